@@ -5,14 +5,16 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
-from ..geometry.vectors import Array, frozen, inverse
+from ..geometry.vectors import Array, frozen, hat, inverse, perpendicular, unit
 from ..mechanism import graphs
 from ..mechanism.model import JointType, Limits, Link, Motor, Note
 from ..mechanism.observations.direction import Direction
 from ..mechanism.sights import NamedCamera
+from . import chains
 from .numerals import Digits
 from .sights import SightSpec
 
@@ -60,10 +62,22 @@ class JointSpec:
         """The type; a joint without one was a defect, so a whole graph has none."""
         return self.type or JointType.FIXED
 
-    @property
+    @cached_property
     def links(self) -> tuple[str, str]:
         """Predecessor and successor."""
         return str(self.ends[0].link), str(self.ends[1].link)
+
+    @cached_property
+    def parts(self) -> list[tuple[Array, Array | None]]:
+        """Of each one-freedom joint that it is a chain of the axis a, and [a]ₓ where it turns about that."""
+        return [(axis, None if kind is JointType.PRISMATIC else hat(unit(axis)))
+                for kind, axis in chains.parts(self.kind, self.axes)]
+
+    @cached_property
+    def across(self) -> Array:
+        """Two unit vectors normal to the first axis and to each other, (2, 3)."""
+        x = perpendicular(self.axes[0])
+        return np.array([x, np.cross(self.axes[0], x)])
 
     def frames(self, poses: Mapping[str, Array]) -> tuple[Array, Array]:
         """The poses (4, 4) of both joint frames, where the links have ``poses``."""

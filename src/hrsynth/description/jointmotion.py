@@ -12,10 +12,9 @@ import numpy as np
 from ..errors import LoopsNotClosed
 from ..geometry.screws import rotation, translation
 from ..geometry.so3 import exponential, logarithm
-from ..geometry.vectors import Array, hat, perpendicular, pose, rotation_about
+from ..geometry.vectors import Array, hat, pose
 from ..mechanism.model import JointType
 from ..tolerances import EXACT, LARGEST_NOISE, SAME_DIRECTION, SAME_GEOMETRY, WITHOUT_DIRECTION
-from . import chains
 from .jointgraph import JointSpec
 
 _MATRIX = (JointType.SPHERICAL, JointType.FREE)
@@ -30,11 +29,15 @@ def displacement(joint: JointSpec, value: Array) -> Array:
     """The pose (4, 4) of the successor's joint frame in the predecessor's: of one freedom after the other."""
     if joint.kind in _MATRIX:
         return value
-    X = np.eye(4)
-    for (kind, axis), q in zip(chains.parts(joint.kind, joint.axes), value, strict=True):
-        step = pose(axis * q) if kind is JointType.PRISMATIC else pose(rotation=rotation_about(axis, q))
-        X = X @ step
-    return X
+    found = None
+    for (axis, K), q in zip(joint.parts, value, strict=True):
+        X = np.eye(4)
+        if K is None:
+            X[:3, 3] = axis * q
+        else:
+            X[:3, :3] += np.sin(q) * K + (1 - np.cos(q)) * (K @ K)
+        found = X if found is None else found @ X
+    return np.eye(4) if found is None else found
 
 
 def step_along(joint: JointSpec, value: Array, step: Array, R_predecessor: Array) -> Array:
@@ -50,11 +53,10 @@ def screws(joint: JointSpec, X_P: Array, X_S: Array) -> list[Array]:
     """The twists (linear at the base origin, angular) of the successor relative to the predecessor, one a coordinate;
     ``X_P`` and ``X_S`` are the poses of the joint's two frames."""
     found = []
-    for number, (kind, axis) in enumerate(chains.parts(joint.kind, joint.axes)):
-        R = np.eye(3) if joint.kind in _MATRIX else X_P[:3, :3]
-        if joint.kind is JointType.UNIVERSAL and number == 1:
-            R = X_S[:3, :3]
-        found.append(translation(R @ axis) if kind is JointType.PRISMATIC else rotation(R @ axis, X_S[:3, 3]))
+    for number, (axis, K) in enumerate(joint.parts):
+        if joint.kind not in _MATRIX:
+            axis = (X_S if joint.kind is JointType.UNIVERSAL and number == 1 else X_P)[:3, :3] @ axis
+        found.append(translation(axis) if K is None else rotation(axis, X_S[:3, 3]))
     return found
 
 
@@ -72,8 +74,9 @@ def _misses(joint: JointSpec, X_P: Array, X_S: Array) -> tuple[Array, Array, Arr
         return np.zeros(0), np.zeros(0), np.zeros((0, 6))
     R, p = X_P[:3, :3], X_S[:3, 3]
     gap, D = R.T @ (p - X_P[:3, 3]), R.T @ X_S[:3, :3]
-    gap_rows = np.hstack([R.T, -R.T @ hat(p)])
-    turn_rows = np.hstack([np.zeros((3, 3)), R.T])
+    gap_rows, turn_rows = np.zeros((3, 6)), np.zeros((3, 6))
+    gap_rows[:, :3] = turn_rows[:, 3:] = R.T
+    gap_rows[:, 3:] = -R.T @ hat(p)
     if kind in (JointType.PRISMATIC, JointType.FIXED):
         turn = logarithm(D)
     elif kind is JointType.SPHERICAL:
@@ -83,21 +86,14 @@ def _misses(joint: JointSpec, X_P: Array, X_S: Array) -> tuple[Array, Array, Arr
         turn = np.array([joint.axes[0] @ second])
         turn_rows = (joint.axes[0] @ -hat(second) @ turn_rows)[None]
     else:
-        moving, across = D @ joint.axes[0], _across(joint.axes[0])
+        moving, across = D @ joint.axes[0], joint.across
         turn = _beyond(across @ moving) if joint.axes[0] @ moving < 0 else across @ moving
         turn_rows = across @ -hat(moving) @ turn_rows
     if kind.slides:
-        across = _across(joint.axes[0])
-        gap, gap_rows = across @ gap, across @ gap_rows
+        gap, gap_rows = joint.across @ gap, joint.across @ gap_rows
     elif kind is JointType.PLANAR:
         gap, gap_rows = joint.axes[:1] @ gap, joint.axes[:1] @ gap_rows
     return gap, turn, np.vstack([gap_rows, turn_rows])
-
-
-def _across(axis: Array) -> Array:
-    """Two unit vectors normal to an axis and to each other, shape (2, 3)."""
-    x = perpendicular(axis)
-    return np.array([x, np.cross(axis, x)])
 
 
 def _beyond(turn: Array) -> Array:

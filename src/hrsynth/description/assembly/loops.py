@@ -17,7 +17,7 @@ from ...geometry.ranks import Rank, rank_of
 from ...geometry.vectors import Array, inverse, pose
 from ...mechanism.model import JointType, Mechanism
 from ...tolerances import FAINT, FIRM, NEARLY_SINGULAR, NEWTON_REACH, NOISE, RANK_CUTOFF, RANK_GAP, SOLVED
-from ..jointgraph import FrameSpec, GearSpec, JointSpec, Posture, TreeJoint, scaled, spanning_tree, zero_poses
+from ..jointgraph import ORIGIN, FrameSpec, GearSpec, JointSpec, Posture, TreeJoint, scaled, spanning_tree, zero_poses
 from ..jointmotion import displacement, opening, screws, step_along, zero
 
 DAMPING = Damping(start=1.0, eased=0.1, least=1e-3, most=1e6)
@@ -44,8 +44,8 @@ class LoopAssembly:
         units = {joint.name: self.unit(joint) for joint in joints}
         self.gears = [replace(g, ratio=g.ratio * units[g.driver] / units[g.driven], offset=g.offset / units[g.driven])
                       for g in gears if g.driver in used and g.driven in used]
-        self._ways = [(self._way(loop.links[0]), self._way(loop.links[1])) for loop in self.loops]
-        active = {name for one, two in self._ways for name in one ^ two}
+        ways = [(self._way(loop.links[0]), self._way(loop.links[1])) for loop in self.loops]
+        active = {name for one, two in ways for name in set(one) ^ set(two)}
         active |= {name for gear in self.gears for name in (gear.driver, gear.driven)}
         self.active = [joint for joint, _, _ in self.tree if joint.name in active]
         self._columns: dict[str, slice] = {}
@@ -53,15 +53,27 @@ class LoopAssembly:
         for joint in self.active:
             self._columns[joint.name] = slice(self.size, self.size + joint.kind.freedoms)
             self.size += joint.kind.freedoms
+        self._carried = [self._signs(after) - self._signs(before) for before, after in ways]
+        self._ends = [(joint.ends[0].X, inverse(joint.ends[1].X)) if joint.links[0] == parent else
+                      (joint.ends[1].X, inverse(joint.ends[0].X)) for joint, parent, _ in self.tree]
+        self._last: tuple[Values, dict[str, Array]] | None = None
         self._effort = len(self.tree) + len(self.loops) + self.size**2 // 50
         self._spent = 0
 
-    def _way(self, link: str) -> frozenset[str]:
-        names = set()
+    def _way(self, link: str) -> dict[str, float]:
+        """The tree joints on the way to a link, 1 where they are passed from predecessor to successor, else −1."""
+        signs = {}
         while link != self.base:
             joint, link = self._parent[link]
-            names.add(joint.name)
-        return frozenset(names)
+            signs[joint.name] = 1.0 if joint.links[0] == link else -1.0
+        return signs
+
+    def _signs(self, way: dict[str, float]) -> Array:
+        """The same, an active coordinate each, (size,)."""
+        signs = np.zeros(self.size)
+        for joint in self.active:
+            signs[self._columns[joint.name]] = way.get(joint.name, 0.0)
+        return signs
 
     def zero(self) -> Values:
         """All tree joints at zero, or in the posture."""
@@ -81,13 +93,13 @@ class LoopAssembly:
 
     def scaled_poses(self, values: Values) -> dict[str, Array]:
         """The pose (4, 4) of every link in the base frame, lengths in characteristic lengths."""
+        if self._last is not None and self._last[0] is values:
+            return self._last[1]
         X = {self.base: np.eye(4)}
-        for joint, parent, child in self.tree:
-            D, (one, two) = displacement(joint, values[joint.name]), joint.ends
-            if joint.links[0] == parent:
-                X[child] = X[parent] @ one.X @ D @ inverse(two.X)
-            else:
-                X[child] = X[parent] @ two.X @ inverse(D) @ inverse(one.X)
+        for (joint, parent, child), (near, far) in zip(self.tree, self._ends, strict=True):
+            D = displacement(joint, values[joint.name])
+            X[child] = X[parent] @ near @ (D if joint.links[0] == parent else inverse(D)) @ far
+        self._last = values, X
         return X
 
     def poses(self, values: Values) -> dict[str, Array]:
@@ -102,16 +114,10 @@ class LoopAssembly:
         for joint in self.active:
             twists[:, self._columns[joint.name]] = np.array(screws(joint, *joint.frames(X))).reshape(-1, 6).T
         errors, rows = [np.zeros(0)], [np.zeros((0, self.size))]
-        for loop, (before, after) in zip(self.loops, self._ways, strict=True):
+        for loop, signs in zip(self.loops, self._carried, strict=True):
             error, by_twist = opening(loop, *loop.frames(X))
-            relative = np.zeros((6, self.size))
-            for link, sign, own in ((loop.links[1], 1.0, after - before), (loop.links[0], -1.0, before - after)):
-                while link != self.base:
-                    joint, parent = self._parent[link]
-                    if joint.name in own:
-                        columns = self._columns[joint.name]
-                        relative[:, columns] = (sign if joint.links[0] == parent else -sign) * twists[:, columns]
-                    link = parent
+            relative, own = np.zeros((6, self.size)), signs != 0
+            relative[:, own] = signs[own] * twists[:, own]
             errors.append(error)
             rows.append(by_twist @ relative)
         for gear in self.gears:
@@ -151,7 +157,7 @@ class LoopAssembly:
         """The values that a step in the active coordinates leads to."""
         X, after = self.scaled_poses(values), dict(values)
         for joint in self.active:
-            R = joint.frames(X)[0][:3, :3]
+            R = joint.frames(X)[0][:3, :3] if values[joint.name].ndim == 2 else ORIGIN[:3, :3]
             after[joint.name] = step_along(joint, values[joint.name], step[self._columns[joint.name]], R)
         return after
 
