@@ -13,10 +13,12 @@ Rod = tuple[Array, Array]
 """Where a leg with its motor held turns on the shank, and where on the foot, at zero (3,)."""
 
 
-def ankle(kind: str, seed: int, *, two_turns: bool = True) -> tuple[Mechanism, tuple[Array, Array, Array], list[Rod]]:
-    """A random ankle in a tilted base; the U joint's centre and two axes, and both rods.
+def ankle(kind: str, seed: int, *, two_turns: bool = True, offset: float = 0.0
+          ) -> tuple[Mechanism, tuple[Array, Array, Array, Array], list[Rod]]:
+    """A random ankle in a tilted base; the U joint's centre and two axes, the second one's point, and both rods.
 
-    ``two_turns``: the U joint is written as two R with a connector that has no length.
+    ``two_turns``: the U joint is written as two R with a connector that has no length, or one of about the length
+    ``offset``: the axes do not meet then.
     """
     rng = np.random.default_rng(seed)
     tilt = rotation_about(rng.normal(size=3), rng.uniform(0, 3))
@@ -26,13 +28,14 @@ def ankle(kind: str, seed: int, *, two_turns: bool = True) -> tuple[Mechanism, t
 
     centre = near(0, 0, 0)
     first, second = unit(near(0, 1, 0, by=0.2)), unit(near(1, 0, 0, by=0.2))
+    lower = centre + np.random.default_rng(seed).normal(size=3) * offset
     b, rods = Builder("ankle"), list[Rod]()
     b.link("shank")
     b.link("foot", at=near(0, 0, -0.05))
     if two_turns:
         b.link("cross", at=centre)
         b.joint("pitch", "R", "shank", "cross", at=centre, axis=first)
-        b.joint("roll", "R", "cross", "foot", at=centre, axis=second)
+        b.joint("roll", "R", "cross", "foot", at=lower, axis=second)
     else:
         b.joint("ankle", "U", "shank", "foot", at=centre, axis=first, axis2=unit(np.cross(np.cross(first, second),
                                                                                          first)))
@@ -56,21 +59,22 @@ def ankle(kind: str, seed: int, *, two_turns: bool = True) -> tuple[Mechanism, t
             b.joint(f"end_{leg}", kind[2], f"rod_{leg}", "foot", at=end, loop=True, **down)
         b.observe(leg, f"rod_{leg}", along)
         rods.append((ball, end))
-    return b.build(platform="foot"), (centre, first, second), rods
+    return b.build(platform="foot"), (centre, first, second, lower), rods
 
 
-def counted(joint: tuple[Array, Array, Array], rods: list[Rod]) -> tuple[int, int]:
+def counted(joint: tuple[Array, Array, Array, Array], rods: list[Rod]) -> tuple[int, int]:
     """Complex and real poses of the foot with both rods' lengths kept.
 
     With x = exp(iα), y = exp(iβ) of both turns, each length is x y times a polynomial of degree two in each; their
     resultant in y, by values at roots of unity, has the solutions' x as roots.
     """
-    centre, a, c = joint
+    centre, a, c, lower = joint
     tables = []
     for ball, end in rods:
         angles = 2 * np.pi * np.arange(3) / 3
-        values = [[np.sum((centre + rotation_about(a, alpha) @ rotation_about(c, beta) @ (end - centre) - ball) ** 2)
-                   - np.sum((end - ball) ** 2) for beta in angles] for alpha in angles]
+        rod = [[centre + rotation_about(a, alpha) @ (lower + rotation_about(c, beta) @ (end - lower) - centre) - ball
+                for beta in angles] for alpha in angles]
+        values = np.sum(np.square(rod), axis=2) - np.sum((end - ball) ** 2)
         tables.append(np.roll(np.fft.fft2(values), (1, 1), (0, 1)))  # powers -1, 0, 1 of x and of y
     nodes = np.exp(2j * np.pi * np.arange(16) / 16)
     powers = nodes[:, None] ** np.arange(3)

@@ -11,9 +11,9 @@ from analysis.modes.test_robots import check_completeness, check_modes
 from analysis.modes.test_surfaces import needs_msolve
 
 
-def check_motors_held(kind: str, seed: int) -> int:
+def check_motors_held(kind: str, seed: int, offset: float = 0.0) -> int:
     """Eight complex modes, proved to be all, and as many real ones as the independent count has."""
-    mechanism, joint, rods = ankle(kind, seed, two_turns=bool(seed % 2))
+    mechanism, joint, rods = ankle(kind, seed, two_turns=bool(seed % 2 or offset), offset=offset)
     found = hrsynth.modes(mechanism, real=True)
     assert (found.found.complex, found.found.bound) == (8, "class")
     assert (8, len(found.modes)) == counted(joint, rods)
@@ -22,9 +22,9 @@ def check_motors_held(kind: str, seed: int) -> int:
     return len(found.modes)
 
 
-def check_one_leg_watched(kind: str, seed: int) -> None:
+def check_one_leg_watched(kind: str, seed: int, offset: float = 0.0) -> None:
     """One rod decides the foot: four complex modes, proved to be all."""
-    mechanism, _, _ = ankle(kind, seed, two_turns=bool(seed % 2))
+    mechanism, _, _ = ankle(kind, seed, two_turns=bool(seed % 2 or offset), offset=offset)
     found = hrsynth.modes(mechanism, "1")
     assert (found.found.complex, found.found.bound) == (4, "class")
     check_modes(found)
@@ -36,6 +36,21 @@ def check_one_leg_watched(kind: str, seed: int) -> None:
 def test_an_ankle_has_eight_modes_with_its_motors_held_and_four_with_one_rod_watched(kind: str):
     check_motors_held(kind, 1)
     check_one_leg_watched(kind, 2)
+
+
+@pytest.mark.parametrize("kind", LEGS)
+def test_an_ankle_whose_axes_do_not_meet_has_as_many(kind: str):
+    check_motors_held(kind, 3, offset=0.02)
+    check_one_leg_watched(kind, 4, offset=0.02)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("kind", LEGS)
+def test_twenty_ankles_whose_axes_do_not_meet(kind: str):
+    real = [check_motors_held(kind, seed, offset=0.03) for seed in range(20)]
+    assert len(set(real)) > 1
+    for seed in range(20):
+        check_one_leg_watched(kind, seed, offset=0.03)
 
 
 @needs_msolve

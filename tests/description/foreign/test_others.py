@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import hrsynth
 from hrsynth.analysis.derive import derive
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.description import load
@@ -25,6 +26,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.skipif(not OTHERS.is_dir(), reason="
 GEPETTO, ONSHAPE = "Gepetto/example-parallel-robots/robots", "Rhoban/onshape-to-robot-examples"
 REACHY = "pollen-robotics/reachy_mini/src/reachy_mini/descriptions/reachy_mini"
 GRBDA = "ROAM-Lab-ND/generalized_rbda"
+ANKLES = "feidedao/Parallel_Ankle_Joint"
 CASSIE = "osudrl/cassie-mujoco-sim/model"
 
 # file: what it does not say, mobility as written, freedoms of the platform, how many of them the directions do not show
@@ -46,6 +48,8 @@ READ: dict[str, tuple[dict[str, str], int, int, int]] = {
     f"{GRBDA}/Benchmarking/urdfs/parallel_chains/Implicit/depth10/loop_size9.urdf": (
         {"platform": "link_2_10"}, 19, 3, 3),
     f"{GRBDA}/Benchmarking/urdfs/variable_four_bar_urdf/four_bar_branch_2_3.urdf": ({"platform": "link_12"}, 6, 3, 2),
+    f"{ANKLES}/2_g1_ankle/urdf/23urdf311.xml": ({}, 2, 2, 0),
+    f"{ANKLES}/5_tiangong/urdf/TG10-00.xml": ({}, 4, 2, 0),
     f"{CASSIE}/cassie.xml": ({"base": "cassie-pelvis", "platform": "left-foot"}, 8, 5, 4),
     f"{CASSIE}/cassiepole.xml": ({"platform": "left-foot"}, 23, 6, 6),
     f"{CASSIE}/cassie_tray_box.xml": ({"platform": "left-foot"}, 28, 6, 6),
@@ -87,6 +91,12 @@ def test_rounded_spherical_robots_have_three_freedoms(name: str):
     """None of their links has two joint centres, so that no segment of theirs can be watched."""
     robot = Oracle(load(path_of(name)))
     assert robot.mobility(robot.zero()) == 3
+
+
+@pytest.mark.parametrize("name", [name for name in READ if name.startswith(ANKLES)])
+def test_modes_of_ankles_are_listed(name: str):
+    found = hrsynth.modes(load(path_of(name)), real=True)
+    assert (found.found.complete, found.found.complex, len(found.modes)) == (True, 8, 4)
 
 
 def _rank(rows: Array) -> int:

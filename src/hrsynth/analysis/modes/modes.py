@@ -31,6 +31,7 @@ from ..observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike
 from ..question import question
 from ..singularity.agreement import weakest
 from .branches import Model, solve_all
+from .carried import CarriedPlatform, solve_carried
 from .drift import drift
 from .formed import formed
 from .motions import SelfMotion, self_motion
@@ -150,7 +151,8 @@ class AssemblyModes(Result, shown_as="modes"):
             return WITHIN[self.confined.motion]
         system = None if self.model is None else self.model.system
         motion = (system.poses.motion if isinstance(system, PosedPlatform) else
-                  "planar" if isinstance(system, PlanarLoops) else None)
+                  "planar" if isinstance(system, PlanarLoops) else
+                  "spatial" if isinstance(system, CarriedPlatform) else None)
         return None if motion is None else WITHIN[motion]
 
     @property
@@ -342,7 +344,7 @@ def _listed(setting: ObservedRobot, measured: MeasuredRobot, goal: ClosedConfigu
     reasons = list[NotConfined | Unsolved | TooLarge | MissingExtra]()
     answers = list[tuple[TipLoci | None, Model, SystemModes]]()
     exact = drift(goal, wanted, setting.normal.moved)
-    for listed in (partial(_of_tips, as_written=as_written, effort=effort), _of_conditions, _of_loops):
+    for listed in (partial(_of_tips, as_written=as_written, effort=effort), _of_conditions, _of_carrier, _of_loops):
         try:
             answers.append(listed(measured, goal, exact))
         except (NotConfined, Unsolved, TooLarge, MissingExtra) as error:
@@ -377,6 +379,10 @@ def _of_tips(measured: MeasuredRobot, goal: ClosedConfiguration, exact: float, a
 
 def _of_conditions(measured: MeasuredRobot, goal: ClosedConfiguration, exact: float) -> tuple[None, Model, SystemModes]:
     return None, *solve_posed(measured, goal, exact)
+
+
+def _of_carrier(measured: MeasuredRobot, goal: ClosedConfiguration, exact: float) -> tuple[None, Model, SystemModes]:
+    return None, *solve_carried(measured, goal, exact)
 
 
 def _of_loops(measured: MeasuredRobot, goal: ClosedConfiguration, exact: float) -> tuple[None, Model, SystemModes]:

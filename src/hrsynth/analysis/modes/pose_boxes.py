@@ -26,7 +26,7 @@ NEWTON = 4
 
 
 @dataclass(frozen=True, eq=False)
-class _Zero:
+class Zero:
     """The equation of a condition in (q, p), with numbers in balls."""
 
     condition: PoseCondition
@@ -169,7 +169,7 @@ def enclosed(forms: SquareForms, slack: float, proposed: tuple[Array, Array]) ->
 
     turned = forms.poses.turns.shape[1]
     conditions = (*forms.planes, *forms.others)
-    equations: list[Polynomial] = [_Unit(turned), *(_Zero(c, forms.poses, slack) for c in conditions)]
+    equations: list[Polynomial] = [_Unit(turned), *(Zero(c, forms.poses, slack) for c in conditions)]
     found: list[PoseBox] = []
     lost = 0
     with ctx.workprec(PRECISION):
@@ -207,4 +207,4 @@ def excluded_by(conditions: Sequence[PoseCondition], poses: Poses, box: PoseBox,
     from flint import ctx
 
     with ctx.workprec(PRECISION):
-        return any(not _Zero(c, poses, slack).value(box.box).contains(0) for c in conditions)
+        return any(not Zero(c, poses, slack).value(box.box).contains(0) for c in conditions)

@@ -1,0 +1,503 @@
+"""All modes of a platform that one leg of R and P carries, the other legs being conditions on its pose, as those of an
+ankle whose two axes do not meet (docs/pages/theory.md, section 8).
+
+With x = o + (c (1 - a aᵀ) + a aᵀ + s [a]ₓ)(y - o) for a turn about a through o, c² + s² = 1, a condition is a
+polynomial of known degree d in each c, s: of degree 2 d in the tangent of the half-angle. As many conditions as the leg
+has joints have at most as many isolated common zeros as the permanent of these degrees (Bézout in a product of lines).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations, permutations
+from math import prod
+from typing import Any
+
+import numpy as np
+
+from ...budgets import LARGEST_LOOPS, PLANAR_STARTS
+from ...constraints.pattern import attached
+from ...errors import NotConfined, Unsolved
+from ...geometry.vectors import Array, frozen, hat, perpendicular, pose
+from ...kinematics.configuration import ClosedConfiguration
+from ...kinematics.locked import carry_joint
+from ...kinematics.relation import Measurement
+from ...mechanism import Direction, JointType
+from ...mechanism.legs import Leg
+from ...mechanism.observations.encoder import Encoder
+from ...tolerances import (
+    CHAIN_ROUNDING,
+    INDEPENDENT_RATES,
+    MOVED,
+    NEARLY_REAL_POSE,
+    SAME_DIRECTION,
+    SAME_RELATION,
+    VANISHES,
+)
+from ..measured import MeasuredRobot
+from .branches import Model
+from .conditions import AtAngle, OnMovingPlane, OnMovingRevolution, OnPlane, OnRevolution, PoseCondition
+from .fits import words
+from .leg_conditions import Middle, leg_conditions
+from .polynomials import Polynomial, krawczyk
+from .pose_boxes import PRECISION, PoseBox, Zero, as_box
+from .pose_forms import Poses
+from .sighted import Sight, conditions, sights
+from .solve import SystemMode, SystemModes
+from .systems import System
+
+
+@dataclass(frozen=True, eq=False)
+class Freedom:
+    """A turn about the ``axis`` through ``point`` (sizes) at the goal, or a slide along it."""
+
+    axis: Array
+    point: Array
+    slides: bool
+
+    def maps(self, of: Any) -> tuple[Any, Any, Any]:
+        """What does not depend on its angle, and what c and s multiply; shape (3, 3) each."""
+        along = np.outer(self.axis, self.axis)
+        return of(along), of(np.eye(3) - along), of(hat(self.axis))
+
+
+@dataclass(frozen=True, eq=False)
+class Told:
+    """A condition on the body that the first ``joints`` of the leg carry."""
+
+    condition: PoseCondition
+    joints: int
+    idle: frozenset[int] = frozenset()
+    """Joints that change nothing of it."""
+    moved: float = 0.0
+    """How far axes are off where they should be for that (sizes)."""
+
+    @classmethod
+    def of(cls, condition: PoseCondition, freedoms: Sequence[Freedom]) -> Told:
+        """With the joints before which nothing turns what the base tells, or after which nothing turns what is told of
+        the body."""
+        idle, off = set[int](), 0.0
+        for order, misses in ((range(len(freedoms)), _before), (range(len(freedoms))[::-1], _after)):
+            for k in order:
+                miss = misses(condition, freedoms[k])
+                if miss > SAME_DIRECTION:
+                    break
+                idle.add(k)
+                off += miss if miss > CHAIN_ROUNDING else 0.0
+        return cls(condition, len(freedoms), frozenset(idle), off)
+
+    def degree(self, k: int, freedom: Freedom) -> int:
+        """In the tangent of half of joint k's angle, or in its slide. The square of a distance has degree one in c and
+        s."""
+        c = self.condition
+        if k >= self.joints or k in self.idle:
+            return 0
+        if freedom.slides:
+            return 0 if isinstance(c, AtAngle) else c.degree
+        around = isinstance(c, OnRevolution | OnMovingRevolution)
+        once = isinstance(c, OnMovingPlane) or (around and float(c.f[2]) == -1.0)  # type: ignore[attr-defined]
+        return 2 * (1 if once else 2 if around else c.degree)
+
+
+def _before(c: PoseCondition, freedom: Freedom) -> float:
+    """How far a joint next to the base is from changing nothing of a condition; infinite where it is none such."""
+    a = freedom.axis
+    if isinstance(c, OnPlane):
+        return abs(float(c.n @ a)) if freedom.slides else float(np.linalg.norm(np.cross(c.n, a)))
+    if isinstance(c, AtAngle):
+        return 0.0 if freedom.slides else float(np.linalg.norm(np.cross(c.a, a)))
+    if isinstance(c, OnRevolution) and not freedom.slides:
+        tilt = 0.0 if _sphere(c) else float(np.linalg.norm(np.cross(c.a, a)))
+        return max(tilt, float(np.linalg.norm(np.cross(c.o - freedom.point, a))))
+    return np.inf
+
+
+def _after(c: PoseCondition, freedom: Freedom) -> float:
+    """The same of a joint next to the body."""
+    a, turned = freedom.axis, float(np.linalg.norm(np.cross(c.c, freedom.axis)))
+    if freedom.slides:
+        return 0.0 if isinstance(c, AtAngle) else np.inf
+    return turned if isinstance(c, AtAngle) else max(turned, float(np.linalg.norm(np.cross(c.b - freedom.point, a))))
+
+
+def _sphere(c: PoseCondition) -> bool:
+    """Whether it tells a distance and no height."""
+    return isinstance(c, OnRevolution) and float(c.f[2]) == -1.0 and float(c.f[1]) == 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class _Equation(Zero):
+    """A condition in all c, all s and slides t (0 and 1 besides), with numbers in balls."""
+
+    freedoms: tuple[Freedom, ...]
+    joints: int
+
+    @cached_property
+    def _maps(self) -> list[tuple[Any, ...]]:
+        return [(*each.maps(self.of), self.of(each.point), self.of(each.axis)) for each in self.freedoms]
+
+    def carried(self, x: Sequence[Any]) -> tuple[Any, Any, list[tuple[int, Any, Any]]]:
+        """The point and the arrow, and their derivatives by the unknowns, by number."""
+        n = len(self.freedoms)
+        p, d = self.of(self.condition.b) + 0 * x[0], self.of(self.condition.c) + 0 * x[0]
+        slopes: list[tuple[int, Any, Any]] = []
+        for k in range(self.joints - 1, -1, -1):
+            rest, c, s, o, a = self._maps[k]
+            if self.freedoms[k].slides:
+                slopes.append((2 * n + k, a + 0 * p, 0 * d))
+                p = p + a * x[2 * n + k]
+                continue
+            turn = rest + c * x[k] + s * x[n + k]
+            slopes = [(j, turn @ dp, turn @ dd) for j, dp, dd in slopes]
+            slopes += [(k, c @ (p - o), c @ d), (n + k, s @ (p - o), s @ d)]
+            p, d = o + turn @ (p - o), turn @ d
+        return p, d, slopes
+
+    def value(self, x: Sequence[Any]) -> Any:
+        """The value at x."""
+        point, arrow, _ = self.carried(x)
+        return self.condition.value(point, arrow, self._of)
+
+    def slopes(self, x: Sequence[Any]) -> Any:
+        """The derivative by each unknown at x."""
+        point, arrow, by = self.carried(x)
+        along, turned = self.condition.slopes(point, arrow, self._of)
+        found = [0 * v for v in x]
+        for j, dp, dd in by:
+            found[j] = along @ dp + turned @ dd
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Held:
+    """c² + s² = 1 of a turn and t = 0, or c = 1, s = 0 of a slide."""
+
+    k: int
+    n: int
+    what: str
+
+    def value(self, x: Sequence[Any]) -> Any:
+        """The value at x."""
+        c, s, t = x[self.k], x[self.n + self.k], x[2 * self.n + self.k]
+        return {"circle": c * c + s * s - 1, "c": c - 1, "s": s, "t": t}[self.what]
+
+    def slopes(self, x: Sequence[Any]) -> Any:
+        """The derivative by each unknown at x."""
+        at = {"c": self.k, "s": self.n + self.k, "t": 2 * self.n + self.k}
+        by = {at["c"]: 2 * x[at["c"]], at["s"]: 2 * x[at["s"]]} if self.what == "circle" else {at[self.what]: 1}
+        return [0 * v + by.get(j, 0) for j, v in enumerate(x)]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CarriedPlatform(System):
+    """A platform that a leg carries; q are its angles (rad) and slides (sizes) since the goal."""
+
+    freedoms_: tuple[Freedom, ...]
+    told: tuple[Told, ...]
+    middle: Middle
+    start: Array
+    """The platform at the goal (4, 4)."""
+    seen: tuple[Sight, ...] = ()
+
+    @property
+    def size(self) -> float:
+        """The unit of lengths (m)."""
+        return self.middle.size
+
+    @property
+    def home(self) -> Array:
+        """The goal."""
+        return np.zeros(len(self.freedoms_))
+
+    def moved(self, q: Array, joints: int | None = None) -> tuple[Array, Array]:
+        """R and p (..., 3) (sizes) of what the first joints carry, at complex coordinates (..., n) too."""
+        q = np.asarray(q)
+        R = np.broadcast_to(np.eye(3), (*q.shape[:-1], 3, 3))
+        p = np.zeros((*q.shape[:-1], 3))
+        for k in range(len(self.freedoms_) if joints is None else joints)[::-1]:
+            each, by = self.freedoms_[k], q[..., k, None, None]
+            if each.slides:
+                p = p + each.axis * by[..., 0]
+                continue
+            rest, c, s = each.maps(np.asarray)
+            turn = rest + c * np.cos(by) + s * np.sin(by)
+            p = each.point + np.einsum("...ij,...j->...i", turn, p - each.point)
+            R = turn @ R
+        return R, p
+
+    def placed(self, q: Array) -> Array:
+        """The platform's pose (4, 4), m."""
+        R, p = self.moved(q)
+        o = self.middle.origin
+        return np.asarray(pose(o + self.size * p - R @ o, R) @ self.start)
+
+    def values(self, q: Array, chosen: Sequence[Told]) -> tuple[Array, Array]:
+        """The values (..., m) of conditions and their derivatives (..., m, n) by q."""
+        values, slopes = [], []
+        for each in chosen:
+            c, columns = each.condition, []
+            R, p = self.moved(q, each.joints)
+            x, d = p + R @ c.b, R @ c.c
+            values.append(c.value(x, d, np.asarray))
+            along, turned = c.slopes(x, d, np.asarray)
+            for k, freedom in enumerate(self.freedoms_):
+                if k >= each.joints:
+                    columns.append(0 * values[-1])
+                    continue
+                Q, o = self.moved(q, k)
+                axis, point = Q @ freedom.axis, o + Q @ freedom.point
+                by_x = axis + 0 * x if freedom.slides else _cross(axis, x - point)
+                by_d = 0 * d if freedom.slides else _cross(axis, d)
+                columns.append(np.sum(along * by_x + turned * by_d, axis=-1))
+            slopes.append(np.stack(columns, axis=-1))
+        return np.stack(values, axis=-1), np.stack(slopes, axis=-2)
+
+    def most(self, chosen: Sequence[Told]) -> int:
+        """How many isolated common zeros some conditions, as many as joints, have at most."""
+        n = len(self.freedoms_)
+        degrees = np.array([[each.degree(k, f) for k, f in enumerate(self.freedoms_)] for each in chosen])
+        found = [_permanent(degrees)]
+        for i, j in combinations(range(n), 2):
+            rest = [k for k in range(n) if k not in (i, j)]
+            if self._meets(chosen[i], chosen[j]) and not degrees[rest, 0].any():
+                bent = np.where(degrees[[i, j], 1:].any(axis=0), 4, 0)
+                found.append(_permanent(np.vstack([bent, degrees[rest, 1:]])))
+        return min(found)
+
+    def _meets(self, one: Told, other: Told) -> bool:
+        """Whether two conditions hold one point, and give where the first joint turns what is across its axis:
+        N R η = A with |R η| = |η|, so |N⁻¹ A|² = |η|², of degree two in the other joints' c and s, and one turn for
+        each zero."""
+        o, a = self.freedoms_[0].point, self.freedoms_[0].axis
+        if self.freedoms_[0].slides or one.joints != other.joints or np.any(one.condition.b != other.condition.b):
+            return False
+        rows = [c.n if isinstance(c, OnPlane) else c.o - o for c in (one.condition, other.condition)
+                if isinstance(c, OnPlane) or (isinstance(c, OnRevolution) and _sphere(c))]
+        return len(rows) == 2 and abs(float(a @ np.cross(rows[0], rows[1]))) > SAME_DIRECTION
+
+    @cached_property
+    def square(self) -> tuple[Told, ...]:
+        """As many conditions as joints, independent at the goal, with the fewest zeros; none where there are no such.
+        """
+        best: tuple[int, tuple[Told, ...]] | None = None
+        for chosen in combinations(self.told, len(self.freedoms_)):
+            most = self.most(chosen)
+            if most and (best is None or most < best[0]):
+                rows = self.values(self.home, chosen)[1]
+                rows = rows / np.maximum(np.linalg.norm(rows, axis=1), INDEPENDENT_RATES)[:, None]
+                if np.linalg.svd(rows, compute_uv=False)[-1] > INDEPENDENT_RATES:
+                    best = most, chosen
+        return () if best is None else best[1]
+
+    def equation(self, each: Told) -> _Equation:
+        """A condition in balls."""
+        return _Equation(each.condition, Poses.spatial(), self.error / self.size, self.freedoms_, each.joints)
+
+    def unknowns(self, q: Array) -> Array:
+        """All c, all s and slides t."""
+        slides = np.array([each.slides for each in self.freedoms_])
+        return np.concatenate([np.where(slides, 1.0, np.cos(q)), np.where(slides, 0.0, np.sin(q)),
+                               np.where(slides, q, 0.0)])
+
+
+def _permanent(degrees: Array) -> int:
+    """Bézout's number in a product of lines."""
+    return sum(prod(int(degrees[i, j]) for i, j in enumerate(order)) for order in permutations(range(len(degrees))))
+
+
+def _cross(a: Array, b: Array) -> Array:
+    return np.stack([a[..., j] * b[..., k] - a[..., k] * b[..., j] for j, k in ((1, 2), (2, 0), (0, 1))], axis=-1)
+
+
+def carried(measured: MeasuredRobot, goal: ClosedConfiguration, error: float) -> CarriedPlatform:
+    """The platform on that leg which leaves fewest zeros. Raises ``NotConfined`` where none carries it, or what the
+    others ask is not known."""
+    anatomy, name = measured.setting.anatomy, measured.setting.robot.name
+    bodies = attached(anatomy)
+    if len(bodies) != 1 or anatomy.point is not None or anatomy.mechanism.couplings:
+        raise NotConfined(name, "its platform is not one rigid body whose pose the legs decide")
+    middle = Middle(goal.pose(bodies[0])[:3, 3], goal.twin.length)
+    rest, seen = sights(anatomy, measured.question, goal)
+    found, reason = list[CarriedPlatform](), "no leg of R and P carries its platform"
+    for leg in anatomy.legs:
+        try:
+            freedoms, told = _carrier(measured, leg, rest, goal, middle)
+            moved = 0.0
+            for other in anatomy.legs:
+                if other is not leg:
+                    branches, off = leg_conditions(anatomy, other, rest, goal, middle)
+                    if len(branches) > 1:
+                        raise NotConfined(name, f"leg {other.label} has {len(branches)} branches")
+                    told += [Told.of(c, freedoms) for c in branches[0]]
+                    moved += off
+        except NotConfined as refused:
+            reason = refused.reason
+            continue
+        told += [Told.of(c, freedoms) for c in conditions(seen, middle, False)]
+        moved += middle.size * max((each.moved for each in told), default=0.0)
+        error_ = error + MOVED * moved + max([0.0, *(sight.error(error, goal) for sight in seen)])
+        each = CarriedPlatform((), np.zeros((0, 3)), freedoms, tuple(told), middle, goal.pose(bodies[0]), seen,
+                               error=error_)
+        off_ = each.values(each.home, told)[0] if told else np.zeros(0)
+        if freedoms and np.abs(off_).max(initial=0.0) <= SAME_RELATION and each.square:
+            found.append(each)
+        else:
+            reason = "the conditions of its legs do not decide its pose one by one"
+    if not found:
+        raise NotConfined(name, reason)
+    return min(found, key=lambda each: each.most(each.square))
+
+
+def _carrier(measured: MeasuredRobot, leg: Leg, rest: Measurement, goal: ClosedConfiguration, middle: Middle
+             ) -> tuple[tuple[Freedom, ...], list[Told]]:
+    """The joints of a leg that are not held, from the base, and what is measured of it."""
+    anatomy, mechanism = measured.setting.anatomy, measured.setting.anatomy.mechanism
+    own = [each for each in rest.observations if each.leg == leg.label]
+    held = [each.joint for each in own if isinstance(each, Encoder)]
+    path, at, found, links = anatomy.path(leg), mechanism.base, list[Freedom](), {mechanism.base: 0}
+    if set(leg.joints) - {name for edge in path for name in edge.joints}:
+        raise NotConfined(mechanism.name, f"leg {leg.label} has loops")
+    for edge in path:
+        joint = mechanism.joints[edge.joints[0]]
+        turns = {JointType.REVOLUTE: 1, JointType.UNIVERSAL: 2, JointType.CYLINDRICAL: 1, JointType.PRISMATIC: 0}
+        if len(edge.joints) > 1 or joint.type not in turns or held.count(joint.name) not in (0, joint.type.freedoms):
+            raise NotConfined(mechanism.name, f"leg {leg.label} is not one of R and P")
+        point, axes = carry_joint(mechanism, joint, goal.pose)
+        if joint.name not in held:
+            for axis in axes if joint.predecessor == at else axes[::-1]:
+                a, o = axis / np.linalg.norm(axis), middle.point(point)
+                found += [Freedom(a, o, False)] * (turns[joint.type] > 0) + [Freedom(a, o, True)] * joint.type.slides
+        at = edge.other(at)
+        links[at] = len(found)
+    told, none = list[Told](), np.zeros(3)
+    for each in own:
+        if isinstance(each, Encoder) and each.joint in leg.joints:
+            continue
+        if not isinstance(each, Direction) or each.link not in links or (
+                each.seen_from or rest.reference) != mechanism.base:
+            raise NotConfined(mechanism.name, f"what is measured at leg {leg.label} is no direction seen from the base")
+        d = goal.pose(each.link)[:3, :3] @ each.direction
+        first = perpendicular(d)
+        told += [Told.of(AtAngle(leg.label, none, d, e, h), found[:links[each.link]])
+                 for e, h in ((first, 0.0), (np.cross(d, first), 0.0), (d, 1.0)) if links[each.link]]
+    return tuple(found), told
+
+
+def proposals(system: CarriedPlatform, most: int) -> Array:
+    """Common zeros (k, n) that Newton's method finds from random complex starts, each with its conjugate."""
+    rng, n, found = np.random.default_rng(0), len(system.freedoms_), list[Array]()
+    slides = np.array([each.slides for each in system.freedoms_])
+    for _ in range(PLANAR_STARTS):
+        q = rng.uniform(-np.pi, np.pi, (64, n)) + 1j * rng.normal(size=(64, n))
+        with np.errstate(all="ignore"):
+            for _ in range(40):
+                F, J = system.values(q, system.square)
+                good = np.all(np.isfinite(J), axis=(1, 2)) & np.all(np.isfinite(F), axis=1)
+                q, F, J = q[good], F[good], J[good]
+                try:
+                    step = np.linalg.solve(J, F[:, :, None])[:, :, 0]
+                except np.linalg.LinAlgError:
+                    step = (np.linalg.pinv(J) @ F[:, :, None])[:, :, 0]
+                q = q - step / np.maximum(1.0, np.abs(step).max(axis=1))[:, None]
+        q = q[np.abs(step).max(axis=1) < 1e-10]
+        for each in (y for x in q for y in (x, x.conj())):
+            turned = np.angle(np.exp(1j * each.real)) + 1j * each.imag
+            at = np.where(slides, each, turned)
+            apart = (np.abs(np.where(slides, at - other, np.exp(1j * (at - other)) - 1.0)).max() for other in found)
+            if len(found) < most and not any(far < 1e-6 for far in apart):
+                found.append(at)
+        if len(found) >= most:
+            break
+    return np.array(found).reshape(-1, n)
+
+
+def solve_carried(measured: MeasuredRobot, goal: ClosedConfiguration, error: float = 0.0
+                  ) -> tuple[Model, SystemModes]:
+    """All modes, with the goal known to ``error`` (m). Raises ``NotConfined``, and ``Unsolved`` where not all zeros are
+    enclosed that there may be."""
+    if not np.isfinite(error):
+        raise NotConfined(measured.setting.robot.name, "no distance bounds how far it is from where its loops close")
+    system = carried(measured, goal, error)
+    (body,) = attached(measured.setting.anatomy)
+    return Model(system, lambda q: {body: system.placed(q)}, system.home), _judged(system)
+
+
+def enclosed(system: CarriedPlatform, proposed: Array) -> list[PoseBox]:
+    """Boxes of common zeros in c, s and t, apart from each other."""
+    from flint import acb, arb, ctx
+
+    n = len(system.freedoms_)
+    equations: list[Polynomial] = [system.equation(each) for each in system.square]
+    for k, each in enumerate(system.freedoms_):
+        equations += [_Held(k, n, what) for what in (("c", "s") if each.slides else ("circle", "t"))]
+    found = list[PoseBox]()
+    with ctx.workprec(PRECISION):
+        for x in map(system.unknowns, proposed):
+            real = bool(np.abs(x.imag).max() < NEARLY_REAL_POSE * (1.0 + np.abs(x).max()))
+            start = [arb(v) for v in x.real.tolist()] if real else [acb(v.real, v.imag) for v in x.tolist()]
+            box = as_box(krawczyk(equations, start), real, 0)
+            if box is not None and all(box.apart(other) for other in found):
+                found.append(box)
+    return found
+
+
+def _judged(system: CarriedPlatform) -> SystemModes:
+    """The modes: as many zeros as the degrees allow."""
+    from flint import ctx
+
+    n, most = len(system.freedoms_), system.most(system.square)
+    size = f"{n} joint{'s' * (n > 1)} of the leg that carries the platform"
+    if most > LARGEST_LOOPS:
+        raise Unsolved("the leg", f"{size}: up to {most} closings, too many (at most {LARGEST_LOOPS})")
+    boxes = enclosed(system, proposals(system, most))
+    at_goal = [box for box in boxes if box.real and box.holds(system.unknowns(system.home))]
+    if len(boxes) < most or len(at_goal) != 1:
+        raise Unsolved("the leg", f"{size}: of {most} closings at most (Bézout) {len(boxes)} have boxes")
+    bodies = [_body(system, box) for box in boxes]
+    if any(all((a - b).contains(0) for a, b in zip(one, other, strict=True))
+           for k, one in enumerate(bodies) for other in bodies[:k]):
+        raise Unsolved("the leg", f"{size}: several of {most} closings have one pose of the platform")
+    besides = [system.equation(each) for each in system.told if each not in system.square]
+    real = [box for box in boxes if box.real]
+    with ctx.workprec(PRECISION):
+        kept = [box for box in real if box is at_goal[0]
+                or not any(not each.value(box.box).contains(0) for each in besides)]
+        modes = [_mode(system, box, not besides or box is at_goal[0]) for box in kept]
+    proof = (f"{size}: at most {most} closings by degrees in each (Bézout), {len(boxes)} enclosed apart from each "
+             f"other, complex ones too, {len(real)} real")
+    if not besides:
+        return SystemModes(len(boxes), tuple(modes), True, proof, bound="class", enclosed=True)
+    fitting = tuple(mode for mode in modes if mode.proved or mode.residual <= VANISHES)
+    others = [mode.residual for mode in fitting if not mode.proved]
+    open_ = len(modes) - len(fitting)
+    proof = (f"from {n} of {len(system.told)} conditions: {proof}; of these "
+             + words(True, False, others, len(real) - len(kept), open_))
+    return SystemModes(len(fitting), fitting, not open_, proof, bound="none" if open_ else "class", enclosed=True)
+
+
+def _body(system: CarriedPlatform, box: PoseBox) -> list[Any]:
+    """The position and the three columns of the turn that carries the platform from the goal, in balls."""
+    from flint import ctx
+
+    found = list[Any]()
+    with ctx.workprec(PRECISION):
+        for c in np.vstack([np.zeros(3), np.eye(3)]):
+            told = Told(PoseCondition("", np.zeros(3), c), len(system.freedoms_))
+            at, arrow, _ = system.equation(told).carried(box.box)
+            found += [*(arrow if c.any() else at)]
+    return found
+
+
+def _mode(system: CarriedPlatform, box: PoseBox, proved: bool) -> SystemMode:
+    """A real box as a mode, or as one that fits."""
+    n, x = len(system.freedoms_), box.middle.real
+    q = np.array([x[2 * n + k] if each.slides else np.arctan2(x[n + k], x[k])
+                  for k, each in enumerate(system.freedoms_)])
+    spread = [float(v.rad()) for v in _body(system, box)]
+    shift, turn = system.size * float(np.linalg.norm(spread[:3])), 2.0 * float(np.linalg.norm(spread[3:]))
+    values, slopes = system.values(q, system.told)
+    miss = float(np.max(np.abs(values) / np.maximum(1.0, np.linalg.norm(slopes, axis=-1))))
+    return SystemMode((), max(shift / system.size, turn), shift, turn, miss, frozen(system.placed(q)), frozen(q),
+                      proved=proved, fits=not proved)
