@@ -211,6 +211,7 @@ def alone(kinds: str) -> str:
     return json.dumps(of_systems(solve(drawn.system, near=False), {}))
 
 
+@pytest.mark.timeout(3600)
 @pytest.mark.parametrize(("kinds", "count"), [
     ("2LLC", 40), ("PSSS", 12), pytest.param("CCSS", 100, marks=pytest.mark.slow),
     *(pytest.param(kinds, 500, marks=pytest.mark.long) for kinds in ("CCSS", "EEEEEE", "LLC"))])

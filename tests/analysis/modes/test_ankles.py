@@ -38,7 +38,7 @@ def test_an_ankle_has_eight_modes_with_its_motors_held_and_four_with_one_rod_wat
     check_one_leg_watched(kind, 2)
 
 
-@pytest.mark.parametrize("kind", LEGS)
+@pytest.mark.parametrize("kind", ["RSU", *(pytest.param(kind, marks=pytest.mark.slow) for kind in ("SPU", "RUS"))])
 def test_an_ankle_whose_axes_do_not_meet_has_as_many(kind: str):
     check_motors_held(kind, 3, offset=0.02)
     check_one_leg_watched(kind, 4, offset=0.02)

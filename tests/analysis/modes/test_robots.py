@@ -84,6 +84,15 @@ def test_what_closes_is_listed(name: str, observe: Legs | None, real: bool):
     assert any(found.modes[k].goal for k in met)
 
 
+@pytest.mark.parametrize("name", ["prrrp_m1", "linear_delta", "3prp"])
+def test_slides_that_motors_hold_stay_where_they_are(name: str):
+    """Away from zero too: a real robot closes at its modes, or beyond limits."""
+    found = listed(name, None, True, 3)
+    assert not isinstance(found, str), found
+    check_modes(found)
+    assert len(found.modes) > 1
+
+
 @cache
 def sets_of(name: str) -> list[Legs | None]:
     """All legs, and three of the smallest sets with the best verdict."""

@@ -9,7 +9,7 @@ has joints have at most as many isolated common zeros as the permanent of these 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import combinations, permutations
 from math import prod
@@ -24,7 +24,7 @@ from ...geometry.vectors import Array, frozen, hat, perpendicular, pose
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.locked import carry_joint
 from ...kinematics.relation import Measurement
-from ...mechanism import Direction, JointType
+from ...mechanism import Direction, Joint, JointType
 from ...mechanism.legs import Leg
 from ...mechanism.observations.encoder import Encoder
 from ...tolerances import (
@@ -50,7 +50,7 @@ from .systems import System
 
 
 @dataclass(frozen=True, eq=False)
-class Freedom:
+class Turn:
     """A turn about the ``axis`` through ``point`` (sizes) at the goal, or a slide along it."""
 
     axis: Array
@@ -75,7 +75,7 @@ class Told:
     """How far axes are off where they should be for that (sizes)."""
 
     @classmethod
-    def of(cls, condition: PoseCondition, freedoms: Sequence[Freedom]) -> Told:
+    def of(cls, condition: PoseCondition, freedoms: Sequence[Turn]) -> Told:
         """With the joints before which nothing turns what the base tells, or after which nothing turns what is told of
         the body."""
         idle, off = set[int](), 0.0
@@ -88,7 +88,7 @@ class Told:
                 off += miss if miss > CHAIN_ROUNDING else 0.0
         return cls(condition, len(freedoms), frozenset(idle), off)
 
-    def degree(self, k: int, freedom: Freedom) -> int:
+    def degree(self, k: int, freedom: Turn) -> int:
         """In the tangent of half of joint k's angle, or in its slide. The square of a distance has degree one in c and
         s."""
         c = self.condition
@@ -101,7 +101,7 @@ class Told:
         return 2 * (1 if once else 2 if around else c.degree)
 
 
-def _before(c: PoseCondition, freedom: Freedom) -> float:
+def _before(c: PoseCondition, freedom: Turn) -> float:
     """How far a joint next to the base is from changing nothing of a condition; infinite where it is none such."""
     a = freedom.axis
     if isinstance(c, OnPlane):
@@ -114,7 +114,7 @@ def _before(c: PoseCondition, freedom: Freedom) -> float:
     return np.inf
 
 
-def _after(c: PoseCondition, freedom: Freedom) -> float:
+def _after(c: PoseCondition, freedom: Turn) -> float:
     """The same of a joint next to the body."""
     a, turned = freedom.axis, float(np.linalg.norm(np.cross(c.c, freedom.axis)))
     if freedom.slides:
@@ -131,7 +131,7 @@ def _sphere(c: PoseCondition) -> bool:
 class _Equation(Zero):
     """A condition in all c, all s and slides t (0 and 1 besides), with numbers in balls."""
 
-    freedoms: tuple[Freedom, ...]
+    freedoms: tuple[Turn, ...]
     joints: int
 
     @cached_property
@@ -194,12 +194,18 @@ class _Held:
 class CarriedPlatform(System):
     """A platform that a leg carries; q are its angles (rad) and slides (sizes) since the goal."""
 
-    freedoms_: tuple[Freedom, ...]
+    freedoms_: tuple[Turn, ...]
+    """Joints, those that carry the platform first."""
     told: tuple[Told, ...]
     middle: Middle
     start: Array
     """The platform at the goal (4, 4)."""
-    seen: tuple[Sight, ...] = ()
+    seen: tuple[Sight, ...] = field(default=(), kw_only=True)
+
+    @property
+    def carrying(self) -> int:
+        """How many of the joints carry the platform."""
+        return len(self.freedoms_)
 
     @property
     def size(self) -> float:
@@ -229,7 +235,7 @@ class CarriedPlatform(System):
 
     def placed(self, q: Array) -> Array:
         """The platform's pose (4, 4), m."""
-        R, p = self.moved(q)
+        R, p = self.moved(q, self.carrying)
         o = self.middle.origin
         return np.asarray(pose(o + self.size * p - R @ o, R) @ self.start)
 
@@ -338,7 +344,7 @@ def carried(measured: MeasuredRobot, goal: ClosedConfiguration, error: float) ->
         told += [Told.of(c, freedoms) for c in conditions(seen, middle, False)]
         moved += middle.size * max((each.moved for each in told), default=0.0)
         error_ = error + MOVED * moved + max([0.0, *(sight.error(error, goal) for sight in seen)])
-        each = CarriedPlatform((), np.zeros((0, 3)), freedoms, tuple(told), middle, goal.pose(bodies[0]), seen,
+        each = CarriedPlatform((), np.zeros((0, 3)), freedoms, tuple(told), middle, goal.pose(bodies[0]), seen=seen,
                                error=error_)
         off_ = each.values(each.home, told)[0] if told else np.zeros(0)
         if freedoms and np.abs(off_).max(initial=0.0) <= SAME_RELATION and each.square:
@@ -350,25 +356,33 @@ def carried(measured: MeasuredRobot, goal: ClosedConfiguration, error: float) ->
     return min(found, key=lambda each: each.most(each.square))
 
 
+def freedoms_of(joint: Joint, at: str, goal: ClosedConfiguration, middle: Middle, held: Sequence[str]
+                ) -> list[Turn]:
+    """What a joint of R and P leaves free that is met from a link, none if it is ``held``. Raises ``NotConfined``."""
+    turns = {JointType.REVOLUTE: 1, JointType.UNIVERSAL: 2, JointType.CYLINDRICAL: 1, JointType.PRISMATIC: 0}
+    if joint.type not in turns or held.count(joint.name) not in (0, joint.type.freedoms):
+        raise NotConfined(goal.twin.mechanism.name, f"joint {joint.name} is not one of R and P")
+    point, axes = carry_joint(goal.twin.mechanism, joint, goal.pose)
+    found = list[Turn]()
+    for axis in () if joint.name in held else axes if joint.predecessor == at else axes[::-1]:
+        a, o = axis / np.linalg.norm(axis), middle.point(point)
+        found += [Turn(a, o, False)] * (turns[joint.type] > 0) + [Turn(a, o, True)] * joint.type.slides
+    return found
+
+
 def _carrier(measured: MeasuredRobot, leg: Leg, rest: Measurement, goal: ClosedConfiguration, middle: Middle
-             ) -> tuple[tuple[Freedom, ...], list[Told]]:
+             ) -> tuple[tuple[Turn, ...], list[Told]]:
     """The joints of a leg that are not held, from the base, and what is measured of it."""
     anatomy, mechanism = measured.setting.anatomy, measured.setting.anatomy.mechanism
     own = [each for each in rest.observations if each.leg == leg.label]
     held = [each.joint for each in own if isinstance(each, Encoder)]
-    path, at, found, links = anatomy.path(leg), mechanism.base, list[Freedom](), {mechanism.base: 0}
+    path, at, found, links = anatomy.path(leg), mechanism.base, list[Turn](), {mechanism.base: 0}
     if set(leg.joints) - {name for edge in path for name in edge.joints}:
         raise NotConfined(mechanism.name, f"leg {leg.label} has loops")
     for edge in path:
-        joint = mechanism.joints[edge.joints[0]]
-        turns = {JointType.REVOLUTE: 1, JointType.UNIVERSAL: 2, JointType.CYLINDRICAL: 1, JointType.PRISMATIC: 0}
-        if len(edge.joints) > 1 or joint.type not in turns or held.count(joint.name) not in (0, joint.type.freedoms):
+        if len(edge.joints) > 1:
             raise NotConfined(mechanism.name, f"leg {leg.label} is not one of R and P")
-        point, axes = carry_joint(mechanism, joint, goal.pose)
-        if joint.name not in held:
-            for axis in axes if joint.predecessor == at else axes[::-1]:
-                a, o = axis / np.linalg.norm(axis), middle.point(point)
-                found += [Freedom(a, o, False)] * (turns[joint.type] > 0) + [Freedom(a, o, True)] * joint.type.slides
+        found += freedoms_of(mechanism.joints[edge.joints[0]], at, goal, middle, held)
         at = edge.other(at)
         links[at] = len(found)
     told, none = list[Told](), np.zeros(3)
@@ -464,7 +478,7 @@ def _judged(system: CarriedPlatform) -> SystemModes:
     with ctx.workprec(PRECISION):
         kept = [box for box in real if box is at_goal[0]
                 or not any(not each.value(box.box).contains(0) for each in besides)]
-        modes = [_mode(system, box, not besides or box is at_goal[0]) for box in kept]
+        modes = [as_mode(system, box, not besides or box is at_goal[0]) for box in kept]
     proof = (f"{size}: at most {most} closings by degrees in each (Bézout), {len(boxes)} enclosed apart from each "
              f"other, complex ones too, {len(real)} real")
     if not besides:
@@ -484,20 +498,21 @@ def _body(system: CarriedPlatform, box: PoseBox) -> list[Any]:
     found = list[Any]()
     with ctx.workprec(PRECISION):
         for c in np.vstack([np.zeros(3), np.eye(3)]):
-            told = Told(PoseCondition("", np.zeros(3), c), len(system.freedoms_))
+            told = Told(PoseCondition("", np.zeros(3), c), system.carrying)
             at, arrow, _ = system.equation(told).carried(box.box)
             found += [*(arrow if c.any() else at)]
     return found
 
 
-def _mode(system: CarriedPlatform, box: PoseBox, proved: bool) -> SystemMode:
-    """A real box as a mode, or as one that fits."""
+def as_mode(system: CarriedPlatform, box: PoseBox, proved: bool, miss: float | None = None) -> SystemMode:
+    """A real box as a mode, or as one that fits; ``miss``: how far it is from meeting all (sizes)."""
     n, x = len(system.freedoms_), box.middle.real
     q = np.array([x[2 * n + k] if each.slides else np.arctan2(x[n + k], x[k])
                   for k, each in enumerate(system.freedoms_)])
     spread = [float(v.rad()) for v in _body(system, box)]
     shift, turn = system.size * float(np.linalg.norm(spread[:3])), 2.0 * float(np.linalg.norm(spread[3:]))
-    values, slopes = system.values(q, system.told)
-    miss = float(np.max(np.abs(values) / np.maximum(1.0, np.linalg.norm(slopes, axis=-1))))
+    if miss is None:
+        values, slopes = system.values(q, system.told)
+        miss = float(np.max(np.abs(values) / np.maximum(1.0, np.linalg.norm(slopes, axis=-1))))
     return SystemMode((), max(shift / system.size, turn), shift, turn, miss, frozen(system.placed(q)), frozen(q),
                       proved=proved, fits=not proved)

@@ -20,7 +20,7 @@ from ...kinematics.closures import Miss
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.limits import outside
 from ...kinematics.relation import Measurement
-from ...kinematics.tasks import Task
+from ...kinematics.tasks import Held, Task
 from ...mechanism.pose import ModeNumber, Pose, PoseLike, asked_pose
 from ...progress import tell
 from ...results import Result
@@ -39,6 +39,7 @@ from .planar_loops import PlanarLoops, solve_loops
 from .posed import PosedPlatform, most_posed, solve_posed
 from .search import FoundMode, leaves_free, search
 from .sighted import all_loci, behind, opposite, sights
+from .single_loop import solve_loop
 from .solve import SystemMode, SystemModes, continuum
 from .tips import TipLoci
 
@@ -344,7 +345,8 @@ def _listed(setting: ObservedRobot, measured: MeasuredRobot, goal: ClosedConfigu
     reasons = list[NotConfined | Unsolved | TooLarge | MissingExtra]()
     answers = list[tuple[TipLoci | None, Model, SystemModes]]()
     exact = drift(goal, wanted, setting.normal.moved)
-    for listed in (partial(_of_tips, as_written=as_written, effort=effort), _of_conditions, _of_carrier, _of_loops):
+    ways = partial(_of_tips, as_written=as_written, effort=effort), _of_conditions, _of_carrier, _of_single, _of_loops
+    for listed in ways:
         try:
             answers.append(listed(measured, goal, exact))
         except (NotConfined, Unsolved, TooLarge, MissingExtra) as error:
@@ -385,6 +387,10 @@ def _of_carrier(measured: MeasuredRobot, goal: ClosedConfiguration, exact: float
     return None, *solve_carried(measured, goal, exact)
 
 
+def _of_single(measured: MeasuredRobot, goal: ClosedConfiguration, exact: float) -> tuple[None, Model, SystemModes]:
+    return None, *solve_loop(measured, goal, exact)
+
+
 def _of_loops(measured: MeasuredRobot, goal: ClosedConfiguration, exact: float) -> tuple[None, Model, SystemModes]:
     return None, *solve_loops(measured, goal, exact)
 
@@ -422,8 +428,7 @@ class _ModeReader:
         self.question, self.motion, self.made, self.goal = question, setting.motion, made, goal
         self.assembler = Assembler(setting.anatomy, goal.twin.length, question.reference)
         rest, self.seen = sights(setting.anatomy, question, goal)
-        self.measured = tuple((each, each.value(goal.pose(each.seen_from or question.reference), goal.pose(each.link)))
-                              for each in rest.observations)
+        self.measured = Held.at(goal.twin, goal.q, question.reference, rest.observations).measured
 
     def away(self, mode: SystemMode) -> float:
         """How far a mode is from the goal (characteristic lengths, differences of rotation matrices)."""
