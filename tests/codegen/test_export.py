@@ -96,6 +96,17 @@ def test_code_tells_where_motors_are_the_only_ones() -> None:
     assert found.to_dict()["back"] == [[low], [high]]
 
 
+def test_it_says_why_it_answers_in_no_more() -> None:
+    bars = (1.0, 1.2, 0.5, 0.8)  # a crank that cannot turn all round: at its ends coupler and rocker are in line
+    found = exported(four_bar(1.0, bars), 3.0)
+    (part,) = found.proof.parts
+    text = str(found)
+    assert part.share < 1
+    assert [f"at {part.motors[0]}={end.q[0]:.4g}" in text for end in part.toggles] == [True] * len(part.toggles)
+    assert "can move while all motors rest" in text
+    assert "\nends" not in str(exported(four_bar(), 0.4))
+
+
 @pytest.mark.slow
 def test_a_four_bar_stays_on_its_branch_all_round(tmp_path: Path) -> None:
     robot = four_bar()

@@ -61,7 +61,12 @@ def _part(part: BranchPart) -> Rows:
              for name, same in part.turns]
     if part.redundant:
         rows.append(("redundant", part.redundant + (f": closed to {part.closed_to:.2g}" if part.closed_to else "")))
-    return rows + [("ends" if not place else "", _end(part, each)) for place, each in enumerate(part.toggles)]
+    return rows + ends(part)
+
+
+def ends(part: BranchPart) -> Rows:
+    """Where the proof of a part ends, and why."""
+    return [("ends" if not place else "", _end(part, each)) for place, each in enumerate(part.toggles)]
 
 
 def _end(part: BranchPart, end: Toggle) -> str:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from ...analysis.exact import ExactVerdict, power_above
 from ...errors import HrsynthError
 from ...tolerances import RANK_CUTOFF, RANK_GAP, SAME_RELATION, SURELY_SOMETHING
+from .branches import ends
 from .tables import LINE, Rows, camera, head, known, listing, sets, table, watched, wrapped
 
 if TYPE_CHECKING:
@@ -182,6 +183,7 @@ def exported(found: ExportedCode) -> str:
         rows.append(("answers for", [f"{name} {low:.6g} to {high:.6g}" for name, low, high in
                                      zip(part.motors, *part.proved, strict=True)]
                      + [f"and in all of {part.in_cells}, {100 * part.share:.4g} % of the box"]))
+        rows += ends(part)
     if proof.back is not None:
         rows.append(("way back", [f"{name} {low:.6g} to {high:.6g}" for name, low, high in
                                   zip(proof.motors, *proof.back, strict=True)]
