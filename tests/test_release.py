@@ -87,7 +87,7 @@ def test_what_needs_a_package_that_is_missing_says_so_in_one_line(packages, extr
 @pytest.mark.slow
 def test_the_core_answers_without_any_extra(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    every = "matplotlib mujoco cv2 numba dask distributed xacro mkdocs nbclient IPython"
+    every = "matplotlib mujoco cv2 numba jax dask distributed xacro mkdocs nbclient IPython"
     for arguments in (["derive", "3rrr_m1"], ["check", "3rrr_m1", "--grid", "x=0:0.01:3,y=0,phi=0"],
                       ["modes", "3rrr_m1"], ["view", "3rrr_m1", "--static", "view.html"],
                       ["derive", "3rrr_m1", "-o", "hidden.urdf"]):

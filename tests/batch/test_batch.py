@@ -110,16 +110,17 @@ def test_a_batch_of_a_random_robot_is_its_relation(mechanism) -> None:
         check_law(setting, known, 4)
 
 
+@pytest.mark.parametrize("package", ["numba", pytest.param("jax", marks=pytest.mark.slow)])
 @pytest.mark.parametrize(("robot", "watched"), [
     ("quattro", 2),
     *(pytest.param(robot, watched, marks=pytest.mark.slow) for robot, watched in product(
         ["quattro", "gough_stewart", "orthoglide", "3rrr_m1", "3puu", "hexa", "3prp"], [2, 3]))])
-def test_numba_gives_the_same_numbers(robot: str, watched: int) -> None:
-    pytest.importorskip("numba")
+def test_numba_and_jax_give_the_same_numbers(robot: str, watched: int, package: str) -> None:
+    pytest.importorskip(package)
     _, batch = shipped_batch(robot)
     legs = list(batch.legs)[:watched]
     X = poses_near(batch, 200, 0.6)
-    plain, quick = (batch.evaluate(X, legs, 0.01, compiled=compiled) for compiled in (False, True))
+    plain, quick = (batch.evaluate(X, legs, 0.01, compiled=compiled) for compiled in (False, package))
     assert np.array_equal(plain.reached, quick.reached)
     assert plain.reached.any()
     here = plain.reached
@@ -303,5 +304,6 @@ def test_what_a_batch_refuses() -> None:
     with pytest.raises(BadRequest, match="memory"):
         batch.evaluate(np.broadcast_to(batch.home, (100_000_000, 4, 4)), ["3"])
     _, solved = shipped_batch("3rps")
-    with pytest.raises(BadRequest, match=r"not compiled|numba is not installed"):
-        solved.evaluate(solved.home[None], compiled=True)
+    for by in ("numba", "jax"):
+        with pytest.raises(BadRequest, match=rf"not compiled|{by} is not installed.*the extra"):
+            solved.evaluate(solved.home[None], compiled=by)

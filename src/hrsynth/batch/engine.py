@@ -30,10 +30,11 @@ from .direction_rows import direction_rows
 from .error_bounds import ErrorBound, bounds_compiled, bounds_of
 from .iterative_leg import IterativeLeg, IterativeLegStates
 from .platform_coordinates import PlatformCoordinates, frames_at
-from .program import CHUNK, Program
+from .program import CHUNK, Compiled, Program
 from .recognition import recognised
 
 Flags = NDArray[np.bool_]
+EXTRAS = {"numba": "fast", "jax": "jax"}
 ROWS = ("reached", "u", "M")
 """What the program of closed forms says at each pose."""
 
@@ -129,14 +130,15 @@ class Batch(Value):
         return self.coordinates.constant and not self.iterative
 
     def evaluate(self, X: ArrayLike, legs: Sequence[str] | str | None = None, cones: ArrayLike | None = None, *,
-                 compiled: bool | None = None) -> Evaluation:
+                 compiled: Compiled | None = None) -> Evaluation:
         """Everything at platform poses X (n, 4, 4) with ``legs`` watched (default: all), ``cones`` their half-angles
         (rad; one, or one a leg).
 
         X are poses that the platform can take as far as its own freedoms go; that is not checked. A pose that is not
         finite is not reached. ``compiled`` asks for numba, or forbids it (default: where its kernels are compiled
-        already and worth their start). Raises ``BadRequest`` for legs that are not compiled, poses of another shape,
-        half-angles of cones that are not between 0 and a right angle, and results that are too large.
+        already and worth their start); "jax" asks for jax, on the device that it has. Raises
+        ``BadRequest`` for legs that are not compiled, poses of another shape, half-angles of cones that are not between
+        0 and a right angle, and results that are too large.
         """
         X = np.asarray(X, dtype=float)
         if X.ndim != 3 or X.shape[1:] != (4, 4):
@@ -148,7 +150,9 @@ class Batch(Value):
             raise BadRequest("the result of a batch takes too much memory (bytes)", need,
                              f"at most {LARGEST_BATCH}; sweep goes through any number of poses in parts")
         k, n = len(watched), len(X)
-        quick = self.compiled(n, watched, half) if compiled is None else compiled and self._can_be_compiled()
+        quick = self.compiled(n, watched, half) if compiled is None else compiled
+        if compiled:
+            self._require_compilable("jax" if compiled == "jax" else "numba")
         rows = self._program(watched).run(X, ROWS, compiled=quick)
         twists = self.span
         reached, u = rows[0] > 0, rows[1 : 1 + 3 * k].reshape(k, 3, n)
@@ -205,13 +209,12 @@ class Batch(Value):
         return n >= POSES_FOR_COMPILING or (self._program(legs).compiled(ROWS) and (
             cones is None or bounds_compiled(len(legs), self.span, cones)))
 
-    def _can_be_compiled(self) -> bool:
-        """True; raises ``BadRequest`` where numba is not there, or does not take this batch."""
-        if find_spec("numba") is None:
-            raise BadRequest("numba is not installed", True, "compiled=False, or the extra fast")
+    def _require_compilable(self, by: str) -> None:
+        """Raise ``BadRequest`` where a package is not there, or this batch is not for it."""
+        if find_spec(by) is None:
+            raise BadRequest(f"{by} is not installed", True, f"compiled=False, or the extra {EXTRAS[by]}")
         if not self.closed:
             raise BadRequest("a batch whose legs are solved by iteration is not compiled", True, "compiled=False")
-        return True
 
     def _program(self, watched: Sequence[str]) -> Program:
         """What closed forms say at a pose X: where it is ``reached``, the directions ``u`` and rows ``M`` of the

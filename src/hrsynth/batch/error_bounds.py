@@ -14,7 +14,7 @@ from ..geometry.components import Components, dot, sqrt, where
 from ..geometry.vectors import Array
 from ..tolerances import RANK_CUTOFF
 from .cones import error_along, largest_eigenvalue, positive, root_of, trace_two
-from .program import Formula, Program
+from .program import Compiled, Formula, Program
 from .three_cones import trace_three
 
 PARTS = ("position", "orientation")
@@ -31,8 +31,8 @@ class ErrorBound:
     lower: Array
 
 
-def bounds_of(M: Array, twists: Array, cones: Array, reached: NDArray[np.bool_] | None = None, *, compiled: bool = False
-              ) -> tuple[ErrorBound, ErrorBound]:
+def bounds_of(M: Array, twists: Array, cones: Array, reached: NDArray[np.bool_] | None = None, *,
+              compiled: Compiled = False) -> tuple[ErrorBound, ErrorBound]:
     """Position and orientation error for Mᵀ (3 k, d, n) on ``twists`` (6, d) or (n, 6, d), and half-angles of k cones
     (rad); the position error is in the unit of the twists' linear rows. NaN where not ``reached``."""
     rows, d, n = M.shape
@@ -205,7 +205,7 @@ def _maximum_of(k: int) -> Program:
     return program
 
 
-def largest_errors(B: Sequence[Array], *, compiled: bool = False) -> tuple[Array, Array]:
+def largest_errors(B: Sequence[Array], *, compiled: Compiled = False) -> tuple[Array, Array]:
     """The largest error and a lower bound of it, (n,) each, for the entries (6, n) of forms B_i."""
     upper, lower = _maximum_of(len(B)).run(np.stack([each.T for each in B], axis=1), ["maximum"], compiled=compiled)
     return upper, lower

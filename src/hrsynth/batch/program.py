@@ -1,4 +1,5 @@
-"""A program for many poses: formulas one after the other on named quantities, in NumPy or compiled by numba.
+"""A program for many poses: formulas one after the other on named quantities, in NumPy, compiled by numba or
+jax.
 
 A name stands for components, each a place of a table (places, poses) or a constant. A formula becomes a kernel of
 straight-line code; a loop repeats one at the poses where a flag, the last of its state, is positive. The sections after
@@ -15,107 +16,24 @@ import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..geometry.components import Components
 from ..geometry.vectors import Array
-from ..results import Value
-from .tape import LANES, UFUNCS, Store, Symbol, Tape
+from .sections import Indices, Kernel, KernelLoop, Section, put, taken
+from .tape import LANES, Store, Symbol, Tape
 
 CHUNK = 4096
 """Poses that are worked on together, so that their arrays stay in the cache."""
-Indices = NDArray[np.int64]
+Compiled = bool | Literal["numba", "jax"]
+"""By what a program is compiled: True is numba, False nothing."""
 Formula = Callable[..., Mapping[str, Components]]
 """From the components of what it reads to those of what it makes, by name."""
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Kernel(Value):
-    """Straight-line code and what it stores."""
-
-    tape: Tape
-    stores: list[Store]
-
-    @cached_property
-    def places(self) -> set[int]:
-        """The places that it reads or fills."""
-        return {code[1] for code in self.tape.code if code[0] == "load"} | {place for place, _ in self.stores}
-
-    @cached_property
-    def _on_rows(self) -> tuple[Callable[..., None], int]:
-        lines, count = self.tape.rows(self.stores)
-        space = {name: getattr(np, name) for name in (*UFUNCS.values(), "copyto", "nan", "inf")} | {"abs": abs}
-        exec("\n    ".join(["def run(m, c, r):", *(lines or ["pass"])]), space)
-        return space["run"], count
-
-    def run(self, table: Array, numbers: Sequence[float]) -> None:
-        """Run at all poses of a table."""
-        run, count = self._on_rows
-        run(table, numbers, np.empty((count, table.shape[1])))
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class KernelLoop(Value):
-    """``step`` is repeated, at most ``limit`` times, at the poses where the place ``open`` is positive."""
-
-    step: Kernel
-    state: list[int]
-    open: int
-    limit: int
-
-    @property
-    def places(self) -> set[int]:
-        """The places that it reads or fills."""
-        return self.step.places
-
-    def run(self, table: Array, numbers: Sequence[float]) -> None:
-        """Run at the poses of a table; those that are still open are brought together whenever some have ended."""
-        index: Indices = np.arange(table.shape[1])
-        here = table
-        for _ in range(self.limit):
-            live = np.flatnonzero(here[self.open] > 0)
-            if len(live) == 0:
-                break
-            if len(live) < here.shape[1]:
-                _put(table, self.state, index, here)
-                index, here = index[live], _taken(here, self.step.places, live)
-            self.step.run(here, numbers)
-        _put(table, self.state, index, here)
-
-
-def _taken(table: Array, places: set[int], index: Indices) -> Array:
-    """Some places of a table at some poses; the others are left open."""
-    found = np.empty((len(table), len(index)))
-    for place in places:
-        np.take(table[place], index, out=found[place])
-    return found
-
-
-def _put(table: Array, places: Sequence[int] | set[int], index: Indices, part: Array) -> None:
-    """The other way round."""
-    if part is not table:
-        for place in places:
-            table[place, index] = part[place]
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Section(Value):
-    """Steps that run where the place ``flag`` is positive (None: everywhere)."""
-
-    flag: int | None
-    steps: list[Kernel | KernelLoop] = field(default_factory=list)
-
-    @property
-    def places(self) -> set[int]:
-        """The places that it reads or fills."""
-        found = {place for step in self.steps for place in step.places}
-        return found if self.flag is None else found | {self.flag}
 
 
 @dataclass(eq=False)
@@ -188,7 +106,7 @@ class Program:
                        if isinstance(place, int) and tape.place(value) != place]
         return Kernel(tape, stores)
 
-    def run(self, inputs: Array, names: Sequence[str], *, compiled: bool = False) -> Array:
+    def run(self, inputs: Array, names: Sequence[str], *, compiled: Compiled = False) -> Array:
         """The components of some names (rows, n) for inputs (n, ...), whose first ``inputs`` numbers are read."""
         flat = inputs.reshape(len(inputs), math.prod(inputs.shape[1:])) if inputs.ndim > 2 else inputs
         outputs = self._outputs(names)
@@ -196,7 +114,12 @@ class Program:
         for row, place in zip(found, outputs, strict=True):
             if not isinstance(place, int):
                 row[:] = place
-        (self._run_lanes if compiled else self._run_rows)(flat, outputs, found)
+        if compiled == "jax":
+            from .on_jax import run
+
+            run(tuple(self.sections), self.numbers, flat[:, : self.inputs], outputs, found)
+        else:
+            (self._run_lanes if compiled else self._run_rows)(flat, outputs, found)
         return found
 
     def compiled(self, names: Sequence[str]) -> bool:
@@ -227,17 +150,17 @@ class Program:
                 live: Indices = np.flatnonzero(np.any(flags, axis=0)) if flags else np.zeros(0, dtype=np.int64)
                 if len(live):
                     index.append(start + live)
-                    parts.append(_taken(table, passed, live))
+                    parts.append(taken(table, passed, live))
             if not parts:
                 return
             rest, poses = np.concatenate(parts, axis=1), np.concatenate(index)
             for section in others:
                 live = np.flatnonzero(rest[section.flag] > 0)
                 if len(live):
-                    table = _taken(rest, section.places & passed, live)
+                    table = taken(rest, section.places & passed, live)
                     for step in section.steps:
                         step.run(table, self.numbers)
-                    _put(rest, section.places, live, table)
+                    put(rest, section.places, live, table)
                     for row, place in here:
                         if place in section.places:
                             found[row, poses[live]] = table[place]
