@@ -38,6 +38,8 @@ class LoopEnds(Value):
         try:
             found = RestSearch.of(setting, goal).answer(minima=True, rounds=rounds)
             others = tuple(sorted(each.kind for each in found.attracting if each.kind != GOAL and not each.beyond))
+            if not all(each.by_segment for each in setting.observed):
+                return cls(others, None, "the radius is one of directions of segments only")
             radius = certified_radius(setting, goal)
         except HrsynthError as error:
             return cls(None, None, str(error))

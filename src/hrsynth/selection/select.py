@@ -226,9 +226,9 @@ def select(robot: RobotLike, camera: CameraLike = None, *, observe: LegsLike = N
     or ``see`` observes, by default of all legs. A set is discarded where it does not see every freedom, where an end is
     singular or something is behind its camera there, where the camera (``sight``) sees too little of a leg, where start
     and goal are proved to lie in different aspects, and where a simulated run ends elsewhere. Modes, aspects and
-    endings are asked for the ``examine`` most accurate sets (endings for ``endings`` of them, of directions of
-    segments), the others are neither kept nor discarded. Runs are made from the best set on, until ``runs`` of them
-    ended at the goal.
+    endings are asked for the ``examine`` most accurate sets (endings for ``endings`` of them; the radius of directions
+    of segments alone), the others are neither kept nor discarded. Runs are made from the best set on, until ``runs`` of
+    them ended at the goal.
 
     Raises ``BadRequest``, ``PoseNotReached``.
 
@@ -373,18 +373,19 @@ class _Work:
             return candidate
         tell("endings")
         setting = self.watching(candidate.legs)
-        if not all(o.by_segment for o in setting.observed):
-            return replace(candidate, ends=LoopEnds(None, None, "sought for directions of segments only"))
-        return replace(candidate, ends=LoopEnds.of(setting, self.goal, self.rounds))
+        rounds = self.rounds if all(o.by_segment for o in self.setting.observed) else self._rounds(setting)
+        return replace(candidate, ends=LoopEnds.of(setting, self.goal, rounds))
 
     @cached_property
-    def rounds(self) -> tuple[Array, ...] | None:
-        """Starts from which all sets' endings are sought; None where not all are directions of segments."""
-        if not all(o.by_segment for o in self.setting.observed):
-            return None
-        system = RestSearch.of(self.setting, self.goal).system
-        homes = np.array([system.system.read(at.pose) for at in (self.goal, *self.setting.configurations)])
-        return tuple(islice(starts(system, homes, self.seed, self.setting), SELECT_ROUNDS))
+    def rounds(self) -> tuple[Array, ...]:
+        """Starts from which the endings of all sets of directions are sought."""
+        return self._rounds(self.setting)
+
+    def _rounds(self, setting: ObservedRobot) -> tuple[Array, ...]:
+        """Starts at which all that a setting observes is in front of its camera."""
+        system = RestSearch.of(setting, self.goal).system
+        homes = np.array([system.system.read(at.pose) for at in (self.goal, *setting.configurations)])
+        return tuple(islice(starts(system, homes, self.seed, setting), SELECT_ROUNDS))
 
     def ran(self, candidate: Candidate) -> Candidate:
         """The candidate with where its simulated run ends, and what the camera sees along it."""

@@ -117,7 +117,10 @@ def rest(setting: ObservedRobot, at: ClosedConfiguration, last: Command) -> Endi
     weak = float(last.values[-1]) < DAMPED
     shifted = at.velocity(setting.motion.link) @ last.weak
     if weak and float(np.linalg.norm(shifted)) < DAMPED:
-        return Ending(BOUNDARY, f"{where}: a leg that is not watched is stretched to its limit")
+        tree = len(at.twin.mechanism.joints) < len(at.twin.mechanism.links)
+        why = ("the arm is at a singularity of its own, as where it is stretched" if tree else
+               "a leg that is not watched is stretched to its limit")
+        return Ending(BOUNDARY, f"{where}: {why}")
     far = posture.distances
     if weak and far.type2 is not None and far.type2 < DAMPED:
         return Ending(MINIMUM, f"{where} at a Type 2 singularity of the hidden robot")

@@ -189,7 +189,7 @@ def test_a_grid_is_its_single_poses_and_leaves_out_what_is_behind_the_camera(tmp
 
 
 @pytest.mark.parametrize(("name", "given", "word"), [
-    ("point", {}, "nothing"), ("point", {"cone": "0.1deg"}, "cones apply to directions only"),
+    ("point", {}, "not said by how much"), ("point", {"cone": "0.1deg"}, "cones apply to directions only"),
     ("direction", {"cone": "0.1deg"}, "not to position"), ("point", {"noise": "1mm"}, "in m"),
     ("point", {"noise": "0.3km"}, "not a number"),
 ])

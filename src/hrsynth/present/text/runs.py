@@ -243,7 +243,7 @@ def _ends(ends: LoopEnds | None) -> list[str]:
     if ends is None or ends.others is None:
         return ["–", "–"]
     if ends.radius is None or not ends.length:
-        return [str(len(ends.others)), "undecided"]
+        return [str(len(ends.others)), "–" if ends.radius is None else "undecided"]
     angle = ends.radius.angle
     turn = "" if angle is None else f", {np.degrees(angle):.2g}°"
     return [str(len(ends.others)), f"{1e3 * ends.length:.3g} mm{turn}"]

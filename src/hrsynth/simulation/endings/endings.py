@@ -30,7 +30,7 @@ from ...kinematics.limits import outside
 from ...mechanism.observations.direction import SeenAxis
 from ...mechanism.pose import PoseLike, asked_pose
 from ...progress import tell
-from ...tolerances import DAMPED, SAME_ENDING, SEEN_ABOVE, VANISHED
+from ...tolerances import CRITICAL_FLAT, DAMPED, SAME_ENDING, SEEN_ABOVE, VANISHED
 from ..ending import ANTIPODAL, BOUNDARY, GOAL, MODE, rest
 from ..law import FixedDirections, Law, Measures, measured, supposed_planes
 from ..servo import require_regular, require_seen, require_sight
@@ -114,8 +114,13 @@ class RestSearch:
         lists = [] if minima else self._lists(isolated)
         isolated += [each for one in lists for each in self._listed(one, isolated, found.idle)]
         tell("enclosures")
-        boxes = ([None] * len(isolated) if minima or self.system.supposes else
-                 enclosed(self.system, [each.point for each in isolated], found.idle))
+        boxes: list[EnclosedPoint | None] = [None] * len(isolated)
+        if not minima and not self.system.supposes:
+            # with idle coordinates held, curvatures of motions that are idle elsewhere are not enclosed
+            whole = [k for k, each in enumerate(isolated) if len(each.point.curvatures) <= self._freedoms]
+            proved = enclosed(self.system, [isolated[k].point for k in whole], found.idle)
+            for k, box in zip(whole, proved, strict=True):
+                boxes[k] = box
         rests = _ways([each for one, box in zip(isolated, boxes, strict=True)
                        if (each := self.read(one, box)) is not None], self)
         continua = [each for one in self._in_mode(found.continua) if (each := self.read(one)) is not None]
@@ -127,6 +132,11 @@ class RestSearch:
         return Endings(setting, self.goal, motion.pose(self.goal.pose(motion.link)), self.desired, tuple(rests),
                        tuple(continua), tuple(lists), measured, found,
                        None if covers is None else covers.judged(rests), self.depth)
+
+    @property
+    def _freedoms(self) -> int:
+        """How many motions are not idle."""
+        return self.setting.samples.members[0].relation.dimension
 
     def _further(self, seed: int) -> Further | None:
         """What finds critical points over the pose; None where legs have no closed forms."""
@@ -204,7 +214,9 @@ class RestSearch:
             singular, boundary = why.reason, why.name == BOUNDARY
         X = at.pose(motion.link)
         shift, turn = (np.inf, np.inf) if box is None else self._radius(box, X)
-        state = stability(point.curvatures if box is None or box.index is None else box.signs(len(point.curvatures)))
+        least = CRITICAL_FLAT if len(point.curvatures) > self._freedoms else SAME_ENDING
+        state = stability(point.curvatures if box is None or box.index is None else box.signs(len(point.curvatures)),
+                          least)
         return RestPoint(motion.pose(X), kind, state, error, tuple(map(float, point.curvatures)), at, shift, turn,
                          box is not None and box.index is not None,
                          () if box is None or singular is not None else box.rates, self._side(at), reversed_, across,

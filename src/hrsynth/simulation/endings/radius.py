@@ -67,8 +67,10 @@ class CertifiedRadius(Value):
 
 
 def certified_radius(setting: ObservedRobot, goal: ClosedConfiguration) -> CertifiedRadius:
-    """The largest radius that is proved with the budget of boxes, for the directions that are watched."""
+    """The largest radius that is proved with the budget of boxes, for directions of segments that are watched."""
     try:
+        if not all(each.by_segment for each in setting.observed):
+            raise NotEnclosed("it is for directions of segments only")
         error = PoseError.of(setting, goal)
         if error.fitted:
             raise NotEnclosed(f"forms are fitted to samples: {', '.join(error.fitted)}")

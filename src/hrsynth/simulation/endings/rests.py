@@ -239,9 +239,9 @@ class Endings(Result, shown_as="endings"):
                 "continua": [each.to_dict() for each in self.continua]}
 
 
-def stability(curvatures: Sequence[float] | Array) -> str:
-    """What the eigenvalues of a Hessian say."""
+def stability(curvatures: Sequence[float] | Array, least: float = SAME_ENDING) -> str:
+    """What the eigenvalues of a Hessian say, of which small ones say nothing."""
     values = np.asarray(curvatures)
-    if np.any(values < -SAME_ENDING):
-        return SADDLE if np.any(values > SAME_ENDING) else UNSTABLE
-    return STABLE if np.all(values > SAME_ENDING) else UNDECIDED
+    if np.any(values < -least):
+        return SADDLE if np.any(values > least) else UNSTABLE
+    return STABLE if np.all(values > least) else UNDECIDED

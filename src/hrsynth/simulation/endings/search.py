@@ -10,13 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import islice
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...analysis.observed import ObservedRobot
+from ...analysis.observed import ObservedRobot, restricted
 from ...budgets import (
     ENDING_DESCENTS,
     ENDING_EFFORT,
@@ -36,7 +37,9 @@ from ...geometry.vectors import Array
 from ...kinematics.assembly import of_links
 from ...kinematics.branch import Signature
 from ...kinematics.configuration import ClosedConfiguration
+from ...kinematics.limits import outside
 from ...kinematics.relation import relation
+from ...mechanism.observation import Observation
 from ...mechanism.observations.direction import SeenAxis
 from ...progress import tell
 from ...results import Value
@@ -66,8 +69,8 @@ NEARBY = 0.02
 @dataclass(frozen=True, eq=False, repr=False)
 class CriticalPoint(Value):
     """A critical point of E: coordinates (N,) and multipliers (m,), ∇E on the loops and G as they are left
-    (``residual``), and the eigenvalues of the Hessian along the motions of the loops, ascending, without idle ones;
-    ``value`` is E."""
+    (``residual``), and the eigenvalues of the Hessian along the motions of the loops, ascending, without those of
+    motions that are idle there; ``value`` is E."""
 
     q: Array
     multipliers: Array
@@ -113,7 +116,8 @@ class Tangents:
 @dataclass(frozen=True, eq=False)
 class Expansion:
     """E on the loops to second order at configurations (c,): the closing step p (c, N), multipliers μ (c, m), gradient
-    (c, d) and Hessian along Z: its eigenvalues (c, d) and directions (c, N, d), the idle ones last."""
+    (c, d) and Hessian along Z: its eigenvalues (c, d) and directions (c, N, d), the last ``idle`` of them those of the
+    motions that are most nearly idle."""
 
     E: Array
     closing: Array
@@ -122,6 +126,18 @@ class Expansion:
     curvatures: Array
     directions: Array
     residual: Array
+    idle: int
+
+    @property
+    def freedoms(self) -> int:
+        """d without idle motions."""
+        return self.curvatures.shape[-1] - self.idle
+
+    def told(self, k: int) -> Array:
+        """The curvatures of the k-th configuration, ascending: of idle motions none but those that are not idle there,
+        as where an arm with a joint more than freedoms is stretched."""
+        values, d = self.curvatures[k], self.freedoms
+        return np.sort(np.concatenate([values[:d], values[d:][np.abs(values[d:]) > CRITICAL_FLAT]]))
 
     @classmethod
     def of(cls, system: RestSystem, q: Array, idle: int) -> Expansion:
@@ -144,9 +160,8 @@ class Expansion:
         order = np.argsort(np.where(still, np.inf, values), axis=-1, kind="stable")
         values, along = (np.take_along_axis(each, order, -1) for each in (values, along))
         vectors = np.take_along_axis(vectors, order[..., None, :], -1)
-        kept = values.shape[-1] - idle
-        return cls(at.E, p, mu, along[..., :kept], values[..., :kept], (Z @ vectors)[..., :kept],
-                   np.maximum(np.linalg.norm(at.G, axis=-1), np.linalg.norm(flat, axis=-1)))
+        return cls(at.E, p, mu, along, values, Z @ vectors,
+                   np.maximum(np.linalg.norm(at.G, axis=-1), np.linalg.norm(flat, axis=-1)), idle)
 
 
 def _times(M: Any, v: Any) -> Array:
@@ -193,13 +208,14 @@ def descend(system: RestSystem, q: Array, index: NDArray[np.intp], idle: int) ->
             break
         at = Expansion.of(system, q, idle)
         done = at.residual < CRITICAL
-        found += [CriticalPoint(*each) for each in zip(q[done], at.multipliers[done], at.residual[done],
-                                                      at.curvatures[done], at.E[done], strict=True)]
-        up = np.arange(at.curvatures.shape[-1]) < index[:, None]
+        found += [CriticalPoint(q[k], at.multipliers[k], float(at.residual[k]), at.told(int(k)), float(at.E[k]))
+                  for k in np.flatnonzero(done)]
+        up = np.arange(at.curvatures.shape[-1]) < np.minimum(index, at.freedoms)[:, None]
         size = np.maximum(np.abs(at.curvatures), CRITICAL_FLAT)
         # near a critical point: Newton's method, whatever it is
-        near = (at.residual < 1e-3) & (np.abs(at.slope / size).max(axis=-1) < 0.05)
+        near = (at.residual < 1e-3) & (np.abs(at.slope / size)[:, : at.freedoms].max(axis=-1) < 0.05)
         sign = np.where(near[:, None], -np.sign(at.curvatures), np.where(up, 1.0, -1.0))
+        sign[:, at.freedoms :] *= np.abs(at.curvatures[:, at.freedoms :]) > CRITICAL_FLAT
         step = _shortened(_times(at.directions, sign * at.slope / size), LONGEST_STEP)
         q = q + step + _shortened(at.closing, LONGEST_STEP)
         going = ~done & np.isfinite(q).all(axis=-1) & (np.abs(q).max(axis=-1) < FARTHEST_ENDING)
@@ -326,18 +342,22 @@ def critical_points(system: RestSystem, setting: ObservedRobot, goal: ClosedConf
 
 
 class ToldApart:
-    """Critical points, told apart; those that are not isolated by E and the signs of the curvatures."""
+    """Critical points, told apart; those that are not isolated by E and the signs of the curvatures. Where joints are
+    free to move though the platform rests, one is kept that is beyond as few limits as any that was met."""
 
     def __init__(self, system: RestSystem, setting: ObservedRobot) -> None:
         self.system, self.setting, self.bodies = system, setting, attached(setting.anatomy)
+        self.told, self.freedoms = told_by(setting), setting.samples.members[0].relation.dimension
+        self.free = len(self.told) < len(setting.everything.question.observations)
         self.own: dict[tuple[int, ...], list[tuple[Array, CriticalPoint, int]]] = {}
         self.families: dict[tuple[int, ...], Critical] = {}
 
     def add(self, points: Sequence[CriticalPoint]) -> int:
         """How many isolated ones are new."""
         new = 0
-        for point, mark in zip(points, marks(self.system, self.setting, self.bodies, points), strict=True):
-            least = SAME_ENDING * self.system.scale(point.curvatures)
+        for point, mark in zip(points, marks(self.system, self.setting, self.bodies, points, self.told), strict=True):
+            more = len(point.curvatures) > self.freedoms
+            least = CRITICAL_FLAT if more else SAME_ENDING * self.system.scale(point.curvatures)
             flat = np.abs(point.curvatures) < least
             key = (*(int(np.sum(each)) for each in (point.curvatures < -least, flat)),)
             if flat.any():
@@ -351,8 +371,19 @@ class ToldApart:
                 own.append((mark, point, 1))
                 new += 1
             else:
-                own[near] = (*own[near][:2], own[near][2] + 1)
+                mark, kept, met = own[near]
+                if self.free and (most := self._beyond(kept)) and self._beyond(point) < most:
+                    kept = point
+                own[near] = (mark, kept, met + 1)
         return new
+
+    def _beyond(self, point: CriticalPoint) -> int:
+        """How many joints are beyond their limits."""
+        twin = self.setting.everything.twin
+        try:
+            return len(outside(twin, of_links(twin, partial(self.system.system.pose, values=point.q.tolist())).q))
+        except LoopsNotClosed:
+            return len(twin.mechanism.joints)
 
     @property
     def count(self) -> int:
@@ -389,8 +420,10 @@ def in_mode(system: RestSystem, setting: ObservedRobot, q: Array) -> NDArray[np.
     return kept
 
 
-def marks(system: RestSystem, setting: ObservedRobot, bodies: Sequence[str], points: Sequence[CriticalPoint]) -> Array:
-    """What tells configurations (n, k) apart: the poses of the platform's bodies and the directions of all segments."""
+def marks(system: RestSystem, setting: ObservedRobot, bodies: Sequence[str], points: Sequence[CriticalPoint],
+          told: Sequence[Observation] | None = None) -> Array:
+    """What tells configurations (n, k) apart: the poses of the platform's bodies and the directions of all segments
+    that have one for each of these poses and what is measured (an arm's elbow that is free to move has not)."""
     if not points:
         return np.zeros((0, 0))
     loops, links = system.system, system.system.mechanism.links
@@ -401,8 +434,18 @@ def marks(system: RestSystem, setting: ObservedRobot, bodies: Sequence[str], poi
         parts.append(carrier.point(chain, X[:3, 3] / loops.length).value)
         if setting.motion.body:
             parts += [carrier.direction(chain, axis).value for axis in X[:3, :2].T]
-    for seen in setting.everything.question.observations:
+    for seen in told_by(setting) if told is None else told:
         if isinstance(seen, SeenAxis):
             parts.append(carrier.direction(loops.way(loops.body[seen.link]),
                                            links[seen.link].pose[:3, :3] @ seen.direction).value)
     return np.concatenate([np.broadcast_to(each, (len(points), 3)) for each in parts], axis=-1)
+
+
+def told_by(setting: ObservedRobot) -> tuple[Observation, ...]:
+    """What can be observed of the robot that does not move where the platform and what is observed are held."""
+    every, own = setting.everything, [o.key for o in setting.observed]
+    held = setting.samples.members[0].relation.dimension
+    if every.members[0].relation.dimension == held:
+        return every.question.observations
+    return tuple(o for o in every.question.observations if o.key in own or
+                 restricted(every, [*setting.observed, o]).members[0].relation.dimension == held)
