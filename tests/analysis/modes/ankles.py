@@ -62,6 +62,28 @@ def ankle(kind: str, seed: int, *, two_turns: bool = True, offset: float = 0.0
     return b.build(platform="foot"), (centre, first, second, lower), rods
 
 
+def carried(word: str, seed: int) -> Mechanism:
+    """A platform that a random leg of R and P carries, and as many telescopic legs with balls as that has joints."""
+    rng, b = np.random.default_rng(seed), Builder("carried")
+    places = [0.3 * (rng.normal(size=3) + [0, 0, k]) for k in range(len(word))]
+    links = ["base", *(f"link_{k}" for k in range(1, len(word))), "platform"]
+    b.link("base")
+    for link, at in zip(links[1:], places, strict=True):
+        b.link(link, at=at)
+    for k, kind in enumerate(word):
+        b.joint(f"joint_{k}", kind, links[k], links[k + 1], at=places[k], axis=unit(rng.normal(size=3)))
+    for k in range(len(word)):
+        foot, end = 0.6 * rng.normal(size=3), places[-1] + 0.3 * rng.normal(size=3)
+        along = unit(end - foot)
+        across = perpendicular(along)
+        b.link(f"tube_{k}", at=foot)
+        b.link(f"rod_{k}", at=end)
+        b.joint(f"ball_{k}", "S", "base", f"tube_{k}", at=foot)
+        b.joint(f"slide_{k}", "P", f"tube_{k}", f"rod_{k}", at=(foot + end) / 2, axis=along, motor=True)
+        b.joint(f"end_{k}", "U", f"rod_{k}", "platform", at=end, axis=across, axis2=np.cross(along, across), loop=True)
+    return b.build(platform="platform")
+
+
 def counted(joint: tuple[Array, Array, Array, Array], rods: list[Rod]) -> tuple[int, int]:
     """Complex and real poses of the foot with both rods' lengths kept.
 

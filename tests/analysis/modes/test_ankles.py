@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import hrsynth
-from analysis.modes.ankles import LEGS, ankle, counted
+from analysis.modes.ankles import LEGS, ankle, carried, counted
 from analysis.modes.test_robots import check_completeness, check_modes
 from analysis.modes.test_surfaces import needs_msolve
 
@@ -61,6 +61,18 @@ def test_twenty_ankles(kind: str):
     assert len(set(real)) > 1
     for seed in range(20):
         check_one_leg_watched(kind, seed)
+
+
+@pytest.mark.parametrize(("word", "count"), [("RR", 8), ("RP", 6), ("PR", 6)])
+def test_a_platform_that_a_random_leg_carries_has_its_number_of_modes(word: str, count: int):
+    real = []
+    for seed in range(2, 5):
+        found = hrsynth.modes(carried(word, seed), real=True)
+        assert (found.found.complex, found.found.bound) == (count, "class")
+        check_modes(found)
+        check_completeness(found, 20)
+        real.append(len(found.modes))
+    assert len(set(real)) > 1
 
 
 def test_a_leg_without_a_segment_is_not_watched():

@@ -264,6 +264,11 @@ class CarriedPlatform(System):
         """How many isolated common zeros some conditions, as many as joints, have at most."""
         n = len(self.freedoms_)
         degrees = np.array([[each.degree(k, f) for k, f in enumerate(self.freedoms_)] for each in chosen])
+        alike = [i for i, each in enumerate(chosen) if _sphere(each.condition)]
+        slides = [k for k, each in enumerate(self.freedoms_) if each.slides]
+        for i in alike[1:]:  # the squares of slides are the same in all: differences have none
+            if chosen[i].joints == chosen[alike[0]].joints:
+                degrees[i, slides] = np.minimum(degrees[i, slides], 1)
         found = [_permanent(degrees)]
         for i, j in combinations(range(n), 2):
             rest = [k for k in range(n) if k not in (i, j)]
@@ -404,9 +409,9 @@ def proposals(system: CarriedPlatform, most: int) -> Array:
     rng, n, found = np.random.default_rng(0), len(system.freedoms_), list[Array]()
     slides = np.array([each.slides for each in system.freedoms_])
     for _ in range(PLANAR_STARTS):
-        q = rng.uniform(-np.pi, np.pi, (64, n)) + 1j * rng.normal(size=(64, n))
+        q = rng.uniform(-np.pi, np.pi, (64, n)) + 3j * rng.normal(size=(64, n))
         with np.errstate(all="ignore"):
-            for _ in range(40):
+            for _ in range(100):
                 F, J = system.values(q, system.square)
                 good = np.all(np.isfinite(J), axis=(1, 2)) & np.all(np.isfinite(F), axis=1)
                 q, F, J = q[good], F[good], J[good]
@@ -414,7 +419,7 @@ def proposals(system: CarriedPlatform, most: int) -> Array:
                     step = np.linalg.solve(J, F[:, :, None])[:, :, 0]
                 except np.linalg.LinAlgError:
                     step = (np.linalg.pinv(J) @ F[:, :, None])[:, :, 0]
-                q = q - step / np.maximum(1.0, np.abs(step).max(axis=1))[:, None]
+                q = q - step / np.maximum(1.0, 2.0 * np.abs(step).max(axis=1))[:, None]
         q = q[np.abs(step).max(axis=1) < 1e-10]
         for each in (y for x in q for y in (x, x.conj())):
             turned = np.angle(np.exp(1j * each.real)) + 1j * each.imag
