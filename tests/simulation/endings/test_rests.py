@@ -27,10 +27,13 @@ from hrsynth.kinematics.locked import joint_at
 from hrsynth.mechanism.model import Limits
 from hrsynth.present.text.endings import endings as text
 from hrsynth.simulation.endings.completeness import Covers
-from hrsynth.simulation.endings.critical_poses import Lift, critical_poses
+from hrsynth.simulation.endings.cover import bounds
+from hrsynth.simulation.endings.critical_poses import Lift, _held, critical_poses
 from hrsynth.simulation.endings.enclosure import _rates, enclosed
 from hrsynth.simulation.endings.endings import RestSearch, _ways, endings
 from hrsynth.simulation.endings.error import RestEquations
+from hrsynth.simulation.endings.pose_error import PoseError
+from hrsynth.simulation.endings.pose_system import LegSystem
 from hrsynth.simulation.endings.rests import Endings, RestPoint, stability
 from hrsynth.simulation.endings.search import CriticalPoint, descend, starts
 from hrsynth.simulation.law import FixedDirections, directions
@@ -279,6 +282,36 @@ def test_critical_poses_are_rests_and_joints_go_there() -> None:
     assert done.sum() > len(poses) / 2
     assert np.abs(lift.told(q[done]) - lift.wanted(poses.some(done))).max() < 1e-8
     assert np.abs(RestEquations(search.system, list(q[done].T)).G).max() < 1e-8
+
+
+@pytest.mark.parametrize(("name", "legs"), [("quattro", "1,4"), ("3rpr_m1", None), ("gough_stewart", "1,3,5"),
+                                           ("linear_delta", "1")])
+def test_equations_over_the_pose_are_what_their_derivatives_say(name: str, legs: str | None) -> None:
+    """E and the equations of watched legs and of all that can be held: differences along a line are the gradient and
+    the Hessian; at drawn poses the watched legs close, and E is that of the pose."""
+    setting = ObservedRobot.of(name, legs)
+    error, rng = PoseError.of(setting, setting.configurations[3]), np.random.default_rng(0)
+    low, high, _ = bounds(error, 3.0)
+    for held in _held(error):
+        system = LegSystem.of(error, held)
+        n, k = system.quaternion.stop, error.shifts.shape[1]
+        x = np.concatenate([rng.uniform(low[:k], high[:k], (2000, k)), rng.normal(size=(2000, n - k))], axis=1)
+        y = system.drawn(x, rng)[:20]
+        assert len(y) == 20
+        at = system.at(list(y.T))
+        if not held:
+            assert np.abs(at.G).max(initial=0.0) < 1e-12
+            w = np.array([error._direction(each, error.p, error.R.ravel(), lambda value: value) for each in error.seen])
+            assert pytest.approx(0.5 * (1 - np.einsum("cia,ia->ci", system.directions(y), w) ** 2).sum(axis=1)) == at.E
+        y += 0.1 * rng.normal(size=y.shape)
+        at, way = system.at(list(y.T)), rng.normal(size=y.shape)
+        mu = rng.normal(size=at.G.shape)
+        ends = [system.at(list((y + sign * 1e-4 * way).T)) for sign in (1, 0, -1)]
+        up, here, down = (each.E + (mu * each.G).sum(axis=1) for each in ends)
+        slope = at.slope + np.einsum("cm,cmn->cn", mu, at.DG)
+        assert (up - down) / 2e-4 == pytest.approx((slope * way).sum(axis=1), rel=1e-5, abs=1e-5)
+        assert (up - 2 * here + down) / 1e-8 == pytest.approx(
+            np.einsum("cn,cnm,cm->c", way, at.bend(mu), way), rel=1e-4, abs=1e-4)
 
 
 @pytest.mark.long

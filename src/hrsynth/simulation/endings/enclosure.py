@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,11 +58,15 @@ class EnclosedPoint(Value):
 def enclosed(system: RestSystem, points: Sequence[CriticalPoint], idle: int) -> list[EnclosedPoint | None]:
     """Boxes around critical points, None where nothing was proved; where the equations of the loops that were chosen
     are nearly dependent, with others."""
-    found = _enclosed(system, np.array([each.q for each in points]), idle) if points else []
-    for k, (each, point) in enumerate(zip(found, points, strict=True)):
-        if each is None or each.index is None:
-            (again,) = _enclosed(system.chosen_at(point.q[None]), point.q[None], idle)
-            found[k] = again or each
+    q = np.array([each.q for each in points])
+    found = _enclosed(system, q, idle) if points else []
+    left = [k for k, each in enumerate(found) if each is None or each.index is None]
+    while left:
+        # equations that are independent at one are so at others
+        again = _enclosed(system.chosen_at(q[left[:1]]), q[left], idle)
+        for k, each in zip(left, again, strict=True):
+            found[k] = each or found[k]
+        left = [k for k in left[1:] if (each := found[k]) is None or each.index is None]
     return found
 
 
@@ -70,14 +75,15 @@ def _enclosed(system: RestSystem, q: Array, idle: int) -> list[EnclosedPoint | N
     size, count = system.size
     at = RestEquations(system, list(q.T))
     mu = Tangents.of(at.DG).multipliers(at.slope)
-    free = np.array([_free(system, each, idle) for each in q])
+    free = _free(system, q, idle)
     # over held coordinates the identity
-    mask = np.concatenate([free, np.ones((len(q), count))], axis=-1)
+    known = np.concatenate([free, np.ones((len(q), count))], axis=-1)
 
-    def evaluated(radius: Array) -> tuple[AffineForms, AffineForms, RestEquations]:
-        """F (c, n) and K (c, n, n) over boxes of radii (c, n), n = N + m."""
-        forms = [affine(q[:, i], np.zeros((len(q), 0)), radius[:, i]) for i in range(size)]
-        held = affine(mu, np.zeros((*mu.shape, 0)), radius[:, size:])
+    def evaluated(radius: Array, some: Any = slice(None)) -> tuple[AffineForms, AffineForms, RestEquations]:
+        """F (c, n) and K (c, n, n) over boxes of radii (c, n) about some of the points, n = N + m."""
+        middle, mult, mask = q[some], mu[some], known[some]
+        forms = [affine(middle[:, i], np.zeros((len(middle), 0)), radius[:, i]) for i in range(size)]
+        held = affine(mult, np.zeros((*mult.shape, 0)), radius[:, size:])
         at = RestEquations(system, forms)
         F, K = (AffineForms(np.zeros((1, *shape)), np.zeros(shape))
                 for shape in (radius.shape, (*radius.shape, radius.shape[-1])))
@@ -94,26 +100,25 @@ def _enclosed(system: RestSystem, q: Array, idle: int) -> list[EnclosedPoint | N
         K.v[0] += held_one
         return AffineForms(F.v * mask, F.r * mask), K, at
 
-    still = np.zeros(mask.shape)
+    still = np.zeros(known.shape)
     with np.errstate(all="ignore"):
         F, K, _ = evaluated(still)
         Y = np.linalg.inv(K.v[0] + _lost(K.v[0]))
         e = combined(Y, F).size
         radius = TUBE_WIDER * e + THINNEST_TUBE
         done, found = np.zeros(len(q), dtype=bool), still.copy()
-        inertia = np.full(len(q), -1)
+        inertia, left = np.full(len(q), -1), np.arange(len(q))
         for _ in range(TUBE_RADII):
-            _, K, _ = evaluated(radius)
-            M = (np.eye(mask.shape[-1]) - combined(Y, K)).size
-            wanted = e + (M @ radius[..., None])[..., 0]
-            fits = np.all(wanted * (1 + AFFINE_ROUNDING) < radius, axis=-1) & ~done
-            found[fits] = radius[fits]
-            inertia[fits] = _negative(K)[fits]
-            done |= fits
-            if done.all():
+            _, K, _ = evaluated(radius, left)
+            M = (np.eye(known.shape[-1]) - combined(Y[left], K)).size
+            wanted = e[left] + (M @ radius[..., None])[..., 0]
+            fits = np.all(wanted * (1 + AFFINE_ROUNDING) < radius, axis=-1)
+            found[left[fits]], done[left[fits]] = radius[fits], True
+            left, radius = left[~fits], (TUBE_WIDER * np.maximum(wanted, radius))[~fits]
+            if not len(left):
                 break
-            radius = np.where(done[:, None], radius, TUBE_WIDER * np.maximum(wanted, radius))
         _, K, at = evaluated(found)
+        inertia[done] = _negative(K)[done]
         gram, inside = at.gram(), free[:, :, None] * free[:, None, :]
         rates = _rates(K, AffineForms(gram.v * inside, gram.r * inside), free, count)
     measured = unexplained_rows(system)
@@ -138,13 +143,14 @@ def _rates(K: AffineForms, gram: AffineForms, free: Array, count: int) -> list[t
     for k in range(freedoms):
         for side, sign in enumerate((-1.0, 1.0)):
             for width in RATE_WIDTHS:
-                sigma = about[:, k] + sign * width * np.maximum(1.0, np.abs(about[:, k]))
-                below = _negative(K - M * np.nan_to_num(sigma)[:, None, None])
-                proved = (below >= 0) & ((below - count <= k) if side == 0 else (below - count > k))
-                new = proved & np.isnan(bounds[side, :, k])
-                bounds[side, new, k] = sigma[new]
-                if not np.any(np.isnan(bounds[side, definite, k])):
+                left = np.flatnonzero(definite & np.isnan(bounds[side, :, k]) & np.isfinite(about[:, k]))
+                if not len(left):
                     break
+                sigma = about[left, k] + sign * width * np.maximum(1.0, np.abs(about[left, k]))
+                own, part = (AffineForms(each.v[:, left], each.r[left]) for each in (K, M))
+                below = _negative(own - part * sigma[:, None, None])
+                proved = (below >= 0) & ((below - count <= k) if side == 0 else (below - count > k))
+                bounds[side, left[proved], k] = sigma[proved]
     known = definite & np.isfinite(bounds).all(axis=(0, 2))
     return [tuple(zip(low, high, strict=True)) if good else () for good, low, high in
             zip(known, bounds[0].tolist(), bounds[1].tolist(), strict=True)]
@@ -192,25 +198,26 @@ def _negative(K: AffineForms) -> Array:
 
 
 def _free(system: RestSystem, q: Array, idle: int) -> Array:
-    """1 for coordinates (N,) that are solved for, 0 for as many as motions are idle, those that tell these apart best.
-    """
-    free = np.ones(len(q))
-    if idle:
+    """1 for coordinates (c, N) that are solved for, 0 for as many as motions are idle, those that tell these apart
+    best."""
+    free = np.ones(q.shape)
+    if idle and len(q):
         from scipy.linalg import qr
 
-        motions = idle_motions(system, q, idle)
-        _, _, order = qr(motions.T, mode="economic", pivoting=True)
-        free[order[:idle]] = 0.0
+        for k, motions in enumerate(idle_motions(system, q, idle)):
+            _, _, order = qr(motions.T, mode="economic", pivoting=True)
+            free[k, order[:idle]] = 0.0
     return free
 
 
 def idle_motions(system: RestSystem, q: Array, idle: int) -> Array:
-    """Motions of the loops (N, idle) along which E is flattest: those that are idle."""
-    at = RestEquations(system, list(q[None].T))
+    """Motions of the loops (c, N, idle) at configurations (c, N) along which E is flattest: those that are idle."""
+    at = RestEquations(system, list(q.T))
     tangents = Tangents.of(at.DG)
-    Z = tangents.Z[0]
-    values, vectors = np.linalg.eigh(Z.T @ at.bend(tangents.multipliers(at.slope))[0] @ Z)
-    return np.asarray(Z @ vectors[:, np.argsort(np.abs(values))[:idle]])
+    Z = tangents.Z
+    values, vectors = np.linalg.eigh(np.swapaxes(Z, 1, 2) @ at.bend(tangents.multipliers(at.slope)) @ Z)
+    order = np.argsort(np.abs(values), axis=1)[:, None, :idle]
+    return np.asarray(Z @ np.take_along_axis(vectors, order, axis=2))
 
 
 def unexplained_rows(system: RestSystem) -> tuple[str, ...]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...analysis.asked import configurations_at
 from ...analysis.aspects.leg_forms import LegPattern, pattern
@@ -41,6 +42,9 @@ from .enclosure import EnclosedPoint, enclosed
 from .error import RestSystem
 from .rests import CRITICAL, Endings, RestPoint, SignedModes, stability
 from .search import NEARBY, Critical, critical_points, descend, in_mode, walked
+
+MODE_TRIES = 4
+"""Walks from a rest that are tried to see its operation mode."""
 
 
 @question()
@@ -102,8 +106,10 @@ class RestSearch:
         """The rests that were found; ``minima`` and ``rounds`` as for :func:`.critical_points`, of minima alone neither
         lists nor enclosures; ``complete``: whether it is to be proved that they are all."""
         setting, motion = self.setting, self.setting.motion
-        found = critical_points(self.system, setting, self.goal, seed, minima=minima, rounds=rounds,
-                                further=None if minima or self.system.supposes else self._further(seed))
+        further = None if minima or self.system.supposes else self._further(seed)
+        found = critical_points(self.system, setting, self.goal, seed, minima=minima, rounds=rounds, further=further,
+                                fit=self._near_mode)
+        found = found if further is None else replace(found, unmet=further.poses.unmet)
         isolated = self._in_mode(found.isolated)
         covers = None
         if not minima and all(each.by_segment for each in setting.observed):
@@ -145,7 +151,7 @@ class RestSearch:
             return None
         seen = self.setting.samples.members[0].relation
         return Further(Lift(self.system, self.law.question.observations, told[0]), told[1],
-                       seen.mobility - seen.dimension)
+                       seen.mobility - seen.dimension, self._near_mode)
 
     def _lists(self, found: Sequence[Critical]) -> list[SignedModes]:
         """The lists of modes of those combinations of signs at which the error was found to vanish, that of the goal
@@ -174,10 +180,18 @@ class RestSearch:
 
     def _placed(self, q: Array) -> ClosedConfiguration | None:
         """The robot at coordinates (N,); None where its loops do not close."""
-        try:
-            return of_links(self.goal.twin, partial(self.system.system.pose, values=q.tolist()))
-        except LoopsNotClosed:
-            return None
+        key = q.tobytes()
+        if key not in self._known:
+            try:
+                self._known[key] = of_links(self.goal.twin, partial(self.system.system.pose, values=q.tolist()))
+            except LoopsNotClosed:
+                self._known[key] = None
+        return self._known[key]
+
+    @cached_property
+    def _known(self) -> dict[bytes, ClosedConfiguration | None]:
+        """What was asked of :meth:`_placed`."""
+        return {}
 
     def _reversed(self, at: ClosedConfiguration) -> tuple[str, ...]:
         """The legs whose direction is opposite to the desired one, as far as it is along it."""
@@ -281,9 +295,20 @@ class RestSearch:
 
     def _in_mode(self, found: Sequence[Critical]) -> list[Critical]:
         """Those near which configurations are of the operation mode of the zero configuration."""
-        q = np.array([each.point.q for each in found]).reshape(len(found), self.system.size[0])
-        nearby = walked(self.system, q, np.random.default_rng(0), 2, NEARBY) if found else q
-        return [each for each, good in zip(found, in_mode(self.system, self.setting, nearby), strict=True) if good]
+        if not found:
+            return []
+        good = self._near_mode(np.array([each.point.q for each in found]))
+        return [each for each, kept in zip(found, good, strict=True) if kept]
+
+    def _near_mode(self, q: Array) -> NDArray[np.bool_]:
+        """Near which of coordinates (c, N) configurations are of that mode."""
+        good, rng = np.zeros(len(q), dtype=bool), np.random.default_rng(0)
+        # what lies nearby may be nearly singular as well: then a little farther away
+        for number in range(MODE_TRIES):
+            if not good.all():
+                near = walked(self.system, q[~good], rng, 2, NEARBY * 2**number)
+                good[~good] = in_mode(self.system, self.setting, near)
+        return good
 
 
 def _ways(rests: Sequence[RestPoint], search: RestSearch) -> list[RestPoint]:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import islice
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,6 +64,25 @@ WIDEST_SLIDE = 2.5
 """Coordinate of a slide (characteristic lengths) up to which one is drawn."""
 NEARBY = 0.02
 """Step (characteristic lengths, radians) to a configuration that shows the operation mode in which a point lies."""
+
+
+class Equations(Protocol):
+    """Equations G (c, m) with derivatives DG (c, m, N), and E (c,) with its gradient (c, N)."""
+
+    G: Any
+    DG: Any
+    E: Any
+    slope: Any
+
+    def bend(self, multipliers: Any) -> Any:
+        """The Hessian (c, N, N) of E + μ · G."""
+
+
+class Critically(Protocol):
+    """Whose critical points are sought."""
+
+    def at(self, values: Sequence[Any]) -> Equations:
+        """Its equations at values (N,) of (c,) each."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -140,10 +159,10 @@ class Expansion:
         return np.sort(np.concatenate([values[:d], values[d:][np.abs(values[d:]) > CRITICAL_FLAT]]))
 
     @classmethod
-    def of(cls, system: RestSystem, q: Array, idle: int) -> Expansion:
+    def of(cls, system: Critically, q: Array, idle: int) -> Expansion:
         """That at q (c, N)."""
         with np.errstate(all="ignore"):
-            at = RestEquations(system, list(q.T))
+            at = system.at(list(q.T))
             tangents = Tangents.of(at.DG)
             p, mu = tangents.closing(at.G), tangents.multipliers(np.nan_to_num(at.slope))
             H = at.bend(mu)
@@ -198,9 +217,10 @@ def walked(system: RestSystem, q: Array, rng: np.random.Generator, steps: int, l
     return q
 
 
-def descend(system: RestSystem, q: Array, index: NDArray[np.intp], idle: int) -> list[CriticalPoint]:
-    """The critical points to which starts (c, N) lead, each sought as one of an index (c,)."""
-    if system.supposes:
+def descend(system: Critically, q: Array, index: NDArray[np.intp], idle: int) -> list[CriticalPoint]:
+    """The critical points to which starts (c, N) lead, each sought as one of an index (c,), or (−1) by Newton's method
+    whatever it is."""
+    if isinstance(system, RestSystem) and system.supposes:
         return settle(system, q, index, idle)
     found: list[CriticalPoint] = []
     for _ in range(ENDING_STEPS):
@@ -213,7 +233,7 @@ def descend(system: RestSystem, q: Array, index: NDArray[np.intp], idle: int) ->
         up = np.arange(at.curvatures.shape[-1]) < np.minimum(index, at.freedoms)[:, None]
         size = np.maximum(np.abs(at.curvatures), CRITICAL_FLAT)
         # near a critical point: Newton's method, whatever it is
-        near = (at.residual < 1e-3) & (np.abs(at.slope / size)[:, : at.freedoms].max(axis=-1) < 0.05)
+        near = (at.residual < 1e-3) & (np.abs(at.slope / size)[:, : at.freedoms].max(axis=-1) < 0.05) | (index < 0)
         sign = np.where(near[:, None], -np.sign(at.curvatures), np.where(up, 1.0, -1.0))
         sign[:, at.freedoms :] *= np.abs(at.curvatures[:, at.freedoms :]) > CRITICAL_FLAT
         step = _shortened(_times(at.directions, sign * at.slope / size), LONGEST_STEP)
@@ -271,7 +291,8 @@ class Critical(Value):
 class CriticalPoints(Value):
     """What a search found: isolated critical points, and of those that fill curves or surfaces one for each value of E
     and signs of the curvatures; how many ``starts`` there were, and how many of the isolated ones the last half of them
-    found first (``late``); how many only the search over the platform's pose found (``posed``)."""
+    found first (``late``); how many only the search over the platform's pose found (``posed``), and an estimate of how
+    many more there are at least that it did not meet (``unmet``, None where there was none)."""
 
     isolated: tuple[Critical, ...]
     continua: tuple[Critical, ...]
@@ -279,11 +300,13 @@ class CriticalPoints(Value):
     starts: int
     late: int
     posed: int = 0
+    unmet: int | None = None
 
     @property
     def words(self) -> str:
         """What was done, and how well it covers."""
         also = f", {self.posed} more over the platform's pose" if self.posed else ""
+        also += "" if self.unmet is None else f"; by how often poses were met, an estimated {self.unmet} were not"
         return (f"found from {self.starts:,} random starts, {self.late} of {len(self.isolated) - self.posed} "
                 f"configurations first in the second half of these{also}")
 
@@ -309,10 +332,12 @@ def starts(system: RestSystem, homes: Array, seed: int = 0, setting: ObservedRob
 
 def critical_points(system: RestSystem, setting: ObservedRobot, goal: ClosedConfiguration, seed: int = 0, *,
                     minima: bool = False, rounds: Iterable[Array] | None = None,
-                    further: Callable[[Array], Sequence[CriticalPoint]] | None = None) -> CriticalPoints:
+                    further: Callable[[Array], Sequence[CriticalPoint]] | None = None,
+                    fit: Callable[[Array], NDArray[np.bool_]] | None = None) -> CriticalPoints:
     """The critical points to which random walks from the samples and from random closings lead, in rounds, until the
     later half of the starts finds few new ones; ``minima``: only descent, which finds what attracts; ``rounds``: of
-    :func:`starts`, where they are known; ``further`` finds more of them, from configurations (n, N)."""
+    :func:`starts`, where they are known; ``further`` finds more of them, from configurations (n, N), beside those that
+    ``fit``."""
     seen = setting.samples.members[0].relation
     idle, freedoms = seen.mobility - seen.dimension, seen.dimension
     homes = np.array([system.system.read(at.pose) for at in (goal, *setting.configurations)])
@@ -336,6 +361,9 @@ def critical_points(system: RestSystem, setting: ObservedRobot, goal: ClosedConf
             break
     late, posed = sum(fresh[len(fresh) // 2 :]), 0
     if further is not None:
+        if fit is not None:
+            known.keep(fit)
+            late = min(late, known.count)
         pool = np.concatenate([*met, *(each.point.q[None] for each in known.isolated)])
         posed = known.add(further(pool))
     return CriticalPoints(known.isolated, tuple(known.families.values()), idle, ENDING_STARTS * len(fresh), late, posed)
@@ -384,6 +412,12 @@ class ToldApart:
             return len(outside(twin, of_links(twin, partial(self.system.system.pose, values=point.q.tolist())).q))
         except LoopsNotClosed:
             return len(twin.mechanism.joints)
+
+    def keep(self, fit: Callable[[Array], NDArray[np.bool_]]) -> None:
+        """Leave out the isolated ones whose coordinates (c, N) do not fit."""
+        for key, own in self.own.items():
+            kept = fit(np.array([point.q for _, point, _ in own])) if own else ()
+            self.own[key] = [each for each, good in zip(own, kept, strict=True) if good]
 
     @property
     def count(self) -> int:
