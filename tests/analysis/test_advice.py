@@ -19,6 +19,7 @@ from hrsynth.analysis.advice import Advice, advise, candidates
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.analysis.verdict import BLIND, CONTROLLABLE, PARTIAL
 from hrsynth.description import load
+from hrsynth.description.sights import listed
 from hrsynth.errors import BadRequest, HrsynthError
 from hrsynth.geometry.vectors import Array, unit
 from hrsynth.mechanism import Mechanism, Observation
@@ -345,3 +346,46 @@ def test_every_robot_with_one_leg_observed(robot: str, camera: str | None) -> No
         for _ in range(200):
             fewer = frozenset(names[k] for k in rng.choice(len(names), size, replace=False))
             assert oracle.lost(fewer) > 0
+
+
+# ---- prices
+
+
+def rank_of(robot: str, watched: list[str], see: list[str]) -> int:
+    return hrsynth.derive(robot, watched, "eye=base@0.3,0.1,0" if see else None, see=see or None).verdict.rank
+
+
+@pytest.mark.some(1)
+@pytest.mark.parametrize("price", ["leg=0.9,point=0.7,direction=9,encoder=9,line=9", "point=1.5,encoder=4,leg=2", ""])
+def test_no_set_that_sees_as_much_is_cheaper(price: str) -> None:
+    """Told sets see all and cost the same; of legs and points each cheaper set, asked by itself, sees less."""
+    places = ["0.1,0,0", "-0.1,0.1,0", "0,-0.1,0.1"]
+    offer = ",".join(f"point:platform@{place}" for place in places)
+    told = hrsynth.advise("gough_stewart", ["1"], "eye=base@0.3,0.1,0", offer=offer, price=price)
+    costs = {kind: float(number) for kind, _, number in (part.partition("=") for part in price.split(",") if part)}
+    assert told.cured
+    paid = {each.price for each in told.sets}
+    assert max(paid) - min(paid) < 1e-9
+    for each in told.sets[:3]:
+        words = [costs.get("point" if m.kind == "offered" else m.kind, 1.0) for m in each.measurements]
+        assert each.price == pytest.approx(sum(words))
+    for legs in range(3):
+        for points in range(len(places) + 1):
+            cost = legs * costs.get("leg", 1.0) + points * costs.get("point", 1.0)
+            if cost < min(paid) - 1e-9:
+                watched = [str(k) for k in range(1, 2 + legs)]
+                see = [f"point:platform@{place}" for place in places[:points]]
+                assert rank_of("gough_stewart", watched, see) < 6, (legs, points)
+
+
+@pytest.mark.parametrize(("price", "said"), [("thing=2", "kind of measurement"), ("point=0", "a positive number"),
+                                             ("point", "a positive number"), ("leg=nan", "a positive number")])
+def test_prices_that_are_none_are_refused(price: str, said: str) -> None:
+    with pytest.raises(BadRequest, match=said):
+        hrsynth.advise("delta", ["1"], price=price)
+
+
+def test_offers_are_parted_at_kinds_alone() -> None:
+    assert listed("point:arm/plate@0.1,0,0,eye=line:plate@1,2,3/0,0,1,inclination,distance:base") == [
+        "point:arm/plate@0.1,0,0", "eye=line:plate@1,2,3/0,0,1", "inclination:plate", "distance:base"]
+    assert listed("encoder") == ["encoder"]

@@ -10,13 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from ..description.sights import offers
-from ..errors import HrsynthError, RankUndecided
+from ..description.sights import listed, offers
+from ..errors import BadRequest, HrsynthError, RankUndecided
 from ..geometry import lines
 from ..geometry.ranks import kernel_basis, largest_angle, range_basis, singular_values
 from ..geometry.vectors import Array
 from ..kinematics.sampling import Samples
 from ..mechanism import Direction, Joint, JointType, Mechanism, Observation
+from ..mechanism.observations import kinds
 from ..mechanism.sensors import encoders, observation_of, observed_line
 from ..progress import tell
 from ..results import Result, Value
@@ -128,6 +129,8 @@ LARGEST_VALUE = 6
 """Rows of the largest measured value."""
 BATCH = 2000
 """Sets that are tried at once."""
+SAME_PRICE = 1e-9
+"""Relative difference below which two sums of prices are one."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -136,17 +139,19 @@ class Cure(Value):
 
     measurements: tuple[FurtherMeasurement, ...]
     verdict: Verdict
+    price: float
+    """Of all of them together; each is 1 where nothing else is said."""
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
         return {"measurements": [each.to_dict() for each in self.measurements], "verdict": self.verdict.verdict,
-                "rank": self.verdict.rank, "gap": self.verdict.gap}
+                "rank": self.verdict.rank, "gap": self.verdict.gap, "price": self.price}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Advice(Result, shown_as="advise"):
-    """What is missing. ``now`` is the verdict as it stands; ``sets`` are all the smallest sets of the best rank within
-    reach, empty where nothing is missing or nothing helps."""
+    """What is missing. ``now`` is the verdict as it stands; ``sets`` are all the cheapest sets of the best rank within
+    reach (the smallest ones, where all prices are alike), empty where nothing is missing or nothing helps."""
 
     setting: ObservedRobot
     now: Verdict
@@ -174,8 +179,8 @@ class Advice(Result, shown_as="advise"):
 
     @property
     def size(self) -> int:
-        """Measurements of each set."""
-        return len(self.sets[0].measurements) if self.sets else 0
+        """Measurements of the smallest set."""
+        return min((len(each.measurements) for each in self.sets), default=0)
 
     def headline(self) -> str:
         """The robot, its verdict and how many sets of how many measurements help."""
@@ -193,8 +198,9 @@ class Advice(Result, shown_as="advise"):
 
 @question()
 def advise(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
-           offer: SeeLike = None, most: int | None = None, seed: int = 0) -> Advice:
-    """The smallest sets of further measurements with which u̇ = 0 forces t = 0 (theory.md 6; MMT 5.3).
+           offer: SeeLike = None, price: str = "", most: int | None = None, seed: int = 0) -> Advice:
+    """The cheapest sets of further measurements with which u̇ = 0 forces t = 0 (theory.md 6; MMT 5.3): the smallest,
+    where ``price`` does not say, as ``encoder=0.5,point=3``, what one of a kind costs (default: 1).
 
     ``observe`` holds leg labels or link names (default: all legs), ``camera`` the link that carries the camera. Added
     can be the default segment of a further leg, the direction of any other link of a leg, the position of a line whose
@@ -208,30 +214,56 @@ def advise(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None
     """
     robot = as_robot(robot)
     length = (robot if isinstance(robot, Mechanism) else robot.robot).length
-    offered = [each for text in as_texts(offer) for each in offers(text, length)]
+    offered = [each for text in as_texts(offer) for one in listed(text) for each in offers(one, length)]
     setting = ObservedRobot.of(robot, observe, camera, see=see, offer=offered or None, seed=seed)
+    prices = _prices(price)
     now = verdict_of(setting, setting.labels, setting.samples)
     if now.verdict == CONTROLLABLE:
         return Advice(setting, now, (), 0, True)
     everything = candidates(setting, offered)
     samples = setting.measuring((*setting.observed, *(each.observation for each in everything)))
     search = Search(samples, len(setting.observed), everything)
-    chosen, complete = search.smallest()
+    costs = [prices.get(_kind(each), 1.0) for each in search.useful]
+    chosen, complete = search.cheapest(costs)
     tell("verification")
-    sets = _verified(setting, samples, [tuple(search.useful[i] for i in places) for places in chosen[:most]])
+    sets = _verified(setting, samples, [(tuple(search.useful[i] for i in places), sum(costs[i] for i in places))
+                                        for places in chosen[:most]])
     undecided = len(chosen[:most]) - len(sets)
     best = max((each.verdict.rank for each in sets), default=now.rank)
     kept = tuple(each for each in sets if each.verdict.rank == best)
     return Advice(setting, now, kept, search.tried, complete and not undecided, undecided)
 
 
-def _verified(setting: ObservedRobot, samples: Samples, sets: Sequence[tuple[FurtherMeasurement, ...]]) -> list[Cure]:
-    """Each set with its verdict at all samples; those whose rank has no clear gap are left out."""
+def _kind(measurement: FurtherMeasurement) -> str:
+    """The word by which a price is given."""
+    return measurement.observation.kind if measurement.kind == "offered" else measurement.kind
+
+
+def _prices(text: str) -> dict[str, float]:
+    """What one measurement of each kind costs; raises ``BadRequest``."""
+    allowed = sorted({"leg", "direction", "line", "encoder", *kinds()})
+    found: dict[str, float] = {}
+    for part in filter(None, text.split(",")):
+        kind, _, number = part.partition("=")
+        if kind not in allowed:
+            raise BadRequest("--price: kind of measurement", kind, ", ".join(allowed))
+        try:
+            found[kind] = float(number)
+        except ValueError:
+            found[kind] = np.nan
+        if not 0 < found[kind] < np.inf:
+            raise BadRequest(f"--price of {kind}", number, "a positive number, as point=3")
+    return found
+
+
+def _verified(setting: ObservedRobot, samples: Samples,
+              sets: Sequence[tuple[tuple[FurtherMeasurement, ...], float]]) -> list[Cure]:
+    """Each set with its price and its verdict at all samples; those whose rank has no clear gap are left out."""
     found: list[Cure] = []
-    for added in sets:
+    for added, price in sets:
         watched = (*setting.observed, *(each.observation for each in added))
         try:
-            found.append(Cure(added, verdict_of(setting, setting.labels, restricted(samples, watched))))
+            found.append(Cure(added, verdict_of(setting, setting.labels, restricted(samples, watched)), price))
         except RankUndecided:
             continue
     return found
@@ -273,29 +305,34 @@ class Search:
             found.append(_ranks(both) - _ranks(seen))
         return np.min(found, axis=0)
 
-    def smallest(self) -> tuple[list[tuple[int, ...]], bool]:
-        """All smallest sets that lose as little as all candidates together, and whether all sets up to their size were
-        tried; within the budget the best there are."""
-        count = len(self.useful)
+    def cheapest(self, costs: Sequence[float]) -> tuple[list[tuple[int, ...]], bool]:
+        """All cheapest sets that lose as little as all candidates together, and whether all sets that could cost less
+        were tried; within the budget the best there are. ``costs`` of single candidates are positive."""
+        count, prices = len(self.useful), np.array(costs)
         if not count:
             return [], True
         least, now = (int(self.lost([places])[0]) for places in (range(count), ()))
         if least == now:
             return [], True
-        best, chosen, complete = np.inf, list[tuple[int, ...]](), True
-        for size in range(1, min(count, LARGEST_SIZE) + 1):
+        best, lowest, chosen, complete = np.inf, np.inf, list[tuple[int, ...]](), True
+        for size in range(1, count + 1):
+            if best == least and np.sort(prices)[:size].sum() > lowest * (1 + SAME_PRICE):
+                return chosen, complete
+            if size > LARGEST_SIZE:
+                break
             complete = complete and comb(count, size) <= LARGEST_COUNT
             sets = islice(combinations(range(count), size), LARGEST_COUNT)
             while batch := list(islice(sets, BATCH)):
                 tell(f"sets of {size}")
                 self.tried += len(batch)
-                left = self.lost(batch)
-                if left.min() < best:
-                    best, chosen = int(left.min()), []
-                if best == left.min() and (not chosen or len(chosen[0]) == size):
-                    chosen += [each for each, rest in zip(batch, left, strict=True) if rest == best]
-            if best == least:
-                return chosen, complete
+                for each, rest, cost in zip(batch, self.lost(batch), prices[np.array(batch)].sum(axis=1), strict=True):
+                    same = rest == best and abs(cost - lowest) <= SAME_PRICE * lowest
+                    if not same and (rest, cost) < (best, lowest):
+                        best, lowest, chosen = int(rest), float(cost), []
+                    if same or not chosen:
+                        chosen.append(each)
+        else:
+            return chosen, complete
         return chosen, False
 
 

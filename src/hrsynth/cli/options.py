@@ -118,8 +118,8 @@ SEE = Option("see", "What else is observed: circle, depth, direction, distance, 
              "needs them (world: the base; of an encoder the joint); again for more.",
              "[CAMERA=]KIND:LINK@x,y,z/dx,dy,dz/radius", list[str], group=WATCHING)
 OFFER = Option("offer", "What could be seen besides, in the words of --see; without a place, as point:plate, several "
-               "places of that link; again for more.", "[CAMERA=]KIND:LINK[@x,y,z/dx,dy,dz/radius]", list[str],
-               group=WATCHING)
+               "places of that link; more after commas, or again.", "[CAMERA=]KIND:LINK[@x,y,z/dx,dy,dz/radius]",
+               list[str], group=WATCHING)
 SEED = Option("seed", "Seed of the random configurations.", "NUMBER", int, 0, low=0)
 SOURCE = (
     Option("robot", "A robot file in any dialect, a shipped robot's name, or example:NAME.", "ROBOT", default=NEEDED,

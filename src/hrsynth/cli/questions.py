@@ -207,9 +207,13 @@ QUESTIONS = (
              ("quattro --observe 1,4", "quattro --observe 1,4 --plane z=-0.7,phi=0 -o locus.png",
               f"gough_stewart {POINTS}")),
     Question("advise", "What is missing: the smallest sets of further measurements that make a robot controllable.",
-             (*WATCHED, SEE, OFFER), ("uranesx", "quattro --observe 1", "quattro --observe 1 --offer point:platform",
-                                      "gough_stewart --camera eye=base@0.3,0.1,0 --see point:platform@0.1,0,0 "
-                                      "--offer point:platform")),
+             (*WATCHED, SEE, OFFER,
+              Option("price", "What a measurement of a kind costs, as encoder=0.5,point=3 (default: 1 each): the "
+                     "cheapest sets are sought; of leg, direction, line, encoder and what is offered.",
+                     "KIND=NUMBER", default="")),
+             ("uranesx", "quattro --observe 1", "quattro --observe 1 --offer point:platform,inclination",
+              "uranesx --offer point:platform --price point=3",
+              "gough_stewart --camera eye=base@0.3,0.1,0 --see point:platform@0.1,0,0 --offer point:platform")),
     Question("branch", "Where the joints are proved to be one function of the motors, on the branch of the zero "
              "configuration, and what ends that.",
              (BOX,

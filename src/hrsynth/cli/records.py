@@ -465,12 +465,13 @@ class FurtherRecord(TypedDict):
 
 
 class CureRecord(TypedDict):
-    """A smallest set of further measurements, and what is seen with it."""
+    """A cheapest set of further measurements, and what is seen with it; a measurement costs 1 if no price is given."""
 
     measurements: list[FurtherRecord]
     verdict: Word
     rank: int
     gap: Gap
+    price: float
 
 
 class Advise(OfRobot):

@@ -140,6 +140,16 @@ def parse_see(text: str, cameras: Sequence[str]) -> SightSpec:
     return found
 
 
+def listed(text: str) -> list[str]:
+    """The words of an ``--offer`` with commas between them, as point:platform,inclination: a kind alone is of the link
+    before it; commas between numbers part nothing."""
+    found: list[str] = []
+    for part in re.split(rf",(?=(?:[^,:=@/]+=)?(?:{'|'.join(kinds())})(?:[:,]|$))", text):
+        link = re.sub("/[^/]*,[^/]*$", "", found[-1].partition(":")[2].partition("@")[0]) if found else ""
+        found.append(part if ":" in part or not link else f"{part}:{link}")
+    return found
+
+
 def offers(text: str, length: float) -> list[str]:
     """The words of ``--see`` that are offered by one of ``--offer``: itself, or where it names a link and no place on
     it, several places, for a characteristic ``length`` (m); raises ``BadRequest``."""

@@ -218,6 +218,8 @@ def _missing(found: Advice) -> list[str]:
     best = found.sets[0].verdict
     gap = min(each.verdict.gap for each in found.sets)
     what = "one more measurement" if found.size == 1 else f"{found.size} more measurements"
+    if any(each.price != len(each.measurements) for each in found.sets):
+        what = f"further measurements at a price of {found.sets[0].price:g}"
     ways = "one way" if len(found.sets) == 1 else f"{len(found.sets)} ways"
     lines = [f"{best.verdict.capitalize()} (rank {best.rank} of {best.dof}) with {what}, {ways}, smallest rank gap "
              f"{gap:.1e} (needed {RANK_GAP:.0e}):",
