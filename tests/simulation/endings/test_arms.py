@@ -9,9 +9,11 @@ import pytest
 from scipy.optimize import least_squares
 
 import hrsynth
+from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.geometry.vectors import Array, pose
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.simulation.endings.rests import Endings
+from hrsynth.simulation.endings.search import told_by
 from oracle import exponential
 
 SQUARE = np.array([[0.4, 0, 0], [0.55, 0, 0], [0.55, 0.15, 0], [0.4, 0.15, 0]])
@@ -76,8 +78,8 @@ class Arm:
         return np.asarray(told.x) if told.cost < 1e-18 else near * np.nan
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["panda", pytest.param("ur5_robot", marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("name", ARMS)
 def test_rests_of_an_arm_are_rests_and_descents_meet_no_other_that_attracts(name: str) -> None:
     """The gradient by differences vanishes at each that is told. Descents from random joint angles with all points in
     view, 40 of which end in view, end where a rest that attracts is told; one of them is a singularity of an arm with
@@ -108,7 +110,18 @@ def test_rests_of_an_arm_are_rests_and_descents_meet_no_other_that_attracts(name
         assert min(float(np.abs(X - each).max()) for each in poses) < 1e-5
 
 
-@pytest.mark.slow
+def test_what_moves_though_the_hand_rests_parts_nothing() -> None:
+    """The elbow of an arm with seven joints, not of one with six."""
+    for name, free in (("panda", True), ("ur5_robot", False)):
+        hand, points, _ = ARMS[name]
+        see = ["point:world@" + ",".join(map(str, point)) for point in points]
+        setting = ObservedRobot.of(f"example:{name}", camera=f"hand={hand}", see=see)
+        told = {o.leg for o in told_by(setting)}
+        assert told >= set(setting.labels)
+        assert (told == {o.leg for o in setting.everything.question.observations}) is not free
+
+
+@pytest.mark.long
 def test_free_joints_do_not_part_a_rest() -> None:
     """An arm of seven joints holds its hand in infinitely many ways: that is one rest, shown within the limits of all
     joints."""
