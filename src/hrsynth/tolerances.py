@@ -292,6 +292,8 @@ CRITICAL = 1e-11
 """Gradient of the error along the loops, and loops' residual, at which a critical point is found."""
 ERROR_ROUNDING = 1e-14
 """½ ‖e‖² below which it is rounding."""
+SAME_PRICE = 1e-9
+"""Relative difference below which two sums of prices are one."""
 SAME_ENDING = 1e-5
 """Difference (characteristic lengths, components of unit vectors) below which two critical points are one; curvature
 below which one may not be isolated."""

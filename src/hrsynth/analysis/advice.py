@@ -21,7 +21,7 @@ from ..mechanism.observations import kinds
 from ..mechanism.sensors import encoders, observation_of, observed_line
 from ..progress import tell
 from ..results import Result, Value
-from ..tolerances import RANK_CUTOFF, SAME_RELATION
+from ..tolerances import RANK_CUTOFF, SAME_PRICE, SAME_RELATION
 from .observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike, as_robot, as_texts, restricted
 from .question import question
 from .verdict import CONTROLLABLE, Verdict, verdict_of
@@ -129,8 +129,6 @@ LARGEST_VALUE = 6
 """Rows of the largest measured value."""
 BATCH = 2000
 """Sets that are tried at once."""
-SAME_PRICE = 1e-9
-"""Relative difference below which two sums of prices are one."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
