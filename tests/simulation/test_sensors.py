@@ -89,6 +89,7 @@ def test_a_depth_that_is_only_supposed_bends_the_way_and_may_make_the_goal_repel
     assert found.ended == "goal"
     assert wrong.ended == "local minimum"
     assert wrong.to_dict()["depth"] == "constant:0.8"
+    assert [", depth: " in str(each) for each in (exact, found, wrong)] == [False, True, True]
     halfway = [np.array([np.interp(0.8, each.run.times, each.way[:, i]) for i in range(3)]) for each in (exact, found)]
     assert np.linalg.norm(halfway[0] - halfway[1]) > 1e-6
     for run, repels in ((exact, False), (found, False), (wrong, True)):

@@ -37,6 +37,7 @@ def servo(found: Servo) -> str:
     run, track, off = found.run, found.track, found.from_goal
     rows = [*head(found.setting), ("from", str(found.start)), ("to", str(found.goal)),
             ("controller", f"gain {found.gain:g} per second, sensed: {found.sense}"
+                           + ("" if found.depth == "exact" else f", depth: {found.depth}")
                            + ("" if found.noise is None else f", noise {found.noise}")),
             *GAP, ("ended", [f"{found.ended} after {run.times[-1]:.3g} s", found.ending.reason]),
             ("at", str(found.pose))]
