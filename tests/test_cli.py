@@ -100,6 +100,7 @@ def check_record(data: dict, command: str, robot: str | None) -> None:
 # ---- derive
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize(("name", "observe", "verdict"), [
     ("quattro_rigid", "1,4", "controllable"), ("3prp", "all", "partially controllable"),
     ("3ppr_m1", "all", "uncontrollable"), ("prrrp_parallel", "all", "partially controllable")])
@@ -132,6 +133,7 @@ def test_derive_text_has_the_hidden_robot_and_the_verdict(run):
     assert answer.err == ""
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize(("name", "legs"), [("delta", "all"), ("quattro", "1,4"), ("3rrr_m1", "all")])
 def test_the_written_file_is_a_robot_again(run, tmp_path: Path, name: str, legs: str):
     hidden, again, copy = (tmp_path / f"{each}.urdf" for each in ("hidden", "again", "copy"))
@@ -282,6 +284,7 @@ def test_check_writes_a_picture_or_a_table(run, tmp_path: Path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["map.csv", "map.png"]
 
 
+@pytest.mark.some(6)
 @pytest.mark.parametrize(("arguments", "status", "words"), [
     (["--at", "x=abc"], 2, ["x is not a number", "'abc'"]), (["--at", "w=1"], 2, ["unknown part", "x, y, z, phi, rpy"]),
     (["--at", ""], 2, ["name=value"]), (["--at", "phi=1deg"], 2, ["cannot change phi", "allowed: x, y, z"]),
@@ -451,6 +454,7 @@ def test_singular_draws_the_locus(run, tmp_path: Path):
     assert list(tmp_path.iterdir()) == [picture]
 
 
+@pytest.mark.some(3)
 @pytest.mark.parametrize(("robot", "arguments", "status", "words"), [
     ("delta", ["-o", "x.txt"], 2, ["unknown extension", "'x.txt'", ".png"]),
     ("delta", ["--plane", "z=-0.6"], 2, ["--output"]),
@@ -499,6 +503,7 @@ def test_path_json_is_the_contract_whatever_the_verdict(run, arguments: list[str
         assert data["margin"] is None
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("name", ["delta", "linear_delta", "quattro_rigid", "rrrrr_m1"])
 def test_path_of_too_few_legs_is_undecided(run, name: str):
     data = run("path", name, "--observe", "1", "--start", "x=0.01", "--goal", "x=0.02", "--json").data
@@ -619,7 +624,7 @@ def test_servo_refuses_what_does_not_fit(run, arguments: list[str], words: list[
     assert all(word in line for word in words)
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(1)
 @pytest.mark.parametrize("arguments", [
     ["derive", "--at", "x=9"], ["legs", "--at", "x=9"], ["check", "--at", "x=9"], ["check", "--grid", "x=8:9:2"],
     ["modes", "--at", "x=9"], ["path", "--start", "x=0", "--goal", "x=9"], ["path", "--start", "x=9", "--goal", "x=0"],

@@ -49,6 +49,7 @@ def test_files_and_text(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> N
     assert [line.endswith(",,") for line in lines[1:]] == [True, False, False, False, True]
 
 
+@pytest.mark.some(4)
 @pytest.mark.parametrize(("arguments", "status", "word"), [
     (("--cone", "90deg"), 2, "less than 90deg"), (("--cone", "0"), 2, "more than 0"),
     (("--cone", "1e-300deg"), 2, "at least 1e-15"),

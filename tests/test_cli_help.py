@@ -236,6 +236,7 @@ def test_a_shell_completes_with_its_script(capsys, tmp_path: Path, shell: str):
     assert done.stdout.split() == ["quattro", "quattro_rigid"], done.stderr
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize(("more", "coloured"), [({}, True), ({"NO_COLOR": "1"}, False), ({"TERM": "dumb"}, False)])
 def test_colour_is_for_terminals_whose_user_wants_it(more: dict[str, str], coloured: bool):
     plain = subprocess.run([sys.executable, "-m", "hrsynth", "legs", "3rrr_m1"], capture_output=True, text=True)

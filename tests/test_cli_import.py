@@ -95,6 +95,7 @@ def test_a_dialog_closes_a_loop_and_its_command_writes_the_same_bytes(tmp_path: 
     assert (tmp_path / "closed.urdf").read_bytes() == written
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize(("answers", "status"), [(["", "^C"], 130), (["", "^D"], 2), pytest.param(
     ["", "", "", "", "no"], 0, marks=pytest.mark.slow)])
 def test_giving_up_writes_nothing(answers: list[str], status: int, tmp_path: Path):

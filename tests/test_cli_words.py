@@ -36,7 +36,7 @@ ASKED = [("check quattro --observe 1,4 --at x=0.02,{}", 1), ("modes 3rrr_m1 --at
          ("accuracy 3rrr_m1 --cone 0.1deg --at x=0.01,{}", 1), ("select 3rrr_m1 --start {} --goal x=0.02 --runs 0", 2)]
 
 
-@pytest.mark.some(3)
+@pytest.mark.some(1)
 @pytest.mark.parametrize(("command", "least"), ASKED, ids=lambda each: str(each).partition(" ")[0])
 @pytest.mark.parametrize(("typed", "said"), [("phi=5deg", rf"phi={NUMBER}deg"), ("phi=0.1", rf"phi={NUMBER}(?!\S*deg)"),
                                              ("rpy=0/0/5deg", rf"rpy={NUMBER}deg/{NUMBER}deg/{NUMBER}deg")])
@@ -100,7 +100,7 @@ def test_axes_have_one_sense():
         assert [oriented(v)[np.argmax(np.abs(v) > 0.5)] > 0 for v in (a, b, -a, -b)] == [True] * 4
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(1)
 @pytest.mark.parametrize("name", ["quattro", "3prp", "uranesx", "3puu", "gough_stewart", "delta", "3rrr_m1"])
 def test_printed_axes_have_that_sense(printed, name: str):
     text = printed(f"legs {name}")
@@ -147,6 +147,7 @@ def test_a_grid_says_what_it_held(printed, robot: str, grid: str, lines: list[st
     assert rows == lines
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("command", ["legs quattro", "legs example:panda", "advise example:panda",
                                      "advise quattro --observe 1 --offer point:platform"])
 def test_tables_and_lists_are_not_wider_than_a_hundred_columns(printed, command: str):

@@ -138,6 +138,7 @@ def test_every_folder_has_its_place():
     )
 
 
+@pytest.mark.slow
 def test_data_walks_one_way():
     complaints = []
     for path, line, parts in own_imports():
@@ -293,6 +294,7 @@ def asserts(node: ast.AST) -> bool:
     return of_pytest or bool(re.search("check|assert|law", name.split(".")[-1]))
 
 
+@pytest.mark.some(65)
 @pytest.mark.parametrize("path", TESTS, ids=lambda path: str(path.relative_to(ROOT)))
 def test_every_test_asserts_something(path: Path):
     complaints = [

@@ -189,6 +189,7 @@ KNOWN: dict[str, tuple[Callable[[], Mechanism], int, int]] = {
 }
 
 
+@pytest.mark.some(8)
 @pytest.mark.parametrize("name", KNOWN)
 def test_known_mobilities_last_along_a_walk(name: str) -> None:
     make, mobility, moving = KNOWN[name]

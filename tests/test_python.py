@@ -19,7 +19,7 @@ FUNCTIONS = sorted({*hrsynth.__all__} - {"__version__", "catalog"})
 SLOW = {"atlas", "draw", "select"}
 
 
-@pytest.mark.some(4)
+@pytest.mark.some(2)
 @pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.slow) if name in SLOW else name
                                   for name in FUNCTIONS])
 def test_help_has_an_example_that_works(name: str):

@@ -38,7 +38,7 @@ def test_the_table_has_every_shipped_robot_in_order():
     assert list(lines()) == list(shipped())
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(1)
 @pytest.mark.parametrize("name", ["3prp", "3ppr_m1", "prrrp_parallel", "delta", "3upu"])
 def test_some_rows_are_fresh(name: str):
     assert lines()[name] == readme.row(name), "the page is stale: make readme"
@@ -49,6 +49,7 @@ def test_the_table_is_fresh():
     assert readme.block(ROBOTS) == readme.table(), "the page is stale: make readme"
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("replay", [SIMULATED[0], SIMULATED[5]], ids=lambda each: each.source)
 def test_some_replays_are_fresh(replay):
     assert replays.row(replay) in readme.block(PAPERS, replays.START).splitlines(), "the page is stale: make readme"
@@ -94,7 +95,7 @@ def test_the_python_example_runs_and_prints_what_it_says():
     assert output.getvalue().splitlines() == said
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(1)
 @pytest.mark.parametrize("command", [pytest.param(each, marks=[pytest.mark.slow] * each.startswith("basins"))
                                      for each in dict.fromkeys(re.findall(r"\$ hrsynth (\w.*)", SHOWN))])
 def test_the_commands_print_what_is_shown(command: str, capsys: pytest.CaptureFixture[str], tmp_path: Path,

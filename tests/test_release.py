@@ -69,6 +69,7 @@ def without(packages: str, *arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([sys.executable, "-c", code, *arguments], capture_output=True, text=True, check=False)
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize(("packages", "extra", "arguments"), [
     ("matplotlib", "plots", ["modes", "3rrr_m1", "-o", "modes.png"]),
     ("matplotlib", "plots", ["derive", "3rrr_m1", "--report", "report.html"]),

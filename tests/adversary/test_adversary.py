@@ -45,6 +45,7 @@ def test_jacobians_are_those_of_differences(tmp_path):
         assert np.allclose((ahead - back) / (2 * h), np.einsum("nri,ni->nr", J, d), atol=1e-8), kind
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize(("name", "real"), [("3rrr_m1", False), ("3rrr_m1", True), ("rrrrr_m1", True)])
 def test_a_mode_dropped_from_a_list_is_found(name, real):
     case = shipped(name)

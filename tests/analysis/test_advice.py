@@ -162,6 +162,7 @@ def test_parallel_rails_need_one_rail_or_one_line(robot: str) -> None:
     assert all(m.actuated for each in answer.sets for m in each.measurements if m.kind == "encoder")
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize(("robot", "size"), [("3prp", 2), ("3rrp", 2), ("3ppr_m2", 3)])
 def test_blind_planar_robots(robot: str, size: int) -> None:
     """Directions that all turn as one (or not at all) leave two (three) freedoms: as many encoders or lines."""
@@ -227,6 +228,7 @@ def test_the_record(robot: str) -> None:
             assert isinstance(m["actuated"], bool) if m["kind"] == "encoder" else m["link"]
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("robot", ["uranesx", "3rrp", "i4l"])
 def test_where_the_robot_stands_and_the_seed_do_not_matter(robot: str) -> None:
     rng = np.random.default_rng(4)

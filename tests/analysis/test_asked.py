@@ -46,6 +46,7 @@ def test_every_command_takes_a_mode():
     assert (run.ending.name, run.ending.matched) == ("mode", 2)
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize(("name", "watched"), [("3rrr_m1", None), ("gough_stewart", "1,3,5"), ("quattro", "1,4")])
 def test_a_robot_is_observed_from_a_mode_on(name: str, watched: str | None):
     """The mode is its zero configuration: what ``derive`` and ``legs`` say holds about there, in the file's numbers."""

@@ -138,7 +138,7 @@ def test_surplus_rows_stay_where_the_loss_stays() -> None:
     assert surplus((), usual) == ()
 
 
-@pytest.mark.some(5)
+@pytest.mark.some(3)
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_shipped_robots_are_regular_at_zero(robot: str) -> None:
     answer = at_zero(robot)

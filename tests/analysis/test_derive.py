@@ -137,7 +137,7 @@ def test_every_robot_is_expected() -> None:
     assert set(EXPECTED) == set(ROBOTS)
 
 
-@pytest.mark.some(5)
+@pytest.mark.some(3)
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_all_legs_observed(robot: str) -> None:
     derivation, expected = derived(robot), EXPECTED[robot]
@@ -194,7 +194,7 @@ def name(case: object) -> str:
     return "".join(case) if isinstance(case, tuple) else str(case)
 
 
-@pytest.mark.some(6)
+@pytest.mark.some(2)
 @pytest.mark.parametrize(("robot", "legs"), SUBSETS, ids=name)
 def test_every_set_of_legs_is_certified(robot: str, legs: tuple[str, ...]) -> None:
     derivation = derived(robot, legs)
@@ -230,6 +230,7 @@ def test_pairs_and_triples_of_a_pod_are_certified(robot: str, legs: tuple[str, .
     assert hidden.ascii.startswith("2-U*PS")
 
 
+@pytest.mark.some(3)
 @pytest.mark.parametrize(("robot", "legs", "hidden"), [
     ("gough_stewart", ("1", "2", "3"), "3-U*PS"),
     ("gough_stewart", ("2", "4", "6"), "3-U*PS"),
@@ -294,6 +295,7 @@ def test_two_legs_of_3upu_need_the_third() -> None:
     assert all("refused" in step.reason for step in refused)
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("seed", [0, 3])
 def test_unobserved_legs_near_a_fold(seed: int) -> None:
     """A sample at which the robot cannot follow itself, for want of the directions of the other legs, is no sample."""
@@ -314,7 +316,7 @@ def test_nothing_is_answered_without_a_certificate(monkeypatch: pytest.MonkeyPat
 
 # --- other segments, other cameras, other forms ------------------------------------------------------------------
 
-@pytest.mark.some(2)
+@pytest.mark.some(1)
 @pytest.mark.parametrize(("robot", "observe", "camera"), [
     ("gough_stewart", ("1", "2", "3"), "platform"),
     ("delta", None, "platform"),
@@ -331,7 +333,7 @@ def test_a_camera_on_any_link(robot: str, observe: tuple[str, ...] | None, camer
     assert derivation.to_dict()["camera"] == camera
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(1)
 @pytest.mark.parametrize(("robot", "observe"), [
     ("delta", ("arm_1", "rod_2a")), ("delta", ("rod_1b", "2")), ("delta", ("arm_1", "arm_2", "arm_3")),
     ("quattro", ("rod_1a", "rod_1b", "4")), ("3rrr_m1", ("1", "2", "3")), ("delta", ("arm_1", "rod_1a", "2"))])
@@ -344,7 +346,7 @@ def test_other_segments(robot: str, observe: tuple[str, ...]) -> None:
     assert len(links) == len(observe)
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(1)
 @pytest.mark.parametrize("observe", ["link_2_1,link_2_2", "link_2_2,link_2_1", "link_1_1,link_1_2,link_2_1,3"])
 @pytest.mark.parametrize("form", ["simplified", "general"])
 def test_two_links_that_a_slide_joins_are_both_watched(observe: str, form: str) -> None:
@@ -364,6 +366,7 @@ def test_encoders_made_visible() -> None:
     assert derivation.hidden_architecture.ascii == "3-R*-{2-SS}"
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize(("robot", "hidden"), [
     ("delta", "3-{R-PP}-{2-U*S}"), ("3rrr_m1", "3-{R-PP}-R*R"), ("quattro", "4-{R-PP}-{2-U*S}"), ("3upu", "3-U*PU"),
     ("orthoglide", "3-P-{2-U*S}")])
@@ -438,6 +441,7 @@ def test_the_record() -> None:
     assert {step["rule"] for step in record["steps"]} >= {"motors off", "lift", "takeover", "leg removal", "keep"}
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize(("form", "expected"), [("general", "{R-PP}-R*RR*-{R-PP}"), ("simplified", "PiR*RR*Pi")])
 def test_a_second_attempt_keeps_to_the_form_that_was_asked_for(monkeypatch: pytest.MonkeyPatch, form: str,
                                                                expected: str) -> None:

@@ -61,7 +61,7 @@ def checked(verdict: ExactVerdict) -> None:
     assert verdict.instances == (1 if verdict.rank == verdict.dof else INSTANCES)
 
 
-@pytest.mark.some(5)
+@pytest.mark.some(2)
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_exact_ranks_are_the_numerical_ones(robot: str) -> None:
     """Every shipped robot, every set of legs."""
@@ -257,6 +257,7 @@ def test_many_random_robots(mechanism: Mechanism) -> None:
     check_agreement(mechanism)
 
 
+@pytest.mark.some(3)
 @pytest.mark.parametrize(("robot", "observe", "camera"), [
     ("delta", ("arm_1", "rod_2b"), None), ("delta", None, "platform"), ("gough_stewart", ("1", "2", "3"), "platform"),
     ("quattro", ("arm_2", "rod_3b"), None), ("3rrr_m1", None, "platform"), ("delta", ("1", "2"), "rod_3a")])
@@ -390,6 +391,7 @@ def test_a_robot_may_see_less_than_its_architecture() -> None:
     assert "this robot 5" in line
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize(("robot", "observe", "verdict", "words"), [
     ("3rrr_m1", None, CONTROLLABLE, "controllable, proved in exact arithmetic"),
     ("quattro_rigid", None, CONTROLLABLE,

@@ -92,7 +92,7 @@ def complete(bodies: str, n: int) -> Derivation:
     return derive(drawn(n, bodies, list(permutations(range(1, n + 1), 2)), seed=n)[0])
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(1)
 @pytest.mark.parametrize("n", [3, pytest.param(4, marks=pytest.mark.slow), pytest.param(5, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("bodies", sorted(MOVES))
 def test_generic_ranks_of_complete_formations_are_those_of_the_literature(bodies: str, n: int):
@@ -112,6 +112,7 @@ def test_generic_ranks_of_complete_formations_are_those_of_the_literature(bodies
     assert (found.exact.verdict, found.exact.rank, found.exact.trivial) == ("rigid", found.verdict.rank, trivial)
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize(("bodies", "names"), [
     pytest.param("position", ["translation along x", "translation along y", "translation along z", "scale"],
                  marks=pytest.mark.slow),
@@ -190,6 +191,7 @@ def test_random_graphs_agree_with_the_matrix():
         assert found.exact.trivial == len(formed.trivial)
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize(("bearings", "distances", "compass", "trivial", "flexes"), [
     (list(permutations((1, 2, 3), 2)), [(1, 2)], True, 4, 0),  # a distance fixes the scale, a direction leaves one turn
     ([(1, 2), (1, 3), (2, 1), (2, 3)], [], False, 7, 3),  # the attitude of a body that is only seen
@@ -249,6 +251,7 @@ def test_the_search_for_the_smallest_sets_is_that_of_all_sets(seed: int):
     assert _smallest(labels, rank_of) == ([each for each in sets if len(each) == len(sets[0])], True)
 
 
+@pytest.mark.slow
 def test_ten_observations_that_are_all_needed_are_told_without_all_their_sets(page: str):
     found = legs(native.parse(page))
     labels = tuple(each.leg for each in found.setting.observed)
@@ -295,6 +298,7 @@ def test_a_formation_on_one_line_is_singular_and_told_so():
     assert sum(flex.count for flex in posture.formation.flexes) == lost
 
 
+@pytest.mark.some(4)
 @pytest.mark.parametrize("ending", ["urdf", "xml", "sdf", "usda"])
 @pytest.mark.parametrize("bodies", ["free", "yaw", "position"])
 def test_round_trips(tmp_path, ending: str, bodies: str):
@@ -312,6 +316,7 @@ def test_round_trips(tmp_path, ending: str, bodies: str):
         assert np.allclose(made.links[link].pose, back.links[link].pose, atol=1e-9)
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("bodies", ["free", "position"])
 def test_the_hidden_robot_of_a_ring_is_read_again(tmp_path, bodies: str):
     """What its file says stands on the ground: it is a robot with the first body as its platform."""

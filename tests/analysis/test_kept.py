@@ -42,6 +42,7 @@ def one_of(mechanism: Mechanism, relations: Relations, seed: int = 0) -> Instanc
     return instance(mechanism, relations, directions, draw(relations, random.Random(seed)))
 
 
+@pytest.mark.some(17)
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_all_relations_of_shipped_robots_are_derived(robot: str) -> None:
     generic = architecture(setting_of(robot))
@@ -115,6 +116,7 @@ def test_what_is_carried_is_kept(seed: int) -> None:
         assert all(keeps for keeps, holds in zip(answers, known, strict=True) if holds)
 
 
+@pytest.mark.some(11)
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_the_degree_of_identities_is_bounded(robot: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Numbers of k more bits make motions of at most degree · k more: the bound is none that is too low."""
@@ -181,6 +183,7 @@ def test_robots_without_axes_or_without_centres() -> None:
         assert all(carried_by_joints(robot, relations, every))
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("robot", ["3upu", "delta", "quattro", "3rps", "hexaglide"])
 def test_the_seed_of_the_samples_does_not_matter(robot: str) -> None:
     settings = [ObservedRobot.of(load(robot), samples=4, seed=seed) for seed in (0, 1, 2)]
@@ -208,6 +211,7 @@ def pod(request: pytest.FixtureRequest) -> ObservedRobot:
     return ObservedRobot.of(built(parse(POD), request.param))
 
 
+@pytest.mark.some(1)
 def test_a_mixture_of_operation_modes_proves_nothing(pod: ObservedRobot) -> None:
     generic = architecture(pod)
     verdict = generic.verdict(pod.segments[1:3])

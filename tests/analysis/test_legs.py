@@ -29,7 +29,7 @@ def table(robot: str) -> dict[tuple[str, ...], Verdict]:
     return {each.legs: each for each in found(robot).sets}
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(1)
 @pytest.mark.parametrize("robot", ["quattro", "quattro_rigid", "delta", "orthoglide", "gough_stewart", "3rrr_m1", "i4l",
                                    "hexaglide", "3ppr_m1", "prrrp_parallel_point", "3upu"])
 def test_all_sets_obey(robot: str) -> None:
@@ -172,6 +172,7 @@ def test_progress_and_record() -> None:
     assert record["minimal"] == [list(each) for each in answer.minimal]
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("robot", ["delta", "gough_stewart"])
 def test_a_carried_camera_sees_no_less_of_a_rigid_platform(robot: str) -> None:
     answer = legs(load(robot), camera="platform")

@@ -152,6 +152,7 @@ def test_forms_enclose(seed):
         assert np.all(np.abs(value - made.v[0] - np.tensordot(e, made.v[1:], 1)) <= made.r)
 
 
+@pytest.mark.slow
 def test_a_crank_stays_on_its_branch_over_a_whole_turn():
     """Bars 1, 0.5, 1.2, 0.8: one branch all round, which comes back to itself; no tube holds the other closure."""
     robot = four_bar()
@@ -215,6 +216,7 @@ def test_tubes_hold_what_small_steps_find_in_random_four_bars(seed):
 SLOW = pytest.mark.slow
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize(("name", "half"), [
     ("rrrrr_m1", 0.15), ("3rrr_m1", 0.1), ("3ppr_m1", 0.01), pytest.param("3prr_m1", 0.02, marks=SLOW),
     pytest.param("delta", 0.04, marks=SLOW), pytest.param("3rps", 0.01, marks=SLOW),
@@ -279,6 +281,7 @@ def test_a_truss_on_the_way_stays_as_it_is():
     assert obeys(proof, np.random.default_rng(0), 2, 5) == 10
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("ratio", [-1.0, 0.5, 0.1, 7.0])
 def test_a_gear_comes_back_after_whole_turns_alone(ratio):
     """A platform that a motor carries itself; x = ratio q is affine, so that its tube is as thin as tubes are."""

@@ -23,6 +23,7 @@ QUESTIONS: dict[str, Callable[..., Any]] = {
     "singular": lambda *asked, **more: singular(*asked, points=20, **more)}
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("name", QUESTIONS)
 def test_an_observed_robot_is_asked_as_its_parts_are(name: str) -> None:
     question, robot = QUESTIONS[name], load("3rrr_m1")

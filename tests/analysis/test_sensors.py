@@ -102,7 +102,7 @@ def certified(mechanism: Mechanism, kind: str, form: str = "simplified") -> Deri
     return found
 
 
-@pytest.mark.some(6)
+@pytest.mark.some(2)
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("robot", ["free_body", "arm", "gough_stewart"])
 def test_every_kind_is_certified(robot: str, kind: str) -> None:
@@ -114,7 +114,7 @@ def test_every_kind_is_certified(robot: str, kind: str) -> None:
     assert certified(mechanism, kind).verdict.rank > 0
 
 
-@pytest.mark.some(7)
+@pytest.mark.some(3)
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("robot", ["free_body", "arm", "gough_stewart", "delta"])
 def test_exact_ranks_are_those_of_samples(robot: str, kind: str) -> None:
@@ -190,6 +190,7 @@ def test_three_points_of_a_free_body_are_three_ups() -> None:
     assert found.paper is None
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("count", [3, 4])
 def test_points_seen_from_the_hand_of_an_arm(count: int) -> None:
     """The arm itself goes: what is left is the camera between the points."""
@@ -202,6 +203,7 @@ def test_points_seen_from_the_hand_of_an_arm(count: int) -> None:
     assert ranks == {size: min(2 * size, 6) for size in range(1, count + 1)}
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_verdicts_agree_with_pixels_of_the_arm(count: int) -> None:
     """The rank of pixels' derivatives by the joints' angles, by the product of exponentials and differences alone."""
@@ -272,6 +274,7 @@ def smallest(points: Array, cameras: Array) -> Array:
     return np.array(found)
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("seed", range(2))
 def test_three_points_are_singular_on_the_danger_cylinder_and_nowhere_else(seed: int) -> None:
     """The circular cylinder over the circumcircle: 2500 centres of the camera on it and as many off it, for each of two

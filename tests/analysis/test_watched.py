@@ -109,6 +109,7 @@ def with_connectors(skew: float, short: float, seed: int) -> str:
  <actuator>{motors}</actuator></mujoco>"""
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize(("skew", "short"), [(0.0, 0.0), (0.0, 1e-6), (0.3, 0.0), (0.3, 1e-6), (-0.5, 1e-7)])
 def test_a_connector_of_no_length_is_never_watched(skew: float, short: float, tmp_path):
     (tmp_path / "robot.xml").write_text(with_connectors(skew, short, 5))

@@ -139,6 +139,7 @@ def test_numba_and_jax_give_the_same_numbers(robot: str, watched: int, package: 
             assert np.all(np.abs(ours[finite] - theirs[finite]) <= allowed[finite])
 
 
+@pytest.mark.some(4)
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
 @pytest.mark.parametrize(("compiled", "robot"), [
     *product([False], ["delta", "gough_stewart", "3rrr_m1", "rrrrr_m1"]),
@@ -193,6 +194,7 @@ def sampled_error(M: Array, rows: Array, u: Array, cone: float, rng: np.random.G
     return float(np.max(np.linalg.norm(errors.reshape(len(errors), -1) @ J.T, axis=1)))
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize(("robot", "legs"), [("quattro", ("1", "4")), ("orthoglide", ("1", "2", "3")),
                                              ("gough_stewart", ("1", "2", "3")), ("3rrr_m1", ("1", "2", "3")),
                                              ("quattro_rigid", ("1", "3"))])

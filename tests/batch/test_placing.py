@@ -60,6 +60,7 @@ def test_coordinates_are_those_of_the_poses_of_all_links(robot: str) -> None:
             assert np.max(np.abs(twin.pose(q, name) - at.pose(name))) < 1e-9
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("robot", ["orthoglide", "3prr_m1", "hexa"])
 def test_walks_give_as_many_different_configurations_as_asked_for(robot: str) -> None:
     setting, placer = placer_of(robot)
@@ -72,6 +73,7 @@ def test_walks_give_as_many_different_configurations_as_asked_for(robot: str) ->
     assert all(np.array_equal(one.q, two.q) for one, two in zip(walk, again, strict=True))
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize(("robot", "grid"), [("orthoglide", "x=-0.35:0.35:5,y=-0.3:0.3:5,z=0.04"),
                                              ("quattro", "x=-0.7:0.7:6,y=-0.1:0.4:4,z=-0.7"),
                                              ("3rrr_m1", "x=-0.2:0.2:4,y=-0.2:0.2:4,phi=0.3")])

@@ -236,6 +236,7 @@ def test_a_worker_that_dies_stops_the_build_in_one_line(tmp_path: Path, whole: d
     assert content(tmp_path) == whole
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("workers", [1, 2])
 def test_a_defect_names_its_word_and_loses_nothing(workers: int, tmp_path: Path):
     if workers > 1:

@@ -20,11 +20,13 @@ def record(word: str) -> dict:
     return found
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("word", ["3(Rz*-Rz-Rz)", "3(Ra*-Rb-Ra-Ph-Ra)", "2(Pz*-Utn-Unt)+(Rt*-2SSt)+(Rt*-Utn-S)"])
 def test_the_oracle_agrees_with_a_record(word: str):
     assert list(Witness(record(word)).complaints()) == []
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("false", [
     {"mobility": 4}, {"dof": 2}, {"rank": 2}, {"motion": "3R"}, {"minimal": [["1", "2"]], "fewest": 2}])
 def test_the_oracle_finds_a_false_record(false: dict):

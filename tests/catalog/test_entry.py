@@ -37,6 +37,7 @@ TWO_FIRST = [pytest.param(name, marks=pytest.mark.slow) if name in ("pods", "del
 """The groups, two left to the slow tests."""
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in SHIPPED])
 def test_an_entry_says_what_the_shipped_robot_says(name):
     found, robot = entry(SHIPPED[name]), derive(load(name))
@@ -63,6 +64,7 @@ def _symmetric(platform, motors):
     return table
 
 
+@pytest.mark.slow
 def test_table_1_falls_out():
     """MMT 4.1.1: of 21 chains with a motor those that can be driven, alike up to exchange of base and platform, are
     ten; of two that are alike the one with the motor nearer to the base, then with the first joint a P, is printed."""
@@ -107,6 +109,7 @@ def test_fifty_entries_are_the_same_in_another_process():
     assert there == [json.dumps(entry(word), sort_keys=True) for word in reversed(chosen)]
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("name", TWO_FIRST)
 def test_verdicts_are_exact_and_confirmed(name):
     for text in random.Random(2).sample(words(name), 3):
@@ -123,6 +126,7 @@ def test_what_does_not_move_has_no_verdict():
         entry("3(Rz*-Q-Rz)")
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("name", TWO_FIRST)
 def test_screws_without_pinocchio_see_the_same(name):
     """At the zero configuration, in maximal coordinates: dof, mobility and rank of all legs and of a smallest set."""

@@ -36,6 +36,7 @@ def test_the_tables_are_those_of_the_catalog() -> None:
         assert says.written(text, hrsynth.catalog.load(which), tables) == text, f"{page.name} is stale: make readme"
 
 
+@pytest.mark.slow
 def test_every_record_agrees_with_each_rule() -> None:
     lines = says.rules(hrsynth.catalog.load()).splitlines()[2:]
     assert len(lines) == 3
@@ -75,6 +76,7 @@ def test_the_theorem_on_planar_robots_is_that_of_their_twists(legs: list[LegWord
     assert np.linalg.matrix_rank(np.vstack(seen), tol=1e-7) == says.planar_rank(RobotWord("", (tuple(legs),)))
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("word", ["3(Rz*-Rz-Rz)", "3(Rz*!-Rz-Rz)", "3(Px*-Rz-Rz)", "3(Px*!-Rz-Rz)", "3(Px*-Rz!-Ph)"])
 def test_the_rule_is_what_derive_finds(word: str) -> None:
     robot = mechanism(parse(word))

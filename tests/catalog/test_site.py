@@ -144,7 +144,7 @@ def test_a_page_says_what_the_record_says(made, catalog):
             assert "{" + ", ".join(legs) + "}" in text
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(1)
 @pytest.mark.parametrize("word", [word for word in WORDS if word != REFUSED])
 def test_the_robot_file_is_what_save_writes_and_derives_as_the_record(made, catalog, word, tmp_path):
     target, _ = made

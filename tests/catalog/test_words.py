@@ -20,6 +20,7 @@ SMALL_FIRST = [pytest.param(name, marks=pytest.mark.slow) if name == "planar" el
 ANY = st.sampled_from([word for name in GROUPS for word in LISTED[name]])
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("name", SMALL_FIRST)
 def test_what_is_listed_is_canonical_and_belongs_there(name):
     for text in LISTED[name]:
@@ -27,6 +28,7 @@ def test_what_is_listed_is_canonical_and_belongs_there(name):
         assert group(parse(text)) == name
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("name", SMALL_FIRST)
 def test_a_motor_changes_no_leg_s_label(name):
     for word in map(parse, LISTED[name]):

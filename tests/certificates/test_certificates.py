@@ -53,7 +53,7 @@ def ranks(legs: str) -> str:
     return json.dumps(hrsynth.certificate(hrsynth.derive(hrsynth.load("quattro"), legs.split(","))))
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(1)
 @pytest.mark.parametrize("name", ROBOTS)
 def test_what_is_listed_is_certified(name, tmp_path):
     found = hrsynth.modes(hrsynth.load(name), list(ROBOTS[name]))
@@ -79,7 +79,7 @@ NEEDED = {name: [mark for mark, names in ((pytest.mark.slow, LONGER), (needs_mso
           for name in sorted(FAMILIES | MEETING | SURFACES)}
 
 
-@pytest.mark.some(5)
+@pytest.mark.some(2)
 @pytest.mark.parametrize("name", [pytest.param(name, marks=marks) for name, marks in NEEDED.items()])
 def test_random_platforms(name):
     """The checker's bound, which trusts no resultant, is the engine's count."""
@@ -103,6 +103,7 @@ def displaced(record, mechanism, box) -> np.ndarray:
     return np.array(found)
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("name", ["quattro", "gough_stewart", "3rrr_m1", "delta"])
 def test_links_are_told_where_the_robot_closes(name):
     """Joints by screws, and the watched directions, at as many modes as are told to be assembled; nowhere else."""
@@ -157,6 +158,7 @@ def scaled(name: str) -> Mechanism:
     return replace(robot, links=links, joints=joints)
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("legs", ["1,4", "1,2", "1"])
 def test_ranks_are_those_of_an_independent_elimination(legs):
     record = json.loads(ranks(legs))
@@ -182,6 +184,7 @@ def attacked(text: str, count: int, seed: int) -> Counter[str]:
     return told
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("name", ["3rpr_m1", "delta", "rrrrr_m1", "gough_stewart"])
 def test_false_certificates_are_refused(name):
     assert sum(attacked(of(name), 40, 1).values()) == 40
@@ -211,6 +214,7 @@ def alone(kinds: str) -> str:
     return json.dumps(of_systems(solve(drawn.system, near=False), {}))
 
 
+@pytest.mark.some(1)
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize(("kinds", "count"), [
     ("2LLC", 40), ("PSSS", 12), pytest.param("CCSS", 100, marks=pytest.mark.slow),
@@ -228,6 +232,7 @@ def test_robots_with_motors_held(name, count, far):
     assert (f"({far} solutions are farther)" in told) == (far > 0)
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("name", ["3prp", "3rrp"])
 def test_lines_of_a_platform_that_keep_to_points_of_the_base(name):
     """Three lines through three points are met twice."""

@@ -43,6 +43,7 @@ def sealed(record):
     return record | {"sha256": checker.digest(record)}
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("name", [name if name in ("3rrr_m1", "orthoglide") else
                                   pytest.param(name, marks=pytest.mark.slow) for name in PATHS])
 def test_what_is_certified_is_accepted(name, tmp_path):

@@ -19,6 +19,7 @@ def halved(rng: np.random.Generator, low: Array, high: Array, depth: int) -> lis
     return halved(rng, low, upper, depth - 1) + halved(rng, lower, high, depth - 1)
 
 
+@pytest.mark.some(4)
 @pytest.mark.parametrize("seed", range(12))
 def test_a_point_is_found_in_the_cell_that_holds_it(seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -71,6 +71,7 @@ def test_every_kind_is_written_and_read_again(robot: str, rng: np.random.Generat
     assert native.write(read) == text
 
 
+@pytest.mark.some(3)
 @pytest.mark.parametrize("ending", ["xml", "sdf", "yaml", "usda"])
 @pytest.mark.parametrize("robot", ["gough_stewart", "3rrr_m1"])
 def test_every_kind_survives_in_other_dialects(robot: str, ending: str, tmp_path: Path) -> None:
@@ -176,7 +177,7 @@ def test_commands_that_know_segments_only_say_so(command: str, tmp_path: Path, c
     assert "knows directions of segments only" in capsys.readouterr().err
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(1)
 @pytest.mark.parametrize("words", ["atlas", "path --start x=0 --goal x=0.01", "accuracy --noise 0.1deg,1mm", "derive",
                                    "select --start x=0 --goal x=0.01 --noise 0.1deg,1mm --runs 0"])
 def test_commands_read_what_a_file_observes(words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -81,6 +81,7 @@ def check_modes(name: str, seed: int, starts: int) -> int:
     return len(told)
 
 
+@pytest.mark.some(3)
 @pytest.mark.parametrize("name", LINKAGES)
 def test_a_paradoxical_linkage_has_one_freedom(name: str):
     check_mobility(name, 1)
@@ -127,6 +128,7 @@ def test_the_last_digits_of_the_starts_do_not_decide_a_zero_configuration(name: 
     assert LINKAGES[name]().regular(Shaken(np.random.PCG64(0))) == pytest.approx(ZERO[name], abs=1e-6)
 
 
+@pytest.mark.slow
 def test_dimensions_that_keep_a_joint_near_to_zero_end_with_the_farthest_angles():
     linkage, zero, _ = drawn("goldberg", 2)
     assert 0.05 < np.abs(np.sin(zero)).min() < 0.1

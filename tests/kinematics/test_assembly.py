@@ -34,6 +34,7 @@ def values(at: ClosedConfiguration, setting: ObservedRobot) -> list[np.ndarray]:
     return measure(at.twin, at.q, question.reference, question.observations)[2]
 
 
+@pytest.mark.some(11)
 @pytest.mark.parametrize("name", ROBOTS)
 def test_a_reachable_pose_is_assembled_with_its_directions(name: str):
     """At random configurations the robot is found again: bodies, platform and directions, loops closed."""
@@ -53,6 +54,7 @@ def test_a_reachable_pose_is_assembled_with_its_directions(name: str):
             assert mine == pytest.approx(theirs, abs=1e-8)
 
 
+@pytest.mark.some(3)
 @pytest.mark.parametrize("name", ["3rrr_m1", "delta", "quattro", "rrrrr_m1", "orthoglide"])
 def test_a_pose_far_away_names_the_legs_that_do_not_close(name: str):
     setting = prepared(name)

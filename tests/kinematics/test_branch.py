@@ -48,7 +48,7 @@ def parallelogram(angle: float, normal: tuple[float, float, float] = (0, 0, 1)) 
     return builder.build(platform="coupler")
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(1)
 @pytest.mark.parametrize("angle", [0.02, 0.1, 0.3, 1.2, np.pi - 0.05])
 @pytest.mark.parametrize("normal", [(0, 0, 1), (0.48, 0.6, 0.64)])
 def test_a_parallelogram_does_not_cross_over(angle: float, normal: tuple[float, float, float]) -> None:
@@ -76,6 +76,7 @@ def test_a_flat_parallelogram_belongs_to_two_modes(angle: float) -> None:
     assert caught.value.exit_status == 3
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("dimensions", [1000, 1002])
 def test_a_sample_with_a_faint_turn_is_of_the_same_mode(dimensions: int) -> None:
     """At some samples of some seeds the platform's third turn has a singular value of 1e-8: no other operation mode."""
@@ -84,7 +85,7 @@ def test_a_sample_with_a_faint_turn_is_of_the_same_mode(dimensions: int) -> None
     assert {setting.everything.signature.motion for setting in found} == {"1T3R"}
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(1)
 @pytest.mark.parametrize(("dimensions", "seed"), [(7, 0), (140, 1), (185, 3), (518, 1), (572, 0)])
 def test_samples_of_a_pod_stay_in_its_operation_mode(dimensions: int, seed: int) -> None:
     """The rails of legs 2 and 3 are along z, so neither sees the platform, which only translates, move along z. In its
@@ -159,6 +160,7 @@ def test_the_verdict_of_a_leg_at_a_dead_point_is_that_of_its_branch(tmp_path: Pa
     assert (found.verdict.rank, found.dof, found.certificate.passed) == (2, 3, True)
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize(("tilt", "rank", "near"), [
     (1e-3, 2, False), (1e-6, 2, True), (1e-8, 1, True), (0.0, 1, False)])
 def test_the_distance_to_another_verdict_is_told(tilt: float, rank: int, near: bool) -> None:

@@ -47,6 +47,7 @@ def caught(certificate: Certificate) -> bool:
     return not certificate.passed and bool(certificate.reason) and evidence
 
 
+@pytest.mark.some(3)
 @pytest.mark.parametrize(("robot", "legs"), [
     ("3rrr_m1", ()), ("3rrr_m1", ("1", "2")), ("gough_stewart", ("1", "2", "3")), ("3upu", ()), ("delta", ("1", "2")),
     ("rrrrr_m1", ()), ("prrrp_parallel_point", ())])
@@ -100,6 +101,7 @@ def exchanged(hidden: Mechanism, name: str) -> Mechanism:
     return hidden.changed(joints=[replace(joint, axes=(joint.axes[1], joint.axes[0]))])
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("robot", ["3upu", "3puu", "3ruu"])
 def test_exchanged_axes_of_a_universal_joint_are_caught(robot: str) -> None:
     """The two orders agree at the zero configuration, and it proves nothing."""

@@ -195,6 +195,7 @@ def parallel_pod(rng: np.random.Generator, apart: float) -> Mechanism:
     return b.build(platform="platform")
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("seed", [1, 2, 5])
 def test_far_modes_of_nearly_parallel_pods_are_assembled(seed: int):
     """No start from near by reaches them: that once was told as *cannot be assembled*."""

@@ -38,6 +38,7 @@ def test_a_platform_has_as_many_coordinates_as_freedoms(name: str):
     assert len(coordinates.names) == setting.dof
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("seed", range(4))
 def test_the_turn_of_a_planar_robot_is_its_angle_about_the_normal(seed: int):
     """Wherever its plane lies: no component of the turn, which is less."""

@@ -10,6 +10,7 @@ from hrsynth.kinematics.relation import platform_motions, relation
 from kinematics.robots import ROBOTS, setting_of
 
 
+@pytest.mark.some(17)
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_platform_motions_span_the_twists_and_nothing_idle(robot: str) -> None:
     """J q̇ = 0 and t orthonormal over all feasible twists; q̇ is normal to every q̇ with t = 0."""
@@ -37,6 +38,7 @@ def test_the_platform_generically_does_what_it_does_at_the_samples(robot: str) -
         assert np.linalg.norm(twists - found @ (found.T @ twists)) < 1e-9
 
 
+@pytest.mark.some(17)
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_measured_again_the_samples_say_the_same(robot: str) -> None:
     """ρ of fewer observations, computed anew, is the projection of ρ of all."""

@@ -71,6 +71,7 @@ def question_of(mechanism: Mechanism) -> Measurement:
     return Measurement(mechanism.platform, None, mechanism.reference, mechanism.observations)
 
 
+@pytest.mark.some(17)
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_twin_and_oracle_agree_on_every_robot(robot: str) -> None:
     everything = setting_of(robot).everything

@@ -66,7 +66,7 @@ def chain(axes: list[np.ndarray], rng: Rng, types: str) -> Mechanism:
     return b.build("tip")
 
 
-@pytest.mark.some(5)
+@pytest.mark.some(2)
 @pytest.mark.parametrize("types", ["RRR", "RRRR", "UR", "RU", "RUR", "RRRRR"])
 @pytest.mark.parametrize("seed", range(6))
 def test_the_interval_is_what_the_axes_reach(types: str, seed: int) -> None:
@@ -139,6 +139,7 @@ def turn_of_tip(at: ClosedConfiguration) -> np.ndarray:
     return A.T @ B
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("seed", range(4))
 def test_a_robot_is_assembled_where_its_three_axes_can_turn(seed: int) -> None:
     """Within the limits exactly where three angles exist; beyond them it is proved, by the margins too."""
@@ -169,6 +170,7 @@ def reached(setting: ObservedRobot, pose: Pose) -> ClosedConfiguration | PoseNot
         return error
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("seed", range(2))
 def test_a_way_ends_where_the_three_axes_turn_no_further(seed: int) -> None:
     """What is reached has three angles; else, and where the way to it passes where there are none, the answer names the

@@ -65,6 +65,7 @@ CHANGES: dict[str, tuple[Change, set[str]]] = {
 }
 
 
+@pytest.mark.some(3)
 @pytest.mark.parametrize("name", CHANGES)
 def test_each_difference_is_found_from_both_sides(name: str, tmp_path: Path):
     change, rules = CHANGES[name]
@@ -76,6 +77,7 @@ def test_each_difference_is_found_from_both_sides(name: str, tmp_path: Path):
     assert differs(one, one) == Counter()
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("ending", [".xml", ".sdf", ".yaml"])
 def test_a_difference_is_found_between_dialects(ending: str, tmp_path: Path):
     robot = load("3rrr_m1")
@@ -145,6 +147,7 @@ def test_names_and_frames_do_not_matter(name: str, seed: int):
         assert max(fit.misses.values()) < 1e-9
 
 
+@pytest.mark.some(3)
 @pytest.mark.parametrize("seed", range(5))
 def test_a_link_is_fitted_wherever_it_is_and_where_on_its_axes_hinges_have_their_centres(seed: int):
     """One link with joints of several types, moved rigidly, its hinges slid along their axes: nothing is missed; a

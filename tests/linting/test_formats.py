@@ -97,6 +97,7 @@ def test_text_names_place_rule_and_mend(bad: Path):
     assert "<limit" in element
 
 
+@pytest.mark.some(6)
 @pytest.mark.parametrize(("arguments", "status"), [
     ([], 1), (["--fail-on", "nothing"], 0), (["--ignore", "limits-order", "--ignore", "refused"], 0),
     (["--format", "sarif"], 1),

@@ -92,6 +92,7 @@ def test_mimics_are_read_as_is_said():
     assert (CONSTRUCTS["mimic"]["mujoco"], mujoco.MjModel.from_xml_string(text).neq) == (READ, 1)
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("name", WRITTEN)
 def test_the_construct_of_a_file_is_recognised(name: str, tmp_path: Path):
     path = tmp_path / "robot.urdf"

@@ -57,7 +57,7 @@ def test_every_rule_has_a_case():
     assert set(lint_rules()) == {each.rule for each in CASES} | ELSEWHERE | compared
 
 
-@pytest.mark.some(6)
+@pytest.mark.some(3)
 @pytest.mark.parametrize("case", CASES, ids=lambda case: f"{case.rule}{case.ending}")
 def test_a_rule_finds_its_defect_and_no_other(case: Case, tmp_path: Path, shelf: Path):
     _, two = files(case, tmp_path, shelf)
@@ -74,7 +74,7 @@ def test_a_rule_finds_its_defect_and_no_other(case: Case, tmp_path: Path, shelf:
 MENDED = [case for case in CASES if lint_rules()[case.rule].mends]
 
 
-@pytest.mark.some(3)
+@pytest.mark.some(1)
 @pytest.mark.parametrize("case", MENDED, ids=lambda case: f"{case.rule}{case.ending}")
 def test_what_is_mended_is_the_sound_file_again(case: Case, tmp_path: Path, shelf: Path):
     one, two = files(case, tmp_path, shelf)
@@ -163,6 +163,7 @@ def test_redundant_constraints_are_named_and_counted(tmp_path: Path):
     assert rules_in(shipped()["gough_stewart"])["constraint-redundant"] == 0
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("decimals", [5, 6])
 @pytest.mark.parametrize("native", [True, False])
 def test_rounded_geometry_is_found_and_written_as_it_is_meant(decimals: int, native: bool, tmp_path: Path):
@@ -231,6 +232,7 @@ SOME = ("3rps", "rrrrr_m1")
 NAMES = [name if name in SOME else pytest.param(name, marks=pytest.mark.slow) for name in shipped()]
 
 
+@pytest.mark.some(3)
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("ending", ["", ".xml", ".sdf", ".yaml"])
 def test_shipped_robots_raise_no_alarm_in_any_dialect(name: str, ending: str, tmp_path: Path):
@@ -244,6 +246,7 @@ def test_shipped_robots_raise_no_alarm_in_any_dialect(name: str, ending: str, tm
     assert not any(each.mends for each in found.findings)
 
 
+@pytest.mark.some(7)
 @pytest.mark.parametrize("name", FILES)
 def test_the_same_four_bar_in_every_dialect_is_the_same(name: str, tmp_path: Path):
     (tmp_path / "other").mkdir()

@@ -54,6 +54,7 @@ def check(mechanism: Mechanism, seed: int, tries: int) -> int:
     return len(states)
 
 
+@pytest.mark.some(11)
 @pytest.mark.parametrize("name", shipped())
 def test_what_is_carried_holds_in_all_modes(name: str) -> None:
     assert check(observed(load(name)), seed=1, tries=60) > 0
@@ -69,6 +70,7 @@ def test_what_is_carried_holds_on_random_robots(mechanism: Mechanism, seed: int)
         assume(False)
 
 
+@pytest.mark.some(11)
 @pytest.mark.parametrize("name", shipped())
 def test_zero_alone_carries_nothing_that_motion_breaks(name: str) -> None:
     """What holds by accident at zero is not carried: all that is carried from zero alone is found over a walk too."""

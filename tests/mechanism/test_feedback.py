@@ -51,6 +51,7 @@ def camera_twists(seen: CameraObservation, X_c: Array) -> Array:
     return np.block([[R, shift @ R], [np.zeros((3, 3)), R]])
 
 
+@pytest.mark.some(4)
 @pytest.mark.parametrize("kind", CHAINED, ids=lambda kind: kind.kind)
 @settings(max_examples=20, deadline=None)
 @given(rng=SEEDS, side=st.sampled_from([1, -1]))

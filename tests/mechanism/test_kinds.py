@@ -79,6 +79,7 @@ def moved(X: Array, twist: Array, time: float) -> Array:
     return pose(X[:3, 3] + time * twist[:3], exponential(time * twist[3:]) @ X[:3, :3])
 
 
+@pytest.mark.some(6)
 @pytest.mark.parametrize("kind", CHAINED, ids=lambda kind: kind.kind)
 @settings(max_examples=20, deadline=None)
 @given(rng=SEEDS, side=st.sampled_from([1, -1]))

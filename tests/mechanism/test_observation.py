@@ -126,6 +126,7 @@ def test_encoders_of_each_type_in_a_tilted_chain(type: str) -> None:
         np.testing.assert_allclose(np.vstack(rates), np.eye(twin.nv)[list(places)], atol=1e-12)
 
 
+@pytest.mark.some(11)
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_rates_and_values_of_candidates_have_the_same_units(robot: str) -> None:
     """Whatever could be measured: its rate is the derivative of its value along any motion of the spanning tree, and

@@ -64,6 +64,7 @@ def test_what_is_held_is_said_in_metres_and_degrees():
     assert figure.get_suptitle() == "title\nz = -0.7 m, φ = 30°"
 
 
+@pytest.mark.some(3)
 @pytest.mark.parametrize("seed", range(6))
 def test_a_tilted_plane_of_motion_is_drawn_in_true_scale(seed: int):
     """Places of the map are as far apart as the platforms that they stand for, however the base is tilted."""

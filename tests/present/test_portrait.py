@@ -14,6 +14,7 @@ from hrsynth.present.portrait import Portrait
 from hrsynth.present.view.shapes import MOTOR, PLATFORM
 
 
+@pytest.mark.some(17)
 @pytest.mark.parametrize("name", sorted(shipped()))
 def test_a_portrait_holds_the_robot_and_nothing_beyond_its_frame(name: str):
     robot = load(name)

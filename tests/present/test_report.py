@@ -158,6 +158,7 @@ def test_a_part_that_fails_leaves_its_reason():
         parts.asked("r", lambda: 1 // 0)
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize(("name", "legs"), [FAST, SLOW[0]])
 def test_each_drawn_step_starts_where_the_last_ended(name: str, legs: str | None):
     """The first drawing shows the real robot's motors, the last one the virtual actuators of the hidden robot."""

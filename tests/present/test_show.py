@@ -75,7 +75,7 @@ def test_each_option_goes_somewhere(question):
     assert {name for file in files for name in (*file.needs, *file.takes)} <= {each.name for each in question.options}
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(1)
 @pytest.mark.parametrize("command", ASKED)
 def test_a_result_is_printed_as_by_the_command_line(command: str, capsys: pytest.CaptureFixture[str]):
     found = answer(command)
@@ -107,6 +107,7 @@ def test_parts_of_results_and_robots_are_shown_too():
     assert str(found.certificate) in str(found)
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize(("name", "observe"), [("rrrrr_m1", None), ("quattro", ["1", "4"]), ("3rrr_m1", None)])
 def test_a_derivation_lists_the_modes_that_the_command_lists(name: str, observe: list[str] | None):
     robot = load(name)
@@ -122,6 +123,7 @@ def test_a_derivation_holds_the_directions_at_the_pose_it_is_given():
     assert found.modes(at=GOAL, real=True).kind == "real"
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("command", ["modes", "servo", pytest.param("singular", marks=pytest.mark.slow)])
 def test_pictures_of_results_are_shown_in_notebooks_and_saved(command: str, tmp_path):
     options = {"steps": 9} if command == "singular" else {}
@@ -141,6 +143,7 @@ def test_pictures_of_grids():
         assert hrsynth.draw(found)._repr_png_().startswith(b"\x89PNG")
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize(("name", "observe"), [("rrrrr_m1", None), ("quattro", ["1", "4"]), ("3ppr_m1", None)])
 def test_a_derivation_is_drawn_as_two_schemes(name: str, observe: list[str] | None):
     found = hrsynth.derive(load(name), observe)

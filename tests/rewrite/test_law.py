@@ -110,6 +110,7 @@ def accepted() -> frozenset[str]:
                      if step.accepted)
 
 
+@pytest.mark.some(5)
 @pytest.mark.parametrize("rule", rules(), ids=lambda rule: rule.name)
 def test_every_rule_has_a_robot(rule: Rule[Any, Any]) -> None:
     """Whatever file lies among the rules is found, has a stage of its own choice, and is accepted somewhere."""
@@ -118,17 +119,19 @@ def test_every_rule_has_a_robot(rule: Rule[Any, Any]) -> None:
     assert rule.name in accepted()
 
 
-@pytest.mark.some(9)
+@pytest.mark.some(3)
 @pytest.mark.parametrize(("robot", "legs"), CASES, ids=name)
 def test_no_accepted_step_changes_the_relation(robot: str, legs: tuple[str, ...] | None) -> None:
     assert obeys(setting_of(robot, legs, None, 3)).steps
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize(("robot", "camera"), CAMERAS)
 def test_no_accepted_step_changes_the_relation_seen_from_a_moving_link(robot: str, camera: str) -> None:
     assert obeys(setting_of(robot, None, camera, 3)).steps
 
 
+@pytest.mark.some(3)
 @pytest.mark.parametrize(("robot", "legs"), [
     ("delta", None), ("quattro", ("1", "4")), ("3rrr_m1", None), ("gough_stewart", ("1", "2", "3")), ("3upu", ("1",)),
     ("prrrp_m1", None), ("hexa", ("1",))], ids=name)

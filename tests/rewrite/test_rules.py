@@ -114,6 +114,7 @@ def skew(legs: int, rng: np.random.Generator, pods: int = 0) -> Mechanism:
 
 # --- wrong rules -------------------------------------------------------------------------------------------------
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize(("legs", "pods", "seed"), [(3, 0, 1), (3, 0, 2), (1, 5, 3), (2, 3, 4)])
 def test_takeover_of_a_skew_elbow_is_caught(legs: int, pods: int, seed: int) -> None:
     """An R that is skew to the base R cannot give way to U: done without its side condition it changes the relation."""
@@ -127,6 +128,7 @@ def test_takeover_of_a_skew_elbow_is_caught(legs: int, pods: int, seed: int) -> 
     is_right(setting, state.mechanism)
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize(("legs", "pods", "seed", "word"), [
     (3, 0, 1, "3-{RR|Pi-U*R}-S"), (1, 5, 3, "{RR|Pi-U*R}-S"), (2, 3, 4, "2-{RR|Pi-U*R}-S")])
 def test_legs_with_skew_axes_keep_their_joint(legs: int, pods: int, seed: int, word: str) -> None:
@@ -172,6 +174,7 @@ def turned_carriers(setting: ObservedRobot, mechanism: Mechanism, state: State) 
     return max(turns)
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("robot", ["3rrr_m1", "delta", "3ruu", "quattro_rigid"])
 def test_a_parallelogram_with_a_wrong_offset_is_caught(robot: str) -> None:
     """One crank's foot 2 % off: the carrier turns with the arm, and the actuator's angle is not the direction's."""
@@ -191,6 +194,7 @@ def test_a_parallelogram_with_a_wrong_offset_is_caught(robot: str) -> None:
         assert "parametrise" in certificate.reason
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("seed", range(4))
 def test_trust_in_arms_that_turn_the_parallelogram_is_caught(seed: int) -> None:
     """Where the base R is not parallel to the short side, the companion rod does not stay beside the observed one."""
@@ -208,6 +212,7 @@ def test_trust_in_arms_that_turn_the_parallelogram_is_caught(seed: int) -> None:
     assert result.state.architecture().ascii != "3-Pi-{2-U*S}"
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("seed", range(3))
 def test_trust_in_aligned_arms_is_justified(seed: int) -> None:
     setting = ObservedRobot.of(deltas(["R"] * 3, ["2-SS"] * 3, np.random.default_rng(seed), True), samples=3)
@@ -228,6 +233,7 @@ def test_a_ball_made_universal_where_the_rod_spins_otherwise_is_caught() -> None
         is_wrong(setting, proposal.state.mechanism)
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("robot", ["delta", "3rrr_m1", "gough_stewart"])
 def test_the_lift_has_virtual_motors_only(robot: str) -> None:
     """The lift has one motor a leg, a virtual one; every real motor is passive, and nothing is constrained."""

@@ -119,6 +119,7 @@ def test_what_is_kept_does_not_depend_on_the_clock(monkeypatch: pytest.MonkeyPat
     assert slow.left is None
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize(("examine", "seconds"), [(1, None), (2, None), (20, 1e-9)])
 def test_what_is_not_examined_is_neither_kept_nor_discarded(examine: int, seconds: float | None) -> None:
     """And nothing else is said of the others than with all examined."""
@@ -251,6 +252,7 @@ def test_bad_requests(options: dict, word: str) -> None:
     assert word in str(caught.value)
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("ends", [("x=4", GOAL), (START, "z=4")])
 def test_ends_out_of_reach(ends: tuple[str, str]) -> None:
     with pytest.raises(PoseNotReached):

@@ -51,6 +51,7 @@ def test_a_pixel_and_its_ray_are_one(x: float, y: float):
     assert 2 * camera.ray(camera.pixels(point[None])[0]) == pytest.approx(point, abs=1e-12)
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("name", ["3rpr_m1", "quattro"])
 def test_the_camera_sees_all_rods_and_exact_edges_give_exact_directions(name: str):
     scene = home(name)

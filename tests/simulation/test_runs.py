@@ -47,6 +47,7 @@ def check_near(name: str) -> None:
     assert np.all(np.diff([command.size for command in found.run.commands]) < 1e-9)
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("name", FEW)
 def test_starts_near_the_goal_end_there(name: str):
     check_near(name)
@@ -68,6 +69,7 @@ def check_far(name: str, seed: int, count: int) -> None:
         assert replace(listed, nearest=None, continuum=False).member in (OUTSIDE, APART)
 
 
+@pytest.mark.slow
 def test_far_runs_end_as_they_are_named():
     check_far("3rpr_m1", 3, 1)
 
@@ -92,6 +94,7 @@ def test_two_legs_of_the_robot_with_an_articulated_platform(legs: str, ended: st
     assert list(untrue(found)) == []
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize(("legs", "ended", "z"), [("1,2", MODE, -0.7023), ("1,3", GOAL, -0.7)])
 def test_two_legs_of_the_robot_with_a_rigid_platform(legs: str, ended: str, z: float):
     found = servo(load("quattro_rigid"), legs, start="x=0.1,y=0.04,z=-0.93", goal="x=0,y=-0.25,z=-0.7", gain=5)
@@ -189,6 +192,7 @@ REFUSED: list[tuple[str, Callable[[], object], type[Exception], str]] = [
     ("no such sense", lambda: servo(load("delta"), start="x=0", goal="x=0.1", sense="touch"), BadRequest, "touch")]
 
 
+@pytest.mark.some(5)
 @pytest.mark.parametrize(("call", "error", "words"), [row[1:] for row in REFUSED], ids=[row[0] for row in REFUSED])
 def test_what_does_not_fit_is_refused_in_one_line(call: Callable[[], object], error: type[Exception], words: str):
     with pytest.raises(error, match=words) as raised:

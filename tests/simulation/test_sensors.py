@@ -149,6 +149,7 @@ def test_noise_in_pixels_needs_a_focal_length_and_keeps_the_platform_near_its_go
     assert 0.1 < worst * 800 / 0.3 <= 1 + 1e-9
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize(("see", "noise", "words", "unit", "most"), [
     (POINTS, "0.3px", "image points", "px", 0.3), (POINTS, "0.1deg", "angles", "degrees", 0.1),
     (tuple(f"position:{each.partition(':')[2]}" for each in POINTS[:3]), "2mm", "lengths", "mm", 2.0)])

@@ -75,6 +75,7 @@ def rigid(legs: str) -> Accuracy:
     return accuracy(load("quattro_rigid"), legs, cone=CONE, grid="x=-0.3:0.3:100,y=-0.29:0.31:100,z=-0.75")
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("legs", ["1,2", "1,3", "2,4"])
 def test_a_map_is_the_closed_form(legs: str) -> None:
     field = rigid(legs).field
@@ -122,7 +123,7 @@ def check_extents(setting: ObservedRobot, cones: Array) -> None:
             assert widths.max() <= extent.largest * (1 + 1e-9)
 
 
-@pytest.mark.some(5)
+@pytest.mark.some(3)
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_extremes_are_attained_and_not_exceeded(robot: str) -> None:
     setting = ObservedRobot.of(load(robot), samples=3)
@@ -140,7 +141,7 @@ def test_extremes_of_random_robots(robot) -> None:
     check_extents(setting, np.full(len(setting.observed), CONE))
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(1)
 @pytest.mark.parametrize("robot", ["quattro", "3rrr_m1", "gough_stewart", "orthoglide", "delta"])
 def test_samples_approach_the_linear_maxima_as_cones_shrink(robot: str) -> None:
     setting = ObservedRobot.of(load(robot), samples=3)
@@ -267,6 +268,7 @@ def test_the_least_error_is_the_least_of_many_directions() -> None:
         assert _width(blocks, _descended(blocks)[:, None])[0] <= _width(blocks, views).min() * (1 + 1e-6)
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("name", ["quattro", "3rrr_m1", "3rps", "prrrp_parallel", "gough_stewart"])
 def test_what_an_ascent_attains_lies_between_the_two_bounds(name: str):
     setting = ObservedRobot.of(name)

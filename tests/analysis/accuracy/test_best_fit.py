@@ -137,7 +137,7 @@ def check_fit(setting: ObservedRobot, at: ClosedConfiguration, way: Array) -> Fi
     return fit
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(1)
 @pytest.mark.parametrize("robot", ["3rps", "gough_stewart", "rrrrr_m1", "orthoglide", "quattro", "delta"])
 def test_best_fits_are_where_the_loop_rests(robot: str) -> None:
     setting = ObservedRobot.of(load(robot), samples=3)

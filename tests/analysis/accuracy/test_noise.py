@@ -113,6 +113,7 @@ def sensed(setting: ObservedRobot, blur: Blur, at: ClosedConfiguration, given: A
 SLOW = pytest.mark.slow
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("name", [
     *(pytest.param(name, marks=SLOW) for name in (*MORE, "delta", "arm") if name != "point"), "point", "encoders"])
 def test_no_wrong_measurement_does_worse_and_the_told_one_does_it(name: str, tmp_path: Path) -> None:
@@ -199,6 +200,7 @@ def test_what_is_no_amount_is_refused_in_a_line(name: str, given: dict[str, str]
     assert len(caught.value.lines()) == 1
 
 
+@pytest.mark.some(4)
 @pytest.mark.parametrize("kind", sorted(set(kinds()) - {"encoder"}))
 def test_what_a_sensor_makes_of_noise_to_first_order(kind: str, tmp_path: Path) -> None:
     """The images of the unit balls are what the simulated sensor gives, but for the square of the noise."""

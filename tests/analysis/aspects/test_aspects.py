@@ -124,6 +124,7 @@ def test_poses_decide_the_values_that_configurations_have(robot: str, observe: s
 # ---- sides of a locus
 
 
+@pytest.mark.some(3)
 @pytest.mark.parametrize(("robot", "observe"), SIGNED)
 def test_opposite_signs_are_separated_and_equal_signs_never(robot: str, observe: str | None):
     aspects = aspects_of(robot, observe)
@@ -140,7 +141,7 @@ def test_nine_of_ten_pairs_on_one_side_are_joined():
     assert verdicts.count(SAME) >= 0.9 * (len(verdicts) - verdicts.count(SEPARATED))
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(1)
 @pytest.mark.parametrize(("robot", "observe"), [
     ("3rrr_m1", None), ("3rpr_m1", None), ("rrrrr_m1", None), ("gough_stewart", "1,2,3"), ("quattro", "1,4"),
     ("quattro_rigid", None)])
@@ -177,6 +178,7 @@ def test_a_way_across_the_locus_is_never_proved():
     assert crossed >= 5
 
 
+@pytest.mark.slow
 def test_a_way_that_crosses_the_locus_twice_is_led_around_it():
     aspects = aspects_of("gough_stewart", "1,2,3")
     around = 0
@@ -191,6 +193,7 @@ def test_a_way_that_crosses_the_locus_twice_is_led_around_it():
     assert around
 
 
+@pytest.mark.some(3)
 @pytest.mark.parametrize(("robot", "observe"), [
     ("rrrrr_m1", None), ("3prr_m1", None), ("quattro_rigid", "1,3"), ("prrrp_m1", None), ("delta", None)])
 def test_a_way_that_leaves_the_workspace_is_never_proved(robot: str, observe: str | None):
@@ -213,6 +216,7 @@ def test_a_way_that_leaves_the_workspace_is_never_proved(robot: str, observe: st
     assert left
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("robot", ["3puu", "3ruu"])
 def test_a_path_crosses_the_limit_of_a_leg_into_its_other_working_mode(robot: str):
     aspects = aspects_of(robot)

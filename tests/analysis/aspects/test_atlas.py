@@ -46,6 +46,7 @@ def check_table(found: Atlas) -> None:
     assert (few == many) or any(UNDECIDED in row for row in table)
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize(("name", "observe"), ROBOTS)
 def test_the_table_is_an_equivalence_with_reasons(name: str, observe: str | None):
     found = atlas_of(name, observe)

@@ -39,7 +39,7 @@ def known(aspects: Aspects) -> LegPattern:
     return aspects.pattern
 
 
-@pytest.mark.some(3)
+@pytest.mark.some(2)
 @pytest.mark.parametrize("name", [*SHIPPED, *RANDOM])
 def test_forms_are_read_from_the_joints_and_hold_at_other_poses(name: str):
     """No form is fitted; at configurations that no form was compared with, tips and what limbs carry are where the
@@ -61,6 +61,7 @@ def _scaled(X: np.ndarray, length: float) -> np.ndarray:
     return scaled
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("name", ["RRR", "gough_stewart", "quattro"])
 def test_what_is_fitted_is_not_certified(name: str):
     free = aspects_of(name)

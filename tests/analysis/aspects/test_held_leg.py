@@ -138,6 +138,7 @@ def test_the_section_holds_all_modes_of_the_goal():
         assert np.abs(place.cranks) == pytest.approx(drawn.robot.cranks, abs=1e-9)
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize(("name", "observe", "reason"), [
     ("quattro", "1,4", "plane"), ("3prr_m1", None, "cranks"), ("3rpr_m1", None, "cranks"), ("rrrrr_m1", None, "plane"),
     ("3rrr_m1", "prox_1,prox_2,prox_3", "rod"), ("3rrr_m1", "1,2,prox_3", "rod")])
@@ -150,6 +151,7 @@ def test_other_robots_have_no_such_section(name: str, observe: str | None, reaso
     assert three_cranks(found.aspects, at) == made
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("seed", [1, 6, 9, 10])
 def test_cusps_of_random_cranks_come_in_pairs_and_are_cusps(seed: int):
     """Any lengths, no robot: the number of cusps on closed pieces is even; where cranks of legs are in one line the

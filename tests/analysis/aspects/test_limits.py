@@ -49,7 +49,7 @@ def limited(robot: str, observe: str | None) -> Aspects:
         mechanism)}), observe)
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(1)
 @pytest.mark.parametrize(("robot", "observe"), KNOWN)
 def test_a_reserve_tells_how_far_a_coordinate_is_from_its_limits(robot: str, observe: str | None):
     aspects = limited(robot, observe)
@@ -129,6 +129,7 @@ def test_a_pose_beyond_a_limit_is_named_and_still_separated():
     assert set(verdicts) == {SEPARATED, UNDECIDED}
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("limits", [Limits(-4.0, 4.0), Limits(lower=-1.0)])
 def test_limits_that_are_not_considered_are_named(limits: Limits):
     aspects = Aspects.of(with_limits(load("3rrr_m1"), {"elbow_1": limits, "elbow_2": Limits(-3.0, 3.0)}))

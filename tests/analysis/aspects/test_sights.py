@@ -44,6 +44,7 @@ def body(folder: Path) -> Mechanism:
     return load(folder / "body.urdf")
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("name", SETS)
 @pytest.mark.parametrize("robot", ["body", pytest.param("gough_stewart", marks=pytest.mark.slow)])
 def test_what_is_enclosed_is_the_condition_of_the_configurations(name: str, robot: str, tmp_path: Path) -> None:

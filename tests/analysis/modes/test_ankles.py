@@ -31,6 +31,7 @@ def check_one_leg_watched(kind: str, seed: int, offset: float = 0.0) -> None:
     check_completeness(found, 20)
 
 
+@pytest.mark.some(1)
 @needs_msolve
 @pytest.mark.parametrize("kind", LEGS)
 def test_an_ankle_has_eight_modes_with_its_motors_held_and_four_with_one_rod_watched(kind: str):

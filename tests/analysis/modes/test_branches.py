@@ -44,7 +44,7 @@ def nearest(found: AssemblyModes, D: Array) -> int | None:
     return int(np.argmin(apart)) if min(apart) < SAME else None
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(1)
 @pytest.mark.parametrize("words", KINDS, ids="+".join)
 def test_all_branches_of_random_legs_are_listed(words: tuple[str, ...]):
     """An offset U holds a direction in two ways, a skew pair RR in two; each way has its own line, circle or point."""
@@ -65,6 +65,7 @@ def test_a_word_of_the_catalog_has_all_its_modes():
     assert all(mode.reachable for mode in found.modes)
 
 
+@pytest.mark.slow
 def test_a_hexapod_with_offset_joints_has_eight_branches():
     robot, legs = pods(["RRPS"] * 6, 1)
     found = modes(robot, "1,2,3")
@@ -81,6 +82,7 @@ def test_legs_that_rest_leave_the_pose_itself():
     assert [mode.goal for mode in found.modes] == [True]
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize(("drive", "seed"), [("four-bar", 0), ("strut", 1), ("ball rod", 2)])
 def test_a_held_drive_leaves_two_angles(drive: str, seed: int):
     check_driven(drive, seed, 12)

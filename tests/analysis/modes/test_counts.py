@@ -190,6 +190,7 @@ def check_count(case: str, seed: int) -> None:
         assert len(found.modes) == np.sum(off <= 1e-7)
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("case", CASES)
 def test_a_known_count_is_proved(case: str):
     check_count(case, 1)

@@ -84,6 +84,7 @@ def missed(name: str, setting: ObservedRobot, at: Decimals, found: AssemblyModes
     return parts
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize(("name", "observe", "at"), QUICK)
 def test_the_exact_pose_is_within_the_radius(name: str, observe: tuple[str, ...] | None, at: str):
     setting = ObservedRobot.of(load(shipped()[name]), observe)

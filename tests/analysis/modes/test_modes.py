@@ -23,6 +23,7 @@ MOST = {"planar, three circles": (47, 6), "spatial, three lines": (259, 8), "two
 """Seeds at which many modes are real, and how many."""
 
 
+@pytest.mark.some(10)
 @pytest.mark.parametrize("name", ALL)
 def test_each_family_has_its_number_of_modes_and_the_goal_is_one(name: str):
     for seed in range(12):
@@ -45,6 +46,7 @@ def test_many_modes_can_be_real(name: str):
     assert min(apart) > 1e-3
 
 
+@pytest.mark.some(7)
 @pytest.mark.parametrize("name", ALL)
 def test_enclosures_are_small(name: str):
     radii = [mode.radius for seed in range(20) for mode in solve(draw(name, seed).system).modes]
@@ -64,6 +66,7 @@ def check_by_newton(name: str, seed: int, starts: int) -> None:
     assert len(found) <= len(modes.modes)
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("name", ["planar, three circles", "spatial, three lines", "two bodies, circles"])
 def test_newton_on_the_pose_finds_the_same_solutions(name: str):
     check_by_newton(name, 5, 400)
@@ -90,6 +93,7 @@ def planar_by_sympy(centres: list[tuple[int, int]], radii: list[int], tips: list
     return polynomial
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize(("centres", "radii", "tips"), [
     ([(0, 0), (5, 1), (2, 6)], [2, 3, 2], [(0, 0), (3, 0), (1, 2)]),
     ([(0, 0), (4, 0), (1, 5)], [3, 2, 3], [(0, 1), (2, 0), (0, 3)]),
@@ -216,6 +220,7 @@ def in_tilted_plane(rng: np.random.Generator) -> tuple[Array, Array, Array]:
     return X, tips, goal[:3, 3] + tips @ goal[:3, :2].T
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("kind", ["equal arms", "parallel lines", "one centre"])
 def test_a_continuum_is_said_and_not_listed(kind: str):
     for seed in range(4):

@@ -75,6 +75,7 @@ def check_found(found: AssemblyModes, motion: SelfMotion, anchors: Array, tips: 
     assert set(motion.links) == set(motion.configuration.twin.mechanism.links) - {"base"}
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("seed", [1, 2])
 def test_equal_parallel_legs_carry_a_congruent_platform_on_a_circle(seed: int):
     """3-RPR with the motors held. The tips of equal parallel legs go on equal circles; besides, the platform may be
@@ -185,7 +186,7 @@ def test_a_singular_pose_is_no_self_motion():
     assert sum(mode.goal for mode in found.modes) == 1
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(1)
 @pytest.mark.parametrize(("name", "observe"), [
     ("i4l", "1"), ("3rrp", "1"), ("hexaglide", "1"), ("quattro", "1"), ("prrrp_parallel_point", None), ("3prp", None)])
 def test_freedoms_that_are_never_seen_are_moved(name: str, observe: str | None):

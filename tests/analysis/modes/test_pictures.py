@@ -113,6 +113,7 @@ def test_a_robot_that_does_not_close_is_drawn_as_its_platform_alone():
     assert len(alone.platform) == 2
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize(("name", "observe"), [("3rrr_m1", None), ("rrrrr_m1", None), ("gough_stewart", "1,3,5")])
 def test_a_tilted_robot_is_drawn_tilted(name: str, observe: str | None):
     rng = rng_of(5)
@@ -181,6 +182,7 @@ def test_a_traced_point_keeps_its_triangle():
 # ---- the page
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize(("name", "observe"), [("3rrr_m1", None), ("gough_stewart", "1,3,5"), ("quattro", "1,4"),
                                                pytest.param("hexa", "1,3,5", marks=pytest.mark.slow)])
 def test_numbers_do_not_cover_each_other_and_nothing_leaves_the_page(name: str, observe: str | None):
@@ -218,6 +220,7 @@ def test_numbers_of_a_crowd_keep_out_of_each_other():
     assert not [1 for i, one in enumerate(boxes) for other in boxes[:i] if one.overlaps(other)]
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize(("name", "observe"), [("3rrr_m1", None), ("quattro", "1,4")])
 def test_scales_are_equal(name: str, observe: str | None):
     page = figure(found(name, observe), drawn(name, observe))
@@ -244,6 +247,7 @@ def test_bad_files_are_refused_before_any_work(path: str, tmp_path: Path, monkey
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize(("name", "observe"), [("quattro", "1,2"), ("i4l", None)])
 def test_a_continuum_is_not_drawn(name: str, observe: str | None, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     with pytest.raises(BadRequest, match=r"nothing to draw: .*continuum"):
@@ -304,6 +308,7 @@ def test_there_are_kept_pictures():
     assert len(KEPT) >= 5
 
 
+@pytest.mark.some(3)
 @pytest.mark.parametrize("file", [
     pytest.param(file, id=file.stem, marks=[pytest.mark.slow] if file.stem == "modes_hexa" else []) for file in KEPT])
 def test_kept_pictures_are_fresh_and_small(file: Path):

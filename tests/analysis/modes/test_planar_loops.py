@@ -44,6 +44,7 @@ def measured(found: AssemblyModes) -> MeasuredRobot:
     return (MeasuredRobot.driven if found.kind == "real" else MeasuredRobot.watched)(found.setting)
 
 
+@pytest.mark.some(4)
 @pytest.mark.parametrize("real", [False, True])
 @pytest.mark.parametrize("name", [pytest.param(name, marks=[] if name in QUICK else [pytest.mark.slow])
                                   for name in planar()])
@@ -71,7 +72,7 @@ def test_there_are_planar_robots():
     assert QUICK.issubset(planar())
 
 
-@pytest.mark.some(5)
+@pytest.mark.some(2)
 @pytest.mark.parametrize("ratio", ["1", "2", "-1", "-2", "1/2", "-3/2", "4"])
 @pytest.mark.parametrize("seed", range(5))
 def test_geared_five_bars(ratio: str, seed: int):
@@ -95,6 +96,7 @@ def test_geared_five_bars(ratio: str, seed: int):
     assert (real.found.complete, real.found.complex) == (True, 2)
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("ratio", [2.0, -1.0])
 def test_a_search_finds_only_closings_that_are_listed(ratio: float):
     listed = hrsynth.modes(five_bar(ratio, 3)[0], "1")
@@ -117,6 +119,7 @@ STEPHENSON = [(0, 0), (0.2, 0.6), (1.1, 0.9), (1.2, 0), (0.8, 1.4), (2.0, 1.5), 
 LINKS = {"base": [0, 3, 6], "a": [0, 1], "coupler": [1, 2, 4], "b": [2, 3], "c": [4, 5], "d": [5, 6]}
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize(("motor", "platform", "count", "loops"), [
     ("j0", "coupler", 2, 1), ("j6", "coupler", 6, 2), ("j3", "coupler", 2, 1), ("j0", "c", 4, 2)])
 def test_a_six_bar_of_two_loops(motor: str, platform: str, count: int, loops: int):

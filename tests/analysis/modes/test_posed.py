@@ -65,6 +65,7 @@ SLOW = [
 """Words, watched legs and how many modes there are, complex ones too."""
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize(("word", "legs", "count"),
                          [*KINDS, *(pytest.param(*each, marks=pytest.mark.slow) for each in SLOW)])
 def test_what_random_starts_find_is_listed(word, legs, count):
@@ -79,6 +80,7 @@ def test_what_random_starts_find_is_listed(word, legs, count):
     assert distance([at.pose(body)], listed, at.twin.length) < SAME
 
 
+@pytest.mark.some(5)
 @pytest.mark.parametrize(("word", "legs"), [
     ("3(Utn-Pl*-S)", "123"), ("3(Rz*-Rz-Rz)", "123"), ("(Rz*-Pl-Rz)+2(Rz*-Rz-Rz)", "123"), ("3(Rt*-Pl-S)", "123"),
     ("(Ph*-Rz-Rz)+2(Rz*-Rz-Rz)", "123")])
@@ -167,6 +169,7 @@ def test_slopes_are_the_derivatives(kind):
 THREE = [OnPlane] * 3
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize(("kinds", "count"), [
     (THREE + [OnPlane] * 3, 8), (THREE + [AtAngle] * 3, 8), (THREE + [OnPlane, OnPlane, OnRevolution], 16),
     (THREE + [OnPlane, Coplanar, Coplanar], 32)])

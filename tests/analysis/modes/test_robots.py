@@ -75,6 +75,7 @@ def check_modes(found: AssemblyModes) -> None:
             assert max(np.abs(one - other).max() for one, other in zip(*places, strict=True)) < 1e-8
 
 
+@pytest.mark.some(3)
 @pytest.mark.parametrize(("name", "observe", "real"), FAST)
 def test_what_closes_is_listed(name: str, observe: Legs | None, real: bool):
     found = listed(name, observe, real)
@@ -179,6 +180,7 @@ def same_modes(one: AssemblyModes, other: AssemblyModes, X: Array | None = None)
         assert len(twins[0].open) == len(mode.open)
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize(("name", "observe", "real"), [FAST[2], FAST[3]])
 def test_modes_move_with_the_robot(name: str, observe: Legs | None, real: bool):
     rng = np.random.default_rng(5)
@@ -189,6 +191,7 @@ def test_modes_move_with_the_robot(name: str, observe: Legs | None, real: bool):
     same_modes(found, moved, pose(p, R))
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize(("name", "observe"), [("quattro", ("rod_1a", "rod_4a")), ("3rrr_m1", None)])
 def test_the_order_of_legs_and_links_does_not_matter(name: str, observe: Legs | None):
     """Legs are named by their links here: their labels follow the order."""
@@ -228,7 +231,7 @@ def asked_directions(found: AssemblyModes) -> Array:
     return oracle.directions(state_of(found.goal.twin, found.goal.q), asked(found).observations)
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(1)
 @pytest.mark.parametrize(("name", "observe", "size"), [
     ("3rrr_m1", ("1",), 2), ("gough_stewart", ("1", "2"), 2), ("quattro", ("1",), 2), ("prrrp_parallel", None, 1),
     ("3ppr_m1", None, 3), ("3prp", None, 2), ("uranesx", None, 1)])
@@ -257,6 +260,7 @@ def test_a_robot_is_closed_where_its_modes_are():
     assert np.abs(poses[0] - poses[1]).max() > 1e-2
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("seed", range(3))
 def test_a_four_bar_has_two_modes_with_one_link_watched_and_one_with_both(seed: int):
     """With one crank held the coupler turns over; with both held, legs at rest, only the pose itself is left."""

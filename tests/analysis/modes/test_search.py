@@ -46,7 +46,7 @@ def check_agreement(listed: AssemblyModes) -> None:
     assert sum(mode.met for mode in found.modes) == found.closed + 1
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(1)
 @pytest.mark.parametrize(("name", "observe", "real"), LISTED)
 def test_a_search_finds_only_what_a_complete_list_has(name: str, observe: str | None, real: bool):
     check_agreement(hrsynth.modes(robot(name), observe, real=real))

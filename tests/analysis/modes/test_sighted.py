@@ -50,6 +50,7 @@ OPEN = (("line", "distance", "distance"), True)
 QUICK = [("point",) * 3, ("point", "point", "image_line"), ("point", "image_line", "image_line"), ("image_line",) * 3]
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("row", QUICK, ids=",".join)
 def test_a_mixed_set_has_the_modes_that_the_page_tells(row: tuple[str, ...]) -> None:
     found = modes(watched(row, 7))
@@ -113,6 +114,7 @@ def three_points(at: Array, seed: int) -> AssemblyModes:
     return modes(observe(free_body(np.random.default_rng(seed)), camera="eye=base@0,0,0", see=see, samples=4))
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("seed", [*range(3), *(pytest.param(k, marks=pytest.mark.slow) for k in range(3, 40))])
 def test_three_points_have_eight_modes_of_which_at_most_four_are_in_front(seed: int) -> None:
     """In pairs, mirrored at the camera's centre; those in front are the solutions of the cosine laws."""

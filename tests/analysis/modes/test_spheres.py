@@ -57,6 +57,7 @@ def test_named_classes_are_proved(name: str):
     check(name, 100)
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize(("platform", "base", "count"), [("AABBCD", "ABABCD", 16), ("AABBCC", "ABABCD", 8),
                                                           ("AAABCD", "ABCDDE", 8)])
 def test_rods_that_share_balls_have_bounds_of_their_own(platform: str, base: str, count: int):
@@ -72,6 +73,7 @@ def test_named_classes_are_proved_at_twenty_instances(name: str):
     assert len(real) > 1
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("name", ["CCSS", "AABCDE on ABCCDE"])
 def test_as_many_are_counted_modulo_a_prime(name: str):
     maker, count = NAMED[name]

@@ -34,13 +34,14 @@ SLOWEST = {"spatial, six spheres", "spatial, three planes and three spheres", "s
 QUICK = sorted(set(FAMILIES | MEETING | SURFACES) - SLOWEST)
 
 
+@pytest.mark.some(4)
 @pytest.mark.parametrize("name", MEETING)
 def test_a_point_on_surfaces_has_its_number_of_places(name: str):
     for seed in range(40):
         check_member(name, seed)
 
 
-@pytest.mark.some(4)
+@pytest.mark.some(2)
 @needs_msolve
 @pytest.mark.parametrize("name", [name for name in QUICK if name not in SURFACES])
 def test_msolve_lists_the_same_poses(name: str):
@@ -56,7 +57,7 @@ def test_msolve_lists_the_same_poses_at_many_instances(name: str):
         check_agreement(name, 1000 + seed)
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(1)
 @needs_msolve
 @pytest.mark.parametrize("name", [name for name in QUICK if name in SURFACES])
 def test_tips_on_surfaces_have_their_number_of_poses(name: str):
@@ -72,6 +73,7 @@ def test_tips_on_surfaces_have_their_number_of_poses_at_many_instances(name: str
         check_member(name, 1000 + seed)
 
 
+@pytest.mark.some(2)
 @needs_msolve
 @pytest.mark.parametrize("draw", [lambda rng: spatial(rng, "EEEEEEE"), lambda rng: spatial(rng, "PSSSS"),
                                   lambda rng: on_two_bodies(rng, ("SSS", "SS"))])

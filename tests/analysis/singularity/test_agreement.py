@@ -45,7 +45,7 @@ def check(answer: Singularity, points: int) -> None:
         assert each.lost
 
 
-@pytest.mark.some(7)
+@pytest.mark.some(3)
 @pytest.mark.parametrize(("robot", "legs", "real"), [
     pytest.param(*case, marks=pytest.mark.slow if case[0] in HEAVY and case[1:] == (None, False) else ())
     for case in CASES])
@@ -132,6 +132,7 @@ def of_another(answer: Singularity) -> LockedLeg:
     return replace(first, line=replace(second.line, symbol=first.line.symbol))
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("robot", [("3rrr_m1",), ("3rpr_m1",), ("gough_stewart", "1,2,3"), ("hexa", "1,2,3")])
 def test_another_tip_is_told(robot: Sequence[str]) -> None:
     answer = found(*robot)
@@ -153,6 +154,7 @@ def test_another_line_is_told(robot: Sequence[str]) -> None:
     assert caught.value.angle > 1e-3
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("robot", [("3rrr_m1",), ("gough_stewart", "1,2,3"), ("quattro", "1,4")])
 def test_another_expression_is_told(robot: Sequence[str]) -> None:
     """The legs are right, the expression is not: at the poses where it vanishes the rank is full."""

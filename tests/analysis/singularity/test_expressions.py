@@ -88,6 +88,7 @@ def planar_case(seed: int) -> tuple[sympy.Matrix, Vectors]:
     return R, vectors
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_planar_is_the_determinant_of_three_lines(seed: int) -> None:
     """The line through B_i along n × τ_i in the plane's own coordinates: direction, and moment about n."""
@@ -102,6 +103,7 @@ def test_planar_is_the_determinant_of_three_lines(seed: int) -> None:
     assert at(expression("3rrr_m1"), vectors) == wanted
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_planar_vanishes_for_lines_through_a_point_and_for_parallel_ones(seed: int) -> None:
     R, vectors = planar_case(seed)
@@ -168,6 +170,7 @@ def test_a_resting_tip_is_a_determinant_of_four_velocity_equations(seed: int) ->
     assert abs(at(expression("rrrrr_m1", real=True), vectors)) == abs(system.det()) != 0
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize(("case", "legs"), [(("delta",), "123"), (("quattro_rigid",), "1234"),
                                             (("delta", "1,2"), "12")])
 def test_translations_vanish_exactly_where_some_translation_is_allowed(case: tuple[str, ...], legs: str) -> None:
@@ -204,6 +207,7 @@ def test_six_lines_of_a_complex_are_dependent_wrenches() -> None:
         assert abs(value) > 1e-6
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize(("case", "real"), [(("3rrr_m1",), False), (("hexa", "1,2,3"), False), (("delta",), False),
                                             (("quattro", "1,4"), False), (("delta",), True), (("rrrrr_m1",), True)])
 def test_numbers_and_polynomials_are_the_same(case: tuple[str, ...], real: bool) -> None:
@@ -223,6 +227,7 @@ def test_a_triple_product_has_the_sign_of_its_order() -> None:
         assert evaluate(det(*map(vector, order)), values)[0] == pytest.approx(wanted)
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("case", [("3rrr_m1",), ("hexa", "1,2,3"), ("quattro", "1,4")])
 def test_the_length_of_a_crank_is_a_factor_and_nothing_more(case: tuple[str, ...]) -> None:
     """Identity: with ℓ_i τ_i in the place of τ_i the expression is ℓ_1 ℓ_2 … times itself, so that dividing each
@@ -237,6 +242,7 @@ def test_the_length_of_a_crank_is_a_factor_and_nothing_more(case: tuple[str, ...
     assert len(found(*case).condition.factors) == len(tangents)
 
 
+@pytest.mark.some(3)
 @pytest.mark.parametrize("case", [("3rrr_m1",), ("hexa", "1,2,3"), ("quattro", "1,4"), ("rrrrr_m1",), ("delta",)])
 def test_the_factors_that_were_split_off_never_vanish(case: tuple[str, ...]) -> None:
     """|a × (Q − P)| is the same at all poses: the length of a crank."""

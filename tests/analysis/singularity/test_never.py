@@ -45,6 +45,7 @@ def tangents(answer: Singularity) -> tuple[Array, Array, Array]:
     return p, a, tau / np.linalg.norm(tau, axis=1, keepdims=True)
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("off", [None, 0.02])
 def test_a_rail_that_is_not_normal_to_a_cranks_axis_is_never_parallel_to_its_tangent(seed: int, off: float | None):
@@ -58,6 +59,7 @@ def test_a_rail_that_is_not_normal_to_a_cranks_axis_is_never_parallel_to_its_tan
     assert min(sizes) > 0
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("seed", range(2))
 def test_a_rail_normal_to_the_axis_can_be_parallel(seed: int):
     answer = told(mixed(seed, 0.0))
@@ -72,6 +74,7 @@ def test_near_misses_are_not_called_never():
     assert [each is not None and each.never for each in answers] == [False, True]
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize(("robot", "legs"), [("orthoglide", "1,2"), ("quattro_rigid", "1,3")])
 def test_robots_in_space_have_no_plane_of_motion(robot: str, legs: str):
     answer = found(robot, legs)

@@ -129,6 +129,7 @@ def test_words_expression_and_rank_agree(robot: str, camera: str | list[str], se
     assert words in seen(*see, camera=camera, robot=robot).words
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("see", [["image_circle:platform@0.1,0,0.1/0,1,1/0.05", "point:platform@0,0.1,0"],
                                  ["line:platform@0.1,0,0.1/0,1,1", "distance:platform@0,0.1,0",
                                   "depth:platform@0.3,0,0"]])
@@ -155,6 +156,7 @@ def slider_crank() -> Mechanism:
     return b.build(platform="platform")
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize(("see", "camera"), [
     ("distance:platform@0,0,0", "eye=base@-0.1,0.2,0"), ("encoder:slide", None), ("direction:rod/1,0,0", None),
     ("point:platform@0,0,0", "eye=base@0,0,-1")])

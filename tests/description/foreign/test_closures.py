@@ -298,6 +298,7 @@ def spherical(seed: int, points: bool) -> str:
     return (f'<mujoco><worldbody><body name="base">{text}</body></worldbody><equality>{closures}</equality></mujoco>')
 
 
+@pytest.mark.some(3)
 @pytest.mark.parametrize("seed", range(6))
 def test_points_in_spherical_loops_are_hinges_through_the_centre(seed: int, tmp_path: Path):
     robot = read(tmp_path, spherical(seed, True), "xml", platform="ball")

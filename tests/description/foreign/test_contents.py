@@ -75,6 +75,7 @@ PAIRS = [pytest.param(*pair, marks=[pytest.mark.slow] * (".usda" in pair or ".ya
          for pair in itertools.permutations(ENDINGS, 2)]
 
 
+@pytest.mark.some(3)
 @pytest.mark.parametrize(("first", "second"), PAIRS)
 def test_what_links_hold_survives_from_dialect_to_dialect(first: str, second: str, tmp_path: Path):
     if ".usda" in (first, second):

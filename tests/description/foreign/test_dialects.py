@@ -38,6 +38,7 @@ def lines(mechanism: Mechanism) -> list[tuple[float, ...]]:
     return sorted(tuple(np.round(point, 9) + 0.0) for point in found)
 
 
+@pytest.mark.some(10)
 @pytest.mark.parametrize("name", FILES)
 def test_every_dialect_says_the_same_four_bar(name: str, tmp_path: Path):
     robot = load(written(tmp_path, FILES[name]))
@@ -50,6 +51,7 @@ def test_every_dialect_says_the_same_four_bar(name: str, tmp_path: Path):
     assert motors == (set() if name.startswith("sdf") else {"a"})
 
 
+@pytest.mark.some(7)
 @pytest.mark.parametrize("name", FILES)
 def test_what_was_guessed_is_told(name: str, tmp_path: Path):
     path = written(tmp_path, FILES[name])

@@ -23,6 +23,7 @@ def test_damaged_files_are_read_or_refused(seed: int):
     assert counts["2"] >= 50
 
 
+@pytest.mark.some(10)
 @pytest.mark.parametrize("name", FILES)
 def test_what_is_read_is_valid(name: str, tmp_path):
     robot = load(written(tmp_path, FILES[name]))

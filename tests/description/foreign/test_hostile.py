@@ -91,6 +91,7 @@ MANY = {
 }
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("name", [pytest.param(each, marks=pytest.mark.slow) if number > 1 else each
                                   for number, each in enumerate(MANY)])
 def test_a_million_links_are_refused_in_time_and_memory(name: str, tmp_path: Path):

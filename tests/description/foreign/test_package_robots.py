@@ -40,6 +40,7 @@ def read(path: Path) -> JointGraph:
     return found
 
 
+@pytest.mark.some(23)
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
 def test_yourdfpy_agrees_on_every_tree(path: Path):
     if path.name == EMPTY:

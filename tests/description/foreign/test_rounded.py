@@ -95,12 +95,14 @@ def test_the_whole_table(decimals: int, tmp_path: Path):
     assert decimals == 3 or not refused
 
 
+@pytest.mark.some(17)
 @pytest.mark.parametrize("name", shipped())
 def test_what_is_not_rounded_stays_as_it_is(name: str):
     robot = load(name)
     assert as_meant(robot, 0.0, NOISE) is robot
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("decimals", [6, 4])
 @pytest.mark.parametrize("name", ["linear_delta", "3ppr_m2"])
 def test_a_tilted_robot_of_no_round_numbers_is_the_same(name: str, decimals: int, tmp_path: Path):

@@ -31,7 +31,7 @@ def refused(path: Path) -> str:
     return line
 
 
-@pytest.mark.some(12)
+@pytest.mark.some(6)
 @pytest.mark.parametrize("ending", [".urdf", ".xml", ".sdf", ".yaml"])
 @pytest.mark.parametrize("name", FILES)
 def test_any_source_comes_back_the_same_from_any_dialect(name: str, ending: str, tmp_path: Path):
@@ -109,7 +109,7 @@ def words(robot: Mechanism) -> list[str]:
                   for leg in decompose(normal).legs)
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(1)
 @pytest.mark.parametrize("ending", [".xml", ".sdf"])
 @pytest.mark.parametrize("word", SPACE, ids="".join)
 @pytest.mark.parametrize("name", ["gough_stewart", "3rps"])

@@ -98,6 +98,7 @@ def test_an_overconstrained_loop_with_rounded_numbers_is_read_as_it_is_meant(siz
         assert any("singular values as written leave a gap of" in note.text for note in robot.notes)
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("size", [3e-4, 1e-2])
 def test_more_than_rounding_is_refused(size: float, tmp_path: Path):
     with pytest.raises((LoopsNotClosed, RankUndecided)) as caught:

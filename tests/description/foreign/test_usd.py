@@ -224,6 +224,7 @@ LOCK = "float limit:{0}:physics:low = 1\n float limit:{0}:physics:high = -1\n"
 FREEDOMS = ("transX", "transY", "transZ", "rotX", "rotY", "rotZ")
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize(("free", "kinds"), [(("rotX", "rotZ"), "U"), (("transX", "rotY"), "PR"), *(
     pytest.param(*each, marks=pytest.mark.slow) for each in [
         ((), "F"), (("rotY",), "R"), (("transZ",), "P"), (("rotX", "rotY"), "U"), (FREEDOMS[3:], "S"),
@@ -274,6 +275,7 @@ REFUSED = [
 ]
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize(("text", "said"), [pytest.param(*each, marks=[pytest.mark.slow] * (k > 4))
                                             for k, each in enumerate(REFUSED)], ids=range(len(REFUSED)))
 def test_what_is_refused(text: str, said: str, tmp_path: Path):

@@ -29,6 +29,7 @@ def bare(robot: Mechanism) -> Mechanism:
     return replace(robot, xml=(), links=links, joints=joints)
 
 
+@pytest.mark.some(4)
 @pytest.mark.parametrize("ending", ENDINGS)
 @pytest.mark.parametrize("name", ROBOTS)
 def test_a_shipped_robot_comes_back_the_same(name: str, ending: str, tmp_path: Path):
@@ -41,6 +42,7 @@ def test_a_shipped_robot_comes_back_the_same(name: str, ending: str, tmp_path: P
     assert lost == ()
 
 
+@pytest.mark.some(3)
 @pytest.mark.parametrize("ending", ENDINGS)
 @pytest.mark.parametrize("seed", [0, 2])
 def test_joints_of_every_type_come_back(seed: int, ending: str, tmp_path: Path):

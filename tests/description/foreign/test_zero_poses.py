@@ -66,6 +66,7 @@ def seen(robot: Mechanism, walk: np.random.Generator) -> dict[tuple[str, ...], i
     return found
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("seed", range(3))
 def test_a_leg_at_a_dead_point_is_judged_at_generic_configurations(seed: int, tmp_path: Path):
     robot = read(tmp_path, leg(seed), "xml", base="pelvis", platform="foot")
@@ -80,6 +81,7 @@ def test_a_leg_at_a_dead_point_is_judged_at_generic_configurations(seed: int, tm
     assert (setting.everything.led, posture.hidden.rank) == (True, answer.sets[-1].rank)
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("hips", [1, 2])
 def test_a_dead_point_below_further_joints_is_no_meeting_of_modes(hips: int, tmp_path: Path):
     robot = read(tmp_path, leg(0, hips=hips), "xml", base="pelvis", platform="foot", keyframe="zero")
@@ -209,6 +211,7 @@ def five_bar(bearer: str, *, seed: int = 0, more: str = "") -> str:
 RAIL = '<joint name="rail" type="slide" axis="0 0 1"/>'
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("bearer", [RAIL, "<freejoint name='rail'/>",
                                     RAIL + '<joint name="up" type="slide" axis="0 1 0"/>'])
 def test_what_bears_the_base_is_no_leg(bearer: str, tmp_path: Path):

@@ -220,6 +220,7 @@ def test_a_servo_run_aims_at_the_configuration_that_was_set():
         ask("servo", "3rrr_m1", end=open_)
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("robot", ["rrrrr_m1", "prrrp_parallel", "3ppr_m1", "3upu"])
 def test_the_plain_answer_agrees_with_legs_and_modes(robot: str):
     found = ask("answer", robot)
@@ -245,7 +246,7 @@ def test_what_is_exported_is_the_file_that_its_name_says(kind: str, tmp_path: Pa
         assert file.read_text(encoding="utf-8").lstrip().lower().startswith(("<svg", "<!doctype html"))
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(1)
 @pytest.mark.parametrize(("what", "robot", "fields"), [
     ("open", "rrrrr_m1", {}), ("watch", "prrrp_parallel", {"watch": ["1"]}),
     ("modes", "rrrrr_m1", {"watch": ["2", "1"]}), ("aspects", "rrrrr_m1", {}),

@@ -47,7 +47,7 @@ def test_the_fuzz_knows_every_question():
     assert tuple(sorted(FIELDS)) == names()
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(1)
 @pytest.mark.parametrize("what", [pytest.param(what, marks=pytest.mark.slow) if what in LONG else what
                                   for what in sorted(FIELDS)])
 def test_no_field_of_any_question_is_trusted(what: str):
@@ -66,6 +66,7 @@ def test_no_option_of_a_robot_is_trusted():
             law_plain_or_refused(Desk(), {"ask": "move", "robot": robot})
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("robot", ["3rps", "rrrrr_m1"])
 def test_a_configuration_that_was_tampered_with_is_refused_or_closed(robot: str):
     rng = random.Random(0)

@@ -54,6 +54,7 @@ def none(flow: Flow, n: int) -> np.ndarray:
     return np.zeros((n, len(flow.legs)), dtype=bool)
 
 
+@pytest.mark.some(3)
 @pytest.mark.parametrize(("name", "legs", "singular"), [
     ("quattro", "1,4", [-0.1757, -0.1931, -0.6481, 0.262]), ("3rpr_m1", None, None), ("gough_stewart", "1,3,5", None),
     ("delta", "1,2", None), ("hexa", None, None)])
@@ -167,6 +168,7 @@ def planar(x: np.ndarray, base: np.ndarray, tips: np.ndarray) -> np.ndarray:
     return arms / np.linalg.norm(arms, axis=1)[:, None]
 
 
+@pytest.mark.slow
 def test_runs_end_where_plain_integration_of_the_plane_does():
     """The law in three coordinates, e_i = sin ∠(u_i, u_di), by SciPy: no mechanism, no batch."""
     made, flow = task("3rpr_m1")
