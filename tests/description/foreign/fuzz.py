@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import argparse
+import copy
 import importlib.util
 import random
 import re
@@ -98,7 +99,7 @@ def _elements(text: str, rng: random.Random, kind: int) -> str:
     if kind == 5:
         one.getparent().remove(one)
     elif kind == 6:
-        two.getparent().append(etree.fromstring(etree.tostring(one, with_tail=False)))
+        two.getparent().append(copy.deepcopy(one))
     else:
         for key, value in two.attrib.items():
             if rng.random() < 0.5:
