@@ -62,18 +62,26 @@ def ankle(kind: str, seed: int, *, two_turns: bool = True, offset: float = 0.0
     return b.build(platform="foot"), (centre, first, second, lower), rods
 
 
-def carried(word: str, seed: int) -> Mechanism:
-    """A platform that a random leg of R and P carries, and as many telescopic legs with balls as that has joints."""
+def carried(word: str, seed: int, on: tuple[int, str] | None = None) -> Mechanism:
+    """A platform that a random leg of R and P carries, and as many telescopic legs with balls as that has joints.
+
+    ``on``: the number of one of these with its foot or its end on the axis of the first or the last joint.
+    """
     rng, b = np.random.default_rng(seed), Builder("carried")
     places = [0.3 * (rng.normal(size=3) + [0, 0, k]) for k in range(len(word))]
     links = ["base", *(f"link_{k}" for k in range(1, len(word))), "platform"]
     b.link("base")
     for link, at in zip(links[1:], places, strict=True):
         b.link(link, at=at)
+    axes = [unit(rng.normal(size=3)) for _ in word]
     for k, kind in enumerate(word):
-        b.joint(f"joint_{k}", kind, links[k], links[k + 1], at=places[k], axis=unit(rng.normal(size=3)))
+        b.joint(f"joint_{k}", kind, links[k], links[k + 1], at=places[k], axis=axes[k])
     for k in range(len(word)):
         foot, end = 0.6 * rng.normal(size=3), places[-1] + 0.3 * rng.normal(size=3)
+        if on == (k, "foot"):
+            foot = places[0] + 0.4 * axes[0]
+        if on == (k, "end"):
+            end = places[-1] + 0.2 * axes[-1]
         along = unit(end - foot)
         across = perpendicular(along)
         b.link(f"tube_{k}", at=foot)

@@ -76,6 +76,16 @@ def test_a_platform_that_a_random_leg_carries_has_its_number_of_modes(word: str,
     assert len(set(real)) > 1
 
 
+@pytest.mark.parametrize(("word", "end"), [("RP", "foot"), ("PR", "end"), ("RR", "foot"), ("RR", "end")])
+@pytest.mark.parametrize("leg", [0, 1])
+def test_a_ball_on_a_joint_of_the_leg_that_carries_halves_them(word: str, end: str, leg: int):
+    """Its distance tells the other joint alone: two values of that, and for each two of the joint."""
+    found = hrsynth.modes(carried(word, 3, (leg, end)), real=True)
+    assert (found.found.complex, found.found.bound) == (4, "class")
+    check_modes(found)
+    check_completeness(found, 20)
+
+
 def test_a_leg_without_a_segment_is_not_watched():
     mechanism, _, _ = ankle("SPU", 1)
     assert hrsynth.observe(mechanism).labels == ("1", "2")

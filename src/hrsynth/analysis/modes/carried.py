@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import combinations, permutations
+from itertools import combinations, permutations, product
 from math import prod
 from typing import Any
 
@@ -266,15 +266,19 @@ class CarriedPlatform(System):
         degrees = np.array([[each.degree(k, f) for k, f in enumerate(self.freedoms_)] for each in chosen])
         alike = [i for i, each in enumerate(chosen) if _sphere(each.condition)]
         slides = [k for k, each in enumerate(self.freedoms_) if each.slides]
-        for i in alike[1:]:  # the squares of slides are the same in all: differences have none
-            if chosen[i].joints == chosen[alike[0]].joints:
-                degrees[i, slides] = np.minimum(degrees[i, slides], 1)
-        found = [_permanent(degrees)]
-        for i, j in combinations(range(n), 2):
+        tables = [degrees]
+        for one in alike if slides else ():  # the squares of slides are the same in all: differences have none
+            tables.append(table := degrees.copy())
+            for i in alike:
+                if i != one and chosen[i].joints == chosen[one].joints:
+                    table[i] = np.maximum(degrees[i], degrees[one])
+                    table[i, slides] = np.minimum(table[i, slides], 1)
+        found = [_permanent(table) for table in tables]
+        for (i, j), table in product(combinations(range(n), 2), tables):
             rest = [k for k in range(n) if k not in (i, j)]
-            if self._meets(chosen[i], chosen[j]) and not degrees[rest, 0].any():
+            if self._meets(chosen[i], chosen[j]) and not table[rest, 0].any():
                 bent = np.where(degrees[[i, j], 1:].any(axis=0), 4, 0)
-                found.append(_permanent(np.vstack([bent, degrees[rest, 1:]])))
+                found.append(_permanent(np.vstack([bent, table[rest, 1:]])))
         return min(found)
 
     def _meets(self, one: Told, other: Told) -> bool:
@@ -425,7 +429,7 @@ def proposals(system: CarriedPlatform, most: int) -> Array:
             turned = np.angle(np.exp(1j * each.real)) + 1j * each.imag
             at = np.where(slides, each, turned)
             apart = (np.abs(np.where(slides, at - other, np.exp(1j * (at - other)) - 1.0)).max() for other in found)
-            if len(found) < most and not any(far < 1e-6 for far in apart):
+            if not any(far < 1e-6 for far in apart):
                 found.append(at)
         if len(found) >= most:
             break
@@ -472,7 +476,7 @@ def _judged(system: CarriedPlatform) -> SystemModes:
         raise Unsolved("the leg", f"{size}: up to {most} closings, too many (at most {LARGEST_LOOPS})")
     boxes = enclosed(system, proposals(system, most))
     at_goal = [box for box in boxes if box.real and box.holds(system.unknowns(system.home))]
-    if len(boxes) < most or len(at_goal) != 1:
+    if len(boxes) != most or len(at_goal) != 1:
         raise Unsolved("the leg", f"{size}: of {most} closings at most (Bézout) {len(boxes)} have boxes")
     bodies = [_body(system, box) for box in boxes]
     if any(all((a - b).contains(0) for a, b in zip(one, other, strict=True))
