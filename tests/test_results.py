@@ -76,6 +76,7 @@ def test_an_answer_is_pickled_and_copied_and_is_the_same(name):
             assert other.to_dict() == found.to_dict() if name != "robot" else not other.differences(found)
 
 
+@pytest.mark.slow
 def test_an_answer_is_not_that_of_another_question():
     found = [asked(name) for name in ASKED]
     for i, one in enumerate(found):

@@ -137,8 +137,9 @@ def test_without_opencv_pictures_are_refused_in_one_line(monkeypatch: pytest.Mon
     assert raised.value.exit_status == 3
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(find_spec("mujoco") is None, reason="needs the extra bench")
-@pytest.mark.parametrize("name", ["delta", pytest.param("quattro", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("name", ["delta", "quattro"])
 def test_directions_from_rendered_pictures(name: str):
     pytest.importorskip("cv2")
     pictures.drawing()

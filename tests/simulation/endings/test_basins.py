@@ -254,6 +254,7 @@ def test_ends_do_not_depend_on_the_number_of_processes(monkeypatch: pytest.Monke
     assert both[0].to_dict() == both[1].to_dict()
 
 
+@pytest.mark.slow
 def test_every_start_within_the_certified_radius_ends_at_the_goal():
     found = small()
     assert found.certified is not None

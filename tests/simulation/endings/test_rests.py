@@ -88,6 +88,7 @@ def test_enclosed_rests_are_rests_for_the_oracle() -> None:
         assert each.stability == {2: "stable", -2: "unstable", 0: "saddle"}[int(signs.sum())]
 
 
+@pytest.mark.slow
 def test_lists_of_modes_are_among_the_rests() -> None:
     """Every mode of the goal's directions at which the robot is assembled is a rest that attracts, and those with legs
     reversed are the modes of the rest itself."""
@@ -450,6 +451,7 @@ def test_a_flat_direction_never_attracts_for_sure(curvatures: list[float], word:
     assert stability(curvatures) == word
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("reach", [0.3, 2.25])
 def test_rests_within_the_limits_of_joints_are_counted(reach: float) -> None:
     robot = hrsynth.load(FIVE_BAR)
