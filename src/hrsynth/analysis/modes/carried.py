@@ -385,6 +385,8 @@ def _carrier(measured: MeasuredRobot, leg: Leg, rest: Measurement, goal: ClosedC
     anatomy, mechanism = measured.setting.anatomy, measured.setting.anatomy.mechanism
     own = [each for each in rest.observations if each.leg == leg.label]
     held = [each.joint for each in own if isinstance(each, Encoder)]
+    if anatomy.floats(leg):
+        raise NotConfined(mechanism.name, "nothing carries its platform: it is a free body")
     path, at, found, links = anatomy.path(leg), mechanism.base, list[Turn](), {mechanism.base: 0}
     if set(leg.joints) - {name for edge in path for name in edge.joints}:
         raise NotConfined(mechanism.name, f"leg {leg.label} has loops")
