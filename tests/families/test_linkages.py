@@ -11,7 +11,8 @@ import hrsynth
 from hrsynth.errors import BadRequest
 from hrsynth.families.__main__ import main
 from hrsynth.families.linkages import LINKAGES, Linkage
-from hrsynth.geometry.vectors import Array, rotation_about
+from hrsynth.geometry.vectors import Array, perpendicular, rotation_about, unit
+from hrsynth.mechanism.builder import Builder
 
 
 def drawn(name: str, seed: int) -> tuple[Linkage, Array, Array]:
@@ -147,3 +148,24 @@ def test_many_linkages(name: str):
     for seed in range(2, 5):
         check_mobility(name, seed)
         check_modes(name, seed, 12)
+
+
+@pytest.mark.parametrize(("word", "closing"), [
+    ("RRRR", "S"), ("RRU", "S"), ("RPRR", "S"), ("URR", "S"), ("RRRRR", "U")])
+def test_a_loop_that_closes_at_any_joint_is_answered(word: str, closing: str):
+    """With joints that are no R and P, or more of them than are bounded, its modes are found."""
+    rng, b = np.random.default_rng(len(word)), Builder("loop")
+    places, links = rng.normal(size=(len(word) + 1, 3)), ["base", *(f"link_{k}" for k in range(1, len(word) + 1))]
+    axes = [unit(each) for each in rng.normal(size=(len(word) + 1, 3))]
+    b.link("base")
+    for link, at in zip(links[1:], places, strict=False):
+        b.link(link, at=at)
+
+    def turns(k: int, kind: str) -> dict[str, Array]:
+        return {} if kind == "S" else {"axis": axes[k]} | ({"axis2": perpendicular(axes[k])} if kind == "U" else {})
+
+    for k, kind in enumerate(word):
+        b.joint(f"joint_{k}", kind, links[k], links[k + 1], at=places[k], motor=k == 0, **turns(k, kind))
+    b.joint("closing", closing, links[-1], "base", at=places[-1], loop=True, **turns(-1, closing))
+    found = hrsynth.modes(b.build(platform=links[len(word) // 2]), real=True)
+    assert sum(mode.goal for mode in found.modes) == 1

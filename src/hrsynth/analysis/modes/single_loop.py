@@ -108,7 +108,7 @@ def single_loop(measured: MeasuredRobot, goal: ClosedConfiguration, error: float
     while left:
         joint = next(each for each in left if at in each.links)
         left.remove(joint)
-        forward, places = joint.predecessor == at, list(goal.twin.coordinates[joint.name])
+        forward, places = joint.predecessor == at, list(goal.twin.coordinates.get(joint.name, ()))
         found = freedoms_of(joint, at, goal, middle, held)
         at = joint.other(at)
         way.append(([(f, place, 1 if forward else -1)
