@@ -31,18 +31,15 @@ from ...tolerances import (
     CHAIN_ROUNDING,
     INDEPENDENT_RATES,
     MOVED,
-    NEARLY_REAL_POSE,
     SAME_DIRECTION,
     SAME_RELATION,
-    VANISHES,
 )
 from ..measured import MeasuredRobot
 from .branches import Model
 from .conditions import AtAngle, OnMovingPlane, OnMovingRevolution, OnPlane, OnRevolution, PoseCondition
-from .fits import words
 from .leg_conditions import Middle, leg_conditions
-from .polynomials import Polynomial, krawczyk
-from .pose_boxes import PRECISION, PoseBox, Zero, as_box
+from .polynomials import Polynomial
+from .pose_boxes import PRECISION, PoseBox, UnitCircle, Zero, zeros
 from .pose_forms import Poses
 from .sighted import Sight, conditions, sights
 from .solve import SystemMode, SystemModes
@@ -170,24 +167,20 @@ class _Equation(Zero):
         return found
 
 
-@dataclass(frozen=True, eq=False)
-class _Held:
-    """c² + s² = 1 of a turn and t = 0, or c = 1, s = 0 of a slide."""
+@dataclass(frozen=True)
+class _Fixed:
+    """An unknown, by its number, that has a value."""
 
     k: int
-    n: int
-    what: str
+    at: int
 
     def value(self, x: Sequence[Any]) -> Any:
         """The value at x."""
-        c, s, t = x[self.k], x[self.n + self.k], x[2 * self.n + self.k]
-        return {"circle": c * c + s * s - 1, "c": c - 1, "s": s, "t": t}[self.what]
+        return x[self.k] - self.at
 
     def slopes(self, x: Sequence[Any]) -> Any:
         """The derivative by each unknown at x."""
-        at = {"c": self.k, "s": self.n + self.k, "t": 2 * self.n + self.k}
-        by = {at["c"]: 2 * x[at["c"]], at["s"]: 2 * x[at["s"]]} if self.what == "circle" else {at[self.what]: 1}
-        return [0 * v + by.get(j, 0) for j, v in enumerate(x)]
+        return [0 * v + (j == self.k) for j, v in enumerate(x)]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -451,21 +444,11 @@ def solve_carried(measured: MeasuredRobot, goal: ClosedConfiguration, error: flo
 
 def enclosed(system: CarriedPlatform, proposed: Array) -> list[PoseBox]:
     """Boxes of common zeros in c, s and t, apart from each other."""
-    from flint import acb, arb, ctx
-
     n = len(system.freedoms_)
     equations: list[Polynomial] = [system.equation(each) for each in system.square]
     for k, each in enumerate(system.freedoms_):
-        equations += [_Held(k, n, what) for what in (("c", "s") if each.slides else ("circle", "t"))]
-    found = list[PoseBox]()
-    with ctx.workprec(PRECISION):
-        for x in map(system.unknowns, proposed):
-            real = bool(np.abs(x.imag).max() < NEARLY_REAL_POSE * (1.0 + np.abs(x).max()))
-            start = [arb(v) for v in x.real.tolist()] if real else [acb(v.real, v.imag) for v in x.tolist()]
-            box = as_box(krawczyk(equations, start), real, 0)
-            if box is not None and all(box.apart(other) for other in found):
-                found.append(box)
-    return found
+        equations += [_Fixed(k, 1), _Fixed(n + k, 0)] if each.slides else [UnitCircle(k, n + k), _Fixed(2 * n + k, 0)]
+    return zeros(equations, map(system.unknowns, proposed))[0]
 
 
 def _judged(system: CarriedPlatform) -> SystemModes:
@@ -494,12 +477,8 @@ def _judged(system: CarriedPlatform) -> SystemModes:
              f"other, complex ones too, {len(real)} real")
     if not besides:
         return SystemModes(len(boxes), tuple(modes), True, proof, bound="class", enclosed=True)
-    fitting = tuple(mode for mode in modes if mode.proved or mode.residual <= VANISHES)
-    others = [mode.residual for mode in fitting if not mode.proved]
-    open_ = len(modes) - len(fitting)
-    proof = (f"from {n} of {len(system.told)} conditions: {proof}; of these "
-             + words(True, False, others, len(real) - len(kept), open_))
-    return SystemModes(len(fitting), fitting, not open_, proof, bound="none" if open_ else "class", enclosed=True)
+    return SystemModes.of_more(modes, len(real) - len(kept), f"from {n} of {len(system.told)} conditions: {proof}",
+                               "class")
 
 
 def _body(system: CarriedPlatform, box: PoseBox) -> list[Any]:

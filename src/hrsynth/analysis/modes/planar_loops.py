@@ -26,13 +26,12 @@ from ...kinematics.tasks import solve as close
 from ...mechanism import Joint, JointType, Observation, graphs
 from ...mechanism.observations.direction import Direction
 from ...mechanism.observations.encoder import Encoder
-from ...tolerances import NEARLY_REAL_POSE, NUMBER_ROUNDING, SAME_DIRECTION, SAME_GEOMETRY, SAME_POINT, SOLVED, VANISHES
+from ...tolerances import NUMBER_ROUNDING, SAME_DIRECTION, SAME_GEOMETRY, SAME_POINT, SOLVED
 from ..measured import MeasuredRobot
 from .branches import Model
-from .fits import words
 from .multiples import Residues, bezout, partitions
-from .polynomials import Polynomial, krawczyk
-from .pose_boxes import PRECISION, PoseBox, as_box
+from .polynomials import Polynomial
+from .pose_boxes import PoseBox, UnitCircle, zeros
 from .solve import SystemMode, SystemModes
 from .systems import System
 
@@ -107,23 +106,6 @@ class _Part:
 
     def _slid(self, x: Sequence[Any], slide: int) -> Any:
         return 1 if slide < 0 else x[2 * self.loop.angles + slide]
-
-
-@dataclass(frozen=True, eq=False)
-class _Circle:
-    """cos² ψ + sin² ψ = 1."""
-
-    angle: int
-    angles: int
-
-    def value(self, x: Sequence[Any]) -> Any:
-        """The value at x."""
-        c, s = x[self.angle], x[self.angles + self.angle]
-        return c * c + s * s - 1
-
-    def slopes(self, x: Sequence[Any]) -> Any:
-        """The derivative by each unknown at x."""
-        return [2 * v if k in (self.angle, self.angles + self.angle) else 0 * v for k, v in enumerate(x)]
 
 
 def _product(x: Sequence[Any], e: Exponents) -> Any:
@@ -596,11 +578,7 @@ def _judged(system: PlanarLoops) -> SystemModes:
         return SystemModes(len(boxes), modes, True, proof, bound=bound, enclosed=True)
     kept = [box for box in real if box is at_goal[0] or not excluded(system, box)]
     modes = tuple(_mode(system, box, box is at_goal[0]) for box in kept)
-    fitting = tuple(mode for mode in modes if mode.proved or mode.residual <= VANISHES)
-    others = [mode.residual for mode in fitting if not mode.proved]
-    open_ = len(kept) - len(fitting)
-    proof += "; of these " + words(True, False, others, len(real) - len(kept), open_)
-    return SystemModes(len(fitting), fitting, not open_, proof, bound="none" if open_ else bound, enclosed=True)
+    return SystemModes.of_more(modes, len(real) - len(kept), proof, bound)
 
 
 def enclosures(system: PlanarLoops) -> list[PoseBox]:
@@ -624,23 +602,11 @@ def _balls(box: PoseBox) -> list[Any]:
 
 def _enclosed(system: PlanarLoops, proposed: Array) -> tuple[list[PoseBox], int]:
     """Boxes of closings, apart from each other, and how many proposals have none."""
-    from flint import acb, arb, ctx
-
     a, slack = system.angles, system.slack
     equations: list[Polynomial] = [*(_Part(loop, part, slack) for loop in system.loops for part in (False, True)),
-                                   *(_Circle(k, a) for k in range(a))]
+                                   *(UnitCircle(k, a + k) for k in range(a))]
     u, v, t = proposed[:, :a], proposed[:, a:2 * a], proposed[:, 2 * a:]
-    found, lost = list[PoseBox](), 0
-    with ctx.workprec(PRECISION):
-        for x in np.hstack([(u + v) / 2, (u - v) / 2j, t]):
-            real = bool(np.abs(x.imag).max(initial=0.0) < NEARLY_REAL_POSE * (1.0 + np.abs(x).max(initial=0.0)))
-            start = [arb(w) for w in x.real.tolist()] if real else [acb(w.real, w.imag) for w in x.tolist()]
-            box = as_box(krawczyk(equations, start), real, 0)
-            if box is None:
-                lost += 1
-            elif all(box.apart(other) for other in found):
-                found.append(box)
-    return found, lost
+    return zeros(equations, np.hstack([(u + v) / 2, (u - v) / 2j, t]))
 
 
 def _mode(system: PlanarLoops, box: PoseBox, proved: bool) -> SystemMode:

@@ -6,7 +6,7 @@ six conditions. Each pose that is proposed is enclosed (Krawczyk), complex ones 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -187,6 +187,39 @@ def enclosed(forms: SquareForms, slack: float, proposed: tuple[Array, Array]) ->
                 lost += 1
             elif all(each.apart(other) for other in found):
                 found.append(each)
+    return found, lost
+
+
+@dataclass(frozen=True)
+class UnitCircle:
+    """c² + s² = 1 of two unknowns, by their numbers."""
+
+    c: int
+    s: int
+
+    def value(self, x: Sequence[Any]) -> Any:
+        """The value at x."""
+        return x[self.c] * x[self.c] + x[self.s] * x[self.s] - 1
+
+    def slopes(self, x: Sequence[Any]) -> Any:
+        """The derivative by each unknown at x."""
+        return [2 * v if k in (self.c, self.s) else 0 * v for k, v in enumerate(x)]
+
+
+def zeros(equations: Sequence[Polynomial], proposed: Iterable[Array]) -> tuple[list[PoseBox], int]:
+    """Boxes of common zeros near those that are proposed (n,), apart from each other, and how many have none."""
+    from flint import acb, arb, ctx
+
+    found, lost = list[PoseBox](), 0
+    with ctx.workprec(PRECISION):
+        for x in proposed:
+            real = bool(np.abs(x.imag).max(initial=0.0) < NEARLY_REAL_POSE * (1.0 + np.abs(x).max(initial=0.0)))
+            start = [arb(v) for v in x.real.tolist()] if real else [acb(v.real, v.imag) for v in x.tolist()]
+            box = as_box(krawczyk(equations, start), real, 0)
+            if box is None:
+                lost += 1
+            elif all(box.apart(other) for other in found):
+                found.append(box)
     return found, lost
 
 

@@ -24,14 +24,12 @@ from ...kinematics.tasks import Held
 from ...kinematics.tasks import solve as close
 from ...mechanism import Direction
 from ...mechanism.observations.encoder import Encoder
-from ...tolerances import INDEPENDENT_RATES, NEARLY_REAL_POSE, NUMBER_ROUNDING, SOLVED, VANISHES
+from ...tolerances import INDEPENDENT_RATES, NUMBER_ROUNDING, SOLVED
 from ..measured import MeasuredRobot
 from .branches import Model
 from .carried import CarriedPlatform, Turn, as_mode, freedoms_of
-from .fits import words
 from .leg_conditions import Middle
-from .polynomials import krawczyk
-from .pose_boxes import PRECISION, PoseBox, as_box
+from .pose_boxes import PRECISION, PoseBox, as_box, zeros
 from .solve import SystemMode, SystemModes
 
 LARGEST_CHAIN = 5
@@ -295,9 +293,8 @@ def _zeros(linear: _Linear) -> SystemModes | None:
     f = _determinant(linear)
     if f[-1].contains(0):
         return None
-    boxes = [_zero(f, complex(t)) for t in np.roots([float(c) for c in f[::-1]])]
-    sure = [box for box in boxes if box is not None]
-    if len(sure) < len(f) - 1 or any(not box.apart(other) for k, box in enumerate(sure) for other in sure[:k]):
+    sure = zeros([_Polynomial(f)], np.roots([float(c) for c in f[::-1]])[:, None])[0]
+    if len(sure) < len(f) - 1:
         return None
     found = [_told(linear, box.box[0]) for box in sure if box.real]
     home = linear.loop.unknowns(linear.loop.home)
@@ -307,20 +304,9 @@ def _zeros(linear: _Linear) -> SystemModes | None:
         return None
     kept = [each for each in told if each is at_goal[0] or not each[1]]
     modes = [_mode(linear.loop, each[0], each is at_goal[0]) for each in kept]
-    fitting = tuple(mode for mode in modes if mode.proved or mode.residual <= VANISHES)
-    others, open_ = [mode.residual for mode in fitting if not mode.proved], len(modes) - len(fitting)
     proof = (f"{LARGEST_CHAIN} free joints of one loop: at most {len(sure)} closings by the degree of a determinant, "
-             f"{len(sure)} zeros enclosed apart from each other, complex ones too, {len(told)} real; of these "
-             + words(True, False, others, len(told) - len(kept), open_))
-    return SystemModes(len(fitting), fitting, not open_, proof, bound="none" if open_ else "class", enclosed=True)
-
-
-def _zero(f: Sequence[Any], t: complex) -> PoseBox | None:
-    """The box of a zero."""
-    from flint import acb, arb
-
-    real = abs(t.imag) < NEARLY_REAL_POSE * (1.0 + abs(t))
-    return as_box(krawczyk([_Polynomial(f)], [arb(t.real) if real else acb(t.real, t.imag)]), real, 0)
+             f"{len(sure)} zeros enclosed apart from each other, complex ones too, {len(told)} real")
+    return SystemModes.of_more(modes, len(told) - len(kept), proof, "class")
 
 
 def _told(linear: _Linear, t: Any) -> tuple[PoseBox, bool] | None:

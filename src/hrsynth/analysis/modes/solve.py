@@ -112,6 +112,16 @@ class SystemModes(Value):
     open: bool = False
     """Whether no choice of legs has finitely many solutions, on some branches of the legs at least."""
 
+    @classmethod
+    def of_more(cls, modes: Sequence[SystemMode], out: int, proof: str, bound: str) -> SystemModes:
+        """Where more is told than a square part needs, all of whose zeros are known: those of its real zeros that are
+        not excluded, as ``out`` others are, by all that is told."""
+        fitting = tuple(mode for mode in modes if mode.proved or mode.residual <= VANISHES)
+        open_ = len(modes) - len(fitting)
+        told = words(True, False, [mode.residual for mode in fitting if not mode.proved], out, open_)
+        return cls(len(fitting), fitting, not open_, f"{proof}; of these {told}", bound="none" if open_ else bound,
+                   enclosed=True)
+
     def __getstate__(self) -> dict[str, Any]:
         return {**super().__getstate__(), "solved": ()}
 
