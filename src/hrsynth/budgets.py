@@ -180,8 +180,9 @@ EFFORT = 120.0
 """Seconds of one core that a list of modes may need, by its size (the answer does not depend on the machine)."""
 ELIMINATION_SECONDS, HOMOTOPY_SECONDS, MSOLVE_SECONDS = 0.02, 0.4, 2.0
 """What one system of equations needs, about: by an exact resultant, by forty paths, by an external program."""
-LARGEST_FORMS = 700
-"""Forms of a degree above which all poses of conditions are not looked for by linear algebra."""
+LARGEST_FORMS, FORMS_SECONDS = 700, 12.0
+"""Forms of a degree above which all poses of conditions are not looked for by linear algebra, and the seconds of one
+core that so many need."""
 CAP_OF_MULTIPLES, LARGEST_MULTIPLES = 4, 250
 """Largest degree in a group of unknowns, and most monomials, of a bound by multiples of quadrics."""
 LARGEST_GEAR, LARGEST_LOOPS, PLANAR_STARTS = 6, 120, 20

@@ -37,7 +37,10 @@ SAME = 1e-6
 
 
 def measured(word, legs, seed=0):
+    """Some legs of a word watched, or its motors (no legs)."""
     setting = observe(mechanism(parse(word), seed), samples=4)
+    if not legs:
+        return MeasuredRobot.driven(setting)
     seen = tuple(o for o in setting.segments if o.leg in legs)
     return MeasuredRobot.watched(replace(setting, observed=seen))
 
@@ -52,6 +55,8 @@ KINDS = [
     ("(Ph*-Rz-Rz)+(Rz*!-Rz-Ph)+(Rz*!-Rz-Rz)", "123", 6),  # in a plane: a line of the platform, a line, a circle
     ("3(Ra-Ph*-Ra!-Ra)", "123", 8),  # three quadrics of revolution, no turns
     ("3(Ra*-Ra!-Ra-Ph)", "123", 8),  # three oblique cylinders
+    ("3(Ro-Ro*!-Ro-Ro)", "123", 64),  # two branches a leg, eight turns about one point for each choice
+    ("3(Ra*-Rb!-Rb-Ph-Ra)", "123", 1),  # two branches a leg, at one choice of which all fit
 ]
 SLOW = [
     ("3(Ra*-Ra-Rb!-Rb-Rb)", "123", 64),  # sums of two circles
@@ -61,8 +66,9 @@ SLOW = [
     ("(Cr-Pz*-S)+2(Rt*-Pl-S)+(S-Pl*-S)+2(Utn-Pl*-S)", "45", 32),  # cones
     ("2(Pk*-2SSt)+(Rt*-Utn-S)", "12", 8),  # pairs of rods
     ("3(Rz*!-Rz-Ph)", "123", 2),
+    ("(Pz*-Rt-S)+(Rt*-Pk-S)+(S-Rt*-Rt)", "", 12),  # a line, a circle, a circle of the platform that holds a ball
 ]
-"""Words, watched legs and how many modes there are, complex ones too."""
+"""Words, watched legs (none: the motors) and how many modes there are, complex ones too."""
 
 
 @pytest.mark.some(2)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations, islice, product
@@ -20,7 +20,7 @@ from .curves import Circle, Line, Plane, Reach
 from .rigid import Planar, Spatial
 from .solve import SystemMode, SystemModes, solve
 from .systems import System
-from .tips import Tip, TipLoci
+from .tips import TipLoci
 from .translating import Articulated, Translating
 
 
@@ -142,7 +142,7 @@ def solve_all(confined: TipLoci, *, near: bool = True, effort: float = EFFORT) -
     found = [_scaled(solve(each.system, near=near, goal=None if k else each.home), each.system.size / size)
              for k, each in enumerate(made)]
     total = int(np.prod([1 + len(tip.others) for tip in confined.tips]))
-    modes = found[0] if len(found) == 1 else _together(found, confined.tips, size)
+    modes = together(found, {tip.leg: 1 + len(tip.others) for tip in confined.tips}, size)
     doubts = [f"leg {tip.leg}: {tip.doubt}" for tip in confined.tips if tip.doubt is not None]
     doubts += [] if confined.doubt is None else [confined.doubt]
     if total > len(made):
@@ -167,18 +167,19 @@ def _scaled(modes: SystemModes, factor: float) -> SystemModes:
     return replace(modes, modes=scaled(modes.modes), near=scaled(modes.near))
 
 
-def _together(found: Sequence[SystemModes], tips: Sequence[Tip], size: float) -> SystemModes:
+def together(found: Sequence[SystemModes], branches: Mapping[str, int], size: float) -> SystemModes:
     """One list of the modes of several systems, the goal's own first; a pose that is in two of them counts once.
+    ``branches``: how many each leg has.
 
     A continuum on the goal's own branches is all that is told; on others it leaves the list open.
     """
-    if found[0].continuum is not None:
+    if len(found) == 1 or found[0].continuum is not None:
         return found[0]
     modes = _once([mode for each in found for mode in each.modes], size)
     near = _once([*modes, *(mode for each in found for mode in each.near)], size)[len(modes):]
     unclear = sum(_apart(one, other, size) <= one.radius + other.radius for one, other in combinations(modes, 2))
     twice = sum(len(each.modes) for each in found) - len(modes)
-    legs = ", ".join(f"leg {tip.leg}: {1 + len(tip.others)}" for tip in tips if tip.others)
+    legs = ", ".join(f"leg {leg}: {count}" for leg, count in branches.items() if count > 1)
     counts = [f"{each} complex in {count}" for each, count in Counter(each.complex for each in found).items()]
     proofs = [f"{count} × ({text})" if count > 1 else text for text, count in Counter(e.proof for e in found).items()]
     proof = (f"{len(found)} choices of the held legs' branches ({legs}), {', '.join(counts)}"

@@ -255,7 +255,7 @@ def _of_foot(leg: str, found: Chain, count: int, tip: Array, middle: Middle, pla
 
 def _holds(leg: str, reach: Reach | Quadrics, foot: Array, middle: Middle, plane: Array | None
            ) -> list[PoseCondition]:
-    o, b = middle.point(foot), middle.point(reach.centre)
+    o, b, none = middle.point(foot), middle.point(reach.centre), np.zeros(3)
     if isinstance(reach, Revolution):
         return [OnMovingRevolution(leg, b, reach.axis, o, _profile(reach, middle))]
     if isinstance(reach, Plane):
@@ -263,6 +263,10 @@ def _holds(leg: str, reach: Reach | Quadrics, foot: Array, middle: Middle, plane
     if isinstance(reach, Line):
         across = _across(reach.direction) if plane is None else [np.cross(plane, reach.direction)]
         return [OnMovingPlane(leg, b, n, o, 0.0) for n in across]
+    if isinstance(reach, Circle | Sphere):
+        ball = OnRevolution(leg, b, none, o, np.array([0.0, 0.0, 1.0]),
+                            np.array([(reach.radius / middle.size) ** 2, 0.0, -1.0]))
+        return [*([OnMovingPlane(leg, b, reach.axis, o, 0.0)] if isinstance(reach, Circle) else []), ball]
     raise Underived(f"a {type(reach).__name__.lower()} of the platform that holds its foot")
 
 

@@ -345,7 +345,8 @@ def _listed(setting: ObservedRobot, measured: MeasuredRobot, goal: ClosedConfigu
     reasons = list[NotConfined | Unsolved | TooLarge | MissingExtra]()
     answers = list[tuple[TipLoci | None, Model, SystemModes]]()
     exact = drift(goal, wanted, setting.normal.moved)
-    ways = partial(_of_tips, as_written=as_written, effort=effort), _of_conditions, _of_carrier, _of_single, _of_loops
+    ways = (partial(_of_tips, as_written=as_written, effort=effort), partial(_of_conditions, effort=effort),
+            _of_carrier, _of_single, _of_loops)
     for listed in ways:
         try:
             answers.append(listed(measured, goal, exact))
@@ -379,8 +380,9 @@ def _of_tips(measured: MeasuredRobot, goal: ClosedConfiguration, exact: float, a
     return confined, *solve_all(confined, effort=effort)
 
 
-def _of_conditions(measured: MeasuredRobot, goal: ClosedConfiguration, exact: float) -> tuple[None, Model, SystemModes]:
-    return None, *solve_posed(measured, goal, exact)
+def _of_conditions(measured: MeasuredRobot, goal: ClosedConfiguration, exact: float, effort: float
+                   ) -> tuple[None, Model, SystemModes]:
+    return None, *solve_posed(measured, goal, exact, effort)
 
 
 def _of_carrier(measured: MeasuredRobot, goal: ClosedConfiguration, exact: float) -> tuple[None, Model, SystemModes]:

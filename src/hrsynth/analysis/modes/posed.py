@@ -5,14 +5,14 @@ At least so many as boxes are apart from each other, complex ones too; at most a
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import product
 from math import prod
 
 import numpy as np
 
-from ...budgets import BRANCH_CHOICES, LARGEST_FORMS
+from ...budgets import BRANCH_CHOICES, EFFORT, FORMS_SECONDS, LARGEST_FORMS
 from ...constraints.pattern import attached
 from ...errors import NotConfined, Unsolved
 from ...geometry.so3 import exponential, logarithm, rotation_of
@@ -20,7 +20,7 @@ from ...geometry.vectors import Array, frozen, inverse, pose
 from ...kinematics.configuration import ClosedConfiguration
 from ...tolerances import MOVED, RANK_GAP, SAME_POINT, SAME_RELATION, VANISHES
 from ..measured import MeasuredRobot
-from .branches import Model
+from .branches import Model, together
 from .conditions import OnPlane, PoseCondition
 from .fits import words
 from .leg_conditions import Branches, Middle, leg_conditions
@@ -43,6 +43,8 @@ class PosedPlatform(System):
     back: bool = False
     """Whether the pose is that of the base, as the platform sees it."""
     seen: tuple[Sight, ...] = ()
+    branches: Mapping[str, int] = field(default_factory=dict)
+    """How many each leg has."""
 
     freedoms = 6
 
@@ -92,6 +94,7 @@ def posed(measured: MeasuredRobot, goal: ClosedConfiguration) -> list[PosedPlatf
     held = any(branch for branches, _ in found for branch in branches)
     ways = [(turned, conditions(seen, middle, turned)) for turned in ((False,) if held else (False, True))]
     turned, own = min(ways, key=lambda way: sum(c.degree for c in way[1]))
+    counts = {leg.label: len(branches) for leg, (branches, _) in zip(anatomy.legs, found, strict=True)}
     found.append(([own], 0.0))
     legs: list[Branches] = [branches for branches, _ in found]
     if prod(map(len, legs)) > BRANCH_CHOICES:
@@ -103,7 +106,7 @@ def posed(measured: MeasuredRobot, goal: ClosedConfiguration) -> list[PosedPlatf
              Poses.spatial() if normal is None else Poses.planar(normal))
     asked = (_once([c for branch in chosen for c in branch]) for chosen in product(*legs))
     return [PosedPlatform((), np.zeros((0, 3)), kept, middle, poses, turned, seen,
-                          error=moved + MOVED * goal.twin.length * off) for kept, off in asked]
+                          counts, error=moved + MOVED * goal.twin.length * off) for kept, off in asked]
 
 
 def _once(conditions: Sequence[PoseCondition]) -> tuple[tuple[PoseCondition, ...], float]:
@@ -125,13 +128,12 @@ def most_posed(measured: MeasuredRobot, goal: ClosedConfiguration) -> int:
     return sum(_forms(measured, each).most for each in posed(measured, goal))
 
 
-def solve_posed(measured: MeasuredRobot, goal: ClosedConfiguration, error: float = 0.0) -> tuple[Model, SystemModes]:
-    """All modes, with the goal known to ``error`` (m). Raises ``NotConfined``, and ``Unsolved`` where not all poses are
-    enclosed that there may be."""
+def solve_posed(measured: MeasuredRobot, goal: ClosedConfiguration, error: float = 0.0, effort: float = EFFORT
+                ) -> tuple[Model, SystemModes]:
+    """All modes of all choices of branches together, with the goal known to ``error`` (m). Raises ``NotConfined``, and
+    ``Unsolved`` where not all poses are enclosed that there may be, or the choices need more than ``effort`` (s)."""
     systems = [replace(each, error=each.error + max([error, *(sight.error(error, goal) for sight in each.seen)]))
                for each in posed(measured, goal)]
-    if len(systems) > 1:
-        raise NotConfined(measured.setting.robot.name, f"its legs have {len(systems)} choices of branches")
     if not np.isfinite(error):
         raise NotConfined(measured.setting.robot.name, "no distance bounds how far it is from where its loops close")
     (body,) = attached(measured.setting.anatomy)
@@ -139,10 +141,16 @@ def solve_posed(measured: MeasuredRobot, goal: ClosedConfiguration, error: float
     X, back = goal.pose(body), inverse(pose(first.middle.origin))
     made = Model(first, lambda q: {body: (inverse if first.back else np.asarray)(first.pose(q) @ back) @ X},
                  first.home, first.back)
-    found = _judged(first, _forms(measured, first))
-    if not found.complete:
-        raise Unsolved("the conditions on the pose", found.proof)
-    return made, found
+    forms, found = _forms(measured, first), list[SystemModes]()
+    needed = len(systems) * FORMS_SECONDS * (forms.size / LARGEST_FORMS) ** 3
+    if len(systems) > 1 and needed > effort:
+        raise Unsolved("conditions on the pose", f"{len(systems)} choices of branches, {forms.size} forms each, need "
+                                                 f"about {needed:.0f} s: too many (the effort is {effort:g} s)")
+    for system in systems:
+        found.append(_judged(system, _forms(measured, system), system is first))
+        if not found[-1].complete:
+            raise Unsolved("the conditions on the pose", found[-1].proof)
+    return made, together(found, first.branches, first.size)
 
 
 def _forms(measured: MeasuredRobot, system: PosedPlatform) -> SquareForms:
@@ -156,8 +164,9 @@ def _forms(measured: MeasuredRobot, system: PosedPlatform) -> SquareForms:
     return forms
 
 
-def _judged(system: PosedPlatform, forms: SquareForms) -> SystemModes:
-    """The modes: as many as the degrees allow, or else as the ranks of all multiples of the conditions do."""
+def _judged(system: PosedPlatform, forms: SquareForms, own: bool) -> SystemModes:
+    """The modes: as many as the degrees allow, or else as the ranks of all multiples of the conditions do; ``own``:
+    whether the goal is one."""
     slack = system.error / system.size
     product_ = (f"the product of degrees {' · '.join(map(str, forms.degrees))}"
                 f"{f' / {2 ** forms.shape[1]}' if forms.shape[1] else ''} (Bézout)")
@@ -169,9 +178,9 @@ def _judged(system: PosedPlatform, forms: SquareForms) -> SystemModes:
         if len(boxes) < most or lost:
             proposed = proposals(forms, found[1], most, found[2])
             boxes, lost = ([], 1) if proposed is None else enclosed(forms, slack, proposed)
-    at_goal = [box for box in boxes if box.real and box.holds(np.eye(len(box.middle))[0])]
+    at_goal = [box for box in boxes if own and box.real and box.holds(np.eye(len(box.middle))[0])]
     goal = at_goal[0] if len(at_goal) == 1 else None
-    complete = len(boxes) == most and goal is not None
+    complete = len(boxes) == most and (goal is not None) == own
     real = [box for box in boxes if box.real]
     proof = (f"at most {most} poses by {why}, {len(boxes)} enclosed apart from each other, complex ones too, "
              f"{len(real)} real")
