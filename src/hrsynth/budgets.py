@@ -180,14 +180,16 @@ EFFORT = 120.0
 """Seconds of one core that a list of modes may need, by its size (the answer does not depend on the machine)."""
 ELIMINATION_SECONDS, HOMOTOPY_SECONDS, MSOLVE_SECONDS = 0.02, 0.4, 2.0
 """What one system of equations needs, about: by an exact resultant, by forty paths, by an external program."""
-LARGEST_FORMS, FORMS_SECONDS = 700, 12.0
+LARGEST_FORMS, FORMS_SECONDS, FEW_FORMS_SECONDS = 700, 12.0, 0.1
 """Forms of a degree above which all poses of conditions are not looked for by linear algebra, and the seconds of one
-core that so many need."""
+core that so many need, and few."""
 CAP_OF_MULTIPLES, LARGEST_MULTIPLES = 4, 250
 """Largest degree in a group of unknowns, and most monomials, of a bound by multiples of quadrics."""
 LARGEST_GEAR, LARGEST_LOOPS, PLANAR_STARTS = 6, 120, 20
 """Of planar loops: whole numbers of which a gear's ratio is the quotient, closings that are looked for, and how many
 times 64 random starts."""
+LARGEST_JOINT_FORMS = 750
+"""The same of conditions on a leg's joints."""
 MOST_INFINITE = 4
 """Powers of q · q that are tried to leave out what are no poses."""
 FINEST_BOX = 2.0 ** -100

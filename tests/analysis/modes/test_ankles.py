@@ -9,6 +9,10 @@ import hrsynth
 from analysis.modes.ankles import LEGS, ankle, carried, counted
 from analysis.modes.test_robots import check_completeness, check_modes
 from analysis.modes.test_surfaces import needs_msolve
+from hrsynth.analysis.measured import MeasuredRobot
+from hrsynth.analysis.modes.carried import carried as carried_platform
+from hrsynth.analysis.modes.carried import polished, proposals
+from hrsynth.analysis.modes.joint_forms import closings_bound, eigenvalues
 
 
 def check_motors_held(kind: str, seed: int, offset: float = 0.0) -> int:
@@ -84,6 +88,33 @@ def test_a_ball_on_a_joint_of_the_leg_that_carries_halves_them(word: str, end: s
     assert (found.found.complex, found.found.bound) == (4, "class")
     check_modes(found)
     check_completeness(found, 20)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("word", "on", "count"), [
+    ("RRR", None, 40), ("RRP", None, 28), ("PRR", None, 28), ("RRR", (0, "foot"), 32), ("RRR", (1, "end"), 32)])
+def test_three_joints_and_three_balls_have_their_number_of_modes(word: str, on: tuple[int, str] | None, count: int):
+    """By ranks; a general leg of three R leaves as many as six balls do."""
+    for seed in range(2):
+        found = hrsynth.modes(carried(word, seed, on), real=True)
+        assert (found.found.complex, found.found.complete, found.found.bound) == (count, True, "rank")
+        check_modes(found)
+        check_completeness(found, 20)
+
+
+@pytest.mark.parametrize("word", ["RR", "PR", "RP"])
+def test_ranks_and_degrees_leave_the_same_number(word: str):
+    for seed in range(2, 4):
+        measured = MeasuredRobot.driven(hrsynth.observe(carried(word, seed)))
+        system = carried_platform(measured, measured.setting.everything.start, 1e-12)
+        counted = closings_bound(system, system.square)
+        assert counted is not None
+        assert counted.most == system.most(system.square)
+        found = polished(system, eigenvalues(system, system.square, counted))
+        others = proposals(system, counted.most)
+        assert len(found) == len(others) == counted.most
+        for q in others:
+            assert min(np.abs(system.unknowns(q) - system.unknowns(each)).max() for each in found) < 1e-6
 
 
 def test_a_leg_without_a_segment_is_not_watched():

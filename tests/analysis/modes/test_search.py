@@ -23,7 +23,7 @@ from hrsynth.mechanism import Mechanism
 
 LISTED = [("3rrr_m1", None, False), ("3rps", None, False), ("gough_stewart", "1,3,5", False), ("quattro", "1,4", False),
           ("delta", None, True)]
-WORDS = ["(Pk*-Rt-S)+(Rt*-Rt-S)+(S-Rt*-Rt)", "3(Ro-Ra*!-Ro-Ro)", "3(Ph*-Rz-Piz)"]
+WORDS = ["(Pk*-Rt-S)+(Rt*-Rt-S)+(S-Rt*-Rt)", "3(Ra!-Ra*-Ph-Rb-Ra)", "3(Ph*-Rz-Piz)"]
 """Robots of which no system of equations is known."""
 
 

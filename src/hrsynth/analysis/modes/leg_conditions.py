@@ -263,6 +263,8 @@ def _holds(leg: str, reach: Reach | Quadrics, foot: Array, middle: Middle, plane
     if isinstance(reach, Line):
         across = _across(reach.direction) if plane is None else [np.cross(plane, reach.direction)]
         return [OnMovingPlane(leg, b, n, o, 0.0) for n in across]
+    if isinstance(reach, Circle) and plane is not None:
+        return _in_motion(leg, reach, b, o, plane, middle)
     if isinstance(reach, Circle | Sphere):
         ball = OnRevolution(leg, b, none, o, np.array([0.0, 0.0, 1.0]),
                             np.array([(reach.radius / middle.size) ** 2, 0.0, -1.0]))

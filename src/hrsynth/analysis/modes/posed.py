@@ -12,7 +12,7 @@ from math import prod
 
 import numpy as np
 
-from ...budgets import BRANCH_CHOICES, EFFORT, FORMS_SECONDS, LARGEST_FORMS
+from ...budgets import BRANCH_CHOICES, EFFORT, FEW_FORMS_SECONDS, FORMS_SECONDS, LARGEST_FORMS
 from ...constraints.pattern import attached
 from ...errors import NotConfined, Unsolved
 from ...geometry.so3 import exponential, logarithm, rotation_of
@@ -142,10 +142,10 @@ def solve_posed(measured: MeasuredRobot, goal: ClosedConfiguration, error: float
     made = Model(first, lambda q: {body: (inverse if first.back else np.asarray)(first.pose(q) @ back) @ X},
                  first.home, first.back)
     forms, found = _forms(measured, first), list[SystemModes]()
-    needed = len(systems) * FORMS_SECONDS * (forms.size / LARGEST_FORMS) ** 3
+    needed = len(systems) * (FEW_FORMS_SECONDS + FORMS_SECONDS * (forms.size / LARGEST_FORMS) ** 3)
     if len(systems) > 1 and needed > effort:
         raise Unsolved("conditions on the pose", f"{len(systems)} choices of branches, {forms.size} forms each, need "
-                                                 f"about {needed:.0f} s: too many (the effort is {effort:g} s)")
+                                                 f"about {needed:.1g} s: too many (the effort is {effort:g} s)")
     for system in systems:
         found.append(_judged(system, _forms(measured, system), system is first))
         if not found[-1].complete:
