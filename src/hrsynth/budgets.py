@@ -180,7 +180,7 @@ EFFORT = 120.0
 """Seconds of one core that a list of modes may need, by its size (the answer does not depend on the machine)."""
 ELIMINATION_SECONDS, HOMOTOPY_SECONDS, MSOLVE_SECONDS = 0.02, 0.4, 2.0
 """What one system of equations needs, about: by an exact resultant, by forty paths, by an external program."""
-LARGEST_FORMS, FORMS_SECONDS, FEW_FORMS_SECONDS = 700, 12.0, 0.1
+LARGEST_FORMS, FORMS_SECONDS, FEW_FORMS_SECONDS = 1100, 46.0, 0.1
 """Forms of a degree above which all poses of conditions are not looked for by linear algebra, and the seconds of one
 core that so many need, and few."""
 CAP_OF_MULTIPLES, LARGEST_MULTIPLES = 4, 250

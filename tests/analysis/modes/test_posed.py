@@ -213,3 +213,13 @@ def test_a_body_that_turns_about_a_point_has_eight_modes(seed: int):
     for mode in others.modes:
         assert min(max(np.abs(X - each.bodies[body]).max() for body, X in mode.bodies.items())
                    for each in found.modes if each.bodies) < 1e-6
+
+
+@pytest.mark.parametrize("legs", [None, "1,3"])
+def test_a_body_that_turns_about_a_point_has_one_mode_where_its_rods_are_watched(legs: str | None):
+    """Each leg's last axis keeps one of two directions."""
+    for seed in range(3):
+        found = modes(spherical(np.random.default_rng(seed)), legs)
+        assert (found.found.complete, found.found.complex, len(found.modes)) == (True, 1, 1)
+    others = search(found.goal, MeasuredRobot.watched(found.setting).question, attached(found.setting.anatomy))
+    assert len(others.modes) == 1

@@ -18,6 +18,7 @@ from analysis.modes.test_posed import distance
 from analysis.modes.watched import free_body, watched, written
 from analysis.test_sensors import arm
 from hrsynth.analysis.asked import observe
+from hrsynth.analysis.measured import MeasuredRobot
 from hrsynth.analysis.modes.leg_conditions import Middle
 from hrsynth.analysis.modes.modes import AssemblyModes, modes
 from hrsynth.analysis.modes.search import search
@@ -264,12 +265,14 @@ def test_the_exact_pose_is_within_the_radius(back: bool) -> None:
 
 
 def test_encoders_of_legs_are_held_with_the_legs() -> None:
-    """What is asked by a name of its own is a leg's all the same; what is of neither leg nor platform is searched."""
+    """What is asked by a name of its own is a leg's all the same; so is a point of a link that is platform and leg."""
     joint = next(joint.name for joint in hrsynth.load("3rrr_m1").joints.values() if joint.actuated)
     found = modes("3rrr_m1", see=[f"encoder:{joint}", "distance:platform@0.1,0.3,0", "distance:platform@0.3,0,0"])
     assert (found.found.complex, found.found.complete) == (4, True)  # circles about one centre: two shapes, two turns
     other = modes("rrrrr_m1", camera="eye=base@0.3,0.1,0.5", see="point:dist_1@0.1,0,0")
-    assert not other.found.complete
+    assert (other.found.complete, len(other.modes)) == (True, 2)
+    found = search(other.goal, MeasuredRobot.watched(other.setting).question, attached(other.setting.anatomy))
+    assert len(found.modes) == 2
 
 
 def test_motors_are_held_or_what_is_seen() -> None:

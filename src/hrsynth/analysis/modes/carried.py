@@ -9,7 +9,7 @@ has joints have at most as many isolated common zeros as the permanent of these 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import combinations, permutations, product
 from math import prod
@@ -40,7 +40,7 @@ from .conditions import AtAngle, OnMovingPlane, OnMovingRevolution, OnPlane, OnR
 from .joint_forms import closings_bound, eigenvalues
 from .leg_conditions import Middle, leg_conditions
 from .polynomials import Polynomial, krawczyk
-from .pose_boxes import PRECISION, PoseBox, UnitCircle, Zero, as_box, zeros
+from .pose_boxes import FAR_FROM_REAL, PRECISION, PoseBox, UnitCircle, Zero, as_box, told_far, zeros
 from .pose_forms import Poses
 from .sighted import Sight, conditions, sights
 from .solve import SystemMode, SystemModes
@@ -48,8 +48,6 @@ from .systems import System
 
 FEW_JOINTS = 2
 """Joints up to which random starts find all zeros soon."""
-FAR_FROM_REAL = 1.0
-"""Imaginary part of an angle from which on a zero is not taken for a real one with other last digits."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -534,7 +532,7 @@ def _far(system: CarriedPlatform, proposed: Array, known: Sequence[PoseBox]) -> 
                           *(t * 0 if slid else 2 * t / w for t, w, slid in zip(half, squares, slides, strict=True)),
                           *(t if slid else t * 0 for t, slid in zip(half, slides, strict=True))], False, 0)
             if box is not None and all(box.apart(other) for other in (*known, *found)):
-                found.append(box)
+                found.append(replace(box, rounded=True))
     return found
 
 
@@ -548,13 +546,11 @@ def _judged(system: CarriedPlatform) -> SystemModes:
         raise Unsolved("the leg", f"{size}: up to {most} closings, too many (at most {LARGEST_LOOPS})")
     why, bound = "degrees in each (Bézout)", "class"
     boxes = enclosed(system, proposals(system, most)) if n <= FEW_JOINTS else []
-    far = list[PoseBox]()
     if len(boxes) < most and (counted := closings_bound(system, system.square)) is not None:
         most, why, bound = counted.most, "ranks modulo a prime of 62 bits", "rank"
         proposed = polished(system, eigenvalues(system, system.square, counted))
         boxes = enclosed(system, proposed)
-        far = _far(system, proposed, boxes)
-    boxes += far
+        boxes += _far(system, proposed, boxes)
     at_goal = [box for box in boxes if box.real and box.holds(system.unknowns(system.home))]
     if len(boxes) != most or len(at_goal) != 1:
         raise Unsolved("the leg", f"{size}: of {most} closings at most ({why}) {len(boxes)} have boxes")
@@ -569,7 +565,7 @@ def _judged(system: CarriedPlatform) -> SystemModes:
                 or not any(not each.value(box.box).contains(0) for each in besides)]
         modes = [as_mode(system, box, not besides or box is at_goal[0]) for box in kept]
     proof = (f"{size}: at most {most} closings by {why}, {len(boxes)} enclosed apart from each other, complex ones "
-             f"too{f', {len(far)} far from real ones for the rounded geometry' if far else ''}, {len(real)} real")
+             f"too{told_far(boxes)}, {len(real)} real")
     if not besides:
         return SystemModes(len(boxes), tuple(modes), True, proof, bound=bound, enclosed=True)
     return SystemModes.of_more(modes, len(real) - len(kept), f"from {n} of {len(system.told)} conditions: {proof}",

@@ -11,7 +11,7 @@ import numpy as np
 from ...errors import NotConfined
 from ...geometry import lines
 from ...geometry.ranks import range_basis
-from ...geometry.vectors import Array
+from ...geometry.vectors import Array, perpendicular
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.locked import carry_joint, leg_twists
 from ...kinematics.relation import Measurement
@@ -35,7 +35,7 @@ from .conditions import (
 )
 from .curves import Circle, Line, Plane, Point, Quadrics, Reach, Revolution, Sphere, SweptCircle
 from .reaches import apart, place
-from .turns import Known, groups, orientations, two_axes
+from .turns import Known, groups, one_axis, orientations, two_axes
 
 Branches = list[list[PoseCondition]]
 _Read = tuple[Branches, float]
@@ -158,6 +158,10 @@ def _of_tip(leg: str, found: Chain, count: int, tip: Array, middle: Middle, plan
             turns = rods.turns(found, known)
         elif missing == 1:
             turns = [_angle(reach, *two_axes(found, known))]
+        elif missing == 2:
+            d, c = one_axis(found, known)
+            first = perpendicular(d)
+            turns = [(first, c, 0.0), (np.cross(d, first), c, 0.0), (d, c, 1.0)]
         elif missing:
             raise Underived(f"{missing} conditions on how the platform turns")
         if not any(_alike(reach, other, found.length) and _same_turns(turns, others) for other, others in seen):

@@ -32,6 +32,7 @@ from ..question import question
 from ..singularity.agreement import weakest
 from .branches import Model, solve_all
 from .carried import CarriedPlatform, solve_carried
+from .conditions import AtAngle
 from .drift import drift
 from .formed import formed
 from .motions import SelfMotion, self_motion
@@ -348,17 +349,20 @@ def _listed(setting: ObservedRobot, measured: MeasuredRobot, goal: ClosedConfigu
     ways = (partial(_of_tips, as_written=as_written, effort=effort), partial(_of_conditions, effort=effort),
             _of_carrier, _of_single, _of_loops)
     for listed in ways:
+        if any(found.complete for _, _, found in answers) and listed is not _of_carrier:
+            break
         try:
             answers.append(listed(measured, goal, exact))
         except (NotConfined, Unsolved, TooLarge, MissingExtra) as error:
             reasons.append(error)
         else:
-            if answers[-1][2].complete:
+            if answers[-1][2].complete and not _more(answers[-1][1]):
                 break
     if not answers:
         raise reasons[-1] if isinstance(reasons[-1], Unsolved) else reasons[0]
     # what is measured leaves no freedom: a continuum is that of legs which tips alone do not show
-    confined, made, found = max(answers, key=lambda each: (each[2].complete, each[2].continuum is None))
+    confined, made, found = max(answers, key=lambda each: (each[2].complete, each[2].continuum is None,
+                                                           not _more(each[1])))
     reader = _ModeReader(setting, measured.question, goal, made)
     at_goal = min(found.modes, key=reader.away, default=None)
     ordered = sorted(found.modes, key=lambda mode: mode is not at_goal)
@@ -367,6 +371,16 @@ def _listed(setting: ObservedRobot, measured: MeasuredRobot, goal: ClosedConfigu
     return AssemblyModes(setting, kind, goal, pose, found, tuple(mode for mode in read if not mode.opposite),
                          tuple(mode for mode in near if not mode.opposite), confined, made,
                          antipodal=tuple(mode for mode in read if mode.opposite))
+
+
+def _more(made: Model) -> bool:
+    """Whether a list is that of a part of the conditions on the pose, and counts modes alone, only because the sense
+    of an axis is told too."""
+    system = made.system
+    if not isinstance(system, PosedPlatform):
+        return False
+    senses = sum(isinstance(c, AtAngle) and c.h == 1.0 for c in system.conditions)
+    return len(system.conditions) - senses <= system.poses.freedoms < len(system.conditions)
 
 
 def _of_tips(measured: MeasuredRobot, goal: ClosedConfiguration, exact: float, as_written: bool,

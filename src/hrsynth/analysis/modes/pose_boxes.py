@@ -21,6 +21,9 @@ from .pose_forms import ROTATION, Poses, SquareForms
 
 PRECISION = 128
 """Bits of the enclosures."""
+FAR_FROM_REAL = 1.0
+"""Imaginary part of a coordinate, or of an angle, from which on a zero is not taken for a real one with other last
+digits."""
 NEWTON = 4
 """Steps that make a proposal as good as floats allow."""
 
@@ -31,8 +34,8 @@ class Zero:
 
     condition: PoseCondition
     poses: Poses
-    slack: float
-    """How far a number can be from the exact one (sizes)."""
+    slack: float | None
+    """How far a number can be from the exact one (sizes); None: the numbers are exact."""
 
     @cached_property
     def _tensors(self) -> tuple[Any, Any]:
@@ -51,8 +54,9 @@ class Zero:
         """Numbers as balls."""
         from flint import arb
 
-        flat = np.array([arb(float(v), self.slack + NUMBER_ROUNDING * (1.0 + abs(float(v)))) for v in np.ravel(values)],
-                        dtype=object)
+        slack = self.slack
+        flat = np.array([arb(v) if slack is None else arb(v, slack + NUMBER_ROUNDING * (1.0 + abs(v)))
+                         for v in np.ravel(values).tolist()], dtype=object)
         return flat.reshape(np.shape(values)) if np.shape(values) else flat[0]
 
     @cached_property
@@ -79,7 +83,7 @@ class Zero:
         return [*(2 * (along @ by_x + turned @ by_d)), *(along @ self._moves)]
 
     def _of(self, values: Array) -> Any:
-        if values is getattr(self.condition, "f", None):
+        if self.slack is not None and values is getattr(self.condition, "f", None):
             from flint import arb
 
             return np.array([arb(float(v), (self.slack + NUMBER_ROUNDING) * self._profile) for v in values],
@@ -113,6 +117,8 @@ class PoseBox:
     real: bool
     box: tuple[Any, ...]
     turned: int
+    rounded: bool = False
+    """Whether it is told for the rounded geometry alone: far from real."""
 
     @property
     def _signs(self) -> Iterator[Array]:
@@ -164,12 +170,13 @@ def refined(forms: SquareForms, y: Array, p: Array) -> Array:
 
 def enclosed(forms: SquareForms, slack: float, proposed: tuple[Array, Array]) -> tuple[list[PoseBox], int]:
     """Boxes of poses, each with one for all input within the slack (sizes), no two with the same; and how many
-    proposals had none."""
+    proposals had none. Poses far from real ones may have a box for the numbers as they are alone."""
     from flint import acb, arb, ctx
 
     turned = forms.poses.turns.shape[1]
     conditions = (*forms.planes, *forms.others)
-    equations: list[Polynomial] = [_Unit(turned), *(Zero(c, forms.poses, slack) for c in conditions)]
+    equations, exact = (list[Polynomial]([_Unit(turned), *(Zero(c, forms.poses, each) for c in conditions)])
+                        for each in (slack, None))
     found: list[PoseBox] = []
     lost = 0
     with ctx.workprec(PRECISION):
@@ -181,6 +188,9 @@ def enclosed(forms: SquareForms, slack: float, proposed: tuple[Array, Array]) ->
             elif np.all(np.isfinite(x)):
                 start = [arb(v) for v in x.real.tolist()] if real else [acb(v.real, v.imag) for v in x.tolist()]
                 each = as_box(krawczyk(equations, start), real, turned)
+                if each is None and turned == 4 and np.abs(x.imag).max() > FAR_FROM_REAL:
+                    each = as_box(krawczyk(exact, start), False, turned)
+                    each = None if each is None else replace(each, rounded=True)
             else:
                 each = None
             if each is None:
@@ -188,6 +198,12 @@ def enclosed(forms: SquareForms, slack: float, proposed: tuple[Array, Array]) ->
             elif all(each.apart(other) for other in found):
                 found.append(each)
     return found, lost
+
+
+def told_far(boxes: Iterable[PoseBox]) -> str:
+    """How many are told for the rounded geometry alone, in words."""
+    far = sum(box.rounded for box in boxes)
+    return f", {far} far from real ones for the rounded geometry" if far else ""
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ from .conditions import OnPlane, PoseCondition
 from .fits import words
 from .leg_conditions import Branches, Middle, leg_conditions
 from .pose_bound import bound
-from .pose_boxes import PoseBox, enclosed, excluded_by
+from .pose_boxes import PoseBox, enclosed, excluded_by, told_far
 from .pose_forms import Poses, SquareForms, proposals
 from .sighted import Sight, conditions, sights
 from .solve import SystemMode, SystemModes
@@ -143,9 +143,9 @@ def solve_posed(measured: MeasuredRobot, goal: ClosedConfiguration, error: float
                  first.home, first.back)
     forms, found = _forms(measured, first), list[SystemModes]()
     needed = len(systems) * (FEW_FORMS_SECONDS + FORMS_SECONDS * (forms.size / LARGEST_FORMS) ** 3)
-    if len(systems) > 1 and needed > effort:
+    if needed > max(effort, FEW_FORMS_SECONDS * (len(systems) == 1)):
         raise Unsolved("conditions on the pose", f"{len(systems)} choices of branches, {forms.size} forms each, need "
-                                                 f"about {needed:.1g} s: too many (the effort is {effort:g} s)")
+                                                 f"about {needed:.2g} s: too many (the effort is {effort:g} s)")
     for system in systems:
         found.append(_judged(system, _forms(measured, system), system is first))
         if not found[-1].complete:
@@ -182,8 +182,8 @@ def _judged(system: PosedPlatform, forms: SquareForms, own: bool) -> SystemModes
     goal = at_goal[0] if len(at_goal) == 1 else None
     complete = len(boxes) == most and (goal is not None) == own
     real = [box for box in boxes if box.real]
-    proof = (f"at most {most} poses by {why}, {len(boxes)} enclosed apart from each other, complex ones too, "
-             f"{len(real)} real")
+    proof = (f"at most {most} poses by {why}, {len(boxes)} enclosed apart from each other, complex ones too"
+             f"{told_far(boxes)}, {len(real)} real")
     left = [c for c in system.conditions if c not in forms.planes and c not in forms.others]
     kept = [box for box in real if box is goal or not excluded_by(left, forms.poses, box, slack)]
     fitting = [box for box in kept if not left or box is goal or system.miss(box) <= VANISHES]

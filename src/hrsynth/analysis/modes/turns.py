@@ -117,6 +117,22 @@ def two_axes(chain: Chain, known: Known) -> tuple[Array, Array, Array]:
     """The two directions about which the last body turns against what is known, or against a direction that is held in
     a body that spins about it: the first as it is fixed in the base, the second at the goal; and the first at the
     goal."""
+    base, parts = _turning(chain, known)
+    if len(parts) != 2:
+        raise Underived(f"{len(parts)} axes turn its end")
+    return base @ parts[0][0][1], parts[1][0][1], parts[0][0][1]
+
+
+def one_axis(chain: Chain, known: Known) -> tuple[Array, Array]:
+    """The only direction about which the last body turns so, as it is fixed in the base, and at the goal."""
+    base, parts = _turning(chain, known)
+    if len(parts) != 1:
+        raise Underived(f"{len(parts)} axes turn its end")
+    return base @ parts[0][0][1], parts[0][0][1]
+
+
+def _turning(chain: Chain, known: Known) -> tuple[Array, list[Way]]:
+    """The orientation from which on the last body turns, and about what."""
     axes, base = list[Array](), np.eye(3)
     for body, Q in zip(chain.bodies[::-1], known[::-1], strict=True):
         if Q is not None:
@@ -127,10 +143,7 @@ def two_axes(chain: Chain, known: Known) -> tuple[Array, Array, Array]:
         axes.append(body.watched[0] if body.axis is None else body.axis)
         if body.axis is None:
             break
-    parts = groups([(0, axis) for axis in axes[::-1]])
-    if len(parts) != 2:
-        raise Underived(f"{len(parts)} axes turn its end")
-    return base @ parts[0][0][1], parts[1][0][1], parts[0][0][1]
+    return base, groups([(0, axis) for axis in axes[::-1]])
 
 
 def _driven(chain: Chain, known: Known) -> Iterator[_Found]:
