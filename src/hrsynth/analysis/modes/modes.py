@@ -343,26 +343,27 @@ def _listed(setting: ObservedRobot, measured: MeasuredRobot, goal: ClosedConfigu
             pose: Pose, kind: str, as_written: bool, effort: float) -> AssemblyModes:
     """The modes as the solutions of the system that the tips' curves and surfaces give, or else of the conditions that
     the legs' joints give."""
-    reasons = list[NotConfined | Unsolved | TooLarge | MissingExtra]()
+    reasons, large = list[NotConfined | Unsolved | TooLarge | MissingExtra](), None
     answers = list[tuple[TipLoci | None, Model, SystemModes]]()
-    exact = drift(goal, wanted, setting.normal.moved)
+    exact, better = drift(goal, wanted, setting.normal.moved), None
     ways = (partial(_of_tips, as_written=as_written, effort=effort), partial(_of_conditions, effort=effort),
-            _of_carrier, _of_single, _of_loops)
+            _of_loops, _of_carrier, _of_single)
     for listed in ways:
-        if any(found.complete for _, _, found in answers) and listed is not _of_carrier:
-            break
+        if better is not None and listed not in better:
+            continue
         try:
             answers.append(listed(measured, goal, exact))
         except (NotConfined, Unsolved, TooLarge, MissingExtra) as error:
             reasons.append(error)
+            large = error if listed is _of_loops and isinstance(error, Unsolved) else large
         else:
-            if answers[-1][2].complete and not _more(answers[-1][1]):
-                break
+            if answers[-1][2].complete:
+                better = () if better else _better(answers[-1][1])
     if not answers:
-        raise reasons[-1] if isinstance(reasons[-1], Unsolved) else reasons[0]
+        raise large or reasons[0]
     # what is measured leaves no freedom: a continuum is that of legs which tips alone do not show
     confined, made, found = max(answers, key=lambda each: (each[2].complete, each[2].continuum is None,
-                                                           not _more(each[1])))
+                                                           not _better(each[1])))
     reader = _ModeReader(setting, measured.question, goal, made)
     at_goal = min(found.modes, key=reader.away, default=None)
     ordered = sorted(found.modes, key=lambda mode: mode is not at_goal)
@@ -373,14 +374,15 @@ def _listed(setting: ObservedRobot, measured: MeasuredRobot, goal: ClosedConfigu
                          antipodal=tuple(mode for mode in read if mode.opposite))
 
 
-def _more(made: Model) -> bool:
-    """Whether a list is that of a part of the conditions on the pose, and counts modes alone, only because the sense
-    of an axis is told too."""
+def _better(made: Model) -> tuple[Any, ...]:
+    """Ways that may count complex modes too where a list is that of a part of the conditions on the pose, as the sense
+    of an axis is told besides."""
     system = made.system
-    if not isinstance(system, PosedPlatform):
-        return False
-    senses = sum(isinstance(c, AtAngle) and c.h == 1.0 for c in system.conditions)
-    return len(system.conditions) - senses <= system.poses.freedoms < len(system.conditions)
+    senses = sum(isinstance(c, AtAngle) and c.h == 1.0 for c in getattr(system, "conditions", ()))
+    if not isinstance(system, PosedPlatform) or not senses:
+        return ()
+    few = len(system.conditions) - senses <= system.poses.freedoms
+    return (_of_loops, _of_carrier) if few else (_of_loops,)
 
 
 def _of_tips(measured: MeasuredRobot, goal: ClosedConfiguration, exact: float, as_written: bool,
