@@ -114,7 +114,7 @@ def wrong_caps(record: Record, rng: random.Random) -> None:
     if bound["kind"] != "rank":
         return wrong_count(record, rng)
     for group in bound["groups"]:
-        group[1] = rng.choice((0, 1, 13, -1, 2.5, "3"))
+        group[1] = rng.choice([cap for cap in (0, 1, 13, -1, 2.5, "3") if cap != group[1]])
     return None
 
 
@@ -160,7 +160,9 @@ def other_geometry(record: Record, rng: random.Random) -> None:
         k = rng.randrange(2)
         vector[k] = moved(vector[k], amount(rng))
         return None
-    reach = rng.choice(system["reaches"][:system.get("square")])
+    if system.get("normals"):
+        return other_rest(system, rng)
+    reach = rng.choice(system["reaches"][:system.get("square", system.get("unknowns"))])
     (kind, vectors), = reach.items()
     if kind == "circle":
         factor = 1 + amount(rng)
@@ -172,6 +174,19 @@ def other_geometry(record: Record, rng: random.Random) -> None:
         by = amount(rng)
         vectors[0] = [moved(x, by * Fraction(d)) for x, d in zip(vectors[0], across, strict=True)]
     return None
+
+
+def other_rest(system: Record, rng: random.Random) -> None:
+    """A joint of a loop that has no unknown elsewhere, or longer than one, or another normal."""
+    if rng.random() < 0.3:
+        rng.choice(system["normals"])[0] = "1"
+        return
+    _, axis, point = rng.choice(system["joints"][system["unknowns"]:])
+    by = amount(rng)
+    if rng.random() < 0.5:
+        axis[0] = moved(axis[0], by)
+    else:
+        point[:] = [moved(x, by * Fraction(d)) for x, d in zip(point, other(axis), strict=True)]
 
 
 def other(direction: list[str]) -> list[str]:

@@ -113,8 +113,8 @@ AWAY = 2.11j
 def test_sound_certificates_are_accepted():
     assert checker.verify(certificate(2, 2, sound())) == "2 real of 2 complex poses, and no other"
     assert checker.verify(certificate(0, 2, far())) == "0 real of 2 complex poses, and no other"
-    assert checker.verify(certificate(1, 1, led())).endswith("no other (more legs than needed fit)")
-    assert checker.verify(certificate(3, 3, led(), sound())).endswith("(more legs than needed fit) (2 systems)")
+    assert checker.verify(certificate(1, 1, led())).endswith("no other (more than needed fits)")
+    assert checker.verify(certificate(3, 3, led(), sound())).endswith("(more than needed fits) (2 systems)")
 
 
 def test_lines_through_one_point_need_no_size():

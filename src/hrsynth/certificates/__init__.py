@@ -15,15 +15,16 @@ from ..description import load
 from ..errors import BadRequest, CertificateRefused, PoseNotReached
 from ..mechanism import Mechanism
 from ..tolerances import SAME_RELATION
-from . import modes, paths, ranks, verify_certificate, verify_path
+from . import modes, paths, ranks, verify_certificate, verify_path, verify_ranks
 from .verify_certificate import NotAccepted, once
 from .verify_path import PathNotAccepted
+from .verify_ranks import RanksNotAccepted
 
 
 def certificate(found: AssemblyModes | Derivation | PathAnswer) -> dict[str, Any]:
     """The certificate of a complete list of modes, of a derivation's verdict in exact arithmetic, or of a path: plain
-    data, as ``verify`` and one file, ``verify_certificate.py`` or ``verify_path.py``, check it. Raises
-    ``NoCertificate``.
+    data, as ``verify`` and one file, ``verify_certificate.py``, ``verify_ranks.py`` or ``verify_path.py``, check it.
+    Raises ``NoCertificate``.
 
     >>> hrsynth.certificate(hrsynth.modes("3rrr_m1"))["complex"]
     6
@@ -66,9 +67,9 @@ def verify(source: Mapping[str, Any] | str | Path, robot: Mechanism | str | Path
     try:
         if not isinstance(record, dict):
             raise NotAccepted("it is no object")
-        checker = verify_path if record.get("claim") == "path" else verify_certificate
-        proved = checker.verify(record)
-    except (NotAccepted, PathNotAccepted) as reason:
+        checkers = {"path": verify_path, "ranks": verify_ranks}
+        proved = checkers.get(str(record.get("claim")), verify_certificate).verify(record)
+    except (NotAccepted, PathNotAccepted, RanksNotAccepted) as reason:
         raise CertificateRefused(name, str(reason)) from None
     if robot is not None:
         robot = load(robot)

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from ..analysis.measured import MeasuredRobot
+from ..analysis.modes.carried import CarriedPlatform
 from ..analysis.modes.curves import Circle, Curve, Line, Plane, Point, Reach, Sphere, Surface, shifted
 from ..analysis.modes.modes import AssemblyModes, modes
 from ..analysis.modes.planar_loops import PlanarLoop, PlanarLoops, enclosures, excluded, planar_loops
@@ -34,6 +35,7 @@ from ..mechanism import Mechanism
 from ..mechanism.pose import Pose
 from ..tolerances import NO_POSE_START
 from .bounds import bound
+from .chains import chains
 from .closures import ClosedRobot, written
 from .poses import regular
 from .refining import Polynomial, Refining
@@ -56,6 +58,9 @@ def certificate(found: AssemblyModes) -> dict[str, Any]:
         found = modes(found.setting, at=found.goal, real=found.kind == "real", as_written=found.confined.as_written)
     robot = ClosedRobot.of(found)
     try:
+        system = None if found.model is None else found.model.system
+        if found.found.complete and isinstance(system, CarriedPlatform):
+            return of_chain(system, found, about, robot)
         if found.found.complete and not found.found.solved:
             with suppress(NotConfined):
                 return of_loops(found, about, robot)
@@ -80,6 +85,30 @@ def of_loops(found: AssemblyModes, about: Mapping[str, Any], robot: ClosedRobot 
     measured = MeasuredRobot.driven(found.setting) if found.kind == "real" else MeasuredRobot.watched(found.setting)
     proposed = _closings(planar_loops(measured, found.goal), found.found.complex or 0)
     return _sealed([_system(proposed, robot)], about, robot, found.found.complex or 0)
+
+
+def of_chain(system: CarriedPlatform, found: AssemblyModes, about: Mapping[str, Any], robot: ClosedRobot | None
+             ) -> dict[str, Any]:
+    """The certificate of a platform that a leg carries, or of a single loop; raises ``NotAccepted``."""
+    assert found.model is not None
+    modes_, why = found.found.modes, "no joint of its loop is between its base and its platform"
+    frame = WorkingFrame(system.middle.origin, np.eye(3), system.size, np.array([0.0, 0.0, 1.0]))
+    for each in chains(system, [mode.q for mode in modes_]):
+        kept = [mode is not None for mode in each.modes]
+        if sum(kept) == len(modes_):
+            R, p = system.moved(each.home, system.carrying)
+            there = [None if k is None else system.moved(modes_[k].q, system.carrying) for k in each.modes]
+            poses = [np.empty(0) if to is None else np.column_stack([to[0] @ R.T, to[1] - to[0] @ R.T @ p])
+                     for to in there]
+            bodies = [None if k is None else found.model.bodies(modes_[k].q) for k in each.modes]
+            try:
+                return _sealed([_system(_Proposed(each.record, each.starts, poses, kept, bodies, frame), robot)], about,
+                               robot, found.found.complex or 0)
+            except NotAccepted as reason:
+                why = str(reason)
+        else:
+            why = f"{len(each.starts)} solutions were enclosed, {sum(kept)} of {len(modes_)} modes among them"
+    raise NotAccepted(why)
 
 
 def _sealed(systems: list[dict[str, Any]], about: Mapping[str, Any], robot: ClosedRobot | None, count: int
@@ -136,7 +165,7 @@ def _system(proposed: _Proposed, robot: ClosedRobot | None) -> dict[str, Any]:
                 box["links"] = robot.links(at)
                 if "places" not in record:
                     tips = [[value(p, middle)[0] / value(w, middle)[0] for p in N]
-                            for N, _, w in points[:len(record["tips"])]]
+                            for N, _, w in points[:3 if record["kind"] == "chain" else len(record["tips"])]]
                     record["places"] = robot.places(record.get("bodies", [0] * len(tips)), frame, at, tips,
                                                     record.get("arrows", 0), rational(record.get("hub", ["0"] * 3)))
         elif is_real_ or (legs and is_real_ is not None):

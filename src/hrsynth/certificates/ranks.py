@@ -12,7 +12,7 @@ from ..analysis.exact import architecture
 from ..analysis.instances import NotRecognised
 from ..errors import NoCertificate
 from ..mechanism import Mechanism
-from .verify_certificate import PRIME, digest, verify
+from .verify_ranks import PRIME, digest, verify
 
 
 def certificate(found: Derivation) -> dict[str, Any]:

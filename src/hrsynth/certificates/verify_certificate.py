@@ -1,6 +1,4 @@
-"""Check a certificate of hrsynth: `python verify_certificate.py c.json`. Integers and fractions only; trusts no solver.
-
-*modes*: platforms of which some points, the tips, are confined to curves and surfaces, in rational numbers; all poses.
+"""Check a certificate of all poses of platforms: `python verify_certificate.py c.json`. Integers and fractions only.
 
 * At least: Krawczyk. Each solution has a complex box |x_k - m_k| <= r. With any matrix Y, the derivatives J at m and
   H what they change by in the box, |Y F(m)| + (|1 - Y J| + |Y| H) r < r makes x - Y F(x) a contraction of the box: it
@@ -13,15 +11,11 @@
   forms would have a zero, and isolated ones be fewer (Bernstein, Funct. Anal. Appl. 9, 1975, Theorem B).
 * At most, *poses*: conditions *on a sphere*, *on a plane* on points of a rigid body are linear in 17 coordinates in
   which poses have dimension 6 and degree 40 (Gallet, Nawratil, Schicho, J. Geom. 106, 2015): of six at most 40 zeros,
-  at infinity too, and no curve besides 40. With a tip at rest, or on six planes, three quadrics of the quaternion
-  remain: 8; three rods in one ball put it in two places: 16.
-* A real pose puts each tip where its box does, to the distance told. With more legs than needed, others miss one, poses
-  fit to 1e-9. Systems (branches of legs) are counted one by one. The robot *closes* where places of its links are told:
-  its joints fit, tips are in place, and what is measured is as told once for all poses.
-
-*ranks*: of stacks of integer matrices, by a minor that is not zero modulo a prime and vectors that the stack annuls.
+  at infinity too, and no curve besides 40. A tip at rest, or six planes, leave three quadrics: 8; rods in a ball: 16.
+* A real pose puts each tip where its box does, to the distance told. With more legs, or loops, than needed, others miss
+  one, poses fit to 1e-9. Systems (branches of legs) are counted one by one. The robot *closes* where places of its
+  links are told: its joints fit, tips are in place, and what is measured is as told once for all poses.
 """
-
 import hashlib
 import json
 import math
@@ -35,7 +29,6 @@ class NotAccepted(Exception):
 def need(true, why):
     if not true:
         raise NotAccepted(why)
-
 def add(*terms):  # a sum of polynomials {exponents: coefficient}
     total = {}
     for p in terms:
@@ -58,11 +51,10 @@ def integral(p):  # with integer coefficients that have no common divisor
     return {e: int(c / common) for e, c in p.items()}
 def cross(u, v, mul=lambda a, b: a * b, minus=lambda a, b: a - b):
     return [minus(mul(u[i], v[j]), mul(u[j], v[i])) for i, j in ((1, 2), (2, 0), (0, 1))]
-def rational(value):
-    if isinstance(value, list):
-        return list(map(rational, value))
-    need(isinstance(value, str) and len(value) < 300 and not set(value) - set("0123456789/.-"), "a number in words")
-    return Fraction(value)
+def rational(x):
+    short = isinstance(x, str) and len(x) < 300 and not set(x) - set("0123456789/.-")
+    need(short or isinstance(x, list), "a number in words")
+    return Fraction(x) if short else list(map(rational, x))
 def reach_of(record):  # a kind, its centre; direction, normal, spokes of a circle, squared radius
     (kind, values), = record.items()
     lengths = {"point": [3], "line": [3] * 2, "circle": [3] * 3, "plane": [3] * 2, "sphere": [3, 1]}
@@ -90,22 +82,21 @@ def conditions(point, reach):  # planes and spheres that a point is on: (equatio
     if kind == "sphere":
         return [(add(Q, *(times(-2 * x, p) for x, p in zip(c, N)), times(dot(c, c) - rest[0][0], w)), rest[0])]
     if kind == "circle":
-        both = ("plane", [c, cross(*rest)]), ("sphere", [c, [dot(rest[0], rest[0])]])
-        return [each for reach in both for each in conditions(point, reach)]
+        sphere = "sphere", [c, [dot(rest[0], rest[0])]]
+        return conditions(point, ("plane", [c, cross(*rest)])) + conditions(point, sphere)
     if kind == "line":
         first = cross(rest[0], min(axes, key=lambda axis: abs(dot(rest[0], axis))))
         rest = [first, cross(rest[0], first)]
     return [(add(*map(times, n, N), times(-dot(n, c), w)), n) for n in rest or axes]
 def misfits(equations):  # by how much lengths miss: over a plane's normal, over the squared radius of small spheres
     return [times(1 / (max(map(abs, n)) if len(n) > 1 else min(n[0], Fraction(1))), p) for p, n in equations]
-
 def spatial(system, tips):
     """Three tips of a rigid body on curves, their distances; others are b1 + i u + j v + k u x v, u, v between tips."""
     reaches = [reach_of(each) for each in system["reaches"]]
     u, v = sub(tips[1], tips[0]), sub(tips[2], tips[0])
     up = cross(u, v)
-    need(system["square"] == 3 <= len(tips) == len(reaches) and any(up), "three tips that are not on one line")
-    need({kind for kind, _ in reaches[:3]} <= {"point", "line", "circle"}, "tips on surfaces need another kind")
+    need(system["square"] == 3 <= len(tips) == len(reaches) and any(up) and {kind for kind, _ in reaches[:3]} <= {
+        "point", "line", "circle"}, "three tips that are not on one line; tips on surfaces need another kind")
     moving = [k for k in range(3) if reaches[k][0] != "point"]  # the tips with an unknown, a half-angle tangent or not
     points = [running(reaches[k], moving.index(k) if k in moving else None, len(moving)) for k in range(3)]
     legs, halves = [], [reaches[k][0] == "circle" for k in moving]
@@ -119,7 +110,6 @@ def spatial(system, tips):
              for a, c, d, e in zip(N, U, V, W)]
         legs.append(misfits(conditions(([mul(p, wxy) for p in P], inner(P, P), mul(wxy, wxy)), reach)))
     return found, halves, points, legs
-
 def loops(system, tips):
     """Links in the plane z = 0 that turn by whole multiples of angles: sums of their vectors vanish, some along slides.
     Unknowns: cosines, sines, slides. Of each tip's link it is told how it turns and shifts; also points of others."""
@@ -139,7 +129,6 @@ def loops(system, tips):
     points = [([*N, {}], inner(N, N), term(1, n)) for N in (*at, *map(total, system["others"]))]
     legs = [misfits(conditions(*each)) for each in zip(points, map(reach_of, system["reaches"]))]
     return found, [False] * n, points, [*map(total, system["besides"]), *legs]
-
 def shifting(system, tips):
     """Bodies that translate: x, y, z of the first, the second on ``slide`` about it. Of spheres, and of
     parallel planes, all but the first are replaced by their difference from it."""
@@ -161,37 +150,59 @@ def shifting(system, tips):
             ratio = dot(normal, n1) / dot(n1, n1) if len(n1) > 1 else 1
             found.append(formal(minus(mul(equation, mine), times(ratio, mul(first, its))), mul(w, mine)))
     return found, [False] * 3 + [slide[0] == "circle" for _ in range(3, n)], points, all_[system["square"]:]
-
+def turned(u, v):  # the product of quaternions
+    rest = zip(u[1:], v[1:], cross(u[1:], v[1:], mul, minus))
+    return [minus(mul(u[0], v[0]), inner(u[1:], v[1:])), *(add(mul(u[0], y), mul(v[0], x), z) for x, y, z in rest)]
+def placed(e, g, b, kappa=None):  # |e|^2 R b; |e|^2 tip = that + 2 vec(g e*), its square over |e|^2, and |e|^2
+    back, w, gg = [e[0], *(times(-1, p) for p in e[1:])], inner(e, e), minus(inner(g, g), kappa or {})
+    arrow = turned(turned(e, [{}, *({tuple(0 * k for k in next(iter(w))): c} for c in b)]), back)[1:]
+    Q = add(times(4, gg), *(times(4 * c, p) for c, p in zip(b, turned(back, g)[1:])), times(dot(b, b), w))
+    return arrow, ([add(p, times(2, q)) for p, q in zip(arrow, turned(g, back)[1:])], Q, w)
 def pose(system, tips):
-    """Study's coordinates: a quaternion e = E (1, x1, x2, x3), g = E (0, x5, x6, x7), |e|^2 x4 = (e.g)^2; |e|^2 tip =
-    2 vec(g e*) + |e|^2 R b. The last ``arrows`` of the tips only turn, about ``hub``."""
+    """Study's coordinates: a quaternion e = E (1, x1, x2, x3), g = E (0, x5, x6, x7), |e|^2 x4 = (e.g)^2. The last
+    ``arrows`` of the tips only turn, about ``hub``."""
     n, E, arrows = 7, [[int(c) for c in row] for row in system["chart"]], system["arrows"]
-    need([*map(len, E)] == [4] * 4 and modular([[c % PRIME for c in row] for row in E], 4)[1] == 4, "dependent rows")
     x, hub = [term(1, n), *(term(1, n, k) for k in range(n))], rational(system["hub"])
     e, g = [add(*map(times, row, x)) for row in E], [add(*map(times, row, ({}, *x[5:]))) for row in E]
-    need(len(hub) == 3 and arrows in range(len(tips)), "a hub, and tips that are no arrows")
-    w, gg, s = inner(e, e), minus(inner(g, g), x[4]), [[mul(a, b) for b in e] for a in e]
-    R = [[add(s[0][0], times(2, s[i][i]), *(times(-1, s[k][k]) for k in (1, 2, 3))) if i == j else
-          times(2, add(s[i][j], times(1 if (i - j) % 3 == 1 else -1, s[0][6 - i - j]))) for j in (1, 2, 3)]
-         for i in (1, 2, 3)]
-    there, back = ([times(2, add(mul(e[0], g[k]), times(-1, mul(e[k], g[0])), times(sign, minus(
-        mul(e[k % 3 + 1], g[(k + 1) % 3 + 1]), mul(e[(k + 1) % 3 + 1], g[k % 3 + 1]))))) for k in (1, 2, 3)]
-        for sign in (1, -1))
-    found, points = [minus(mul(x[4], w), mul(inner(e, g), inner(e, g)))], []
+    need([*map(len, E)] == [4] * 4 and modular([[c % PRIME for c in row] for row in E], 4)[1] == 4 == len(hub) + 1
+         and arrows in range(len(tips)), "a chart with dependent rows, no hub, or tips that are all arrows")
+    w, points, found = inner(e, e), [], [minus(mul(x[4], inner(e, e)), mul(inner(e, g), inner(e, g)))]
     for k, (b, reach) in enumerate(zip(tips, map(reach_of, system["reaches"]), strict=True)):
-        N = [add(*map(times, b, row)) for row in R]
-        if k < len(tips) - arrows:
-            Q = add(times(4, gg), *(times(2 * c, p) for c, p in zip(b, back)), times(dot(b, b), w))
-            points.append(([add(p, q) for p, q in zip(there, N)], Q, w))
-        else:
-            need(reach[0] == "plane", "an arrow keeps to a plane")
-            points.append(([add(p, times(c, w)) for p, c in zip(N, hub)], {}, w))
+        arrow, point = placed(e, g, b, x[4])
+        need(k < len(tips) - arrows or reach[0] == "plane", "an arrow keeps to a plane")
+        points.append(point if k < len(tips) - arrows else ([add(p, times(c, w)) for p, c in zip(arrow, hub)], {}, w))
         found += [equation for equation, _ in conditions(points[-1], reach)]
     return found, [False] * n, points, []
-
+def chain(system, tips):
+    """Turns and slides from the base on: dual quaternions 1 + t h, h = a + eps o x a or eps a / 2. Three tips are the
+    platform's, behind the first of ``ends``; others are points, or arrows, that some joints carry. ``normals`` annul
+    all that the rest of a loop, without unknowns, can be."""
+    n, joints, ((last,), *ends) = system["unknowns"], [(k, *rational(v)) for k, *v in system["joints"]], system["ends"]
+    t, halves, rows = [term(1, n, k) for k in range(n)], [kind == "R" for kind, _, _ in joints[:n]], []
+    def carried(start, by):
+        e, g = [term(1, n), {}, {}, {}], [{}] * 4
+        for (kind, a, o), x in zip(joints[start:], by):
+            turn, slide = (a, cross(o, a)) if kind == "R" else ([0] * 3, [c / 2 for c in a])
+            p, q = [term(1, n), *(times(c, x) for c in turn)], [{}, *(times(c, x) for c in slide)]
+            e, g = turned(e, p), [*map(add, turned(e, q), turned(g, p))]
+        return e, g
+    def at(b, start, end): return placed(*carried(start, t[start:end]), b)
+    need(all(kind in ("R", "P") and dot(a, a) == 1 for kind, a, _ in joints) and 0 < last <= n <= len(joints) and any(
+        cross(sub(tips[1], tips[0]), sub(tips[2], tips[0]))), "turns and slides along vectors of length 1, a platform")
+    rest = [[p for part in carried(n, by) for p in part] for by in product(({}, term(1, n)), repeat=len(joints) - n)]
+    for v in map(rational, system["normals"]):
+        back = [-c if k % 4 else c for k, c in enumerate(v)]
+        need(len(v) == 8 and not any(add(*map(times, back, x)) for x in rest), "a normal of what the rest can be")
+        rows.append((add(*map(times, v, [p for part in carried(0, t) for p in part])), v, {tuple(map(int, halves)): 1}))
+    for b, (start, end, arrow), reach in zip(tips[3:], ends, map(reach_of, system["reaches"]), strict=True):
+        need(0 <= start < end <= n and reach[0] in ("plane", "sphere")[:2 - bool(arrow)], "what a tip is told of")
+        turn, point = at(b, start, end)
+        rows += [(*each, point[2]) for each in conditions((turn, {}, point[2]) if arrow else point, reach)]
+    points = [at(b, 0, last)[1] for b in tips[:3]] + [at(tips[0], 0, n)[1]]
+    return [formal(p, w) for p, _, w in rows[:n]], halves, points, [misfits([row[:2]]) for row in rows[n:]]
 KINDS = {"spatial": (spatial, "square"), "loops": (loops, "angles slides loops besides links others"),
-         "shifting": (shifting, "square bodies slide"), "pose": (pose, "chart arrows hub")}
-
+         "shifting": (shifting, "square bodies slide"), "pose": (pose, "chart arrows hub"),
+         "chain": (chain, "joints unknowns ends normals")}
 def whole(x):  # complex numbers, pairs of fractions, as integers, and what they are over
     q = math.lcm(*(u.denominator for z in x for u in z))
     return [[u.numerator * (q // u.denominator) for u in z] for z in x], q
@@ -210,6 +221,10 @@ def change(p, m, r):  # in a box; distances rounded upwards
     return r * sum(most(slope(p, k), far) for k in range(len(m)))
 def most_of(p, m, r): return size(value(p, m)) + change(p, m, r)
 def least(p, m, r): return size(value(p, m)) / 2 - change(p, m, r)  # of |p| in the box
+def differ(p, w, m, r, k, s):  # whether p / w surely has other values in two boxes
+    off = sum(change(f, x, a) * most_of(g, y, b) + most_of(f, x, a) * change(g, y, b)
+              for f, x, a, g, y, b in ((p, m, r, w, k, s), (w, m, r, p, k, s)))
+    return size(sub(along([value(p, m)], [value(w, k)]), along([value(p, k)], [value(w, m)]))) / 2 > off
 def along(y, z):
     (y, q), (z, s) = whole(y), whole(z)
     return [Fraction(sum(x), q * s) for x in zip(*((a * c - b * d, a * d + b * c) for (a, b), (c, d) in zip(y, z)))]
@@ -276,10 +291,10 @@ def modes(record):
         far = FAR * fair(system, tips := rational(system["tips"]))
         equations, halves, points, legs = KINDS[system["kind"]][0](system, tips)
         equations = [integral(p) for p in equations]
-        need((equations, legs) not in seen, "a system that is told twice")
-        seen.append((equations, legs))
         need(len(equations) == len(halves), f"{len(equations)} equations in {len(halves)} unknowns")
-        flat, boxes = [times(Fraction(1, 2 ** max(map(abs, p.values())).bit_length()), p) for p in equations], []
+        need((equations, legs) not in seen, "a system that is told twice")
+        boxes, counted, seen = [], [], [*seen, (equations, legs)]
+        flat = [times(Fraction(1, 2 ** max(map(abs, p.values())).bit_length()), p) for p in equations]
         bound = {"rank": rank, "poses": poses, "degrees": degrees}[system["bound"]["kind"]](equations, halves, system)
         need(len(system["boxes"]) == bound, f"{len(system['boxes'])} boxes, but there may be {bound} solutions")
         for each in system["boxes"]:
@@ -287,8 +302,7 @@ def modes(record):
             need(len(m) == len(halves) and all(len(z) == 2 for z in m), "a box without its unknowns")
             one = "misses" if "misses" in each else "pose within links"  # what a box says, and nothing else
             need(each.keys() <= {*f"middle radius inverse {one}".split()}, "another key of a box")
-            boxes.append((m, r))
-            proofs.append((flat, m, r, rational(each["inverse"])))
+            boxes, proofs = [*boxes, (m, r)], [*proofs, (flat, m, r, rational(each["inverse"]))]
             finite = all(least(w, m, r) > 0 for _, _, w in points)
             away = far > 0 and any(least(p, m, r) > far * most_of(w, m, r) for N, _, w in points for p in N)
             if "pose" in each:
@@ -304,15 +318,15 @@ def modes(record):
             else:
                 need(any(abs(v) > r for _, v in m), "a box that may be real has no pose")
                 need(finite and not legs, "a box that may be a pose, or none")
-            real, complex_ = real + ("pose" in each), complex_ + (not away and "misses" not in each)
+            real, counted = real + ("pose" in each), counted + [(m, r)] * (not away and "misses" not in each)
+        own, complex_ = {"loops": points, "chain": points[:3]}.get(system["kind"], []), complex_ + len(counted)
+        need(all(any(differ(p, w, *one, *other) for N, _, w in own for p in N) or not own
+                 for one, other in combinations(counted, 2)), "two closings may be of one pose")
         for (m, r), (k, s) in combinations(boxes, 2):
             need(any(max(abs(a - c), abs(b - d)) > r + s for (a, b), (c, d) in zip(m, k)), "two boxes touch")
-            need(system["kind"] != "loops" or any(size(sub(value(p, m), value(p, k))) / 2 > change(p, m, r) + change(
-                p, k, s) for N, _, _ in points for p in N), "two closings may be of one pose")
     need(seen and record["real"] == real and record["complex"] == complex_, f"{real} real of {complex_} are proved")
-    for each in proofs:
-        enclosed(*each)
-    more = " (more legs than needed fit)" * any(legs for _, legs in seen) + f" ({len(seen)} systems)" * (len(seen) > 1)
+    need(all(enclosed(*each) is None for each in proofs), "boxes without a solution")
+    more = " (more than needed fits)" * any(legs for _, legs in seen) + f" ({len(seen)} systems)" * (len(seen) > 1)
     more += f" nearer than 10^7 of its sizes ({apart} solutions are farther)" * (apart > 0)
     more += f"; the robot closes at {closed} of the real ones, to 1e-9" * ("assembly" in record)
     return f"{real} real of {complex_} complex poses, and no other{more}"
@@ -348,10 +362,9 @@ def closes(robot, links):  # its joints fit to 1e-9 with links displaced since z
     need(robot["held"] and robot["joints"] and all(abs(x) < FIT for x in off), "an open joint, or another measurement")
     return True
 def told(system, each, points, tips, m, r):  # whether the pose puts the tips where the box does
-    P, within = rational(each["pose"]), rational(each["within"])
-    turn = turn_of(P)
+    turn, P, within = turn_of(rational(each["pose"])), rational(each["pose"]), rational(each["within"])
     need(within <= WITHIN and (system["kind"] != "shifting" or all(turn[i][i] == 1 for i in range(3))), "another pose")
-    arrows, bodies = system.get("arrows", 0), system.get("bodies", [0] * len(tips))
+    arrows, bodies = system.get("arrows", 0), system.get("bodies", [0] * (3 if system["kind"] == "chain" else 50))
     for k, (b, (N, _, w), body) in enumerate(zip(tips, points, bodies)):
         start = rational(system["hub"]) if k >= len(tips) - arrows else [row[3] for row in P]
         at = [value(p, m)[0] / value(w, m)[0] for p in N]
@@ -364,18 +377,6 @@ def told(system, each, points, tips, m, r):  # whether the pose puts the tips wh
             need(x[3] in ("0", "1") and all(abs(dot(u, v) - (u is v)) < FIT for u in rows for v in rows) and all(
                 abs(v - dot(row, there) / unit - (x[3] == "0") * c) + off <= WITHIN
                 for v, row, c in zip(at, rows, start, strict=True)), "a tip that is not on its link")
-def ranks(record):
-    need(record["stacks"] and record["matrices"].keys() <= {"A", "X", "Y"}, "no stack, or a matrix of another name")
-    for each in record["stacks"]:
-        rows, kernel = [row for name in each["of"] for row in record["matrices"][name]], each["kernel"]
-        need(rows and all(type(c) is int for row in [*rows, *kernel, [each["rank"]]] for c in row)
-             and len(set(each["of"])) == len(each["of"]), "matrices of integers, each once")
-        minor = [[rows[i][j] % PRIME for j in each["columns"]] for i in each["rows"]]
-        need(len(set(each["columns"])) == len(minor) == modular(minor, 0)[1] == each["rank"], "a minor that is zero")
-        need(all(sum(map(int.__mul__, row, v)) == 0 for row in rows for v in kernel), "a vector that is not annulled")
-        need({len(row) for row in rows + kernel} == {each["rank"] + len(kernel)}, "too few vectors that are annulled")
-        need(modular([[c % PRIME for c in v] for v in kernel], 0)[1] == len(kernel), "vectors that are dependent")
-    return "; ".join(f"rank [{'; '.join(each['of'])}] = {each['rank']}" for each in record["stacks"])
 def digest(record):
     rest = {key: each for key, each in record.items() if key != "sha256"}
     return hashlib.sha256(json.dumps(rest, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
@@ -386,11 +387,10 @@ def verify(record):  # what a certificate proves, in words; raises NotAccepted
     try:
         need(isinstance(record, dict) and record.get("format") == "hrsynth-certificate-1", "this is no certificate")
         need(record["sha256"] == digest(record), "the file was changed: another digest")
-        need(record["claim"] != "path", "it is of a path, which verify_path.py checks")
-        return {"modes": modes, "ranks": ranks}[record["claim"]](record)
+        need(record["claim"] == "modes", "it is of another claim: verify_path.py and verify_ranks.py check those")
+        return modes(record)
     except Exception as error:
         raise error if isinstance(error, NotAccepted) else NotAccepted(f"no certificate: {error!r}") from None
-
 if __name__ == "__main__":
     try:
         with open(sys.argv[1], encoding="utf-8") as file:

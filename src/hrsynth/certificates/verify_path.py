@@ -265,7 +265,7 @@ def once(pairs: Any) -> Any:  # an object of JSON; of two keys a reader may see 
 def verify(record: Any) -> str:  # what a certificate proves, in words; raises PathNotAccepted
     try:
         need(isinstance(record, dict) and record.get("format") == "hrsynth-certificate-1", "this is no certificate")
-        need(record["claim"] == "path", "it is not of a path: verify_certificate.py checks modes and ranks")
+        need(record["claim"] == "path", "it is not of a path: verify_certificate.py and verify_ranks.py check others")
         need(record["sha256"] == digest(record), "the file was changed: another digest")
         return path(record)
     except Exception as error:

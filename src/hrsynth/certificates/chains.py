@@ -1,0 +1,211 @@
+"""Platforms that a leg of R and P carries, and single loops of R and P, as the checker's kind ``chain``.
+
+All is told at the goal: there each unknown is zero, and a loop of whatever rational axes closes. Of a loop the last two
+joints have no unknowns: with h₁, h₂ their axes the others have to be, but for a factor, in the span of 1, h₁, h₂ and
+h₂ h₁, which four *normals* annul (M. L. Husty, M. Pfurner and H.-P. Schröcker, Mech. Mach. Theory 42, 2007).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import permutations, product
+from math import gcd, prod
+from typing import Any
+
+import numpy as np
+
+from ..analysis.modes.carried import CarriedPlatform, Told, Turn, enclosed, proposals
+from ..analysis.modes.conditions import AtAngle, OnPlane, OnRevolution
+from ..analysis.modes.quadrics import UNIT
+from ..analysis.modes.single_loop import SingleLoop
+from ..geometry.vectors import Array
+from .closures import written
+from .refining import Polynomial
+from .verify_certificate import KINDS, NotAccepted, cross, integral, rational, slope
+
+PLATFORM = [["0", "0", "0"], ["1", "0", "0"], ["0", "1", "0"]]
+"""Three points of the platform at the goal (sizes)."""
+REST = 2
+"""Joints of a loop without unknowns."""
+STARTS, SETS, ITERATIONS = 64, 20, 60
+"""Random starts at once, how often, and Newton's steps from them."""
+REACHED, SAME = 1e-10, 1e-6
+"""The last of Newton's steps at a solution, and how far two proposals of one are apart at most."""
+FROM = 0.6
+"""By how much the home of each next joint of a leg is turned from the goal (rad)."""
+
+Starts = list[tuple[list[complex], bool | None]]
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """A system without boxes and bound; about where its solutions are, and whether they are real (None: no poses, the
+    tangent of half an angle is ±i); for the real ones the number of the list's mode there, None where it is none."""
+
+    record: dict[str, Any]
+    starts: Starts
+    modes: list[int | None]
+    home: Array
+    """The coordinates (n,) of the list's at which all of the record is told."""
+
+    @classmethod
+    def of(cls, record: dict[str, Any], starts: Starts, found: Sequence[Array], home: Array) -> Chain:
+        """With the list's modes by their coordinates (rad, sizes)."""
+        slides = np.array([kind == "P" for kind, *_ in record["joints"][:record["unknowns"]]])
+        places = [np.where(slides, np.real(start), 2.0 * np.arctan(np.real(start))) for start, real in starts if real]
+        return cls(record, starts, [next((k for k, x in enumerate(found) if np.abs(np.where(
+            slides, x[:len(q)] - q, np.exp(1j * (x[:len(q)] - q)) - 1.0)).max() < SAME), None) for q in places], home)
+
+
+def chains(system: CarriedPlatform, found: Sequence[Array]) -> Iterator[Chain]:
+    """The ways to write a system with modes at these coordinates."""
+    if not isinstance(system, SingleLoop):
+        yield _carried(system, found)
+        return
+    joints, m = [_joint(each, np.eye(3), np.zeros(3)) for each in system.freedoms_], len(system.freedoms_)
+    back = [[kind, [str(-Fraction(c)) for c in a], o] for kind, a, o in joints[::-1]]
+    n = max(1, m - REST)
+    for way, ends, q in ((joints, system.before, found), (back, m - system.before, [x[::-1] for x in found])):
+        if 0 < ends <= n:
+            record = _record(way, n, ends) | {"normals": _normals(way[n:])}
+            yield Chain.of(record, _solved(record), q, system.home)
+
+
+def _record(joints: list[Any], n: int, ends: int) -> dict[str, Any]:
+    return {"kind": "chain", "joints": joints, "unknowns": n, "ends": [[ends]], "normals": [], "tips": [*PLATFORM],
+            "reaches": []}
+
+
+def _carried(system: CarriedPlatform, found: Sequence[Array]) -> Chain:
+    """The conditions of the square part first. Angles are counted from where no joint is at the goal, so that a half
+    turn from there, as directions that are watched allow, is no infinite tangent."""
+    n, told, slides = len(system.freedoms_), [*system.square], np.array([each.slides for each in system.freedoms_])
+    told += [each for each in system.told if each not in told and _carriers(each)]
+    off = np.where(slides, 0.0, FROM * np.arange(1, n + 1))
+    record = _record([_joint(each, *system.moved(off, k)) for k, each in enumerate(system.freedoms_)], n,
+                     system.carrying)
+    for each in told:
+        tip, reach, arrow = _told(each, *system.moved(off, each.joints))
+        record["tips"].append(tip)
+        record["reaches"].append(reach)
+        record["ends"].append([min(_carriers(each)), max(_carriers(each)) + 1, arrow])
+    turn, starts = np.exp(-1j * off), Starts()
+    for box in enclosed(system, proposals(system, system.most(system.square))):
+        c, s, t = box.middle[:n], box.middle[n:2 * n], box.middle[2 * n:]
+        c, s = c * turn.real - s * turn.imag, s * turn.real + c * turn.imag
+        starts.append((np.where(slides, t, s / (1.0 + c)).tolist(), box.real))
+    return Chain.of(record, starts, [x - off for x in found], off)
+
+
+def _carriers(told: Told) -> list[int]:
+    """The joints that change what is told."""
+    return [k for k in range(told.joints) if k not in told.idle]
+
+
+def _joint(turn: Turn, R: Array, p: Array) -> list[Any]:
+    """A turn or a slide, displaced, its axis of length one, and a point."""
+    return ["P" if turn.slides else "R", written(_unit(R @ turn.axis)), written(_near(p + R @ turn.point))]
+
+
+def _near(v: Array) -> list[Fraction]:
+    return [Fraction(round(float(x) * UNIT), UNIT) for x in v]
+
+
+def _unit(v: Array) -> list[Fraction]:
+    """A rational vector of length exactly one near a unit vector, by its image in a plane from its opposite."""
+    k = int(np.argmax(np.abs(v)))
+    sign = 1 if v[k] > 0 else -1
+    image = _near(np.delete(v, k) / (1.0 + abs(v[k])))
+    w = sum((x * x for x in image), Fraction(1))
+    found = [2 * x / w for x in image]
+    found.insert(k, sign * (2 - w) / w)
+    return found
+
+
+def _told(each: Told, R: Array, p: Array) -> tuple[Any, Any, int]:
+    """A tip, or an arrow, displaced, and the plane or sphere on which it is."""
+    c = each.condition
+    b = written(_near(p + R @ c.b))
+    if isinstance(c, OnPlane):
+        return b, {"plane": written([_near(c.h * c.n / (c.n @ c.n)), _near(c.n)])}, 0
+    if isinstance(c, AtAngle):
+        return written(_near(R @ c.c)), {"plane": written([_near(c.h * c.a), _near(c.a)])}, 1
+    if isinstance(c, OnRevolution) and float(c.f[2]) == -1.0 and float(c.f[1]) == 0.0:
+        return b, {"sphere": written([_near(c.o), _near(c.f[:1])])}, 0
+    raise NotAccepted(f"legs have conditions that the checker does not know: {type(c).__name__}")
+
+
+def _normals(joints: Sequence[Any]) -> list[Any]:
+    """Whole vectors that span what annuls all dual quaternions that some joints together can be, conjugated."""
+    from flint import fmpz_mat
+
+    units = [_dual(each) for each in joints]
+    rows = []
+    for chosen in product((0, 1), repeat=len(units)):
+        total = [Fraction(k == 0) for k in range(8)]
+        for unit in (u for u, use in zip(units, chosen, strict=True) if use):
+            total = _times(total, unit)
+        common = prod({c.denominator for c in total})
+        rows.append([int(c * common * (1 if k in (0, 4) else -1)) for k, c in enumerate(total)])
+    kernel, size = fmpz_mat(rows).nullspace()
+    vectors = [[int(kernel[i, k]) for i in range(8)] for k in range(int(size))]
+    short = fmpz_mat([[c // gcd(*v) for c in v] for v in vectors]).lll()
+    return [[str(int(c)) for c in row] for row in short.table()]
+
+
+def _dual(joint: Any) -> list[Fraction]:
+    """h of a joint."""
+    kind, (a, o) = joint[0], rational(joint[1:])
+    zero = [Fraction(0)] * 3
+    first, second = (a, cross(o, a)) if kind == "R" else (zero, [c / 2 for c in a])
+    return [Fraction(0), *first, Fraction(0), *second]
+
+
+def _times(a: Sequence[Fraction], b: Sequence[Fraction]) -> list[Fraction]:
+    """The product of dual quaternions (8,)."""
+    def of(p: Sequence[Fraction], q: Sequence[Fraction]) -> list[Fraction]:
+        across = cross(p[1:], q[1:])
+        return [p[0] * q[0] - sum(x * y for x, y in zip(p[1:], q[1:], strict=True)),
+                *(p[0] * y + q[0] * x + z for x, y, z in zip(p[1:], q[1:], across, strict=True))]
+
+    return [*of(a[:4], b[:4]), *(x + y for x, y in zip(of(a[:4], b[4:]), of(a[4:], b[:4]), strict=True))]
+
+
+def _solved(record: dict[str, Any]) -> Starts:
+    """About where all solutions of a loop's equations are, by Newton's method from random complex starts, as many as
+    the degrees allow (a permanent)."""
+    equations = [integral(p) for p in KINDS["chain"][0](record, rational(record["tips"]))[0]]
+    n, found, rng = len(equations), list[Array](), np.random.default_rng(0)
+    degrees = [[max(e[k] for e in p) for k in range(n)] for p in equations]
+    most = sum(prod(degrees[i][j] for i, j in enumerate(order)) for order in permutations(range(n)))
+    values, slopes = [_float(p) for p in equations], [[_float(slope(p, k), p) for k in range(n)] for p in equations]
+    for _ in range(SETS):
+        x = rng.normal(size=(STARTS, n)) + 1j * rng.normal(size=(STARTS, n))
+        x[0] = 0.0
+        step = x
+        with np.errstate(all="ignore"):
+            for _ in range(ITERATIONS):
+                F = np.stack([f(x) for f in values], axis=-1)
+                J = np.stack([np.stack([f(x) for f in row], axis=-1) for row in slopes], axis=-2)
+                step = np.einsum("kij,kj->ki", np.linalg.pinv(J), F)
+                x = x - step / np.maximum(1.0, np.abs(step).max(axis=1))[:, None]
+                good = np.all(np.isfinite(x), axis=1) & (np.abs(x).max(axis=1) < 1e8)
+                x, step = x[good], step[good]
+        for each in x[np.abs(step).max(axis=1) < REACHED]:
+            for z in (each, each.conj()):
+                if all(np.abs(z - y).max() > SAME for y in found):
+                    found.append(z)
+        if len(found) >= most:
+            break
+    turns = [kind == "R" for kind, *_ in record["joints"][:n]]
+    return [(z.tolist(), None if np.abs(z * z + 1.0)[turns].min(initial=1.0) < SAME else
+             bool(np.abs(z.imag).max() < SAME)) for z in found]
+
+
+def _float(p: Polynomial, whole: Polynomial | None = None) -> Any:
+    """A polynomial of arrays (k, n), its coefficients over the largest of the ``whole``."""
+    most, e = max(map(abs, (whole or p).values())), np.array([*p], dtype=int)
+    c = np.array([float(Fraction(v) / most) for v in p.values()])
+    return lambda x: np.prod(x[:, None, :] ** e.reshape(-1, x.shape[1]), axis=2) @ c
