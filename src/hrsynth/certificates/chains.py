@@ -40,7 +40,7 @@ Starts = list[tuple[list[complex], bool | None]]
 
 
 @dataclass(frozen=True, eq=False)
-class Chain:
+class ToldChain:
     """A system without boxes and bound; about where its solutions are, and whether they are real (None: no poses, the
     tangent of half an angle is ±i); for the real ones the number of the list's mode there, None where it is none."""
 
@@ -51,7 +51,7 @@ class Chain:
     """The coordinates (n,) of the list's at which all of the record is told."""
 
     @classmethod
-    def of(cls, record: dict[str, Any], starts: Starts, found: Sequence[Array], home: Array) -> Chain:
+    def of(cls, record: dict[str, Any], starts: Starts, found: Sequence[Array], home: Array) -> ToldChain:
         """With the list's modes by their coordinates (rad, sizes)."""
         slides = np.array([kind == "P" for kind, *_ in record["joints"][:record["unknowns"]]])
         places = [np.where(slides, np.real(start), 2.0 * np.arctan(np.real(start))) for start, real in starts if real]
@@ -59,7 +59,7 @@ class Chain:
             slides, x[:len(q)] - q, np.exp(1j * (x[:len(q)] - q)) - 1.0)).max() < SAME), None) for q in places], home)
 
 
-def chains(system: CarriedPlatform, found: Sequence[Array]) -> Iterator[Chain]:
+def chains(system: CarriedPlatform, found: Sequence[Array]) -> Iterator[ToldChain]:
     """The ways to write a system with modes at these coordinates."""
     if not isinstance(system, SingleLoop):
         yield _carried(system, found)
@@ -70,7 +70,7 @@ def chains(system: CarriedPlatform, found: Sequence[Array]) -> Iterator[Chain]:
     for way, ends, q in ((joints, system.before, found), (back, m - system.before, [x[::-1] for x in found])):
         if 0 < ends <= n:
             record = _record(way, n, ends) | {"normals": _normals(way[n:])}
-            yield Chain.of(record, _solved(record), q, system.home)
+            yield ToldChain.of(record, _solved(record), q, system.home)
 
 
 def _record(joints: list[Any], n: int, ends: int) -> dict[str, Any]:
@@ -78,7 +78,7 @@ def _record(joints: list[Any], n: int, ends: int) -> dict[str, Any]:
             "reaches": []}
 
 
-def _carried(system: CarriedPlatform, found: Sequence[Array]) -> Chain:
+def _carried(system: CarriedPlatform, found: Sequence[Array]) -> ToldChain:
     """The conditions of the square part first. Angles are counted from where no joint is at the goal, so that a half
     turn from there, as directions that are watched allow, is no infinite tangent."""
     n, told, slides = len(system.freedoms_), [*system.square], np.array([each.slides for each in system.freedoms_])
@@ -96,7 +96,7 @@ def _carried(system: CarriedPlatform, found: Sequence[Array]) -> Chain:
         c, s, t = box.middle[:n], box.middle[n:2 * n], box.middle[2 * n:]
         c, s = c * turn.real - s * turn.imag, s * turn.real + c * turn.imag
         starts.append((np.where(slides, t, s / (1.0 + c)).tolist(), box.real))
-    return Chain.of(record, starts, [x - off for x in found], off)
+    return ToldChain.of(record, starts, [x - off for x in found], off)
 
 
 def _carriers(told: Told) -> list[int]:

@@ -24,11 +24,12 @@ from ..analysis.modes.planar_loops import PlanarLoop, PlanarLoops, enclosures, e
 from ..analysis.modes.quadrics import UNIT, PoseSystem, Rounded, WorkingFrame, direction, spokes
 from ..analysis.modes.rigid import Planar, Spatial
 from ..analysis.modes.roots import Roots, is_real
+from ..analysis.modes.single_loop import solve_loop
 from ..analysis.modes.solve import Solved, SystemModes
 from ..analysis.modes.squares import TURNS, SquareSystem
 from ..analysis.modes.translating import Articulated, Translating, coplanar, met_normal
 from ..analysis.observed import ObservedRobot
-from ..errors import NoCertificate, NotConfined
+from ..errors import NoCertificate, NotConfined, Unsolved
 from ..geometry.so3 import quaternions
 from ..geometry.vectors import Array, cross, rotation_about, unit
 from ..mechanism import Mechanism
@@ -60,7 +61,10 @@ def certificate(found: AssemblyModes) -> dict[str, Any]:
     try:
         system = None if found.model is None else found.model.system
         if found.found.complete and isinstance(system, CarriedPlatform):
-            return of_chain(system, found, about, robot)
+            try:
+                return of_chain(system, found, about, robot)
+            except NotAccepted as reason:
+                return _as_loop(found, about, robot, reason)
         if found.found.complete and not found.found.solved:
             with suppress(NotConfined):
                 return of_loops(found, about, robot)
@@ -109,6 +113,21 @@ def of_chain(system: CarriedPlatform, found: AssemblyModes, about: Mapping[str, 
         else:
             why = f"{len(each.starts)} solutions were enclosed, {sum(kept)} of {len(modes_)} modes among them"
     raise NotAccepted(why)
+
+
+def _as_loop(found: AssemblyModes, about: Mapping[str, Any], robot: ClosedRobot | None, reason: NotAccepted
+             ) -> dict[str, Any]:
+    """Of a mechanism that is one loop too, where its carried platform has no certificate; raises ``NotAccepted``."""
+    assert found.model is not None
+    measured = MeasuredRobot.driven(found.setting) if found.kind == "real" else MeasuredRobot.watched(found.setting)
+    try:
+        model, listed = solve_loop(measured, found.goal, found.model.system.error)
+    except (NotConfined, Unsolved):
+        raise reason from None
+    if not listed.complete:
+        raise reason
+    assert isinstance(model.system, CarriedPlatform)
+    return of_chain(model.system, replace(found, model=model, found=listed), about, robot)
 
 
 def _sealed(systems: list[dict[str, Any]], about: Mapping[str, Any], robot: ClosedRobot | None, count: int
