@@ -293,7 +293,8 @@ CHAINS: dict[str, tuple[Callable[[], AssemblyModes], str]] = {
     "a rod watched": (lambda: hrsynth.modes(ankle("RSU", 1, offset=0.05)[0], "1"), "2 real of 4"),
     "both rods watched": (lambda: hrsynth.modes(ankle("RUS", 1, offset=0.05)[0]), "1 real of 1"),
     "a turn and a slide": (lambda: hrsynth.modes(carried("RP", 1), real=True), "6 real of 6"),
-    **{name: (partial(driven, name), f"{count} real of {count}") for name, count in LISTED.items()}}
+    **{name: (partial(driven, name), f"{count} real of {count}") for name, count in LISTED.items()
+       if name != "sarrus"}}
 QUICK = {"an ankle", "bennett", "goldberg"}
 
 

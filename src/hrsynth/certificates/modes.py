@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from ..analysis.measured import MeasuredRobot
-from ..analysis.modes.carried import CarriedPlatform
+from ..analysis.modes.carried import CarriedPlatform, solve_carried
 from ..analysis.modes.curves import Circle, Curve, Line, Plane, Point, Reach, Sphere, Surface, shifted
 from ..analysis.modes.modes import AssemblyModes, modes
 from ..analysis.modes.planar_loops import PlanarLoop, PlanarLoops, enclosures, excluded, planar_loops
@@ -64,11 +64,16 @@ def certificate(found: AssemblyModes) -> dict[str, Any]:
             try:
                 return of_chain(system, found, about, robot)
             except NotAccepted as reason:
-                return _as_loop(found, about, robot, reason)
+                return _as_chain(found, about, robot, reason)
         if found.found.complete and not found.found.solved:
             with suppress(NotConfined):
                 return of_loops(found, about, robot)
-        return of_systems(found.found, about, robot)
+        try:
+            return of_systems(found.found, about, robot)
+        except NotAccepted as reason:
+            if found.found.solved or not found.found.complete:
+                raise
+            return _as_chain(found, about, robot, reason)
     except NotAccepted as reason:
         raise NoCertificate(found.setting.robot.name, str(reason)) from None
 
@@ -115,19 +120,19 @@ def of_chain(system: CarriedPlatform, found: AssemblyModes, about: Mapping[str, 
     raise NotAccepted(why)
 
 
-def _as_loop(found: AssemblyModes, about: Mapping[str, Any], robot: ClosedRobot | None, reason: NotAccepted
-             ) -> dict[str, Any]:
-    """Of a mechanism that is one loop too, where its carried platform has no certificate; raises ``NotAccepted``."""
+def _as_chain(found: AssemblyModes, about: Mapping[str, Any], robot: ClosedRobot | None, reason: NotAccepted
+              ) -> dict[str, Any]:
+    """Of a mechanism that is a carried platform, or one loop, besides the way in which its modes were listed; raises
+    ``NotAccepted``."""
     assert found.model is not None
     measured = MeasuredRobot.driven(found.setting) if found.kind == "real" else MeasuredRobot.watched(found.setting)
-    try:
-        model, listed = solve_loop(measured, found.goal, found.model.system.error)
-    except (NotConfined, Unsolved):
-        raise reason from None
-    if not listed.complete:
-        raise reason
-    assert isinstance(model.system, CarriedPlatform)
-    return of_chain(model.system, replace(found, model=model, found=listed), about, robot)
+    for way in (solve_carried, solve_loop):
+        with suppress(NotConfined, Unsolved, NotAccepted):
+            model, listed = way(measured, found.goal, found.model.system.error)
+            system = model.system
+            if listed.complete and listed.complex == found.found.complex and isinstance(system, CarriedPlatform):
+                return of_chain(system, replace(found, model=model, found=listed), about, robot)
+    raise reason
 
 
 def _sealed(systems: list[dict[str, Any]], about: Mapping[str, Any], robot: ClosedRobot | None, count: int

@@ -99,7 +99,7 @@ def test_three_joints_and_three_balls_have_their_number_of_modes(word: str, on: 
         found = hrsynth.modes(carried(word, seed, on), real=True)
         assert (found.found.complex, found.found.complete, found.found.bound) == (count, True, "rank")
         check_modes(found)
-        check_completeness(found, 20)
+        check_completeness(found, 40)
 
 
 @pytest.mark.parametrize("word", ["RR", "PR", "RP"])
