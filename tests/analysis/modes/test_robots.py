@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -12,9 +13,11 @@ from hrsynth.analysis.controllability import legs
 from hrsynth.analysis.modes.modes import AssemblyModes, modes
 from hrsynth.description import load, shipped
 from hrsynth.errors import BadRequest, HrsynthError, PoseNotReached
-from hrsynth.geometry.vectors import Array, pose
-from hrsynth.mechanism import Mechanism
+from hrsynth.geometry.vectors import Array, inverse, pose
+from hrsynth.kinematics.configuration import ClosedConfiguration
+from hrsynth.mechanism import Joint, JointType, Mechanism
 from hrsynth.mechanism.builder import Builder
+from hrsynth.mechanism.model import Coupling
 from hrsynth.mechanism.pose import Pose
 from kinematics.robots import state_of
 from oracle import Oracle
@@ -279,3 +282,41 @@ def test_a_four_bar_has_two_modes_with_one_link_watched_and_one_with_both(seed: 
         assert (found.found.complex, len(found.modes), found.found.complete) == (count, count, True)
         assert found.modes[0].goal
         assert all(mode.reachable for mode in found.modes)
+
+
+@pytest.mark.some(2)
+@pytest.mark.parametrize(("name", "one", "other", "ratio", "real"), [
+    ("delta", "shoulder_1", "shoulder_2", -0.5, False), ("3rps", "slide_1", "slide_3", 2.0, True),
+    ("3rps", "slide_2", "slide_1", 1.0, False), ("gough_stewart", "slide_1", "slide_4", 1.0, False),
+    pytest.param("gough_stewart", "slide_1", "slide_2", -1.0, True, marks=pytest.mark.slow),
+    pytest.param("hexa", "shoulder_2", "shoulder_5", 0.5, True, marks=pytest.mark.slow)])
+def test_couplings_in_space_rule_poses_out(name: str, one: str, other: str, ratio: float, real: bool):
+    """Lists are those of the robot without them, with the tied motor held; closings with them are among these."""
+    robot = load(shipped()[name])
+    ends = [robot.joints[joint] for joint in (one, other)]
+    coupled = robot.changed(joints=[replace(ends[1], motor=None)], couplings=(
+        Coupling("gear", ends[0].successor, ends[1].successor, ratio),))
+    found, free = modes(coupled, real=real), modes(robot, real=real)
+    assert found.found.complex == free.found.complex
+    assert found.found.proof == f"without couplings, which can only rule poses out: {free.found.proof}"
+    if name != "delta":  # its parallelograms cross at most closings
+        check_completeness(found, FEW, seed=1)
+    assert next(mode for mode in found.modes if mode.goal).reachable
+    for mode, of_free in zip(found.modes, free.modes, strict=True):
+        if mode.configuration is not None:
+            assert distance(free, of_free, mode.configuration) < 1e-9
+            places = [moved_since_zero(mode.configuration, joint) for joint in ends]
+            assert places[1] == pytest.approx(ratio * places[0], abs=1e-8)
+        if real:
+            assert mode.assembly == of_free.assembly
+
+
+def moved_since_zero(at: ClosedConfiguration, joint: Joint) -> float:
+    """The turn (rad) or the slide (m) of a joint of one freedom, from the poses of its links."""
+    links = at.twin.mechanism.links
+    before, after = (at.pose(link) @ inverse(links[link].pose) for link in joint.links)
+    D, axis = inverse(before) @ after, joint.axes[0]
+    if joint.type is JointType.PRISMATIC:
+        return float(axis @ D[:3, 3])
+    across = D[:3, :3] - D[:3, :3].T
+    return float(np.arctan2(axis @ [across[2, 1], across[0, 2], across[1, 0]], np.trace(D[:3, :3]) - 1.0))

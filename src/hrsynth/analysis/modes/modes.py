@@ -13,15 +13,27 @@ import numpy as np
 from ...batch.reach import reach
 from ...budgets import EFFORT
 from ...constraints.pattern import attached
-from ...errors import BadRequest, MissingExtra, NotConfined, PoseNotReached, TooLarge, Unsolved
+from ...errors import (
+    BadRequest,
+    HrsynthError,
+    LoopsNotClosed,
+    MissingExtra,
+    NotConfined,
+    PoseNotReached,
+    TooLarge,
+    Unsolved,
+)
 from ...geometry.vectors import Array, pose_difference
 from ...kinematics.assembly import NOT_FOUND, Assembler, Assembly, of_links
 from ...kinematics.closures import Miss
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.limits import outside
+from ...kinematics.pinocchio_model import PinocchioModel
 from ...kinematics.relation import Measurement
 from ...kinematics.tasks import Held, Task
+from ...mechanism.observations.encoder import Encoder
 from ...mechanism.pose import ModeNumber, Pose, PoseLike, asked_pose
+from ...mechanism.sensors import encoders
 from ...progress import tell
 from ...results import Result
 from ...tolerances import SAME_RELATION
@@ -346,13 +358,15 @@ def _listed(setting: ObservedRobot, measured: MeasuredRobot, goal: ClosedConfigu
     reasons, large = list[NotConfined | Unsolved | TooLarge | MissingExtra](), None
     answers = list[tuple[TipLoci | None, Model, SystemModes]]()
     exact, better = drift(goal, wanted, setting.normal.moved), None
-    ways = (partial(_of_tips, as_written=as_written, effort=effort), partial(_of_conditions, effort=effort),
-            _of_loops, _of_carrier, _of_single)
+    free = uncoupled(measured, goal)
+    tips, asked = partial(_of_tips, as_written=as_written, effort=effort), partial(_of_conditions, effort=effort)
+    ways = ((tips, asked, _of_loops, _of_carrier, _of_single) if free is None else
+            (_of_loops, tips, asked, _of_carrier, _of_single))
     for listed in ways:
         if better is not None and listed not in better:
             continue
         try:
-            answers.append(listed(measured, goal, exact))
+            answers.append(listed(*((measured, goal) if free is None or listed is _of_loops else free), exact))
         except (NotConfined, Unsolved, TooLarge, MissingExtra) as error:
             reasons.append(error)
             large = error if listed is _of_loops and isinstance(error, Unsolved) else large
@@ -364,7 +378,9 @@ def _listed(setting: ObservedRobot, measured: MeasuredRobot, goal: ClosedConfigu
     # what is measured leaves no freedom: a continuum is that of legs which tips alone do not show
     confined, made, found = max(answers, key=lambda each: (each[2].complete, each[2].continuum is None,
                                                            not _better(each[1])))
-    reader = _ModeReader(setting, measured.question, goal, made)
+    if free is not None and made.closing is None:
+        found = replace(found, proof=f"without couplings, which can only rule poses out: {found.proof}")
+    reader = _ModeReader(setting, measured.question if free is None else free[0].question, goal, made)
     at_goal = min(found.modes, key=reader.away, default=None)
     ordered = sorted(found.modes, key=lambda mode: mode is not at_goal)
     read = [reader.read(mode, mode is at_goal) for mode in ordered]
@@ -372,6 +388,31 @@ def _listed(setting: ObservedRobot, measured: MeasuredRobot, goal: ClosedConfigu
     return AssemblyModes(setting, kind, goal, pose, found, tuple(mode for mode in read if not mode.opposite),
                          tuple(mode for mode in near if not mode.opposite), confined, made,
                          antipodal=tuple(mode for mode in read if mode.opposite))
+
+
+def uncoupled(measured: MeasuredRobot, goal: ClosedConfiguration) -> tuple[MeasuredRobot, ClosedConfiguration] | None:
+    """The robot without its couplings, at the same place, and with what is measured held: so are joints that couplings
+    tie to motors that are held. It has all modes of the robot, and those at which couplings cannot be closed besides.
+    None where it has no couplings, or sees less than all freedoms without them."""
+    mechanism, setting = goal.twin.mechanism, measured.setting
+    if not mechanism.couplings:
+        return None
+    held = {each.joint for each in measured.question.observations if isinstance(each, Encoder)}
+    ties = [{mechanism.carrier(each, link).name for link in (each.predecessor, each.successor)}
+            for each in mechanism.couplings]
+    tied = set(held)
+    while more := set().union(*(tie for tie in ties if tie & tied)) - tied:
+        tied |= more
+    try:
+        loose = ObservedRobot.of(replace(setting.mechanism, couplings=(), observations=()))
+        at = of_links(PinocchioModel(loose.mechanism, goal.twin.length), goal.pose)
+    except HrsynthError:
+        return None
+    of = {name: leg.label for leg in loose.anatomy.legs for name in leg.joints}
+    seen = (*measured.question.observations, *(each for name in sorted(tied - held) for each in encoders(
+        loose.mechanism, loose.mechanism.joints[name], of.get(name, ""))))
+    found = MeasuredRobot(loose, loose.measuring(seen))
+    return (found, at) if found.rank == loose.dof and loose.anatomy.labels == setting.anatomy.labels else None
 
 
 def _better(made: Model) -> tuple[Any, ...]:
@@ -471,6 +512,8 @@ class _ModeReader:
             found = Assembly(at, (), tuple(outside(at.twin, at.q)), held=True)
         elif not at_goal or near or outside(self.goal.twin, self.goal.q):
             found = self.assembler.at(bodies, held, 0.0 if near else self.known(mode))
+        if found.configuration is not None and self.made.closing is None and not self.geared(found.configuration):
+            found = Assembly(None, self.assembler.anatomy.labels, platform=self.assembler.platform(bodies))
         X = (found.platform[self.motion.link] if found.platform is not None else self.goal.pose(self.motion.link)
              if found.configuration is None else found.configuration.pose(self.motion.link))
         shift, turn = self.radius(mode, bodies, X)
@@ -481,6 +524,17 @@ class _ModeReader:
             mode.proved, mode.rounded, mode.residual * scale if mode.fits else None,
             () if self.motion.link in bodies else tuple(bodies), size, bodies,
             antipodal, behind([each.seen for each in self.seen], pose))
+
+    def geared(self, at: ClosedConfiguration) -> bool:
+        """Whether couplings close where legs do."""
+        if not self.goal.twin.mechanism.couplings:
+            return True
+        try:
+            whole = of_links(self.goal.twin, at.pose)
+        except LoopsNotClosed:
+            return False
+        return all(pose_difference(whole.pose(link), at.pose(link), at.twin.length) <= SAME_RELATION
+                   for link in at.twin.mechanism.links)
 
     def known(self, mode: SystemMode) -> float:
         """How far the bodies' exact poses can be from the system's (characteristic lengths, radians); 0 where nothing
