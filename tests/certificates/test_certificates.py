@@ -13,6 +13,7 @@ from dataclasses import replace
 from fractions import Fraction
 from functools import cache, partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -324,6 +325,51 @@ def test_platforms_that_a_leg_carries_and_single_loops(name: str):
     closed = sum(mode.assembly in ("yes", "beyond limits") for mode in found.modes)
     assert told.endswith(f"; the robot closes at {closed} of the real ones, to 1e-9")
     assert sum(attacked(chained(name), 10, 8).values()) == 10
+
+
+def test_normals_are_all_of_those_of_the_rest_of_a_loop():
+    """Of one joint along z the six unit vectors but the first and that of k; none less, and no two nearly parallel."""
+    unit = np.eye(8, dtype=int)
+    normals = text_of(np.delete(unit, (0, 3), 0))
+    system = {"unknowns": 1, "ends": [[1]], "reaches": [], "normals": normals,
+              "joints": [["R", *text_of([[1, 0, 0], [0, 1, 0]])], ["R", *text_of([[0, 0, 1], [0, 0, 0]])]]}
+    tips = [[Fraction(int(i == k)) for i in range(3)] for k in range(3)]
+    assert len(checker.chain(system, tips)[0]) == 1
+    for last in ([], [text_of(1000 * unit[1] + unit[7])], [text_of(unit[3])]):
+        with pytest.raises(checker.NotAccepted, match="normals"):
+            checker.chain(system | {"normals": [*normals[:5], *last]}, tips)
+
+
+def text_of(x: Any) -> Any:
+    return str(x) if np.ndim(x) == 0 else [text_of(each) for each in x]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("forged", ["left out", "mixed", "without links"])
+def test_a_loop_has_all_of_its_normals_and_is_closed(forged: str):
+    """A solution of some of a loop's equations told as a pose: those that it misses are left out, or drowned in others
+    that it meets. Nor do normals alone make a closing: products are told by the links."""
+    record = json.loads(chained("goldberg"))
+    (system,) = record["systems"]
+    n, normals = system["unknowns"], system["normals"]
+    box = next(each for each in system["boxes"] if ("misses" in each) == (forged != "without links"))
+    if forged == "without links":
+        del box["links"]
+    else:
+        *_, points, _ = checker.chain(system, checker.rational(system["tips"]))
+        m = checker.rational(box["middle"])
+        at, *ends = (np.array([float(checker.value(p, m)[0] / checker.value(w, m)[0]) for p in N])
+                     for N, _, w in points[:3])
+        x, y = (end - at for end in ends)
+        del box["misses"]
+        box |= {"pose": [[str(Fraction(float(v))) for v in row] for row in np.column_stack([x, y, np.cross(x, y), at])],
+                "within": "1/1000000000"}
+        record |= {"real": record["real"] + 1, "complex": record["complex"] + 1}
+        system["normals"] = normals[:n] + ([] if forged == "left out" else [
+            [str(int(a) + 10 ** 14 * int(b)) for a, b in zip(each, normals[0], strict=True)] for each in normals[n:]])
+    record["sha256"] = checker.digest(record)
+    with pytest.raises(checker.NotAccepted, match="normals" if forged != "without links" else "links"):
+        checker.verify(record)
 
 
 def test_a_chain_of_joints_is_that_of_rotations_and_shifts():

@@ -23,12 +23,14 @@ from ..analysis.modes.single_loop import SingleLoop
 from ..geometry.vectors import Array
 from .closures import written
 from .refining import Polynomial
-from .verify_certificate import KINDS, NotAccepted, cross, integral, rational, slope
+from .verify_certificate import KINDS, NotAccepted, cross, dot, integral, rational, slope
 
 PLATFORM = [["0", "0", "0"], ["1", "0", "0"], ["0", "1", "0"]]
 """Three points of the platform at the goal (sizes)."""
 REST = 2
 """Joints of a loop without unknowns."""
+STEPS = 1024
+"""How finely normals are turned to be at right angles."""
 STARTS, SETS, ITERATIONS = 64, 20, 60
 """Random starts at once, how often, and Newton's steps from them."""
 REACHED, SAME = 1e-10, 1e-6
@@ -138,7 +140,7 @@ def _told(each: Told, R: Array, p: Array) -> tuple[Any, Any, int]:
 
 
 def _normals(joints: Sequence[Any]) -> list[Any]:
-    """Whole vectors that span what annuls all dual quaternions that some joints together can be, conjugated."""
+    """Whole vectors, about at right angles, that span what annuls all that some joints together can be, conjugated."""
     from flint import fmpz_mat
 
     units = [_dual(each) for each in joints]
@@ -152,7 +154,14 @@ def _normals(joints: Sequence[Any]) -> list[Any]:
     kernel, size = fmpz_mat(rows).nullspace()
     vectors = [[int(kernel[i, k]) for i in range(8)] for k in range(int(size))]
     short = fmpz_mat([[c // gcd(*v) for c in v] for v in vectors]).lll()
-    return [[str(int(c)) for c in row] for row in short.table()]
+    found = list[list[int]]()
+    for row in short.table():
+        v = [int(c) for c in row]
+        for u in found:  # nearly at right angles to those before
+            by = Fraction(round(STEPS * dot(u, v) / dot(u, u)), STEPS)
+            v = [STEPS * a - int(STEPS * by) * b for a, b in zip(v, u, strict=True)]
+        found.append([c // gcd(*v) for c in v])
+    return [[str(c) for c in v] for v in found]
 
 
 def _dual(joint: Any) -> list[Fraction]:

@@ -176,6 +176,8 @@ def _system(proposed: _Proposed, robot: ClosedRobot | None) -> dict[str, Any]:
     record, frame = proposed.record, proposed.frame
     equations, halves, points, legs = KINDS[record["kind"]][0](record, rational(record["tips"]))
     equations = [integral(p) for p in equations]
+    if len(equations) != len(halves):
+        raise NotAccepted(f"{len(equations)} equations in {len(halves)} unknowns")
     real = iter(zip(proposed.poses, proposed.kept, proposed.bodies, strict=True))
     record["boxes"], refining = [], Refining(equations)
     for start, is_real_ in [*proposed.starts, *((each, None) for each in _no_poses(equations, halves))]:

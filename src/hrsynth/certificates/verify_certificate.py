@@ -175,10 +175,10 @@ def pose(system, tips):
     return found, [False] * n, points, []
 def chain(system, tips):
     """Turns and slides from the base on: dual quaternions 1 + t h, h = a + eps o x a or eps a / 2. Three tips are the
-    platform's, behind the first of ``ends``; others are points, or arrows, that some joints carry. ``normals`` annul
-    all that the rest of a loop, without unknowns, can be."""
+    platform's, behind the first of ``ends``; others are points, or arrows, that some joints carry. ``normals`` are
+    all that annul what the rest of a loop, without unknowns, can be, about at right angles to each other."""
     n, joints, ((last,), *ends) = system["unknowns"], [(k, *rational(v)) for k, *v in system["joints"]], system["ends"]
-    t, halves, rows = [term(1, n, k) for k in range(n)], [kind == "R" for kind, _, _ in joints[:n]], []
+    t, halves, annul = [term(1, n, k) for k in range(n)], [j[0] == "R" for j in joints[:n]], rational(system["normals"])
     def carried(start, by):
         e, g = [term(1, n), {}, {}, {}], [{}] * 4
         for (kind, a, o), x in zip(joints[start:], by):
@@ -186,19 +186,20 @@ def chain(system, tips):
             p, q = [term(1, n), *(times(c, x) for c in turn)], [{}, *(times(c, x) for c in slide)]
             e, g = turned(e, p), [*map(add, turned(e, q), turned(g, p))]
         return e, g
-    def at(b, start, end): return placed(*carried(start, t[start:end]), b)
     need(all(kind in ("R", "P") and dot(a, a) == 1 for kind, a, _ in joints) and 0 < last <= n <= len(joints) and any(
         cross(sub(tips[1], tips[0]), sub(tips[2], tips[0]))), "turns and slides along vectors of length 1, a platform")
-    rest = [[p for part in carried(n, by) for p in part] for by in product(({}, term(1, n)), repeat=len(joints) - n)]
-    for v in map(rational, system["normals"]):
-        back = [-c if k % 4 else c for k, c in enumerate(v)]
-        need(len(v) == 8 and not any(add(*map(times, back, x)) for x in rest), "a normal of what the rest can be")
-        rows.append((add(*map(times, v, [p for part in carried(0, t) for p in part])), v, {tuple(map(int, halves)): 1}))
+    rest = [[sum(p.values()) * (-1) ** (k % 4 > 0) for k, p in enumerate(p for part in carried(n, by) for p in part)]
+            for by in product(({}, term(1, n)), repeat=len(joints) - n)]
+    all_ = [[*integral(dict(enumerate(v))).values()] for v in rest + annul if any(v)]
+    off = [u for u, v in combinations(annul, 2) if 64 * dot(u, v) ** 2 > dot(u, u) * dot(v, v)] + [
+        v for v in annul for x in rest if dot(v, x)]
+    need((len(joints) == n and not annul) or (not off and modular(all_, 0)[1] == 8), "normals of what the rest can be")
+    rows = [(add(*map(times, v, [*carried(0, t)[0], *carried(0, t)[1]])), v, {(*map(int, halves),): 1}) for v in annul]
     for b, (start, end, arrow), reach in zip(tips[3:], ends, map(reach_of, system["reaches"]), strict=True):
         need(0 <= start < end <= n and reach[0] in ("plane", "sphere")[:2 - bool(arrow)], "what a tip is told of")
-        turn, point = at(b, start, end)
+        turn, point = placed(*carried(start, t[start:end]), b)
         rows += [(*each, point[2]) for each in conditions((turn, {}, point[2]) if arrow else point, reach)]
-    points = [at(b, 0, last)[1] for b in tips[:3]] + [at(tips[0], 0, n)[1]]
+    points = [placed(*carried(0, by), b)[1] for by, b in zip([t[:last]] * 3 + [t], tips[:3] + tips[:1])]
     return [formal(p, w) for p, _, w in rows[:n]], halves, points, [misfits([row[:2]]) for row in rows[n:]]
 KINDS = {"spatial": (spatial, "square"), "loops": (loops, "angles slides loops besides links others"),
          "shifting": (shifting, "square bodies slide"), "pose": (pose, "chart arrows hub"),
@@ -229,9 +230,8 @@ def along(y, z):
     (y, q), (z, s) = whole(y), whole(z)
     return [Fraction(sum(x), q * s) for x in zip(*((a * c - b * d, a * d + b * c) for (a, b), (c, d) in zip(y, z)))]
 def enclosed(equations, m, r, Y):  # Krawczyk's condition; see above
-    n = len(m)
+    n, slopes = len(m), [[slope(p, k) for k in range(len(m))] for p in equations]
     need(r > 0 and len(Y) == n and all(len(row) == n for row in Y), "a box without radius or inverse")
-    slopes = [[slope(p, k) for k in range(n)] for p in equations]
     F, J = [value(p, m) for p in equations], [[value(d, m) for d in row] for row in slopes]
     H = [sum(change(d, m, r) for d in row) for row in slopes]
     for i, y in enumerate(Y):
@@ -309,7 +309,7 @@ def modes(record):
                 need(all(most_of(p, m, r) < FIT for leg in legs for p in leg), "a leg that misses")
                 need(finite and not away and all(v == 0 for _, v in m), "a real pose with a complex or far box")
                 told(system, each, points, tips, m, r)
-                closed += "links" in each and closes(record["assembly"], each["links"])
+                closed += bool(system.get("normals") or "links" in each) and closes(record["assembly"], each["links"])
             elif "misses" in each:
                 need(any(least(p, m, r) > 0 for p in legs[each["misses"]]), "a leg that may not miss")
             elif away:
@@ -317,7 +317,7 @@ def modes(record):
                 apart += any(map(any, (value(p, m) for p in equations))) or all(any(value(w, m)) for _, _, w in points)
             else:
                 need(any(abs(v) > r for _, v in m), "a box that may be real has no pose")
-                need(finite and not legs, "a box that may be a pose, or none")
+                need(finite and not legs and not system.get("normals"), "a box that may be a pose, or none")
             real, counted = real + ("pose" in each), counted + [(m, r)] * (not away and "misses" not in each)
         own, complex_ = {"loops": points, "chain": points[:3]}.get(system["kind"], []), complex_ + len(counted)
         need(all(any(differ(p, w, *one, *other) for N, _, w in own for p in N) or not own

@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from analysis.modes.closings import asked, bodies_of, compared, distance, motor_places
+from hrsynth.analysis.asked import observe as watched
 from hrsynth.analysis.controllability import legs
-from hrsynth.analysis.modes.modes import AssemblyModes, modes
+from hrsynth.analysis.measured import MeasuredRobot
+from hrsynth.analysis.modes.modes import AssemblyModes, modes, uncoupled
 from hrsynth.description import load, shipped
 from hrsynth.errors import BadRequest, HrsynthError, PoseNotReached
 from hrsynth.geometry.vectors import Array, inverse, pose
@@ -309,6 +311,20 @@ def test_couplings_in_space_rule_poses_out(name: str, one: str, other: str, rati
             assert places[1] == pytest.approx(ratio * places[0], abs=1e-8)
         if real:
             assert mode.assembly == of_free.assembly
+
+
+def test_a_joint_that_a_coupling_holds_apart_from_another_is_no_joint_without_it():
+    """Two stages of a telescope, both driven: the link between them is there for the coupling alone."""
+    robot = load(shipped()["3rps"])
+    slide, stage = robot.joints["slide_1"], "stage"
+    inner = replace(slide, name="inner", predecessor=stage)
+    coupled = robot.changed(links=[replace(robot.links[slide.successor], name=stage)],
+                            joints=[replace(slide, successor=stage), inner],
+                            couplings=(Coupling("belt", stage, slide.successor, 1.0),))
+    setting = watched(coupled)
+    assert stage in setting.mechanism.links
+    assert uncoupled(MeasuredRobot.driven(setting), setting.everything.start) is None
+    assert uncoupled(MeasuredRobot.watched(setting), setting.everything.start) is not None
 
 
 def moved_since_zero(at: ClosedConfiguration, joint: Joint) -> float:

@@ -393,7 +393,8 @@ def _listed(setting: ObservedRobot, measured: MeasuredRobot, goal: ClosedConfigu
 def uncoupled(measured: MeasuredRobot, goal: ClosedConfiguration) -> tuple[MeasuredRobot, ClosedConfiguration] | None:
     """The robot without its couplings, at the same place, and with what is measured held: so are joints that couplings
     tie to motors that are held. It has all modes of the robot, and those at which couplings cannot be closed besides.
-    None where it has no couplings, or sees less than all freedoms without them."""
+    None where it has no couplings, sees less than all freedoms without them, or what is measured is of joints that are
+    one without them."""
     mechanism, setting = goal.twin.mechanism, measured.setting
     if not mechanism.couplings:
         return None
@@ -408,6 +409,10 @@ def uncoupled(measured: MeasuredRobot, goal: ClosedConfiguration) -> tuple[Measu
         at = of_links(PinocchioModel(loose.mechanism, goal.twin.length), goal.pose)
     except HrsynthError:
         return None
+    links, joints = loose.mechanism.links, loose.mechanism.joints
+    if not tied <= joints.keys() or any(link not in links for each in measured.question.observations
+                                        for link in (each.link, each.seen_from or each.link)):
+        return None  # without couplings what they hold apart is one joint
     of = {name: leg.label for leg in loose.anatomy.legs for name in leg.joints}
     seen = (*measured.question.observations, *(each for name in sorted(tied - held) for each in encoders(
         loose.mechanism, loose.mechanism.joints[name], of.get(name, ""))))
