@@ -101,7 +101,7 @@ def of_chain(system: CarriedPlatform, found: AssemblyModes, about: Mapping[str, 
     """The certificate of a platform that a leg carries, or of a single loop; raises ``NotAccepted``."""
     assert found.model is not None
     modes_, why = found.found.modes, "no joint of its loop is between its base and its platform"
-    frame = WorkingFrame(system.middle.origin, np.eye(3), system.size, np.array([0.0, 0.0, 1.0]))
+    frame = WorkingFrame(system.middle.origin, system.rows, system.size, system.rows[2])
     for each in chains(system, [mode.q for mode in modes_]):
         kept = [mode is not None for mode in each.modes]
         if sum(kept) == len(modes_):

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import hrsynth
 from analysis.modes.ankles import LEGS, ankle, carried, counted
-from analysis.modes.test_robots import check_completeness, check_modes
+from analysis.modes.test_robots import check_completeness, check_modes, same_modes
 from analysis.modes.test_surfaces import needs_msolve
 from hrsynth.analysis.measured import MeasuredRobot
 from hrsynth.analysis.modes.carried import carried as carried_platform
 from hrsynth.analysis.modes.carried import polished, proposals
 from hrsynth.analysis.modes.joint_forms import closings_bound, eigenvalues
+from hrsynth.geometry.vectors import pose, rotation_about
+from hrsynth.mechanism.model import Motor
+from strategies import random_rotation, transformed
 
 
 def check_motors_held(kind: str, seed: int, offset: float = 0.0) -> int:
@@ -115,6 +120,40 @@ def test_ranks_and_degrees_leave_the_same_number(word: str):
         assert len(found) == len(others) == counted.most
         for q in others:
             assert min(np.abs(system.unknowns(q) - system.unknowns(each)).max() for each in found) < 1e-6
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_how_a_robot_stands_does_not_change_what_its_leg_leaves(seed: int):
+    """Two parallel hinges leave 6 closings by ranks, also where they are parallel to rounding only."""
+    rng, robot, axis = np.random.default_rng(seed), carried("RR", 2), np.array([0.0, 0.0, 1.0])
+    robot = robot.changed(joints=[replace(robot.joints[f"joint_{k}"], axes=(axis,)) for k in range(2)])
+    R = random_rotation(rng)
+    measured = MeasuredRobot.driven(hrsynth.observe(transformed(robot, R, rng.normal(size=3)), samples=4))
+    system = carried_platform(measured, measured.setting.everything.start, 1e-12)
+    counted = closings_bound(system, system.square)
+    assert counted is not None
+    assert counted.most == 6
+    q = rng.normal(size=2)
+    moved = system.placed(q) @ np.linalg.inv(system.placed(0 * q))
+    assert min(np.abs(moved[:3, :3] - rotation_about(R @ axis, sign * q.sum())).max() for sign in (1, -1)) < 1e-12
+
+
+def test_motors_on_all_joints_of_a_leg_leave_it_no_way():
+    robot = carried("RR", 2)
+    driven = robot.changed(joints=[replace(robot.joints[f"joint_{k}"], motor=Motor(f"motor_{k}")) for k in range(2)])
+    found = hrsynth.modes(driven, real=True)
+    assert [mode.goal for mode in found.modes] == [True]
+
+
+@pytest.mark.slow
+def test_lists_of_parallel_hinges_do_not_depend_on_how_a_robot_stands():
+    robot, rng = carried("RR", 3), np.random.default_rng(1)
+    robot = robot.changed(joints=[replace(robot.joints[f"joint_{k}"], axes=(np.eye(3)[2],)) for k in range(2)])
+    R, p = random_rotation(rng), rng.normal(size=3)
+    one, other = hrsynth.modes(robot, real=True), hrsynth.modes(transformed(robot, R, p), real=True)
+    assert (one.found.complex, one.found.complete, one.found.bound) == (6, True, "rank")
+    same_modes(one, other, pose(p, R))
+    check_completeness(other, 20)
 
 
 def test_a_leg_without_a_segment_is_not_watched():
