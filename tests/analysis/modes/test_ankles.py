@@ -15,6 +15,7 @@ from hrsynth.analysis.measured import MeasuredRobot
 from hrsynth.analysis.modes.carried import carried as carried_platform
 from hrsynth.analysis.modes.carried import polished, proposals
 from hrsynth.analysis.modes.joint_forms import closings_bound, eigenvalues
+from hrsynth.errors import NotConfined
 from hrsynth.geometry.vectors import pose, rotation_about
 from hrsynth.mechanism.model import Motor
 from strategies import random_rotation, transformed
@@ -141,8 +142,10 @@ def test_how_a_robot_stands_does_not_change_what_its_leg_leaves(seed: int):
 def test_motors_on_all_joints_of_a_leg_leave_it_no_way():
     robot = carried("RR", 2)
     driven = robot.changed(joints=[replace(robot.joints[f"joint_{k}"], motor=Motor(f"motor_{k}")) for k in range(2)])
-    found = hrsynth.modes(driven, real=True)
-    assert [mode.goal for mode in found.modes] == [True]
+    measured = MeasuredRobot.driven(hrsynth.observe(driven, samples=4))
+    with pytest.raises(NotConfined):
+        carried_platform(measured, measured.setting.everything.start, 1e-12)
+    assert [mode.goal for mode in hrsynth.modes(driven, real=True).modes] == [True]
 
 
 @pytest.mark.slow
