@@ -145,7 +145,6 @@ def test_motors_on_all_joints_of_a_leg_leave_it_no_way():
     measured = MeasuredRobot.driven(hrsynth.observe(driven, samples=4))
     with pytest.raises(NotConfined):
         carried_platform(measured, measured.setting.everything.start, 1e-12)
-    assert [mode.goal for mode in hrsynth.modes(driven, real=True).modes] == [True]
 
 
 @pytest.mark.slow
