@@ -29,3 +29,7 @@ def test_a_system_that_needs_more_is_not_started():
     assert confined is not None
     with pytest.raises(TooLarge, match=r"6 legs and 6 freedoms, needs about 0\.4 s, more than the effort of 0\.1 s"):
         solve_all(confined, effort=0.1)
+
+
+def test_effort_may_be_without_end():
+    assert hrsynth.modes("rrrrr_m1", effort=float("inf")).found.complete

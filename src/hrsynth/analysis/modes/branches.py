@@ -136,7 +136,7 @@ def solve_all(confined: TipLoci, *, near: bool = True, effort: float = EFFORT) -
     if first.seconds > effort:
         raise TooLarge("a system of equations", f"{len(first.curves)} legs and {first.freedoms} freedoms",
                        first.seconds, effort)
-    most = min(BRANCH_CHOICES, int(effort / first.seconds))
+    most = int(min(BRANCH_CHOICES, effort / first.seconds))
     made = [model(each) for each in islice(choices(confined), most)]
     size = made[0].system.size
     found = [_scaled(solve(each.system, near=near, goal=None if k else each.home), each.system.size / size)
