@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 import pytest
@@ -12,10 +13,24 @@ from analysis.modes.closings import asked, bodies_of, compared, distance, motor_
 from hrsynth.analysis.asked import observe as watched
 from hrsynth.analysis.controllability import legs
 from hrsynth.analysis.measured import MeasuredRobot
+from hrsynth.analysis.modes import modes as ways
+from hrsynth.analysis.modes.branches import Model
+from hrsynth.analysis.modes.drift import drift
 from hrsynth.analysis.modes.modes import AssemblyModes, modes, uncoupled
+from hrsynth.analysis.modes.solve import SystemModes
+from hrsynth.analysis.observed import ObservedRobot
+from hrsynth.budgets import EFFORT
 from hrsynth.description import load, shipped
-from hrsynth.errors import BadRequest, HrsynthError, PoseNotReached
-from hrsynth.geometry.vectors import Array, inverse, pose
+from hrsynth.errors import (
+    BadRequest,
+    HrsynthError,
+    MissingExtra,
+    NotConfined,
+    PoseNotReached,
+    TooLarge,
+    Unsolved,
+)
+from hrsynth.geometry.vectors import Array, inverse, pose, pose_difference
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.mechanism import Joint, JointType, Mechanism
 from hrsynth.mechanism.builder import Builder
@@ -336,3 +351,39 @@ def moved_since_zero(at: ClosedConfiguration, joint: Joint) -> float:
         return float(axis @ D[:3, 3])
     across = D[:3, :3] - D[:3, :3].T
     return float(np.arctan2(axis @ [across[2, 1], across[0, 2], across[1, 0]], np.trace(D[:3, :3]) - 1.0))
+
+
+WAYS = {"tips": partial(ways._of_tips, as_written=False, effort=EFFORT),
+        "conditions": partial(ways._of_conditions, effort=EFFORT),
+        "loops": ways._of_loops, "carrier": ways._of_carrier, "single": ways._of_single}
+
+
+@pytest.mark.some(2)
+@pytest.mark.parametrize("name", sorted(shipped()))
+def test_all_ways_list_the_same(name: str):
+    """The known patterns and the general ways, wherever several of them prove a list: the same poses, and as many
+    complex ones (a carried platform with more conditions than needed counts those that all of them meet)."""
+    robot = load(shipped()[name])
+    sets = [*dict.fromkeys([None, *legs(robot).minimal[:2]]), "motors"]
+    for observe in sets:
+        setting = ObservedRobot.of(robot, None if observe == "motors" else observe)
+        measured = MeasuredRobot.driven(setting) if observe == "motors" else MeasuredRobot.watched(setting)
+        if measured.rank < setting.dof:
+            continue
+        goal = setting.everything.start
+        exact, listed = drift(goal, None, setting.normal.moved), dict[str, tuple[Model, SystemModes]]()
+        for way, solved in WAYS.items():
+            with suppress(NotConfined, Unsolved, TooLarge, MissingExtra):
+                _, made, found = solved(measured, goal, exact)
+                if found.complete:
+                    listed[way] = made, found
+        assert listed, observe
+        counts = {found.complex for way, (_, found) in listed.items() if way != "carrier" or len(listed) == 1}
+        assert len(counts) == 1, (observe, counts)
+        (first, one), *others = listed.values()
+        for made, found in others:
+            assert len(found.modes) == len(one.modes), observe
+            for mode in found.modes:
+                bodies = made.bodies(mode.q)
+                assert min(max(pose_difference(X, first.bodies(each.q)[body], goal.twin.length)
+                               for body, X in bodies.items()) for each in one.modes) < 1e-7, observe
