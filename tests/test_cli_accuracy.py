@@ -56,7 +56,9 @@ def test_files_and_text(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> N
     (("--at", "x=5"), 3, "is not reached"), (("--plane", "z=5"), 3, "no pose of the plane"),
     (("--grid", "x=0:1:4000,y=0:1:4000,z=-0.7"), 2, "at most 10000000"),
     (("--grid", "x=0:1:1,z=-0.7"), 2, "a count of 2 to"), (("-o", "map.png"), 2, "--plane or --grid"),
-    (("--plane", "z=-0.7", "-o", "map.txt"), 2, "unknown extension"),
+    (("--plane", "z=-0.7", "-o", "map.txt"), 2, "unknown extension"), (("-o", "map.npy"), 2, "--plane or --grid"),
+    (("--grid", "x=0:1:100000,y=0:1:100000,z=0:1:2", "-o", "map.npy"), 2, "at most 10000000000"),
+    (("--grid", "x=5:6:3,z=-0.7", "-o", "map.npy"), 3, "none of 3 is"),
     (("--plane", "z=-0.7", "-o", "/nowhere/map.png"), 2, "nowhere")])
 def test_refusals_are_one_line(capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], status: int, word: str
                                ) -> None:

@@ -122,6 +122,14 @@ POSES_FOR_NUMBA_ONCE = 500_000
 """The same in a run with this batch alone."""
 POSES_FOR_COMPILING = 5_000_000
 """Poses from which it pays that numba compiles a robot's kernels first."""
+LARGEST_FIELD = 10_000_000
+"""Cells of a grid whose errors are kept in memory: 160 MB."""
+LARGEST_SWEEP = 10_000_000_000
+"""Cells of a grid, beyond which it is taken for a slip, whose errors go to a file: 160 GB and some hours."""
+SWEEP_PART = 1 << 16
+"""Poses of a part of such a grid, of which memory is had."""
+SWEEP_DRAWN = 10_000
+"""Poses of it, at random, among which those are chosen at which it is held against Pinocchio."""
 
 # Singularities, paths, modes
 

@@ -311,12 +311,13 @@ class NotRendered(Unanswered):
 
 
 class BuildStopped(Unanswered):
-    """A build of the catalog that cannot go on: why, and the journal that keeps what was built, if any."""
+    """A build of the catalog, or a sweep to a file, that cannot go on: why, and the journal that keeps what was done,
+    if any."""
 
-    def __init__(self, reason: str, kept: str | None = None) -> None:
+    def __init__(self, reason: str, kept: str | None = None, what: str = "build") -> None:
         self.reason, self.kept = reason, kept
         rest = "" if kept is None else f"; what was built is kept in {kept}, the same command continues"
-        super().__init__(f"the build stopped: {reason}{rest}")
+        super().__init__(f"the {what} stopped: {reason}{rest}")
 
 
 class CatalogStale(Unanswered):

@@ -90,7 +90,7 @@ def question(*, formations: bool = False, **old: str) -> Callable[[Callable[P, R
             if source.formation and not formations:
                 raise BadRequest(f"{source.name}: {function.__name__} asks about one platform, and this is a formation",
                                  ", ".join(source.bodies), "a file with a <platform>, or derive, legs, check")
-            if given.get("seconds") is not None:
+            if any(given.get(name) is not None for name in ("seconds", "into")):
                 return function(*bound.args, **bound.kwargs)
             every = known.bind(*args, **given)
             every.apply_defaults()

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import os
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+from ..description.files import require_alone
 from ..errors import BadRequest, BuildStopped
 from .jsonl import head, read_head, word_of
 
@@ -100,11 +100,3 @@ class Journal:
                 os.ftruncate(self._file, self._end)
             raise BuildStopped(f"{self.path}: {error.strerror}", str(self.path)) from None
         self._end += len(content)
-
-
-def require_alone(handle: int, otherwise: str, path: Path) -> None:
-    """Lock an open file or folder until it is closed; raises ``BadRequest`` where another process has it."""
-    try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        raise BadRequest(otherwise, str(path), "one build at a time") from None

@@ -75,6 +75,7 @@ class Question:
             function = getattr(hrsynth, self.name)
             given = self._given(function, values)
             for each, path in files.items():
+                given |= each.given(path)
                 each.require_drawable(path, mechanism, given)
             found = function(mechanism, **given)
             for option in ("cone", "noise"):

@@ -938,9 +938,29 @@ class SpotCheck(TypedDict):
     difference: float
 
 
+class ErrorRangeRecord(TypedDict):
+    """The least and the largest of the errors that the first order bounds, how many are larger, how many infinite."""
+
+    least: Number
+    largest: Number
+    loose: int
+    infinite: int
+
+
+class SweptRecord(TypedDict):
+    """Poses whose errors are in the file, how many of them are reached, and how many were there before from a sweep
+    that was broken off."""
+
+    poses: int
+    reached: int
+    before: int
+    position_mm: ErrorRangeRecord
+    orientation_deg: ErrorRangeRecord
+
+
 class AccuracyAnswer(OfRobot, WrittenTo):
-    """The largest errors at poses; of a plane or grid also its axes and a table of each error. ``noise``: by unit (px,
-    m, rad), of what is no direction; ``exact``: what has none."""
+    """The largest errors at poses; of a plane or grid also its axes and a table of each error, or what was swept to a
+    file. ``noise``: by unit (px, m, rad), of what is no direction; ``exact``: what has none."""
 
     observed: list[Watched]
     camera: str
@@ -959,6 +979,7 @@ class AccuracyAnswer(OfRobot, WrittenTo):
     orientation_deg: NotRequired[Array]
     gap: NotRequired[float]
     checked: NotRequired[SpotCheck | None]
+    swept: NotRequired[SweptRecord]
 
 
 class CountRecord(TypedDict):

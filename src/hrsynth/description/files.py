@@ -49,16 +49,22 @@ def write_whole(path: str | Path, content: bytes | Iterable[bytes]) -> None:
         raise BadRequest(f"cannot write the file: {reason}", str(path)) from None
 
 
-@contextlib.contextmanager
-def replacement(path: str | Path, *, sync: bool = False) -> Iterator[Path]:
-    """A temporary name beside a file; what is written there takes the file's place when the block ends without an
-    error, with ``sync`` not before it is on the disk. Raises ``BadRequest`` for a directory or a device, ``OSError``
-    where the disk refuses."""
+def replaceable(path: str | Path) -> Path:
+    """Where a file is that is to be written anew; raises ``BadRequest`` for a directory or a device."""
     target = Path(os.path.realpath(path))
     if target.is_dir():
         raise BadRequest("cannot write the file: a directory", str(path))
     if target.exists() and not target.is_file():
         raise BadRequest("cannot write the file: not a regular file", str(path))
+    return target
+
+
+@contextlib.contextmanager
+def replacement(path: str | Path, *, sync: bool = False) -> Iterator[Path]:
+    """A temporary name beside a file; what is written there takes the file's place when the block ends without an
+    error, with ``sync`` not before it is on the disk. Raises ``BadRequest`` for a directory or a device, ``OSError``
+    where the disk refuses."""
+    target = replaceable(path)
     draft = target.with_name(f".{target.name}.{os.getpid()}.tmp")
     try:
         yield draft
@@ -70,3 +76,13 @@ def replacement(path: str | Path, *, sync: bool = False) -> Iterator[Path]:
         os.replace(draft, target)
     finally:
         draft.unlink(missing_ok=True)
+
+
+def require_alone(handle: int, otherwise: str, path: Path, allowed: str = "one build at a time") -> None:
+    """Lock an open file or folder until it is closed; raises ``BadRequest`` where another process has it."""
+    import fcntl
+
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise BadRequest(otherwise, str(path), allowed) from None

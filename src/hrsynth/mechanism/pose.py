@@ -13,7 +13,7 @@ from itertools import product
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..budgets import FARTHEST_POSE, LARGEST_GRID
 from ..errors import BadRequest
@@ -248,9 +248,20 @@ class Grid(Value):
         """The parts that vary, in order."""
         return tuple(name for name, _ in self.axes)
 
-    def places(self) -> Array:
-        """The values of the parts that vary at all cells, (n, ndim), the last axis running fastest."""
-        return np.stack(np.meshgrid(*(values for _, values in self.axes), indexing="ij"), -1).reshape(-1, self.ndim)
+    @property
+    def size(self) -> int:
+        """Number of cells."""
+        return math.prod(self.shape)
+
+    def places(self, start: int = 0, stop: int | None = None) -> Array:
+        """The values of the parts that vary at all cells, or those from ``start`` to before ``stop``, (n, ndim), the
+        last axis running fastest."""
+        return self.places_at(np.arange(start, self.size if stop is None else min(stop, self.size)))
+
+    def places_at(self, cells: NDArray[np.int64]) -> Array:
+        """The values of the parts that vary at cells by their number, (n, ndim)."""
+        on = np.unravel_index(cells, self.shape)
+        return np.stack([values[i] for (_, values), i in zip(self.axes, on, strict=True)], axis=1)
 
     def poses(self) -> tuple[Pose, ...]:
         """The poses of all cells, the last axis running fastest."""

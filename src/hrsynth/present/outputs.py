@@ -64,6 +64,8 @@ class File:
     """An ending, and what raises ``BadRequest`` for an observed robot that cannot be drawn so."""
     plotted: tuple[str, ...] = (".png", ".svg", ".pdf")
     """The endings that are drawn with matplotlib."""
+    streamed: tuple[str, str] | None = None
+    """An ending that is written part by part while the question is answered, and the parameter that names the file."""
 
     def require(self, path: str | None, asked: Asked) -> None:
         """Raise ``BadRequest`` where there is nothing to write, the ending is no format or the folder not there, and
@@ -83,8 +85,9 @@ class File:
         if self.needs and all(asked[name] is None for name in self.needs):
             options = " or ".join(f"--{name}" for name in self.needs)
             raise BadRequest(f"only {self.words} is written", path, f"--output together with {options}")
-        if ending not in self.makers:
-            raise BadRequest(f"{self.refusal}: unknown extension", path, self.allowed or tuple(self.makers))
+        known = (*self.makers, *(self.streamed or ())[:1])
+        if ending not in known:
+            raise BadRequest(f"{self.refusal}: unknown extension", path, self.allowed or known)
         if ending in self.plotted:
             function("plots:library")()
         if self.installed is not None and ending == self.installed[0]:
@@ -98,6 +101,12 @@ class File:
 
             watched = {name: asked[name] for name in ("observe", "camera", "see", "seed") if name in asked}
             function(self.limited[1])(ObservedRobot.of(robot, **watched))
+
+    def given(self, path: str | None) -> dict[str, str]:
+        """What the question is told of a file that it writes itself."""
+        if path is None or self.streamed is None or Path(path).suffix.lower() != self.streamed[0]:
+            return {}
+        return {self.streamed[1]: path}
 
     def told(self, path: str) -> str:
         """The sentence that tells where it was written."""
@@ -122,6 +131,8 @@ class File:
         """What writes the file, whole or not at all, once all else is done, and what the JSON says more."""
         from ..description.files import write_whole
 
+        if self.given(path):
+            return (lambda: None), {}
         content, more = self.content(found, Path(path).suffix.lower(), asked)
         return partial(write_whole, path, content), more
 
@@ -185,8 +196,9 @@ CERTIFICATE = File("cannot write the certificate", {".json": ".certificates:writ
 OUTPUTS = {
     "accuracy": Outputs("text.runs:accuracy", (
         File("cannot write the errors", {**figures("maps:error_map"), CSV: "maps:error_table"}, "The map of errors",
-             "Write the plane or grid: map.png, .pdf, .svg, or a table, map.csv.", part="field",
-             needs=("plane", "grid"), words="a plane or a grid", drawn=True),)),
+             "Write the plane or grid: map.png, .pdf, .svg; a table, map.csv; or an array, map.npy, part by part: any "
+             "number of poses, and the same command goes on where it was broken off.", part="field",
+             needs=("plane", "grid"), words="a plane or a grid", drawn=True, streamed=(".npy", "into")),)),
     "advise": Outputs("text.robots:advice"),
     "atlas": Outputs("text.poses:atlas", (
         File("cannot draw the atlas", figures("atlas:picture"), "The picture of the atlas",

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ...budgets import LARGEST_FIELD, LARGEST_SWEEP
 from ...errors import BadRequest
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
@@ -24,9 +26,8 @@ from .cones import IN_SIGHT, Blur, Cones, unseen
 from .error_map import ErrorMap, Mapper
 from .pose_errors import PoseErrors, measured
 from .sampled import Sampled, sampled
+from .swept import SweptErrors, required, sweep_to
 
-LARGEST_FIELD = 10_000_000
-"""Cells of a grid beyond which it is taken for a slip: about a gigabyte and ten seconds by the batch."""
 WORST = 3
 """Poses of a grid, those of the largest errors, at which the linear law is checked by samples."""
 
@@ -41,6 +42,8 @@ class Accuracy(Result, shown_as="accuracy"):
     poses: tuple[PoseErrors, ...]
     sampled: tuple[Sampled | None, ...]
     field: ErrorMap | None
+    swept: SweptErrors | None = None
+    """What is in a file, where a grid was swept to one."""
 
     @property
     def cones(self) -> Array:
@@ -52,7 +55,9 @@ class Accuracy(Result, shown_as="accuracy"):
         limit = LARGEST_FIRST_ORDER * self.setting.everything.twin.length
         worst = [(f"{1e3 * each.position.largest:.3g} mm" if each.position.largest <= limit else
                   "not bounded to first order") + f" at {each.pose}" for each in self.poses]
-        grid = [] if self.field is None else [f"{self.field.reached.sum()} poses of a grid"]
+        reached = ([] if self.field is None else [self.field.reached.sum()]) + (
+            [] if self.swept is None else [self.swept.tally.reached])
+        grid = [f"{count} poses of a grid" for count in reached]
         return f"{self.setting.headline()}: {'; '.join(worst + grid)}"
 
     def to_dict(self) -> dict[str, Any]:
@@ -64,14 +69,14 @@ class Accuracy(Result, shown_as="accuracy"):
                  for o, cone in zip(self.setting.observed, self.cones, strict=True) if cone]
         noise = {"noise": self.blur.amounts, "exact": list(self.blur.exact(self.setting.observed))}
         return {**self.setting.to_dict(), "cones": cones, **noise, **(self.field.to_dict() if self.field else {}),
-                "poses": poses}
+                **(self.swept.to_dict() if self.swept else {}), "poses": poses}
 
 
 @question(cones="cone", samples="nonlinear")
 def accuracy(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
              cone: Cones | None = None, noise: str | Noise | None = None, at: PoseLike | Iterable[PoseLike] = (),
              plane: PoseLike | None = None, grid: Grid | str | None = None, steps: int | None = None,
-             nonlinear: int = 0, seed: int = 0) -> Accuracy:
+             nonlinear: int = 0, into: str | Path | None = None, seed: int = 0) -> Accuracy:
     """The largest position and orientation error of the platform over all errors of what is observed, to first order
     (docs/pages/theory.md, section 10; MMT A.1): max over unit w of Σ ψ_i ‖(J_i P_i)ᵀ w‖, J = M^{T+}.
 
@@ -80,7 +85,9 @@ def accuracy(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = No
     reached of it, ``steps`` poses a side), or over ``grid``; default: the zero configuration. In a grid free parts stay
     as at the zero configuration where legs are known subproblems. The platform comes to rest where ``servo`` does;
     poses of a grid at which something is not in front of its camera are left out. ``nonlinear`` true errors are tried
-    at each single pose, of a grid at its worst ones. ``observe``, ``camera`` and ``see`` as for ``derive``.
+    at each single pose, of a grid at its worst ones. The errors (m, rad) of a plane or grid of any size are written
+    part by part ``into`` a file .npy; a sweep that was broken off goes on when it is asked again. ``observe``,
+    ``camera`` and ``see`` as for ``derive``.
 
     Raises ``BadRequest`` for names that there are not, cones that are none, what does not see every freedom (the error
     is infinite everywhere) or is behind its camera, ``PoseNotReached``, ``PlaneNotMet``.
@@ -95,28 +102,36 @@ def accuracy(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = No
         raise BadRequest("poses a side", steps, "only of a plane")
     if nonlinear < 0:
         raise BadRequest("number of samples", nonlinear, "none or more")
+    if into is not None:
+        required(into)
+        if plane is None and grid is None:
+            raise BadRequest("only a plane or a grid is written", str(into), "a plane or a grid as well")
+        if nonlinear and not wanted:
+            raise BadRequest("samples at the worst poses of a file", nonlinear, "samples at single poses")
     held = None if plane is None else as_pose(plane)
-    cells = Grid.parse(grid, LARGEST_FIELD) if isinstance(grid, str) else grid
+    cells = grid if not isinstance(grid, str) else Grid.parse(grid, LARGEST_FIELD if into is None else LARGEST_SWEEP)
     setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed).telling(wanted)
     blur = Blur.of(cone, noise, setting.observed)
     sees_all(setting)
     mapper = Mapper(setting, blur)
-    field = None
+    field = swept = None
     if held is not None:
         cells = mapper.plane(held, steps)
-    if cells is not None:
+    if cells is not None and into is not None:
+        swept = sweep_to(into, mapper, cells, seed)
+    elif cells is not None:
         field = mapper.over(cells, seed)
     if field is not None and nonlinear and not wanted:
         wanted = [*field.worst(WORST)]
     start, motion = setting.everything.start, setting.motion
     configurations = configurations_at(setting, wanted)
-    if not configurations and field is None:
+    if not configurations and field is None and swept is None:
         configurations = [start]
     tell("errors")
     poses = tuple(errors_at(setting, blur, each) for each in configurations)
     true = tuple(sampled(each, mapper.question, motion, blur, errors, nonlinear, seed)
                  if nonlinear else None for each, errors in zip(configurations, poses, strict=True))
-    return Accuracy(setting, blur, poses, true, field)
+    return Accuracy(setting, blur, poses, true, field, swept)
 
 
 def errors_at(setting: ObservedRobot, blur: Blur, at: ClosedConfiguration) -> PoseErrors:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -99,12 +98,17 @@ class ErrorMap(Value):
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line: arrays nested in the order of ``axes``, null where not finite."""
-        fixed = {name: values[0] for name, values in self.grid.fixed.given.items() if name in SCALARS}
-        rpy = {} if self.grid.fixed.rpy is None else {"rpy": list(self.grid.fixed.rpy)}
-        return {"axes": list(self.grid.names), **{name: values.tolist() for name, values in self.grid.axes},
-                "fixed": {**fixed, **rpy}, "reached": self.reached.tolist(),
+        return {**axes_of(self.grid), "reached": self.reached.tolist(),
                 "position_mm": nested(1e3 * self.position), "orientation_deg": nested(np.degrees(self.orientation)),
                 "gap": self.gap, "checked": self.spots and self.spots.to_dict()}
+
+
+def axes_of(grid: Grid) -> dict[str, Any]:
+    """The record of what a grid varies and what it holds."""
+    fixed = {name: values[0] for name, values in grid.fixed.given.items() if name in SCALARS}
+    rpy = {} if grid.fixed.rpy is None else {"rpy": list(grid.fixed.rpy)}
+    return {"axes": list(grid.names), **{name: values.tolist() for name, values in grid.axes},
+            "fixed": {**fixed, **rpy}}
 
 
 def nested(values: Array) -> list[Any]:
@@ -153,59 +157,69 @@ class Mapper(Value):
         """The error maxima over a grid, by the batch ``checked`` at so many poses; raises ``PlaneNotMet`` where no pose
         of it is reached, ``BadRequest`` where poses have to be found one by one and are too many for that."""
         name = self.setting.robot.name
-        if self.batch is None and math.prod(grid.shape) > LARGEST_GRID:
-            raise BadRequest(f"{name}: poses are found one by one; number of poses", math.prod(grid.shape),
+        if self.batch is None and grid.size > LARGEST_GRID:
+            raise BadRequest(f"{name}: poses are found one by one; number of poses", grid.size,
                              f"at most {LARGEST_GRID}")
-        seen = self._one_by_one(grid) if self.batch is None else self._together(grid, grid.places())
+        seen = self._one_by_one(grid) if self.batch is None else self._together(grid)
         if not seen.reached.any():
-            raise PlaneNotMet(name, f"the grid {grid}", f"none of {math.prod(grid.shape)} is")
+            raise PlaneNotMet(name, f"the grid {grid}", f"none of {grid.size} is")
         spots = smallest_at = None
         if self.batch is not None:
-            spots, smallest_at = self._spots(grid, seen, seed, checked), partial(self._smallest, grid)
+            spots, smallest_at = self.spots(grid, seen, seed, checked), partial(self._smallest, grid)
         shape = grid.shape
         position, orientation = seen.position.reshape(shape), seen.orientation.reshape(shape)
         return ErrorMap(grid, seen.reached.reshape(shape), position, orientation, seen.gap, seen, spots, smallest_at)
 
-    def _together(self, grid: Grid, places: Array) -> Seen:
+    def _together(self, grid: Grid) -> Seen:
         """Poses by the batch; of a part of them no more is kept than their errors."""
-        reached, gaps = [], []
-        columns: tuple[list[Array], list[Array]] = [], []
-        for possible, part in self._parts(grid, places, self.blur.cones):
-            reached.append(possible & part.reached)
-            for column, spread in zip(columns, (part.position, part.orientation), strict=True):
-                assert spread is not None
-                column.append(np.where(reached[-1], spread.largest, np.nan))
-                gaps.append(_gap(spread.largest, spread.lower))
+        parts = [self.errors(*part) for part in self.parts(grid, self.blur.cones)]
+        reached, position, orientation = (np.concatenate([part[i] for part in parts]) for i in range(3))
+        return Seen(reached, position, orientation, partial(self._determinant, grid), partial(self._smallest, grid),
+                    max(part[3] for part in parts))
 
-        position, orientation = map(np.concatenate, columns)
-        return Seen(np.concatenate(reached), position, orientation, partial(self._determinant, grid, places),
-                    partial(self._smallest, grid, places), max(gaps))
+    @staticmethod
+    def errors(possible: Flags, part: Evaluation) -> tuple[Flags, Array, Array, float]:
+        """Of a part: where it is reached, the position and orientation errors there (NaN elsewhere), their gap."""
+        reached, bounds = possible & part.reached, (part.position, part.orientation)
+        largest = [np.where(reached, each.largest, np.nan) for each in bounds if each is not None]
+        return reached, largest[0], largest[1], max(_gap(each.largest, each.lower) for each in bounds if each)
 
-    def _determinant(self, grid: Grid, places: Array) -> Array | None:
+    def _determinant(self, grid: Grid) -> Array | None:
         """The determinant of the directions' rates by the batch."""
         found = []
-        for possible, part in self._parts(grid, places, None):
+        for possible, part in self.parts(grid, None):
             with np.errstate(invalid="ignore"):
                 if part.determinant is None:
                     return None
             found.append(np.where(possible & part.reached, part.determinant, np.nan))
         return np.concatenate(found)
 
-    def _smallest(self, grid: Grid, places: Array) -> Array:
-        """The smallest singular value of Mᵀ by the batch."""
+    def _smallest(self, grid: Grid, places: Array | None = None) -> Array:
+        """The smallest singular value of Mᵀ by the batch, of the grid or at other places of it."""
         return np.concatenate([np.where(possible, part.singular_values[:, -1], np.nan)
-                               for possible, part in self._parts(grid, places, None)])
+                               for possible, part in self.parts(grid, None, places)])
 
-    def _parts(self, grid: Grid, places: Array, cones: Array | None) -> Iterator[tuple[Flags, Evaluation]]:
-        """Which poses of each part the platform can have at all, and what the batch says of them; in NumPy where they
-        do not make up for numba's start."""
-        assert self.batch is not None
-        size = -(-len(places) // max(1, len(places) // PART))
-        compiled = self.batch.compiled(len(places), self.setting.labels, cones, POSES_FOR_NUMBA_ONCE)
-        for start in range(0, len(places), size):
+    def parts(self, grid: Grid, cones: Array | None, places: Array | None = None) -> Iterator[tuple[Flags, Evaluation]]:
+        """Which poses of each part of a grid (or of other ``places`` of it) the platform can have at all, and what the
+        batch says of them; in NumPy where they do not make up for numba's start."""
+        count = grid.size if places is None else len(places)
+        size = -(-count // max(1, count // PART))
+        compiled = self.compiled(count, cones)
+        for start in range(0, count, size):
             tell("poses")
-            X, possible = poses_over(self.setting.motion, grid, self.setting.robot.name, places[start : start + size])
-            yield possible, self.batch.evaluate(X, self.setting.labels, cones, compiled=compiled)
+            here = grid.places(start, start + size) if places is None else places[start : start + size]
+            yield self.part(grid, here, cones, compiled)
+
+    def compiled(self, count: int, cones: Array | None) -> bool:
+        """Whether so many poses are done by numba."""
+        assert self.batch is not None
+        return self.batch.compiled(count, self.setting.labels, cones, POSES_FOR_NUMBA_ONCE)
+
+    def part(self, grid: Grid, places: Array, cones: Array | None, compiled: bool) -> tuple[Flags, Evaluation]:
+        """Which poses at some places of a grid the platform can have at all, and what the batch says of them."""
+        assert self.batch is not None
+        X, possible = poses_over(self.setting.motion, grid, self.setting.robot.name, places)
+        return possible, self.batch.evaluate(X, self.setting.labels, cones, compiled=compiled)
 
     def _one_by_one(self, grid: Grid) -> Seen:
         everything = self.setting.everything
@@ -219,15 +233,18 @@ class Mapper(Value):
                 table[2, i] = _weakest(rates, twists, at.twin.length)
         return Seen(np.isfinite(table[2]), table[0], table[1], lambda: None, lambda: table[2], 0.0)
 
-    def _spots(self, grid: Grid, seen: Seen, seed: int, count: int) -> Spots:
-        """Hold the batch against Pinocchio at random poses; raises ``Disagreement``."""
+    def spots(self, grid: Grid, seen: Seen, seed: int, count: int = SPOTS, cells: NDArray[np.int64] | None = None
+              ) -> Spots:
+        """Hold the batch against Pinocchio at random poses of those that are ``seen``, all of a grid or those at some
+        ``cells``; raises ``Disagreement``."""
         sizes = [np.where(np.isfinite(each), each, 0.0) for each in (seen.position, seen.orientation)]
         limits = [USUAL_ERROR * np.median(each[each > 0]) if (each > 0).any() else np.inf for each in sizes]
         finite = np.isfinite(seen.position) & np.isfinite(seen.orientation)
         usual = np.flatnonzero(seen.reached & finite & (sizes[0] <= limits[0]) & (sizes[1] <= limits[1]))
         chosen = np.random.default_rng(seed).choice(usual, min(count, len(usual)), replace=False)
         met, largest = 0, 0.0
-        for i, at in zip(chosen, self._configurations(grid, chosen), strict=True):
+        spots = chosen if cells is None else cells[chosen]
+        for i, at in zip(chosen, self._configurations(grid, spots), strict=True):
             if at is None:
                 continue
             met += 1
@@ -242,9 +259,7 @@ class Mapper(Value):
     def _configurations(self, grid: Grid, chosen: NDArray[np.int64]) -> list[ClosedConfiguration | None]:
         """The closed configurations at cells of a grid."""
         setting = self.setting
-        cells = np.unravel_index(chosen, grid.shape)
-        places = np.stack([values[cell] for (_, values), cell in zip(grid.axes, cells, strict=True)], axis=1)
-        X, _ = poses_over(setting.motion, grid, setting.robot.name, places)
+        X, _ = poses_over(setting.motion, grid, setting.robot.name, grid.places_at(chosen))
         if setting.placer is not None:
             return setting.placer.configurations(X)
         found: list[ClosedConfiguration | None] = []

@@ -9,9 +9,8 @@ import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
-from ...description.files import require_folder
+from ...description.files import require_alone, require_folder
 from ...errors import BadRequest
-from ..journal import require_alone
 from ..store import writable
 
 STAMP = "site.json"

@@ -7,14 +7,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...analysis.accuracy.ranges import ErrorRange
 from ...geometry.vectors import Array
-from ...tolerances import DAMPED
+from ...tolerances import DAMPED, LARGEST_FIRST_ORDER
 from .tables import GAP, NOT_BOUNDED, Rows, bounded, camera, head, labelled, listing, table
 
 if TYPE_CHECKING:
     from ...analysis.accuracy.accuracy import Accuracy
+    from ...analysis.accuracy.error_map import Spots
     from ...analysis.accuracy.pose_errors import ErrorEllipsoid, PoseErrors
     from ...analysis.accuracy.sampled import Sampled
+    from ...analysis.accuracy.swept import SweptErrors
+    from ...mechanism.pose import Grid
     from ...selection.loop_ends import LoopEnds
     from ...selection.select import Candidate, ModeCount, Selection
     from ...simulation.endings.basins import Basins
@@ -112,6 +116,8 @@ def accuracy(found: Accuracy) -> str:
     length = found.setting.everything.twin.length
     if found.field is not None:
         rows += [*GAP, *field_rows(found)]
+    if found.swept is not None:
+        rows += [*GAP, *_swept_rows(found.swept, found.blur.each)]
     for errors, true in zip(found.poses, found.sampled, strict=True):
         rows += [*GAP, ("pose", str(errors.pose)), *_extent("position", errors.position, 1e3, "mm", length),
                  *_extent("orientation", errors.orientation, 180 / np.pi, "degrees"),
@@ -123,32 +129,48 @@ def field_rows(found: Accuracy) -> list[tuple[str, str]]:
     """What a grid holds: its size, what is reached of it, the range of the errors, how they were checked."""
     field, length = found.field, found.setting.everything.twin.length
     assert field is not None
-    grid = field.grid
+    ranges = [ErrorRange.of(field.position, LARGEST_FIRST_ORDER * length),
+              ErrorRange.of(field.orientation, LARGEST_FIRST_ORDER)]
+    position = _range(ranges[0], field.position, 1e3, "mm")
+    orientation = _range(ranges[1], field.orientation, 180 / np.pi, "degrees")
+    reached = f"{np.sum(field.reached)} of {field.reached.size}"
+    return _grid_rows(field.grid, reached, position, orientation, field.spots, field.gap, found.blur.each)
+
+
+def _swept_rows(swept: SweptErrors, each: str) -> list[tuple[str, str]]:
+    """The same of a grid that is in a file, of which no median is known."""
+    tally = swept.tally
+    reached = f"{tally.reached} of {swept.grid.size}" + (
+        f" ({swept.before} were there from a sweep that was broken off)" if swept.before else "")
+    return _grid_rows(swept.grid, reached, _range(tally.position, None, 1e3, "mm"),
+                      _range(tally.orientation, None, 180 / np.pi, "degrees"), swept.spots, tally.gap, each)
+
+
+def _grid_rows(grid: Grid, reached: str, position: str, orientation: str, spots: Spots | None, gap: float, each: str
+               ) -> list[tuple[str, str]]:
     size = " × ".join(f"{count} {name}" for count, name in zip(grid.shape, grid.names, strict=True))
     ranges = ", ".join(f"{name} {values[0]:.4g} to {values[-1]:.4g}" for name, values in grid.axes)
     fixed = str(grid.fixed)
     rows = [("poses", f"{size}: {ranges}" + (f"; {fixed}" if fixed else "")),
-            ("reached", f"{np.sum(field.reached)} of {field.reached.size}"),
-            ("position", _range(field.position, 1e3, "mm", length)),
-            ("orientation", _range(field.orientation, 180 / np.pi, "degrees"))]
-    if field.spots is not None and field.spots.count:
-        rows.append(("checked", f"against Pinocchio at {field.spots.count} random poses, largest difference "
-                                f"{field.spots.difference:.1e}"))
-    if field.gap > 1e-9:
-        rows.append(("", f"three {found.blur.each}s and more: upper bounds, nowhere more than {100 * field.gap:.2g} % "
-                         "too large"))
+            ("reached", reached), ("position", position), ("orientation", orientation)]
+    if spots is not None and spots.count:
+        rows.append(("checked", f"against Pinocchio at {spots.count} random poses, largest difference "
+                                f"{spots.difference:.1e}"))
+    if gap > 1e-9:
+        rows.append(("", f"three {each}s and more: upper bounds, nowhere more than {100 * gap:.2g} % too large"))
     return rows
 
 
-def _range(errors: Array, unit: float, word: str, length: float = 1.0) -> str:
-    if not np.nanmax(errors, initial=0.0) > 0:
+def _range(found: ErrorRange, errors: Array | None, unit: float, word: str) -> str:
+    if not found.moves:
         return "no errors: the platform does not move so"
-    kept, lost = errors[bounded(errors, length)], int(np.sum(np.isinf(errors)))
-    loose = int(np.sum(~np.isnan(errors))) - kept.size - lost
-    text = [f"{unit * kept.min():.4g} to {unit * kept.max():.4g} {word}, median {unit * np.median(kept):.4g}"] if (
-        kept.size) else []
-    text += [f"{NOT_BOUNDED} at {loose} poses"] * (loose > 0)
-    return "; ".join([*text, *[f"infinite at {lost} poses, where a freedom is lost"] * (lost > 0)])
+    text = []
+    if found.least is not None and found.largest is not None:
+        text.append(f"{unit * found.least:.4g} to {unit * found.largest:.4g} {word}")
+        if errors is not None:
+            text[0] += f", median {unit * np.median(errors[errors <= found.largest]):.4g}"
+    text += [f"{NOT_BOUNDED} at {found.loose} poses"] * (found.loose > 0)
+    return "; ".join([*text, *[f"infinite at {found.infinite} poses, where a freedom is lost"] * (found.infinite > 0)])
 
 
 def _samples(errors: PoseErrors, true: Sampled) -> Rows:

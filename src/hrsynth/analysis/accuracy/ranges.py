@@ -1,0 +1,75 @@
+"""What errors in any number come to, part by part."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...geometry.vectors import Array
+from ...results import Value
+
+
+@dataclass(frozen=True)
+class ErrorRange(Value):
+    """Errors in any number: the least and the largest of those that the first order bounds (None: there are none), how
+    many are larger, how many infinite, and whether any is not zero."""
+
+    least: float | None = None
+    largest: float | None = None
+    loose: int = 0
+    infinite: int = 0
+    moves: bool = False
+
+    @classmethod
+    def of(cls, errors: Array, limit: float) -> ErrorRange:
+        """The range of errors, NaN left out; the first order bounds those up to a ``limit``."""
+        there = errors[~np.isnan(errors)]
+        kept, infinite = there[there <= limit], int(np.isinf(there).sum())
+        low, high = (float(kept.min()), float(kept.max())) if kept.size else (None, None)
+        return cls(low, high, there.size - kept.size - infinite, infinite, bool((there > 0).any()))
+
+    def with_more(self, other: ErrorRange) -> ErrorRange:
+        """The range of both."""
+        lows, highs = ([each for each in both if each is not None]
+                       for both in ((self.least, other.least), (self.largest, other.largest)))
+        return ErrorRange(min(lows, default=None), max(highs, default=None), self.loose + other.loose,
+                          self.infinite + other.infinite, self.moves or other.moves)
+
+    def to_dict(self, unit: float) -> dict[str, Any]:
+        """The record of the command line, errors in a unit."""
+        ends = {name: value if value is None else unit * value
+                for name, value in (("least", self.least), ("largest", self.largest))}
+        return {**ends, "loose": self.loose, "infinite": self.infinite}
+
+
+@dataclass(frozen=True)
+class Tally(Value):
+    """What the first poses of a sweep came to: how many were done, how many of them are reached, the ranges, the gap,
+    and of the part with the most that are reached how many and where it starts."""
+
+    done: int = 0
+    reached: int = 0
+    position: ErrorRange = ErrorRange()
+    orientation: ErrorRange = ErrorRange()
+    gap: float = 0.0
+    fullest: tuple[int, int] = (0, 0)
+
+    def with_part(self, count: int, reached: int, position: ErrorRange, orientation: ErrorRange, gap: float) -> Tally:
+        """With one part more."""
+        return Tally(self.done + count, self.reached + reached, self.position.with_more(position),
+                     self.orientation.with_more(orientation), max(self.gap, gap),
+                     max(self.fullest, (reached, self.done), key=lambda each: each[0]))
+
+    @classmethod
+    def read(cls, line: str) -> Tally:
+        """What a line of the journal says."""
+        told = json.loads(line)
+        ranges = {name: ErrorRange(**told[name]) for name in ("position", "orientation")}
+        return cls(**{**told, **ranges, "fullest": tuple(told["fullest"])})
+
+    def written(self) -> str:
+        """The line of the journal."""
+        return json.dumps({**vars(self), "position": vars(self.position), "orientation": vars(self.orientation)})

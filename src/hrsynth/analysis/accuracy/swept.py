@@ -1,0 +1,220 @@
+"""The error maxima over a grid of any size, written to a file part by part; a sweep that was broken off goes on."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ... import __version__
+from ...budgets import SWEEP_DRAWN, SWEEP_PART
+from ...description.files import replaceable, require_alone, require_folder
+from ...errors import BadRequest, BuildStopped, PlaneNotMet
+from ...geometry.vectors import Array
+from ...mechanism.pose import Grid
+from ...progress import tell
+from ...results import Value, content
+from ...tolerances import LARGEST_FIRST_ORDER
+from .error_map import SPOTS, Mapper, Seen, Spots, axes_of
+from .ranges import ErrorRange, Tally
+
+ENDING, PART, JOURNAL = ".npy", ".part", ".journal"
+ROW = np.dtype([("position", "<f8"), ("orientation", "<f8")])
+"""What the file holds of a pose: the errors (m, rad), NaN where it is not reached, infinite where a freedom is lost."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SweptErrors(Value):
+    """The error maxima over a grid in a file: an array of ``ROW`` in the grid's shape. ``before`` poses of it were
+    there from a sweep that was broken off."""
+
+    grid: Grid
+    file: Path
+    tally: Tally
+    spots: Spots
+    before: int
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line."""
+        return {**axes_of(self.grid), "gap": self.tally.gap, "checked": self.spots.to_dict(),
+                "swept": {"poses": self.grid.size, "reached": self.tally.reached, "before": self.before,
+                          "position_mm": self.tally.position.to_dict(1e3),
+                          "orientation_deg": self.tally.orientation.to_dict(180 / np.pi)}}
+
+
+def sweep_to(path: str | Path, mapper: Mapper, grid: Grid, seed: int) -> SweptErrors:
+    """Write the error maxima over a grid to ``path``, whole or not at all, and go on where the same sweep was broken
+    off; memory is that of one part.
+
+    Raises
+    ------
+    BadRequest
+        For another ending than .npy, poses that are found one by one, a disk that is too small, another sweep to that
+        file: at work, or broken off.
+    BuildStopped
+        Where the disk takes no more; what was written is kept.
+    PlaneNotMet
+        Where no pose of the grid is reached.
+    """
+    name, target = mapper.setting.robot.name, required(path)
+    if mapper.batch is None:
+        raise BadRequest(f"{name}: poses are found one by one, not in parts", str(path),
+                         "another file, as map.csv")
+    cones = mapper.blur.cones
+    asked = hashlib.sha256(repr(content((mapper.setting.mechanism, mapper.setting.observed, mapper.blur, grid,
+                                         SWEEP_PART, __version__))).encode()).hexdigest()
+    with _SweepDraft(target, grid, asked, mapper.compiled(grid.size, cones)) as draft:
+        tally = draft.tally
+        limits = [LARGEST_FIRST_ORDER * mapper.setting.everything.twin.length, LARGEST_FIRST_ORDER]
+        for start in range(tally.done, grid.size, SWEEP_PART):
+            places = grid.places(start, start + SWEEP_PART)
+            reached, *errors, gap = mapper.errors(*mapper.part(grid, places, cones, draft.compiled))
+            rows = np.stack(errors, axis=1)
+            position, orientation = map(ErrorRange.of, errors, limits)
+            tally = tally.with_part(len(rows), int(reached.sum()), position, orientation, gap)
+            draft.add(rows, tally)
+            tell(f"poses, {100 * tally.done // grid.size} % of {grid.size}")
+        if not tally.reached:
+            draft.discard()
+            raise PlaneNotMet(name, f"the grid {grid}", f"none of {grid.size} is")
+        spots = _spots(mapper, grid, draft, tally, seed)
+        before = draft.tally.done
+        draft.finish()
+    return SweptErrors(grid, Path(path), tally, spots, before)
+
+
+def _spots(mapper: Mapper, grid: Grid, draft: _SweepDraft, tally: Tally, seed: int) -> Spots:
+    """The file held against Pinocchio at random poses of it; where few of these are reached, of the part that is
+    reached most."""
+    rng = np.random.default_rng(seed)
+    start = tally.fullest[1]
+    for low, high in ((0, grid.size), (start, min(start + SWEEP_PART, grid.size))):
+        cells = np.arange(low, high) if high - low <= SWEEP_DRAWN else np.sort(rng.integers(low, high, SWEEP_DRAWN))
+        rows = draft.rows(cells)
+        reached = ~np.isnan(rows[:, 0])
+        if reached.sum() >= SPOTS:
+            break
+    position, orientation = rows.T
+    seen = Seen(reached, position, orientation, lambda: None, lambda: position, tally.gap)
+    return mapper.spots(grid, seen, seed, cells=cells)
+
+
+def required(path: str | Path) -> Path:
+    """Where the file will be; raises ``BadRequest``."""
+    if Path(path).suffix.lower() != ENDING:
+        raise BadRequest("errors are written part by part to an array", str(path), f"a file that ends in {ENDING}")
+    require_folder(path)
+    return replaceable(path)
+
+
+class _SweepDraft:
+    """The array of a grid that is being written, and its journal: what was asked, then a line a part. Both are on the
+    disk when a part counts as done; a last line that was torn is cut off."""
+
+    def __init__(self, target: Path, grid: Grid, asked: str, compiled: bool) -> None:
+        self.target = target
+        self.part, self.journal = (target.with_name(target.name + each) for each in (PART, JOURNAL))
+        head = io.BytesIO()
+        np.lib.format.write_array_header_1_0(head, {"descr": np.lib.format.dtype_to_descr(ROW), "fortran_order": False,
+                                                    "shape": grid.shape})
+        self._head, self._whole = head.getvalue(), grid.size * ROW.itemsize
+        self._files = ExitStack()
+        with _stopping(self.journal), ExitStack() as files:
+            self._lines = files.enter_context(open(os.open(self.journal, os.O_RDWR | os.O_CREAT, 0o666), "r+b"))
+            require_alone(self._lines.fileno(), "another sweep writes this file", self.journal, "one sweep at a time")
+            self.compiled, self.tally = self._read(asked, compiled)
+            self._rows = files.enter_context(open(os.open(self.part, os.O_RDWR | os.O_CREAT, 0o666), "r+b"))
+            self._begin(asked)
+            self._files = files.pop_all()
+
+    def __enter__(self) -> _SweepDraft:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._files.close()
+
+    def _read(self, asked: str, compiled: bool) -> tuple[bool, Tally]:
+        """Whether it is done by numba, and how far it came; raises ``BadRequest`` for another question's journal."""
+        content = self._lines.read()
+        lines = content[: content.rfind(b"\n") + 1].decode("ascii", "replace").splitlines()
+        if not lines:
+            return compiled, Tally()
+        try:
+            told = json.loads(lines[0])
+            if told["asked"] != asked:
+                raise BadRequest("another sweep to this file was broken off", str(self.journal),
+                                 "the same question, another file, or that journal removed")
+            done = Tally.read(lines[-1]) if lines[1:] else Tally()
+            there = self.part.stat().st_size if self.part.exists() else 0
+        except (ValueError, KeyError, TypeError):
+            raise BadRequest("no journal of a sweep", str(self.journal), "another file, or that one removed") from None
+        return told["compiled"], done if there >= self._place(done.done) else Tally()
+
+    def _begin(self, asked: str) -> None:
+        """Write the heads of both, or cut off what is no whole part; raises ``BadRequest`` for a disk too small."""
+        free, need = shutil.disk_usage(self.target.parent).free, self._whole - self.tally.done * ROW.itemsize
+        if need > free:
+            raise BadRequest("the file takes more bytes than are free on the disk", need, f"at most {free}")
+        if not self.tally.done:
+            self._rows.truncate(0)
+            self._rows.write(self._head)
+            self._lines.truncate(0)
+            self._lines.seek(0)
+            self._line(json.dumps({"asked": asked, "compiled": self.compiled}))
+        else:
+            self._lines.seek(0)
+            self._lines.truncate(self._lines.read().rfind(b"\n") + 1)
+            self._lines.seek(0, os.SEEK_END)
+
+    def _place(self, done: int) -> int:
+        """Where the row of a cell begins."""
+        return len(self._head) + done * ROW.itemsize
+
+    def _line(self, text: str) -> None:
+        self._lines.write(text.encode("ascii") + b"\n")
+        self._lines.flush()
+        os.fsync(self._lines.fileno())
+
+    def add(self, rows: Array, tally: Tally) -> None:
+        """Write the next rows, and what they came to with all before them."""
+        with _stopping(self.journal):
+            self._rows.seek(self._place(tally.done - len(rows)))
+            self._rows.write(rows.tobytes())
+            self._rows.flush()
+            os.fsync(self._rows.fileno())
+            self._line(tally.written())
+
+    def rows(self, cells: NDArray[np.int64]) -> Array:
+        """The rows (n, 2) of some cells."""
+        handle = self._rows.fileno()  # a memory map would keep what the system reads ahead
+        return np.frombuffer(b"".join(os.pread(handle, ROW.itemsize, self._place(cell)) for cell in cells.tolist())
+                             ).reshape(-1, 2)
+
+    def finish(self) -> None:
+        """Give the array its name."""
+        os.replace(self.part, self.target)
+        self.journal.unlink()
+
+    def discard(self) -> None:
+        """Leave nothing."""
+        self.part.unlink()
+        self.journal.unlink()
+
+
+@contextmanager
+def _stopping(journal: Path) -> Iterator[None]:
+    """Raise ``BuildStopped`` where the disk refuses."""
+    try:
+        yield
+    except OSError as error:
+        raise BuildStopped(f"{error.filename or journal}: {error.strerror}", str(journal), "sweep") from None
