@@ -22,7 +22,8 @@ from typing import Any
 
 import numpy as np
 
-from hrsynth.analysis.aspects.path import SEPARATED, Aspects
+from hrsynth.analysis.aspects.path import Aspects
+from hrsynth.analysis.aspects.words import SEPARATED
 from hrsynth.budgets import RUN_AWAY
 from hrsynth.description import load
 from hrsynth.geometry.vectors import hat, rotation_from_rpy

@@ -87,10 +87,9 @@ def configurations_at(setting: ObservedRobot, poses: Sequence[Pose | ModeNumber]
     Raises ``BadRequest`` for parts of a pose that the platform cannot change and for modes that there are not,
     ``PoseNotReached`` for poses out of reach and for modes at which the robot was not found assembled.
     """
-    from .modes.modes import at_mode, modes
-
-    if poses:
-        require_platform(setting.robot, poses[0])
+    if not poses:
+        return []
+    require_platform(setting.robot, poses[0])
     everything, motion = setting.everything, setting.motion
     reached: dict[Pose, ClosedConfiguration] = {}
     refused: list[tuple[Pose, PoseNotReached]] = []
@@ -103,9 +102,12 @@ def configurations_at(setting: ObservedRobot, poses: Sequence[Pose | ModeNumber]
                     raise
                 refused.append((each, error))
     about = next(iter(reached.values()), everything.start)
-    listed = modes(setting, at=about) if refused or any(isinstance(each, ModeNumber) for each in poses) else None
+    if not refused and all(isinstance(each, Pose) for each in poses):
+        return [reached[each] for each in poses if isinstance(each, Pose)]
+    from .modes.modes import at_mode, modes
+
+    listed = modes(setting, at=about)
     for pose, reason in refused:
-        assert listed is not None
         reached[pose] = _met(listed, pose, reason)
     return [reached[each] if isinstance(each, Pose) else at_mode(listed, each) for each in poses]
 

@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.aspects.path import SEPARATED, Aspects, PathAnswer
+from ..analysis.aspects.path import Aspects, PathAnswer
 from ..analysis.aspects.path import path as asked
 from ..analysis.aspects.path_segments import StraightSegment
 from ..analysis.aspects.vector_expressions import DerivedVector, LegVector, VectorExpression
+from ..analysis.aspects.words import SEPARATED
 from ..closed_forms.legs import ClosedFormLeg, OnCrank, OnRail, SlidingRod
 from ..closed_forms.platform_points import PlatformPoint
 from ..constraints.condition import Named

@@ -10,7 +10,8 @@ from ..errors import RankUndecided
 from ..tolerances import NAMED, RANK_CUTOFF, RANK_GAP, SAME_DIRECTION
 from .vectors import Array
 
-CLEAN = float(1 / np.finfo(float).eps)
+EPSILON, TINY = float(np.finfo(float).eps), float(np.finfo(float).tiny)
+CLEAN = 1 / EPSILON
 """The gap of a rank that nothing contradicts: no singular value is dropped, or all are exactly zero."""
 
 
@@ -37,17 +38,17 @@ class Rank:
 
 def rank_of(singular_values: Array, scale: float | None = None, cutoff: float = RANK_CUTOFF) -> Rank:
     """The rank that descending singular values show: those above ``cutoff`` × ``scale`` (default: the largest)."""
-    values = np.asarray(singular_values, dtype=float)
-    if values.size == 0:
+    values = np.asarray(singular_values, dtype=float).tolist()
+    if not values:
         return Rank(0, CLEAN)
-    largest = float(values[0]) if scale is None else max(scale, float(values[0]))
-    if largest <= np.finfo(float).tiny:
+    largest = values[0] if scale is None else max(scale, values[0])
+    if largest <= TINY:
         return Rank(0, CLEAN)
-    floor = np.finfo(float).eps * largest
-    kept = int(np.sum(values > cutoff * largest))
-    last = float(values[kept - 1]) if kept else largest
-    dropped = max(float(values[kept]), floor) if kept < values.size else floor
-    return Rank(kept, float(last / dropped), last / largest)
+    floor, least = EPSILON * largest, cutoff * largest
+    kept = sum(value > least for value in values)
+    last = values[kept - 1] if kept else largest
+    dropped = max(values[kept], floor) if kept < len(values) else floor
+    return Rank(kept, last / dropped, last / largest)
 
 
 def range_basis(matrix: Array, scale: float | None = None) -> tuple[Array, Rank]:

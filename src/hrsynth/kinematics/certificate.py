@@ -15,7 +15,7 @@ from ..geometry.ranks import CLEAN, kernel_basis, largest_angle
 from ..geometry.vectors import Array
 from ..mechanism import Mechanism
 from ..results import Result
-from ..tolerances import FOLLOWED, RANK_GAP, SAME_RELATION, SOLVED, SURELY_SOMETHING
+from ..tolerances import FOLLOWED, RANK_GAP, SAME_RELATION, SOLVED
 from .configuration import ClosedConfiguration
 from .pinocchio_model import PinocchioModel
 from .relation import Measurement, Relation, relation
@@ -82,7 +82,7 @@ def certify(samples: Samples, hidden: Mechanism, *, count: int | None = None, bo
         angle = np.pi / 2
         return verdict(str(error))
     active = twin.actuated()
-    usual = [max(ranks) for ranks in zip(*(map(shown, members)), strict=True)]
+    usual = [max(ranks) for ranks in zip(*(member.shown for member in members), strict=True)]
     kept = () if all(o.by_segment for o in question.observations) else _as_they_were(samples, hidden)
     start = float(np.linalg.norm(twin.residual(twin.q0)))
     if start > FOLLOWED:
@@ -112,18 +112,10 @@ def certify(samples: Samples, hidden: Mechanism, *, count: int | None = None, bo
             return verdict(f"a rank is not clear: gap {gap:.2g}", Mismatch(ours, theirs, here))
         if not angle <= SAME_RELATION:
             return verdict(_difference(ours, theirs, angle), Mismatch(ours, theirs, here))
-        if active and shown(member) == usual and not _parametrise(at, asked, active, blind, complete):
+        if active and member.shown == usual and not _parametrise(at, asked, active, blind, complete):
             angle = np.pi / 2
             return verdict("the virtual actuators do not parametrise the observed directions")
     return verdict("")
-
-
-def shown(member: Sample) -> list[int]:
-    """How many independent numbers each observation shows clearly at a sample: fewer where it is itself nearly
-    singular, as a circle that is seen edge-on."""
-    relation = member.relation
-    rows = [relation.basis[relation.rows_of(place)] for place in range(len(relation.sizes))]
-    return [int(np.sum(np.linalg.svd(each, compute_uv=False) > SURELY_SOMETHING)) for each in rows]
 
 
 def _as_they_were(samples: Samples, hidden: Mechanism) -> tuple[str, ...]:

@@ -19,7 +19,19 @@ from ..geometry.ranks import kernel_basis, largest_angle, range_basis
 from ..geometry.vectors import Array
 from ..mechanism.observation import Observation
 from ..results import Value
-from ..tolerances import CLOSED, EXACT, FOLLOWED, INVERTED, NUDGE, PASSED_BY, RANK_GAP, SHARP, SOLVED, STEADY_TANGENT
+from ..tolerances import (
+    CLOSED,
+    EXACT,
+    FOLLOWED,
+    INVERTED,
+    NUDGE,
+    PASSED_BY,
+    RANK_GAP,
+    SHARP,
+    SOLVED,
+    STEADY_TANGENT,
+    SURELY_SOMETHING,
+)
 from .branch import CORRECTED, OperationMode, Signature, follows, group_modes, turns_of
 from .configuration import ClosedConfiguration
 from .pinocchio_model import PinocchioModel
@@ -53,6 +65,13 @@ class Sample(Value):
     configuration: ClosedConfiguration
     way: tuple[Target, ...]
     relation: Relation
+
+    @cached_property
+    def shown(self) -> list[int]:
+        """How many independent numbers each observation shows clearly: fewer where it is itself nearly singular, as a
+        circle that is seen edge-on."""
+        rows = [self.relation.basis[self.relation.rows_of(place)] for place in range(len(self.relation.sizes))]
+        return [int(np.sum(np.linalg.svd(each, compute_uv=False) > SURELY_SOMETHING)) for each in rows]
 
 
 @dataclass(frozen=True, eq=False, repr=False)

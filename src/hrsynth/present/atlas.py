@@ -10,8 +10,8 @@ import numpy as np
 
 from ..analysis.aspects.atlas import Atlas
 from ..analysis.aspects.held_leg import HeldLegSection
-from ..analysis.aspects.path import SAME, SEPARATED, UNDECIDED
 from ..analysis.aspects.three_cranks import CrankPlace, mode_counts
+from ..analysis.aspects.words import SAME, SEPARATED, UNDECIDED
 from ..errors import BadRequest
 from ..geometry.vectors import Array
 from . import plots

@@ -16,7 +16,8 @@ from ..analysis.accuracy.accuracy import errors_at
 from ..analysis.accuracy.cones import Blur, Cones, unseen
 from ..analysis.accuracy.pose_errors import PoseErrors
 from ..analysis.asked import configurations_at
-from ..analysis.aspects.path import SEPARATED, Aspects
+from ..analysis.aspects.path import Aspects
+from ..analysis.aspects.words import SEPARATED
 from ..analysis.modes.modes import AssemblyModes, modes
 from ..analysis.observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike
 from ..analysis.posture import ConfigurationAnalysis, Posture

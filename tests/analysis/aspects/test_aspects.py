@@ -16,9 +16,10 @@ from hypothesis import strategies as st
 from analysis.aspects.certified import check_certified
 from hrsynth.analysis.aspects.condition_enclosure import ConditionEnclosure, enclosed, prove
 from hrsynth.analysis.aspects.leg_forms import LegPattern
-from hrsynth.analysis.aspects.path import BUDGET, SAME, SEPARATED, UNDECIDED, Aspects, path
+from hrsynth.analysis.aspects.path import BUDGET, Aspects, path
 from hrsynth.analysis.aspects.path_segments import StraightSegment, mode_change
 from hrsynth.analysis.aspects.road_map import PoseRegion, plan
+from hrsynth.analysis.aspects.words import SAME, SEPARATED, UNDECIDED
 from hrsynth.analysis.singularity.agreement import smallest_of
 from hrsynth.closed_forms.legs import OnCrank
 from hrsynth.description import load

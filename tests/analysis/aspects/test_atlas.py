@@ -16,7 +16,7 @@ from analysis.aspects.certified import check_certified
 from analysis.aspects.six_modes import determinants, six_modes, tips_at
 from hrsynth.analysis.aspects import atlas as module
 from hrsynth.analysis.aspects.atlas import Atlas, atlas
-from hrsynth.analysis.aspects.path import SAME, SEPARATED, UNDECIDED
+from hrsynth.analysis.aspects.words import SAME, SEPARATED, UNDECIDED
 from hrsynth.cli import execute
 from hrsynth.errors import BadRequest, PoseNotReached
 from hrsynth.families.planar import six_poses

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from hrsynth.analysis.aspects.leg_forms import LegPattern
-from hrsynth.analysis.aspects.path import SAME, SEPARATED, Aspects, leads
+from hrsynth.analysis.aspects.path import Aspects, leads
+from hrsynth.analysis.aspects.words import SAME, SEPARATED
 from hrsynth.closed_forms.legs import ClosedFormLeg
 from hrsynth.description import load
 from hrsynth.geometry.balls import balls

@@ -12,7 +12,8 @@ import pytest
 from analysis.aspects.certified import check_certified, followed
 from hrsynth.analysis.aspects.joint_limits import SlideLimit, TurnLimit
 from hrsynth.analysis.aspects.leg_forms import LegPattern
-from hrsynth.analysis.aspects.path import SAME, SEPARATED, UNDECIDED, Aspects
+from hrsynth.analysis.aspects.path import Aspects
+from hrsynth.analysis.aspects.words import SAME, SEPARATED, UNDECIDED
 from hrsynth.description import load
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.sampling import random_walk

@@ -9,8 +9,9 @@ import pytest
 
 from analysis.aspects.certified import check_certified
 from analysis.aspects.six_modes import LEGS, SixModes, determinants, six_modes, tips_at
-from hrsynth.analysis.aspects.path import BUDGET, SAME, SEPARATED, UNDECIDED, Aspects, PathAnswer
+from hrsynth.analysis.aspects.path import BUDGET, Aspects, PathAnswer
 from hrsynth.analysis.aspects.path_segments import WorkingModeChange
+from hrsynth.analysis.aspects.words import SAME, SEPARATED, UNDECIDED
 from hrsynth.geometry.vectors import Array
 from hrsynth.kinematics.configuration import measure
 

@@ -24,9 +24,10 @@ from ..modes.modes import AssemblyModes, at_mode, modes
 from ..observed import CameraLike, LegsLike, RobotLike, SeeLike
 from ..question import question
 from .held_leg import HeldLegSection, section
-from .path import BUDGET, SAME, SEPARATED, UNDECIDED, Aspects, PathAnswer
+from .path import BUDGET, Aspects, PathAnswer
 from .three_cranks import CrankPlace, three_cranks
 from .vector_expressions import NoLegForm
+from .words import SAME, SEPARATED, UNDECIDED
 
 if TYPE_CHECKING:
     import networkx as nx

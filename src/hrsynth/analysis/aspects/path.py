@@ -30,8 +30,7 @@ from .leg_forms import LegPattern, pattern
 from .path_segments import PathCoordinates, Place, WorkingModeChange, path_coordinates
 from .road_map import PlannedPath, PoseRegion, plan
 from .vector_expressions import NoLegForm
-
-SAME, SEPARATED, UNDECIDED = "same aspect", "separated", "undecided"
+from .words import SAME, SEPARATED, UNDECIDED
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...analysis.aspects.path import SAME, SEPARATED
-from ...analysis.aspects.path import UNDECIDED as UNDECIDED_PAIR
+from ...analysis.aspects.words import SAME, SEPARATED
+from ...analysis.aspects.words import UNDECIDED as UNDECIDED_PAIR
 from ...analysis.posture import CONSTRAINT, REGULAR, UNDECIDED
 from ...mechanism.pose import Pose
 from ...tolerances import NOISE, RANK_GAP

@@ -1,0 +1,3 @@
+"""The words for two poses and the paths between them."""
+
+SAME, SEPARATED, UNDECIDED = "same aspect", "separated", "undecided"
