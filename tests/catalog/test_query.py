@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import sqlite3
+import time
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ import hrsynth
 from catalog.stub import CHAINS, REFUSED, VERDICTS, WORKERS, source
 from hrsynth.catalog import Catalog, load
 from hrsynth.catalog.build import build, check
+from hrsynth.catalog.store import _write_tables, shipped
 from hrsynth.errors import BadRequest
 
 ASKED = st.fixed_dictionaries({}, optional={
@@ -27,7 +29,7 @@ ASKED = st.fixed_dictionaries({}, optional={
     "modes": st.integers(1, 9),
     "legs": st.one_of(st.integers(1, 7), st.sampled_from(["3", "?-R*", "*S", "6-UPS", "UPS", "R?R", "(c0?*)", "R-{*"]),
                       st.sampled_from([f"4-{chain}" for chain in CHAINS])),
-    "text": st.sampled_from(["ROTATION", "σ", "two lines", "(d", "nowhere"])})
+    "text": st.sampled_from(["ROTATION", "σ", "two lines", "(d", "nowhere", "", "['", "1\x1f"])})
 
 
 @pytest.fixture(scope="module")
@@ -84,6 +86,37 @@ def test_sqlite_holds_the_same_records(stores: tuple[Path, Path]):
     assert list(load(lines)) == list(load(big))
     assert len(load(big)) == 100
     assert sorted(file.name for file in big.parent.iterdir()) == ["big.sqlite", "lines"]
+
+
+@pytest.mark.parametrize("asked", [{"legs": "?-R*"}, {"text": "two lines"}, {"modes": 6}, {"dof": 3, "legs": 4}])
+def test_sqlite_files_of_older_versions_are_read(asked: dict[str, Any], stores: tuple[Path, Path], tmp_path: Path):
+    """They have neither the names of legs nor texts, modes and what is seen."""
+    older = tmp_path / "older.sqlite"
+    older.write_bytes(stores[1].read_bytes())
+    with sqlite3.connect(older) as file:
+        file.execute("DROP TABLE names")
+        for name in ("see", "modes_bound"):
+            file.execute(f"DROP INDEX records_{name}")
+        for name in ("see", "modes_bound", "texts"):
+            file.execute(f"ALTER TABLE records DROP COLUMN {name}")
+    assert list(load(older, **asked)) == list(load(stores[0], **asked))
+    assert 0 < len(load(older, **asked)) < 100
+
+
+@pytest.mark.slow
+def test_sqlite_answers_within_50_ms(tmp_path: Path):
+    """Any question about the shipped catalog, in processor time, and as the lines answer it."""
+    kept, file = shipped(), tmp_path / "all.sqlite"
+    _write_tables(file, {group: kept.lines(group, {}) for group in kept.groups()})
+    for asked in ({}, {"legs": "3-R*"}, {"legs": 3, "verdict": "controllable"}, {"modes": 6}, {"text": "takeover"},
+                  {"text": "hexaglide"}, {"dof": 3}, {"motion": "2T1R", "base_motors": True}, {"see": "3point"}):
+        spent = []
+        for _ in range(3):
+            start = time.process_time()
+            found = load(file, **asked)
+            spent.append(time.process_time() - start)
+        assert list(found) == list(load(**asked))
+        assert min(spent) < 0.05, asked
 
 
 def test_sqlite_has_the_same_bytes_however_it_was_built(stores: tuple[Path, Path], tmp_path: Path):

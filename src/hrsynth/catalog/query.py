@@ -3,32 +3,51 @@
 from __future__ import annotations
 
 import difflib
-import re
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
 
 from ..errors import BadRequest
 from ..results import Value
+from .fits import fits, require_askable
 from .jsonl import Record, record
 from .store import DATABASES, Store, shipped, store
-from .words import SENSORS, counted, parse, sights
+from .words import SENSORS, parse
 
-EXACT = ("group", "dof", "motion", "verdict", "base_motors", "fewest", "see")
-"""Fields that have to be equal to what is asked for."""
-ASKED = (*EXACT, "modes", "legs", "text")
-"""What can be asked for."""
+
+class ReadRecords(Sequence[Record]):
+    """The records of lines, each read when it is looked at first."""
+
+    def __init__(self, lines: Sequence[str]) -> None:
+        self._lines = lines
+        self._read: list[Record | None] = [None] * len(lines)
+
+    def __len__(self) -> int:
+        return len(self._lines)
+
+    @overload
+    def __getitem__(self, place: int) -> Record: ...
+
+    @overload
+    def __getitem__(self, place: slice) -> Sequence[Record]: ...
+
+    def __getitem__(self, place: int | slice) -> Record | Sequence[Record]:
+        if isinstance(place, slice):
+            return [self[i] for i in range(*place.indices(len(self)))]
+        found = self._read[place]
+        if found is None:
+            found = self._read[place] = record(self._lines[place])
+        return found
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Catalog(Value):
     """Records, by group and then by word."""
 
-    records: tuple[Record, ...]
+    records: Sequence[Record]
 
     def __iter__(self) -> Iterator[Record]:
         return iter(self.records)
@@ -89,74 +108,40 @@ def load(path: str | Path | None = None, **asked: Any) -> Catalog:
     another version.
     """
     require_askable(asked)
-    kept = shipped() if path is None else store(path)
-    _require_there(kept, path)
-    exactly = {name: value for name, value in asked.items()
-               if name in EXACT and value is not None and not isinstance(value, tuple)}
+    kept = _there(path)
+    groups = _groups(kept, asked)
+    found = Catalog(ReadRecords([line for name in groups for line in kept.lines(name, asked)]))
+    return found if kept.decides(asked) else found.where(**asked)
+
+
+def count(path: str | Path | None = None, **asked: Any) -> int:
+    """How many records there are of the groups among which those lie that are ``asked`` for."""
+    kept = _there(path)
+    groups = _groups(kept, asked if asked.get("group") == SENSORS else {**asked, "group": None})
+    return sum(kept.count(name) for name in groups)
+
+
+def groups_of(path: str | Path | None = None) -> list[str]:
+    """The names of the groups that are there."""
+    return _there(path).groups()
+
+
+def _groups(kept: Store, asked: Mapping[str, Any]) -> list[str]:
+    """The groups in which is what is asked for."""
     wanted = asked.get("group")
-    groups = [name for name in kept.groups() if name in _tuple(wanted) or (
+    return [name for name in kept.groups() if name in _tuple(wanted) or (
         wanted is None and (name == SENSORS) == (asked.get("see") is not None))]
-    return Catalog(tuple(record(line) for name in groups for line in kept.lines(name, exactly))).where(**asked)
 
 
 def _tuple(value: object) -> tuple[object, ...]:
     return value if isinstance(value, tuple) else (value,)
 
 
-def _require_there(kept: Store, path: str | Path | None) -> None:
+def _there(path: str | Path | None) -> Store:
+    """The store of a path, the shipped one where there is none; raises ``BadRequest`` where nothing is."""
+    kept = shipped() if path is None else store(path)
     if path is not None and not kept.path.exists():
         raise BadRequest("no such catalog", str(path), f"a folder, or a file that ends in {', '.join(DATABASES)}")
     if not kept.groups():
         raise BadRequest("nothing in the catalog", str(kept.path), "one that was built by hrsynth catalog build")
-
-
-def require_askable(asked: Mapping[str, Any]) -> None:
-    """Raise ``BadRequest`` for a name that cannot be asked for."""
-    for name in asked:
-        if name not in ASKED:
-            raise BadRequest("the catalog cannot be asked for", name, ASKED)
-
-
-def fits(record: Record, asked: Mapping[str, Any]) -> bool:
-    """Whether a record fits all that is asked for and not None."""
-    return all(_one(record, name, value) for name, value in asked.items() if value is not None)
-
-
-def _one(record: Record, name: str, value: Any) -> bool:
-    if isinstance(value, tuple):
-        return any(_one(record, name, each) for each in value)
-    match name:
-        case "legs":
-            return _legs(record, value)
-        case "see":
-            return bool(record.get("see") == counted(sights(value)))
-        case "modes":
-            return bool(record.get("modes_bound") == value)
-        case "text":
-            from .site.known import is_called
-
-            return is_called(record, str(value)) or any(
-                str(value).casefold() in str(each).casefold() for each in record.values())
-        case _:
-            return name in record and bool(record[name] == value)
-
-
-def _legs(record: Record, value: int | str) -> bool:
-    """Whether a robot has so many legs, or its notation, its word or a leg's chain the pattern."""
-    if isinstance(value, int) or value.isdecimal():
-        return bool(record.get("legs") == int(value))
-    return any(name == value or fnmatchcase(name, _plain_brackets(value)) for name in names(record))
-
-
-def names(record: Record) -> set[str]:
-    """The names by which legs are found: word, notation and each leg's chain, with and without the marks of motors."""
-    notation = str(record.get("notation", ""))
-    found = {str(record["word"]), notation}
-    for term in re.split(r"\+(?![^{]*})", notation):
-        found.add(re.sub(r"^[0-9]+-", "", term))
-    return {name for each in found if each for name in (each, each.replace("*", ""))}
-
-
-def _plain_brackets(pattern: str) -> str:
-    """A pattern in which brackets stand for themselves."""
-    return pattern.replace("[", "[[]")
+    return kept

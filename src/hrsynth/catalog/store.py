@@ -5,16 +5,17 @@ from __future__ import annotations
 import contextlib
 import errno
 import sqlite3
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from importlib import resources
 from pathlib import Path
 from typing import Any, Protocol
 
 from ..description.files import replacement
 from ..errors import BadRequest, BuildStopped
+from .fits import names, plain_brackets, texts
 from .journal import ENDING, Journal
 from .jsonl import FORMAT, decoded, encoded, record, require_version, word_of
-from .words import VERSION
+from .words import VERSION, counted, sights
 
 DATABASES = (".sqlite", ".sqlite3", ".db")
 """Endings of a store that is one SQLite file."""
@@ -22,8 +23,12 @@ PUBLISHED = "published"
 """The shipped catalog of published robots."""
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 COLUMNS = {"legs": "INTEGER", "dof": "INTEGER", "motion": "TEXT", "verdict": "TEXT", "base_motors": "INTEGER",
-           "fewest": "INTEGER"}
+           "fewest": "INTEGER", "see": "TEXT", "modes_bound": "INTEGER"}
 """Fields of a record that have a column and an index."""
+OLD_COLUMNS = ("dof", "motion", "verdict", "base_motors", "fewest")
+"""What older files can be asked for."""
+APART = "\x1f"
+"""Between the texts of a record."""
 
 
 class Store(Protocol):
@@ -34,8 +39,14 @@ class Store(Protocol):
     def groups(self) -> list[str]:
         """The groups that are stored, by name."""
 
-    def lines(self, group: str, exactly: Mapping[str, Any]) -> list[str]:
-        """The lines of a group, sorted by word; with ``exactly``, at most those without a field of another value."""
+    def lines(self, group: str, asked: Mapping[str, Any]) -> list[str]:
+        """The lines of a group, sorted by word, without some that do not fit what is asked for (:mod:`.fits`)."""
+
+    def decides(self, asked: Mapping[str, Any]) -> bool:
+        """Whether these are all lines that fit, and no others."""
+
+    def count(self, group: str) -> int:
+        """How many lines a group has."""
 
     def write(self, group: str, lines: Iterable[str]) -> None:
         """Replace a group."""
@@ -56,10 +67,16 @@ class Folder:
     def groups(self) -> list[str]:
         return sorted(file.stem for file in self.path.glob("*.jsonl"))
 
-    def lines(self, group: str, exactly: Mapping[str, Any]) -> list[str]:
+    def lines(self, group: str, asked: Mapping[str, Any]) -> list[str]:
         file = self.file(group)
         with _readable(file):
             return decoded(file.read_bytes(), str(file))
+
+    def decides(self, asked: Mapping[str, Any]) -> bool:
+        return all(value is None for value in asked.values())
+
+    def count(self, group: str) -> int:
+        return len(self.lines(group, {}))
 
     def write(self, group: str, lines: Iterable[str]) -> None:
         file = self.file(group)
@@ -76,7 +93,8 @@ class Folder:
 
 
 class Database:
-    """One SQLite file with the same lines, and indexes on what is asked for most."""
+    """One SQLite file with the same lines, indexes on what is asked for most, the names by which legs are found and the
+    text of each record. Files of older versions have fewer of these."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -85,12 +103,28 @@ class Database:
         with self._read() as file:
             return [name for name, in file.execute('SELECT DISTINCT "group" FROM records ORDER BY 1')]
 
-    def lines(self, group: str, exactly: Mapping[str, Any]) -> list[str]:
-        asked = {name: value for name, value in exactly.items() if name in COLUMNS}
-        where = " AND ".join(['"group" = ?', *(f"{name} = ?" for name in asked)])
+    def lines(self, group: str, asked: Mapping[str, Any]) -> list[str]:
+        known = self._known()
+        met = {"\"group\" = ?": group} | dict(each for name, value in asked.items() if value is not None
+                                            and (each := _condition(name, value)) and known(name))
         with self._read() as file:
-            rows = file.execute(f"SELECT line FROM records WHERE {where} ORDER BY word", (group, *asked.values()))
+            rows = file.execute(f"SELECT line FROM records WHERE {' AND '.join(met)} ORDER BY word", [*met.values()])
             return [text for text, in rows]
+
+    def decides(self, asked: Mapping[str, Any]) -> bool:
+        known = self._known()
+        return all(value is None or name == "group" or (_condition(name, value) is not None and known(name))
+                   for name, value in asked.items())
+
+    def count(self, group: str) -> int:
+        with self._read() as file:
+            return int(file.execute('SELECT count(*) FROM records WHERE "group" = ?', (group,)).fetchone()[0])
+
+    def _known(self) -> Callable[[str], bool]:
+        """Whether the file can tell of what is asked by a name."""
+        with self._read() as file:
+            new = file.execute("SELECT count(*) FROM sqlite_master WHERE name = 'names'").fetchone()[0]
+        return lambda name: bool(new) or name in OLD_COLUMNS
 
     def write(self, group: str, lines: Iterable[str]) -> None:
         kept = {} if not self.path.exists() else {name: self.lines(name, {}) for name in self.groups() if name != group}
@@ -165,19 +199,41 @@ def writable(file: Path, what: str = "catalog") -> Iterator[None]:
         raise BadRequest(f"cannot write the {what}: {error.strerror}", str(file)) from None
 
 
+def _condition(name: str, value: Any) -> tuple[str, Any] | None:
+    """The condition on a row that decides whether it fits what is asked, and its value; None where there is none."""
+    if isinstance(value, tuple) or name == "group":
+        return None
+    match name:
+        case "legs":
+            if isinstance(value, int) or value.isdecimal():
+                return "legs = ?", int(value)
+            return "word IN (SELECT word FROM names WHERE name GLOB ?)", plain_brackets(value)
+        case "see":
+            return "see = ?", counted(sights(value))
+        case "modes":
+            return "modes_bound = ?", value
+        case "text":
+            return None if APART in str(value) else ("instr(texts, ?) > 0", str(value).casefold())
+        case _:
+            return f"{name} = ?", value
+
+
 def _write_tables(path: Path, groups: Mapping[str, Iterable[str]]) -> None:
     """Write a new file: the same bytes for the same lines."""
     with contextlib.closing(sqlite3.connect(path)) as file:
         file.execute("PRAGMA journal_mode = OFF")
         columns = ", ".join(f"{name} {kind}" for name, kind in COLUMNS.items())
         file.execute('CREATE TABLE versions (format INTEGER, catalog INTEGER)')
-        file.execute(f'CREATE TABLE records ("group" TEXT, word TEXT, {columns}, line TEXT, '
-                     'PRIMARY KEY ("group", word)) WITHOUT ROWID')
+        file.execute(f'CREATE TABLE records ("group" TEXT, word TEXT, {columns}, line TEXT, texts TEXT, '
+                     'PRIMARY KEY ("group", word))')  # rows are too long for a table without rowids
         file.execute("INSERT INTO versions VALUES (?, ?)", (FORMAT, VERSION))
-        marks = ", ".join("?" * (len(COLUMNS) + 3))
+        file.execute("CREATE TABLE names (name TEXT, word TEXT, PRIMARY KEY (name, word)) WITHOUT ROWID")
+        marks = ", ".join("?" * (len(COLUMNS) + 4))
         for group, lines in sorted(groups.items()):
-            rows = (_row(group, line) for line in sorted(lines, key=word_of))
-            file.executemany(f"INSERT INTO records VALUES ({marks})", rows)
+            ordered = sorted(lines, key=word_of)
+            file.executemany(f"INSERT INTO records VALUES ({marks})", (_row(group, line) for line in ordered))
+            file.executemany("INSERT OR IGNORE INTO names VALUES (?, ?)", (
+                (name, found["word"]) for found in map(record, ordered) for name in sorted(names(found))))
         for name in ("word", *COLUMNS):
             file.execute(f"CREATE INDEX records_{name} ON records ({name})")
         file.commit()
@@ -185,4 +241,4 @@ def _write_tables(path: Path, groups: Mapping[str, Iterable[str]]) -> None:
 
 def _row(group: str, line: str) -> tuple[Any, ...]:
     found = record(line)
-    return (group, found["word"], *(found.get(name) for name in COLUMNS), line)
+    return (group, found["word"], *(found.get(name) for name in COLUMNS), line, APART.join(texts(found)))

@@ -92,17 +92,16 @@ def build(groups: list[str] | None, output: str | None, tables: str | None, work
 def entries(kept: str | None, json: bool, **asked: Any) -> None:
     """List the architectures that fit."""
     from ..catalog import load
-    from ..catalog.words import SENSORS
+    from ..catalog.query import count, groups_of
     from ..errors import BadRequest
     from ..present.text.catalog import entries as written
 
-    every = load(kept, group=SENSORS if asked["see"] is not None or asked["group"] == SENSORS else None)
-    for name, known in (("group", {str(each) for each, in every.count("group")}), ("verdict", VERDICTS)):
+    for name, known in (("group", groups_of(kept)), ("verdict", VERDICTS)):
         if asked[name] not in (None, *known):
             raise BadRequest(f"no {name} of the catalog", asked[name], sorted(known))
-    found = every.where(**asked)
-    _say("list", {"total": len(every), "entries": [dict(each) for each in found]}, written(found.records, len(every)),
-         json)
+    found, total = load(kept, **asked), count(kept, **asked)
+    _say("list", {"total": total, "entries": [dict(each) for each in found] if json else []},
+         "" if json else written(found.records, total), json)
 
 
 def show(word: str, output: str | None, tables: str | None, kept: str | None, json: bool) -> None:

@@ -39,8 +39,13 @@ def kinds(word: str) -> frozenset[str]:
 
 def is_called(record: Record, text: str) -> bool:
     """Whether a text occurs in a name under which a record's robot is known; words with other legs are not read."""
+    return kinds(record["word"]) in called(text) and text.casefold() in known_as(record).casefold()
+
+
+def known_as(record: Record) -> str:
+    """The names under which a record's robot is known; words with legs that no known robot has are not read."""
     word = record["word"]
-    return kinds(word) in called(text) and text.casefold() in (alias(word) or "").casefold()
+    return (alias(word) or "") if kinds(word) in called("") else ""
 
 
 def bare(word: str) -> str:
