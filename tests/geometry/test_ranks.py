@@ -8,7 +8,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hrsynth.errors import BadMechanism, LoopsNotClosed, RankUndecided
-from hrsynth.geometry.ranks import CLEAN, Rank, kernel_basis, largest_angle, range_basis, rank_of, space_basis
+from hrsynth.geometry.ranks import (
+    CLEAN,
+    Rank,
+    decomposed,
+    kernel_basis,
+    largest_angle,
+    range_basis,
+    rank_of,
+    space_basis,
+)
 from hrsynth.geometry.vectors import rotation_about
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
@@ -233,3 +242,20 @@ def test_of_directions_that_are_equally_near_the_first_is_taken():
     for noise in (1e-15, -1e-15):
         assert np.allclose(space_basis(way + noise * np.array([[1.0], [-1.0]])), way)
     assert np.allclose(space_basis(-way), way)
+
+
+@pytest.mark.parametrize("full", [False, True])
+def test_a_matrix_that_lapack_gives_up_on_is_decomposed(full: bool, monkeypatch: pytest.MonkeyPatch):
+    matrix = np.random.default_rng(0).normal(size=(4, 6)) * np.array([1, 1, 0, 2, 0, 1])
+    expected = np.linalg.svd(matrix, compute_uv=False)
+
+    def gives_up(*_: object, **__: object) -> None:
+        raise np.linalg.LinAlgError("SVD did not converge")
+
+    monkeypatch.setattr(np.linalg, "svd", gives_up)
+    U, s, Vt = decomposed(matrix, full)
+    assert Vt.shape == ((6, 6) if full else (4, 6))
+    np.testing.assert_allclose(s, expected, atol=1e-14)
+    np.testing.assert_allclose(U * s @ Vt[:4], matrix, atol=1e-14)
+    with pytest.raises(np.linalg.LinAlgError):
+        decomposed(np.full((2, 2), np.nan))

@@ -51,11 +51,25 @@ def rank_of(singular_values: Array, scale: float | None = None, cutoff: float = 
     return Rank(kept, last / dropped, last / largest)
 
 
+def decomposed(matrix: Array, full_matrices: bool = False) -> tuple[Array, Array, Array]:
+    """U, s, Vᵀ of a matrix (rows, columns). LAPACK's divide and conquer gives up on some matrices with many equal
+    singular values; QR iteration, which is slower, does these."""
+    try:
+        return np.linalg.svd(matrix, full_matrices=full_matrices)
+    except np.linalg.LinAlgError:
+        if not np.all(np.isfinite(matrix)):
+            raise
+        from scipy.linalg import svd
+
+        U, s, Vt = svd(matrix, full_matrices=full_matrices, lapack_driver="gesvd")
+        return U, s, Vt
+
+
 def range_basis(matrix: Array, scale: float | None = None) -> tuple[Array, Rank]:
     """An orthonormal basis (rows of ``matrix`` long) of the column space, with the rank."""
     if 0 in matrix.shape:
         return np.zeros((matrix.shape[0], 0)), Rank(0, CLEAN)
-    U, s, _ = np.linalg.svd(matrix, full_matrices=False)
+    U, s, _ = decomposed(matrix)
     rank = rank_of(s, scale)
     return U[:, : rank.value], rank
 
@@ -101,7 +115,7 @@ def spectrum(matrix: Array, scale: float | None = None) -> Spectrum:
     rows, columns = matrix.shape
     if 0 in matrix.shape:
         return Spectrum(np.eye(columns), Rank(0, CLEAN), np.zeros(0), np.zeros((rows, 0)), np.zeros((columns, 0)))
-    U, s, Vt = np.linalg.svd(matrix, full_matrices=rows < columns)
+    U, s, Vt = decomposed(matrix, full_matrices=rows < columns)
     rank = rank_of(s, scale)
     r = rank.value
     return Spectrum(Vt[r:].T, rank, s[:r], U[:, :r], Vt[:r].T)

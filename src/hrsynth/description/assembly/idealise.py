@@ -17,6 +17,7 @@ import numpy as np
 from ...budgets import FINER_TRIES, LARGEST_RELATED
 from ...errors import RankUndecided, StructureUndecided
 from ...geometry.gauss_newton import Damping, Residual, descend
+from ...geometry.ranks import decomposed
 from ...geometry.vectors import Array
 from ...mechanism.model import Mechanism, Note
 from ...mechanism.normal import normal_form
@@ -149,7 +150,7 @@ def _project(at: JointCoordinates, relations: Sequence[GeometricRelation]) -> tu
 
     def advance(x: Array, here: Residual, factor: float) -> Array:
         # rows that depend on each other at the solution differ by the miss before it: they are not followed
-        U, s, Vt = np.linalg.svd(here.J / weights, full_matrices=False)
+        U, s, Vt = decomposed(here.J / weights)
         kept = s > max(30 * float(np.max(np.abs(here.error))), 1e-9) * s[0]
         V = Vt[kept].T
         back = weights * (start - x)

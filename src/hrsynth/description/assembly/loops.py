@@ -13,7 +13,7 @@ import numpy as np
 
 from ...budgets import FIRMER_BY, LOOP_EFFORT, LOOP_STRIDE, LOOP_TRIES
 from ...geometry.gauss_newton import Damping, Residual, descend
-from ...geometry.ranks import Rank, rank_of
+from ...geometry.ranks import Rank, decomposed, rank_of
 from ...geometry.vectors import Array, inverse, pose
 from ...mechanism.model import JointType, Mechanism
 from ...tolerances import FAINT, FIRM, NEARLY_SINGULAR, NEWTON_REACH, NOISE, RANK_CUTOFF, RANK_GAP, SOLVED
@@ -192,7 +192,7 @@ class LoopAssembly:
 
     def _damped(self, at: Residual, factor: float) -> Array:
         """The damped step, no longer than ``LOOP_STRIDE``; near the solution the plain one without faint directions."""
-        U, s, Vt = np.linalg.svd(at.J, full_matrices=False)
+        U, s, Vt = decomposed(at.J)
         if at.size < self.noise and factor <= 1.0:
             kept = s > FAINT * s[0]
             step = -(Vt[kept].T @ ((U.T @ at.error)[kept] / s[kept]))
@@ -211,7 +211,7 @@ class LoopAssembly:
 
     def kernel(self, values: Values) -> Array:
         """A basis (size, freedoms) of the velocities that keep the loops closed."""
-        _, s, Vt = np.linalg.svd(self.system(values)[1], full_matrices=True)
+        _, s, Vt = decomposed(self.system(values)[1], full_matrices=True)
         return np.asarray(Vt[int(np.sum(s > RANK_CUTOFF * max(s, default=1.0))):].T)
 
     def worst(self, values: Values) -> tuple[str, float]:
