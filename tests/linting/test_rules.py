@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from lxml import etree
 
 import hrsynth
 from description.foreign.examples import FILES, URDF
@@ -117,6 +118,34 @@ def test_the_sound_limits_are_counted_from_the_new_zero(tmp_path: Path, shelf: P
         if joint.limits is not None and joint.limits.lower is not None:
             assert np.allclose([after.joints[name].limits.lower, after.joints[name].limits.upper],
                                [joint.limits.lower, joint.limits.upper])
+
+
+def test_a_mimic_follows_from_the_new_zero(tmp_path: Path):
+    """Where the loop is closed at the new zero a mimic joint keeps its place and its ratio; soft limits move along."""
+    path = tmp_path / "robot.urdf"
+    path.write_text(
+        """<robot name="r"><link name="base"/><link name="crank"/><link name="bar"/><link name="rocker"/>
+        <link name="led"/>
+        <joint name="a" type="continuous"><parent link="base"/><child link="crank"/><axis xyz="0 1 0"/></joint>
+        <joint name="b" type="continuous"><parent link="crank"/><child link="bar"/><origin xyz="0 0 1" rpy="0 0.1 0"/>
+        <axis xyz="0 1 0"/><safety_controller soft_lower_limit="-0.5" soft_upper_limit="1.5" k_velocity="1"/></joint>
+        <joint name="c" type="continuous"><parent link="base"/><child link="rocker"/><origin xyz="2 0 0"/>
+        <axis xyz="0 1 0"/></joint>
+        <joint name="m" type="continuous"><parent link="rocker"/><child link="led"/><origin xyz="0 0 0.5"/>
+        <axis xyz="0 1 0"/><mimic joint="c" multiplier="2" offset="0.3"/></joint>
+        <loop name="d" type="revolute"><predecessor link="rocker"><origin xyz="0 0 1"/></predecessor>
+        <successor link="bar"><origin xyz="2 0 0"/></successor><axis xyz="0 1 0"/></loop></robot>""")
+    before = load(path, platform="bar")
+    assert [each.rule for each in hrsynth.lint(path, platform="bar", fix=True).mended] == ["loop-open"]
+    after = load(path, platform="bar")
+    assert not [note for note in after.notes if note.kind == "solved"]
+    assert [text for text in after.differences(before) if "xml of joint b" not in text] == []
+    tree = etree.parse(path)
+    ends = [float(tree.find("joint/safety_controller").get(f"soft_{end}_limit")) for end in ("lower", "upper")]
+    old = np.arctan2(*before.links["crank"].pose[[0, 2], 2]), np.arctan2(*before.links["bar"].pose[[0, 2], 2])
+    moved = old[1] - old[0] - 0.1
+    assert abs(moved) > 1e-3
+    assert ends == pytest.approx([-0.5 - moved, 1.5 - moved])
 
 
 def load_tolerantly(path: Path):

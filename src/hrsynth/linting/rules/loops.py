@@ -17,7 +17,7 @@ from ...description.jointgraph import JointGraph, JointSpec
 from ...description.jointmotion import displacement, opening
 from ...errors import HrsynthError
 from ...mechanism.model import Joint, JointType, Mechanism
-from ...tolerances import NOISE, OPPOSITE
+from ...tolerances import EXACT, NOISE, OPPOSITE
 from ..elements import NumberAt
 from ..findings import LintRule, Mend, Spot
 from ..freedoms import NearbyFreedoms
@@ -79,8 +79,8 @@ def _miss(joint: JointSpec, poses: dict[str, np.ndarray], length: float) -> floa
 
 
 def _closed(file: LintedFile, graph: JointGraph, assembly: LoopAssembly, closed: LoopSolution) -> Mend | None:
-    """Let every joint that moved count from where it is closed: its origin takes the displacement, its limits lose
-    it."""
+    """Let every joint that moved count from where it is closed: its origin takes the displacement, its limits and the
+    offset of its mimic lose it."""
     if file.dialect != "urdf" or file.expanded:
         return None
     moved = []
@@ -97,9 +97,11 @@ def _closed(file: LintedFile, graph: JointGraph, assembly: LoopAssembly, closed:
 
 def _rezero(moved: list[tuple[JointSpec, xml.Element]], values: Values, graph: JointGraph,
             assembly: LoopAssembly) -> None:
+    turned: dict[str | None, float] = {}
     for scaled, element in moved:
         joint = graph.joints[scaled.name]
         q = float(values[joint.name][0]) * assembly.unit(scaled)
+        turned[joint.name] = q
         X = joint.ends[0].X @ displacement(joint, np.array([q]))
         origin = element.find("origin")
         if origin is None:
@@ -107,12 +109,25 @@ def _rezero(moved: list[tuple[JointSpec, xml.Element]], values: Values, graph: J
             element.insert(0, origin)
         origin.set("xyz", numerals.exact_vector(X[:3, 3]))
         origin.set("rpy", numerals.exact_vector(numerals.rpy(X[:3, :3])))
-        for limit in element.findall("limit"):
+        for limit in element.iterfind("limit"):
             free = (limit.get("free") or "").split()
-            for key in ("lower", "upper"):
-                value = NumberAt(limit, key).value
-                if value is not None and key not in free:
-                    limit.set(key, numerals.exact(value - q))
+            _less(limit, q, *(key for key in ("lower", "upper") if key not in free))
+        for limit in element.iterfind("safety_controller"):
+            _less(limit, q, "soft_lower_limit", "soft_upper_limit")
+    for element in moved[0][1].getroottree().iter("joint"):
+        for mimic in element.iterfind("mimic"):
+            ratio = NumberAt(mimic, "multiplier").value
+            led = (1.0 if ratio is None else ratio) * turned.get(mimic.get("joint"), 0.0)
+            if own := turned.get(element.get("name"), 0.0) - led:
+                offset = (NumberAt(mimic, "offset").value or 0.0) - own
+                mimic.set("offset", numerals.exact(offset if abs(offset) > EXACT else 0.0))
+
+
+def _less(element: xml.Element, q: float, *keys: str) -> None:
+    for key in keys:
+        value = NumberAt(element, key).value
+        if value is not None:
+            element.set(key, numerals.exact(value - q))
 
 
 def _opposite(joint: JointSpec, poses: dict[str, np.ndarray]) -> bool:
