@@ -17,10 +17,11 @@ ENDINGS = {"native": ".urdf", "gepetto": ".yaml", "mjcf": ".xml", "sdf": ".sdf"}
 _NUMBER = re.compile(rb"(?<![\w.])-?\d+\.\d+(?:[eE][-+]?\d+)?|(?<![\w.])-?\d+[eE][-+]?\d+")
 
 
-def of_hinges(robot: Mechanism, aligned: bool = False) -> Mechanism:
-    """Every ball as three R and every U as two R, through links of no size whose names and frames say nothing; the axes
-    of balls in any directions, or ``aligned`` with the base's."""
-    links, joints = dict(robot.links), {}
+def of_hinges(robot: Mechanism, aligned: bool = False, slid: float = 0.0, apart: float = 0.0) -> Mechanism:
+    """Every ball as three R and every U as two R, through links whose names and frames say nothing; the axes of balls
+    in any directions, or ``aligned`` with the base's. The links between have no size, or the R are ``slid`` along their
+    axes, or these pass each other ``apart`` (characteristic lengths): then the joint is no ball and no U."""
+    links, joints, rng = dict(robot.links), {}, np.random.default_rng(7)
     for joint in robot.joints.values():
         if joint.type not in (JointType.SPHERICAL, JointType.UNIVERSAL):
             joints[joint.name] = joint
@@ -31,11 +32,13 @@ def of_hinges(robot: Mechanism, aligned: bool = False) -> Mechanism:
         for number, axis in enumerate(axes):
             last = number == len(axes) - 1
             after = joint.successor if last else f"{joint.name}_cross{number}"
+            point = joint.point + robot.length * (slid * rng.uniform(-1, 1) * axis
+                                                  + apart * number * np.cross(axes[0], axes[1]))
             if not last:
-                links[after] = Link(after, pose(joint.point))
+                links[after] = Link(after, pose(point))
             name = f"{joint.name}_hinge{number}"
             motor = None if joint.motor is None else Motor(f"{joint.motor.name}_{number}")
-            joints[name] = Joint(name, JointType.REVOLUTE, before, after, joint.point, (axis,), motor,
+            joints[name] = Joint(name, JointType.REVOLUTE, before, after, point, (axis,), motor,
                                  in_tree=joint.in_tree or not last)
             before = after
     return spanning(replace(robot, links=links, joints=joints))
@@ -51,9 +54,11 @@ def in_millimetres(robot: Mechanism) -> Mechanism:
     return replace(robot, links=links, joints=joints)
 
 
-def round_file(path: Path, decimals: int) -> None:
-    """Every number of a file with at most so many decimals."""
+def round_file(path: Path, decimals: int, significant: bool = False) -> None:
+    """Every number of a file with at most so many decimals, or significant digits."""
     def short(match: re.Match[bytes]) -> bytes:
+        if significant:
+            return f"{float(match[0]):.{decimals}g}".encode()
         return (f"{round(float(match[0]), decimals):.{decimals}f}".rstrip("0").rstrip(".") or "0").encode()
 
     for file in (path, path.with_suffix(".urdf")):
@@ -62,8 +67,8 @@ def round_file(path: Path, decimals: int) -> None:
             file.write_bytes(head + mark + _NUMBER.sub(short, rest) if rest else _NUMBER.sub(short, head))
 
 
-def exported(robot: Mechanism, path: Path, decimals: int) -> Path:
-    """The robot written in the dialect of the file's ending, with so many decimals."""
+def exported(robot: Mechanism, path: Path, decimals: int, significant: bool = False) -> Path:
+    """The robot written in the dialect of the file's ending, with so many decimals or significant digits."""
     save(robot, path)
-    round_file(path, decimals)
+    round_file(path, decimals, significant)
     return path

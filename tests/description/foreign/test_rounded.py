@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
@@ -9,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import hrsynth
 from description.foreign.rounded import ENDINGS, exported, in_millimetres, of_hinges
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.description import load, save, shipped
@@ -18,7 +20,9 @@ from hrsynth.errors import BadRequest, LoopsNotClosed, StructureUndecided
 from hrsynth.geometry.vectors import pose, rotation_about, unit
 from hrsynth.mechanism import JointType, Mechanism
 from hrsynth.mechanism.normal import normal_form
+from hrsynth.mechanism.observations.direction import Direction
 from hrsynth.tolerances import NOISE
+from strategies import transformed
 
 SOME = ("3rps", "delta", "3upu", "3rrr_m1", "prrrp_m1")
 DECIMALS = (14, 9, 7, 6, 5, 4, 3)
@@ -30,17 +34,19 @@ def answer(robot: Mechanism) -> tuple[object, ...]:
     return found.anatomy.architecture(), found.dof, found.mobility
 
 
-def again(robot: Mechanism, path: Path, decimals: int, **given: object) -> Mechanism:
-    """The robot written with so many decimals, and read."""
+def again(robot: Mechanism, path: Path, decimals: int, significant: bool = False) -> Mechanism:
+    """The robot written with so many decimals, or significant digits, and read."""
     own = {} if path.suffix == ".urdf" else {"platform": robot.platform}
-    return load(exported(robot, path, decimals), **own, **given)  # type: ignore[arg-type]
+    return load(exported(robot, path, decimals, significant), **own)
 
 
 def variants(robot: Mechanism) -> dict[str, Mechanism]:
-    """Balls and U joints as such, as R in any directions, as R along the base's axes; in metres and in millimetres."""
+    """Balls and U joints as such, as R in any directions, as R along the base's axes, as R with connectors that have a
+    length; in metres and in millimetres."""
     found = {"plain": robot}
     if any(joint.type in (JointType.SPHERICAL, JointType.UNIVERSAL) for joint in robot.joints.values()):
-        found |= {"hinges": of_hinges(robot), "aligned": of_hinges(robot, aligned=True)}
+        found |= {"hinges": of_hinges(robot), "aligned": of_hinges(robot, aligned=True),
+                  "connectors": of_hinges(robot, slid=0.2)}
     return found | {f"{name}, mm": in_millimetres(each) for name, each in found.items()}
 
 
@@ -76,23 +82,35 @@ def test_a_usd_file_of_single_precision_is_the_same(name: str, tmp_path: Path):
 
 
 @pytest.mark.long
-@pytest.mark.timeout(3600)
-@pytest.mark.parametrize("decimals", DECIMALS)
-def test_the_whole_table(decimals: int, tmp_path: Path):
+@pytest.mark.timeout(7200)
+@pytest.mark.parametrize(("decimals", "significant"), [*((each, False) for each in DECIMALS), (6, True), (5, True)])
+def test_the_whole_table(decimals: int, significant: bool, tmp_path: Path):
     """docs/pages/files.md, "Rounded numbers": all down to four decimals; with three the same, or refused."""
     refused = 0
+    endings = ENDINGS | ({"usd": ".usda"} if importlib.util.find_spec("pxr") else {})
     for name in shipped():
         meant = answer(load(name))
-        for (variant, robot), (dialect, ending) in product(variants(load(name)).items(), ENDINGS.items()):
+        for (variant, robot), (dialect, ending) in product(variants(load(name)).items(), endings.items()):
             folder = tmp_path / f"{name} {variant} {dialect}"
             folder.mkdir()
             try:
-                found = again(robot, folder / f"robot{ending}", decimals)
+                found = again(robot, folder / f"robot{ending}", decimals, significant)
             except StructureUndecided:
                 refused += 1
                 continue
             assert answer(found) == meant, folder.name
     assert decimals == 3 or not refused
+
+
+@pytest.mark.long
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize("name", ["3puu", "3upu", "3rps", "6pus", "delta", "gough_stewart", "hexaglide"])
+def test_axes_that_miss_each_other_by_far_make_no_ball(name: str, tmp_path: Path):
+    """The R of balls and U joints pass each other at a twentieth of the robot's size: that robot, not a simpler one."""
+    robot = of_hinges(load(name), apart=0.05)
+    meant = answer(robot)
+    for (dialect, ending), decimals in product(ENDINGS.items(), (9, 6, 5, 4)):
+        assert answer(again(robot, tmp_path / f"{dialect}{ending}", decimals)) == meant, (dialect, decimals)
 
 
 @pytest.mark.some(17)
@@ -115,6 +133,52 @@ def test_a_tilted_robot_of_no_round_numbers_is_the_same(name: str, decimals: int
               for name, joint in robot.joints.items()}
     tilted = of_hinges(replace(robot, links=moved, joints=joints))
     assert answer(again(tilted, tmp_path / "robot.sdf", decimals)) == answer(robot)
+
+
+def test_rounded_directions_of_observe_are_those_of_segments(tmp_path: Path):
+    """Watched along its rods a Delta is watched along the rods that are read; lint writes these directions."""
+    robot = load("delta")
+    seen = ObservedRobot.of(robot, samples=3).observed
+    path = exported(of_hinges(replace(robot, observations=tuple(seen))), tmp_path / "robot.urdf", 5)
+    found = load(path)
+    assert [note.text for note in found.notes if note.text.endswith("watched directions of leg 1, of leg 2, of leg 3")]
+    balls = normal_form(found).mechanism
+    for one, two in zip(found.observations, seen, strict=True):
+        assert isinstance(one, Direction)
+        assert isinstance(two, Direction)
+        assert 1e-11 < np.linalg.norm(one.direction - two.direction) < 1e-4
+        ends = [joint.point for joint in balls.joints_of(one.link)]
+        rod = found.links[one.link].pose[:3, :3].T @ unit(ends[1] - ends[0])
+        assert abs(one.direction @ rod) == pytest.approx(1.0, abs=1e-15)
+    assert {each.rule for each in hrsynth.lint(path, fix=True).mended} == {"geometry-rounded"}
+    assert not load(path).notes
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["delta", "quattro", "3rps", "3upu"])
+def test_rounded_observe_elements_hide_the_same_robot(name: str, tmp_path: Path):
+    robot = load(name)
+    meant = hrsynth.derive(robot, "all")
+    watched = of_hinges(replace(robot, observations=tuple(ObservedRobot.of(robot, samples=3).observed)))
+    for decimals in (7, 4):
+        found = hrsynth.derive(load(exported(watched, tmp_path / "robot.urdf", decimals)))
+        assert (found.hidden_architecture, found.mobility) == (meant.hidden_architecture, meant.mobility)
+
+
+def test_watched_directions_are_square_to_axes_or_as_they_are(tmp_path: Path):
+    """No segment: in the plane where that is meant, else untouched."""
+    robot, X = load("3rrr_m1"), pose((0.1, 0.2, 0.3), rotation_about(unit([1.0, 2.0, 0.5]), 0.7))
+    moved = transformed(robot, X[:3, :3], X[:3, 3])
+    link = moved.links[robot.platform].pose[:3, :3]
+    normal = link.T @ next(iter(moved.joints.values())).axis
+    flat = unit(np.cross(normal, [0.3, 0.5, 0.1]))
+    seen = [Direction("1", robot.platform, flat), Direction("2", robot.platform, unit(flat + 0.01 * normal))]
+    found = load(exported(replace(moved, observations=tuple(seen)), tmp_path / "robot.urdf", 5))
+    axis = next(iter(found.joints.values())).axis
+    R = found.links[robot.platform].pose[:3, :3]
+    cosines = [R @ each.direction @ axis for each in found.observations if isinstance(each, Direction)]
+    assert abs(cosines[0]) < 1e-12
+    assert cosines[1] == pytest.approx(0.01, abs=2e-5)
 
 
 def test_what_was_made_exact_is_exact_and_told(tmp_path: Path):

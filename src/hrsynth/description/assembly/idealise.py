@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
@@ -18,10 +19,11 @@ from ...budgets import FINER_TRIES, LARGEST_RELATED
 from ...errors import RankUndecided, StructureUndecided
 from ...geometry.gauss_newton import Damping, Residual, descend
 from ...geometry.ranks import decomposed
-from ...geometry.vectors import Array
-from ...mechanism.model import Mechanism, Note
+from ...geometry.vectors import Array, unit
+from ...mechanism.model import JointType, Mechanism, Note
 from ...mechanism.normal import normal_form
-from ...tolerances import EXACT, NO_FINER, RANK_CUTOFF, RANK_GAP, SAME_GEOMETRY
+from ...mechanism.observations.direction import SeenAxis
+from ...tolerances import EXACT, NO_FINER, OBLIQUE, RANK_CUTOFF, RANK_GAP, SAME_GEOMETRY
 from ..jointgraph import comma_list
 from ..tree import spanning
 from .loops import LoopAssembly
@@ -95,14 +97,54 @@ def as_meant(mechanism: Mechanism, residual: float, tolerance: float, possible: 
     rank, firm = meant.rank(meant.zero()), meant.rank(meant.zero(), max(RANK_CUTOFF, NO_FINER * residual))
     if rank.gap < RANK_GAP or firm.value != rank.value:
         raise RankUndecided(f"{mechanism.file}: loops with rounded numbers", min(rank.gap, firm.gap), RANK_GAP)
-    if not ideal.mended:
-        return mechanism if residual <= SAME_GEOMETRY else replace(mechanism, notes=(*mechanism.notes, Note(
+    if ideal.mended:
+        written = LoopAssembly.of(mechanism)
+        gap = written.rank(written.zero(), max(RANK_CUTOFF, NO_FINER * tolerance)).gap
+        found, notes = spanning(ideal.mechanism), ideal.notes(tolerance, mechanism.length, gap)
+    else:
+        found, notes = mechanism, [] if residual <= SAME_GEOMETRY else [Note(
             "merged", f"the loops are open by up to {residual:.2g} (characteristic lengths, radians; a gap of "
                       f"{1e3 * residual * mechanism.length:.2g} mm) at zero, within the tolerance of {tolerance:.1g}: "
-                      "the joints that close them are put in the middle")))
-    written = LoopAssembly.of(mechanism)
-    gap = written.rank(written.zero(), max(RANK_CUTOFF, NO_FINER * tolerance)).gap
-    return replace(spanning(ideal.mechanism), notes=(*mechanism.notes, *ideal.notes(tolerance, mechanism.length, gap)))
+                      "the joints that close them are put in the middle")]
+    return _watched(replace(found, notes=(*mechanism.notes, *notes)) if notes else found, tolerance)
+
+
+def _watched(mechanism: Mechanism, tolerance: float) -> Mechanism:
+    """With the watched directions along segments and axes of their links, or square to axes, that are nearly so."""
+    found, told = list(mechanism.observations), []
+    if not found or tolerance <= EXACT:
+        return mechanism
+    bodies = Bodies(normal_form(mechanism).mechanism)
+    for number, seen in enumerate(found):
+        if isinstance(seen, SeenAxis) and seen.link in bodies.of:
+            R = mechanism.links[seen.link].pose[:3, :3]
+            meant = R.T @ _direction(bodies, seen.link, R @ seen.direction, mechanism.length, tolerance)
+            if np.linalg.norm(meant - seen.direction) > EXACT:
+                found[number] = replace(seen, direction=meant)
+                told.append(f"of leg {seen.leg}")
+    note = Note("merged", f"made to be along segments or axes: watched directions {', '.join(told)}")
+    return replace(mechanism, observations=tuple(found), notes=(*mechanism.notes, note)) if told else mechanism
+
+
+def _direction(bodies: Bodies, link: str, d: Array, length: float, tolerance: float) -> Array:
+    """The segment of joint centres or the axis of a link that is nearest to a direction, within the tolerance, its
+    sense kept; else the direction square to the axes that it nearly is square to."""
+    joints = bodies.on[bodies.of[link]]
+    axes = [axis for joint in joints for axis in joint.axes]
+    centres = [joint.point for joint in joints if joint.type is not JointType.PRISMATIC]
+    lines = [(axis, tolerance) for axis in axes]
+    for one, two in combinations(centres, 2):
+        size = float(np.linalg.norm(two - one)) / length
+        if size > tolerance / OBLIQUE:
+            lines.append((unit(two - one), tolerance * max(1.0, 1.0 / size)))
+    misses = [float(np.linalg.norm(np.cross(d, line))) / within for line, within in lines]
+    if min(misses, default=np.inf) <= 1.0:
+        line, _ = lines[int(np.argmin(misses))]
+        return np.asarray(np.copysign(1.0, d @ line) * line)
+    square = [axis for axis in axes if abs(float(d @ axis)) <= tolerance]
+    _, s, Vt = decomposed(np.array(square).reshape(-1, 3))
+    across = Vt[s > OBLIQUE]
+    return unit(d - across.T @ (across @ d))
 
 
 def nearest(mechanism: Mechanism, tolerance: float, known: Ideal | None = None) -> Ideal | None:

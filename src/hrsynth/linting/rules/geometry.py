@@ -12,6 +12,7 @@ from ...description import numerals, xml
 from ...description.chains import TIP
 from ...geometry.vectors import Array, inverse, pose
 from ...mechanism.model import Joint, Mechanism
+from ...mechanism.observations.direction import SeenAxis
 from ..findings import LintRule, Mend, Spot
 from ..subject import LintedFile
 
@@ -43,10 +44,15 @@ def _as_meant(file: LintedFile, robot: Mechanism) -> Mend | None:
         if not given.name.endswith(TIP) and joint.links != (one, tips.get(two, two)):
             return None
         found.append((joint, given.links, element))
-    return partial(_write, found, robot) if len(found) == len(robot.joints) + len(tips) else None
+    seen = [(each.direction, element) for each in robot.observations if isinstance(each, SeenAxis)
+            and (element := file.element(each.line, "observe")) is not None]
+    return partial(_write, found, seen, robot) if len(found) == len(robot.joints) + len(tips) else None
 
 
-def _write(joints: list[tuple[Joint, tuple[str, str], xml.Element]], robot: Mechanism) -> None:
+def _write(joints: list[tuple[Joint, tuple[str, str], xml.Element]], seen: list[tuple[Array, xml.Element]],
+           robot: Mechanism) -> None:
+    for direction, element in seen:
+        element.set("axis", numerals.exact_vector(direction))
     X = {name: link.pose for name, link in robot.links.items()}
     for joint, (_, two), element in joints:  # the frame of a URDF link is that of the joint that carries it
         if joint.in_tree and element.get("name") == joint.name:
