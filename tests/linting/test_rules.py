@@ -148,6 +148,21 @@ def test_a_mimic_follows_from_the_new_zero(tmp_path: Path):
     assert ends == pytest.approx([-0.5 - moved, 1.5 - moved])
 
 
+def test_degrees_beside_radians_are_told_and_left(tmp_path: Path, shelf: Path):
+    """Of 3.1416 and 90 in one element one is wrong: nobody knows which way."""
+    case = next(each for each in CASES if each.rule == "unit-angles")
+    one, _ = files(case, tmp_path, shelf)
+    for tag, values in (("origin", {"rpy": "3.1416 0 90"}), ("limit", {"lower": "-1.5708", "upper": "90"})):
+        path = tmp_path / f"{tag}.urdf"
+        tree = etree.fromstring(one.read_bytes())
+        element = next(tree.iter(tag))
+        element.attrib.update(values)
+        path.write_bytes(etree.tostring(tree))
+        found = [each for each in hrsynth.lint(path, fix=True).findings if each.rule in ("unit-angles", "unit-limits")]
+        assert [each.mends for each in found] == [False]
+        assert all(text in path.read_text() for text in values.values())
+
+
 def load_tolerantly(path: Path):
     found = LintedFile(path).mechanism
     assert found is not None

@@ -9,7 +9,7 @@ import numpy as np
 from ...budgets import LARGEST_ROBOT, SMALLEST_ROBOT, WIDEST_BODY
 from ...description import numerals, xml
 from ...geometry.vectors import Array
-from ...tolerances import IN_DEGREES, TURN_IN_RADIANS, UNIT_AXIS
+from ...tolerances import IN_DEGREES, NEARLY_ONE, TURN_IN_RADIANS, UNIT_AXIS
 from ..elements import NumberAt, inertials, joints, limits
 from ..findings import LintRule, Mend, Spot
 from ..subject import LintedFile
@@ -20,7 +20,18 @@ def in_degrees(value: float | None) -> bool:
     return value is not None and TURN_IN_RADIANS < abs(value) <= 360 and value % IN_DEGREES == 0
 
 
-def _converted(numbers: list[NumberAt]) -> Mend:
+def _in_radians(value: float | None) -> bool:
+    """Whether an angle looks like a simple part of a turn in radians, as it is printed."""
+    steps = round((value or 0.0) / numerals.SIMPLE_ANGLE)
+    return value is not None and steps != 0 and not in_degrees(value) and \
+        abs(value - steps * numerals.SIMPLE_ANGLE) < NEARLY_ONE
+
+
+def _converted(numbers: list[NumberAt]) -> Mend | None:
+    """All of them in radians; None where some are in these, so that nobody knows what the others are."""
+    if any(_in_radians(each.value) for each in numbers):
+        return None
+
     def mend() -> None:
         for each in numbers:
             each.put(numerals.exact(float(np.radians(each.value or 0.0))))
