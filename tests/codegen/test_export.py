@@ -6,9 +6,11 @@ import os
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +18,7 @@ import pytest
 import hrsynth
 from codegen.robots import BARS, MAIN, answered, box_of, compiled, eigen, four_bar, inside, module_of, own_pose
 from hrsynth.codegen.export import ExportedCode, export
+from hrsynth.codegen.languages import namespace
 from hrsynth.errors import BadRequest
 from hrsynth.geometry.vectors import Array
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
@@ -248,3 +251,40 @@ def test_a_compiler_that_drops_checks_is_refused(tmp_path: Path) -> None:
         done = subprocess.run([*command, flag], capture_output=True, text=True)
         assert done.returncode != 0
         assert "#error" in done.stderr
+
+
+ODD = {"class": "class_", "9 lives": "_9_lives", "std": "std_", "": "robot", "a-b.é": "a_b__",
+       "# coding: utf-7": "__coding__utf_7", "r\n#error \\": "r__error__"}
+"""Names of robots, and their namespaces."""
+
+
+def oddly_named(name: str) -> Mechanism:
+    robot = four_bar()
+    joints = {f'{key} "*/ q\n\\': replace(joint, name=f'{key} "*/ q\n\\') for key, joint in robot.joints.items()}
+    return replace(robot, name=name, joints=joints)
+
+
+@pytest.mark.some(1)
+@pytest.mark.parametrize("name", ODD)
+def test_names_are_no_code(name: str, tmp_path: Path) -> None:
+    """What a file calls its robot and joints ends no comment and no string; the names come through."""
+    robot = oddly_named(name)
+    code = export(robot, "numpy", box_of(robot, 0.1)).code
+    path = tmp_path / "module.py"
+    path.write_text(code, encoding="utf-8")
+    made: dict[str, Any] = {}
+    exec(compile(path.read_bytes(), str(path), "exec"), made)
+    assert made["MOTOR_NAMES"] == ['motor "*/ q\n\\']
+    assert made["forward"](np.zeros((1, 1)))[0].tolist() == [made["OK"]]
+    assert namespace(name) == ODD[name]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["class", "", "r\n#error \\"])
+def test_names_are_no_code_in_cpp(name: str, tmp_path: Path) -> None:
+    robot = oddly_named(name)
+    code = export(robot, "c++", box_of(robot, 0.1)).code
+    own = namespace(robot.name)
+    main = f'#include "robot.hpp"\n#include <cstdio>\nint main() {{ std::puts({own}::MOTOR_NAMES[0]); }}'
+    found = subprocess.run([compiled(tmp_path, code, main)], capture_output=True, text=True, check=True)
+    assert found.stdout == 'motor "*/ q\n\\\n'

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
 from collections.abc import Sequence
@@ -24,6 +25,26 @@ if TYPE_CHECKING:
 
 TEMPLATES = {"c++": "header.hpp.j2", "numpy": "module.py.j2"}
 """The languages."""
+TAKEN = frozenset(re.findall(r"\w+", """
+    alignas alignof and and_eq asm auto bitand bitor bool break case catch char char16_t char32_t class compl const
+    const_cast constexpr continue decltype default delete do double dynamic_cast else enum explicit export extern false
+    float for friend goto if inline int long mutable namespace new noexcept not not_eq nullptr operator or or_eq private
+    protected public register reinterpret_cast return short signed sizeof static static_assert static_cast struct switch
+    template this thread_local throw true try typedef typeid typename union unsigned using virtual void volatile wchar_t
+    while xor xor_eq Eigen detail main std"""))
+"""Keywords of C++17, and names that something else has where headers are included."""
+
+
+def namespace(name: str) -> str:
+    """The name of a robot as a namespace of C++."""
+    found = re.sub(r"[^0-9A-Za-z_]|^(?=\d)", "_", name) or "robot"
+    return f"{found}_" if found in TAKEN else found
+
+
+def _comment(text: str) -> str:
+    """A text as it can stand in a comment: names of a file end none, continue none, and choose no encoding."""
+    line = "".join(each if each.isprintable() and each != "\\" else "_" for each in text)
+    return re.sub(r"coding(?=[:=])", "coding ", line)
 
 
 def program(source: Source, language: str, told: Sequence[str]) -> str:
@@ -41,7 +62,7 @@ def program(source: Source, language: str, told: Sequence[str]) -> str:
                    "Eigen::Matrix<double, 3 * DIRECTIONS, MOTORS + UNKNOWNS>& W")
     functions.append(("rates", arguments + moving, source.rates))
     values: dict[str, Any] = {
-        "robot": mechanism.name, "told": told, "name": re.sub(r"\W|^(?=\d)", "_", mechanism.name), "source": source,
+        "robot": mechanism.name, "told": told, "name": namespace(mechanism.name), "source": source,
         "m": len(branch.motors), "p": len(branch.passive), "c": len(source.cut), "d": d, "steps": NEWTON_STEPS_AT_RUN,
         "inverse": INVERSE_STEPS_AT_RUN, "parts": source.parts, "functions": functions,
         "lower": [float(x) for x in branch.lower], "upper": [float(x) for x in branch.upper],
@@ -61,6 +82,7 @@ def _templates() -> Environment:
 
     made = Environment(loader=PackageLoader("hrsynth.codegen", ""), undefined=StrictUndefined,
                        keep_trailing_newline=True)
-    made.filters["quoted"] = lambda names: ", ".join(f'"{name}"' for name in names)
+    made.filters["quoted"] = lambda names: ", ".join(json.dumps(name, ensure_ascii=False) for name in names)
+    made.filters["comment"] = _comment
     made.filters["name_of"] = lambda place, names: names[place]
     return made
