@@ -210,6 +210,8 @@ BRANCH_CELLS = 1000
 """Cells of motor coordinates that are tried at most where a branch is proved, for each part of the loops."""
 FINEST_BRANCH_CELL = 40
 """Halvings of a side of the box that the whole numbers that count them can tell."""
+WIDEST_BRANCH_BOX = 1000.0
+"""The widest interval of a motor (radians, characteristic lengths) in which its branch is followed."""
 BRANCH_DEPTH = 7
 """How often a cell of a branch is halved at most for each motor, and once more as often."""
 COARSEST_BRANCH_CELL = 4.0

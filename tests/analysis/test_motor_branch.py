@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,7 +12,7 @@ from hrsynth.analysis.branch.answer import BranchProof
 from hrsynth.errors import BadRequest, MotorsNotEnough
 from hrsynth.geometry.affine import AffineForms, affine
 from hrsynth.mechanism.builder import Builder
-from hrsynth.mechanism.model import Mechanism
+from hrsynth.mechanism.model import Limits, Mechanism
 from strategies import random_rotation
 
 Z = np.array([0.0, 0.0, 1.0])
@@ -243,6 +245,19 @@ def test_motors_that_do_not_make_a_function_are_refused():
         branch(robot, {"shoulder_9": (-1, 1)})
     with pytest.raises(BadRequest, match="low < high"):
         branch(robot, "shoulder_1=1:2")
+    with pytest.raises(BadRequest, match="at most 1000 rad wide"):
+        branch("rrrrr_m1", {"shoulder_1": (-1e9, 1e9)})
+
+
+def test_limits_that_limit_nothing_are_a_whole_turn():
+    """As some exporters write for a joint without limits."""
+    robot = four_bar(coupler=5.0, rocker=5.0)
+    wide = robot.changed(joints=[replace(joint, limits=Limits(-1e9, 1e9)) for joint in robot.joints.values()
+                                 if joint.actuated])
+    found = branch(wide, effort=2)
+    assert found.box == "a whole turn"
+    assert np.array(found.parts[0].asked).ravel() == pytest.approx([-np.pi, np.pi])
+
 
 
 @pytest.mark.slow

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ...budgets import BRANCH_CELLS, BRANCH_DEPTH, COARSEST_BRANCH_CELL
+from ...budgets import BRANCH_CELLS, BRANCH_DEPTH, COARSEST_BRANCH_CELL, WIDEST_BRANCH_BOX
 from ...errors import BadMechanism, BadRequest, LoopsNotClosed
 from ...geometry.vectors import Array
 from ...mechanism import Mechanism
@@ -123,15 +123,15 @@ def _box(system: LoopSystem, box: BoxLike | None) -> tuple[dict[int, tuple[float
         if wanted is not None:
             low, high = wanted
             sources.add("as asked")
-        elif np.isfinite(low) and np.isfinite(high):
+        elif high - low <= WIDEST_BRANCH_BOX * unit:
             sources.add("limits of the file")
         else:
             reach = system.length if each.slides else np.pi
             low, high = max(low, -reach), min(high, reach)
             sources.add("a characteristic length either way" if each.slides else "a whole turn")
-        if not low <= 0 <= high or not low < high:
+        if not low <= 0 <= high or not 0 < high - low <= WIDEST_BRANCH_BOX * unit:
             raise BadRequest(f"interval of motor {each.name!r}", (low, high), "low < high, with the zero configuration "
-                             "in it")
+                             f"in it, at most {WIDEST_BRANCH_BOX * unit:.4g} {'m' if each.slides else 'rad'} wide")
         found[i] = low / unit, high / unit
     if given:
         raise BadRequest("motors of the box", sorted(given), [system.names[i] for i in system.driven])
