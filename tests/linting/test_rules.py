@@ -12,12 +12,14 @@ from lxml import etree
 
 import hrsynth
 from description.foreign.examples import FILES, URDF
+from description.foreign.rounded import exported, of_hinges
 from description.foreign.test_dialects import written
 from hrsynth.description import load, save, shipped
 from hrsynth.errors import BadRequest, BadRobotFile
 from hrsynth.linting.elements import inertials
 from hrsynth.linting.rules import lint_rules
 from hrsynth.linting.subject import LintedFile
+from hrsynth.mechanism.normal import normal_form
 from linting.defects import CASES, Case, damaged, foreign, put, rounded, sound
 from strategies import planar, random_rotation, transformed
 
@@ -228,6 +230,29 @@ def test_rounded_geometry_is_found_and_written_as_it_is_meant(decimals: int, nat
     assert np.max(np.abs(np.cross(axes, axes[0]))) < 1e-12
     for name, joint in before.joints.items():
         assert np.linalg.norm(after.joints[name].point - joint.point) < 30 * 10.0**-decimals
+
+
+@pytest.mark.some(1)
+@pytest.mark.parametrize("name", ["3rps", "3rrr_m1", pytest.param("delta", marks=pytest.mark.slow)])
+def test_rounded_loops_are_not_closed_by_moving_joints(name: str, tmp_path: Path):
+    """Four decimals open loops by more than noise: numbers are made exact, no joint moves; the robot is the same, also
+    for readers that take the numbers as they are."""
+    path = exported(of_hinges(load(name)), tmp_path / "robot.urdf", 4)
+    before = load(path)
+    found = hrsynth.lint(path, fix=True)
+    assert {each.rule for each in found.mended} == {"geometry-rounded"}
+    after = load(path, as_written=True)
+    assert [text for text in after.differences(before, 1e-9) if not text.startswith("pose of link")] == []
+    assert normal_form(after).mechanism.joints.keys() == normal_form(before).mechanism.joints.keys()
+
+
+def test_a_file_that_is_near_to_two_robots_is_left_to_a_person(tmp_path: Path):
+    path = exported(of_hinges(load("3upu"), slid=0.2), tmp_path / "robot.urdf", 3)
+    text = path.read_bytes()
+    found = hrsynth.lint(path, fix=True)
+    assert [each.rule for each in found.findings if each.severity == "error"] == ["refused"]
+    assert not found.mended
+    assert path.read_bytes() == text
 
 
 def test_frames_that_nobody_closes_are_told(tmp_path: Path):

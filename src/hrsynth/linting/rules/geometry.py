@@ -16,7 +16,7 @@ from ...mechanism.observations.direction import SeenAxis
 from ..findings import LintRule, Mend, Spot
 from ..subject import LintedFile
 
-ROUNDED = re.compile(r"\d+ relations of joints|made to be ")
+ROUNDED = re.compile(r"\d+ relations of joints|made to be |the loops are open by up to ")
 """How the reader's notes of such relations begin."""
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from ...budgets import MOST_LOOP_COORDINATES
 from ...description import numerals, xml
 from ...description.assembly import guess
+from ...description.assembly.build import rounding
 from ...description.assembly.candidates import closure_candidates
 from ...description.assembly.loops import LoopAssembly, LoopSolution, Values, solve
 from ...description.assembly.zero import moves
@@ -17,7 +18,7 @@ from ...description.jointgraph import JointGraph, JointSpec
 from ...description.jointmotion import displacement, opening
 from ...errors import HrsynthError
 from ...mechanism.model import Joint, JointType, Mechanism
-from ...tolerances import EXACT, NOISE, OPPOSITE
+from ...tolerances import EXACT, NO_FINER, NOISE, OPPOSITE
 from ..elements import NumberAt
 from ..findings import LintRule, Mend, Spot
 from ..freedoms import NearbyFreedoms
@@ -57,7 +58,7 @@ def _open(file: LintedFile) -> Iterator[Spot]:
         if not _opposite(given, zero):
             misses[loop.name] = _miss(given, zero, assembly.length)
     worst = max(misses, key=lambda name: misses[name], default=None)
-    if worst is None or misses[worst] <= NOISE:
+    if worst is None or misses[worst] <= NOISE or _by_digits(file, graph, assembly):
         return
     closed = solve(assembly)
     size = ", ".join(f"{name!r} by {miss:.3g}" for name, miss in list(misses.items())[:6] if miss > NOISE)
@@ -70,6 +71,13 @@ def _open(file: LintedFile) -> Iterator[Spot]:
     text += f"; they close with {moves(assembly, closed.values)}"
     yield Spot(graph.joints[worst].line, text, _closed(file, graph, assembly, closed),
                severity="warning" if file.refusal is None else None)
+
+
+def _by_digits(file: LintedFile, graph: JointGraph, assembly: LoopAssembly) -> bool:
+    """Whether rounded numbers explain what is open: no joint has to move, numbers are to be made exact."""
+    miss = assembly.worst(assembly.zero())[1]
+    explained = file.given.tolerance or rounding(graph.digits, assembly.length / graph.unit, miss)
+    return not file.given.as_written and miss <= NO_FINER * explained
 
 
 def _miss(joint: JointSpec, poses: dict[str, np.ndarray], length: float) -> float:
