@@ -389,7 +389,7 @@ COVER_REACH = 1.0
 """Half the width (characteristic lengths) of the box of platform positions that is looked at where legs have none."""
 SHORTEST_ROD = 0.05
 """Length (characteristic lengths) of a rod that slides below which its leg counts as out of reach."""
-SMALLEST_BOX = 1e-4
+SMALLEST_BOX = 1e-6
 """Part of the whole box below which a box of poses that is not settled is left open."""
 
 # The audit of published tables

@@ -77,10 +77,17 @@ class BoxFormula(Value):
     def at(self, inputs: Sequence[AffineForms]) -> list[AffineForms]:
         """What is given out, for inputs of shape (boxes,); no number where a formula has a pole in a box."""
         found: dict[int, AffineForms] = {}
+        pairs: dict[int, tuple[AffineForms, AffineForms]] = {}
         with np.errstate(all="ignore"):
             for (i, name, arguments), done in zip(self.steps, self.done, strict=True):
                 if name == "load":
                     found[i] = inputs[arguments[0]]  # type: ignore[index]
+                elif name in ("sin", "cos"):
+                    of = arguments[0]
+                    assert isinstance(of, int)
+                    if of not in pairs:
+                        pairs[of] = found[of].sines()
+                    found[i] = pairs[of][name == "cos"]
                 else:
                     found[i] = _forms(name, [found[a] if isinstance(a, int) else a for a in arguments])
                 for each in done:

@@ -5,7 +5,7 @@ A symmetric matrix is given by its six entries xx, yy, zz, xy, xz, yz.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -68,6 +68,15 @@ def normalised(a: Components) -> list[Any]:
     """a / |a|."""
     size = sqrt(dot(a, a))
     return [x / size for x in a]
+
+
+def combination(x: Components, ways: NDArray[Any], number: Callable[[Any], Any]) -> Components:
+    """Σ x_i w_i of the columns w_i of ``ways``, which ``number`` makes components."""
+    found: Components = [0.0, 0.0, 0.0]
+    for i, (each, way) in enumerate(zip(x, ways.T, strict=True)):
+        part = scaled(each, number(way))
+        found = plus(found, part) if i else part
+    return found
 
 
 def transformed(R: Components, b: Components) -> list[Any]:

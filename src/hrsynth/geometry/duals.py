@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from .components import sqrt
+from .components import cosine, sine, sqrt
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,3 +58,13 @@ class Dual:
         root = sqrt(self.value)
         half = 0.5 / root
         return Dual(root, [a * half for a in self.rates])
+
+    def sin(self) -> Dual:
+        """Its sine."""
+        rate = cosine(self.value)
+        return Dual(sine(self.value), [a * rate for a in self.rates])
+
+    def cos(self) -> Dual:
+        """Its cosine."""
+        rate = -sine(self.value)
+        return Dual(cosine(self.value), [a * rate for a in self.rates])

@@ -46,8 +46,8 @@ class Covers(Value):
         """Those of a goal."""
         tell("boxes")
         budget = COVER_BOXES if complete else SIGN_BOXES if setting.dof <= 3 else 0
-        found = cover(setting, goal, every_mode=True, vanishing=True, budget=budget)
-        return cls(system, question, found, cover(setting, goal, every_mode=True) if complete else None)
+        found = cover(setting, goal, vanishing=True, budget=budget)
+        return cls(system, question, found, cover(setting, goal) if complete else None)
 
     def missed(self, known: Sequence[ClosedConfiguration], q: Array, idle: int) -> list[Critical]:
         """The proved critical points that none of the configurations (with coordinates q (c, N)) is at, as far as the

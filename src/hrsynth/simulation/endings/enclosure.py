@@ -118,7 +118,7 @@ def _enclosed(system: RestSystem, q: Array, idle: int) -> list[EnclosedPoint | N
             if not len(left):
                 break
         _, K, at = evaluated(found)
-        inertia[done] = _negative(K)[done]
+        inertia[done] = negative(K)[done]
         gram, inside = at.gram(), free[:, :, None] * free[:, None, :]
         rates = _rates(K, AffineForms(gram.v * inside, gram.r * inside), free, count)
     measured = unexplained_rows(system)
@@ -136,7 +136,7 @@ def _rates(K: AffineForms, gram: AffineForms, free: Array, count: int) -> list[t
     flat = AffineForms(K.v.copy(), K.r.copy())
     flat.v[..., :size, :size], flat.r[:, :size, :size] = gram.v, gram.r
     flat.v[0, :, :size, :size] += (1 - free)[..., None] * np.eye(size)
-    definite = _negative(flat) == count
+    definite = negative(flat) == count
     about = np.array([_eigenvalues(k[:size, :size], g, k[size:, :size], np.flatnonzero(own), freedoms)
                       for k, g, own in zip(K.v[0], gram.v[0], free, strict=True)])
     bounds = np.full((2, *about.shape), np.nan)
@@ -148,7 +148,7 @@ def _rates(K: AffineForms, gram: AffineForms, free: Array, count: int) -> list[t
                     break
                 sigma = about[left, k] + sign * width * np.maximum(1.0, np.abs(about[left, k]))
                 own, part = (AffineForms(each.v[:, left], each.r[left]) for each in (K, M))
-                below = _negative(own - part * sigma[:, None, None])
+                below = negative(own - part * sigma[:, None, None])
                 proved = (below >= 0) & ((below - count <= k) if side == 0 else (below - count > k))
                 bounds[side, left[proved], k] = sigma[proved]
     known = definite & np.isfinite(bounds).all(axis=(0, 2))
@@ -179,7 +179,7 @@ def _lost(K: Array) -> Array:
     return np.where(lost[:, None, None], np.eye(K.shape[-1]) - K, 0.0)
 
 
-def _negative(K: AffineForms) -> Array:
+def negative(K: AffineForms) -> Array:
     """The numbers (c,) of negative eigenvalues of all symmetric matrices in K (c, n, n), −1 where that was not proved:
     of VᵀKV each diagonal entry outweighs its row."""
     middle, spread = K.v[0], K.spread

@@ -10,7 +10,7 @@ coordinates x: the point's shift along a basis (characteristic lengths), then γ
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -23,7 +23,19 @@ from ...analysis.observed import ObservedRobot
 from ...closed_forms.legs import ClosedFormLeg, OnCrank, OnRod, SlidingRod
 from ...closed_forms.platform_points import PlatformPoint, platform_point
 from ...constraints.named_vectors import BodyVector, poses_at
-from ...geometry.components import Components, cayley, cross, dot, minus, plus, scaled, spin, sqrt, transformed
+from ...geometry.components import (
+    Components,
+    cayley,
+    combination,
+    cross,
+    dot,
+    minus,
+    plus,
+    scaled,
+    spin,
+    sqrt,
+    transformed,
+)
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
@@ -31,7 +43,6 @@ from ...mechanism.observation import Observation
 from ...mechanism.observations.direction import Direction
 from ...results import Value
 from ...tolerances import FOLLOWED
-from .leg_chart import LegChart, combination
 
 Number = Callable[[Any], Any]
 Place = tuple[Components, Components]
@@ -45,12 +56,10 @@ def _plain(value: Any) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class Twist:
-    """Velocity of the platform's point, its angular velocity (None where it never turns), and that of the rod of a held
-    limb."""
+    """Velocity of the platform's point and its angular velocity (None where it never turns)."""
 
     v: Components
     w: Components | None
-    own: Components | None = None
 
 
 class NotEnclosed(Exception):
@@ -137,13 +146,8 @@ class PoseError(Value):
     """What was fitted to samples and not read from the joints."""
     limits: tuple[str, ...] = ()
     """Joints whose limits are not looked at."""
-    goal: tuple[Array, Array] | None = None
-    """The goal's pose, in whose working modes ``wanted`` the limbs are there; None where these are its own."""
-    wanted: tuple[float, ...] = ()
     coordinates: PathCoordinates | None = None
     """What reads poses of configurations."""
-    held: LegChart | None = None
-    """Coordinates of a limb in the place of the shifts."""
 
     @classmethod
     def of(cls, setting: ObservedRobot, goal: ClosedConfiguration) -> PoseError:
@@ -173,19 +177,6 @@ class PoseError(Value):
                        (*known.fitted, *rules), (*mechanism.limited, *mechanism.wrists), coordinates=each)
         raise NotEnclosed(reason)
 
-    def elsewhere(self, p: Array, R: Array, modes: Sequence[float]) -> PoseError:
-        """The error to the same goal about another pose, in other working modes."""
-        limbs = tuple(replace(limb, mode=mode) for limb, mode in zip(self.limbs, modes, strict=True))
-        return replace(self, p=p, R=R, limbs=limbs, goal=self.goal or (self.p, self.R),
-                       wanted=self.wanted or tuple(limb.mode for limb in self.limbs))
-
-    def modes_at(self, x: Array) -> tuple[float, ...]:
-        """The limbs' working modes at coordinates (n,)."""
-        held = self.held
-        own = None if held is None else held.mode(x[: self.shifts.shape[1]].tolist())
-        return tuple(limb.mode if held is None or own is None or i != held.limb else own
-                     for i, limb in enumerate(self.limbs))
-
     @property
     def size(self) -> int:
         """The number of coordinates."""
@@ -198,22 +189,15 @@ class PoseError(Value):
             gamma = combination(x[k:], self.turns, number)
             columns = [cayley(gamma, [R[3 * i + j] for i in range(3)]) for j in range(3)]
             R = [columns[j][i] for i in range(3) for j in range(3)]
-        if self.held is not None:
-            limb = self.limbs[self.held.limb]
-            none, _ = self._tip(limb, [0.0, 0.0, 0.0], R, number)
-            return minus(self.held.tip(x[:k], number), none), R
         return plus(number(self.p), combination(x[:k], self.shifts, number)), R
 
     def at(self, x: Components, directions: Sequence[Components], number: Number) -> ErrorRates:
         """What the error does at coordinates x, and along directions of the coordinates."""
         p, R = self.pose(x, number)
-        place, turn = self.goal or (self.p, self.R)
-        goal = number(place), number(turn.ravel())
+        goal = number(self.p), number(self.R.ravel())
         twists = [self._twist(x, R, each, number) for each in directions]
-        # a held limb is where its coordinates put it
-        margins = [1.0 if self.held is not None and self.held.limb == i else
-                   limb.at(self._tip(limb, p, R, number)[0], number, limb.mode)[0] for i, limb in enumerate(self.limbs)]
-        return ErrorRates(margins, [self._turning(each, (p, R), x, goal, twists, number) for each in self.seen])
+        margins = [limb.at(self._tip(limb, p, R, number)[0], number, limb.mode)[0] for limb in self.limbs]
+        return ErrorRates(margins, [self._turning(each, (p, R), goal, twists, number) for each in self.seen])
 
     def levels(self, x: Array) -> tuple[NDArray[np.bool_], Array]:
         """Whether all legs reach, and E, (n,), at coordinates (n, size)."""
@@ -240,30 +224,17 @@ class PoseError(Value):
         if self.turns.shape[1]:
             gamma, rate = (combination(each[k:], self.turns, number) for each in (x, rates))
             w = spin(gamma, rate, self.turns.shape[1] == 1)
-        if self.held is None:
-            return Twist(combination(rates[:k], self.shifts, number), w)
-        v, turn = self.held.rates(x[:k], rates[:k], number)
-        if w is not None:
-            v = minus(v, cross(w, self._tip(self.limbs[self.held.limb], v, R, number)[1]))
-        return Twist(v, w, turn)
+        return Twist(combination(rates[:k], self.shifts, number), w)
 
     def _tip(self, limb: ClosedFormLeg, p: Components, R: Components, number: Number) -> tuple[Components, Components]:
         """A limb's tip, and the tip from the point."""
         arm: Components = transformed(R, number(limb.tip.turned)) if np.any(limb.tip.turned) else [0.0, 0.0, 0.0]
         return plus(plus(p, number(limb.tip.constant)), arm), arm
 
-    def _turning(self, seen: SeenDirection, here: Place, x: Components, goal: Place, twists: Sequence[Twist],
-                 number: Number) -> Turning:
+    def _turning(self, seen: SeenDirection, here: Place, goal: Place, twists: Sequence[Twist], number: Number
+                 ) -> Turning:
         """An observed direction, and how it changes with twists of the platform's point."""
-        own = None if seen.limb is None or not self.wanted else self.wanted[seen.limb]
-        wanted, held = self._direction(seen, *goal, number, own), self.held
-        if held is not None and seen.limb == held.limb:
-            limb = self.limbs[held.limb]
-            assert isinstance(limb, OnRod)
-            u: Components = scaled(seen.sense / number(limb.rod), held.along(x[: self.shifts.shape[1]], number))
-            plain = [cross(each.own, u) for each in twists if each.own is not None]
-            return Turning(u, wanted, plain, [0.0] * len(twists), u, 1.0)
-        u = self._direction(seen, *here, number)
+        wanted, u = self._direction(seen, *goal, number), self._direction(seen, *here, number)
         if seen.limb is None:
             plain = [[0.0, 0.0, 0.0] if each.w is None else cross(each.w, u) for each in twists]
             return Turning(u, wanted, plain, [0.0] * len(twists), u, 1.0)
@@ -280,15 +251,14 @@ class PoseError(Value):
             gain, slip, along = (seen.sense * limb.mode) / sqrt(margin), u, 1.0
         return Turning(u, wanted, [scaled(gain, y) for y in tips], [gain * dot(u, y) for y in tips], slip, along)
 
-    def _direction(self, seen: SeenDirection, p: Components, R: Components, number: Number, mode: float | None = None
-                   ) -> Components:
-        """An observed direction at a pose, in its limb's working mode or in another one."""
+    def _direction(self, seen: SeenDirection, p: Components, R: Components, number: Number) -> Components:
+        """An observed direction at a pose, in its limb's working mode."""
         if seen.rule is not None:
             return plus(transformed(R, number(seen.rule.turned)), number(seen.rule.constant))
         assert seen.limb is not None
         limb = self.limbs[seen.limb]
         tip = self._tip(limb, p, R, number)[0]
-        carried = limb.at(tip, number, mode or limb.mode)[1]
+        carried = limb.at(tip, number, limb.mode)[1]
         return scaled(seen.sense / number(limb.rod), minus(tip, carried)) if isinstance(limb, OnRod) else scaled(
             seen.sense, carried)
 

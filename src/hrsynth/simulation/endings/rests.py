@@ -145,8 +145,6 @@ class RestCover(Value):
         cover = self.cover
         if cover.reason:
             return cover.reason
-        if cover.unwatched:
-            return f"at the limits of legs that are not watched ({', '.join(cover.unwatched)}) nothing is proved"
         if cover.open:
             return f"{len(cover.open):,} boxes, {cover.share:.2g} of all, are left open{self._where()}"
         if self.unmet or self.strangers:
@@ -161,6 +159,8 @@ class RestCover(Value):
             return ""
         k = cover.error.shifts.shape[1]
         middle, half = (np.array(each)[:, :k] for each in zip(*cover.open, strict=True))
+        if not np.isfinite(half).all():
+            return ", some however far away"
         corners = np.stack([(middle - half).min(axis=0), (middle + half).max(axis=0)])
         about = cover.error.length * (cover.error.p + cover.error.shifts @ corners.mean(axis=0))
         size = cover.error.length * float(np.ptp(corners, axis=0).max())

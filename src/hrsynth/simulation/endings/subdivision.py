@@ -1,341 +1,388 @@
-"""Boxes of platform poses that are cut until each is settled: it holds no critical point of the error, or exactly one.
+"""Boxes of poses and joints that are cut until each is settled: it holds no critical point of the error, or exactly
+one.
 
-A box is settled where a leg does not reach it, where E's gradient g is enclosed away from zero, or where Krawczyk's
-operator proves that a box about it holds exactly one zero of g; where poses are asked for at which the error vanishes,
-also where an observed direction is enclosed away from the desired one's line. Near a leg's limit see :mod:`.steep`; the
-limit itself, where E is smooth in s_i instead, is no critical point then. Other boxes are cut, down to a size at which
-they are left open.
+Coordinates y and equations g are those of :mod:`.joint_error`. At a critical point ∇E + μ ∇g = 0 for some μ: for any
+choice P of as many coordinates as there are equations, F = ∇E_N − ∇E_P (∇g_P)⁻¹ ∇g_N vanishes, N the other
+coordinates. A box is settled where g or F is enclosed away from zero, where a leg without a joint does not reach, or
+where Krawczyk's operator on (∇E + μ ∇g, g) proves that a box about it holds exactly one zero; where poses are asked for
+at which the error vanishes, also where that is enclosed away from zero. g = 0 narrows the others, and tells the
+coordinates P in terms of N alone.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ...batch.enclosures import BoxFormula, traced
 from ...budgets import BOXES_AT_ONCE
-from ...closed_forms.legs import OnRod
 from ...geometry.affine import AffineForms, affine, combined, stacked
-from ...geometry.components import dot, minus
-from ...geometry.duals import Dual
 from ...geometry.vectors import Array
 from ...results import Value
-from ...tolerances import AFFINE_ROUNDING, FOLLOWED, SHORTEST_ROD, SMALLEST_BOX
+from ...tolerances import AFFINE_ROUNDING, MET_AGAIN, SHORTEST_ROD, SMALLEST_BOX
 from .cones import cut
-from .pose_error import Number, PoseError
-from .steep import Flags, SteepPart, sloping, some
+from .enclosure import negative
+from .joint_error import JointError
 
-WIDER = 1.25
-"""By how much the box is larger in which exactly one zero is to be proved."""
-NEAR_LIMIT = 0.5
-"""Ratio of the least to the largest reach margin in a box below which a leg's part of g is bounded by its sign."""
+Flags = NDArray[np.bool_]
+Places = NDArray[np.intp]
+WIDER = (1.25, 4.0)
+"""By how much boxes are larger in which exactly one zero is to be proved, one after the other."""
+THINNEST = 1e-3
+"""Least ratio of the edges of such a box."""
 STRETCHED = 8.0
 """Ratio of a box's edges, as parts of those of the whole, above which the longest is cut."""
-PAIRS_AT_ONCE = 4_000_000
-"""Pairs of boxes that are compared at once."""
+NARROWED = 0.6
+"""Part of an edge to which g = 0 narrows it below which a box is looked at again before it is cut."""
+ROUNDED = 1e-12
+"""What rounding makes of a box's edges, relative to them."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CriticalBox(Value):
-    """A pose ``p`` (m), ``R`` about which exactly one critical point is proved, where no leg is at its limit: in
-    coordinates it lies within ``radius`` of ``x`` and is the only one in ``half``; ``error`` encloses ‖e‖; ``falling``
-    is the number of directions in which E falls (None where that is not decided), ``modes`` are the legs' working
-    modes; ``directions`` those observed (legs, 3). ``chart``: what tells apart the coordinates in which it was
-    found."""
+    """A pose ``p`` (m), ``R`` about which exactly one critical point is proved: in coordinates it lies within
+    ``radius`` of ``x`` and is the only one within ``half``; ``error`` encloses ‖e‖; ``falling`` is the number of
+    directions in which E falls (None where that is not decided); ``directions`` those observed (legs, 3)."""
 
     p: Array
     R: Array
     x: Array
     half: Array
-    radius: float
+    radius: Array
     error: tuple[float, float]
     falling: int | None
-    modes: tuple[float, ...]
     directions: Array
-    chart: tuple[int, ...] = ()
-
-
-@dataclass(frozen=True, eq=False)
-class PoseBoxes:
-    """Boxes of the pose's coordinates: middles and half edges (c, n)."""
-
-    middle: Array
-    half: Array
-
-    def meet(self, other: PoseBoxes) -> Flags:
-        """Which of these boxes (c,) meet one of the others."""
-        found = np.zeros(len(self.middle), dtype=bool)
-        step = max(1, PAIRS_AT_ONCE // max(1, other.middle.size))
-        for i in range(0, len(found), step):
-            part = slice(i, i + step)
-            apart = np.abs(self.middle[part, None] - other.middle) - self.half[part, None] - other.half
-            found[part] = np.any(np.all(~(apart > 0), axis=-1), axis=-1)
-        return found
-
-    def some(self, which: Any) -> PoseBoxes:
-        """Some of them."""
-        return PoseBoxes(self.middle[which], self.half[which])
 
 
 @dataclass(eq=False)
 class Subdivision:
-    """Boxes of coordinates in one chart and one working mode that are cut until they are settled; ``within``: boxes of
-    poses besides which nothing is asked for."""
+    """Boxes between two corners of coordinates in one chart; ``vanishing``: only where the error vanishes."""
 
-    error: PoseError
+    error: JointError
     low: Array
     high: Array
-    gradient: BoxFormula
-    hessian: BoxFormula
-    errors: BoxFormula | None
-    steep: tuple[int, ...]
-    """The limbs at whose limits the gradient grows beyond all bounds."""
-    signs: tuple[float, ...] = ()
-    """Those of what it is divided by there."""
-    within: PoseBoxes | None = None
+    vanishing: bool = False
     boxes: int = 0
     left: list[tuple[Array, Array]] = field(default_factory=list)
     proved: list[tuple[Array, Array]] = field(default_factory=list)
-
-    @classmethod
-    def of(cls, error: PoseError, low: Array, high: Array, vanishing: bool = False, within: PoseBoxes | None = None
-           ) -> Subdivision:
-        """The formulas, traced: reach margins, g without what is steep, that and what it is divided by for each limb,
-        the pose's shifts where these are no coordinates; then the Hessian."""
-        n, held = error.size, error.held
-        steep = tuple(each.limb for each in error.seen if each.limb is not None
-                      and isinstance(error.limbs[each.limb], OnRod) and not (held and held.limb == each.limb))
-
-        def gradient(x: Sequence[Any], number: Number) -> list[Any]:
-            found = error.at(x, list(np.eye(n)), number)
-            plain: list[Any] = [0.0] * n
-            parts: list[Any] = []
-            for seen, turning in zip(error.seen, found.seen, strict=True):
-                slopes, rest = turning.slopes
-                plain = [a + b for a, b in zip(plain, slopes, strict=True)]
-                if seen.limb in steep:
-                    parts += [*turning.normal, rest, turning.along]
-                else:
-                    plain = [a + rest * b for a, b in zip(plain, turning.normal, strict=True)]
-            if held is not None:
-                away = minus(error.pose(x, number)[0], number(error.p))
-                parts += [dot(number(axis), away) for axis in error.shifts.T]
-            return [*found.margins, *plain, *parts]
-
-        def hessian(x: Sequence[Any], number: Number) -> list[Any]:
-            def constant(value: Any) -> Any:
-                return [constant(each) for each in value] if np.ndim(value) else Dual(number(value), [0.0] * n)
-
-            y = [Dual(each, list(axis)) for each, axis in zip(x, np.eye(n).tolist(), strict=True)]
-            rows = [[Dual(value, [0.0] * n) for value in axis] for axis in np.eye(n).tolist()]
-            return [rate for slope in error.at(y, rows, constant).slopes for rate in slope.rates]
-
-        def errors(x: Sequence[Any], number: Number) -> list[Any]:
-            return [e for each in error.at(x, [], number).seen for e in each.error]
-
-        signs = tuple(-error.limbs[each.limb].mode * each.sense for each in error.seen if each.limb in steep)
-        return cls(error, low, high, traced(gradient, n), traced(hessian, n), traced(errors, n) if vanishing else None,
-                   steep, signs, within)
+    """Coordinates and multipliers, and the room about them, in which exactly one zero is proved."""
 
     @property
     def whole(self) -> Array:
         """Half the edges of the whole box."""
         return (self.high - self.low) / 2
 
+    @property
+    def share(self) -> float:
+        """What part of the whole is left open."""
+        return float(sum(np.prod(half / self.whole) for _, half in self.left))
+
     def run(self, budget: int) -> None:
         """Cut boxes until all are settled, too small, or so many were looked at."""
         middle, half = ((self.low + self.high) / 2)[None], self.whole[None]
         while len(middle) and self.boxes < budget:
             # the smallest first: memory stays small
-            now, later = slice(len(middle) - BOXES_AT_ONCE if len(middle) > BOXES_AT_ONCE else 0, None), slice(
-                0, max(0, len(middle) - BOXES_AT_ONCE))
-            part, size = middle[now], half[now]
-            self.boxes += len(part)
-            weights = size / self.whole
-            if self.errors is not None:
-                kept = self._vanishing(part, size)
-                part, size, weights = part[kept], size[kept], weights[kept]
-            if len(part):
-                open_, weights = self._open(part, size)
-                part, size, weights = part[open_], size[open_], weights[open_]
+            first = max(0, len(middle) - BOXES_AT_ONCE)
+            part, size, axis = self._open(middle[first:], half[first:])
+            self.boxes += len(middle) - first
             small = np.all(size <= SMALLEST_BOX * self.whole, axis=1)
             self.left += list(zip(part[small], size[small], strict=True))
-            part, size, weights = part[~small], size[~small], weights[~small]
-            share = size / self.whole
-            axis = np.argmax(np.where((share.max(axis=1) > STRETCHED * share.min(axis=1))[:, None], share, weights),
-                             axis=1)
-            part, size = cut(part, size, axis)
-            middle, half = np.concatenate([middle[later], part]), np.concatenate([half[later], size])
+            again, rest = ~small & (axis < 0), ~small & (axis >= 0)
+            below, edges = cut(part[rest], size[rest], axis[rest])
+            middle = np.concatenate([middle[:first], part[again], below])
+            half = np.concatenate([half[:first], size[again], edges])
         self.left += list(zip(middle, half, strict=True))
 
-    def forms(self, middle: Array, half: Array) -> list[AffineForms]:
-        """The coordinates of boxes (c, n)."""
-        eye = np.eye(middle.shape[1])
-        return [affine(middle[:, i], half[:, i, None] * eye[i], np.zeros(len(middle))) for i in range(len(eye))]
-
-    def _vanishing(self, middle: Array, half: Array) -> Flags:
-        """In which boxes (c,) every observed direction may be along the desired one."""
-        assert self.errors is not None
-        e = stacked(self.errors.at(self.forms(middle, half)))
+    def _open(self, middle: Array, half: Array) -> tuple[Array, Array, Places]:
+        """Boxes (c, n) that are not settled, narrowed, and the axes (c,) across which they are to be cut, −1 of those
+        that are to be looked at again first."""
+        forms = _forms(middle, half)
+        g = stacked(self.error.closing.at(forms)) if self.error.size[1] else AffineForms(
+            np.zeros((middle.shape[1] + 1, len(middle), 0)), np.zeros((len(middle), 0)))
+        low, high = _narrowed(g)
+        if self.vanishing:
+            low, high = (pick(one, other) for pick, one, other in zip(
+                (np.maximum, np.minimum), (low, high), _narrowed(stacked(self.error.errors.at(forms))), strict=True))
+        gone = np.any(low > high, axis=1)
         with np.errstate(all="ignore"):
-            away = np.any(np.abs(e.v[0]) > e.spread * (1 + AFFINE_ROUNDING), axis=1)
-            near = combined(_inverse(np.moveaxis(e.v[1:], 0, -1)), e)
-            away |= np.any(np.abs(near.v[0]) > near.spread * (1 + AFFINE_ROUNDING), axis=1)
-        return np.asarray(~away)
+            J = np.where(half[:, None] > 0, np.moveaxis(g.v[1:], 0, -1) / half[:, None], 0.0)
+        P, N = _pivots(J)
+        follow = combined(_inverted(_columns(np.moveaxis(g.v[1:], 0, -1), P)), g)
+        inner = _narrowed(follow, P)
+        low, high = np.maximum(low, inner[0]), np.minimum(high, inner[1])
+        gone |= np.any(low > high, axis=1)
+        own, size = middle + half * (low + high) / 2, half * np.maximum((high - low) / 2, 0.0) * (1 + ROUNDED)
+        axis = np.full(len(middle), -1)
+        tiny = np.all(size <= 100 * SMALLEST_BOX * self.whole, axis=1)
+        look = np.flatnonzero(~gone & (tiny | np.all(high - low >= 2 * NARROWED, axis=1)))
+        if len(look):
+            tube, loose = _tube(own[look], size[look], middle[look], half[look], P[look], N[look],
+                                AffineForms(follow.v[:, look], follow.r[look]))
+            settled, F = self._settled(tube, P[look], N[look])
+            step = _solved(np.moveaxis(F.v[1:], 0, -1), F.v[0])
+            likely = ~settled & np.all(np.abs(step) < 3.0, axis=1) & np.isfinite(F.r).all(axis=1)
+            for wider in WIDER:
+                at = look[likely]
+                if len(at):
+                    settled[likely] = self._unique(own[at], size[at], P[at], wider)
+                    likely &= ~settled
+            gone[look[settled]] = True
+            axis[look] = self._axes(size[look], N[look], F, loose)
+        return own[~gone], size[~gone], axis[~gone]
 
-    def poses(self, found: Sequence[AffineForms], middle: Array, half: Array) -> PoseBoxes:
-        """The poses of boxes, of what the gradient's formula gives for them."""
-        k = self.error.shifts.shape[1]
-        if self.error.held is None:
-            return PoseBoxes(middle, half)
-        shifts = stacked(found[len(found) - k:])
-        wide = shifts.spread + AFFINE_ROUNDING * np.abs(shifts.v[0])
-        return PoseBoxes(np.concatenate([shifts.v[0], middle[:, k:]], axis=1),
-                         np.concatenate([wide, half[:, k:]], axis=1))
+    def _settled(self, tube: list[AffineForms], P: Places, N: Places) -> tuple[Flags, AffineForms]:
+        """Whether nothing is asked for on a tube, and F there."""
+        _, M, slope, margins = self._values(tube)
+        F = _reduced(M, slope, P, N)
+        settled = _away(F)
+        if self.vanishing:
+            settled |= _away(stacked(self.error.errors.at(tube)))
+        for margin in margins:
+            settled |= margin.high < SHORTEST_ROD**2
+        return settled, F
 
-    def left_poses(self) -> PoseBoxes:
-        """The poses of the boxes that are left open."""
-        middle, half = (np.array(each).reshape(-1, self.error.size) for each in
-                        (zip(*self.left, strict=True) if self.left else ([], [])))
-        if not len(middle):
-            return PoseBoxes(middle, half)
-        return self.poses(self.gradient.at(self.forms(middle, half)), middle, half)
+    def _axes(self, size: Array, N: Places, F: AffineForms, loose: Flags) -> Places:
+        """Across which axes boxes are cut: that along which F changes most, or the longest, of those coordinates (c, n)
+        that are ``loose``."""
+        share, slopes = size / self.whole, np.abs(np.moveaxis(F.v[1:], 0, -1)).max(axis=1, initial=0.0)
+        changes = np.zeros(share.shape)
+        np.put_along_axis(changes, N, np.where(np.isfinite(slopes), slopes, 0.0), 1)
+        even = share.max(axis=1) <= STRETCHED * np.take_along_axis(share, N, 1).max(axis=1)
+        known = even & np.isfinite(F.r).all(axis=1) & changes.any(axis=1) & (loose.sum(axis=1) == N.shape[1])
+        return np.where(known, changes.argmax(axis=1), np.where(loose, share, 0.0).argmax(axis=1))
 
-    def _open(self, middle: Array, half: Array) -> tuple[Flags, Array]:
-        """Which boxes (c,) are not settled, and how much g changes across each axis (c, n)."""
-        n, k = middle.shape[1], len(self.error.limbs)
-        found = self.gradient.at(self.forms(middle, half))
-        margins, plain, parts = found[:k], found[k : k + n], found[k + n :]
-        beyond, inside = np.zeros(len(middle), dtype=bool), np.ones(len(middle), dtype=bool)
-        at_limit, close = np.zeros((2, len(middle), len(self.steep)), dtype=bool)
-        for i, margin in enumerate(margins):
-            limb = self.error.limbs[i]
-            least = 0.0 if isinstance(limb, OnRod) else SHORTEST_ROD**2
-            beyond |= margin.high < least
-            if i in self.steep:
-                at_limit[:, self.steep.index(i)] = ~(margin.low > 0)
-                close[:, self.steep.index(i)] = ~(margin.low > NEAR_LIMIT * margin.high)
-            elif not isinstance(limb, OnRod):
-                inside &= margin.low > 0
-        if self.within is not None:
-            asked = np.flatnonzero(~beyond)
-            beyond[asked] = ~self.poses(found, middle, half).some(asked).meet(self.within)
-        a, b = stacked(plain), []
-        for i in range(len(self.steep)):
-            *normal, share, along = parts[i * (n + 2) : (i + 1) * (n + 2)]
-            b.append(SteepPart(stacked(normal), share, along, self.signs[i]))
-        regular = inside & ~at_limit.any(axis=1)
-        g = a
+    def _values(self, forms: list[AffineForms]) -> tuple[AffineForms, AffineForms, AffineForms, list[AffineForms]]:
+        """g (c, k), its rates (c, k, n), those of E (c, n), reach margins."""
+        (n, k), out = self.error.size, self.error.slopes.at(forms)
+        like = forms[0]
+        if not k:
+            none = AffineForms(np.zeros((*like.v.shape, 0)), np.zeros((*like.r.shape, 0)))
+            return none, AffineForms(none.v[..., None] * np.zeros(n), none.r[..., None] * np.zeros(n)), stacked(
+                out[:n]), out[n:]
+        M = stacked(out[k : k + k * n])
+        return (stacked(out[:k]), AffineForms(M.v.reshape(*M.v.shape[:-1], k, n), M.r.reshape(-1, k, n)),
+                stacked(out[k + k * n : k + k * n + n]), out[k + k * n + n :])
+
+    def _unique(self, middle: Array, half: Array, P: Places, wider: float) -> Flags:
+        """Boxes (c, n) in which, made ``wider``, exactly one zero is proved, or that there is none in them."""
+        (n, k), wide = self.error.size, wider * np.maximum(half, THINNEST * half.max(axis=1, keepdims=True))
+        _, M, slope, _ = self._values(_forms(middle, 0 * half))
+        back = _inverted(_columns(M.v[0], P))
+        mu = np.nan_to_num(-(np.take_along_axis(slope.v[0], P, 1)[:, None] @ back)[:, 0])
+        # over the wide box μ is μ₀ + δ, with (∇E + μ₀ ∇g)_P + δ ∇g_P = 0
+        _, M, slope, _ = self._values(_forms(middle, wide))
+        turned = np.swapaxes(back, 1, 2)
+        pull = combined(turned, _some(slope + (M * mu[:, :, None]).sum(-2), P))
+        rates = _some(M, P)
+        off = (combined(turned, AffineForms(np.swapaxes(rates.v, -1, -2), np.swapaxes(rates.r, -1, -2)))
+               - np.eye(k)).size.sum(axis=-1).max(axis=1, initial=0.0)
         with np.errstate(all="ignore"):
-            for each in b:
-                g = g + each.regular
-        settled = beyond | (regular & _away(g))
-        near = ~settled & inside & close.any(axis=1)
-        if near.any():
-            settled[near] = sloping(some(a, near), [each.some(near) for each in b], close[near])
-        rest = ~settled & regular
-        if rest.any():
-            # a zero may be where Newton's step from the middle ends
-            S = np.moveaxis(g.v[1:, rest], 0, -1)
-            step = _solved(S, g.v[0, rest])
-            likely = np.flatnonzero(rest)[np.all(np.abs(step) < 3.0, axis=1)]
-            if len(likely):
-                settled[likely] = self._unique(middle[likely], half[likely])
-        weights = np.abs(np.nan_to_num(g.v[1:], nan=0.0, posinf=0.0)).max(axis=-1).T
-        weights = np.where(weights.any(axis=1)[:, None] & regular[:, None], weights, half / self.whole)
-        return ~settled, weights
-
-    def _unique(self, middle: Array, half: Array) -> Flags:
-        """Boxes (c,) in which, made ``WIDER``, Krawczyk's operator proves exactly one zero, or that there is none."""
-        n, wide = middle.shape[1], WIDER * half
-        g = stacked(self._slopes(self.forms(middle, 0 * half)))
-        H = stacked(self.hessian.at(self.forms(middle, wide)))
-        H = AffineForms(H.v.reshape(*H.v.shape[:-1], n, n), H.r.reshape(-1, n, n))
-        Y = _inverse(H.v[0])
+            room = pull.size.max(axis=1, initial=0.0) / (1 - off) * (1 + ROUNDED)
+        known = np.isfinite(room) & (room >= 0)
+        room = np.where(known, room, 1.0)[:, None] * np.ones(k)
+        at, about = np.concatenate([middle, mu], axis=1), np.concatenate([wide, WIDER[0] * room], axis=1)
+        shift, reach = self._krawczyk(at, about)
         with np.errstate(all="ignore"):
-            shift = combined(Y, g)
-            M = (np.eye(n) - combined(Y, H)).size
-            off = (M @ wide[..., None])[..., 0] * (1 + AFFINE_ROUNDING)
-            reach = shift.size + off
-            one = np.all(reach < wide, axis=1)
-            none = np.any((np.abs(shift.v[0]) - shift.spread - off) > half, axis=1)
-        for i in np.flatnonzero(one):
-            self.proved.append((middle[i], wide[i]))
+            one = known & np.all(reach < about, axis=1)
+            none = known & np.any((np.abs(shift) - (reach - np.abs(shift)))[:, :n] > half, axis=1)
+        for i in np.flatnonzero(one & ~none):
+            self.proved.append((at[i], about[i]))
         return one | none
 
-    def _slopes(self, forms: list[AffineForms]) -> list[AffineForms]:
-        """g where no leg is at its limit."""
-        n, k = len(forms), len(self.error.limbs)
-        found = self.gradient.at(forms)
-        g = found[k : k + n]
-        for i in range(len(self.steep)):
-            *normal, share, along = found[k + n + i * (n + 2) : k + n + (i + 1) * (n + 2)]
-            factor = share * along.inverse()
-            g = [one + other * factor for one, other in zip(g, normal, strict=True)]
-        return g
+    def _krawczyk(self, at: Array, about: Array) -> tuple[Array, Array]:
+        """Newton's step from coordinates and multipliers (c, n + k), and how far from there the operator over a box
+        about them reaches."""
+        pull, K = self._equations(at, about)
+        Y = _inverse(K.v[0])
+        with np.errstate(all="ignore"):
+            shift = combined(Y, pull)
+            off = ((np.eye(at.shape[1]) - combined(Y, K)).size @ about[..., None])[..., 0]
+            return shift.v[0], (shift.size + off) * (1 + AFFINE_ROUNDING)
+
+    def _equations(self, at: Array, about: Array) -> tuple[AffineForms, AffineForms]:
+        """(∇E + μ ∇g, g) (c, n + k) at places, and its derivatives over boxes about these."""
+        n, k = self.error.size
+        g, M, slope, _ = self._values(_forms(at[:, :n], 0 * at[:, :n]))
+        mu = at[:, n:]
+        pull = slope + (M * mu[:, :, None]).sum(-2)
+        phi = AffineForms(np.concatenate([pull.v, g.v], axis=-1), np.concatenate([pull.r, g.r], axis=-1))
+        out = stacked(self.error.bends.at(_forms(at, about)))
+        # the rates of g along the fields, which multiply μ: those by the coordinates but for a far chart
+        rates = self._values(_forms(at, about)[:n])[1]
+        c, K = len(at), AffineForms(np.zeros((len(out.v), len(at), n + k, n + k)), np.zeros((len(at), n + k, n + k)))
+        K.v[..., :n, :n], K.r[:, :n, :n] = out.v[..., : n * n].reshape(-1, c, n, n), out.r[:, : n * n].reshape(c, n, n)
+        K.v[..., n:, :n], K.r[:, n:, :n] = (each[..., n * n :].reshape(*lead, c, k, n) for each, lead in
+                                            ((out.v, (-1,)), (out.r, ())))
+        K.v[..., :n, n:], K.r[:, :n, n:] = np.swapaxes(rates.v, -1, -2), np.swapaxes(rates.r, -1, -2)
+        return phi, K
 
     def zeros(self) -> list[CriticalBox]:
-        """The zeros that were proved, enclosed by Newton's method from the middle."""
-        found = (self._enclosed(middle, wide) for middle, wide in self.proved)
-        return [each for each in found if each is not None]
-
-    def _enclosed(self, middle: Array, wide: Array) -> CriticalBox | None:
-        """The one zero within ``wide`` of a place; None where it lies out of the legs' reach."""
-        n = len(middle)
-        x, still = middle[None], np.zeros((1, n))
+        """The zeros that were proved, enclosed in the chart that is not far away; those of which that fails are left
+        open."""
+        if not self.proved:
+            return []
+        n, k = self.error.size
+        chart = self if self.error.far is None else Subdivision(JointError(self.error.error, self.error.joints),
+                                                                self.low, self.high)
+        at, room = (np.array(each) for each in zip(*self.proved, strict=True))
+        x = np.concatenate([self.error.near(at[:, :n]), at[:, n:]], axis=1)
+        if chart is not self:
+            # the multipliers there
+            _, M, slope, _ = chart._values(_forms(x[:, :n], 0 * x[:, :n]))
+            x[:, n:] = _multipliers(M.v[0], slope.v[0])
         for _ in range(8):
-            g = stacked(self._slopes(self.forms(x, still))).v[0]
-            bent = np.array([each.v[0] for each in self.hessian.at(self.forms(x, still))]).T.reshape(1, n, n)
-            x = x - _solved(bent, g)
-            x = np.clip(x, middle - wide, middle + wide)
-        radius = FOLLOWED ** 0.75
-        while True:
-            half = np.full((1, n), radius)
-            g = stacked(self._slopes(self.forms(x, still)))
-            H = stacked(self.hessian.at(self.forms(x, half)))
-            H = AffineForms(H.v.reshape(*H.v.shape[:-1], n, n), H.r.reshape(-1, n, n))
-            Y = _inverse(H.v[0])
-            reach = combined(Y, g).size + ((np.eye(n) - combined(Y, H)).size @ half[..., None])[..., 0]
-            if np.all(reach < half):
+            x = x - chart._krawczyk(x, 0 * x)[0]
+        about, reach, left = np.zeros(x.shape), np.full(x.shape, np.inf), np.arange(len(x))
+        for radius in MET_AGAIN * 4.0 ** np.arange(8):
+            size = np.full((len(left), n + k), radius)
+            found = chart._krawczyk(x[left], size)[1]
+            done = np.all(found < size, axis=1)
+            about[left[done]], reach[left[done]] = size[done], found[done]
+            left = left[~done]
+            if not len(left):
                 break
-            radius *= 4
-            if radius > np.min(wide):
-                radius = float(np.max(wide))
-                break
-        values = np.linalg.eigvalsh((H.v[0, 0] + H.v[0, 0].T) / 2)
-        off = float(np.linalg.norm(H.spread[0]))
-        falling = int(np.sum(values < 0)) if np.min(np.abs(values)) > off else None
-        error, place = self.error, x[0]
-        p, R = error.pose(list(place), _plain)
-        forms = self.forms(x, half)
-        E = traced(lambda y, number: [error.at(y, [], number).E], n).at(forms)[0]
-        size = (float(np.sqrt(max(0.0, 2 * E.low[0]))), float(np.sqrt(2 * max(0.0, E.high[0]))))
-        margins = self.gradient.at(forms)[: len(error.limbs)]
-        if any(each.high[0] < 0 for each in margins):
-            return None
-        seen = [np.array(each.u, dtype=float) for each in error.at(list(place), [], _plain).seen]
-        return CriticalBox(error.length * np.array(p, dtype=float), np.array(R, dtype=float).reshape(3, 3), place, wide,
-                           radius, size, falling, error.modes_at(place), np.array(seen))
+        inside = self._within(x[:, :n], at[:, :n], room[:, :n]) & np.isfinite(reach).all(axis=1)
+        own = ~inside & (chart is self)
+        x[own], about[own], reach[own] = at[own], room[own], room[own]
+        lost = ~inside & ~own
+        self.left += [(at[i, :n], room[i, :n]) for i in np.flatnonzero(lost)]
+        return chart._told(x[~lost], about[~lost], reach[~lost])
+
+    def _within(self, x: Array, at: Array, room: Array) -> Flags:
+        """Whether coordinates of the other chart are within a room of this one's."""
+        y = x.copy()
+        if (far := self.error.far) is not None:
+            size = self.error.error.shifts.shape[1]
+            own = y[:, far].copy()
+            with np.errstate(all="ignore"):
+                y[:, :size] /= own[:, None]
+                y[:, far] = 1 / own
+        return np.asarray(np.all(np.abs(y - at) <= room, axis=1))
+
+    def _told(self, x: Array, about: Array, reach: Array) -> list[CriticalBox]:
+        """What boxes with one zero each hold."""
+        (n, k), error = self.error.size, self.error.error
+        if not len(x):
+            return []
+        falling = negative(self._equations(x, about)[1]) - k
+        forms = _forms(x[:, :n], reach[:, :n])
+        e, u = stacked(self.error.errors.at(forms)), stacked(self.error.directions.at(_forms(x[:, :n], 0 * x[:, :n])))
+        least, most = np.maximum(np.maximum(e.low, -e.high), 0.0), e.size
+        p, R = self.error.pose(x[:, :n])
+        return [CriticalBox(error.length * p[i], R[i], x[i, :n], about[i, :n], reach[i, :n],
+                            (float(np.linalg.norm(least[i])), float(np.linalg.norm(most[i]))),
+                            int(falling[i]) if falling[i] >= 0 else None, u.v[0, i].reshape(-1, 3))
+                for i in range(len(x))]
 
 
-def _plain(value: Any) -> Any:
-    return value
+def _forms(middle: Array, half: Array) -> list[AffineForms]:
+    """The coordinates of boxes (c, n)."""
+    eye = np.eye(middle.shape[1])
+    return [affine(middle[:, i], half[:, i, None] * eye[i], np.zeros(len(middle))) for i in range(len(eye))]
 
 
-def _away(g: AffineForms) -> Flags:
-    """Whether g (c, n) is enclosed away from zero: a component of it, g along its own middle, or a component in the
+def _narrowed(g: AffineForms, P: Places | None = None) -> tuple[Array, Array]:
+    """Where in [−1, 1] the symbols (c, n) are, as far as equations g (c, k) = 0 tell; those ``P`` alone of one equation
+    each, which it has the coefficient 1 in."""
+    J = np.moveaxis(g.v[1:], 0, -1)
+    size = np.abs(J)
+    if P is not None:
+        size = np.where(np.arange(size.shape[2]) == P[:, :, None], size, 0.0)
+    rest = np.abs(J).sum(axis=2, keepdims=True) - np.abs(J) * (size > 0) + g.r[:, :, None]
+    with np.errstate(all="ignore"):
+        far = np.where(size > 0, rest * (1 + ROUNDED) / size, np.inf) + ROUNDED
+        at = np.where(size > 0, -g.v[0][:, :, None] / J, 0.0)
+    far, at = np.where(np.isfinite(far) & np.isfinite(at), far, np.inf), np.where(np.isfinite(at), at, 0.0)
+    return (at - far).max(axis=1, initial=-1.0), (at + far).min(axis=1, initial=1.0)
+
+
+def _tube(middle: Array, half: Array, old: Array, edges: Array, P: Places, N: Places, follow: AffineForms
+          ) -> tuple[list[AffineForms], Flags]:
+    """The coordinates of boxes (c, n), those of P as they follow from N: ε_P = −(f₀ + Σ f_N ε_N) ± r in the symbols of
+    the ``old`` boxes, or as wide as they are where that is no narrower: these are loose (c, n), as those of N are."""
+    slopes, radius = np.zeros((*middle.shape, N.shape[1])), np.zeros(middle.shape)
+    own, was = np.take_along_axis(half, N, 1), np.take_along_axis(edges, N, 1)
+    np.put_along_axis(slopes, N[:, :, None], own[:, :, None] * np.eye(N.shape[1]), 1)
+    with np.errstate(all="ignore"):
+        ratio = np.where(was > 0, own / was, 0.0)
+        shift = np.where(was > 0, np.take_along_axis(middle - old, N, 1) / was, 0.0)
+        J, wide = _columns(np.moveaxis(follow.v[1:], 0, -1), N), np.take_along_axis(edges, P, 1)
+        at = np.take_along_axis(old, P, 1) - wide * (follow.v[0] + (J * shift[:, None]).sum(-1))
+        along, doubt = -wide[:, :, None] * J * ratio[:, None], wide * (follow.r + ROUNDED)
+    plain = np.take_along_axis(half, P, 1)
+    good = np.isfinite(doubt) & np.isfinite(at) & np.isfinite(along).all(axis=-1) & (doubt < plain)
+    centre = middle.copy()
+    np.put_along_axis(centre, P, np.where(good, at, np.take_along_axis(middle, P, 1)), 1)
+    np.put_along_axis(slopes, P[:, :, None], np.where(good[:, :, None], along, 0.0), 1)
+    np.put_along_axis(radius, P, np.where(good, doubt, plain), 1)
+    loose = np.ones(middle.shape, dtype=bool)
+    np.put_along_axis(loose, P, ~good, 1)
+    return [affine(centre[:, i], slopes[:, i], radius[:, i]) for i in range(middle.shape[1])], loose
+
+
+def _pivots(J: Array) -> tuple[Places, Places]:
+    """Columns (c, k) of matrices (c, k, n), by elimination with the largest entries, and the others (c, n − k)."""
+    A = np.where(np.isfinite(J), J, 0.0)
+    c, k, n = A.shape
+    rows, P = np.arange(c), np.zeros((c, k), dtype=np.intp)
+    open_, used = np.ones((c, k), dtype=bool), np.zeros((c, n), dtype=bool)
+    for step in range(k):
+        free = open_[:, :, None] & ~used[:, None]
+        r, p = np.divmod(np.where(free, np.abs(A), -1.0).reshape(c, -1).argmax(axis=1), n)
+        pivot = A[rows, r, p]
+        factor = A[rows, :, p] / np.where(pivot == 0, 1.0, pivot)[:, None]
+        A = A - factor[:, :, None] * A[rows, r][:, None] * open_[:, :, None]
+        P[:, step], open_[rows, r], used[rows, p] = p, False, True
+    return P, np.argsort(used, axis=1, kind="stable")[:, : n - k]
+
+
+def _columns(J: Array, P: Places) -> Array:
+    """Columns (c, k, p) of matrices (c, k, n)."""
+    return np.take_along_axis(J, P[:, None], 2)
+
+
+def _some(forms: AffineForms, P: Places) -> AffineForms:
+    """Some of the last places, others of each box."""
+    index = P.reshape(len(P), *(1,) * (forms.r.ndim - 2), -1)
+    return AffineForms(np.take_along_axis(forms.v, index[None], -1), np.take_along_axis(forms.r, index, -1))
+
+
+def _reduced(M: AffineForms, slope: AffineForms, P: Places, N: Places) -> AffineForms:
+    """∇E_N − ∇E_P (∇g_P)⁻¹ ∇g_N, (c, n − k), by Gauss's elimination; no number where a pivot may vanish."""
+    k, order = P.shape[1], np.concatenate([P, N], axis=1)
+    A, rest = _some(M, order), _some(slope, order)
+    A = combined(_inverted(A.v[0, ..., :k]), A) if k else A
+    rows = [AffineForms(A.v[:, :, i], A.r[:, i]) for i in range(k)]
+    with np.errstate(all="ignore"):
+        for r in range(k):
+            tail = rows[r][..., 1:] * rows[r][..., 0].inverse()[..., None]
+            rows[r + 1 :] = [each[..., 1:] - tail * each[..., 0][..., None] for each in rows[r + 1 :]]
+            rest = rest[..., 1:] - tail * rest[..., 0][..., None]
+    return rest
+
+
+def _multipliers(M: Array, slope: Array) -> Array:
+    """μ (c, k) for which ∇E + μ ∇g is least."""
+    return -(slope[:, None] @ np.linalg.pinv(M))[:, 0]
+
+
+def _away(F: AffineForms) -> Flags:
+    """Whether F (c, d) is enclosed away from zero: a component of it, F along its own middle, or a component in the
     coordinates in which it is nearest to the box's own."""
     with np.errstate(all="ignore"):
-        found = np.any(np.abs(g.v[0]) > g.spread * (1 + AFFINE_ROUNDING), axis=1)
-        v = np.nan_to_num(g.v[0])[:, None, :]
-        found |= combined(v, g).low[:, 0] > 0
-        Y = _inverse(np.moveaxis(g.v[1:], 0, -1))
-        near = combined(Y, g)
+        found = np.any(np.abs(F.v[0]) > F.spread * (1 + AFFINE_ROUNDING), axis=1)
+        found |= combined(np.nan_to_num(F.v[0])[:, None, :], F).low[:, 0] > 0
+        near = combined(_inverse(np.moveaxis(F.v[1:], 0, -1)), F)
         found |= np.any(np.abs(near.v[0]) > near.spread * (1 + AFFINE_ROUNDING), axis=1)
     return np.asarray(found)
+
+
+def _inverted(A: Array) -> Array:
+    """Inverses (c, k, k); no numbers where there is none."""
+    good = np.isfinite(A).all(axis=(1, 2))
+    good[good] = np.abs(np.linalg.det(A[good])) > 0
+    return np.where(good[:, None, None], np.linalg.inv(np.where(good[:, None, None], A, np.eye(A.shape[-1]))), np.nan)
 
 
 def _inverse(A: Array) -> Array:

@@ -1,0 +1,245 @@
+"""The error over the platform's pose and the places of the legs' joints, closed by equations: smooth at all limits of
+legs.
+
+Coordinates y: shifts of the platform's point, the angle of its turn, and of each leg the angle of its crank or of its
+rod that slides, or the way of its slider. Equations g: the length of a rod, or that a rod that slides points to its
+tip. At a leg's limit g does not change with the leg's own joint; nothing is singular there but the pose as coordinates.
+
+Where all rods slide, poses may be anywhere. A chart of those ``far`` away has P / w in the place of the point, one
+component of P being 1: with all lengths times w the equations are smooth at w = 0, and so is half a turn's worth of
+freedom, (1 / w) ∂/∂ψ, along which rates are taken there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ...batch.enclosures import BoxFormula, traced
+from ...closed_forms.legs import ClosedFormLeg, OnCrank, OnRail, SlidingRod
+from ...geometry.components import Components, combination, cosine, cross, dot, minus, plus, scaled, sine, transformed
+from ...geometry.duals import Dual
+from ...geometry.so3 import exponential
+from ...geometry.vectors import Array, hat
+from ...results import Value
+from ...tolerances import FOLLOWED
+from .pose_error import Number, PoseError
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class JointError(Value):
+    """The error to a goal in these coordinates; ``joints`` are the limbs with a joint among them, the others are closed
+    forms of the pose; ``far``: which of the shifts is w in a chart of poses far away."""
+
+    error: PoseError
+    joints: tuple[int, ...]
+    far: int | None = None
+
+    @classmethod
+    def of(cls, error: PoseError) -> JointError:
+        """That about the goal; a rod that slides in a plane turns about the plane's normal."""
+        limbs = tuple(_in_plane(error, limb) for limb in error.limbs)
+        joints = tuple(i for i, limb in enumerate(limbs) if isinstance(limb, OnCrank | OnRail)
+                       or (isinstance(limb, SlidingRod) and limb.axis is not None))
+        return cls(replace(error, limbs=limbs), joints)
+
+    @property
+    def charts(self) -> tuple[JointError, ...]:
+        """Those that together hold all poses: this one, and of those far away where all rods slide; this one alone
+        where that is not so."""
+        limbs = self.error.limbs
+        if len(self.joints) < len(limbs) or not all(isinstance(each, SlidingRod) for each in limbs) or any(
+                each.limb is None for each in self.error.seen):
+            return (self,)
+        return (self, *(replace(self, far=k) for k in range(self.error.shifts.shape[1])))
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Coordinates and equations."""
+        return self.error.size + len(self.joints), len(self.joints)
+
+    @property
+    def periods(self) -> Array:
+        """How far apart coordinates (n,) mean the same: a rod through a point may point either way, E is the same."""
+        found = [*(np.inf for _ in self.error.shifts.T), *(2 * np.pi for _ in self.error.turns.T)]
+        for i in self.joints:
+            limb = self.error.limbs[i]
+            found.append(np.inf if isinstance(limb, OnRail) else
+                         np.pi if isinstance(limb, SlidingRod) and limb.aside == 0 else 2 * np.pi)
+        return np.array(found)
+
+    def box(self, low: Array, high: Array, reach: float) -> tuple[Array, Array]:
+        """The lower and the upper corner of all coordinates, for shifts between two corners, or beyond ``reach``."""
+        error, k, most = self.error, self.error.shifts.shape[1], self.periods / 2
+        if self.far is not None:
+            low, high = (sign * np.where(np.arange(k) == self.far, 1 / reach, 1.0) for sign in (-1.0, 1.0))
+        low, high = np.concatenate([low[:k], -most[k:]]), np.concatenate([high[:k], most[k:]])
+        for place, i in enumerate(self.joints, error.size):
+            limb = error.limbs[i]
+            if isinstance(limb, OnRail):
+                ways = limb.axis @ error.shifts
+                middle = limb.axis @ (error.p + limb.tip.constant - limb.centre) + ways @ (low[:k] + high[:k]) / 2
+                room = limb.rod + np.linalg.norm(limb.tip.turned) + np.abs(ways) @ (high[:k] - low[:k]) / 2
+                low[place], high[place] = middle - room - FOLLOWED, middle + room + FOLLOWED
+        return low, high
+
+    def near(self, y: Array) -> Array:
+        """Coordinates (c, n) of a far chart in the other one, infinite where w may vanish."""
+        y = y.copy()
+        if self.far is not None:
+            w, k = y[:, self.far].copy(), self.error.shifts.shape[1]
+            y[:, self.far] = 1.0
+            with np.errstate(all="ignore"):
+                y[:, :k] /= w[:, None]
+        return y
+
+    def pose(self, y: Array) -> tuple[Array, Array]:
+        """The platform's point (c, 3), in characteristic lengths, and rotation (c, 3, 3) at coordinates (c, n)."""
+        y, k = self.near(y), self.error.shifts.shape[1]
+        turn = exponential(y[:, k : self.error.size] @ self.error.turns.T)
+        return self.error.p + y[:, :k] @ self.error.shifts.T, turn @ self.error.R
+
+    def parts(self, y: Sequence[Any], known: Number) -> tuple[list[Dual], list[Sequence[Dual]], list[Dual]]:
+        """g, the observed directions, and the reach margins of limbs without a joint, with their rates by the
+        coordinates (n,), of which ``known`` makes numbers as well."""
+        error, n, k = self.error, self.size[0], self.error.shifts.shape[1]
+        none = [0.0] * n
+
+        def number(value: Any) -> Any:
+            return [number(each) for each in value] if np.ndim(value) else Dual(known(value), none)
+
+        x = [Dual(y[i], [float(i == j) for j in range(n)]) for i in range(n)]
+        w, place = number(1.0), list(x[:k])
+        if self.far is not None:
+            w, place[self.far] = x[self.far], w
+        point = combination(place, error.shifts, number)
+        turned = self._turned(y, w, known)
+        g, margins, told = list[Dual](), list[Dual](), list[Sequence[Dual]]()
+        for i, limb in enumerate(error.limbs):
+            tip = plus(point, scaled(w, number(error.p + limb.tip.constant)))
+            if np.any(limb.tip.turned):
+                tip = plus(tip, transformed(turned, number(limb.tip.turned)))
+            if i not in self.joints:
+                margin, carried = limb.at(tip, number, limb.mode)
+                margins.append(margin)
+                told.append(carried)
+                continue
+            assert isinstance(limb, OnCrank | OnRail | SlidingRod)
+            assert limb.axis is not None
+            z, one = x[error.size + self.joints.index(i)], np.linalg.svd(limb.axis[None])[2][1]
+            c, s, one, two = cosine(z), sine(z), number(one), number(np.cross(limb.axis, one))
+            way, ring = minus(tip, scaled(w, number(limb.centre))), plus(scaled(c, one), scaled(s, two))
+            if isinstance(limb, SlidingRod):
+                g.append(dot(way, minus(scaled(c, two), scaled(s, one))) - w * number(limb.aside))
+                told.append(ring)
+                continue
+            carried = scaled(number(limb.radius), ring) if isinstance(limb, OnCrank) else scaled(z, number(limb.axis))
+            rod = minus(way, carried)
+            g.append((dot(rod, rod) - number(limb.rod**2)) * 0.5)
+            told.append(scaled(number(1 / limb.rod), rod))
+        seen = [scaled(each.sense, told[each.limb]) if each.limb is not None else
+                plus(transformed(turned, number(each.rule.turned)), number(each.rule.constant))
+                for each in error.seen if each.limb is not None or each.rule is not None]
+        return g, seen, margins
+
+    def _turned(self, y: Sequence[Any], w: Dual, known: Number) -> list[Dual]:
+        """w R by rows: R₀ + sin ψ K R₀ + (1 − cos ψ) K² R₀."""
+        R, k, n = self.error.R, self.error.shifts.shape[1], self.size[0]
+        if not self.error.turns.shape[1]:
+            return [w * Dual(known(each), [0.0] * n) for each in R.ravel()]
+        K, found = hat(self.error.turns[:, 0]), list[Dual]()
+        c, s = cosine(y[k]), sine(y[k])
+        for still, even, odd in zip((R + K @ K @ R).ravel(), (-K @ K @ R).ravel(), (K @ R).ravel(), strict=True):
+            value, rates = known(still) + known(even) * c + known(odd) * s, [0.0] * n
+            rates[k] = known(odd) * c - known(even) * s
+            if self.far is not None:
+                rates[self.far], value = value, y[self.far] * value
+            found.append(Dual(value, rates))
+        return found
+
+    @cached_property
+    def wanted(self) -> list[Components]:
+        """The desired directions."""
+        error = self.error
+        return [error._direction(each, error.p, error.R.ravel(), lambda value: value) for each in error.seen]
+
+    @cached_property
+    def closing(self) -> BoxFormula:
+        """g (k)."""
+        return traced(lambda y, number: [each.value for each in self.parts(y, number)[0]], self.size[0])
+
+    @cached_property
+    def errors(self) -> BoxFormula:
+        """u × u* of all that is observed."""
+        return traced(lambda y, number: [e.value for u, wanted in self._seen(y, number) for e in cross(u, wanted)],
+                      self.size[0])
+
+    @cached_property
+    def directions(self) -> BoxFormula:
+        """u of all that is observed."""
+        return traced(lambda y, number: [each.value for u, _ in self._seen(y, number) for each in u], self.size[0])
+
+    def _seen(self, y: Sequence[Any], number: Number) -> list[tuple[Sequence[Dual], list[Dual]]]:
+        """The observed directions and the desired ones."""
+        none = [0.0] * self.size[0]
+        return [(u, [Dual(number(each), none) for each in wanted])
+                for u, wanted in zip(self.parts(y, number)[1], self.wanted, strict=True)]
+
+    @cached_property
+    def slopes(self) -> BoxFormula:
+        """g (k), its rates (k n), those of E (n), the reach margins of limbs without a joint."""
+        n, _ = self.size
+
+        def formula(y: Sequence[Any], number: Number) -> list[Any]:
+            g, _, margins = self.parts(y, number)
+            slopes = [-total(c.value * c.rates[j] for c in self._cosines(y, number)) for j in range(n)]
+            return [*(each.value for each in g), *(rate for each in g for rate in each.rates), *slopes,
+                    *(each.value for each in margins)]
+
+        return traced(formula, n)
+
+    def _cosines(self, y: Sequence[Any], number: Number) -> list[Dual]:
+        return [dot(u, wanted) for u, wanted in self._seen(y, number)]
+
+    @cached_property
+    def bends(self) -> BoxFormula:
+        """Of coordinates and multipliers: the derivatives by the coordinates of ∇E + μ ∇g (n n) and of g (k n)."""
+        n, k = self.size
+        none = [0.0] * n
+
+        def formula(y: Sequence[Any], number: Number) -> list[Any]:
+            x = [Dual(y[i], [float(i == j) for j in range(n)]) for i in range(n)]
+            mu = [Dual(each, none) for each in y[n:]]
+
+            def known(value: Any) -> Dual:
+                return Dual(number(value), none)
+
+            g, cosines = self.parts(x, known)[0], self._cosines(x, known)
+            rows = [total([*(c.value * c.rates[j] * -1.0 for c in cosines),
+                           *(each.rates[j] * own for each, own in zip(g, mu, strict=True))]) for j in range(n)]
+            return [rate for each in (*rows, *(each.value for each in g))
+                    for rate in (each.rates if isinstance(each, Dual) else none)]
+
+        return traced(formula, n + k)
+
+
+def total(parts: Any) -> Any:
+    """Their sum, without a zero to begin with."""
+    first, *rest = parts
+    for each in rest:
+        first = first + each
+    return first
+
+
+def _in_plane(error: PoseError, limb: ClosedFormLeg) -> ClosedFormLeg:
+    """A rod that slides, with the normal of the plane in which it stays as its axis."""
+    if not isinstance(limb, SlidingRod) or limb.axis is not None or error.shifts.shape[1] != 2:
+        return limb
+    normal = np.cross(*error.shifts.T)
+    off = [normal @ (error.p + limb.tip.constant + error.R @ limb.tip.turned - limb.centre),
+           *(np.cross(normal, error.turns.T).ravel())]
+    return limb if np.abs(off).max() > FOLLOWED else replace(limb, axis=normal)
