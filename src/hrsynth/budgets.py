@@ -375,7 +375,7 @@ RAYS = 3000
 """Rays from a goal along which it is seen, not proved, how high the error rises."""
 RADIUS_BOXES = 60_000
 """Boxes with which a certified radius is tried, at most."""
-COVER_BOXES = 2_000_000
+COVER_BOXES = 6_000_000
 """Boxes of platform poses that are looked at, at most, where all critical points of the error are to be listed."""
 SIGN_BOXES = 80_000
 """Boxes of platform poses of three freedoms, at most, in which those are sought at which the error vanishes; with more

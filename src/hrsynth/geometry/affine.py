@@ -124,6 +124,10 @@ class AffineForms:
         v[0] += shift
         return _rounded(v, self.r * np.abs(slope) + off, 4 * (size + np.abs(v).sum(axis=0)))
 
+    def padded(self, count: int) -> AffineForms:
+        """The same with more symbols, on which it does not depend."""
+        return AffineForms(np.concatenate([self.v, np.zeros((count - len(self.v), *self.r.shape))]), self.r)
+
     def sum(self, axis: int = -1) -> AffineForms:
         """The sum along one of the last dimensions."""
         return _rounded(self.v.sum(axis=axis), self.r.sum(axis=axis), np.abs(self.v).sum(axis=0).sum(axis=axis))

@@ -1,6 +1,7 @@
 """Lists of critical points by subdivision: the members are zeros, no other is met by Newton's method from anywhere, and
 on a closed surface their kinds sum up to what its shape asks for."""
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -9,7 +10,10 @@ import pytest
 from hrsynth import load
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.budgets import COVER_BOXES
-from hrsynth.simulation.endings.cover import cover
+from hrsynth.closed_forms.legs import OnRod
+from hrsynth.geometry.affine import affine
+from hrsynth.simulation.endings.cover import bounds, cover
+from hrsynth.simulation.endings.joint_error import JointError
 from hrsynth.simulation.endings.pose_error import PoseError
 from hrsynth.simulation.endings.subdivision import Subdivision
 from strategies import random_rotation, transformed
@@ -17,20 +21,32 @@ from strategies import random_rotation, transformed
 STEP = 1e-6
 
 
-def slopes(error, x):
+def levels(error, modes, x):
+    """Whether all legs reach (n,), and E, at coordinates (n, size), in some working modes, to the directions in those
+    of the goal."""
+    other = replace(error, limbs=tuple(replace(limb, mode=mode) for limb, mode in zip(error.limbs, modes, strict=True)))
+    with np.errstate(all="ignore"):
+        own, there = (np.array([[np.broadcast_to(c, len(x)) for c in each.u] for each in
+                                one.at(list(at.T), [], lambda value: value).seen])
+                      for one, at in ((error, 0 * x), (other, x)))
+        reached = np.all([margin > 0 for margin in other.at(list(x.T), [], lambda value: value).margins], axis=0)
+    return reached, 0.5 * (1 - (own * there).sum(axis=1) ** 2).sum(axis=0)
+
+
+def slopes(error, modes, x):
     """∇E (n, size) at coordinates, by differences of E alone; no number out of reach."""
     found = []
     for axis in np.eye(error.size):
-        (one, up), (other, down) = (error.levels(x + sign * STEP * axis) for sign in (1, -1))
+        (one, up), (other, down) = (levels(error, modes, x + sign * STEP * axis) for sign in (1, -1))
         found.append(np.where(one & other, up - down, np.nan) / (2 * STEP))
     return np.array(found).T
 
 
-def newton(error, x, steps=20):
+def newton(error, modes, x, steps=20):
     """Zeros of ∇E that Newton's method meets from places (n, size)."""
     for _ in range(steps):
-        g = slopes(error, x)
-        H = np.array([(slopes(error, x + 1e-4 * axis) - slopes(error, x - 1e-4 * axis)) / 2e-4
+        g = slopes(error, modes, x)
+        H = np.array([(slopes(error, modes, x + 1e-4 * axis) - slopes(error, modes, x - 1e-4 * axis)) / 2e-4
                       for axis in np.eye(error.size)]).transpose(1, 0, 2)
         good = np.isfinite(H).all(axis=(1, 2)) & np.isfinite(g).all(axis=1)
         good[good] = np.abs(np.linalg.det(H[good])) > 1e-9
@@ -39,22 +55,49 @@ def newton(error, x, steps=20):
             break
         step = np.linalg.solve(H, g[..., None])[..., 0]
         x = x - step * np.minimum(1, 0.3 / (np.linalg.norm(step, axis=1) + 1e-300))[:, None]
-    return x[np.linalg.norm(slopes(error, x), axis=1) < 1e-7] if len(x) else x
+    return x[np.linalg.norm(slopes(error, modes, x), axis=1) < 1e-7] if len(x) else x
 
 
 def unlisted(setting, found, rng, count=40):
-    """Zeros that Newton's method meets in reach, farther than 1e-4 from all members and from open boxes."""
+    """Zeros that Newton's method meets in reach, in all working modes, farther than 1e-4 from all members and from open
+    boxes."""
     error = PoseError.of(setting, setting.everything.start)
     missed = []
-    for modes in found.modes:
-        here = error.elsewhere(error.p, error.R, modes)
-        listed = np.array([each.x for each in found.found if each.modes == modes]).reshape(-1, error.size)
-        for x in newton(here, rng.uniform(-4, 4, (count, error.size))):
-            near = np.any(np.linalg.norm(listed - x, axis=1) < 1e-4)
-            left = any(np.all(np.abs(x - middle) < half + 1e-3) for middle, half in found.open)
-            if not near and not left and np.all(np.abs(x) < 3):
+    listed = np.array([each.x[: error.size] for each in found.found]).reshape(-1, error.size)
+    for modes in product(*((-1.0, 1.0) if isinstance(limb, OnRod) else (limb.mode,) for limb in error.limbs)):
+        for x in newton(error, modes, rng.uniform(-4, 4, (count, error.size))):
+            left = any(np.all((low - 1e-3 < x) & (x < high + 1e-3)) for low, high in found.open)
+            if not np.any(np.linalg.norm(listed - x, axis=1) < 1e-4) and not left and np.all(np.abs(x) < 3):
                 missed.append((modes, x))
     return missed
+
+
+@pytest.mark.parametrize("name", ["3rrr_m1", "3rpr_m1", "prrrp_m1", "quattro"])
+def test_rates_by_pose_and_joints_are_those_of_differences(name):
+    """Of the equations and of E, in all charts; far away those by the turn are rates over w."""
+    setting, rng = ObservedRobot.of(name), np.random.default_rng(0)
+    whole = JointError.of(PoseError.of(setting, setting.everything.start))
+    for error in whole.charts:
+        n, k = error.size
+        y = rng.uniform(0.2, 1.0, (3, n))
+
+        def at(formula, y):
+            return np.array([each.v[0] for each in formula.at([affine(x, np.zeros((len(y), 0)), 0 * x) for x in y.T])]).T
+
+        def E(y, error=error, at=at):
+            return 0.5 * (at(error.errors, y) ** 2).sum(axis=1)
+
+        told = at(error.slopes, y)
+        for j in range(n):
+            step = STEP * np.eye(n)[j]
+            rate = 1.0 if error.far is None or j != 2 else y[:, error.far]
+            g = (at(error.closing, y + step) - at(error.closing, y - step)) / (2 * STEP)
+            assert np.allclose(g, told[:, k : k + k * n].reshape(3, k, n)[..., j] * np.reshape(rate, (-1, 1)), atol=1e-7)
+            # E of directions that are of length one where g vanishes: by the cosines
+            u = [np.array(at(error.directions, y + sign * step)).reshape(3, -1, 3) for sign in (1, -1)]
+            c = [(each * np.array(error.wanted, dtype=float)).sum(axis=2) for each in u]
+            slope = (0.5 * (c[1] ** 2 - c[0] ** 2)).sum(axis=1) / (2 * STEP)
+            assert np.allclose(slope, told[:, k + k * n : k + k * n + n][:, j] * rate, atol=1e-7)
 
 
 @pytest.mark.slow
@@ -63,11 +106,10 @@ def test_a_closed_surface_of_poses_has_the_kinds_that_its_shape_asks_for():
     minima, saddles and maxima sum up to nothing, signs alternating."""
     rng = np.random.default_rng(0)
     setting = ObservedRobot.of(transformed(load("prrrp_m1"), random_rotation(rng), rng.normal(size=3)))
-    found = cover(setting, setting.everything.start, every_mode=True)
+    found = cover(setting, setting.everything.start)
     assert found.complete
     assert found.bounded
     assert [sum(each.falling == k for each in found.found) for k in range(3)] == [4, 8, 4]
-    assert set(found.modes) == set(product((-1.0, 1.0), repeat=2))
     assert sum(each.error[0] < 1e-5 for each in found.found) == 4
     assert unlisted(setting, found, rng) == []
 
@@ -77,44 +119,88 @@ def test_a_closed_surface_of_poses_has_the_kinds_that_its_shape_asks_for():
 def test_no_other_critical_point_is_met(name, budget):
     """Where boxes are left open, they are told; away from them the list is whole."""
     setting = ObservedRobot.of(name)
-    found = cover(setting, setting.everything.start, every_mode=True, budget=budget or COVER_BOXES, reach=3.0)
+    found = cover(setting, setting.everything.start, budget=budget or COVER_BOXES, reach=3.0)
     assert found.complete is (budget is None)
     assert bool(found.open) is not found.complete
     assert unlisted(setting, found, np.random.default_rng(1)) == []
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("name", "number"), [("rrrrr_m1", -6), ("3prr_m1", 0)])
+@pytest.mark.parametrize(("name", "number"), [
+    pytest.param("rrrrr_m1", -6, marks=pytest.mark.slow), pytest.param("3prr_m1", 0, marks=pytest.mark.slow),
+    pytest.param("3rrr_m1", 0, marks=pytest.mark.long)])
 def test_kinds_sum_up_to_the_number_of_the_closures(name, number):
     """The five-bar's closures make up a surface of genus 4, as those of an equilateral pentagon; of any that have three
     dimensions the number is 0."""
     setting = ObservedRobot.of(name)
-    found = cover(setting, setting.everything.start, every_mode=True)
+    found = cover(setting, setting.everything.start)
     assert found.complete
     assert sum((-1) ** each.falling for each in found.found) == number
 
 
-def test_a_saddle_near_a_limit_is_left_open():
-    """The middle of this box is out of the second leg's reach, one of its corners is a saddle: the sign with which E
-    grows is not read off the middle (3prr_m1, the first leg in its other working mode)."""
+@pytest.mark.slow
+def test_rests_are_listed_however_far_away_they_are():
+    """Of the 3-RPR, whose rods slide without end: at each pose Newton's method on E by hand, (x, y) the platform's point
+    and its turn, stays; one is 274 lengths away, and no start of it leads elsewhere."""
+    setting = ObservedRobot.of("3rpr_m1")
+    goal = setting.configurations[3]
+    found = cover(setting, goal)
+    assert found.complete
+    assert found.bounded
+    error = PoseError.of(setting, goal)
+    hips = np.array([limb.centre[:2] for limb in error.limbs])
+    tips = np.array([limb.tip.constant[:2] + limb.tip.turned[:2] for limb in error.limbs])
+    arms = np.array([(error.R @ limb.tip.turned)[:2] for limb in error.limbs])
+    offsets = np.array([limb.tip.constant[:2] for limb in error.limbs])
+    assert tips.shape == hips.shape
+    aim = np.array([(error.p[:2] + offset + arm - hip) for offset, arm, hip in zip(offsets, arms, hips, strict=True)])
+    wanted = np.arctan2(aim[:, 1], aim[:, 0])
+
+    def pulled(pose):
+        """E's gradient over (x, y, ψ) from the goal; and what its parts are of size."""
+        x, y, turn = pose
+        c, s = np.cos(turn), np.sin(turn)
+        arm = arms @ np.array([[c, s], [-s, c]])
+        r = error.p[:2] + [x, y] + offsets + arm - hips
+        size = np.linalg.norm(r, axis=1)
+        kappa = 0.5 * np.sin(2 * (np.arctan2(r[:, 1], r[:, 0]) - wanted))
+        across = np.column_stack([-r[:, 1], r[:, 0]]) / size[:, None]
+        along = np.column_stack([-arm[:, 1], arm[:, 0]])
+        parts = np.column_stack([across, (across * along).sum(axis=1)]) * (kappa / size)[:, None]
+        return parts.sum(axis=0), np.abs(parts).sum(axis=0) + 1e-12
+
+    poses = np.unique(np.round([each.x[:3] for each in found.found], 6), axis=0)
+    assert len(found.found) == 8 * len(poses) == 224
+    assert np.linalg.norm(poses[:, :2], axis=1).max() > 200
+    for each in found.found:
+        g, size = pulled(each.x[:3])
+        assert np.all(np.abs(g) < 1e-5 * size + 1e-12)
+
+
+@pytest.mark.slow
+def test_a_saddle_near_a_limit_is_found():
+    """The middle of this box of poses is out of the second leg's reach, one of its corners is a saddle (3prr_m1, the
+    first leg in its other working mode)."""
     setting = ObservedRobot.of("3prr_m1")
-    error = PoseError.of(setting, setting.everything.start)
-    error = error.elsewhere(error.p, error.R, (-1.0, 1.0, 1.0))
-    part = Subdivision.of(error, -np.ones(3), np.ones(3))
-    middle, half = np.array([0.35488091, 0.31337551, -0.375]), np.array([0.078, 0.052, 0.125])
-    saddle = np.array([0.279589, 0.33178293, -0.45761711])
+    error = JointError.of(PoseError.of(setting, setting.everything.start))
+    low, high = error.box(*bounds(error.error, 1.0)[:2], 1.0)
+    middle, half = np.array([0.35488091, 0.31337551, -0.7187]), np.array([0.078, 0.052, 0.25])
+    saddle = np.array([0.279589, 0.33178293, 2 * np.arctan(-0.45761711)])
     assert np.all(np.abs(saddle - middle) < half)
-    assert np.linalg.norm(slopes(error, saddle[None])) < 1e-6
-    assert part._open(middle[None], half[None])[0].all()
+    low[:3], high[:3] = middle - half, middle + half
+    part = Subdivision(error, low, high)
+    part.run(100_000)
+    assert not part.left
+    assert min(np.linalg.norm(each.x[:3] - saddle) for each in part.zeros()) < 1e-6
 
 
 def test_the_goal_is_listed_as_a_minimum():
     setting = ObservedRobot.of("prrrp_m1")
     goal = setting.configurations[0]
-    found = cover(setting, goal)
-    (own,) = [each for each in found.found if np.linalg.norm(each.x) < 1e-5]
-    assert (own.falling, found.modes) == (0, (own.modes,))
-    assert own.error[0] <= 1e-9 < own.radius < own.half.min()
+    found = cover(setting, goal, vanishing=True)
+    own = [each for each in found.found if np.linalg.norm(each.x[:2]) < 1e-5]
+    assert [each.falling for each in own] == [0]
+    assert own[0].error[0] == 0.0
+    assert own[0].radius.max() < 1e-6
 
 
 def test_what_is_not_covered_says_why():

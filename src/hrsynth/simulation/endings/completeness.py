@@ -45,7 +45,7 @@ class Covers(Value):
            complete: bool) -> Covers:
         """Those of a goal."""
         tell("boxes")
-        budget = COVER_BOXES if complete else SIGN_BOXES if setting.dof <= 3 else 0
+        budget = COVER_BOXES if complete else SIGN_BOXES
         found = cover(setting, goal, vanishing=True, budget=budget)
         return cls(system, question, found, cover(setting, goal) if complete else None)
 

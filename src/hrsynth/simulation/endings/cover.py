@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -24,7 +23,7 @@ from .subdivision import CriticalBox, Subdivision
 @dataclass(frozen=True, eq=False, repr=False)
 class Cover(Value):
     """What subdivision says of platform poses: all critical points of E there, in all working modes of the legs, but
-    for ``open`` boxes (middle, half, in coordinates about the goal), which are a ``share`` of all. ``bounded``: whether
+    for ``open`` boxes (lower, upper corner, in coordinates about the goal), which are a ``share``. ``bounded``: whether
     the legs cannot reach beyond the box, or poses however far away were looked at too."""
 
     found: tuple[CriticalBox, ...]
@@ -78,9 +77,8 @@ def cover(setting: ObservedRobot, goal: ClosedConfiguration, *, vanishing: bool 
             raise NotEnclosed("the platform turns about more than one axis")
     except NotEnclosed as why:
         return Cover((), (), 1.0, 0, False, str(why))
-    low, high, bounded = bounds(error, reach)
-    charts = JointError.of(error).charts if not bounded else (JointError.of(error),)
-    everywhere = bounded or len(charts) > 1
+    (low, high, bounded), whole = bounds(error, reach), JointError.of(error)
+    charts = (whole,) if bounded else whole.charts
     parts = [Subdivision(each, *each.box(low, high, reach), vanishing) for each in charts]
     found: list[CriticalBox] = []
     for part in parts:
@@ -90,22 +88,13 @@ def cover(setting: ObservedRobot, goal: ClosedConfiguration, *, vanishing: bool 
                 found.append(zero)
     if vanishing:
         found = [each for each in found if each.error[0] == 0.0]
-    left = [box for part in parts for box in _poses(part)]
+    left: list[tuple[Array, Array]] = []
+    for part in (each for each in parts if each.left):
+        corners = part.error.spanned(*map(np.array, zip(*part.left, strict=True)))
+        left += zip(*(each[:, : error.size] for each in corners), strict=True)
     return Cover(tuple(_mirrored(error, found)), tuple(left), sum(each.share for each in parts) / len(parts),
-                 sum(each.boxes for each in parts), everywhere, "",
-                 None if len(charts) > 1 else (low, high), error)
-
-
-def _poses(part: Subdivision) -> Iterator[tuple[Array, Array]]:
-    """The shifts and turns of boxes that are left open."""
-    size, error = part.error.error.size, part.error
-    for middle, half in part.left:
-        corners = np.array([middle[:size] + np.array(signs) * half[:size] for signs in product((-1, 1), repeat=size)])
-        corners = error.near(corners)
-        if error.far is not None and abs(middle[error.far]) <= half[error.far]:
-            corners[:, : error.error.shifts.shape[1]] *= np.inf
-        low, high = corners.min(axis=0), corners.max(axis=0)
-        yield (low + high) / 2, (high - low) / 2
+                 sum(each.boxes for each in parts), bounded or len(charts) > 1, "",
+                 (low, high) if len(charts) == 1 else None, error)
 
 
 def _mirrored(error: PoseError, found: list[CriticalBox]) -> list[CriticalBox]:
@@ -113,15 +102,9 @@ def _mirrored(error: PoseError, found: list[CriticalBox]) -> list[CriticalBox]:
     points with all choices of that."""
     both = [k for k, each in enumerate(error.seen) if each.limb is not None
             and isinstance(leg := error.limbs[each.limb], SlidingRod) and leg.aside == 0]
-    return [replace(each, directions=each.directions * signs[:, None]) for choice in
-            product((1.0, -1.0), repeat=len(both)) for signs in [_signs(len(error.seen), both, choice)]
-            for each in found]
-
-
-def _signs(count: int, places: list[int], values: tuple[float, ...]) -> Array:
-    found = np.ones(count)
-    found[places] = values
-    return found
+    signs = np.ones((2 ** len(both), len(error.seen), 1))
+    signs[:, both, 0] = list(product((1.0, -1.0), repeat=len(both)))
+    return [replace(each, directions=each.directions * own) for own in signs for each in found]
 
 
 def bounds(error: PoseError, reach: float) -> tuple[Array, Array, bool]:

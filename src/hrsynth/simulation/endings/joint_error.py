@@ -6,8 +6,8 @@ rod that slides, or the way of its slider. Equations g: the length of a rod, or 
 tip. At a leg's limit g does not change with the leg's own joint; nothing is singular there but the pose as coordinates.
 
 Where all rods slide, poses may be anywhere. A chart of those ``far`` away has P / w in the place of the point, one
-component of P being 1: with all lengths times w the equations are smooth at w = 0, and so is half a turn's worth of
-freedom, (1 / w) ∂/∂ψ, along which rates are taken there.
+component of P being 1: with all lengths times w the equations are smooth at w = 0, and so are rates
+along (1 / w) ∂/∂ψ, which are taken there.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -88,14 +89,24 @@ class JointError(Value):
         return low, high
 
     def near(self, y: Array) -> Array:
-        """Coordinates (c, n) of a far chart in the other one, infinite where w may vanish."""
+        """Coordinates (…, n) of a far chart in the one about the goal, no numbers where w vanishes."""
         y = y.copy()
         if self.far is not None:
-            w, k = y[:, self.far].copy(), self.error.shifts.shape[1]
-            y[:, self.far] = 1.0
+            w, k = y[..., self.far].copy(), self.error.shifts.shape[1]
+            y[..., self.far] = 1.0
             with np.errstate(all="ignore"):
-                y[:, :k] /= w[:, None]
+                y[..., :k] /= w[..., None]
         return y
+
+    def spanned(self, middle: Array, half: Array) -> tuple[Array, Array]:
+        """What boxes (c, n) hold in the chart about the goal, boundless where w may vanish."""
+        if self.far is None:
+            return middle - half, middle + half
+        ends = np.stack([self.near(middle + half * signs) for signs in product((-1.0, 1.0), repeat=middle.shape[1])])
+        low, high = ends.min(axis=0), ends.max(axis=0)
+        k, endless = self.error.shifts.shape[1], np.abs(middle[:, self.far]) <= half[:, self.far]
+        low[endless, :k], high[endless, :k] = -np.inf, np.inf
+        return low, high
 
     def pose(self, y: Array) -> tuple[Array, Array]:
         """The platform's point (c, 3), in characteristic lengths, and rotation (c, 3, 3) at coordinates (c, n)."""
@@ -141,9 +152,12 @@ class JointError(Value):
             rod = minus(way, carried)
             g.append((dot(rod, rod) - number(limb.rod**2)) * 0.5)
             told.append(scaled(number(1 / limb.rod), rod))
-        seen = [scaled(each.sense, told[each.limb]) if each.limb is not None else
-                plus(transformed(turned, number(each.rule.turned)), number(each.rule.constant))
-                for each in error.seen if each.limb is not None or each.rule is not None]
+        seen = list[Sequence[Dual]]()
+        for each in error.seen:
+            if each.limb is not None:
+                seen.append(scaled(each.sense, told[each.limb]))
+            elif each.rule is not None:
+                seen.append(plus(transformed(turned, number(each.rule.turned)), number(each.rule.constant)))
         return g, seen, margins
 
     def _turned(self, y: Sequence[Any], w: Dual, known: Number) -> list[Dual]:

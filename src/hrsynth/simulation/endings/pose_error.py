@@ -99,12 +99,6 @@ class Turning:
         return [cross(minus(plain, scaled(normal / self.along, self.slip)), self.wanted)
                 for plain, normal in zip(self.plain, self.normal, strict=True)]
 
-    @property
-    def slopes(self) -> tuple[list[Any], Any]:
-        """e · ė = −(u · u*) (u̇ · u*) along each direction: the plain part; κ of the rest, κ ``normal``/``along``."""
-        c = dot(self.u, self.wanted)
-        return [-(c * dot(plain, self.wanted)) for plain in self.plain], c * dot(self.slip, self.wanted)
-
 
 @dataclass(frozen=True, eq=False)
 class ErrorRates:
@@ -117,15 +111,6 @@ class ErrorRates:
     def E(self) -> Any:
         """½ Σ |e|²."""
         return 0.5 * sum(dot(e, e) for e in (each.error for each in self.seen))
-
-    @property
-    def slopes(self) -> list[Any]:
-        """E's rates along the directions, where no leg is at its limit."""
-        parts = []
-        for each in self.seen:
-            plain, steep = each.slopes
-            parts.append([a + steep * normal / each.along for a, normal in zip(plain, each.normal, strict=True)])
-        return [sum(column) for column in zip(*parts, strict=True)]
 
 
 @dataclass(frozen=True, eq=False, repr=False)

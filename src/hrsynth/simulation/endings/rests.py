@@ -158,10 +158,10 @@ class RestCover(Value):
         if cover.error is None:
             return ""
         k = cover.error.shifts.shape[1]
-        middle, half = (np.array(each)[:, :k] for each in zip(*cover.open, strict=True))
-        if not np.isfinite(half).all():
+        low, high = (np.array(each)[:, :k] for each in zip(*cover.open, strict=True))
+        corners = np.stack([low.min(axis=0), high.max(axis=0)])
+        if not np.isfinite(corners).all():
             return ", some however far away"
-        corners = np.stack([(middle - half).min(axis=0), (middle + half).max(axis=0)])
         about = cover.error.length * (cover.error.p + cover.error.shifts @ corners.mean(axis=0))
         size = cover.error.length * float(np.ptp(corners, axis=0).max())
         return f", in {size:.3g} m about ({', '.join(f'{x:.3g}' for x in about)})"

@@ -42,13 +42,12 @@ ROUNDED = 1e-12
 @dataclass(frozen=True, eq=False, repr=False)
 class CriticalBox(Value):
     """A pose ``p`` (m), ``R`` about which exactly one critical point is proved: in coordinates it lies within
-    ``radius`` of ``x`` and is the only one within ``half``; ``error`` encloses ‖e‖; ``falling`` is the number of
-    directions in which E falls (None where that is not decided); ``directions`` those observed (legs, 3)."""
+    ``radius`` of ``x``; ``error`` encloses ‖e‖; ``falling`` is the number of directions in which E falls (None where
+    that is not decided); ``directions`` those observed (legs, 3)."""
 
     p: Array
     R: Array
     x: Array
-    half: Array
     radius: Array
     error: tuple[float, float]
     falling: int | None
@@ -121,7 +120,7 @@ class Subdivision:
                                 AffineForms(follow.v[:, look], follow.r[look]))
             settled, F = self._settled(tube, P[look], N[look])
             step = _solved(np.moveaxis(F.v[1:], 0, -1), F.v[0])
-            likely = ~settled & np.all(np.abs(step) < 3.0, axis=1) & np.isfinite(F.r).all(axis=1)
+            likely = ~settled & np.isfinite(F.r).all(axis=1) & (tiny[look] | np.all(np.abs(step) < 3.0, axis=1))
             for wider in WIDER:
                 at = look[likely]
                 if len(at):
@@ -166,7 +165,8 @@ class Subdivision:
 
     def _unique(self, middle: Array, half: Array, P: Places, wider: float) -> Flags:
         """Boxes (c, n) in which, made ``wider``, exactly one zero is proved, or that there is none in them."""
-        (n, k), wide = self.error.size, wider * np.maximum(half, THINNEST * half.max(axis=1, keepdims=True))
+        (n, k), wide = self.error.size, np.maximum(
+            wider * np.maximum(half, THINNEST * half.max(axis=1, keepdims=True)), MET_AGAIN)
         _, M, slope, _ = self._values(_forms(middle, 0 * half))
         back = _inverted(_columns(M.v[0], P))
         mu = np.nan_to_num(-(np.take_along_axis(slope.v[0], P, 1)[:, None] @ back)[:, 0])
@@ -180,7 +180,7 @@ class Subdivision:
         with np.errstate(all="ignore"):
             room = pull.size.max(axis=1, initial=0.0) / (1 - off) * (1 + ROUNDED)
         known = np.isfinite(room) & (room >= 0)
-        room = np.where(known, room, 1.0)[:, None] * np.ones(k)
+        room = np.where(known, np.maximum(room, MET_AGAIN), 1.0)[:, None] * np.ones(k)
         at, about = np.concatenate([middle, mu], axis=1), np.concatenate([wide, WIDER[0] * room], axis=1)
         shift, reach = self._krawczyk(at, about)
         with np.errstate(all="ignore"):
@@ -212,74 +212,58 @@ class Subdivision:
         rates = self._values(_forms(at, about)[:n])[1]
         c, K = len(at), AffineForms(np.zeros((len(out.v), len(at), n + k, n + k)), np.zeros((len(at), n + k, n + k)))
         K.v[..., :n, :n], K.r[:, :n, :n] = out.v[..., : n * n].reshape(-1, c, n, n), out.r[:, : n * n].reshape(c, n, n)
-        K.v[..., n:, :n], K.r[:, n:, :n] = (each[..., n * n :].reshape(*lead, c, k, n) for each, lead in
-                                            ((out.v, (-1,)), (out.r, ())))
+        K.v[..., n:, :n] = out.v[..., n * n :].reshape(len(out.v), c, k, n)
+        K.r[:, n:, :n] = out.r[:, n * n :].reshape(c, k, n)
         K.v[..., :n, n:], K.r[:, :n, n:] = np.swapaxes(rates.v, -1, -2), np.swapaxes(rates.r, -1, -2)
         return phi, K
 
     def zeros(self) -> list[CriticalBox]:
-        """The zeros that were proved, enclosed in the chart that is not far away; those of which that fails are left
-        open."""
+        """The zeros that were proved, enclosed; those that may be at no finite place are left open."""
         if not self.proved:
             return []
-        n, k = self.error.size
-        chart = self if self.error.far is None else Subdivision(JointError(self.error.error, self.error.joints),
-                                                                self.low, self.high)
+        n, far = self.error.size[0], self.error.far
         at, room = (np.array(each) for each in zip(*self.proved, strict=True))
-        x = np.concatenate([self.error.near(at[:, :n]), at[:, n:]], axis=1)
-        if chart is not self:
-            # the multipliers there
-            _, M, slope, _ = chart._values(_forms(x[:, :n], 0 * x[:, :n]))
-            x[:, n:] = _multipliers(M.v[0], slope.v[0])
+        x, reach, left = at.copy(), room.copy(), np.arange(len(at))
         for _ in range(8):
-            x = x - chart._krawczyk(x, 0 * x)[0]
-        about, reach, left = np.zeros(x.shape), np.full(x.shape, np.inf), np.arange(len(x))
+            x = x - self._krawczyk(x, 0 * x)[0]
         for radius in MET_AGAIN * 4.0 ** np.arange(8):
-            size = np.full((len(left), n + k), radius)
-            found = chart._krawczyk(x[left], size)[1]
-            done = np.all(found < size, axis=1)
-            about[left[done]], reach[left[done]] = size[done], found[done]
+            found = self._krawczyk(x[left], np.full(x[left].shape, radius))[1]
+            done = np.all((found < radius) & (np.abs(x - at)[left] + radius <= room[left]), axis=1)
+            reach[left[done]] = found[done]
             left = left[~done]
             if not len(left):
                 break
-        inside = self._within(x[:, :n], at[:, :n], room[:, :n]) & np.isfinite(reach).all(axis=1)
-        own = ~inside & (chart is self)
-        x[own], about[own], reach[own] = at[own], room[own], room[own]
-        lost = ~inside & ~own
-        self.left += [(at[i, :n], room[i, :n]) for i in np.flatnonzero(lost)]
-        return chart._told(x[~lost], about[~lost], reach[~lost])
+        x[left] = at[left]
+        if far is not None:
+            endless = np.abs(x[:, far]) <= reach[:, far]
+            self.left += [(at[i, :n], room[i, :n]) for i in np.flatnonzero(endless)]
+            x, reach = x[~endless], reach[~endless]
+        return self._told(x, reach) if len(x) else []
 
-    def _within(self, x: Array, at: Array, room: Array) -> Flags:
-        """Whether coordinates of the other chart are within a room of this one's."""
-        y = x.copy()
-        if (far := self.error.far) is not None:
-            size = self.error.error.shifts.shape[1]
-            own = y[:, far].copy()
-            with np.errstate(all="ignore"):
-                y[:, :size] /= own[:, None]
-                y[:, far] = 1 / own
-        return np.asarray(np.all(np.abs(y - at) <= room, axis=1))
-
-    def _told(self, x: Array, about: Array, reach: Array) -> list[CriticalBox]:
+    def _told(self, x: Array, reach: Array) -> list[CriticalBox]:
         """What boxes with one zero each hold."""
-        (n, k), error = self.error.size, self.error.error
-        if not len(x):
-            return []
-        falling = negative(self._equations(x, about)[1]) - k
-        forms = _forms(x[:, :n], reach[:, :n])
+        (n, k), error, far = self.error.size, self.error.error, self.error.far
+        K, forms = self._equations(x, reach)[1], _forms(x[:, :n], reach[:, :n])
+        if far is not None and error.turns.shape[1]:
+            # rates by the turn itself, so that K is symmetric at the zero
+            place = error.shifts.shape[1]
+            row = K[..., place, :] * forms[far].padded(len(K.v))[..., None]
+            K.v[..., place, :], K.r[:, place] = row.v, row.r
+        falling = negative(K) - k
         e, u = stacked(self.error.errors.at(forms)), stacked(self.error.directions.at(_forms(x[:, :n], 0 * x[:, :n])))
         least, most = np.maximum(np.maximum(e.low, -e.high), 0.0), e.size
         p, R = self.error.pose(x[:, :n])
-        return [CriticalBox(error.length * p[i], R[i], x[i, :n], about[i, :n], reach[i, :n],
+        low, high = self.error.spanned(x[:, :n], reach[:, :n])
+        return [CriticalBox(error.length * p[i], R[i], (low[i] + high[i]) / 2, (high[i] - low[i]) / 2,
                             (float(np.linalg.norm(least[i])), float(np.linalg.norm(most[i]))),
                             int(falling[i]) if falling[i] >= 0 else None, u.v[0, i].reshape(-1, 3))
                 for i in range(len(x))]
 
 
 def _forms(middle: Array, half: Array) -> list[AffineForms]:
-    """The coordinates of boxes (c, n)."""
-    eye = np.eye(middle.shape[1])
-    return [affine(middle[:, i], half[:, i, None] * eye[i], np.zeros(len(middle))) for i in range(len(eye))]
+    """The coordinates of boxes (c, n), and what cutting and narrowing them may have rounded."""
+    eye, off = np.eye(middle.shape[1]), AFFINE_ROUNDING * (1 + np.abs(middle))
+    return [affine(middle[:, i], half[:, i, None] * eye[i], off[:, i]) for i in range(len(eye))]
 
 
 def _narrowed(g: AffineForms, P: Places | None = None) -> tuple[Array, Array]:
@@ -362,11 +346,6 @@ def _reduced(M: AffineForms, slope: AffineForms, P: Places, N: Places) -> Affine
     return rest
 
 
-def _multipliers(M: Array, slope: Array) -> Array:
-    """μ (c, k) for which ∇E + μ ∇g is least."""
-    return -(slope[:, None] @ np.linalg.pinv(M))[:, 0]
-
-
 def _away(F: AffineForms) -> Flags:
     """Whether F (c, d) is enclosed away from zero: a component of it, F along its own middle, or a component in the
     coordinates in which it is nearest to the box's own."""
@@ -380,8 +359,8 @@ def _away(F: AffineForms) -> Flags:
 
 def _inverted(A: Array) -> Array:
     """Inverses (c, k, k); no numbers where there is none."""
-    good = np.isfinite(A).all(axis=(1, 2))
-    good[good] = np.abs(np.linalg.det(A[good])) > 0
+    good = np.asarray(np.isfinite(A).all(axis=(1, 2)))
+    good &= np.abs(np.linalg.det(np.where(good[:, None, None], A, np.eye(A.shape[-1])))) > 0
     return np.where(good[:, None, None], np.linalg.inv(np.where(good[:, None, None], A, np.eye(A.shape[-1]))), np.nan)
 
 
