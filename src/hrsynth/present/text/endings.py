@@ -64,7 +64,7 @@ def _complete(found: Endings) -> list[str]:
     where = ("wherever the legs reach" if found.cover.within is None else
              f"with the point within {found.cover.within:.3g} m of the goal's either way")
     return [f"all rests, proved by {found.cover.cover.boxes:,} boxes of poses: no other in any working mode of the "
-            f"watched legs, {where}"]
+            f"legs, {where}"]
 
 
 def _enclosed(found: Endings, boxed: list[RestPoint]) -> list[str]:

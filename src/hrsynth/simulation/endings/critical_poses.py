@@ -71,24 +71,26 @@ class CriticalPoses(Value):
 
 
 def critical_poses(setting: ObservedRobot, goal: ClosedConfiguration, seed: int = 0) -> tuple[
-        PoseError, CriticalPoses] | None:
-    """What is found, in rounds until these add little; None where the error is no closed form of the pose."""
+        PoseError, CriticalPoses, CriticalPoses] | None:
+    """The isolated ones that are found, in rounds until these add little, and one each of those that fill curves; None
+    where the error is no closed form of the pose."""
     try:
         error = PoseError.of(setting, goal)
     except NotEnclosed:
         return None
     rng, systems = np.random.default_rng([seed, 2]), [LegSystem.of(error, held) for held in _held(error)]
-    found = _none(systems[0])
+    found, continua = _none(systems[0]), dict[tuple[int, ...], CriticalPoses]()
     fresh: list[int] = []
     for _ in range(POSE_ROUNDS):
         before = len(found)
         for system in systems:
             tell("poses")
-            found = _apart(found, _round(system, rng))
+            drawn, flat = _round(system, rng)
+            found, continua = _apart(found, drawn), flat | continua
         fresh.append(len(found) - before)
-        if len(fresh) > 2 and sum(fresh[-2:]) <= POSE_LATE * len(found):
+        if len(fresh) > 2 and sum(fresh[-2:]) <= POSE_LATE * len(found) and found.unmet <= POSE_LATE * len(found):
             break
-    return error, _mirrored(error, found)
+    return error, _mirrored(error, found), _joined([_none(systems[0]), *continua.values()])
 
 
 def _apart(found: CriticalPoses, drawn: CriticalPoses) -> CriticalPoses:
@@ -112,10 +114,10 @@ def _held(error: PoseError) -> list[tuple[int, ...]]:
     return [chosen for size in range(min(len(free), error.size - 1) + 1) for chosen in combinations(free, size)]
 
 
-def _round(system: LegSystem, rng: np.random.Generator) -> CriticalPoses:
-    """Starts led to critical points of each index: those at which the legs that are not looked at reach, isolated, and
-    whose held legs hold them. Half of the starts are random poses; of half a leg's joints are so, which are more often
-    near its limits."""
+def _round(system: LegSystem, rng: np.random.Generator) -> tuple[CriticalPoses, dict[tuple[int, ...], CriticalPoses]]:
+    """Starts led to critical points of each index: those at which the legs that are not looked at reach, and whose held
+    legs hold them, isolated; of others one for each value of E and signs of the curvatures. Half of the starts are
+    random poses; of half a leg's joints are so, which are more often near its limits."""
     error = system.error
     low, high, _ = bounds(error, FARTHER * COVER_REACH)
     k, n = error.shifts.shape[1], system.quaternion.stop
@@ -126,13 +128,16 @@ def _round(system: LegSystem, rng: np.random.Generator) -> CriticalPoses:
     with np.errstate(all="ignore"):
         index = rng.integers(system.size[0] - system.size[1] + 1, size=len(y))
         points = descend(system, y, np.where(rng.random(len(y)) < POSE_NEWTON, -1, index), 0)
-        kept = [each for each in points if np.abs(each.curvatures).min(initial=1.0) > SAME_ENDING
-                and all(abs(each.multipliers[row]) > SAME_ENDING for row in system.holding)]
+        kept = [each for each in points if all(abs(each.multipliers[row]) > SAME_ENDING for row in system.holding)]
         y = np.array([each.q for each in kept]).reshape(len(kept), system.size[0])
-        falling = np.array([np.sum(each.curvatures < 0) for each in kept], dtype=np.intp)
+        falling = np.array([np.sum(each.curvatures < -SAME_ENDING) for each in kept], dtype=np.intp)
+        flat = np.array([np.sum(np.abs(each.curvatures) <= SAME_ENDING) for each in kept], dtype=np.intp)
         found = CriticalPoses(error.length * system.point(y), system.turned(y), system.directions(y), falling,
                               np.ones(len(y), dtype=np.intp))
-        return found.some(system.reached(y))
+        reached = system.reached(y)
+    families: dict[tuple[int, ...], CriticalPoses] = {(int(falling[k]), int(flat[k]), round(kept[k].value / SAME_ENDING)): found.some(np.array([k]))
+                for k in np.flatnonzero(reached & (flat > 0))}
+    return found.some(reached & (flat == 0)), families
 
 
 def _none(system: LegSystem) -> CriticalPoses:
@@ -260,13 +265,15 @@ class Lift:
 
 @dataclass(frozen=True, eq=False)
 class Further:
-    """The critical points at critical poses: those that configurations of a pool (n, N) lead to, and that ``fit``."""
+    """The critical points at critical poses, ``continua`` among them: those that configurations of a pool (n, N) lead
+    to, and that ``fit``."""
 
     lift: Lift
     poses: CriticalPoses
+    continua: CriticalPoses
     idle: int
     fit: Fit
 
     def __call__(self, pool: Array) -> list[CriticalPoint]:
-        q, done = self.lift(self.poses, pool, self.fit)
+        q, done = self.lift(_joined([self.poses, self.continua]), pool, self.fit)
         return descend(self.lift.system, q[done], np.full(int(done.sum()), -1), self.idle)

@@ -150,7 +150,7 @@ class RestSearch:
         if told is None:
             return None
         seen = self.setting.samples.members[0].relation
-        return Further(Lift(self.system, self.law.question.observations, told[0]), told[1],
+        return Further(Lift(self.system, self.law.question.observations, told[0]), *told[1:],
                        seen.mobility - seen.dimension, self._near_mode)
 
     def _lists(self, found: Sequence[Critical]) -> list[SignedModes]:
