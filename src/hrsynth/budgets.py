@@ -267,8 +267,6 @@ ENDING_EFFORT = 300
 """Coordinates of all rounds together, up to which there may be more rounds of robots with few."""
 ENDING_DESCENTS, ENDING_LEAST = 3, 7
 """Rounds before the last one at least where only what attracts is sought, and where all rests are."""
-ENDING_NEWTON = 0.3
-"""Share of the starts that are led by Newton's method where rests are not sought over the pose as well."""
 ENDING_LATE = 0.005
 """Part of the critical points that the later half of the starts may find first for the search to end."""
 ENDING_LATE_DESCENT = 0.02

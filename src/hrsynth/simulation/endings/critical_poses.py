@@ -135,8 +135,9 @@ def _round(system: LegSystem, rng: np.random.Generator) -> tuple[CriticalPoses, 
         found = CriticalPoses(error.length * system.point(y), system.turned(y), system.directions(y), falling,
                               np.ones(len(y), dtype=np.intp))
         reached = system.reached(y)
-    families: dict[tuple[int, ...], CriticalPoses] = {(int(falling[k]), int(flat[k]), round(kept[k].value / SAME_ENDING)): found.some(np.array([k]))
-                for k in np.flatnonzero(reached & (flat > 0))}
+    families: dict[tuple[int, ...], CriticalPoses] = {}
+    for k in np.flatnonzero(reached & (flat > 0)):
+        families[int(falling[k]), int(flat[k]), round(kept[k].value / SAME_ENDING)] = found.some(np.array([k]))
     return found.some(reached & (flat == 0)), families
 
 

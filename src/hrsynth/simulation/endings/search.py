@@ -24,7 +24,6 @@ from ...budgets import (
     ENDING_LATE,
     ENDING_LATE_DESCENT,
     ENDING_LEAST,
-    ENDING_NEWTON,
     ENDING_ROUNDS,
     ENDING_STARTS,
     ENDING_STEPS,
@@ -353,9 +352,6 @@ def critical_points(system: RestSystem, setting: ObservedRobot, goal: ClosedConf
         tell("starts")
         # what attracts matters most: two of five starts go down all along
         index = rng.integers(freedoms + 1, size=len(q)) * (rng.random(len(q)) < (0.0 if minima else 0.6))
-        if further is None and not minima:
-            # where the pose is not searched, Newton's method finds what other saddles hide
-            index = np.where(rng.random(len(q)) < ENDING_NEWTON, -1, index)
         points += descend(system, q, index, idle)
         fresh.append(known.add(points))
         points = []
