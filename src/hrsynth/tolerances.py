@@ -383,14 +383,18 @@ CERTIFIED_LEVEL = 0.95
 RADIUS_SHARES = (0.97, 0.9, 0.8, 0.65, 0.5, 0.3)
 """Parts of the radius that rays show that are tried, one after the other, as the certified one."""
 MET_AGAIN = 1e-7
-"""How far apart (characteristic lengths, directions) one critical point can seem in two charts; boxes in which there is
-one alone are a thousand times as large."""
+"""Half the edge (characteristic lengths, radians) of the smallest box in which it is tried to prove one critical point:
+the file's numbers are known to a hundredth of that."""
+THINNEST_BOX = 1e-3
+"""Least ratio of such a box's edges."""
 COVER_REACH = 1.0
 """Half the width (characteristic lengths) of the box of platform positions that is looked at where legs have none."""
 SHORTEST_ROD = 0.05
 """Length (characteristic lengths) of a rod that slides below which its leg counts as out of reach."""
+BOX_ROUNDING = 1e-12
+"""What rounding makes of the edges of a box that equations narrow, relative to them."""
 SMALLEST_BOX = 1e-6
-"""Part of the whole box below which a box of poses that is not settled is left open."""
+"""Part of the whole box below which a box of poses and joints that is not settled is left open."""
 
 # The audit of published tables
 

@@ -20,7 +20,7 @@ from ...budgets import BOXES_AT_ONCE
 from ...geometry.affine import AffineForms, affine, combined, stacked
 from ...geometry.vectors import Array
 from ...results import Value
-from ...tolerances import AFFINE_ROUNDING, MET_AGAIN, SHORTEST_ROD, SMALLEST_BOX
+from ...tolerances import AFFINE_ROUNDING, BOX_ROUNDING, MET_AGAIN, SHORTEST_ROD, SMALLEST_BOX, THINNEST_BOX
 from .cones import cut
 from .enclosure import negative
 from .joint_error import JointError
@@ -29,14 +29,10 @@ Flags = NDArray[np.bool_]
 Places = NDArray[np.intp]
 WIDER = (1.25, 4.0)
 """By how much boxes are larger in which exactly one zero is to be proved, one after the other."""
-THINNEST = 1e-3
-"""Least ratio of the edges of such a box."""
 STRETCHED = 8.0
 """Ratio of a box's edges, as parts of those of the whole, above which the longest is cut."""
 NARROWED = 0.6
 """Part of an edge to which g = 0 narrows it below which a box is looked at again before it is cut."""
-ROUNDED = 1e-12
-"""What rounding makes of a box's edges, relative to them."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -111,7 +107,7 @@ class Subdivision:
         inner = _narrowed(follow, P)
         low, high = np.maximum(low, inner[0]), np.minimum(high, inner[1])
         gone |= np.any(low > high, axis=1)
-        own, size = middle + half * (low + high) / 2, half * np.maximum((high - low) / 2, 0.0) * (1 + ROUNDED)
+        own, size = middle + half * (low + high) / 2, half * np.maximum((high - low) / 2, 0.0) * (1 + BOX_ROUNDING)
         axis = np.full(len(middle), -1)
         tiny = np.all(size <= 100 * SMALLEST_BOX * self.whole, axis=1)
         look = np.flatnonzero(~gone & (tiny | np.all(high - low >= 2 * NARROWED, axis=1)))
@@ -166,7 +162,7 @@ class Subdivision:
     def _unique(self, middle: Array, half: Array, P: Places, wider: float) -> Flags:
         """Boxes (c, n) in which, made ``wider``, exactly one zero is proved, or that there is none in them."""
         (n, k), wide = self.error.size, np.maximum(
-            wider * np.maximum(half, THINNEST * half.max(axis=1, keepdims=True)), MET_AGAIN)
+            wider * np.maximum(half, THINNEST_BOX * half.max(axis=1, keepdims=True)), MET_AGAIN)
         _, M, slope, _ = self._values(_forms(middle, 0 * half))
         back = _inverted(_columns(M.v[0], P))
         mu = np.nan_to_num(-(np.take_along_axis(slope.v[0], P, 1)[:, None] @ back)[:, 0])
@@ -178,7 +174,7 @@ class Subdivision:
         off = (combined(turned, AffineForms(np.swapaxes(rates.v, -1, -2), np.swapaxes(rates.r, -1, -2)))
                - np.eye(k)).size.sum(axis=-1).max(axis=1, initial=0.0)
         with np.errstate(all="ignore"):
-            room = pull.size.max(axis=1, initial=0.0) / (1 - off) * (1 + ROUNDED)
+            room = pull.size.max(axis=1, initial=0.0) / (1 - off) * (1 + BOX_ROUNDING)
         known = np.isfinite(room) & (room >= 0)
         room = np.where(known, np.maximum(room, MET_AGAIN), 1.0)[:, None] * np.ones(k)
         at, about = np.concatenate([middle, mu], axis=1), np.concatenate([wide, WIDER[0] * room], axis=1)
@@ -275,7 +271,7 @@ def _narrowed(g: AffineForms, P: Places | None = None) -> tuple[Array, Array]:
         size = np.where(np.arange(size.shape[2]) == P[:, :, None], size, 0.0)
     rest = np.abs(J).sum(axis=2, keepdims=True) - np.abs(J) * (size > 0) + g.r[:, :, None]
     with np.errstate(all="ignore"):
-        far = np.where(size > 0, rest * (1 + ROUNDED) / size, np.inf) + ROUNDED
+        far = np.where(size > 0, rest * (1 + BOX_ROUNDING) / size, np.inf) + BOX_ROUNDING
         at = np.where(size > 0, -g.v[0][:, :, None] / J, 0.0)
     far, at = np.where(np.isfinite(far) & np.isfinite(at), far, np.inf), np.where(np.isfinite(at), at, 0.0)
     return (at - far).max(axis=1, initial=-1.0), (at + far).min(axis=1, initial=1.0)
@@ -293,7 +289,7 @@ def _tube(middle: Array, half: Array, old: Array, edges: Array, P: Places, N: Pl
         shift = np.where(was > 0, np.take_along_axis(middle - old, N, 1) / was, 0.0)
         J, wide = _columns(np.moveaxis(follow.v[1:], 0, -1), N), np.take_along_axis(edges, P, 1)
         at = np.take_along_axis(old, P, 1) - wide * (follow.v[0] + (J * shift[:, None]).sum(-1))
-        along, doubt = -wide[:, :, None] * J * ratio[:, None], wide * (follow.r + ROUNDED)
+        along, doubt = -wide[:, :, None] * J * ratio[:, None], wide * (follow.r + BOX_ROUNDING)
     plain = np.take_along_axis(half, P, 1)
     good = np.isfinite(doubt) & np.isfinite(at) & np.isfinite(along).all(axis=-1) & (doubt < plain)
     centre = middle.copy()
