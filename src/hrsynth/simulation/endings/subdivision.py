@@ -229,7 +229,10 @@ class Subdivision:
             left = left[~done]
             if not len(left):
                 break
-        x[left] = at[left]
+        # nearly flat ones are no better enclosed than by the room, but told where Newton's method puts them
+        inside = np.all(np.abs(x - at)[left] <= room[left], axis=1)
+        x[left] = np.where(inside[:, None], x[left], at[left])
+        reach[left] = room[left] + np.abs(x - at)[left]
         if far is not None:
             endless = np.abs(x[:, far]) <= reach[:, far]
             self.left += [(at[i, :n], room[i, :n]) for i in np.flatnonzero(endless)]
