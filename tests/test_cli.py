@@ -261,6 +261,7 @@ def test_check_text_names_the_singularity(run):
         assert re.search(line, answer.out, re.MULTILINE), answer.out
 
 
+@pytest.mark.slow
 def test_check_writes_a_picture_or_a_table(run, tmp_path: Path):
     picture, table = tmp_path / "map.png", tmp_path / "map.csv"
     grid = ["--grid", f"x=-0.4:0.4:3,y=0.25:{2 * (0.16 + 0.03**0.5) - 0.25!r}:3"]

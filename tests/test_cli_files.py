@@ -166,6 +166,7 @@ def parts(terminal: int) -> str:
         return ""
 
 
+@pytest.mark.slow
 def test_a_long_silence_has_its_bar():
     """Work that tells nothing shows a bar after a second all the same, on a terminal; else nothing, but for a line
     now and then of what takes longer still."""

@@ -41,6 +41,7 @@ def test_answers_are_those_of_the_questions_one_by_one_in_their_order():
         assert sum(isinstance(each, PoseNotReached) for each in found) == 2
 
 
+@pytest.mark.slow
 def test_an_error_ends_all_and_says_what_was_asked():
     for jobs in (1, 2):
         with pytest.raises(PoseNotReached) as caught:
@@ -51,6 +52,7 @@ def test_an_error_ends_all_and_says_what_was_asked():
         assert caught.value.exit_status == 3
 
 
+@pytest.mark.slow
 def test_a_defect_in_a_worker_is_told_with_what_was_asked():
     with pytest.raises(ZeroDivisionError) as caught:
         hrsynth.map(lambda robot: 1 / 0, ["quattro"] * 3, jobs=2, errors="keep")
@@ -104,6 +106,7 @@ def test_a_script_needs_no_guard(tmp_path):
     assert len(run.stdout.splitlines()) == 1
 
 
+@pytest.mark.slow
 def test_joblib_does_as_well():
     """Questions and answers go to processes and back without this function too."""
     from joblib import Parallel, delayed

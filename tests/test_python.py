@@ -101,6 +101,7 @@ def test_a_family_is_written_with_a_sentence_a_file(tmp_path: Path):
     assert (wrong.returncode, len(wrong.stderr.splitlines())) == (2, 1)
 
 
+@pytest.mark.slow
 def test_a_picture_is_written_in_any_kind_of_file(tmp_path: Path):
     found = hrsynth.modes("rrrrr_m1")
     picture = hrsynth.draw(found, tmp_path / "a.pdf", width="88mm", font="serif 8pt")

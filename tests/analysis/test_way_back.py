@@ -69,6 +69,7 @@ def test_a_rocker_leads_back_between_its_dead_points_alone(seed):
     assert min(abs(dead - high)) < 0.2 or high > 3
 
 
+@pytest.mark.slow
 def test_without_a_dead_point_the_whole_box_leads_back():
     bars, angle, side = crank_rockers(np.random.default_rng(1))
     low, high = (0.9 * dead_points(bars, angle, side)).tolist()

@@ -275,7 +275,7 @@ def check_same(one: Evaluation, two: Evaluation) -> None:
     assert np.array_equal(one.position.largest, two.position.largest, equal_nan=True)
 
 
-@pytest.mark.parametrize("compiled", [False, True])
+@pytest.mark.parametrize("compiled", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_no_pose_one_pose_and_poses_out_of_reach(compiled: bool) -> None:
     if compiled:
         pytest.importorskip("numba")

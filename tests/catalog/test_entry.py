@@ -80,6 +80,7 @@ def test_table_1_falls_out():
                     "PR*R": "3-PR*R", "P*PR": None, "PP*R": None, "P*RP": "3-PR*P", "R*RP": "3-PiR*P"}
 
 
+@pytest.mark.slow
 def test_the_twelve_symmetric_planar_robots_fall_out():
     """MMT 4.1.2: motors on the base or on the second joint, all legs observed at their last segment."""
     found = {each["notation"] for platform in ("", "point") for (letters, _), each in _symmetric(platform, 2).items()

@@ -20,6 +20,7 @@ def tables(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write(tmp_path_factory.mktemp("published") / "tables")
 
 
+@pytest.mark.slow
 def test_entries_say_what_the_screws_of_the_legs_say(tables: Path):
     source = published(tables)
     for robot in read(tables).robots:
@@ -46,6 +47,7 @@ def test_sets_are_all_but_for_turns_of_the_robot(tables: Path):
             assert len(list(_sets(robot, size))) == sum(fixed) / len(turns)
 
 
+@pytest.mark.slow
 def test_the_command_line(tables: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     kept, robot = tmp_path / "published.sqlite", tmp_path / "robot.urdf"
     assert execute(["catalog", "build", "2T1R", "--tables", str(tables), "-o", str(kept)]) == 0

@@ -269,6 +269,7 @@ def looped(name: str) -> str:
     return json.dumps(hrsynth.certificate(LOOPS[name]()))
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("name", LOOPS)
 def test_loops_of_planar_mechanisms(name):
     """Their lists have no tips on curves; the degrees bound them."""

@@ -99,6 +99,7 @@ def test_code_tells_where_motors_are_the_only_ones() -> None:
     assert found.to_dict()["back"] == [[low], [high]]
 
 
+@pytest.mark.slow
 def test_it_says_why_it_answers_in_no_more() -> None:
     bars = (1.0, 1.2, 0.5, 0.8)  # a crank that cannot turn all round: at its ends coupler and rocker are in line
     found = exported(four_bar(1.0, bars), 3.0)

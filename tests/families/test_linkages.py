@@ -88,6 +88,7 @@ def test_a_paradoxical_linkage_has_one_freedom(name: str):
     check_mobility(name, 1)
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("name", ["bennett", "myard", "schatz"])
 def test_the_modes_of_a_driven_linkage_are_listed(name: str):
     assert check_modes(name, 1, 10) >= 1

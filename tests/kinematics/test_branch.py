@@ -101,6 +101,7 @@ def test_samples_of_a_pod_stay_in_its_operation_mode(dimensions: int, seed: int)
     assert [freedom.name for freedom in verdict.lost] == ["translation along z"]
 
 
+@pytest.mark.slow
 def test_another_operation_mode_is_named_and_can_be_asked_for() -> None:
     """Beside its translations this pod has a mode in which it turns: legs 2 and 3 see all of that."""
     robot = mechanism(parse(POD), 572)

@@ -147,6 +147,7 @@ def test_every_rule_says_what_why_and_what_to_do():
         assert rule.explanation.endswith(".")
 
 
+@pytest.mark.slow
 def test_what_is_mended_only_where_a_rule_says_so(tmp_path: Path):
     """A finding comes with a mend only if its rule announces one."""
     path = tmp_path / "robot.urdf"

@@ -40,6 +40,7 @@ def rods(found: View, link: str) -> int:
     return sum((shape.kind, shape.link) == ("rod", link) for shape in found.machines[0].shapes)
 
 
+@pytest.mark.slow
 def test_solids_stand_for_the_rods_of_their_links(tmp_path: Path):
     found = with_visuals(tmp_path, hidden=True, platform=BOX)
     (points,) = meshed(found, "platform")

@@ -168,6 +168,7 @@ def test_the_distance_is_that_of_check():
     assert found.largest == max(state.distance for state in states(found))
 
 
+@pytest.mark.slow
 def test_without_hidden_only_the_real_robot_is_shown():
     found = view(load("rrrrr_m1"), ["1"])
     assert [machine.key for machine in found.machines] == ["real"]

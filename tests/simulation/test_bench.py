@@ -70,6 +70,7 @@ def test_the_other_simulated_robots_do_too(name: str):
     check_together(name)
 
 
+@pytest.mark.slow
 def test_the_bench_tells_how_far_it_stopped_from_there():
     found = servo(load("delta"), start="x=0,y=0,z=-0.6", goal="x=0.05,y=0.05,z=-0.62", physics=True, gain=4)
     assert found.ended == "goal"

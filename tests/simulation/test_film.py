@@ -61,6 +61,7 @@ def test_a_film_ends_with_the_watched_leg_over_its_wanted_place():
     assert pale(image.n_frames - 1) < 0.5 * pale(0)
 
 
+@pytest.mark.slow
 def test_the_words_of_a_film_tell_start_crossings_and_end():
     found = hrsynth.servo(hrsynth.load("3rpr_m1"), start="x=-0.08,y=-0.06,phi=-10deg", goal="x=0.034,y=0.23,phi=23deg")
     moments = list(range(0, len(found.run.times), 2))

@@ -120,6 +120,7 @@ def test_noise_keeps_the_platform_about_the_goal_and_more_of_it_further_away():
     assert 5 < far("0.1deg") / small < 20
 
 
+@pytest.mark.slow
 def test_a_trajectory_is_followed_with_a_small_error():
     robot, ends = load("delta"), {"start": "x=0,y=0,z=-0.6", "goal": "x=0.1,y=0.1,z=-0.65"}
     led, at_once = servo(robot, duration=4.0, **ends), servo(robot, **ends)
@@ -142,6 +143,7 @@ def test_a_blocked_trajectory_tells_that_it_began_at_the_start(monkeypatch: pyte
         servo(load("delta"), start="x=0,y=0,z=-0.6", goal="x=0.1,y=0,z=-0.6", duration=2.0)
 
 
+@pytest.mark.slow
 def test_a_bias_holds_the_platform_where_the_measured_directions_are_the_desired_ones():
     found = servo(load("delta"), start="x=0,y=0,z=-0.6", goal="x=0.1,y=0.05,z=-0.65", noise="1deg", bias=True, gain=4,
                   time=5.0)

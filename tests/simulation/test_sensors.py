@@ -184,6 +184,7 @@ def test_what_stands_behind_the_camera_is_refused() -> None:
             platform(**options)
 
 
+@pytest.mark.slow
 def test_a_run_ends_where_a_camera_loses_sight() -> None:
     """Legs lead the platform; a point on its long arm, whose depth is measured, sweeps out of the picture on the way
     between two poses at which it is inside. There the run ends, to the picture's very side."""
@@ -202,6 +203,7 @@ def test_a_run_ends_where_a_camera_loses_sight() -> None:
     assert wide.ended in ("goal", "mode")
 
 
+@pytest.mark.slow
 def test_directions_are_fed_back_as_ever() -> None:
     """The same robot with its legs' directions, asked as legs and as observations of their links."""
     robot = setting("3rrr_m1")

@@ -120,6 +120,7 @@ def test_pairs_that_follow_from_others_agree_with_their_own_paths():
             assert own.verdict in (pair.verdict, UNDECIDED)
 
 
+@pytest.mark.slow
 def test_a_mode_that_is_not_proved_shows_nothing():
     """Without enclosures, or where they are wider than the tube of the paths, no robot is called cuspidal."""
     found = atlas_of("six")
@@ -164,6 +165,7 @@ def test_json_is_the_contract(capsys: pytest.CaptureFixture[str], tmp_path: Path
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 def test_a_pose_that_is_a_mode_is_reached_where_no_small_steps_lead():
     """Every mode that ``modes`` calls assembled is an end of a path, by its pose as it is printed."""
     robot = six_poses()

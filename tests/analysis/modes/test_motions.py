@@ -138,6 +138,7 @@ def test_equal_parallel_legs_in_space_carry_a_congruent_platform_on_a_sphere():
     assert np.linalg.norm(platforms(motion)[:, :3, 3] + way, axis=1) == pytest.approx(np.linalg.norm(way), abs=1e-9)
 
 
+@pytest.mark.slow
 def test_a_platform_on_points_of_similar_conics_moves_generically():
     """Architecturally singular: base and platform similar (M. Husty, A. Karger 2000). It moves through every pose."""
     rng, tilt = tilted(6)

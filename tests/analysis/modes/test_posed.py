@@ -203,6 +203,7 @@ def test_legs_that_are_not_watched_are_not_forgotten():
     assert found.within == "poses turned as this one"
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("seed", range(3))
 def test_a_body_that_turns_about_a_point_has_eight_modes(seed: int):
     """Three legs RRR whose axes meet in one point, driven at the base: an axis of the platform keeps an angle to each
@@ -215,6 +216,7 @@ def test_a_body_that_turns_about_a_point_has_eight_modes(seed: int):
                    for each in found.modes if each.bodies) < 1e-6
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("legs", [None, "1,3"])
 def test_a_body_that_turns_about_a_point_has_one_mode_where_its_rods_are_watched(legs: str | None):
     """Each leg's last axis keeps one of two directions."""

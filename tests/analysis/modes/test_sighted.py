@@ -59,6 +59,7 @@ def test_a_mixed_set_has_the_modes_that_the_page_tells(row: tuple[str, ...]) -> 
     assert count(row, 7) == table()[row][0]
 
 
+@pytest.mark.slow
 def test_a_free_body_without_a_proof_is_answered_too() -> None:
     row, cameras = OPEN
     found = modes(watched(row, 0, cameras))

@@ -88,6 +88,7 @@ def test_as_many_are_counted_modulo_a_prime_at_twenty_instances(name: str):
         assert sections.poses(sections.rows(maker(np.random.default_rng(seed)).system)) == count, f"seed {seed}"
 
 
+@pytest.mark.slow
 def test_poses_are_of_degree_forty():
     assert sections.degree() == 40
 

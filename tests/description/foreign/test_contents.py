@@ -146,6 +146,7 @@ def test_meshes_are_named_from_the_new_folder_and_never_overwritten(tmp_path: Pa
         assert execute(asked) == 2
 
 
+@pytest.mark.slow
 def test_meshes_in_a_usd_file_become_files(tmp_path: Path):
     pytest.importorskip("pxr")
     save(filled(tmp_path), tmp_path / "robot.usda")

@@ -72,6 +72,7 @@ def test_the_robot_with_rods_hides_what_the_paper_says():
     assert found.certificate.passed
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize(("name", "architecture"), [
     ("gepetto-wl16-leg", "6-SP*S"), ("stewart-sdf-ritwik/stewart_sdf.sdf", "6-RUPUR")])
 def test_three_observed_legs_control_all_six_freedoms(name: str, architecture: str):

@@ -283,6 +283,7 @@ def test_what_is_drawn_as_certified_is_around_the_goal():
     assert found.covered == pytest.approx(np.pi * found.certified.length**2 / goal, rel=0.05)
 
 
+@pytest.mark.slow
 def test_the_table_has_a_line_a_start():
     content = next(file for file in OUTPUTS["basins"].files).content(small(), ".csv", {})[0]
     rows = list(csv.DictReader(io.StringIO(content.decode())))

@@ -106,6 +106,7 @@ def test_lists_of_modes_are_among_the_rests() -> None:
         assert all(each.stable for each in own)
 
 
+@pytest.mark.slow
 def test_every_choice_of_signs_is_told() -> None:
     """The list of each set of reversed legs, those without a pose as well."""
     found = listed()
@@ -245,6 +246,7 @@ def test_few_random_starts_find_no_other() -> None:
     assert len(result.met) > 5
 
 
+@pytest.mark.slow
 def test_a_thousand_starts_at_once_find_no_other() -> None:
     """The same by a program whose derivatives are by hand, which are those of what they are derivatives of."""
     scene, rng = many.Many(listed()), np.random.default_rng(2)
@@ -451,7 +453,7 @@ def test_a_flat_direction_never_attracts_for_sure(curvatures: list[float], word:
     assert stability(curvatures) == word
 
 
-@pytest.mark.some(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("reach", [0.3, 2.25])
 def test_rests_within_the_limits_of_joints_are_counted(reach: float) -> None:
     robot = hrsynth.load(FIVE_BAR)
