@@ -61,11 +61,17 @@ def test_a_rounded_robot_is_the_same(name: str, ending: str, decimals: int, tmp_
 @pytest.mark.slow
 @pytest.mark.parametrize("name", shipped())
 def test_every_rounded_robot_is_the_same_or_refused(name: str, tmp_path: Path):
-    meant = answer(load(name))
+    """With four decimals; connectors with a length, twice as many joints, may leave one file of a robot undecided."""
+    meant, undecided = answer(load(name)), list[str]()
     for (variant, robot), (dialect, ending), decimals in product(variants(load(name)).items(), ENDINGS.items(), (4,)):
         folder = tmp_path / f"{variant} {dialect} {decimals}"
         folder.mkdir()
-        assert answer(again(robot, folder / f"robot{ending}", decimals)) == meant, folder.name
+        try:
+            assert answer(again(robot, folder / f"robot{ending}", decimals)) == meant, folder.name
+        except StructureUndecided:
+            undecided.append(variant)
+    assert len(undecided) <= 1
+    assert all(variant.startswith("connectors") for variant in undecided)
 
 
 @pytest.mark.slow
