@@ -8,7 +8,7 @@ solution is refined and enclosed, and the smallest bound that proves the count i
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from ..analysis.measured import MeasuredRobot
+from ..analysis.modes.branches import Model
 from ..analysis.modes.carried import CarriedPlatform, solve_carried
 from ..analysis.modes.curves import Circle, Curve, Line, Plane, Point, Reach, Sphere, Surface, shifted
 from ..analysis.modes.modes import AssemblyModes, modes
@@ -24,7 +25,7 @@ from ..analysis.modes.planar_loops import PlanarLoop, PlanarLoops, enclosures, e
 from ..analysis.modes.quadrics import UNIT, PoseSystem, Rounded, WorkingFrame, direction, spokes
 from ..analysis.modes.rigid import Planar, Spatial
 from ..analysis.modes.roots import Roots, is_real
-from ..analysis.modes.single_loop import solve_loop
+from ..analysis.modes.single_loop import SingleLoop, solve_loop
 from ..analysis.modes.solve import Solved, SystemModes
 from ..analysis.modes.squares import TURNS, SquareSystem
 from ..analysis.modes.translating import Articulated, Translating, coplanar, met_normal
@@ -32,6 +33,7 @@ from ..analysis.observed import ObservedRobot
 from ..errors import NoCertificate, NotConfined, Unsolved
 from ..geometry.so3 import quaternions
 from ..geometry.vectors import Array, cross, rotation_about, unit
+from ..kinematics.configuration import ClosedConfiguration
 from ..mechanism import Mechanism
 from ..mechanism.pose import Pose
 from ..tolerances import NO_POSE_START
@@ -64,7 +66,8 @@ def certificate(found: AssemblyModes) -> dict[str, Any]:
             try:
                 return of_chain(system, found, about, robot)
             except NotAccepted as reason:
-                return _as_chain(found, about, robot, reason)
+                other = solve_carried if isinstance(system, SingleLoop) else solve_loop
+                return _as_chain(found, about, robot, reason, other)
         if found.found.complete and not found.found.solved:
             with suppress(NotConfined):
                 return of_loops(found, about, robot)
@@ -73,7 +76,7 @@ def certificate(found: AssemblyModes) -> dict[str, Any]:
         except NotAccepted as reason:
             if found.found.solved or not found.found.complete:
                 raise
-            return _as_chain(found, about, robot, reason)
+            return _as_chain(found, about, robot, reason, solve_carried, solve_loop)
     except NotAccepted as reason:
         raise NoCertificate(found.setting.robot.name, str(reason)) from None
 
@@ -120,13 +123,14 @@ def of_chain(system: CarriedPlatform, found: AssemblyModes, about: Mapping[str, 
     raise NotAccepted(why)
 
 
-def _as_chain(found: AssemblyModes, about: Mapping[str, Any], robot: ClosedRobot | None, reason: NotAccepted
+def _as_chain(found: AssemblyModes, about: Mapping[str, Any], robot: ClosedRobot | None, reason: NotAccepted,
+              *ways: Callable[[MeasuredRobot, ClosedConfiguration, float], tuple[Model, SystemModes]]
               ) -> dict[str, Any]:
     """Of a mechanism that is a carried platform, or one loop, besides the way in which its modes were listed; raises
     ``NotAccepted``."""
     assert found.model is not None
     measured = MeasuredRobot.driven(found.setting) if found.kind == "real" else MeasuredRobot.watched(found.setting)
-    for way in (solve_carried, solve_loop):
+    for way in ways:
         with suppress(NotConfined, Unsolved, NotAccepted):
             model, listed = way(measured, found.goal, found.model.system.error)
             system = model.system
