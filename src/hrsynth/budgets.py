@@ -365,6 +365,14 @@ APPROACH = 8
 
 NEWTON_STEPS_AT_RUN = 8
 """Steps of Newton's method that a generated program takes at most in each part of the loops."""
+CELLS_TOGETHER = 32
+"""Cells of a branch in which the steps of a program are bounded together."""
+BOUND_HALVINGS = 3
+"""How often the sides of a cell are halved, at most, to bound them."""
+MOST_PARTS = 64
+"""Into how many parts it is cut at once, at most."""
+MOST_BOUNDED = 2_000
+"""Parts of a size that are bounded, about."""
 INVERSE_STEPS_AT_RUN = 20
 """Steps from motors to motors that it takes at most towards a pose."""
 CONE_BOXES = 60_000

@@ -224,6 +224,10 @@ it, as part of the largest, is left out on the way there."""
 BALL_ZERO = 2.0 ** -256
 """Radius of a ball that holds zero at which the number in it counts as zero."""
 
+UNIT_ROUNDOFF = 2.0 ** -53
+"""What one rounding makes of a number, relative to its size."""
+SINE_ERROR = 2.0 ** -50
+"""Error of a sine or cosine in a program that was generated, at most: four units in the last place."""
 AFFINE_ROUNDING = 2.0 ** -46
 """What sixty-four roundings make of numbers, relative to their size: more than one operation on affine forms has."""
 TOGGLE = 0.03
@@ -348,7 +352,17 @@ ROUNDED_AXIS = 1e-15
 GENERATED_NEAR = 1e-7
 """Step of Newton's method (characteristic lengths, radians) after which a generated program makes its last one: what is
 left is of the size of its square."""
-GENERATED_LAST_STEP = 3e-13
+GENERATED_ERROR = 1e-12
+"""What its answers may be off (characteristic lengths, radians), its own rounding included."""
+BOUND_WIDER = 1.25
+"""Radius over which its steps are bounded, as part of the tube's."""
+BOUND_ROUNDING = 1 + 2.0 ** -40
+"""What bounds of its steps are multiplied by, for the rounding of their own products."""
+FREE_WIDER = 24.0
+"""The same where it is not known that the tube holds a zero of the equations that are solved, of its largest radius."""
+PART_TUBE = 0.6
+"""Radius of the tubes that are tried in parts of a cell, as part of its own."""
+GENERATED_LAST_STEP = 3e-12
 """Largest last step of an answer (characteristic lengths, radians)."""
 GENERATED_CLOSED = 1e-11
 """What its loops' equations may be off (m, cosines) where it gives an answer."""

@@ -722,6 +722,8 @@ class Exported(OfRobot, WrittenTo):
     legs: list[str]
     cells: int
     inverse: Annotated[Literal["closed form", "Newton's method"], "how the program finds the motors of a pose"]
+    steps: Annotated[int | None, "steps of Newton's method that are enough in each part (proved), or null"]
+    error: Annotated[float | None, "how far an answer is off at most (rad, 1, characteristic lengths; proved), or null"]
     back: Annotated[Array | None, "low and high of motors, no two of which give the platform one pose (proved)"]
     parts: list[ExportedPart]
 

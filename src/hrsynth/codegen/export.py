@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +17,7 @@ from ..results import Result
 from ..tolerances import GENERATED_CLOSED, GENERATED_LAST_STEP
 from .inverse import closed_inverse
 from .languages import TEMPLATES, program
-from .source import Source
+from .source import ProvedBounds, Source
 from .tubes import TubedBranch
 
 
@@ -31,6 +30,10 @@ class ExportedCode(Result, shown_as="export"):
     legs: tuple[str, ...]
     closed: bool
     """Whether the motors of a pose are found in closed form."""
+    bounds: ProvedBounds | None
+    """Newton's steps that are enough, and how far an answer is off at most (proved); None where a cell has no bound."""
+    cells: int
+    """How many cells the program holds."""
     code: str
 
     @property
@@ -43,11 +46,6 @@ class ExportedCode(Result, shown_as="export"):
         """What is compared besides the record."""
         return self.proof.robot
 
-    @cached_property
-    def cells(self) -> int:
-        """How many cells the program holds."""
-        return sum(len(part.cells) for part in self.proof.parts)
-
     def headline(self) -> str:
         """The robot, and how much is proved."""
         return f"{self.lang} of {self.proof.headline()}"
@@ -55,8 +53,10 @@ class ExportedCode(Result, shown_as="export"):
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line, without the command's own fields."""
         return {"lang": self.lang, "motors": list(self.proof.motors), "passive": list(self.proof.passive),
-                "held": list(self.proof.held), "legs": list(self.legs), "cells": self.cells, 
+                "held": list(self.proof.held), "legs": list(self.legs), "cells": self.cells,
                 "inverse": "closed form" if self.closed else "Newton's method",
+                "steps": self.bounds.steps if self.bounds else None,
+                "error": self.bounds.error if self.bounds else None,
                 "back": None if self.proof.back is None else [each.tolist() for each in self.proof.back],
                 "parts": [{"motors": list(part.motors), "share": part.share,
                            "proved": [each.tolist() for each in part.proved]} for part in self.proof.parts]}
@@ -86,7 +86,8 @@ def export(robot: RobotLike, lang: str = "c++", box: BoxLike | None = None, *, o
     branch_ = TubedBranch.of(proof)
     source = Source.of(branch_, watched, closed_inverse(given, proof, branch_))
     code = program(source, lang, _told(proof, source, lang, box))
-    return ExportedCode(proof, lang, tuple(each.leg for each in watched), bool(source.legs), code)
+    return ExportedCode(proof, lang, tuple(each.leg for each in watched), bool(source.legs), source.bounds,
+                        sum(len(part.bounded) for part in source.parts), code)
 
 
 def _watched(robot: Any, observe: LegsLike, camera: CameraLike) -> tuple[Direction, ...]:
@@ -131,6 +132,19 @@ def _told(proof: BranchProof, source: Source, lang: str, box: BoxLike | None) ->
         lines += [f"  {name}: {a!r} to {b!r}" for name, a, b in zip(part.motors, low, high, strict=True)]
     lines += [f"An answer is given where the last step of Newton's method is at most {GENERATED_LAST_STEP:g} (rad, or "
               f"of {robot.length:.6g} m), all loops are", f"closed to {GENERATED_CLOSED:g}, and the joints are in the "
-              "cell's tube, in which the loops have one closure (proved).",
+              "cell's tube, in which the loops have one closure (proved).", *_bounds(source),
               "The proof takes the robot's numbers as the file has them."]
     return lines
+
+
+def _bounds(source: Source) -> list[str]:
+    """What is proved of Newton's method in it."""
+    if source.bounds is None:
+        return ["How many steps are enough, and how far answers can be off, is not proved in all cells."]
+    bounds = source.bounds
+    return [f"{bounds.steps} steps of Newton's method are enough in each part, and an answer is within "
+            f"{bounds.joints:.2g} (rad, or of that length) of the",
+            f"closure, the platform within {bounds.rotation:.2g} and {bounds.position:.2g}: proved, rounding in double "
+            "precision included."] + [
+        f"Whether equations that are proved to hold to {part.closed_to:.2g} alone do, the program finds out."
+        for part in source.branch.parts if part.closed_to]

@@ -63,7 +63,8 @@ def program(source: Source, language: str, told: Sequence[str]) -> str:
     functions.append(("rates", arguments + moving, source.rates))
     values: dict[str, Any] = {
         "robot": mechanism.name, "told": told, "name": namespace(mechanism.name), "source": source,
-        "m": len(branch.motors), "p": len(branch.passive), "c": len(source.cut), "d": d, "steps": NEWTON_STEPS_AT_RUN,
+        "m": len(branch.motors), "p": len(branch.passive), "c": len(source.cut), "d": d,
+        "steps": source.bounds.steps if source.bounds else NEWTON_STEPS_AT_RUN,
         "inverse": INVERSE_STEPS_AT_RUN, "parts": source.parts, "functions": functions,
         "lower": [float(x) for x in branch.lower], "upper": [float(x) for x in branch.upper],
         "back": [[float(x) for x in end] for end in branch.back or ()],

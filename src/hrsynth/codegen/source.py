@@ -11,6 +11,7 @@ import numpy as np
 from ..mechanism.observations.direction import Direction
 from ..results import Value
 from .cell_tree import Node, cell_tree
+from .convergence import BoundedCell, bounded_cells, platform_error
 from .inverse import LegMotor
 from .trace import FormulaTracer, TracedFunction
 from .tubes import TubedBranch, TubePart
@@ -37,6 +38,24 @@ class SourcePart(Value):
     units: tuple[float, ...]
     lower: tuple[float, ...]
     upper: tuple[float, ...]
+    bounded: tuple[BoundedCell, ...]
+
+
+@dataclass(frozen=True)
+class ProvedBounds:
+    """Steps of Newton's method that are enough in each part, and how far an answer is from the closure at most, with
+    rounding: ``joints`` (radians, characteristic lengths), the entries of the platform's ``rotation``, its ``position``
+    (characteristic lengths)."""
+
+    steps: int
+    joints: float
+    rotation: float
+    position: float
+
+    @property
+    def error(self) -> float:
+        """The largest of the three."""
+        return max(self.joints, self.rotation, self.position)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -54,6 +73,8 @@ class Source(Value):
     observed: tuple[Direction, ...]
     legs: tuple[LegMotor, ...]
     """Closed forms of the motors of a pose; none where Newton's method finds them."""
+    bounds: ProvedBounds | None
+    """What is proved of its steps and answers; None where some cell has no bound."""
 
     @classmethod
     def of(cls, branch: TubedBranch, observed: Sequence[Direction], legs: Sequence[LegMotor] = ()) -> Source:
@@ -61,8 +82,9 @@ class Source(Value):
         tracer = FormulaTracer(branch.system, branch.motors, branch.passive)
         parts = tuple(_part(branch, tracer, part) for part in branch.parts)
         names, values, slopes = tracer.cut()
-        return cls(branch, parts, tracer.platform(), tuple(names), values, slopes, tracer.rates(observed),
-                   tuple(observed), tuple(legs))
+        platform = tracer.platform()
+        return cls(branch, parts, platform, tuple(names), values, slopes, tracer.rates(observed),
+                   tuple(observed), tuple(legs), _proved(branch, parts, platform))
 
     def names(self, places: Sequence[int]) -> list[str]:
         """The names of coordinates."""
@@ -76,13 +98,37 @@ def _part(branch: TubedBranch, tracer: FormulaTracer, part: TubePart) -> SourceP
     unknowns = [branch.passive.index(i) for i in part.unknowns]
     equations, slopes = tracer.loops(rows, part.unknowns, part.driven)
     lower, upper = branch.lower[driven], branch.upper[driven]
-    root, nodes = cell_tree(lower, upper, [(cell.lower, cell.upper) for cell in part.cells])
+    closure, own = tracer.closure(every), [every.index(i) for i in rows]
+    bounded = bounded_cells(branch, part, every, own, equations, closure)
+    units = np.array([branch.unit(i) for i in part.unknowns])
+    tried = [each.tried(units) for each in bounded]
+    root, nodes = cell_tree(lower, upper, [(cell.lower, cell.upper) for cell in tried])
     cells = tuple((tuple(cell.centre), tuple(cell.middle), tuple(cell.slopes.ravel()), tuple(cell.radius))
-                  for cell in part.cells)
-    return SourcePart(tuple(driven), tuple(unknowns), equations, slopes, tracer.closure(every),
-                      tuple(every.index(i) for i in rows), len(every), root,
-                      tuple(nodes), _floats(cells), tuple(branch.unit(i) for i in part.unknowns),
-                      tuple(map(float, lower)), tuple(map(float, upper)))
+                  for cell in tried)
+    return SourcePart(tuple(driven), tuple(unknowns), equations, slopes, closure, tuple(own), len(every), root,
+                      tuple(nodes), _floats(cells), _floats(tuple(units)), tuple(map(float, lower)),
+                      tuple(map(float, upper)), tuple(bounded))
+
+
+def _proved(branch: TubedBranch, parts: Sequence[SourcePart], platform: TracedFunction) -> ProvedBounds | None:
+    """The bounds of all parts together."""
+    every = [each for part in parts for each in part.bounded]
+    if not all(each.steps and np.all(np.isfinite(each.error)) for each in every):
+        return None
+    count = len(branch.passive)
+    ranges, errors, units = np.zeros((2, count)), np.zeros(count), np.ones(count)
+    for part in parts:
+        places = list(part.unknowns)
+        reach = [np.abs(each.cell.slopes) @ (each.cell.upper - each.cell.centre) + 2 * each.cell.radius
+                 for each in part.bounded]
+        middles = [each.cell.middle for each in part.bounded]
+        ranges[0, places] = np.min(np.subtract(middles, reach), axis=0)
+        ranges[1, places] = np.max(np.add(middles, reach), axis=0)
+        errors[places] = np.max([each.error for each in part.bounded], axis=0)
+        units[places] = part.units
+    rotation, position = platform_error(branch, ranges, errors, platform)
+    return ProvedBounds(max(each.steps for each in every), float((errors / units).max()), rotation,
+                        position / branch.system.mechanism.length)
 
 
 def _floats(values: Any) -> Any:

@@ -36,18 +36,20 @@ class TubeCell(Value):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class TubePart(Value):
-    """Unknowns that ``driven`` coordinates decide, by their places among all coordinates, and the cells."""
+    """Unknowns that ``driven`` coordinates decide, by their places among all coordinates, and the cells; ``closed_to``
+    bounds what is left of equations that were not proved to hold."""
 
     driven: tuple[int, ...]
     unknowns: tuple[int, ...]
     cells: tuple[TubeCell, ...]
+    closed_to: float = 0.0
 
     def ordered(self, places: Sequence[int]) -> TubePart:
         """The same with its unknowns in another order."""
         own = list(places)
         return TubePart(self.driven, tuple(self.unknowns[k] for k in own), tuple(
             replace(each, middle=each.middle[own], slopes=each.slopes[own], radius=each.radius[own])
-            for each in self.cells))
+            for each in self.cells), self.closed_to)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -78,7 +80,8 @@ class TubedBranch(Value):
             places = [motors.index(i) for i in driven]
             lower[places] = np.maximum(lower[places], np.min([each.lower for each in cells], axis=0))
             upper[places] = np.minimum(upper[places], np.max([each.upper for each in cells], axis=0))
-            parts.append(TubePart(driven, tuple(table[name] for name in part.passive), cells))
+            parts.append(TubePart(driven, tuple(table[name] for name in part.passive), cells,
+                                  part.closed_to))
         for place, i in enumerate(motors):
             low, high = proof.robot.limited.get(system.coordinates[i].joint, (-np.inf, np.inf))
             if not np.isfinite(lower[place]):  # in no loop

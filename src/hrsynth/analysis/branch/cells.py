@@ -139,7 +139,7 @@ def _prove_block(trial: TubeTrial, block: LoopBlock) -> None:
     except np.linalg.LinAlgError:
         Y = np.linalg.pinv(A.v[0])
     # Y G along x̃, as a whole and in mean value form: both hold, the sharper one counts
-    e = (combined(Y, residual(trial, equations)).size + _drift(combined(Y, at.along))
+    e = (combined(Y, residual(trial, equations)).size + drift(combined(Y, at.along))
          + _times(combined(Y, at.by_others).size, trial.radius))
     e = np.fmin(e, combined(Y, at.values).size)
     one = np.eye(len(own))
@@ -177,7 +177,7 @@ def _times(M: Array, r: Array) -> Array:
     return np.asarray((M @ r[..., None])[..., 0])
 
 
-def _drift(B: AffineForms) -> Array:
+def drift(B: AffineForms) -> Array:
     """A bound (c, k) of ∫₀¹ B(tε) ε dt for forms B (c, k, n): of Σ (b_i + ½ Σ s_ij ε_j) ε_i ± r_i, j ≤ n; r_i holds
     the other symbols."""
     s = np.moveaxis(B.v[1 : 1 + B.r.shape[-1]], 0, -1)

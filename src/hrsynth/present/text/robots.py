@@ -174,11 +174,15 @@ def legs(found: Legs) -> str:
 
 def exported(found: ExportedCode) -> str:
     """What the code is of, and where it answers."""
-    proof = found.proof
+    proof, bounds = found.proof, found.bounds
     rows: Rows = [("robot", proof.robot.name), ("language", found.lang), ("motors", ", ".join(proof.motors)),
                   ("joints", f"{len(proof.passive)} passive, {len(proof.held)} idle (held)"),
                   ("directions", ", ".join(found.legs) or "none"),
-                  ("inverse", "in closed form" if found.closed else "by Newton's method, from motors that are near")]
+                  ("inverse", "in closed form" if found.closed else "by Newton's method, from motors that are near"),
+                  ("steps", [f"{bounds.steps} of Newton's method are enough, and an answer is within "
+                             f"{bounds.error:.2g} of",
+                             "the closure (rad, 1 or characteristic lengths), rounding included, proved"]
+                   if bounds else "not bounded in all cells: what is not confirmed is undecided")]
     for part in proof.parts:
         rows.append(("answers for", [f"{name} {low:.6g} to {high:.6g}" for name, low, high in
                                      zip(part.motors, *part.proved, strict=True)]

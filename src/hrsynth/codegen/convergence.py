@@ -1,0 +1,361 @@
+"""How many steps of Newton's method a generated program needs, and how far its answers can be off, proved cell by cell.
+
+Let R be somewhat more than the radius of a cell's tube about x̃(q). With Y(q), of first order in the motors, about
+(D_xG)⁻¹, let |1 − Y D_xG| ≤ M and |Y D²_xG(·, v)| ≤ Q(v) in |x − x̃| ≤ R (componentwise, affine forms), let the program
+compute G to δ, and its steps as those of a matrix within ΔJ of D_xG (N. J. Higham, Accuracy and Stability of Numerical
+Algorithms, 2002, theorem 9.5); F = |Y| ΔJ. Then
+
+1. the closure x* has |x* − x̃| ≤ a, the smaller of the tube's radius and (1 − M)⁻¹ |Y G(x̃)|; where it is not known that
+   the tube holds one, it does if the latter is at most R (Brouwer), and it is the only one there;
+2. a step with the matrix at z from x, |x − x*| ≤ e, |z − x*| ≤ b, leads to within
+   (1 − M − F)⁻¹ (Q(b + e / 2) e + F e + |Y| δ) of x*, with Q(e / 2) where z = x, as long as this and e are at most
+   R − a;
+3. from e = a the bounds of the steps follow one another, until those of the program's tests are met;
+4. where the program's last step was at most s, the answer is within (1 − M)⁻¹ (Q(r + s') s + F s + |Y| δ) of x*, s' its
+   step before and r = (1 − M)⁻¹ ((1 + M + F) s + |Y| δ) how far it was off before the last.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import islice, product
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..analysis.branch.cells import TubeTrial, derivatives, drift, residual
+from ..analysis.branch.loops import curvatures
+from ..analysis.branch.part import LoopBlock, LoopEquation, LoopPart
+from ..budgets import BOUND_HALVINGS, CELLS_TOGETHER, MOST_BOUNDED, MOST_PARTS, NEWTON_STEPS_AT_RUN
+from ..geometry.affine import AffineForms, affine, combined, stacked
+from ..geometry.vectors import Array
+from ..results import Value
+from ..tolerances import (
+    AFFINE_ROUNDING,
+    BOUND_ROUNDING,
+    BOUND_WIDER,
+    FREE_WIDER,
+    GENERATED_CLOSED,
+    GENERATED_ERROR,
+    GENERATED_LAST_STEP,
+    GENERATED_NEAR,
+    PART_TUBE,
+    UNIT_ROUNDOFF,
+)
+from .rounding import RoundedNumber, rounded
+from .trace import TracedFunction
+from .tubes import TubeCell, TubedBranch, TubePart
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class BoundedCell(Value):
+    """A cell with the steps that are enough in it, 0 where that is not proved, and how far the unknowns of an answer
+    are from the closure at most (p,), rounding included, infinite where no bound is proved; ``inner``: how far the
+    closure is from the middle of the tube (p,); ``alone``: the equations that are solved have no other zero in it."""
+
+    cell: TubeCell
+    steps: int
+    error: Array
+    inner: Array
+    alone: bool
+
+    def good(self, units: Array) -> bool:
+        """Whether all is proved that is wanted."""
+        return bool(self.steps and np.all(self.error <= GENERATED_ERROR * units))
+
+    def is_of(self, parent: BoundedCell) -> bool:
+        """Whether it is proved that there is a closure in its tube, that of the cell of which this is a part."""
+        cell, whole = self.cell, parent.cell
+        off = (np.abs(cell.middle - whole.middle - whole.slopes @ (cell.centre - whole.centre))
+               + np.abs(cell.slopes - whole.slopes) @ (cell.upper - cell.centre) + self.inner)
+        inside = np.all(off < whole.radius * (1 - AFFINE_ROUNDING))
+        return bool(parent.alone and np.all(self.inner <= cell.radius) and inside)
+
+    def tried(self, units: Array) -> TubeCell:
+        """The cell as a program has it: where its steps are bounded, an answer in its tube counts though it is off."""
+        widened = self.cell.radius + GENERATED_NEAR * units
+        return replace(self.cell, radius=widened) if self.steps else self.cell
+
+    @property
+    def divisible(self) -> bool:
+        """Whether it has not too many sides to halve them all."""
+        return bool(2 ** len(self.cell.lower) <= MOST_PARTS)
+
+    def split(self, loops: LoopPart, known: bool) -> _Parts:
+        """Its parts when all its sides are halved: with its own tube, which is ``known`` to hold a closure, or with
+        tubes about their own closures that are still to be proved."""
+        cell = self.cell
+        upper = np.array(list(product((False, True), repeat=len(cell.lower))))
+        ends = np.stack([np.where(upper, cell.centre, cell.lower), np.where(upper, cell.upper, cell.centre)], axis=1)
+        centres = ends.mean(axis=1)
+        x = cell.middle + (centres - cell.centre) @ cell.slopes.T
+        slopes = np.broadcast_to(cell.slopes, (len(centres), *cell.slopes.shape))
+        if not known:
+            x = loops.closed(centres, x)[0]
+            slopes = loops.slopes(centres, x)
+        radius = cell.radius * (1.0 + AFFINE_ROUNDING if known else PART_TUBE)
+        return _Parts(self, [TubeCell(low, high, middle, rates, radius)
+                             for (low, high), middle, rates in zip(ends, x, slopes, strict=True)], known)
+
+
+@dataclass(frozen=True, eq=False)
+class _Parts:
+    """The parts of a cell, or one that is whole; ``known``: there is a closure in each tube."""
+
+    whole: BoundedCell
+    cells: list[TubeCell]
+    known: bool
+
+
+def bounded_cells(branch: TubedBranch, part: TubePart, every: Sequence[int], rows: Sequence[int],
+                  equations: TracedFunction, closure: TracedFunction) -> list[BoundedCell]:
+    """The cells of a program that solves the equations with places ``rows`` among those that a part has to do with
+    (``every``: their places among all), by its own formulas. Where a cell is too large for a bound it is halved, with
+    thinner tubes inside its own."""
+    system = branch.system
+    among: list[LoopEquation] = [LoopEquation(loop, row) for loop in system.loops for row in loop.rows]
+    among += [LoopEquation(gear) for gear in system.gears]
+    block = LoopBlock(part.unknowns, tuple(among[every[i]] for i in rows))
+    loops = LoopPart(system, part.driven, part.unknowns, (block,), system.loops, system.gears)
+    code = _Code(branch, part, loops, [among[i] for i in every], equations, closure, list(rows))
+    found: list[BoundedCell] = []
+    nothing = np.full(len(rows), np.inf)
+    left = [_Parts(BoundedCell(cell, 0, nothing, cell.radius, False), [cell], True) for cell in part.cells]
+    for depth in range(BOUND_HALVINGS + 1):
+        again: list[_Parts] = []
+        smaller: list[_Parts] = []
+        for some in (left, again):
+            for parts, made in zip(some, code.bounded(some), strict=True):
+                if not parts.known and not all(each.is_of(parts.whole) for each in made):
+                    again.append(parts.whole.split(loops, True))
+                    continue
+                for each in made:
+                    if (each.good(code.units) or part.closed_to or depth == BOUND_HALVINGS or not each.divisible
+                            or len(smaller) * 2 ** len(part.driven) >= MOST_BOUNDED):
+                        found.append(each)
+                    else:
+                        smaller.append(each.split(loops, False))
+        left = smaller
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Code:
+    """What a program computes of a part: the solved equations, places ``rows`` among all, with their derivatives."""
+
+    branch: TubedBranch
+    part: TubePart
+    loops: LoopPart
+    every: list[LoopEquation]
+    equations: TracedFunction
+    closure: TracedFunction
+    rows: list[int]
+
+    @cached_property
+    def units(self) -> Array:
+        """What counts as 1 of each unknown (p,)."""
+        return np.array([self.branch.unit(i) for i in self.part.unknowns])
+
+    def bounded(self, every: Sequence[_Parts]) -> Iterator[list[BoundedCell]]:
+        """All parts with their bounds."""
+        pairs = [(cell, each.known) for each in every for cell in each.cells]
+        made = (each for k in range(0, len(pairs), CELLS_TOGETHER) for each in _bounds(
+            self, *map(list, zip(*pairs[k : k + CELLS_TOGETHER], strict=True))))
+        return (list(islice(made, len(each.cells))) for each in every)
+
+    @cached_property
+    def growth(self) -> float:
+        """What is off of a matrix whose LU factors are taken, relative to its largest row sum (theorem 9.5): a row at
+        most doubles whenever another is taken from it, which happens where it can have an entry in the column."""
+        p = len(self.rows)
+        pattern = [{place[1] for array, place, _ in self.equations.stores if array == "J" and place[0] == i}
+                   for i in range(p)]
+        times = [0] * p
+        left = set(range(p))
+        for column in range(p):
+            candidates = sorted((i for i in left if column in pattern[i]), key=lambda i: times[i])
+            if not candidates:
+                return float("inf")
+            together = set().union(*(pattern[i] for i in candidates))
+            highest = max(times[i] for i in candidates)
+            for i in candidates[1:]:  # whichever is the pivot
+                pattern[i], times[i] = set(together), highest + 1
+            left.discard(candidates[0])
+        return 4 * p**3 * 2.0 ** max(times) * UNIT_ROUNDOFF
+
+    def computed(self, trial: TubeTrial, radius: Array) -> tuple[Array, Array, Array, Array]:
+        """Errors of the solved equations (c, p) and of all (c, e), of each entry of a matrix (c,) with what its factors
+        add, and the largest sizes of the unknowns (c, p): by running errors over tubes."""
+        c, p = trial.x.shape
+        q = [RoundedNumber.of(0.0)] * len(self.branch.motors)
+        x = [RoundedNumber.of(0.0)] * len(self.branch.passive)
+        for k, i in enumerate(self.part.driven):
+            q[self.branch.motors.index(i)] = RoundedNumber.between(trial.centre[:, k] - trial.half[:, k],
+                                                                   trial.centre[:, k] + trial.half[:, k])
+        reach = (np.abs(trial.slopes) @ trial.half[..., None])[..., 0] + radius
+        for k, i in enumerate(self.part.unknowns):
+            x[self.branch.passive.index(i)] = RoundedNumber.between(trial.x[:, k] - reach[:, k],
+                                                                    trial.x[:, k] + reach[:, k])
+        once, again = rounded(self.equations, q, x), rounded(self.closure, q, x)
+        closing = np.zeros((c, len(self.every)))
+        for (_, place), each in again.items():
+            closing[:, place[0]] = each.error
+        solved, sums, doubt = closing[:, self.rows], np.zeros((c, p)), np.zeros(c)
+        for (array, place), each in once.items():
+            if array == "G":
+                solved[:, place[0]] = np.maximum(solved[:, place[0]], each.error)
+            else:
+                sums[:, place[0]] += each.size
+                doubt = np.maximum(doubt, each.error)
+        return (solved, closing, self.growth * sums.max(axis=1) + doubt, np.abs(trial.x) + reach)
+
+
+def _trial(loops: LoopPart, cells: Sequence[TubeCell]) -> TubeTrial:
+    """Cells as the enclosures take them."""
+    lower, upper, x, slopes, radius = (np.array([getattr(cell, name) for cell in cells])
+                                       for name in ("lower", "upper", "middle", "slopes", "radius"))
+    half = (upper - lower) / 2 * (1 + AFFINE_ROUNDING)
+    return TubeTrial(loops, (lower + upper) / 2, half, x, slopes, radius, np.zeros(len(x)), np.ones(len(x), dtype=bool))
+
+
+def _bounds(code: _Code, cells: Sequence[TubeCell], known: Sequence[bool]) -> list[BoundedCell]:
+    """Steps 1 to 4 of the head of this file; ``known``: which tubes hold a closure."""
+    trial, every = _trial(code.loops, cells), code.every
+    (c, p), units = trial.x.shape, code.units
+    own, one, near, last = list(range(p)), np.eye(p), GENERATED_NEAR * units, GENERATED_LAST_STEP * units
+    with np.errstate(all="ignore"):
+        # 1. where the closure is
+        largest = (trial.radius / units).max(axis=-1)[:, None] * units
+        wide = (FREE_WIDER * largest if code.part.closed_to else BOUND_WIDER * trial.radius) + 4 * near
+        at = derivatives(trial, every, own, wide)
+        Y = _inverses(at.by_own[..., code.rows, :].v[0])
+        P, M = _levelled(combined(Y, at.by_own[..., code.rows, :]), trial.symbols[0])
+        size, Q = P @ np.abs(Y), _curved(code, trial, wide, Y, P)
+        along = derivatives(trial, every, own, 0.0 * trial.radius)
+        g = (combined(Y, residual(trial, every)[..., code.rows]).size
+             + drift(combined(Y, along.along[..., code.rows, :])))
+        back = _inverse_bound(M)
+        a = _times(back @ P, np.fmin(g, combined(Y, along.values[..., code.rows]).size))
+        if not code.part.closed_to:
+            a = np.where(np.array(known)[:, None], np.fmin(trial.radius, a), a)
+        solved, closing, matrix, sizes = code.computed(trial, wide)
+        F = size.sum(axis=-1, keepdims=True) * matrix[:, None, None] * np.ones(p)
+        noise, rates = _times(size, solved), at.by_own.size
+        rounding = (4 + len(trial.part.driven)) * UNIT_ROUNDOFF * sizes
+        outer = _inverse_bound(M + F)
+
+        def step(e: Array, off: Array) -> Array:
+            """What is left of e after a step; ``off``: how far the matrix's place is from those between."""
+            return _times(outer, _times(_weighed(Q, off) + F, e) + noise) + rounding
+
+        # equations that are not proved to hold are left to the program
+        closed = code.rows if code.part.closed_to else list(range(len(every)))
+        # 2, 3. one step after another, each with a second one by the same matrix
+        steps, alive = np.zeros(c, dtype=int), np.all(a <= wide, axis=-1)
+        e = a + rounding
+        for count in range(1, NEWTON_STEPS_AT_RUN + 1):
+            first = step(e, e / 2)
+            second = step(first, e + first / 2)
+            alive &= _within(first, wide - a) & _within(second, wide - a)
+            ends = (_within(e + first, near) & _within(first + second, last)
+                    & np.all((_times(rates, first) + closing)[:, closed] <= GENERATED_CLOSED, axis=-1))
+            steps[alive & ends & (steps == 0)] = count
+            e = np.maximum(first, second)
+        # 4. what an answer is worth: the program's tube is wider by a step that is near
+        s = np.broadcast_to(last, e.shape)
+        off = _times(back, _times(one + M + F, s) + noise) + near
+        error = _times(back, _times(_weighed(Q, off) + F, s) + noise) + rounding
+        error[~(np.all(a <= wide, axis=-1) & _within(trial.radius + near + off, wide - last))] = np.inf
+        error[~np.isfinite(error)] = np.inf
+        alone = np.all(np.isfinite(back), axis=(-1, -2))
+    inner = np.where(a <= wide, a, np.inf)
+    return [BoundedCell(*each) for each in zip(cells, steps.tolist(), error, inner, alone.tolist(), strict=True)]
+
+
+def _levelled(B: AffineForms, motors: int) -> tuple[Array, Array]:
+    """Of matrices B = 1 + Σ N_k ε_k + … (c, p, p), the first symbols those of the motors: P B with P = 1 − Σ N_k ε_k, a
+    bound of |P|, and one of |1 − P B|."""
+    p = B.r.shape[-1]
+    v = np.zeros_like(B.v)
+    v[0] = np.eye(p)
+    v[1 : 1 + motors] = -B.v[1 : 1 + motors]
+    P = AffineForms(v, np.zeros_like(B.r))
+    rows = [(P[..., i, :, None] * B).sum(-2) for i in range(p)]
+    made = AffineForms(np.stack([row.v for row in rows], axis=-2), np.stack([row.r for row in rows], axis=-2))
+    return P.size, (np.eye(p) - made).size
+
+
+def _curved(code: _Code, trial: TubeTrial, radius: Array, Y: Array, P: Array) -> Array:
+    """Bounds (c, p, p, p) of |Y D²_xG|, the last two dimensions the unknowns."""
+    every, place, p = code.every, trial.part.place, len(trial.part.unknowns)
+    forms = trial.forms(radius)
+    rows: list[dict[tuple[int, int], Any]] = [{} for _ in code.rows]  # gears are linear
+    for loop in trial.part.loops:
+        own = [(k, every[i].row) for k, i in enumerate(code.rows) if every[i].of is loop]
+        found = curvatures(trial.part.system, loop, forms, [row for _, row in own if row is not None])
+        for (k, _), slope in zip(own, found, strict=True):
+            rows[k] = slope
+    pairs = sorted({pair for row in rows for pair in row if pair[0] in place and pair[1] in place})
+    Q = np.zeros((len(trial.x), p, p, p))
+    if not pairs:
+        return Q
+    zero = affine(np.zeros(len(Q)), np.zeros((len(Q), trial.symbols[1])), np.zeros(len(Q)))
+    H = stacked([stacked([zero + row.get(pair, 0.0) for pair in pairs]) for row in rows], axis=-2)
+    size = P @ combined(Y, H).size
+    for k, (i, j) in enumerate(pairs):
+        Q[:, :, place[i], place[j]] = Q[:, :, place[j], place[i]] = size[:, :, k]
+    return Q
+
+
+def platform_error(branch: TubedBranch, ranges: Array, errors: Array, function: TracedFunction) -> tuple[float, float]:
+    """How far the platform's rotation (entries) and position (m) are from those at the closure, at most: ``ranges``
+    (2, p) of the unknowns, ``errors`` (p,) of them."""
+    q = [RoundedNumber.between(low, high) for low, high in zip(branch.lower, branch.upper, strict=True)]
+    x = [RoundedNumber.between(low, high, off) for low, high, off in zip(*ranges, errors, strict=True)]
+    made = rounded(function, q, x)
+    rotation, position = (max(float(each.error) for (array, _), each in made.items() if array == name)
+                          for name in ("R", "p"))
+    return rotation, position
+
+
+def _times(M: Array, v: Array) -> Array:
+    """M v for matrices (c, k, p) and vectors (c, p) of bounds, rounded up."""
+    return np.asarray((M @ v[..., None])[..., 0] * BOUND_ROUNDING)
+
+
+def _weighed(Q: Array, v: Array) -> Array:
+    """Q(v), (c, p, p)."""
+    return np.asarray((Q @ v[:, None, :, None])[..., 0])
+
+
+def _within(e: Array, limit: Array) -> NDArray[np.bool_]:
+    """Which rows (c,) of a bound (c, p) are at most a limit."""
+    return np.asarray(np.all(e * BOUND_ROUNDING <= limit, axis=-1))
+
+
+def _inverses(A: Array) -> Array:
+    """Inverses (c, p, p), any that will do."""
+    try:
+        return np.asarray(np.linalg.inv(A))
+    except np.linalg.LinAlgError:
+        return np.asarray(np.linalg.pinv(A))
+
+
+def _inverse_bound(M: Array) -> Array:
+    """A bound (c, p, p) of |(1 − E)⁻¹| for all |E| ≤ M, nan where there is none: with v > 0 and M v < v it is at most
+    N = (1 − M)⁻¹ ≥ 0, and with S ≥ 0 in floats and |1 − (1 − M) S| ≤ D, ‖D‖ = d < 1, N ≤ S (1 − D)⁻¹."""
+    p = M.shape[-1]
+    one = np.eye(p)
+    good = np.all(np.isfinite(M), axis=(-1, -2))
+    safe = np.where(good[:, None, None], M, 0.0)
+    S = np.abs(np.linalg.inv(one - safe))
+    v = S.sum(axis=-1)
+    good &= np.all(_times(safe, v) * (1 + AFFINE_ROUNDING) < v, axis=-1)
+    D = np.abs(one - (one - safe) @ S) + AFFINE_ROUNDING * p * (one + safe) @ S
+    d = D.sum(axis=-1).max(axis=-1)
+    good &= d < 0.5
+    found = S + v[..., None] * (d / (1 - d))[:, None, None] * (1 + AFFINE_ROUNDING)
+    return np.where(good[:, None, None], found, np.nan)
