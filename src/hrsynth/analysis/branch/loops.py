@@ -301,7 +301,7 @@ def curvatures(system: LoopSystem, loop: JointLoop, values: Any, rows: Sequence[
     one, two = (system.displacement(chain, values) for chain in loop.chains)
     places = [[(place, i) for place, i in enumerate(chain) if values[i] is not None] for chain in loop.chains]
     a, b = one.at(loop.point), two.at(loop.point)
-    ends = _Moved.of(one, places[0], -a, one.rate, a, -1), _Moved.of(two, places[1], b, two.rate, b, 1)
+    ends = _CarriedVector.of(one, places[0], -a, one.rate, a, -1), _CarriedVector.of(two, places[1], b, two.rate, b, 1)
     found = []
     for row in rows:
         if row.kind == "distance":
@@ -309,11 +309,12 @@ def curvatures(system: LoopSystem, loop: JointLoop, values: Any, rows: Sequence[
         slope: dict[tuple[int, int], Any] = {}
         if row.kind == "direction":
             u, v = mapped(one.R, row.one), mapped(two.R, row.other)
-            pairs = [(_Moved.of(one, places[0], u, one.turned, u, 1), _Moved.of(two, places[1], v, two.turned, v, 1))]
+            pairs = [(_CarriedVector.of(one, places[0], u, one.turned, u, 1),
+                      _CarriedVector.of(two, places[1], v, two.turned, v, 1))]
         else:
             assert row.one is not None
             k = mapped(one.R, row.one) if row.carried else row.one
-            held = _Moved.of(one, places[0] if row.carried else [], k, one.turned, k, 1)
+            held = _CarriedVector.of(one, places[0] if row.carried else [], k, one.turned, k, 1)
             pairs = [(end, held) for end in ends]
         for first, second in pairs:
             first.multiply(second, slope)
@@ -322,7 +323,7 @@ def curvatures(system: LoopSystem, loop: JointLoop, values: Any, rows: Sequence[
 
 
 @dataclass(frozen=True, eq=False)
-class _Moved:
+class _CarriedVector:
     """A vector (…, 3) with its first and second derivatives by coordinates, those that vanish left out."""
 
     value: Any
@@ -331,7 +332,7 @@ class _Moved:
 
     @classmethod
     def of(cls, swept: Swept, places: Sequence[tuple[int, int]], value: Any, rate: Callable[[int, Any], Any], at: Any,
-           sign: int) -> _Moved:
+           sign: int) -> _CarriedVector:
         """Of what a chain carries: ``rate`` of ``at`` times a sign."""
         once = {i: rate(place, at) for place, i in places}
         once = {i: each * sign for i, each in once.items() if each is not None}
@@ -343,7 +344,7 @@ class _Moved:
                     twice[min(i, j), max(i, j)] = turned
         return cls(value, once, twice)
 
-    def multiply(self, other: _Moved, slope: dict[tuple[int, int], Any]) -> None:
+    def multiply(self, other: _CarriedVector, slope: dict[tuple[int, int], Any]) -> None:
         """Add the second derivatives of the product of two vectors."""
         terms = [(pair, each, far.value) for own, far in ((self, other), (other, self))
                  for pair, each in own.twice.items()]
