@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 
 from ...geometry.vectors import inverse
 from ...mechanism.model import Joint, JointType, Mechanism
 from ...tolerances import NOISE
+from .. import numerals, xml
 from ..jointgraph import comma_list
 from .loops import LoopAssembly, Values
+
+COUNTED_FROM_ZERO = {"safety_controller": ("soft_lower_limit", "soft_upper_limit"),
+                     "calibration": ("rising", "falling", "reference_position")}
+"""Attributes of elements of a joint that are coordinates of it."""
 
 
 def with_zero_at(mechanism: Mechanism, assembly: LoopAssembly, values: Values) -> Mechanism:
@@ -26,16 +32,40 @@ def with_zero_at(mechanism: Mechanism, assembly: LoopAssembly, values: Values) -
 
 
 def with_limits(joints: Mapping[str, Joint], assembly: LoopAssembly, values: Values) -> dict[str, Joint]:
-    """The joints with the limits of R and P counted from where ``values`` put them."""
+    """The joints with the limits of R and P, and what else of them the file counts from zero, from where ``values`` put
+    them."""
     found = dict(joints)
     for tree_joint, _, _ in assembly.tree:
         joint = joints[tree_joint.name]
         limits = joint.limits
-        if limits is not None and joint.type in (JointType.REVOLUTE, JointType.PRISMATIC):
-            q = float(values[joint.name][0]) * assembly.unit(tree_joint)
-            lower, upper = (None if bound is None else bound - q for bound in (limits.lower, limits.upper))
-            found[joint.name] = replace(joint, limits=replace(limits, lower=lower, upper=upper))
+        if joint.type not in (JointType.REVOLUTE, JointType.PRISMATIC):
+            continue
+        if q := float(values[joint.name][0]) * assembly.unit(tree_joint):
+            if limits is not None:
+                lower, upper = (None if bound is None else bound - q for bound in (limits.lower, limits.upper))
+                limits = replace(limits, lower=lower, upper=upper)
+            found[joint.name] = replace(joint, limits=limits, xml=tuple(_counted(each, q) for each in joint.xml))
     return found
+
+
+def _counted(fragment: str, q: float) -> str:
+    """A kept element of a joint with what it counts from zero counted from q."""
+    if not fragment.startswith(tuple(f"<{tag}" for tag in COUNTED_FROM_ZERO)):
+        return fragment
+    element = xml.parse_fragment(fragment)
+    count_from(element, q)
+    return xml.canonical(element)
+
+
+def count_from(element: xml.Element, q: float) -> None:
+    """Count coordinates in an element of a joint from q; what is no number stays."""
+    for key in COUNTED_FROM_ZERO.get(str(element.tag), ()):
+        try:
+            value = float(element.get(key, ""))
+        except ValueError:
+            continue
+        if math.isfinite(value):
+            element.set(key, numerals.exact(value - q))
 
 
 def moves(assembly: LoopAssembly, values: Values) -> str:

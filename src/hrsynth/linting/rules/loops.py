@@ -13,7 +13,7 @@ from ...description.assembly import guess
 from ...description.assembly.build import rounding
 from ...description.assembly.candidates import closure_candidates
 from ...description.assembly.loops import LoopAssembly, LoopSolution, Values, solve
-from ...description.assembly.zero import moves
+from ...description.assembly.zero import count_from, moves
 from ...description.jointgraph import JointGraph, JointSpec
 from ...description.jointmotion import displacement, opening
 from ...errors import HrsynthError
@@ -120,8 +120,8 @@ def _rezero(moved: list[tuple[JointSpec, xml.Element]], values: Values, graph: J
         for limit in element.iterfind("limit"):
             free = (limit.get("free") or "").split()
             _less(limit, q, *(key for key in ("lower", "upper") if key not in free))
-        for limit in element.iterfind("safety_controller"):
-            _less(limit, q, "soft_lower_limit", "soft_upper_limit")
+        for each in element:
+            count_from(each, q)
     for element in moved[0][1].getroottree().iter("joint"):
         for mimic in element.iterfind("mimic"):
             ratio = NumberAt(mimic, "multiplier").value
