@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -44,14 +44,29 @@ def descend(x: X, evaluate: Callable[[X], tuple[Array, Array]], advance: Callabl
     ``evaluate`` gives the error and its Jacobian at a place, ``advance`` where a step with a damping factor leads (or
     None), ``content`` tells whether that is enough.
     """
-    found, factor = Residual.of(*evaluate(x)), damping.start
+    return next(descend_together(
+        [x], lambda places: [evaluate(place) for place in places.values()],
+        lambda at: {0: advance(*at[0])}, damping, iterations, content))
+
+
+def descend_together(
+        starts: Sequence[X], evaluate: Callable[[Mapping[int, X]], Iterable[tuple[Array, Array]]],
+        advance: Callable[[Mapping[int, tuple[X, Residual, float]]], Mapping[int, X | None]],
+        damping: Damping, iterations: int, content: Callable[[Residual], bool]) -> Iterator[tuple[X, Residual]]:
+    """As :func:`descend`, of several starts that know nothing of each other, in step: ``evaluate`` and ``advance`` are
+    given those of each number that still descend."""
+    x = dict(enumerate(starts))
+    found = {i: Residual.of(*each) for i, each in zip(x, evaluate(x), strict=True)}
+    factor = dict.fromkeys(x, damping.start)
     for _ in range(iterations):
-        if content(found) or factor > damping.most:
+        going = {i: (x[i], at, factor[i]) for i, at in found.items() if not (content(at) or factor[i] > damping.most)}
+        if not going:
             break
-        there = advance(x, found, factor)
-        trial = None if there is None else Residual.of(*evaluate(there))
-        if there is not None and trial is not None and trial.size < found.size:
-            x, found, factor = there, trial, max(damping.eased * factor, damping.least)
-        else:
-            factor *= 10.0
-    return x, found
+        there = {i: place for i, place in advance(going).items() if place is not None}
+        trial = {i: Residual.of(*each) for i, each in zip(there, evaluate(there), strict=True)} if there else {}
+        for i, (_, at, used) in going.items():
+            if i in trial and trial[i].size < at.size:
+                x[i], found[i], factor[i] = there[i], trial[i], max(damping.eased * used, damping.least)
+            else:
+                factor[i] = 10.0 * used
+    return ((x[i], found[i]) for i in x)

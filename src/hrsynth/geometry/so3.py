@@ -121,6 +121,13 @@ def rotation_of(q: Array) -> Array:
 def _quaternion(R: Array) -> tuple[float, float, float, float]:
     """A quaternion (w, x, y, z) of one rotation, of any length: faster than :func:`quaternions`."""
     (a, b, c), (d, e, f), (g, h, i) = R.tolist()
-    forms = ((1 + a + e + i, h - f, c - g, d - b), (h - f, 1 + a - e - i, b + d, c + g),
-             (c - g, b + d, 1 - a + e - i, f + h), (d - b, c + g, f + h, 1 - a - e + i))
-    return forms[max(range(4), key=lambda k: forms[k][k])]
+    squares = 1 + a + e + i, 1 + a - e - i, 1 - a + e - i, 1 - a - e + i
+    match squares.index(max(squares)):
+        case 0:
+            return squares[0], h - f, c - g, d - b
+        case 1:
+            return h - f, squares[1], b + d, c + g
+        case 2:
+            return c - g, b + d, squares[2], f + h
+        case _:
+            return d - b, c + g, f + h, squares[3]

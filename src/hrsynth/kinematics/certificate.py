@@ -19,7 +19,7 @@ from ..tolerances import FOLLOWED, RANK_GAP, SAME_RELATION, SOLVED
 from .configuration import ClosedConfiguration
 from .pinocchio_model import PinocchioModel
 from .relation import Measurement, Relation, relation
-from .sampling import Sample, Samples, track_path
+from .sampling import Sample, Samples, track_paths
 from .tasks import LinkPoses, Target, solve
 
 
@@ -89,19 +89,19 @@ def certify(samples: Samples, hidden: Mechanism, *, count: int | None = None, bo
         worst = start
         angle = np.pi / 2
         return verdict(f"not assembled at the zero configuration (loop {twin.worst_loop(twin.q0)[0]!r} misses)")
-    for member in members:
-        way = member.way if complete else member.way[1::2]
-        try:
-            q, residual = track_path(twin, [_visible(target, blind) for target in way])
-        except NotMeasured as error:
+    ways = [[target if not blind else target.of(lambda o: o.link not in blind)
+             for target in (member.way if complete else member.way[1::2])] for member in members]
+    for member, way, led in zip(members, ways, track_paths(twin, ways), strict=True):
+        if isinstance(led, NotMeasured):
             angle = np.pi / 2
-            return verdict(f"cannot follow the real robot: {error}")
+            return verdict(f"cannot follow the real robot: {led}")
+        q, residual = led
         worst = max(worst, residual)
         if not residual <= FOLLOWED:
             angle = np.pi / 2
             return verdict(f"cannot follow the real robot: misses by {residual:.2g}")
         if kept:
-            q = _at_real_poses(twin, q, member, _visible(way[-1], blind), kept)
+            q = _at_real_poses(twin, q, member, way[-1], kept)
         at = ClosedConfiguration.of(twin, q, FOLLOWED)
         here = member.configuration.pose(question.platform)[:3, 3]
         theirs = relation(at, asked, blind=blind)
@@ -133,12 +133,6 @@ def _at_real_poses(twin: PinocchioModel, q: Array, member: Sample, target: Targe
     poses = tuple((link, member.configuration.pose(link)) for link in kept)
     found, residual = solve(twin, q, LinkPoses(poses, target), tolerance=SOLVED)
     return found if residual <= FOLLOWED else q
-
-
-def _visible(target: Target, blind: frozenset[str]) -> Target:
-    if not blind:
-        return target
-    return replace(target, measured=tuple(pair for pair in target.measured if pair[0].link not in blind))
 
 
 def _difference(ours: Relation, theirs: Relation, angle: float) -> str:

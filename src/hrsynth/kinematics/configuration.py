@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from itertools import accumulate
 
 import numpy as np
 from numpy.typing import NDArray
@@ -95,6 +96,28 @@ def measure(twin: PinocchioModel, q: Array, reference: str, observations: Sequen
     return twin.measured[2]
 
 
+def measure_together(twin: PinocchioModel, places: Sequence[Array], reference: str, observations: Sequence[Observation],
+                     links: Sequence[str] = ()) -> tuple[Array, Array, Array, Array, Array, Array]:
+    """At several configurations the loops' residuals (n, rows) and Jacobians (n, rows, nv), and what :func:`measure`
+    gives there: (n, k, 4, 4), (n, k, 6, nv), all values (n, size) and rates (n, size, nv)."""
+    names, whole, groups = _grouped(reference, tuple(observations), tuple(links))
+    errors, loops, X, V = twin.states(places, names, whole)
+    metric = V
+    if not all(group.kind.turns_only for group in groups):
+        metric = V.copy()
+        metric[..., :3, :] *= twin.length
+    size = sum(o.size for o in observations)
+    values, rates = np.empty((len(places), size)), np.empty((len(places), size, twin.nv))
+    for group in groups:
+        kind, view, at = group.kind, group.view, group.at
+        found, moving = kind.abreast(group.observations, X[:, view], X[:, at], metric[:, view], metric[:, at])
+        if group.powers is not None:
+            unit = twin.length**group.powers
+            found, moving = found / unit, moving / unit[:, None]
+        values[:, group.rows], rates[:, group.rows] = found, moving
+    return errors, loops, X[:, : len(links)], V[:, : len(links)], values, rates
+
+
 @dataclass(frozen=True, eq=False)
 class _AlikeObservations:
     """Observations of one kind, seen from one link: their places among all, the places of the links."""
@@ -104,6 +127,8 @@ class _AlikeObservations:
     members: list[int]
     observations: tuple[Observation, ...]
     at: NDArray[np.intp]
+    rows: list[int] | slice
+    """Their rows among those of all."""
     powers: Array | None
     """Of length, one for each row; None where all are zero."""
 
@@ -118,11 +143,18 @@ def _grouped(reference: str, observations: tuple[Observation, ...], links: tuple
     first = (*links, *dict.fromkeys(name for name in sliding if name not in links))
     names = (*first, *dict.fromkeys(name for name in (*seen, *(o.link for o in observations)) if name not in first))
     place = {name: i for i, name in enumerate(names)}
+    starts = list(accumulate((o.size for o in observations), initial=0))
     groups = []
     for kind, view in dict.fromkeys((type(o), name) for o, name in zip(observations, seen, strict=True)):
         members = [i for i, o in enumerate(observations) if (type(o), seen[i]) == (kind, view)]
         chosen = tuple(observations[i] for i in members)
         powers = np.tile(np.broadcast_to(kind.dimension, kind.size), len(members)) if np.any(kind.dimension) else None
         at = np.array([place[o.link] for o in chosen])
-        groups.append(_AlikeObservations(kind, place[view], members, chosen, at, powers))
+        rows = [row for i in members for row in range(starts[i], starts[i] + kind.size)]
+        groups.append(_AlikeObservations(kind, place[view], members, chosen, at, _run(rows), powers))
     return names, len(first), groups
+
+
+def _run(rows: list[int]) -> list[int] | slice:
+    """The same rows, as a slice where they follow each other."""
+    return slice(rows[0], rows[-1] + 1) if rows == list(range(rows[0], rows[-1] + 1)) else rows

@@ -8,7 +8,7 @@ welded to the other link.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -253,15 +253,19 @@ class PinocchioModel:
         """Poses (k, 4, 4) and velocities (k, 6, nv) of several links at once; after the first ``whole`` (default: all)
         the linear parts are those of the points at the base's origin."""
         X = self.poses(q, links)
-        V = self.data.J.reshape(6, self.nv) * self._several[links][2]  # of one coordinate J is (6,)
+        return X, self._moving(X, self.data.J.reshape(6, self.nv), links, whole)  # of one coordinate J is (6,)
+
+    def _moving(self, X: Array, J: Array, links: tuple[str, ...], whole: int | None) -> Array:
+        """The velocities (…, k, 6, nv) of links with poses X (…, k, 4, 4), by Pinocchio's J (…, 6, nv)."""
+        V: Array = J[..., None, :, :] * self._several[links][2]
         if whole != 0:
-            first = V[:whole]
-            x, y, z = (X[:whole, :3, 3] / self.length).T[:, :, None]
-            u, v, w = first[:, 3], first[:, 4], first[:, 5]
-            first[:, 0] += v * z - w * y  # the origin's velocity: ω × p more than that of the base's origin
-            first[:, 1] += w * x - u * z
-            first[:, 2] += u * y - v * x
-        return X, V
+            first = V[..., :whole, :, :]
+            x, y, z = (X[..., :whole, i, 3, None] / self.length for i in range(3))
+            u, v, w = first[..., 3, :], first[..., 4, :], first[..., 5, :]
+            first[..., 0, :] += v * z - w * y  # the origin's velocity: ω × p more than that of the base's origin
+            first[..., 1, :] += w * x - u * z
+            first[..., 2, :] += u * y - v * x
+        return V
 
     def poses(self, q: Array, links: tuple[str, ...]) -> Array:
         """X_BL (k, 4, 4) of several links at once, metres."""
@@ -270,6 +274,26 @@ class PinocchioModel:
         X = np.array([self._placements[body].homogeneous for body in bodies])
         X[:, :3, 3] *= self.length
         return np.asarray(X @ offsets)
+
+    def states(self, places: Sequence[Array], links: tuple[str, ...], whole: int | None = None
+               ) -> tuple[Array, Array, Array, Array]:
+        """Of several configurations :meth:`residual` (n, rows), :meth:`jacobian` (n, rows, nv) and :meth:`frames`
+        (n, k, 4, 4), (n, k, 6, nv)."""
+        bodies, offsets, _ = self._several.get(links) or self._together(links)
+        errors, loops, J, X = [], [], [], []
+        for q in places:
+            errors.append(self.residual(q))
+            loops.append(self.jacobian(q))
+            if bodies:
+                J.append(self.data.J.reshape(6, self.nv).copy())
+                X += [self._placements[body].homogeneous for body in bodies]
+        if not bodies:
+            none = np.zeros((len(places), 0, 4, 4)), np.zeros((len(places), 0, 6, self.nv))
+            return np.array(errors), np.array(loops), *none
+        poses = np.array(X).reshape(len(places), len(bodies), 4, 4)
+        poses[..., :3, 3] *= self.length
+        poses = poses @ offsets
+        return np.array(errors), np.array(loops), poses, self._moving(poses, np.array(J), links, whole)
 
     def _together(self, links: tuple[str, ...]) -> tuple[list[int], Array, Array]:
         """Of several links: the bodies that carry them, where (k, 4, 4), and what moves them (k, 1, nv)."""

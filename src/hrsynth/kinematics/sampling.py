@@ -8,7 +8,7 @@ What fails is discarded and counted. All samples must agree in what tells operat
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -36,7 +36,7 @@ from .branch import CORRECTED, OperationMode, Signature, follows, group_modes, t
 from .configuration import ClosedConfiguration
 from .pinocchio_model import PinocchioModel
 from .relation import Measurement, Relation, relation
-from .tasks import Target, shortened, solve
+from .tasks import Places, Target, shortened, solve, solve_together
 
 STEP = 0.11
 """Length of a step: the norm of (t, u̇), in characteristic lengths and radians."""
@@ -218,29 +218,33 @@ class _Walks:
         """So many samples, how many were discarded, and whether the robot finds all of them again; raises
         ``NotSampled``."""
         members, lonely = list[Sample](), list[Sample]()
-        discarded = 0
-        for number in range(4 * count):
-            try:
-                sample = self.walk(roots[number % len(roots)])
-            except NotMeasured:
-                sample = None
-            if sample is None:
-                discarded += 1
-                continue
-            (members if self._found_again(sample) else lonely).append(sample)
-            if len(members) == count:
-                return members, discarded + len(lonely), True
+        discarded, draws = 0, iter(range(4 * count))
+        while len(members) < count:
+            drawn = list[Sample]()
+            for number in draws:
+                try:
+                    sample = self.walk(roots[number % len(roots)])
+                except NotMeasured:
+                    sample = None
+                drawn += [] if sample is None else [sample]
+                discarded += sample is None
+                if len(drawn) == count - len(members):
+                    break
+            if not drawn:
+                break
+            for sample, again in zip(drawn, self._found_again(drawn), strict=True):
+                (members if again else lonely).append(sample)
+        if len(members) == count:
+            return members, discarded + len(lonely), True
         if len(members) + len(lonely) < count:
             raise NotSampled(roots[0].twin.mechanism.name, len(members) + len(lonely), count)
         return [*members, *lonely][:count], discarded, False
 
-    def _found_again(self, sample: Sample) -> bool:
-        led = [replace(t, measured=tuple(pair for pair in t.measured if pair[0].key in self.leading))
-               for t in sample.way]
-        try:
-            return track_path(sample.configuration.twin, led, iterations=EASY_ITERATIONS)[1] <= FOLLOWED
-        except NotMeasured:
-            return False
+    def _found_again(self, samples: Sequence[Sample]) -> Iterator[bool]:
+        """Whether the robot, led along the way of each sample, arrives."""
+        ways = [[target.of(lambda o: o.key in self.leading) for target in sample.way] for sample in samples]
+        for led in track_paths(samples[0].configuration.twin, ways, EASY_ITERATIONS):
+            yield not isinstance(led, NotMeasured) and led[1] <= FOLLOWED
 
     def walk(self, start: ClosedConfiguration) -> Sample | None:
         """The sample at the end of a random walk; None where it is blocked, or its ranks are not clear."""
@@ -362,10 +366,23 @@ def random_walk(start: ClosedConfiguration, count: int, seed: int = 0, steps: in
             raise NotSampled(start.twin.mechanism.name, given, count)
 
 
-def track_path(twin: PinocchioModel, way: Sequence[Target], iterations: int = 120) -> tuple[Array, float]:
-    """The configuration a twin reaches when it is led from its zero configuration along a way, and the residual."""
-    q, residual = twin.q0, 0.0
-    for target in way:
-        exact = target is way[-1]
-        q, residual = solve(twin, q, target, tolerance=SOLVED if exact else PASSED_BY, iterations=iterations)
-    return q, residual
+def track_paths(twin: PinocchioModel, ways: Sequence[Sequence[Target]], iterations: int = 120
+                ) -> Iterator[tuple[Array, float] | NotMeasured]:
+    """The configurations a twin reaches when it is led from its zero configuration along ways of equal length, and the
+    residuals, or what cannot be measured on a way; all ways in step, or each alone where that is so of one."""
+    try:
+        yield from _tracked(twin, ways, iterations)
+    except NotMeasured as error:
+        for way in ways if len(ways) > 1 else ():
+            yield from track_paths(twin, [way], iterations)
+        if len(ways) == 1:
+            yield error
+
+
+def _tracked(twin: PinocchioModel, ways: Sequence[Sequence[Target]], iterations: int) -> list[tuple[Array, float]]:
+    found, stages = [(twin.q0, 0.0)] * len(ways), list(zip(*ways, strict=True))
+    places = Places(twin, stages[0][0] if stages else None)
+    for targets in stages:
+        tolerance = SOLVED if targets is stages[-1] else PASSED_BY
+        found = solve_together(places, [q for q, _ in found], targets, tolerance=tolerance, iterations=iterations)
+    return found

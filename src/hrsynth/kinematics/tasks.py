@@ -5,20 +5,21 @@ Lengths are in characteristic lengths, so that errors of positions and of turns 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
 
-from ..geometry.gauss_newton import Damping, Residual, descend
+from ..geometry.gauss_newton import Damping, Residual, descend, descend_together
 from ..geometry.screws import point_velocity
 from ..geometry.so3 import logarithm
 from ..geometry.vectors import Array
 from ..mechanism.observation import Observation
 from ..results import Value
 from ..tolerances import CLOSED
-from .configuration import measure
+from .configuration import measure, measure_together
 from .pinocchio_model import PinocchioModel
 
 DAMPING = Damping(start=1.0, eased=0.1, least=0.1, most=1e8)
@@ -77,15 +78,30 @@ class Target(Value):
         observations = tuple(o for o, _ in self.measured)
         frames, velocities, values, rates = measure(twin, q, self.reference, observations, (self.link,))
         X, V = frames[0], velocities[0]
-        if self.point is not None:
-            errors = [(X[:3, :3] @ self.point + X[:3, 3] - self.pose[:3, :3] @ self.point - self.pose[:3, 3])
-                      / twin.length]
-            blocks = [point_velocity(V, X[:3, :3] @ self.point / twin.length)]
-        else:
-            errors = [(X[:3, 3] - self.pose[:3, 3]) / twin.length, logarithm(X[:3, :3] @ self.pose[:3, :3].T)]
-            blocks = [V]
-        errors += [o.apart(value, wanted) for value, (o, wanted) in zip(values, self.measured, strict=True)]
-        return np.concatenate(errors), np.concatenate([*blocks, *rates])
+        block = V if self.point is None else point_velocity(V, X[:3, :3] @ self.point / twin.length)
+        apart = (o.apart(value, wanted) for value, (o, wanted) in zip(values, self.measured, strict=True))
+        missed, = self.misses([self], X[None], twin.length)
+        return np.concatenate([missed, *apart]), np.concatenate([block, *rates])
+
+    def of(self, chosen: Callable[[Observation], bool]) -> Target:
+        """The same pose, with some of the measured values."""
+        return replace(self, measured=tuple(pair for pair in self.measured if chosen(pair[0])))
+
+    @cached_property
+    def wanted(self) -> Array:
+        """All measured values (size,)."""
+        return np.concatenate([np.zeros(0), *(value for _, value in self.measured)])
+
+    @staticmethod
+    def misses(targets: Sequence[Target], X: Array, length: float) -> Array:
+        """By how much poses X (n, 4, 4) miss those of targets of one kind, or their points: characteristic lengths,
+        radians (n, 6 or 3)."""
+        wanted, point = np.array([target.pose for target in targets]), targets[0].point
+        if point is not None:
+            return np.array([x[:3, :3] @ point + x[:3, 3] - w[:3, :3] @ point - w[:3, 3]
+                             for x, w in zip(X, wanted, strict=True)]) / length
+        turns = X[:, :3, :3] @ wanted[:, :3, :3].swapaxes(1, 2)
+        return np.concatenate([(X[:, :3, 3] - wanted[:, :3, 3]) / length, [logarithm(R) for R in turns]], axis=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,16 +128,92 @@ def solve(twin: PinocchioModel, q: Array, task: Task | None = None, *, tolerance
     def advance(q: Array, at: Residual, factor: float) -> Array:
         normal = at.J.T @ at.J
         normal.reshape(-1)[:: twin.nv + 1] += max(factor * at.size**2, 1e-14)
-        wanted = -(at.J.T @ at.error)
-        try:
-            step: Array = np.asarray(np.linalg.solve(normal, wanted), dtype=float)
-        except np.linalg.LinAlgError:  # singular but for rounding, beside which the least damping is nothing
-            step = np.asarray(np.linalg.lstsq(normal, wanted)[0], dtype=float)
-        return twin.moved(q, shortened(step, 0.5))
+        return twin.moved(q, shortened(_damped(normal, -(at.J.T @ at.error)), 0.5))
 
     q, left = descend(q, lambda q: system(twin, q, task), advance, DAMPING, iterations,
                       lambda at: at.size <= tolerance)
     return q, left.size
+
+
+def solve_together(places: Places, starts: Sequence[Array], targets: Sequence[Target | None], *,
+                   tolerance: float = CLOSED, iterations: int = 30) -> list[tuple[Array, float]]:
+    """As :func:`solve`, from several configurations in step, each to its own target: the same answers."""
+    twin = places.twin
+
+    def evaluate(at: Mapping[int, Array]) -> Iterable[tuple[Array, Array]]:
+        return places.at(list(at.values()), [targets[i] for i in at])
+
+    def advance(going: Mapping[int, tuple[Array, Residual, float]]) -> dict[int, Array | None]:
+        J = np.array([at.J for _, at, _ in going.values()])
+        errors = np.array([at.error for _, at, _ in going.values()])
+        normal = J.swapaxes(1, 2) @ J
+        damping = [max(factor * at.size**2, 1e-14) for _, at, factor in going.values()]
+        normal.reshape(len(J), -1)[:, :: twin.nv + 1] += np.array(damping)[:, None]
+        wanted = -(J.swapaxes(1, 2) @ errors[:, :, None])
+        try:
+            steps = np.linalg.solve(normal, wanted)[:, :, 0]
+        except np.linalg.LinAlgError:
+            steps = np.array([_damped(*each) for each in zip(normal, wanted[:, :, 0], strict=True)])
+        return {i: twin.moved(q, shortened(step, 0.5)) for step, (i, (q, _, _)) in zip(steps, going.items(),
+                                                                                     strict=True)}
+
+    return [(q, left.size) for q, left in descend_together(
+        starts, evaluate, advance, DAMPING, iterations, lambda at: at.size <= tolerance)]
+
+
+def _damped(normal: Array, wanted: Array) -> Array:
+    """The step of damped normal equations."""
+    try:
+        return np.asarray(np.linalg.solve(normal, wanted), dtype=float)
+    except np.linalg.LinAlgError:  # singular but for rounding, beside which the least damping is nothing
+        return np.asarray(np.linalg.lstsq(normal, wanted)[0], dtype=float)
+
+
+class Places:
+    """Errors and Jacobians of the loops and of targets of one kind, at several configurations at once; what is known
+    of the places where one target is reached serves the next one too."""
+
+    def __init__(self, twin: PinocchioModel, like: Target | None) -> None:
+        self.twin, self.like = twin, like
+        self.links = () if like is None else (like.link,)
+        self.observations = () if like is None else tuple(o for o, _ in like.measured)
+        self.plain = all(type(o).apart is Observation.apart for o in self.observations)
+        self.known: dict[int, tuple[Array, tuple[Array, ...], int]] = {}
+
+    def at(self, places: Sequence[Array], targets: Sequence[Target | None]) -> Iterable[tuple[Array, Array]]:
+        """Error (rows,) and Jacobian (rows, nv) at each configuration, for its target."""
+        if all(id(q) in self.known for q in places):
+            known = {id(q): self.known[id(q)] for q in places}
+            loops, J, X, values = (np.array([stack[part][i] for _, stack, i in known.values()]) for part in range(4))
+            self.known = known
+        else:
+            stack = loops, J, X, values = self._measured(places)
+            self.known |= {id(q): (q, stack, i) for i, q in enumerate(places)}
+        goals = [target for target in targets if target is not None]
+        if not goals:
+            return zip(loops, J, strict=True)
+        missed = Target.misses(goals, X, self.twin.length)
+        wanted = np.array([goal.wanted for goal in goals])
+        if self.plain:
+            apart = values - wanted
+        else:
+            ends = np.cumsum([o.size for o in self.observations])[:-1]
+            apart = np.array([np.concatenate([o.apart(*pair) for o, *pair in zip(
+                self.observations, *(np.split(row, ends) for row in rows), strict=True)])
+                for rows in zip(values, wanted, strict=True)])
+        return zip(np.concatenate([loops, missed, apart], axis=1), J, strict=True)
+
+    def _measured(self, places: Sequence[Array]) -> tuple[Array, Array, Array, Array]:
+        """The loops' residuals (n, rows), all Jacobians (n, rows, nv), poses X_BP (n, 4, 4), and values (n, size)."""
+        twin, like = self.twin, self.like
+        reference = twin.mechanism.base if like is None else like.reference
+        loops, J, X, V, values, rates = measure_together(twin, places, reference, self.observations, self.links)
+        if like is None:
+            return loops, J, X, values
+        X, V = X[:, 0], V[:, 0]
+        if like.point is not None:
+            V = np.array([point_velocity(v, x[:3, :3] @ like.point / twin.length) for v, x in zip(V, X, strict=True)])
+        return loops, np.concatenate([J, V, rates], axis=1), X, values
 
 
 def shortened(step: Array, longest: float) -> Array:

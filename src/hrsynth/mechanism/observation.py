@@ -116,6 +116,14 @@ class Observation(Value):
                  for o, X, V in zip(observations, X_links, V_links, strict=True)]
         return np.concatenate(values), np.concatenate(rates)
 
+    @classmethod
+    def abreast(cls, observations: Sequence[Observation], X_reference: Array, X_links: Array, V_reference: Array,
+                V_links: Array) -> tuple[Array, Array]:
+        """The same at several configurations, poses (n, 4, 4) and (n, k, 4, 4): (n, rows), (n, rows, columns)."""
+        found = [cls.together(observations, *each)
+                 for each in zip(X_reference, X_links, V_reference, V_links, strict=True)]
+        return np.array([values for values, _ in found]), np.array([rates for _, rates in found])
+
     def carried_by(self, into: Mapping[str, str], poses: Mapping[str, Array]) -> Self:
         """The same measurement where links became parts of others: ``into[old]``; ``poses`` are X_BL at zero."""
         seen_from = None if self.seen_from is None else into[self.seen_from]

@@ -76,13 +76,16 @@ class SeenAxis(Observation):
     @classmethod
     def together(cls, observations: Sequence[Observation], X_reference: Array, X_links: Array, V_reference: Array,
                  V_links: Array) -> tuple[Array, Array]:
-        seen = X_reference[:3, :3].T
-        u = np.matmul(X_links[:, :3, :3], _directions(tuple(observations)))[:, :, 0]
-        crosses = np.zeros((3, 3, len(u)))
-        crosses[1, 2], crosses[2, 0], crosses[0, 1] = u.T
-        crosses -= crosses.transpose(1, 0, 2)
-        rates = (seen @ crosses.transpose(2, 0, 1)) @ (V_links[:, 3:] - V_reference[3:])
-        return (u @ seen.T).ravel(), rates.reshape(-1, rates.shape[2])
+        seen = X_reference[..., :3, :3].swapaxes(-1, -2)
+        u = np.matmul(X_links[..., :3, :3], _directions(tuple(observations)))[..., 0]
+        across = np.zeros((*u.shape, 3))
+        across[..., 0, 1], across[..., 1, 2], across[..., 2, 0] = u[..., 2], u[..., 0], u[..., 1]
+        across -= across.swapaxes(-1, -2)
+        rates = (seen[..., None, :, :] @ across) @ (V_links[..., 3:, :] - V_reference[..., None, 3:, :])
+        n = u.shape[:-2]
+        return (u @ X_reference[..., :3, :3]).reshape(*n, -1), rates.reshape(*n, -1, rates.shape[-1])
+
+    abreast = together
 
     @property
     def view(self) -> Array:

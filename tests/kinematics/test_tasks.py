@@ -1,0 +1,56 @@
+"""Configurations solved in step are those that each gives alone."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hrsynth.analysis.asked import observe
+from hrsynth.errors import NotMeasured
+from hrsynth.geometry.gauss_newton import Damping, Residual, descend, descend_together
+from hrsynth.geometry.vectors import Array
+from hrsynth.kinematics.sampling import track_paths
+from hrsynth.kinematics.tasks import solve
+from hrsynth.tolerances import PASSED_BY, SOLVED
+from kinematics.robots import setting_of
+
+
+@pytest.mark.parametrize(("robot", "see"), [
+    ("quattro", ()), ("orthoglide", ()), ("3rrr_m1", ()), ("gough_stewart", ("c=point:platform@0,0,0",))])
+def test_together_every_way_ends_where_it_ends_alone(robot: str, see: tuple[str, ...]) -> None:
+    """To the last digit, on the ways of samples; the loop here is the one that solves for a single configuration."""
+    setting = observe(robot, camera="c=base@0,0,2/180deg,0,0", see=see, samples=3) if see else setting_of(robot)
+    twin = setting.everything.twin
+    ways = [member.way for member in setting.samples.members]
+    for way, led in zip(ways, track_paths(twin, ways), strict=True):
+        assert not isinstance(led, NotMeasured)
+        q, residual = twin.q0, 0.0
+        for target in way:
+            q, residual = solve(twin, q, target, tolerance=SOLVED if target is way[-1] else PASSED_BY, iterations=120)
+        np.testing.assert_array_equal(led[0], q)
+        assert led[1] == residual <= SOLVED
+
+
+def test_one_that_diverges_leaves_the_others_as_they_are() -> None:
+    """x² = a from several starts; of a < 0 there is no root."""
+    wanted = {0: 4.0, 1: -1.0, 2: 9.0}
+    damping = Damping(start=1e-3, eased=0.1, least=1e-9, most=1e6)
+
+    def system(x: Array, a: float) -> tuple[Array, Array]:
+        return x * x - a, np.array([2 * x])
+
+    def step(x: Array, at: Residual, factor: float) -> Array:
+        return np.asarray(x - at.J[0] * at.error / (at.J[0] ** 2 + factor))
+
+    def content(at: Residual) -> bool:
+        return at.size < 1e-12
+
+    starts = [np.array([3.0]), np.array([0.5]), np.array([1.0])]
+    together = list(descend_together(
+        starts, lambda places: [system(x, wanted[i]) for i, x in places.items()],
+        lambda going: {i: step(*at) for i, at in going.items()}, damping, 40, content))
+    for i, (start, found) in enumerate(zip(starts, together, strict=True)):
+        alone = descend(start, lambda x, a=wanted[i]: system(x, a), step, damping, 40, content)
+        assert found[0] == alone[0] and found[1].size == alone[1].size
+    np.testing.assert_allclose([together[0][0][0], together[2][0][0]], [2.0, 3.0], atol=1e-12)
+    assert together[1][1].size >= 1.0
