@@ -51,6 +51,6 @@ def test_one_that_diverges_leaves_the_others_as_they_are() -> None:
         lambda going: {i: step(*at) for i, at in going.items()}, damping, 40, content))
     for i, (start, found) in enumerate(zip(starts, together, strict=True)):
         alone = descend(start, lambda x, a=wanted[i]: system(x, a), step, damping, 40, content)
-        assert found[0] == alone[0] and found[1].size == alone[1].size
+        assert (found[0], found[1].size) == (alone[0], alone[1].size)
     np.testing.assert_allclose([together[0][0][0], together[2][0][0]], [2.0, 3.0], atol=1e-12)
     assert together[1][1].size >= 1.0

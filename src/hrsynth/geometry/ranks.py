@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -65,13 +66,28 @@ def decomposed(matrix: Array, full_matrices: bool = False) -> tuple[Array, Array
         return U, s, Vt
 
 
+def decomposed_together(matrices: Sequence[Array], full_matrices: bool = False) -> list[tuple[Array, Array, Array]]:
+    """:func:`decomposed` of several matrices, those of one shape in one call: the same digits."""
+    if len({matrix.shape for matrix in matrices}) == 1:
+        try:
+            return list(zip(*np.linalg.svd(np.array(matrices), full_matrices=full_matrices), strict=True))
+        except np.linalg.LinAlgError:
+            pass
+    return [decomposed(matrix, full_matrices) for matrix in matrices]
+
+
 def range_basis(matrix: Array, scale: float | None = None) -> tuple[Array, Rank]:
     """An orthonormal basis (rows of ``matrix`` long) of the column space, with the rank."""
-    if 0 in matrix.shape:
-        return np.zeros((matrix.shape[0], 0)), Rank(0, CLEAN)
-    U, s, _ = decomposed(matrix)
-    rank = rank_of(s, scale)
-    return U[:, : rank.value], rank
+    return range_bases([matrix], scale)[0]
+
+
+def range_bases(matrices: Sequence[Array], scale: float | None = None) -> list[tuple[Array, Rank]]:
+    """:func:`range_basis` of several matrices."""
+    if any(0 in matrix.shape for matrix in matrices):
+        return [range_basis(matrix, scale) if matrix.size else (np.zeros((matrix.shape[0], 0)), Rank(0, CLEAN))
+                for matrix in matrices]
+    ranks = [(U, rank_of(s, scale)) for U, s, _ in decomposed_together(matrices)]
+    return [(U[:, : rank.value], rank) for U, rank in ranks]
 
 
 def space_basis(matrix: Array, scale: float | None = None) -> Array:
@@ -112,13 +128,23 @@ class Spectrum:
 
 def spectrum(matrix: Array, scale: float | None = None) -> Spectrum:
     """The spectrum of a matrix; ``scale`` as in :func:`rank_of`."""
-    rows, columns = matrix.shape
-    if 0 in matrix.shape:
-        return Spectrum(np.eye(columns), Rank(0, CLEAN), np.zeros(0), np.zeros((rows, 0)), np.zeros((columns, 0)))
-    U, s, Vt = decomposed(matrix, full_matrices=rows < columns)
-    rank = rank_of(s, scale)
-    r = rank.value
-    return Spectrum(Vt[r:].T, rank, s[:r], U[:, :r], Vt[:r].T)
+    return spectra([matrix], scale)[0]
+
+
+def spectra(matrices: Sequence[Array], scale: float | None = None) -> list[Spectrum]:
+    """:func:`spectrum` of several matrices."""
+    if len({matrix.shape for matrix in matrices}) != 1:
+        return [spectrum(matrix, scale) for matrix in matrices]
+    rows, columns = matrices[0].shape
+    if 0 in (rows, columns):
+        return [Spectrum(np.eye(columns), Rank(0, CLEAN), np.zeros(0), np.zeros((rows, 0)), np.zeros((columns, 0)))
+                for _ in matrices]
+    found = []
+    for U, s, Vt in decomposed_together(matrices, full_matrices=rows < columns):
+        rank = rank_of(s, scale)
+        r = rank.value
+        found.append(Spectrum(Vt[r:].T, rank, s[:r], U[:, :r], Vt[:r].T))
+    return found
 
 
 def singular_values(matrices: Array) -> Array:

@@ -28,6 +28,8 @@ CHANGED = 1.5
 """Largest ratio between the loops' singular values, in order, at the start of a step and along it."""
 CORRECTED = 0.2
 """Longest correction, as part of the step: what ``TURNED`` lets a smooth branch bend away, with a margin."""
+MARGIN = 1e-3
+"""Part of a limit that a bound leaves for rounding, where it takes the place of singular values."""
 EVENLY = 0.2
 """Part of the weakest singular value by which its fall to a singularity may depart from an even one."""
 LARGEST_WHOLE = 4
@@ -44,8 +46,35 @@ def follows(here: ClosedConfiguration, step: Array, there: ClosedConfiguration) 
     if not len(kept):
         return True
     return (_alike(kept, there.strengths) and _same_side(here, there)
-            and largest_angle(here.kernel()[0], there.kernel()[0]) <= TURNED
-            and all(_alike(kept, _values(here, part * step, len(kept))) for part in (0.5, 1.0)))
+            and _turned_little(here.kernel()[0], there.kernel()[0])
+            and all(_alike_after(here, part * step) for part in (0.5, 1.0)))
+
+
+def _turned_little(A: Array, B: Array) -> bool:
+    """Whether the largest principal angle is at most ``TURNED``: its sine is at most the Frobenius norm of what lies
+    outside."""
+    if A.shape == B.shape and np.linalg.norm(B - A @ (A.T @ B)) < (1 - MARGIN) * np.sin(TURNED):
+        return True
+    return largest_angle(A, B) <= TURNED
+
+
+def _alike_after(here: ClosedConfiguration, step: Array) -> bool:
+    """Whether the loops' singular values after a step are like those ``here``.
+
+    With J = U S Vᵀ here, J' there, A = S⁻¹ Uᵀ J' and δ = ‖A Aᵀ − 1‖: σ'² of Uᵀ J' lies in (1 ± δ) σ², and that of J'
+    exceeds it by no more than ‖J' − U Uᵀ J'‖². Only where these bounds do not decide are they taken apart.
+    """
+    kept, U = here.strengths, here.loops.left
+    J = here.twin.jacobian(here.twin.moved(here.q, step))
+    within = U.T @ J
+    A = within / kept[:, None]
+    change = A @ A.T
+    change.reshape(-1)[:: len(kept) + 1] -= 1.0
+    delta = float(np.linalg.norm(change))
+    beyond = float(np.linalg.norm(J - U @ within)) / kept[-1]
+    if delta < (1 - MARGIN) * (1 - CHANGED**-2) and delta + beyond**2 < (1 - MARGIN) * (CHANGED**2 - 1):
+        return True
+    return _alike(kept, np.linalg.svd(J, compute_uv=False)[: len(kept)])
 
 
 def nears(here: ClosedConfiguration, step: Array, there: ClosedConfiguration) -> bool:

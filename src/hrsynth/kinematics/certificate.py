@@ -5,20 +5,21 @@ Source: docs/pages/theory.md, section 5.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from ..errors import BadMechanism, NotMeasured
-from ..geometry.ranks import CLEAN, kernel_basis, largest_angle
+from ..geometry.ranks import CLEAN, largest_angle, spectra
 from ..geometry.vectors import Array
 from ..mechanism import Mechanism
 from ..results import Result
 from ..tolerances import FOLLOWED, RANK_GAP, SAME_RELATION, SOLVED
 from .configuration import ClosedConfiguration
 from .pinocchio_model import PinocchioModel
-from .relation import Measurement, Relation, relation
+from .relation import Relation, relations
 from .sampling import Sample, Samples, track_paths
 from .tasks import LinkPoses, Target, solve
 
@@ -91,28 +92,39 @@ def certify(samples: Samples, hidden: Mechanism, *, count: int | None = None, bo
         return verdict(f"not assembled at the zero configuration (loop {twin.worst_loop(twin.q0)[0]!r} misses)")
     ways = [[target if not blind else target.of(lambda o: o.link not in blind)
              for target in (member.way if complete else member.way[1::2])] for member in members]
-    for member, way, led in zip(members, ways, track_paths(twin, ways), strict=True):
+    followed = list(track_paths(twin, ways))
+    arrived = list[Array]()
+    for led in followed:
+        if isinstance(led, NotMeasured) or not led[1] <= FOLLOWED:
+            break
+        arrived.append(led[0])
+    if kept:
+        arrived = [_at_real_poses(twin, q, member, way[-1], kept)
+                   for q, member, way in zip(arrived, members, ways, strict=False)]
+    reached = ClosedConfiguration.several(twin, arrived, FOLLOWED)
+    rows = asked.rows_together(reached, blind)
+    hidden_relations = relations(reached, asked, rows)
+    real = [member.configuration for member in members[: len(reached)]]
+    real_relations = ([member.relation for member in members] if not bodies else
+                      relations(real, asked, asked.rows_together(real)))
+    driven = _parametrise(reached, [each[asked.twist_rows :] for each in rows], question.sizes, active, complete)
+    for number, (member, led) in enumerate(zip(members, followed, strict=True)):
         if isinstance(led, NotMeasured):
             angle = np.pi / 2
             return verdict(f"cannot follow the real robot: {led}")
-        q, residual = led
-        worst = max(worst, residual)
-        if not residual <= FOLLOWED:
+        worst = max(worst, led[1])
+        if not led[1] <= FOLLOWED:
             angle = np.pi / 2
-            return verdict(f"cannot follow the real robot: misses by {residual:.2g}")
-        if kept:
-            q = _at_real_poses(twin, q, member, way[-1], kept)
-        at = ClosedConfiguration.of(twin, q, FOLLOWED)
-        here = member.configuration.pose(question.platform)[:3, 3]
-        theirs = relation(at, asked, blind=blind)
-        ours = member.relation if not bodies else relation(member.configuration, asked)
+            return verdict(f"cannot follow the real robot: misses by {led[1]:.2g}")
+        here = real[number].pose(question.platform)[:3, 3]
+        ours, theirs = real_relations[number], hidden_relations[number]
         gap = min(gap, theirs.gap, ours.gap)
         angle = max(angle, largest_angle(ours.basis, theirs.basis))
         if gap < RANK_GAP:
             return verdict(f"a rank is not clear: gap {gap:.2g}", Mismatch(ours, theirs, here))
         if not angle <= SAME_RELATION:
             return verdict(_difference(ours, theirs, angle), Mismatch(ours, theirs, here))
-        if active and member.shown == usual and not _parametrise(at, asked, active, blind, complete):
+        if active and member.shown == usual and not driven[number]:
             angle = np.pi / 2
             return verdict("the virtual actuators do not parametrise the observed directions")
     return verdict("")
@@ -141,21 +153,24 @@ def _difference(ours: Relation, theirs: Relation, angle: float) -> str:
     return f"ρ turns by {angle:.2g} rad"
 
 
-def _parametrise(at: ClosedConfiguration, question: Measurement, active: list[int], blind: frozenset[str],
-                 complete: bool) -> bool:
-    """Whether each actuator's rate follows from the rate of one observation alone, and (``complete``) each
-    observation's rate from those of its own actuators."""
-    kernel, _ = at.kernel()
-    rows = question.rows(at, blind=blind)[question.twist_rows :] @ kernel
-    ends = np.cumsum(question.sizes)
-    motors = kernel[active]
-    explained = np.zeros(len(active), dtype=bool)
-    for size, end in zip(question.sizes, ends, strict=True):
-        measured = rows[end - size : end]
-        unseen, _ = kernel_basis(measured, 1.0)
-        own = np.linalg.norm(motors @ unseen, axis=1) <= SAME_RELATION
-        explained |= own
-        locked, _ = kernel_basis(motors[own], 1.0)
-        if complete and np.linalg.norm(measured @ locked) > SAME_RELATION:
-            return False
-    return bool(explained.all())
+def _parametrise(at: Sequence[ClosedConfiguration], rows: Sequence[Array], sizes: Sequence[int], active: list[int],
+                 complete: bool) -> list[bool]:
+    """Whether, at each configuration, each actuator's rate follows from the rate of one observation alone, and
+    (``complete``) each observation's rate from those of its own actuators; ``rows`` are those of the observations."""
+    kernels = [each.kernel()[0] for each in at]
+    measured = [moved @ kernel for moved, kernel in zip(rows, kernels, strict=True)]
+    motors = [kernel[active] for kernel in kernels]
+    explained = [np.zeros(len(active), dtype=bool) for _ in at]
+    found = [True] * len(at)
+    start = 0
+    for size in sizes if active else ():
+        seen = [each[start : start + size] for each in measured]
+        start += size
+        own = [np.linalg.norm(motor @ unseen.kernel, axis=1) <= SAME_RELATION
+               for motor, unseen in zip(motors, spectra(seen, 1.0), strict=True)]
+        explained = [before | here for before, here in zip(explained, own, strict=True)]
+        if complete:
+            locked = spectra([motor[here] for motor, here in zip(motors, own, strict=True)], 1.0)
+            found = [good and bool(np.linalg.norm(here @ each.kernel) <= SAME_RELATION)
+                     for good, here, each in zip(found, seen, locked, strict=True)]
+    return [good and bool(each.all()) for good, each in zip(found, explained, strict=True)]

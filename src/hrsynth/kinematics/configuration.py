@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import LoopsNotClosed
-from ..geometry.ranks import Rank, Spectrum, spectrum
+from ..geometry.ranks import Rank, Spectrum, spectra, spectrum
 from ..geometry.vectors import Array, frozen
 from ..mechanism.observation import Observation
 from ..results import Value
@@ -38,6 +38,15 @@ class ClosedConfiguration(Value):
         if not residual <= tolerance:
             raise LoopsNotClosed(twin.mechanism.name, residual, tolerance, twin.worst_loop(q)[0])
         return cls(twin, q, residual)
+
+    @classmethod
+    def several(cls, twin: PinocchioModel, places: Sequence[Array], tolerance: float = CLOSED
+                ) -> list[ClosedConfiguration]:
+        """:meth:`of` of several, their constraints taken apart together."""
+        found = [cls.of(twin, q, tolerance) for q in places]
+        for at, loops in zip(found, spectra([twin.jacobian(at.q) for at in found]), strict=True):
+            at.__dict__["loops"] = loops
+        return found
 
     def pose(self, link: str) -> Array:
         """X_BL (4, 4), metres."""

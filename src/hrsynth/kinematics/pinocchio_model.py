@@ -260,11 +260,10 @@ class PinocchioModel:
         V: Array = J[..., None, :, :] * self._several[links][2]
         if whole != 0:
             first = V[..., :whole, :, :]
-            x, y, z = (X[..., :whole, i, 3, None] / self.length for i in range(3))
-            u, v, w = first[..., 3, :], first[..., 4, :], first[..., 5, :]
-            first[..., 0, :] += v * z - w * y  # the origin's velocity: ω × p more than that of the base's origin
-            first[..., 1, :] += w * x - u * z
-            first[..., 2, :] += u * y - v * x
+            p, turn = X[..., :whole, :3, 3, None] / self.length, first[..., 3:, :]
+            # the origin's velocity: ω × p more than that of the base's origin
+            first[..., :3, :] += (turn[..., [1, 2, 0], :] * p[..., [2, 0, 1], :]
+                                  - turn[..., [2, 0, 1], :] * p[..., [1, 2, 0], :])
         return V
 
     def poses(self, q: Array, links: tuple[str, ...]) -> Array:
@@ -279,7 +278,7 @@ class PinocchioModel:
                ) -> tuple[Array, Array, Array, Array]:
         """Of several configurations :meth:`residual` (n, rows), :meth:`jacobian` (n, rows, nv) and :meth:`frames`
         (n, k, 4, 4), (n, k, 6, nv)."""
-        bodies, offsets, _ = self._several.get(links) or self._together(links)
+        bodies = (self._several.get(links) or self._together(links))[0] if links else []
         errors, loops, J, X = [], [], [], []
         for q in places:
             errors.append(self.residual(q))
@@ -287,12 +286,12 @@ class PinocchioModel:
             if bodies:
                 J.append(self.data.J.reshape(6, self.nv).copy())
                 X += [self._placements[body].homogeneous for body in bodies]
+        n = len(places)
         if not bodies:
-            none = np.zeros((len(places), 0, 4, 4)), np.zeros((len(places), 0, 6, self.nv))
-            return np.array(errors), np.array(loops), *none
-        poses = np.array(X).reshape(len(places), len(bodies), 4, 4)
+            return np.array(errors), np.array(loops), np.zeros((n, 0, 4, 4)), np.zeros((n, 0, 6, self.nv))
+        poses = np.array(X).reshape(n, len(bodies), 4, 4)
         poses[..., :3, 3] *= self.length
-        poses = poses @ offsets
+        poses = poses @ self._several[links][1]
         return np.array(errors), np.array(loops), poses, self._moving(poses, np.array(J), links, whole)
 
     def _together(self, links: tuple[str, ...]) -> tuple[list[int], Array, Array]:

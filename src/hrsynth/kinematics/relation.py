@@ -5,18 +5,19 @@ Source: docs/pages/theory.md, section 2; as a graph, MMT eq. 7.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from ..geometry.ranks import Rank, kernel_basis, range_basis
+from ..geometry.ranks import Rank, kernel_basis, range_bases, range_basis
 from ..geometry.screws import point_velocity
 from ..geometry.vectors import Array
 from ..mechanism.observation import Observation
 from ..results import Value
 from ..tolerances import INVERTED
-from .configuration import ClosedConfiguration, measure
+from .configuration import ClosedConfiguration, measure, measure_together
 from .tasks import Target
 
 
@@ -62,6 +63,22 @@ class Measurement(Value):
                  [point_velocity(V[0], X[0][:3, :3] @ self.point / at.twin.length)])
         parts += [np.zeros((o.size, at.twin.nv)) if o.link in blind else next(found) for o in self.observations]
         return np.vstack([*parts, *V[own:]])
+
+    def rows_together(self, at: Sequence[ClosedConfiguration], blind: frozenset[str] = frozenset()) -> list[Array]:
+        """:meth:`rows` at several configurations of one twin."""
+        if len(at) < 2:
+            return [self.rows(each, blind=blind) for each in at]
+        twin, links = at[0].twin, (self.platform, *self.others, *self.bodies)
+        seen = [o for o in self.observations if o.link not in blind]
+        *_, X, V, _, rates = measure_together(twin, [each.q for each in at], self.reference, seen, links)
+        own, n = 1 + len(self.others), len(at)
+        t = (V[:, :own].reshape(n, -1, twin.nv) if self.point is None else np.array([
+            point_velocity(v, x[:3, :3] @ self.point / twin.length) for v, x in zip(V[:, 0], X[:, 0], strict=True)]))
+        if len(seen) < len(self.observations):
+            shown = np.repeat([o.link not in blind for o in self.observations], self.sizes)
+            rates, some = np.zeros((n, len(shown), twin.nv)), rates
+            rates[:, shown] = some
+        return list(np.concatenate([t, rates, V[:, own:].reshape(n, -1, twin.nv)], axis=1))
 
     @property
     def sizes(self) -> tuple[int, ...]:
@@ -154,17 +171,24 @@ def platform_motions(at: ClosedConfiguration, question: Measurement) -> Array:
 
 def relation(at: ClosedConfiguration, question: Measurement, *, blind: frozenset[str] = frozenset()) -> Relation:
     """ρ at a closed configuration."""
-    return _relation(at, question.rows(at, blind=blind), question.twist_rows, question.sizes)
+    return relations([at], question, [question.rows(at, blind=blind)])[0]
+
+
+def relations(at: Sequence[ClosedConfiguration], question: Measurement, rows: Sequence[Array]) -> list[Relation]:
+    """ρ at several closed configurations of one twin, from the rows that the question has there."""
+    return _relations(at, rows, question.twist_rows, question.sizes)
 
 
 def relation_of(at: ClosedConfiguration, question: Measurement, rows: Array) -> Relation:
     """ρ between the platform's twist and what ``rows`` (measured, nv) make of the joint rates, each a measurement of
     its own: the motors' coordinates, for one."""
     twist = replace(question, observations=(), bodies=()).rows(at)
-    return _relation(at, np.vstack([twist, rows]), question.twist_rows, (1,) * len(rows))
+    return _relations([at], [np.vstack([twist, rows])], question.twist_rows, (1,) * len(rows))[0]
 
 
-def _relation(at: ClosedConfiguration, rows: Array, twist_rows: int, sizes: tuple[int, ...]) -> Relation:
-    kernel, constraints = at.kernel()
-    basis, rank = range_basis(rows @ kernel, 1.0)
-    return Relation(basis, twist_rows, sizes, kernel.shape[1], min(constraints.gap, rank.gap))
+def _relations(at: Sequence[ClosedConfiguration], rows: Sequence[Array], twist_rows: int, sizes: tuple[int, ...]
+               ) -> list[Relation]:
+    kernels = [each.kernel() for each in at]
+    bases = range_bases([moved @ kernel for moved, (kernel, _) in zip(rows, kernels, strict=True)], 1.0)
+    return [Relation(basis, twist_rows, sizes, kernel.shape[1], min(constraints.gap, rank.gap))
+            for (kernel, constraints), (basis, rank) in zip(kernels, bases, strict=True)]

@@ -117,12 +117,14 @@ def sample(twin: PinocchioModel, question: Measurement, count: int, seed: int = 
     for freely in (False, True):
         walks = _Walks(question, leading, np.random.default_rng(seed), freely)
         members, discarded, led = walks.sample(roots, count)
+        signatures = [Signature.of(member.relation) for member in members]
         if freely or not (far := _far(roots[0])):
             break
         probe = _mode(_firmest(far), question)
-        if probe is None or all(probe.signature.agrees(Signature.of(member.relation)) for member in members):
+        if probe is None or all(map(probe.signature.agrees, signatures)):
             break
-    groups = group_modes([OperationMode(Signature.of(m.relation), m.configuration) for m in members])
+    groups = group_modes([OperationMode(each, member.configuration)
+                          for each, member in zip(signatures, members, strict=True)])
     _require_one(groups, question, "the configurations reached differ as only those of several operation modes do")
     own = groups[0][0].signature
     return Samples(question, twin, start, tuple(members), discarded, _others(walks.beyond, own, question), led)

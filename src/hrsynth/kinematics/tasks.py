@@ -154,8 +154,9 @@ def solve_together(places: Places, starts: Sequence[Array], targets: Sequence[Ta
             steps = np.linalg.solve(normal, wanted)[:, :, 0]
         except np.linalg.LinAlgError:
             steps = np.array([_damped(*each) for each in zip(normal, wanted[:, :, 0], strict=True)])
-        return {i: twin.moved(q, shortened(step, 0.5)) for step, (i, (q, _, _)) in zip(steps, going.items(),
-                                                                                     strict=True)}
+        longest = np.abs(steps).max(axis=1, initial=0.0).tolist()
+        return {i: twin.moved(q, step if size <= 0.5 else shortened(step, 0.5))
+                for (i, (q, _, _)), step, size in zip(going.items(), steps, longest, strict=True)}
 
     return [(q, left.size) for q, left in descend_together(
         starts, evaluate, advance, DAMPING, iterations, lambda at: at.size <= tolerance)]
