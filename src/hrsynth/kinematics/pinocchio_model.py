@@ -21,6 +21,7 @@ from ..geometry.vectors import Array, cross, inverse, transform
 from ..mechanism import Joint, JointType, Mechanism, graphs
 from ..tolerances import SAME_GEOMETRY
 
+_UPRIGHT = np.eye(3)
 _WEIGHT = {"F": 0, "R": 1, "P": 1, "C": 2, "U": 2, "E": 3, "S": 4, "6": 100}
 
 
@@ -59,6 +60,7 @@ class PinocchioModel:
         self._links = {name: (self._body[name], self._seen_from_body(name)) for name in mechanism.links}
         self._placements = self.data.oMi
         self._several: dict[tuple[str, ...], tuple[list[int], Array, Array]] = {}
+        self._masks = {0: np.zeros(self.nv)}
         self._q: Array | None = None
         self.measured: tuple[tuple[object, ...], Array, tuple[Array, Array, list[Array], list[Array]]] | None = None
         """What was measured last: what was asked, where, and the answer."""
@@ -145,7 +147,7 @@ class PinocchioModel:
         index = self._body[parent]
         turned = joint.predecessor != parent
         point = joint.point / self.length
-        placement = pin.SE3(np.eye(3), point - self._centre[index])
+        placement = pin.SE3(_UPRIGHT, point - self._centre[index])
         start = self.model.nv
         names = []
         for number, model in enumerate(self._chain(joint, parent)):
@@ -168,14 +170,14 @@ class PinocchioModel:
         point = joint.point / self.length
         if joint.type is JointType.SPHERICAL:
             return pin.ConstraintModel(pin.PointAnchorConstraintModel(
-                self.model, a, pin.SE3(np.eye(3), point - self._centre[a]),
-                b, pin.SE3(np.eye(3), point - self._centre[b])))
+                self.model, a, pin.SE3(_UPRIGHT, point - self._centre[a]),
+                b, pin.SE3(_UPRIGHT, point - self._centre[b])))
         if joint.type is JointType.FIXED:
-            half, offset = a, pin.SE3(np.eye(3), point - self._centre[a])
+            half, offset = a, pin.SE3(_UPRIGHT, point - self._centre[a])
         else:
             half, offset = self._add(joint, joint.predecessor, "__cut"), pin.SE3.Identity()
         return pin.ConstraintModel(pin.FrameAnchorConstraintModel(
-            self.model, half, offset, b, pin.SE3(np.eye(3), point - self._centre[b])))
+            self.model, half, offset, b, pin.SE3(_UPRIGHT, point - self._centre[b])))
 
     def _gear_rows(self) -> Array:
         """One row a coupling: successor's rate − ratio × predecessor's rate (metres, radians)."""
@@ -304,11 +306,12 @@ class PinocchioModel:
 
     def _supports(self, body: int) -> Array:
         """1 for the velocity indices that move a body, 0 for the others, (nv,)."""
-        mask = np.zeros(self.nv)
-        for joint in self.model.supports[body]:
-            start = self.model.joints[joint].idx_v
-            mask[start : start + self.model.joints[joint].nv] = 1.0
-        return mask
+        if body not in self._masks:
+            mask = self._supports(self.model.parents[body]).copy()
+            joint = self.model.joints[body]
+            mask[joint.idx_v : joint.idx_v + joint.nv] = 1.0
+            self._masks[body] = mask
+        return self._masks[body]
 
     def read(self, pose: Callable[[str], Array]) -> Array:
         """The configuration at which all links have their poses X_BL (4, 4), m, as far as the tree's joints allow."""

@@ -86,14 +86,12 @@ def spanning_forest(nodes: Iterable[str], bonds: Sequence[B], weights: Sequence[
     """The bonds of a minimum spanning forest, lightest first (Kruskal); of equal ones that of the earlier node, then of
     the pair that is joined first."""
     place = {node: i for i, node in enumerate(nodes)}
-    pairs: dict[frozenset[str], int] = {}
-    for bond in bonds:
-        pairs.setdefault(frozenset(bond.links), len(pairs))
-    order = sorted(range(len(bonds)), key=lambda i: (weights[i], min(place[link] for link in bonds[i].links),
-                                                     pairs[frozenset(bonds[i].links)]))
+    ends = [sorted((place[one], place[other])) for one, other in (bond.links for bond in bonds)]
+    pairs: dict[tuple[int, int], int] = {}
+    ranked = [(weights[i], a, pairs.setdefault((a, b), len(pairs)), i) for i, (a, b) in enumerate(ends)]
     tree = {node: node for node in place}
     chosen = []
-    for i in order:
+    for *_, i in sorted(ranked):
         a, b = (_root(tree, link) for link in bonds[i].links)
         if a != b:
             tree[b] = a

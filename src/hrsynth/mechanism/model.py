@@ -145,6 +145,10 @@ class Joint(Value):
 
     def turned(self) -> Joint:
         """The same joint with predecessor and successor exchanged (its coordinate keeps its sign)."""
+        return self._turned
+
+    @cached_property
+    def _turned(self) -> Joint:
         axes = tuple(-axis for axis in reversed(self.axes))
         wrist = None if self.wrist is None else self.wrist.turned()
         return replace(self, predecessor=self.successor, successor=self.predecessor, axes=axes, wrist=wrist)
