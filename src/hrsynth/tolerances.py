@@ -71,6 +71,8 @@ SURELY_ZERO = 1e-9
 """Singular values of a relation below this are zero, whatever rounding did; between the two lies the cutoff."""
 INVERTED = 1e-9
 """Singular values below this fraction of the largest are left out where a map is inverted on its range."""
+BOUNDED = 1e-3
+"""Part of a limit that a bound leaves for rounding, where it takes the place of singular values."""
 NUDGE = 1e-6
 """Step (characteristic lengths, radians) over which a slope is taken."""
 NAMED = 1e-6

@@ -14,9 +14,12 @@ from hrsynth.geometry.ranks import (
     decomposed,
     kernel_basis,
     largest_angle,
+    range_bases,
     range_basis,
     rank_of,
     space_basis,
+    spectra,
+    spectrum,
 )
 from hrsynth.geometry.vectors import rotation_about
 from hrsynth.kinematics.configuration import ClosedConfiguration
@@ -91,6 +94,20 @@ def test_range_and_kernel(seed: int, rows: int, columns: int, rank: int) -> None
     assert np.linalg.norm(A @ kernel[0]) < 1e-12
     assert largest_angle(image[0], U[:, :rank]) < 1e-12
     np.testing.assert_allclose(kernel[0].T @ kernel[0], np.eye(columns - rank), atol=1e-12)
+
+
+def test_several_matrices_together_are_those_apart() -> None:
+    """Of one shape, of several, empty ones among them."""
+    rng = np.random.default_rng(3)
+    for shapes in ([(4, 6)] * 3, [(6, 4)] * 3, [(5, 3), (3, 5)], [(0, 4)] * 2, [(4, 0)] * 2, [(3, 2), (3, 0), (3, 2)]):
+        matrices = [rng.normal(size=(rows, 2)) @ rng.normal(size=(2, columns)) for rows, columns in shapes]
+        for matrix, found, (basis, rank) in zip(matrices, spectra(matrices), range_bases(matrices), strict=True):
+            alone, (own, own_rank) = spectrum(matrix), range_basis(matrix)
+            np.testing.assert_array_equal(found.kernel, alone.kernel)
+            np.testing.assert_array_equal(basis, own)
+            assert (found.rank, rank) == (alone.rank, own_rank)
+            assert rank.value == min(2, *matrix.shape)
+            np.testing.assert_allclose(matrix @ found.kernel, 0.0, atol=1e-12)
 
 
 def test_empty_matrices() -> None:

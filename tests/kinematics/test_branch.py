@@ -18,6 +18,7 @@ from hrsynth.catalog.words import parse
 from hrsynth.description import load
 from hrsynth.errors import BranchPoint
 from hrsynth.geometry.vectors import rotation_about
+from hrsynth.kinematics.branch import CHANGED, TURNED, alike_after, turned_little
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.kinematics.relation import Measurement, relation
@@ -25,6 +26,7 @@ from hrsynth.kinematics.sampling import random_walk, sample
 from hrsynth.mechanism import JointType, Mechanism
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.pose import Pose
+from kinematics.robots import setting_of
 
 POD = "(Pk*-Utn-Unt)+(Pz*-2SSt)+(Pz*-Utn-S)+(Rt*-2SSt)"
 
@@ -46,6 +48,25 @@ def parallelogram(angle: float, normal: tuple[float, float, float] = (0, 0, 1)) 
     builder.observe("1", "left", tip)
     builder.observe("2", "right", tip)
     return builder.build(platform="coupler")
+
+
+@pytest.mark.parametrize("robot", ["3rrr_m1", "gough_stewart", "quattro", "3upu"])
+def test_bounds_never_say_what_singular_values_deny(robot: str) -> None:
+    """Of short and of long steps: where bounds decide, singular values and angles say the same; of both kinds some."""
+    rng, here = np.random.default_rng(0), setting_of(robot).configurations[0]
+    kept, said = here.strengths, set()
+    for size in np.geomspace(0.01, 3.0, 60):
+        step = rng.normal(size=here.twin.nv)
+        step *= size / np.linalg.norm(step)
+        values = np.linalg.svd(here.twin.jacobian(here.twin.moved(here.q, step)), compute_uv=False)[: len(kept)]
+        alike = bool(np.all(values <= CHANGED * kept) and np.all(kept <= CHANGED * values))
+        assert alike_after(here, step) == alike
+        tangent = here.kernel()[0]
+        other = np.linalg.qr(tangent + size * rng.normal(size=tangent.shape) / 10)[0]
+        little = bool(np.linalg.norm(other - tangent @ (tangent.T @ other), 2) <= np.sin(TURNED))
+        assert turned_little(tangent, other) == little
+        said |= {("alike", alike), ("little", little)}
+    assert len(said) == 4
 
 
 @pytest.mark.some(1)

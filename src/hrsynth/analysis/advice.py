@@ -261,7 +261,8 @@ def _verified(setting: ObservedRobot, samples: Samples,
     for added, price in sets:
         watched = (*setting.observed, *(each.observation for each in added))
         try:
-            found.append(Cure(added, verdict_of(setting, setting.labels, restricted(samples, watched)), price))
+            verdict = verdict_of(setting, setting.labels, restricted(samples, watched, ways=False))
+            found.append(Cure(added, verdict, price))
         except RankUndecided:
             continue
     return found

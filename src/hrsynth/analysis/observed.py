@@ -16,7 +16,7 @@ from ..budgets import REMEMBERED
 from ..description import load
 from ..description.sights import CAMERA, SEE, SightSpec, parse_camera, parse_see, with_sights
 from ..errors import BadMechanism, BadRequest, NoSegment, NotSampled
-from ..geometry.ranks import range_basis
+from ..geometry.ranks import range_bases
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.pinocchio_model import PinocchioModel
 from ..kinematics.platform_motion import PlatformMotion
@@ -397,24 +397,28 @@ def motors(setting: ObservedRobot) -> Measurement:
     return replace(setting.everything.question, observations=found)
 
 
-def restricted(samples: Samples, observations: Iterable[Observation]) -> Samples:
-    """The same samples for fewer observations (all of them among the samples' own)."""
+def restricted(samples: Samples, observations: Iterable[Observation], *, ways: bool = True) -> Samples:
+    """The same samples for fewer observations (all of them among the samples' own), with their ``ways`` or without."""
     wanted = tuple(observations)
     all_of = samples.question.observations
     keys = [o.key for o in all_of]
     places = [keys.index(o.key) for o in wanted]
     question = replace(samples.question, observations=tuple(all_of[i] for i in places))
+    found = _selected([member.relation for member in samples.members], places)
     members = tuple(
         Sample(m.configuration,
-               tuple(replace(t, measured=tuple(t.measured[i] for i in places)) for t in m.way),
-               selected(m.relation, places))
-        for m in samples.members)
+               tuple(replace(t, measured=tuple(t.measured[i] for i in places)) for t in m.way) if ways else (), each)
+        for m, each in zip(samples.members, found, strict=True))
     return replace(samples, question=question, members=members)
 
 
 def selected(relation: Relation, places: Sequence[int]) -> Relation:
     """ρ for some of the observations: the projection of ρ for all."""
-    blocks = [relation.twist_part, *(relation.basis[relation.rows_of(place)] for place in places)]
-    basis, rank = range_basis(np.vstack(blocks), 1.0)
-    sizes = tuple(relation.sizes[i] for i in places)
-    return Relation(basis, relation.twist_rows, sizes, relation.mobility, min(relation.gap, rank.gap))
+    return _selected([relation], places)[0]
+
+
+def _selected(relations: Sequence[Relation], places: Sequence[int]) -> list[Relation]:
+    rows = [np.vstack([each.twist_part, *(each.basis[each.rows_of(place)] for place in places)]) for each in relations]
+    return [Relation(basis, each.twist_rows, tuple(each.sizes[i] for i in places), each.mobility,
+                     min(each.gap, rank.gap))
+            for each, (basis, rank) in zip(relations, range_bases(rows, 1.0), strict=True)]

@@ -8,7 +8,7 @@ from typing import Any
 
 from ..errors import RankUndecided
 from ..geometry.ranks import Rank
-from ..kinematics.relation import relation
+from ..kinematics.relation import look, relation
 from ..kinematics.sampling import Samples
 from ..results import Result
 from ..tolerances import RANK_CUTOFF, RANK_GAP, SURELY_SOMETHING, SURELY_ZERO
@@ -74,6 +74,7 @@ def verdict_of(setting: ObservedRobot, legs: Sequence[str], samples: Samples) ->
     a sample, or between what counts at one sample and what does not at another.
     """
     found = [member.relation for member in samples.members]
+    look(found)
     rank = max(each.rank for each in found)
     what = f"what legs {', '.join(legs)} see"
     if any(each.rank != rank for each in found):

@@ -184,7 +184,7 @@ def _smallest(setting: ObservedRobot, exact: ExactArchitecture | None,
         found = []
         for places in sets(size):
             seen = [_watched(setting)[i] for i in places]
-            samples = restricted(setting.everything, seen)
+            samples = restricted(setting.everything, seen, ways=False)
             verdict = verdict_of(setting, [o.leg for o in seen], samples)
             if exact is not None:
                 _agree(exact, samples, verdict)

@@ -18,7 +18,7 @@ import numpy as np
 
 from ..geometry.ranks import largest_angle, singular_values
 from ..geometry.vectors import Array
-from ..tolerances import NUDGE, RANK_CUTOFF, SURELY_SOMETHING, SURELY_ZERO
+from ..tolerances import BOUNDED, NUDGE, RANK_CUTOFF, SURELY_SOMETHING, SURELY_ZERO
 from .configuration import ClosedConfiguration
 from .relation import Relation
 
@@ -28,8 +28,6 @@ CHANGED = 1.5
 """Largest ratio between the loops' singular values, in order, at the start of a step and along it."""
 CORRECTED = 0.2
 """Longest correction, as part of the step: what ``TURNED`` lets a smooth branch bend away, with a margin."""
-MARGIN = 1e-3
-"""Part of a limit that a bound leaves for rounding, where it takes the place of singular values."""
 EVENLY = 0.2
 """Part of the weakest singular value by which its fall to a singularity may depart from an even one."""
 LARGEST_WHOLE = 4
@@ -46,19 +44,19 @@ def follows(here: ClosedConfiguration, step: Array, there: ClosedConfiguration) 
     if not len(kept):
         return True
     return (_alike(kept, there.strengths) and _same_side(here, there)
-            and _turned_little(here.kernel()[0], there.kernel()[0])
-            and all(_alike_after(here, part * step) for part in (0.5, 1.0)))
+            and turned_little(here.kernel()[0], there.kernel()[0])
+            and all(alike_after(here, part * step) for part in (0.5, 1.0)))
 
 
-def _turned_little(A: Array, B: Array) -> bool:
+def turned_little(A: Array, B: Array) -> bool:
     """Whether the largest principal angle is at most ``TURNED``: its sine is at most the Frobenius norm of what lies
     outside."""
-    if A.shape == B.shape and np.linalg.norm(B - A @ (A.T @ B)) < (1 - MARGIN) * np.sin(TURNED):
+    if A.shape == B.shape and np.linalg.norm(B - A @ (A.T @ B)) < (1 - BOUNDED) * np.sin(TURNED):
         return True
     return largest_angle(A, B) <= TURNED
 
 
-def _alike_after(here: ClosedConfiguration, step: Array) -> bool:
+def alike_after(here: ClosedConfiguration, step: Array) -> bool:
     """Whether the loops' singular values after a step are like those ``here``.
 
     With J = U S Vᵀ here, J' there, A = S⁻¹ Uᵀ J' and δ = ‖A Aᵀ − 1‖: σ'² of Uᵀ J' lies in (1 ± δ) σ², and that of J'
@@ -72,9 +70,9 @@ def _alike_after(here: ClosedConfiguration, step: Array) -> bool:
     change.reshape(-1)[:: len(kept) + 1] -= 1.0
     delta = float(np.linalg.norm(change))
     beyond = float(np.linalg.norm(J - U @ within)) / kept[-1]
-    if delta < (1 - MARGIN) * (1 - CHANGED**-2) and delta + beyond**2 < (1 - MARGIN) * (CHANGED**2 - 1):
+    if delta < (1 - BOUNDED) * (1 - CHANGED**-2) and delta + beyond**2 < (1 - BOUNDED) * (CHANGED**2 - 1):
         return True
-    return _alike(kept, np.linalg.svd(J, compute_uv=False)[: len(kept)])
+    return _alike(kept, np.asarray(np.linalg.svd(J, compute_uv=False)[: len(kept)]))
 
 
 def nears(here: ClosedConfiguration, step: Array, there: ClosedConfiguration) -> bool:

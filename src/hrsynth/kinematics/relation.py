@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..geometry.ranks import Rank, kernel_basis, range_bases, range_basis
+from ..geometry.ranks import Rank, range_bases, range_basis, spectra
 from ..geometry.screws import point_velocity
 from ..geometry.vectors import Array
 from ..mechanism.observation import Observation
@@ -118,20 +118,24 @@ class Relation(Value):
         return slice(start, start + self.sizes[place])
 
     @cached_property
+    def _platform(self) -> tuple[Array, Rank]:
+        return range_basis(self.twist_part, 1.0)
+
+    @property
     def dof(self) -> Rank:
         """dim of the platform's twists: the robot's dof."""
-        return range_basis(self.twist_part, 1.0)[1]
+        return self._platform[1]
 
-    @cached_property
+    @property
     def twists(self) -> Array:
         """An orthonormal basis of the platform's twists."""
-        return range_basis(self.twist_part, 1.0)[0]
+        return self._platform[0]
 
     @cached_property
     def _unseen(self) -> tuple[Array, Rank, Rank]:
-        kernel, seen = kernel_basis(self.rates, 1.0)
-        basis, rank = range_basis(self.twist_part @ kernel, 1.0)
-        return basis, Rank(rank.value, min(rank.gap, seen.gap)), seen
+        look([self])
+        found: tuple[Array, Rank, Rank] = self.__dict__["_unseen"]
+        return found
 
     @property
     def seen(self) -> Rank:
@@ -151,13 +155,25 @@ class Relation(Value):
     @cached_property
     def RI(self) -> int:
         """RI = dim {u̇ : (0, u̇) ∈ ρ}: where it is not zero, Mᵀ does not exist."""
-        kernel, _ = kernel_basis(self.twist_part, 1.0)
-        return range_basis(self.rates @ kernel, 1.0)[1].value
+        look([self])
+        return int(self.__dict__["RI"])
 
     @cached_property
     def rank(self) -> int:
         """Freedoms of the platform that the observations see: dof − RO."""
         return self.dof.value - self.unobserved_twists.shape[1]
+
+
+def look(found: Sequence[Relation]) -> None:
+    """Take several relations apart together: what no observation sees in each, and what moves while the platform
+    rests."""
+    still = spectra([each.rates for each in found], 1.0)
+    unseen = range_bases([each.twist_part @ seen.kernel for each, seen in zip(found, still, strict=True)], 1.0)
+    resting = spectra([each.twist_part for each in found], 1.0)
+    beside = range_bases([each.rates @ at.kernel for each, at in zip(found, resting, strict=True)], 1.0)
+    for each, seen, (basis, rank), (_, free) in zip(found, still, unseen, beside, strict=True):
+        each.__dict__["_unseen"] = basis, Rank(rank.value, min(rank.gap, seen.rank.gap)), seen.rank
+        each.__dict__["RI"] = free.value
 
 
 def platform_motions(at: ClosedConfiguration, question: Measurement) -> Array:

@@ -482,4 +482,4 @@ def told_by(setting: ObservedRobot) -> tuple[Observation, ...]:
     if every.members[0].relation.dimension == held:
         return every.question.observations
     return tuple(o for o in every.question.observations if o.key in own or
-                 restricted(every, [*setting.observed, o]).members[0].relation.dimension == held)
+                 restricted(every, [*setting.observed, o], ways=False).members[0].relation.dimension == held)

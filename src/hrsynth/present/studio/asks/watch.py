@@ -110,7 +110,8 @@ def smallest(setting: ObservedRobot) -> tuple[Verdict, ...]:
     for size in range(1, len(labels) + 1):
         found = []
         for chosen in combinations(labels, size):
-            samples = restricted(setting.everything, [each for each in setting.observed if each.leg in chosen])
+            samples = restricted(setting.everything, [each for each in setting.observed if each.leg in chosen],
+                                 ways=False)
             if max(member.relation.rank for member in samples.members) == best:
                 with suppress(RankUndecided):
                     found.append(verdict_of(setting, chosen, samples))
