@@ -66,11 +66,11 @@ def alike_after(here: ClosedConfiguration, step: Array) -> bool:
     J = here.twin.jacobian(here.twin.moved(here.q, step))
     within = U.T @ J
     A = within / kept[:, None]
-    change = A @ A.T
-    change.reshape(-1)[:: len(kept) + 1] -= 1.0
-    delta = float(np.linalg.norm(change))
+    product = A @ A.T
+    product.reshape(-1)[:: len(kept) + 1] -= 1.0
+    change = float(np.linalg.norm(product))
     beyond = float(np.linalg.norm(J - U @ within)) / kept[-1]
-    if delta < (1 - BOUNDED) * (1 - CHANGED**-2) and delta + beyond**2 < (1 - BOUNDED) * (CHANGED**2 - 1):
+    if change < (1 - BOUNDED) * (1 - CHANGED**-2) and change + beyond**2 < (1 - BOUNDED) * (CHANGED**2 - 1):
         return True
     return _alike(kept, np.asarray(np.linalg.svd(J, compute_uv=False)[: len(kept)]))
 
