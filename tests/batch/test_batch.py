@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 from itertools import product
+from time import process_time
 
 import numpy as np
 import pytest
@@ -14,6 +15,8 @@ from hypothesis import HealthCheck, given, settings
 from hrsynth.analysis.classes import interaction_matrix
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.batch.engine import Batch, Evaluation
+from hrsynth.batch.holds import freedoms
+from hrsynth.batch.iterative_leg import IterativeLeg
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, HrsynthError
 from hrsynth.geometry.vectors import Array
@@ -28,7 +31,7 @@ POSES = 8
 BOUND = 1e-4
 """How far the upper bounds of the two engines may be apart where three cones leave a gap (relative)."""
 SOLVED = {"3rps", "prrrp_m1", "prrrp_m2", "prrrp_parallel", "rprpr_m1", "rprpr_m2", "rrrrr_m1", "rrrrr_m2"}
-"""Robots whose platform has other freedoms at each pose: their legs are solved by iteration."""
+"""Robots whose platform has other freedoms at each pose: what their legs forbid, in closed form, says which."""
 
 
 @cache
@@ -91,9 +94,59 @@ def test_a_batch_is_the_relation_at_every_pose(robot: str) -> None:
     setting, batch = shipped_batch(robot)
     known = [name for name, leg in batch.legs.items() if leg is not None]
     assert batch.complete or robot == "i4l"
-    assert batch.coordinates.constant == (robot not in SOLVED)
+    assert batch.coordinates.constant == (robot not in SOLVED) == (not batch.holds)
+    assert not batch.iterative
     assert check_law(setting, known, POSES) >= POSES // 2
     assert check_law(setting, known[-2:], 3) >= 1
+
+
+@pytest.mark.parametrize("robot", sorted(SOLVED))
+def test_what_legs_forbid_in_closed_form_is_what_their_joints_forbid(robot: str) -> None:
+    """The twists of the closed forms are those of the legs' own links, closed by Newton's method, at other poses."""
+    setting, batch = shipped_batch(robot)
+    mechanism, anatomy = setting.mechanism, setting.anatomy
+    seen = dict(zip(anatomy.labels, setting.segments, strict=True))
+    X = np.array([at.pose(mechanism.platform) for at in random_walk(setting.everything.start, 12, seed=5, steps=4)])
+    chains = [IterativeLeg.of(mechanism, leg, seen[leg.label], None) for leg in anatomy.legs]  # type: ignore[arg-type]
+    rows = np.concatenate([each.followed_from_zero(batch.coordinates, batch.home, X, batch.span).wrenches()
+                           for each in chains], axis=1)
+    basis = np.linalg.pinv(batch.span) @ batch.evaluate(X).twists
+    assert np.max(np.abs(basis.swapaxes(1, 2) @ basis - np.eye(batch.coordinates.dof))) < 1e-12
+    assert np.max(np.abs(rows @ basis)) < CLOSE
+    assert np.linalg.matrix_rank(rows[0], 1e-6) == batch.span.shape[1] - batch.coordinates.dof
+
+
+def test_freedoms_are_normal_to_all_rows_and_never_turn_over() -> None:
+    """Of random rows, and of one that goes once round: the sense of rows and freedoms together stays."""
+    rng = np.random.default_rng(1)
+    for k, D in ((1, 3), (2, 3), (3, 6), (5, 6)):
+        rows = rng.normal(size=(k, D, 50))
+        basis, least = freedoms(rows)
+        whole = np.concatenate([rows, basis.swapaxes(0, 1)]).transpose(2, 0, 1)
+        assert np.max(np.abs(np.einsum("kdn,din->kin", rows, basis))) < 1e-12
+        assert np.max(np.abs(np.einsum("din,djn->nij", basis, basis) - np.eye(D - k))) < 1e-12
+        assert len(set(np.sign(np.linalg.det(whole)))) == 1
+        values = np.linalg.svd(rows.transpose(2, 0, 1), compute_uv=False)
+        assert np.all(values[:, -1] <= least * (1 + 1e-12))
+    angle = np.linspace(0.0, 2 * np.pi, 721)
+    basis, _ = freedoms(np.array([[np.cos(angle), np.sin(angle), 0.3 + 0 * angle]]))
+    sense = np.einsum("in,in->n", np.cross(basis[:, 0].T, basis[:, 1].T).T, [np.cos(angle), np.sin(angle), 0 * angle])
+    assert np.all(sense > 0) or np.all(sense < 0)
+    assert freedoms(np.zeros((1, 3, 2)))[1] == pytest.approx([0.0, 0.0], abs=1e-100)
+
+
+@pytest.mark.parametrize("robot", ["3rps", "rrrrr_m1"])
+def test_other_twists_at_each_pose_cost_no_more_than_three_times_a_constant_platform(robot: str) -> None:
+    """Poses a second beside those of a platform on six legs, in turns, the best of three."""
+    def seconds(batch: Batch) -> float:
+        X = np.repeat(batch.home[None], 20_000, axis=0)
+        start = process_time()
+        batch.evaluate(X, compiled=False)
+        return process_time() - start
+
+    one, six = (shipped_batch(name)[1] for name in (robot, "gough_stewart"))
+    both = [(seconds(one), seconds(six)) for _ in range(4)][1:]
+    assert min(ours for ours, _ in both) < 3 * min(theirs for _, theirs in both)
 
 
 @settings(max_examples=8, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))

@@ -28,6 +28,7 @@ from ..results import Value
 from ..tolerances import RANK_CUTOFF
 from .direction_rows import direction_rows
 from .error_bounds import ErrorBound, bounds_compiled, bounds_of
+from .holds import Hold, freedoms, held
 from .iterative_leg import IterativeLeg, IterativeLegStates
 from .platform_coordinates import PlatformCoordinates, frames_at
 from .program import CHUNK, Compiled, Program
@@ -80,13 +81,16 @@ class Evaluation(Value):
 @dataclass(frozen=True, eq=False, repr=False)
 class Batch(Value):
     """A compiled mechanism: each leg a closed form or solved by iteration, None where it hangs on a link that does not
-    go with the platform's pose; ``iterative`` are those by which the platform's freedoms follow from its pose."""
+    go with the platform's pose; ``iterative`` are those that are solved, by which the platform's freedoms follow from
+    its pose too where no closed form says them."""
 
     coordinates: PlatformCoordinates
     home: Array
     """The platform's pose at the zero configuration, (4, 4)."""
     legs: Mapping[str, ClosedFormLeg | IterativeLeg | None]
     iterative: Mapping[str, IterativeLeg]
+    holds: Sequence[Hold]
+    """Where the platform has other twists at each pose and legs in closed form say which: what they forbid."""
     normals: Mapping[str, Array | None]
     length: float
     programs: dict[tuple[str, ...], Program] = field(default_factory=dict, repr=False)
@@ -116,8 +120,11 @@ class Batch(Value):
             if placed and (found is None or not coordinates.constant):
                 iterative[leg.label] = IterativeLeg.of(mechanism, leg, seen[leg.label], anatomy.point)
             legs[leg.label] = found or iterative.get(leg.label)
+        holds = _holds(anatomy, coordinates, iterative, frames)
+        if holds:
+            iterative = {label: leg for label, leg in iterative.items() if legs[label] is leg}
         normals = {o.leg: _axis_of(frames[o.link][:, :3, :3] @ o.direction) for o in seen.values()}
-        return cls(coordinates, frozen(motion.home), legs, iterative, normals, mechanism.length)
+        return cls(coordinates, frozen(motion.home), legs, iterative, holds, normals, mechanism.length)
 
     @property
     def complete(self) -> bool:
@@ -126,7 +133,7 @@ class Batch(Value):
 
     @property
     def closed(self) -> bool:
-        """Whether closed forms alone give everything."""
+        """Whether one program of closed forms gives everything."""
         return self.coordinates.constant and not self.iterative
 
     def evaluate(self, X: ArrayLike, legs: Sequence[str] | str | None = None, cones: ArrayLike | None = None, *,
@@ -199,7 +206,7 @@ class Batch(Value):
     @cached_property
     def span(self) -> Array:
         """The coordinates' twists (m, rad), (6, D)."""
-        return self.coordinates.twists * np.repeat([self.length, 1.0], 3)[:, None]
+        return _span(self.coordinates, self.length)
 
     def compiled(self, n: int, legs: Sequence[str], cones: Array | None, enough: int = POSES_FOR_NUMBA) -> bool:
         """Whether numba is to do n poses by default: its kernels are there already, and they are ``enough``, or they
@@ -214,7 +221,8 @@ class Batch(Value):
         if find_spec(by) is None:
             raise BadRequest(f"{by} is not installed", True, f"compiled=False, or the extra {EXTRAS[by]}")
         if not self.closed:
-            raise BadRequest("a batch whose legs are solved by iteration is not compiled", True, "compiled=False")
+            raise BadRequest("a batch whose platform has other twists at each pose, or legs that are solved by "
+                             "iteration, is not compiled", True, "compiled=False")
 
     def _program(self, watched: Sequence[str]) -> Program:
         """What closed forms say at a pose X: where it is ``reached``, the directions ``u`` and rows ``M`` of the
@@ -258,7 +266,8 @@ class Batch(Value):
         return program
 
     def _iterated(self, X: Array, watched: Sequence[str], reached: Flags, u: Array, M: Array) -> tuple[Array, Array]:
-        """Fill in the rows of legs that are solved by iteration, and ``reached``; Mᵀ (3 k, d, n) and its twists."""
+        """Fill in the rows of legs that are solved by iteration, and ``reached``; Mᵀ (3 k, d, n) and its twists, which
+        the legs decide where they are not the same at all poses."""
         n, constant = len(X), self.coordinates.constant
         basis = np.empty((n, self.span.shape[1], self.coordinates.dof))
         X = np.where(reached[:, None, None], X, self.home)
@@ -272,12 +281,27 @@ class Batch(Value):
                     if name in watched:
                         place = list(watched).index(name)
                         u[place, :, here], M[3 * place : 3 * place + 3, :, here] = found, rows
-            if not constant:
+            if self.holds:
+                across, there = self._held(X[here])
+                basis[here], found = across.transpose(2, 0, 1), M[:, :, here].copy()
+                M[:, : self.coordinates.dof, here] = sum(
+                    row[:, None] * column for row, column in zip(found.swapaxes(0, 1), across, strict=True))
+                reached[here] &= there
+            elif not constant:
                 basis[here], there = self._feasible(list(states.values()))
                 reached[here] &= there
         if constant:
             return M, self.span
+        if self.holds:
+            return M[:, : self.coordinates.dof], self.span @ basis
         return np.einsum("rcn,ncd->rdn", M, basis), self.span @ basis
+
+    def _held(self, X: Array) -> tuple[Array, Flags]:
+        """An orthonormal basis (D, d, n) of the coordinates of the twists that the legs' forces allow, and where these
+        are independent."""
+        p, R = self.coordinates.place(X)
+        basis, least = freedoms(np.array([hold.rows(p, R, self.span) for hold in self.holds]))
+        return basis, least > RANK_CUTOFF
 
     def _followed(self, leg: IterativeLeg, X: Array) -> IterativeLegStates:
         return leg.followed_from_zero(self.coordinates, self.home, X, self.span)
@@ -302,6 +326,30 @@ class Batch(Value):
         states = [self._followed(leg, self.home[None]) for leg in self.iterative.values()]
         rows = np.concatenate([each.wrenches() for each in states], axis=1)[0]
         return np.linalg.svd(rows)[2][rows.shape[1] - self.coordinates.dof :].T
+
+
+def _span(coordinates: PlatformCoordinates, length: float) -> Array:
+    return coordinates.twists * np.repeat([length, 1.0], 3)[:, None]
+
+
+def _holds(anatomy: LegDecomposition, coordinates: PlatformCoordinates, legs: Mapping[str, IterativeLeg],
+           frames: Mapping[str, Array]) -> tuple[Hold, ...]:
+    """What the legs forbid the platform, where that is known in closed form and decides its twists; else nothing."""
+    if coordinates.constant or anatomy.point is not None or set(legs) != set(anatomy.labels):
+        return ()
+    span = _span(coordinates, anatomy.mechanism.length)
+    p, R = coordinates.place(frames[anatomy.mechanism.platform])
+    found: list[Hold] = []
+    for leg in anatomy.legs:
+        chain = legs[leg.label]
+        state = np.stack([frames[link] for link in chain.links], axis=1)
+        state[:, :, :3, 3] /= chain.length
+        states = IterativeLegStates(chain, coordinates, state, np.zeros(len(state)), R, span)
+        holds = held(anatomy.mechanism, leg, coordinates, states, p)
+        if holds is None:
+            return ()
+        found += holds
+    return tuple(found) if len(found) == span.shape[1] - coordinates.dof else ()
 
 
 def _half_angles(cones: ArrayLike, k: int) -> Array:
