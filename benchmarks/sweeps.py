@@ -139,6 +139,21 @@ def planar(setting: ObservedRobot, X: Array, legs: tuple[str, ...]) -> Callable[
     return lambda: by_hand.planar(p, phi, base[:, :2], tips, cranks, rods, sides)
 
 
+def other_twists() -> Iterator[Row]:
+    """Robots whose platform has other twists at each pose, beside one whose twists are the same everywhere."""
+    _, six = compiled("gough_stewart")
+    X = plane(six, 0.1)
+    for robot in ("3rps", "rrrrr_m1", "rprpr_m1", "prrrp_m1"):
+        setting, batch = compiled(robot)
+        walk = [at.pose(setting.mechanism.platform) for at in setting.configurations]
+        poses = np.resize(np.array(walk), X.shape)
+        assert batch.evaluate(poses[: len(walk)], compiled=False).reached.all()
+        ours, theirs = least(lambda poses=poses, batch=batch: batch.evaluate(poses, compiled=False),
+                             lambda: six.evaluate(X, compiled=False))
+        yield told("NumPy", f"Mᵀ alone, all legs, {robot}, whose platform has other twists at each pose", ours,
+                   "the Gough-Stewart platform, six legs, NumPy", theirs, len(X))
+
+
 def growth() -> Iterator[Row]:
     _, batch = compiled("hexa")
     X = plane(batch, 0.1)

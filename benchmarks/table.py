@@ -15,7 +15,7 @@ from pathlib import Path
 from generated import generated
 from measure import Row
 from others import catalog, derivations, jacobians, modes, platforms
-from sweeps import exact_maxima, growth, matrices
+from sweeps import exact_maxima, growth, matrices, other_twists
 
 from hrsynth.present.readme import replaced
 
@@ -36,6 +36,7 @@ def main(arguments: Sequence[str]) -> None:
 def lines() -> Iterator[Row]:
     yield from exact_maxima()
     yield from matrices()
+    yield from other_twists()
     yield from modes()
     yield from platforms()
     yield from jacobians()
