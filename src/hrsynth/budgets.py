@@ -5,9 +5,6 @@ What decides whether two things are the same is in :mod:`tolerances`.
 
 # Mechanisms, poses, files
 
-KEPT_MEMORY = 64 << 20
-"""Bytes that were freed and are kept for what comes next, at most; and blocks of up to an eighth of it come from
-there."""
 LARGEST_MODEL = 256
 """Coordinates above which a mechanism is refused: Pinocchio's data hold several cubes of their number."""
 SURELY_MEANT = 2

@@ -8,15 +8,13 @@ welded to the other link.
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
 
-from ..budgets import KEPT_MEMORY, LARGEST_MODEL
+from ..budgets import LARGEST_MODEL
 from ..errors import BadMechanism, BadRequest
 from ..geometry.so3 import logarithm, turns_about
 from ..geometry.vectors import Array, cross, inverse, transform
@@ -24,21 +22,7 @@ from ..mechanism import Joint, JointType, Mechanism, graphs
 from ..tolerances import SAME_GEOMETRY
 
 _UPRIGHT = np.eye(3)
-TRIM_THRESHOLD, MMAP_THRESHOLD = -1, -3
-"""Names of glibc's settings (malloc.h)."""
 _WEIGHT = {"F": 0, "R": 1, "P": 1, "C": 2, "U": 2, "E": 3, "S": 4, "6": 100}
-
-
-def _keep_memory() -> None:
-    """Let glibc keep what is freed: Pinocchio's tables of one model are megabytes, and to have them from the system
-    anew each time, page by page, takes three quarters of making a model. Elsewhere nothing is changed."""
-    with suppress(OSError, AttributeError, TypeError):
-        mallopt = ctypes.CDLL(None).mallopt
-        mallopt(TRIM_THRESHOLD, KEPT_MEMORY)
-        mallopt(MMAP_THRESHOLD, KEPT_MEMORY // 8)
-
-
-_keep_memory()
 
 
 class PinocchioModel:
