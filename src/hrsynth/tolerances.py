@@ -360,8 +360,9 @@ BOUND_WIDER = 1.25
 """Radius over which its steps are bounded, as part of the tube's."""
 BOUND_ROUNDING = 1 + 2.0 ** -40
 """What bounds of its steps are multiplied by, for the rounding of their own products."""
-FREE_WIDER = 24.0
-"""The same where it is not known that the tube holds a zero of the equations that are solved, of its largest radius."""
+FREE_WIDER, FREEST_WIDER = 2.0, 24.0
+"""The same where it is not known that the tube holds a zero of the equations that are solved; if that is not enough, as
+part of its largest radius."""
 PART_TUBE = 0.6
 """Radius of the tubes that are tried in parts of a cell, as part of its own."""
 GENERATED_LAST_STEP = 3e-12

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hrsynth.codegen.cell_tree import OUTSIDE, cell_tree
+from hrsynth.codegen.cell_tree import OUTSIDE, cell_tree, tree_depth
 from hrsynth.geometry.vectors import Array
 
 
@@ -30,13 +30,15 @@ def test_a_point_is_found_in_the_cell_that_holds_it(seed: int) -> None:
     points = rng.uniform(low, high, (400, m))
     corners = np.array([corner for cell in cells for corner in cell]).reshape(-1, m)
     for q in [*points, *corners]:
-        at = root
-        while at >= 0:
-            axis, value, below, above = nodes[at]
-            at = below if q[axis] < value else above
+        at, waiting = OUTSIDE, [root]
+        while waiting and at == OUTSIDE:
+            at = waiting.pop()
+            while at >= 0:
+                axis, value, below, above = nodes[at]
+                if q[axis] == value:
+                    waiting.append(below)
+                at = below if q[axis] < value else above
+            assert len(waiting) <= tree_depth(root, nodes)
         holding = [i for i, (a, b) in enumerate(cells) if np.all(a <= q) and np.all(q <= b)]
-        if at == OUTSIDE:
-            # on a wall of cells beside which none lies, the side without one may be taken
-            assert not any(np.all(cells[i][0] < q) and np.all(q < cells[i][1]) for i in holding)
-        else:
-            assert ~at in holding
+        assert (at == OUTSIDE) == (not holding)
+        assert at == OUTSIDE or ~at in holding

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import product
 from typing import Any
 
@@ -164,6 +165,41 @@ def test_running_errors_hold(formula: tuple[Any, Any, RoundedNumber]) -> None:
         assert abs(mpmath.mpf(float(computed)) - exact) <= mpmath.mpf(float(bounds.error))
     assert abs(float(computed)) <= float(bounds.size) * (1 + 1e-12)
     assert float(bounds.low) - 1e-12 <= float(exact) <= float(bounds.high) + 1e-12
+
+
+def test_axes_that_are_parallel_but_for_rounding() -> None:
+    """Loops that close to less than the program asks for are open: it says that it finds out."""
+    robot, rng = made("four_bar"), np.random.default_rng(0)
+
+    def off(axis: Array) -> Array:
+        axis = axis + 1e-9 * rng.normal(size=3)
+        return np.asarray(axis / np.linalg.norm(axis))
+
+    robot = replace(robot, joints={name: replace(joint, axes=tuple(map(off, joint.axes)))
+                                   for name, joint in robot.joints.items()})
+    found = export(robot, "numpy", box_of(robot, 0.2))
+    assert found.bounds is not None
+    assert found.bounds.others == 3
+    assert "Whether 3 more equations of the loops hold, the program finds out" in found.code
+    assert "3 more equations" in exported(found)
+    program: Any = module_of(found.code)
+    assert set(program.forward(np.linspace(*found.proof.proved, 50))[0]) <= {program.OK, program.UNDECIDED}
+
+
+@pytest.mark.slow
+def test_faces_of_cells_are_answered() -> None:
+    """Where a branch fills a part of its box alone, all closed cells are answered."""
+    robot = made("geared")
+    found = export(robot, "numpy")
+    assert found.proof.parts[0].share < 0.9
+    rng, q = np.random.default_rng(0), []
+    for cell in found.proof.parts[0].cells:
+        for axis, end in product(range(len(cell.low)), (cell.low, cell.high)):
+            at = rng.uniform(cell.low, cell.high, (3, len(cell.low)))
+            at[:, axis] = end[axis]
+            q.append(at)
+    program: Any = module_of(found.code)
+    assert set(program.forward(np.vstack(q))[0]) == {program.OK}
 
 
 def test_a_cell_without_a_bound_is_told(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -17,7 +17,7 @@ Node = tuple[int, float, int, int]
 
 def cell_tree(lower: Array, upper: Array, cells: Sequence[tuple[Array, Array]]) -> tuple[int, list[Node]]:
     """Root and nodes for cells (lower, upper), (m,) each, within a box from ``lower`` to ``upper``; what no cell fills
-    is outside. Cells may touch, and lie as halving leaves them."""
+    is outside. Cells may touch, and lie as halving leaves them. What lies on a plane may be on either side of it."""
     nodes: list[Node] = []
 
     def of(low: Array, high: Array, inside: list[int]) -> int:
@@ -50,6 +50,14 @@ def cell_tree(lower: Array, upper: Array, cells: Sequence[tuple[Array, Array]]) 
 
     root = of(np.asarray(lower, dtype=float), np.asarray(upper, dtype=float), list(range(len(cells))))
     return root, nodes
+
+
+def tree_depth(root: int, nodes: Sequence[Node]) -> int:
+    """How many nodes lie on the longest way from the root."""
+    depth, level = 0, [root] if root >= 0 else []
+    while level:
+        depth, level = depth + 1, [each for at in level for each in nodes[at][2:] if each >= 0]
+    return depth
 
 
 def _plane(cells: Sequence[tuple[Array, Array]]) -> tuple[int, float]:

@@ -38,6 +38,7 @@ from ..tolerances import (
     BOUND_ROUNDING,
     BOUND_WIDER,
     FREE_WIDER,
+    FREEST_WIDER,
     GENERATED_CLOSED,
     GENERATED_ERROR,
     GENERATED_LAST_STEP,
@@ -76,7 +77,7 @@ class BoundedCell(Value):
 
     def tried(self, units: Array) -> TubeCell:
         """The cell as a program has it: where its steps are bounded, an answer in its tube counts though it is off."""
-        widened = self.cell.radius + GENERATED_NEAR * units
+        widened = np.maximum(self.cell.radius, self.inner) + GENERATED_NEAR * units
         return replace(self.cell, radius=widened) if self.steps else self.cell
 
     @property
@@ -96,7 +97,7 @@ class BoundedCell(Value):
         if not known:
             x = loops.closed(centres, x)[0]
             slopes = loops.slopes(centres, x)
-        radius = cell.radius * (1.0 + AFFINE_ROUNDING if known else PART_TUBE)
+        radius = (cell.radius + AFFINE_ROUNDING * np.abs(x).max(axis=0)) if known else PART_TUBE * cell.radius
         return _Parts(self, [TubeCell(low, high, middle, rates, radius)
                              for (low, high), middle, rates in zip(ends, x, slopes, strict=True)], known)
 
@@ -133,7 +134,7 @@ def bounded_cells(branch: TubedBranch, part: TubePart, every: Sequence[int], row
                     again.append(parts.whole.split(loops, True))
                     continue
                 for each in made:
-                    if (each.good(code.units) or part.closed_to or depth == BOUND_HALVINGS or not each.divisible
+                    if (each.good(code.units) or depth == BOUND_HALVINGS or not each.divisible
                             or len(smaller) * 2 ** len(part.driven) >= MOST_BOUNDED):
                         found.append(each)
                     else:
@@ -162,9 +163,18 @@ class _Code:
     def bounded(self, every: Sequence[_Parts]) -> Iterator[list[BoundedCell]]:
         """All parts with their bounds."""
         pairs = [(cell, each.known) for each in every for cell in each.cells]
-        made = (each for k in range(0, len(pairs), CELLS_TOGETHER) for each in _bounds(
-            self, *map(list, zip(*pairs[k : k + CELLS_TOGETHER], strict=True))))
+        made = iter([each for k in range(0, len(pairs), CELLS_TOGETHER)
+                     for each in self._together(*map(list, zip(*pairs[k : k + CELLS_TOGETHER], strict=True)))])
         return (list(islice(made, len(each.cells))) for each in every)
+
+    def _together(self, cells: list[TubeCell], known: list[bool]) -> list[BoundedCell]:
+        """Some cells with their bounds, by the first width of the tubes that gives one."""
+        found: list[BoundedCell] = []
+        for wider in (BOUND_WIDER, *(() if self.part.exact else (FREE_WIDER, FREEST_WIDER))):
+            now = _bounds(self, cells, known, wider)
+            found = [old if old.good(self.units) or (old.alone and not new.good(self.units)) else new
+                     for old, new in zip(found or now, now, strict=True)]
+        return found
 
     @cached_property
     def growth(self) -> float:
@@ -217,19 +227,20 @@ def _trial(loops: LoopPart, cells: Sequence[TubeCell]) -> TubeTrial:
     """Cells as the enclosures take them."""
     lower, upper, x, slopes, radius = (np.array([getattr(cell, name) for cell in cells])
                                        for name in ("lower", "upper", "middle", "slopes", "radius"))
-    half = (upper - lower) / 2 * (1 + AFFINE_ROUNDING)
+    half = (upper - lower) / 2 * (1 + AFFINE_ROUNDING) + 4 * UNIT_ROUNDOFF * (np.abs(lower) + np.abs(upper))
     return TubeTrial(loops, (lower + upper) / 2, half, x, slopes, radius, np.zeros(len(x)), np.ones(len(x), dtype=bool))
 
 
-def _bounds(code: _Code, cells: Sequence[TubeCell], known: Sequence[bool]) -> list[BoundedCell]:
-    """Steps 1 to 4 of the head of this file; ``known``: which tubes hold a closure."""
+def _bounds(code: _Code, cells: Sequence[TubeCell], known: Sequence[bool], wider: float) -> list[BoundedCell]:
+    """Steps 1 to 4 of the head of this file; ``known``: which tubes hold a closure,
+    ``wider`` the radius R, as part of the tube's."""
     trial, every = _trial(code.loops, cells), code.every
     (c, p), units = trial.x.shape, code.units
     own, one, near, last = list(range(p)), np.eye(p), GENERATED_NEAR * units, GENERATED_LAST_STEP * units
     with np.errstate(all="ignore"):
         # 1. where the closure is
         largest = (trial.radius / units).max(axis=-1)[:, None] * units
-        wide = (FREE_WIDER * largest if code.part.closed_to else BOUND_WIDER * trial.radius) + 4 * near
+        wide = wider * (largest if wider == FREEST_WIDER else trial.radius) + 4 * near
         at = derivatives(trial, every, own, wide)
         Y = _inverses(at.by_own[..., code.rows, :].v[0])
         P, M = _levelled(combined(Y, at.by_own[..., code.rows, :]), trial.symbols[0])
@@ -239,7 +250,7 @@ def _bounds(code: _Code, cells: Sequence[TubeCell], known: Sequence[bool]) -> li
              + drift(combined(Y, along.along[..., code.rows, :])))
         back = _inverse_bound(M)
         a = _times(back @ P, np.fmin(g, combined(Y, along.values[..., code.rows]).size))
-        if not code.part.closed_to:
+        if code.part.exact:
             a = np.where(np.array(known)[:, None], np.fmin(trial.radius, a), a)
         solved, closing, matrix, sizes = code.computed(trial, wide)
         F = size.sum(axis=-1, keepdims=True) * matrix[:, None, None] * np.ones(p)
@@ -251,9 +262,8 @@ def _bounds(code: _Code, cells: Sequence[TubeCell], known: Sequence[bool]) -> li
             """What is left of e after a step; ``off``: how far the matrix's place is from those between."""
             return _times(outer, _times(_weighed(Q, off) + F, e) + noise) + rounding
 
-        # equations that are not proved to hold are left to the program
-        closed = code.rows if code.part.closed_to else list(range(len(every)))
-        # 2, 3. one step after another, each with a second one by the same matrix
+        # 2, 3. one step after another, each with a second one by the same matrix; whether equations that are not solved
+        # hold is left to the program
         steps, alive = np.zeros(c, dtype=int), np.all(a <= wide, axis=-1)
         e = a + rounding
         for count in range(1, NEWTON_STEPS_AT_RUN + 1):
@@ -261,14 +271,15 @@ def _bounds(code: _Code, cells: Sequence[TubeCell], known: Sequence[bool]) -> li
             second = step(first, e + first / 2)
             alive &= _within(first, wide - a) & _within(second, wide - a)
             ends = (_within(e + first, near) & _within(first + second, last)
-                    & np.all((_times(rates, first) + closing)[:, closed] <= GENERATED_CLOSED, axis=-1))
+                    & np.all((_times(rates, first) + closing)[:, code.rows] <= GENERATED_CLOSED, axis=-1))
             steps[alive & ends & (steps == 0)] = count
             e = np.maximum(first, second)
         # 4. what an answer is worth: the program's tube is wider by a step that is near
         s = np.broadcast_to(last, e.shape)
         off = _times(back, _times(one + M + F, s) + noise) + near
         error = _times(back, _times(_weighed(Q, off) + F, s) + noise) + rounding
-        error[~(np.all(a <= wide, axis=-1) & _within(trial.radius + near + off, wide - last))] = np.inf
+        tube = np.maximum(trial.radius, a) + near
+        error[~(np.all(a <= wide, axis=-1) & _within(tube + off, wide - last))] = np.inf
         error[~np.isfinite(error)] = np.inf
         alone = np.all(np.isfinite(back), axis=(-1, -2))
     inner = np.where(a <= wide, a, np.inf)
@@ -337,11 +348,11 @@ def _within(e: Array, limit: Array) -> NDArray[np.bool_]:
 
 
 def _inverses(A: Array) -> Array:
-    """Inverses (c, p, p), any that will do."""
-    try:
-        return np.asarray(np.linalg.inv(A))
-    except np.linalg.LinAlgError:
-        return np.asarray(np.linalg.pinv(A))
+    """Inverses (c, p, p), any that will do; zero where there is none."""
+    good = np.all(np.isfinite(A), axis=(-1, -2)) & (np.abs(np.linalg.det(A)) > 0)
+    found = np.zeros_like(A)
+    found[good] = np.linalg.pinv(A[good], rcond=UNIT_ROUNDOFF)
+    return found
 
 
 def _inverse_bound(M: Array) -> Array:
@@ -351,7 +362,7 @@ def _inverse_bound(M: Array) -> Array:
     one = np.eye(p)
     good = np.all(np.isfinite(M), axis=(-1, -2))
     safe = np.where(good[:, None, None], M, 0.0)
-    S = np.abs(np.linalg.inv(one - safe))
+    S = np.abs(_inverses(one - safe))
     v = S.sum(axis=-1)
     good &= np.all(_times(safe, v) * (1 + AFFINE_ROUNDING) < v, axis=-1)
     D = np.abs(one - (one - safe) @ S) + AFFINE_ROUNDING * p * (one + safe) @ S

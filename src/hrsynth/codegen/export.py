@@ -144,7 +144,6 @@ def _bounds(source: Source) -> list[str]:
     bounds = source.bounds
     return [f"{bounds.steps} steps of Newton's method are enough in each part, and an answer is within "
             f"{bounds.joints:.2g} (rad, or of that length) of the",
-            f"closure, the platform within {bounds.rotation:.2g} and {bounds.position:.2g}: proved, rounding in double "
-            "precision included."] + [
-        f"Whether equations that are proved to hold to {part.closed_to:.2g} alone do, the program finds out."
-        for part in source.branch.parts if part.closed_to]
+            f"closure (the joints that are solved for), the platform within {bounds.rotation:.2g} and "
+            f"{bounds.position:.2g}:", "proved, rounding in double precision included."] + [
+        f"Whether {bounds.others} more equations of the loops hold, the program finds out."] * (bounds.others > 0)

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..mechanism.observations.direction import Direction
 from ..results import Value
-from .cell_tree import Node, cell_tree
+from .cell_tree import Node, cell_tree, tree_depth
 from .convergence import BoundedCell, bounded_cells, platform_error
 from .inverse import LegMotor
 from .trace import FormulaTracer, TracedFunction
@@ -33,6 +33,8 @@ class SourcePart(Value):
     """How many equations there are in all."""
     root: int
     nodes: tuple[Node, ...]
+    depth: int
+    """Of the tree."""
     cells: tuple[tuple[tuple[float, ...], ...], ...]
     """Centre, x there, slopes row by row, radius."""
     units: tuple[float, ...]
@@ -45,12 +47,13 @@ class SourcePart(Value):
 class ProvedBounds:
     """Steps of Newton's method that are enough in each part, and how far an answer is from the closure at most, with
     rounding: ``joints`` (radians, characteristic lengths), the entries of the platform's ``rotation``, its ``position``
-    (characteristic lengths)."""
+    (characteristic lengths); ``others``: equations of the loops that are not solved, which the program tests."""
 
     steps: int
     joints: float
     rotation: float
     position: float
+    others: int
 
     @property
     def error(self) -> float:
@@ -106,8 +109,8 @@ def _part(branch: TubedBranch, tracer: FormulaTracer, part: TubePart) -> SourceP
     cells = tuple((tuple(cell.centre), tuple(cell.middle), tuple(cell.slopes.ravel()), tuple(cell.radius))
                   for cell in tried)
     return SourcePart(tuple(driven), tuple(unknowns), equations, slopes, closure, tuple(own), len(every), root,
-                      tuple(nodes), _floats(cells), _floats(tuple(units)), tuple(map(float, lower)),
-                      tuple(map(float, upper)), tuple(bounded))
+                      tuple(nodes), tree_depth(root, nodes), _floats(cells), _floats(tuple(units)),
+                      tuple(map(float, lower)), tuple(map(float, upper)), tuple(bounded))
 
 
 def _proved(branch: TubedBranch, parts: Sequence[SourcePart], platform: TracedFunction) -> ProvedBounds | None:
@@ -119,8 +122,8 @@ def _proved(branch: TubedBranch, parts: Sequence[SourcePart], platform: TracedFu
     ranges, errors, units = np.zeros((2, count)), np.zeros(count), np.ones(count)
     for part in parts:
         places = list(part.unknowns)
-        reach = [np.abs(each.cell.slopes) @ (each.cell.upper - each.cell.centre) + 2 * each.cell.radius
-                 for each in part.bounded]
+        reach = [np.abs(each.cell.slopes) @ (each.cell.upper - each.cell.centre) + 2 * np.maximum(
+            each.cell.radius, each.inner) for each in part.bounded]
         middles = [each.cell.middle for each in part.bounded]
         ranges[0, places] = np.min(np.subtract(middles, reach), axis=0)
         ranges[1, places] = np.max(np.add(middles, reach), axis=0)
@@ -128,7 +131,7 @@ def _proved(branch: TubedBranch, parts: Sequence[SourcePart], platform: TracedFu
         units[places] = part.units
     rotation, position = platform_error(branch, ranges, errors, platform)
     return ProvedBounds(max(each.steps for each in every), float((errors / units).max()), rotation,
-                        position / branch.system.mechanism.length)
+                        position / branch.system.mechanism.length, sum(part.count - len(part.rows) for part in parts))
 
 
 def _floats(values: Any) -> Any:
@@ -136,8 +139,9 @@ def _floats(values: Any) -> Any:
 
 
 def _rows(branch: TubedBranch, part: TubePart) -> tuple[list[int], list[int], list[int]]:
-    """As many equations as unknowns, the firmest at the middles of the part's cells together; all that have to do with
-    the unknowns; the unknowns' places, those that few of the equations know first, so that elimination fills little."""
+    """As many equations as unknowns, those that the proof solved, else the firmest at the middles of the part's cells
+    together; all that have to do with the unknowns; the unknowns' places, those that few of the equations know first,
+    so that elimination fills little."""
     from scipy.linalg import qr
 
     units = np.array([branch.unit(i) for i in part.unknowns])
@@ -151,11 +155,11 @@ def _rows(branch: TubedBranch, part: TubePart) -> tuple[list[int], list[int], li
         stacked.append(branch.evaluate(q, x)[1][:, part.unknowns] * units)
     every = [i for i in range(len(stacked[0])) if any(np.any(each[i]) for each in stacked)]
     together = np.hstack(stacked)[every]
-    kept = qr(together.T, pivoting=True, mode="r")[1]
+    kept = [every.index(i) for i in part.solved] if part.exact else qr(together.T, pivoting=True, mode="r")[1]
     chosen: list[int] = []
     for k in kept:  # independent at the first cell as well
         trial = stacked[0][[every[i] for i in (*chosen, k)]]
-        if np.linalg.matrix_rank(trial, tol=1e-6 * np.linalg.norm(trial, 2)) == len(trial):
+        if part.exact or np.linalg.matrix_rank(trial, tol=1e-6 * np.linalg.norm(trial, 2)) == len(trial):
             chosen.append(int(k))
         if len(chosen) == len(part.unknowns):
             break

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..analysis.branch.answer import BranchProof
 from ..analysis.branch.loops import LoopSystem
-from ..analysis.branch.part import whole
+from ..analysis.branch.part import DISTANCE, LoopPart, parts_of, whole
 from ..budgets import FARTHEST_MOTOR
 from ..errors import NothingProved
 from ..geometry.vectors import Array
@@ -36,20 +36,25 @@ class TubeCell(Value):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class TubePart(Value):
-    """Unknowns that ``driven`` coordinates decide, by their places among all coordinates, and the cells; ``closed_to``
-    bounds what is left of equations that were not proved to hold."""
+    """Unknowns that ``driven`` coordinates decide, by their places among all coordinates, and the cells; ``solved``:
+    the places among all equations of those that hold where the proof's equations do, whatever the others are."""
 
     driven: tuple[int, ...]
     unknowns: tuple[int, ...]
     cells: tuple[TubeCell, ...]
-    closed_to: float = 0.0
+    solved: tuple[int, ...]
+
+    @property
+    def exact(self) -> bool:
+        """Whether these are as many as the unknowns: the closure is their zero."""
+        return len(self.solved) == len(self.unknowns)
 
     def ordered(self, places: Sequence[int]) -> TubePart:
         """The same with its unknowns in another order."""
         own = list(places)
         return TubePart(self.driven, tuple(self.unknowns[k] for k in own), tuple(
             replace(each, middle=each.middle[own], slopes=each.slopes[own], radius=each.radius[own])
-            for each in self.cells), self.closed_to)
+            for each in self.cells), self.solved)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -72,6 +77,7 @@ class TubedBranch(Value):
         motors = tuple(table[name] for name in proof.motors)
         lower, upper = np.full(len(motors), -np.inf), np.full(len(motors), np.inf)
         parts = []
+        solved = {tuple(own.unknowns): _solved(proof.system, own) for own in parts_of(proof.system)[0]}
         for part in proof.parts:
             if not part.cells:
                 raise NothingProved(proof.robot.name, part.motors, "; ".join(each.reason for each in part.toggles))
@@ -80,8 +86,8 @@ class TubedBranch(Value):
             places = [motors.index(i) for i in driven]
             lower[places] = np.maximum(lower[places], np.min([each.lower for each in cells], axis=0))
             upper[places] = np.minimum(upper[places], np.max([each.upper for each in cells], axis=0))
-            parts.append(TubePart(driven, tuple(table[name] for name in part.passive), cells,
-                                  part.closed_to))
+            unknowns = tuple(table[name] for name in part.passive)
+            parts.append(TubePart(driven, unknowns, cells, solved[unknowns]))
         for place, i in enumerate(motors):
             low, high = proof.robot.limited.get(system.coordinates[i].joint, (-np.inf, np.inf))
             if not np.isfinite(lower[place]):  # in no loop
@@ -111,3 +117,15 @@ class TubedBranch(Value):
         values = np.zeros(len(self.system.coordinates))
         values[list(self.motors)], values[list(self.passive)] = q, x
         return whole(self.system, self.system.loops, self.system.gears, values)
+
+
+def _solved(system: LoopSystem, part: LoopPart) -> tuple[int, ...]:
+    """The places among all equations of those that hold where a part is solved: of a loop that is closed by turning a
+    rod all of them, if its length is among what was solved."""
+    left = {(each.of.name, id(each.row)) for each in part.left_out}
+    turned = {loop.name: (loop.name, id(DISTANCE)) not in left for loop in part.loops if loop.swung is not None}
+    own = {loop.name for loop in part.loops} | {gear.name for gear in part.gears}
+    every = [(loop.name, id(row)) for loop in system.loops for row in loop.rows]
+    every += [(gear.name, id(None)) for gear in system.gears]
+    return tuple(k for k, (name, row) in enumerate(every)
+                 if name in own and turned.get(name, (name, row) not in left))

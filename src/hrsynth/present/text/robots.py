@@ -181,7 +181,9 @@ def exported(found: ExportedCode) -> str:
                   ("inverse", "in closed form" if found.closed else "by Newton's method, from motors that are near"),
                   ("steps", [f"{bounds.steps} of Newton's method are enough, and an answer is within "
                              f"{bounds.error:.2g} of",
-                             "the closure (rad, 1 or characteristic lengths), rounding included, proved"]
+                             "the closure (rad, 1 or characteristic lengths), rounding included, proved",
+                             *[f"whether {bounds.others} more equations of the loops hold, it finds out"
+                               for _ in range(bounds.others > 0)]]
                    if bounds else "not bounded in all cells: what is not confirmed is undecided")]
     for part in proof.parts:
         rows.append(("answers for", [f"{name} {low:.6g} to {high:.6g}" for name, low, high in
