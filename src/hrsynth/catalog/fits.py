@@ -1,9 +1,10 @@
-"""Whether a record fits what is asked for."""
+"""Whether a record fits what is asked for, and a row of a SQLite file."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from typing import Any
 
@@ -11,10 +12,10 @@ from ..errors import BadRequest
 from .jsonl import Record
 from .words import counted, sights
 
-EXACT = ("group", "dof", "motion", "verdict", "base_motors", "fewest", "see")
-"""Fields that have to be equal to what is asked for."""
-ASKED = (*EXACT, "modes", "legs", "text")
+ASKED = ("group", "dof", "motion", "verdict", "base_motors", "fewest", "see", "modes", "legs", "text")
 """What can be asked for."""
+APART = "\x1f"
+"""Between the texts of a record."""
 
 
 def require_askable(asked: Mapping[str, Any]) -> None:
@@ -24,35 +25,57 @@ def require_askable(asked: Mapping[str, Any]) -> None:
             raise BadRequest("the catalog cannot be asked for", name, ASKED)
 
 
-def fits(record: Record, asked: Mapping[str, Any]) -> bool:
+@dataclass(frozen=True)
+class Condition:
+    """What is asked for by one name, told once: of a record, and of a row of a SQLite file."""
+
+    holds: Callable[[Record], bool]
+    row: str | None
+    """With a mark for each of the values; None where no row tells."""
+    values: tuple[Any, ...]
+
+
+def conditions(asked: Mapping[str, Any]) -> dict[str, Condition]:
+    """The condition of each name for which something is asked; of several values in a tuple one has to be met."""
+    return {name: _any_of([_condition(name, each) for each in (value if isinstance(value, tuple) else (value,))])
+            for name, value in asked.items() if value is not None}
+
+
+def fits(asked: Mapping[str, Any]) -> Callable[[Record], bool]:
     """Whether a record fits all that is asked for and not None."""
-    return all(_one(record, name, value) for name, value in asked.items() if value is not None)
+    every = conditions(asked).values()
+    return lambda record: all(each.holds(record) for each in every)
 
 
-def _one(record: Record, name: str, value: Any) -> bool:
-    if isinstance(value, tuple):
-        return any(_one(record, name, each) for each in value)
+def _any_of(every: Sequence[Condition]) -> Condition:
+    if len(every) == 1:
+        return every[0]
+    rows = [each.row for each in every if each.row is not None]
+    return Condition(lambda record: any(each.holds(record) for each in every),
+                     f"({' OR '.join(rows) or '0'})" if len(rows) == len(every) else None,
+                     tuple(value for each in every for value in each.values))
+
+
+def _condition(name: str, value: Any) -> Condition:
     match name:
-        case "legs":
-            return _legs(record, value)
-        case "see":
-            return bool(record.get("see") == counted(sights(value)))
-        case "modes":
-            return bool(record.get("modes_bound") == value)
+        case "legs" if not isinstance(value, int) and not value.isdecimal():
+            pattern = plain_brackets(value)
+            return Condition(lambda record: any(each == value or fnmatchcase(each, pattern) for each in names(record)),
+                             "word IN (SELECT word FROM names WHERE name GLOB ?)", (pattern,))
         case "text":
             from .site.known import is_called
 
-            return is_called(record, str(value)) or any(
-                str(value).casefold() in str(each).casefold() for each in record.values())
-        case _:
-            return name in record and bool(record[name] == value)
-
-
-def _legs(record: Record, value: int | str) -> bool:
-    """Whether a robot has so many legs, or its notation, its word or a leg's chain the pattern."""
-    if isinstance(value, int) or value.isdecimal():
-        return bool(record.get("legs") == int(value))
-    return any(name == value or fnmatchcase(name, plain_brackets(value)) for name in names(record))
+            text = str(value).casefold()
+            return Condition(
+                lambda record: is_called(record, text) or any(text in str(each).casefold() for each in record.values()),
+                None if APART in text else "instr(texts, ?) > 0", (text,))
+        case "legs":
+            value = int(value)
+        case "see":
+            value = counted(sights(value))
+        case "modes":
+            name = "modes_bound"
+    return Condition(lambda record: name in record and bool(record[name] == value), f'"{name}" = ?', (value,))
 
 
 def names(record: Record) -> set[str]:

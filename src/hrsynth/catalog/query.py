@@ -77,14 +77,15 @@ class Catalog(Value):
         under which the robot is known. Several values in a tuple: one of them.
         """
         require_askable(asked)
-        return Catalog(tuple(each for each in self.records if fits(each, asked)))
+        return Catalog(tuple(filter(fits(asked), self.records)))
 
     def named(self, text: str) -> list[Record]:
         """The records of robots that are called so, or whose legs are, those first that a list shows first: names that
         begin with the text before others."""
         from .site.known import alias, is_called, order
 
-        found = [each for each in self if is_called(each, text) or fits(each, {"legs": text})]
+        has_legs = fits({"legs": text})
+        found = [each for each in self if is_called(each, text) or has_legs(each)]
         starts = f", {text}".casefold()
         return sorted(found, key=lambda each: (starts not in f", {alias(each['word'])}".casefold(), *order(each)))
 

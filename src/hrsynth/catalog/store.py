@@ -12,10 +12,10 @@ from typing import Any, Protocol
 
 from ..description.files import replacement
 from ..errors import BadRequest, BuildStopped
-from .fits import names, plain_brackets, texts
+from .fits import APART, conditions, names, texts
 from .journal import ENDING, Journal
 from .jsonl import FORMAT, decoded, encoded, record, require_version, word_of
-from .words import VERSION, counted, sights
+from .words import VERSION
 
 DATABASES = (".sqlite", ".sqlite3", ".db")
 """Endings of a store that is one SQLite file."""
@@ -25,10 +25,8 @@ FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 COLUMNS = {"legs": "INTEGER", "dof": "INTEGER", "motion": "TEXT", "verdict": "TEXT", "base_motors": "INTEGER",
            "fewest": "INTEGER", "see": "TEXT", "modes_bound": "INTEGER"}
 """Fields of a record that have a column and an index."""
-OLD_COLUMNS = ("dof", "motion", "verdict", "base_motors", "fewest")
+OLD_COLUMNS = ("group", "dof", "motion", "verdict", "base_motors", "fewest")
 """What older files can be asked for."""
-APART = "\x1f"
-"""Between the texts of a record."""
 
 
 class Store(Protocol):
@@ -105,16 +103,15 @@ class Database:
 
     def lines(self, group: str, asked: Mapping[str, Any]) -> list[str]:
         known = self._known()
-        met = {"\"group\" = ?": group} | dict(each for name, value in asked.items() if value is not None
-                                            and (each := _condition(name, value)) and known(name))
+        told = [each for name, each in conditions(asked).items() if each.row and known(name)]
+        met, values = ['"group" = ?', *(str(each.row) for each in told)], [v for each in told for v in each.values]
         with self._read() as file:
-            rows = file.execute(f"SELECT line FROM records WHERE {' AND '.join(met)} ORDER BY word", [*met.values()])
+            rows = file.execute(f"SELECT line FROM records WHERE {' AND '.join(met)} ORDER BY word", [group, *values])
             return [text for text, in rows]
 
     def decides(self, asked: Mapping[str, Any]) -> bool:
         known = self._known()
-        return all(value is None or name == "group" or (_condition(name, value) is not None and known(name))
-                   for name, value in asked.items())
+        return all(each.row and known(name) for name, each in conditions(asked).items())
 
     def count(self, group: str) -> int:
         with self._read() as file:
@@ -197,25 +194,6 @@ def writable(file: Path, what: str = "catalog") -> Iterator[None]:
         if error.errno in FULL:
             raise BuildStopped(f"{file}: {error.strerror}") from None
         raise BadRequest(f"cannot write the {what}: {error.strerror}", str(file)) from None
-
-
-def _condition(name: str, value: Any) -> tuple[str, Any] | None:
-    """The condition on a row that decides whether it fits what is asked, and its value; None where there is none."""
-    if isinstance(value, tuple) or name == "group":
-        return None
-    match name:
-        case "legs":
-            if isinstance(value, int) or value.isdecimal():
-                return "legs = ?", int(value)
-            return "word IN (SELECT word FROM names WHERE name GLOB ?)", plain_brackets(value)
-        case "see":
-            return "see = ?", counted(sights(value))
-        case "modes":
-            return "modes_bound = ?", value
-        case "text":
-            return None if APART in str(value) else ("instr(texts, ?) > 0", str(value).casefold())
-        case _:
-            return f"{name} = ?", value
 
 
 def _write_tables(path: Path, groups: Mapping[str, Iterable[str]]) -> None:
