@@ -11,6 +11,7 @@ from collections import Counter
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 import networkx as nx
 import pytest
@@ -65,7 +66,6 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 TESTS = sorted((ROOT / "tests").rglob("test_*.py"))
 
 
-@cache
 def tree_of(path: Path) -> ast.Module:
     return ast.parse(path.read_text(encoding="utf-8"), filename=str(path))
 
@@ -80,30 +80,56 @@ def folder_of(path: Path) -> str:
     return "" if top == "__init__" else top
 
 
+class Import(NamedTuple):
+    """What an import statement of a module takes, by its full name."""
+
+    line: int
+    name: str
+    text: str
+    head: bool
+    """Whether it runs when the module is imported."""
+    runs: bool
+    """Whether it runs at all: not under ``if TYPE_CHECKING``."""
+
+
+class Source(NamedTuple):
+    """What the rules ask of a module; all its trees at once would fill the memory."""
+
+    imports: tuple[Import, ...]
+    classes: tuple[tuple[int, str], ...]
+    constants: tuple[tuple[int, str, float | None], ...]
+
+
 @cache
-def nodes_of(path: Path) -> tuple[ast.AST, ...]:
-    return tuple(ast.walk(tree_of(path)))
+def source_of(path: Path) -> Source:
+    """A module, read once."""
+    tree, imports, classes = tree_of(path), list[Import](), list[tuple[int, str]]()
+    package = ["hrsynth", *path.relative_to(PACKAGE).parent.parts]
+    pending: list[tuple[ast.AST, bool, bool]] = [(tree, True, True)]
+    while pending:
+        node, head, runs = pending.pop()
+        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
+            head = runs = False
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            level = node.level if isinstance(node, ast.ImportFrom) else 0
+            base = package[: len(package) - level + 1] if level else []
+            base += (node.module or "").split(".") if isinstance(node, ast.ImportFrom) and node.module else []
+            imports += [Import(node.lineno, ".".join([*base, alias.name]), ast.unparse(node), head, runs)
+                        for alias in node.names]
+        elif isinstance(node, ast.ClassDef):
+            classes.append((node.lineno, node.name))
+        elif isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda):
+            head = False
+        elif isinstance(node, ast.expr):
+            continue  # holds none of these
+        pending += [(child, head, runs) for child in ast.iter_child_nodes(node)]
+    return Source(tuple(imports), tuple(classes), tuple(constants(tree)))
 
 
 def imports_of(path: Path) -> Iterator[tuple[int, str]]:
     """Line and dotted name of everything that a module imports, also inside functions; relative ones made full."""
-    for node, name in named_imports(path):
-        yield node.lineno, name
-
-
-@cache
-def named_imports(path: Path) -> tuple[tuple[ast.Import | ast.ImportFrom, str], ...]:
-    """The same with the statements."""
-    found: list[tuple[ast.Import | ast.ImportFrom, str]] = []
-    package = ["hrsynth", *path.relative_to(PACKAGE).parent.parts]
-    for node in nodes_of(path):
-        if isinstance(node, ast.Import):
-            found += [(node, alias.name) for alias in node.names]
-        elif isinstance(node, ast.ImportFrom):
-            base = package[: len(package) - node.level + 1] if node.level else []
-            base = [*base, *(node.module or "").split(".")] if node.module else base
-            found += [(node, ".".join([*base, alias.name])) for alias in node.names]
-    return tuple(found)
+    for each in source_of(path).imports:
+        yield each.line, each.name
 
 
 def own_imports() -> Iterator[tuple[Path, int, list[str]]]:
@@ -113,17 +139,6 @@ def own_imports() -> Iterator[tuple[Path, int, list[str]]]:
             parts = name.split(".")
             if parts[0] == "hrsynth" and parts[1:] not in ([], ["__version__"]):
                 yield path, line, parts[1:]
-
-
-def at_head(node: ast.AST) -> Iterator[ast.AST]:
-    """The nodes that run when the module is imported: not the bodies of functions, not ``if TYPE_CHECKING``."""
-    for child in ast.iter_child_nodes(node):
-        if isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda):
-            continue
-        if isinstance(child, ast.If) and "TYPE_CHECKING" in ast.unparse(child.test):
-            continue
-        yield child
-        yield from at_head(child)
 
 
 def assert_none(complaints: list[str], law: str) -> None:
@@ -138,7 +153,6 @@ def test_every_folder_has_its_place():
     )
 
 
-@pytest.mark.slow
 def test_data_walks_one_way():
     complaints = []
     for path, line, parts in own_imports():
@@ -146,14 +160,6 @@ def test_data_walks_one_way():
         if own and parts[0] != own and LEVEL.get(parts[0], 99) > LEVEL.get(own, 99):
             complaints.append(f"{where(path, line)}: {own} imports {'.'.join(parts)}, which comes after it")
     assert_none(complaints, "a module imports only from its own folder and from those above it")
-
-
-def runs(node: ast.AST) -> Iterator[ast.AST]:
-    """All nodes below one but those under ``if TYPE_CHECKING``."""
-    for child in ast.iter_child_nodes(node):
-        if not (isinstance(child, ast.If) and "TYPE_CHECKING" in ast.unparse(child.test)):
-            yield child
-            yield from runs(child)
 
 
 def module_of(path: Path) -> tuple[str, ...]:
@@ -165,9 +171,8 @@ def test_no_module_imports_itself_in_the_end():
     modules = {module_of(path): path for path in MODULES}
     graph = nx.DiGraph()
     for own, path in modules.items():
-        taken = {id(node) for node in runs(tree_of(path))}
-        for node, name in named_imports(path):
-            parts = tuple(name.split(".")[1:]) if id(node) in taken and name.startswith("hrsynth.") else ()
+        for each in source_of(path).imports:
+            parts = tuple(each.name.split(".")[1:]) if each.runs and each.name.startswith("hrsynth.") else ()
             while parts and parts not in modules:
                 parts = parts[:-1]
             if parts and parts != own:
@@ -186,12 +191,12 @@ SMALL = 1e-2
 """Below it a number is a tolerance."""
 
 
-def constants(path: Path) -> Iterator[tuple[int, str, float | None]]:
+def constants(tree: ast.Module) -> Iterator[tuple[int, str, float | None]]:
     """Line, name and value (None for what is no number) of the constants of a module."""
-    for node in tree_of(path).body:
+    for node in tree.body:
         if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name) and node.targets[0].id.isupper():
             try:
-                value = eval(compile(ast.Expression(node.value), str(path), "eval"), {})
+                value = eval(compile(ast.Expression(node.value), "constant", "eval"), {})
             except NameError:
                 continue
             yield node.lineno, node.targets[0].id, value if isinstance(value, int | float) else None
@@ -202,34 +207,32 @@ def test_tolerances_and_budgets_stand_in_their_tables():
         f"{where(path, line)}: {name}"
         for path in MODULES
         if folder_of(path) not in TABLES and str(path.relative_to(PACKAGE)) not in MEASURED
-        for line, name, value in constants(path)
+        for line, name, value in source_of(path).constants
         if name.strip("_") in BARE or (isinstance(value, float) and 0 < abs(value) < SMALL)
     ]
     assert_none(complaints, "a tolerance belongs to tolerances.py, a limit to budgets.py, by a name with a meaning")
 
 
 def test_constants_with_the_same_name_are_not_in_both_tables():
-    names = [name for table in TABLES for _, name, _ in constants(PACKAGE / f"{table}.py")]
+    names = [name for table in TABLES for _, name, _ in source_of(PACKAGE / f"{table}.py").constants]
     assert_none([name for name, count in Counter(names).items() if count > 1], "defined twice")
 
 
 def test_class_names_are_unique():
     homes: dict[str, list[str]] = {}
     for path in MODULES:
-        for node in nodes_of(path):
-            if isinstance(node, ast.ClassDef):
-                homes.setdefault(node.name, []).append(where(path, node.lineno))
+        for line, name in source_of(path).classes:
+            homes.setdefault(name, []).append(where(path, line))
     twice = {name: places for name, places in homes.items() if len(places) > 1}
     assert_none([f"{name}: {', '.join(places)}" for name, places in twice.items()],
                 "two classes of one name")
 
 
 def test_the_package_itself_imports_nothing_of_its_own():
-    nodes = at_head(tree_of(PACKAGE / "__init__.py"))
-    heads = [node for node in nodes if isinstance(node, ast.Import | ast.ImportFrom)]
+    own = PACKAGE / "__init__.py"
     assert_none(
-        [where(PACKAGE / "__init__.py", node.lineno) for node in heads
-         if ast.unparse(node) not in (TYPE_CHECKING, "from .results import Result")],
+        [where(own, each.line) for each in source_of(own).imports
+         if each.head and each.text not in (TYPE_CHECKING, "from .results import Result")],
         "imports (public names are imported when they are asked for; results are told how to find them)",
     )
 
@@ -267,12 +270,10 @@ def test_the_engine_names_no_robot():
 def test_slow_packages_are_imported_where_they_are_used():
     complaints = []
     for path in MODULES:
-        heads = [node for node in at_head(tree_of(path)) if isinstance(node, ast.Import | ast.ImportFrom)]
-        for node in heads:
-            modules = [a.name for a in node.names] if isinstance(node, ast.Import) else [node.module or ""]
-            for name in {m.split(".")[0] for m in modules if not getattr(node, "level", 0)} & SLOW.keys():
-                if SLOW[name] is None or SLOW[name] != folder_of(path):
-                    complaints.append(f"{where(path, node.lineno)}: {name}")
+        for each in source_of(path).imports:
+            name = each.name.split(".")[0]
+            if each.head and name in SLOW and SLOW[name] != folder_of(path):
+                complaints.append(f"{where(path, each.line)}: {name}")
     assert_none(complaints, "imported at the head of a module, wanted inside the function that uses it")
 
 

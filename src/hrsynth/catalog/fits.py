@@ -26,7 +26,7 @@ def require_askable(asked: Mapping[str, Any]) -> None:
 
 
 @dataclass(frozen=True)
-class Condition:
+class RecordCondition:
     """What is asked for by one name, told once: of a record, and of a row of a SQLite file."""
 
     holds: Callable[[Record], bool]
@@ -35,7 +35,7 @@ class Condition:
     values: tuple[Any, ...]
 
 
-def conditions(asked: Mapping[str, Any]) -> dict[str, Condition]:
+def conditions(asked: Mapping[str, Any]) -> dict[str, RecordCondition]:
     """The condition of each name for which something is asked; of several values in a tuple one has to be met."""
     return {name: _any_of([_condition(name, each) for each in (value if isinstance(value, tuple) else (value,))])
             for name, value in asked.items() if value is not None}
@@ -47,26 +47,26 @@ def fits(asked: Mapping[str, Any]) -> Callable[[Record], bool]:
     return lambda record: all(each.holds(record) for each in every)
 
 
-def _any_of(every: Sequence[Condition]) -> Condition:
+def _any_of(every: Sequence[RecordCondition]) -> RecordCondition:
     if len(every) == 1:
         return every[0]
     rows = [each.row for each in every if each.row is not None]
-    return Condition(lambda record: any(each.holds(record) for each in every),
+    return RecordCondition(lambda record: any(each.holds(record) for each in every),
                      f"({' OR '.join(rows) or '0'})" if len(rows) == len(every) else None,
                      tuple(value for each in every for value in each.values))
 
 
-def _condition(name: str, value: Any) -> Condition:
+def _condition(name: str, value: Any) -> RecordCondition:
     match name:
         case "legs" if not isinstance(value, int) and not value.isdecimal():
             pattern = plain_brackets(value)
-            return Condition(lambda record: any(each == value or fnmatchcase(each, pattern) for each in names(record)),
+            return RecordCondition(lambda record: any(each == value or fnmatchcase(each, pattern) for each in names(record)),
                              "word IN (SELECT word FROM names WHERE name GLOB ?)", (pattern,))
         case "text":
             from .site.known import is_called
 
             text = str(value).casefold()
-            return Condition(
+            return RecordCondition(
                 lambda record: is_called(record, text) or any(text in str(each).casefold() for each in record.values()),
                 None if APART in text else "instr(texts, ?) > 0", (text,))
         case "legs":
@@ -75,7 +75,7 @@ def _condition(name: str, value: Any) -> Condition:
             value = counted(sights(value))
         case "modes":
             name = "modes_bound"
-    return Condition(lambda record: name in record and bool(record[name] == value), f'"{name}" = ?', (value,))
+    return RecordCondition(lambda record: name in record and bool(record[name] == value), f'"{name}" = ?', (value,))
 
 
 def names(record: Record) -> set[str]:
