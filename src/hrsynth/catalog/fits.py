@@ -52,16 +52,17 @@ def _any_of(every: Sequence[RecordCondition]) -> RecordCondition:
         return every[0]
     rows = [each.row for each in every if each.row is not None]
     return RecordCondition(lambda record: any(each.holds(record) for each in every),
-                     f"({' OR '.join(rows) or '0'})" if len(rows) == len(every) else None,
-                     tuple(value for each in every for value in each.values))
+                           f"({' OR '.join(rows) or '0'})" if len(rows) == len(every) else None,
+                           tuple(value for each in every for value in each.values))
 
 
 def _condition(name: str, value: Any) -> RecordCondition:
     match name:
         case "legs" if not isinstance(value, int) and not value.isdecimal():
             pattern = plain_brackets(value)
-            return RecordCondition(lambda record: any(each == value or fnmatchcase(each, pattern) for each in names(record)),
-                             "word IN (SELECT word FROM names WHERE name GLOB ?)", (pattern,))
+            return RecordCondition(
+                lambda record: any(each == value or fnmatchcase(each, pattern) for each in names(record)),
+                "word IN (SELECT word FROM names WHERE name GLOB ?)", (pattern,))
         case "text":
             from .site.known import is_called
 
