@@ -17,19 +17,18 @@ from measure import Row
 from others import catalog, derivations, jacobians, modes, platforms
 from sweeps import exact_maxima, growth, matrices, other_twists
 
-from hrsynth.present.readme import replaced
+from hrsynth.present.markdown import replaced, table
 
 START = "<!-- generated: benchmarks -->"
 
 
 def main(arguments: Sequence[str]) -> None:
-    rows = [("what", "ours", "theirs", "theirs / ours"), ("---", "---", "---", "---:"), *lines()]
-    table = "".join(f"| {' | '.join(row)} |\n" for row in rows)
+    made = table(("what", "ours", "theirs", "theirs / ours"), lines(), 3)
     if not arguments:
-        print(table)
+        print(made)
         return
     file = Path(arguments[0])
-    made = replaced(file.read_text(encoding="utf-8"), table, START)
+    made = replaced(file.read_text(encoding="utf-8"), made, START)
     file.write_text(made, encoding="utf-8", newline="\n")
 
 

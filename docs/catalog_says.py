@@ -12,7 +12,7 @@ from typing import Any
 from hrsynth.analysis.verdict import BLIND, CONTROLLABLE, PARTIAL
 from hrsynth.catalog.query import Catalog, load
 from hrsynth.catalog.words import LegWord, RobotWord, parse
-from hrsynth.present.readme import replaced
+from hrsynth.present.markdown import replaced, table
 
 PAGE = Path(__file__).resolve().parent / "pages" / "catalog_says.md"
 AUDIT = PAGE.with_name("audit.md")
@@ -79,7 +79,7 @@ def motions(catalog: Catalog) -> str:
         by.setdefault(each["motion"], Counter())[each["verdict"]] += 1
     rows = [(motion, f"{sum(found.values()):,}", *(f"{found[v]:,}" for v in VERDICTS), _share(found))
             for motion, found in sorted(by.items(), key=lambda item: -sum(item[1].values()))]
-    return _table(("motion", "architectures", *VERDICTS, "controllable (%)"), rows)
+    return table(("motion", "architectures", *VERDICTS, "controllable (%)"), rows, 1)
 
 
 def numbers(record: Record) -> int:
@@ -96,7 +96,7 @@ def fewest(catalog: Catalog) -> str:
             by.setdefault((each["motion"], each["group"], least), Counter())[each["fewest"] - least] += 1
     rows = [(motion, group, least, *(f"{found[k]:,}" if found[k] else "–" for k in range(4)))
             for (motion, group, least), found in sorted(by.items())]
-    return _table(("motion", "group", "at least", "so many", "one more", "two more", "three more"), rows)
+    return table(("motion", "group", "at least", "so many", "one more", "two more", "three more"), rows, 1)
 
 
 def chains(catalog: Catalog) -> str:
@@ -109,7 +109,7 @@ def chains(catalog: Catalog) -> str:
             by.setdefault((each["group"], *letters), Counter())[each["verdict"]] += 1
     rows = [(group, f"`{chain}`", *(f"{found[v]:,}" if found[v] else "–" for v in VERDICTS), _share(found))
             for (group, chain), found in sorted(by.items())]
-    return _table(("group", "legs", *VERDICTS, "controllable (%)"), rows)
+    return table(("group", "legs", *VERDICTS, "controllable (%)"), rows, 1)
 
 
 def cures(catalog: Catalog) -> str:
@@ -120,7 +120,7 @@ def cures(catalog: Catalog) -> str:
             text = each["cure"]
             known = not text.startswith(("none", "not all"))
             found[str(text.count(" and ") + 1) if known else "none of up to four was found"] += 1
-    return _table(("further measurements", "architectures"), [(key, f"{n:,}") for key, n in sorted(found.items())])
+    return table(("further measurements", "architectures"), [(key, f"{n:,}") for key, n in sorted(found.items())], 1)
 
 
 def rules(catalog: Catalog) -> str:
@@ -138,7 +138,7 @@ def rules(catalog: Catalog) -> str:
             for each in every if each["group"] == "deltas")),
         ("at least dof/2 legs, in a plane dof", agree(
             each["fewest"] >= numbers(each) for each in every if each["verdict"] == CONTROLLABLE))]
-    return _table(("rule", "agree"), rows)
+    return table(("rule", "agree"), rows, 1)
 
 
 def published(catalog: Catalog) -> str:
@@ -152,8 +152,8 @@ def published(catalog: Catalog) -> str:
                      f"{len(every) - len(found):,}", f"{sum(not each['exact'] for each in found):,}",
                      ", ".join(f"{n}: {count:,}" for n, count in sorted(legs.items())),
                      f"{sum('modes_bound' in each for each in found):,}"))
-    return _table(("group", "robots", *VERDICTS, "refused", "not exact", "legs to watch: controllable robots",
-                   "with a list of modes"), rows)
+    return table(("group", "robots", *VERDICTS, "refused", "not exact", "legs to watch: controllable robots",
+                  "with a list of modes"), rows, 1)
 
 
 TABLES = {"motions": motions, "fewest": fewest, "chains": chains, "cures": cures, "rules": rules}
@@ -176,11 +176,6 @@ def written(text: str, catalog: Catalog, tables: Mapping[str, Callable[[Catalog]
 
 def _share(found: Counter[str]) -> str:
     return f"{100 * found[CONTROLLABLE] / sum(found.values()):.0f}"
-
-
-def _table(heads: Sequence[object], rows: Iterable[Sequence[object]]) -> str:
-    lines = [heads, ["---:" if i else "---" for i in range(len(heads))], *rows]
-    return "\n".join(f"| {' | '.join(map(str, line))} |" for line in lines) + "\n"
 
 
 if __name__ == "__main__":

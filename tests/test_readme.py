@@ -15,6 +15,7 @@ from hrsynth.cli import execute
 from hrsynth.description import shipped
 from hrsynth.families.replays import REPLAYS, SIMULATED
 from hrsynth.present import observation_kinds, readme, replays
+from hrsynth.present.markdown import block, line, replaced
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = ROOT / "docs" / "pages"
@@ -30,7 +31,7 @@ differ from machine to machine."""
 
 
 def lines() -> dict[str, str]:
-    rows = readme.block(ROBOTS).splitlines()[2:]
+    rows = block(ROBOTS, readme.START).splitlines()[2:]
     return {re.match(r"\| `(\w+)` \|", row)[1]: row for row in rows}
 
 
@@ -41,46 +42,46 @@ def test_the_table_has_every_shipped_robot_in_order():
 @pytest.mark.some(1)
 @pytest.mark.parametrize("name", ["3prp", "3ppr_m1", "prrrp_parallel", "delta", "3upu"])
 def test_some_rows_are_fresh(name: str):
-    assert lines()[name] == readme.row(name), "the page is stale: make readme"
+    assert lines()[name] == line(readme.row(name)), "the page is stale: make readme"
 
 
 @pytest.mark.slow
 def test_the_table_is_fresh():
-    assert readme.block(ROBOTS) == readme.table(), "the page is stale: make readme"
+    assert block(ROBOTS, readme.START) == readme.table(), "the page is stale: make readme"
 
 
 @pytest.mark.some(1)
 @pytest.mark.parametrize("replay", [SIMULATED[0], SIMULATED[5]], ids=lambda each: each.source)
 def test_some_replays_are_fresh(replay):
-    assert replays.row(replay) in readme.block(PAPERS, replays.START).splitlines(), "the page is stale: make readme"
+    assert line(replays.row(replay)) in block(PAPERS, replays.START).splitlines(), "the page is stale: make readme"
 
 
 def test_the_table_has_every_replay():
-    assert len(readme.block(PAPERS, replays.START).splitlines()) == 2 + len(REPLAYS)
+    assert len(block(PAPERS, replays.START).splitlines()) == 2 + len(REPLAYS)
 
 
 @pytest.mark.long
 def test_the_replays_are_fresh():
     pytest.importorskip("mujoco")
-    assert readme.block(PAPERS, replays.START) == replays.table(), "the page is stale: make readme"
+    assert block(PAPERS, replays.START) == replays.table(), "the page is stale: make readme"
 
 
 def test_the_table_of_kinds_is_fresh():
     page = (PAGES / "observations.md").read_text(encoding="utf-8")
-    assert readme.block(page, observation_kinds.START) == observation_kinds.table(), "the page is stale: make readme"
+    assert block(page, observation_kinds.START) == observation_kinds.table(), "the page is stale: make readme"
 
 
 def test_the_table_of_the_catalog_is_fresh():
-    assert readme.block(CATALOG, catalog.START) == catalog.table(), "the page is stale: make readme"
+    assert block(CATALOG, catalog.START) == catalog.table(), "the page is stale: make readme"
 
 
 def test_the_text_outside_the_marks_is_kept():
-    assert readme.replaced(ROBOTS, readme.block(ROBOTS)) == ROBOTS
-    other = readme.replaced(ROBOTS, "none at all\n")
-    assert readme.block(other) == "none at all\n"
-    assert readme.replaced(other, readme.block(ROBOTS)) == ROBOTS
+    assert replaced(ROBOTS, block(ROBOTS, readme.START), readme.START) == ROBOTS
+    other = replaced(ROBOTS, "none at all\n", readme.START)
+    assert block(other, readme.START) == "none at all\n"
+    assert replaced(other, block(ROBOTS, readme.START), readme.START) == ROBOTS
     with pytest.raises(ValueError, match="generated: robots"):
-        readme.replaced("# without marks\n", "nothing\n")
+        replaced("# without marks\n", "nothing\n", readme.START)
 
 
 def test_the_readme_is_short():

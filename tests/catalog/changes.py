@@ -21,7 +21,7 @@ from typing import Any
 
 from catalog.witness import Witness
 from hrsynth.catalog.groups import GROUPS
-from hrsynth.present.readme import replaced
+from hrsynth.present.markdown import replaced, table
 
 START = "<!-- generated: changes -->"
 ROOT = Path(__file__).resolve().parents[2]
@@ -97,12 +97,12 @@ def page(before: Mapping[str, Record], now: Mapping[str, Record]) -> str:
         if record != before[word]:
             kinds[reason(before[word], record)].append(word)
     counts = {name: Counter(now[word]["group"] for word in kinds[name]) for name in REASONS}
-    rows = [["reason", *sorted(GROUPS), "all"], ["---", *["---:"] * (len(GROUPS) + 1)]]
-    rows += [[name, *(str(counts[name][group] or "–") for group in sorted(GROUPS)), str(counts[name].total())]
+    heads = ("reason", *sorted(GROUPS), "all")
+    rows = [[name, *(str(counts[name][group] or "–") for group in sorted(GROUPS)), str(counts[name].total())]
              for name in REASONS]
     rows += [["all", *(str(sum(each[group] for each in counts.values())) for group in sorted(GROUPS)),
               str(sum(map(len, kinds.values())))]]
-    return "".join(f"| {' | '.join(row)} |\n" for row in rows) + "".join(
+    return table(heads, rows, 1) + "".join(
         f"\n## {name[0].upper()}{name[1:]}\n\n{WHY[name]}\n\n{''.join(_lines(kinds[name], before, now))}"
         for name in REASONS)
 

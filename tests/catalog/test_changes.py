@@ -10,7 +10,7 @@ import pytest
 from catalog import changes
 from catalog.witness import Witness
 from hrsynth.catalog import load
-from hrsynth.present.readme import block
+from hrsynth.present.markdown import block
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "pages" / "catalog-changes.md"
 

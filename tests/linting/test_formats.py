@@ -14,7 +14,7 @@ from hrsynth.cli import execute
 from hrsynth.linting.findings import SEVERITIES
 from hrsynth.linting.rules import lint_rules
 from hrsynth.present import lint_rules as page
-from hrsynth.present.readme import block
+from hrsynth.present.markdown import block
 from hrsynth.present.text.lint import github, sarif
 from linting.defects import CASES, damaged, put, sound
 

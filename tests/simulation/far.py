@@ -31,7 +31,7 @@ from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.locked import interaction
 from hrsynth.kinematics.relation import relation
 from hrsynth.mechanism.model import Mechanism
-from hrsynth.present.readme import replaced
+from hrsynth.present.markdown import replaced, table
 from hrsynth.simulation.ending import ANTIPODAL, BOUNDARY, ENDINGS, GOAL, MINIMUM, MODE
 from hrsynth.simulation.law import FixedDirections, Law, directions
 from hrsynth.simulation.result import Servo
@@ -174,7 +174,7 @@ def tables(records: Sequence[dict[str, Any]], names: Sequence[str]) -> dict[str,
     found = {}
     for mark, (field, kinds) in ways.items():
         heads = ("robot", "pairs", *kinds, *(("untrue",) if mark == START else ()))
-        found[mark] = row(*heads) + row("---", *["---:"] * (len(heads) - 1))
+        rows = list[tuple[object, ...]]()
         for name in names:
             of = ", ".join(f"`{each}`" for each in same_question(name))
             for watched, what in ((False, of), (True, f"{of}, random sets")):
@@ -182,12 +182,9 @@ def tables(records: Sequence[dict[str, Any]], names: Sequence[str]) -> dict[str,
                 if own and not (watched and mark == START):
                     counted = Counter(each[field] for each in own)
                     wrong = (sum(map(len, (each["untrue"] for each in own))),) if mark == START else ()
-                    found[mark] += row(what, len(own), *(counted[kind] or "–" for kind in kinds), *wrong)
+                    rows.append((what, len(own), *(counted[kind] or "–" for kind in kinds), *wrong))
+        found[mark] = table(heads, rows, 1)
     return found
-
-
-def row(*cells: object) -> str:
-    return f"| {' | '.join(map(str, cells))} |\n"
 
 
 def main() -> None:
@@ -220,8 +217,8 @@ def main() -> None:
         print("\n".join(found.values()))
     else:
         text = asked.page.read_text(encoding="utf-8")
-        for mark, table in found.items():
-            text = replaced(text, table, mark)
+        for mark, made in found.items():
+            text = replaced(text, made, mark)
         asked.page.write_text(text, encoding="utf-8", newline="\n")
     sys.exit("\n".join(f"{record['robot']}, {record['watched'] or 'all legs'}, {record['start']} to {record['goal']}: "
                        f"{each}" for record in records for each in record["untrue"]) or None)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import sys
-from pathlib import Path
 
 from ..analysis.verdict import BLIND, CONTROLLABLE, PARTIAL
-from ..present.readme import replaced
+from ..present.markdown import rewrite
+from ..present.markdown import table as markdown
 from .query import Catalog, load
 from .store import shipped
 from .words import SENSORS
@@ -20,23 +20,15 @@ def table(catalog: Catalog | None = None) -> str:
     """The Markdown table of how many architectures of each group have which verdict (default: of what is shipped)."""
     if catalog is None:
         catalog = Catalog((*load(), *load(group=SENSORS))) if shipped().groups() else Catalog(())
-    lines = [_line(HEADS), "|".join(["", " --- ", *(" ---: " for _ in HEADS[1:]), ""])]
-    for group, in catalog.count("group"):
-        lines.append(_row(str(group), catalog.where(group=group)))
-    return "\n".join([*lines, _row("all", catalog)]) + "\n"
+    rows = [_row(str(group), catalog.where(group=group)) for group, in catalog.count("group")]
+    return markdown(HEADS, [*rows, _row("all", catalog)], 1)
 
 
-def _row(name: str, catalog: Catalog) -> str:
+def _row(name: str, catalog: Catalog) -> list[str]:
     counts = catalog.count("verdict")
-    return _line([name, f"{len(catalog):,}", *(f"{counts.get((verdict,), 0):,}" for verdict in VERDICTS)])
-
-
-def _line(cells: tuple[str, ...] | list[str]) -> str:
-    return f"| {' | '.join(cells)} |"
+    return [name, f"{len(catalog):,}", *(f"{counts.get((verdict,), 0):,}" for verdict in VERDICTS)]
 
 
 if __name__ == "__main__":
     for argument in sys.argv[1:]:
-        file = Path(argument)
-        text = replaced(file.read_text(encoding="utf-8"), table(), START)
-        file.write_text(text, encoding="utf-8", newline="\n")
+        rewrite(argument, {START: table})

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from ..linting.rules import lint_rules
+from .markdown import table as markdown
 
 START = "<!-- generated: rules -->"
 
 
 def table() -> str:
     """The Markdown table of all rules, as they say it themselves."""
-    lines = ["| rule | severity | what it finds | why it matters | what to do |", "| --- | --- | --- | --- | --- |"]
+    rows = []
     for rule in lint_rules().values():
         advice = f"{rule.advice} (`--fix`)" if rule.mends else rule.advice
         cells = (f"`{rule.name}`", rule.severity, rule.title, rule.explanation, advice)
-        lines.append("| " + " | ".join(each.replace("|", "\\|").replace("<", "&lt;") for each in cells) + " |")
-    return "\n".join(lines) + "\n"
+        rows.append([each.replace("<", "&lt;") for each in cells])
+    return markdown(("rule", "severity", "what it finds", "why it matters", "what to do"), rows)

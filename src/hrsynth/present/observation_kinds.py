@@ -8,6 +8,7 @@ from ..geometry.vectors import frozen, unit
 from ..mechanism.notation import Letter, Word
 from ..mechanism.observations import kinds
 from ..mechanism.sights import Sighting
+from .markdown import table as markdown
 
 START = "<!-- generated: kinds -->"
 AT = Sighting(np.zeros(3), np.array([0, 0, 1.0]), np.array([0.3, 0.2, 1.0]), unit((1, 2, 0.5)))
@@ -16,14 +17,13 @@ AT = Sighting(np.zeros(3), np.array([0, 0, 1.0]), np.array([0.3, 0.2, 1.0]), uni
 
 def table() -> str:
     """The Markdown table of all kinds, as they say it themselves."""
-    lines = ["| kind | measured | attributes | numbers | virtual chain | held, it transmits | error in a servo loop |",
-             "| --- | --- | --- | --- | --- | --- | --- |"]
+    rows = []
     for word, kind in kinds().items():
         needs = ", ".join(f"`{name.rstrip('?')}`{' (optional)' * name.endswith('?')}" for name in kind.needs)
-        cells = (f"`{word}`", kind.words, needs, str(kind.rank), chain_word(word), kind.locked,  # type: ignore[attr-defined]
-                 kind.fed_back)
-        lines.append("| " + " | ".join(each.replace("|", "\\|") for each in cells) + " |")
-    return "\n".join(lines) + "\n"
+        rows.append((f"`{word}`", kind.words, needs, kind.rank, chain_word(word),  # type: ignore[attr-defined]
+                     kind.locked, kind.fed_back))
+    return markdown(("kind", "measured", "attributes", "numbers", "virtual chain", "held, it transmits",
+                     "error in a servo loop"), rows)
 
 
 def chain_word(word: str) -> str:

@@ -9,6 +9,7 @@ from functools import cache
 from ..analysis.modes.modes import AssemblyMode, AssemblyModes, modes
 from ..description import load, shipped
 from ..families.printed import CLAIMS, Place, PrintedClaim
+from .markdown import table as markdown
 
 START = "<!-- generated: printed modes -->"
 HEADS = ("source", "robot", "legs", "printed x, y, z (φ = 0)", "computed x, y, z; φ", "apart", "word")
@@ -27,8 +28,7 @@ def nearest(place: Place, found: AssemblyModes) -> AssemblyMode:
 
 def table() -> str:
     """The Markdown table of all claims: each printed pose with the nearest mode, then the modes not printed."""
-    rule = "|".join(["", *(" --- " for _ in HEADS), ""])
-    return "\n".join([_line(HEADS), rule, *(_line(row) for claim in CLAIMS for row in _rows(claim))]) + "\n"
+    return markdown(HEADS, (row for claim in CLAIMS for row in _rows(claim)))
 
 
 def _rows(claim: PrintedClaim) -> Iterator[tuple[str, ...]]:
@@ -59,7 +59,3 @@ def _written(mode: AssemblyMode) -> str:
     assert mode.pose.rpy is not None
     turn = round(math.degrees(mode.pose.rpy[2])) % 360
     return f"{', '.join(f'{round(v, 4) + 0.0:.4f}' for v in _place(mode))}; {turn}°"
-
-
-def _line(cells: tuple[str, ...]) -> str:
-    return f"| {' | '.join(cells)} |"

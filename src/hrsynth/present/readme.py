@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import re
 import sys
 from collections.abc import Iterable, Sequence
-from pathlib import Path
 
 from ..analysis.controllability import legs
 from ..analysis.derive import derive
 from ..analysis.singularity.singular import singular
 from ..description import load, shipped
 from . import lint_rules, observation_kinds, printed, replays
+from .markdown import rewrite
+from .markdown import table as markdown
 
-START, END = "<!-- generated: robots -->", "<!-- end -->"
+START = "<!-- generated: robots -->"
 HEADS = ("robot", "architecture", "dof", "hidden robot, all legs watched", "verdict", "exact", "lost",
          "smallest leg sets", "Type 2 singularities, all legs watched")
 POINTS = 200
@@ -22,8 +22,8 @@ POINTS = 200
 _LONGEST_LIST = 4
 
 
-def row(name: str) -> str:
-    """One shipped robot's line: no number in it that a rounding error can change."""
+def row(name: str) -> tuple[str, ...]:
+    """One shipped robot's row: no number in it that a rounding error can change."""
     mechanism = load(shipped()[name])
     found, sets = derive(mechanism), legs(mechanism)
     hidden = found.hidden_architecture
@@ -34,40 +34,13 @@ def row(name: str) -> str:
     words = singular(mechanism, points=POINTS).words
     if words.startswith("always"):
         words = "always" + "".join(words.partition(", because")[1:])
-    return _line((f"`{name}`", _cell(str(found.architecture)), str(found.dof), _cell(str(hidden)) if hidden else "none",
-                  found.verdict.verdict, exact, lost or "–", smallest, _cell(words)))
+    return (f"`{name}`", str(found.architecture), str(found.dof), str(hidden) if hidden else "none",
+            found.verdict.verdict, exact, lost or "–", smallest, words)
 
 
 def table(names: Iterable[str] | None = None) -> str:
     """The Markdown table of the shipped robots (default: all)."""
-    rule = "|".join(["", *(" --- " for _ in HEADS), ""])
-    return "\n".join([_line(HEADS), rule, *(row(name) for name in (shipped() if names is None else names))]) + "\n"
-
-
-def block(text: str, start: str = START) -> str:
-    """What stands between the marks; raises ``ValueError`` where they are not there."""
-    match = _between(start).search(text)
-    if match is None:
-        raise ValueError(f"no {start} … {END}")
-    return match[2]
-
-
-def replaced(text: str, made: str, start: str = START) -> str:
-    """The text with ``made`` between the marks."""
-    block(text, start)
-    return _between(start).sub(lambda match: match[1] + made + match[3], text)
-
-
-def _between(start: str) -> re.Pattern[str]:
-    return re.compile(rf"({re.escape(start)}\n)(.*?)({re.escape(END)})", re.DOTALL)
-
-
-def _line(cells: Sequence[str]) -> str:
-    return f"| {' | '.join(cells)} |"
-
-
-def _cell(architecture: str) -> str:
-    return architecture.replace("|", "\\|")
+    return markdown(HEADS, map(row, shipped() if names is None else names))
 
 
 def _smallest(sets: Sequence[Sequence[str]]) -> str:
@@ -80,9 +53,5 @@ def _smallest(sets: Sequence[Sequence[str]]) -> str:
 
 if __name__ == "__main__":
     for argument in sys.argv[1:]:
-        file = Path(argument)
-        text = file.read_text(encoding="utf-8")
-        for start, make in ((START, table), (printed.START, printed.table), (replays.START, replays.table),
-                            (lint_rules.START, lint_rules.table), (observation_kinds.START, observation_kinds.table)):
-            text = replaced(text, make(), start) if start in text else text
-        file.write_text(text, encoding="utf-8", newline="\n")
+        rewrite(argument, {START: table, **{each.START: each.table
+                                            for each in (printed, replays, lint_rules, observation_kinds)}})

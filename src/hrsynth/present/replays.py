@@ -12,6 +12,7 @@ from ..families.replays import REPLAYS, Replay
 from ..mechanism.pose import Pose
 from ..simulation.result import Servo
 from ..simulation.servo import servo
+from .markdown import table as markdown
 
 START = "<!-- generated: replays -->"
 HEADS = ("source", "robot", "legs", "noise", "printed", "computed", "agree?", "word")
@@ -34,12 +35,11 @@ def computed(replay: Replay, seed: int = 0) -> Servo:
 
 def table(replays: Sequence[Replay] = REPLAYS) -> str:
     """The Markdown table of all replays."""
-    rule = "|".join(["", *(" --- " for _ in HEADS), ""])
-    return "\n".join([_line(HEADS), rule, *map(row, replays)]) + "\n"
+    return markdown(HEADS, map(row, replays))
 
 
-def row(replay: Replay) -> str:
-    """One run's line."""
+def row(replay: Replay) -> tuple[str, ...]:
+    """One run's row."""
     found = computed(replay)
     here = found.ended
     if found.spread is not None:
@@ -52,8 +52,8 @@ def row(replay: Replay) -> str:
     else:
         here += f" {_place(found.pose)}"
     noise = "–" if replay.noise is None else replay.noise if "deg" in replay.noise else f"{replay.noise} rad, bench"
-    return _line((replay.source, f"`{replay.robot}`", ", ".join(replay.legs), noise, f"{replay.ended} {replay.said}",
-                  here, _agrees(replay, found), replay.remark))
+    return (replay.source, f"`{replay.robot}`", ", ".join(replay.legs), noise, f"{replay.ended} {replay.said}",
+            here, _agrees(replay, found), replay.remark)
 
 
 def _agrees(replay: Replay, found: Servo) -> str:
@@ -86,7 +86,3 @@ def _error(replay: Replay) -> tuple[float, float]:
 
 def _place(pose: Pose) -> str:
     return f"({', '.join(f'{round(v or 0.0, 3) + 0.0:g}' for v in (pose.x, pose.y, pose.z))})".replace("-", "−")
-
-
-def _line(cells: Sequence[str]) -> str:
-    return f"| {' | '.join(cells)} |"
