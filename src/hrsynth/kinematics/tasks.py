@@ -104,6 +104,11 @@ class Target(Value):
         return np.concatenate([(X[:, :3, 3] - wanted[:, :3, 3]) / length, [logarithm(R) for R in turns]], axis=1)
 
 
+def pose_error(X: Array, wanted: Array, length: float) -> list[Array]:
+    """How far a pose is shifted (lengths) and turned from the one that is wanted."""
+    return [(X[:3, 3] - wanted[:3, 3]) / length, logarithm(X[:3, :3] @ wanted[:3, :3].T)]
+
+
 @dataclass(frozen=True, eq=False)
 class LinkPoses:
     """Poses (4, 4) wanted of several links, and what else is wanted besides."""
@@ -113,9 +118,11 @@ class LinkPoses:
 
     def rows(self, twin: PinocchioModel, q: Array) -> tuple[Array, Array]:
         """Error (reached − wanted) and its Jacobian."""
-        parts = [Target(link, X, None, twin.mechanism.base, ()).rows(twin, q) for link, X in self.wanted]
-        parts += [] if self.besides is None else [self.besides.rows(twin, q)]
-        return np.concatenate([error for error, _ in parts]), np.vstack([rows for _, rows in parts])
+        reached, velocities = twin.frames(q, tuple(link for link, _ in self.wanted))
+        errors = [part for X, (_, wanted) in zip(reached, self.wanted, strict=True)
+                  for part in pose_error(X, wanted, twin.length)]
+        error, rows = ([], []) if self.besides is None else ([each] for each in self.besides.rows(twin, q))
+        return np.concatenate([*errors, *error]), np.vstack([*velocities, *rows])
 
 
 def solve(twin: PinocchioModel, q: Array, task: Task | None = None, *, tolerance: float = CLOSED,
