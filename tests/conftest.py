@@ -10,6 +10,7 @@ import pytest
 
 pytest_plugins = ["browser"]
 
+gc.set_threshold(50_000, 20, 50)  # little of what tests make is a circle: to look for some takes a tenth of the time
 for library in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
     os.environ.setdefault(library, "1")
 

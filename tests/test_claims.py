@@ -36,10 +36,11 @@ def texts() -> tuple[tuple[str, str], ...]:
 
 def strings(source: str) -> Iterator[tuple[int, str]]:
     """The strings of a module that are no docstrings."""
-    tree = ast.parse(source)
-    alone = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in alone:
+    alone = set[int]()
+    for node in ast.walk(ast.parse(source)):  # what holds a node comes before it
+        if isinstance(node, ast.Expr):
+            alone.add(id(node.value))
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in alone:
             yield node.lineno, node.value
 
 

@@ -188,9 +188,9 @@ def test_a_blind_robot_writes_nothing_and_says_so(run, tmp_path: Path):
 
 
 def test_observe_takes_labels_links_duplicates_and_spaces(run):
-    once = run("derive", "quattro_rigid", "--observe", "1,4", "--json").data
-    assert run("derive", "quattro_rigid", "--observe", " 1, 4 ,1,rod_4a", "--json").data == once
-    assert run("derive", "quattro_rigid", "--observe", "rod_1a,rod_4a", "--json").data == once
+    once = run("derive", "3rrr_m1", "--observe", "1,3", "--json").data
+    assert run("derive", "3rrr_m1", "--observe", " 1, 3 ,1,dist_3", "--json").data == once
+    assert run("derive", "3rrr_m1", "--observe", "dist_1,dist_3", "--json").data == once
 
 
 def test_both_forms_are_certified(run):
@@ -809,7 +809,7 @@ def test_help_and_version(run):
 
 
 def test_the_exit_status_of_the_process(tmp_path: Path):
-    done = process("derive", "3prp")
+    done = process("robots")
     assert (done.returncode, done.stderr) == (0, "")
     refused = process("derive", str(tmp_path))
     assert (refused.returncode, refused.stdout) == (2, "")
@@ -824,7 +824,7 @@ def test_a_terminal_without_utf8_is_no_defect():
 
 
 def test_a_reader_that_stops_early_is_no_defect():
-    command = f"{sys.executable} -m hrsynth.cli derive 3prp --json | head -c 1"
+    command = f"{sys.executable} -m hrsynth.cli robots --json | head -c 1"
     done = subprocess.run(["bash", "-o", "pipefail", "-c", command], capture_output=True, text=True)
     assert (done.stdout, done.stderr) == ("{", "")
     closed = f"{sys.executable} -m hrsynth.cli robots | true"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import re
 import subprocess
 import sys
@@ -95,20 +94,6 @@ def test_the_core_answers_without_any_extra(tmp_path, monkeypatch):
         run = without(every, *arguments)
         assert (run.returncode, run.stderr) == (0, ""), arguments
         assert run.stdout
-
-
-def test_only_what_is_declared_is_imported_by_the_core():
-    """Packages that modules import at their head are dependencies."""
-    declared = {re.split(r"[\[><=]", each)[0].lower().replace("-", "_") for each in PROJECT["dependencies"]}
-    names = {"pinocchio": "pin", "yaml": "pyyaml", "flint": "python_flint"}
-    for path in (ROOT / "src").rglob("*.py"):
-        for node in ast.parse(path.read_text(encoding="utf-8")).body:
-            found = [each.name for each in node.names] if isinstance(node, ast.Import) else []
-            if isinstance(node, ast.ImportFrom) and not node.level:
-                found = [str(node.module)]
-            for name in (each.partition(".")[0] for each in found):
-                if name not in sys.stdlib_module_names:
-                    assert names.get(name, name) in declared, (path, name)
 
 
 def test_the_long_description_has_no_link_that_needs_the_repository():

@@ -298,7 +298,7 @@ def test_a_formation_on_one_line_is_singular_and_told_so():
     assert sum(flex.count for flex in posture.formation.flexes) == lost
 
 
-@pytest.mark.some(4)
+@pytest.mark.some(2)
 @pytest.mark.parametrize("ending", ["urdf", "xml", "sdf", "usda"])
 @pytest.mark.parametrize("bodies", ["free", "yaw", "position"])
 def test_round_trips(tmp_path, ending: str, bodies: str):

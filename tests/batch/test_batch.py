@@ -192,7 +192,7 @@ def test_numba_and_jax_give_the_same_numbers(robot: str, watched: int, package: 
             assert np.all(np.abs(ours[finite] - theirs[finite]) <= allowed[finite])
 
 
-@pytest.mark.some(4)
+@pytest.mark.some(2)
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
 @pytest.mark.parametrize(("compiled", "robot"), [
     *product([False], ["delta", "gough_stewart", "3rrr_m1", "rrrrr_m1"]),

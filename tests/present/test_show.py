@@ -83,7 +83,8 @@ def test_a_result_is_printed_as_by_the_command_line(command: str, capsys: pytest
     assert str(found) == hrsynth.text(found) == capsys.readouterr().out.rstrip("\n")
 
 
-@pytest.mark.parametrize("command", ASKED)
+@pytest.mark.parametrize("command", [pytest.param(each, marks=pytest.mark.slow) if each == "select" else each
+                                     for each in ASKED])
 def test_a_result_is_one_line_at_a_prompt_and_marked_up_in_a_notebook(command: str):
     found = answer(command)
     assert repr(found).startswith(f"<{type(found).__name__}: rrrrr_m1")

@@ -87,6 +87,7 @@ def test_a_thousand_points_of_each_certified_path(robot: str, observe: str | Non
         check_certified(aspects, answer, 1000)
 
 
+@pytest.mark.some(5)
 @pytest.mark.parametrize(("robot", "observe"), KNOWN)
 def test_enclosures_hold_the_values_of_all_poses_in_them(robot: str, observe: str | None):
     aspects, rng = aspects_of(robot, observe), np.random.default_rng(0)
@@ -109,6 +110,7 @@ def test_enclosures_hold_the_values_of_all_poses_in_them(robot: str, observe: st
                 assert all(value[0].overlaps(value[0] * 0 + float(each)) for each in exact)
 
 
+@pytest.mark.some(5)
 @pytest.mark.parametrize(("robot", "observe"), KNOWN)
 def test_poses_decide_the_values_that_configurations_have(robot: str, observe: str | None):
     aspects = aspects_of(robot, observe)

@@ -62,7 +62,7 @@ def _scaled(X: np.ndarray, length: float) -> np.ndarray:
     return scaled
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(1)
 @pytest.mark.parametrize("name", ["RRR", "gough_stewart", "quattro"])
 def test_what_is_fitted_is_not_certified(name: str):
     free = aspects_of(name)
@@ -101,6 +101,7 @@ def test_ways_with_a_gap_lead_nowhere():
     assert joined
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("name", ["RRR", "PRR", "RPR", "gough_stewart", "delta"])
 def test_balls_hold_limbs_whose_numbers_were_rounded(name: str):
     """The reserve and what is carried, of limbs with numbers moved by less than 1e-10, lie in the balls."""

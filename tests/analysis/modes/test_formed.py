@@ -53,6 +53,7 @@ def require_modes(found: AssemblyModes, bearings: Pairs, distances: Pairs) -> No
     assert all(np.abs(a - b).max() > 1e-5 for a, b in combinations(invariants, 2))
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("bodies", ["position", "plane position"])
 @pytest.mark.parametrize(("n", "bearings"), [(4, list(combinations(range(1, 5), 2))), (5, LAMAN)])
 def test_rigid_bearings_in_a_common_frame_have_one_mode_by_rank(bodies: str, n: int, bearings: Pairs):

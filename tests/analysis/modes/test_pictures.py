@@ -78,6 +78,7 @@ def test_modes_are_where_the_curves_meet(name: str, observe: str | None, real: b
         assert min(gaps, default=0.0) < (1e-3 * size if all(each.ndim == 2 for each in moving) else cell), gaps
 
 
+@pytest.mark.some(3)
 @MANY
 def test_numbers_states_and_words_are_the_texts(name: str, observe: str | None, real: bool):
     result, view = found(name, observe, real), drawn(name, observe, real)
@@ -89,6 +90,7 @@ def test_numbers_states_and_words_are_the_texts(name: str, observe: str | None, 
         assert bool(placed.strokes) == (mode.configuration is not None)
 
 
+@pytest.mark.some(3)
 @MANY
 def test_strokes_keep_their_lengths_and_the_base_its_place(name: str, observe: str | None, real: bool):
     """Links are rigid: each polygon is congruent at all modes; each leg begins at the base."""

@@ -134,6 +134,7 @@ def test_a_six_bar_of_two_loops(motor: str, platform: str, count: int, loops: in
     assert (found.complete, found.complex) == (True, count)
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize(("word", "count"), [
     ("(Rz!-Rz*-Ph)+(Rz!-Rz-Rz*)+(Rz!-Rz*-Rz)", 6), ("(Ph*-Rz-Pj)+(Ph-Rz-Rz*)+(Rz-Ph*-Pj)", 4)])
 def test_loops_are_told_so_that_their_degrees_are_low(word: str, count: int):

@@ -69,6 +69,7 @@ def test_four_points_are_on_all_danger_cylinders() -> None:
             assert abs(off_the_cylinder(P[list(three)], np.array([0.3, 0.1, 0]))) < 1e-6
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize(("see", "words"), [
     (LINES, "the normals n4, n5, n6 are parallel to one plane"),
     ([each.replace("image_line", "line") for each in LINES], "the axes d4, d5, d6 are all parallel"),
