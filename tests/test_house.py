@@ -219,6 +219,13 @@ def test_constants_with_the_same_name_are_not_in_both_tables():
     assert_none([name for name, count in Counter(names).items() if count > 1], "defined twice")
 
 
+def test_what_stands_in_the_tables_is_used():
+    names = {name for table in TABLES for _, name, _ in source_of(PACKAGE / f"{table}.py").constants}
+    words = Counter(word for path in (*MODULES, *(ROOT / "tests").rglob("*.py"))
+                    for word in set(re.findall(r"\b[A-Z][A-Z0-9_]+\b", path.read_text(encoding="utf-8"))))
+    assert_none(sorted(name for name in names if words[name] < 2), "a tolerance or limit that nothing uses")
+
+
 def test_class_names_are_unique():
     homes: dict[str, list[str]] = {}
     for path in MODULES:

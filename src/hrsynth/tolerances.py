@@ -308,8 +308,6 @@ VANISHED = 1e-8
 angles."""
 CRITICAL_FLAT = 1e-7
 """Curvature of the error below which it counts as none while a critical point is sought."""
-CRITICAL_POSE = 1e-8
-"""Gradient of the error over the pose at which a critical pose is found; it is sought again over the joints."""
 POSE_STEP, POSE_MARGIN_STEP = 1e-5, 1e-4
 """Differences of coordinates by which the Hessian over the pose and derivatives of reach margins are measured."""
 FLOWED = 3e-5

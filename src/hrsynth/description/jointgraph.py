@@ -11,7 +11,7 @@ import numpy as np
 
 from ..geometry.vectors import Array, frozen, hat, inverse, perpendicular, unit
 from ..mechanism import graphs
-from ..mechanism.model import JointType, Limits, Link, Motor, Note
+from ..mechanism.model import JointType, Limits, Link, Motor, Note, fresh_name
 from ..mechanism.observations.direction import Direction
 from ..mechanism.sights import NamedCamera
 from . import chains
@@ -155,12 +155,7 @@ class JointGraph:
 
     def fresh(self, name: str) -> str:
         """``name``, or ``name_2``, ``name_3`` … if it is taken."""
-        taken, number = {*self.links, *self.joints}, 2
-        if name not in taken:
-            return name
-        while f"{name}_{number}" in taken:
-            number += 1
-        return f"{name}_{number}"
+        return fresh_name(name, self.links.keys() | self.joints.keys())
 
     def close(self, name: str, kind: JointType, ends: tuple[FrameSpec, FrameSpec], axes: Sequence[Array] = (Z,),
               line: int | None = None, motor: Motor | None = None) -> None:

@@ -71,6 +71,11 @@ def triple(a: Numbers, b: Numbers, c: Numbers) -> Numbers:
     return dot(a, cross(b, c))
 
 
+def times(M: Any, v: Any) -> Array:
+    """M v of matrices (..., k, l) and vectors (..., l)."""
+    return np.asarray((M @ v[..., None])[..., 0])
+
+
 def hat(vectors: ArrayLike) -> Array:
     """The matrices [v]ₓ (..., 3, 3) of vectors (..., 3): [v]ₓ w = v × w."""
     v = np.asarray(vectors, dtype=float)

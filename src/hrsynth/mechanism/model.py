@@ -6,10 +6,11 @@ therefore needs no frames of its own: a centre and its axes say all. SI units, r
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Container, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
+from itertools import chain, count
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -183,6 +184,11 @@ class Note:
         return f"{self.kind}: {self.text}"
 
 
+def fresh_name(name: str, taken: Container[str]) -> str:
+    """``name``, or ``name_2``, ``name_3`` … if it is taken."""
+    return next(each for each in chain([name], (f"{name}_{number}" for number in count(2))) if each not in taken)
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Mechanism(Result, shown_as="robot"):
     """Links, joints, a base, a platform, observations: a frozen value; every change returns a new one."""
@@ -340,13 +346,7 @@ class Mechanism(Result, shown_as="robot"):
 
     def fresh(self, name: str) -> str:
         """``name``, or ``name_2``, ``name_3`` … if it is taken by a link or a joint."""
-        taken = set(self.links) | set(self.joints)
-        if name not in taken:
-            return name
-        number = 2
-        while f"{name}_{number}" in taken:
-            number += 1
-        return f"{name}_{number}"
+        return fresh_name(name, self.links.keys() | self.joints.keys())
 
     def differences(self, other: Mechanism, tolerance: float = SAME_GEOMETRY) -> list[str]:
         """What differs from ``other``, in words; empty where they are the same mechanism (names, order, geometry)."""

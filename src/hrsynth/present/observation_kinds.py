@@ -20,8 +20,8 @@ def table() -> str:
     rows = []
     for word, kind in kinds().items():
         needs = ", ".join(f"`{name.rstrip('?')}`{' (optional)' * name.endswith('?')}" for name in kind.needs)
-        rows.append((f"`{word}`", kind.words, needs, kind.rank, chain_word(word),  # type: ignore[attr-defined]
-                     kind.locked, kind.fed_back))
+        rows.append((f"`{word}`", kind.words, needs, kind.rank, chain_word(word), kind.locked,  # type: ignore[attr-defined]
+                     kind.fed_back))
     return markdown(("kind", "measured", "attributes", "numbers", "virtual chain", "held, it transmits",
                      "error in a servo loop"), rows)
 

@@ -26,7 +26,7 @@ from ...budgets import BACK_CELLS, BACK_SIDES, BACK_SIZES, BACK_TRIALS
 from ...geometry.affine import AffineForms, affine, combined, stacked
 from ...geometry.vectors import Array
 from ...tolerances import AFFINE_ROUNDING
-from .cells import BranchTube, TubeTrial, derivatives, prove_all, trial_of, turning
+from .cells import BranchTube, TubeTrial, derivatives, middles, prove_all, trial_of, turning
 from .growth import AT_ONCE, Growth, largest_box
 from .loops import LoopSystem, mapped
 from .part import LoopPart
@@ -226,9 +226,7 @@ class TubedCells:
         low, high = (np.where(sides == side, end[:, None], middle[:, None]).reshape(-1, self.low.shape[1])
                      for side, end in ((0, self.low), (1, self.high)))
         old = [tube for tube in self.tubes for _ in sides]
-        centre = (low + high) / 2
-        half = np.maximum(high - centre, centre - low)
-        half = half + 2 * np.spacing(np.abs(centre) + half)
+        centre, half = middles(low, high)
         x = np.array([tube.at(q) for tube, q in zip(old, centre, strict=True)])
         new = prove_all(self.part, centre, half, self.part.closed(centre, x)[0])
         return TubedCells(self.part, low, high, [

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from ...budgets import TUBE_RADII, TUBE_WIDER
 from ...geometry.affine import AffineForms, affine, combined, dotted, stacked
-from ...geometry.vectors import Array
+from ...geometry.vectors import Array, times
 from ...tolerances import AFFINE_ROUNDING, THINNEST_CELL, THINNEST_TUBE
 from .loops import GearEquation, JointLoop, LoopRow, residuals, rod_ends
 from .part import LoopBlock, LoopEquation, LoopPart
@@ -140,7 +140,7 @@ def _prove_block(trial: TubeTrial, block: LoopBlock) -> None:
         Y = np.linalg.pinv(A.v[0])
     # Y G along x̃, as a whole and in mean value form: both hold, the sharper one counts
     e = (combined(Y, residual(trial, equations)).size + drift(combined(Y, at.along))
-         + _times(combined(Y, at.by_others).size, trial.radius))
+         + times(combined(Y, at.by_others).size, trial.radius))
     e = np.fmin(e, combined(Y, at.values).size)
     one = np.eye(len(own))
     done = np.zeros(len(e), dtype=bool)
@@ -151,7 +151,7 @@ def _prove_block(trial: TubeTrial, block: LoopBlock) -> None:
             at = derivatives(trial, equations, own, radius)
         M = (one - combined(Y, at.by_own)).size
         r = radius[:, own]
-        Mr = _times(M, r)
+        Mr = times(M, r)
         fits = np.all((e + Mr) * (1 + AFFINE_ROUNDING) < r, axis=-1) & ~done
         if fits.any():
             beta = (Mr / r).max(axis=-1)
@@ -172,9 +172,11 @@ def _prove_block(trial: TubeTrial, block: LoopBlock) -> None:
         trial.alive &= _same_side(trial, block)
 
 
-def _times(M: Array, r: Array) -> Array:
-    """M r for matrices (c, k, p) and vectors (c, p)."""
-    return np.asarray((M @ r[..., None])[..., 0])
+def middles(low: Array, high: Array) -> tuple[Array, Array]:
+    """The middles of cells and, rounded up, how far their sides are from these."""
+    centre = (low + high) / 2
+    half = np.maximum(high - centre, centre - low)
+    return centre, half + 2 * np.spacing(np.abs(centre) + half)
 
 
 def drift(B: AffineForms) -> Array:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ...budgets import FINEST_BRANCH_CELL
 from ...geometry.vectors import Array
 from ...tolerances import AFFINE_ROUNDING
-from .cells import BranchTube, prove_all
+from .cells import BranchTube, middles, prove_all
 from .part import LoopPart
 
 AT_ONCE = 64
@@ -126,12 +126,10 @@ class Growth:
         """The tubes of cells, each about the closure at its middle that its start leads to."""
         low = np.array([self.grid.point(leaf.low) for leaf, *_ in batch])
         high = np.array([self.grid.point(leaf.high) for leaf, *_ in batch])
-        centre = (low + high) / 2
+        centre, half = middles(low, high)
         q = np.array([q for _, q, _ in batch])
         x, closed = self.part.closed(q, np.array([x for *_, x in batch]))
         starts, good = self.part.followed(q, x, centre)
-        half = np.maximum(high - centre, centre - low)
-        half = half + 2 * np.spacing(np.abs(centre) + half)
         return self._proved(centre, half, starts, np.logical_and(good, closed))
 
     def _proved(self, centre: Array, half: Array, x: Array, which: Array) -> list[BranchTube | None]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...errors import BadRequest, MotorsNotEnough
 from ...geometry.ranks import spectrum
-from ...geometry.vectors import Array
+from ...geometry.vectors import Array, times
 from ...results import Value
 from ...tolerances import NAMED, RANK_CUTOFF, SOLVED
 from .loops import GearEquation, JointLoop, LoopRow, LoopSystem, residuals
@@ -117,7 +117,7 @@ class LoopPart(Value):
         good = np.ones(len(q), dtype=bool)
         for k in range(count):
             here, there = q + (goal - q) * (k / count), q + (goal - q) * ((k + 1) / count)
-            ahead = (self.slopes(here, x) @ (there - here)[..., None])[..., 0]
+            ahead = times(self.slopes(here, x), there - here)
             found, done = self.closed(there, x + ahead)
             off = np.abs(found - x - ahead).max(axis=-1, initial=0.0)
             good &= done & (off <= step + np.abs(ahead).max(axis=-1, initial=0.0))

@@ -41,7 +41,7 @@ from ..measured import MeasuredRobot
 from .branches import Model
 from .conditions import AtAngle, OnMovingPlane, OnMovingRevolution, OnPlane, OnRevolution, PoseCondition
 from .joint_forms import closings_bound, eigenvalues
-from .leg_conditions import Middle, leg_conditions
+from .leg_conditions import Middle, leg_conditions, rigid_platform
 from .polynomials import Polynomial, krawczyk
 from .pose_boxes import FAR_FROM_REAL, PRECISION, PoseBox, UnitCircle, Zero, as_box, told_far, zeros
 from .pose_forms import Poses
@@ -383,10 +383,7 @@ def carried(measured: MeasuredRobot, goal: ClosedConfiguration, error: float) ->
     """The platform on that leg which leaves fewest zeros. Raises ``NotConfined`` where none carries it, or what the
     others ask is not known."""
     anatomy, name = measured.setting.anatomy, measured.setting.robot.name
-    bodies = attached(anatomy)
-    if len(bodies) != 1 or anatomy.point is not None or anatomy.mechanism.couplings:
-        raise NotConfined(name, "its platform is not one rigid body whose pose the legs decide")
-    middle = Middle(goal.pose(bodies[0])[:3, 3], goal.twin.length)
+    body, middle = rigid_platform(measured, goal)
     rest, seen = sights(anatomy, measured.question, goal)
     found, reason = list[CarriedPlatform](), "no leg of R and P carries its platform"
     for leg in anatomy.legs:
@@ -408,7 +405,7 @@ def carried(measured: MeasuredRobot, goal: ClosedConfiguration, error: float) ->
         asked = [Told.of(c, turns[:joints]) for c, (_, joints) in zip(alike, told, strict=True)]
         moved += middle.size * (off + max((each.moved for each in asked), default=0.0))
         error_ = error + MOVED * moved + max([0.0, *(sight.error(error, goal) for sight in seen)])
-        each = CarriedPlatform((), np.zeros((0, 3)), turns, tuple(asked), middle, goal.pose(bodies[0]), seen=seen,
+        each = CarriedPlatform((), np.zeros((0, 3)), turns, tuple(asked), middle, goal.pose(body), seen=seen,
                                error=error_, rows=rows)
         off_ = each.values(each.home, asked)[0] if asked and turns else np.zeros(0)
         if turns and np.abs(off_).max(initial=0.0) <= SAME_RELATION and each.square:

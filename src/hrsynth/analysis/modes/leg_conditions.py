@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 
+from ...constraints.pattern import attached
 from ...errors import NotConfined
 from ...geometry import lines
 from ...geometry.ranks import range_basis
@@ -21,6 +22,7 @@ from ...mechanism.legs import Leg, LegDecomposition
 from ...mechanism.notation import Rods
 from ...mechanism.observations.direction import Direction
 from ...tolerances import CHAIN_ROUNDING, SAME_POINT, SAME_RELATION
+from ..measured import MeasuredRobot
 from .chain import Chain, ChainBody, Underived, chain
 from .conditions import (
     AtAngle,
@@ -53,6 +55,15 @@ class Middle:
     def point(self, at: Array) -> Array:
         """A point in these units."""
         return np.asarray((at - self.origin) / self.size)
+
+
+def rigid_platform(measured: MeasuredRobot, goal: ClosedConfiguration) -> tuple[str, Middle]:
+    """The one body on which all legs end, and lengths from where it is at the goal. Raises ``NotConfined``."""
+    anatomy = measured.setting.anatomy
+    bodies = attached(anatomy)
+    if len(bodies) != 1 or anatomy.point is not None or anatomy.mechanism.couplings:
+        raise NotConfined(measured.setting.robot.name, "its platform is not one rigid body whose pose the legs decide")
+    return bodies[0], Middle(goal.pose(bodies[0])[:3, 3], goal.twin.length)
 
 
 def leg_conditions(anatomy: LegDecomposition, leg: Leg, question: Measurement, goal: ClosedConfiguration,

@@ -23,7 +23,7 @@ from ..measured import MeasuredRobot
 from .branches import Model, together
 from .conditions import OnPlane, PoseCondition
 from .fits import words
-from .leg_conditions import Branches, Middle, leg_conditions
+from .leg_conditions import Branches, Middle, leg_conditions, rigid_platform
 from .pose_bound import bound
 from .pose_boxes import PoseBox, enclosed, excluded_by, told_far
 from .pose_forms import Poses, SquareForms, proposals
@@ -82,10 +82,7 @@ def posed(measured: MeasuredRobot, goal: ClosedConfiguration) -> list[PosedPlatf
     """The platform with the measurements at a configuration, one for each choice of the legs' branches, the goal's own
     first. Raises ``NotConfined`` where a leg's conditions are not known."""
     anatomy, name = measured.setting.anatomy, measured.setting.robot.name
-    bodies = attached(anatomy)
-    if len(bodies) != 1 or anatomy.point is not None or anatomy.mechanism.couplings:
-        raise NotConfined(name, "its platform is not one rigid body whose pose the legs decide")
-    middle = Middle(goal.pose(bodies[0])[:3, 3], goal.twin.length)
+    _, middle = rigid_platform(measured, goal)
     motion, normal = measured.moving
     rest, seen = sights(anatomy, measured.question, goal)
     found = [leg_conditions(anatomy, leg, rest, goal, middle, normal, motion == "translations")

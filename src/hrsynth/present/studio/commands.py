@@ -70,6 +70,12 @@ def same_at(setting: ObservedRobot, *at: ClosedConfiguration) -> bool:
     return True
 
 
+def lines_at(request: Request, name: str, setting: ObservedRobot, here: ClosedConfiguration) -> dict[str, str]:
+    """The lines of a question that is asked at a configuration, none where no command is at it."""
+    pose = at_pose(setting, here)
+    return lines(request, name, "--at", pose, at=pose) if same_at(setting, here) else NONE
+
+
 def digits(value: float) -> str:
     """A number as it is typed: to a tenth of a nanometre, nine digits."""
     return f"{round(float(value), 10) + 0.0:.9g}"

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...budgets import FLOW_STEPS
-from ...geometry.vectors import Array
+from ...geometry.vectors import Array, times
 from ...progress import tell
 from ...results import Value
 from ...tolerances import (
@@ -133,7 +133,7 @@ class Abreast:
         W = np.linalg.inv(np.eye(d) - GAMMA * h[:, :, None] * J)
 
         def solved(rhs: Array) -> Array:
-            return np.asarray((W @ rhs[:, :, None])[..., 0])
+            return times(W, rhs)
 
         k1 = solved(f)
         f1, met = rate(h * k1 / 2)
@@ -234,7 +234,7 @@ class Abreast:
         for _ in range(2):
             miss = np.where(active, margin - self.flow.margins(X, flipped), 0.0)
             N = np.where(active[:, :, None], self.flow.slopes(X, flipped), 0.0)
-            X = self.flow.moved(X, (np.linalg.pinv(N, rcond=1e-6) @ miss[:, :, None])[..., 0])
+            X = self.flow.moved(X, times(np.linalg.pinv(N, rcond=1e-6), miss))
         return X
 
     def _end(self, live: Places, here: Commanded, horizon: float) -> None:

@@ -4,13 +4,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import product
 
 import numpy as np
 
 from ...analysis.observed import ObservedRobot
 from ...budgets import COVER_BOXES
-from ...closed_forms.legs import OnCrank, OnRail, SlidingRod
+from ...closed_forms.legs import OnCrank, OnRail
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...results import Value
@@ -92,19 +91,10 @@ def cover(setting: ObservedRobot, goal: ClosedConfiguration, *, vanishing: bool 
     for part in (each for each in parts if each.left):
         corners = part.error.spanned(*map(np.array, zip(*part.left, strict=True)))
         left += zip(*(each[:, : error.size] for each in corners), strict=True)
-    return Cover(tuple(_mirrored(error, found)), tuple(left), sum(each.share for each in parts) / len(parts),
+    found = [replace(each, directions=each.directions * own) for own in error.mirrors for each in found]
+    return Cover(tuple(found), tuple(left), sum(each.share for each in parts) / len(parts),
                  sum(each.boxes for each in parts), bounded or len(charts) > 1, "",
                  (low, high) if len(charts) == 1 else None, error)
-
-
-def _mirrored(error: PoseError, found: list[CriticalBox]) -> list[CriticalBox]:
-    """A rod that slides through a base point has its direction either way at a pose, and E is the same: the critical
-    points with all choices of that."""
-    both = [k for k, each in enumerate(error.seen) if each.limb is not None
-            and isinstance(leg := error.limbs[each.limb], SlidingRod) and leg.aside == 0]
-    signs = np.ones((2 ** len(both), len(error.seen), 1))
-    signs[:, both, 0] = list(product((1.0, -1.0), repeat=len(both)))
-    return [replace(each, directions=each.directions * own) for own in signs for each in found]
 
 
 def bounds(error: PoseError, reach: float) -> tuple[Array, Array, bool]:

@@ -9,14 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from itertools import combinations, product
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...analysis.observed import ObservedRobot
 from ...budgets import POSE_LATE, POSE_MIRRORS, POSE_NEWTON, POSE_ROUNDS, POSE_STARTS, POSE_THINNED, POSE_TRIES
-from ...closed_forms.legs import OnRod, SlidingRod
+from ...closed_forms.legs import OnRod
 from ...geometry.vectors import Array, transform
 from ...kinematics.configuration import ClosedConfiguration
 from ...mechanism.observation import Observation
@@ -151,14 +151,10 @@ def _joined(parts: list[CriticalPoses]) -> CriticalPoses:
 
 
 def _mirrored(error: PoseError, found: CriticalPoses) -> CriticalPoses:
-    """A rod that slides through a base point has its direction either way at a pose, and E is the same: all choices of
-    that, where these are few."""
-    both = [k for k, each in enumerate(error.seen) if each.limb is not None
-            and isinstance(leg := error.limbs[each.limb], SlidingRod) and leg.aside == 0]
-    if not both or len(both) > POSE_MIRRORS:
+    """With all choices of directions under which E is the same, where these are few."""
+    signs = error.mirrors
+    if not 1 < len(signs) <= 2**POSE_MIRRORS:
         return found
-    signs = np.ones((2 ** len(both), len(error.seen), 1))
-    signs[:, both, 0] = list(product((1.0, -1.0), repeat=len(both)))
     others = _joined([replace(found, directions=found.directions * each) for each in signs[1:]])
     return _apart(found, replace(others, met=0 * others.met))
 

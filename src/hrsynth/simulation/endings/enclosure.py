@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from ...analysis.branch.redundant import dependent_rows
 from ...budgets import TUBE_RADII, TUBE_WIDER
 from ...geometry.affine import AffineForms, affine, combined
-from ...geometry.vectors import Array
+from ...geometry.vectors import Array, times
 from ...results import Value
 from ...tolerances import AFFINE_ROUNDING, THINNEST_TUBE
 from .error import RestEquations, RestSystem
@@ -111,7 +111,7 @@ def _enclosed(system: RestSystem, q: Array, idle: int) -> list[EnclosedPoint | N
         for _ in range(TUBE_RADII):
             _, K, _ = evaluated(radius, left)
             M = (np.eye(known.shape[-1]) - combined(Y[left], K)).size
-            wanted = e[left] + (M @ radius[..., None])[..., 0]
+            wanted = e[left] + times(M, radius)
             fits = np.all(wanted * (1 + AFFINE_ROUNDING) < radius, axis=-1)
             found[left[fits]], done[left[fits]] = radius[fits], True
             left, radius = left[~fits], (TUBE_WIDER * np.maximum(wanted, radius))[~fits]

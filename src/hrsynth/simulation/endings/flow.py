@@ -21,7 +21,7 @@ from ...batch.placing import Placer, coordinates
 from ...closed_forms.legs import ClosedFormLeg, SlidingRod
 from ...geometry.screws import point_velocity
 from ...geometry.so3 import exponential
-from ...geometry.vectors import Array, hat
+from ...geometry.vectors import Array, hat, times
 from ...kinematics.configuration import ClosedConfiguration
 from ...results import Value
 from ...tolerances import DAMPED, FLOW_SLOPE, SOLVED
@@ -98,7 +98,7 @@ class Flow(Value):
             normals = np.where(active[slid, :, None], self.slopes(X[slid], flipped[slid]), 0.0) @ root[slid]
             velocity[slid], weakest[slid], push = _along(normals, A[slid], g[slid, :, 0])
             held[slid] = active[slid] & (push >= 0)
-        velocity = (root @ velocity[..., None])[..., 0]
+        velocity = times(root, velocity)
         velocity[~reached] = 0.0
         return Commanded(velocity, np.linalg.norm(error, axis=(1, 2)), weakest, margins, reached, held, u)
 
@@ -201,8 +201,8 @@ def _along(normals: Array, A: Array, g: Array) -> tuple[Array, Array, Array]:
         some = np.flatnonzero(ranks == rank)
         K = right[some, rank:].transpose(0, 2, 1)
         inside, weakest[some] = damped(K.transpose(0, 2, 1) @ A[some] @ K, (g[some, None] @ K)[:, 0])
-        found[some] = (K @ inside[..., None])[..., 0]
-    rest = (A @ found[..., None])[..., 0] + g
+        found[some] = times(K, inside)
+    rest = times(A, found) + g
     push = np.linalg.pinv(normals.transpose(0, 2, 1), rcond=DAMPED) @ rest[..., None]
     return found, weakest, push[..., 0]
 

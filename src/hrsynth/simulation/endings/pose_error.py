@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -175,6 +176,16 @@ class PoseError(Value):
             columns = [cayley(gamma, [R[3 * i + j] for i in range(3)]) for j in range(3)]
             R = [columns[j][i] for i in range(3) for j in range(3)]
         return plus(number(self.p), combination(x[:k], self.shifts, number)), R
+
+    @property
+    def mirrors(self) -> Array:
+        """Signs (2ᵏ, legs, 1) of the observed directions under which E is the same at a pose, all 1 first: a rod that
+        slides through a base point has its direction either way."""
+        both = [k for k, each in enumerate(self.seen) if each.limb is not None
+                and isinstance(leg := self.limbs[each.limb], SlidingRod) and leg.aside == 0]
+        signs = np.ones((2 ** len(both), len(self.seen), 1))
+        signs[:, both, 0] = list(product((1.0, -1.0), repeat=len(both)))
+        return signs
 
     def at(self, x: Components, directions: Sequence[Components], number: Number) -> ErrorRates:
         """What the error does at coordinates x, and along directions of the coordinates."""

@@ -33,7 +33,7 @@ from ...budgets import (
 )
 from ...constraints.pattern import attached
 from ...errors import LoopsNotClosed
-from ...geometry.vectors import Array
+from ...geometry.vectors import Array, times
 from ...kinematics.assembly import of_links
 from ...kinematics.branch import Signature
 from ...kinematics.configuration import ClosedConfiguration
@@ -125,11 +125,11 @@ class Tangents:
 
     def closing(self, G: Array) -> Array:
         """p (c, N), normal to Z, with DG p = −G."""
-        return -1.0 * _times(self.Y, np.linalg.solve(np.swapaxes(self.R, -1, -2), G[..., None])[..., 0])
+        return -1.0 * times(self.Y, np.linalg.solve(np.swapaxes(self.R, -1, -2), G[..., None])[..., 0])
 
     def multipliers(self, slope: Array) -> Array:
         """μ (c, m) with ∇E + DGᵀ μ in the span of Z."""
-        return np.asarray(-np.linalg.solve(self.R, _times(np.swapaxes(self.Y, -1, -2), slope)[..., None])[..., 0])
+        return np.asarray(-np.linalg.solve(self.R, times(np.swapaxes(self.Y, -1, -2), slope)[..., None])[..., 0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,21 +171,16 @@ class Expansion:
         # where nothing is measured there is no way to go
         lost = ~np.isfinite(H).all(axis=(-1, -2))
         H, p = np.where(lost[:, None, None], 0.0, H), np.where(lost[:, None], np.nan, p)
-        flat = _times(back, at.slope)
-        slope = flat + _times(back, _times(H, p))
+        flat = times(back, at.slope)
+        slope = flat + times(back, times(H, p))
         values, vectors = np.linalg.eigh(back @ H @ Z)
-        along = _times(np.swapaxes(vectors, -1, -2), slope)
+        along = times(np.swapaxes(vectors, -1, -2), slope)
         still = np.argsort(np.argsort(np.abs(values) + np.abs(along), axis=-1), axis=-1) < idle
         order = np.argsort(np.where(still, np.inf, values), axis=-1, kind="stable")
         values, along = (np.take_along_axis(each, order, -1) for each in (values, along))
         vectors = np.take_along_axis(vectors, order[..., None, :], -1)
         return cls(at.E, p, mu, along, values, Z @ vectors,
                    np.maximum(np.linalg.norm(at.G, axis=-1), np.linalg.norm(flat, axis=-1)), idle)
-
-
-def _times(M: Any, v: Any) -> Array:
-    """M v for matrices (c, k, l) and vectors (c, l)."""
-    return np.asarray((M @ v[..., None])[..., 0])
 
 
 def _shortened(step: Array, longest: float) -> Array:
@@ -208,7 +203,7 @@ def walked(system: RestSystem, q: Array, rng: np.random.Generator, steps: int, l
     """Closed configurations (c, N), each led so many random steps along the loops; those that do not close stay."""
     for _ in range(steps):
         tangents = Tangents.of(RestEquations(system, list(q.T)).DG)
-        way = _times(tangents.Z, rng.normal(size=(len(q), tangents.Z.shape[-1])))
+        way = times(tangents.Z, rng.normal(size=(len(q), tangents.Z.shape[-1])))
         there = closed(system, q + longest * rng.uniform(0.2, 1.0, (len(q), 1)) * way / np.abs(way).max(
             axis=-1, keepdims=True), 6)
         good = np.linalg.norm(RestEquations(system, list(there.T)).G, axis=-1) < CRITICAL
@@ -236,7 +231,7 @@ def descend(system: Critically, q: Array, index: NDArray[np.intp], idle: int) ->
         near = (at.residual < 1e-3) & (np.abs(at.slope / size)[:, : at.freedoms].max(axis=-1) < 0.05) | (index < 0)
         sign = np.where(near[:, None], -np.sign(at.curvatures), np.where(up, 1.0, -1.0))
         sign[:, at.freedoms :] *= np.abs(at.curvatures[:, at.freedoms :]) > CRITICAL_FLAT
-        step = _shortened(_times(at.directions, sign * at.slope / size), LONGEST_STEP)
+        step = _shortened(times(at.directions, sign * at.slope / size), LONGEST_STEP)
         q = q + step + _shortened(at.closing, LONGEST_STEP)
         going = ~done & np.isfinite(q).all(axis=-1) & (np.abs(q).max(axis=-1) < FARTHEST_ENDING)
         q, index = q[going], index[going]
@@ -259,7 +254,7 @@ def settle(system: RestSystem, q: Array, index: NDArray[np.intp], idle: int) -> 
             E, pull, gram = at.commanded()
             lost = np.asarray(~np.isfinite(gram).all(axis=(-1, -2)) | ~np.isfinite(pull).all(axis=-1))
             pull, gram = np.where(lost[:, None], 0.0, pull), np.where(lost[:, None, None], 0.0, gram)
-            mu, p, v, M = tangents.multipliers(pull), tangents.closing(at.G), _times(back, pull), back @ gram @ Z
+            mu, p, v, M = tangents.multipliers(pull), tangents.closing(at.G), times(back, pull), back @ gram @ Z
             there = (q[:, None] + COMMAND_STEP * back).reshape(-1, q.shape[1])
             turned = RestEquations(system, list(there.T)).commanded()[1].reshape(*back.shape) - pull[:, None]
             A = back @ (np.swapaxes(np.nan_to_num(turned), -1, -2) / COMMAND_STEP + at.bend(mu, error=False) @ Z)
@@ -271,9 +266,9 @@ def settle(system: RestSystem, q: Array, index: NDArray[np.intp], idle: int) -> 
             kept = values[np.argsort(np.abs(values))[idle:]].real
             found.append(CriticalPoint(q[k], mu[k], float(residual[k]), np.sort(kept), float(E[k])))
         # steps of half a unit of time where the loop is fast, longer ones where it slows down
-        slow = np.where(flows, 2 * np.minimum(1.0, np.linalg.norm(_times(inverse, v), axis=-1)), 0.0)
-        step = -_times(np.linalg.pinv(slow[:, None, None] * M + A, rcond=COMMAND_CUTOFF), v)
-        q = q + _shortened(_times(Z, step), LONGEST_STEP) + _shortened(p, LONGEST_STEP)
+        slow = np.where(flows, 2 * np.minimum(1.0, np.linalg.norm(times(inverse, v), axis=-1)), 0.0)
+        step = -times(np.linalg.pinv(slow[:, None, None] * M + A, rcond=COMMAND_CUTOFF), v)
+        q = q + _shortened(times(Z, step), LONGEST_STEP) + _shortened(p, LONGEST_STEP)
         going = ~done & ~lost & np.isfinite(q).all(axis=-1) & (np.abs(q).max(axis=-1) < FARTHEST_ENDING)
         q, flows = q[going], flows[going]
     return found

@@ -6,7 +6,7 @@ from typing import Any
 
 from ....analysis.aspects.atlas import Atlas, atlas
 from ...text.poses import aspect_groups, pair_words
-from ..commands import NONE, at_pose, lines, same_at
+from ..commands import lines_at
 from ..request import Request
 
 
@@ -16,15 +16,14 @@ def answer(request: Request) -> dict[str, Any]:
     setting = request.seeing()
     here = request.here(request.mover())
     found = atlas(setting, at=here.real)
-    pose = at_pose(setting, here.real)
-    same = lines(request, "atlas", "--at", pose, at=pose) if same_at(setting, here.real) else NONE
     known = len(set(found.count)) == 1 and all(pair.certified for pair in found.pairs)
     return {"groups": [list(group) for group in found.groups],
             "aspect": [next((i for i, group in enumerate(found.groups, 1) if known and number in group), None)
                        for number in range(1, len(found.places) + 1)],
             "words": words(found),
             "pairs": [f"modes {one} and {other}: {pair_words(pair)}"
-                      for pair in found.pairs for one, other in [pair.numbers]], **same}
+                      for pair in found.pairs for one, other in [pair.numbers]],
+            **lines_at(request, "atlas", setting, here.real)}
 
 
 def words(found: Atlas) -> str:

@@ -10,7 +10,7 @@ from ....mechanism.pose import ModeNumber
 from ...text.poses import all_of, assembly
 from ...view.mode_outlines import outline
 from ...view.states import Posed
-from ..commands import NONE, at_pose, lines, same_at
+from ..commands import lines_at
 from ..request import Request
 
 
@@ -19,10 +19,8 @@ def answer(request: Request) -> dict[str, Any]:
     setting = request.seeing()
     here = request.here(request.mover())
     found = modes(setting, at=here.real)
-    pose = at_pose(setting, here.real)
-    same = lines(request, "modes", "--at", pose, at=pose) if same_at(setting, here.real) else NONE
     return {"modes": [_mode(request, found, number, mode) for number, mode in enumerate(found.modes, 1)],
-            "words": words(found), **same}
+            "words": words(found), **lines_at(request, "modes", setting, here.real)}
 
 
 def words(found: AssemblyModes) -> str:
