@@ -79,6 +79,7 @@ def check_printed(setting: ObservedRobot) -> None:
         assert at.residual <= CLOSED
 
 
+@pytest.mark.some(12)
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_a_pose_can_be_typed_as_it_is_printed(robot: str) -> None:
     check_printed(setting_of(robot))

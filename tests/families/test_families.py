@@ -190,7 +190,7 @@ def test_zero_is_assembled_and_far_from_singularities(robot: Shipped):
     assert sight > FAR if expected.seen == expected.dof else sight < 1e-9
 
 
-@pytest.mark.some(17)
+@pytest.mark.some(8)
 @robots
 def test_freedoms_are_finite_motions(robot: Shipped):
     oracle = Oracle(robot.make())

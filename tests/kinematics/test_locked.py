@@ -31,7 +31,7 @@ def by_pinocchio(at: ClosedConfiguration, question: Measurement) -> Array:
     return np.linalg.svd(M - hidden @ (hidden.T @ M), compute_uv=False)
 
 
-@pytest.mark.some(22)
+@pytest.mark.some(10)
 @pytest.mark.parametrize("carried", [False, True])
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_the_interaction_matrix_is_that_of_the_engine(robot: str, carried: bool) -> None:

@@ -211,7 +211,7 @@ def test_redundant_constraints_are_named_and_counted(tmp_path: Path):
     assert rules_in(shipped()["gough_stewart"])["constraint-redundant"] == 0
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(1)
 @pytest.mark.parametrize("decimals", [5, 6])
 @pytest.mark.parametrize("native", [True, False])
 def test_rounded_geometry_is_found_and_written_as_it_is_meant(decimals: int, native: bool, tmp_path: Path):

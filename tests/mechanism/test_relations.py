@@ -78,7 +78,7 @@ class Here:
                 return abs(float(vector @ by[0]))
 
 
-@pytest.mark.some(11)
+@pytest.mark.some(6)
 @pytest.mark.parametrize("name", shipped())
 def test_relations_hold_wherever_the_robot_goes(name: str) -> None:
     """What holds at three configurations holds at others on another path."""
@@ -88,7 +88,7 @@ def test_relations_hold_wherever_the_robot_goes(name: str) -> None:
         assert max(Here(robot, relations, state).misses(relations), default=0.0) < 1e-8
 
 
-@pytest.mark.some(17)
+@pytest.mark.some(8)
 @pytest.mark.parametrize("name", shipped())
 def test_the_constraints_in_screws_are_those_of_the_oracle(name: str) -> None:
     """The kernel of A, built from centres and axes where the robot is, is T_qC."""

@@ -268,7 +268,7 @@ def test_the_least_error_is_the_least_of_many_directions() -> None:
         assert _width(blocks, _descended(blocks)[:, None])[0] <= _width(blocks, views).min() * (1 + 1e-6)
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(1)
 @pytest.mark.parametrize("name", ["quattro", "3rrr_m1", "3rps", "prrrp_parallel", "gough_stewart"])
 def test_what_an_ascent_attains_lies_between_the_two_bounds(name: str):
     setting = ObservedRobot.of(name)

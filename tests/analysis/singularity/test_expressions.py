@@ -242,7 +242,7 @@ def test_the_length_of_a_crank_is_a_factor_and_nothing_more(case: tuple[str, ...
     assert len(found(*case).condition.factors) == len(tangents)
 
 
-@pytest.mark.some(3)
+@pytest.mark.some(1)
 @pytest.mark.parametrize("case", [("3rrr_m1",), ("hexa", "1,2,3"), ("quattro", "1,4"), ("rrrrr_m1",), ("delta",)])
 def test_the_factors_that_were_split_off_never_vanish(case: tuple[str, ...]) -> None:
     """|a × (Q − P)| is the same at all poses: the length of a crank."""

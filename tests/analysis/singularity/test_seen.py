@@ -130,7 +130,7 @@ def test_words_expression_and_rank_agree(robot: str, camera: str | list[str], se
     assert words in seen(*see, camera=camera, robot=robot).words
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(1)
 @pytest.mark.parametrize("see", [["image_circle:platform@0.1,0,0.1/0,1,1/0.05", "point:platform@0,0.1,0"],
                                  ["line:platform@0.1,0,0.1/0,1,1", "distance:platform@0,0.1,0",
                                   "depth:platform@0.3,0,0"]])

@@ -54,7 +54,7 @@ def none(flow: Flow, n: int) -> np.ndarray:
     return np.zeros((n, len(flow.legs)), dtype=bool)
 
 
-@pytest.mark.some(3)
+@pytest.mark.some(2)
 @pytest.mark.parametrize(("name", "legs", "singular"), [
     ("quattro", "1,4", [-0.1757, -0.1931, -0.6481, 0.262]), ("3rpr_m1", None, None), ("gough_stewart", "1,3,5", None),
     ("delta", "1,2", None), ("hexa", None, None)])
