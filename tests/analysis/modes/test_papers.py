@@ -19,7 +19,7 @@ from hrsynth.description import load, shipped
 from hrsynth.families.printed import CLAIMS, GOAL, PrintedClaim, PrintedMode, printed
 from hrsynth.geometry.vectors import Array
 from hrsynth.present import printed as table
-from hrsynth.present import readme
+from hrsynth.present.markdown import block
 
 PAGE = (Path(__file__).resolve().parents[3] / "docs" / "pages" / "papers.md").read_text(encoding="utf-8")
 L1, L2 = 0.380, 0.825
@@ -193,4 +193,4 @@ def test_the_printed_pose_of_legs_1_and_2_is_deeper_than_the_rods_are_long():
 
 
 def test_the_page_shows_the_table():
-    assert readme.block(PAGE, table.START) == table.table(), "the page is stale: make readme"
+    assert block(PAGE, table.START) == table.table(), "the page is stale: make readme"
