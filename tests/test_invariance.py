@@ -39,7 +39,7 @@ def as_shipped(name: str) -> tuple[object, ...]:
     return essence(derive(load(name)))
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(1)
 @pytest.mark.parametrize("change", CHANGES)
 @pytest.mark.parametrize("name", [pytest.param(n, marks=() if n in QUICK else pytest.mark.slow) for n in shipped()])
 def test_the_same_robot_written_differently_has_the_same_hidden_robot(name: str, change: str) -> None:

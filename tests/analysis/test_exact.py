@@ -97,6 +97,7 @@ def doubles(vector: object) -> Array:
     return np.array([float(x / largest) for x in exact])
 
 
+@pytest.mark.some(16)
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_an_instance_is_a_mechanism_of_the_same_kind(robot: str) -> None:
     """The oracle, given the instance's geometry in doubles, finds the same dimensions as exact arithmetic."""

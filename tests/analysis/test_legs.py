@@ -67,6 +67,7 @@ def lost_by_oracle(robot: str, chosen: tuple[str, ...]) -> Array:
     return np.asarray(U[:, values > 1e-8])
 
 
+@pytest.mark.some(4)
 @pytest.mark.parametrize(("robot", "size"), [("quattro", 1), ("quattro", 2), ("quattro_rigid", 1), ("delta", 1),
                                              ("gough_stewart", 1), ("gough_stewart", 2), ("3upu", 1)])
 def test_lost_freedoms_are_those_of_the_oracle(robot: str, size: int) -> None:

@@ -64,6 +64,7 @@ def _renamed(leg, rng):
     return leg
 
 
+@pytest.mark.some(60)
 @pytest.mark.parametrize("text", SOME)
 def test_a_mechanism_has_the_joints_of_its_word(text):
     word = parse(text)

@@ -5,7 +5,6 @@ twists of its links. Numbers may be floats or exact, as in :mod:`hrsynth.geometr
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -61,15 +60,15 @@ def allowed(kind: JointType, point: Numbers, axes: Sequence[Numbers]) -> list[Nu
             return [*(translation(e) for e in basis), *(rotation(e, point) for e in basis)]
 
 
-def constraints(joints: Sequence[Joint], place: Mapping[str, int], geometry: Geometry, dtype: Any = float) -> Numbers:
+def constraints(joints: Sequence[Joint], place: Mapping[str, int], geometry: Geometry) -> Numbers:
     """The constraint matrix of joints on the stacked twists of links: A ξ = 0, shape (rows, 6 links).
 
     ``place`` numbers the links whose twists are unknown; a link that is not in it (the base) rests.
     """
-    blocks = [np.zeros((0, 6 * len(place)), dtype=dtype)]
+    blocks = [np.zeros((0, 6 * len(place)))]
     for joint in joints:
         wrenches = np.array(transmitted(joint.type, *geometry(joint))).reshape(-1, 6)
-        block = np.zeros((len(wrenches), 6 * len(place)), dtype=dtype)
+        block = np.zeros((len(wrenches), 6 * len(place)))
         for link, sign in ((joint.successor, 1), (joint.predecessor, -1)):
             if link in place:
                 block[:, 6 * place[link] : 6 * place[link] + 6] += sign * wrenches

@@ -206,7 +206,7 @@ class Evidence:
 
 
 def _moved(mechanism: Mechanism, reference: str, nodes: set[str], joints: Sequence[Joint], before: str,
-           anchor: Array, count: int = 12) -> tuple[Array, Array]:
+           anchor: Array) -> tuple[Array, Array]:
     """Orientations of ``before`` and positions of the anchor over random motions of the part alone."""
     if before == reference:
         return np.eye(3)[None], anchor[None]
@@ -217,7 +217,7 @@ def _moved(mechanism: Mechanism, reference: str, nodes: set[str], joints: Sequen
     home = part.links[before].pose
     local = home[:3, :3].T @ (anchor - home[:3, 3])
     rotations, anchors = [], []
-    for _ in range(count):
+    for _ in range(12):
         q = twin.q0
         if not twin.loops:
             q = twin.moved(q, rng.uniform(-0.6, 0.6, twin.nv))

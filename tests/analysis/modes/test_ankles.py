@@ -110,6 +110,7 @@ def test_three_joints_and_three_balls_have_their_number_of_modes(word: str, on: 
         check_completeness(found, 40)
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("word", ["RR", "PR", "RP"])
 def test_ranks_and_degrees_leave_the_same_number(word: str):
     for seed in range(2, 4):

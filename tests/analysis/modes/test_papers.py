@@ -111,6 +111,7 @@ def test_the_closed_form_has_the_modes_that_are_listed(claim: PrintedClaim):
     assert np.allclose(ours, theirs, atol=1e-7)
 
 
+@pytest.mark.some(5)
 @pytest.mark.parametrize(("claim", "mode"), list(printed()), ids=lambda each: (
     spoken(each) if isinstance(each, PrintedClaim) else "/".join(map(str, each.place))))
 def test_only_the_desired_poses_are_printed_as_they_are(claim: PrintedClaim, mode: PrintedMode):

@@ -37,6 +37,7 @@ def model(name: str) -> Mechanism:
     return load(MODELS / name)
 
 
+@pytest.mark.some(6)
 @pytest.mark.parametrize("name", FIGURES)
 def test_every_model_is_read_closed_and_as_mobile_as_it_is(name: str):
     total, idle, written = FIGURES[name]

@@ -268,13 +268,13 @@ def solve(assembly: LoopAssembly, seed: int = 0) -> LoopSolution:
     return best
 
 
-def regular_values(assembly: LoopAssembly, values: Values, seed: int = 0) -> Values | None:
+def regular_values(assembly: LoopAssembly, values: Values) -> Values | None:
     """Closed values near ``values`` with fewer freedoms, or with loops that resist much more firmly, where ``values``
     are singular or nearly so; None where they are neither, or nothing better is found."""
     here = assembly.rank(values)
     if assembly.freedoms(here) == 0:
         return None
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     best, found, origin = replace(here, weakest=FIRMER_BY * here.weakest), None, values
     for number in range(LOOP_TRIES):
         if found is not None and best.weakest > FIRM:

@@ -11,7 +11,6 @@ from ...analysis.modes.modes import AssemblyMode, modes
 from ...analysis.observed import ObservedRobot
 from ...errors import HrsynthError
 from ...geometry.vectors import Array, inverse
-from ...kinematics.configuration import ClosedConfiguration
 from ...mechanism.pose import Pose
 from ...results import Value
 from .states import page_values, place
@@ -44,11 +43,10 @@ class ModeOutline(Value):
                 "assembly": self.assembly, "places": places}
 
 
-def mode_outlines(setting: ObservedRobot,
-           goal: ClosedConfiguration | None = None) -> tuple[tuple[ModeOutline, ...], tuple[str, ...]]:
-    """All modes but the pose itself (default: the zero configuration's), and why there are none or not all."""
+def mode_outlines(setting: ObservedRobot) -> tuple[tuple[ModeOutline, ...], tuple[str, ...]]:
+    """All modes but the zero configuration's pose, and why there are none or not all."""
     try:
-        found = modes(setting, at=goal)
+        found = modes(setting)
     except HrsynthError as error:
         return (), (f"assembly modes are not shown: {error}",)
     if found.found.continuum is not None:

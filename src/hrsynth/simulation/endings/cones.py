@@ -214,12 +214,12 @@ class ProvedCones:
         return float(np.min(self.cones.rise))
 
 
-def prove_cones(prover: ConeProver, wanted: float, budget: int = CONE_BOXES) -> ProvedCones:
-    """The cones proved to as high a level as the ``budget`` of boxes allows, at most to ``wanted``."""
+def prove_cones(prover: ConeProver, wanted: float) -> ProvedCones:
+    """The cones proved to as high a level as the budget of boxes allows, at most to ``wanted``."""
     core, rise = prover.core()
     cones, boxes = RisingCones.all(prover.error.size, core, rise), 0
     target = wanted
-    while boxes < budget:
+    while boxes < CONE_BOXES:
         todo = np.flatnonzero(cones.level < target)
         if not len(todo):
             break

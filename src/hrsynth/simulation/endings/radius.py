@@ -105,10 +105,10 @@ def _proved(error: PoseError) -> ProvedCones:
     return proved
 
 
-def _highest(error: PoseError, W: Array, seed: int = 0) -> float:
+def _highest(error: PoseError, W: Array) -> float:
     """The least E at which a ray of many stops rising, or leaves the legs' reach: seen, not proved."""
     n = error.size
-    w = np.random.default_rng(seed).normal(size=(RAYS, n))
+    w = np.random.default_rng(0).normal(size=(RAYS, n))
     w /= np.linalg.norm(w, axis=1)[:, None]
     rising, before, lowest = np.ones(RAYS, dtype=bool), np.zeros(RAYS), np.inf
     for t in np.geomspace(1e-3, 3.0, 150):
@@ -122,12 +122,12 @@ def _highest(error: PoseError, W: Array, seed: int = 0) -> float:
     return lowest if np.isfinite(lowest) else float(np.max(before))
 
 
-def _reach(proved: ProvedCones, seed: int = 0) -> tuple[float, int]:
+def _reach(proved: ProvedCones) -> tuple[float, int]:
     """The radius (characteristic lengths, radians) within which E < c is enclosed, and the boxes for it: near the one
     that rays show."""
     error, W, c = proved.prover.error, proved.prover.W, proved.level
     # rays evenly about the goal, and towards where E rises fast
-    w = np.random.default_rng(seed).normal(size=(2 * RAYS, error.size))
+    w = np.random.default_rng(0).normal(size=(2 * RAYS, error.size))
     x = np.concatenate([w[:RAYS], w[RAYS:] @ np.linalg.inv(W)])
     x *= np.max(np.linalg.norm(W, axis=0)) / np.linalg.norm(x, axis=1)[:, None]
     low, high = np.zeros(len(x)), np.full(len(x), 2.0)
