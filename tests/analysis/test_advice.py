@@ -147,6 +147,7 @@ def test_advice_on_random_robots(robot: Mechanism, seed: int) -> None:
 # ---- robots that are known
 
 
+@pytest.mark.some(3)
 @pytest.mark.parametrize("robot", ["uranesx", "i4l", "prrrp_parallel", "prrrp_parallel_point", "hexaglide"])
 def test_parallel_rails_need_one_rail_or_one_line(robot: str) -> None:
     """The rods' directions do not see the translation along the rails: the position of any one rod, or the encoder of
@@ -162,7 +163,7 @@ def test_parallel_rails_need_one_rail_or_one_line(robot: str) -> None:
     assert all(m.actuated for each in answer.sets for m in each.measurements if m.kind == "encoder")
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(1)
 @pytest.mark.parametrize(("robot", "size"), [("3prp", 2), ("3rrp", 2), ("3ppr_m2", 3)])
 def test_blind_planar_robots(robot: str, size: int) -> None:
     """Directions that all turn as one (or not at all) leave two (three) freedoms: as many encoders or lines."""

@@ -69,6 +69,7 @@ def dims(basis: Array, twist_rows: int) -> tuple[int, int, int]:
     return basis.shape[1], span(basis[:twist_rows]).shape[1], span(basis[twist_rows:]).shape[1]
 
 
+@pytest.mark.some(16)
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_ranks_are_those_of_the_oracle(robot: str) -> None:
     setting = setting_of(robot)
@@ -117,6 +118,7 @@ def test_singular_values_are_those_of_the_oracle(robot: str) -> None:
         np.testing.assert_allclose(M @ (found.twists.T @ t), found.rates @ np.ones(found.dimension), atol=1e-9)
 
 
+@pytest.mark.some(16)
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_redundant_rows_add_up(robot: str) -> None:
     """All rows of the loops less their rank, at zero and at samples; what is redundant only here is what is lost."""

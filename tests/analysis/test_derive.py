@@ -195,7 +195,7 @@ def name(case: object) -> str:
     return "".join(case) if isinstance(case, tuple) else str(case)
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(1)
 @pytest.mark.parametrize(("robot", "legs"), SUBSETS, ids=name)
 def test_every_set_of_legs_is_certified(robot: str, legs: tuple[str, ...]) -> None:
     derivation = derived(robot, legs)
@@ -231,7 +231,7 @@ def test_pairs_and_triples_of_a_pod_are_certified(robot: str, legs: tuple[str, .
     assert hidden.ascii.startswith("2-U*PS")
 
 
-@pytest.mark.some(3)
+@pytest.mark.some(2)
 @pytest.mark.parametrize(("robot", "legs", "hidden"), [
     ("gough_stewart", ("1", "2", "3"), "3-U*PS"),
     ("gough_stewart", ("2", "4", "6"), "3-U*PS"),
@@ -367,7 +367,7 @@ def test_encoders_made_visible() -> None:
     assert derivation.hidden_architecture.ascii == "3-R*-{2-SS}"
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(1)
 @pytest.mark.parametrize(("robot", "hidden"), [
     ("delta", "3-{R-PP}-{2-U*S}"), ("3rrr_m1", "3-{R-PP}-R*R"), ("quattro", "4-{R-PP}-{2-U*S}"), ("3upu", "3-U*PU"),
     ("orthoglide", "3-P-{2-U*S}")])

@@ -116,7 +116,7 @@ def test_what_is_carried_is_kept(seed: int) -> None:
         assert all(keeps for keeps, holds in zip(answers, known, strict=True) if holds)
 
 
-@pytest.mark.some(11)
+@pytest.mark.some(6)
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_the_degree_of_identities_is_bounded(robot: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Numbers of k more bits make motions of at most degree · k more: the bound is none that is too low."""

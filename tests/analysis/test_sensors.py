@@ -102,7 +102,7 @@ def certified(mechanism: Mechanism, kind: str, form: str = "simplified") -> Deri
     return found
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(1)
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("robot", ["free_body", "arm", "gough_stewart"])
 def test_every_kind_is_certified(robot: str, kind: str) -> None:

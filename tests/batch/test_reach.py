@@ -51,7 +51,7 @@ def check_reached(setting: ObservedRobot, motion: PlatformMotion, X: Array) -> C
     return at
 
 
-@pytest.mark.some(11)
+@pytest.mark.some(6)
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_poses_of_samples_are_reached_again(robot: str) -> None:
     """The pose is that of the sample; one step away from zero, where no other working mode is near, so are the
@@ -231,7 +231,7 @@ def test_the_leg_that_misses_is_named(x: float, y: float, leg: str) -> None:
     assert max(np.linalg.norm([last.x, last.y] - foot) for foot in FEET) == pytest.approx(CRANK + ROD, abs=1e-3)
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(1)
 @pytest.mark.parametrize(("x", "y", "z"), [(0.6, 0.1, -0.7), (0.02, 0.03, -0.3), (0, 0, -0.95), (-0.5, 0.3, -0.6)])
 def test_the_miss_of_a_leg_whose_platform_only_translates(x: float, y: float, z: float) -> None:
     """The rod's two ends: the elbow somewhere on its circle, the tip carried along without a turn."""

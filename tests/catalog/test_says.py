@@ -78,7 +78,7 @@ def test_the_theorem_on_planar_robots_is_that_of_their_twists(legs: list[LegWord
     assert np.linalg.matrix_rank(np.vstack(seen), tol=1e-7) == says.planar_rank(RobotWord("", (tuple(legs),)))
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(1)
 @pytest.mark.parametrize("word", ["3(Rz*-Rz-Rz)", "3(Rz*!-Rz-Rz)", "3(Px*-Rz-Rz)", "3(Px*!-Rz-Rz)", "3(Px*-Rz!-Ph)"])
 def test_the_rule_is_what_derive_finds(word: str) -> None:
     robot = mechanism(parse(word))

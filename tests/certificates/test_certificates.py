@@ -108,7 +108,7 @@ def displaced(record, mechanism, box) -> np.ndarray:
     return np.array(found)
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(1)
 @pytest.mark.parametrize("name", ["quattro", "gough_stewart", "3rrr_m1", "delta"])
 def test_links_are_told_where_the_robot_closes(name):
     """Joints by screws, and the watched directions, at as many modes as are told to be assembled; nowhere else."""

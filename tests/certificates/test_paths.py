@@ -130,6 +130,7 @@ def attacked(name, count):
     return count
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("name", ["3rrr_m1", "orthoglide"])
 def test_false_certificates_are_refused(name):
     assert attacked(name, 100) == 100

@@ -35,6 +35,7 @@ def check_round_trip(mechanism: Mechanism) -> Mechanism:
     return read
 
 
+@pytest.mark.some(32)
 @pytest.mark.parametrize("kind", IN_TREE)
 @pytest.mark.parametrize("seed", range(8))
 def test_a_tree_joint_of_every_type(kind: JointType, seed: int):
@@ -42,6 +43,7 @@ def test_a_tree_joint_of_every_type(kind: JointType, seed: int):
     assert [joint.type for joint in read.joints.values()] == [kind, kind, JointType.SPHERICAL]
 
 
+@pytest.mark.some(28)
 @pytest.mark.parametrize("kind", IN_LOOP)
 @pytest.mark.parametrize("seed", range(8))
 def test_a_loop_of_every_type(kind: JointType, seed: int):

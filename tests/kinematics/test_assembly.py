@@ -34,7 +34,7 @@ def values(at: ClosedConfiguration, setting: ObservedRobot) -> list[np.ndarray]:
     return measure(at.twin, at.q, question.reference, question.observations)[2]
 
 
-@pytest.mark.some(11)
+@pytest.mark.some(6)
 @pytest.mark.parametrize("name", ROBOTS)
 def test_a_reachable_pose_is_assembled_with_its_directions(name: str):
     """At random configurations the robot is found again: bodies, platform and directions, loops closed."""

@@ -182,7 +182,7 @@ def test_the_verdict_of_a_leg_at_a_dead_point_is_that_of_its_branch(tmp_path: Pa
     assert (found.verdict.rank, found.dof, found.certificate.passed) == (2, 3, True)
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(1)
 @pytest.mark.parametrize(("tilt", "rank", "near"), [
     (1e-3, 2, False), (1e-6, 2, True), (1e-8, 1, True), (0.0, 1, False)])
 def test_the_distance_to_another_verdict_is_told(tilt: float, rank: int, near: bool) -> None:

@@ -71,6 +71,7 @@ def by_oracle(at: ClosedConfiguration, leg: Leg, locks: list[Direction]) -> Arra
     return np.asarray(U[:, : int(np.sum(sizes > 1e-8))])
 
 
+@pytest.mark.some(6)
 @pytest.mark.parametrize("robot", ["3rrr_m1", "3prr_m1", "delta", "orthoglide", "3upu", "3rps", "gough_stewart", "hexa",
                                    "quattro", "quattro_rigid", "3ruu"])
 def test_a_held_leg_allows_what_the_oracle_says(robot: str) -> None:

@@ -95,6 +95,7 @@ def test_rates_are_derivatives(kind: type[Observation], rng: Rng, side: int) -> 
     assert np.max(np.abs(slope - rate)) < 1e-8 * (1 + np.max(np.abs(rate)))
 
 
+@pytest.mark.some(6)
 @pytest.mark.parametrize("kind", CHAINED, ids=lambda kind: kind.kind)
 @settings(max_examples=20, deadline=None)
 @given(rng=SEEDS, side=st.sampled_from([1, -1]))
@@ -109,6 +110,7 @@ def test_a_chain_constrains_nothing_and_sees_what_the_kind_sees(kind: type[Obser
     assert np.linalg.matrix_rank(M, tol=1e-8) == seen.rank == 6 - passive.shape[1]  # type: ignore[attr-defined]
 
 
+@pytest.mark.some(6)
 @pytest.mark.parametrize("kind", CHAINED, ids=lambda kind: kind.kind)
 @settings(max_examples=20, deadline=None)
 @given(rng=SEEDS, side=st.sampled_from([1, -1]))

@@ -89,6 +89,7 @@ def test_a_platform_fixed_to_the_base_is_refused() -> None:
         normal_form(b.build("plate"))
 
 
+@pytest.mark.some(16)
 @pytest.mark.parametrize("name", shipped())
 def test_what_is_split_comes_together_again(name: str) -> None:
     robot = normal_form(load(name)).mechanism

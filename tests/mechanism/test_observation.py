@@ -78,6 +78,7 @@ def test_every_kind_has_a_key_of_its_own() -> None:
 # ---- encoders
 
 
+@pytest.mark.some(33)
 @pytest.mark.parametrize("robot", ROBOTS)
 @pytest.mark.parametrize("cut", ["normal form", "as written"])
 def test_encoders_read_the_coordinates_of_the_twin(robot: str, cut: str) -> None:

@@ -100,6 +100,7 @@ def assert_free(found: Layout) -> None:
         assert x != u or last < start
 
 
+@pytest.mark.some(33)
 @DRAWINGS
 @pytest.mark.parametrize("name", shipped())
 def test_every_joint_of_a_robot_stands_once_and_motors_are_grey(name: str, draw: Draw) -> None:

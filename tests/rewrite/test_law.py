@@ -131,7 +131,7 @@ def test_no_accepted_step_changes_the_relation_seen_from_a_moving_link(robot: st
     assert obeys(setting_of(robot, None, camera, 3)).steps
 
 
-@pytest.mark.some(3)
+@pytest.mark.some(2)
 @pytest.mark.parametrize(("robot", "legs"), [
     ("delta", None), ("quattro", ("1", "4")), ("3rrr_m1", None), ("gough_stewart", ("1", "2", "3")), ("3upu", ("1",)),
     ("prrrp_m1", None), ("hexa", ("1",))], ids=name)

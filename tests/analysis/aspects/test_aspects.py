@@ -127,7 +127,7 @@ def test_poses_decide_the_values_that_configurations_have(robot: str, observe: s
 # ---- sides of a locus
 
 
-@pytest.mark.some(3)
+@pytest.mark.some(2)
 @pytest.mark.parametrize(("robot", "observe"), SIGNED)
 def test_opposite_signs_are_separated_and_equal_signs_never(robot: str, observe: str | None):
     aspects = aspects_of(robot, observe)

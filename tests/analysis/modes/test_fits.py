@@ -121,6 +121,7 @@ def test_tips_at_rest_that_are_torn_apart_leave_no_mode():
     assert found.modes == ()
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize(("name", "observe", "at", "expected"), [
     ("quattro_rigid", ("1", "2"), None, 2), ("delta", None, None, 2), ("delta", None, "x=0.05,y=0.02,z=-0.6", 1),
     ("quattro", None, None, 2)])

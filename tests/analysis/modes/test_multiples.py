@@ -62,6 +62,7 @@ def test_combinations_have_the_same_zeros():
     assert any(each.value([1, 2, 3]) for each in found)
 
 
+@pytest.mark.some(1)
 @needs_msolve
 @pytest.mark.parametrize(("name", "count", "seed"), [("quattro", 4, None), ("i4l", 2, 1), pytest.param(
     "quattro", 4, 2, marks=pytest.mark.slow), pytest.param("quattro", 4, 1, marks=pytest.mark.slow)])

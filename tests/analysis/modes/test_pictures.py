@@ -147,6 +147,7 @@ def test_near_modes_have_their_own_mark():
 # ---- coupler curves, against distances
 
 
+@pytest.mark.some(20)
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("kinds", ["CC", "LL", "LC", "CL", "PC", "CP", "PL"])
 def test_a_bar_keeps_its_length_and_its_ends_their_curves(kinds: str, seed: int):

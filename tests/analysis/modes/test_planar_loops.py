@@ -44,7 +44,7 @@ def measured(found: AssemblyModes) -> MeasuredRobot:
     return (MeasuredRobot.driven if found.kind == "real" else MeasuredRobot.watched)(found.setting)
 
 
-@pytest.mark.some(4)
+@pytest.mark.some(2)
 @pytest.mark.parametrize("real", [False, True])
 @pytest.mark.parametrize("name", [pytest.param(name, marks=[] if name in QUICK else [pytest.mark.slow])
                                   for name in planar()])

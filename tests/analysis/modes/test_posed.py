@@ -175,7 +175,7 @@ def test_slopes_are_the_derivatives(kind):
 THREE = [OnPlane] * 3
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(1)
 @pytest.mark.parametrize(("kinds", "count"), [
     (THREE + [OnPlane] * 3, 8), (THREE + [AtAngle] * 3, 8), (THREE + [OnPlane, OnPlane, OnRevolution], 16),
     (THREE + [OnPlane, Coplanar, Coplanar], 32)])

@@ -51,7 +51,7 @@ OPEN = (("line", "distance", "distance"), True)
 QUICK = [("point",) * 3, ("point", "point", "image_line"), ("point", "image_line", "image_line"), ("image_line",) * 3]
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(1)
 @pytest.mark.parametrize("row", QUICK, ids=",".join)
 def test_a_mixed_set_has_the_modes_that_the_page_tells(row: tuple[str, ...]) -> None:
     found = modes(watched(row, 7))

@@ -49,7 +49,7 @@ def test_tips_of_hidden_robots_lie_on_their_curves(name: str):
     assert missed(found) < 1e-9
 
 
-@pytest.mark.some(6)
+@pytest.mark.some(3)
 @pytest.mark.parametrize("name", [*REAL, *RODS])
 def test_tips_with_the_motors_held(name: str):
     found = confined(name, real=True)

@@ -115,6 +115,7 @@ def test_planar_vanishes_for_lines_through_a_point_and_for_parallel_ones(seed: i
     assert at(expression("3rrr_m1"), meeting | {"tau1": vectors["n"].cross(meeting["tau1"])}) != 0
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_spatial_is_the_determinant_of_nine_velocity_equations(seed: int) -> None:
     """v + ω × B_i = λ_i τ_i in the nine unknowns v, ω, λ; one sign for all vectors."""
