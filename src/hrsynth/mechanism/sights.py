@@ -382,6 +382,17 @@ class CameraObservation(Observation):
                                                           and np.max(np.abs(a - b)) > tolerance)]
 
 
+class MetricPoint(CameraObservation):
+    """What a sensor tells of a point in metres."""
+
+    needs = ("at",)
+    dimension = 1
+    found_by = frozenset({"m"})
+
+    def sensed(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
+        return value + noise["m"] * shocks[0, : self.size]
+
+
 @lru_cache(maxsize=512)
 def _stacked(observations: tuple[Observation, ...]) -> tuple[Array, Array, Array, Array]:
     """Points (k, 3, 1) and axes (k, 3, 1) of observations in their links, radii (k, 1), cameras (k, 4, 4)."""

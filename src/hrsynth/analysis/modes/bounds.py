@@ -52,13 +52,11 @@ class Bound:
     """At most so many isolated poses, none besides if that many are, and why.
 
     ``law``: ``degree`` where solutions at infinity count among them, ``quadrics``, ``places`` or ``product``.
-    ``doubles``: two (a₀, a) and two (b₀, b) each, on the lines of double points of X that solve all equations.
     """
 
     most: int
     why: str
     law: str
-    doubles: tuple[tuple[_Pair, _Pair], ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,17 +127,15 @@ def degree_bound(system: Spatial, legs: Sequence[int]) -> Bound:
     """40, or less by the double points that are proved to be isolated solutions, for all input in the balls."""
     from flint import ctx
 
-    found, known = list[tuple[_Pair, _Pair]](), list[_Double]()
+    known = list[_Double]()
     with ctx.workprec(PRECISION):
         rows = list(_conditions(system, legs))
         for a, b in _covers(rows):
-            points = [each for each in _doubles(rows, a, b) if all(each.apart(other) for other in known)]
-            known += points
-            found += [(a, b)] * bool(points)
+            known += [each for each in _doubles(rows, a, b) if all(each.apart(other) for other in known)]
     why = "six conditions on points of a rigid body (degree of the poses among 16 coordinates"
     if known:
         why += f", less 2 for each of {len(known)} isolated double points at infinity"
-    return Bound(DEGREE - 2 * len(known), f"{why})", "degree", tuple(found))
+    return Bound(DEGREE - 2 * len(known), f"{why})", "degree")
 
 
 def _conditions(system: Spatial, legs: Sequence[int]) -> Iterator[_Condition]:

@@ -77,7 +77,6 @@ class Studied:
     related: bool = False
     letters: str = ""
     gap: float = CLEAN
-    trials: int = 0
     watched: WatchedLegs | None = None
     others: tuple[tuple[int, int], ...] = ()
     """Motions that were found instead, where it does not move as stated."""
@@ -118,18 +117,18 @@ def _batch(cases: Sequence[StudyCase], random: np.random.Generator) -> list[Stud
         if not todo:
             break
         letters = [cases[i].tried(trial) for i in todo]
-        for i, each, other in zip(todo, *_trial([cases[i].robot for i in todo], letters, random, related, trial),
+        for i, each, other in zip(todo, *_trial([cases[i].robot for i in todo], letters, random, related),
                                   strict=True):
             if each is not None and (found[i] is None or each.finite is None):
                 found[i] = each
             if other is not None:
                 others[i].add(other)
-    return [each or Studied(False, trials=AUDIT_TRIALS, others=tuple(sorted(other)))
+    return [each or Studied(False, others=tuple(sorted(other)))
             for each, other in zip(found, others, strict=True)]
 
 
-def _trial(robots: Sequence[PublishedRobot], letters: Sequence[str], random: np.random.Generator, related: bool,
-           trial: int) -> tuple[list[Studied | None], list[tuple[int, int] | None]]:
+def _trial(robots: Sequence[PublishedRobot], letters: Sequence[str], random: np.random.Generator, related: bool
+           ) -> tuple[list[Studied | None], list[tuple[int, int] | None]]:
     """One random start of each robot: what it does, None where it does not close or move as stated."""
     parts = [factors(robot, each) for robot, each in zip(robots, letters, strict=True)]
     of, axes, wanted = batch(parts, len(robots[0].chain.joints)), axes_of(robots[0]), sum(robots[0].motion)
@@ -159,7 +158,7 @@ def _trial(robots: Sequence[PublishedRobot], letters: Sequence[str], random: np.
         found.append(Studied(
             True, motion, bool(finite[b]) if two.dof[b] > wanted else None, int(two.idle[b]),
             {driven: HeldMotors(int(each[0][b]), int(each[1][b])) for driven, each in motors.items()}, related,
-            letters[b], gap, trial + 1, watching(later[b], robot.chain.kinds, int(two.dof[b])), screws=later[b]))
+            letters[b], gap, watching(later[b], robot.chain.kinds, int(two.dof[b])), screws=later[b]))
     instead = [(int(two.translations[b]), int(two.rotations[b])) if same[b] and not related else None
                for b in range(len(robots))]
     return found, instead

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,22 +14,19 @@ from ...geometry.jets import Jet
 from ...geometry.screws import force
 from ...geometry.vectors import Array, Numbers, perpendicular
 from ..observation import Drawn
-from ..sights import CameraObservation, HeldPlace, Sighting, VirtualJoint, kept_in
+from ..sights import HeldPlace, MetricPoint, Sighting, VirtualJoint, kept_in
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PointDepth(CameraObservation):
+class PointDepth(MetricPoint):
     """z · p, p from C to B."""
 
     kind = "depth"
     words = "the z-coordinate of B in the camera's frame"
     locked = "the force along z at B"
-    needs = ("at",)
     size = 1
     rank = 1
     along_z = True
-    dimension = 1
-    found_by = frozenset({"m"})
 
     @staticmethod
     def measured(p: Array, d: Array, r: Array) -> Array:
@@ -45,9 +42,6 @@ class PointDepth(CameraObservation):
     @staticmethod
     def fed(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
         return [p[2] - float(wanted[0])]
-
-    def sensed(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
-        return value + noise["m"] * shocks[0, :1]
 
     @staticmethod
     def outline(p: Array, d: Array, r: float, size: float) -> Drawn:

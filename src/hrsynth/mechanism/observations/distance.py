@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,22 +14,19 @@ from ...geometry.jets import Jet, inner
 from ...geometry.screws import force, normals
 from ...geometry.vectors import Array, Numbers, unit
 from ..observation import Drawn
-from ..sights import CameraObservation, HeldPlace, Sighting, VirtualJoint, apart, gimbal, normalised, ring
+from ..sights import HeldPlace, MetricPoint, Sighting, VirtualJoint, apart, gimbal, normalised, ring
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PointDistance(CameraObservation):
+class PointDistance(MetricPoint):
     """‖p‖, p from C to B; its rate is u · ṗ."""
 
     kind = "distance"
     words = "‖CB‖"
     locked = "the force along CB"
-    needs = ("at",)
     size = 1
     rank = 1
     spot = False
-    dimension = 1
-    found_by = frozenset({"m"})
 
     @staticmethod
     def measured(p: Array, d: Array, r: Array) -> Array:
@@ -42,9 +39,6 @@ class PointDistance(CameraObservation):
     @staticmethod
     def fed(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
         return [inner(p, p).sqrt() - float(wanted[0])]
-
-    def sensed(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
-        return value + noise["m"] * shocks[0, :1]
 
     @staticmethod
     def outline(p: Array, d: Array, r: float, size: float) -> Drawn:

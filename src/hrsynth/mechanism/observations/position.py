@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,21 +14,18 @@ from ...geometry.jets import Jet
 from ...geometry.screws import force
 from ...geometry.vectors import Array, Numbers
 from ..observation import Drawn
-from ..sights import CameraObservation, HeldPlace, Sighting, VirtualJoint, apart, gimbal, kept_in, normalised, stretch
+from ..sights import HeldPlace, MetricPoint, Sighting, VirtualJoint, apart, gimbal, kept_in, normalised, stretch
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PointPosition(CameraObservation):
+class PointPosition(MetricPoint):
     """p, from C to B, in the camera's frame."""
 
     kind = "position"
     words = "the point B itself: a point with depth, stereo, a sphere of known radius"
     locked = "three forces at B"
-    needs = ("at",)
     size = 3
     rank = 3
-    dimension = 1
-    found_by = frozenset({"m"})
 
     @staticmethod
     def measured(p: Array, d: Array, r: Array) -> Array:
@@ -44,9 +41,6 @@ class PointPosition(CameraObservation):
     @staticmethod
     def fed(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
         return [a - b for a, b in zip(p, wanted.tolist(), strict=True)]
-
-    def sensed(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
-        return value + noise["m"] * shocks[0]
 
     @staticmethod
     def outline(p: Array, d: Array, r: float, size: float) -> Drawn:
