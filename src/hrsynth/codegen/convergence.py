@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..analysis.branch.cells import TubeTrial, derivatives, drift, residual
+from ..analysis.branch.cells import TubeTrial, derivatives, drift, middles, residual
 from ..analysis.branch.loops import curvatures
 from ..analysis.branch.part import LoopBlock, LoopEquation, LoopPart
 from ..budgets import BOUND_HALVINGS, CELLS_TOGETHER, MOST_BOUNDED, MOST_PARTS, NEWTON_STEPS_AT_RUN
@@ -227,8 +227,7 @@ def _trial(loops: LoopPart, cells: Sequence[TubeCell]) -> TubeTrial:
     """Cells as the enclosures take them."""
     lower, upper, x, slopes, radius = (np.array([getattr(cell, name) for cell in cells])
                                        for name in ("lower", "upper", "middle", "slopes", "radius"))
-    half = (upper - lower) / 2 * (1 + AFFINE_ROUNDING) + 4 * UNIT_ROUNDOFF * (np.abs(lower) + np.abs(upper))
-    return TubeTrial(loops, (lower + upper) / 2, half, x, slopes, radius, np.zeros(len(x)), np.ones(len(x), dtype=bool))
+    return TubeTrial(loops, *middles(lower, upper), x, slopes, radius, np.zeros(len(x)), np.ones(len(x), dtype=bool))
 
 
 def _bounds(code: _Code, cells: Sequence[TubeCell], known: Sequence[bool], wider: float) -> list[BoundedCell]:
