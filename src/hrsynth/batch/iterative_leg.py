@@ -7,15 +7,17 @@ products α·β of directions fixed in its two links.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..budgets import CHAIN_STEP, CHAIN_STEPS
 from ..geometry.so3 import exponential, logarithm
-from ..geometry.vectors import Array, hat, inverse, perpendicular
+from ..geometry.vectors import Array, cross, hat, inverse, perpendicular
 from ..mechanism import Joint, JointType, Mechanism
 from ..mechanism.legs import Leg
 from ..mechanism.observations.direction import Direction
@@ -76,24 +78,36 @@ class Ties(Value):
         signs = [np.sum((R[:, i] @ alpha) * (R[:, j] @ beta), axis=1) > 0 for i, j, alpha, beta in self.upright]
         return np.all(signs, axis=0) if signs else np.ones(len(X), dtype=bool)
 
-    def evaluate(self, X: Array) -> tuple[Array, Array]:
-        """Residuals (n, rows) and derivatives by the twists of all links (n, rows, links, 6)."""
-        n, links = X.shape[:2]
-        residual, J = np.zeros((n, self.count)), np.zeros((n, self.count, links, 6))
+    @cached_property
+    def _stacked(self) -> tuple[list[Any], list[Any]]:
+        """Forces and moments, each of their parts of all rows in one array; once all joints are there."""
+        def stacked(rows: Sequence[tuple[Any, ...]], vectors: int) -> list[Any]:
+            columns = list(zip(*rows, strict=True)) or [()] * 5
+            shapes = [(-1, 3) if 2 <= k < 2 + vectors else (-1,) for k in range(5)]
+            return [np.array(column, dtype=int if k < 2 else float).reshape(shape)
+                    for k, (column, shape) in enumerate(zip(columns, shapes, strict=True))]
+
+        return stacked(self.forces, 3), stacked(self.moments, 2)
+
+    def residual(self, X: Array) -> Array:
+        """How far each row is from being kept, (n, rows)."""
+        (i, j, normal, at_i, at_j), (k, m, alpha, beta, level) = self._stacked
         R, o = X[..., :3, :3], X[..., :3, 3]
-        for row, (i, j, normal, at_i, at_j) in enumerate(self.forces):
-            force = R[:, i] @ normal
-            p_i, p_j = o[:, i] + R[:, i] @ at_i, o[:, j] + R[:, j] @ at_j
-            residual[:, row] = np.sum(force * (p_j - p_i), axis=1)
-            J[:, row, i] -= np.hstack((force, np.cross(p_j - o[:, i], force)))
-            J[:, row, j] += np.hstack((force, np.cross(p_j - o[:, j], force)))
-        for row, (i, j, alpha, beta, level) in enumerate(self.moments, len(self.forces)):
-            a, b = R[:, i] @ alpha, R[:, j] @ beta
-            residual[:, row] = np.sum(a * b, axis=1) - level
-            moment = np.cross(b, a)
-            J[:, row, i, 3:] -= moment
-            J[:, row, j, 3:] += moment
-        return residual, J
+        way = o[:, j] + turned(R[:, j], at_j) - o[:, i] - turned(R[:, i], at_i)
+        return np.concatenate([np.sum(turned(R[:, i], normal) * way, axis=2),
+                               np.sum(turned(R[:, k], alpha) * turned(R[:, m], beta), axis=2) - level], axis=1)
+
+    def rates(self, X: Array) -> Array:
+        """Its derivatives by the twists of all links, (n, rows, links, 6)."""
+        (i, j, normal, _, at_j), (k, m, alpha, beta, _) = self._stacked
+        R, o = X[..., :3, :3], X[..., :3, 3]
+        J = np.zeros((len(X), self.count, X.shape[1], 6))
+        rows, force, arm = np.arange(len(i)), turned(R[:, i], normal), turned(R[:, j], at_j)
+        J[:, rows, i, :3], J[:, rows, j, :3] = -force, force
+        J[:, rows, i, 3:], J[:, rows, j, 3:] = cross(force, o[:, j] + arm - o[:, i]), cross(arm, force)
+        rows, moment = np.arange(len(i), self.count), cross(turned(R[:, m], beta), turned(R[:, k], alpha))
+        J[:, rows, k, 3:], J[:, rows, m, 3:] = -moment, moment
+        return J
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -149,13 +163,13 @@ class IterativeLeg(Value):
         live = np.arange(len(X))
         size = np.full(len(X), np.inf)
         for _ in range(iterations):
-            residual, J = self.ties.evaluate(X[live])
+            residual = self.ties.residual(X[live])
             size[live] = np.linalg.norm(residual, axis=1)
             keep = size[live] > SOLVED / 10
             if not keep.any() or len(self.free) == 0:
                 break
-            live, residual, J = live[keep], residual[keep], J[keep]
-            J = J[:, :, self.free].reshape(len(live), self.ties.count, -1)
+            live, residual = live[keep], residual[keep]
+            J = self.ties.rates(X[live])[:, :, self.free].reshape(len(live), self.ties.count, -1)
             damping = np.maximum(size[live] ** 2, 1e-14)
             A = J.transpose(0, 2, 1) @ J + damping[:, None, None] * np.eye(J.shape[2])
             step = -np.linalg.solve(A, J.transpose(0, 2, 1) @ residual[:, :, None])[..., 0]
@@ -168,7 +182,7 @@ class IterativeLeg(Value):
         orthonormal set padded with zeros (n, 6, 6)."""
         number, direction = self.seen
         u = X[:, number, :3, :3] @ direction
-        J = self.ties.evaluate(X)[1]
+        J = self.ties.rates(X)
         given = 1 if 1 not in self.free else len(self.links) - 1
         own, end = J[:, :, self.free].reshape(len(X), self.ties.count, -1), J[:, :, given]
         left, s, right = np.linalg.svd(own, full_matrices=True)
@@ -261,3 +275,8 @@ def moved(X: Array, twists: Array) -> Array:
     found[..., :3, 3] += twists[..., :3]
     found[..., :3, :3] = exponential(twists[..., 3:]) @ X[..., :3, :3]
     return found
+
+
+def turned(R: Array, vectors: Array) -> Array:
+    """Vectors (rows, 3) each turned by its own of n rows of rotations (n, rows, 3, 3)."""
+    return np.asarray((R @ vectors[..., None])[..., 0])
