@@ -9,7 +9,7 @@ from batch.test_batch import SOLVED, poses_near, shipped_batch
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.analysis.singularity.agreement import spectrum
 from hrsynth.analysis.singularity.batch_spectrum import Quick
-from hrsynth.batch.placing import Placer, coordinates
+from hrsynth.batch.placing import Placer, coordinates, rates
 from hrsynth.batch.reach import reach, sweep
 from hrsynth.description import load
 from hrsynth.errors import Disagreement
@@ -58,6 +58,23 @@ def test_coordinates_are_those_of_the_poses_of_all_links(robot: str) -> None:
         assert np.max(np.abs(twin.residual(q))) < 1e-9
         for name in twin.mechanism.links:
             assert np.max(np.abs(twin.pose(q, name) - at.pose(name))) < 1e-9
+
+
+@pytest.mark.parametrize("robot", ["quattro", "6pus", "3upu", "3rrp", "gough_stewart"])
+def test_what_velocities_do_is_what_pinocchio_says(robot: str) -> None:
+    placer = ObservedRobot.of(robot).placer
+    twin = placer.twin
+    closed = [at for at in placer.configurations(poses_near(placer.batch, 10)) if at is not None]
+    names = tuple(twin.mechanism.links)
+    X = np.array([twin.poses(at.q, names) for at in closed])
+    assert len(closed) > 3
+    for link in names:
+        for at, J, V in zip(closed, *rates(twin, {name: X[:, i] for i, name in enumerate(names)}, link), strict=True):
+            theirs, (_, moves) = twin.jacobian(at.q), twin.frames(at.q, (link,), whole=0)
+            # the rates of a ball are told in one frame or another
+            ours, other = (rows @ (np.eye(twin.nv) - np.linalg.pinv(loops, rcond=1e-9) @ loops) @ rows.T
+                           for rows, loops in ((V, J), (moves[0], theirs)))
+            np.testing.assert_allclose(ours, other, atol=1e-8)
 
 
 @pytest.mark.some(2)

@@ -96,7 +96,7 @@ def test_every_type_of_loop(letter: str, seed: int) -> None:
     rng = np.random.default_rng(seed)
     mechanism = cycle(CYCLES[letter], rng, welded=letter == "F")
     twin = PinocchioModel(mechanism)
-    assert letter in {joint.type.value for joint in twin._spanned[1]}
+    assert letter in {joint.type.value for joint in twin.spanned[1]}
     assert set(twin.loops) <= set(mechanism.joints)
     assert np.linalg.norm(twin.residual(twin.q0)) < 1e-12
     agrees(ClosedConfiguration.of(twin, twin.q0), question_of(mechanism))

@@ -16,9 +16,9 @@ from ..budgets import FAST_DIRECTIONS
 from ..closed_forms.legs import ClosedFormLeg, OnCrank, OnRail, PlatformDirection
 from ..errors import NotSampled
 from ..geometry.so3 import between, exponential, quaternions
-from ..geometry.vectors import Array, frozen, inverse
+from ..geometry.vectors import Array, cross, frozen, hat, inverse
 from ..kinematics.configuration import ClosedConfiguration
-from ..kinematics.pinocchio_model import PinocchioModel
+from ..kinematics.pinocchio_model import PinocchioModel, across
 from ..mechanism import Joint, JointType, Mechanism
 from ..mechanism.legs import Leg, LegDecomposition
 from ..mechanism.observations.direction import Direction
@@ -199,8 +199,7 @@ def _hold(mechanism: Mechanism, leg: Leg, name: str, placed: Mapping[str, Array]
 
 def coordinates(twin: PinocchioModel, frames: Mapping[str, Array]) -> Array:
     """The twin's q (n, nq) for poses of all links (n, 4, 4), metres."""
-    mechanism = twin.mechanism
-    moved = {name: X @ inverse(mechanism.links[name].pose) for name, X in frames.items()}
+    moved = _moved(twin, frames)
     n = len(next(iter(frames.values())))
     q = np.repeat(twin.q0[None], n, axis=0)
     for joint, parent, names in twin.parts():
@@ -213,6 +212,67 @@ def coordinates(twin: PinocchioModel, frames: Mapping[str, Array]) -> Array:
         for start, value in zip((twin.start(name) for name in names), values, strict=True):
             q[:, start : start + value.shape[1]] = value
     return q
+
+
+def rates(twin: PinocchioModel, frames: Mapping[str, Array], link: str) -> tuple[Array, Array]:
+    """What the twin's velocities do at closed poses of all links (n, 4, 4), metres: how fast the loops open
+    (n, rows, nv), and the twists (n, 6, nv) of a link at the base's origin; characteristic lengths and radians."""
+    moved, (tree, cuts) = _moved(twin, frames), twin.spanned
+    screws, rows = np.zeros((len(moved[link]), 6, twin.nv)), [np.zeros((len(moved[link]), 0, twin.nv))]
+    moves = {twin.mechanism.base: np.zeros(twin.nv)}
+
+    def beyond(joint: Joint, parent: str) -> Array:
+        """Which coordinates move what is beyond a joint, whose screws are added."""
+        found, places = moves[parent].copy(), sorted(twin.coordinates.get(joint.name, ()))
+        if places:
+            own = joint if joint.predecessor == parent else joint.turned()
+            found[places] = 1.0
+            screws[:, :, places[0] : places[-1] + 1] = _screws(own, moved[parent], moved[joint.other(parent)],
+                                                               twin.length)
+        return found
+
+    for joint in tree:
+        parent = next(name for name in joint.links if name in moves)
+        moves[joint.other(parent)] = beyond(joint, parent)
+    ends = [beyond(joint, joint.predecessor) - moves[joint.successor] for joint in cuts]
+    for joint, signs in zip(cuts, ends, strict=True):
+        gap = screws * signs
+        if joint.type is JointType.SPHERICAL:
+            gap = gap[:, :3] - hat(_centre(joint, moved[joint.predecessor]) / twin.length) @ gap[:, 3:]
+        rows.append(gap)
+    return np.concatenate(rows, axis=1), screws * moves[link]
+
+
+def _screws(joint: Joint, A: Array, B: Array, length: float) -> Array:
+    """The twists (n, 6, k) at the base's origin for unit velocities of a joint's coordinates, A and B (n, 4, 4) what
+    brought its links from the zero configuration."""
+    R, slides, turns = A[:, :3, :3], np.zeros((0, 3)), np.array(joint.axes).reshape(-1, 3)
+    match joint.type:
+        case JointType.PRISMATIC:
+            slides, turns = turns, slides
+        case JointType.CYLINDRICAL:
+            slides = turns
+        case JointType.SPHERICAL:
+            turns = np.eye(3)
+        case JointType.PLANAR:
+            x = across(joint.axis)
+            slides = np.array([x, cross(joint.axis, x)])
+    turned = R @ turns.T
+    if joint.type is JointType.UNIVERSAL:
+        turned[:, :, 1] = B[:, :3, :3] @ turns[1]
+    arms = hat(_centre(joint, A) / length) @ turned
+    slid = R @ slides.T
+    return np.concatenate([np.concatenate([slid, np.zeros_like(slid)], axis=1),
+                           np.concatenate([arms, turned], axis=1)], axis=2)
+
+
+def _centre(joint: Joint, A: Array) -> Array:
+    return np.asarray(A[:, :3, :3] @ joint.point + A[:, :3, 3])
+
+
+def _moved(twin: PinocchioModel, frames: Mapping[str, Array]) -> dict[str, Array]:
+    """What brought each link from the zero configuration to poses (n, 4, 4)."""
+    return {name: X @ inverse(twin.mechanism.links[name].pose) for name, X in frames.items()}
 
 
 def _coordinates(joint: Joint, R: Array, shift: Array) -> list[Array]:
@@ -234,7 +294,7 @@ def _coordinates(joint: Joint, R: Array, shift: Array) -> list[Array]:
         case JointType.SPHERICAL:
             return [quaternions(R)[:, [1, 2, 3, 0]]]
         case JointType.PLANAR:
-            x = np.linalg.svd(joint.axis[None, :])[2][1]
+            x = across(joint.axis)
             return [shift @ x[:, None], shift @ np.cross(joint.axis, x)[:, None], _angle(R, joint.axis)]
         case _:
             return []

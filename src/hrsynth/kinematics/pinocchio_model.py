@@ -41,7 +41,8 @@ class PinocchioModel:
         for joint, parent in tree:
             self._add_tree(joint, parent)
         constraints = [self._loop(joint) for joint in loops]
-        self._spanned = [joint for joint, _ in tree], loops
+        self.spanned = tuple(joint for joint, _ in tree), tuple(loops)
+        """The joints of the tree, from the base outwards, and those at which loops are cut."""
         self._gears = self._gear_rows()
         if self.model.nv > LARGEST_MODEL:
             raise BadRequest(f"{mechanism.name}: joints with {self.model.nv} coordinates", None,
@@ -76,7 +77,7 @@ class PinocchioModel:
     def loops(self) -> tuple[str, ...]:
         """The names of the loops, as the file has them: each cut that the file has elsewhere is called by a loop of the
         file in the ring that it closes, no two by the same (the exchange of two spanning trees)."""
-        tree, cuts = self._spanned
+        tree, cuts = self.spanned
         way: dict[str, frozenset[str]] = {self.mechanism.base: frozenset()}
         for joint, near, far in graphs.outward(self.mechanism.base, tree):
             way[far] = way[near] | {joint.name}
@@ -133,7 +134,7 @@ class PinocchioModel:
             case JointType.SPHERICAL:
                 return [pin.JointModelSpherical()]
             case JointType.PLANAR:
-                x = _across(turned.axis)
+                x = across(turned.axis)
                 return [pin.JointModelPrismaticUnaligned(x),
                         pin.JointModelPrismaticUnaligned(cross(turned.axis, x)),
                         pin.JointModelRevoluteUnaligned(turned.axis)]
@@ -330,7 +331,7 @@ class PinocchioModel:
                 case JointType.REVOLUTE | JointType.UNIVERSAL:
                     step[places] = turns_about(np.array(own.axes), R)
                 case JointType.PRISMATIC | JointType.CYLINDRICAL | JointType.PLANAR:
-                    x = _across(own.axis)
+                    x = across(own.axis)
                     slides = [x, cross(own.axis, x)] if own.type is JointType.PLANAR else [own.axis]
                     turn = turns_about(own.axis[None], R)[: len(places) - len(slides)]
                     step[places] = [*(axis @ shift for axis in slides), *turn]
@@ -353,6 +354,6 @@ class PinocchioModel:
         return [i for joint in self.mechanism.joints.values() if joint.actuated for i in self.coordinates[joint.name]]
 
 
-def _across(axis: Array) -> Array:
+def across(axis: Array) -> Array:
     """The first direction in which a planar joint with this normal slides."""
     return np.asarray(np.linalg.svd(axis[None, :])[2][1])
