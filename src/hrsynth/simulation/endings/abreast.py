@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...budgets import FLOW_STEPS
+from ...budgets import FLOW_KEPT, FLOW_STEPS
 from ...geometry.vectors import Array, times
 from ...progress import tell
 from ...results import Value
@@ -87,6 +87,9 @@ class Abreast:
         self.stopped = np.full(n, "", dtype="U8")
         self.weak = np.zeros(n, dtype=bool)
         self.pointed = np.array([flow.points[flow.legs.index(name)] for name in flow.watched])
+        d = flow.batch.span.shape[1]
+        self.slopes, self.old = np.zeros((n, d, d)), np.full(n, FLOW_KEPT)
+        """∂ẏ/∂y of each run, and for how many steps it is kept."""
         self.roots = np.repeat(flow.roots(flow.batch.home[None], self.flipped[:1])[0], n, axis=0)
         self.taken = np.repeat(flow.batch.home[None], n, axis=0)
 
@@ -118,18 +121,23 @@ class Abreast:
         """One step of each; where it is too long, or leaves what is reached, a shorter one is next."""
         flow, chart = self.flow, (self.X[live], self.flipped[live], self.active[live], self.roots[live])
         X, flipped, active, root = chart
-        n, d = here.velocity.shape
+        d = here.velocity.shape[1]
         h, f = self.steps[live][:, None], here.velocity
 
-        def rate(y: Array) -> tuple[Array, Flags]:
+        def rate(y: Array, runs: slice | Places = slice(None)) -> tuple[Array, Flags]:
             """ẏ at one or several coordinates of each run's chart, (m n, d)."""
-            X, *rest = (np.tile(each, (len(y) // n, *[1] * (each.ndim - 1))) for each in chart)
+            X, *rest = (np.tile(each[runs], (len(y) // len(each[runs]), *[1] * (each.ndim - 1))) for each in chart)
             there = flow.at(flow.moved(X, y), *rest)
             return flow.rate(y, there.velocity), there.reached
 
-        ahead, met = rate(np.repeat(FLOW_SLOPE * np.eye(d), n, axis=0))
-        slope = np.where(met[:, None], ahead - np.tile(f, (d, 1)), 0.0) / FLOW_SLOPE
-        J = slope.reshape(d, n, d).transpose(1, 2, 0)
+        # any slopes give order 2: those of a run are kept for some steps while the law changes evenly
+        anew = np.flatnonzero(self.old[live] >= FLOW_KEPT)
+        if len(anew):
+            ahead, met = rate(np.repeat(FLOW_SLOPE * np.eye(d), len(anew), axis=0), anew)
+            slope = np.where(met[:, None], ahead - np.tile(f[anew], (d, 1)), 0.0) / FLOW_SLOPE
+            self.slopes[live[anew]] = slope.reshape(d, -1, d).transpose(1, 2, 0)
+            self.old[live[anew]] = 0
+        J = self.slopes[live]
         W = np.linalg.inv(np.eye(d) - GAMMA * h[:, :, None] * J)
 
         def solved(rhs: Array) -> Array:
@@ -158,6 +166,8 @@ class Abreast:
         self.steps[live] = np.minimum(self.steps[live] * factor, LONGEST_STEP)
         here = _merged(here, there, good)
         changed = self._stretched(live, here, met) | self._released(live, here, good) | self._weakened(live, here, good)
+        uneven = changed | (here.weakest < FLOW_WEAK * DAMPED) | (~good & (self.old[live] > 0))
+        self.old[live] = np.where(uneven, FLOW_KEPT, self.old[live] + good)
         if changed.any():
             here = _merged(here, self._at(live), changed)
             self.stopped[live[changed & ~here.reached]] = LOST

@@ -240,7 +240,7 @@ class BasinSearch:
                                  outcome.size, len(here), len(here) / counts.sum(), example))
         return Basins(self.setting, motion.pose(self.goal.pose(motion.link)), self.goal, grid, tuple(ends),
                       cells.reshape(grid.shape), found.damped.reshape(grid.shape), self.flow is not None,
-                      found.followed, found.checked, found.agreed, certified_radius(self.setting, self.goal))
+                      found.followed, found.checked, found.agreed, found.certified)
 
     def _example(self, X: Array) -> Pose:
         """Of the starts X (n, 4, 4) that end alike the one nearest to their middle, if small steps lead there from the
@@ -267,8 +267,12 @@ class BasinSearch:
         if not len(starts):
             return Found([], cells, damped, X)
         horizon = self.task.conditions.horizon * self.task.law.gain
-        parts = [X[starts[k : k + FLOW_PART]] for k in range(0, len(starts), FLOW_PART)]
-        runs = Runs.joined(self._done(partial(_followed, flow.bare(), horizon, RUN_AWAY * length), parts))
+        # each part from all over the grid, so that all take as long
+        count = -(-len(starts) // FLOW_PART)
+        shares = [starts[k::count] for k in range(count)]
+        starts = np.concatenate(shares)
+        runs = Runs.joined(self._done([partial(_followed, flow.bare(), horizon, RUN_AWAY * length, X[share])
+                                       for share in shares]))
         damped[starts] = runs.weak
         groups = runs.groups(length, flow.seen)
         shown = groups[:FLOW_NAMED]
@@ -279,7 +283,7 @@ class BasinSearch:
         firsts = [*away[:1], *followed, *checked]
         at = flow.configurations(runs.X[[group[0] for group in shown]], runs.flipped[[group[0] for group in shown]])
         at += flow.configurations(X[starts[firsts]], np.zeros((len(firsts), len(flow.legs)), dtype=bool))
-        told = self._simulated(at)
+        told, certified = self._simulated(at)
         numbers, outcomes = np.full(len(starts), -1), Outcomes(length)
         for group, outcome in zip(shown, told, strict=False):
             numbers[group] = outcomes.number(_at(outcome, runs.X[group[0]], length))
@@ -294,7 +298,7 @@ class BasinSearch:
                 for run, outcome in zip(checked, rest[len(followed):], strict=True)]
         numbers[numbers < 0] = outcomes.number(Outcome(Ending(UNDECIDED, "not followed to an end")))
         cells[starts] = numbers
-        return Found(outcomes.all, cells, damped, X, len(followed), len(same), sum(same))
+        return Found(outcomes.all, cells, damped, X, len(followed), len(same), sum(same), certified)
 
     def _one_by_one(self, X: Array, grid: Grid) -> Found:
         """The outcomes of the starts of a grid, each simulated; X (n, 4, 4) are its poses with free parts as at home.
@@ -303,26 +307,29 @@ class BasinSearch:
         at = sweep(everything.start, everything.question, grid, self.setting.motion, self.setting.placer)
         starts = np.array([i for i, each in enumerate(at) if each is not None], dtype=int)
         cells, outcomes = np.full(len(at), NOT_REACHED), Outcomes(self.goal.twin.length)
-        for i, outcome in zip(starts, self._simulated([at[i] for i in starts]), strict=True):
+        told, certified = self._simulated([at[i] for i in starts])
+        for i, outcome in zip(starts, told, strict=True):
             cells[i] = outcomes.number(outcome)
         reached = np.array([there if each is None else each.pose(self.setting.motion.link)
                             for each, there in zip(at, X, strict=True)])
-        return Found(outcomes.all, cells, np.zeros(len(at), dtype=bool), reached, len(starts))
+        return Found(outcomes.all, cells, np.zeros(len(at), dtype=bool), reached, len(starts), certified=certified)
 
-    def _simulated(self, starts: Sequence[ClosedConfiguration | None]) -> list[Outcome]:
-        """The outcomes of single runs; undecided where there is no start."""
+    def _simulated(self, starts: Sequence[ClosedConfiguration | None]) -> tuple[list[Outcome], CertifiedRadius]:
+        """The outcomes of single runs, undecided where there is no start; and what is certified, at the same time."""
         parts = [starts[k : k + FLOW_SINGLE] for k in range(0, len(starts), FLOW_SINGLE)]
-        return list(chain.from_iterable(self._done(partial(_simulated, self.task), parts)))
+        certified, *told = self._done([partial(certified_radius, self.setting, self.goal),
+                                       *(partial(_simulated, self.task, part) for part in parts)])
+        return list(chain.from_iterable(told)), certified
 
-    def _done(self, work: Callable[[Any], Any], parts: Sequence[Any]) -> list[Any]:
-        """What the parts give, in their order."""
-        if self.jobs == 1 or len(parts) == 1:
-            return [work(part) for part in parts]
+    def _done(self, works: Sequence[Callable[[], Any]]) -> list[Any]:
+        """What pieces of work give, in their order."""
+        if self.jobs == 1 or len(works) == 1:
+            return [work() for work in works]
         from joblib import Parallel, delayed
 
         found = []
-        for each in Parallel(n_jobs=min(self.jobs, len(parts)), batch_size=1, return_as="generator")(
-                delayed(work)(part) for part in parts):
+        for each in Parallel(n_jobs=min(self.jobs, len(works)), batch_size=1, return_as="generator")(
+                delayed(work)() for work in works):
             tell("run")
             found.append(each)
         return found

@@ -17,14 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...batch.engine import Batch
-from ...batch.placing import Placer, coordinates
+from ...batch.placing import Placer, rates
 from ...closed_forms.legs import ClosedFormLeg, SlidingRod
-from ...geometry.screws import point_velocity
 from ...geometry.so3 import exponential
-from ...geometry.vectors import Array, hat, times
+from ...geometry.vectors import Array, cross, hat, times
 from ...kinematics.configuration import ClosedConfiguration
 from ...results import Value
-from ...tolerances import DAMPED, FLOW_SLOPE, SOLVED
+from ...tolerances import DAMPED, FLOW_SLOPE, FLOW_WEAK, SOLVED
 
 Flags = NDArray[np.bool_]
 Places = NDArray[np.int64]
@@ -32,9 +31,9 @@ Places = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Commanded(Value):
-    """What the law commands at n poses: ẋ (n, d), ‖e‖ (n,), the smallest singular value of L S (n,), the legs' reach
-    margins (n, legs) as parts of those at home, whether all but active legs reach (n,), and which active legs hold the
-    platform (n, legs)."""
+    """What the law commands at n poses: ẋ (n, d), ‖e‖ (n,), the smallest singular value of L S (n,; as ``damped`` tells
+    it), the legs' reach margins (n, legs) as parts of those at home, whether all but active legs reach (n,), and which
+    active legs hold the platform (n, legs)."""
 
     velocity: Array
     size: Array
@@ -86,7 +85,7 @@ class Flow(Value):
         margins /= self._home
         reached = np.all((margins > 0) | active, axis=1) & np.isfinite(M).all(axis=(1, 2, 3))
         u[~reached], M[~reached] = self.desired, 0.0
-        error = np.cross(u, self.desired).reshape(n, 3 * k, 1)
+        error = cross(u, self.desired).reshape(n, 3 * k, 1)
         # L_iᵀ = −[u_di]ₓ M_iᵀ
         L = -(hat(self.desired) @ M).reshape(n, 3 * k, d)
         scaled = L @ root
@@ -138,20 +137,16 @@ class Flow(Value):
     def roots(self, X: Array, flipped: Flags) -> tuple[Array, Flags]:
         """S (n, d, d) at poses: S² = P Pᵀ, P the platform's coordinates for joint velocities that keep the loops
         closed; and where the robot was found closed."""
-        twin, span = self.placer.twin, self.batch.span
-        J, V = np.zeros((len(X), len(twin.jacobian(twin.q0)), twin.nv)), np.zeros((len(X), span.shape[1], twin.nv))
-        closed = np.zeros(len(X), dtype=bool)
-        inverse = np.linalg.pinv(span)
+        twin, coordinates, inverse = self.placer.twin, self.batch.coordinates, np.linalg.pinv(self.batch.span)
+        square, closed = np.empty((len(X), len(inverse), len(inverse))), np.zeros(len(X), dtype=bool)
         for bits, some in _groups(flipped):
             frames, closed[some] = self.placed(bits).frames(X[some])
-            for i, q in zip(some, coordinates(twin, frames), strict=True):
-                J[i] = twin.jacobian(q)
-                (pose,), (rates,) = twin.frames(q, (self.batch.coordinates.link,))
-                arm = pose[:3, :3] @ self.batch.coordinates.point / twin.length
-                V[i] = inverse @ np.vstack([point_velocity(rates, arm) * twin.length, rates[3:]])
-        across = J @ V.transpose(0, 2, 1)
-        inner = J @ J.transpose(0, 2, 1) + SOLVED * np.eye(J.shape[1])
-        square = V @ V.transpose(0, 2, 1) - across.transpose(0, 2, 1) @ np.linalg.solve(inner, across)
+            J, V = rates(twin, frames, coordinates.link)
+            arms = hat(coordinates.place(X[some])[0] / twin.length)
+            V = inverse @ np.concatenate([(V[:, :3] - arms @ V[:, 3:]) * twin.length, V[:, 3:]], axis=1)
+            inner = J @ J.transpose(0, 2, 1) + SOLVED * np.eye(J.shape[1])
+            across = J @ V.transpose(0, 2, 1)
+            square[some] = V @ V.transpose(0, 2, 1) - across.transpose(0, 2, 1) @ np.linalg.solve(inner, across)
         values, Q = np.linalg.eigh(square)
         return Q * np.sqrt(np.maximum(values, 0.0))[:, None] @ Q.transpose(0, 2, 1), closed
 
@@ -185,10 +180,19 @@ class Flow(Value):
 
 
 def damped(A: Array, g: Array) -> tuple[Array, Array]:
-    """−V max(Σ², DAMPED²)⁻¹ Vᵀ g (n, d) for A = V Σ² Vᵀ (n, d, d), as ``law.inverted``; the smallest of Σ (n,)."""
-    values, V = np.linalg.eigh(A)
-    inside = V.transpose(0, 2, 1) @ g[..., None] / np.maximum(values, DAMPED**2)[..., None]
-    return -(V @ inside)[..., 0], np.sqrt(np.maximum(values[:, 0], 0.0))
+    """−V max(Σ², DAMPED²)⁻¹ Vᵀ g (n, d) for A = V Σ² Vᵀ (n, d, d), as ``law.inverted``; the smallest of Σ (n,), of
+    which only a lower bound is told from ``FLOW_WEAK`` times ``DAMPED`` on."""
+    velocity = np.empty_like(g)
+    # the norm of (A + ε)⁻¹ is at least 1 / (λ + ε) for the least eigenvalue λ of A
+    extra = 0.1 * DAMPED**2
+    least = 1 / np.linalg.norm(np.linalg.inv(A + extra * np.eye(A.shape[1])), axis=(1, 2)) - extra
+    weak = least < (FLOW_WEAK * DAMPED) ** 2
+    weakest = np.sqrt(np.maximum(least, 0.0))
+    velocity[~weak] = -np.linalg.solve(A[~weak], g[~weak, :, None])[..., 0]
+    values, V = np.linalg.eigh(A[weak])
+    inside = V.transpose(0, 2, 1) @ g[weak, :, None] / np.maximum(values, DAMPED**2)[..., None]
+    velocity[weak], weakest[weak] = -(V @ inside)[..., 0], np.sqrt(np.maximum(values[:, 0], 0.0))
+    return velocity, weakest
 
 
 def _along(normals: Array, A: Array, g: Array) -> tuple[Array, Array, Array]:

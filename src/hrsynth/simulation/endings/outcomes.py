@@ -11,6 +11,7 @@ from ...results import Value
 from ...tolerances import RUNS_ALIKE
 from ..ending import BOUNDARY, Ending
 from .flow import Flags, Places
+from .radius import CertifiedRadius
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -41,6 +42,7 @@ class Found:
     followed: int = 0
     checked: int = 0
     agreed: int = 0
+    certified: CertifiedRadius | None = None
 
 
 class Outcomes:
