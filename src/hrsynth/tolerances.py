@@ -397,6 +397,8 @@ CERTIFIED_LEVEL = 0.95
 """Part of the error at which a ray is seen to stop rising up to which it is tried to prove that all rays rise."""
 RADIUS_SHARES = (0.97, 0.9, 0.8, 0.65, 0.5, 0.3)
 """Parts of the radius that rays show that are tried, one after the other, as the certified one."""
+INWARD_SHARES = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
+"""The same of a ball into which the law leads."""
 MET_AGAIN = 1e-7
 """Half the edge (characteristic lengths, radians) of the smallest box in which it is tried to prove one critical point:
 the file's numbers are known to a hundredth of that."""

@@ -865,12 +865,13 @@ class BasinEndRecord(TypedDict):
 
 class CertifiedRecord(TypedDict):
     """From how far around the goal every start is proved to end there, and what part that is of the goal's basin among
-    the starts."""
+    the starts; from how far as long as the law is not damped, where that is farther."""
 
     words: str
     radius_m: float
     radius_rad: Number
     covered: float
+    undamped: str | None
 
 
 class BasinsAnswer(OfRobot, WrittenTo):

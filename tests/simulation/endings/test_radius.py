@@ -13,6 +13,7 @@ from hrsynth.geometry.affine import affine
 from hrsynth.geometry.so3 import exponential, logarithm
 from hrsynth.mechanism.model import Limits
 from hrsynth.simulation.endings.cones import ConeProver, RisingCones
+from hrsynth.simulation.endings.inward import InwardProver, inward_radius
 from hrsynth.simulation.endings.pose_error import PoseError
 from hrsynth.simulation.endings.radius import CERTIFIED, UNDECIDED, certified_radius
 from hrsynth.simulation.law import inverted
@@ -95,6 +96,50 @@ def test_enclosures_hold_the_error_and_its_rates(name, legs):
         assert np.all(bounds.low[kept] <= E[kept] * (1 + 1e-9))
         assert np.all(E[kept] <= bounds.high[kept] * (1 + 1e-9))
         assert np.all(bounds.rise[kept] <= slope[kept] / t[kept] + 1e-9)
+
+
+@pytest.mark.parametrize(("name", "legs"), [("quattro", "1,4"), ("3rpr_m1", None), ("delta", None)])
+def test_boxes_that_lead_inwards_do_so_at_all_their_poses(name, legs):
+    setting = ObservedRobot.of(name, legs)
+    error = PoseError.of(setting, setting.configurations[0])
+    n, rng = error.size, np.random.default_rng(0)
+    middle, half = rng.normal(size=(300, n)) / 5, rng.uniform(0, 0.02, (300, n))
+    proved, _ = InwardProver.of(error).inwards(middle, half)
+    assert 10 < proved.sum() < 300
+    for _ in range(20):
+        x = (middle + half * rng.uniform(-1, 1, (300, n)))[proved]
+        for pose, miss, rows in zip(x, *error.numbers(x, np.eye(n)), strict=True):
+            assert pose @ np.linalg.lstsq(rows, miss)[0] > 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "legs", "least"), [
+    ("quattro", "1,4", 0.017), ("delta", None, 0.11), ("3rrr_m1", None, 0.010), ("gough_stewart", None, 0.0033)])
+def test_the_law_without_damping_leads_inwards(name, legs, least):
+    """From all over the ball runs end at the goal, on whose way nothing is damped."""
+    setting = ObservedRobot.of(name, legs)
+    found = certified(setting)
+    reach = found.goal.twin.length * found.undamped
+    assert reach > max(least, found.length)
+    assert found.undamped_words is not None
+    wide = replace(found, length=reach, angle=None if found.angle is None else found.undamped)
+    assert np.all(ends(setting, wide, starts(wide, np.random.default_rng(4), 200)) < 1e-6)
+
+
+def test_a_ball_ends_before_the_law_leads_away():
+    """The first pose along many rays at which it does is a little beyond the ball that is proved."""
+    setting = ObservedRobot.of("rrrrr_m1")
+    error = PoseError.of(setting, setting.everything.start)
+    radius, _ = inward_radius(error)
+    turn = np.linspace(0, 2 * np.pi, 400)
+    rays = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    first = np.inf
+    for t in np.linspace(0.01, 1, 200):
+        e, J = error.numbers(t * rays, np.eye(2))
+        if not error.levels(t * rays)[0].all() or np.any(np.einsum("ni,nij,nj->n", rays, np.linalg.pinv(J), e) <= 0):
+            first = t
+            break
+    assert 0.7 * first < radius < first
 
 
 def test_roots_and_inverses_of_forms_hold_those_of_numbers():

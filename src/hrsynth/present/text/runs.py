@@ -99,7 +99,8 @@ def basins(found: Basins) -> str:
     rows.append(("found", notes))
     if found.certified is not None:
         part = f": {100 * found.covered:.2g} % of its basin, as far as that is drawn" if found.certified.length else ""
-        rows.append(("certified", f"{found.certified.words}{part}"))
+        farther = found.certified.undamped_words
+        rows.append(("certified", [f"{found.certified.words}{part}", *([farther] if farther else [])]))
     return listing(rows)
 
 

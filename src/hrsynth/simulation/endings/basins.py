@@ -155,7 +155,8 @@ class Basins(Result, shown_as="basins"):
                 "damped": int(np.sum(self.damped)), "abreast": self.abreast, "followed": self.followed,
                 "checked": self.checked, "agreed": self.agreed,
                 "certified": {"words": self.certified.words, "radius_m": self.certified.length,
-                              "radius_rad": self.certified.angle, "covered": self.covered} if self.certified else None}
+                              "radius_rad": self.certified.angle, "covered": self.covered,
+                              "undamped": self.certified.undamped_words} if self.certified else None}
 
 
 @question()

@@ -120,28 +120,31 @@ class ConeProver:
 
         e = J̄ w and its rate is J w, J̄ the mean of J on the way from the goal: with |J − Q| ≤ δ and |J̄ − Q| ≤ δ̄, and
         σ, Σ the extreme singular values of Q, wᵀ J̄ᵀ J w ≥ (σ² − Σ (δ + δ̄) − δ δ̄) |w|²."""
-        n, rho = self.error.size, 1.0
-        values = np.linalg.svd(self.Q, compute_uv=False)
+        rho, values = 1.0, np.linalg.svd(self.Q, compute_uv=False)
         for _ in range(40):
-            off = rho * np.eye(n)
-            # noise ε = w / ρ: x = W w
-            forms = [affine(np.zeros(1), (row @ off)[None], np.full(1, AFFINE_ROUNDING * rho * np.abs(row).sum()))
-                     for row in self.W]
-            found = self.jacobian.at(forms)
-            margins, rates = found[: len(self.error.limbs)], found[len(self.error.limbs):]
-            slopes = np.array([each.v[1:, 0] for each in rates]).reshape(*self.Q.shape, n)
-            shift = np.array([each.v[0, 0] for each in rates]).reshape(self.Q.shape) - self.Q
-            rest = np.linalg.norm(np.abs(shift) + np.array([each.r[0] for each in rates]).reshape(self.Q.shape))
-            if not np.isfinite(slopes).all():
-                rho *= 0.8
-                continue
-            linear = np.sqrt(np.linalg.norm(np.einsum("ijk,ilk->jl", slopes, slopes), 2)) * (1 + FOLLOWED)
-            d, mean = linear + rest, linear / 2 + rest
+            d, mean = self.changes(rho)
             bound = values[-1] ** 2 * (1 - FOLLOWED) - values[0] * (1 + FOLLOWED) * (d + mean) - d * mean
-            if bound > 0.1 * values[-1] ** 2 and all(each.low[0] > 0 for each in margins):
+            if bound > 0.1 * values[-1] ** 2:
                 return rho, float(bound)
             rho *= 0.8
         return 0.0, 0.0
+
+    def changes(self, rho: float) -> tuple[float, float]:
+        """δ and δ̄ of a ball |w| ≤ ρ, infinite where not all of it is reached."""
+        n = self.error.size
+        off = rho * np.eye(n)
+        # noise ε = w / ρ: x = W w
+        forms = [affine(np.zeros(1), (row @ off)[None], np.full(1, AFFINE_ROUNDING * rho * np.abs(row).sum()))
+                 for row in self.W]
+        found = self.jacobian.at(forms)
+        margins, rates = found[: len(self.error.limbs)], found[len(self.error.limbs):]
+        slopes = np.array([each.v[1:, 0] for each in rates]).reshape(*self.Q.shape, n)
+        shift = np.array([each.v[0, 0] for each in rates]).reshape(self.Q.shape) - self.Q
+        rest = np.linalg.norm(np.abs(shift) + np.array([each.r[0] for each in rates]).reshape(self.Q.shape))
+        if not (np.isfinite(slopes).all() and all(each.low[0] > 0 for each in margins)):
+            return np.inf, np.inf
+        linear = np.sqrt(np.linalg.norm(np.einsum("ijk,ilk->jl", slopes, slopes), 2)) * (1 + FOLLOWED)
+        return float(linear + rest), float(linear / 2 + rest)
 
     @cached_property
     def square(self) -> tuple[float, float]:

@@ -2,7 +2,8 @@
 
 In cones about the goal the error E = ½‖e‖² is proved to rise along every ray until it is at least c. Then no run, along
 which E falls, leaves the component of {E < c} that holds the goal; the goal is its only critical point; and all starts
-within r lie in it, if E is enclosed below c there. That holds for the damped law as for the exact one.
+within r lie in it, if E is enclosed below c there. That holds for the damped law as for the exact one. Of the exact
+one a larger ball is proved, into which it leads (:mod:`.inward`).
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from ...kinematics.platform_motion import PlatformMotion
 from ...results import Value
 from ...tolerances import AFFINE_ROUNDING, CERTIFIED_LEVEL, FOLLOWED, RADIUS_SHARES, RANK_CUTOFF
 from .cones import ConeProver, ProvedCones, cut, prove_cones
+from .inward import inward_radius
 from .pose_error import NotEnclosed, PoseError
 
 CERTIFIED, UNDECIDED = "certified", "undecided"
@@ -44,6 +46,8 @@ class CertifiedRadius(Value):
     least: float
     boxes: int
     reason: str
+    undamped: float = 0.0
+    """The same of the law where it is not damped (characteristic lengths, radians)."""
 
     @property
     def verdict(self) -> str:
@@ -55,8 +59,21 @@ class CertifiedRadius(Value):
         """From where every start ends at the goal."""
         if not self.length:
             return f"undecided: {self.reason}"
-        turn = "" if self.angle is None else f" and {np.degrees(self.angle):.2g}°"
-        return f"from anywhere within {1e3 * self.length:.3g} mm{turn} of the goal"
+        return f"from anywhere {self._within(self.length, self.angle)}"
+
+    @property
+    def undamped_words(self) -> str | None:
+        """From where, as long as the law is not damped; None where that is not farther."""
+        length = self.goal.twin.length * self.undamped
+        if length <= self.length:
+            return None
+        within = self._within(length, None if self.angle is None else self.undamped)
+        return f"proved where the law is not damped: {within}"
+
+    @staticmethod
+    def _within(length: float, angle: float | None) -> str:
+        turn = "" if angle is None else f" and {np.degrees(angle):.2g}°"
+        return f"within {1e3 * length:.3g} mm{turn} of the goal"
 
     def holds(self, X: Array) -> bool:
         """Whether a platform pose X (4, 4) is one of those starts."""
@@ -84,8 +101,18 @@ def certified_radius(setting: ObservedRobot, goal: ClosedConfiguration) -> Certi
     # |x| ≤ t |W| √n on the faces of the cube
     least = proved.rise / (error.size * float(np.linalg.norm(proved.prover.W, 2)) ** 2)
     reason = "forms of the legs and the error enclosed in cones about the goal"
-    return CertifiedRadius(goal, error.motion, reach * error.length, angle, proved.level, least, proved.boxes + boxes,
-                           reason)
+    ball, more = inward_radius(error)
+    return CertifiedRadius(goal, error.motion, reach * error.length, angle, proved.level, least,
+                           proved.boxes + boxes + more, reason, _product(ball) if error.turns.shape[1] else ball)
+
+
+def _product(radius: float) -> float:
+    """The largest r with r² + tan²(r / 2) ≤ ρ²: shifts and turns of at most r are in the ball."""
+    low, high = 0.0, radius
+    for _ in range(60):
+        middle = (low + high) / 2
+        low, high = (middle, high) if middle**2 + np.tan(middle / 2) ** 2 <= radius**2 else (low, middle)
+    return float(low)
 
 
 def _proved(error: PoseError) -> ProvedCones:
