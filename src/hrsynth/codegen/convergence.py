@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..analysis.branch.cells import TubeTrial, derivatives, drift, middles, residual
+from ..analysis.branch.cells import TubeTrial, derivatives, drift, inverses, middles, residual
 from ..analysis.branch.loops import curvatures
 from ..analysis.branch.part import LoopBlock, LoopEquation, LoopPart
 from ..budgets import BOUND_HALVINGS, CELLS_TOGETHER, MOST_BOUNDED, MOST_PARTS, NEWTON_STEPS_AT_RUN
@@ -111,17 +111,16 @@ class _Parts:
     known: bool
 
 
-def bounded_cells(branch: TubedBranch, part: TubePart, every: Sequence[int], rows: Sequence[int],
+def bounded_cells(branch: TubedBranch, part: TubePart, solved: Sequence[int], rows: Sequence[int],
                   equations: TracedFunction, closure: TracedFunction) -> list[BoundedCell]:
-    """The cells of a program that solves the equations with places ``rows`` among those that a part has to do with
-    (``every``: their places among all), by its own formulas. Where a cell is too large for a bound it is halved, with
-    thinner tubes inside its own."""
+    """The cells of a program that solves equations with places ``solved`` among all, ``rows`` in its closure, by its
+    own formulas. Where a cell is too large for a bound it is halved, with thinner tubes inside its own."""
     system = branch.system
     among: list[LoopEquation] = [LoopEquation(loop, row) for loop in system.loops for row in loop.rows]
     among += [LoopEquation(gear) for gear in system.gears]
-    block = LoopBlock(part.unknowns, tuple(among[every[i]] for i in rows))
+    block = LoopBlock(part.unknowns, tuple(among[i] for i in solved))
     loops = LoopPart(system, part.driven, part.unknowns, (block,), system.loops, system.gears)
-    code = _Code(branch, part, loops, [among[i] for i in every], equations, closure, list(rows))
+    code = _Code(branch, part, loops, equations, closure, list(rows))
     found: list[BoundedCell] = []
     nothing = np.full(len(rows), np.inf)
     left = [_Parts(BoundedCell(cell, 0, nothing, cell.radius, False), [cell], True) for cell in part.cells]
@@ -145,15 +144,19 @@ def bounded_cells(branch: TubedBranch, part: TubePart, every: Sequence[int], row
 
 @dataclass(frozen=True, eq=False)
 class _Code:
-    """What a program computes of a part: the solved equations, places ``rows`` among all, with their derivatives."""
+    """What a program computes of a part: the solved equations, ``rows`` of its closure, with their derivatives."""
 
     branch: TubedBranch
     part: TubePart
     loops: LoopPart
-    every: list[LoopEquation]
     equations: TracedFunction
     closure: TracedFunction
     rows: list[int]
+
+    @property
+    def solved(self) -> Sequence[LoopEquation]:
+        """The equations that it solves."""
+        return self.loops.blocks[0].equations
 
     @cached_property
     def units(self) -> Array:
@@ -196,9 +199,9 @@ class _Code:
             left.discard(candidates[0])
         return 4 * p**3 * 2.0 ** max(times) * UNIT_ROUNDOFF
 
-    def computed(self, trial: TubeTrial, radius: Array) -> tuple[Array, Array, Array, Array]:
-        """Errors of the solved equations (c, p) and of all (c, e), of each entry of a matrix (c,) with what its factors
-        add, and the largest sizes of the unknowns (c, p): by running errors over tubes."""
+    def computed(self, trial: TubeTrial, radius: Array) -> tuple[Array, Array, Array]:
+        """Errors of the solved equations (c, p), of each entry of a matrix (c,) with what its factors add, and the
+        largest sizes of the unknowns (c, p): by running errors over tubes."""
         c, p = trial.x.shape
         q = [RoundedNumber.of(0.0)] * len(self.branch.motors)
         x = [RoundedNumber.of(0.0)] * len(self.branch.passive)
@@ -210,17 +213,16 @@ class _Code:
             x[self.branch.passive.index(i)] = RoundedNumber.between(trial.x[:, k] - reach[:, k],
                                                                     trial.x[:, k] + reach[:, k])
         once, again = rounded(self.equations, q, x), rounded(self.closure, q, x)
-        closing = np.zeros((c, len(self.every)))
-        for (_, place), each in again.items():
-            closing[:, place[0]] = each.error
-        solved, sums, doubt = closing[:, self.rows], np.zeros((c, p)), np.zeros(c)
+        solved, sums, doubt = np.zeros((c, p)), np.zeros((c, p)), np.zeros(c)
+        for k, row in enumerate(self.rows):
+            for each in (once.get(("G", (k,))), again.get(("E", (row,)))):
+                if each is not None:
+                    solved[:, k] = np.maximum(solved[:, k], each.error)
         for (array, place), each in once.items():
-            if array == "G":
-                solved[:, place[0]] = np.maximum(solved[:, place[0]], each.error)
-            else:
+            if array == "J":
                 sums[:, place[0]] += each.size
                 doubt = np.maximum(doubt, each.error)
-        return (solved, closing, self.growth * sums.max(axis=1) + doubt, np.abs(trial.x) + reach)
+        return solved, self.growth * sums.max(axis=1) + doubt, np.abs(trial.x) + reach
 
 
 def _trial(loops: LoopPart, cells: Sequence[TubeCell]) -> TubeTrial:
@@ -233,27 +235,26 @@ def _trial(loops: LoopPart, cells: Sequence[TubeCell]) -> TubeTrial:
 def _bounds(code: _Code, cells: Sequence[TubeCell], known: Sequence[bool], wider: float) -> list[BoundedCell]:
     """Steps 1 to 4 of the head of this file; ``known``: which tubes hold a closure,
     ``wider`` the radius R, as part of the tube's."""
-    trial, every = _trial(code.loops, cells), code.every
+    trial, solved = _trial(code.loops, cells), code.solved
     (c, p), units = trial.x.shape, code.units
     own, one, near, last = list(range(p)), np.eye(p), GENERATED_NEAR * units, GENERATED_LAST_STEP * units
     with np.errstate(all="ignore"):
         # 1. where the closure is
         largest = (trial.radius / units).max(axis=-1)[:, None] * units
         wide = wider * (largest if wider == FREEST_WIDER else trial.radius) + 4 * near
-        at = derivatives(trial, every, own, wide)
-        Y = _inverses(at.by_own[..., code.rows, :].v[0])
-        P, M = _levelled(combined(Y, at.by_own[..., code.rows, :]), trial.symbols[0])
-        size, Q = P @ np.abs(Y), _curved(code, trial, wide, Y, P)
-        along = derivatives(trial, every, own, 0.0 * trial.radius)
-        g = (combined(Y, residual(trial, every)[..., code.rows]).size
-             + drift(combined(Y, along.along[..., code.rows, :])))
+        J = derivatives(trial, solved, own, wide).by_own
+        Y = inverses(J.v[0])
+        P, M = _levelled(combined(Y, J), trial.symbols[0])
+        size, Q = P @ np.abs(Y), _curved(solved, trial, wide, Y, P)
+        inside = derivatives(trial, solved, own, 0.0 * trial.radius)
+        g = combined(Y, residual(trial, solved)).size + drift(combined(Y, inside.along))
         back = _inverse_bound(M)
-        a = _times(back @ P, np.fmin(g, combined(Y, along.values[..., code.rows]).size))
+        a = _times(back @ P, np.fmin(g, combined(Y, inside.values).size))
         if code.part.exact:
             a = np.where(np.array(known)[:, None], np.fmin(trial.radius, a), a)
-        solved, closing, matrix, sizes = code.computed(trial, wide)
+        errors, matrix, sizes = code.computed(trial, wide)
         F = size.sum(axis=-1, keepdims=True) * matrix[:, None, None] * np.ones(p)
-        noise, rates = _times(size, solved), at.by_own.size
+        noise, rates = _times(size, errors), J.size
         rounding = (4 + len(trial.part.driven)) * UNIT_ROUNDOFF * sizes
         outer = _inverse_bound(M + F)
 
@@ -270,7 +271,7 @@ def _bounds(code: _Code, cells: Sequence[TubeCell], known: Sequence[bool], wider
             second = step(first, e + first / 2)
             alive &= _within(first, wide - a) & _within(second, wide - a)
             ends = (_within(e + first, near) & _within(first + second, last)
-                    & np.all((_times(rates, first) + closing)[:, code.rows] <= GENERATED_CLOSED, axis=-1))
+                    & np.all(_times(rates, first) + errors <= GENERATED_CLOSED, axis=-1))
             steps[alive & ends & (steps == 0)] = count
             e = np.maximum(first, second)
         # 4. what an answer is worth: the program's tube is wider by a step that is near
@@ -298,13 +299,13 @@ def _levelled(B: AffineForms, motors: int) -> tuple[Array, Array]:
     return P.size, (np.eye(p) - made).size
 
 
-def _curved(code: _Code, trial: TubeTrial, radius: Array, Y: Array, P: Array) -> Array:
+def _curved(solved: Sequence[LoopEquation], trial: TubeTrial, radius: Array, Y: Array, P: Array) -> Array:
     """Bounds (c, p, p, p) of |Y D²_xG|, the last two dimensions the unknowns."""
-    every, place, p = code.every, trial.part.place, len(trial.part.unknowns)
+    place, p = trial.part.place, len(trial.part.unknowns)
     forms = trial.forms(radius)
-    rows: list[dict[tuple[int, int], Any]] = [{} for _ in code.rows]  # gears are linear
+    rows: list[dict[tuple[int, int], Any]] = [{} for _ in solved]  # gears are linear
     for loop in trial.part.loops:
-        own = [(k, every[i].row) for k, i in enumerate(code.rows) if every[i].of is loop]
+        own = [(k, each.row) for k, each in enumerate(solved) if each.of is loop]
         found = curvatures(trial.part.system, loop, forms, [row for _, row in own if row is not None])
         for (k, _), slope in zip(own, found, strict=True):
             rows[k] = slope
@@ -346,14 +347,6 @@ def _within(e: Array, limit: Array) -> NDArray[np.bool_]:
     return np.asarray(np.all(e * BOUND_ROUNDING <= limit, axis=-1))
 
 
-def _inverses(A: Array) -> Array:
-    """Inverses (c, p, p), any that will do; zero where there is none."""
-    good = np.all(np.isfinite(A), axis=(-1, -2)) & (np.abs(np.linalg.det(A)) > 0)
-    found = np.zeros_like(A)
-    found[good] = np.linalg.pinv(A[good], rcond=UNIT_ROUNDOFF)
-    return found
-
-
 def _inverse_bound(M: Array) -> Array:
     """A bound (c, p, p) of |(1 − E)⁻¹| for all |E| ≤ M, nan where there is none: with v > 0 and M v < v it is at most
     N = (1 − M)⁻¹ ≥ 0, and with S ≥ 0 in floats and |1 − (1 − M) S| ≤ D, ‖D‖ = d < 1, N ≤ S (1 − D)⁻¹."""
@@ -361,7 +354,7 @@ def _inverse_bound(M: Array) -> Array:
     one = np.eye(p)
     good = np.all(np.isfinite(M), axis=(-1, -2))
     safe = np.where(good[:, None, None], M, 0.0)
-    S = np.abs(_inverses(one - safe))
+    S = np.abs(inverses(one - safe))
     v = S.sum(axis=-1)
     good &= np.all(_times(safe, v) * (1 + AFFINE_ROUNDING) < v, axis=-1)
     D = np.abs(one - (one - safe) @ S) + AFFINE_ROUNDING * p * (one + safe) @ S

@@ -102,7 +102,7 @@ def _part(branch: TubedBranch, tracer: FormulaTracer, part: TubePart) -> SourceP
     equations, slopes = tracer.loops(rows, part.unknowns, part.driven)
     lower, upper = branch.lower[driven], branch.upper[driven]
     closure, own = tracer.closure(every), [every.index(i) for i in rows]
-    bounded = bounded_cells(branch, part, every, own, equations, closure)
+    bounded = bounded_cells(branch, part, rows, own, equations, closure)
     units = np.array([branch.unit(i) for i in part.unknowns])
     tried = [each.tried(units) for each in bounded]
     root, nodes = cell_tree(lower, upper, [(cell.lower, cell.upper) for cell in tried])

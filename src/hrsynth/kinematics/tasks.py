@@ -100,13 +100,13 @@ class Target(Value):
         if point is not None:
             return np.array([x[:3, :3] @ point + x[:3, 3] - w[:3, :3] @ point - w[:3, 3]
                              for x, w in zip(X, wanted, strict=True)]) / length
-        turns = X[:, :3, :3] @ wanted[:, :3, :3].swapaxes(1, 2)
-        return np.concatenate([(X[:, :3, 3] - wanted[:, :3, 3]) / length, [logarithm(R) for R in turns]], axis=1)
+        return pose_errors(X, wanted, length)
 
 
-def pose_error(X: Array, wanted: Array, length: float) -> list[Array]:
-    """How far a pose is shifted (lengths) and turned from the one that is wanted."""
-    return [(X[:3, 3] - wanted[:3, 3]) / length, logarithm(X[:3, :3] @ wanted[:3, :3].T)]
+def pose_errors(X: Array, wanted: Array, length: float) -> Array:
+    """How far poses (n, 4, 4) are shifted (lengths) and turned from those that are wanted, (n, 6)."""
+    turns = X[:, :3, :3] @ wanted[:, :3, :3].swapaxes(1, 2)
+    return np.concatenate([(X[:, :3, 3] - wanted[:, :3, 3]) / length, [logarithm(R) for R in turns]], axis=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,10 +119,9 @@ class LinkPoses:
     def rows(self, twin: PinocchioModel, q: Array) -> tuple[Array, Array]:
         """Error (reached − wanted) and its Jacobian."""
         reached, velocities = twin.frames(q, tuple(link for link, _ in self.wanted))
-        errors = [part for X, (_, wanted) in zip(reached, self.wanted, strict=True)
-                  for part in pose_error(X, wanted, twin.length)]
+        missed = pose_errors(reached, np.array([X for _, X in self.wanted]), twin.length).ravel()
         error, rows = ([], []) if self.besides is None else ([each] for each in self.besides.rows(twin, q))
-        return np.concatenate([*errors, *error]), np.vstack([*velocities, *rows])
+        return np.concatenate([missed, *error]), np.vstack([*velocities, *rows])
 
 
 def solve(twin: PinocchioModel, q: Array, task: Task | None = None, *, tolerance: float = CLOSED,

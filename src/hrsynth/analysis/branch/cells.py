@@ -134,10 +134,7 @@ def _prove_block(trial: TubeTrial, block: LoopBlock) -> None:
     equations = block.equations if block.loop is None else turning(trial, block)
     at = derivatives(trial, equations, own, trial.radius)
     A = at.by_own
-    try:
-        Y = np.linalg.inv(A.v[0])
-    except np.linalg.LinAlgError:
-        Y = np.linalg.pinv(A.v[0])
+    Y = inverses(A.v[0])
     # Y G along x̃, as a whole and in mean value form: both hold, the sharper one counts
     e = (combined(Y, residual(trial, equations)).size + drift(combined(Y, at.along))
          + times(combined(Y, at.by_others).size, trial.radius))
@@ -170,6 +167,14 @@ def _prove_block(trial: TubeTrial, block: LoopBlock) -> None:
     trial.alive &= done
     if block.loop is not None:
         trial.alive &= _same_side(trial, block)
+
+
+def inverses(A: Array) -> Array:
+    """Approximate inverses (c, p, p), pseudo-inverses where one has none."""
+    try:
+        return np.asarray(np.linalg.inv(A))
+    except np.linalg.LinAlgError:
+        return np.asarray(np.linalg.pinv(np.nan_to_num(A)))
 
 
 def middles(low: Array, high: Array) -> tuple[Array, Array]:
