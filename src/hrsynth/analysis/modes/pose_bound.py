@@ -10,6 +10,8 @@ that of wᵏ S + I_t is the same unless the prime divides one certain minor, whi
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
 from typing import Any
@@ -18,6 +20,7 @@ import numpy as np
 
 from ...budgets import LARGEST_FORMS, MOST_INFINITE
 from ...geometry.vectors import Array
+from .conditions import PoseCondition
 from .pose_forms import ROTATION, SquareForms, exponents
 
 PRIME = (1 << 62) - 57
@@ -30,59 +33,133 @@ def residues(values: Array) -> Any:
     return flat.reshape(np.shape(values)) if np.shape(values) else flat[0]
 
 
-@lru_cache(maxsize=16)
-def _points(shape: tuple[int, int], t: int) -> tuple[Any, Any]:
-    """Random residues y (n, a) and s (n, m), as many as forms of the degree."""
-    count = len(exponents(shape, t))
-    values = np.random.default_rng(0).integers(1, PRIME, size=(count, sum(shape))).astype(object)
-    return values[:, :shape[0]], values[:, shape[0]:]
+@lru_cache(maxsize=64)
+def _random(shape: tuple[int, int], count: int) -> Any:
+    """Random residues y and s; shape (count, a + m)."""
+    return np.random.default_rng(0).integers(1, PRIME, size=(count, sum(shape))).astype(object)
+
+
+def _monomials(x: Any, exponents: Array) -> Any:
+    """Monomials at points x (points, unknowns); shape (forms, points)."""
+    powers = [x.T * 0 + 1]
+    for _ in range(int(exponents.max(initial=0))):
+        powers.append(powers[-1] * x.T % PRIME)
+    by = {(): x[:, 0] * 0 + 1}
+    for i in range(x.shape[1]):
+        by = {each: by[each[:-1]] * powers[each[-1]][i] % PRIME if each[-1] else by[each[:-1]]
+              for each in dict.fromkeys(map(tuple, exponents[:, :i + 1].tolist()))}
+    return np.array(list(by.values()), dtype=object).reshape(-1, len(x))
 
 
 @lru_cache(maxsize=32)
 def _values(shape: tuple[int, int], t: int, at: int) -> Any:
-    """The monomials of degree t at the points for degree ``at``; shape (forms, points)."""
-    x = np.hstack(_points(shape, at)).T
-    powers = [np.array([v * 0 + 1 for v in x])]
-    for _ in range(t):
-        powers.append(powers[-1] * x % PRIME)
-    found = []
-    for each in exponents(shape, t):
-        value = x[0] * 0 + 1
-        for i, e in enumerate(each):
-            value = value * powers[e][i] % PRIME if e else value
-        found.append(value)
-    return np.array(found, dtype=object)
+    """The monomials of degree t at the random points for degree ``at``; shape (forms, points)."""
+    return _monomials(_random(shape, len(exponents(shape, at))), exponents(shape, t))
 
 
-def dimensions(forms: SquareForms, t: int, most: int) -> list[int]:
-    """dim (wᵏ S + I_t) - dim I_t for k = 1 … ``most``, modulo the prime."""
-    from flint import nmod_mat
-
-    y, s = _points(forms.shape, t)
+def _conditions(forms: SquareForms, x: Any, others: Sequence[PoseCondition]) -> tuple[Any, list[Any]]:
+    """w and conditions, as forms, at points x; shape (points,) each."""
+    y, s = x[:, :forms.shape[0]], x[:, forms.shape[0]:]
     q = y @ residues(forms.poses.turns).T % PRIME
     w = np.sum(q * q, axis=1) % PRIME
     inverse = np.array([pow(int(v), -1, PRIME) for v in w], dtype=object)
     R = np.einsum("ikab,na,nb->nik", ROTATION.astype(int).astype(object), q, q) * inverse[:, None, None] % PRIME
     s = s * inverse[:, None] % PRIME
     heights = [(residues(np.array(c.h)) - (R @ residues(c.b)) @ residues(c.n)) % PRIME for c in forms.planes]
-    matrix = nmod_mat([[int(v) for v in row] for row in residues(forms.system)], PRIME).inv()
+    matrix = nmod(residues(forms.system)).inv()
     solved = np.array([[int(v) for v in row] for row in matrix.table()], dtype=object)
     p = np.column_stack([*heights, *s.T]) @ solved.T @ residues(forms.poses.moves).T % PRIME
-    rows = []
-    for c in forms.others:
+    found = []
+    for c in others:
         value = c.value((p + R @ residues(c.b)) % PRIME, R @ residues(c.c) % PRIME, residues) % PRIME
         for _ in range(c.degree):
             value = value * w % PRIME
-        rows.append(_values(forms.shape, t - 2 * c.degree, t) * value % PRIME)
+        found.append(value)
+    return w, found
+
+
+def nmod(rows: Any) -> Any:
+    """A matrix of residues."""
+    from flint import nmod_mat
+
+    return nmod_mat(rows.tolist(), PRIME)
+
+
+@dataclass(frozen=True, eq=False)
+class _Quotient:
+    """The forms modulo a condition of degree 2: those without the ``power`` of the unknown ``place``, at points
+    (points, unknowns) where the condition holds."""
+
+    place: int
+    power: int
+    points: Any
+
+    @classmethod
+    def of(cls, forms: SquareForms, t: int) -> _Quotient | None:
+        """Modulo the first condition, for degrees up to t; None where it gives no unknown, or points do not tell the
+        forms apart."""
+        (a, m), one = forms.shape, forms.others[0]
+        if one.degree > 1 or len(forms.others) < 2:
+            return None
+        for place in (*range(a, a + m), *range(a)):
+            power = 1 if place >= a else 2
+            kept = exponents(forms.shape, t)
+            kept = kept[kept[:, place] < power]
+            x, found = _random(forms.shape, len(kept) if power == 1 else 3 * len(kept) + 20), list[Any]()
+            c, b, d = _parabola(forms, x, place, one)
+            if not c[0] if power == 2 else not b[0]:
+                continue
+            for row, *of in zip(x, c, b, d, strict=True):
+                if (root := _root(*map(int, of))) is not None:
+                    found.append([*row[:place], root, *row[place + 1:]])
+            points = np.array(found[:len(kept)], dtype=object).reshape(-1, a + m)
+            told = len(points) == len(kept) and nmod(_monomials(points, kept)).rank() == len(kept)
+            return cls(place, power, points) if told else None
+        return None
+
+    def values(self, forms: SquareForms, t: int) -> Any:
+        """The forms of a degree that are left, at the points."""
+        every = exponents(forms.shape, t)
+        return _monomials(self.points, every[every[:, self.place] < self.power])
+
+
+def _parabola(forms: SquareForms, x: Any, place: int, one: PoseCondition) -> tuple[Any, Any, Any]:
+    """c, b, d of a condition c v² + b v + d of degree 2 in an unknown v, the others as they are at points."""
+    d, plus, minus = (_conditions(forms, np.hstack([x[:, :place], x[:, :1] * 0 + v, x[:, place + 1:]]), [one])[1][0]
+                      for v in (0, 1, PRIME - 1))
+    half = (PRIME + 1) // 2
+    return ((plus + minus) * half - d) % PRIME, (plus - minus) * half % PRIME, d
+
+
+def _root(c: int, b: int, d: int) -> int | None:
+    """A root of c v² + b v + d, where there is one; the prime is 3 modulo 4."""
+    if not c:
+        return -d * pow(b, -1, PRIME) % PRIME if b else None
+    square = (b * b - 4 * c * d) % PRIME
+    root = pow(square, (PRIME + 1) // 4, PRIME)
+    return (root - b) * pow(2 * c, -1, PRIME) % PRIME if root * root % PRIME == square else None
+
+
+def dimensions(forms: SquareForms, t: int, most: int) -> list[int]:
+    """dim (wᵏ S + I_t) - dim I_t for k = 1 … ``most``, modulo the prime."""
+    quotient = _Quotient.of(forms, t)
+    points, others = _random(forms.shape, len(exponents(forms.shape, t))), forms.others
+    if quotient is not None:
+        points, others = quotient.points, others[1:]
+
+    def values(degree: int) -> Any:
+        return _values(forms.shape, degree, t) if quotient is None else quotient.values(forms, degree)
+
+    w, found = _conditions(forms, points, others)
+    rows = [values(t - 2 * c.degree) * value % PRIME for c, value in zip(others, found, strict=True)]
     # what vanishes on I_t, on which wᵏ S has the rank that it has modulo I_t
-    kernel, size = nmod_mat(np.vstack(rows).tolist(), PRIME).nullspace()
+    kernel, size = nmod(np.vstack(rows)).nullspace()
     columns = np.array([[int(v) for v in row[:size]] for row in kernel.table()], dtype=object)
-    found = []
+    ranks = []
     for k in range(1, most + 1):
         columns = columns * w[:, None] % PRIME
-        found.append((nmod_mat(_values(forms.shape, t - 2 * k, t).tolist(), PRIME)
-                      * nmod_mat(columns.tolist(), PRIME)).rank())
-    return found
+        ranks.append((nmod(values(t - 2 * k)) * nmod(columns)).rank())
+    return ranks
 
 
 def bound(forms: SquareForms) -> tuple[int, int, int] | None:

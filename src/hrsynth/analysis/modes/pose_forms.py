@@ -206,7 +206,8 @@ def _times(shape: tuple[int, int], t: int, count: int, what: str) -> Array:
 
 def proposals(forms: SquareForms, t: int, number: int, k: int) -> tuple[Array, Array] | None:
     """All poses to rounding, from the forms of degree t, ``number`` of them on the multiples of wᵏ: coordinates y
-    (n, a), of unit quaternions, complex, and positions (n, 3); None where they are not told apart."""
+    (n, a), of unit quaternions, complex, and positions (n, 3); None where they are not told apart, or where there are
+    more functionals than isolated zeros could span: some zeros are not isolated, and then these are fewer."""
     from scipy.linalg import lstsq, qr
 
     shape = forms.shape
@@ -223,7 +224,7 @@ def proposals(forms: SquareForms, t: int, number: int, k: int) -> tuple[Array, A
         space = Q[:, int(np.sum(pivots > RANK_OF_FORMS * pivots[0])):]
     for step in range(k):
         space = _times(shape, t - 2 * step, count, "w")[0] @ space
-    if space.shape[1] < number:
+    if space.shape[1] < number or (not k and space.shape[1] > number):
         return None
     if k:
         space = np.linalg.svd(space, full_matrices=False)[0][:, :number]
