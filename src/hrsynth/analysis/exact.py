@@ -22,13 +22,13 @@ import math
 import random
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 
 from ..batch.platform_coordinates import frames_at
-from ..budgets import LARGEST_RANDOM
+from ..budgets import LARGEST_RANDOM, REMEMBERED
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.relation import Measurement, Relation
 from ..mechanism import Mechanism, Observation
@@ -127,6 +127,7 @@ class ExactArchitecture:
         """Why there are no instances; empty as long as there are."""
         self._places = {o.key: i for i, o in enumerate(self.observations)}
         self._instances: list[Instance] = []
+        self._answers: dict[tuple[tuple[str, ...], ...], ExactVerdict] = {}
         self._random = random.Random(0)
 
     def instance(self, number: int) -> Instance:
@@ -151,6 +152,12 @@ class ExactArchitecture:
 
     def verdict(self, observed: Sequence[Observation]) -> ExactVerdict:
         """The verdict for some of the observations."""
+        asked = tuple(o.key for o in observed)
+        if asked not in self._answers:
+            self._answers[asked] = self._verdict(observed)
+        return self._answers[asked]
+
+    def _verdict(self, observed: Sequence[Observation]) -> ExactVerdict:
         legs = labels_of(observed)
         try:
             seen, instances = self._rank(observed)
@@ -262,6 +269,7 @@ class ExactArchitecture:
         return best, INSTANCES
 
 
+@lru_cache(maxsize=REMEMBERED)
 def architecture(setting: ObservedRobot) -> ExactArchitecture:
     """The architecture of a robot, from its zero configuration and its samples."""
     everything = setting.everything
