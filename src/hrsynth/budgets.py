@@ -311,6 +311,8 @@ LARGEST_WORD = 12
 
 REMEMBERED = 32
 """Observed robots that are kept for further questions about them."""
+LEGS_HELD = 64
+"""Legs with their measurements held that are kept for other sets of legs of the same robot."""
 REMEMBERED_ANSWERS = 64
 """Answers that are kept where the same is asked again."""
 REMEMBERED_GRIDS = 2

@@ -8,15 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import combinations
 
 import numpy as np
 
+from ..budgets import LEGS_HELD
 from ..geometry.ranks import range_basis
 from ..geometry.vectors import Array, frozen, hat
 from ..kinematics.configuration import ClosedConfiguration
-from ..kinematics.locked import leg_twists, split
+from ..kinematics.locked import leg_twists_together, split_together
 from ..kinematics.relation import Measurement, relation
 from ..mechanism import JointType, Mechanism, Observation
 from ..mechanism.legs import Leg, LegDecomposition
@@ -117,7 +118,8 @@ def recognise(anatomy: LegDecomposition, question: Measurement, samples: Sequenc
             if leg is None:
                 return other
             locks[leg].append(each)
-    held = {leg.label: _held(anatomy, leg, locks[leg.label], question.reference, samples) for leg in anatomy.legs}
+    held = {leg.label: _held(anatomy, leg, tuple(locks[leg.label]), question.reference, tuple(samples))
+            for leg in anatomy.legs}
     alone = motions.shape[1:] == (6, 6) and not any(locks.values())
     if anatomy.mechanism.couplings and not alone:
         return other
@@ -260,17 +262,18 @@ def _normal(mechanism: Mechanism, normal: Array, meaning: str = "normal of the p
     return BodyVector("n", meaning, mechanism.base, frozen(direction))
 
 
-def _held(anatomy: LegDecomposition, leg: Leg, locks: Sequence[Observation], reference: str,
-          samples: Sequence[ClosedConfiguration]) -> LockedLeg | None:
+@lru_cache(maxsize=LEGS_HELD)
+def _held(anatomy: LegDecomposition, leg: Leg, locks: tuple[Observation, ...], reference: str,
+          samples: tuple[ClosedConfiguration, ...]) -> LockedLeg | None:
     """The leg's pattern with these observations held, the same at all samples, or None."""
     try:
-        systems = [leg_twists(at, leg, locks, reference) for at in samples]
+        systems = leg_twists_together(samples, leg, locks, reference)
     except ValueError:
         return None
     symbol = leg.label if leg.label.isalnum() else str(anatomy.labels.index(leg.label) + 1)
     for spot in _tips(anatomy, leg, symbol, samples[0].twin.length):
         points = spot.value(poses_at(samples, spot.links))
-        parts = [split(T, B) for T, B in zip(systems, points, strict=True)]
+        parts = split_together(systems, list(points))
         first = parts[0]
         shape = (first.translations.shape[1], first.rotations.shape[1])
         if not all(p.whole and (p.translations.shape[1], p.rotations.shape[1]) == shape for p in parts):

@@ -14,7 +14,7 @@ from functools import cache
 
 import numpy as np
 
-from ..geometry.ranks import kernel_basis, range_basis
+from ..geometry.ranks import kernel_basis, range_bases, range_basis, spectra
 from ..geometry.screws import point_velocity
 from ..geometry.vectors import Array, hat
 from ..mechanism import Coupling, Joint, Mechanism, Observation
@@ -79,11 +79,18 @@ class _Bodies:
 def leg_twists(at: ClosedConfiguration, leg: Leg, locks: Sequence[Observation], reference: str) -> Array:
     """An orthonormal basis (6, k) of T_i: the twists of the link on which the leg ends that its joints and held
     measurements allow. Raises ``ValueError`` where a measurement is seen from a link outside the leg."""
-    mechanism = at.twin.mechanism
+    return leg_twists_together([at], leg, locks, reference)[0]
+
+
+def leg_twists_together(samples: Sequence[ClosedConfiguration], leg: Leg, locks: Sequence[Observation], reference: str
+                        ) -> list[Array]:
+    """:func:`leg_twists` at several configurations."""
+    mechanism, rows = samples[0].twin.mechanism, []
     links = (leg.attach, *(link for link in leg.links if link not in (leg.attach, mechanism.base)))
-    bodies = _Bodies(at, links, [mechanism.joints[name] for name in leg.joints])
-    kernel, _ = kernel_basis(np.vstack([bodies.A, bodies.rates(locks, reference)]))
-    return range_basis(kernel[:6], 1.0)[0]
+    for at in samples:
+        bodies = _Bodies(at, links, [mechanism.joints[name] for name in leg.joints])
+        rows.append(np.vstack([bodies.A, bodies.rates(locks, reference)]))
+    return [basis for basis, _ in range_bases([found.kernel[:6] for found in spectra(rows)], 1.0)]
 
 
 def interaction(at: ClosedConfiguration, question: Measurement) -> Array:
@@ -151,11 +158,16 @@ class Split:
 
 def split(twists: Array, point: Array) -> Split:
     """Take a twist system (6, k) apart at a point (3,)."""
-    at_point = twists.copy()
-    at_point[:3] = point_velocity(twists, point)
-    still, _ = kernel_basis(at_point[3:], 1.0)
-    fixed, _ = kernel_basis(at_point[:3], 1.0)
-    translations = range_basis(at_point[:3] @ still, 1.0)[0]
-    rotations = range_basis(at_point[3:] @ fixed, 1.0)[0]
-    whole = translations.shape[1] + rotations.shape[1] == twists.shape[1]
-    return Split(translations, rotations, whole)
+    return split_together([twists], [point])[0]
+
+
+def split_together(systems: Sequence[Array], points: Sequence[Array]) -> list[Split]:
+    """:func:`split` of several systems, each at its own point."""
+    there = [np.vstack([point_velocity(twists, point), twists[3:]])
+             for twists, point in zip(systems, points, strict=True)]
+    parts = []
+    for part, other in ((slice(3), slice(3, 6)), (slice(3, 6), slice(3))):
+        alone = spectra([twists[other] for twists in there], 1.0)
+        parts.append(range_bases([twists[part] @ each.kernel for twists, each in zip(there, alone, strict=True)], 1.0))
+    return [Split(moved, turned, moved.shape[1] + turned.shape[1] == twists.shape[1])
+            for (moved, _), (turned, _), twists in zip(*parts, systems, strict=True)]
