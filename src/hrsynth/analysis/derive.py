@@ -20,7 +20,7 @@ from ..progress import tell
 from ..results import Result, Value
 from ..rewrite.evidence import Evidence
 from ..rewrite.state import State
-from ..rewrite.strategy import FORMS, GENERAL, Check, Rewriting, Step, Strategy, trusting
+from ..rewrite.strategy import FORMS, GENERAL, OBSERVED_STAGES, Check, Rewriting, Step, Strategy, trusting
 from ..tolerances import SAME_RELATION
 from .asked import observe as observed_robot
 from .exact import ExactVerdict
@@ -126,7 +126,8 @@ class Derivation(Result, shown_as="derive"):
 
 @question(formations=True)
 def derive(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
-           at: PoseLike | None = None, form: str = "simplified", paper: bool = True, seed: int = 0) -> Derivation:
+           at: PoseLike | None = None, form: str = "simplified", paper: bool = True, steps: bool = True, seed: int = 0
+           ) -> Derivation:
     """The certified hidden robot of a robot and the legs that are watched (MMT 3.2; docs/pages/theory.md, sections 3
     to 5).
 
@@ -134,7 +135,9 @@ def derive(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None
     (default: the base), or further cameras, and ``see`` what these see (:func:`hrsynth.observe`); ``at`` is a pose that
     takes the place of the zero configuration, in another operation mode if need be, or one of its modes (``mode:2``);
     an observed robot says all of that itself. ``form`` is ``simplified`` or ``general``; ``paper``: with the paper's
-    own form beside it. Raises ``BadRequest`` for unknown names, ``NotCertified`` if even the exact lift fails.
+    own form beside it; ``steps``: each step of the observed legs is compared with the real robot by itself, not only
+    where all together give another one. Raises ``BadRequest`` for unknown names, ``NotCertified`` if even the exact
+    lift fails.
 
     >>> found = hrsynth.derive("3rrr_m1", [1, 2, 3])
     >>> found
@@ -150,27 +153,34 @@ def derive(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None
     exact = exact_architecture(setting).verdict(setting.observed)
     evidence = Evidence(anatomy, samples)
 
-    result = FORMS[form](Rewriting.of(evidence, _check(samples, STEP_SAMPLES)))
+    result = FORMS[form](Rewriting.of(evidence, _check(samples, STEP_SAMPLES), () if steps else OBSERVED_STAGES))
+    hidden, certificate = _certified(setting, result.state, samples)
+    if not steps and not (certificate.passed and result.virtual_only):
+        result = FORMS[form](Rewriting.of(evidence, _check(samples, STEP_SAMPLES)))
+        hidden, certificate = _certified(setting, result.state, samples)
+    architecture: Architecture | None = None
     by_paper = None
-    if result.state.actuators:
-        tell("certificate")
-        hidden: Mechanism | None = finished(setting, result.state)
-        assert hidden is not None
-        certificate = certify(samples, hidden)
+    if hidden is not None:
         if not (certificate.passed and result.virtual_only):
             result, hidden, certificate = _fallback(setting, evidence, samples, certificate, FORMS[form])
-        architecture: Architecture | None = result.state.architecture()
+        architecture = result.state.architecture()
         segments = all(each.by_segment for each in setting.observed)
         if paper and form == "simplified" and architecture is not None and segments:
             tell("the paper's form")
             by_paper = _paper_form(setting, evidence, samples, architecture, certificate)
-    else:
-        hidden = architecture = None
-        certificate = _blind(samples)
-        if not certificate.passed:
-            raise NotCertified(setting.robot.name, certificate.largest_angle, SAME_RELATION)
+    elif not certificate.passed:
+        raise NotCertified(setting.robot.name, certificate.largest_angle, SAME_RELATION)
     return Derivation(setting.robot, setting, form, anatomy.architecture(), hidden, architecture, verdict, exact,
                       result.steps, certificate, by_paper)
+
+
+def _certified(setting: ObservedRobot, state: State, samples: Samples) -> tuple[Mechanism | None, Certificate]:
+    """The hidden robot, None where every leg is blind, and its certificate at all samples."""
+    if not state.actuators:
+        return None, _blind(samples)
+    tell("certificate")
+    hidden = finished(setting, state)
+    return hidden, certify(samples, hidden)
 
 
 def finished(setting: ObservedRobot, state: State) -> Mechanism:

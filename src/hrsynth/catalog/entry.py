@@ -22,7 +22,7 @@ from ..analysis.verdict import CONTROLLABLE, Verdict, verdict_of
 from ..errors import BadRequest, HrsynthError, MissingExtra, NotConfined, NotConfirmed, Unsolved
 from ..geometry.ranks import range_basis
 from ..kinematics.configuration import ClosedConfiguration
-from ..kinematics.relation import Relation
+from ..kinematics.relation import Relation, relation
 from ..kinematics.sampling import Samples
 from ..mechanism import Observation
 from ..mechanism.legs import decompose
@@ -130,7 +130,7 @@ def study(drawn: Mechanism, sets: Callable[[int], Iterable[tuple[int, ...]]], at
     setting = observe(drawn, samples=SAMPLES)
     if not setting.dof:
         raise NotConfirmed(setting.robot.name, "its platform does not move")
-    derivation = derive(setting, paper=False)
+    derivation = derive(setting, paper=False, steps=False)
     exact = architecture(setting) if proved or derivation.exact.exact else None
     if exact is not None:
         _agree(exact, setting.samples, derivation.verdict)
@@ -276,5 +276,5 @@ def _encoders(setting: ObservedRobot) -> tuple[Relation, tuple[str, ...]]:
     """What encoders on all joints see at a configuration, and the joint of each."""
     every = [(joint.name, each) for joint in setting.mechanism.joints.values()
              for each in encoders(setting.mechanism, joint, "")]
-    found = setting.measuring(tuple(each for _, each in every)).members[0].relation
-    return found, tuple(name for name, _ in every)
+    question = replace(setting.everything.question, observations=tuple(each for _, each in every))
+    return relation(setting.configurations[0], question), tuple(name for name, _ in every)

@@ -54,20 +54,22 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class Rewriting:
-    """Where strategies came to, and how; ``check`` None accepts every proposal and waives side conditions."""
+    """Where strategies came to, and how; ``check`` None accepts every proposal and waives side conditions. What rules
+    of ``unchecked`` stages propose is accepted where their side conditions hold: a later check compares the whole."""
 
     state: State
     evidence: Evidence
     check: Check | None = None
+    unchecked: frozenset[Stage] = frozenset()
     steps: tuple[Step, ...] = ()
     tried: int = 0
     """How many proposals were checked."""
 
     @classmethod
-    def of(cls, evidence: Evidence, check: Check | None = None) -> Rewriting:
+    def of(cls, evidence: Evidence, check: Check | None = None, unchecked: Iterable[Stage] = ()) -> Rewriting:
         """The real robot, before any rule."""
         real = evidence.anatomy
-        return cls(State(real, replace(real.mechanism, observations=())), evidence, check)
+        return cls(State(real, replace(real.mechanism, observations=())), evidence, check, frozenset(unchecked))
 
     @property
     def virtual_only(self) -> bool:
@@ -91,7 +93,7 @@ class Rewriting:
         if isinstance(proposal, Refusal):
             return self._after(rule, leg, False, proposal.reason)
         tell(f"{rule.name} {leg or ''}")
-        if self.check is None:
+        if self.check is None or rule.stage in self.unchecked:
             return self._after(rule, leg, True, proposal.reason, None, proposal.state)
         if self.tried >= BUDGET:
             return self._after(rule, leg, False, "the budget of attempts is used up")
@@ -190,6 +192,9 @@ def unless_blind(strategy: Strategy) -> Strategy:
     """A strategy for robots of which some leg is not blind."""
     return lambda at: strategy(at) if at.state.actuators else at
 
+
+OBSERVED_STAGES = frozenset(Stage) - {Stage.LEG, Stage.ENDS}
+"""The stages of the observed legs: where all hidden robot is, the relation of all steps together decides."""
 
 LIFTED = chain(whole_robot(Stage.MOTORS), each_leg(observed, Stage.LIFT))
 """The exact lift, of which the relation is that of the real robot for every robot."""
