@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from hashlib import sha256
 from typing import cast
 
@@ -31,6 +32,7 @@ Z = np.array([0.0, 0.0, 1.0])
 Rng = np.random.Generator
 
 
+@lru_cache(maxsize=8)
 def mechanism(word: RobotWord, attempt: int = 0) -> Mechanism:
     """The mechanism of a word: geometry from the word without its motors and the number of the attempt, metres.
 
