@@ -69,7 +69,8 @@ def model(word: RobotWord) -> RobotWord:
     It has a motor on the first R or P of each leg; but it is the word itself where that makes other links, since
     passive joints become one: three R that meet in a point an S.
     """
-    return word.driven if _links(str(word)) == _links(str(word.driven)) else word
+    driven = word.driven
+    return driven if word == driven or _links(str(word)) == _links(str(driven)) else word
 
 
 @lru_cache(maxsize=128)
@@ -259,6 +260,8 @@ def _lists(measured: MeasuredRobot, configurations: Sequence[ClosedConfiguration
         except (NotConfined, Unsolved, MissingExtra, BadRequest):
             return
         yield found
+        if found.continuum:  # of the architecture: the configuration is a random one
+            return
         if found.bound != "resultant":
             count = 1 if found.bound == "rank" or (found.complex or 0) > LISTED_ONCE else FEWER
 

@@ -43,7 +43,7 @@ from .conditions import AtAngle, OnMovingPlane, OnMovingRevolution, OnPlane, OnR
 from .joint_forms import closings_bound, eigenvalues
 from .leg_conditions import Middle, leg_conditions, rigid_platform
 from .polynomials import Polynomial, krawczyk
-from .pose_boxes import FAR_FROM_REAL, PRECISION, PoseBox, UnitCircle, Zero, as_box, told_far, zeros
+from .pose_boxes import FAR_FROM_REAL, PRECISION, PoseBox, UnitCircle, Zero, as_box, at_middle, told_far, zeros
 from .pose_forms import Poses
 from .sighted import Sight, conditions, sights
 from .solve import SystemMode, SystemModes
@@ -576,8 +576,7 @@ def _far(system: CarriedPlatform, proposed: Array, known: Sequence[PoseBox]) -> 
     slides, found = np.array([each.slides for each in system.freedoms_]), list[PoseBox]()
     with ctx.workprec(PRECISION):
         for q in proposed:
-            if np.abs(q.imag[~slides]).max(initial=0.0) < FAR_FROM_REAL or any(
-                    box.near(system.unknowns(q)) for box in known):
+            if np.abs(q.imag[~slides]).max(initial=0.0) < FAR_FROM_REAL or at_middle(known, system.unknowns(q)):
                 continue
             with np.errstate(all="ignore"):
                 start = np.where(slides, q, np.tan(q / 2.0))
@@ -588,7 +587,7 @@ def _far(system: CarriedPlatform, proposed: Array, known: Sequence[PoseBox]) -> 
             box = as_box([*(t * 0 + 1 if slid else 2 / w - 1 for t, w, slid in zip(half, squares, slides, strict=True)),
                           *(t * 0 if slid else 2 * t / w for t, w, slid in zip(half, squares, slides, strict=True)),
                           *(t if slid else t * 0 for t, slid in zip(half, slides, strict=True))], False, 0)
-            if box is not None and all(box.apart(other) for other in (*known, *found)):
+            if box is not None and box.apart((*known, *found)):
                 found.append(replace(box, rounded=True))
     return found
 

@@ -6,7 +6,7 @@ six conditions. Each pose that is proposed is enclosed (Krawczyk), complex ones 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -120,10 +120,9 @@ class PoseBox:
     rounded: bool = False
     """Whether it is told for the rounded geometry alone: far from real."""
 
-    @property
-    def _signs(self) -> Iterator[Array]:
-        """q and -q are one pose."""
-        return (np.r_[np.full(self.turned, s), np.ones(len(self.middle) - self.turned)] for s in (1.0, -1.0))
+    def alike(self, x: Array) -> Array:
+        """A pose with q and with -q, which are one; shape (2, n)."""
+        return np.array([x, np.r_[-x[:self.turned], x[self.turned:]]])
 
     def pose(self, poses: Poses) -> tuple[Array, Array]:
         """The quaternion (4,) and the position (3,) at the middle of a real box."""
@@ -132,17 +131,15 @@ class PoseBox:
 
     def holds(self, x: Array) -> bool:
         """Whether a pose is in it."""
-        return any(bool(np.all(np.abs(self.middle - s * x) <= self.radii)) for s in self._signs)
+        return bool(np.any(np.all(np.abs(self.alike(x) - self.middle) <= self.radii, axis=1)))
 
-    def near(self, x: Array) -> bool:
-        """Whether a pose is its middle to rounding."""
-        return any(bool(np.all(np.abs(x - s * self.middle) <= NEARLY_REAL_POSE * (1.0 + np.abs(x))))
-                   for s in self._signs)
-
-    def apart(self, other: PoseBox) -> bool:
-        """Whether no pose is in both."""
-        radii = self.radii + other.radii
-        return all(bool(np.any(np.abs(self.middle - s * other.middle) > radii)) for s in self._signs)
+    def apart(self, others: Sequence[PoseBox]) -> bool:
+        """Whether no pose is in this one and in one of the others."""
+        if not others:
+            return True
+        radii = self.radii + np.array([other.radii for other in others])
+        far = np.abs(np.array([other.middle for other in others]) - self.alike(self.middle)[:, None]) > radii
+        return bool(np.all(np.any(far, axis=2)))
 
 
 def refined(forms: SquareForms, y: Array, p: Array) -> Array:
@@ -182,7 +179,7 @@ def enclosed(forms: SquareForms, slack: float, proposed: tuple[Array, Array]) ->
     with ctx.workprec(PRECISION):
         for x in refined(forms, *proposed):
             real = bool(np.abs(x.imag).max() < NEARLY_REAL_POSE)
-            twin = None if real else next((box for box in found if not box.real and box.near(x.conj())), None)
+            twin = None if real else at_middle([box for box in found if not box.real], x.conj())
             if twin is not None:
                 each: PoseBox | None = replace(twin, middle=twin.middle.conj())
             elif np.all(np.isfinite(x)):
@@ -195,9 +192,19 @@ def enclosed(forms: SquareForms, slack: float, proposed: tuple[Array, Array]) ->
                 each = None
             if each is None:
                 lost += 1
-            elif all(each.apart(other) for other in found):
+            elif each.apart(found):
                 found.append(each)
     return found, lost
+
+
+def at_middle(boxes: Sequence[PoseBox], x: Array) -> PoseBox | None:
+    """The first box of which a pose is the middle to rounding."""
+    if not boxes:
+        return None
+    same = np.abs(np.array([box.middle for box in boxes]) - boxes[0].alike(x)[:, None]) <= (
+        NEARLY_REAL_POSE * (1.0 + np.abs(x)))
+    found = np.nonzero(np.any(np.all(same, axis=2), axis=0))[0]
+    return boxes[found[0]] if len(found) else None
 
 
 def told_far(boxes: Iterable[PoseBox]) -> str:
@@ -234,7 +241,7 @@ def zeros(equations: Sequence[Polynomial], proposed: Iterable[Array]) -> tuple[l
             box = as_box(krawczyk(equations, start), real, 0)
             if box is None:
                 lost += 1
-            elif all(box.apart(other) for other in found):
+            elif box.apart(found):
                 found.append(box)
     return found, lost
 
