@@ -53,6 +53,15 @@ class Measurement(Value):
         return Target(self.platform, X[0], self.point, self.reference,
                       tuple(zip(self.observations, values, strict=True)))
 
+    def targets(self, at: Sequence[ClosedConfiguration]) -> list[Target]:
+        """:meth:`target` of several configurations of one twin."""
+        *_, X, _, values, _ = measure_together(at[0].twin, [each.q for each in at], self.reference, self.observations,
+                                               (self.platform,))
+        ends = np.cumsum(self.sizes)[:-1]
+        return [Target(self.platform, x[0], self.point, self.reference,
+                       tuple(zip(self.observations, np.split(own, ends), strict=True)))
+                for x, own in zip(X, values, strict=True)]
+
     def rows(self, at: ClosedConfiguration, *, blind: frozenset[str] = frozenset()) -> Array:
         """The map from joint rates to (t, measured rates, twists of ``bodies``), shape (rows, nv); links in ``blind``
         are not in the mechanism, their rates are zero."""

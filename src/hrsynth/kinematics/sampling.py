@@ -15,7 +15,7 @@ import numpy as np
 
 from ..budgets import EASY_ITERATIONS
 from ..errors import BadMechanism, BranchPoint, NotMeasured, NotSampled
-from ..geometry.ranks import kernel_basis, largest_angle, range_basis
+from ..geometry.ranks import kernel_basis, largest_angle, range_bases, range_basis
 from ..geometry.vectors import Array
 from ..mechanism.observation import Observation
 from ..results import Value
@@ -35,7 +35,7 @@ from ..tolerances import (
 from .branch import CORRECTED, OperationMode, Signature, follows, group_modes, turns_of
 from .configuration import ClosedConfiguration
 from .pinocchio_model import PinocchioModel
-from .relation import Measurement, Relation, relation
+from .relation import Measurement, Relation, relation, relations
 from .tasks import Places, Target, shortened, solve, solve_together
 
 STEP = 0.11
@@ -52,6 +52,8 @@ BEYOND = 16
 """Steps of such a walk."""
 LEAVING = 24
 """Steps in random directions by which the branches at a singular zero configuration are sought."""
+LEAST_WISH = 1e-6
+"""Length of (t, u̇), as part of what is wished, below which the mechanism cannot go that way."""
 STEPS = 4
 """Steps from the zero configuration to a sample."""
 WEAKEST = 0.05
@@ -187,7 +189,7 @@ def _velocity(at: ClosedConfiguration, question: Measurement, wish: Array | None
         wanted = wanted + 0.2 * rng.normal(size=rank.value) / np.sqrt(rank.value)
     wanted = basis @ wanted
     norm = float(np.linalg.norm(wanted))
-    if norm < 1e-6:
+    if norm < LEAST_WISH:
         return None
     wanted = wanted / norm
     return kernel @ np.linalg.lstsq(image, wanted, rcond=INVERTED)[0], wanted
@@ -220,18 +222,19 @@ class _Walks:
         """So many samples, how many were discarded, and whether the robot finds all of them again; raises
         ``NotSampled``."""
         members, lonely = list[Sample](), list[Sample]()
-        discarded, draws = 0, iter(range(4 * count))
+        discarded, draws = 0, 4 * count
+        straight = self._straight(roots[0], count) if len(roots) == 1 and not self.freely else []
         while len(members) < count:
-            drawn = list[Sample]()
-            for number in draws:
+            drawn, straight = straight, []
+            draws -= len(drawn)
+            while draws and len(drawn) < count - len(members):
                 try:
-                    sample = self.walk(roots[number % len(roots)])
+                    sample = self.walk(roots[(4 * count - draws) % len(roots)])
                 except NotMeasured:
                     sample = None
                 drawn += [] if sample is None else [sample]
                 discarded += sample is None
-                if len(drawn) == count - len(members):
-                    break
+                draws -= 1
             if not drawn:
                 break
             for sample, again in zip(drawn, self._found_again(drawn), strict=True):
@@ -247,6 +250,56 @@ class _Walks:
         ways = [[target.of(lambda o: o.key in self.leading) for target in sample.way] for sample in samples]
         for led in track_paths(samples[0].configuration.twin, ways, EASY_ITERATIONS):
             yield not isinstance(led, NotMeasured) and led[1] <= FOLLOWED
+
+    def _straight(self, start: ClosedConfiguration, count: int) -> list[Sample]:
+        """So many first walks of :meth:`walk` in step, with the same digits; none where one of them does not go
+        straight on: then no random number is used."""
+        before = self.rng.bit_generator.state
+        try:
+            found = self._in_step(start, count)
+        except NotMeasured:
+            found = []
+        if not found:
+            self.rng.bit_generator.state = before
+        return found
+
+    def _in_step(self, start: ClosedConfiguration, count: int) -> list[Sample]:
+        twin, question = start.twin, self.question
+        here, wishes, ways = [start] * count, list[Array](), list[list[Target]]()
+        weakest = WEAKEST * start.kernel()[1].weakest
+        for number in range(STEPS):
+            images = [moved @ at.kernel()[0] for moved, at in zip(question.rows_together(here), here, strict=True)]
+            bases = range_bases(images, 1.0)
+            if not number:
+                freedoms = bases[0][1].value
+                random = iter(self.rng.normal(size=(count, STEPS + 1, freedoms)).swapaxes(0, 1))
+                wishes = list(next(random))
+            if not freedoms or any(rank.value != freedoms for _, rank in bases):
+                return []
+            wanted = [(basis.T @ wish if number else wish) + 0.2 * noise / np.sqrt(freedoms)
+                      for (basis, _), wish, noise in zip(bases, wishes, next(random), strict=True)]
+            wishes = [basis @ each for (basis, _), each in zip(bases, wanted, strict=True)]
+            sizes = [float(np.linalg.norm(wish)) for wish in wishes]
+            if min(sizes) < LEAST_WISH:
+                return []
+            wishes = [wish / size for wish, size in zip(wishes, sizes, strict=True)]
+            steps = [shortened(STEP * (at.kernel()[0] @ np.linalg.lstsq(image, wish, rcond=INVERTED)[0]), 3 * STEP)
+                     for at, image, wish in zip(here, images, wishes, strict=True)]
+            predicted = [twin.moved(at.q, step) for at, step in zip(here, steps, strict=True)]
+            solved = solve_together(Places(twin, None), predicted, [None] * count, tolerance=SOLVED)
+            if not all(residual <= CLOSED for _, residual in solved):
+                return []
+            there = ClosedConfiguration.several(twin, [q for q, _ in solved])
+            if not all(_beside(*each) and each[-1].kernel()[1].weakest >= weakest
+                       for each in zip(here, steps, predicted, there, strict=True)):
+                return []
+            here = there
+            ways.append(question.targets(here))
+        steady = [at for each in here if (at := _steady(each)) is not None]
+        found = relations(steady, question, question.rows_together(steady)) if len(steady) == count else []
+        if not found or any(each.gap < RANK_GAP for each in found):
+            return []
+        return [Sample(*each) for each in zip(steady, zip(*ways, strict=True), found, strict=True)]
 
     def walk(self, start: ClosedConfiguration) -> Sample | None:
         """The sample at the end of a random walk; None where it is blocked, or its ranks are not clear."""
@@ -318,15 +371,21 @@ def _moved(here: ClosedConfiguration, velocity: Array, part: float = 1.0,
     q, residual = solve(here.twin, predicted, tolerance=SOLVED)
     if not residual <= CLOSED:
         return None
-    there, length = ClosedConfiguration.of(here.twin, q), float(np.linalg.norm(step))
-    apart = float(np.linalg.norm(here.twin.difference(predicted, q)))
+    there = ClosedConfiguration.of(here.twin, q)
     if leaving:
-        return there if apart <= length / 2 else None
-    if apart <= CORRECTED * length + 1e-9 and follows(here, step, there):
+        apart = float(np.linalg.norm(here.twin.difference(predicted, q)))
+        return there if apart <= float(np.linalg.norm(step)) / 2 else None
+    if _beside(here, step, predicted, there):
         return there
     if beyond is not None and part == 1:
         beyond.append(there)
     return None
+
+
+def _beside(here: ClosedConfiguration, step: Array, predicted: Array, there: ClosedConfiguration) -> bool:
+    """Whether ``there``, where the loops close after a step, is near its prediction and follows the branch."""
+    apart = float(np.linalg.norm(here.twin.difference(predicted, there.q)))
+    return apart <= CORRECTED * float(np.linalg.norm(step)) + 1e-9 and follows(here, step, there)
 
 
 def _regular(start: ClosedConfiguration, rng: np.random.Generator) -> bool:

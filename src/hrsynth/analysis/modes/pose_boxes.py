@@ -165,9 +165,11 @@ def refined(forms: SquareForms, y: Array, p: Array) -> Array:
     return x
 
 
-def enclosed(forms: SquareForms, slack: float, proposed: tuple[Array, Array]) -> tuple[list[PoseBox], int]:
+def enclosed(forms: SquareForms, slack: float, proposed: tuple[Array, Array], needed: int = 0
+             ) -> tuple[list[PoseBox], int]:
     """Boxes of poses, each with one for all input within the slack (sizes), no two with the same; and how many
-    proposals had none. Poses far from real ones may have a box for the numbers as they are alone."""
+    proposals had none. Poses far from real ones may have a box for the numbers as they are alone. Where no ``needed``
+    ones can be found any more, the others are not looked for."""
     from flint import acb, arb, ctx
 
     turned = forms.poses.turns.shape[1]
@@ -177,7 +179,9 @@ def enclosed(forms: SquareForms, slack: float, proposed: tuple[Array, Array]) ->
     found: list[PoseBox] = []
     lost = 0
     with ctx.workprec(PRECISION):
-        for x in refined(forms, *proposed):
+        for number, x in enumerate(refined(forms, *proposed)):
+            if lost and len(found) + len(proposed[0]) - number < needed:
+                break
             real = bool(np.abs(x.imag).max() < NEARLY_REAL_POSE)
             twin = None if real else at_middle([box for box in found if not box.real], x.conj())
             if twin is not None:

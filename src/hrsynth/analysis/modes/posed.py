@@ -169,11 +169,13 @@ def _judged(system: PosedPlatform, forms: SquareForms, own: bool) -> SystemModes
                 f"{f' / {2 ** forms.shape[1]}' if forms.shape[1] else ''} (Bézout)")
     most, why, named = forms.most, product_, "class"
     proposed = proposals(forms, forms.degree, forms.most, 0)
-    boxes, lost = ([], 1) if proposed is None else enclosed(forms, slack, proposed)
-    if len(boxes) < most and (found := bound(forms)) is not None:
-        most, why, named = found[0], f"ranks modulo a prime of 62 bits, in degree {found[1]}", "rank"
-        if len(boxes) < most or lost:
+    boxes, lost = ([], 1) if proposed is None else enclosed(forms, slack, proposed, most)
+    if len(boxes) < most:
+        if (found := bound(forms)) is not None:
+            most, why, named = found[0], f"ranks modulo a prime of 62 bits, in degree {found[1]}", "rank"
+        if found is not None and (len(boxes) < most or lost):
             proposed = proposals(forms, found[1], most, found[2])
+        if lost:
             boxes, lost = ([], 1) if proposed is None else enclosed(forms, slack, proposed)
     at_goal = [box for box in boxes if own and box.real and box.holds(np.eye(len(box.middle))[0])]
     goal = at_goal[0] if len(at_goal) == 1 else None
