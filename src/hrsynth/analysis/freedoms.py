@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..geometry.ranks import kernel_basis, range_basis
-from ..geometry.vectors import Array, oriented, unit
+from ..geometry.vectors import Array, cross, oriented, unit
 from ..mechanism import JointType
 from ..mechanism.legs import LegDecomposition
 from ..results import Value
@@ -111,7 +111,7 @@ def direction_name(direction: Array, anatomy: LegDecomposition) -> str:
         if abs(abs(direction[i]) - 1) < NAMED:
             return _AXES[i]
     along = [j.name for j in anatomy.mechanism.joints.values()
-             if j.type is JointType.PRISMATIC and np.linalg.norm(np.cross(j.axis, direction)) < NAMED]
+             if j.type is JointType.PRISMATIC and np.linalg.norm(cross(j.axis, direction)) < NAMED]
     return f"{point_text(direction)}, the axis of {along[0]}" if along else point_text(direction)
 
 
@@ -152,13 +152,13 @@ def _lines(anatomy: LegDecomposition, labels: tuple[str, ...] | None) -> list[tu
 
 def _rotation(anatomy: LegDecomposition, point: Array, direction: Array) -> Array:
     origin = anatomy.mechanism.links[anatomy.mechanism.platform].pose[:3, 3]
-    return np.concatenate([np.cross(direction, origin - point), direction])
+    return np.concatenate([cross(direction, origin - point), direction])
 
 
 def _screw(origin: Array, twist: Array) -> str:
     """The screw of a twist with unit angular part at ``origin``: its axis and pitch (m/rad)."""
     v, w = twist[:3], twist[3:]
-    point = origin + np.cross(w, v)
+    point = origin + cross(w, v)
     pitch = float(w @ v)
     kind = "rotation" if abs(pitch) < NAMED else f"screw motion of pitch {pitch:.4g} m/rad"
     return f"{kind} about the line through {point_text(point)} along {point_text(w)}"

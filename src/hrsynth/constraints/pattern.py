@@ -15,7 +15,7 @@ import numpy as np
 
 from ..budgets import LEGS_HELD
 from ..geometry.ranks import range_basis
-from ..geometry.vectors import Array, frozen, hat
+from ..geometry.vectors import Array, cross, frozen, hat
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.locked import leg_twists_together, split_together
 from ..kinematics.relation import Measurement, relation
@@ -235,7 +235,7 @@ def _common_plane(mechanism: Mechanism, legs: Sequence[LockedLeg], samples: Sequ
     values = np.concatenate([axis.value(poses_at(samples, axis.links)) for axis in axes])
     lines = [leg.line for leg in legs if leg.line is not None]
     paths = [line.value(poses_at(samples, line.links)) for line in lines]
-    if not _vanishes(np.cross(values, values[0])) or any(not _vanishes(path @ values[0]) for path in paths):
+    if not _vanishes(cross(values, values[0])) or any(not _vanishes(path @ values[0]) for path in paths):
         return None
     return _normal(mechanism, values[0])
 
@@ -282,7 +282,7 @@ def _held(anatomy: LegDecomposition, leg: Leg, locks: tuple[Observation, ...], r
         if shape[0] == 1:
             line = _named(anatomy, leg, locks, symbol, np.array([p.translations[:, 0] for p in parts]), samples)
         elif shape[0] == 2:
-            across = np.array([np.cross(p.translations[:, 0], p.translations[:, 1]) for p in parts])
+            across = np.array([cross(p.translations[:, 0], p.translations[:, 1]) for p in parts])
             normal = _named(anatomy, leg, locks, symbol, across, samples)
         if shape[0] in (1, 2) and line is None and normal is None:
             return None
@@ -351,4 +351,4 @@ def _along(feature: NamedVector, values: Array, samples: Sequence[ClosedConfigur
     found = feature.value(poses_at(samples, feature.links))
     if np.min(np.linalg.norm(found, axis=1)) < SAME_RELATION:
         return False
-    return bool(np.max(np.linalg.norm(np.cross(found, values), axis=1)) < SAME_RELATION)
+    return bool(np.max(np.linalg.norm(cross(found, values), axis=1)) < SAME_RELATION)

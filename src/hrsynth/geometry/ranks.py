@@ -46,7 +46,9 @@ def rank_of(singular_values: Array, scale: float | None = None, cutoff: float = 
     if largest <= TINY:
         return Rank(0, CLEAN)
     floor, least = EPSILON * largest, cutoff * largest
-    kept = sum(value > least for value in values)
+    kept = len(values)
+    while kept and not values[kept - 1] > least:
+        kept -= 1
     last = values[kept - 1] if kept else largest
     dropped = max(values[kept], floor) if kept < len(values) else floor
     return Rank(kept, last / dropped, last / largest)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from math import lcm
 from typing import Any
@@ -32,8 +33,8 @@ def scaled(vector: Numbers) -> tuple[Numbers, int]:
 def unit(vector: ArrayLike) -> Array:
     """``vector`` divided by its length; shape (3,). Raises ``ValueError`` for a zero vector."""
     array = np.asarray(vector, dtype=float)
-    length = float(np.linalg.norm(array))
-    if not length > 0 or not np.isfinite(length):
+    length = math.sqrt(array @ array)
+    if not 0 < length < math.inf:
         raise ValueError("a zero or infinite vector has no direction")
     return array / length
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from ...geometry import lines
 from ...geometry.screws import normals
-from ...geometry.vectors import Array, unit
+from ...geometry.vectors import Array, cross, unit
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.locked import carry_joint
 from ...mechanism import Joint, JointType, Observation
@@ -99,7 +99,7 @@ def chain(anatomy: LegDecomposition, leg: Leg, held: Sequence[Observation], goal
         bodies = (*bodies, ChainBody(end, tip))
     for one, other in pairwise(bodies):
         if one.axis is not None and other.axis is not None:
-            sine = float(np.linalg.norm(np.cross(one.axis, other.axis)))
+            sine = float(np.linalg.norm(cross(one.axis, other.axis)))
             if SAME_DIRECTION / RANK_GAP < sine < SAME_DIRECTION:
                 raise Underived(f"two of its axes are only {sine:.1e} from parallel")
     return Chain(bodies, end != "free" if isinstance(end, str) else True, goal.twin.length, off)
@@ -109,7 +109,7 @@ def _tilted(bodies: Sequence[ChainBody]) -> float:
     """The angles (rad) of all pairs of directions of a chain that count as parallel, and are not but for rounding."""
     found = [d for body in bodies for d in (*([] if body.axis is None else [body.axis]), *body.slides, *body.watched,
                                             *(d for crank in body.cranks for d in (crank.axis, *crank.watched)))]
-    angles = [float(np.linalg.norm(np.cross(one, other))) for one, other in combinations(found, 2)
+    angles = [float(np.linalg.norm(cross(one, other))) for one, other in combinations(found, 2)
               if lines.parallel(one, other)]
     return sum(angle for angle in angles if angle > CHAIN_ROUNDING)
 
@@ -196,7 +196,7 @@ class _Walk:
                 for name in [name for name in self.coordinates if name in self.beside]:
                     if any(part.issuperset(self.anatomy.mechanism.joints[name].links) for part in (rod, near, far)):
                         del self.coordinates[name]
-                return (0.0, 1.0), (2 * float(np.arctan2(a @ np.cross(d, c), d @ c)), 3.0 + 8.0 / float(least))
+                return (0.0, 1.0), (2 * float(np.arctan2(a @ cross(d, c), d @ c)), 3.0 + 8.0 / float(least))
         return ()
 
     def _centre(self, one: set[str], other: set[str]) -> Array | None:

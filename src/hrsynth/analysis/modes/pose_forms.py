@@ -81,7 +81,7 @@ class Poses:
     def rates(self, condition: PoseCondition) -> Array:
         """The derivative of a condition at the goal by the freedoms; shape (freedoms,)."""
         along, turned = condition.slopes(condition.b, condition.c, np.asarray)
-        moment = np.cross(condition.b, along) + np.cross(condition.c, turned)
+        moment = cross(condition.b, along) + cross(condition.c, turned)
         return np.hstack([along @ self.moves, moment @ self.turns[1:, 1:]])
 
     def rotations(self, y: Array) -> Array:

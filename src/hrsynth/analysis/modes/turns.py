@@ -18,7 +18,7 @@ from itertools import pairwise
 import numpy as np
 
 from ...geometry import lines
-from ...geometry.vectors import Array, rotation_about
+from ...geometry.vectors import Array, cross, rotation_about
 from ...tolerances import EXACT, SAME_RELATION
 from .chain import Chain, Underived
 
@@ -219,8 +219,8 @@ def _about(axis: Array, start: Array, end: Array) -> tuple[Array, float] | None:
         return None
     if np.max(np.abs(start - end)) <= EXACT:
         return np.eye(3), 1.0
-    angle = math.atan2(float(axis @ np.cross(start, end)), float(start @ end - (axis @ start) * (axis @ end)))
-    return rotation_about(axis, angle), 3.0 + 4.0 / float(np.linalg.norm(np.cross(axis, start)))
+    angle = math.atan2(float(axis @ cross(start, end)), float(start @ end - (axis @ start) * (axis @ end)))
+    return rotation_about(axis, angle), 3.0 + 4.0 / float(np.linalg.norm(cross(axis, start)))
 
 
 def _cones(a: Array, b: Array, start: Array, end: Array) -> list[tuple[Array, Array, float]] | None:
@@ -238,7 +238,7 @@ def _cones(a: Array, b: Array, start: Array, end: Array) -> list[tuple[Array, Ar
         return []
     s = math.sqrt(max(square, 0.0))
     found = []
-    ends = [p * a + q * b + sign * s * np.cross(a, b) for sign in (1.0, -1.0)]
+    ends = [p * a + q * b + sign * s * cross(a, b) for sign in (1.0, -1.0)]
     if any(lines.parallel(z, axis) for z in ends for axis in (a, b)):
         return None
     if EXACT < s <= SAME_RELATION:
@@ -246,7 +246,7 @@ def _cones(a: Array, b: Array, start: Array, end: Array) -> list[tuple[Array, Ar
     for z in sorted(ends[: 1 + (s > EXACT)], key=lambda z: float(np.linalg.norm(z - start))):
         second, first = _about(b, start, z), _about(a, z, end)
         if first is not None and second is not None:
-            slopes = np.column_stack([np.cross(a, end), np.cross(first[0] @ b, end)])
+            slopes = np.column_stack([cross(a, end), cross(first[0] @ b, end)])
             still = first[1] == second[1] == 1.0
             found.append((first[0], second[0], 1.0 if still else 4.0 + 9.0 / float(np.linalg.norm(slopes, -2))))
     return found
