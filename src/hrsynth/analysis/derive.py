@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -69,9 +70,16 @@ class Derivation(Result, shown_as="derive"):
     verdict: Verdict
     exact: ExactVerdict
     """What generic geometry of the same architecture sees."""
-    steps: tuple[Step, ...]
+    taken: tuple[Step, ...]
+    """All attempts; those of the observed legs were compared with the real robot all together."""
     certificate: Certificate
     paper: PaperForm | None
+
+    @cached_property
+    def steps(self) -> tuple[Step, ...]:
+        """All attempts, each compared with the real robot by itself."""
+        check = _check(self.setting.samples, STEP_SAMPLES)
+        return tuple(step.measured(check) for step in self.taken)
 
     @property
     def dof(self) -> int:
@@ -126,8 +134,7 @@ class Derivation(Result, shown_as="derive"):
 
 @question(formations=True)
 def derive(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
-           at: PoseLike | None = None, form: str = "simplified", paper: bool = True, steps: bool = True, seed: int = 0
-           ) -> Derivation:
+           at: PoseLike | None = None, form: str = "simplified", paper: bool = True, seed: int = 0) -> Derivation:
     """The certified hidden robot of a robot and the legs that are watched (MMT 3.2; docs/pages/theory.md, sections 3
     to 5).
 
@@ -135,9 +142,7 @@ def derive(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None
     (default: the base), or further cameras, and ``see`` what these see (:func:`hrsynth.observe`); ``at`` is a pose that
     takes the place of the zero configuration, in another operation mode if need be, or one of its modes (``mode:2``);
     an observed robot says all of that itself. ``form`` is ``simplified`` or ``general``; ``paper``: with the paper's
-    own form beside it; ``steps``: each step of the observed legs is compared with the real robot by itself, not only
-    where all together give another one. Raises ``BadRequest`` for unknown names, ``NotCertified`` if even the exact
-    lift fails.
+    own form beside it. Raises ``BadRequest`` for unknown names, ``NotCertified`` if even the exact lift fails.
 
     >>> found = hrsynth.derive("3rrr_m1", [1, 2, 3])
     >>> found
@@ -153,9 +158,9 @@ def derive(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None
     exact = exact_architecture(setting).verdict(setting.observed)
     evidence = Evidence(anatomy, samples)
 
-    result = FORMS[form](Rewriting.of(evidence, _check(samples, STEP_SAMPLES), () if steps else OBSERVED_STAGES))
+    result = FORMS[form](Rewriting.of(evidence, _check(samples, STEP_SAMPLES), OBSERVED_STAGES))
     hidden, certificate = _certified(setting, result.state, samples)
-    if not steps and not (certificate.passed and result.virtual_only):
+    if hidden is None or not (certificate.passed and result.virtual_only):
         result = FORMS[form](Rewriting.of(evidence, _check(samples, STEP_SAMPLES)))
         hidden, certificate = _certified(setting, result.state, samples)
     architecture: Architecture | None = None

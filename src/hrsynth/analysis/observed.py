@@ -96,7 +96,7 @@ class ObservedRobot(Value):
         return self is other or self._said() == other._said()
 
     def __hash__(self) -> int:
-        return hash((self.robot, self.labels))
+        return hash((self.robot, self.labels, *self.configurations[0].q.tolist()))
 
     def _said(self) -> tuple[Any, ...]:
         at = [each.q for each in (self.everything.start, *self.configurations)]

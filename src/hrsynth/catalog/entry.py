@@ -131,14 +131,14 @@ def study(drawn: Mechanism, sets: Callable[[int], Iterable[tuple[int, ...]]], at
     setting = observe(drawn, samples=SAMPLES)
     if not setting.dof:
         raise NotConfirmed(setting.robot.name, "its platform does not move")
-    derivation = derive(setting, paper=False, steps=False)
+    derivation = derive(setting, paper=False)
     exact = architecture(setting) if proved or derivation.exact.exact else None
     if exact is not None:
         _agree(exact, setting.samples, derivation.verdict)
     fewest = _smallest(setting, exact, sets, derivation.verdict)
     facts = {
         "hidden": derivation.hidden_architecture and derivation.hidden_architecture.ascii,
-        "steps": _steps(derivation.steps), "legs": len(setting.segments), "dof": setting.dof,
+        "steps": _steps(derivation.taken), "legs": len(setting.segments), "dof": setting.dof,
         "motion": _motion(setting),
         "mobility": setting.mobility.total, "idle": setting.mobility.idle,
         "verdict": derivation.verdict.verdict, "rank": derivation.verdict.rank, "exact": derivation.exact.exact,

@@ -41,7 +41,8 @@ Check = Callable[[Mechanism, tuple[str, ...]], Comparison]
 @dataclass(frozen=True)
 class Step:
     """One attempt: the rule, the leg (None: all), whether it was accepted, why, and the angle if it was measured;
-    ``state`` is what an accepted rewriting left behind, ``always`` whether the rule holds for every robot."""
+    ``state`` is what an accepted rewriting left behind, ``always`` whether the rule holds for every robot, ``bodies``
+    the links, besides the platform, whose twists must not change."""
 
     rule: str
     leg: str | None
@@ -50,6 +51,15 @@ class Step:
     largest_angle: float | None
     state: State | None = field(default=None, compare=False, repr=False)
     always: bool = field(default=False, compare=False, repr=False)
+    bodies: tuple[str, ...] = field(default=(), compare=False, repr=False)
+
+    def measured(self, check: Check) -> Step:
+        """The step with its own angle, where it was accepted unchecked."""
+        if self.state is None or self.largest_angle is not None:
+            return self
+        found = check(self.state.mechanism, self.bodies)
+        reason = self.reason if found.passed else f"{self.reason} (by itself another robot: {found.reason})"
+        return replace(self, largest_angle=found.largest_angle, reason=reason)
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,18 +104,18 @@ class Rewriting:
             return self._after(rule, leg, False, proposal.reason)
         tell(f"{rule.name} {leg or ''}")
         if self.check is None or rule.stage in self.unchecked:
-            return self._after(rule, leg, True, proposal.reason, None, proposal.state)
+            return self._after(rule, leg, True, proposal.reason, None, proposal)
         if self.tried >= BUDGET:
             return self._after(rule, leg, False, "the budget of attempts is used up")
         found = self.check(proposal.state.mechanism, proposal.bodies)
         reason = proposal.reason if found.passed else f"{proposal.reason}: refused, {found.reason}"
-        after = self._after(rule, leg, found.passed, reason, found.largest_angle, proposal.state)
+        after = self._after(rule, leg, found.passed, reason, found.largest_angle, proposal)
         return replace(after, tried=self.tried + 1)
 
     def _after(self, rule: Rule[Any, Any], leg: str | None, accepted: bool, reason: str, angle: float | None = None,
-               state: State | None = None) -> Rewriting:
-        state = state if accepted else None
-        step = Step(rule.name, leg, accepted, reason, angle, state, rule.always)
+               proposal: Proposal | None = None) -> Rewriting:
+        state, bodies = (proposal.state, proposal.bodies) if accepted and proposal else (None, ())
+        step = Step(rule.name, leg, accepted, reason, angle, state, rule.always, bodies)
         return replace(self, state=state or self.state, steps=(*self.steps, step))
 
 

@@ -6,6 +6,9 @@ t - 2k - 2, so there are at most D = dim (wᵏ S + I_t) - dim I_t poses, multipl
 by their values at random points modulo the prime. A rank modulo a prime is at most that over ℚ: enough for dim I_t;
 that of wᵏ S + I_t is the same unless the prime divides one certain minor, which fewer than 10⁶ of the 10¹⁷ primes of
 62 bits do.
+
+Where a condition is a form of degree 2 all is asked modulo it: of forms without the powers of an unknown that it gives
+by the others, at points where it holds. They are known there if so many points tell all of them apart: it is checked.
 """
 
 from __future__ import annotations
