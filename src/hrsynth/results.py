@@ -15,6 +15,7 @@ LONGEST_LINE, LONGEST_PART = 160, 48
 """Characters of a value at a prompt, and of each of its fields there."""
 P = ParamSpec("P")
 R = TypeVar("R")
+V = TypeVar("V", bound="Value")
 LISTED = 3
 """Members of a tuple that are shown; of more their number is."""
 
@@ -147,6 +148,20 @@ def spelled(function: Callable[P, R]) -> Callable[P, R]:
         return function(*args, **given)
 
     return called
+
+
+def with_value(function: Callable[[V], R]) -> Callable[[V], R]:
+    """A function of one frozen value, whose answer is kept with that value."""
+    name = f"_{function.__name__}"
+
+    @wraps(function)
+    def asked(value: V) -> R:
+        if name not in value.__dict__:
+            value.__dict__[name] = function(value)
+        found: R = value.__dict__[name]
+        return found
+
+    return asked
 
 
 def by_name(value: type[Any], keyword: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:

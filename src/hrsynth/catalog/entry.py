@@ -77,7 +77,7 @@ def model(word: RobotWord) -> RobotWord:
 def _links(text: str) -> frozenset[str]:
     """The links of a word's normal form; none where its mechanism cannot be made."""
     try:
-        return frozenset(normal_form(mechanism(parse(text))).mechanism.links)
+        return frozenset(normal_form(mechanism(parse(text), 0)).mechanism.links)
     except HrsynthError:
         return frozenset()
 

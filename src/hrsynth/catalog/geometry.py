@@ -146,7 +146,7 @@ def _observed(drawn: Mechanism, word: RobotWord, chords: Mapping[str, Direction]
             continue
         if leg.observed is not None:
             found.append(replace(segment, leg=label))
-    return replace(drawn, observations=tuple(found))
+    return replace(drawn, observations=tuple(found)) if found else drawn
 
 
 class _Limb:

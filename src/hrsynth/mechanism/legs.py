@@ -15,7 +15,7 @@ from itertools import combinations, pairwise
 from ..errors import BadMechanism, BadRequest, BadRobotFile, Defect
 from ..geometry import lines
 from ..geometry.vectors import Array
-from ..results import Value
+from ..results import Value, with_value
 from ..tolerances import SAME_POINT
 from . import graphs
 from .composites import WordEdge, WordGraph
@@ -149,6 +149,7 @@ def _paths_word(graph: WordGraph, start: str, end: str) -> Word:
     return Word((Bar(branches),)) if len(branches) > 1 else branches[0]
 
 
+@with_value
 def decompose(mechanism: Mechanism) -> LegDecomposition:
     """Platform and legs of a mechanism in normal form; raises ``BadMechanism`` where there is no leg, ``BadRobotFile``
     where the observations contradict the legs."""

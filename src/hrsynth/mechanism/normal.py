@@ -18,7 +18,7 @@ import numpy as np
 from ..errors import BadMechanism
 from ..geometry import lines
 from ..geometry.vectors import Array, angle_between
-from ..results import Value
+from ..results import Value, with_value
 from ..tolerances import SAME_POINT
 from . import graphs
 from .model import Joint, JointType, Mechanism
@@ -37,6 +37,7 @@ class NormalForm(Value):
     made_of: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
 
+@with_value
 def normal_form(mechanism: Mechanism) -> NormalForm:
     """Merge until nothing merges; names, frames and order of what stays are kept."""
     into = {name: name for name in mechanism.links}
