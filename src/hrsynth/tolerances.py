@@ -65,6 +65,8 @@ RANK_CUTOFF = 1e-7
 """Singular values below this fraction of the largest are candidates for zero; the gap around it is what decides."""
 SAME_RELATION = 1e-6
 """Largest principal angle (radians) at which two relations count as the same."""
+UNMOVING = 1e-6
+"""Length of (t, u̇), as part of what is wished, below which a mechanism cannot go that way."""
 SURELY_SOMETHING = 1e-5
 """Singular values of a relation above this count, whatever rounding did."""
 SURELY_ZERO = 1e-9

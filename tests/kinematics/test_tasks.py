@@ -22,6 +22,8 @@ def test_together_every_way_ends_where_it_ends_alone(robot: str, see: tuple[str,
     setting = observe(robot, camera="c=base@0,0,2/180deg,0,0", see=see, samples=3) if see else setting_of(robot)
     twin = setting.everything.twin
     ways = [member.way for member in setting.samples.members]
+    home = setting.samples.question.target(setting.everything.start)
+    ways += [(home, *way[1:]) for way in ways]  # which are at the same place still where the second target begins
     for way, led in zip(ways, track_paths(twin, ways), strict=True):
         assert not isinstance(led, NotMeasured)
         q, residual = twin.q0, 0.0

@@ -31,6 +31,7 @@ from ..tolerances import (
     SOLVED,
     STEADY_TANGENT,
     SURELY_SOMETHING,
+    UNMOVING,
 )
 from .branch import CORRECTED, OperationMode, Signature, follows, group_modes, turns_of
 from .configuration import ClosedConfiguration
@@ -52,8 +53,6 @@ BEYOND = 16
 """Steps of such a walk."""
 LEAVING = 24
 """Steps in random directions by which the branches at a singular zero configuration are sought."""
-LEAST_WISH = 1e-6
-"""Length of (t, u̇), as part of what is wished, below which the mechanism cannot go that way."""
 STEPS = 4
 """Steps from the zero configuration to a sample."""
 WEAKEST = 0.05
@@ -189,7 +188,7 @@ def _velocity(at: ClosedConfiguration, question: Measurement, wish: Array | None
         wanted = wanted + 0.2 * rng.normal(size=rank.value) / np.sqrt(rank.value)
     wanted = basis @ wanted
     norm = float(np.linalg.norm(wanted))
-    if norm < LEAST_WISH:
+    if norm < UNMOVING:
         return None
     wanted = wanted / norm
     return kernel @ np.linalg.lstsq(image, wanted, rcond=INVERTED)[0], wanted
@@ -280,7 +279,7 @@ class _Walks:
                       for (basis, _), wish, noise in zip(bases, wishes, next(random), strict=True)]
             wishes = [basis @ each for (basis, _), each in zip(bases, wanted, strict=True)]
             sizes = [float(np.linalg.norm(wish)) for wish in wishes]
-            if min(sizes) < LEAST_WISH:
+            if min(sizes) < UNMOVING:
                 return []
             wishes = [wish / size for wish, size in zip(wishes, sizes, strict=True)]
             steps = [shortened(STEP * (at.kernel()[0] @ np.linalg.lstsq(image, wish, rcond=INVERTED)[0]), 3 * STEP)

@@ -190,9 +190,9 @@ class Places:
     def at(self, places: Sequence[Array], targets: Sequence[Target | None]) -> Iterable[tuple[Array, Array]]:
         """Error (rows,) and Jacobian (rows, nv) at each configuration, for its target."""
         if all(id(q) in self.known for q in places):
-            known = {id(q): self.known[id(q)] for q in places}
-            loops, J, X, values = (np.array([stack[part][i] for _, stack, i in known.values()]) for part in range(4))
-            self.known = known
+            known = [self.known[id(q)] for q in places]
+            loops, J, X, values = (np.array([stack[part][i] for _, stack, i in known]) for part in range(4))
+            self.known = {id(each[0]): each for each in known}
         else:
             stack = loops, J, X, values = self._measured(places)
             self.known |= {id(q): (q, stack, i) for i, q in enumerate(places)}
