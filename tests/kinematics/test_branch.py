@@ -22,7 +22,7 @@ from hrsynth.kinematics.branch import CHANGED, TURNED, alike_after, turned_littl
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.kinematics.relation import Measurement, relation
-from hrsynth.kinematics.sampling import random_walk, sample
+from hrsynth.kinematics.sampling import _Walks, random_walk, sample
 from hrsynth.mechanism import JointType, Mechanism
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.pose import Pose
@@ -95,6 +95,25 @@ def test_a_flat_parallelogram_belongs_to_two_modes(angle: float) -> None:
     assert any("1T" in mode for mode in caught.value.modes)
     assert any("1R" in mode for mode in caught.value.modes)
     assert caught.value.exit_status == 3
+
+
+@pytest.mark.some(2)
+@pytest.mark.parametrize("robot", ["quattro", "3rrr_m1", "i4l", "orthoglide", "gough_stewart"])
+def test_walks_in_step_end_where_each_ends_alone(robot: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """To the last digit, and whatever is random afterwards as well."""
+    drawn = setting_of(robot).everything
+    straight, ends = _Walks._straight, []
+    monkeypatch.setattr(_Walks, "_straight", lambda *asked: ends.append(straight(*asked)) or ends[-1])
+    together = sample(drawn.twin, drawn.question, 3)
+    monkeypatch.setattr(_Walks, "_straight", lambda *asked: [])
+    alone = sample(drawn.twin, drawn.question, 3)
+    assert [len(found) for found in ends] == [3]
+    for one, other in zip(together.members, alone.members, strict=True):
+        assert one.configuration.q.tolist() == other.configuration.q.tolist()
+        assert one.relation.basis.tolist() == other.relation.basis.tolist()
+        for target, same in zip(one.way, other.way, strict=True):
+            assert target.pose.tolist() == same.pose.tolist()
+            assert target.wanted.tolist() == same.wanted.tolist()
 
 
 @pytest.mark.some(1)

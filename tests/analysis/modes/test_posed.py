@@ -21,7 +21,7 @@ from hrsynth.analysis.modes.conditions import (
     OnTwoCircles,
 )
 from hrsynth.analysis.modes.modes import modes
-from hrsynth.analysis.modes.pose_bound import bound
+from hrsynth.analysis.modes.pose_bound import _Quotient, bound, dimensions
 from hrsynth.analysis.modes.pose_forms import Poses, SquareForms
 from hrsynth.analysis.modes.posed import posed, solve_posed
 from hrsynth.analysis.modes.search import search
@@ -182,6 +182,22 @@ THREE = [OnPlane] * 3
 def test_ranks_give_the_product_of_degrees_of_general_conditions(kinds, count):
     forms = SquareForms.of(random_conditions(np.random.default_rng(1), kinds), Poses.spatial())
     assert forms.most == count == bound(forms)[0]
+
+
+@pytest.mark.some(2)
+@pytest.mark.parametrize("kinds", [
+    THREE + [OnPlane] * 3, THREE + [AtAngle] * 3, THREE + [AtAngle, OnPlane, OnRevolution],
+    [OnPlane, OnPlane, AtAngle, AtAngle, OnRevolution, OnPlane]])
+def test_ranks_modulo_one_condition_are_those_modulo_all(kinds, monkeypatch):
+    """On points of a quadric, and on any: also where the forms are of too low a degree to give the zeros."""
+    forms = SquareForms.of(random_conditions(np.random.default_rng(3), kinds), Poses.spatial())
+    for t in (forms.degree - 2, forms.degree):
+        assert _Quotient.of(forms, t) is not None
+        most = min(2, t // 2 - 1)
+        found = dimensions(forms, t, most)
+        with monkeypatch.context() as without:
+            without.setattr(_Quotient, "of", lambda *asked: None)
+            assert dimensions(forms, t, most) == found
 
 
 @pytest.mark.slow
