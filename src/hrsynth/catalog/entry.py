@@ -237,8 +237,12 @@ def _modes(setting: ObservedRobot, fewest: Sequence[Sequence[str]]) -> dict[str,
     robots = [MeasuredRobot.watched(replace(setting, observed=tuple(o for o in _watched(setting) if o.leg in legs)))
               for legs in fewest]
     at = setting.configurations[0]
-    others = sorted(range(1, len(fewest)), key=lambda k: expected(robots[k], at))
-    for k in (0, *others[:OTHERS]):
+
+    def tried() -> Iterator[int]:
+        yield 0
+        yield from sorted(range(1, len(fewest)), key=lambda k: expected(robots[k], at))[:OTHERS]
+
+    for k in tried():
         found = [each for each in _lists(robots[k], setting.configurations) if each.complete and not each.continuum]
         bounds = [each.complex for each in found if each.complex is not None]
         if bounds:

@@ -38,7 +38,7 @@ def main(arguments: list[str] | None = None) -> None:
     """Run the command line; every failure is one line a defect, never a traceback."""
     for library in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(library, "1")
-    gc.set_threshold(50_000)
+    gc.set_threshold(200_000)
     sys.stdout, sys.stderr = sys.stdout or io.StringIO(), sys.stderr or io.StringIO()
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
