@@ -264,7 +264,7 @@ def _lists(measured: MeasuredRobot, configurations: Sequence[ClosedConfiguration
         except (NotConfined, Unsolved, MissingExtra, BadRequest):
             return
         yield found
-        if found.continuum:  # of the architecture: the configuration is a random one
+        if found.open or found.continuum is not None:  # for the architecture: the configuration is a random one
             return
         if found.bound != "resultant":
             count = 1 if found.bound == "rank" or (found.complex or 0) > LISTED_ONCE else FEWER

@@ -160,7 +160,7 @@ def _solved(system: System, near: bool, goal: Array | None) -> SystemModes:
                            ((each, solve_square(each)) for each in islice(others, CHOICES)), goal)
     if system.surfaces and not isinstance(system, Translating):
         return _proposed(system, near, goal, proposed)
-    return _undecided(system, square is not None, goal)
+    return _undecided(system, square is not None, goal, near)
 
 
 def solve_by_msolve(system: System, *, near: bool = True, goal: Array | None = None) -> SystemModes:
@@ -194,19 +194,23 @@ def _proposed(system: System, near: bool, goal: Array | None,
                 break
         if roots is not None:
             return _judged(system, part, roots, () if near else None, goal, most)
-    return _undecided(system, part is not None, goal)
+    return _undecided(system, part is not None, goal, near)
 
 
 def _too_few(system: System) -> SystemModes:
     return continuum(f"too few legs: a continuum of dimension {system.missing}", system.missing)
 
 
-def _undecided(system: System, tried: bool, goal: Array | None) -> SystemModes:
-    """What is said where no choice of legs has finitely many solutions: the goal, where it is given, is one."""
+def _undecided(system: System, tried: bool, goal: Array | None, near: bool) -> SystemModes:
+    """What is said where no choice of legs has finitely many solutions: the goal, where it is given, is one. Poses of a
+    continuum are looked for where ``near`` ones are."""
     known = () if goal is None else (_by_construction(system, goal, ()),)
     if not tried:
         return SystemModes(len(known), known, False, "nothing proved", degenerate="no choice of legs decides the pose: "
                            "tips on one line, in one point, or at rest", open=True)
+    if not near:
+        return SystemModes(len(known), known, False, "nothing proved", degenerate="the equations depend on each other",
+                           open=True)
     size = dimension(system)
     if not size:
         return SystemModes(len(known), known, False, "nothing proved",
