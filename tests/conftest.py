@@ -3,8 +3,10 @@ test: what one patches is seen."""
 
 import gc
 import os
+from collections import Counter
 from collections.abc import Iterator
 from functools import lru_cache
+from typing import Any
 
 import pytest
 
@@ -36,16 +38,32 @@ def nothing_said_after_half_a_minute(monkeypatch: pytest.MonkeyPatch):
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Of a law that is marked ``some(n)`` so many members, spread over all, are quick; the others are slow."""
-    laws: dict[tuple[str, int], list[pytest.Item]] = {}
+    """Of a law marked ``some(n, m)`` n members, spread over all, are quick, m others slow and the rest long; without m
+    all others are slow."""
+    laws: dict[tuple[str, int], list[pytest.Function]] = {}
     for item in items:
-        if (mark := item.get_closest_marker("some")) and not item.get_closest_marker("slow"):
+        mark = item.get_closest_marker("some")
+        if mark and isinstance(item, pytest.Function) and not item.get_closest_marker("long"):
             laws.setdefault((item.nodeid.partition("[")[0], *mark.args), []).append(item)
-    for (_, count), members in laws.items():
-        quick = {round(k * (len(members) - 1) / max(count - 1, 1)) for k in range(count)}
-        for k, item in enumerate(members):
-            if k not in quick:
-                item.add_marker("slow")
+    for (_, count, *slow), members in laws.items():
+        free = [item for item in members if not item.get_closest_marker("slow")]
+        quick = {free[round(k * (len(free) - 1) / max(count - 1, 1))] for k in range(count)} if free else set()
+        others = [item for item in members if item not in quick]
+        kept = set(diverse(others, max(*slow, 1))) if slow else set(others)
+        for item in others:
+            item.add_marker("slow" if item in kept else "long")
+
+
+def diverse(members: list[Any], count: int) -> list[Any]:
+    """So many members, each of the values (of its parameters) that were taken least, spread over all."""
+    left = [members[k] for k in sorted(range(len(members)), key=lambda k: k * 0.6180339887 % 1)]
+    taken, seen = list[Any](), Counter[tuple[str, int]]()
+    while left and len(taken) < count:
+        best = min(left, key=lambda item: sum(seen[value] for value in item.callspec.indices.items()))
+        left.remove(best)
+        taken.append(best)
+        seen.update(best.callspec.indices.items())
+    return taken
 
 
 @pytest.hookimpl(wrapper=True)

@@ -11,11 +11,15 @@ import tomllib
 from collections import Counter
 from collections.abc import Iterator
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 from typing import NamedTuple
 
 import networkx as nx
 import pytest
+
+from conftest import diverse
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "src" / "hrsynth"
@@ -325,6 +329,18 @@ def test_every_test_asserts_something(path: Path):
         if not any(asserts(node) for statement in function.body for node in ast.walk(statement))
     ]
     assert_none(complaints, "asserts nothing")
+
+
+def test_members_that_stay_in_the_slow_suite_have_values_of_all_parameters():
+    """Of 12 robots in 4 dialects a quarter has every robot once and every dialect three times; and is no run of
+    neighbours."""
+    members = [SimpleNamespace(callspec=SimpleNamespace(indices={"robot": k // 4, "dialect": k % 4}), number=k)
+               for k in range(48)]
+    kept = diverse(members, 12)
+    for name, values in (("robot", 12), ("dialect", 4)):
+        assert Counter(each.callspec.indices[name] for each in kept) == {value: 12 // values for value in range(values)}
+    few = sorted(each.number for each in diverse(members[::4], 3))
+    assert min(b - a for a, b in pairwise(few)) > 8
 
 
 def project_files() -> list[Path]:
