@@ -71,6 +71,10 @@ def test_summaries_are_whole_at_any_width(capsys, monkeypatch: pytest.MonkeyPatc
     assert shown == " ".join(called(capsys).split())
 
 
+LONGEST = {("select", "quattro"), ("basins", "quattro"), ("endings", "quattro")}
+"""Examples that take a minute; the first notebooks, the pages and smaller robots ask the same."""
+
+
 def examples() -> Iterator[tuple[str, ...]]:
     for path in LEAVES:
         for text in command(path).examples:
@@ -136,8 +140,10 @@ def test_what_cannot_be_read_is_refused_in_one_line(capsys, words: str, told: st
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("arguments", [each for each in examples() if each[0] not in ("view", "studio", "catalog")
-                                       and not any(part.endswith(".urdf") for part in each[1:2])], ids=" ".join)
+@pytest.mark.parametrize("arguments", [
+    pytest.param(each, marks=[pytest.mark.long] * (each[:2] in LONGEST)) for each in examples()
+    if each[0] not in ("view", "studio", "catalog") and not any(part.endswith(".urdf") for part in each[1:2])],
+    ids=" ".join)
 def test_examples_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys, arguments: tuple[str, ...]):
     monkeypatch.chdir(tmp_path)
     if "c.json" in arguments and arguments[0] == "verify":  # the file that the example of modes writes

@@ -39,7 +39,7 @@ def as_shipped(name: str) -> tuple[object, ...]:
     return essence(derive(load(name)))
 
 
-@pytest.mark.some(1)
+@pytest.mark.some(1, 40)
 @pytest.mark.parametrize("change", CHANGES)
 @pytest.mark.parametrize("name", [pytest.param(n, marks=() if n in QUICK else pytest.mark.slow) for n in shipped()])
 def test_the_same_robot_written_differently_has_the_same_hidden_robot(name: str, change: str) -> None:
@@ -49,7 +49,7 @@ def test_the_same_robot_written_differently_has_the_same_hidden_robot(name: str,
 
 @pytest.mark.slow
 @given(st.data(), st.integers(0, 2**31))
-@settings(max_examples=4, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
+@settings(max_examples=8, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
 def test_random_robots_are_certified_and_keep_their_hidden_robot(data: st.DataObject, seed: int) -> None:
     robot = data.draw(strategies.parallel_robots())
     found = derive(robot)
@@ -60,7 +60,7 @@ def test_random_robots_are_certified_and_keep_their_hidden_robot(data: st.DataOb
     assert essence(derive(changed(robot, change, np.random.default_rng(seed)))) == essence(found)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @given(strategies.parallel_robots())
 @settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
 def test_many_random_robots_are_certified(robot: Mechanism) -> None:

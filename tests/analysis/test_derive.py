@@ -196,7 +196,7 @@ def name(case: object) -> str:
     return "".join(case) if isinstance(case, tuple) else str(case)
 
 
-@pytest.mark.some(1)
+@pytest.mark.some(1, 10)
 @pytest.mark.parametrize(("robot", "legs"), SUBSETS, ids=name)
 def test_every_set_of_legs_is_certified(robot: str, legs: tuple[str, ...]) -> None:
     derivation = derived(robot, legs)
@@ -214,7 +214,7 @@ def test_every_set_of_legs_is_certified(robot: str, legs: tuple[str, ...]) -> No
         assert hidden.ascii in PAIRS
 
 
-@pytest.mark.slow
+@pytest.mark.some(0, 9)
 @pytest.mark.parametrize(("robot", "legs"), PODS, ids=name)
 def test_pairs_and_triples_of_a_pod_are_certified(robot: str, legs: tuple[str, ...]) -> None:
     derivation = derived(robot, legs)

@@ -70,7 +70,7 @@ def test_no_ascent_ends_higher_and_one_ends_there(kind: str) -> None:
     assert found == pytest.approx(dual_bound(entries(B), entries(C)), rel=1e-12)
 
 
-@pytest.mark.slow
+@pytest.mark.some(0, 2)
 @pytest.mark.parametrize("kind", KINDS)
 def test_numba_finds_the_same(kind: str) -> None:
     pytest.importorskip("numba")

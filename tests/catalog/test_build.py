@@ -310,12 +310,13 @@ def test_files_round_trip_and_cut_off_ones_are_refused(whole: dict[str, bytes]):
         decoded(data.replace(b'"catalog":1', b'"catalog":9', 1), "c")
 
 
-@pytest.mark.slow
-def test_the_catalog_itself_has_the_same_bytes_from_two_workers(tmp_path: Path):
+@pytest.mark.some(0, 1)
+@pytest.mark.parametrize("words_each", [2, 4])
+def test_the_catalog_itself_has_the_same_bytes_from_two_workers(words_each: int, tmp_path: Path):
     """A few words of every group: that they are made here or elsewhere, alone or after others, changes nothing."""
     pytest.importorskip("joblib")
     every = architectures()
-    few = {group: random.Random(5).sample(every.words(group), 4) for group in every.groups}
+    few = {group: random.Random(5).sample(every.words(group), words_each) for group in every.groups}
     some = replace(every, groups={group: few[group].copy for group in few})
     build(tmp_path / "one", source=some)
     build(tmp_path / "two", source=some, workers=2)

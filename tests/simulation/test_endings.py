@@ -56,7 +56,7 @@ def check_endings(name: str, seed: int, count: int, monkeypatch: pytest.MonkeyPa
             assert np.allclose(each.turns[-1], found[0].turns[-1], atol=1e-5)
 
 
-@pytest.mark.slow
+@pytest.mark.some(0, 1)
 @pytest.mark.parametrize("name", ["3rps", "rrrrr_m1", "3rpr_m1"])
 def test_endings_depend_on_neither_time_nor_tolerance(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     check_endings(name, 0, 1, monkeypatch)

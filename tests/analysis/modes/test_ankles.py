@@ -65,7 +65,7 @@ def test_twenty_ankles_whose_axes_do_not_meet(kind: str):
 
 
 @needs_msolve
-@pytest.mark.slow
+@pytest.mark.some(0, 1)
 @pytest.mark.parametrize("kind", LEGS)
 def test_twenty_ankles(kind: str):
     real = [check_motors_held(kind, seed) for seed in range(20)]

@@ -88,7 +88,7 @@ def test_random_planar_robots_keep_to_their_bounds(word: str):
     assert 2 <= len(found.modes) <= WORDS[word]
 
 
-@pytest.mark.slow
+@pytest.mark.some(0, 1)
 @pytest.mark.parametrize("word", WORDS)
 def test_random_planar_robots_reach_their_bounds(word: str):
     """Six real modes by random search over robots; where lines meet, two are reached always."""

@@ -51,7 +51,7 @@ def test_all_branches_of_random_legs_are_listed(words: tuple[str, ...]):
     check(words, 0, KINDS[words])
 
 
-@pytest.mark.slow
+@pytest.mark.some(0, 2)
 @pytest.mark.parametrize("words", KINDS, ids="+".join)
 def test_all_branches_of_many_random_legs_are_listed(words: tuple[str, ...]):
     for seed in range(1, 9):
@@ -88,7 +88,7 @@ def test_a_held_drive_leaves_two_angles(drive: str, seed: int):
     check_driven(drive, seed, 12)
 
 
-@pytest.mark.slow
+@pytest.mark.some(0, 1)
 @pytest.mark.parametrize("drive", ["four-bar", "strut", "ball rod"])
 def test_many_held_drives_leave_two_angles(drive: str):
     for seed in range(10, 20):

@@ -160,7 +160,7 @@ def placings(base: Array, platform: Array, rods: Array) -> int:
     return int(np.sum(np.abs(np.abs(roots) - 1) < 1e-7))
 
 
-@pytest.mark.slow
+@pytest.mark.some(0, 1)
 @pytest.mark.parametrize("seed", range(3))
 def test_the_modes_of_a_prism_are_those_of_two_triangles_on_three_rods(seed: int):
     """24 complex embeddings with mirror images (the Desargues graph): six for either side of the second triangle,

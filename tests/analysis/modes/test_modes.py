@@ -30,7 +30,7 @@ def test_each_family_has_its_number_of_modes_and_the_goal_is_one(name: str):
         check_member(name, seed)
 
 
-@pytest.mark.slow
+@pytest.mark.some(0, 5)
 @pytest.mark.parametrize("name", ALL)
 def test_each_family_has_its_number_of_modes_at_many_instances(name: str):
     for seed in range(1_500):
@@ -72,7 +72,7 @@ def test_newton_on_the_pose_finds_the_same_solutions(name: str):
     check_by_newton(name, 5, 400)
 
 
-@pytest.mark.slow
+@pytest.mark.some(0, 5)
 @pytest.mark.parametrize("seed", [100, *(pytest.param(seed, marks=pytest.mark.long) for seed in (101, 102))])
 @pytest.mark.parametrize("name", ALL)
 def test_newton_on_the_pose_finds_the_same_solutions_everywhere(name: str, seed: int):

@@ -72,7 +72,7 @@ def test_there_are_planar_robots():
     assert QUICK.issubset(planar())
 
 
-@pytest.mark.some(1)
+@pytest.mark.some(1, 9)
 @pytest.mark.parametrize("ratio", ["1", "2", "-1", "-2", "1/2", "-3/2", "4"])
 @pytest.mark.parametrize("seed", range(5))
 def test_geared_five_bars(ratio: str, seed: int):

@@ -71,7 +71,7 @@ SLOW = [
 """Words, watched legs (none: the motors) and how many modes there are, complex ones too."""
 
 
-@pytest.mark.some(1)
+@pytest.mark.some(1, 4)
 @pytest.mark.parametrize(("word", "legs", "count"),
                          [*KINDS, *(pytest.param(*each, marks=pytest.mark.slow) for each in SLOW)])
 def test_what_random_starts_find_is_listed(word, legs, count):

@@ -179,7 +179,7 @@ def test_what_closes_is_listed_for_random_robots(kind: str, seed: int):
     assert check_random(kind, seed, 20) in ("listed", "continuum", "found")
 
 
-@pytest.mark.slow
+@pytest.mark.some(0, 1)
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_closes_is_listed_for_many_random_robots(kind: str):
     outcomes = [check_random(kind, seed, 100) for seed in range(100, 115)]
@@ -358,7 +358,7 @@ WAYS = {"tips": partial(ways._of_tips, as_written=False, effort=EFFORT),
         "loops": ways._of_loops, "carrier": ways._of_carrier, "single": ways._of_single}
 
 
-@pytest.mark.some(1)
+@pytest.mark.some(1, 8)
 @pytest.mark.parametrize("name", sorted(shipped()))
 def test_all_ways_list_the_same(name: str):
     """The known patterns and the general ways, wherever several of them prove a list: the same poses, and as many

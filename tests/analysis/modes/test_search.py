@@ -52,7 +52,7 @@ def test_a_search_finds_only_what_a_complete_list_has(name: str, observe: str | 
     check_agreement(hrsynth.modes(robot(name), observe, real=real))
 
 
-@pytest.mark.slow
+@pytest.mark.some(0, 5)
 @pytest.mark.parametrize("kind", ["planar", "pod", "delta"])
 @pytest.mark.parametrize("seed", range(200, 206))
 def test_a_search_finds_only_what_a_complete_list_of_a_random_robot_has(kind: str, seed: int):

@@ -66,7 +66,7 @@ def test_a_free_body_without_a_proof_is_answered_too() -> None:
     assert (len(found.modes) > 0, found.found.complete) == (True, False)
 
 
-@pytest.mark.slow
+@pytest.mark.some(0, 2)
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("cameras", [False, True])
 def test_all_rows_of_the_page(seed: int, cameras: bool) -> None:
@@ -122,7 +122,7 @@ def three_points(at: Array, seed: int) -> AssemblyModes:
     return modes(observe(free_body(np.random.default_rng(seed)), camera="eye=base@0,0,0", see=see, samples=4))
 
 
-@pytest.mark.some(1)
+@pytest.mark.some(1, 10)
 @pytest.mark.parametrize("seed", [*range(3), *(pytest.param(k, marks=pytest.mark.slow) for k in range(3, 40))])
 def test_three_points_have_eight_modes_of_which_at_most_four_are_in_front(seed: int) -> None:
     """In pairs, mirrored at the camera's centre; those in front are the solutions of the cosine laws."""

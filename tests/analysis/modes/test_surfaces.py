@@ -41,7 +41,7 @@ def test_a_point_on_surfaces_has_its_number_of_places(name: str):
         check_member(name, seed)
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(2, 4)
 @needs_msolve
 @pytest.mark.parametrize("name", [name for name in QUICK if name not in SURFACES])
 def test_msolve_lists_the_same_poses(name: str):

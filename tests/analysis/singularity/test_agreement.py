@@ -45,7 +45,7 @@ def check(answer: Singularity, points: int) -> None:
         assert each.lost
 
 
-@pytest.mark.some(1)
+@pytest.mark.some(1, 13)
 @pytest.mark.parametrize(("robot", "legs", "real"), [
     pytest.param(*case, marks=pytest.mark.slow if case[0] in HEAVY and case[1:] == (None, False) else ())
     for case in CASES])
@@ -53,13 +53,13 @@ def test_shipped_robots(robot: str, legs: str | None, real: bool) -> None:
     check(found(robot, legs, real=real), 100)
 
 
-@pytest.mark.slow
+@pytest.mark.some(0, 6)
 @pytest.mark.parametrize("robot", shipped())
 def test_shipped_robots_at_ten_thousand_poses(robot: str) -> None:
     check(singular(load(robot)), 10_000)
 
 
-@pytest.mark.slow
+@pytest.mark.some(0, 8)
 @pytest.mark.parametrize("robot", shipped())
 def test_shipped_robots_with_their_own_motors(robot: str) -> None:
     check(singular(load(robot), real=True, points=1000), 1000)
@@ -82,14 +82,14 @@ def test_a_condition_whose_sign_changes_has_poses_on_its_locus(robot: str, legs:
 
 
 @pytest.mark.slow
-@given(robot=st.one_of(strategies.planar_robots(point=None), strategies.delta_like()), seed=st.integers(0, 2**31),
-       real=st.booleans())
+@given(robot=st.one_of(strategies.planar_robots(point=None), strategies.delta_like(), strategies.parallel_robots()),
+       seed=st.integers(0, 2**31), real=st.booleans())
 @settings(max_examples=3, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
 def test_random_robots(robot: Mechanism, seed: int, real: bool) -> None:
     check_random_robot(robot, seed, real, 12)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @given(robot=strategies.parallel_robots(), seed=st.integers(0, 2**31), real=st.booleans())
 @settings(max_examples=10, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
 def test_many_random_robots(robot: Mechanism, seed: int, real: bool) -> None:

@@ -125,6 +125,7 @@ def test_no_other_critical_point_is_met(name, budget):
     assert unlisted(setting, found, np.random.default_rng(1)) == []
 
 
+@pytest.mark.some(0, 1)
 @pytest.mark.parametrize(("name", "number"), [
     pytest.param("rrrrr_m1", -6, marks=pytest.mark.slow), pytest.param("3prr_m1", 0, marks=pytest.mark.slow),
     pytest.param("3rrr_m1", 0, marks=pytest.mark.long)])

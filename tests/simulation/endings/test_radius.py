@@ -112,7 +112,7 @@ def test_boxes_that_lead_inwards_do_so_at_all_their_poses(name, legs):
             assert pose @ np.linalg.lstsq(rows, miss)[0] > 0
 
 
-@pytest.mark.slow
+@pytest.mark.some(0, 1)
 @pytest.mark.parametrize(("name", "legs", "least"), [
     ("quattro", "1,4", 0.017), ("delta", None, 0.11), ("3rrr_m1", None, 0.010), ("gough_stewart", None, 0.0033)])
 def test_the_law_without_damping_leads_inwards(name, legs, least):

@@ -182,7 +182,7 @@ def test_rates_are_those_of_the_law() -> None:
         assert values == pytest.approx([(low + high) / 2 for low, high in rates], rel=1e-3, abs=1e-3)
 
 
-@pytest.mark.slow
+@pytest.mark.some(0, 1)
 @pytest.mark.parametrize("name", ["prrrp_m1", pytest.param("rrrrr_m1", marks=pytest.mark.slow),
                                   pytest.param("3prr_m1", marks=pytest.mark.slow)])
 def test_what_is_said_to_be_all_is_what_boxes_prove(name: str) -> None:
