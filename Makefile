@@ -34,7 +34,7 @@ test: setup-dev  ## the tests, without the slow ones
 test-all: setup-all setup-browser  ## all tests but the longest (AFTER_TEST=1: those that `make test` left out)
 	@$(PYTEST) --dist worksteal -m "$(if $(AFTER_TEST),(slow or browser) and )not long" tests
 
-test-long: setup-all  ## the longest tests: many instances, all robots; more than an hour
+test-long: setup-all  ## the tests that are left: all members of each law, many instances; hours
 	@$(PYTEST) -m long tests
 
 fuzz: setup-dev  ## 100,000 mutations of robot files (MUTATIONS=, SEED=): each is read or refused

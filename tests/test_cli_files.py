@@ -45,7 +45,7 @@ def test_every_drawing_command_is_among_them():
     assert {name for name, each in OUTPUTS.items() if any(file.drawn for file in each.files)} == DRAWN.keys()
 
 
-@pytest.mark.some(1)
+@pytest.mark.some(1, 4)
 @pytest.mark.parametrize(("arguments", "files"), [each for group in FILES.values() for each in group],
                          ids=lambda each: " ".join(each))
 def test_one_sentence_names_what_is_written(here: Path, capsys, arguments: list[str], files: list[str]):
@@ -59,7 +59,7 @@ def test_one_sentence_names_what_is_written(here: Path, capsys, arguments: list[
     assert all(sentences[0].count(name) == 1 for name in files)
 
 
-@pytest.mark.some(1)
+@pytest.mark.some(1, 3)
 @pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * (name in ("singular", "endings")))
                                   for name in DRAWN])
 def test_figures_are_written_as_wide_as_asked(here: Path, capsys, name: str):

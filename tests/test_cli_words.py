@@ -36,7 +36,7 @@ ASKED = [("check quattro --observe 1,4 --at x=0.02,{}", 1), ("modes 3rrr_m1 --at
          ("accuracy 3rrr_m1 --cone 0.1deg --at x=0.01,{}", 1), ("select 3rrr_m1 --start {} --goal x=0.02 --runs 0", 2)]
 
 
-@pytest.mark.some(1)
+@pytest.mark.some(1, 6)
 @pytest.mark.parametrize(("command", "least"), ASKED, ids=lambda each: str(each).partition(" ")[0])
 @pytest.mark.parametrize(("typed", "said"), [("phi=5deg", rf"phi={NUMBER}deg"), ("phi=0.1", rf"phi={NUMBER}(?!\S*deg)"),
                                              ("rpy=0/0/5deg", rf"rpy={NUMBER}deg/{NUMBER}deg/{NUMBER}deg")])

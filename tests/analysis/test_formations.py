@@ -92,7 +92,7 @@ def complete(bodies: str, n: int) -> Derivation:
     return derive(drawn(n, bodies, list(permutations(range(1, n + 1), 2)), seed=n)[0])
 
 
-@pytest.mark.some(1)
+@pytest.mark.some(1, 4)
 @pytest.mark.parametrize("n", [3, pytest.param(4, marks=pytest.mark.slow), pytest.param(5, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("bodies", sorted(MOVES))
 def test_generic_ranks_of_complete_formations_are_those_of_the_literature(bodies: str, n: int):

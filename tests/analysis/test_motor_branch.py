@@ -198,7 +198,7 @@ def test_the_proof_ends_where_the_loop_toggles():
     assert not part.turns
 
 
-@pytest.mark.slow
+@pytest.mark.some(0, 2)
 @pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 6))])
 def test_tubes_hold_what_small_steps_find_in_random_four_bars(seed):
     rng = np.random.default_rng(seed)
@@ -218,7 +218,7 @@ def test_tubes_hold_what_small_steps_find_in_random_four_bars(seed):
 SLOW = pytest.mark.slow
 
 
-@pytest.mark.some(1)
+@pytest.mark.some(1, 2)
 @pytest.mark.parametrize(("name", "half"), [
     ("rrrrr_m1", 0.15), ("3rrr_m1", 0.1), ("3ppr_m1", 0.01), pytest.param("3prr_m1", 0.02, marks=SLOW),
     pytest.param("delta", 0.04, marks=SLOW), pytest.param("3rps", 0.01, marks=SLOW),

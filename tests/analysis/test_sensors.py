@@ -102,7 +102,7 @@ def certified(mechanism: Mechanism, kind: str, form: str = "simplified") -> Deri
     return found
 
 
-@pytest.mark.some(1)
+@pytest.mark.some(1, 13)
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("robot", ["free_body", "arm", "gough_stewart"])
 def test_every_kind_is_certified(robot: str, kind: str) -> None:
@@ -114,7 +114,7 @@ def test_every_kind_is_certified(robot: str, kind: str) -> None:
     assert certified(mechanism, kind).verdict.rank > 0
 
 
-@pytest.mark.some(3)
+@pytest.mark.some(3, 13)
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("robot", ["free_body", "arm", "gough_stewart", "delta"])
 def test_exact_ranks_are_those_of_samples(robot: str, kind: str) -> None:

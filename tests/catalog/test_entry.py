@@ -37,7 +37,7 @@ TWO_FIRST = [pytest.param(name, marks=pytest.mark.slow) if name in ("pods", "del
 """The groups, two left to the slow tests."""
 
 
-@pytest.mark.some(1)
+@pytest.mark.some(1, 6)
 @pytest.mark.parametrize("name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in SHIPPED])
 def test_an_entry_says_what_the_shipped_robot_says(name):
     found, robot = entry(SHIPPED[name]), derive(load(name))

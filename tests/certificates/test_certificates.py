@@ -84,7 +84,7 @@ NEEDED = {name: [mark for mark, names in ((pytest.mark.slow, LONGER), (needs_mso
           for name in sorted(FAMILIES | MEETING | SURFACES)}
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(2, 12)
 @pytest.mark.parametrize("name", [pytest.param(name, marks=marks) for name, marks in NEEDED.items()])
 def test_random_platforms(name):
     """The checker's bound, which trusts no resultant, is the engine's count."""

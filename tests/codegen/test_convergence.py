@@ -108,7 +108,7 @@ def test_steps_and_errors_are_as_proved(name: str) -> None:
     check(name, 40, 4)
 
 
-@pytest.mark.slow
+@pytest.mark.some(0, 8)
 @pytest.mark.parametrize("name", sorted(WIDTHS))
 def test_steps_and_errors_of_every_form(name: str) -> None:
     check(name, 400, 30)
@@ -177,7 +177,7 @@ def test_axes_that_are_parallel_but_for_rounding() -> None:
 
     robot = replace(robot, joints={name: replace(joint, axes=tuple(map(off, joint.axes)))
                                    for name, joint in robot.joints.items()})
-    found = export(robot, "numpy", box_of(robot, 0.2))
+    found = export(robot, "numpy", box_of(robot, 0.05))
     assert found.bounds is not None
     assert found.bounds.others == 3
     assert "Whether 3 more equations of the loops hold, the program finds out" in found.code

@@ -143,7 +143,7 @@ def test_dimensions_that_do_not_close_are_refused():
         Linkage.of([1.0, 0.1, 0.1, 0.1], [0.5] * 4).regular(np.random.default_rng(0))
 
 
-@pytest.mark.slow
+@pytest.mark.some(0, 2)
 @pytest.mark.parametrize("name", LINKAGES)
 def test_many_linkages(name: str):
     for seed in range(2, 5):

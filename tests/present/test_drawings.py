@@ -109,7 +109,7 @@ def test_every_joint_of_a_robot_stands_once_and_motors_are_grey(name: str, draw:
     assert_free(plan(mechanism, observed=observed))
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(2, 16)
 @pytest.mark.parametrize("form", ["simplified", "general"])
 @pytest.mark.parametrize("name", [*FEW, *(pytest.param(n, marks=pytest.mark.slow) for n in shipped() if n not in FEW)])
 def test_virtual_actuators_of_hidden_robots_are_coloured(name: str, form: str) -> None:

@@ -31,6 +31,7 @@ def law_joints_hold(found: View) -> None:
             assert worst < CLOSED, (machine.key, worst)
 
 
+@pytest.mark.some(1, 8)
 @pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.slow) if name == "quattro" else name
                                   for name in ROBOTS])
 def test_all_loops_are_closed_at_every_position_of_every_slider(name: str):
@@ -40,7 +41,7 @@ def test_all_loops_are_closed_at_every_position_of_every_slider(name: str):
     law_joints_hold(found)
 
 
-@pytest.mark.slow
+@pytest.mark.some(0, 8)
 @pytest.mark.parametrize("name", ROBOTS)
 def test_a_slider_moves_one_coordinate_and_keeps_the_others(name: str):
     found = seen(name)

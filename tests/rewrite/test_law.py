@@ -119,7 +119,7 @@ def test_every_rule_has_a_robot(rule: Rule[Any, Any]) -> None:
     assert rule.name in accepted()
 
 
-@pytest.mark.some(3)
+@pytest.mark.some(3, 16)
 @pytest.mark.parametrize(("robot", "legs"), CASES, ids=name)
 def test_no_accepted_step_changes_the_relation(robot: str, legs: tuple[str, ...] | None) -> None:
     assert obeys(setting_of(robot, legs, None, 3)).steps
@@ -147,7 +147,7 @@ def test_the_general_form_keeps_all_legs(robot: str, legs: tuple[str, ...] | Non
         assert "{R-PP}" in state.architecture().ascii
 
 
-@pytest.mark.slow
+@pytest.mark.some(0, 16)
 @pytest.mark.parametrize(("robot", "legs"), CASES, ids=name)
 def test_no_accepted_step_changes_the_relation_anywhere(robot: str, legs: tuple[str, ...] | None) -> None:
     assert obeys(setting_of(robot, legs, None, 3), thorough=True).steps

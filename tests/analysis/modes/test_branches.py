@@ -44,7 +44,7 @@ def nearest(found: AssemblyModes, D: Array) -> int | None:
     return int(np.argmin(apart)) if min(apart) < SAME else None
 
 
-@pytest.mark.some(1)
+@pytest.mark.some(1, 2)
 @pytest.mark.parametrize("words", KINDS, ids="+".join)
 def test_all_branches_of_random_legs_are_listed(words: tuple[str, ...]):
     """An offset U holds a direction in two ways, a skew pair RR in two; each way has its own line, circle or point."""

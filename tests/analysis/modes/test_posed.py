@@ -220,7 +220,7 @@ def test_legs_that_are_not_watched_are_not_forgotten():
 
 
 @pytest.mark.some(1)
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [1, 0, 2])
 def test_a_body_that_turns_about_a_point_has_eight_modes(seed: int):
     """Three legs RRR whose axes meet in one point, driven at the base: an axis of the platform keeps an angle to each
     elbow's axis, three quadrics of the quaternion."""

@@ -176,6 +176,7 @@ ROBOTS = {
 QUICKLY = ("a plane",)
 
 
+@pytest.mark.some(1, 2)
 @pytest.mark.parametrize("name", [pytest.param(name, marks=() if name in QUICKLY else pytest.mark.slow)
                                   for name in ROBOTS])
 def test_what_random_starts_of_the_whole_robot_find_is_listed(name: str) -> None:

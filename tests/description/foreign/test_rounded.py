@@ -58,7 +58,7 @@ def test_a_rounded_robot_is_the_same(name: str, ending: str, decimals: int, tmp_
     assert answer(again(robot, tmp_path / f"robot{ending}", decimals)) == answer(load(name))
 
 
-@pytest.mark.some(0, 6)
+@pytest.mark.some(0, 3)
 @pytest.mark.parametrize("name", shipped())
 def test_every_rounded_robot_is_the_same_or_refused(name: str, tmp_path: Path):
     """With four decimals; connectors with a length, twice as many joints, may leave one file of a robot undecided."""

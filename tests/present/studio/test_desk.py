@@ -335,7 +335,7 @@ def test_what_was_guessed_of_a_foreign_file_is_told_and_can_be_changed(tmp_path:
     assert changed["failed"] or changed["command"].endswith(f"--platform {wrong}")
 
 
-@pytest.mark.slow
+@pytest.mark.some(0, 8)
 @pytest.mark.parametrize("robot", list(shipped()))
 def test_along_every_slider_the_loops_stay_closed(robot: str):
     """Step by step, as a hand draws it, with the hidden robot; how quickly is measured in ``benchmarks/studio.py``."""

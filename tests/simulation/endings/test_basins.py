@@ -350,7 +350,7 @@ def test_why_runs_are_simulated_one_by_one_is_told():
     assert module.hindrances(ObservedRobot.of("3rrr_m1")) == ()
 
 
-@pytest.mark.slow
+@pytest.mark.some(0, 1)
 @pytest.mark.parametrize(("grid", "hollow"), [("x=-0.02:0.02:2,y=-0.02:0.02:2,phi=0", False),
                                               ("x=-0.02:0.02:2,y=-0.02:0.02:2,phi=0.1", True),
                                               ("x=-0.02:0.02:2,y=0,phi=0.1", True)])

@@ -390,7 +390,7 @@ def test_four_image_points_of_a_tilted_square(tmp_path: Path) -> None:
     assert met
 
 
-@pytest.mark.slow
+@pytest.mark.some(0, 2)
 @pytest.mark.parametrize("see", [
     ["circle:platform@0.1,0,0/0,0.3,1", "distance:platform@0.1,0.1,0"],
     ["edges:platform@0.1,0,0/0,1,0.2/0.02", "edge:platform@0.1,0.1,0/1,0,0/0.02"],
@@ -414,7 +414,7 @@ def test_rests_of_all_kinds_are_those_of_the_law(see: list[str], tmp_path: Path)
             assert (away.max() < 1e-4) == (each.stable is True)
 
 
-@pytest.mark.slow
+@pytest.mark.some(0, 1)
 @pytest.mark.parametrize(("depth", "mixed"), [("desired", False), ("constant:1", True)])
 def test_rests_with_supposed_depths_are_those_of_the_law(depth: str, mixed: bool, tmp_path: Path) -> None:
     """There the law commands nothing, and its differences have the eigenvalues that are told."""
