@@ -119,7 +119,7 @@ def address() -> Iterator[str]:
 
 
 @pytest.mark.browser
-def test_with_a_server_sliders_move_the_robot_together(tab: Tab, address: str):
+def test_with_a_server_sliders_move_the_robot_together(address: str, tab: Tab):
     tab.page.set_viewport_size(SIZE)
     tab.open(address)
     known = tab.page.evaluate
