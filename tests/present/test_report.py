@@ -21,10 +21,9 @@ from hrsynth.description import load
 from hrsynth.errors import BadRequest, PlaneNotMet
 from hrsynth.families.formations import formation
 from hrsynth.present.drawings import svg
-from hrsynth.present.report import figures, parts
+from hrsynth.present.report import figures, pages, parts
 from hrsynth.present.report.answer import set_rows
 from hrsynth.present.report.formulas import barred, collected, formula, indexed
-from hrsynth.present.report.pages import report
 
 FAST = ("uranesx", None)
 SLOW = [("quattro", "1,4"), ("rrrrr_m1", None), ("3ppr_m1", None)]
@@ -39,6 +38,10 @@ def made(name: str, legs: str | None) -> tuple[Derivation, str]:
     observe = None if legs is None else legs.split(",")
     found = derive(load(name), observe)
     return found, report(found)
+
+
+def report(found: Derivation) -> str:
+    return pages.page(found, parts.parts(found, 0)).decode()
 
 
 def read(page: str) -> Any:

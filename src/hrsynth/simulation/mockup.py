@@ -18,6 +18,8 @@ from ..errors import BadMechanism
 from ..geometry.vectors import Array
 from ..mechanism import Joint, JointType, Mechanism
 
+GRAVITY = 9.81
+"""m/s²."""
 DENSITY = 1500.0
 """Of all rods (kg/m³)."""
 RADIUS = 0.02
@@ -51,13 +53,13 @@ class Mockup:
         return RADIUS * self.mechanism.length
 
 
-def mockup(mechanism: Mechanism, gravity: float = 9.81) -> str:
-    """The MJCF of a mechanism that is to move from its zero configuration under gravity along −z (m/s²); motors are
-    named as their joints. Raises ``BadMechanism`` for a joint that leaves all six freedoms."""
+def mockup(mechanism: Mechanism) -> str:
+    """The MJCF of a mechanism that is to move from its zero configuration under gravity along −z; motors are named as
+    their joints. Raises ``BadMechanism`` for a joint that leaves all six freedoms."""
     made = Mockup(mechanism)
     root = made.root
     root.set("model", mechanism.name)
-    Xml.SubElement(root, "option", timestep=str(STEP), gravity=f"0 0 {-gravity}", integrator="implicitfast",
+    Xml.SubElement(root, "option", timestep=str(STEP), gravity=f"0 0 {-GRAVITY}", integrator="implicitfast",
                    iterations="100", tolerance="1e-12")
     Xml.SubElement(root, "compiler", angle="radian", autolimits="false", inertiafromgeom="true")
     Xml.SubElement(Xml.SubElement(root, "default"), "geom", contype="0", conaffinity="0", density=str(DENSITY))

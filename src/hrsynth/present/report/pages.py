@@ -20,7 +20,7 @@ from ..text.tables import labelled
 from .answer import answer, good, held, set_rows, things, wrong
 from .figures import SOURCES, actuators, pairs, step_figures
 from .formulas import barred, collected, formula, indexed
-from .parts import Parts, Refused, asked, parts
+from .parts import Parts, Refused, asked
 
 LARGEST_LIST = 63
 """Sets of legs in the table at most: all of six legs; of more, the smallest sets."""
@@ -28,14 +28,9 @@ PORTRAIT = (420.0, 330.0)
 """Width and height of the robot's picture (pixels)."""
 
 
-def report(found: Derivation, *, seed: int = 0) -> str:
-    """The report of a derivation as a page of HTML without references to anything outside; ``seed`` is the one that the
-    derivation was asked with. The other parts are computed here (seconds to a minute)."""
-    return page(found, parts(found, seed)).decode()
-
-
 def page(found: Derivation, told: Parts) -> bytes:
-    """The page that says a derivation and the other parts; what is refused is told with its reason."""
+    """The page of HTML, without references to anything outside, that says a derivation and the other parts; what is
+    refused is told with its reason."""
     name, modes, errors = found.robot.name, told.modes, told.accuracy
     observed = [o.link for o in found.setting.observed]
     graphs = [graph_svg(found.setting.anatomy, observed=observed, title=f"Joint graph of the real robot {name}")]
