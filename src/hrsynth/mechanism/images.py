@@ -13,9 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..geometry.jets import Jet, turn
+from ..geometry.screws import couple, force
 from ..geometry.so3 import wrap_angle
-from ..geometry.vectors import Array, cross, unit
-from .sights import CameraObservation
+from ..geometry.vectors import Array, Numbers, cross, unit
+from .observation import Drawn
+from .sights import CameraObservation, HeldPlace, Sighting, in_plane, line_plane, stretch
 
 HALF_PICTURE = 1.0
 """A line in the image is found by two points this far on each side of the one nearest to the picture's centre: at the
@@ -139,13 +141,41 @@ def shifted_ellipse(Q: Array, shocks: Array, by: float) -> Array:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SeenLine(CameraObservation):
-    """A measurement of which the value is the unit normal n of a plane through C: a line in the picture."""
+    """A measurement of which the value is the unit normal n of a plane through C that meets a straight line or a
+    cylinder: a line in the picture."""
 
     size = 3
     angular = True
     rank = 2
     found_by = frozenset({"px"})
     spot = False
+
+    def normal(self, at: Sighting) -> Numbers:
+        """Of the plane, of any length."""
+        raise NotImplementedError
+
+    @staticmethod
+    def met(p: Array, d: Array, r: Array) -> Array:
+        """A point of the line of direction d in which the plane meets what is seen."""
+        raise NotImplementedError
+
+    @classmethod
+    def plane(cls, p: Array, d: Array, r: Array) -> Array | None:
+        """Through that line, normal to the plane of C and it."""
+        return line_plane(cls.met(p, d, r), d)
+
+    @classmethod
+    def outline(cls, p: Array, d: Array, r: float, size: float) -> Drawn:
+        """A piece of that line, and its plane with C."""
+        piece = stretch(cls.met(p, d, np.array([r])), d, size)
+        return Drawn((piece,), (np.vstack([0 * p, piece]),))
+
+    def wrenches(self, at: Sighting) -> list[Numbers]:
+        n = self.normal(at)
+        return [force(n, at.B), couple(cross(at.d, n))]
+
+    def loci(self, at: Sighting) -> tuple[HeldPlace, ...]:
+        return in_plane(at, self.normal(at))
 
     def error(self, value: Array, wanted: Array) -> Array:
         return line_apart(value, wanted)

@@ -12,22 +12,9 @@ import numpy as np
 
 from ...errors import NotMeasured
 from ...geometry.jets import Jet, inner, moment
-from ...geometry.screws import couple, force
 from ...geometry.vectors import Array, Numbers, cross, unit
 from ..images import SeenLine, line_fed
-from ..observation import Drawn
-from ..sights import (
-    HeldPlace,
-    Sighting,
-    VirtualJoint,
-    across,
-    apart,
-    in_plane,
-    line_plane,
-    normalised,
-    on_plane,
-    stretch,
-)
+from ..sights import Sighting, VirtualJoint, across, apart, normalised, on_plane
 
 
 def tangent(p: Array, d: Array, r: Array) -> Array:
@@ -77,13 +64,12 @@ class CylinderEdge(SeenLine):
     def partials(p: Array, d: Array, r: Array) -> tuple[Array | None, Array | None]:
         return tangent_partials(p, d, r)
 
-    def _normal(self, at: Sighting) -> Array:
+    def normal(self, at: Sighting) -> Numbers:
         return tangent(at.B - at.C, at.d, np.array([self.radius]))
 
     @staticmethod
-    def plane(p: Array, d: Array, r: Array) -> Array | None:
-        """As of a line in the image, the one in which the plane touches the cylinder."""
-        return line_plane(p - r * tangent(p, d, r), d)
+    def met(p: Array, d: Array, r: Array) -> Array:
+        return p - r * tangent(p, d, r)
 
     @staticmethod
     def supposed(p: Array, d: Array, r: Array, g: Array) -> tuple[Array, Array]:
@@ -96,24 +82,11 @@ class CylinderEdge(SeenLine):
     def fed(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
         return line_fed(touching(p, d, r), wanted)
 
-    @staticmethod
-    def outline(p: Array, d: Array, r: float, size: float) -> Drawn:
-        """Where the plane through C touches the cylinder, and that plane."""
-        piece = stretch(p - r * tangent(p, d, np.array([r])), d, size)
-        return Drawn((piece,), (np.vstack([0 * p, piece]),))
-
-    def wrenches(self, at: Sighting) -> list[Numbers]:
-        n = self._normal(at)
-        return [force(n, at.B), couple(cross(at.d, n))]
-
     def chain(self, at: Sighting) -> tuple[VirtualJoint, ...]:
         radius = self.radius or 0.0
         apart(at, at.foot, abs(radius), f"edge {self.leg!r}", f"more than the radius {abs(radius):g}")
-        n = self._normal(at)
+        n = self.normal(at)
         return across(at, n, unit(at.foot - at.C - radius * n), 1)
-
-    def loci(self, at: Sighting) -> tuple[HeldPlace, ...]:
-        return in_plane(at, self._normal(at))
 
 
 KIND = CylinderEdge

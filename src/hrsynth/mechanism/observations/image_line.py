@@ -11,22 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...geometry.jets import Jet, moment
-from ...geometry.screws import couple, force
 from ...geometry.vectors import Array, Numbers, cross, hat, unit
 from ..images import SeenLine, line_fed
-from ..observation import Drawn
-from ..sights import (
-    HeldPlace,
-    Sighting,
-    VirtualJoint,
-    across,
-    apart,
-    in_plane,
-    line_plane,
-    normalised,
-    on_plane,
-    stretch,
-)
+from ..sights import Sighting, VirtualJoint, across, apart, normalised, on_plane
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -48,10 +35,12 @@ class ImageLine(SeenLine):
         turned = normalised(cross(p, d))[1]
         return -turned @ hat(d), turned @ hat(p)
 
+    def normal(self, at: Sighting) -> Numbers:
+        return cross(at.B - at.C, at.d)
+
     @staticmethod
-    def plane(p: Array, d: Array, r: Array) -> Array | None:
-        """Through the line, normal to that of C and the line."""
-        return line_plane(p, d)
+    def met(p: Array, d: Array, r: Array) -> Array:
+        return p
 
     @staticmethod
     def supposed(p: Array, d: Array, r: Array, g: Array) -> tuple[Array, Array]:
@@ -64,23 +53,10 @@ class ImageLine(SeenLine):
     def fed(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
         return line_fed(moment(p, d), wanted)
 
-    @staticmethod
-    def outline(p: Array, d: Array, r: float, size: float) -> Drawn:
-        """A piece of the line, and its plane with C."""
-        piece = stretch(p, d, size)
-        return Drawn((piece,), (np.vstack([0 * p, piece]),))
-
-    def wrenches(self, at: Sighting) -> list[Numbers]:
-        n = cross(at.B - at.C, at.d)
-        return [force(n, at.B), couple(cross(at.d, n))]
-
     def chain(self, at: Sighting) -> tuple[VirtualJoint, ...]:
         apart(at, at.foot, 0.0, f"image_line {self.leg!r}", "a line that does not meet it")
         out = unit(at.foot - at.C)
         return across(at, np.cross(out, at.d), out, 1)
-
-    def loci(self, at: Sighting) -> tuple[HeldPlace, ...]:
-        return in_plane(at, cross(at.B - at.C, at.d))
 
 
 KIND = ImageLine
