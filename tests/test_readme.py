@@ -93,7 +93,7 @@ def test_the_python_example_runs_and_prints_what_it_says():
 
 
 @pytest.mark.some(1)
-@pytest.mark.parametrize("command", [pytest.param(each, marks=[pytest.mark.slow] * each.startswith("basins"))
+@pytest.mark.parametrize("command", [pytest.param(each, marks=[pytest.mark.long] * each.startswith("basins"))
                                      for each in dict.fromkeys(re.findall(r"\$ hrsynth (\w.*)", SHOWN))])
 def test_the_commands_print_what_is_shown(command: str, capsys: pytest.CaptureFixture[str], tmp_path: Path,
                                           monkeypatch: pytest.MonkeyPatch):

@@ -57,7 +57,7 @@ def assembled(mechanism: Mechanism, D: np.ndarray) -> Assembly:
     return Assembler(anatomy, mechanism.length, mechanism.reference).at(bodies, ())
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(2, 6)
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize(("first", "count"), [(0, 2), pytest.param(100, 12, marks=pytest.mark.slow)])
 def test_what_is_said_of_assembly_holds_by_brute_force(kind: str, first: int, count: int):

@@ -18,7 +18,10 @@ from present.views import mechanism_of, miss, moved, seen, states, turned
 CLOSED, DRAWN = 1e-6, 1e-6
 """Metres, and sines of angles, that joints may be open in the data; that drawn points may be off."""
 QUICK = ("rrrrr_m1", "quattro")
-ROBOTS = [*QUICK, *(pytest.param(name, marks=pytest.mark.slow) for name in shipped() if name not in QUICK)]
+OTHERS = [name for name in shipped() if name not in QUICK]
+ROBOTS = [*QUICK, *(pytest.param(name, marks=pytest.mark.long if k % 4 else pytest.mark.slow)
+                    for k, name in enumerate(OTHERS))]
+"""Of the others a quarter is slow, the same in all laws: what is seen of a robot is computed once."""
 
 
 def law_joints_hold(found: View) -> None:
@@ -31,7 +34,6 @@ def law_joints_hold(found: View) -> None:
             assert worst < CLOSED, (machine.key, worst)
 
 
-@pytest.mark.some(1, 8)
 @pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.slow) if name == "quattro" else name
                                   for name in ROBOTS])
 def test_all_loops_are_closed_at_every_position_of_every_slider(name: str):
@@ -41,7 +43,7 @@ def test_all_loops_are_closed_at_every_position_of_every_slider(name: str):
     law_joints_hold(found)
 
 
-@pytest.mark.some(0, 8)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ROBOTS)
 def test_a_slider_moves_one_coordinate_and_keeps_the_others(name: str):
     found = seen(name)

@@ -99,7 +99,7 @@ def test_runs_abreast_end_where_single_runs_end():
     assert ends_agree("3rrr_m1", None, poses(task("3rrr_m1")[1], 2, 2, 1.0)) == 2
 
 
-@pytest.mark.some(0, 5)
+@pytest.mark.some(0, 3)
 @pytest.mark.parametrize(("name", "legs"), [
     ("3prr_m1", None), ("3puu", None), ("3rpr_m2", None), ("3ruu", None), ("3upu", None), ("6pus", None),
     ("delta", None), ("delta", "1,2"), ("gough_stewart", "1,3,5"), ("linear_delta", None), ("orthoglide", None),
