@@ -331,7 +331,7 @@ def test_unknown_names(observe: str, camera: str | None, value: str) -> None:
     assert caught.value.value == value
 
 
-@pytest.mark.slow
+@pytest.mark.some(0, 16)
 @pytest.mark.parametrize("camera", [None, "platform"])
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_every_robot_with_one_leg_observed(robot: str, camera: str | None) -> None:

@@ -138,7 +138,7 @@ def test_every_robot_is_expected() -> None:
     assert set(EXPECTED) == set(ROBOTS)
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(2, 8)
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_all_legs_observed(robot: str) -> None:
     derivation, expected = derived(robot), EXPECTED[robot]
