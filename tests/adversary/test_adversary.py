@@ -242,7 +242,7 @@ FOUND = (
 """What was found wrong once: kind, seed, check."""
 
 
-@pytest.mark.slow
+@pytest.mark.some(0, 11)
 @pytest.mark.parametrize(("kind", "seed", "check"), FOUND)
 def test_what_was_wrong_once_is_right(kind, seed, check):
     assert not wrong([attacked(kind, seed, only=[check])])

@@ -151,7 +151,7 @@ def test_values_that_close_a_skew_leg_are_among_those_told(first: str, second: s
     assert told or (second, last) == ("P", "R")
 
 
-@pytest.mark.slow
+@pytest.mark.some(0, 1)
 @pytest.mark.parametrize("kind", ["R2-SS", "RRR", "PRR"])
 def test_the_reach_told_is_the_boundary(kind: str):
     """A platform led straight away closes until the miss that is told begins: it

@@ -72,7 +72,7 @@ def test_mesh_files_beside_the_robot_are_read(tmp_path: Path, address: str):
     assert (rods(found, "prox_1"), rods(found, "prox_2")) == (0, 1)
 
 
-@pytest.mark.slow
+@pytest.mark.some(0, 1)
 @pytest.mark.parametrize("ending", [
     ".xml", pytest.param(".sdf", marks=pytest.mark.slow), pytest.param(".usda", marks=pytest.mark.slow)])
 def test_other_dialects_show_the_same_meshes(ending: str, tmp_path: Path):
@@ -113,7 +113,7 @@ def test_links_that_a_merged_joint_swallows_are_told(tmp_path: Path):
     assert len(meshed(found, "hand")) == 1
 
 
-@pytest.mark.slow
+@pytest.mark.some(0, 1)
 @pytest.mark.parametrize("ending", ["xml", pytest.param("sdf", marks=pytest.mark.slow),
                                     pytest.param("usda", marks=pytest.mark.slow)])
 def test_a_robot_of_another_dialect_is_drawn_with_the_same_shapes(tmp_path: Path, ending: str):

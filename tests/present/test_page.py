@@ -51,6 +51,7 @@ def push(tab: Tab, number: int, key: str, times: int = 4) -> None:
         slider.press(key)
 
 
+@pytest.mark.some(0, 2)
 @pytest.mark.browser
 @pytest.mark.parametrize("name", FIVE)
 def test_the_page_of_a_robot_shows_it_and_its_sliders_move_it(name: str, tab: Tab, tmp_path: Path):

@@ -96,7 +96,7 @@ def overlapping(texts: list[Text]) -> Iterator[tuple[str, str]]:
             yield one, other
 
 
-@pytest.mark.some(1, 4)
+@pytest.mark.some(1, 2)
 @pytest.mark.parametrize("name", [name if name == "check of a line" else pytest.param(name, marks=pytest.mark.slow)
                                   for name in QUESTIONS])
 def test_text_is_legible_on_the_page_and_apart_at_any_width(name: str, folder: str):

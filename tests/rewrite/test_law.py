@@ -153,7 +153,7 @@ def test_no_accepted_step_changes_the_relation_anywhere(robot: str, legs: tuple[
     assert obeys(setting_of(robot, legs, None, 3), thorough=True).steps
 
 
-@pytest.mark.slow
+@pytest.mark.some(0, 4)
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("kind", ["planar", "pods", "aligned", "random"])
 def test_the_law_on_random_robots(kind: str, seed: int) -> None:

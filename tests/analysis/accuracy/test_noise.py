@@ -113,7 +113,7 @@ def sensed(setting: ObservedRobot, blur: Blur, at: ClosedConfiguration, given: A
 SLOW = pytest.mark.slow
 
 
-@pytest.mark.some(1)
+@pytest.mark.some(1, 4)
 @pytest.mark.parametrize("name", [
     *(pytest.param(name, marks=SLOW) for name in (*MORE, "delta", "arm") if name != "point"), "point", "encoders"])
 def test_no_wrong_measurement_does_worse_and_the_told_one_does_it(name: str, tmp_path: Path) -> None:

@@ -106,6 +106,7 @@ def test_what_cannot_be_read_is_noticed(tab: Tab, tmp_path: Path):
     assert len(faint(tab.page)) == len(beyond(tab.page)) == 1
 
 
+@pytest.mark.some(0, 1)
 @pytest.mark.parametrize("size", SIZES)
 def test_legs_are_ticked_and_what_follows_is_told(size: str, tab: Tab, address: str):
     page = opened(tab, address, "quattro", size)

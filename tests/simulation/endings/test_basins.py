@@ -292,7 +292,7 @@ def test_the_table_has_a_line_a_start():
     assert all(names[row["end"]] == row["ended"] for row in rows)
 
 
-@pytest.mark.slow
+@pytest.mark.some(0, 1)
 @pytest.mark.parametrize("grid", ["x=-0.02:0.02:4,y=0.02,phi=0", "x=-0.02:0.02:3,y=0:0.01:2,phi=-0.1:0.1:2"])
 def test_lines_and_boxes_are_drawn(grid: str, tmp_path):
     found = hrsynth.basins("3rrr_m1", to="x=0,y=0,phi=0", grid=grid, jobs=1)
