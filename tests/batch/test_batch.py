@@ -163,7 +163,7 @@ def test_a_batch_of_a_random_robot_is_its_relation(mechanism) -> None:
         check_law(setting, known, 4)
 
 
-@pytest.mark.some(1, 3)
+@pytest.mark.some(1, 2)
 @pytest.mark.parametrize("package", ["numba", pytest.param("jax", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("watched", [2, 3])
 @pytest.mark.parametrize("robot", ["3prp", "quattro", "gough_stewart", "orthoglide", "3rrr_m1", "3puu", "hexa"])

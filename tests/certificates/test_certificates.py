@@ -269,7 +269,7 @@ def looped(name: str) -> str:
     return json.dumps(hrsynth.certificate(LOOPS[name]()))
 
 
-@pytest.mark.some(1)
+@pytest.mark.some(1, 2)
 @pytest.mark.parametrize("name", LOOPS)
 def test_loops_of_planar_mechanisms(name):
     """Their lists have no tips on curves; the degrees bound them."""
@@ -345,7 +345,7 @@ def text_of(x: Any) -> Any:
     return str(x) if np.ndim(x) == 0 else [text_of(each) for each in x]
 
 
-@pytest.mark.slow
+@pytest.mark.some(0, 1)
 @pytest.mark.parametrize("forged", ["left out", "mixed", "without links"])
 def test_a_loop_has_all_of_its_normals_and_is_closed(forged: str):
     """A solution of some of a loop's equations told as a pose: those that it misses are left out, or drowned in others

@@ -45,7 +45,7 @@ def check(answer: Singularity, points: int) -> None:
         assert each.lost
 
 
-@pytest.mark.some(1, 13)
+@pytest.mark.some(1, 8)
 @pytest.mark.parametrize(("robot", "legs", "real"), [
     pytest.param(*case, marks=pytest.mark.slow if case[0] in HEAVY and case[1:] == (None, False) else ())
     for case in CASES])
@@ -53,13 +53,13 @@ def test_shipped_robots(robot: str, legs: str | None, real: bool) -> None:
     check(found(robot, legs, real=real), 100)
 
 
-@pytest.mark.some(0, 6)
+@pytest.mark.some(0, 3)
 @pytest.mark.parametrize("robot", shipped())
 def test_shipped_robots_at_ten_thousand_poses(robot: str) -> None:
     check(singular(load(robot)), 10_000)
 
 
-@pytest.mark.some(0, 8)
+@pytest.mark.some(0, 4)
 @pytest.mark.parametrize("robot", shipped())
 def test_shipped_robots_with_their_own_motors(robot: str) -> None:
     check(singular(load(robot), real=True, points=1000), 1000)

@@ -120,7 +120,7 @@ def test_the_table_has_every_shipped_robot() -> None:
     assert set(WHOLE) == set(shipped())
 
 
-@pytest.mark.some(2, 9)
+@pytest.mark.some(2, 6)
 @pytest.mark.parametrize(("robot", "legs", "real"), [
     pytest.param(*case, marks=pytest.mark.slow if case[0] in HEAVY and case[1:] == (None, False) else ())
     for case in CASES])
