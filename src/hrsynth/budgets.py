@@ -248,14 +248,15 @@ RUN_EVALUATIONS = 20_000
 """Configurations that the integrator may ask for in a servo run."""
 FLOW_STARTS, FLOW_STARTS_ONE_BY_ONE = 100_000, 2_500
 """Starts of runs, where many are followed at once and where each is simulated."""
-FLOW_PART, FLOW_SINGLE = 5_000, 2
-"""Starts abreast, at most, and single runs, that are one piece of work for a process."""
+FLOW_PART, FLOW_FEW, FLOW_SINGLE = 5_000, 100, 1
+"""Starts abreast, at most, of which so few go on with the last of other pieces, and single runs, that are one piece of
+work for a process."""
 FLOW_FOLLOWED, FLOW_CHECKED, FLOW_NAMED = 24, 6, 16
 """Of many runs at once, those that could not go on and are simulated one by one, others that are held against that, and
 the poses of rest that are named."""
 FLOW_EXAMPLES = 8
 """Of starts that end alike, those of which one to which small steps lead is told."""
-FLOW_STEPS, FLOW_KEPT = 4_000, 2
+FLOW_STEPS, FLOW_KEPT = 4_000, 4
 """Steps of many runs at once, and steps for which the slopes of the law are kept."""
 LONGEST_RUN = 10_000.0
 """Seconds that a run with noise, on the physics bench or along a way may take: these go on to their end."""

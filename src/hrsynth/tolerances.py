@@ -332,6 +332,9 @@ FLOW_WALL = 1e-8
 """Reach margin, part of that at home, at which a run goes along where a leg is stretched that is not watched."""
 FLOW_SERVED = 1e-6
 """Norm of the error from which Newton's method does the rest."""
+FLOW_NEAR, FLOW_CONTRACTED, FLOW_CLEAR = 0.1, 0.125, 0.1
+"""Error from which on whole steps of Newton's method are tried, to what part the first has to shorten the next, and the
+reach margins, as parts of those at home, that all legs keep."""
 IN_PLANE = 1e-3
 """Distance (characteristic lengths, radians) up to which an end of runs is drawn in a plane."""
 BENCH_SETTLED = 1e-6

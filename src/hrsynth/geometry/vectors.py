@@ -77,6 +77,18 @@ def times(M: Any, v: Any) -> Array:
     return np.asarray((M @ v[..., None])[..., 0])
 
 
+def solved(A: Array, B: Array) -> Array:
+    """A⁻¹ B (n, d, k) of many small positive definite A (n, d, d): Gauss-Jordan elimination of all at once, as LAPACK
+    would be called for each."""
+    d = A.shape[1]
+    rows = np.concatenate([A, B], axis=2).transpose(1, 2, 0).copy()
+    for p in range(d):
+        rows[p, p + 1 :] /= rows[p, p]
+        for r in (*range(p), *range(p + 1, d)):
+            rows[r, p + 1 :] -= rows[r, p] * rows[p, p + 1 :]
+    return np.ascontiguousarray(rows[:, d:].transpose(2, 0, 1))
+
+
 def hat(vectors: ArrayLike) -> Array:
     """The matrices [v]ₓ (..., 3, 3) of vectors (..., 3): [v]ₓ w = v × w."""
     v = np.asarray(vectors, dtype=float)

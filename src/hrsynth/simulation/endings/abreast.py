@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,9 @@ from ...tolerances import (
     AT_REST,
     DAMPED,
     FLOW_ANEW,
+    FLOW_CLEAR,
+    FLOW_CONTRACTED,
+    FLOW_NEAR,
     FLOW_SERVED,
     FLOW_SHORTEST_STEP,
     FLOW_SLOPE,
@@ -39,6 +43,8 @@ GAMMA = 1 / (2 + np.sqrt(2))
 E32 = 6 + np.sqrt(2)
 LONGEST_STEP = 2.0
 """Time constants: a longer step of an implicit method would stay at a rest that repels."""
+STATE = ("X", "first", "flipped", "active", "times", "steps", "stopped", "weak", "slopes", "old", "roots", "taken")
+"""What :class:`Abreast` knows of each run."""
 POLISHED = 4
 """Newton steps at the end of a run whose error vanishes."""
 
@@ -56,11 +62,6 @@ class Runs(Value):
     active: Flags
     weak: Flags
     times: Array
-
-    @classmethod
-    def joined(cls, parts: Sequence[Runs]) -> Runs:
-        """Several as one."""
-        return cls(*(np.concatenate([getattr(each, name) for each in parts]) for name in cls.__dataclass_fields__))
 
     def groups(self, length: float, seen: Flags) -> list[Places]:
         """The runs that came to rest, by the poses and the working modes of the ``seen`` legs in which they did, the
@@ -95,24 +96,33 @@ class Abreast:
 
     def run(self, horizon: float) -> Runs:
         """All runs to their ends, or to the ``horizon`` (time constants)."""
-        live = np.arange(len(self.X))
+        self.follow(horizon)
+        size = self._at(np.arange(len(self.X))).size
+        self.stopped[(self.stopped == SERVED_AT) & ~(size <= SERVED)] = LOST
+        return Runs(self.X, size, self.stopped, self.flipped, self.active, self.weak, self.times)
+
+    def follow(self, horizon: float, few: int = 0) -> Self:
+        """The same, until no more than a ``few`` are on their way."""
+        live = np.flatnonzero(self.stopped == "")
         here = self._at(live)
-        self.stopped[~here.reached] = LOST
+        self.stopped[live[~here.reached]] = LOST
         for _ in range(FLOW_STEPS):
             tell("run")
             kept = self.stopped[live] == ""
             live, here = live[kept], _part(here, kept)
-            if not len(live):
-                break
+            if len(live) <= few:
+                return self
             here = self._step(live, here)
+            self._arrive(live, here)
             self._end(live, here, horizon)
-        self.stopped[self.stopped == ""] = EFFORT
-        served = np.flatnonzero(self.stopped == SERVED_AT)
-        for _ in range(POLISHED):
-            self.X[served] = self.flow.moved(self.X[served], self._at(served).velocity)
-        size = self._at(np.arange(len(self.X))).size
-        self.stopped[(self.stopped == SERVED_AT) & ~(size <= SERVED)] = LOST
-        return Runs(self.X, size, self.stopped, self.flipped, self.active, self.weak, self.times)
+        self.stopped[live] = EFFORT
+        return self
+
+    def together(self, others: Sequence[Abreast]) -> Self:
+        """These and others of the same loop."""
+        for name in STATE:
+            setattr(self, name, np.concatenate([getattr(each, name) for each in (self, *others)]))
+        return self
 
     def _at(self, live: Places) -> Commanded:
         return self.flow.at(self.X[live], self.flipped[live], self.active[live], self.roots[live])
@@ -247,11 +257,34 @@ class Abreast:
             X = self.flow.moved(X, times(np.linalg.pinv(N, rcond=1e-6), miss))
         return X
 
+    def _arrive(self, live: Places, here: Commanded) -> None:
+        """Take runs to where the error vanishes, by Newton's method. The undamped law is that method with short steps:
+        where whole ones contract so fast that they converge (a quarter would do: Deuflhard, *Newton Methods for
+        Nonlinear Problems*, section 2.1) and no leg comes near its limit, both end at the same pose."""
+        firm = (here.weakest >= FLOW_WEAK * DAMPED) & (here.size <= FLOW_NEAR)
+        firm &= np.all(here.margins > FLOW_CLEAR, axis=1)
+        some = np.flatnonzero((firm | (here.size <= FLOW_SERVED)) & (self.stopped[live] == ""))
+        if not len(some):
+            return
+        runs, X, speed = live[some], self.X[live[some]], np.linalg.norm(here.velocity[some], axis=1)
+        self.X[runs] = self.flow.moved(X, here.velocity[some])
+        there = self._at(runs)
+        slow = np.linalg.norm(there.velocity, axis=1) > FLOW_CONTRACTED * speed
+        for _ in range(POLISHED - 1):
+            slow |= ~np.all(there.margins > FLOW_CLEAR, axis=1)
+            self.X[runs] = self.flow.moved(self.X[runs], there.velocity)
+            there = self._at(runs)
+        back = (slow | ~(there.size <= SERVED)) & (here.size[some] > FLOW_SERVED)
+        self.X[runs[back]] = X[back]
+        some, runs = some[~back], runs[~back]
+        self.times[runs] += np.log(np.maximum(here.size[some] / FLOW_SERVED, 1.0))
+        self.stopped[runs] = SERVED_AT
+
     def _end(self, live: Places, here: Commanded, horizon: float) -> None:
         """Mark the runs that are at an end."""
         speed = np.linalg.norm(here.velocity, axis=1)
         shift = np.linalg.norm(self.X[live][:, :3, 3] - self.first[live][:, :3, 3], axis=1)
-        for word, at_end in ((SERVED_AT, here.size <= FLOW_SERVED), (REST, speed <= AT_REST * here.size),
+        for word, at_end in ((REST, speed <= AT_REST * here.size),
                              (TIME, self.times[live] >= horizon), (AWAY, shift > self.farthest)):
             self.stopped[live[at_end & (self.stopped[live] == "")]] = word
 

@@ -23,6 +23,7 @@ from ...batch.reach import sweep
 from ...budgets import (
     FLOW_CHECKED,
     FLOW_EXAMPLES,
+    FLOW_FEW,
     FLOW_FOLLOWED,
     FLOW_NAMED,
     FLOW_PART,
@@ -45,7 +46,7 @@ from ..law import measured
 from ..run import AWAY, EFFORT, LOST, POISED, REST, SERVED_AT
 from ..run import TIME as OVER
 from ..servo import Conditions, ServoTask
-from .abreast import Abreast, Runs
+from .abreast import Abreast
 from .flow import Flags, Flow, Places
 from .outcomes import Found, Outcome, Outcomes
 from .radius import CertifiedRadius, certified_radius
@@ -272,19 +273,20 @@ class BasinSearch:
         count = -(-len(starts) // FLOW_PART)
         shares = [starts[k::count] for k in range(count)]
         starts = np.concatenate(shares)
-        runs = Runs.joined(self._done([partial(_followed, flow.bare(), horizon, RUN_AWAY * length, X[share])
-                                       for share in shares]))
+        first, *others = self._done([partial(_followed, flow.bare(), horizon, RUN_AWAY * length, X[share])
+                                     for share in shares])
+        # a step of few runs takes as long as one of a thousand: the last of all parts go on together
+        checked = np.random.default_rng(seed).choice(len(starts), min(FLOW_CHECKED, len(starts)), replace=False)
+        runs, certified, *alone = self._done([partial(first.together(others).run, horizon),
+                                              partial(certified_radius, self.setting, self.goal),
+                                              *self._single(self._at(X[starts[checked]]))])
         damped[starts] = runs.weak
         groups = runs.groups(length, flow.seen)
         shown = groups[:FLOW_NAMED]
         away, open_ = (np.flatnonzero(np.isin(runs.stopped, words)) for words in ((AWAY,), (LOST, EFFORT)))
         followed = open_[np.unique(np.linspace(0, len(open_) - 1, FLOW_FOLLOWED).astype(int))] if len(open_) else open_
-        known = np.concatenate([*shown, away]).astype(int)
-        checked = np.random.default_rng(seed).choice(known, min(FLOW_CHECKED, len(known)), replace=False)
-        firsts = [*away[:1], *followed, *checked]
         at = flow.configurations(runs.X[[group[0] for group in shown]], runs.flipped[[group[0] for group in shown]])
-        at += flow.configurations(X[starts[firsts]], np.zeros((len(firsts), len(flow.legs)), dtype=bool))
-        told, certified = self._simulated(at)
+        told = list(chain(*self._done(self._single(at + self._at(X[starts[[*away[:1], *followed]]])))))
         numbers, outcomes = np.full(len(starts), -1), Outcomes(length)
         for group, outcome in zip(shown, told, strict=False):
             numbers[group] = outcomes.number(_at(outcome, runs.X[group[0]], length))
@@ -292,11 +294,10 @@ class BasinSearch:
         if len(away):
             numbers[away] = outcomes.number(told[0])
         numbers[runs.stopped == OVER] = outcomes.number(Outcome(Ending(TIME, "the time was over")))
-        rest = told[min(len(away), 1):]
-        for run, outcome in zip(followed, rest, strict=False):
-            numbers[run] = outcomes.number(outcome)
         same = [outcome.alike(outcomes.all[numbers[run]], length)
-                for run, outcome in zip(checked, rest[len(followed):], strict=True)]
+                for run, outcome in zip(checked, chain(*alone), strict=True) if numbers[run] >= 0]
+        for run, outcome in zip(followed, told[min(len(away), 1):], strict=True):
+            numbers[run] = outcomes.number(outcome)
         numbers[numbers < 0] = outcomes.number(Outcome(Ending(UNDECIDED, "not followed to an end")))
         cells[starts] = numbers
         return Found(outcomes.all, cells, damped, X, len(followed), len(same), sum(same), certified)
@@ -308,19 +309,22 @@ class BasinSearch:
         at = sweep(everything.start, everything.question, grid, self.setting.motion, self.setting.placer)
         starts = np.array([i for i, each in enumerate(at) if each is not None], dtype=int)
         cells, outcomes = np.full(len(at), NOT_REACHED), Outcomes(self.goal.twin.length)
-        told, certified = self._simulated([at[i] for i in starts])
-        for i, outcome in zip(starts, told, strict=True):
+        certified, *told = self._done([partial(certified_radius, self.setting, self.goal),
+                                       *self._single([at[i] for i in starts])])
+        for i, outcome in zip(starts, chain(*told), strict=True):
             cells[i] = outcomes.number(outcome)
         reached = np.array([there if each is None else each.pose(self.setting.motion.link)
                             for each, there in zip(at, X, strict=True)])
         return Found(outcomes.all, cells, np.zeros(len(at), dtype=bool), reached, len(starts), certified=certified)
 
-    def _simulated(self, starts: Sequence[ClosedConfiguration | None]) -> tuple[list[Outcome], CertifiedRadius]:
-        """The outcomes of single runs, undecided where there is no start; and what is certified, at the same time."""
-        parts = [starts[k : k + FLOW_SINGLE] for k in range(0, len(starts), FLOW_SINGLE)]
-        certified, *told = self._done([partial(certified_radius, self.setting, self.goal),
-                                       *(partial(_simulated, self.task, part) for part in parts)])
-        return list(chain.from_iterable(told)), certified
+    def _at(self, X: Array) -> list[ClosedConfiguration | None]:
+        """The configurations at starts X (n, 4, 4)."""
+        assert self.flow is not None
+        return self.flow.configurations(X, np.zeros((len(X), len(self.flow.legs)), dtype=bool))
+
+    def _single(self, starts: Sequence[ClosedConfiguration | None]) -> list[Callable[[], list[Outcome]]]:
+        """Pieces of work that give the outcomes of single runs, undecided where there is no start."""
+        return [partial(_simulated, self.task, starts[k : k + FLOW_SINGLE]) for k in range(0, len(starts), FLOW_SINGLE)]
 
     def _done(self, works: Sequence[Callable[[], Any]]) -> list[Any]:
         """What pieces of work give, in their order."""
@@ -360,8 +364,10 @@ def _at(outcome: Outcome, X: Array, length: float) -> Outcome:
     return Outcome(Ending(UNDECIDED, "a single run does not stay where these end"))
 
 
-def _followed(flow: Flow, horizon: float, farthest: float, X: Array) -> Runs:
-    return Abreast(flow, X, farthest).run(horizon)
+def _followed(flow: Flow, horizon: float, farthest: float, X: Array) -> Abreast:
+    found = Abreast(flow, X, farthest).follow(horizon, FLOW_FEW)
+    found.flow = flow.bare()
+    return found
 
 
 def _simulated(task: ServoTask, starts: Sequence[ClosedConfiguration | None]) -> list[Outcome]:

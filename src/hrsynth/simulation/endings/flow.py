@@ -20,7 +20,7 @@ from ...batch.engine import Batch
 from ...batch.placing import Placer, rates
 from ...closed_forms.legs import ClosedFormLeg, SlidingRod
 from ...geometry.so3 import exponential
-from ...geometry.vectors import Array, cross, hat, times
+from ...geometry.vectors import Array, cross, hat, solved, times
 from ...kinematics.configuration import ClosedConfiguration
 from ...results import Value
 from ...tolerances import DAMPED, FLOW_SLOPE, FLOW_WEAK, SOLVED
@@ -89,7 +89,8 @@ class Flow(Value):
         # L_iᵀ = −[u_di]ₓ M_iᵀ
         L = -(hat(self.desired) @ M).reshape(n, 3 * k, d)
         scaled = L @ root
-        A, g = scaled.transpose(0, 2, 1) @ scaled, scaled.transpose(0, 2, 1) @ error
+        back = np.ascontiguousarray(scaled.transpose(0, 2, 1))
+        A, g = back @ scaled, back @ error
         velocity, weakest = damped(A, g[..., 0])
         held = np.zeros_like(active)
         slid = np.flatnonzero(active.any(axis=1) & reached)
@@ -182,13 +183,13 @@ class Flow(Value):
 def damped(A: Array, g: Array) -> tuple[Array, Array]:
     """−V max(Σ², DAMPED²)⁻¹ Vᵀ g (n, d) for A = V Σ² Vᵀ (n, d, d), as ``law.inverted``; the smallest of Σ (n,), of
     which only a lower bound is told from ``FLOW_WEAK`` times ``DAMPED`` on."""
-    velocity = np.empty_like(g)
-    # the norm of (A + ε)⁻¹ is at least 1 / (λ + ε) for the least eigenvalue λ of A
-    extra = 0.1 * DAMPED**2
-    least = 1 / np.linalg.norm(np.linalg.inv(A + extra * np.eye(A.shape[1])), axis=(1, 2)) - extra
-    weak = least < (FLOW_WEAK * DAMPED) ** 2
-    weakest = np.sqrt(np.maximum(least, 0.0))
-    velocity[~weak] = -np.linalg.solve(A[~weak], g[~weak, :, None])[..., 0]
+    d = A.shape[1]
+    with np.errstate(all="ignore"):
+        found = solved(A, np.concatenate([g[..., None], np.broadcast_to(np.eye(d), A.shape)], axis=2))
+        # the norm of A⁻¹ is at least 1 / λ for the least eigenvalue λ of A
+        least = 1 / np.sqrt(np.square(found[..., 1:]).sum(axis=(1, 2)))
+    weak = ~(least >= (FLOW_WEAK * DAMPED) ** 2)
+    velocity, weakest = -found[..., 0], np.sqrt(least)
     values, V = np.linalg.eigh(A[weak])
     inside = V.transpose(0, 2, 1) @ g[weak, :, None] / np.maximum(values, DAMPED**2)[..., None]
     velocity[weak], weakest[weak] = -(V @ inside)[..., 0], np.sqrt(np.maximum(values[:, 0], 0.0))
