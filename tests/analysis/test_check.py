@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from functools import cache
 from math import sqrt
 
@@ -11,7 +12,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 
 from hrsynth.analysis import posture as posture_module
-from hrsynth.analysis.check import MEASURES, Check, check
+from hrsynth.analysis.check import MEASURES, UNREACHABLE, Check, check
 from hrsynth.analysis.classes import Counts, interaction_matrix, redundant_rows, surplus
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.analysis.posture import ConfigurationAnalysis, Posture
@@ -22,6 +23,7 @@ from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.relation import Relation, relation
 from hrsynth.mechanism import JointType, Mechanism
 from hrsynth.mechanism.builder import Builder
+from hrsynth.mechanism.model import Limits
 from kinematics.robots import ROBOTS, setting_of, state_of
 from oracle import Oracle, span
 from strategies import parallel_robots, random_rotation
@@ -261,6 +263,21 @@ def test_a_grid_says_what_single_poses_say(robot: str) -> None:
             value = record[measure][index[0]][index[1]]
             assert value == pytest.approx(each.distances.to_dict()[measure], rel=1e-6, abs=1e-9)
     assert record["axes"] == list(answer.grid.grid.names)
+
+
+def test_a_grid_reaches_whatever_legs_that_stretch_without_limit_reach() -> None:
+    found = check(load("gough_stewart"), grid="x=-3:3:7,y=-3:3:7,z=0.2,rpy=0/0/0").grid
+    assert found is not None
+    assert UNREACHABLE not in found.states
+
+
+def test_a_pose_beyond_joint_limits_says_so() -> None:
+    robot = load("3rpr_m1")
+    made = robot.changed(joints=[replace(joint, limits=Limits(-1e-3, 1e-3)) for joint in robot.joints.values()
+                                 if joint.actuated])
+    (at,), (home,) = (check(made, at=poses).postures for poses in (["x=0.05,y=0,phi=0"], []))
+    assert set(at.to_dict()["beyond"]) == {name for name, joint in robot.joints.items() if joint.actuated}
+    assert home.beyond == ()
 
 
 def test_a_grid_marks_what_is_out_of_reach_and_singular() -> None:

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from os import environ
+from typing import Any
 
 import numpy as np
 import pytest
 
+from hrsynth.analysis.asked import configurations_at
 from hrsynth.analysis.aspects.path import Aspects
 from hrsynth.batch.reach import reach
 from hrsynth.description import load
@@ -17,8 +19,11 @@ from hrsynth.geometry.ranks import range_basis
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.tasks import solve
 from hrsynth.mechanism.model import Limits
+from hrsynth.mechanism.pose import asked_poses
 from hrsynth.simulation.ending import BOUNDARY, GOAL, MODE
 from hrsynth.simulation.servo import servo
+from hrsynth.simulation.track import tracked
+from hrsynth.tolerances import DAMPED
 from simulation.far import run_between, untold, untrue
 from simulation.listed import APART, OUTSIDE, Listed
 from simulation.scenes import BLIND, CONTROLLABLE, far_pairs, regular, setting
@@ -79,6 +84,29 @@ def test_far_runs_end_as_they_are_named():
 def test_more_far_runs_end_as_they_are_named(name: str):
     """``PAIRS`` of each robot (environment; 5)."""
     check_far(name, 4, int(environ.get("PAIRS", "5")))
+
+
+def test_a_crossing_is_told_where_the_side_changes():
+    """Next to where the smallest singular value is least, though sides are told apart only a centimetre away."""
+    found = setting("quattro", ("1", "4"))
+    along = -0.1757 + np.array([-2e-2, -1e-2, -1e-3, -1e-4, -2e-5, 2e-5, 1e-4, 2e-4, 1e-3, 1e-2, 2e-2])
+    at = configurations_at(found, asked_poses([f"x={x},y=-0.1931,z=-0.6481,phi=0.262" for x in along]))
+    track = tracked(at, found.samples.question, found.everything.question, found.dof)
+    (crossing,) = track.crossings("type2")
+    assert track.passages == (crossing,)
+    assert abs(crossing.place - int(np.argmin(track.smallest))) <= 1
+    assert track.smallest[crossing.place + 1] < DAMPED
+
+
+@pytest.mark.parametrize(("name", "given", "made", "said"), [
+    ("rrrrr_m1", {"start": "x=0", "goal": "x=0.02"}, {"motor": None}, "motors for 1 of the platform's 2 freedoms"),
+    ("3rpr_m1", {"start": "x=0,y=0,phi=0.1", "goal": "x=0,y=0,phi=0"}, {"limits": Limits(-1e-3, 1e-3)},
+     "the start is beyond the limits of ")])
+def test_a_run_says_what_it_leaves_out(name: str, given: dict[str, str], made: dict[str, Any], said: str):
+    robot = load(name)
+    driven = next(joint for joint in robot.joints.values() if joint.actuated)
+    assert servo(robot.changed(joints=[replace(driven, **made)]), **given).notes[0].startswith(said)
+    assert not servo(robot, **given).notes
 
 
 # ---- the papers' cases (docs/pages/papers.md: what their geometry gives)

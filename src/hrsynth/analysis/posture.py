@@ -12,6 +12,7 @@ from ..budgets import REMEMBERED
 from ..geometry.ranks import range_basis
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
+from ..kinematics.limits import outside
 from ..kinematics.relation import Relation, relation, relation_of
 from ..mechanism.pose import Pose
 from ..results import Value
@@ -110,6 +111,11 @@ class Posture(Value):
     formation: Formation | None = None
     """Of a formation: what is not seen here; ``pose`` is that of its first body."""
 
+    @cached_property
+    def beyond(self) -> tuple[str, ...]:
+        """The joints that are beyond their limits."""
+        return tuple(outside(self.configuration.twin, self.configuration.q))
+
     @property
     def gap(self) -> float:
         """The smallest gap of all ranks."""
@@ -128,8 +134,9 @@ class Posture(Value):
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
         hidden = self.hidden.to_dict()
-        return {"pose": self.pose.to_dict(), "mobility": {"total": self.mobility.total, "idle": self.mobility.idle},
-                "dof": self.dof, "rank_M": hidden.pop("rank"), **hidden, "condition": self.distances.condition,
+        return {"pose": self.pose.to_dict(), "beyond": list(self.beyond),
+                "mobility": {"total": self.mobility.total, "idle": self.mobility.idle}, "dof": self.dof,
+                "rank_M": hidden.pop("rank"), **hidden, "condition": self.distances.condition,
                 "real": self.real and self.real.to_dict(),
                 "constraint": {"singular": self.constraint_singular,
                                "rank_lost": None if self.hidden.classes is None else self.hidden.classes.IIM,

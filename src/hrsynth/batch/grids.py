@@ -27,7 +27,8 @@ def ready(placer: Placer, motion: PlatformMotion, goals: Sequence[Goal]
     found = {i: at for i, at in enumerate(placer.configurations(X))
              if at is not None and np.linalg.norm(goals[i].rows(placer.twin, at.q)[0]) <= RANK_CUTOFF}
     missed = [i for i in range(len(goals)) if i not in found]
-    closed = [i for i in missed if _freedoms_left(motion, goals[i]) == 0]
+    out = np.flatnonzero(~placer.batch.reached(X)) if missed else ()
+    closed = [i for i in missed if _freedoms_left(motion, goals[i]) == 0 and i in out]
     turning = [i for i in missed if _freedoms_left(motion, goals[i]) == 1]
     hopeless = {i for i, some in zip(turning, _some_turn(placer, motion, X[turning]), strict=True) if not some}
     return found, {*closed, *hopeless}

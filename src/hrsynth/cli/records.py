@@ -317,9 +317,10 @@ class DistancesRecord(TypedDict):
 
 
 class PostureRecord(KindsRecord):
-    """All that is said of one configuration."""
+    """All that is said of one configuration; ``beyond`` names the joints that are beyond their limits there."""
 
     pose: PoseRecord
+    beyond: list[str]
     mobility: MobilityRecord
     dof: int
     rank_M: int

@@ -19,6 +19,7 @@ from ..errors import BadRequest, RankUndecided
 from ..geometry.so3 import angle_of
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
+from ..kinematics.limits import outside
 from ..mechanism.noise import Noise
 from ..mechanism.observation import Observation
 from ..mechanism.observations.direction import SeenAxis
@@ -244,7 +245,14 @@ class ServoTask:
                      tuple(self._notes(run, still, simulated)))
 
     def _notes(self, run: Run, still: Run, simulated: Array | None) -> Iterator[str]:
-        """What was measured on the benches."""
+        """What the run leaves out, and what was measured on the benches."""
+        twin = self.goal.twin
+        for name, at in (("start", self.start), ("goal", self.goal)):
+            if beyond := outside(twin, at.q):
+                yield f"the {name} is beyond the limits of {', '.join(beyond)}"
+        if self.setting.segments and (motors := len(twin.actuated())) < self.setting.dof:
+            yield (f"motors for {motors} of the platform's {self.setting.dof} freedoms: "
+                   "they cannot make every motion that is commanded")
         if run.stopped == EFFORT:
             yield f"the run was stopped after {RUN_EVALUATIONS:,} configurations, at {run.times[-1]:.3g} s"
         if self.conditions.noisy:

@@ -27,7 +27,8 @@ TYPE_2, TYPE_1, LIMIT, CONSTRAINT = "type2", "type1", "limit", "constraint"
 
 @dataclass(frozen=True)
 class Passage:
-    """A crossing: its kind and the place along the run before which it happened."""
+    """A crossing: its kind and the place along the run from which on the side is the other one. Sides are told apart
+    before and after, where no map is singular."""
 
     kind: str
     place: int
@@ -91,15 +92,17 @@ def tracked(configurations: Sequence[ClosedConfiguration], question: Measurement
         return Track(smallest, None)
     passages: list[Passage] = []
     before = np.ones(3)
-    here = before.copy()
+    here, last = before.copy(), np.zeros(3, dtype=int)
     for place in range(1, len(marks)):
-        here = here * _turned(marks[place - 1], marks[place])
+        turned = _turned(marks[place - 1], marks[place])
+        here, last = here * turned, np.where(turned < 0, place, last)
         if marks[place].clear and np.any(here != before):
             rates, twists, loops = here != before
             if loops:
-                passages.append(Passage(CONSTRAINT, place))
+                passages.append(Passage(CONSTRAINT, int(last[2])))
             if rates or twists:
-                passages.append(Passage(LIMIT if rates and twists else TYPE_2 if rates else TYPE_1, place))
+                passages.append(Passage(LIMIT if rates and twists else TYPE_2 if rates else TYPE_1,
+                                        int(np.where(here != before, last, 0)[:2].max())))
             before = here.copy()
     return Track(smallest, tuple(passages))
 

@@ -63,7 +63,7 @@ def servo(found: Servo) -> str:
     least = track.to_dict(run.times.tolist())
     if least["smallest"] is not None:
         rows.append(("on the way", f"smallest singular value of Mᵀ {least['smallest']:.3g}, at {least['at']:.3g} s"))
-    rows += [("", f"{passed[each.kind]} before {run.times[each.place]:.3g} s, at "
+    rows += [("", f"{passed[each.kind]} at about {run.times[each.place]:.3g} s, near "
                   f"{found.pose_of(run.configurations[each.place])}") for each in track.passages or ()]
     if track.passages == ():
         met = least["smallest"] is not None and least["smallest"] < DAMPED
