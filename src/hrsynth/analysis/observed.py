@@ -268,10 +268,7 @@ def as_names(given: LegsLike) -> tuple[str, ...] | None:
     if not all(isinstance(each, str | Integral) and not isinstance(each, bool) for each in every):
         raise BadRequest("legs to watch", given, "a label or a link such as 1 or 'rod_1a', several in a list or in a "
                          "text with commas, or 'all'")
-    names = tuple(str(each).strip() for each in every)
-    if twice := next((name for name in names if names.count(name) > 1), None):
-        raise BadRequest("legs to watch: one stands twice", twice, "each leg or link once")
-    return names
+    return tuple(str(each).strip() for each in every)
 
 
 def legs_asked(robot: Mechanism | ObservedRobot, observe: LegsLike, see: SeeLike = None) -> tuple[str, ...] | None:

@@ -252,7 +252,7 @@ class ServoTask:
                 yield f"the {name} is beyond the limits of {', '.join(beyond)}"
         if self.setting.segments and (motors := len(twin.actuated())) < self.setting.dof:
             yield (f"motors for {motors} of the platform's {self.setting.dof} freedoms: "
-                   "they cannot make every motion that is commanded")
+                   "fewer than the motion that is commanded needs")
         if run.stopped == EFFORT:
             yield f"the run was stopped after {RUN_EVALUATIONS:,} configurations, at {run.times[-1]:.3g} s"
         if self.conditions.noisy:
