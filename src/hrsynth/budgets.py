@@ -282,14 +282,17 @@ FARTHEST_ENDING = 50.0
 """Coordinate (characteristic lengths, radians) beyond which a start is given up."""
 POSE_WALKS = 0.17
 """Part of the rounds of starts over the joints that is left where critical poses are sought as well."""
-POSE_STARTS, POSE_ROUNDS = 800, 12
-"""Starts of one round in which critical poses are sought where legs have closed forms, and rounds at most."""
+POSE_STARTS, POSE_ROUNDS = 800, 60
+"""Starts of one round in which critical poses are sought where legs have closed forms, and rounds at most, for each
+choice of legs that are held."""
+POSE_BESIDE = 0.6
+"""Part of them that lies beside poses that were found before."""
 POSE_NEWTON = 0.5
 """Part of these that go by Newton's method all along."""
 POSE_THINNED = 16
 """So many times as many poses are drawn at most: not all of them are in reach."""
-POSE_LATE = 0.01
-"""Part of the critical poses that the last two rounds may find first for the search to end."""
+POSE_LATE, POSE_QUIET = 0.001, 8
+"""Part of the critical poses that the last rounds, so many, may find first for the search to end."""
 POSE_TRIES = 12
 """Configurations, the nearest first, from which one at a critical pose is sought."""
 POSE_MIRRORS = 3

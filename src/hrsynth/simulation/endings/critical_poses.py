@@ -1,8 +1,8 @@
 """Critical points of the error over the platform's pose, where legs have closed forms, and the joints that go there.
 
 A pose and the working modes of the watched legs decide the error (:mod:`.pose_system`), so that starts are as cheap as
-they are few coordinates: from all that the legs reach, in all working modes, with the platform turned at random.
-Nothing here proves anything.
+they are few coordinates: from all that the legs reach, in all working modes, with the platform turned at random, and
+from poses beside those that were found, as rests lie near each other. Nothing here proves anything.
 """
 
 from __future__ import annotations
@@ -15,8 +15,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...analysis.observed import ObservedRobot
-from ...budgets import POSE_LATE, POSE_MIRRORS, POSE_NEWTON, POSE_ROUNDS, POSE_STARTS, POSE_THINNED, POSE_TRIES
+from ...budgets import (
+    POSE_BESIDE,
+    POSE_LATE,
+    POSE_MIRRORS,
+    POSE_NEWTON,
+    POSE_QUIET,
+    POSE_ROUNDS,
+    POSE_STARTS,
+    POSE_THINNED,
+    POSE_TRIES,
+)
 from ...closed_forms.legs import OnRod
+from ...geometry.so3 import quaternions
 from ...geometry.vectors import Array, transform
 from ...kinematics.configuration import ClosedConfiguration
 from ...mechanism.observation import Observation
@@ -28,13 +39,15 @@ from .carried import CarriedVector, SweptChains
 from .cover import bounds
 from .error import RestEquations, RestSystem
 from .pose_error import NotEnclosed, PoseError
-from .pose_system import LegSystem
+from .pose_system import LegSystem, unbound
 from .search import CriticalPoint, descend
 
 LONGEST_STEP = 0.25
 """Longest change of a coordinate in a step."""
 Fit = Callable[[Array], NDArray[np.bool_]]
 """Which of configurations (c, N) will do."""
+BESIDE = (0.1, 0.3, 0.6, 1.0)
+"""How far (characteristic lengths, components of a quaternion) starts lie beside poses that were found, about."""
 FARTHER = 3.0
 """Where legs do not end it, the box of starts is this many times as wide as that which is covered."""
 
@@ -42,7 +55,7 @@ FARTHER = 3.0
 @dataclass(frozen=True, eq=False, repr=False)
 class CriticalPoses(Value):
     """Poses p (k, 3) (m), R (k, 3, 3), the observed directions u (k, legs, 3) there, the numbers (k,) of directions in
-    which E falls, and how many (k,) starts met each."""
+    which E falls, and how many (k,) starts from anywhere met each."""
 
     p: Array
     R: Array
@@ -59,10 +72,10 @@ class CriticalPoses(Value):
 
     @property
     def unmet(self) -> int:
-        """An estimate of how many more there are, at least: f₁ (f₁ − 1) / 2 (f₂ + 1), f₁ met once and f₂ twice
-        (A. Chao, Scand. J. Statist. 11, 1984)."""
-        once, twice = (int(np.sum(self.met == count)) for count in (1, 2))
-        return round(once * (once - 1) / (2 * (twice + 1)))
+        """An estimate of how many more there are, at least: f₁ (f₁ − 1) / 2 (f₂ + 1), f₁ met once and f₂ twice, less
+        those that were found otherwise (A. Chao, Scand. J. Statist. 11, 1984)."""
+        never, once, twice = (int(np.sum(self.met == count)) for count in range(3))
+        return max(0, round(once * (once - 1) / (2 * (twice + 1))) - never)
 
     @property
     def marks(self) -> Array:
@@ -71,26 +84,26 @@ class CriticalPoses(Value):
 
 
 def critical_poses(setting: ObservedRobot, goal: ClosedConfiguration, seed: int = 0) -> tuple[
-        PoseError, CriticalPoses, CriticalPoses] | None:
-    """The isolated ones that are found, in rounds until these add little, and one each of those that fill curves; None
-    where the error is no closed form of the pose."""
+        PoseError, CriticalPoses, CriticalPoses, int] | None:
+    """The isolated ones that are found, with each choice of held legs in rounds until these add little, one each of
+    those that fill curves, and an estimate of how many were not met; None where the error is no closed form of the
+    pose."""
     try:
         error = PoseError.of(setting, goal)
     except NotEnclosed:
         return None
     rng, systems = np.random.default_rng([seed, 2]), [LegSystem.of(error, held) for held in _held(error)]
     found, continua = _none(systems[0]), dict[tuple[int, ...], CriticalPoses]()
-    fresh: list[int] = []
-    for _ in range(POSE_ROUNDS):
-        before = len(found)
-        for system in systems:
+    for system in systems:
+        fresh: list[int] = []
+        while len(fresh) < POSE_ROUNDS and (
+                len(fresh) < POSE_QUIET or sum(fresh[-POSE_QUIET:]) > POSE_LATE * len(found)):
             tell("poses")
-            drawn, flat = _round(system, rng)
+            before = len(found)
+            drawn, flat = _round(system, found, rng)
             found, continua = _apart(found, drawn), flat | continua
-        fresh.append(len(found) - before)
-        if len(fresh) > 2 and sum(fresh[-2:]) <= POSE_LATE * len(found) and found.unmet <= POSE_LATE * len(found):
-            break
-    return error, _mirrored(error, found), _joined([_none(systems[0]), *continua.values()])
+            fresh.append(len(found) - before)
+    return error, _mirrored(error, found), _joined([_none(systems[0]), *continua.values()]), found.unmet
 
 
 def _apart(found: CriticalPoses, drawn: CriticalPoses) -> CriticalPoses:
@@ -107,24 +120,52 @@ def _apart(found: CriticalPoses, drawn: CriticalPoses) -> CriticalPoses:
 
 
 def _held(error: PoseError) -> list[tuple[int, ...]]:
-    """The sets of limbs that may be at their limits at a rest, none first: those that are not watched, as E does not
-    know how far they are from it."""
+    """The sets of limbs that are held, none first: at their limits those that are not watched, as E does not know how
+    far they are from it; of watched rods that slide one that is free, as it may be short."""
     watched = {each.limb for each in error.seen}
-    free = [i for i, limb in enumerate(error.limbs) if i not in watched and isinstance(limb, OnRod)]
-    return [chosen for size in range(min(len(free), error.size - 1) + 1) for chosen in combinations(free, size)]
+    idle = [i for i, limb in enumerate(error.limbs) if i not in watched and isinstance(limb, OnRod)]
+    held = [chosen for size in range(min(len(idle), error.size - 1) + 1) for chosen in combinations(idle, size)]
+    return [(*chosen, *free) for free in ((), *((i,) for i in watched if i is not None and unbound(error.limbs[i])))
+            for chosen in held]
 
 
-def _round(system: LegSystem, rng: np.random.Generator) -> tuple[CriticalPoses, dict[tuple[int, ...], CriticalPoses]]:
+def _beside(system: LegSystem, found: CriticalPoses, count: int, rng: np.random.Generator) -> Array:
+    """Coordinates of poses (count, k) beside some that were found."""
+    error, k, n = system.error, system.quaternion.start, system.quaternion.stop
+    some = rng.integers(len(found), size=count)
+    x = np.zeros((count, n))
+    x[:, :k] = (found.p[some] / error.length - error.p) @ error.shifts
+    if n > k:
+        x[:, k:] = quaternions(found.R[some] @ error.R.T) @ system.span
+    return x + rng.normal(size=x.shape) * rng.choice(BESIDE, size=(count, 1))
+
+
+def _round(system: LegSystem, old: CriticalPoses, rng: np.random.Generator) -> tuple[
+        CriticalPoses, dict[tuple[int, ...], CriticalPoses]]:
     """Starts led to critical points of each index: those at which the legs that are not looked at reach, and whose held
-    legs hold them, isolated; of others one for each value of E and signs of the curvatures. Half of the starts are
-    random poses; of half a leg's joints are so, which are more often near its limits."""
+    legs hold them, isolated; of others one for each value of E and signs of the curvatures. Some starts lie beside
+    poses that are known; half of the others are random poses, of half a leg's joints are so, which are more often near
+    its limits."""
     error = system.error
     low, high, _ = bounds(error, FARTHER * COVER_REACH)
     k, n = error.shifts.shape[1], system.quaternion.stop
-    x = np.concatenate([rng.uniform(low[:k], high[:k], (POSE_THINNED * POSE_STARTS, k)),
-                        rng.normal(size=(POSE_THINNED * POSE_STARTS, n - k))], axis=1)
-    own = system.drawn(system.about_legs(x[: len(x) // 4], FARTHER, rng), rng)[: POSE_STARTS // 2]
-    y = np.concatenate([own, system.drawn(x, rng)])[:POSE_STARTS]
+    count = POSE_STARTS
+    x = np.concatenate([rng.uniform(low[:k], high[:k], (POSE_THINNED * count, k)),
+                        rng.normal(size=(POSE_THINNED * count, n - k))], axis=1)
+    own = system.drawn(system.about_legs(x[: len(x) // 4], FARTHER, rng), rng)[: count // 2]
+    y = np.concatenate([own, system.drawn(x, rng)])[:count]
+    if len(old):
+        near = system.drawn(_beside(system, old, 4 * round(POSE_BESIDE * count), rng), rng)[:round(POSE_BESIDE * count)]
+        beside, families = _led(system, near, rng)
+        some, more = _led(system, rng.permutation(y)[: len(y) - len(near)], rng)
+        return _joined([some, replace(beside, met=0 * beside.met)]), families | more
+    return _led(system, y, rng)
+
+
+def _led(system: LegSystem, y: Array, rng: np.random.Generator) -> tuple[
+        CriticalPoses, dict[tuple[int, ...], CriticalPoses]]:
+    """What starts (c, N) lead to."""
+    error = system.error
     with np.errstate(all="ignore"):
         index = rng.integers(system.size[0] - system.size[1] + 1, size=len(y))
         points = descend(system, y, np.where(rng.random(len(y)) < POSE_NEWTON, -1, index), 0)
@@ -135,9 +176,11 @@ def _round(system: LegSystem, rng: np.random.Generator) -> tuple[CriticalPoses, 
         found = CriticalPoses(error.length * system.point(y), system.turned(y), system.directions(y), falling,
                               np.ones(len(y), dtype=np.intp))
         reached = system.reached(y)
+        across = np.abs(np.einsum("cla,la->cl", found.directions, system.wanted)) < SAME_ENDING
     families: dict[tuple[int, ...], CriticalPoses] = {}
     for k in np.flatnonzero(reached & (flat > 0)):
-        families[int(falling[k]), int(flat[k]), round(kept[k].value / SAME_ENDING)] = found.some(np.array([k]))
+        families[int(falling[k]), int(flat[k]), round(kept[k].value / SAME_ENDING),
+                 *across[k].astype(int)] = found.some(np.array([k]))
     return found.some(reached & (flat == 0)), families
 
 
@@ -268,6 +311,7 @@ class Further:
     lift: Lift
     poses: CriticalPoses
     continua: CriticalPoses
+    unmet: int
     idle: int
     fit: Fit
 

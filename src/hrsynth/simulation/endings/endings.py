@@ -109,7 +109,7 @@ class RestSearch:
         further = None if minima or self.system.supposes else self._further(seed)
         found = critical_points(self.system, setting, self.goal, seed, minima=minima, rounds=rounds, further=further,
                                 fit=self._near_mode)
-        found = found if further is None else replace(found, unmet=further.poses.unmet)
+        found = found if further is None else replace(found, unmet=further.unmet)
         isolated = self._in_mode(found.isolated)
         covers = None
         if not minima and all(each.by_segment for each in setting.observed):
@@ -318,22 +318,23 @@ def _ways(rests: Sequence[RestPoint], search: RestSearch) -> list[RestPoint]:
     setting = search.setting
     segments, (home,) = ([np.concatenate([*measured(at, setting.everything.question)[0]]) for at in every] for every in
                          ([each.configuration for each in rests], [search.goal]))
+    told = np.array([_told(each.configuration, search) for each in rests])
     groups: list[list[int]] = []
-    for k, each in enumerate(rests):
-        seen = _values(each.configuration, search)
-        own = next((group for group in groups if search.alike(rests[group[0]].configuration, each.configuration)
-                    and np.abs(_values(rests[group[0]].configuration, search) - seen).max()
-                    < SAME_ENDING), None)
-        if own is None:
-            groups.append([k])
+    for k in range(len(rests)):
+        first = np.array([group[0] for group in groups], dtype=np.intp)
+        own = np.flatnonzero(np.abs(told[first] - told[k]).max(axis=1, initial=0.0) < SAME_ENDING)
+        if len(own):
+            groups[own[0]].append(k)
         else:
-            own.append(k)
+            groups.append([k])
     best = [min(group, key=lambda k: (not rests[k].proved, float(np.linalg.norm(segments[k] - home))))
             for group in groups]
     return [replace(rests[k], ways=len(group), met=sum(rests[i].met for i in group))
             for k, group in zip(best, groups, strict=True)]
 
 
-def _values(at: ClosedConfiguration, search: RestSearch) -> Array:
-    """All that is measured, (rows,)."""
-    return np.concatenate(measured(at, search.law.question)[0])
+def _told(at: ClosedConfiguration, search: RestSearch) -> Array:
+    """Where the platform's bodies are (characteristic lengths), how they are turned, and all that is measured."""
+    poses = [at.pose(body) for body in attached(search.setting.anatomy)]
+    return np.concatenate([*(X[:3, 3] / search.goal.twin.length for X in poses), *(X[:3, :3].ravel() for X in poses),
+                           *measured(at, search.law.question)[0]])

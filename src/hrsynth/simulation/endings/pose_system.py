@@ -4,6 +4,9 @@ Unknown are shifts of the platform's point, a unit quaternion of its turn, and f
 slider, or a rod that slides, the place θ of that joint. The rod's length is an equation g(t, θ) = 0, t its tip; at a
 limit, where the leg is *held*, ∂g/∂θ = 0 is one more. All are products and sums with sines and cosines of θ, so that
 first and second derivatives are by hand.
+
+A rod that slides through a base point A and turns as it likes has the direction of t − A, which is none at t = A, and
+turns fast nearby. Where it is *free*, its length s and its direction u are unknown as well, and t − A = s u, |u| = 1.
 """
 
 from __future__ import annotations
@@ -25,8 +28,8 @@ from .pose_error import PoseError, SeenDirection
 
 @dataclass(frozen=True, eq=False)
 class Local:
-    """A number (c,) that a tip t (c, 3) and a joint's θ (c,) decide, and its derivatives: by t (c, 3), by θ, twice by t
-    (3, 3) each, by both (c, 3), twice by θ."""
+    """A number (c,) that a tip t (c, 3) and a leg's own j coordinates decide, and its derivatives: by t (c, 3), by
+    these (c, j), twice by t (3, 3) each, by both (c, 3, j), twice by these (c, j, j); of one, the j may be missing."""
 
     value: Array
     t: Array
@@ -39,17 +42,26 @@ class Local:
 @dataclass(frozen=True, eq=False, repr=False)
 class Piece(Value):
     """A leg or a direction that the pose turns: its tip is p (where it ``follows``) + ``constant`` + R ``turned``;
-    ``place`` is that of θ among the coordinates, None where there is none; ``wanted`` the desired direction."""
+    ``place`` is that of its own among the coordinates, None where there are none; ``wanted`` the desired direction."""
 
     follows: bool
     constant: Array
     bends: Array
     """a = qᵀ bends q is R ``turned``, (3, 4, 4)."""
     limb: ClosedFormLeg | None
-    place: int | None
+    place: slice | None
     held: bool
     seen: SeenDirection | None
     wanted: Array
+
+    @property
+    def free(self) -> bool:
+        """Whether it is a rod with a length and a direction of its own."""
+        return self.held and self.limb is not None and unbound(self.limb)
+
+    def own(self, y: Array) -> Array:
+        """Its own coordinates (c, j)."""
+        return y[:, self.place or slice(0)]
 
     @cached_property
     def frame(self) -> tuple[Array, Array]:
@@ -60,9 +72,9 @@ class Piece(Value):
         return one, np.cross(self.limb.axis, one)
 
     def ring(self, o: Array) -> tuple[Array, Array]:
-        """The unit vector (c, 3) at θ and its derivative."""
+        """The unit vector (c, 3) at θ (c, 1) and its derivative."""
         one, two = self.frame
-        c, s = np.cos(o)[:, None], np.sin(o)[:, None]
+        c, s = np.cos(o), np.sin(o)
         return c * one + s * two, c * two - s * one
 
     def start(self, o: Array) -> tuple[Array, Array, Array]:
@@ -72,7 +84,7 @@ class Piece(Value):
         if isinstance(limb, OnCrank):
             spoke, rate = (limb.radius * each for each in self.ring(o))
             return limb.centre + spoke, rate, -spoke
-        return limb.centre + o[:, None] * limb.axis, limb.axis + 0 * o[:, None], 0 * o[:, None] * limb.axis
+        return limb.centre + o * limb.axis, limb.axis + 0 * o, 0 * o * limb.axis
 
     def direction(self, t: Array, o: Array) -> Array:
         """The observed direction (c, 3)."""
@@ -82,6 +94,8 @@ class Piece(Value):
             return t
         if isinstance(limb, OnRod):
             return sense / limb.rod * (t - self.start(o)[0])
+        if self.free:
+            return sense * o[:, 1:]
         if self.place is not None:
             return sense * self.ring(o)[0]
         way = t - limb.centre
@@ -99,6 +113,8 @@ class Piece(Value):
             k = sense / limb.rod
             _, rate, bend = self.start(o)
             return Local(c, k * w + 0 * t, -k * (rate @ w), None, None, -k * (bend @ w))
+        if self.free:
+            return Local(c, 0 * t, sense * np.append(0.0, w) + 0 * o, None, None, np.zeros((4, 4)))
         if self.place is not None:
             return Local(c, 0 * t, sense * (self.ring(o)[1] @ w), None, None, -c)
         size = np.linalg.norm(t - limb.centre, axis=1)[:, None]
@@ -116,6 +132,15 @@ class Piece(Value):
         limb = self.limb
         if self.place is None:
             return []
+        if self.free:
+            assert limb is not None
+            s, u, eye = o[:, :1], o[:, 1:], np.eye(4)
+            found = [Local((_dot(u, u) - 1) / 2, 0 * t, np.append(0 * s, u, axis=1), None, None,
+                           np.diag([0.0, 1.0, 1.0, 1.0]))]
+            found += [Local(x, axis + 0 * t, -np.append(u[:, k, None], s * axis, axis=1), None, None,
+                            -np.outer(eye[0], eye[k + 1]) - np.outer(eye[k + 1], eye[0]))
+                      for k, (x, axis) in enumerate(zip((t - limb.centre - s * u).T, np.eye(3), strict=True))]
+            return found
         if isinstance(limb, SlidingRod):
             u, q = self.ring(o)
             way = t - limb.centre
@@ -131,13 +156,18 @@ class Piece(Value):
         return found
 
 
+def unbound(limb: ClosedFormLeg) -> bool:
+    """Whether it is a rod that slides through a base point and turns as it likes."""
+    return isinstance(limb, SlidingRod) and limb.axis is None
+
+
 def _dot(a: Array, b: Array) -> Array:
     return np.asarray((a * b).sum(axis=-1))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LegSystem(Value):
-    """The legs that are watched, and those that are ``held`` at their limits."""
+    """The legs that are watched, and those that are ``held`` at their limits or, of rods that slide, free."""
 
     error: PoseError
     held: tuple[int, ...]
@@ -159,12 +189,13 @@ class LegSystem(Value):
             limb = None if i is None else error.limbs[i]
             point = seen.rule if limb is None and seen is not None else limb.tip if limb is not None else None
             assert point is not None
-            joint = isinstance(limb, OnRod) or (isinstance(limb, SlidingRod) and limb.axis is not None)
+            free = i in held and limb is not None and unbound(limb)
+            joint = 4 if free else int(limb is not None and not unbound(limb))
             wanted = np.zeros(3) if seen is None else np.array(error._direction(seen, *goal, lambda value: value))
             pieces.append(Piece(point.follows, point.constant, _bends(error.R @ point.turned, error.turns), limb,
-                                place if joint else None, i in held, seen, wanted))
+                                slice(place, place + joint) if joint else None, i in held, seen, wanted))
             place += joint
-            count += joint + (i in held)
+            count += joint + (i in held and not free)
         order = {each: number for number, each in enumerate(error.seen)}
         pieces.sort(key=lambda each: len(order) if each.seen is None else order[each.seen])
         return cls(error, held, tuple(pieces), quaternion, (place, count))
@@ -172,9 +203,24 @@ class LegSystem(Value):
     @cached_property
     def holding(self) -> list[int]:
         """The lengths of held rods: without a multiplier such a leg holds nothing."""
-        counts = [(each.place is not None) + each.held for each in self.pieces]
+        counts = [4 if each.free else (each.place is not None) + each.held for each in self.pieces]
         ends = np.cumsum(counts) + (self.quaternion.stop > self.quaternion.start)
-        return [int(end) - 2 for each, end in zip(self.pieces, ends, strict=True) if each.held]
+        return [int(end) - 2 for each, end in zip(self.pieces, ends, strict=True) if each.held and not each.free]
+
+    @property
+    def free(self) -> list[Piece]:
+        """The rods with a length and a direction of their own."""
+        return [each for each in self.pieces if each.free]
+
+    @cached_property
+    def wanted(self) -> Array:
+        """The desired directions (legs, 3)."""
+        return np.stack([each.wanted for each in self.pieces if each.seen is not None])
+
+    @cached_property
+    def span(self) -> Array:
+        """The quaternions (4, m + 1) whose vector is in the span of the turns."""
+        return _quaternions(self.error.turns)
 
     def at(self, values: Sequence[Any]) -> PoseEquations:
         """All of it at values (N,) of (c,) each."""
@@ -200,15 +246,15 @@ class LegSystem(Value):
 
     def directions(self, y: Array) -> Array:
         """The observed ones (c, legs, 3)."""
-        return np.stack([piece.direction(self.tip(piece, y), y[:, piece.place or 0]) for piece in self.pieces
+        return np.stack([piece.direction(self.tip(piece, y), piece.own(y)) for piece in self.pieces
                          if piece.seen is not None], axis=1)
 
     def reached(self, y: Array) -> NDArray[np.bool_]:
         """Whether all other limbs reach, and no held leg's crank can stand anywhere as its tip is on its axis, (c,)."""
         error, good = self.error, np.ones(len(y), dtype=bool)
         for piece in self.pieces:
-            if piece.held and piece.place is not None:
-                good &= np.abs(piece.equations(self.tip(piece, y), y[:, piece.place])[1].o) > SAME_ENDING
+            if piece.held and not piece.free:
+                good &= np.abs(piece.equations(self.tip(piece, y), piece.own(y))[1].o) > SAME_ENDING
         own = {id(each.limb) for each in self.pieces if each.place is not None}
         p, R = self.point(y), self.turned(y)
         for limb in error.limbs:
@@ -221,15 +267,19 @@ class LegSystem(Value):
 
     def about_legs(self, x: Array, reach: float, rng: np.random.Generator) -> Array:
         """Coordinates of poses (n, k) so that a random leg's joint is anywhere (a slider within ``reach``), and its rod
-        has any direction; the turn is kept."""
-        legs = [each for each in self.pieces if each.place is not None and isinstance(each.limb, OnRod)]
+        has any direction, one that slides any length, often a short one; the turn is kept."""
+        legs = self.free or [each for each in self.pieces if isinstance(each.limb, OnRod | SlidingRod)]
         x, k = x.copy(), self.quaternion.start
         x[:, self.quaternion] /= np.maximum(np.linalg.norm(x[:, self.quaternion], axis=1, keepdims=True), 1e-300)
         for some, piece in zip(np.array_split(np.arange(len(x)), max(len(legs), 1)), legs, strict=False):
-            assert isinstance(piece.limb, OnRod)
-            o = rng.uniform(-1, 1, len(some)) * (np.pi if isinstance(piece.limb, OnCrank) else reach)
+            limb, o = piece.limb, rng.uniform(-1, 1, (len(some), 1))
             way = rng.normal(size=(len(some), k)) @ self.error.shifts.T
-            tip = piece.start(o)[0] + piece.limb.rod * way / np.linalg.norm(way, axis=1)[:, None]
+            way /= np.linalg.norm(way, axis=1)[:, None]
+            if isinstance(limb, OnRod):
+                tip = piece.start(o * (np.pi if isinstance(limb, OnCrank) else reach))[0] + limb.rod * way
+            else:
+                assert limb is not None
+                tip = limb.centre + reach * o**3 * way
             x[some, :k] += (tip - self.tip(piece, x[some])) @ self.error.shifts
         return x
 
@@ -243,7 +293,14 @@ class LegSystem(Value):
         for piece in (each for each in self.pieces if each.place is not None):
             tip, limb = self.tip(piece, y), piece.limb
             assert limb is not None
+            assert piece.place is not None
             way = tip - limb.centre
+            if piece.free:
+                # any direction: where the rod is short, the way is soon along it
+                u = rng.normal(size=way.shape)
+                u /= np.linalg.norm(u, axis=1)[:, None]
+                y[:, piece.place] = np.append(_dot(way, u)[:, None], u, axis=1)
+                continue
             if not piece.held:
                 with np.errstate(invalid="ignore", divide="ignore"):
                     margin, carried = limb.at(list(tip.T), lambda value: value, rng.choice([-1.0, 1.0], count))
@@ -252,10 +309,10 @@ class LegSystem(Value):
             if isinstance(limb, OnCrank | SlidingRod):
                 one, two = piece.frame
                 o = np.arctan2(way @ two, way @ one)
-                y[:, piece.place] = o + np.pi * rng.integers(2, size=count) if piece.held else o
+                y[:, piece.place.start] = o + np.pi * rng.integers(2, size=count) if piece.held else o
             else:
                 assert isinstance(limb, OnRod)
-                y[:, piece.place] = way @ limb.axis
+                y[:, piece.place.start] = way @ limb.axis
         return y[good & self.reached(y)]
 
 
@@ -274,7 +331,7 @@ class PoseEquations:
             DG[0][:, quaternion] = q
         self.parts: list[tuple[Piece, Array, Local | None, Array, list[Local]]] = []
         for piece in system.pieces:
-            t, o = system.tip(piece, y), y[:, piece.place or 0]
+            t, o = system.tip(piece, y), piece.own(y)
             T = np.zeros((c, 3, n))
             if piece.follows:
                 T[:, :, :k] = system.error.shifts
@@ -313,21 +370,29 @@ class PoseEquations:
             if twice:
                 H += np.swapaxes(T, 1, 2) @ sum(twice) @ T
             if piece.place is not None:
+                j = piece.place.stop - piece.place.start
                 for weight, each in weighed:
                     if each.to is not None:
-                        mixed = weight[:, None] * np.einsum("ck,ckn->cn", each.to, T)
+                        mixed = weight[:, None, None] * np.einsum("ckj,ckn->cjn", each.to.reshape(c, 3, j), T)
                         H[:, piece.place] += mixed
-                        H[:, :, piece.place] += mixed
-                    H[:, piece.place, piece.place] += weight * each.oo
+                        H[:, :, piece.place] += np.swapaxes(mixed, 1, 2)
+                    H[:, piece.place, piece.place] += weight[:, None, None] * np.reshape(each.oo, (-1, j, j))
         return H
 
 
-def _along(local: Local, T: Array, place: int | None) -> Array:
+def _along(local: Local, T: Array, place: slice | None) -> Array:
     """Its gradient (c, N)."""
     found = np.einsum("ck,ckn->cn", local.t, T)
     if place is not None:
-        found[:, place] += local.o
+        found[:, place] += np.reshape(local.o, (-1, place.stop - place.start))
     return np.asarray(found)
+
+
+def _quaternions(turns: Array) -> Array:
+    """Those (4, m + 1) whose vector is in the span of turns (3, m)."""
+    basis = np.zeros((4, turns.shape[1] + 1))
+    basis[0, 0], basis[1:, 1:] = 1.0, turns
+    return basis
 
 
 def _bends(h: Array, turns: Array) -> Array:
@@ -339,6 +404,5 @@ def _bends(h: Array, turns: Array) -> Array:
     for k in range(3):
         form[k, 1 + k, 1:] += h
         form[k, 1:, 1 + k] += h
-    basis = np.zeros((4, turns.shape[1] + 1))
-    basis[0, 0], basis[1:, 1:] = 1.0, turns
+    basis = _quaternions(turns)
     return np.asarray(np.einsum("kij,ia,jb->kab", form, basis, basis))

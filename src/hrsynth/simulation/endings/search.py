@@ -54,7 +54,7 @@ from ...tolerances import (
 )
 from ..law import Law
 from .carried import SweptChains
-from .error import RestEquations, RestSystem
+from .error import DirectionTerm, RestEquations, RestSystem
 
 LONGEST_STEP = 0.25
 """Longest change of a coordinate in a step (characteristic lengths, radians)."""
@@ -62,6 +62,8 @@ WALK_STEP = 0.3
 """The same of a random step between starts."""
 WIDEST_SLIDE = 2.5
 """Coordinate of a slide (characteristic lengths) up to which one is drawn."""
+FAMILY_TRIES = 8
+"""Points of one continuum, at most, of which one is to lie in the operation mode of the zero configuration."""
 NEARBY = 0.02
 """Step (characteristic lengths, radians) to a configuration that shows the operation mode in which a point lies."""
 
@@ -228,7 +230,8 @@ def descend(system: Critically, q: Array, index: NDArray[np.intp], idle: int) ->
         up = np.arange(at.curvatures.shape[-1]) < np.minimum(index, at.freedoms)[:, None]
         size = np.maximum(np.abs(at.curvatures), CRITICAL_FLAT)
         # near a critical point: Newton's method, whatever it is
-        near = (at.residual < 1e-3) & (np.abs(at.slope / size)[:, : at.freedoms].max(axis=-1) < 0.05) | (index < 0)
+        near = (at.residual < 1e-3) & (np.abs(at.slope / size)[:, : at.freedoms].max(axis=-1, initial=0.0) < 0.05)
+        near |= index < 0
         sign = np.where(near[:, None], -np.sign(at.curvatures), np.where(up, 1.0, -1.0))
         sign[:, at.freedoms :] *= np.abs(at.curvatures[:, at.freedoms :]) > CRITICAL_FLAT
         step = _shortened(times(at.directions, sign * at.slope / size), LONGEST_STEP)
@@ -361,7 +364,7 @@ def critical_points(system: RestSystem, setting: ObservedRobot, goal: ClosedConf
             late = min(late, known.count)
         pool = np.concatenate([*met, *(each.point.q[None] for each in known.isolated)])
         posed = known.add(further(pool))
-    return CriticalPoints(known.isolated, tuple(known.families.values()), idle, ENDING_STARTS * len(fresh), late, posed)
+    return CriticalPoints(known.isolated, known.continua, idle, ENDING_STARTS * len(fresh), late, posed)
 
 
 class ToldApart:
@@ -373,20 +376,20 @@ class ToldApart:
         self.told, self.freedoms = told_by(setting), setting.samples.members[0].relation.dimension
         self.free = len(self.told) < len(setting.everything.question.observations)
         self.own: dict[tuple[int, ...], list[tuple[Array, CriticalPoint, int]]] = {}
-        self.families: dict[tuple[int, ...], Critical] = {}
+        self.families: dict[tuple[int, ...], list[CriticalPoint]] = {}
 
     def add(self, points: Sequence[CriticalPoint]) -> int:
         """How many isolated ones are new."""
         new = 0
-        for point, mark in zip(points, marks(self.system, self.setting, self.bodies, points, self.told), strict=True):
+        told = marks(self.system, self.setting, self.bodies, points, self.told)
+        for point, mark, across in zip(points, told, self._across(points), strict=True):
             more = len(point.curvatures) > self.freedoms
             least = CRITICAL_FLAT if more else SAME_ENDING * self.system.scale(point.curvatures)
             flat = np.abs(point.curvatures) < least
             key = (*(int(np.sum(each)) for each in (point.curvatures < -least, flat)),)
             if flat.any():
-                key = (*key, round(point.value / SAME_ENDING))
-                old = self.families.get(key)
-                self.families[key] = Critical(point, 1) if old is None else Critical(old.point, old.met + 1)
+                key = (*key, round(point.value / SAME_ENDING), *across)
+                self.families.setdefault(key, []).append(point)
                 continue
             own = self.own.setdefault(key, [])
             near = next((k for k, each in enumerate(own) if np.abs(mark - each[0]).max() < SAME_ENDING), None)
@@ -400,6 +403,15 @@ class ToldApart:
                 own[near] = (mark, kept, met + 1)
         return new
 
+    def _across(self, points: Sequence[CriticalPoint]) -> list[list[int]]:
+        """Of each point, which of the observed directions are at right angles to the desired ones."""
+        terms = [each for each in self.system.terms if isinstance(each, DirectionTerm)]
+        if not terms or not points:
+            return [[] for _ in points]
+        carrier = SweptChains(self.system.system, list(np.array([each.q for each in points]).T))
+        cosines = [np.broadcast_to(each.cosine(carrier).value, len(points)) for each in terms]
+        return (np.abs(np.stack(cosines, axis=-1)) < SAME_ENDING).astype(int).tolist()
+
     def _beyond(self, point: CriticalPoint) -> int:
         """How many joints are beyond their limits."""
         twin = self.setting.everything.twin
@@ -409,15 +421,23 @@ class ToldApart:
             return len(twin.mechanism.joints)
 
     def keep(self, fit: Callable[[Array], NDArray[np.bool_]]) -> None:
-        """Leave out the isolated ones whose coordinates (c, N) do not fit."""
+        """Leave out those whose coordinates (c, N) do not fit."""
         for key, own in self.own.items():
             kept = fit(np.array([point.q for _, point, _ in own])) if own else ()
             self.own[key] = [each for each, good in zip(own, kept, strict=True) if good]
+        for key, points in self.families.items():
+            kept = fit(np.array([point.q for point in points[:FAMILY_TRIES]])) if points else ()
+            self.families[key] = [each for each, good in zip(points, kept, strict=False) if good]
 
     @property
     def count(self) -> int:
         """How many are isolated."""
         return sum(map(len, self.own.values()))
+
+    @property
+    def continua(self) -> tuple[Critical, ...]:
+        """One each of those that are not."""
+        return tuple(Critical(points[0], len(points)) for points in self.families.values() if points)
 
     @property
     def isolated(self) -> tuple[Critical, ...]:
