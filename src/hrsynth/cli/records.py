@@ -815,8 +815,10 @@ class SignedModesRecord(TypedDict):
 
 class RestCoverRecord(TypedDict):
     """What boxes of platform poses prove of a list of rests: `proved` critical poses; `open` boxes, a `share` of all;
-    `within_m` of the goal, null where legs end the box. `unmet` of those are not in the list, `strangers` of the list
-    are not among them."""
+    `within_m` of the goal, null where legs end the box; rods that slide and are shorter than `shorter_m` are left out,
+    null where there are none, as is a platform that only translates and is turned otherwise, at `turned` poses of the
+    list. `gained` of the list are where the loops gain a freedom. `unmet` of those that are proved are not in the list,
+    `strangers` of the list are not among them."""
 
     complete: bool
     proved: int
@@ -824,6 +826,9 @@ class RestCoverRecord(TypedDict):
     open: int
     share: float
     within_m: Number
+    shorter_m: Number
+    turned: int
+    gained: int
     unmet: int
     strangers: int
     reason: str | None

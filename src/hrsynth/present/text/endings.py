@@ -63,8 +63,12 @@ def _complete(found: Endings) -> list[str]:
         return [f"the others are found, not proved to be all: {found.search.words}", found.cover.reason]
     where = ("wherever the legs reach" if found.cover.within is None else
              f"with the point within {found.cover.within:.3g} m of the goal's either way")
+    where += ", with the platform turned as at the goal" if found.cover.turned else ""
+    where += "" if found.cover.shorter is None else f", no rod shorter than {1e3 * found.cover.shorter:.3g} mm"
     return [f"all rests, proved by {found.cover.cover.boxes:,} boxes of poses: no other in any working mode of the "
-            f"legs, {where}"]
+            f"legs, {where}",
+            *([f"{found.cover.gained} of these are where the loops gain a freedom, which boxes do not look for"]
+              if found.cover.gained else [])]
 
 
 def _enclosed(found: Endings, boxed: list[RestPoint]) -> list[str]:

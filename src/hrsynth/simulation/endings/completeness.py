@@ -13,11 +13,11 @@ from ...analysis.observed import ObservedRobot
 from ...budgets import COVER_BOXES, SIGN_BOXES, SIGN_CHOICES
 from ...geometry.vectors import Array, transform
 from ...kinematics.configuration import ClosedConfiguration
-from ...kinematics.relation import Measurement
+from ...kinematics.relation import Measurement, relation
 from ...mechanism.observations.direction import SeenAxis
 from ...progress import tell
 from ...results import Value
-from ...tolerances import COVER_REACH, FOLLOWED
+from ...tolerances import COVER_REACH, FOLLOWED, SHORTEST_ROD
 from ..law import directions
 from .carried import SweptChains
 from .cover import Cover, cover
@@ -39,6 +39,7 @@ class Covers(Value):
     question: Measurement
     vanishing: Cover
     every: Cover | None
+    mobility: int
 
     @classmethod
     def of(cls, setting: ObservedRobot, goal: ClosedConfiguration, system: RestSystem, question: Measurement,
@@ -47,7 +48,8 @@ class Covers(Value):
         tell("boxes")
         budget = COVER_BOXES if complete else SIGN_BOXES
         found = cover(setting, goal, vanishing=True, budget=budget)
-        return cls(system, question, found, cover(setting, goal) if complete else None)
+        return cls(system, question, found, cover(setting, goal) if complete else None,
+                   setting.samples.members[0].relation.mobility)
 
     def missed(self, known: Sequence[ClosedConfiguration], q: Array, idle: int) -> list[Critical]:
         """The proved critical points that none of the configurations (with coordinates q (c, N)) is at, as far as the
@@ -118,7 +120,10 @@ class Covers(Value):
             return None
         told = self.every
         places = [told.place(each.configuration, directions(each.configuration, self.question)[0]) for each in rests]
-        strangers = sum(place is None and told.holds(each.configuration)
-                        for place, each in zip(places, rests, strict=True))
+        strangers = [each.configuration for place, each in zip(places, rests, strict=True)
+                     if place is None and told.holds(each.configuration)]
+        gained = sum(relation(at, self.question).mobility > self.mobility for at in strangers)
         within = None if told.bounded or told.error is None else COVER_REACH * told.error.length
-        return RestCover(told, len(told.found) - len(set(places) - {None}), strangers, within)
+        shorter = SHORTEST_ROD * told.error.length if told.short and told.error is not None else None
+        return RestCover(told, len(told.found) - len(set(places) - {None}), len(strangers) - gained, within,
+                         shorter, sum(told.turned(each.configuration) for each in rests), gained)

@@ -9,11 +9,11 @@ import numpy as np
 
 from ...analysis.observed import ObservedRobot
 from ...budgets import COVER_BOXES
-from ...closed_forms.legs import OnCrank, OnRail
+from ...closed_forms.legs import ClosedFormLeg, OnCrank, OnRail, SlidingRod
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...results import Value
-from ...tolerances import COVER_REACH, FOLLOWED, SAME_ENDING, SMALLEST_BOX
+from ...tolerances import COVER_REACH, FOLLOWED, SAME_ENDING, SHORTEST_ROD, SMALLEST_BOX
 from .joint_error import JointError
 from .pose_error import NotEnclosed, PoseError
 from .subdivision import CriticalBox, Subdivision
@@ -34,6 +34,8 @@ class Cover(Value):
     box: tuple[Array, Array] | None = None
     """Where it was looked: the lower and the upper corner, in coordinates about the goal; None: everywhere."""
     error: PoseError | None = None
+    short: tuple[ClosedFormLeg, ...] = ()
+    """Rods that slide and turn as they like: where one is shorter than ``SHORTEST_ROD`` it was not looked."""
 
     @property
     def complete(self) -> bool:
@@ -41,14 +43,24 @@ class Cover(Value):
         return not self.open and not self.reason
 
     def holds(self, at: ClosedConfiguration) -> bool:
-        """Whether a configuration's pose was looked at."""
-        if self.error is None or self.error.coordinates is None:
+        """Whether a configuration's pose was looked at: not where a platform that only translates is turned otherwise
+        than at the goal, as it can be in another assembly."""
+        if self.error is None or self.error.coordinates is None or self.turned(at):
+            return False
+        (p, R), k = (each[0] for each in self.error.coordinates.of([at])), self.error.shifts.shape[1]
+        if any(limb.solve(limb.tip.value(p[None], R[None]), limb.mode)[0] < SHORTEST_ROD**2 for limb in self.short):
             return False
         if self.box is None:
             return True
-        (p,), k = self.error.coordinates.of([at])[0], self.error.shifts.shape[1]
         x = self.error.shifts.T @ (p - self.error.p)
         return bool(np.all(self.box[0][:k] <= x) and np.all(x <= self.box[1][:k]))
+
+    def turned(self, at: ClosedConfiguration) -> bool:
+        """Whether a platform that only translates is turned otherwise than at the goal."""
+        error = self.error
+        if error is None or error.coordinates is None or error.motion.rotations.shape[1]:
+            return False
+        return bool(np.abs(error.coordinates.of([at])[1][0] - error.R).max() > SAME_ENDING)
 
     def place(self, at: ClosedConfiguration, u: Array) -> int | None:
         """Which of the critical points a configuration with observed directions u (legs, 3) is at."""
@@ -57,6 +69,8 @@ class Cover(Value):
         p, R = (each[0] for each in self.error.coordinates.of([at]))
         if not self.error.coordinates.turning:
             R = self.error.R
+        if self.turned(at):
+            return None
         away = [max(np.abs(each.p / self.error.length - p).max(), np.abs(each.R - R).max(),
                     np.abs(each.directions - u).max()) for each in self.found]
         nearest = int(np.argmin(away))
@@ -94,7 +108,9 @@ def cover(setting: ObservedRobot, goal: ClosedConfiguration, *, vanishing: bool 
     found = [replace(each, directions=each.directions * own) for own in error.mirrors for each in found]
     return Cover(tuple(found), tuple(left), sum(each.share for each in parts) / len(parts),
                  sum(each.boxes for each in parts), bounded or len(charts) > 1, "",
-                 (low, high) if len(charts) == 1 else None, error)
+                 (low, high) if len(charts) == 1 else None, error,
+                 tuple(each for i, each in enumerate(error.limbs)
+                       if i not in whole.joints and isinstance(each, SlidingRod)))
 
 
 def bounds(error: PoseError, reach: float) -> tuple[Array, Array, bool]:

@@ -27,7 +27,7 @@ from ...geometry.duals import Dual
 from ...geometry.so3 import exponential
 from ...geometry.vectors import Array, hat
 from ...results import Value
-from ...tolerances import FOLLOWED
+from ...tolerances import FOLLOWED, SHORTEST_ROD
 from .pose_error import Number, PoseError
 
 
@@ -52,8 +52,7 @@ class JointError(Value):
     def charts(self) -> tuple[JointError, ...]:
         """Those that together hold all poses: this one, and of those far away where all rods slide; this one alone
         where that is not so."""
-        limbs = self.error.limbs
-        if len(self.joints) < len(limbs) or not all(isinstance(each, SlidingRod) for each in limbs) or any(
+        if not all(isinstance(each, SlidingRod) for each in self.error.limbs) or any(
                 each.limb is None for each in self.error.seen):
             return (self,)
         return (self, *(replace(self, far=k) for k in range(self.error.shifts.shape[1])))
@@ -115,8 +114,8 @@ class JointError(Value):
         return self.error.p + y[:, :k] @ self.error.shifts.T, turn @ self.error.R
 
     def parts(self, y: Sequence[Any], known: Number) -> tuple[list[Dual], list[Sequence[Dual]], list[Dual]]:
-        """g, the observed directions, and the reach margins of limbs without a joint, with their rates by the
-        coordinates (n,), of which ``known`` makes numbers as well."""
+        """g, the observed directions, and of limbs without a joint the reach margins less what a rod is to be long (of
+        those far away times w²), with their rates by the coordinates (n,), of which ``known`` makes numbers as well."""
         error, n, k = self.error, self.size[0], self.error.shifts.shape[1]
         none = [0.0] * n
 
@@ -135,8 +134,9 @@ class JointError(Value):
             if np.any(limb.tip.turned):
                 tip = plus(tip, transformed(turned, number(limb.tip.turned)))
             if i not in self.joints:
+                tip = plus(tip, scaled(number(1.0) - w, number(limb.centre)))
                 margin, carried = limb.at(tip, number, limb.mode)
-                margins.append(margin)
+                margins.append(margin - w * w * number(SHORTEST_ROD**2))
                 told.append(carried)
                 continue
             assert isinstance(limb, OnCrank | OnRail | SlidingRod)

@@ -126,13 +126,18 @@ class SignedModes(Value):
 class RestCover(Value):
     """Whether the rests are all, by boxes of platform poses: what subdivision found (:class:`Cover`), how many of its
     critical points are no rest of the list (``unmet``), and how many isolated rests in its box are none of its critical
-    points (``strangers``); ``within`` (m) is how far the box reaches from the goal where legs do not end it, else None.
-    """
+    points (``strangers``); ``within`` (m) is how far the box reaches from the goal where legs do not end it, else None;
+    rods that slide and are ``shorter`` (m) were not looked at, None where there are none; of the list so many are at
+    poses at which a platform that only translates is ``turned`` otherwise, which were not looked at either, and so many
+    are no critical points of the closed legs, but rests where the loops gain a freedom (``gained``)."""
 
     cover: Cover
     unmet: int
     strangers: int
     within: float | None
+    shorter: float | None = None
+    turned: int = 0
+    gained: int = 0
 
     @property
     def complete(self) -> bool:
@@ -170,8 +175,9 @@ class RestCover(Value):
         """The record of the command line."""
         cover = self.cover
         return {"complete": self.complete, "proved": len(cover.found), "boxes": cover.boxes, "open": len(cover.open),
-                "share": cover.share, "within_m": self.within, "unmet": self.unmet, "strangers": self.strangers,
-                "reason": self.reason or None}
+                "share": cover.share, "within_m": self.within, "shorter_m": self.shorter,
+                "turned": self.turned, "gained": self.gained,
+                "unmet": self.unmet, "strangers": self.strangers, "reason": self.reason or None}
 
 
 @dataclass(frozen=True, eq=False, repr=False)

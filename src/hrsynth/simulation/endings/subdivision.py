@@ -20,7 +20,7 @@ from ...budgets import BOXES_AT_ONCE
 from ...geometry.affine import AffineForms, affine, combined, stacked
 from ...geometry.vectors import Array
 from ...results import Value
-from ...tolerances import AFFINE_ROUNDING, BOX_ROUNDING, MET_AGAIN, SHORTEST_ROD, SMALLEST_BOX, THINNEST_BOX
+from ...tolerances import AFFINE_ROUNDING, BOX_ROUNDING, MET_AGAIN, SMALLEST_BOX, THINNEST_BOX
 from .cones import cut
 from .enclosure import negative
 from .joint_error import JointError
@@ -134,7 +134,7 @@ class Subdivision:
         if self.vanishing:
             settled |= _away(stacked(self.error.errors.at(tube)))
         for margin in margins:
-            settled |= margin.high < SHORTEST_ROD**2
+            settled |= margin.high < 0
         return settled, F
 
     def _axes(self, size: Array, N: Places, F: AffineForms, loose: Flags) -> Places:
