@@ -60,6 +60,8 @@ LONGEST_STEP = 0.25
 """Longest change of a coordinate in a step (characteristic lengths, radians)."""
 WALK_STEP = 0.3
 """The same of a random step between starts."""
+BESIDE = 0.5
+"""So many times as many starts lie a few random steps beside rests that were found, where there are no closed forms."""
 WIDEST_SLIDE = 2.5
 """Coordinate of a slide (characteristic lengths) up to which one is drawn."""
 FAMILY_TRIES = 8
@@ -345,9 +347,15 @@ def critical_points(system: RestSystem, setting: ObservedRobot, goal: ClosedConf
     points = descend(system, homes[:1], np.zeros(1, dtype=np.intp), idle)
     most = max(ENDING_ROUNDS, ENDING_EFFORT // system.size[0])
     met = [homes]
+    lies_near = not minima and further is None and all(isinstance(each, DirectionTerm) for each in system.terms)
     most = most if further is None else int(POSE_WALKS * most)
     for q in islice(rounds or starts(system, homes, seed, setting), most):
         tell("starts")
+        if lies_near and known.count:
+            # rests lie near each other
+            own = np.array([each.point.q for each in known.isolated])
+            some = own[rng.integers(len(own), size=round(BESIDE * len(q)))]
+            q = np.concatenate([q, walked(system, some, rng, 1 + len(fresh) % 3)])
         # what attracts matters most: two of five starts go down all along
         index = rng.integers(freedoms + 1, size=len(q)) * (rng.random(len(q)) < (0.0 if minima else 0.6))
         points += descend(system, q, index, idle)
@@ -364,7 +372,7 @@ def critical_points(system: RestSystem, setting: ObservedRobot, goal: ClosedConf
             late = min(late, known.count)
         pool = np.concatenate([*met, *(each.point.q[None] for each in known.isolated)])
         posed = known.add(further(pool))
-    return CriticalPoints(known.isolated, known.continua, idle, ENDING_STARTS * len(fresh), late, posed)
+    return CriticalPoints(known.isolated, known.continua, idle, sum(map(len, met[1:])), late, posed)
 
 
 class ToldApart:
