@@ -817,8 +817,7 @@ class RestCoverRecord(TypedDict):
     """What boxes of platform poses prove of a list of rests: `proved` critical poses; `open` boxes, a `share` of all;
     `within_m` of the goal, null where legs end the box; rods that slide and are shorter than `shorter_m` are left out,
     null where there are none, as is a platform that only translates and is turned otherwise, at `turned` poses of the
-    list. `gained` of the list are where the loops gain a freedom. `unmet` of those that are proved are not in the list,
-    `strangers` of the list are not among them."""
+    list. `unmet` of those that are proved are not in the list, `strangers` of the list are not among them."""
 
     complete: bool
     proved: int
@@ -828,7 +827,6 @@ class RestCoverRecord(TypedDict):
     within_m: Number
     shorter_m: Number
     turned: int
-    gained: int
     unmet: int
     strangers: int
     reason: str | None

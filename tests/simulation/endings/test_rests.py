@@ -193,8 +193,7 @@ def test_what_is_said_to_be_all_is_what_boxes_prove(name: str) -> None:
     assert found.complete
     assert found.cover is not None
     assert len(found.rests) == len(found.cover.cover.found)
-    covers = Covers(search.system, search.law.question, found.cover.cover, found.cover.cover,
-                    found.setting.samples.members[0].relation.mobility)
+    covers = Covers(search.system, search.law.question, found.cover.cover, found.cover.cover)
     short = covers.judged(found.rests[1:])
     assert short is not None
     assert (short.unmet, short.complete) == (1, False)

@@ -66,9 +66,7 @@ def _complete(found: Endings) -> list[str]:
     where += ", with the platform turned as at the goal" if found.cover.turned else ""
     where += "" if found.cover.shorter is None else f", no rod shorter than {1e3 * found.cover.shorter:.3g} mm"
     return [f"all rests, proved by {found.cover.cover.boxes:,} boxes of poses: no other in any working mode of the "
-            f"legs, {where}",
-            *([f"{found.cover.gained} of these are where the loops gain a freedom, which boxes do not look for"]
-              if found.cover.gained else [])]
+            f"legs, {where}"]
 
 
 def _enclosed(found: Endings, boxed: list[RestPoint]) -> list[str]:

@@ -13,7 +13,7 @@ from ...analysis.observed import ObservedRobot
 from ...budgets import COVER_BOXES, SIGN_BOXES, SIGN_CHOICES
 from ...geometry.vectors import Array, transform
 from ...kinematics.configuration import ClosedConfiguration
-from ...kinematics.relation import Measurement, relation
+from ...kinematics.relation import Measurement
 from ...mechanism.observations.direction import SeenAxis
 from ...progress import tell
 from ...results import Value
@@ -39,7 +39,6 @@ class Covers(Value):
     question: Measurement
     vanishing: Cover
     every: Cover | None
-    mobility: int
 
     @classmethod
     def of(cls, setting: ObservedRobot, goal: ClosedConfiguration, system: RestSystem, question: Measurement,
@@ -48,8 +47,7 @@ class Covers(Value):
         tell("boxes")
         budget = COVER_BOXES if complete else SIGN_BOXES
         found = cover(setting, goal, vanishing=True, budget=budget)
-        return cls(system, question, found, cover(setting, goal) if complete else None,
-                   setting.samples.members[0].relation.mobility)
+        return cls(system, question, found, cover(setting, goal) if complete else None)
 
     def missed(self, known: Sequence[ClosedConfiguration], q: Array, idle: int) -> list[Critical]:
         """The proved critical points that none of the configurations (with coordinates q (c, N)) is at, as far as the
@@ -120,10 +118,9 @@ class Covers(Value):
             return None
         told = self.every
         places = [told.place(each.configuration, directions(each.configuration, self.question)[0]) for each in rests]
-        strangers = [each.configuration for place, each in zip(places, rests, strict=True)
-                     if place is None and told.holds(each.configuration)]
-        gained = sum(relation(at, self.question).mobility > self.mobility for at in strangers)
+        strangers = sum(place is None and told.holds(each.configuration)
+                        for place, each in zip(places, rests, strict=True))
         within = None if told.bounded or told.error is None else COVER_REACH * told.error.length
         shorter = SHORTEST_ROD * told.error.length if told.short and told.error is not None else None
-        return RestCover(told, len(told.found) - len(set(places) - {None}), len(strangers) - gained, within,
-                         shorter, sum(told.turned(each.configuration) for each in rests), gained)
+        return RestCover(told, len(told.found) - len(set(places) - {None}), strangers, within, shorter,
+                         sum(told.turned(each.configuration) for each in rests))

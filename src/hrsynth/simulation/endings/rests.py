@@ -128,8 +128,7 @@ class RestCover(Value):
     critical points are no rest of the list (``unmet``), and how many isolated rests in its box are none of its critical
     points (``strangers``); ``within`` (m) is how far the box reaches from the goal where legs do not end it, else None;
     rods that slide and are ``shorter`` (m) were not looked at, None where there are none; of the list so many are at
-    poses at which a platform that only translates is ``turned`` otherwise, which were not looked at either, and so many
-    are no critical points of the closed legs, but rests where the loops gain a freedom (``gained``)."""
+    poses at which a platform that only translates is ``turned`` otherwise, which were not looked at either."""
 
     cover: Cover
     unmet: int
@@ -137,7 +136,6 @@ class RestCover(Value):
     within: float | None
     shorter: float | None = None
     turned: int = 0
-    gained: int = 0
 
     @property
     def complete(self) -> bool:
@@ -176,8 +174,7 @@ class RestCover(Value):
         cover = self.cover
         return {"complete": self.complete, "proved": len(cover.found), "boxes": cover.boxes, "open": len(cover.open),
                 "share": cover.share, "within_m": self.within, "shorter_m": self.shorter,
-                "turned": self.turned, "gained": self.gained,
-                "unmet": self.unmet, "strangers": self.strangers, "reason": self.reason or None}
+                "turned": self.turned, "unmet": self.unmet, "strangers": self.strangers, "reason": self.reason or None}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
