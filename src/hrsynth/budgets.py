@@ -248,8 +248,8 @@ RUN_EVALUATIONS = 20_000
 """Configurations that the integrator may ask for in a servo run."""
 FLOW_STARTS, FLOW_STARTS_ONE_BY_ONE = 100_000, 2_500
 """Starts of runs, where many are followed at once and where each is simulated."""
-FLOW_PART, FLOW_FEW, FLOW_SINGLE = 5_000, 100, 1
-"""Starts abreast, at most, of which so few go on with the last of other pieces, and single runs, that are one piece of
+FLOW_PART, FLOW_FEW, FLOW_SINGLE = 5_000, 2_000, 1
+"""Starts abreast, at most, the last ones of all pieces, that go on together, and single runs, that are one piece of
 work for a process."""
 FLOW_FOLLOWED, FLOW_CHECKED, FLOW_NAMED = 24, 6, 16
 """Of many runs at once, those that could not go on and are simulated one by one, others that are held against that, and

@@ -273,9 +273,9 @@ class BasinSearch:
         count = -(-len(starts) // FLOW_PART)
         shares = [starts[k::count] for k in range(count)]
         starts = np.concatenate(shares)
-        first, *others = self._done([partial(_followed, flow.bare(), horizon, RUN_AWAY * length, X[share])
-                                     for share in shares])
         # a step of few runs takes as long as one of a thousand: the last of all parts go on together
+        first, *others = self._done([partial(_followed, flow.bare(), horizon, RUN_AWAY * length, X[share],
+                                             FLOW_FEW // count) for share in shares])
         checked = np.random.default_rng(seed).choice(len(starts), min(FLOW_CHECKED, len(starts)), replace=False)
         runs, certified, *alone = self._done([partial(first.together(others).run, horizon),
                                               partial(certified_radius, self.setting, self.goal),
@@ -364,8 +364,8 @@ def _at(outcome: Outcome, X: Array, length: float) -> Outcome:
     return Outcome(Ending(UNDECIDED, "a single run does not stay where these end"))
 
 
-def _followed(flow: Flow, horizon: float, farthest: float, X: Array) -> Abreast:
-    found = Abreast(flow, X, farthest).follow(horizon, FLOW_FEW)
+def _followed(flow: Flow, horizon: float, farthest: float, X: Array, few: int) -> Abreast:
+    found = Abreast(flow, X, farthest).follow(horizon, few)
     found.flow = flow.bare()
     return found
 
