@@ -79,7 +79,7 @@ class File:
                 function("paper:asked")(PNG, asked.get("width"), asked.get("font"))
         if path is None:
             if asked.get("plane") is not None and "plane" in self.takes:
-                raise BadRequest("a plane of poses is drawn", asked["plane"], "--plane together with --output FILE.png")
+                raise BadRequest("--plane is of a figure: no file for it", asked["plane"], "--output FILE.png as well")
             return
         ending = Path(path).suffix.lower()
         if self.needs and all(asked[name] is None for name in self.needs):

@@ -146,7 +146,7 @@ def supposed_planes(text: str, goal: ClosedConfiguration, question: Measurement)
             plane = seen.plane_at(goal.pose(seen.seen_from or question.reference), goal.pose(seen.link))
         found.append(plane if plane is None or depth is None else depth_plane(np.array([depth])))
     if not any(plane is not None for plane in found):
-        raise BadRequest("--depth: the depth of nothing matters that is observed", text,
+        raise BadRequest("--depth: nothing that is observed needs a depth", text,
                          "none, or --see of what is seen in an image: point, image_line, edge …")
     return tuple(found)
 

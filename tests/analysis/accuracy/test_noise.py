@@ -190,7 +190,7 @@ def test_a_grid_is_its_single_poses_and_leaves_out_what_is_behind_the_camera(tmp
 
 
 @pytest.mark.parametrize(("name", "given", "word"), [
-    ("point", {}, "not said by how much"), ("point", {"cone": "0.1deg"}, "cones apply to directions only"),
+    ("point", {}, "how wrong the observations may be"), ("point", {"cone": "0.1deg"}, "cones apply to directions only"),
     ("direction", {"cone": "0.1deg"}, "not to position"), ("point", {"noise": "1mm"}, "in m"),
     ("point", {"noise": "0.3km"}, "not a number"),
 ])

@@ -117,7 +117,7 @@ class Blur(Value):
         axes = [o for o in observed if isinstance(o, SeenAxis)]
         others = [o for o in observed if not isinstance(o, SeenAxis)]
         if cone is None and amounts is None:
-            raise BadRequest("it is not said by how much what is observed may be wrong", None,
+            raise BadRequest("how wrong the observations may be is not given", None,
                              "a cone as 0.1deg, or noise as 0.1deg,0.3px,1mm: --cone, --noise")
         if cone is not None and not axes:
             raise BadRequest("cones apply to directions only", ", ".join(o.leg for o in observed), "--noise")

@@ -43,7 +43,7 @@ def _toggle(growth: Growth, end: BranchEnd) -> Toggle:
     _, strengths, rows = np.linalg.svd(A)
     weakest = strengths[-1] / max(np.linalg.svd(home, compute_uv=False)[-1], 1e-300)
     if last == 1.0 or weakest > TOGGLE:
-        why = ("not tried any more: the effort was spent" if not end.leaf.failed else
+        why = ("not tried any more: the effort was spent (a smaller --box takes less)" if not end.leaf.failed else
                "undecided: the cells would have to be smaller")
         return Toggle(q * unit, (), (), why)
     moving = np.abs(rows[-1]) > TOGGLE_JOINT * np.abs(rows[-1]).max()

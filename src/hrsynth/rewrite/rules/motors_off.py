@@ -17,7 +17,8 @@ from ..state import State
 def find(state: State, evidence: Evidence, leg: str) -> Iterator[Match[list[Joint]]]:
     """All motors of all legs at once."""
     driven = [joint for joint in state.mechanism.joints.values() if joint.actuated]
-    yield Match(driven, f"{len(driven)} real motors become passive")
+    yield Match(driven, "1 real motor becomes passive" if len(driven) == 1 else
+                f"{len(driven)} real motors become passive")
 
 
 def apply(state: State, driven: list[Joint]) -> State:
