@@ -132,7 +132,7 @@ def test_the_shipped_platform_has_twenty_eight():
 def test_platforms_that_move_are_not_listed(word: str):
     """Six rods to two balls, or three rods on either side of a line: the platform turns about it."""
     system, _ = six_rods(np.random.default_rng(0), word, "ABCDEF" if word == "AAABBB" else "ABABAB")
-    found = solve(system, near=False)
+    found = solve(system)
     assert (found.complete, found.modes) == (False, ())
     assert found.continuum == 1
 
