@@ -171,12 +171,13 @@ def _judged(system: PosedPlatform, forms: SquareForms, own: bool) -> SystemModes
     proposed = proposals(forms, forms.degree, forms.most, 0)
     boxes, lost = ([], 1) if proposed is None else enclosed(forms, slack, proposed, most)
     if len(boxes) < most:
-        if (found := bound(forms)) is not None:
+        found = bound(forms)
+        if found is not None:
             most, why, named = found[0], f"ranks modulo a prime of 62 bits, in degree {found[1]}", "rank"
-        if found is not None and (len(boxes) < most or lost):
-            proposed = proposals(forms, found[1], most, found[2])
+            if lost or len(boxes) < most:
+                proposed, lost = proposals(forms, found[1], most, found[2]), 1
         if lost:
-            boxes, lost = ([], 1) if proposed is None else enclosed(forms, slack, proposed)
+            boxes = [] if proposed is None else enclosed(forms, slack, proposed)[0]
     at_goal = [box for box in boxes if own and box.real and box.holds(np.eye(len(box.middle))[0])]
     goal = at_goal[0] if len(at_goal) == 1 else None
     complete = len(boxes) == most and (goal is not None) == own
