@@ -27,11 +27,9 @@ def ready(placer: Placer, motion: PlatformMotion, goals: Sequence[Goal]
     found = {i: at for i, at in enumerate(placer.configurations(X))
              if at is not None and np.linalg.norm(goals[i].rows(placer.twin, at.q)[0]) <= RANK_CUTOFF}
     missed = [i for i in range(len(goals)) if i not in found]
-    out = np.flatnonzero(~placer.batch.reached(X)) if missed else ()
-    closed = [i for i in missed if _freedoms_left(motion, goals[i]) == 0 and i in out]
-    turning = [i for i in missed if _freedoms_left(motion, goals[i]) == 1]
-    hopeless = {i for i, some in zip(turning, _some_turn(placer, motion, X[turning]), strict=True) if not some}
-    return found, {*closed, *hopeless}
+    closed, turning = ([i for i in missed if _freedoms_left(motion, goals[i]) == left] for left in (0, 1))
+    some = np.concatenate([placer.batch.reached(X[closed]), _some_turn(placer, motion, X[turning])])
+    return found, {i for i, reached in zip([*closed, *turning], some, strict=True) if not reached}
 
 
 def pose_of(motion: PlatformMotion, goal: Goal) -> Array:
