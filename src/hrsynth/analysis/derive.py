@@ -158,11 +158,11 @@ def derive(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None
     exact = exact_architecture(setting).verdict(setting.observed)
     evidence = Evidence(anatomy, samples)
 
-    result = FORMS[form](Rewriting.of(evidence, _check(samples, STEP_SAMPLES), OBSERVED_STAGES))
-    hidden, certificate = _certified(setting, result.state, samples)
-    if hidden is None or not (certificate.passed and result.virtual_only):
-        result = FORMS[form](Rewriting.of(evidence, _check(samples, STEP_SAMPLES)))
+    for unchecked in (OBSERVED_STAGES, ()):
+        result = FORMS[form](Rewriting.of(evidence, _check(samples, STEP_SAMPLES), unchecked))
         hidden, certificate = _certified(setting, result.state, samples)
+        if hidden is not None and certificate.passed and result.virtual_only:
+            break
     architecture: Architecture | None = None
     by_paper = None
     if hidden is not None:

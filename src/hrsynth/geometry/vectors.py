@@ -78,8 +78,8 @@ def times(M: Any, v: Any) -> Array:
 
 
 def solved(A: Array, B: Array) -> Array:
-    """A⁻¹ B (n, d, k) of many small positive definite A (n, d, d): Gauss-Jordan elimination of all at once, as LAPACK
-    would be called for each."""
+    """A⁻¹ B (n, d, k) of many small positive definite A (n, d, d): Gauss-Jordan elimination of all at once; LAPACK
+    takes a call for each."""
     d = A.shape[1]
     rows = np.concatenate([A, B], axis=2).transpose(1, 2, 0).copy()
     for p in range(d):

@@ -70,7 +70,7 @@ def _posture(posture: Posture, length: float, setting: ObservedRobot) -> Rows:
     shown = "directions" if all(each.by_segment for each in setting.observed) else "observations"
     mobility, far, dof = posture.mobility, posture.distances, posture.dof
     whose = "bodies have" if setting.mechanism.formation else "platform has"
-    rows = [*([("limits", f"beyond those of {', '.join(posture.beyond)}")] if posture.beyond else []),
+    rows = [*known("limits", f"beyond those of {', '.join(posture.beyond)}" if posture.beyond else None),
             ("mobility", f"{mobility.total}, of which {mobility.idle} idle; the {whose} " + (
         "one freedom" if dof == 1 else f"{dof} freedoms")),
             *_kinds("hidden robot", f"the {shown} show {posture.hidden.rank} of {dof}", posture.hidden, "not seen"),

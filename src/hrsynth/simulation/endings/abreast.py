@@ -43,8 +43,6 @@ GAMMA = 1 / (2 + np.sqrt(2))
 E32 = 6 + np.sqrt(2)
 LONGEST_STEP = 2.0
 """Time constants: a longer step of an implicit method would stay at a rest that repels."""
-STATE = ("X", "first", "flipped", "active", "times", "steps", "stopped", "weak", "slopes", "old", "roots", "taken")
-"""What :class:`Abreast` knows of each run."""
 POLISHED = 4
 """Newton steps at the end of a run whose error vanishes."""
 
@@ -87,7 +85,6 @@ class Abreast:
         self.times, self.steps = np.zeros(n), np.full(n, 0.05)
         self.stopped = np.full(n, "", dtype="U8")
         self.weak = np.zeros(n, dtype=bool)
-        self.pointed = np.array([flow.points[flow.legs.index(name)] for name in flow.watched])
         d = flow.batch.span.shape[1]
         self.slopes, self.old = np.zeros((n, d, d)), np.full(n, FLOW_KEPT)
         """∂ẏ/∂y of each run, and for how many steps it is kept."""
@@ -120,7 +117,7 @@ class Abreast:
 
     def together(self, others: Sequence[Abreast]) -> Self:
         """These and others of the same loop."""
-        for name in STATE:
+        for name in [name for name, value in vars(self).items() if isinstance(value, np.ndarray)]:
             setattr(self, name, np.concatenate([getattr(each, name) for each in (self, *others)]))
         return self
 
@@ -164,7 +161,7 @@ class Abreast:
         there = flow.at(Y, flipped, active, root)
         # a leg that slides through a fixed point keeps its direction there
         turned = np.sum(here.u * there.u, axis=2) < 0
-        met &= there.reached & ~(turned & self.pointed).any(axis=1)
+        met &= there.reached & ~(turned & flow.pointed).any(axis=1)
         k3 = solved(flow.rate(y, there.velocity) - E32 * (k2 - f1) - 2 * (k1 - f))
         error = np.max(np.abs(h / 6 * (k1 - 2 * k2 + k3)), axis=1) / FLOWED
         error = np.where(met & np.isfinite(error), error, np.inf)

@@ -279,14 +279,14 @@ class BasinSearch:
         checked = np.random.default_rng(seed).choice(len(starts), min(FLOW_CHECKED, len(starts)), replace=False)
         runs, certified, *alone = self._done([partial(first.together(others).run, horizon),
                                               partial(certified_radius, self.setting, self.goal),
-                                              *self._single(self._at(X[starts[checked]]))])
+                                              *self._single(self._started(X[starts[checked]]))])
         damped[starts] = runs.weak
         groups = runs.groups(length, flow.seen)
         shown = groups[:FLOW_NAMED]
         away, open_ = (np.flatnonzero(np.isin(runs.stopped, words)) for words in ((AWAY,), (LOST, EFFORT)))
         followed = open_[np.unique(np.linspace(0, len(open_) - 1, FLOW_FOLLOWED).astype(int))] if len(open_) else open_
         at = flow.configurations(runs.X[[group[0] for group in shown]], runs.flipped[[group[0] for group in shown]])
-        told = list(chain(*self._done(self._single(at + self._at(X[starts[[*away[:1], *followed]]])))))
+        told = list(chain(*self._done(self._single(at + self._started(X[starts[[*away[:1], *followed]]])))))
         numbers, outcomes = np.full(len(starts), -1), Outcomes(length)
         for group, outcome in zip(shown, told, strict=False):
             numbers[group] = outcomes.number(_at(outcome, runs.X[group[0]], length))
@@ -317,7 +317,7 @@ class BasinSearch:
                             for each, there in zip(at, X, strict=True)])
         return Found(outcomes.all, cells, np.zeros(len(at), dtype=bool), reached, len(starts), certified=certified)
 
-    def _at(self, X: Array) -> list[ClosedConfiguration | None]:
+    def _started(self, X: Array) -> list[ClosedConfiguration | None]:
         """The configurations at starts X (n, 4, 4)."""
         assert self.flow is not None
         return self.flow.configurations(X, np.zeros((len(X), len(self.flow.legs)), dtype=bool))

@@ -76,6 +76,11 @@ class Flow(Value):
         """Which legs slide along a line through a fixed point, at which they turn over: no border of reach."""
         return np.array([isinstance(leg, SlidingRod) and not leg.aside for leg in self.batch.legs.values()])
 
+    @cached_property
+    def pointed(self) -> Flags:
+        """Which of the watched ones do."""
+        return np.array([self.points[self.legs.index(name)] for name in self.watched])
+
     def at(self, X: Array, flipped: Flags, active: Flags, root: Array) -> Commanded:
         """The command at poses X (n, 4, 4), with S (n, d, d)."""
         n, d, k = len(X), root.shape[1], len(self.watched)
