@@ -76,6 +76,8 @@ class Question:
             given = self._given(function, values)
             for each, path in files.items():
                 given |= each.given(path)
+                if path is not None:
+                    require_other(path, source["robot"], mechanism.file)
                 each.require_drawable(path, mechanism, given)
             found = function(mechanism, **given)
             for option in ("cone", "noise"):
@@ -88,7 +90,6 @@ class Question:
                     warn(why)
                     files[each] = None
                     continue
-                require_other(path, source["robot"], mechanism.file)
                 writer, told = each.writer(found, path, values)
                 writers.append(writer)
                 more |= told

@@ -15,7 +15,7 @@ from ..results import spelled
 from . import formats
 from .dialect import Dialect
 from .example_data import PREFIX, examples
-from .files import require_folder, require_same, write_whole
+from .files import require_same, require_writable, write_whole
 from .formats import native
 from .meshes import carried, taken_back, written
 from .overrides import Overrides
@@ -107,9 +107,10 @@ def _named(name: str, files: dict[str, Path], what: str, command: str) -> Path:
 
 def targets(path: str | Path, dialect: str | None = None) -> tuple[Path, ...]:
     """The files that :func:`save` writes, the tree first; raises ``BadRequest`` for an unknown dialect or ending, and
-    where there is no folder to write in."""
+    where they cannot be written."""
     files = _dialect(Path(path), dialect).files(Path(path))
-    require_folder(path)
+    for file in files:
+        require_writable(file)
     return files
 
 

@@ -11,13 +11,24 @@ from pathlib import Path
 from ..errors import BadRequest
 
 
+def require_writable(path: str | Path) -> Path:
+    """Where a file will be; raises ``BadRequest`` where it cannot be written: before long work, not after it."""
+    require_folder(path)
+    return replaceable(path)
+
+
 def require_folder(path: str | Path) -> None:
-    """Raise ``BadRequest`` where there is no folder to write a file in: before long work, not after it."""
-    folder = Path(os.path.realpath(path)).parent
-    if not folder.is_dir():
-        raise BadRequest("cannot write the file: no such folder", str(folder))
-    if not os.access(folder, os.W_OK):
-        raise BadRequest("cannot write the file: no permission to write in the folder", str(folder))
+    """Raise ``BadRequest`` where there is no folder to make this file or folder in, or it takes none of that name,
+    which is tried."""
+    try:
+        target = Path(os.path.realpath(path))
+        if not target.parent.is_dir():
+            raise _unwritten("no such folder", target.parent)
+        tried = _draft(target, "try")
+        tried.touch()
+        tried.unlink()
+    except (OSError, ValueError) as error:
+        raise _unwritten(f"its folder takes no such file ({_reason(error)})", path) from None
 
 
 def require_other(path: str | Path, *sources: str | Path | None) -> None:
@@ -32,7 +43,7 @@ def require_same(path: Path, content: bytes) -> None:
     try:
         same = not path.exists() or (path.stat().st_size == len(content) and path.read_bytes() == content)
     except (OSError, ValueError) as error:
-        raise BadRequest(f"cannot write the file: {getattr(error, 'strerror', None) or error}", str(path)) from None
+        raise _unwritten(_reason(error), path) from None
     if not same:
         raise BadRequest("cannot write the file beside: it is there already, with other content", str(path),
                          "another name, or that file moved away")
@@ -45,18 +56,30 @@ def write_whole(path: str | Path, content: bytes | Iterable[bytes]) -> None:
         with replacement(path) as draft, draft.open("wb") as file:
             file.writelines([content] if isinstance(content, bytes) else content)
     except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise BadRequest(f"cannot write the file: {reason}", str(path)) from None
+        raise _unwritten(_reason(error), path) from None
 
 
 def replaceable(path: str | Path) -> Path:
     """Where a file is that is to be written anew; raises ``BadRequest`` for a directory or a device."""
     target = Path(os.path.realpath(path))
     if target.is_dir():
-        raise BadRequest("cannot write the file: a directory", str(path))
+        raise _unwritten("a directory", path)
     if target.exists() and not target.is_file():
-        raise BadRequest("cannot write the file: not a regular file", str(path))
+        raise _unwritten("not a regular file", path)
     return target
+
+
+def _unwritten(reason: str, path: str | Path) -> BadRequest:
+    return BadRequest(f"cannot write the file: {reason}", str(path))
+
+
+def _reason(error: OSError | ValueError) -> str:
+    return getattr(error, "strerror", None) or str(error)
+
+
+def _draft(target: Path, ending: str) -> Path:
+    """The name beside a file under which it is written, or tried."""
+    return target.with_name(f".{target.name}.{os.getpid()}.{ending}")
 
 
 @contextlib.contextmanager
@@ -65,7 +88,7 @@ def replacement(path: str | Path, *, sync: bool = False) -> Iterator[Path]:
     error, with ``sync`` not before it is on the disk. Raises ``BadRequest`` for a directory or a device, ``OSError``
     where the disk refuses."""
     target = replaceable(path)
-    draft = target.with_name(f".{target.name}.{os.getpid()}.tmp")
+    draft = _draft(target, "tmp")
     try:
         yield draft
         if target.exists():

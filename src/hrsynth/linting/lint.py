@@ -9,7 +9,7 @@ from typing import Any
 
 from ..budgets import MOST_MENDING
 from ..description import file_of
-from ..description.files import write_whole
+from ..description.files import require_writable, write_whole
 from ..description.overrides import Overrides, names
 from ..errors import BadRequest, BadRobotFile, Defect
 from ..results import Result, require_keywords
@@ -78,6 +78,8 @@ def lint(files: str | Path | Iterable[str | Path], *, compare: str | Path | None
         raise BadRequest("no file to look at", None, "one or more")
     if output is not None and (not fix or len(paths) > 1):
         raise BadRequest("an output is the mended file", str(output), "one file with --fix")
+    if output is not None:
+        require_writable(output)
     given = Overrides.said(**said)
     other = None if compare is None else LintedFile(file_of(compare), given)
     opened, defects = [], list[Defect]()
@@ -88,17 +90,17 @@ def lint(files: str | Path | Iterable[str | Path], *, compare: str | Path | None
             defects += error.defects
     if defects:
         raise BadRobotFile(defects)
-    mended: list[Finding] = []
-    written = None
+    mended, written = list[Finding](), None
     if fix:
-        for number, file in enumerate(opened):
-            after, gone = _mended(file, skipped)
-            mended += gone
-            target = file.path if output is None else Path(output)
-            if gone or output is not None:
-                write_whole(target, file.data if after is file else after.data)
-                written = str(target)
-            opened[number] = after
+        every = [(file, *_mended(file, skipped)) for file in opened]
+        new = [(Path(output or file.path), after.data) for file, after, gone in every if gone or output is not None]
+        for target, _ in new:
+            require_writable(target)
+        for target, data in new:
+            write_whole(target, data)
+            written = str(target)
+        mended = [each for _, _, gone in every for each in gone]
+        opened = [after for _, after, _ in every]
     found = [each for file in opened for each, _ in findings(file, skipped)]
     return Lint(tuple(file.file for file in opened), tuple(found), tuple(mended), written,
                 tuple(name for name in lint_rules() if name not in skipped))

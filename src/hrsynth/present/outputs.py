@@ -68,9 +68,9 @@ class File:
     """An ending that is written part by part while the question is answered, and the parameter that names the file."""
 
     def require(self, path: str | None, asked: Asked) -> None:
-        """Raise ``BadRequest`` where there is nothing to write, the ending is no format or the folder not there, and
-        ``MissingExtra``: before long work, not after it."""
-        from ..description.files import require_folder
+        """Raise ``BadRequest`` where there is nothing to write, the ending is no format or the file cannot be written,
+        and ``MissingExtra``: before long work, not after it."""
+        from ..description.files import require_writable
 
         for name in ("width", "font") if self.drawn else ():
             if asked.get(name) is not None and (path is None or Path(path).suffix.lower() not in FIGURES):
@@ -92,7 +92,7 @@ class File:
             function("plots:library")()
         if self.installed is not None and ending == self.installed[0]:
             function(self.installed[1])()
-        require_folder(path)
+        require_writable(path)
 
     def require_drawable(self, path: str | None, robot: Any, asked: Asked) -> None:
         """Raise ``BadRequest`` where what is observed of a robot cannot be drawn so: before long work as well."""

@@ -125,12 +125,12 @@ def draw(result: Result, file: str | Path | None = None, *, plane: Pose | str | 
 
 def _ending(file: str | Path, endings: tuple[str, ...]) -> str:
     """The ending of a file that a picture can be written to; raises ``BadRequest``."""
-    from ..description.files import require_folder
+    from ..description.files import require_writable
 
     ending = Path(file).suffix.lower()
     if ending not in endings:
         raise BadRequest("cannot write the picture: unknown extension", str(file), endings)
-    require_folder(file)
+    require_writable(file)
     return ending
 
 

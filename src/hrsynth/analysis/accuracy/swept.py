@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ... import __version__
 from ...budgets import SWEEP_DRAWN, SWEEP_PART
-from ...description.files import replaceable, require_alone, require_folder
+from ...description.files import require_alone, require_writable
 from ...errors import BadRequest, BuildStopped, PlaneNotMet
 from ...geometry.vectors import Array
 from ...mechanism.pose import Grid
@@ -113,8 +113,7 @@ def required(path: str | Path) -> Path:
     """Where the file will be; raises ``BadRequest``."""
     if Path(path).suffix.lower() != ENDING:
         raise BadRequest("errors are written part by part to an array", str(path), f"a file that ends in {ENDING}")
-    require_folder(path)
-    return replaceable(path)
+    return require_writable(path)
 
 
 class _SweepDraft:
