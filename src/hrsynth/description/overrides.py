@@ -50,6 +50,9 @@ class Overrides:
              freeze: str | Iterable[str] = (), observe: str | Iterable[str] | None = None,
              tolerance: float | None = None, as_written: bool = False, **more: str | None) -> Overrides:
         """What a user says, lists also as texts with commas."""
+        if tolerance is not None and as_written:
+            raise BadRequest("--as-written keeps the numbers, --tolerance says how far they are changed",
+                             f"{tolerance:g}", "one of the two")
         if tolerance is not None and not EXACT < tolerance <= LARGEST_NOISE:
             raise BadRequest("tolerance", f"{tolerance:g}",
                              f"{EXACT:g} to {LARGEST_NOISE:g} (characteristic lengths, radians)")
