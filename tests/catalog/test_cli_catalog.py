@@ -76,7 +76,7 @@ def test_list_finds_what_python_finds(run, folder: Path):
     for options, asked in [([], {}), (["--dof", 3], {"dof": 3}), (["--legs", "?-R*", "--base-motors"],
                            {"legs": "?-R*", "base_motors": True}), (["--verdict", "controllable", "--moving-motors"],
                            {"verdict": "controllable", "base_motors": False}),
-                           (["--text", "two lines"], {"text": "two lines"}), (["--legs", "9"], {"legs": 9}),
+                           (["--text", "two lines"], {"text": "two lines"}), (["--legs", "3"], {"legs": 3}),
                            (["--group", "d", "--fewest", 2, "--motion", "3T"],
                            {"group": "d", "fewest": 2, "motion": "3T"})]:
         wanted = load(folder, **asked)
@@ -145,6 +145,11 @@ def test_bad_input_is_one_line(run, folder: Path, tmp_path: Path, monkeypatch: p
     check_refused(run("build", "-o", tmp_path / "no" / "where"), "No such file or directory")
     check_refused(run("list", "--catalog", tmp_path / "nowhere"), "no such catalog")
     check_refused(run("list", "--dof", "many"), "--dof")
+    for legs in ("banana", "9", "", "3-r*"):
+        check_refused(run("list", "--catalog", folder, "--legs", legs), "such legs")
+        check_refused(run("site", "-o", tmp_path / "site", "--catalog", folder, "--legs", legs), "such legs")
+    check_refused(run("show", "nope", "--catalog", folder), "hrsynth catalog list --text nope")
+    check_refused(run("show", "no pe", "--catalog", folder), "hrsynth catalog list --text 'no pe'")
     check_refused(run("show", "3(Qz*-Rz-Rz)"), "unknown joint")
     check_refused(run("show", "3(Rz*-Rz-Rz)", "-o", tmp_path / "robot.doc"), "robot.doc")
     check_refused(run("show", "3()"), "unknown joint")

@@ -127,6 +127,14 @@ def groups_of(path: str | Path | None = None) -> list[str]:
     return _there(path).groups()
 
 
+def numbers_of_legs(legs: str, path: str | Path | None = None) -> list[int]:
+    """What numbers of legs there are, where no record at all has the ``legs``, a number or a pattern; else none."""
+    groups = tuple(groups_of(path))
+    if len(load(path, legs=legs, group=groups)):
+        return []
+    return sorted({number for number, in load(path, group=groups).count("legs") if number is not None})
+
+
 def _groups(kept: Store, asked: Mapping[str, Any]) -> list[str]:
     """The groups in which is what is asked for."""
     wanted = asked.get("group")

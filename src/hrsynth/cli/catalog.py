@@ -10,6 +10,7 @@ its table by groups and every disagreement.
 from __future__ import annotations
 
 import json as javascript
+import shlex
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -92,16 +93,28 @@ def build(groups: list[str] | None, output: str | None, tables: str | None, work
 def entries(kept: str | None, json: bool, **asked: Any) -> None:
     """List the architectures that fit."""
     from ..catalog import load
-    from ..catalog.query import count, groups_of
-    from ..errors import BadRequest
+    from ..catalog.query import count
     from ..present.text.catalog import entries as written
+
+    found, total = load(kept, **asked), count(kept, **asked)
+    if not found:
+        _require_known(kept, asked)
+    _say("list", {"total": total, "entries": [dict(each) for each in found] if json else []},
+         "" if json else written(found.records, total), json)
+
+
+def _require_known(kept: str | None, asked: dict[str, Any]) -> None:
+    """Raise ``BadRequest`` for a group, a verdict, or legs, that no record of the catalog has: why none fits."""
+    from ..catalog.query import groups_of, numbers_of_legs
+    from ..errors import BadRequest
 
     for name, known in (("group", groups_of(kept)), ("verdict", VERDICTS)):
         if asked[name] not in (None, *known):
             raise BadRequest(f"no {name} of the catalog", asked[name], sorted(known))
-    found, total = load(kept, **asked), count(kept, **asked)
-    _say("list", {"total": total, "entries": [dict(each) for each in found] if json else []},
-         "" if json else written(found.records, total), json)
+    if asked["legs"] is not None and (numbers := numbers_of_legs(asked["legs"], kept)):
+        raise BadRequest("no architecture of the catalog has such legs", asked["legs"], f"their number, "
+                         f"{', '.join(map(str, numbers))}, or a pattern in which * and ? stand for letters: 3-R*RR, "
+                         "PUS, 6-*")
 
 
 def show(word: str, output: str | None, tables: str | None, kept: str | None, json: bool) -> None:
@@ -179,6 +192,8 @@ def site(output: str, workers: int, anew: bool, kept: str | None, json: bool, **
     from ..present.text.catalog import sited
 
     found = load(kept, **asked)
+    if not found:
+        _require_known(kept, asked)
     if seen := [each["word"] for each in found if "see" in each]:
         raise BadRequest("no pages are made of words with sensors", seen[0], "hrsynth catalog show, list")
     if published := [each["word"] for each in found if "choices" in each]:
@@ -219,8 +234,12 @@ def _word(text: str, kept: str | None) -> tuple[str, str]:
         return str(parse(text)), ""
     except BadRequest:
         found = load(kept).named(text)
-        if not found:
+        if not found and "(" in text:
             raise
+        if not found:
+            raise BadRequest("no architecture of the catalog is called so, or has such legs", text,
+                             f"a word such as '3(Rz*-Rz-Rz)'; hrsynth catalog list --text {shlex.quote(text)} seeks it "
+                             "in all fields") from None
     word = found[0]["word"]
     more = [f"{len(found)} are called so: {', '.join(each['word'] for each in found[1:4])} …"] if found[1:] else []
     return word, "; ".join([*filter(None, [alias(word)]), *more])
