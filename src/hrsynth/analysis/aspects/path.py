@@ -18,7 +18,7 @@ from ...kinematics.steps import led, track
 from ...mechanism.pose import Pose, PoseLike, asked_pose
 from ...progress import tell
 from ...results import Result, Value
-from ...tolerances import RANK_CUTOFF, RANK_GAP, SOLVED
+from ...tolerances import AS_PRINTED, RANK_CUTOFF, RANK_GAP, SOLVED
 from ..accuracy.cones import unseen
 from ..asked import configurations_at
 from ..measured import MeasuredRobot
@@ -97,6 +97,12 @@ class PathAnswer(Result, shown_as="path"):
     def headline(self) -> str:
         """The robot and the verdict."""
         return f"{self.setting.headline()}: {self.verdict}"
+
+    @property
+    def stays(self) -> bool:
+        """Whether start and goal are one pose of the platform, to the digits printed."""
+        one, other = (at.pose(self.setting.motion.link) for at in (self.start.configuration, self.goal.configuration))
+        return bool(np.max(np.abs(one - other)) <= AS_PRINTED)
 
     @property
     def not_proved(self) -> str:

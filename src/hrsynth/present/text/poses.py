@@ -269,6 +269,7 @@ def path(found: PathAnswer) -> str:
     value = "expression" if found.signed else "smallest singular value"
     rows = [*head(found.setting), ("from", f"{found.start.pose}   ({value} {found.start.value:.4g})"),
             ("to", f"{found.goal.pose}   ({value} {found.goal.value:.4g})"),
+            *known("", "start and goal are the same pose: there is no way to go" if found.stays else None),
             ("verdict", [f"{found.verdict} ({'certified' if found.certified else 'not certified'})", found.reason])]
     if found.margin is not None:
         where = "all along the path" if found.certified and found.ways else "at both poses"
