@@ -7,6 +7,7 @@ import os
 import re
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -15,7 +16,10 @@ import hrsynth
 from description.samples import FOUR_BAR
 from description.test_defects import DEFECTS, edited
 from hrsynth.cli import execute
+from hrsynth.cli.questions import QUESTIONS
 from hrsynth.description import shipped
+from hrsynth.errors import BadRequest
+from hrsynth.present.outputs import OUTPUTS
 
 FIELDS = {
     "derive": {"observed", "notation", "dof", "mobility", "verdict", "lost", "paper_form", "steps", "certificate",
@@ -155,6 +159,51 @@ def test_a_file_that_cannot_be_written_leaves_nothing(run, tmp_path: Path):
     assert "cannot write" in run("derive", "3prp", "-o", tmp_path).refused()[0]
     assert "cannot write" in run("convert", "3prp", "").refused()[0]
     assert list(tmp_path.iterdir()) == []
+
+
+WRITERS = {"accuracy": ["--cone", "0.1deg", "--grid", "x=0:0.1:2"], "check": ["--grid", "x=0:0.1:2"],
+           "path": ["--start", "x=0", "--goal", "x=0"], "servo": ["--start", "x=0", "--goal", "x=0"],
+           "endings": ["--at", "x=0"], "basins": ["--to", "x=0"]}
+OTHERS = (["import", "3prp", "--yes", "-o", "{}.urdf"], ["convert", "3prp", "{}.xml"], ["convert", "3prp", "{}.yaml"],
+          ["catalog", "show", "Delta", "-o", "{}.urdf"], ["lint", "3prp", "--fix", "-o", "{}.urdf"])
+
+
+@pytest.mark.parametrize("arguments", [
+    [each.name, "3prp", *WRITERS.get(each.name, []), f"--{file.option}", "{}" + next(iter(file.makers), ".urdf")]
+    for each in QUESTIONS for file in OUTPUTS[each.name].files if file.option] + list(OTHERS), ids=" ".join)
+def test_a_file_that_cannot_be_written_is_told_before_any_work(run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+                                                               arguments: list[str]):
+    """In one wording, whether its folder is missing, takes no such name, or a folder has its name."""
+    def worked(*_: object, **__: object) -> None:
+        pytest.fail("the work began")
+
+    for module, work in (("cli.questions", "robot_of"), ("cli.files", "robot_of"), ("cli.importing", "_read"),
+                         ("cli.catalog", "_of_word"), ("linting.lint", "LintedFile")):
+        monkeypatch.setattr(import_module(f"hrsynth.{module}"), work, worked)
+    *most, file = arguments
+    taken = tmp_path / file.format("taken")
+    taken.mkdir()
+    for path, reason in ((tmp_path / "none" / file.format("x"), "no such folder"), (taken, "a directory"),
+                         (tmp_path / file.format("x" * 300), "its folder takes no such file")):
+        (line,) = run(*most, path).refused()
+        assert line.startswith(f"hrsynth: cannot write the file: {reason}"), line
+    assert list(tmp_path.iterdir()) == [taken]
+
+
+def test_all_mended_files_can_be_written_before_the_first_is(run, robot, tmp_path: Path,
+                                                             monkeypatch: pytest.MonkeyPatch):
+    def refuse(path: Path) -> None:
+        if path.name == "b.urdf":
+            raise BadRequest("cannot write the file", str(path))
+
+    monkeypatch.setattr(import_module("hrsynth.linting.lint"), "require_writable", refuse)
+    broken = FOUR_BAR.replace('<axis xyz="0 1 0"/>', '<axis xyz="0 1 0"/>\n    <limit lower="1" upper="-1"/>', 1)
+    files = [robot(broken, "a.urdf"), robot(broken, "b.urdf")]
+    assert "b.urdf" in run("lint", "--fix", *files).refused()[0]
+    assert all(file.read_text() == broken for file in files)
+    monkeypatch.undo()
+    run("lint", "--fix", *files)
+    assert all(file.read_text() != broken for file in files)
 
 
 def test_a_device_or_pipe_is_never_replaced(run, tmp_path: Path):
@@ -525,10 +574,17 @@ def test_path_text_has_the_verdict_the_path_and_what_is_not_proved(run):
     (["--start", "x=0", "--goal", "w=9"], 2, ["unknown part", "'w'"]),
     (["--start", "x=0", "--goal", "z=0.1"], 2, ["cannot change z"]),
     (["--start", "x=0", "--goal", "x=0.01", "--observe", "7"], 2, ["no leg or link", "'7'"]),
-    (["--start", "x=0"], 2, ["--goal"])])
+    (["--start", "x=0"], 2, ["--goal"]),
+    (["--start", "x=0", "--goal", "x=0", "--as-written", "--tolerance", "1e-3"], 2, ["one of the two"])])
 def test_path_refuses_what_does_not_fit(run, arguments: list[str], status: int, words: list[str]):
     (line,) = run("path", "3rrr_m1", *arguments).refused(status)
     assert all(word in line for word in words)
+
+
+def test_path_to_where_it_starts_says_so(run):
+    for start, goal, same in (("mode:2", "mode:2", True), ("x=0.01", "x=0.01", True), ("x=0.01", "x=0.02", False)):
+        told = run("path", "3rrr_m1", "--start", start, "--goal", goal).out
+        assert ("start and goal are the same pose" in told) is same
 
 
 # ---- modes

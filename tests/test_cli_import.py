@@ -139,6 +139,18 @@ def test_without_a_terminal_guesses_are_taken_and_told(ending: str, tmp_path: Pa
     assert np.allclose(back.links[back.platform].pose, robot.links[robot.platform].pose, atol=1e-9)
 
 
+def test_a_robot_without_motors_is_told(tmp_path: Path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    told_of(tmp_path)
+    for motors, told in (("", True), ("a", False)):
+        asked = ["import", "open.urdf", "--close", "bar_end:rocker_end:revolute", "--platform", "bar", "--yes", "-o",
+                 "out.urdf", *["--motors", motors] * bool(motors)]
+        assert execute(asked) == 0
+        assert ("no joint is driven" in capsys.readouterr().err) is told
+        assert execute([*asked, "--json"]) == 0
+        assert any("no joint is driven" in note for note in json.loads(capsys.readouterr().out)["notes"]) is told
+
+
 def test_its_record_holds_the_command(tmp_path: Path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     path = told_of(tmp_path)

@@ -26,14 +26,14 @@ SHOWN = 20
 def importing(target: str, observe: str | None, yes: bool, view: bool, json: bool, **source: Any) -> None:
     """Read a robot with what is answered or guessed, and write it."""
     from ..description import file_of, save
-    from ..description.files import require_folder, require_other
+    from ..description.files import require_other, require_writable
     from ..errors import BadRequest
     from ..present.show import record
 
     path = file_of(source["robot"])
     if Path(target).suffix.lower() != ".urdf":
         raise BadRequest("import writes the native dialect", target, "a file .urdf; hrsynth convert writes others")
-    require_folder(target)
+    require_writable(target)
     require_other(target, path)
     asking = not (yes or json) and sys.stdin.isatty() and sys.stdout.isatty()
     if asking:
@@ -42,15 +42,21 @@ def importing(target: str, observe: str | None, yes: bool, view: bool, json: boo
     with Progress():
         mechanism = _read(source, observe, tell=not asking)
         lost = [str(warning) for warning in save(mechanism, target, "native")]
+    motors = [name for name, joint in mechanism.joints.items() if joint.actuated]
+    notes = [str(note) for note in mechanism.notes]
+    if not motors:
+        notes.append("open: no joint is driven, of the real robot's motors nothing can be said (--motors JOINTS names "
+                     "the driven ones)")
+        if not asking:
+            warn(notes[-1])
     for warning in lost:
         warn(warning)
     again = repeated(source, observe, target)
     if json:
-        motors = [name for name, joint in mechanism.joints.items() if joint.actuated]
         fields = {"file": target, "repeat": again, "links": len(mechanism.links), "joints": len(mechanism.joints),
                   "base": mechanism.base, "platform": mechanism.platform, "motors": motors,
                   "observed": {leg: seen.link for leg, seen in _segments(mechanism).items()},
-                  "notes": [str(note) for note in mechanism.notes], "warnings": lost}
+                  "notes": notes, "warnings": lost}
         say(record("import", mechanism.name, fields))
     else:
         say(f"{mechanism.name} with {len(mechanism.links)} links and {len(mechanism.joints)} joints is written "
