@@ -353,6 +353,25 @@ def test_check_refuses_in_one_line_and_writes_nothing(run, tmp_path: Path, monke
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize("asked", [["x=9", "x=0.01"], ["x=0.01", "x=9", "x=0.02", "y=-8"], ["x=9", "mode:2"]])
+def test_check_tells_every_pose_and_ends_as_at_one_that_is_not_reached(run, asked: list[str]):
+    arguments = ["check", "3rrr_m1", *(word for pose in asked for word in ("--at", pose))]
+    far = [pose for pose in asked if pose in ("x=9", "y=-8", "mode:2")]
+    answer, record = run(*arguments), run(*arguments, "--json")
+    assert (answer.status, record.status, answer.err) == (3, 3, record.err)
+    assert [re.search("the pose (.*?) is not reached", line)[1] for line in answer.err.splitlines()] == far
+    if len(far) == len(asked):
+        assert (answer.out, record.out) == ("", "")
+        return
+    near = [f"{each.postures[0].pose}" for each in (hrsynth.check("3rrr_m1", at=p) for p in asked if p not in far)]
+    assert re.findall(r"^pose +(.*)$", answer.out, re.MULTILINE) == near + far
+    assert len(re.findall(r"^not reached", answer.out, re.MULTILINE)) == len(far)
+    data = json.loads(record.out)
+    assert [each["pose"] for each in data["unreached"]] == far
+    assert all(each["reason"] in record.err for each in data["unreached"])
+    assert len(data["configurations"]) == len(near)
+
+
 def test_check_without_an_interaction_matrix_draws_nothing(run, tmp_path: Path):
     (line,) = run("check", "i4l", "--grid", "x=0:0.01:2", "-o", tmp_path / "map.png").refused()
     assert "there is nothing to draw" in line

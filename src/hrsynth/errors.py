@@ -196,10 +196,11 @@ class PoseNotReached(Unanswered):
         self.robot, self.pose, self.came, self.last = robot, pose, came, last
         self.leg, self.millimetres, self.degrees = leg, millimetres, degrees
         self.wrist = wrist
+        self.others: tuple[PoseNotReached, ...] = ()
+        came_to = "" if reason else f"; from {origin} the robot comes {100 * came:.3g} % of the way, to {last}"
         if reason is not None:
-            super().__init__(f"{robot}: the pose {pose} is not reached: {reason}")
-            return
-        if wrist is not None:
+            pass
+        elif wrist is not None:
             reason = f"joint {wrist}, which stands for several R through one point, is near the end of its turns"
         elif leg is None:
             reason = ("each leg alone can close there, but the straight way to it is blocked (a leg at its limit, "
@@ -207,8 +208,18 @@ class PoseNotReached(Unanswered):
         else:
             turn = f" and {degrees:.3g} degrees" if degrees > 1e-6 else ""
             reason = f"leg {leg} alone misses it by {millimetres:.4g} mm{turn}"
-        super().__init__(f"{robot}: the pose {pose} is not reached: {reason}; from {origin} the robot comes "
-                         f"{100 * came:.3g} % of the way, to {last}")
+        self.reason = reason + came_to
+        super().__init__(f"{robot}: the pose {pose} is not reached: {self.reason}")
+
+    @classmethod
+    def of_all(cls, refused: Sequence[PoseNotReached]) -> PoseNotReached:
+        """The first of some poses that are not reached, which tells a line of each."""
+        refused[0].others = tuple(refused[1:])
+        return refused[0]
+
+    def lines(self) -> list[str]:
+        """A line of this pose, and one of each of the others."""
+        return super().lines() + [line for each in self.others for line in each.lines()]
 
 
 class PlaneNotMet(Unanswered):

@@ -80,36 +80,55 @@ def _started(setting: ObservedRobot, wanted: Pose) -> ClosedConfiguration:
 
 def configurations_at(setting: ObservedRobot, poses: Sequence[Pose | ModeNumber], by_modes: bool = False
                       ) -> list[ClosedConfiguration]:
-    """The robot at each of the poses. ``mode:3`` is the third mode, with the directions that are watched, of the first
-    pose among these that is given by its parts (of the zero configuration where none is), as ``modes`` lists them.
-    With ``by_modes`` a pose to which no small steps lead is that of such a mode, where one is there.
+    """The robot at each of the poses, as :func:`asked_at`; raises ``PoseNotReached`` for the first that is not reached.
+    """
+    found = asked_at(setting, poses, by_modes)
+    for each in found:
+        if isinstance(each, PoseNotReached):
+            raise each
+    return [each for each in found if isinstance(each, ClosedConfiguration)]
 
-    Raises ``BadRequest`` for parts of a pose that the platform cannot change and for modes that there are not,
-    ``PoseNotReached`` for poses out of reach and for modes at which the robot was not found assembled.
+
+def asked_at(setting: ObservedRobot, poses: Sequence[Pose | ModeNumber], by_modes: bool = False
+             ) -> list[ClosedConfiguration | PoseNotReached]:
+    """The robot at each of the poses, or why it does not get there. ``mode:3`` is the third mode, with the directions
+    that are watched, of the first pose among these that is given by its parts (of the zero configuration where none
+    is), as ``modes`` lists them; with ``by_modes`` of the first that is reached, and a pose to which no small steps
+    lead is that of such a mode, where one is there.
+
+    Raises ``BadRequest`` for parts of a pose that the platform cannot change and for modes that there are not.
     """
     if not poses:
         return []
     require_platform(setting.robot, poses[0])
     everything, motion = setting.everything, setting.motion
-    reached: dict[Pose, ClosedConfiguration] = {}
-    refused: list[tuple[Pose, PoseNotReached]] = []
+    found: dict[Pose | ModeNumber, ClosedConfiguration | PoseNotReached] = {}
     for each in poses:
         if isinstance(each, Pose):
             try:
-                reached[each] = reach(everything.start, everything.question, each, motion)
+                found[each] = reach(everything.start, everything.question, each, motion)
             except PoseNotReached as error:
-                if not by_modes:
-                    raise
-                refused.append((each, error))
-    about = next(iter(reached.values()), everything.start)
-    if not refused and all(isinstance(each, Pose) for each in poses):
-        return [reached[each] for each in poses if isinstance(each, Pose)]
-    from .modes.modes import at_mode, modes
+                found[each] = error
+    reached = [at for at in found.values() if isinstance(at, ClosedConfiguration)]
+    about = next(iter(reached if by_modes else found.values()), everything.start)
+    unreached = {each: at for each, at in found.items() if isinstance(at, PoseNotReached)}
+    if isinstance(about, PoseNotReached):
+        reason = f"it would be a mode at {about.pose}, which is not reached"
+        return [found.get(each) or PoseNotReached(about.robot, str(each), 0.0, about.last, reason=reason)
+                for each in poses]
+    if len(found) < len(set(poses)) or (by_modes and unreached):
+        from .modes.modes import at_mode, modes
 
-    listed = modes(setting, at=about)
-    for pose, reason in refused:
-        reached[pose] = _met(listed, pose, reason)
-    return [reached[each] if isinstance(each, Pose) else at_mode(listed, each) for each in poses]
+        listed = modes(setting, at=about)
+        for each in poses:
+            try:
+                if isinstance(each, ModeNumber):
+                    found[each] = at_mode(listed, each)
+                elif by_modes and each in unreached:
+                    found[each] = _met(listed, each, unreached[each])
+            except PoseNotReached as error:
+                found[each] = error
+    return [found[each] for each in poses]
 
 
 def _met(listed: AssemblyModes, pose: Pose, refused: PoseNotReached) -> ClosedConfiguration:

@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 
 from ..batch.reach import sweep
-from ..errors import HrsynthError, PlaneNotMet
+from ..errors import HrsynthError, PlaneNotMet, PoseNotReached
+from ..kinematics.configuration import ClosedConfiguration
 from ..mechanism.pose import SCALARS, Grid, PoseLike, asked_poses
 from ..progress import tell
 from ..results import Result, Value
-from .asked import configurations_at, require_platform
+from .asked import asked_at, require_platform
 from .classes import Redundancy, listed
 from .observed import CameraLike, LegsLike, Mobility, ObservedRobot, RobotLike, SeeLike
 from .posture import ConfigurationAnalysis, Posture
@@ -60,6 +61,8 @@ class Check(Result, shown_as="check"):
     postures: tuple[Posture, ...]
     redundant: tuple[Redundancy, ...]
     grid: GridCheck | None = None
+    unreached: tuple[PoseNotReached, ...] = ()
+    """The poses asked for that the robot does not reach, and why."""
 
     @property
     def length(self) -> float:
@@ -76,8 +79,8 @@ class Check(Result, shown_as="check"):
 
     def headline(self) -> str:
         """The robot, and the state of its hidden robot at each pose."""
-        states = "; ".join(f"{each.pose} {each.hidden.state}" for each in self.postures)
-        return f"{self.setting.headline()}: {states}"
+        states = [f"{each.pose} {each.hidden.state}" for each in self.postures]
+        return f"{self.setting.headline()}: {'; '.join(states + [f'{each.pose} not reached' for each in self.unreached])}"
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line, without the command's own fields."""
@@ -87,6 +90,7 @@ class Check(Result, shown_as="check"):
                 "mobility": {"total": generic.total, "idle": generic.idle,
                              "as_written": written and {"total": written.total, "idle": written.idle}},
                 "configurations": [each.to_dict() for each in self.postures],
+                "unreached": [{"pose": each.pose, "reason": each.reason} for each in self.unreached],
                 "redundant": [each.to_dict() for each in self.redundant],
                 "grid": self.grid and self.grid.to_dict()}
 
@@ -101,8 +105,9 @@ def check(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None,
     hidden robot's own (theory.md 3); the real robot's kinds take its motors' coordinates for what is measured. Generic
     values are those of random samples. ``observe`` and ``camera`` as for ``derive``.
 
-    Raises ``BadRequest`` for names that there are not and for parts of a pose that the platform cannot change,
-    ``PoseNotReached`` for poses out of reach, ``PlaneNotMet`` for a grid of them.
+    Of several poses those out of reach are told in ``unreached``. Raises ``BadRequest`` for names that there are not
+    and for parts of a pose that the platform cannot change, ``PoseNotReached`` where no pose is reached,
+    ``PlaneNotMet`` where none of a grid is.
 
     >>> hrsynth.check("3rrr_m1", at=["x=0,y=0,phi=0", [0.01, 0, 0]])
     <Check: 3rrr_m1, watching 1, 2, 3: x=0,y=0,z=0,phi=0 regular; x=0.01,y=0,z=0,phi=0 regular>
@@ -112,15 +117,19 @@ def check(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None,
     setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed).telling(poses)
     examiner = ConfigurationAnalysis.of(setting)
     start, question, motion = setting.everything.start, setting.everything.question, setting.motion
-    configurations = configurations_at(setting, poses) or [start]
+    found = asked_at(setting, poses) or [start]
+    configurations = [each for each in found if isinstance(each, ClosedConfiguration)]
+    unreached = tuple(each for each in found if isinstance(each, PoseNotReached))
+    if not configurations:
+        raise PoseNotReached.of_all(unreached)
     tell("poses")
     postures = tuple(map(examiner.examine, configurations))
     swept = None
     if cells is not None:
         require_platform(setting.robot, cells)
-        found = sweep(start, question, cells, motion, setting.placer)
-        if not any(found):
-            raise PlaneNotMet(setting.robot.name, f"the grid {cells}", f"none of {len(found)} is")
-        swept = GridCheck(cells, tuple(None if each is None else examiner.classify(each) for each in found),
+        places = sweep(start, question, cells, motion, setting.placer)
+        if not any(places):
+            raise PlaneNotMet(setting.robot.name, f"the grid {cells}", f"none of {len(places)} is")
+        swept = GridCheck(cells, tuple(None if each is None else examiner.classify(each) for each in places),
                           motion.free({*cells.names, *cells.fixed.given}))
-    return Check(setting, postures, listed(examiner.redundant, generic=True), swept)
+    return Check(setting, postures, listed(examiner.redundant, generic=True), swept, unreached)

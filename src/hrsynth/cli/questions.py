@@ -120,13 +120,15 @@ class Question:
 
 
 def _decided(found: Any, at: list[str] | None, **_: Any) -> None:
-    """Raise ``RankUndecided`` at poses that were asked for."""
-    from ..errors import RankUndecided
+    """Raise ``RankUndecided`` and ``PoseNotReached`` at poses that were asked for."""
+    from ..errors import PoseNotReached, RankUndecided
     from ..tolerances import RANK_GAP
 
     for posture in found.postures if at else ():
         if not posture.decided:
             raise RankUndecided(f"{found.setting.robot.name} at {posture.pose}", posture.gap, RANK_GAP)
+    if found.unreached:
+        raise PoseNotReached.of_all(found.unreached)
 
 
 def _deprecated(_: Any, seconds: float | None, **__: Any) -> None:

@@ -366,6 +366,13 @@ class GridRecord(GridAxes):
     degrees_per_degree: Array
 
 
+class Unreached(TypedDict):
+    """A pose that was asked for, as it was written, and why it is not reached."""
+
+    pose: str
+    reason: str
+
+
 class CheckAnswer(OfRobot, WrittenTo):
     """Mobility, ranks, singularities and redundant constraints at poses and over a grid."""
 
@@ -375,6 +382,7 @@ class CheckAnswer(OfRobot, WrittenTo):
     watched: list[WatchedAxis]
     mobility: MobilityMaybeWritten
     configurations: list[PostureRecord]
+    unreached: list[Unreached]
     redundant: list[RedundantRecord]
     grid: GridRecord | None
 

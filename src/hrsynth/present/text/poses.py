@@ -43,6 +43,8 @@ def check(found: Check) -> str:
             ("lengths in", f"{found.length:.4g} m (the characteristic length), angles in radians")]
     for posture in found.postures:
         rows += [*GAP, ("pose", str(posture.pose)), *_posture(posture, found.length, found.setting)]
+    for each in found.unreached:
+        rows += [*GAP, ("pose", each.pose), ("not reached", each.reason)]
     redundant = [f"the loop {each.loop}: {each.rows} of its constraints" for each in found.redundant]
     rows += [*GAP, ("redundant", redundant or "no constraint")]
     if found.grid is not None:
