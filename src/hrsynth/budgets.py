@@ -137,6 +137,8 @@ WEAKEST_STARTS = 8
 """Further starts, the weakest poses of parts of the walk, where the walk crosses no singularity."""
 COARSE_GRID = 25
 """Poses a side of the grid that finds how far a plane is reached."""
+CLOSER = 4
+"""How many times closer the border of what it finds is looked at, where tips may be thin."""
 LOCUS_SIDES = (2.5, 5.0)
 """Half the side of that grid (characteristic lengths), and where the robot reaches its border, of a second one."""
 NEIGHBOUR_STEP = 0.01

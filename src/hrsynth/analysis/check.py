@@ -80,7 +80,8 @@ class Check(Result, shown_as="check"):
     def headline(self) -> str:
         """The robot, and the state of its hidden robot at each pose."""
         states = [f"{each.pose} {each.hidden.state}" for each in self.postures]
-        return f"{self.setting.headline()}: {'; '.join(states + [f'{each.pose} not reached' for each in self.unreached])}"
+        states += [f"{each.pose} not reached" for each in self.unreached]
+        return f"{self.setting.headline()}: {'; '.join(states)}"
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line, without the command's own fields."""

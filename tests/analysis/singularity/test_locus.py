@@ -11,9 +11,11 @@ import pytest
 
 from analysis.singularity.found import found
 from analysis.singularity.test_figures import centre
-from hrsynth.analysis.singularity.locus import Locus
+from hrsynth.analysis.observed import ObservedRobot
+from hrsynth.analysis.singularity.locus import Locus, framed
 from hrsynth.analysis.singularity.locus import locus as drawn
 from hrsynth.batch.reach import reach
+from hrsynth.budgets import COARSE_GRID, LOCUS_SIDES
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, PlaneNotMet
 from hrsynth.geometry.vectors import unit
@@ -118,6 +120,39 @@ def test_isolated_singular_poses_are_spots_of_a_plane() -> None:
     assert locus.grid.names == ("x", "z")
     assert not locus.hidden.signed
     assert np.min(np.abs(locus.hidden.spots[:, 0])) < 1e-7
+
+
+@pytest.mark.parametrize("degrees", range(5, 360, 50))
+def test_thin_tips_are_within_the_window(degrees: int) -> None:
+    """A disc with a needle of 20 degrees, whatever its direction; and the window is no more than a step wider."""
+    setting = ObservedRobot.of("3rrr_m1")
+    motion, length = setting.motion, setting.everything.start.twin.length
+    towards = np.array([np.cos(np.radians(degrees)), np.sin(np.radians(degrees))])
+    centre = motion.position(setting.everything.start.pose(motion.link))[:2]
+    end, radius = centre + 1.9 * length * towards, 0.4 * length
+
+    def inside(places: np.ndarray) -> np.ndarray:
+        back = end - places
+        along, across = back @ towards, back @ [-towards[1], towards[0]]
+        needle = (along >= 0) & (along <= 1.9 * length) & (np.abs(across) <= along * np.tan(np.radians(10)))
+        return needle | (np.linalg.norm(places - centre, axis=1) <= radius)
+
+    grid = framed(setting.everything.start, setting.everything.question, motion, Pose(phi=0.0), 5,
+                  lambda _, cells: inside(cells.places()))
+    step = 2 * LOCUS_SIDES[0] * length / (COARSE_GRID - 1)
+    corners = np.stack([end, centre + radius, centre - radius])
+    window = np.array([[values[0], values[-1]] for _, values in grid.axes]).T
+    assert (window[0] <= corners.min(axis=0)).all()
+    assert (window[1] >= corners.max(axis=0)).all()
+    assert np.abs(window - [corners.min(axis=0), corners.max(axis=0)]).max() <= 1.25 * step
+
+
+@pytest.mark.some(1)
+@pytest.mark.parametrize(("robot", "plane"), [("3rrr_m1", "phi=0"), ("prrrp_m1", None), ("rrrrr_m1", None)])
+def test_nothing_that_is_reached_touches_the_window(robot: str, plane: str | None) -> None:
+    reached = np.isfinite(drawn(load(robot), plane=plane, steps=21).hidden.type2)
+    assert reached.any()
+    assert not any(edge.any() for edge in (reached[0], reached[-1], reached[:, 0], reached[:, -1]))
 
 
 def test_a_plane_that_is_not_reached() -> None:

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
+from functools import partial
+from itertools import combinations, product
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...batch.reach import reach, sweep
-from ...budgets import COARSE_GRID, LOCUS_SIDES
+from ...budgets import CLOSER, COARSE_GRID, LOCUS_SIDES
 from ...errors import BadRequest, PlaneNotMet, PoseNotReached
 from ...geometry.so3 import turn_about
 from ...geometry.vectors import Array
@@ -152,11 +153,42 @@ def framed(start: ClosedConfiguration, question: Measurement, motion: PlatformMo
             cells = np.array([[COARSE_GRID // 2, COARSE_GRID // 2]])
         if cells.min() > 0 and cells.max() < COARSE_GRID - 1:
             break
-    fine = []
-    for (name, values), low, high in zip(axes, cells.min(axis=0), cells.max(axis=0), strict=True):
-        step = values[1] - values[0]
-        fine.append((name, np.linspace(values[low] - step, values[high] + step, steps)))
-    return Grid(tuple(fine), plane)
+    steps_apart = np.array([values[1] - values[0] for _, values in axes])
+    found = np.array([[values[low], values[high]] for (_, values), low, high in zip(axes, cells.min(axis=0),
+                                                                                    cells.max(axis=0), strict=True)])
+    beside = {}
+    for axis, end in product(range(2), range(2)):
+        (pose,) = coarse.poses_at([cells[np.argsort(cells[:, axis], kind="stable")[-end]]])
+        try:
+            beside[axis, end] = reach(first, question, pose, motion)
+        except PoseNotReached:
+            beside[axis, end] = first
+    moved = np.inf
+    while moved > 1:
+        before = found.copy()
+        for (axis, end), near in beside.items():
+            found[axis, end] = _last(coarse, found, axis, end, partial(met, near))
+        moved = float(np.max(np.abs(found - before) / steps_apart[:, None]))
+    window = found + 0.75 * steps_apart[:, None] * [-1, 1]
+    return Grid(tuple((name, np.linspace(*ends, steps)) for (name, _), ends in zip(axes, window, strict=True)), plane)
+
+
+def _last(coarse: Grid, found: Array, axis: int, end: int, met: Callable[[Grid], NDArray[np.bool_]]) -> float:
+    """How far a plane is reached along one axis, to half a step of the coarse grid and as far as that goes: what is
+    ``found`` (2, 2) by it, and thinner tips beyond, of which cells are looked at that are ``CLOSER``."""
+    (_, along), (_, across) = coarse.axes[axis], coarse.axes[1 - axis]
+    step, apart, last = (along[1] - along[0]) * (2 * end - 1), across[1] - across[0], float(found[axis, end])
+    low, high = found[1 - axis]
+    columns = np.arange(low - apart, high + apart, apart / CLOSER)
+    while (along[-end] - last) / step > 0.5:
+        rows = last + step * np.arange(0, 2, 0.5)
+        axes = ((coarse.names[axis], rows), (coarse.names[1 - axis], columns))
+        there = met(Grid(axes if axis == 0 else axes[::-1], coarse.fixed))
+        reached = there.reshape((len(rows), -1) if axis == 0 else (-1, len(rows))).any(axis=1 - axis)
+        if not reached[1:].any():
+            break
+        last = float(rows[np.flatnonzero(reached)[-1]])
+    return last
 
 
 def _axes(start: ClosedConfiguration, motion: PlatformMotion, plane: Pose | None) -> tuple[Pose, tuple[str, ...]]:
