@@ -81,6 +81,20 @@ def test_the_law_abreast_is_the_law(name: str, legs: str | None, singular: list[
         assert size == pytest.approx(command.size, abs=1e-9)
 
 
+@pytest.mark.parametrize(("name", "legs"), [("quattro", "1,4"), ("3rrr_m1", None)])
+def test_nothing_is_commanded_where_a_leg_does_not_reach(name: str, legs: str | None):
+    _, flow = task(name, legs)
+    far = flow.batch.home.copy()
+    far[:3, 3] += 50 * flow.batch.length
+    X = np.stack([flow.batch.home, far])
+    found = flow.at(X, none(flow, 2), none(flow, 2), flow.roots(np.stack([flow.batch.home] * 2), none(flow, 2))[0])
+    assert found.reached.tolist() == [True, False]
+    for each in (found.velocity, found.size, found.weakest, found.u):
+        assert np.isfinite(each[0]).all()
+        assert np.isnan(each[1]).all()
+    assert np.array_equal(found.moves, [found.velocity[0], np.zeros_like(found.velocity[1])])
+
+
 def ends_agree(name: str, legs: str | None, X: np.ndarray, to: str | None = None) -> int:
     """Hold runs abreast against single ones; how many."""
     made, flow = task(name, legs, to)

@@ -135,7 +135,7 @@ class Abreast:
             """ẏ at one or several coordinates of each run's chart, (m n, d)."""
             X, *rest = (np.tile(each[runs], (len(y) // len(each[runs]), *[1] * (each.ndim - 1))) for each in chart)
             there = flow.at(flow.moved(X, y), *rest)
-            return flow.rate(y, there.velocity), there.reached
+            return flow.rate(y, there.moves), there.reached
 
         # any slopes give order 2: those of a run are kept for some steps while the law changes evenly
         anew = np.flatnonzero(self.old[live] >= FLOW_KEPT)
@@ -162,7 +162,7 @@ class Abreast:
         # a leg that slides through a fixed point keeps its direction there
         turned = np.sum(here.u * there.u, axis=2) < 0
         met &= there.reached & ~(turned & flow.pointed).any(axis=1)
-        k3 = solved(flow.rate(y, there.velocity) - E32 * (k2 - f1) - 2 * (k1 - f))
+        k3 = solved(flow.rate(y, there.moves) - E32 * (k2 - f1) - 2 * (k1 - f))
         error = np.max(np.abs(h / 6 * (k1 - 2 * k2 + k3)), axis=1) / FLOWED
         error = np.where(met & np.isfinite(error), error, np.inf)
         good = error <= 1
@@ -215,7 +215,7 @@ class Abreast:
         runs, leg, velocity, time = runs[came], leg[came], velocity[came], margin[came] / rate[came]
         through = time < 0
         self.flipped[runs[through], leg[through]] ^= True
-        after = np.where((flow.points[leg] | ~through)[:, None], velocity, self._at(runs).velocity)
+        after = np.where((flow.points[leg] | ~through)[:, None], velocity, self._at(runs).moves)
         time = np.where(through, -2 * time, time)
         self.X[runs] = flow.moved(self.X[runs], time[:, None] * (velocity + after) / np.where(through, 1, 2)[:, None])
         self.steps[runs] = np.where(flow.points[leg], self.steps[runs], 2 * FLOW_SHORTEST_STEP)
@@ -266,10 +266,10 @@ class Abreast:
         runs, X, speed = live[some], self.X[live[some]], np.linalg.norm(here.velocity[some], axis=1)
         self.X[runs] = self.flow.moved(X, here.velocity[some])
         there = self._at(runs)
-        slow = np.linalg.norm(there.velocity, axis=1) > FLOW_CONTRACTED * speed
+        slow = ~(np.linalg.norm(there.velocity, axis=1) <= FLOW_CONTRACTED * speed)
         for _ in range(POLISHED - 1):
             slow |= ~np.all(there.margins > FLOW_CLEAR, axis=1)
-            self.X[runs] = self.flow.moved(self.X[runs], there.velocity)
+            self.X[runs] = self.flow.moved(self.X[runs], there.moves)
             there = self._at(runs)
         back = (slow | ~(there.size <= SERVED)) & (here.size[some] > FLOW_SERVED)
         self.X[runs[back]] = X[back]

@@ -33,7 +33,7 @@ Places = NDArray[np.int64]
 class Commanded(Value):
     """What the law commands at n poses: ẋ (n, d), ‖e‖ (n,), the smallest singular value of L S (n,; as ``damped`` tells
     it), the legs' reach margins (n, legs) as parts of those at home, whether all but active legs reach (n,), and which
-    active legs hold the platform (n, legs)."""
+    active legs hold the platform (n, legs). Where one does not reach there is no command: NaN."""
 
     velocity: Array
     size: Array
@@ -43,6 +43,11 @@ class Commanded(Value):
     held: Flags
     u: Array
     """The watched directions (n, k, 3)."""
+
+    @property
+    def moves(self) -> Array:
+        """The velocity, none where nothing is commanded."""
+        return np.where(self.reached[:, None], self.velocity, 0.0)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -103,9 +108,10 @@ class Flow(Value):
             normals = np.where(active[slid, :, None], self.slopes(X[slid], flipped[slid]), 0.0) @ root[slid]
             velocity[slid], weakest[slid], push = _along(normals, A[slid], g[slid, :, 0])
             held[slid] = active[slid] & (push >= 0)
-        velocity = times(root, velocity)
-        velocity[~reached] = 0.0
-        return Commanded(velocity, np.linalg.norm(error, axis=(1, 2)), weakest, margins, reached, held, u)
+        velocity, size = times(root, velocity), np.linalg.norm(error, axis=(1, 2))
+        for each in (velocity, size, weakest, u):
+            each[~reached] = np.nan
+        return Commanded(velocity, size, weakest, margins, reached, held, u)
 
     def margins(self, X: Array, flipped: Flags) -> Array:
         """The legs' reach margins (n, legs), parts of those at home."""
