@@ -7,6 +7,7 @@ from functools import cache
 from itertools import combinations
 from typing import Any
 
+import numpy as np
 import pytest
 from matplotlib.text import Text
 
@@ -14,7 +15,9 @@ import hrsynth
 from hrsynth.families.__main__ import main
 from hrsynth.present import paper as papers
 from hrsynth.present.outputs import OUTPUTS
-from hrsynth.present.paper import Paper, asked
+from hrsynth.present.paper import Paper, asked, scaled
+from hrsynth.present.plots import empty_figure
+from hrsynth.present.sketch import Sketch
 from hrsynth.results import Result
 
 SMALLEST = 6.0
@@ -148,3 +151,20 @@ def test_lines_break_at_spaces_into_like_parts_and_keep_numbers_with_their_units
         assert " ".join(lines) == whole
         assert text.get_window_extent().width <= width * figure.dpi + 1e-9
         assert not any(line.startswith(("m", "=")) or line.endswith("=") for line in lines)
+
+
+@pytest.mark.parametrize("scale", [1.0, 0.6])
+@pytest.mark.parametrize("extent", [(1, 1, 1), (1, 0.3, 3), (4, 2, 0.5)])
+def test_names_of_axes_in_space_are_beside_their_scales(extent: tuple[float, float, float], scale: float):
+    figure = empty_figure(6, 6)
+    place = Sketch.of(None, np.zeros((1, 3)), []).place(figure, (0.1, 0.1, 0.8, 0.8), np.array([(0, 0, 0), extent]))
+    scaled(figure, list({id(each): each for each in figure.findobj()}.values()), scale)
+    figure.draw_without_rendering()
+    for axis in (place.xaxis, place.yaxis, place.zaxis):
+        name = axis.label.get_window_extent()
+        numbers = [tick.label1.get_window_extent() for tick in axis.get_major_ticks()]
+        assert (np.abs(name.corners() - figure.bbox.size / 2) < figure.bbox.size / 2).all()
+        assert not any(name.shrunk(0.8, 0.8).overlaps(each) for each in numbers)
+        gap = min(np.linalg.norm(np.subtract(*(each.corners().mean(axis=0) for each in (name, other))))
+                  for other in numbers)
+        assert gap < 60 * scale * figure.dpi / 72

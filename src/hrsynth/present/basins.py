@@ -27,6 +27,7 @@ from .plots import (
     styled,
     tick_values,
 )
+from .runs import ENDS
 from .sketch import axis_label
 
 SHADES = {GOAL: (COLOURS[2], "#7FCEB9"), MODE: (COLOURS[0], COLOURS[5], "#B9DDF3"), ANTIPODAL: (COLOURS[3], "#E8C4D8"),
@@ -74,15 +75,16 @@ def picture(found: Basins, paper: Paper = PNG) -> bytes:
     entries = [Patch(facecolor=shade, label=_told(letter, each))
                for letter, each, shade in zip(LETTERS, found.ends, shades, strict=False)]
     if found.region is not None and found.certified is not None and grid.ndim == 2:
-        told = re.sub(" (within|of) ", r"\n\1 ", found.certified.words) + ("\n(drawn larger)" if larger else "")
-        entries.append(entry(f"certified: every start inside\nends at the goal, {told}", color="white",
+        told = re.sub(" of ", "\nof ", found.certified.words.removeprefix("from anywhere "))
+        told += " ends there" + "\n(drawn larger)" * larger
+        entries.append(entry(f"certified: every start\n{told}", color="white",
                              linewidth=1.6, path_effects=[Stroke(linewidth=3.4, foreground="black"), Normal()]))
     if found.damped.any():
         entries.append(Patch(label="the run comes to a singularity", **DAMPED))
     if (found.cells == NOT_REACHED).any():
         entries.append(missing_entry())
     kinds = dict.fromkeys(each.ending.name for each in found.ends if each.X is not None)
-    entries += [entry(f"{kind}: where the runs end", linestyle="", marker=MARKS[kind], color="black") for kind in kinds]
+    entries += [entry(ENDS[kind], linestyle="", marker=MARKS[kind], color="black") for kind in kinds]
     if beside:
         others = " or ".join("φ" if name == "phi" else name for name in _held(found, 0.0))
         entries.append(entry(f"hollow: at another {others}", linestyle="", marker="o", markerfacecolor="none",

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import BadRequest
+from .sketch import NAME_ON_AXIS, NUMBER_ON_AXIS
 
 USUAL, PRINTED = 10.0, 8.0
 """Size of text (points) with which figures are laid out, and with which they are printed at least unless one is asked
@@ -209,6 +210,8 @@ def scaled(figure: Any, every: list[Any], scale: float) -> None:
         given = axis.get_tick_params()
         for label in axis.get_ticklabels()[:1]:
             axis.set_tick_params(labelsize=label.get_fontsize())
-        axis.set_tick_params(pad=scale * given.get("pad", 3.5), length=scale * given.get("length", 3.5))
-        axis.labelpad *= scale
+        numbers, name = (NUMBER_ON_AXIS, NAME_ON_AXIS) if axis.axes.name == "3d" else (0.0, 0.0)
+        pad = numbers + scale * (given.get("pad", 3.5) - numbers)
+        axis.set_tick_params(pad=pad, length=scale * given.get("length", 3.5))
+        axis.labelpad = name + scale * (axis.labelpad - name)
     figure.set_size_inches(scale * figure.get_size_inches())

@@ -30,6 +30,8 @@ WIRES = 12
 """Lines drawn on a surface each way."""
 LABELS = 0.42
 """Room for scales and their names about axes in space (inches)."""
+NAME_ON_AXIS, NUMBER_ON_AXIS, NAME_GAP = -21.0, -8.0, 3.0
+"""The pads with which matplotlib writes a name, and numbers, on an axis in space; the room between both (points)."""
 CLEAR, NEAREST = 26.0, 9.0
 """Distances (points) between numbers and marks, and between numbers and curves, that are enough."""
 
@@ -92,6 +94,8 @@ class Sketch(Value):
             place.set_axis_off()
         if not self.flat:
             self._fill(place, extent if bare else np.array(list(product(*limits))), 0.0 if bare else LABELS)
+        if not (self.flat or bare):
+            _name_axes(place)
         return place
 
     def _fill(self, place: Any, points: Array, labels: float) -> None:
@@ -145,6 +149,29 @@ class Sketch(Value):
             data = seen[:, :2] / seen[:, 3:]
         scale = 72.0 / place.figure.dpi
         return np.hstack([place.transData.transform(data) * scale, data])
+
+
+def _name_axes(place: Any) -> None:
+    """Move the names of axes in space to just beyond their scales: matplotlib has them farther off the larger a robot
+    is drawn. Names and numbers are off the axis one way, in proportion to their pads from where these are on it."""
+    axes, middles = (place.xaxis, place.yaxis, place.zaxis), []
+    for pad in (NAME_ON_AXIS, 0.0):
+        for axis in axes:
+            axis.labelpad = pad
+        place.figure.draw_without_rendering()
+        middles.append([_middle(axis.label) for axis in axes])
+    for axis, at, there in zip(axes, *middles, strict=True):
+        away = (there - at) / -NAME_ON_AXIS
+        ticks = axis.get_major_ticks()
+        sizes = [text.get_window_extent().size for text in (axis.label, *(tick.label1 for tick in ticks))]
+        step = float(np.linalg.norm(away))
+        half = np.abs(away) / step @ (sizes[0] + np.max(sizes[1:], axis=0)) / 2
+        clear = (half + NAME_GAP * place.figure.dpi / 72) / step
+        axis.labelpad = NAME_ON_AXIS - NUMBER_ON_AXIS + ticks[0].get_pad() + clear
+
+
+def _middle(text: Any) -> Array:
+    return np.asarray(text.get_window_extent().corners().mean(axis=0))
 
 
 def _beside(at: Array, curves: Array) -> Iterator[tuple[float, float]]:
