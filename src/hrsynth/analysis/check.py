@@ -111,7 +111,7 @@ def check(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None,
     ``PlaneNotMet`` where none of a grid is.
 
     >>> hrsynth.check("3rrr_m1", at=["x=0,y=0,phi=0", [0.01, 0, 0]])
-    <Check: 3rrr_m1, watching 1, 2, 3: x=0,y=0,z=0,phi=0 regular; x=0.01,y=0,z=0,phi=0 regular>
+    <Check: 3rrr_m1, watching 1, 2, 3: x=0,y=0,z=0,phi=0deg regular; x=0.01,y=0,z=0,phi=0deg regular>
     """
     poses = asked_poses(at)
     cells = Grid.parse(grid) if isinstance(grid, str) else grid

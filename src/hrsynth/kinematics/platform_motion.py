@@ -148,6 +148,11 @@ class PlatformMotion(Value):
         return (self.translations.shape[1], self.rotations.shape[1], self.dof) == (2, 1, 3)
 
     @property
+    def turns_once(self) -> bool:
+        """Whether all that it turns is phi."""
+        return self.rotations.shape[1] == 1 and abs(float(self.normal @ self.rotations[:, 0])) > 1 - RANK_CUTOFF
+
+    @property
     def parts(self) -> tuple[str, ...]:
         """The parts of a pose that the platform can change."""
         found = [name for name, row in zip("xyz", self.translations, strict=True) if np.linalg.norm(row) > RANK_CUTOFF]
@@ -172,15 +177,16 @@ class PlatformMotion(Value):
         return transform(X, self.point)
 
     def pose(self, X: Array) -> Pose:
-        """A platform pose X (4, 4) as a user writes it; of a point body the position alone."""
+        """A platform pose X (4, 4) as a user writes it; of a point body the position alone, of one that turns about one
+        axis that turn, as phi in degrees."""
         found = Pose.of(X, None if self.body else self.point)
-        if found.rotation is None or self.form == RADIANS:
+        if found.rotation is None or (self.form == RADIANS and not self.turns_once):
             return found
         parts, turn = found.given, X[:3, :3] @ self.home[:3, :3].T
-        if self.form.phi and np.linalg.norm(turn @ self.normal - self.normal) <= AS_PRINTED:
+        if (self.form.phi or self.turns_once) and np.linalg.norm(turn @ self.normal - self.normal) <= AS_PRINTED:
             parts["phi"] = (positive_half_turn(turn_about(self.normal, turn)[0]),)
             del parts["rpy"]
-        return replace(found, shown=written(parts, self.form.degrees))
+        return replace(found, shown=written(parts, self.form.degrees or "phi" in parts))
 
     def goal(self, pose: Pose, robot: str = "the robot") -> Goal:
         """The goal that a pose asks for; raises ``BadRequest`` for parts that the platform cannot change."""

@@ -95,7 +95,7 @@ class Pose:
 
 @dataclass(frozen=True)
 class PoseForm:
-    """How a user writes poses: a turn by ``phi`` where it is one, angles in ``degrees``."""
+    """How a user writes poses that turn about several axes: a turn by ``phi`` where it is one, rpy in ``degrees``."""
 
     phi: bool = False
     degrees: bool = False

@@ -243,7 +243,8 @@ def heading(figure: Any, text: str, fixed: Pose, before: str = "\n") -> None:
 
 def pose_words(pose: Pose) -> str:
     """A pose with its units, angles in degrees."""
-    return ", ".join(_held(name, values) for name, values in pose.given.items())
+    told = Pose.parse(pose.shown) if pose.shown else pose
+    return ", ".join(_held(name, values) for name, values in told.given.items())
 
 
 def _held(name: str, values: Sequence[float]) -> str:

@@ -93,7 +93,7 @@ def accuracy(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = No
     is infinite everywhere) or is behind its camera, ``PoseNotReached``, ``PlaneNotMet``.
 
     >>> hrsynth.accuracy("3rrr_m1", cone="0.1deg", at="x=0,y=0,phi=0")
-    <Accuracy: 3rrr_m1, watching 1, 2, 3: 0.414 mm at x=0,y=0,z=0,phi=0>
+    <Accuracy: 3rrr_m1, watching 1, 2, 3: 0.414 mm at x=0,y=0,z=0,phi=0deg>
     """
     wanted: list[Pose | ModeNumber] = asked_poses(at)
     if plane is not None and grid is not None:
