@@ -856,6 +856,8 @@ def test_files_that_are_none(run, robot, tmp_path: Path):
     with open(sparse, "wb") as stream:
         stream.truncate(200_000_000)
     assert "no such file" in run("derive", tmp_path / "none.urdf").refused()[0]
+    assert "a robot's file, found ''" in run("derive", "").refused()[0]
+    assert "no such joint" in run("derive", robot(FOUR_BAR), "--motors", "").refused()[0]
     assert "too large" in run("derive", sparse).refused()[0]
     assert "empty file" in run("derive", robot("", "empty.urdf")).refused()[0]
     assert "empty file" in run("derive", robot(" \n\n", "blank.urdf")).refused()[0]

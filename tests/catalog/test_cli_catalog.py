@@ -148,6 +148,9 @@ def test_bad_input_is_one_line(run, folder: Path, tmp_path: Path, monkeypatch: p
     for legs in ("banana", "9", "", "3-r*"):
         check_refused(run("list", "--catalog", folder, "--legs", legs), "such legs")
         check_refused(run("site", "-o", tmp_path / "site", "--catalog", folder, "--legs", legs), "such legs")
+    check_refused(run("list", "--catalog", folder, "--motion", "9T"), "has this --motion")
+    check_refused(run("list", "--catalog", folder, "--dof", 9), "has this --dof")
+    check_refused(run("show", "", "--catalog", folder), "no architecture of the catalog")
     check_refused(run("show", "nope", "--catalog", folder), "hrsynth catalog list --text nope")
     check_refused(run("show", "no pe", "--catalog", folder), "hrsynth catalog list --text 'no pe'")
     check_refused(run("show", "3(Qz*-Rz-Rz)"), "unknown joint")

@@ -129,10 +129,13 @@ def groups_of(path: str | Path | None = None) -> list[str]:
 
 def numbers_of_legs(legs: str, path: str | Path | None = None) -> list[int]:
     """What numbers of legs there are, where no record at all has the ``legs``, a number or a pattern; else none."""
-    groups = tuple(groups_of(path))
-    if len(load(path, legs=legs, group=groups)):
-        return []
-    return sorted({number for number, in load(path, group=groups).count("legs") if number is not None})
+    return [] if len(load(path, legs=legs, group=tuple(groups_of(path)))) else values_of("legs", path)
+
+
+def values_of(name: str, path: str | Path | None = None) -> list[Any]:
+    """The values of a field that records have."""
+    counts = load(path, group=tuple(groups_of(path))).count(name)
+    return sorted(value for value, in counts if value is not None)
 
 
 def _groups(kept: Store, asked: Mapping[str, Any]) -> list[str]:

@@ -104,15 +104,17 @@ def entries(kept: str | None, json: bool, **asked: Any) -> None:
 
 
 def _require_known(kept: str | None, asked: dict[str, Any]) -> None:
-    """Raise ``BadRequest`` for a group, a verdict, or legs, that no record of the catalog has: why none fits."""
-    from ..catalog.query import groups_of, numbers_of_legs
+    """Raise ``BadRequest`` for what is asked and no record of the catalog has at all: why none fits."""
+    from ..catalog.query import groups_of, numbers_of_legs, values_of
     from ..errors import BadRequest
 
-    for name, known in (("group", groups_of(kept)), ("verdict", VERDICTS)):
+    for name, known in (("group", groups_of(kept)), ("verdict", VERDICTS),
+                        *((name, values_of(name, kept)) for name in ("motion", "dof", "fewest"))):
         if asked[name] not in (None, *known):
-            raise BadRequest(f"no {name} of the catalog", asked[name], sorted(known))
+            raise BadRequest(f"no architecture of the catalog has this --{name}", asked[name],
+                             list(map(str, sorted(known))))
     if asked["legs"] is not None and (numbers := numbers_of_legs(asked["legs"], kept)):
-        raise BadRequest("no architecture of the catalog has such legs", asked["legs"], f"their number, "
+        raise BadRequest("no architecture of the catalog has such legs", asked["legs"], "their number, "
                          f"{', '.join(map(str, numbers))}, or a pattern in which * and ? stand for letters: 3-R*RR, "
                          "PUS, 6-*")
 
@@ -233,7 +235,7 @@ def _word(text: str, kept: str | None) -> tuple[str, str]:
     try:
         return str(parse(text)), ""
     except BadRequest:
-        found = load(kept).named(text)
+        found = load(kept).named(text) if text.strip() else []
         if not found and "(" in text:
             raise
         if not found:

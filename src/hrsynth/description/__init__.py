@@ -81,7 +81,7 @@ def load(robot: str | Path | Mechanism, *, base: str | None = None, platform: st
 
 def file_of(robot: str | Path) -> Path:
     """The file that a name or a path stands for; raises ``BadRequest`` for a name of no robot."""
-    if not isinstance(robot, str | os.PathLike):
+    if not isinstance(robot, str | os.PathLike) or robot == "":
         raise BadRequest("a robot's file", robot, "a path, the name of a shipped robot, example:NAME")
     path = Path(robot)
     if isinstance(robot, str) and robot.startswith(PREFIX) and not os.path.exists(robot):

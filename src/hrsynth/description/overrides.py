@@ -139,7 +139,7 @@ def _drive(graph: JointGraph, wanted: Iterable[str]) -> None:
     """Motors on the named joints alone; both joints of a pair N__1, N__2 may be named as N."""
     chosen = set()
     for name in wanted:
-        own = [each for each in graph.joints if each == name or each.rpartition("__")[0] == name]
+        own = [each for each in graph.joints if name and name in (each, each.rpartition("__")[0])]
         if not own or all(graph.joints[each].type is JointType.FIXED for each in own):
             moving = [each for each, joint in graph.joints.items() if joint.type is not JointType.FIXED]
             raise BadRequest("--motors: no such joint that moves", name, comma_list(moving, like=name))

@@ -210,8 +210,8 @@ def scaled(figure: Any, every: list[Any], scale: float) -> None:
         given = axis.get_tick_params()
         for label in axis.get_ticklabels()[:1]:
             axis.set_tick_params(labelsize=label.get_fontsize())
-        numbers, name = (NUMBER_ON_AXIS, NAME_ON_AXIS) if axis.axes.name == "3d" else (0.0, 0.0)
+        numbers, names = (NUMBER_ON_AXIS, NAME_ON_AXIS) if axis.axes.name == "3d" else (0.0, 0.0)
         pad = numbers + scale * (given.get("pad", 3.5) - numbers)
         axis.set_tick_params(pad=pad, length=scale * given.get("length", 3.5))
-        axis.labelpad = name + scale * (axis.labelpad - name)
+        axis.labelpad = names + scale * (axis.labelpad - names)
     figure.set_size_inches(scale * figure.get_size_inches())

@@ -170,7 +170,8 @@ def framed(start: ClosedConfiguration, question: Measurement, motion: PlatformMo
             found[axis, end] = _last(coarse, found, axis, end, partial(met, near))
         moved = float(np.max(np.abs(found - before) / steps_apart[:, None]))
     window = found + 0.75 * steps_apart[:, None] * [-1, 1]
-    return Grid(tuple((name, np.linspace(*ends, steps)) for (name, _), ends in zip(axes, window, strict=True)), plane)
+    return Grid(tuple((name, np.linspace(low, high, steps))
+                      for (name, _), (low, high) in zip(axes, window, strict=True)), plane)
 
 
 def _last(coarse: Grid, found: Array, axis: int, end: int, met: Callable[[Grid], NDArray[np.bool_]]) -> float:
@@ -184,10 +185,11 @@ def _last(coarse: Grid, found: Array, axis: int, end: int, met: Callable[[Grid],
         rows = last + step * np.arange(0, 2, 0.5)
         axes = ((coarse.names[axis], rows), (coarse.names[1 - axis], columns))
         there = met(Grid(axes if axis == 0 else axes[::-1], coarse.fixed))
-        reached = there.reshape((len(rows), -1) if axis == 0 else (-1, len(rows))).any(axis=1 - axis)
-        if not reached[1:].any():
+        cells = there.reshape((len(rows), -1) if axis == 0 else (-1, len(rows)))
+        reached = np.flatnonzero(np.any(cells, axis=1 - axis))
+        if not (reached > 0).any():
             break
-        last = float(rows[np.flatnonzero(reached)[-1]])
+        last = float(rows[reached[-1]])
     return last
 
 
