@@ -413,6 +413,10 @@ COVER_REACH = 1.0
 """Half the width (characteristic lengths) of the box of platform positions that is looked at where legs have none."""
 SHORTEST_ROD = 0.05
 """Length (characteristic lengths) of a rod that slides below which its leg counts as out of reach."""
+SHORT_SHARE = 0.1
+"""Part of the least distance of two base points up to which boxes about a short rod reach."""
+COVER_MARGIN = 1.25
+"""How many times as far as the farthest base point boxes of positions reach, before those of poses far away."""
 BOX_ROUNDING = 1e-12
 """What rounding makes of the edges of a box that equations narrow, relative to them."""
 SMALLEST_BOX = 1e-6

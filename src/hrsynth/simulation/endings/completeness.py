@@ -11,23 +11,18 @@ import numpy as np
 
 from ...analysis.observed import ObservedRobot
 from ...budgets import COVER_BOXES, SIGN_BOXES, SIGN_CHOICES
-from ...geometry.vectors import Array, transform
+from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.relation import Measurement
-from ...mechanism.observations.direction import SeenAxis
 from ...progress import tell
 from ...results import Value
-from ...tolerances import COVER_REACH, FOLLOWED, SHORTEST_ROD
+from ...tolerances import COVER_REACH, SHORTEST_ROD
 from ..law import directions
-from .carried import SweptChains
 from .cover import Cover, cover
-from .error import RestEquations, RestSystem
+from .critical_poses import CriticalPoses, Lift
+from .error import RestSystem
 from .rests import RestCover, RestPoint, SignedModes
-from .search import Critical, descend
-from .subdivision import CriticalBox
-
-TRIES = 6
-"""Configurations, the nearest first, from which one at a proved pose is sought."""
+from .search import Critical, descend, sharpened
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -55,46 +50,18 @@ class Covers(Value):
         found: list[Critical] = []
         seen = [directions(at, self.question)[0] for at in known]
         for each in (self.vanishing, self.every):
-            if each is None:
+            if each is None or each.error is None or each.error.coordinates is None or not known:
                 continue
             met = {each.place(at, u) for at, u in zip(known, seen, strict=True)}
-            for k, box in enumerate(each.found):
-                if k not in met and (at := self._closed(each, box, q)) is not None:
-                    index = np.array([box.falling or 0])
-                    found += [Critical(point, 0) for point in descend(self.system, at[None], index, idle)]
+            left = [box for k, box in enumerate(each.found) if k not in met]
+            if left:
+                falling = np.array([box.falling or 0 for box in left])
+                poses = CriticalPoses(*(np.array([getattr(box, name) for box in left]) for name in (
+                    "p", "R", "directions")), falling, 0 * falling)
+                start, done = Lift(self.system, self.question.observations, each.error)(poses, q)
+                points = descend(self.system, start[done], falling[done], idle, np.inf)
+                found += [Critical(point, 0) for point in sharpened(self.system, points, idle)]
         return found
-
-    def _closed(self, told: Cover, box: CriticalBox, q: Array) -> Array | None:
-        """Coordinates at which the platform and the observed directions are where a box has them."""
-        from scipy.optimize import least_squares
-
-        loops, coordinates = self.system.system, None if told.error is None else told.error.coordinates
-        if coordinates is None:
-            return None
-        links, motion = loops.mechanism.links, coordinates.motion
-        chain, zero = loops.way(loops.body[motion.link]), links[motion.link].pose
-        turned = coordinates.turning
-
-        def off(values: Array) -> Array:
-            x = list(np.atleast_2d(values).T)
-            carrier = SweptChains(loops, x)
-            parts = [RestEquations(self.system, x).G,
-                     carrier.point(chain, transform(zero, motion.point) / loops.length).value - box.p / loops.length]
-            if turned:
-                parts += [carrier.direction(chain, axis).value - column for axis, column in
-                          zip(zero[:3, :3].T, box.R.T, strict=True)]
-            for seen, u in zip(self.question.observations, box.directions, strict=True):
-                if isinstance(seen, SeenAxis):
-                    way = loops.way(loops.body[seen.link])
-                    parts.append(carrier.direction(way, links[seen.link].pose[:3, :3] @ seen.direction).value - u)
-            return np.concatenate([np.ravel(each) for each in parts])
-
-        nearest = sorted(q, key=lambda each: float(np.linalg.norm(off(each))))
-        for start in nearest[:TRIES]:
-            found = least_squares(off, start, xtol=1e-15, ftol=1e-15, gtol=1e-15)
-            if np.abs(found.fun).max() < FOLLOWED:
-                return np.asarray(found.x)
-        return None
 
     def signed(self, lists: Sequence[SignedModes], desired: Array) -> list[SignedModes]:
         """The lists of modes with what boxes prove, and those of all other choices of signs."""

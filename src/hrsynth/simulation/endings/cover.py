@@ -12,10 +12,12 @@ from ...budgets import COVER_BOXES
 from ...closed_forms.legs import ClosedFormLeg, OnCrank, OnRail, SlidingRod
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
+from ...mechanism import JointType
 from ...results import Value
-from ...tolerances import COVER_REACH, FOLLOWED, SAME_ENDING, SHORTEST_ROD, SMALLEST_BOX
+from ...tolerances import COVER_MARGIN, COVER_REACH, FOLLOWED, SAME_ENDING, SHORTEST_ROD, SMALLEST_BOX
 from .joint_error import JointError
 from .pose_error import NotEnclosed, PoseError
+from .struts import Struts
 from .subdivision import CriticalBox, Subdivision
 
 
@@ -36,6 +38,10 @@ class Cover(Value):
     error: PoseError | None = None
     short: tuple[ClosedFormLeg, ...] = ()
     """Rods that slide and turn as they like: where one is shorter than ``SHORTEST_ROD`` it was not looked."""
+    struts: Struts | None = None
+    """The legs of a platform that translates, whose joints' own singularities and all whose turns were looked at."""
+    unread: tuple[str, ...] = ()
+    """Legs in space with joints of which it is not known where they lock: there it was not looked."""
 
     @property
     def complete(self) -> bool:
@@ -43,8 +49,8 @@ class Cover(Value):
         return not self.open and not self.reason
 
     def holds(self, at: ClosedConfiguration) -> bool:
-        """Whether a configuration's pose was looked at: not where a platform that only translates is turned otherwise
-        than at the goal, as it can be in another assembly."""
+        """Whether a configuration's pose was looked at: not where a platform that only translates is turned as at none
+        of the ``turns``, as it can be in another assembly."""
         if self.error is None or self.error.coordinates is None or self.turned(at):
             return False
         (p, R), k = (each[0] for each in self.error.coordinates.of([at])), self.error.shifts.shape[1]
@@ -55,22 +61,24 @@ class Cover(Value):
         x = self.error.shifts.T @ (p - self.error.p)
         return bool(np.all(self.box[0][:k] <= x) and np.all(x <= self.box[1][:k]))
 
+    @property
+    def turns(self) -> tuple[Array, ...]:
+        """Rotations from the goal's at which a platform that only translates was looked at."""
+        return (np.eye(3),) if self.struts is None else self.struts.turns
+
     def turned(self, at: ClosedConfiguration) -> bool:
-        """Whether a platform that only translates is turned otherwise than at the goal."""
+        """Whether a platform that only translates is turned otherwise than it was looked at."""
         error = self.error
         if error is None or error.coordinates is None or error.motion.rotations.shape[1]:
             return False
-        return bool(np.abs(error.coordinates.of([at])[1][0] - error.R).max() > SAME_ENDING)
+        R = error.coordinates.of([at])[1][0]
+        return all(np.abs(R - turn @ error.R).max() > SAME_ENDING for turn in self.turns)
 
     def place(self, at: ClosedConfiguration, u: Array) -> int | None:
         """Which of the critical points a configuration with observed directions u (legs, 3) is at."""
-        if self.error is None or self.error.coordinates is None or not self.found:
+        if self.error is None or self.error.coordinates is None or not self.found or self.turned(at):
             return None
         p, R = (each[0] for each in self.error.coordinates.of([at]))
-        if not self.error.coordinates.turning:
-            R = self.error.R
-        if self.turned(at):
-            return None
         away = [max(np.abs(each.p / self.error.length - p).max(), np.abs(each.R - R).max(),
                     np.abs(each.directions - u).max()) for each in self.found]
         nearest = int(np.argmin(away))
@@ -91,26 +99,61 @@ def cover(setting: ObservedRobot, goal: ClosedConfiguration, *, vanishing: bool 
     except NotEnclosed as why:
         return Cover((), (), 1.0, 0, False, str(why))
     (low, high, bounded), whole = bounds(error, reach), JointError.of(error)
-    charts = (whole,) if bounded else whole.charts
-    parts = [Subdivision(each, *each.box(low, high, reach), vanishing) for each in charts]
+    struts = Struts.of(setting, goal, error)
+    families = [whole] if struts is None else [*struts.whole(), *([] if vanishing else struts.locked())]
+    charts = [(each,) if bounded else each.charts for each in families]
+    parts = [[_boxes(each, low, high, reach, vanishing) for each in some] for some in charts]
+    every = [part for some in parts for part in some]
+    # the small ones first: what they do not use is left for the others
+    for k, part in enumerate(reversed(every)):
+        part.run((budget - sum(each.boxes for each in every)) // (len(every) - k), f"part {k + 1} of {len(every)}")
     found: list[CriticalBox] = []
-    for part in parts:
-        part.run(budget // len(parts))
-        for zero in part.zeros():
-            if not any(_same(zero, other, part.error) for other in found):
-                found.append(zero)
+    for family, some in zip(families, parts, strict=True):
+        own: list[CriticalBox] = []
+        for zero in (zero for part in some for zero in part.zeros()):
+            if not any(_same(zero, other, family) for other in own):
+                own.append(zero)
+        found += [_on_line(each, family.error, error) if len(each.x) < error.size else each for each in own]
     if vanishing:
         found = [each for each in found if each.error[0] == 0.0]
     left: list[tuple[Array, Array]] = []
-    for part in (each for each in parts if each.left):
+    for part in (each for each in every if each.left):
         corners = part.error.spanned(*map(np.array, zip(*part.left, strict=True)))
+        if part.error.error.size < error.size:
+            corners = np.full((len(part.left), error.size), -np.inf), np.full((len(part.left), error.size), np.inf)
         left += zip(*(each[:, : error.size] for each in corners), strict=True)
     found = [replace(each, directions=each.directions * own) for own in error.mirrors for each in found]
-    return Cover(tuple(found), tuple(left), sum(each.share for each in parts) / len(parts),
-                 sum(each.boxes for each in parts), bounded or len(charts) > 1, "",
-                 (low, high) if len(charts) == 1 else None, error,
-                 tuple(each for i, each in enumerate(error.limbs)
-                       if i not in whole.joints and isinstance(each, SlidingRod)))
+    free = [each for i, each in enumerate(error.limbs) if i not in whole.joints and isinstance(each, SlidingRod)]
+    return Cover(tuple(found), tuple(left), sum(each.share for each in every) / len(every),
+                 sum(each.boxes for each in every), bounded or len(charts[0]) > 1, "",
+                 (low, high) if len(charts[0]) == 1 else None, error,
+                 () if any(each.short for each in charts[0]) else tuple(free), struts,
+                 () if struts is not None else unread(setting))
+
+
+def _boxes(error: JointError, low: Array, high: Array, reach: float, vanishing: bool) -> Subdivision:
+    """All of a chart; those of poses far away begin beyond the places where rods have no length."""
+    ends = np.abs(error.ends).max(initial=0.0)
+    if ends:
+        reach = max(reach, COVER_MARGIN * float(ends))
+        low, high = np.full(3, -reach), np.full(3, reach)
+    return Subdivision(error, *error.box(low, high, reach), vanishing)
+
+
+def unread(setting: ObservedRobot) -> tuple[str, ...]:
+    """The legs whose joints may lock where their closed forms are regular: those with U joints, or with rods side by
+    side; of R and P in a plane, and of one rod between balls, the forms tell all."""
+    joints = setting.mechanism.joints
+    return tuple(leg.label for leg in setting.anatomy.legs if len(leg.joints) > len(leg.links) + 1
+                 or any(joints[name].type is JointType.UNIVERSAL for name in leg.joints))
+
+
+def _on_line(zero: CriticalBox, line: PoseError, error: PoseError) -> CriticalBox:
+    """A critical point of a line, where a rod lies along its leg's outer axes, among all: its coordinates about the
+    goal. E falls in one direction more, in which the joints turn the rod off the line."""
+    return replace(zero, x=error.shifts.T @ (line.p + line.shifts @ zero.x - error.p),
+                   radius=np.abs(error.shifts.T @ line.shifts) @ zero.radius + FOLLOWED,
+                   falling=None if zero.falling is None else zero.falling + 1)
 
 
 def bounds(error: PoseError, reach: float) -> tuple[Array, Array, bool]:
@@ -142,11 +185,13 @@ def bounds(error: PoseError, reach: float) -> tuple[Array, Array, bool]:
 
 
 def _same(one: CriticalBox, other: CriticalBox, error: JointError) -> bool:
-    """Whether two enclosed zeros are at one pose with the same directions: enclosures of what is watched meet."""
+    """Whether two enclosed zeros are at one pose with the same directions, or opposite ones: enclosures of what is
+    watched meet."""
     watched = {each.limb for each in error.error.seen}
     own = [*range(error.error.size), *(k for k, i in enumerate(error.joints, error.error.size) if i in watched)]
     away, periods = np.abs(one.x - other.x)[own], error.periods[own]
     turns = np.isfinite(periods)
     away[turns] %= periods[turns]
     away[turns] = np.minimum(away[turns], periods[turns] - away[turns])
-    return bool(np.all(away <= (one.radius + other.radius)[own] + FOLLOWED))
+    apart = np.linalg.norm(np.cross(one.directions, other.directions), axis=1).max(initial=0.0)
+    return bool(np.all(away <= (one.radius + other.radius)[own] + FOLLOWED) and apart < SAME_ENDING)

@@ -277,6 +277,8 @@ class Lift:
     def _led(self, q: Array, wanted: Array, steps: int = 40) -> tuple[Array, NDArray[np.bool_]]:
         size, q = q.shape[1], q.copy()
         good, going = np.zeros(len(q), dtype=bool), np.arange(len(q))
+        # poses far away are to be reached as well
+        longest = np.maximum(2 * LONGEST_STEP, 4 * np.abs(wanted).max(axis=1) / steps)
         for _ in range(steps):
             here = q[going]
             at = RestEquations(self.system, list(here.T))
@@ -298,7 +300,7 @@ class Lift:
             back = np.swapaxes(J, 1, 2)
             damped = back @ J + (1e-13 + 1e-3 * np.minimum(r, 1.0) ** 2)[:, None, None] * np.eye(size)
             step = np.linalg.solve(damped, -back @ off[..., None])[..., 0]
-            q[going] = here + step * np.minimum(1.0, 2 * LONGEST_STEP / np.maximum(
+            q[going] = here + step * np.minimum(1.0, longest[going] / np.maximum(
                 np.abs(step).max(axis=1), 1e-300))[:, None]
         return q, good
 

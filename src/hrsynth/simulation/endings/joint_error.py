@@ -7,7 +7,9 @@ tip. At a leg's limit g does not change with the leg's own joint; nothing is sin
 
 Where all rods slide, poses may be anywhere. A chart of those ``far`` away has P / w in the place of the point, one
 component of P being 1: with all lengths times w the equations are smooth at w = 0, and so are rates
-along (1 / w) ∂/∂ψ, which are taken there.
+along (1 / w) ∂/∂ψ, which are taken there. Of a platform that translates in space on rods that slide, a chart about a
+``short`` one has its length d and its direction u in the place of the point, A + d u, A where its length vanishes:
+u = v / |v| with one component of v being 1. E is smooth at d = 0, where the point does not tell u.
 """
 
 from __future__ import annotations
@@ -22,7 +24,7 @@ import numpy as np
 
 from ...batch.enclosures import BoxFormula, traced
 from ...closed_forms.legs import ClosedFormLeg, OnCrank, OnRail, SlidingRod
-from ...geometry.components import Components, combination, cosine, cross, dot, minus, plus, scaled, sine, transformed
+from ...geometry.components import Components, combination, cosine, cross, dot, minus, plus, scaled, sine, sqrt, transformed
 from ...geometry.duals import Dual
 from ...geometry.so3 import exponential
 from ...geometry.vectors import Array, hat
@@ -34,28 +36,45 @@ from .pose_error import Number, PoseError
 @dataclass(frozen=True, eq=False, repr=False)
 class JointError(Value):
     """The error to a goal in these coordinates; ``joints`` are the limbs with a joint among them, the others are closed
-    forms of the pose; ``far``: which of the shifts is w in a chart of poses far away."""
+    forms of the pose; ``far``: which of the shifts is w in a chart of poses far away; ``short``: which limb is so in a
+    chart about it, and which component of v is 1. Other rods without a joint are to be ``shortest`` long at least;
+    the desired directions are those at the ``goal`` (its pose and limbs), from which ``error`` may be turned."""
 
     error: PoseError
     joints: tuple[int, ...]
+    goal: PoseError
     far: int | None = None
+    short: tuple[int, int] | None = None
+    shortest: float = SHORTEST_ROD
 
     @classmethod
-    def of(cls, error: PoseError) -> JointError:
+    def of(cls, error: PoseError, goal: PoseError | None = None, shortest: float = SHORTEST_ROD) -> JointError:
         """That about the goal; a rod that slides in a plane turns about the plane's normal."""
         limbs = tuple(_in_plane(error, limb) for limb in error.limbs)
         joints = tuple(i for i, limb in enumerate(limbs) if isinstance(limb, OnCrank | OnRail)
                        or (isinstance(limb, SlidingRod) and limb.axis is not None))
-        return cls(replace(error, limbs=limbs), joints)
+        return cls(replace(error, limbs=limbs), joints, goal or error, shortest=shortest)
 
     @property
     def charts(self) -> tuple[JointError, ...]:
-        """Those that together hold all poses: this one, and of those far away where all rods slide; this one alone
-        where that is not so."""
+        """Those that together hold all poses: this one, and where all rods slide those of poses far away and about
+        short rods; this one alone where that is not so."""
         if not all(isinstance(each, SlidingRod) for each in self.error.limbs) or any(
-                each.limb is None for each in self.error.seen):
+                each.limb is None and (each.rule is None or np.any(each.rule.turned)) for each in self.error.seen):
             return (self,)
-        return (self, *(replace(self, far=k) for k in range(self.error.shifts.shape[1])))
+        about = product(range(len(self.ends)), range(3))
+        return (self, *(replace(self, far=k) for k in range(self.error.shifts.shape[1])),
+                *(replace(self, short=each) for each in about))
+
+    @property
+    def ends(self) -> Array:
+        """Where the platform's point is, from that of the goal, when rods that slide and turn as they like in space have
+        no length, (limbs, 3); none where length and direction of one do not tell where the platform is."""
+        error = self.error
+        if error.shifts.shape[1] != 3 or self.size[0] != 3 or not all(
+                isinstance(each, SlidingRod) for each in error.limbs):
+            return np.zeros((0, 3))
+        return np.array([limb.centre - limb.tip.constant - error.R @ limb.tip.turned - error.p for limb in error.limbs])
 
     @property
     def size(self) -> tuple[int, int]:
@@ -75,6 +94,9 @@ class JointError(Value):
     def box(self, low: Array, high: Array, reach: float) -> tuple[Array, Array]:
         """The lower and the upper corner of all coordinates, for shifts between two corners, or beyond ``reach``."""
         error, k, most = self.error, self.error.shifts.shape[1], self.periods / 2
+        if self.short is not None:
+            high = np.array([self.shortest, 1.0, 1.0])
+            return -high, high
         if self.far is not None:
             low, high = (sign * np.where(np.arange(k) == self.far, 1 / reach, 1.0) for sign in (-1.0, 1.0))
         low, high = np.concatenate([low[:k], -most[k:]]), np.concatenate([high[:k], most[k:]])
@@ -88,8 +110,12 @@ class JointError(Value):
         return low, high
 
     def near(self, y: Array) -> Array:
-        """Coordinates (…, n) of a far chart in the one about the goal, no numbers where w vanishes."""
+        """Coordinates (…, n) of a chart in the one about the goal, no numbers where w vanishes."""
         y = y.copy()
+        if self.short is not None:
+            v = np.insert(y[..., 1:], self.short[1], 1.0, axis=-1)
+            u = v / np.linalg.norm(v, axis=-1, keepdims=True)
+            return np.asarray((self.ends[self.short[0]] + y[..., :1] * u) @ self.error.shifts)
         if self.far is not None:
             w, k = y[..., self.far].copy(), self.error.shifts.shape[1]
             y[..., self.far] = 1.0
@@ -99,6 +125,10 @@ class JointError(Value):
 
     def spanned(self, middle: Array, half: Array) -> tuple[Array, Array]:
         """What boxes (c, n) hold in the chart about the goal, boundless where w may vanish."""
+        if self.short is not None:
+            # |∂u/∂v| ≤ 1
+            at, off = self.near(middle), half[:, :1] + (np.abs(middle) + half)[:, :1] * half[:, 1:].sum(1)[:, None]
+            return at - off, at + off
         if self.far is None:
             return middle - half, middle + half
         ends = np.stack([self.near(middle + half * signs) for signs in product((-1.0, 1.0), repeat=middle.shape[1])])
@@ -126,17 +156,26 @@ class JointError(Value):
         w, place = number(1.0), list(x[:k])
         if self.far is not None:
             w, place[self.far] = x[self.far], w
-        point = combination(place, error.shifts, number)
+        point, u = combination(place, error.shifts, number), list[Dual]()
+        if self.short is not None:
+            v = [x[1], x[2]]
+            v.insert(self.short[1], w)
+            u = scaled(number(1.0) / sqrt(dot(v, v)), v)
+            point = plus(number(self.ends[self.short[0]]), scaled(x[0], u))
         turned = self._turned(y, w, known)
         g, margins, told = list[Dual](), list[Dual](), list[Sequence[Dual]]()
+        least = self.shortest if self.short is None else 0.0
         for i, limb in enumerate(error.limbs):
+            if self.short is not None and i == self.short[0]:
+                told.append(u)
+                continue
             tip = plus(point, scaled(w, number(error.p + limb.tip.constant)))
             if np.any(limb.tip.turned):
                 tip = plus(tip, transformed(turned, number(limb.tip.turned)))
             if i not in self.joints:
                 tip = plus(tip, scaled(number(1.0) - w, number(limb.centre)))
                 margin, carried = limb.at(tip, number, limb.mode)
-                margins.append(margin - w * w * number(SHORTEST_ROD**2))
+                margins.append(margin - w * w * number(least**2))
                 told.append(carried)
                 continue
             assert isinstance(limb, OnCrank | OnRail | SlidingRod)
@@ -178,8 +217,8 @@ class JointError(Value):
     @cached_property
     def wanted(self) -> list[Components]:
         """The desired directions."""
-        error = self.error
-        return [error._direction(each, error.p, error.R.ravel(), lambda value: value) for each in error.seen]
+        goal = self.goal
+        return [goal._direction(each, goal.p, goal.R.ravel(), lambda value: value) for each in goal.seen]
 
     @cached_property
     def closing(self) -> BoxFormula:

@@ -58,6 +58,8 @@ from .error import DirectionTerm, RestEquations, RestSystem
 
 LONGEST_STEP = 0.25
 """Longest change of a coordinate in a step (characteristic lengths, radians)."""
+SHARPENING_STEPS = 4
+"""Newton's steps from a critical point that was found."""
 WALK_STEP = 0.3
 """The same of a random step between starts."""
 BESIDE = 0.5
@@ -216,9 +218,10 @@ def walked(system: RestSystem, q: Array, rng: np.random.Generator, steps: int, l
     return q
 
 
-def descend(system: Critically, q: Array, index: NDArray[np.intp], idle: int) -> list[CriticalPoint]:
+def descend(system: Critically, q: Array, index: NDArray[np.intp], idle: int, farthest: float = FARTHEST_ENDING
+            ) -> list[CriticalPoint]:
     """The critical points to which starts (c, N) lead, each sought as one of an index (c,), or (−1) by Newton's method
-    whatever it is."""
+    whatever it is; none with a coordinate beyond ``farthest``."""
     if isinstance(system, RestSystem) and system.supposes:
         return settle(system, q, index, idle)
     found: list[CriticalPoint] = []
@@ -238,9 +241,24 @@ def descend(system: Critically, q: Array, index: NDArray[np.intp], idle: int) ->
         sign[:, at.freedoms :] *= np.abs(at.curvatures[:, at.freedoms :]) > CRITICAL_FLAT
         step = _shortened(times(at.directions, sign * at.slope / size), LONGEST_STEP)
         q = q + step + _shortened(at.closing, LONGEST_STEP)
-        going = ~done & np.isfinite(q).all(axis=-1) & (np.abs(q).max(axis=-1) < FARTHEST_ENDING)
+        going = ~done & np.isfinite(q).all(axis=-1) & (np.abs(q).max(axis=-1) < farthest)
         q, index = q[going], index[going]
     return found
+
+
+def sharpened(system: Critically, points: Sequence[CriticalPoint], idle: int) -> list[CriticalPoint]:
+    """Critical points after a few more of Newton's steps: where E is nearly flat, as far away, it is known where they
+    are to fewer digits than ∇E."""
+    if not points:
+        return []
+    q = np.array([each.q for each in points])
+    for _ in range(SHARPENING_STEPS):
+        at = Expansion.of(system, q, idle)
+        size = np.where(np.abs(at.curvatures) > CRITICAL, at.curvatures, np.inf)
+        q = q + times(at.directions, -at.slope / size) + at.closing
+    at = Expansion.of(system, q, idle)
+    return [CriticalPoint(q[k], at.multipliers[k], float(at.residual[k]), at.told(k), float(at.E[k]))
+            for k in range(len(q)) if at.residual[k] < CRITICAL]
 
 
 def settle(system: RestSystem, q: Array, index: NDArray[np.intp], idle: int) -> list[CriticalPoint]:

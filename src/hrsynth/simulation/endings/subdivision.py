@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ...budgets import BOXES_AT_ONCE
 from ...geometry.affine import AffineForms, affine, combined, stacked
 from ...geometry.vectors import Array
+from ...progress import tell
 from ...results import Value
 from ...tolerances import AFFINE_ROUNDING, BOX_ROUNDING, MET_AGAIN, SMALLEST_BOX, THINNEST_BOX
 from .cones import cut
@@ -73,10 +74,13 @@ class Subdivision:
         """What part of the whole is left open."""
         return float(sum(np.prod(half / self.whole) for _, half in self.left))
 
-    def run(self, budget: int) -> None:
-        """Cut boxes until all are settled, too small, or so many were looked at."""
+    def run(self, budget: int, name: str = "all") -> None:
+        """Cut boxes until all are settled, too small, or so many were looked at; what is told of how far that is has
+        its ``name``."""
         middle, half = ((self.low + self.high) / 2)[None], self.whole[None]
         while len(middle) and self.boxes < budget:
+            left = self.share + float(np.prod(half / self.whole, axis=1).sum())
+            tell(f"boxes, {100 * (1 - left):.0f} % of {name}")
             # the smallest first: memory stays small
             first = max(0, len(middle) - BOXES_AT_ONCE)
             part, size, axis = self._open(middle[first:], half[first:])
