@@ -7,13 +7,24 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 
 _listener: ContextVar[Callable[[str], None] | None] = ContextVar("listener", default=None)
+_part: ContextVar[str] = ContextVar("part", default="")
 
 
 def tell(stage: str) -> None:
     """One more step of a stage of the question that is being answered."""
     listener = _listener.get()
     if listener is not None:
-        listener(stage)
+        listener(_part.get() + stage)
+
+
+@contextmanager
+def part(name: str) -> Iterator[None]:
+    """Tell each stage within as one of a part of the question, as ``set 3 of 20: modes``."""
+    token = _part.set(f"{_part.get()}{name}: ")
+    try:
+        yield
+    finally:
+        _part.reset(token)
 
 
 @contextmanager

@@ -824,8 +824,10 @@ class SignedModesRecord(TypedDict):
 class RestCoverRecord(TypedDict):
     """What boxes of platform poses prove of a list of rests: `proved` critical poses; `open` boxes, a `share` of all;
     `within_m` of the goal, null where legs end the box; rods that slide and are shorter than `shorter_m` are left out,
-    null where there are none, as is a platform that only translates and is turned otherwise, at `turned` poses of the
-    list. `unmet` of those that are proved are not in the list, `strangers` of the list are not among them."""
+    null where there are none, as is a platform that only translates and is turned otherwise than in one of `turns`
+    turns, at `turned` poses of the list, and poses at which the joints of the legs `unread` lock; `apart` of the list
+    lie where was not looked. At `crossings` points of the platform rests fill curves, as two legs' joints lock. `unmet`
+    of those that are proved are not in the list, `strangers` of the list are not among them."""
 
     complete: bool
     proved: int
@@ -834,7 +836,11 @@ class RestCoverRecord(TypedDict):
     share: float
     within_m: Number
     shorter_m: Number
+    turns: int
     turned: int
+    apart: int
+    crossings: int
+    unread: list[str]
     unmet: int
     strangers: int
     reason: str | None

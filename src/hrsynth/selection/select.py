@@ -31,7 +31,7 @@ from ..mechanism.noise import Noise
 from ..mechanism.observation import labels_of
 from ..mechanism.observations.direction import SeenAxis
 from ..mechanism.pose import Pose, PoseLike, asked_pose
-from ..progress import tell
+from ..progress import part, tell
 from ..results import Compared, Result, Value, by_name
 from ..simulation.camera import cylinders, placed
 from ..simulation.ending import GOAL
@@ -251,7 +251,11 @@ def select(robot: RobotLike, camera: CameraLike = None, *, observe: LegsLike = N
                  np.inf if criteria.seconds is None else time.monotonic() + criteria.seconds, seed)
     labels = labels_of(setting.observed)
     sets = [legs for count in range(1, min(criteria.size, len(labels)) + 1) for legs in combinations(labels, count)]
-    found, left = work.examined(sorted((work.first(legs) for legs in sets), key=lambda each: each.order))
+    looked = []
+    for number, legs in enumerate(sets, 1):
+        with part(f"set {number} of {len(sets)}"):
+            looked.append(work.first(legs))
+    found, left = work.examined(sorted(looked, key=lambda each: each.order))
     found.sort(key=lambda each: (each.discarded is not None, not each.examined,
                                  () if each.discarded is not None else each.rank))
     poses = [setting.motion.pose(at.pose(setting.motion.link)) for at in ends]
@@ -287,7 +291,7 @@ class _Work:
 
     def first(self, legs: tuple[str, ...]) -> Candidate:
         """What is quickly said of a set: verdict, singular ends, sight, accuracy."""
-        tell("sets of legs")
+        tell("accuracy")
         setting = self.watching(legs)
         try:
             verdict = verdict_of(setting, legs, setting.samples)
@@ -347,7 +351,7 @@ class _Work:
         most, runs = self.criteria.examine, self.criteria.runs
         found: list[Candidate] = []
         arrived = begun = 0
-        left = None
+        left, every = None, min(most, sum(not each.discarded for each in candidates))
         for candidate in candidates:
             if candidate.discarded:
                 found.append(candidate)
@@ -359,12 +363,13 @@ class _Work:
                 found.append(replace(candidate, examined=False))
                 continue
             begun += 1
-            found.append(self.ended(self.decided(candidate), begun))
+            with part(f"examined set {begun} of {every}"):
+                found.append(self.ended(self.decided(candidate), begun))
         for place in sorted(range(len(found)), key=lambda i: found[i].rank):
             candidate = found[place]
             if candidate.examined and not candidate.discarded and arrived < runs:
-                tell("runs")
-                found[place] = self.ran(candidate)
+                with part(f"run {arrived + 1} of {runs}"):
+                    found[place] = self.ran(candidate)
                 arrived += found[place].discarded is None
         return found, left
 

@@ -61,12 +61,24 @@ def _complete(found: Endings) -> list[str]:
         return [f"the others are found, not proved to be all: {found.search.words}"]
     if not found.cover.complete:
         return [f"the others are found, not proved to be all: {found.search.words}", found.cover.reason]
-    where = ("wherever the legs reach" if found.cover.within is None else
-             f"with the point within {found.cover.within:.3g} m of the goal's either way")
-    where += ", with the platform turned as at the goal" if found.cover.turned else ""
-    where += "" if found.cover.shorter is None else f", no rod shorter than {1e3 * found.cover.shorter:.3g} mm"
-    return [f"all rests, proved by {found.cover.cover.boxes:,} boxes of poses: no other in any working mode of the "
-            f"legs, {where}"]
+    told, turns = found.cover, len(found.cover.cover.turns)
+    where = ("wherever the legs reach" if told.within is None else
+             f"with the point within {told.within:.3g} m of the goal's either way")
+    if told.cover.struts is not None:
+        where += f", while the platform translates, in {'the one turn' if turns == 1 else f'each of the {turns} turns'}"
+        where += " in which it can"
+    elif told.turned:
+        where += ", with the platform turned as at the goal"
+    where += "" if told.shorter is None else f", no rod shorter than {1e3 * told.shorter:.3g} mm"
+    if told.cover.unread:
+        where += f", but for poses at which the joints of {named('leg', told.cover.unread)} lock"
+    lines = [f"all rests, proved by {told.cover.boxes:,} boxes of poses: no other in any working mode of the legs, "
+             f"{where}"]
+    if told.crossings:
+        lines += [f"but for rests that fill curves, at {told.crossings} points at which the joints of two legs lock"]
+    if told.apart:
+        lines += [f"{told.apart} of the list lie where was not looked"]
+    return lines
 
 
 def _enclosed(found: Endings, boxed: list[RestPoint]) -> list[str]:
@@ -107,6 +119,9 @@ def _signs(each: SignedModes, found: Endings) -> str:
     if each.listed is None:
         return f"poses {which}: found, not listed"
     known = "proved to be all" if each.complete else "found, not proved to be all"
+    if each.turns > 1 and each.boxes is not None:
+        known += (f" with the platform turned as at the goal, {each.boxes} in the {each.turns} turns in which it "
+                  "translates")
     return f"poses {which}: {each.listed.count}, {known}"
 
 

@@ -14,7 +14,7 @@ from ...budgets import COVER_BOXES, SIGN_BOXES, SIGN_CHOICES
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.relation import Measurement
-from ...progress import tell
+from ...progress import part
 from ...results import Value
 from ...tolerances import COVER_REACH, SHORTEST_ROD
 from ..law import directions
@@ -39,10 +39,13 @@ class Covers(Value):
     def of(cls, setting: ObservedRobot, goal: ClosedConfiguration, system: RestSystem, question: Measurement,
            complete: bool) -> Covers:
         """Those of a goal."""
-        tell("boxes")
         budget = COVER_BOXES if complete else SIGN_BOXES
-        found = cover(setting, goal, vanishing=True, budget=budget)
-        return cls(system, question, found, cover(setting, goal) if complete else None)
+        with part("poses without an error"):
+            found = cover(setting, goal, vanishing=True, budget=budget)
+        if not complete:
+            return cls(system, question, found, None)
+        with part("all rests"):
+            return cls(system, question, found, cover(setting, goal))
 
     def missed(self, known: Sequence[ClosedConfiguration], q: Array, idle: int) -> list[Critical]:
         """The proved critical points that none of the configurations (with coordinates q (c, N)) is at, as far as the
@@ -56,8 +59,8 @@ class Covers(Value):
             left = [box for k, box in enumerate(each.found) if k not in met]
             if left:
                 falling = np.array([box.falling or 0 for box in left])
-                poses = CriticalPoses(*(np.array([getattr(box, name) for box in left]) for name in (
-                    "p", "R", "directions")), falling, 0 * falling)
+                poses = CriticalPoses(np.array([box.p for box in left]), np.array([box.R for box in left]),
+                                      np.array([box.directions for box in left]), falling, 0 * falling)
                 start, done = Lift(self.system, self.question.observations, each.error)(poses, q)
                 points = descend(self.system, start[done], falling[done], idle, np.inf)
                 found += [Critical(point, 0) for point in sharpened(self.system, points, idle)]
@@ -76,8 +79,13 @@ class Covers(Value):
         met = {each.reversed: each for each in lists}
         every = [tuple(leg for leg, sign in zip(labels, signs, strict=True) if sign)
                  for signs in product((False, True), repeat=len(labels))]
-        return [SignedModes(each, met[each].listed if each in met else None, None if counts is None else counts[each])
-                for each in sorted(every, key=lambda each: each not in met)]
+        return [SignedModes(each, met[each].listed if each in met else None, None if counts is None else counts[each],
+                            len(known.turns)) for each in sorted(every, key=lambda each: each not in met)]
+
+    def proves(self, rest: RestPoint) -> bool:
+        """Whether boxes prove that a rest is by itself, though E is nearly flat there."""
+        told, u = self.every, directions(rest.configuration, self.question)[0]
+        return told is not None and told.place(rest.configuration, u) is not None
 
     def judged(self, rests: Sequence[RestPoint]) -> RestCover | None:
         """Whether the rests are all."""
@@ -85,9 +93,8 @@ class Covers(Value):
             return None
         told = self.every
         places = [told.place(each.configuration, directions(each.configuration, self.question)[0]) for each in rests]
-        strangers = sum(place is None and told.holds(each.configuration)
-                        for place, each in zip(places, rests, strict=True))
+        held = [told.holds(each.configuration) for each, place in zip(rests, places, strict=True) if place is None]
         within = None if told.bounded or told.error is None else COVER_REACH * told.error.length
         shorter = SHORTEST_ROD * told.error.length if told.short and told.error is not None else None
-        return RestCover(told, len(told.found) - len(set(places) - {None}), strangers, within, shorter,
-                         sum(told.turned(each.configuration) for each in rests))
+        return RestCover(told, len(told.found) - len(set(places) - {None}), sum(held), within, shorter,
+                         sum(told.turned(each.configuration) for each in rests), len(held) - sum(held))

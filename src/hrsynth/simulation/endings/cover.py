@@ -106,7 +106,7 @@ def cover(setting: ObservedRobot, goal: ClosedConfiguration, *, vanishing: bool 
     every = [part for some in parts for part in some]
     # the small ones first: what they do not use is left for the others
     for k, part in enumerate(reversed(every)):
-        part.run((budget - sum(each.boxes for each in every)) // (len(every) - k), f"part {k + 1} of {len(every)}")
+        part.run((budget - sum(each.boxes for each in every)) // (len(every) - k), k, len(every))
     found: list[CriticalBox] = []
     for family, some in zip(families, parts, strict=True):
         own: list[CriticalBox] = []

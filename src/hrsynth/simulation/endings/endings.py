@@ -129,7 +129,8 @@ class RestSearch:
                 boxes[k] = box
         rests = _ways([each for one, box in zip(isolated, boxes, strict=True)
                        if (each := self.read(one, box)) is not None], self)
-        continua = [each for one in self._in_mode(found.continua) if (each := self.read(one)) is not None]
+        continua = [each for one in self._in_mode(found.continua) if (each := self.read(one)) is not None
+                    and not (covers is not None and covers.proves(each))]
         measured = tuple(dict.fromkeys(name for box in boxes if box for name in box.measured))
         order = {GOAL: 0, MODE: 1, ANTIPODAL: 2, CRITICAL: 3}
         rests.sort(key=lambda each: (order[each.kind], not each.stable, each.error))

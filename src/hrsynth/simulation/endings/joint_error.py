@@ -24,7 +24,19 @@ import numpy as np
 
 from ...batch.enclosures import BoxFormula, traced
 from ...closed_forms.legs import ClosedFormLeg, OnCrank, OnRail, SlidingRod
-from ...geometry.components import Components, combination, cosine, cross, dot, minus, plus, scaled, sine, sqrt, transformed
+from ...geometry.components import (
+    Components,
+    combination,
+    cosine,
+    cross,
+    dot,
+    minus,
+    plus,
+    scaled,
+    sine,
+    sqrt,
+    transformed,
+)
 from ...geometry.duals import Dual
 from ...geometry.so3 import exponential
 from ...geometry.vectors import Array, hat
@@ -68,8 +80,8 @@ class JointError(Value):
 
     @property
     def ends(self) -> Array:
-        """Where the platform's point is, from that of the goal, when rods that slide and turn as they like in space have
-        no length, (limbs, 3); none where length and direction of one do not tell where the platform is."""
+        """Where the platform's point is, from that of the goal, when rods that slide and turn as they like in space
+        have no length, (limbs, 3); none where length and direction of one do not tell where the platform is."""
         error = self.error
         if error.shifts.shape[1] != 3 or self.size[0] != 3 or not all(
                 isinstance(each, SlidingRod) for each in error.limbs):

@@ -98,11 +98,13 @@ class RestPoint:
 class SignedModes(Value):
     """The poses at which the error vanishes with the directions of the legs ``reversed`` opposite to the desired ones:
     the list of all modes with these, None where it could not be made or none was met; ``boxes``: how many poses boxes
-    prove there to be, None where they prove nothing."""
+    prove there to be, None where they prove nothing, in so many ``turns`` of a platform that translates (lists of modes
+    know that of the goal)."""
 
     reversed: tuple[str, ...]
     listed: AssemblyModes | None
     boxes: int | None = None
+    turns: int = 1
 
     @property
     def complete(self) -> bool:
@@ -128,7 +130,8 @@ class RestCover(Value):
     critical points are no rest of the list (``unmet``), and how many isolated rests in its box are none of its critical
     points (``strangers``); ``within`` (m) is how far the box reaches from the goal where legs do not end it, else None;
     rods that slide and are ``shorter`` (m) were not looked at, None where there are none; of the list so many are at
-    poses at which a platform that only translates is ``turned`` otherwise, which were not looked at either."""
+    poses at which a platform that only translates is ``turned`` otherwise, which were not looked at either, and so many
+    are ``apart`` in all, as they lie where was not looked."""
 
     cover: Cover
     unmet: int
@@ -136,6 +139,12 @@ class RestCover(Value):
     within: float | None
     shorter: float | None = None
     turned: int = 0
+    apart: int = 0
+
+    @property
+    def crossings(self) -> int:
+        """At so many points of a platform on struts rests fill curves, as two legs' joints lock."""
+        return 0 if self.cover.struts is None else self.cover.struts.crossings
 
     @property
     def complete(self) -> bool:
@@ -174,7 +183,9 @@ class RestCover(Value):
         cover = self.cover
         return {"complete": self.complete, "proved": len(cover.found), "boxes": cover.boxes, "open": len(cover.open),
                 "share": cover.share, "within_m": self.within, "shorter_m": self.shorter,
-                "turned": self.turned, "unmet": self.unmet, "strangers": self.strangers, "reason": self.reason or None}
+                "turns": len(cover.turns), "turned": self.turned, "apart": self.apart, "crossings": self.crossings,
+                "unread": list(cover.unread), "unmet": self.unmet, "strangers": self.strangers,
+                "reason": self.reason or None}
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -74,13 +74,13 @@ class Subdivision:
         """What part of the whole is left open."""
         return float(sum(np.prod(half / self.whole) for _, half in self.left))
 
-    def run(self, budget: int, name: str = "all") -> None:
-        """Cut boxes until all are settled, too small, or so many were looked at; what is told of how far that is has
-        its ``name``."""
+    def run(self, budget: int, place: int = 0, places: int = 1) -> None:
+        """Cut boxes until all are settled, too small, or so many were looked at; of so many ``places`` at which this is
+        done, it is told how far they are settled."""
         middle, half = ((self.low + self.high) / 2)[None], self.whole[None]
         while len(middle) and self.boxes < budget:
-            left = self.share + float(np.prod(half / self.whole, axis=1).sum())
-            tell(f"boxes, {100 * (1 - left):.0f} % of {name}")
+            settled = 1 - self.share - float(np.prod(half / self.whole, axis=1).sum())
+            tell(f"boxes, {100 * (place + max(settled, self.boxes / budget)) / places:.0f} %")
             # the smallest first: memory stays small
             first = max(0, len(middle) - BOXES_AT_ONCE)
             part, size, axis = self._open(middle[first:], half[first:])
