@@ -24,6 +24,7 @@ from hrsynth.description import load
 from hrsynth.errors import BadRequest, PoseNotReached
 from hrsynth.geometry.vectors import pose, rotation_from_rpy
 from hrsynth.mechanism.pose import Pose
+from hrsynth.progress import following, tell
 from hrsynth.selection.loop_ends import LoopEnds, fewer_are_better
 from hrsynth.selection.select import Candidate, Criteria, Selection, _Work, select
 from hrsynth.selection.sight import CameraView, camera_at, hidden
@@ -333,3 +334,17 @@ def test_sets_of_points_are_ranked_by_what_attracts_their_loops(tmp_path: Path) 
     assert all("directions of segments only" in each.ends.why for each in found.kept if each.ends is not None)
     worst = [each.errors.position.largest for each in found.kept if each.errors is not None]
     assert worst != sorted(worst)
+
+
+def test_how_far_it_is_is_told() -> None:
+    """Each set by its number, then those that are examined; nothing of it afterwards."""
+    stages: list[str] = []
+    with following(stages.append):
+        found = select("rrrrr_m1", start="x=0,y=0.25", goal="x=0.02,y=0.25", runs=0, endings=0)
+        tell("over")
+    sets = [each.split(":")[0] for each in stages if each.startswith("set ")]
+    every = len(found.candidates)
+    assert list(dict.fromkeys(sets)) == [f"set {k + 1} of {every}" for k in range(every)]
+    examined = {each.split(":")[0] for each in stages if each.startswith("examined ")}
+    assert examined == {f"examined set {k + 1} of {len(found.kept)}" for k in range(len(found.kept))}
+    assert stages[-1] == "over"
