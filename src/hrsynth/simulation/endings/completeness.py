@@ -25,6 +25,10 @@ from .rests import RestCover, RestPoint, SignedModes
 from .search import Critical, descend, sharpened
 
 
+CLOSING_STARTS = 3000
+"""Coordinates that are scattered where the robot is to be closed at proved poses, at most."""
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Covers(Value):
     """Boxes of platform poses: those at which the error vanishes, and (None where that was not asked) all critical
@@ -47,10 +51,14 @@ class Covers(Value):
         with part("all rests"):
             return cls(system, question, found, cover(setting, goal))
 
-    def missed(self, known: Sequence[ClosedConfiguration], q: Array, idle: int) -> list[Critical]:
+    def missed(self, known: Sequence[ClosedConfiguration], q: Array, idle: int, turn: int = 0
+               ) -> list[Critical]:
         """The proved critical points that none of the configurations (with coordinates q (c, N)) is at, as far as the
-        robot is closed there."""
+        robot is closed there, from these and (of each ``turn`` but the first) from coordinates scattered about them."""
         found: list[Critical] = []
+        if turn:
+            some = np.resize(q, (min(CLOSING_STARTS, 10 * len(q)), q.shape[1]))
+            q = np.concatenate([q, some + np.random.default_rng(turn).normal(size=some.shape)])
         seen = [directions(at, self.question)[0] for at in known]
         for each in (self.vanishing, self.every):
             if each is None or each.error is None or each.error.coordinates is None or not known:

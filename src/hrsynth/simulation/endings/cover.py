@@ -75,11 +75,13 @@ class Cover(Value):
         return all(np.abs(R - turn @ error.R).max() > SAME_ENDING for turn in self.turns)
 
     def place(self, at: ClosedConfiguration, u: Array) -> int | None:
-        """Which of the critical points a configuration with observed directions u (legs, 3) is at."""
+        """Which of the critical points a configuration with observed directions u (legs, 3) is at: far away as near as
+        directions tell."""
         if self.error is None or self.error.coordinates is None or not self.found or self.turned(at):
             return None
         p, R = (each[0] for each in self.error.coordinates.of([at]))
-        away = [max(np.abs(each.p / self.error.length - p).max(), np.abs(each.R - R).max(),
+        far = max(1.0, float(np.abs(p).max()))
+        away = [max(np.abs(each.p / self.error.length - p).max() / far, np.abs(each.R - R).max(),
                     np.abs(each.directions - u).max()) for each in self.found]
         nearest = int(np.argmin(away))
         return nearest if away[nearest] < SAME_ENDING else None

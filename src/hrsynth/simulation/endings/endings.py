@@ -43,6 +43,8 @@ from .error import RestSystem
 from .rests import CRITICAL, Endings, RestPoint, SignedModes, stability
 from .search import NEARBY, Critical, critical_points, descend, in_mode, walked
 
+MISSED_ROUNDS = 3
+"""Rounds in which it is tried to close the robot at the proved poses that are not in the list."""
 MODE_TRIES = 4
 """Walks from a rest that are tried to see its operation mode."""
 
@@ -114,9 +116,9 @@ class RestSearch:
         covers = None
         if not minima and all(each.by_segment for each in setting.observed):
             covers = Covers.of(setting, self.goal, self.system, self.law.question, complete)
-        if covers is not None:
+        for turn in range(MISSED_ROUNDS if covers is not None else 0):
             places = [(at, each.point.q) for each in isolated if (at := self._placed(each.point.q)) is not None]
-            isolated += covers.missed([at for at, _ in places], np.array([q for _, q in places]), found.idle)
+            isolated += covers.missed([at for at, _ in places], np.array([q for _, q in places]), found.idle, turn)
         lists = [] if minima else self._lists(isolated)
         isolated += [each for one in lists for each in self._listed(one, isolated, found.idle)]
         tell("enclosures")
