@@ -24,7 +24,6 @@ from .error import RestSystem
 from .rests import RestCover, RestPoint, SignedModes
 from .search import Critical, descend, sharpened
 
-
 CLOSING_STARTS = 3000
 """Coordinates that are scattered where the robot is to be closed at proved poses, at most."""
 

@@ -116,7 +116,9 @@ class RestSearch:
         covers = None
         if not minima and all(each.by_segment for each in setting.observed):
             covers = Covers.of(setting, self.goal, self.system, self.law.question, complete)
-        for turn in range(MISSED_ROUNDS if covers is not None else 0):
+        for turn in range(MISSED_ROUNDS):
+            if covers is None:
+                break
             places = [(at, each.point.q) for each in isolated if (at := self._placed(each.point.q)) is not None]
             isolated += covers.missed([at for at, _ in places], np.array([q for _, q in places]), found.idle, turn)
         lists = [] if minima else self._lists(isolated)
