@@ -7,7 +7,7 @@ slice to slice of t; in the first slice, from t = 0 on where it vanishes, its se
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -83,6 +83,24 @@ def cut(middle: Array, half: Array, axis: NDArray[np.int64]) -> tuple[Array, Arr
     shift = np.zeros_like(middle)
     shift[rows, axis] = size[rows, axis]
     return np.concatenate([middle - shift, middle + shift]), np.concatenate([size, size])
+
+
+def proved_all_over(whole: Array, inside: Callable[[Array, Array], NDArray[np.bool_]],
+                    judge: Callable[[Array, Array], tuple[NDArray[np.bool_], NDArray[np.int64]]], most: int
+                    ) -> tuple[bool, int]:
+    """Whether something is proved at all points of a region in the box |x| ≤ ``whole`` (n,), and by how many boxes.
+
+    ``inside`` tells which boxes (c, n) meet the region, ``judge`` in which it is proved and across which axis to cut
+    the others. With more than ``most`` boxes it is not proved."""
+    middle, half, boxes = np.zeros((1, len(whole))), whole[None], 0
+    while True:
+        kept = inside(middle, half)
+        middle, half = middle[kept], half[kept]
+        boxes += len(middle)
+        if not len(middle) or boxes > most:
+            return not len(middle), boxes
+        proved, axis = judge(middle, half)
+        middle, half = cut(middle[~proved], half[~proved], axis[~proved])
 
 
 @dataclass(frozen=True, eq=False)

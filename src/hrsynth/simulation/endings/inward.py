@@ -17,7 +17,7 @@ from ...budgets import INWARD_BOXES, RADIUS_AT_ONCE, RAYS
 from ...geometry.affine import affine, stacked
 from ...geometry.vectors import Array
 from ...tolerances import FOLLOWED, INWARD_SHARES
-from .cones import ConeProver, cut
+from .cones import ConeProver, proved_all_over
 from .pose_error import PoseError
 
 
@@ -100,20 +100,16 @@ def inward_radius(error: PoseError, seed: int = 0) -> tuple[float, int]:
 
 def _held(prover: InwardProver, radius: float, core: float) -> tuple[bool, int]:
     """Whether runs lead inwards all over the ball outside its core, by boxes that are cut where that is not proved."""
-    n, boxes = prover.error.size, 0
-    middle, half = np.zeros((1, n)), np.full((1, n), radius)
-    while len(middle):
-        boxes += len(middle)
-        if boxes > INWARD_BOXES:
-            return False, boxes
-        proved, axis = (np.concatenate(each) for each in zip(*(
-            prover.inwards(middle[k : k + RADIUS_AT_ONCE], half[k : k + RADIUS_AT_ONCE])
-            for k in range(0, len(middle), RADIUS_AT_ONCE)), strict=True))
-        middle, half = cut(middle[~proved], half[~proved], axis[~proved])
+    def inside(middle: Array, half: Array) -> NDArray[np.bool_]:
         near, far = np.maximum(np.abs(middle) - half, 0.0), np.abs(middle) + half
-        kept = (np.linalg.norm(near, axis=1) <= radius) & (np.linalg.norm(far, axis=1) > core)
-        middle, half = middle[kept], half[kept]
-    return True, boxes
+        return (np.linalg.norm(near, axis=1) <= radius) & (np.linalg.norm(far, axis=1) > core)
+
+    def judge(middle: Array, half: Array) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
+        proved, axis = zip(*(prover.inwards(middle[k : k + RADIUS_AT_ONCE], half[k : k + RADIUS_AT_ONCE])
+                             for k in range(0, len(middle), RADIUS_AT_ONCE)), strict=True)
+        return np.concatenate(proved), np.concatenate(axis)
+
+    return proved_all_over(np.full(prover.error.size, radius), inside, judge, INWARD_BOXES)
 
 
 def _seen(error: PoseError, seed: int) -> float:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...analysis.observed import ObservedRobot
 from ...batch.enclosures import BoxFormula, traced
@@ -22,7 +23,7 @@ from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
 from ...results import Value
 from ...tolerances import AFFINE_ROUNDING, CERTIFIED_LEVEL, FOLLOWED, RADIUS_SHARES, RANK_CUTOFF
-from .cones import ConeProver, ProvedCones, cut, prove_cones
+from .cones import ConeProver, ProvedCones, prove_cones, proved_all_over
 from .inward import inward_radius
 from .pose_error import NotEnclosed, PoseError
 
@@ -200,18 +201,12 @@ def _highest_on(errors: BoxFormula, Q: Array, middle: Array, half: Array) -> Aff
 def _below(error: PoseError, errors: BoxFormula, Q: Array, radius: float, c: float) -> tuple[bool, int]:
     """Whether E < c is enclosed at all poses within a radius, by boxes that are cut where it is not; their number."""
     k, n = error.shifts.shape[1], error.size
-    half = np.where(np.arange(n) < k, radius, np.tan(min(radius, 3.0) / 2)) * (1 + FOLLOWED)
-    whole, middle, half, boxes = half, np.zeros((1, n)), half[None], 0
-    while len(middle):
-        near = np.maximum(np.abs(middle) - half, 0.0)
-        kept = _gauge(error, near) <= radius
-        middle, half = middle[kept], half[kept]
-        boxes += len(middle)
-        if boxes > RADIUS_BOXES:
-            return False, boxes
-        E = _highest_on(errors, Q, middle, half)
-        wide = ~(E.high < c)
-        middle, half = middle[wide], half[wide]
-        axis = np.argmax(half / whole, axis=1)
-        middle, half = cut(middle, half, axis)
-    return True, boxes
+    whole = np.where(np.arange(n) < k, radius, np.tan(min(radius, 3.0) / 2)) * (1 + FOLLOWED)
+
+    def inside(middle: Array, half: Array) -> NDArray[np.bool_]:
+        return np.asarray(_gauge(error, np.maximum(np.abs(middle) - half, 0.0)) <= radius)
+
+    def judge(middle: Array, half: Array) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
+        return _highest_on(errors, Q, middle, half).high < c, np.argmax(half / whole, axis=1)
+
+    return proved_all_over(whole, inside, judge, RADIUS_BOXES)
