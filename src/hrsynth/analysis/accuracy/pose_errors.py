@@ -18,7 +18,7 @@ from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.relation import Measurement, relation
 from ...mechanism.pose import Pose
 from ...results import Value
-from ...tolerances import INVERTED, RANK_CUTOFF
+from ...tolerances import FOLLOWED, INVERTED, RANK_CUTOFF
 from .cones import Blur
 
 VIEWS = 2000
@@ -27,6 +27,8 @@ CLIMBS = 200
 """Steps of the ascent to the largest error, and of the descent to the least."""
 DESCENTS = 60
 """Views from which the least error is sought."""
+ASCENTS = 16
+"""Views, besides the best one, from which the largest error is sought."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -195,15 +197,18 @@ def _views(dimension: int) -> Array:
 
 
 def _ascended(blocks: Array) -> Array:
-    """The direction (d,) of the largest error: ascent from the best view (a convex function on the sphere)."""
+    """The direction (d,) of the largest error: ascent from the best view and from some spread evenly (a convex function
+    on the sphere, which may have several maxima)."""
     views = _views(blocks.shape[2])
-    w = np.asarray(views[:, np.argmax(_width(blocks, views))])
+    best = int(np.argmax(_width(blocks, views)))
+    w = np.concatenate([views[:, [best]], views[:, :: max(1, views.shape[1] // ASCENTS)]], axis=1)
     for _ in range(CLIMBS):
         pulls = blocks @ w
-        sizes = np.linalg.norm(pulls, axis=1)
-        step = np.einsum("kcd,kc->d", blocks, pulls / np.where(sizes > 0, sizes, 1.0)[:, None])
-        w = step / np.linalg.norm(step)
-    return w
+        sizes = np.linalg.norm(pulls, axis=1)[:, None]
+        w = np.einsum("kcd,kcn->dn", blocks, pulls / np.where(sizes > 0, sizes, 1.0))
+        w = w / np.linalg.norm(w, axis=0)
+    reached = _width(blocks, w)
+    return np.asarray(w[:, 0 if reached[0] >= (1 - FOLLOWED) * reached.max() else np.argmax(reached)])
 
 
 def _descended(blocks: Array) -> Array:
