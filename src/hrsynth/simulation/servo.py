@@ -136,7 +136,7 @@ def servo(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None,
     those at which something is behind its camera; ``PoseNotReached`` for poses out of reach; ``MissingExtra``.
 
     >>> hrsynth.servo("3rrr_m1", start="x=0,y=0,phi=0", goal="x=0.02,y=0,phi=0", gain=0.8)
-    <Servo: 3rrr_m1, watching 1, 2, 3: ended at x=0.02,y=0,z=0,phi=0, goal>
+    <Servo: 3rrr_m1, watching 1, 2, 3: ended at x=0.02,y=0,z=0,phi=0deg, goal>
     """
     setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed)
     if conditions.physics or conditions.sense != EXACT:

@@ -239,7 +239,7 @@ def modes(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None,
     where special geometry may be meant or not.
 
     >>> hrsynth.modes("3rrr_m1", at="x=0,y=0,phi=0")
-    <AssemblyModes: 3rrr_m1, watching 1, 2, 3: 2 real of 6 complex (hidden robot) at x=0,y=0,z=0,phi=0>
+    <AssemblyModes: 3rrr_m1, watching 1, 2, 3: 2 real of 6 complex (hidden robot) at x=0,y=0,z=0,phi=0deg>
     """
     if real and (observe not in (None, "all", ["all"]) or see is not None):
         raise BadRequest("the motors are held instead of what is observed", f"real with {observe or see}",

@@ -177,7 +177,7 @@ def basins(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None
     starts; ``PoseNotReached``, ``PlaneNotMet`` for poses out of reach.
 
     >>> hrsynth.basins("3rrr_m1", to="x=0,y=0,phi=0", grid="x=-0.02:0.02:5,y=-0.02:0.02:5,phi=0")
-    <Basins: 3rrr_m1, watching 1, 2, 3: 100 % of 25 starts end at the goal x=0,y=0,z=0,phi=0>
+    <Basins: 3rrr_m1, watching 1, 2, 3: 100 % of 25 starts end at the goal x=0,y=0,z=0,phi=0deg>
     """
     setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed)
     asked = asked_pose(to)
