@@ -197,18 +197,17 @@ class PoseNotReached(Unanswered):
         self.leg, self.millimetres, self.degrees = leg, millimetres, degrees
         self.wrist = wrist
         self.others: tuple[PoseNotReached, ...] = ()
-        came_to = "" if reason else f"; from {origin} the robot comes {100 * came:.3g} % of the way, to {last}"
-        if reason is not None:
-            pass
-        elif wrist is not None:
-            reason = f"joint {wrist}, which stands for several R through one point, is near the end of its turns"
-        elif leg is None:
-            reason = ("each leg alone can close there, but the straight way to it is blocked (a leg at its limit, "
-                      "another working mode)")
-        else:
-            turn = f" and {degrees:.3g} degrees" if degrees > 1e-6 else ""
-            reason = f"leg {leg} alone misses it by {millimetres:.4g} mm{turn}"
-        self.reason = reason + came_to
+        if reason is None:
+            if wrist is not None:
+                reason = f"joint {wrist}, which stands for several R through one point, is near the end of its turns"
+            elif leg is None:
+                reason = ("each leg alone can close there, but the straight way to it is blocked (a leg at its limit, "
+                          "another working mode)")
+            else:
+                turn = f" and {degrees:.3g} degrees" if degrees > 1e-6 else ""
+                reason = f"leg {leg} alone misses it by {millimetres:.4g} mm{turn}"
+            reason += f"; from {origin} the robot comes {100 * came:.3g} % of the way, to {last}"
+        self.reason = reason
         super().__init__(f"{robot}: the pose {pose} is not reached: {self.reason}")
 
     @classmethod

@@ -89,6 +89,10 @@ class Catalog(Value):
         starts = f", {text}".casefold()
         return sorted(found, key=lambda each: (starts not in f", {alias(each['word'])}".casefold(), *order(each)))
 
+    def values(self, name: str) -> list[Any]:
+        """The values of a field that records have, sorted."""
+        return sorted(value for value, in self.count(name) if value is not None)
+
     def count(self, *fields: str) -> dict[tuple[Any, ...], int]:
         """How many records have which values of the fields, sorted by these; None where a record has no such field."""
         counts = Counter(tuple(each.get(name) for name in fields) for each in self.records)
@@ -125,17 +129,6 @@ def count(path: str | Path | None = None, **asked: Any) -> int:
 def groups_of(path: str | Path | None = None) -> list[str]:
     """The names of the groups that are there."""
     return _there(path).groups()
-
-
-def numbers_of_legs(legs: str, path: str | Path | None = None) -> list[int]:
-    """What numbers of legs there are, where no record at all has the ``legs``, a number or a pattern; else none."""
-    return [] if len(load(path, legs=legs, group=tuple(groups_of(path)))) else values_of("legs", path)
-
-
-def values_of(name: str, path: str | Path | None = None) -> list[Any]:
-    """The values of a field that records have."""
-    counts = load(path, group=tuple(groups_of(path))).count(name)
-    return sorted(value for value, in counts if value is not None)
 
 
 def _groups(kept: Store, asked: Mapping[str, Any]) -> list[str]:

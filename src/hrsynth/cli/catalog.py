@@ -105,18 +105,20 @@ def entries(kept: str | None, json: bool, **asked: Any) -> None:
 
 def _require_known(kept: str | None, asked: dict[str, Any]) -> None:
     """Raise ``BadRequest`` for what is asked and no record of the catalog has at all: why none fits."""
-    from ..catalog.query import groups_of, numbers_of_legs, values_of
+    from ..catalog import load
+    from ..catalog.query import groups_of
     from ..errors import BadRequest
 
+    every = load(kept, group=tuple(groups_of(kept)))
     for name, known in (("group", groups_of(kept)), ("verdict", VERDICTS),
-                        *((name, values_of(name, kept)) for name in ("motion", "dof", "fewest"))):
+                        *((name, every.values(name)) for name in ("motion", "dof", "fewest"))):
         if asked[name] not in (None, *known):
             raise BadRequest(f"no architecture of the catalog has this --{name}", asked[name],
                              list(map(str, sorted(known))))
-    if asked["legs"] is not None and (numbers := numbers_of_legs(asked["legs"], kept)):
+    if asked["legs"] is not None and not every.where(legs=asked["legs"]):
         raise BadRequest("no architecture of the catalog has such legs", asked["legs"], "their number, "
-                         f"{', '.join(map(str, numbers))}, or a pattern in which * and ? stand for letters: 3-R*RR, "
-                         "PUS, 6-*")
+                         f"{', '.join(map(str, every.values('legs')))}, or a pattern in which * and ? stand for "
+                         "letters: 3-R*RR, PUS, 6-*")
 
 
 def show(word: str, output: str | None, tables: str | None, kept: str | None, json: bool) -> None:

@@ -13,7 +13,7 @@ from hrsynth.progress import following
 from hrsynth.simulation.endings.cover import cover
 from hrsynth.simulation.endings.endings import RestSearch
 from hrsynth.simulation.endings.pose_error import PoseError
-from hrsynth.simulation.endings.struts import Struts, parallel
+from hrsynth.simulation.endings.struts import Struts, coincide, meetings, parallel
 from hrsynth.simulation.endings.subdivision import Subdivision
 from strategies import random_rotation
 
@@ -219,3 +219,21 @@ def test_how_far_boxes_are_is_told():
     told = [int(each.split()[1]) for each in stages if each.startswith("boxes")]
     assert len(told) > 3
     assert all(0 <= one <= other <= 100 for one, other in pairwise(told))
+
+
+def test_lines_on_which_legs_lock_meet_in_points_or_are_one():
+    """Three lines through a point meet once; of two that are one no points are told, and such legs are not struts."""
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        centre, R = rng.normal(size=3), random_rotation(rng)
+        through = [(centre + rng.normal() * axis, axis) for axis in R]
+        (met,) = meetings(through)
+        assert np.abs(met - centre).max() < 1e-12
+        assert not coincide(through)
+        apart = [(p + 0.3 * k * R[(k + 1) % 3], axis) for k, (p, axis) in enumerate(through)]
+        assert len(meetings(apart[:2])) == 0
+        point, axis = through[0]
+        beside = [(point, axis), (point + rng.normal() * axis, -axis)]
+        assert coincide([*through, *beside[1:]])
+        assert meetings(beside) == []
+        assert not coincide([beside[0], (beside[1][0] + 0.1 * R[1], axis)])

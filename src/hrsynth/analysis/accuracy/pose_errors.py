@@ -93,7 +93,7 @@ def maxima(at: ClosedConfiguration, question: Measurement, blur: Blur) -> tuple[
 
 def attained(at: ClosedConfiguration, question: Measurement, blur: Blur) -> tuple[float, float]:
     """The largest position (m) and orientation error (rad) that an ascent from many views finds: as :func:`maxima`, but
-    a lower bound of it, in a tenth of the time."""
+    a lower bound of it, where six legs are watched in a sixth of the time."""
     position, orientation = (_axes(part, 1) for part in _parts(at, question, blur))
     return _longest(position), _longest(orientation)
 

@@ -45,6 +45,11 @@ from ...tolerances import FOLLOWED, SHORTEST_ROD
 from .pose_error import Number, PoseError
 
 
+def rodless(error: PoseError) -> Array:
+    """Where the platform's point is as each rod that slides in space has no length, (limbs, 3)."""
+    return np.array([limb.centre - limb.tip.constant - error.R @ limb.tip.turned for limb in error.limbs])
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class JointError(Value):
     """The error to a goal in these coordinates; ``joints`` are the limbs with a joint among them, the others are closed
@@ -86,7 +91,7 @@ class JointError(Value):
         if error.shifts.shape[1] != 3 or self.size[0] != 3 or not all(
                 isinstance(each, SlidingRod) for each in error.limbs):
             return np.zeros((0, 3))
-        return np.array([limb.centre - limb.tip.constant - error.R @ limb.tip.turned - error.p for limb in error.limbs])
+        return rodless(error) - error.p
 
     @property
     def size(self) -> tuple[int, int]:

@@ -11,7 +11,7 @@ so none of them attracts. Where two lines meet E is critical along curves: both 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, product
 
@@ -20,13 +20,16 @@ import numpy as np
 from ...analysis.observed import ObservedRobot
 from ...closed_forms.legs import SlidingRod
 from ...closed_forms.platform_points import PlatformPoint
+from ...geometry import lines
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...mechanism import JointType
 from ...results import Value
 from ...tolerances import EXACT, FOLLOWED, SHORT_SHARE, SHORTEST_ROD
-from .joint_error import JointError
+from .joint_error import JointError, rodless
 from .pose_error import PoseError, SeenDirection
+
+Line = tuple[Array, Array]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -40,7 +43,7 @@ class Struts(Value):
 
     @classmethod
     def of(cls, setting: ObservedRobot, goal: ClosedConfiguration, error: PoseError) -> Struts | None:
-        """None where a leg is something else, or axes are not as they are to be."""
+        """None where a leg is something else, axes are not as they are to be, or two legs lock along one line."""
         mechanism, axes = setting.mechanism, list[Array]()
         if error.shifts.shape[1] != 3 or error.turns.shape[1] or len(error.limbs) != len(setting.anatomy.legs):
             return None
@@ -61,7 +64,8 @@ class Struts(Value):
                 return None
             axes.append(outer[0])
         found = np.array(axes)
-        return cls(error, found, tuple(parallel(found)))
+        struts = cls(error, found, tuple(parallel(found)))
+        return None if any(map(coincide, struts.lines)) else struts
 
     def turned(self, turn: Array) -> PoseError:
         """The error with the platform turned."""
@@ -75,8 +79,7 @@ class Struts(Value):
         """The error at all turns; a rod counts as short by how far apart the tips are at which rods have no length."""
         found = []
         for error in map(self.turned, self.turns):
-            ends = [limb.centre - limb.tip.constant for limb in error.limbs]
-            gap = min((float(np.linalg.norm(a - b)) for a, b in combinations(ends, 2)), default=1.0)
+            gap = min((float(np.linalg.norm(a - b)) for a, b in combinations(rodless(error), 2)), default=1.0)
             found.append(JointError.of(error, self.error, max(SHORT_SHARE * gap, SHORTEST_ROD)))
         return found
 
@@ -88,22 +91,36 @@ class Struts(Value):
             seen = (SeenDirection(each.leg, each.sense, None, PlatformPoint(False, np.zeros(3), each.sense * axis))
                     if each.limb == i else each if each.limb is None else
                     replace(each, limb=each.limb - (each.limb > i)) for each in error.seen)
-            line = replace(error, p=error.limbs[i].centre - error.limbs[i].tip.constant, shifts=axis[:, None],
+            line = replace(error, p=rodless(error)[i], shifts=axis[:, None],
                            limbs=(*error.limbs[:i], *error.limbs[i + 1 :]), seen=tuple(seen))
             found.append(JointError.of(line, self.error, 0.0))
         return found
 
     @property
-    def crossings(self) -> int:
-        """At how many points of the platform, at all turns, two of these lines meet."""
-        return sum(1 for error in map(self.turned, self.turns) for _ in self._met(error))
+    def lines(self) -> list[list[Line]]:
+        """These lines at each turn, a point and a direction of each."""
+        return [list(zip(rodless(error), self.axes, strict=True)) for error in map(self.turned, self.turns)]
 
-    def _met(self, error: PoseError) -> Iterator[Array]:
-        ends = [limb.centre - limb.tip.constant for limb in error.limbs]
-        for i, j in combinations(range(len(ends)), 2):
-            normal = np.cross(self.axes[i], self.axes[j])
-            if np.linalg.norm(normal) > FOLLOWED and abs(normal @ (ends[i] - ends[j])) < FOLLOWED:
-                yield normal
+    @property
+    def crossings(self) -> int:
+        """At how many points of the platform, at all turns, such lines meet."""
+        return sum(len(meetings(each)) for each in self.lines)
+
+
+def meetings(every: Sequence[Line]) -> list[Array]:
+    """The points at which lines that are not parallel meet, each once."""
+    found: list[Array] = []
+    for pair in combinations(every, 2):
+        point = lines.meeting_point(list(pair), FOLLOWED)
+        if point is not None and all(np.linalg.norm(point - other) > FOLLOWED for other in found):
+            found.append(point)
+    return found
+
+
+def coincide(every: Sequence[Line]) -> bool:
+    """Whether some two lines are one: two legs lock all along it, which fills more than points."""
+    return any(lines.parallel(a, b) and lines.distance(p, q, b) <= FOLLOWED
+               for (p, a), (q, b) in combinations(every, 2))
 
 
 def parallel(axes: Array) -> Iterator[Array]:
