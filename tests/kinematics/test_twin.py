@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from hrsynth.geometry.vectors import Array
@@ -101,6 +102,47 @@ def test_every_type_of_loop(letter: str, seed: int) -> None:
     assert np.linalg.norm(twin.residual(twin.q0)) < 1e-12
     agrees(ClosedConfiguration.of(twin, twin.q0), question_of(mechanism))
     agrees(walked(twin, seed), question_of(mechanism))
+
+
+def constrained(twin: PinocchioModel, q: Array) -> tuple[Array, Array]:
+    """The loops' errors and Jacobian by Pinocchio's own constraints, between the frames that the twin has for them."""
+    model, data = twin.model, twin.model.createData()
+    constraints, datas = pin.StdVec_ConstraintModel(), pin.StdVec_ConstraintData()
+    for number, joint in enumerate(twin.spanned[1]):
+        near, far = model.frames[2 * number + 1], model.frames[2 * number + 2]
+        kind = pin.PointAnchorConstraintModel if joint.type is JointType.SPHERICAL else pin.FrameAnchorConstraintModel
+        constraints.append(pin.ConstraintModel(
+            kind(model, near.parentJoint, near.placement, far.parentJoint, far.placement)))
+        datas.append(constraints[number].createData())
+    pin.computeJointJacobians(model, data, q)
+    for constraint, each in zip(constraints, datas, strict=True):
+        constraint.calc(model, data, each)
+    errors = [each.extract().constraint_position_error.copy() for each in datas]
+    return np.concatenate(errors), pin.getConstraintsJacobian(model, data, constraints, datas)
+
+
+@pytest.mark.parametrize("letter", [*CYCLES, "quattro"])
+def test_loops_are_the_constraints_of_pinocchio(letter: str) -> None:
+    """At any configuration, far from closure too, and whichever of two twins was asked last; as do many at once."""
+    rng = np.random.default_rng(3)
+    twins = [setting_of(letter).everything.twin if letter in ROBOTS
+             else PinocchioModel(cycle(CYCLES[letter], rng, welded=letter == "F")) for _ in range(2)]
+    twins[1] = PinocchioModel(twins[1].mechanism, 0.3)
+    for size in (0.0, 0.01, 0.3, 1.0):
+        places = [twin.moved(twin.q0, size * rng.normal(size=twin.nv)) for twin in twins]
+        for twin, q in zip(twins, places, strict=True):
+            twin.at(q)
+        for twin, q in zip(twins, places, strict=True):
+            errors, J = constrained(twin, q)
+            assert np.any(J)
+            assert size == 0.0 or np.linalg.norm(errors) > 1e-3
+            np.testing.assert_allclose(twin.residual(q), errors, rtol=0, atol=1e-12)
+            np.testing.assert_allclose(twin.jacobian(q), J, rtol=0, atol=1e-12)
+            several = twin.states([twin.q0, q], (twin.mechanism.platform,))
+            np.testing.assert_array_equal(several[0][1], twin.residual(q))
+            np.testing.assert_array_equal(several[1][1], twin.jacobian(q))
+            np.testing.assert_array_equal(several[2][1, 0], twin.poses(q, (twin.mechanism.platform,))[0])
+            np.testing.assert_allclose(several[2][1, 0], twin.pose(q, twin.mechanism.platform), rtol=0, atol=1e-14)
 
 
 @pytest.mark.parametrize("letters", ["RRRRRRR", "UUUU", "CCCC", "ERUUR", "SRSR", "UPSR", "CRSP"])

@@ -2,8 +2,8 @@
 
 The twin measures lengths in characteristic lengths of the mechanism it was given (``length``), so that its Jacobians
 mix no metres with radians. Every tree joint's frame has the base's orientation at the zero configuration. A spherical
-loop is Pinocchio's point constraint; any other loop is cut through the joint: the joint is added as a leaf and the leaf
-welded to the other link.
+loop holds two points together; any other loop is cut through the joint: the joint is added as a leaf and the leaf
+welded to the other link (:mod:`.loop_rows`).
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from ..geometry.so3 import logarithm, turns_about
 from ..geometry.vectors import Array, cross, inverse, transform
 from ..mechanism import Joint, JointType, Mechanism, graphs
 from ..tolerances import SAME_GEOMETRY
+from .loop_rows import LoopRows, Places, numbers
 
 _UPRIGHT = np.eye(3)
 _WEIGHT = {"F": 0, "R": 1, "P": 1, "C": 2, "U": 2, "E": 3, "S": 4, "6": 100}
@@ -40,28 +41,22 @@ class PinocchioModel:
         tree, loops = self._span()
         for joint, parent in tree:
             self._add_tree(joint, parent)
-        constraints = [self._loop(joint) for joint in loops]
+        ends = [self._loop(joint) for joint in loops]
         self.spanned = tuple(joint for joint, _ in tree), tuple(loops)
         """The joints of the tree, from the base outwards, and those at which loops are cut."""
         self._gears = self._gear_rows()
+        self._geared = len(self._gears) > 0
         if self.model.nv > LARGEST_MODEL:
             raise BadRequest(f"{mechanism.name}: joints with {self.model.nv} coordinates", None,
                              f"up to {LARGEST_MODEL}")
         self.data = self.model.createData()
-        self._models = pin.StdVec_ConstraintModel()
-        self._datas = pin.StdVec_ConstraintData()
-        for constraint in constraints:
-            self._models.append(constraint)
-        for constraint in self._models:
-            self._datas.append(constraint.createData())
-        self._pairs = list(zip(self._models, self._datas, strict=True))
-        self._views = [data.extract() for data in self._datas]
         self.nv: int = self.model.nv
         self.q0: Array = pin.neutral(self.model)
         self._links = {name: (self._body[name], self._seen_from_body(name)) for name in mechanism.links}
-        self._placements = self.data.oMi
-        self._several: dict[tuple[str, ...], tuple[list[int], Array, Array]] = {}
+        self._placements, self._screws = numbers(self.data.oMi), self.data.J.reshape(6, self.nv)
+        self._several: dict[tuple[str, ...], tuple[Places, Array, Array]] = {}
         self._masks = {0: np.zeros(self.nv)}
+        self._rows = LoopRows(self.model, self.data, ends, self._supports)
         self._q: Array | None = None
         self.measured: tuple[tuple[object, ...], Array, tuple[Array, Array, list[Array], list[Array]]] | None = None
         """What was measured last: what was asked, where, and the answer."""
@@ -166,19 +161,16 @@ class PinocchioModel:
         child = joint.other(parent)
         self._body[child] = self._body[parent] if joint.type is JointType.FIXED else self._add(joint, parent, "")
 
-    def _loop(self, joint: Joint) -> object:
-        a, b = (self._body[link] for link in joint.links)
+    def _loop(self, joint: Joint) -> tuple[int, int, bool]:
+        """The two frames of a loop, and whether a ball holds their points together."""
+        near, far = (self._body[link] for link in joint.links)
+        if joint.type not in (JointType.SPHERICAL, JointType.FIXED):
+            near = self._add(joint, joint.predecessor, "__cut")
         point = joint.point / self.length
-        if joint.type is JointType.SPHERICAL:
-            return pin.ConstraintModel(pin.PointAnchorConstraintModel(
-                self.model, a, pin.SE3(_UPRIGHT, point - self._centre[a]),
-                b, pin.SE3(_UPRIGHT, point - self._centre[b])))
-        if joint.type is JointType.FIXED:
-            half, offset = a, pin.SE3(_UPRIGHT, point - self._centre[a])
-        else:
-            half, offset = self._add(joint, joint.predecessor, "__cut"), pin.SE3.Identity()
-        return pin.ConstraintModel(pin.FrameAnchorConstraintModel(
-            self.model, half, offset, b, pin.SE3(_UPRIGHT, point - self._centre[b])))
+        first, second = (self.model.addFrame(pin.Frame(
+            f"{joint.name}__{end}", body, pin.SE3(_UPRIGHT, point - self._centre[body]), pin.FrameType.OP_FRAME))
+            for end, body in enumerate((near, far)))
+        return first, second, joint.type is JointType.SPHERICAL
 
     def _gear_rows(self) -> Array:
         """One row a coupling: successor's rate − ratio × predecessor's rate (metres, radians)."""
@@ -199,40 +191,38 @@ class PinocchioModel:
         return int(self.model.joints[self.model.getJointId(part)].idx_q)
 
     def at(self, q: Array) -> None:
-        """Bring poses, Jacobians and loop constraints up to date with ``q``."""
+        """Bring placements and the screws of the joints up to date with ``q``."""
         if self._q is q:
             return
         pin.computeJointJacobians(self.model, self.data, q)
-        for model, data in self._pairs:
-            model.calc(self.model, self.data, data)
+        pin.updateFramePlacements(self.model, self.data)
         self._q = q
 
     def residual(self, q: Array) -> Array:
         """Loop residuals, stacked in the order of ``loops`` (characteristic lengths, radians)."""
         self.at(q)
-        parts = [view.constraint_position_error for view in self._views]
-        if len(self._gears):
-            parts.append(self._gears @ pin.difference(self.model, self.q0, q))
-        return np.concatenate(parts) if parts else np.zeros(0)
+        errors = self._rows.residual()
+        if self._geared:
+            return np.concatenate([errors, self._gears @ pin.difference(self.model, self.q0, q)])
+        return errors
 
     def jacobian(self, q: Array) -> Array:
         """The derivative of :meth:`residual` at closure, shape (rows, nv)."""
-        self.at(q)
-        J = (pin.getConstraintsJacobian(self.model, self.data, self._models, self._datas)
-             if self._pairs else np.zeros((0, self.nv)))
-        return np.vstack([J, self._gears]) if len(self._gears) else J
+        if self._q is not q:
+            self.at(q)
+        J = self._rows.jacobian()
+        return np.vstack([J, self._gears]) if self._geared else J
 
     @property
     def blocks(self) -> tuple[tuple[str, ...], tuple[int, ...]]:
         """What the rows of :meth:`jacobian` belong to: names of loops, then of couplings, and rows of each."""
         gears = tuple(coupling.name for coupling in self.mechanism.couplings)
-        return (*self.loops, *gears), (*(model.residualSize() for model in self._models), *[1] * len(gears))
+        return (*self.loops, *gears), (*self._rows.sizes, *[1] * len(gears))
 
     def worst_loop(self, q: Array) -> tuple[str, float]:
         """The loop that misses most, and by how much."""
-        self.at(q)
-        misses = [(float(np.linalg.norm(view.constraint_position_error)), name)
-                  for view, name in zip(self._views, self.loops, strict=True)]
+        parts = np.split(self.residual(q), np.cumsum(self._rows.sizes))
+        misses = [(float(np.linalg.norm(part)), name) for part, name in zip(parts, self.loops, strict=False)]
         miss, name = max(misses, default=(0.0, "none"))
         return name, miss
 
@@ -256,7 +246,7 @@ class PinocchioModel:
         """Poses (k, 4, 4) and velocities (k, 6, nv) of several links at once; after the first ``whole`` (default: all)
         the linear parts are those of the points at the base's origin."""
         X = self.poses(q, links)
-        return X, self._moving(X, self.data.J.reshape(6, self.nv), links, whole)  # of one coordinate J is (6,)
+        return X, self._moving(X, self._screws, links, whole)
 
     def _moving(self, X: Array, J: Array, links: tuple[str, ...], whole: int | None) -> Array:
         """The velocities (…, k, 6, nv) of links with poses X (…, k, 4, 4), by Pinocchio's J (…, 6, nv)."""
@@ -273,36 +263,40 @@ class PinocchioModel:
         """X_BL (k, 4, 4) of several links at once, metres."""
         self.at(q)
         bodies, offsets, _ = self._several.get(links) or self._together(links)
-        X = np.array([self._placements[body].homogeneous for body in bodies])
-        X[:, :3, 3] *= self.length
-        return np.asarray(X @ offsets)
+        return self._homogeneous(self._placements.take(bodies, 0)) @ offsets
 
     def states(self, places: Sequence[Array], links: tuple[str, ...], whole: int | None = None
                ) -> tuple[Array, Array, Array, Array]:
         """Of several configurations :meth:`residual` (n, rows), :meth:`jacobian` (n, rows, nv) and :meth:`frames`
         (n, k, 4, 4), (n, k, 6, nv)."""
-        bodies = (self._several.get(links) or self._together(links))[0] if links else []
+        bodies = (self._several.get(links) or self._together(links))[0] if links else np.zeros(0, dtype=np.intp)
         errors, loops, J, X = [], [], [], []
         for q in places:
             errors.append(self.residual(q))
             loops.append(self.jacobian(q))
-            if bodies:
-                J.append(self.data.J.reshape(6, self.nv).copy())
-                X += [self._placements[body].homogeneous for body in bodies]
+            if links:
+                J.append(self._screws.copy())
+                X.append(self._placements.take(bodies, 0))
         n = len(places)
-        if not bodies:
+        if not links:
             return np.array(errors), np.array(loops), np.zeros((n, 0, 4, 4)), np.zeros((n, 0, 6, self.nv))
-        poses = np.array(X).reshape(n, len(bodies), 4, 4)
-        poses[..., :3, 3] *= self.length
-        poses = poses @ self._several[links][1]
+        poses = self._homogeneous(np.array(X)) @ self._several[links][1]
         return np.array(errors), np.array(loops), poses, self._moving(poses, np.array(J), links, whole)
 
-    def _together(self, links: tuple[str, ...]) -> tuple[list[int], Array, Array]:
+    def _homogeneous(self, placements: Array) -> Array:
+        """The matrices (…, 4, 4), metres, of placements by their numbers (…, 12)."""
+        X = np.empty((*placements.shape[:-1], 4, 4))
+        X[..., :3, :3] = placements[..., :9].reshape(*placements.shape[:-1], 3, 3).swapaxes(-1, -2)
+        X[..., :3, 3] = placements[..., 9:] * self.length
+        X[..., 3, :] = 0.0, 0.0, 0.0, 1.0
+        return X
+
+    def _together(self, links: tuple[str, ...]) -> tuple[Places, Array, Array]:
         """Of several links: the bodies that carry them, where (k, 4, 4), and what moves them (k, 1, nv)."""
         bodies = [self._links[link][0] for link in links]
         offsets = np.array([self._links[link][1] for link in links])
         masks = np.array([self._supports(body) for body in bodies])[:, None, :]
-        self._several[links] = bodies, offsets, masks
+        self._several[links] = np.array(bodies, dtype=np.intp), offsets, masks
         return self._several[links]
 
     def _supports(self, body: int) -> Array:

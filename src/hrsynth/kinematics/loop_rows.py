@@ -1,0 +1,96 @@
+"""Errors and Jacobian of all loops at once, from the numbers of Pinocchio's placements, where it keeps them.
+
+Let r be an axis of the first frame of a loop, p1 and p2 the points of its frames. A ball has the errors r·(p2 − p1).
+Their derivatives are what the forces (r, p2 × r) do on the screws of the joints between the frames. A weld has the
+errors of log6, and the rows of the forces (r, p1 × r) and the torques (0, r). All components are differences of two
+products of numbers of placements; the placement of the world has the numbers 1 and 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from ..geometry.vectors import Array
+
+Places = NDArray[np.intp]
+SIZE = 12
+"""Numbers of a placement: three axes, then the point."""
+_AXES, _POINT = np.arange(9).reshape(3, 3), np.arange(9, 12)
+_ONE, _ZERO = 0, 1
+"""Where a placement has them; where that of the world has a 1 and a 0."""
+_NEXT, _LAST = [1, 2, 0], [2, 0, 1]
+
+
+def numbers(placements: Sequence[pin.SE3]) -> Array:
+    """The numbers of a vector of placements, (k, 12), in Pinocchio's memory: they change with it, and live as long."""
+    first, last = placements[0].rotation, placements[len(placements) - 1].translation
+    shape = len(placements), SIZE
+    found = np.lib.stride_tricks.as_strided(first, shape, (SIZE * first.itemsize, first.itemsize))
+    assert np.shares_memory(found[-1, 9:], last), "Pinocchio hands out copies (pinocchio.sharedMemory)"
+    return found
+
+
+class LoopRows:
+    """Of loops between two frames of a model, balls or not; ``supports`` says what moves a body (nv,)."""
+
+    def __init__(self, model: pin.Model, data: pin.Data, loops: Sequence[tuple[int, int, bool]],
+                 supports: Callable[[int], Array]) -> None:
+        self._model, self._data = model, data
+        self.sizes = tuple(3 if ball else 6 for _, _, ball in loops)
+        self._welds: list[tuple[pin.FrameAnchorConstraintModel, pin.FrameAnchorConstraintData]] = []
+        self._missed: list[tuple[slice, Array]] = []
+        blocks: list[tuple[int, int, bool]] = []
+        signs = np.zeros((sum(self.sizes), model.nv))
+        for (first, second, ball), size in zip(loops, self.sizes, strict=True):
+            near, far = model.frames[first], model.frames[second]
+            rows = slice(3 * len(blocks), 3 * len(blocks) + size)
+            signs[rows] = supports(far.parentJoint) - supports(near.parentJoint)
+            blocks += [(first, second, False)] if ball else [(first, first, False), (first, first, True)]
+            if not ball:
+                weld = pin.FrameAnchorConstraintModel(model, near.parentJoint, near.placement, far.parentJoint,
+                                                      far.placement)
+                self._welds.append((weld, weld.createData()))
+                self._missed.append((rows, self._welds[-1][1].constraint_position_error))
+        starts, ends, turns = np.array(blocks, dtype=np.intp).reshape(-1, 3, 1, 1).swapaxes(0, 1)
+        axes, p1, p = SIZE * starts + _AXES, SIZE * starts + _POINT + 0 * _AXES, SIZE * ends + _POINT + 0 * _AXES
+        forces = np.array([axes, p[..., _NEXT], p[..., _LAST], axes[..., _LAST], axes[..., _NEXT]])
+        zero, one = np.full_like(axes, _ZERO), np.full_like(axes, _ONE)
+        self._forces = _by_component(np.where(turns, np.array([zero, axes, zero, one, zero]), forces))
+        self._errors = _by_component(np.array([axes, p, p1]))
+        self._signs = signs
+        self._take = numbers(data.oMf).reshape(-1).take
+        self._screws = data.J.reshape(6, model.nv)  # of one coordinate J is (6,)
+        self._parts = parts = np.empty(self._forces.shape)
+        self._left, self._right = parts[1:3], parts[3:]
+        self._moments, self._less = self._left
+        self._dot = parts[:2].reshape(6, -1).T.dot
+
+    def jacobian(self) -> Array:
+        """The derivatives of the errors at closure, at the placements and screws that are there, (rows, nv)."""
+        self._take(self._forces, None, self._parts, "clip")
+        np.multiply(self._left, self._right, self._left)
+        np.subtract(self._moments, self._less, self._moments)
+        J: Array = self._dot(self._screws)
+        J *= self._signs
+        return J
+
+    def residual(self) -> Array:
+        """The errors at the placements that are there (rows,)."""
+        for weld, data in self._welds:
+            weld.calc(self._model, self._data, data)
+        if len(self._welds) == len(self.sizes):
+            return np.concatenate([np.zeros(0), *(missed for _, missed in self._missed)])
+        axes, ends, starts = self._take(self._errors)
+        errors: Array = np.add.reduce(axes * (ends - starts), axis=0)
+        for rows, missed in self._missed:
+            errors[rows] = missed
+        return errors
+
+
+def _by_component(places: Places) -> Places:
+    """Places (k, blocks, 3, 3) of three components in each of three rows, as one table (k, components, rows)."""
+    return places.transpose(0, 3, 1, 2).reshape(len(places), 3, -1)
