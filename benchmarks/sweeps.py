@@ -140,18 +140,31 @@ def planar(setting: ObservedRobot, X: Array, legs: tuple[str, ...]) -> Callable[
 
 
 def other_twists() -> Iterator[Row]:
-    """Robots whose platform has other twists at each pose, beside one whose twists are the same everywhere."""
+    """Robots whose platform has other twists at each pose, or carries a link that slides on it, beside one whose twists
+    are the same everywhere."""
     _, six = compiled("gough_stewart")
     X = plane(six, 0.1)
-    for robot in ("3rps", "rrrrr_m1", "rprpr_m1", "prrrp_m1"):
+    for robot in ("3rps", "rrrrr_m1", "rprpr_m1", "prrrp_m1", "i4l"):
         setting, batch = compiled(robot)
         walk = [at.pose(setting.mechanism.platform) for at in setting.configurations]
         poses = np.resize(np.array(walk), X.shape)
-        assert batch.evaluate(poses[: len(walk)], compiled=False).reached.all()
-        ours, theirs = least(lambda poses=poses, batch=batch: batch.evaluate(poses, compiled=False),
+        slides = None
+        if batch.slides:
+            far = [[at.twin.difference(at.twin.q0, at.q)[at.twin.coordinates[name][0]] * at.twin.length
+                    for name in batch.slides] for at in setting.configurations]
+            slides = np.resize(np.array(far), (len(X), len(batch.slides)))
+        given = {"slides": slides, "compiled": False}
+        found = batch.evaluate(poses, **given)
+        assert found.reached[: len(walk)].all()
+        u = np.array([[at.pose(each.link)[:3, :3] @ each.direction for each in setting.segments]
+                      for at in setting.configurations])
+        same(found.directions[: len(walk)], u, 1e-9)
+        ours, theirs = least(lambda poses=poses, batch=batch, given=given: batch.evaluate(poses, **given),
                              lambda: six.evaluate(X, compiled=False))
-        yield told("NumPy", f"Mᵀ alone, all legs, {robot}, whose platform has other twists at each pose", ours,
-                   "the Gough-Stewart platform, six legs, NumPy", theirs, len(X))
+        why = "on whose platform a link slides, its coordinate given" if batch.slides else (
+            "whose platform has other twists at each pose")
+        yield told("NumPy", f"Mᵀ alone, all legs, {robot}, {why}", ours, "the Gough-Stewart platform, six legs, NumPy",
+                   theirs, len(X))
 
 
 def growth() -> Iterator[Row]:

@@ -7,7 +7,7 @@ Only the working mode of the zero configuration is followed. Twists have coordin
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from importlib.util import find_spec
 
@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..budgets import LARGEST_BATCH, POSES_FOR_COMPILING, POSES_FOR_NUMBA
 from ..closed_forms.legs import ClosedFormLeg
 from ..errors import BadRequest
-from ..geometry.components import Components, plus, tangents, transformed, where
+from ..geometry.components import Components, cross, plus, scaled, tangents, transformed, where
 from ..geometry.vectors import Array, frozen
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.platform_motion import PlatformMotion
@@ -30,7 +30,7 @@ from .direction_rows import direction_rows
 from .error_bounds import ErrorBound, bounds_compiled, bounds_of
 from .holds import Hold, freedoms, held
 from .iterative_leg import IterativeLeg, IterativeLegStates
-from .platform_coordinates import PlatformCoordinates, frames_at
+from .platform_coordinates import PlatformCoordinates, SlidingLink, frames_at, sliding_links
 from .program import CHUNK, Compiled, Program
 from .recognition import recognised
 
@@ -45,7 +45,8 @@ class Evaluation(Value):
     """What a batch says of n poses with k legs watched; NaN where a pose is not reached.
 
     ``interaction_matrix`` is Mᵀ (n, 3 k, d): the rates of the directions for the twists of ``twists`` ((6, d) or
-    (n, 6, d), m and rad). ``position`` (m) and ``orientation`` (rad) are the error maxima, None without cones.
+    (n, 6, d), m and rad; zero for the rates of slides, which are in characteristic lengths).
+    ``position`` (m) and ``orientation`` (rad) are the error maxima, None without cones.
     """
 
     reached: Flags
@@ -93,8 +94,10 @@ class Batch(Value):
     """Where the platform has other twists at each pose and legs in closed form say which: what they forbid."""
     normals: Mapping[str, Array | None]
     length: float
-    programs: dict[tuple[str, ...], Program] = field(default_factory=dict, repr=False)
-    """What was traced so far, by the legs that are watched."""
+    sliding: Mapping[str, tuple[SlidingLink, ClosedFormLeg]]
+    """Legs on links that slide on the platform: such a link, and the closed form as if it went with the platform."""
+    programs: dict[tuple[tuple[str, ...], bool], Program] = field(default_factory=dict, repr=False)
+    """What was traced so far, by the legs that are watched, and whether slides are given."""
 
     @classmethod
     def of(cls, anatomy: LegDecomposition, observations: Sequence[Observation], motion: PlatformMotion,
@@ -124,7 +127,23 @@ class Batch(Value):
         if holds:
             iterative = {label: leg for label, leg in iterative.items() if legs[label] is leg}
         normals = {o.leg: _axis_of(frames[o.link][:, :3, :3] @ o.direction) for o in seen.values()}
-        return cls(coordinates, frozen(motion.home), legs, iterative, holds, normals, mechanism.length)
+        sliding: dict[str, tuple[SlidingLink, ClosedFormLeg]] = {}
+        if coordinates.constant and not iterative:
+            slid = sliding_links(coordinates, frames, names, mechanism)
+            for leg in anatomy.legs:
+                if legs[leg.label] is None and leg.attach in slid:
+                    link, far = slid[leg.attach]
+                    there = {**frames, mechanism.platform: link.moved(frames[mechanism.platform], far)}
+                    placed_so = replace(coordinates, links={leg.attach: link.body})
+                    form = recognised(anatomy, leg, seen[leg.label], placed_so, there)
+                    if form is not None:
+                        sliding[leg.label] = link, form
+        return cls(coordinates, frozen(motion.home), legs, iterative, holds, normals, mechanism.length, sliding)
+
+    @property
+    def slides(self) -> tuple[str, ...]:
+        """The P joints by which links slide on the platform, whose coordinates ``evaluate`` can be given."""
+        return tuple(dict.fromkeys(link.joint for link, _ in self.sliding.values()))
 
     @property
     def complete(self) -> bool:
@@ -137,9 +156,11 @@ class Batch(Value):
         return self.coordinates.constant and not self.iterative
 
     def evaluate(self, X: ArrayLike, legs: Sequence[str] | str | None = None, cones: ArrayLike | None = None, *,
-                 compiled: Compiled | None = None) -> Evaluation:
+                 slides: ArrayLike | None = None, compiled: Compiled | None = None) -> Evaluation:
         """Everything at platform poses X (n, 4, 4) with ``legs`` watched (default: all), ``cones`` their half-angles
-        (rad; one, or one a leg).
+        (rad; one, or one a leg). ``slides`` (n, m) are the coordinates of the P joints :attr:`slides` (m), by which
+        links of the platform slide on it: then the legs on these can be watched as well, and Mᵀ has a column more for
+        each (default: only what the pose alone says).
 
         X are poses that the platform can take as far as its own freedoms go; that is not checked. A pose that is not
         finite is not reached. ``compiled`` asks for numba, or forbids it (default: where its kernels are compiled
@@ -150,18 +171,21 @@ class Batch(Value):
         X = np.asarray(X, dtype=float)
         if X.ndim != 3 or X.shape[1:] != (4, 4):
             raise BadRequest("poses of a batch: shape", X.shape, "(n, 4, 4)")
-        watched = self._watched(legs)
+        s = self._slid(slides, len(X))
+        slid = s is not None
+        watched = self._watched(legs, slid)
         half = None if cones is None else _half_angles(cones, len(watched))
-        need = 8 * len(X) * (3 * len(watched) * (self.coordinates.dof + 1) + 5)
+        twists = self._twists(slid)
+        need = 8 * len(X) * (3 * len(watched) * (self.coordinates.dof + slid * len(self.slides) + 1) + 5)
         if need > LARGEST_BATCH:
             raise BadRequest("the result of a batch takes too much memory (bytes)", need,
                              f"at most {LARGEST_BATCH}; sweep goes through any number of poses in parts")
         k, n = len(watched), len(X)
-        quick = self.compiled(n, watched, half) if compiled is None else compiled
+        quick = self.compiled(n, watched, half, slid=slid) if compiled is None else compiled
         if compiled:
             self._require_compilable("jax" if compiled == "jax" else "numba")
-        rows = self._program(watched).run(X, ROWS, compiled=quick)
-        twists = self.span
+        given = X if s is None else np.hstack([X[:, :3].reshape(n, 12), s])
+        rows = self._program(watched, slid).run(given, ROWS, compiled=quick)
         reached, u = rows[0] > 0, rows[1 : 1 + 3 * k].reshape(k, 3, n)
         M = rows[1 + 3 * k :].reshape(3 * k, twists.shape[1], n)
         if not self.closed:
@@ -191,9 +215,22 @@ class Batch(Value):
         """The evaluations of parts of a sweep, (n, 4, 4) each, one after the other: memory is that of one part."""
         return (self.evaluate(X, legs, cones) for X in parts)
 
-    def _watched(self, legs: Sequence[str] | str | None) -> list[str]:
+    def _slid(self, slides: ArrayLike | None, n: int) -> Array | None:
+        if slides is None:
+            return None
+        s = np.asarray(slides, dtype=float)
+        if not self.slides or s.shape != (n, len(self.slides)):
+            raise BadRequest("coordinates of slides of a batch: shape", s.shape,
+                             f"({n}, {len(self.slides)})" if self.slides else "none: nothing slides on the platform")
+        return s
+
+    def _twists(self, slid: bool) -> Array:
+        """The platform's twists for the columns of Mᵀ (m, rad): it rests where a link slides on it."""
+        return np.hstack([self.span, np.zeros((6, len(self.slides)))]) if slid else self.span
+
+    def _watched(self, legs: Sequence[str] | str | None, slid: bool = False) -> list[str]:
         names = list(self.legs) if legs is None else legs.split(",") if isinstance(legs, str) else list(legs)
-        known = [name for name, leg in self.legs.items() if leg is not None]
+        known = [name for name, leg in self.legs.items() if leg is not None or (slid and name in self.sliding)]
         for name in names:
             if name not in known:
                 raise BadRequest("a leg of the batch", name, known)
@@ -208,13 +245,14 @@ class Batch(Value):
         """The coordinates' twists (m, rad), (6, D)."""
         return _span(self.coordinates, self.length)
 
-    def compiled(self, n: int, legs: Sequence[str], cones: Array | None, enough: int = POSES_FOR_NUMBA) -> bool:
+    def compiled(self, n: int, legs: Sequence[str], cones: Array | None, enough: int = POSES_FOR_NUMBA, *,
+                 slid: bool = False) -> bool:
         """Whether numba is to do n poses by default: its kernels are there already, and they are ``enough``, or they
         are so many that compiling pays."""
         if not self.closed or n < enough or find_spec("numba") is None:
             return False
-        return n >= POSES_FOR_COMPILING or (self._program(legs).compiled(ROWS) and (
-            cones is None or bounds_compiled(len(legs), self.span, cones)))
+        return n >= POSES_FOR_COMPILING or (self._program(legs, slid).compiled(ROWS) and (
+            cones is None or bounds_compiled(len(legs), self._twists(slid), cones)))
 
     def _require_compilable(self, by: str) -> None:
         """Raise ``BadRequest`` where a package is not there, or this batch is not for it."""
@@ -224,26 +262,38 @@ class Batch(Value):
             raise BadRequest("a batch whose platform has other twists at each pose, or legs that are solved by "
                              "iteration, is not compiled", True, "compiled=False")
 
-    def _program(self, watched: Sequence[str]) -> Program:
-        """What closed forms say at a pose X: where it is ``reached``, the directions ``u`` and rows ``M`` of the
-        watched legs; zero for those that are solved by iteration."""
-        key = tuple(watched)
+    def _program(self, watched: Sequence[str], slid: bool = False) -> Program:
+        """What closed forms say at a pose X, and how far links have ``slid`` on the platform: where it is ``reached``,
+        the directions ``u`` and rows ``M`` of the watched legs; zero for those that are solved by iteration."""
+        key = tuple(watched), slid
         if key not in self.programs:
-            self.programs[key] = self._traced(key)
+            self.programs[key] = self._traced(*key)
         return self.programs[key]
 
-    def _traced(self, watched: tuple[str, ...]) -> Program:
-        program, d = Program.of(X=12), self.span.shape[1]
+    def _traced(self, watched: tuple[str, ...], slid: bool) -> Program:
+        twists, slides = self._twists(slid), self.slides if slid else ()
+        program, d = Program.of(X=12, **{f"slide_{name}": 1 for name in slides}), twists.shape[1]
 
-        def pose(X: Components) -> dict[str, Components]:
+        def pose(X: Components, *slid_by: Components) -> dict[str, Components]:
             """p and R; a sum of numbers that are not all finite is not its own double's half."""
-            R, whole = [X[i] for i in (0, 1, 2, 4, 5, 6, 8, 9, 10)], sum(X)
+            R, whole = [X[i] for i in (0, 1, 2, 4, 5, 6, 8, 9, 10)], sum(X) + sum(each for (each,) in slid_by)
             p = plus([X[3], X[7], X[11]], transformed(R, program.number(self.coordinates.point)))
             return {"p": p, "R": R, "finite": [where(abs(whole - whole) <= 0.0, 1.0, 0.0)]}
 
-        def leg_rows(p: Components, R: Components, *, name: str, leg: ClosedFormLeg) -> dict[str, Components]:
-            twists = program.number(self.span.ravel())
-            margin, u, M = direction_rows(leg, p, R, twists, program.number)
+        def leg_rows(p: Components, R: Components, *s: Components, name: str, leg: ClosedFormLeg,
+                     link: SlidingLink | None = None) -> dict[str, Components]:
+            moves = program.number(twists)
+            if link is not None:  # its point is p + s R a: it moves by v + ω × s R a + ṡ R a
+                way = transformed(R, program.number(link.along)) if self.coordinates.rotations.size else (
+                    program.number(self.home[:3, :3] @ link.along))
+                shift = scaled(s[0][0], way)
+                p = plus(p, shift)
+                for j in range(d - len(slides)):
+                    for i, each in enumerate(cross([moves[3 + i][j] for i in range(3)], shift)):
+                        moves[i][j] = moves[i][j] + each
+                for i, each in enumerate(scaled(program.number(self.length), way)):
+                    moves[i][d - len(slides) + slides.index(link.joint)] = each
+            margin, u, M = direction_rows(leg, p, R, [each for row in moves for each in row], program.number)
             found: dict[str, Components] = {f"margin_{name}": [margin]}
             return found | ({f"u_{name}": u, f"M_{name}": M} if name in watched else {})
 
@@ -253,11 +303,15 @@ class Batch(Value):
                 there = where(margin > 0.0, there, 0.0) if not isinstance(margin, float) else there
             return {ROWS[0]: [there]}
 
-        program.apply(pose, "X")
+        program.apply(pose, "X", *(f"slide_{name}" for name in slides))
         margins = []
         for name, leg in self.legs.items():
             if isinstance(leg, ClosedFormLeg):
                 program.apply(partial(leg_rows, name=name, leg=leg), "p", "R")
+                margins.append(f"margin_{name}")
+            elif slid and name in self.sliding:
+                link, form = self.sliding[name]
+                program.apply(partial(leg_rows, name=name, leg=form, link=link), "p", "R", f"slide_{link.joint}")
                 margins.append(f"margin_{name}")
         program.apply(reached, "finite", *margins)
         for name, size in zip(ROWS[1:], (3, 3 * d), strict=True):

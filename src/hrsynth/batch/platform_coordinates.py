@@ -2,7 +2,8 @@
 
 Poses are given as the platform's reference point p and its rotation R. A point of a link that turns with the platform
 is p + R b; one of a link that only translates (a half of an articulated platform) is p + R b + c: the law is fitted to
-closed configurations and holds at all of them, or the link is not placed.
+closed configurations and holds at all of them, or the link is not placed. A link that slides on the platform has one
+more number, how far; it is as it would be if it went with the platform and the platform stood so much farther.
 """
 
 from __future__ import annotations
@@ -13,9 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..closed_forms.platform_points import PlatformPoint
-from ..geometry.vectors import Array
+from ..geometry.vectors import Array, inverse
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.platform_motion import PlatformMotion
+from ..mechanism import JointType, Mechanism
 from ..results import Value
 from ..tolerances import SAME_GEOMETRY
 
@@ -44,6 +46,20 @@ class PlatformLink(Value):
         X[:, :3, 3] = p + R @ self.b + self.c
         X[:, :3, :3] = R @ self.Q if self.turns else self.Q
         return X
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SlidingLink(Value):
+    """A link that a P joint of this name carries on the platform: as ``body`` says at p + s R ``along``, s the joint's
+    coordinate (m; zero at the zero configuration)."""
+
+    joint: str
+    along: Array
+    body: PlatformLink
+
+    def moved(self, X: Array, s: Array) -> Array:
+        """The platform's poses X (n, 4, 4), farther by as much as the link has slid (n,)."""
+        return _farther(X, s[:, None] * (X[:, :3, :3] @ self.along))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -87,6 +103,32 @@ class PlatformCoordinates(Value):
         found = {name: body for name in names if motion.body
                  and (body := _body(p, X[:, :3, :3], frames[name], length)) is not None}
         return cls(motion.link, motion.point, motion.translations, motion.rotations, found, motion.dof)
+
+
+def sliding_links(coordinates: PlatformCoordinates, frames: Frames, names: Sequence[str], mechanism: Mechanism
+                  ) -> dict[str, tuple[SlidingLink, Array]]:
+    """The links that slide on one that goes with the platform, and how far they slid in all ``frames`` (m,)."""
+    found: dict[str, tuple[SlidingLink, Array]] = {}
+    X = frames[mechanism.platform]
+    for joint in mechanism.joints.values():
+        link, other = joint.links if joint.predecessor not in coordinates.links else joint.links[::-1]
+        if joint.type is not JointType.PRISMATIC or link in coordinates.links or other not in coordinates.links or (
+                link not in names):
+            continue
+        D, base = (frames[each] @ inverse(mechanism.links[each].pose) for each in (link, other))
+        axes = (1.0 if link == joint.successor else -1.0) * base[:, :3, :3] @ joint.axis
+        s = np.einsum("ni,ni->n", axes, (D - base)[:, :3] @ np.append(joint.point, 1.0))
+        along = X[0, :3, :3].T @ axes[0]
+        body = _body(*coordinates.place(_farther(X, s[:, None] * axes)), frames[link], mechanism.length)
+        if body is not None and np.max(np.abs(X[:, :3, :3] @ along - axes)) <= SAME_GEOMETRY:
+            found[link] = SlidingLink(joint.name, along, body), s
+    return found
+
+
+def _farther(X: Array, shifts: Array) -> Array:
+    X = X.copy()
+    X[:, :3, 3] += shifts
+    return X
 
 
 def _body(p: Array, R: Array, X: Array, length: float) -> PlatformLink | None:
