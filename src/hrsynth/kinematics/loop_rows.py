@@ -57,26 +57,13 @@ class LoopRows:
                 self._missed.append((rows, self._welds[-1][1].constraint_position_error))
         starts, ends, turns = np.array(blocks, dtype=np.intp).reshape(-1, 3, 1, 1).swapaxes(0, 1)
         axes, p1, p = SIZE * starts + _AXES, SIZE * starts + _POINT + 0 * _AXES, SIZE * ends + _POINT + 0 * _AXES
-        forces = np.array([axes, p[..., _NEXT], p[..., _LAST], axes[..., _LAST], axes[..., _NEXT]])
+        moving = np.array([axes, p[..., _NEXT], p[..., _LAST], axes[..., _LAST], axes[..., _NEXT]])
         zero, one = np.full_like(axes, _ZERO), np.full_like(axes, _ONE)
-        self._forces = _by_component(np.where(turns, np.array([zero, axes, zero, one, zero]), forces))
+        forces = _by_component(np.where(turns, np.array([zero, axes, zero, one, zero]), moving))
         self._errors = _by_component(np.array([axes, p, p1]))
-        self._signs = signs
         self._take = numbers(data.oMf).reshape(-1).take
-        self._screws = data.J.reshape(6, model.nv)  # of one coordinate J is (6,)
-        self._parts = parts = np.empty(self._forces.shape)
-        self._left, self._right = parts[1:3], parts[3:]
-        self._moments, self._less = self._left
-        self._dot = parts[:2].reshape(6, -1).T.dot
-
-    def jacobian(self) -> Array:
+        self.jacobian = _product(self._take, forces, data.J.reshape(6, model.nv), signs)
         """The derivatives of the errors at closure, at the placements and screws that are there, (rows, nv)."""
-        self._take(self._forces, None, self._parts, "clip")
-        np.multiply(self._left, self._right, self._left)
-        np.subtract(self._moments, self._less, self._moments)
-        J: Array = self._dot(self._screws)
-        J *= self._signs
-        return J
 
     def residual(self) -> Array:
         """The errors at the placements that are there (rows,)."""
@@ -91,6 +78,25 @@ class LoopRows:
         return errors
 
 
+def _product(take: Callable[..., Array], forces: Places, screws: Array, signs: Array) -> Callable[[], Array]:
+    """What the forces at these places do on the screws that move a loop's far end (sign 1) or its near end (−1). What
+    is the same in each call is bound here: to look it up would take a tenth of the time."""
+    parts = np.empty(forces.shape)
+    left, right = parts[1:3], parts[3:]
+    moments, less = left
+    dot, multiply, subtract = parts[:2].reshape(6, -1).T.dot, np.multiply, np.subtract
+
+    def product() -> Array:
+        take(forces, None, parts, "clip")
+        multiply(left, right, left)
+        subtract(moments, less, moments)
+        J: Array = dot(screws)
+        J *= signs
+        return J
+
+    return product
+
+
 def _by_component(places: Places) -> Places:
     """Places (k, blocks, 3, 3) of three components in each of three rows, as one table (k, components, rows)."""
-    return places.transpose(0, 3, 1, 2).reshape(len(places), 3, -1)
+    return np.ascontiguousarray(places.transpose(0, 3, 1, 2).reshape(len(places), 3, -1))

@@ -192,11 +192,11 @@ class PinocchioModel:
 
     def at(self, q: Array) -> None:
         """Bring placements and the screws of the joints up to date with ``q``."""
-        if self._q is q:
-            return
-        pin.computeJointJacobians(self.model, self.data, q)
-        pin.updateFramePlacements(self.model, self.data)
-        self._q = q
+        if self._q is not q:
+            model, data = self.model, self.data
+            pin.computeJointJacobians(model, data, q)
+            pin.updateFramePlacements(model, data)
+            self._q = q
 
     def residual(self, q: Array) -> Array:
         """Loop residuals, stacked in the order of ``loops`` (characteristic lengths, radians)."""
@@ -208,8 +208,7 @@ class PinocchioModel:
 
     def jacobian(self, q: Array) -> Array:
         """The derivative of :meth:`residual` at closure, shape (rows, nv)."""
-        if self._q is not q:
-            self.at(q)
+        self.at(q)
         J = self._rows.jacobian()
         return np.vstack([J, self._gears]) if self._geared else J
 
