@@ -23,6 +23,7 @@ _AXES, _POINT = np.arange(9).reshape(3, 3), np.arange(9, 12)
 _ONE, _ZERO = 0, 1
 """Where a placement has them; where that of the world has a 1 and a 0."""
 _NEXT, _LAST = [1, 2, 0], [2, 0, 1]
+_NOTHING = np.zeros(0)
 
 
 def numbers(placements: Sequence[pin.SE3]) -> Array:
@@ -42,7 +43,8 @@ class LoopRows:
         self._model, self._data = model, data
         self.sizes = tuple(3 if ball else 6 for _, _, ball in loops)
         self._welds: list[tuple[pin.FrameAnchorConstraintModel, pin.FrameAnchorConstraintData]] = []
-        self._missed: list[tuple[slice, Array]] = []
+        self._missed: list[Array] = []
+        welded: list[int] = []
         blocks: list[tuple[int, int, bool]] = []
         signs = np.zeros((sum(self.sizes), model.nv))
         for (first, second, ball), size in zip(loops, self.sizes, strict=True):
@@ -54,27 +56,37 @@ class LoopRows:
                 weld = pin.FrameAnchorConstraintModel(model, near.parentJoint, near.placement, far.parentJoint,
                                                       far.placement)
                 self._welds.append((weld, weld.createData()))
-                self._missed.append((rows, self._welds[-1][1].constraint_position_error))
+                self._missed.append(self._welds[-1][1].constraint_position_error)
+                welded += range(rows.start, rows.stop)
         starts, ends, turns = np.array(blocks, dtype=np.intp).reshape(-1, 3, 1, 1).swapaxes(0, 1)
         axes, p1, p = SIZE * starts + _AXES, SIZE * starts + _POINT + 0 * _AXES, SIZE * ends + _POINT + 0 * _AXES
         moving = np.array([axes, p[..., _NEXT], p[..., _LAST], axes[..., _LAST], axes[..., _NEXT]])
         zero, one = np.full_like(axes, _ZERO), np.full_like(axes, _ONE)
         forces = _by_component(np.where(turns, np.array([zero, axes, zero, one, zero]), moving))
         self._errors = _by_component(np.array([axes, p, p1]))
-        self._take = numbers(data.oMf).reshape(-1).take
-        self.jacobian = _product(self._take, forces, data.J.reshape(6, model.nv), signs)
+        self._welded = np.array(welded, dtype=np.intp)
+        self.numbers = numbers(data.oMf).reshape(-1)
+        """Those of the placements that are there."""
+        self.jacobian = _product(self.numbers.take, forces, data.J.reshape(6, model.nv), signs)
         """The derivatives of the errors at closure, at the placements and screws that are there, (rows, nv)."""
 
-    def residual(self) -> Array:
-        """The errors at the placements that are there (rows,)."""
+    def missed(self) -> Array:
+        """The errors of the welds at the placements that are there."""
+        if not self._welds:
+            return _NOTHING
         for weld, data in self._welds:
             weld.calc(self._model, self._data, data)
+        return np.concatenate(self._missed)
+
+    def residual(self, numbers: Array, missed: Array) -> Array:
+        """The errors (…, rows) at placements with these ``numbers`` (…, N), at which welds have ``missed`` (…, k)."""
         if len(self._welds) == len(self.sizes):
-            return np.concatenate([np.zeros(0), *(missed for _, missed in self._missed)])
-        axes, ends, starts = self._take(self._errors)
-        errors: Array = np.add.reduce(axes * (ends - starts), axis=0)
-        for rows, missed in self._missed:
-            errors[rows] = missed
+            return missed
+        places = numbers.take(self._errors, axis=-1)
+        errors: Array = np.add.reduce(
+            places[..., 0, :, :] * (places[..., 1, :, :] - places[..., 2, :, :]), axis=-2)
+        if self._welds:
+            errors[..., self._welded] = missed
         return errors
 
 

@@ -201,10 +201,12 @@ class PinocchioModel:
     def residual(self, q: Array) -> Array:
         """Loop residuals, stacked in the order of ``loops`` (characteristic lengths, radians)."""
         self.at(q)
-        errors = self._rows.residual()
-        if self._geared:
-            return np.concatenate([errors, self._gears @ pin.difference(self.model, self.q0, q)])
-        return errors
+        errors = self._rows.residual(self._rows.numbers, self._rows.missed())
+        return np.concatenate([errors, self._turned(q)]) if self._geared else errors
+
+    def _turned(self, q: Array) -> Array:
+        """What the gears leave over."""
+        return np.asarray(self._gears @ pin.difference(self.model, self.q0, q))
 
     def jacobian(self, q: Array) -> Array:
         """The derivative of :meth:`residual` at closure, shape (rows, nv)."""
@@ -269,18 +271,22 @@ class PinocchioModel:
         """Of several configurations :meth:`residual` (n, rows), :meth:`jacobian` (n, rows, nv) and :meth:`frames`
         (n, k, 4, 4), (n, k, 6, nv)."""
         bodies = (self._several.get(links) or self._together(links))[0] if links else np.zeros(0, dtype=np.intp)
-        errors, loops, J, X = [], [], [], []
+        rows = self._rows
+        numbers, missed, loops, J, X = [], [], [], [], []
         for q in places:
-            errors.append(self.residual(q))
             loops.append(self.jacobian(q))
+            numbers.append(rows.numbers.copy())
+            missed.append(rows.missed())
             if links:
                 J.append(self._screws.copy())
                 X.append(self._placements.take(bodies, 0))
-        n = len(places)
+        n, errors = len(places), rows.residual(np.array(numbers), np.array(missed))
+        if self._geared:
+            errors = np.hstack([errors, [self._turned(q) for q in places]])
         if not links:
-            return np.array(errors), np.array(loops), np.zeros((n, 0, 4, 4)), np.zeros((n, 0, 6, self.nv))
+            return errors, np.array(loops), np.zeros((n, 0, 4, 4)), np.zeros((n, 0, 6, self.nv))
         poses = self._homogeneous(np.array(X)) @ self._several[links][1]
-        return np.array(errors), np.array(loops), poses, self._moving(poses, np.array(J), links, whole)
+        return errors, np.array(loops), poses, self._moving(poses, np.array(J), links, whole)
 
     def _homogeneous(self, placements: Array) -> Array:
         """The matrices (…, 4, 4), metres, of placements by their numbers (…, 12)."""
