@@ -98,17 +98,17 @@ def test_a_flat_parallelogram_belongs_to_two_modes(angle: float) -> None:
 
 
 @pytest.mark.some(2)
-@pytest.mark.parametrize("robot", ["quattro", "3rrr_m1", "i4l", "orthoglide", "gough_stewart"])
-def test_walks_in_step_end_where_each_ends_alone(robot: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """To the last digit, and whatever is random afterwards as well."""
-    drawn = setting_of(robot).everything
-    straight, ends = _Walks._straight, []
-    monkeypatch.setattr(_Walks, "_straight", lambda *asked: ends.append(straight(*asked)) or ends[-1])
-    together = sample(drawn.twin, drawn.question, 3)
-    monkeypatch.setattr(_Walks, "_straight", lambda *asked: [])
-    alone = sample(drawn.twin, drawn.question, 3)
-    assert [len(found) for found in ends] == [3]
-    for one, other in zip(together.members, alone.members, strict=True):
+@pytest.mark.parametrize("robot", ["quattro", "3rrr_m1", "i4l", "orthoglide", "gough_stewart", "halved"])
+def test_walks_in_step_end_where_each_ends_alone(robot: str) -> None:
+    """To the last digit, where all steps are whole and where some have to be halved."""
+    halved = mechanism(parse("(Ph*-Pj-Ra-Ra-Ra)+(Ph*-Ra-Rb-Ra-Pj)+(Ra*-Ra-Ph-Ra-Rb)"), 0)
+    drawn = ObservedRobot.of(halved).everything if robot == "halved" else setting_of(robot).everything
+    together, alone = (_Walks(drawn.question, set(), np.random.default_rng(0), False) for _ in range(2))
+    ends = together.walk([drawn.start] * 3), [end for _ in range(3) for end in alone.walk([drawn.start])]
+    assert len(ends[0]) == 3
+    assert len(together.beyond) == len(alone.beyond)
+    assert bool(together.beyond) == (robot == "halved")
+    for one, other in zip(*ends, strict=True):
         assert one.configuration.q.tolist() == other.configuration.q.tolist()
         assert one.relation.basis.tolist() == other.relation.basis.tolist()
         for target, same in zip(one.way, other.way, strict=True):

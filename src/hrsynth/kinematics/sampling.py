@@ -7,15 +7,16 @@ What fails is discarded and counted. All samples must agree in what tells operat
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+from typing import TypeVar
 
 import numpy as np
 
 from ..budgets import EASY_ITERATIONS
 from ..errors import BadMechanism, BranchPoint, NotMeasured, NotSampled
-from ..geometry.ranks import kernel_basis, largest_angle, range_bases, range_basis
+from ..geometry.ranks import kernel_basis, largest_angle, range_bases
 from ..geometry.vectors import Array
 from ..mechanism.observation import Observation
 from ..results import Value
@@ -38,6 +39,8 @@ from .configuration import ClosedConfiguration
 from .pinocchio_model import PinocchioModel
 from .relation import Measurement, Relation, relation, relations
 from .tasks import Places, Target, shortened, solve, solve_together
+
+X = TypeVar("X")
 
 STEP = 0.11
 """Length of a step: the norm of (t, u̇), in characteristic lengths and radians."""
@@ -173,27 +176,6 @@ def _require_one(groups: Sequence[Sequence[OperationMode]], question: Measuremen
                                                                                            strict=True)])
 
 
-def _velocity(at: ClosedConfiguration, question: Measurement, wish: Array | None, rng: np.random.Generator | None
-              ) -> tuple[Array, Array] | None:
-    """A joint velocity without idle motion whose (t, u̇) is a unit vector: near ``wish``, or random; without ``rng``
-    as ``wish`` as can be."""
-    kernel, _ = at.kernel()
-    image = question.rows(at) @ kernel
-    basis, rank = range_basis(image, 1.0)
-    if rank.value == 0:
-        return None
-    wanted = np.zeros(rank.value) if wish is None else basis.T @ wish
-    if rng is not None:
-        wanted = rng.normal(size=rank.value) if wish is None else wanted
-        wanted = wanted + 0.2 * rng.normal(size=rank.value) / np.sqrt(rank.value)
-    wanted = basis @ wanted
-    norm = float(np.linalg.norm(wanted))
-    if norm < UNMOVING:
-        return None
-    wanted = wanted / norm
-    return kernel @ np.linalg.lstsq(image, wanted, rcond=INVERTED)[0], wanted
-
-
 def _far(start: ClosedConfiguration, steps: int = STEPS) -> list[ClosedConfiguration]:
     """The configurations of two random walks in all of the mechanism's freedoms, the second half of each."""
     try:
@@ -206,6 +188,38 @@ def _far(start: ClosedConfiguration, steps: int = STEPS) -> list[ClosedConfigura
 def _firmest(found: Sequence[ClosedConfiguration]) -> ClosedConfiguration:
     """The configuration farthest from a singularity of the loops."""
     return max(found, key=lambda at: at.kernel()[1].weakest)
+
+
+@dataclass(eq=False)
+class _Walker:
+    """A random walk: where it is, where in (t, u̇) it last went, the targets it passed, the random vectors that it takes
+    first, and how weak the loops may become."""
+
+    here: ClosedConfiguration
+    noise: Iterator[Array]
+    weakest: float
+    wish: Array | None = None
+    way: list[Target] = field(default_factory=list)
+
+
+@dataclass(frozen=True, eq=False)
+class _Stride:
+    """A step on its way: where it has come to, the joint velocity there and its (t, u̇), which part of it is done and
+    which comes next."""
+
+    here: ClosedConfiguration
+    velocity: Array
+    direction: Array
+    came: float = 0.0
+    part: float = 1.0
+
+    def tangent(self) -> Array:
+        """The next part of it, (nv,)."""
+        return self.part * shortened(STEP * self.velocity, 3 * STEP)
+
+    def on(self, basis: Array) -> Array:
+        """Its direction in a basis of (t, u̇)."""
+        return np.asarray(basis.T @ self.direction)
 
 
 class _Walks:
@@ -221,21 +235,11 @@ class _Walks:
         """So many samples, how many were discarded, and whether the robot finds all of them again; raises
         ``NotSampled``."""
         members, lonely = list[Sample](), list[Sample]()
-        discarded, draws = 0, 4 * count
-        straight = self._straight(roots[0], count) if len(roots) == 1 and not self.freely else []
-        while len(members) < count:
-            drawn, straight = straight, []
-            draws -= len(drawn)
-            while draws and len(drawn) < count - len(members):
-                try:
-                    sample = self.walk(roots[(4 * count - draws) % len(roots)])
-                except NotMeasured:
-                    sample = None
-                drawn += [] if sample is None else [sample]
-                discarded += sample is None
-                draws -= 1
-            if not drawn:
-                break
+        discarded, draws, most = 0, 0, 4 * count
+        while len(members) < count and draws < most:
+            last, draws = draws, min(draws + count - len(members), most)
+            drawn = self.walk([roots[number % len(roots)] for number in range(last, draws)])
+            discarded += draws - last - len(drawn)
             for sample, again in zip(drawn, self._found_again(drawn), strict=True):
                 (members if again else lonely).append(sample)
         if len(members) == count:
@@ -247,105 +251,126 @@ class _Walks:
     def _found_again(self, samples: Sequence[Sample]) -> Iterator[bool]:
         """Whether the robot, led along the way of each sample, arrives."""
         ways = [[target.of(lambda o: o.key in self.leading) for target in sample.way] for sample in samples]
-        for led in track_paths(samples[0].configuration.twin, ways, EASY_ITERATIONS):
+        for led in track_paths(samples[0].configuration.twin, ways, EASY_ITERATIONS) if ways else ():
             yield not isinstance(led, NotMeasured) and led[1] <= FOLLOWED
 
-    def _straight(self, start: ClosedConfiguration, count: int) -> list[Sample]:
-        """So many first walks of :meth:`walk` in step, with the same digits; none where one of them does not go
-        straight on: then no random number is used."""
-        before = self.rng.bit_generator.state
-        try:
-            found = self._in_step(start, count)
-        except NotMeasured:
-            found = []
-        if not found:
-            self.rng.bit_generator.state = before
-        return found
-
-    def _in_step(self, start: ClosedConfiguration, count: int) -> list[Sample]:
-        twin, question = start.twin, self.question
-        here, wishes, ways = [start] * count, list[Array](), list[list[Target]]()
-        weakest = WEAKEST * start.kernel()[1].weakest
-        for number in range(STEPS):
-            images = [moved @ at.kernel()[0] for moved, at in zip(question.rows_together(here), here, strict=True)]
-            bases = range_bases(images, 1.0)
-            if not number:
-                freedoms = bases[0][1].value
-                random = iter(self.rng.normal(size=(count, STEPS + 1, freedoms)).swapaxes(0, 1))
-                wishes = list(next(random))
-            if not freedoms or any(rank.value != freedoms for _, rank in bases):
-                return []
-            wanted = [(basis.T @ wish if number else wish) + 0.2 * noise / np.sqrt(freedoms)
-                      for (basis, _), wish, noise in zip(bases, wishes, next(random), strict=True)]
-            wishes = [basis @ each for (basis, _), each in zip(bases, wanted, strict=True)]
-            sizes = [float(np.linalg.norm(wish)) for wish in wishes]
-            if min(sizes) < UNMOVING:
-                return []
-            wishes = [wish / size for wish, size in zip(wishes, sizes, strict=True)]
-            steps = [shortened(STEP * (at.kernel()[0] @ np.linalg.lstsq(image, wish, rcond=INVERTED)[0]), 3 * STEP)
-                     for at, image, wish in zip(here, images, wishes, strict=True)]
-            predicted = [twin.moved(at.q, step) for at, step in zip(here, steps, strict=True)]
-            solved = solve_together(Places(twin, None), predicted, [None] * count, tolerance=SOLVED)
-            if not all(residual <= CLOSED for _, residual in solved):
-                return []
-            there = ClosedConfiguration.several(twin, [q for q, _ in solved])
-            if not all(_beside(*each) and each[-1].kernel()[1].weakest >= weakest
-                       for each in zip(here, steps, predicted, there, strict=True)):
-                return []
-            here = there
-            ways.append(question.targets(here))
-        steady = [at for each in here if (at := _steady(each)) is not None]
-        found = relations(steady, question, question.rows_together(steady)) if len(steady) == count else []
-        if not found or any(each.gap < RANK_GAP for each in found):
-            return []
-        return [Sample(*each) for each in zip(steady, zip(*ways, strict=True), found, strict=True)]
-
-    def walk(self, start: ClosedConfiguration) -> Sample | None:
-        """The sample at the end of a random walk; None where it is blocked, or its ranks are not clear."""
+    def walk(self, starts: Sequence[ClosedConfiguration]) -> list[Sample]:
+        """The samples at the ends of random walks from these configurations, in step; without those that are blocked,
+        or whose ranks are not clear."""
         question = self.question
-        here, wish = start, None
-        way: list[Target] = []
-        weakest = WEAKEST * start.kernel()[1].weakest
+        noise = self.rng.normal(size=(len(starts), STEPS + 1, relation(starts[0], question).dimension))
+        walkers = [_Walker(start, iter(own), WEAKEST * start.kernel()[1].weakest)
+                   for start, own in zip(starts, noise, strict=True)]
         for _ in range(STEPS):
             if self.freely:
-                idly = _anywhere(here, self.rng)
-                here = next((m for part in HALVED if (m := _moved(here, 2 * idly, part)) is not None), here)
-            moved = None
-            for attempt in range(TURNS):
-                moving = _velocity(here, question, None if attempt else wish, self.rng)
-                moved = None if moving is None else self._stride(here, *moving, weakest)
-                if moved is not None:
-                    break
-            if moved is None:
-                return None
-            here, wish = moved
-            way.append(question.target(here))
-        steady = _steady(here)
-        found = None if steady is None else relation(steady, question)
-        return None if steady is None or found is None or found.gap < RANK_GAP else Sample(steady, tuple(way), found)
+                for walker in walkers:
+                    idly = 2 * _anywhere(walker.here, self.rng)
+                    walker.here = next((there for part in HALVED if (there := _moved(walker.here, idly, part))),
+                                       walker.here)
+            arrived = self._step(walkers)
+            targets = _measured(question.targets, [walker.here for walker in arrived])
+            walkers = []
+            for walker, target in zip(arrived, targets, strict=True):
+                if target is not None:
+                    walker.way.append(target)
+                    walkers.append(walker)
+        steady = [(at, walker.way) for walker in walkers if (at := _steady(walker.here)) is not None]
+        found = _measured(lambda at: relations(at, question, question.rows_together(at)), [at for at, _ in steady])
+        return [Sample(at, tuple(way), each) for (at, way), each in zip(steady, found, strict=True)
+                if each is not None and each.gap >= RANK_GAP]
 
-    def _stride(self, here: ClosedConfiguration, velocity: Array, direction: Array, weakest: float
-                ) -> tuple[ClosedConfiguration, Array] | None:
-        """The configuration a step along ``direction`` in (t, u̇) leads to, in parts that follow the branch; None where
-        it comes too near to a singularity of the loops."""
-        came, part = 0.0, 1.0
-        while came < 1:
-            part = min(part, 1 - came)
-            there = _moved(here, velocity, part, self.beyond)
-            if there is None:
-                part /= 2
-                if part < HALVED[-1]:
-                    return None
-                continue
-            if there.kernel()[1].weakest < weakest:
-                return None
-            here, came, part = there, came + part, 2 * part
-            if came < 1:
-                moving = _velocity(here, self.question, direction, None)
-                if moving is None:
-                    return None
-                velocity, direction = moving
-        return here, direction
+    def _step(self, walkers: Sequence[_Walker]) -> list[_Walker]:
+        """One step of each, where it is blocked in another direction; those that were not blocked in all."""
+        left = list(walkers)
+        for _ in range(TURNS):
+            if not left:
+                break
+            aims = self._velocities([walker.here for walker in left], [partial(self._aim, walker) for walker in left])
+            ends = self._stride({i: _Stride(walker.here, *aim) for i, (walker, aim)
+                                 in enumerate(zip(left, aims, strict=True)) if aim is not None},
+                                [walker.weakest for walker in left])
+            for i, (here, direction) in ends.items():
+                left[i].here, left[i].wish = here, direction
+            left = [walker for i, walker in enumerate(left) if i not in ends]
+            for walker in left:
+                walker.wish = None
+        return [walker for walker in walkers if walker not in left]
+
+    def _aim(self, walker: _Walker, basis: Array) -> Array:
+        """Where to go next, in this basis of (t, u̇): near where the walk last went, or anywhere."""
+        count = basis.shape[1]
+
+        def noise() -> Array:
+            drawn = next(walker.noise, None)
+            return drawn if drawn is not None and len(drawn) == count else np.asarray(self.rng.normal(size=count))
+
+        wanted = noise() if walker.wish is None else basis.T @ walker.wish
+        return wanted + 0.2 * noise() / np.sqrt(count)
+
+    def _velocities(self, here: Sequence[ClosedConfiguration], aims: Sequence[Callable[[Array], Array]]
+                    ) -> list[tuple[Array, Array] | None]:
+        """A joint velocity without idle motion at each configuration, whose (t, u̇) is a unit vector, and this vector:
+        along what its aim makes of a basis; None where nothing moves so."""
+        rows = _measured(self.question.rows_together, here)
+        images = {i: moved @ here[i].kernel()[0] for i, moved in enumerate(rows) if moved is not None}
+        found: list[tuple[Array, Array] | None] = [None] * len(here)
+        for (i, image), (basis, rank) in zip(images.items(), range_bases(list(images.values()), 1.0), strict=True):
+            wanted = basis @ aims[i](basis) if rank.value else np.zeros(len(image))
+            norm = float(np.linalg.norm(wanted))
+            if norm >= UNMOVING:
+                wanted = wanted / norm
+                found[i] = here[i].kernel()[0] @ np.linalg.lstsq(image, wanted, rcond=INVERTED)[0], wanted
+        return found
+
+    def _stride(self, going: dict[int, _Stride], weakest: Sequence[float]
+                ) -> dict[int, tuple[ClosedConfiguration, Array]]:
+        """Where steps along (t, u̇) lead, in parts that follow the branch, and their last directions; without those that
+        come too near to a singularity of the loops."""
+        ended: dict[int, tuple[ClosedConfiguration, Array]] = {}
+        while going:
+            onward: dict[int, _Stride] = {}
+            for (i, at), there in zip(going.items(), self._parts(list(going.values())), strict=True):
+                came = at.came + at.part
+                if there is None:
+                    if at.part / 2 >= HALVED[-1]:
+                        onward[i] = replace(at, part=at.part / 2)
+                elif there.kernel()[1].weakest >= weakest[i]:
+                    if came < 1:
+                        onward[i] = _Stride(there, at.velocity, at.direction, came, min(2 * at.part, 1 - came))
+                    else:
+                        ended[i] = there, at.direction
+            turned = [i for i, at in onward.items() if at.here is not going[i].here]
+            moving = self._velocities([onward[i].here for i in turned], [onward[i].on for i in turned])
+            for i, each in zip(turned, moving, strict=True):
+                if each is None:
+                    del onward[i]
+                else:
+                    onward[i] = replace(onward[i], velocity=each[0], direction=each[1])
+            going = onward
+        return ended
+
+    def _parts(self, strides: Sequence[_Stride]) -> list[ClosedConfiguration | None]:
+        """As :func:`_moved`, of the next part of several steps."""
+        twin, tangents = strides[0].here.twin, [stride.tangent() for stride in strides]
+        predicted = [twin.moved(stride.here.q, tangent) for stride, tangent in zip(strides, tangents, strict=True)]
+        solved = solve_together(Places(twin, None), predicted, [None] * len(strides), tolerance=SOLVED)
+        closed = [k for k, (_, residual) in enumerate(solved) if residual <= CLOSED]
+        found: list[ClosedConfiguration | None] = [None] * len(strides)
+        for k, there in zip(closed, ClosedConfiguration.several(twin, [solved[k][0] for k in closed]), strict=True):
+            if _beside(strides[k].here, tangents[k], predicted[k], there):
+                found[k] = there
+            elif strides[k].part == 1:
+                self.beyond.append(there)
+        return found
+
+
+def _measured(ask: Callable[[list[ClosedConfiguration]], Iterable[X]], places: Sequence[ClosedConfiguration]
+              ) -> list[X | None]:
+    """What is asked of several configurations together; None at those where it cannot be measured."""
+    try:
+        return list(ask(list(places))) if places else []
+    except NotMeasured:
+        return [None] if len(places) == 1 else [each for place in places for each in _measured(ask, [place])]
 
 
 def _steady(here: ClosedConfiguration) -> ClosedConfiguration | None:
@@ -360,11 +385,10 @@ def _steady(here: ClosedConfiguration) -> ClosedConfiguration | None:
     return here if turn * max(here.residual, SHARP) / here.strengths[-1] <= STEADY_TANGENT else None
 
 
-def _moved(here: ClosedConfiguration, velocity: Array, part: float = 1.0,
-           beyond: list[ClosedConfiguration] | None = None, *, leaving: bool = False) -> ClosedConfiguration | None:
+def _moved(here: ClosedConfiguration, velocity: Array, part: float = 1.0, *, leaving: bool = False
+           ) -> ClosedConfiguration | None:
     """The configuration a ``part`` of a step along ``velocity`` leads to; None where it does not close near its
-    prediction, or does not follow the branch: what it closes to goes to ``beyond`` then. ``leaving`` a singular
-    configuration, any branch will do."""
+    prediction, or does not follow the branch. ``leaving`` a singular configuration, any branch will do."""
     step = part * shortened(STEP * velocity, 3 * STEP)
     predicted = here.twin.moved(here.q, step)
     q, residual = solve(here.twin, predicted, tolerance=SOLVED)
@@ -374,11 +398,7 @@ def _moved(here: ClosedConfiguration, velocity: Array, part: float = 1.0,
     if leaving:
         apart = float(np.linalg.norm(here.twin.difference(predicted, q)))
         return there if apart <= float(np.linalg.norm(step)) / 2 else None
-    if _beside(here, step, predicted, there):
-        return there
-    if beyond is not None and part == 1:
-        beyond.append(there)
-    return None
+    return there if _beside(here, step, predicted, there) else None
 
 
 def _beside(here: ClosedConfiguration, step: Array, predicted: Array, there: ClosedConfiguration) -> bool:
