@@ -91,6 +91,10 @@ class LegWord:
     joints: tuple[JointSymbol, ...]
 
     def __str__(self) -> str:
+        return self._text
+
+    @cached_property
+    def _text(self) -> str:
         return f"({'-'.join(map(str, self.joints))})"
 
     @property
@@ -102,6 +106,11 @@ class LegWord:
     def unmoved(self) -> LegWord:
         """The leg without its motors."""
         return LegWord(tuple(replace(joint, motor=False) for joint in self.joints))
+
+    @cached_property
+    def chain(self) -> LegWord:
+        """The joints alone, in canonical names: nothing is driven, the default segment is observed."""
+        return LegWord(tuple(replace(joint, motor=False, watched=False) for joint in self.joints)).canonical
 
     @property
     def driven(self) -> LegWord:
@@ -145,10 +154,11 @@ class LegWord:
             return self._along(slide - 1)
         return len(self.joints) - (1 if self.joints[-1].letter in COMPOSITE else 2)
 
-
-def _order(leg: LegWord) -> tuple[LegWord, LegWord]:
-    """The place of a leg among others: as it is without motors, then by its motors."""
-    return leg.unmoved, leg
+    @cached_property
+    def order(self) -> tuple[tuple[object, ...], ...]:
+        """Its place among others: as it is without motors, then by its motors."""
+        return (tuple((joint.letter, joint.axes, False, joint.watched) for joint in self.joints),
+                tuple((joint.letter, joint.axes, joint.motor, joint.watched) for joint in self.joints))
 
 
 @dataclass(frozen=True, order=True)
@@ -175,8 +185,8 @@ class RobotWord:
     def of(cls, legs: list[LegWord], *more: list[LegWord], platform: str = "", seen: Iterable[SightWord] = ()
            ) -> RobotWord:
         """The canonical word of these legs; ``more``: those of a second body."""
-        bodies = (tuple(sorted((leg.canonical for leg in body), key=_order)) for body in (legs, *more))
-        return cls(platform, tuple(sorted(bodies, key=lambda body: ([leg.unmoved for leg in body], body))),
+        bodies = (tuple(sorted((leg.canonical for leg in body), key=lambda leg: leg.order)) for body in (legs, *more))
+        return cls(platform, tuple(sorted(bodies, key=lambda body: [*zip(*(leg.order for leg in body), strict=True)])),
                    tuple(sorted(seen)))
 
     @property
@@ -209,7 +219,7 @@ class RobotWord:
 
 def counted(symbols: Iterable[LegWord | SightWord]) -> str:
     """Equal ones once with their number, joined by +."""
-    return "+".join(f"{count if count > 1 else ''}{each}" for each, count in Counter(symbols).items())
+    return "+".join(f"{count if count > 1 else ''}{each}" for each, count in Counter(map(str, symbols)).items())
 
 
 def parse(text: str) -> RobotWord:

@@ -9,10 +9,10 @@ from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 
 from ..words import SENSORS, RobotWord
-from . import deltas, planar, pods, sensors, spatial
+from . import deltas, mixed, planar, pods, sensors, spatial
 
 _LISTED: Mapping[str, Callable[[], Iterable[RobotWord]]] = {
-    "planar": planar.words, "pods": pods.words, "deltas": deltas.words, "spatial": spatial.words}
+    "planar": planar.words, "pods": pods.words, "deltas": deltas.words, "mixed": mixed.words, "spatial": spatial.words}
 """What each module lists, in no order, some of it twice or of another group."""
 
 
@@ -20,9 +20,8 @@ def group(word: RobotWord) -> str:
     """The group to which a word belongs: the first whose law it obeys."""
     if word.seen:
         return SENSORS
-    if planar.belongs(word):
-        return "planar"
-    return next((name for name, law in (("pods", pods.belongs), ("deltas", deltas.belongs)) if law(word)), "spatial")
+    laws = {"planar": planar, "pods": pods, "deltas": deltas, "mixed": mixed}
+    return next((name for name, module in laws.items() if module.belongs(word)), "spatial")
 
 
 def words(name: str) -> list[str]:

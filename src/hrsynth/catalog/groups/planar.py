@@ -1,8 +1,9 @@
 """Planar robots, complete: the seven chains of three joints R and P, with every motor and every observed segment.
 
 Three legs on a rigid platform move it with three freedoms, two legs that end on one R move a point with two. Special
-geometry: the rails of all legs that begin with a P are parallel; and equal legs in which parallelograms take the place
-of P or R joints.
+geometry: the rails of all legs that begin with a P are parallel. With chains in which parallelograms take the place of
+P or R joints: equal legs with every motor, and all sets of three legs driven at the base, of four where there is no
+parallelogram.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from itertools import product
 
 from ..geometry import planar as belongs
 from ..words import LegWord, RobotWord
-from .legs import driven, leg, robots, watched
+from .legs import base_driven, driven, leg, robots, watched
 
 __all__ = ["belongs", "chains", "words"]
 
@@ -47,7 +48,8 @@ def _kinds(rail: str, motors: int, tip: str = "RP") -> list[LegWord]:
 
 
 def words() -> Iterator[RobotWord]:
-    """Robots with three and with two freedoms, of general geometry and with parallel rails."""
+    """Robots with three and with two freedoms, of general geometry and with parallel rails; legs of all chains; one leg
+    more than freedoms."""
     for rail in ("h", "x"):
         yield from robots(_kinds(rail, 3), 3)
         yield from robots(_kinds(rail, 2, tip="R"), 2, "point")
@@ -57,3 +59,7 @@ def words() -> Iterator[RobotWord]:
                 yield RobotWord.of([moved] * 3)
                 if chain.joints[-1].letter == "R":
                     yield RobotWord.of([moved] * 2, platform="point")
+    plain, other = ([base_driven(seen) for chain in found for seen in watched(chain)]
+                    for found in (chains(), with_parallelograms()))
+    yield from robots([*plain, *other], 3)
+    yield from robots(plain, 4)

@@ -1,4 +1,5 @@
-"""Spatial robots with three freedoms from the literature of type synthesis, legs of up to five joints.
+"""Spatial robots with three equal legs and three freedoms, from the literature of type synthesis; legs have up to five
+joints.
 
 Translational: all R of a leg have one or two directions, each direction in one piece (the first may return at the
 end), so that the leg's constraint is a couple of constant direction. Spherical: R axes through a common point, with at
@@ -8,19 +9,17 @@ modes of 3-UPU with parallel and with meeting outer axes.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
-from itertools import combinations_with_replacement, product
+from itertools import product
 
 from ..words import LegWord, RobotWord
-from .legs import base_driven, driven, leg, robots, watched
+from .legs import driven, leg, watched
 
 _SLIDES = "hjk"
 """Names of a leg's P axes, one after another; more are not needed for three freedoms."""
-
-
-def belongs(word: RobotWord) -> bool:
-    """Every word that is in no other group."""
-    return True
+CLAVEL = "Rt*-Rt-Pin-Rt"
+"""The leg of the Delta robot."""
 
 
 def translational() -> Iterator[LegWord]:
@@ -34,6 +33,13 @@ def translational() -> Iterator[LegWord]:
                 continue
             own = iter(_SLIDES)
             yield leg("-".join(f"P{next(own)}" if letter == "P" else f"R{letter}" for letter in letters))
+
+
+def translates(chain: LegWord) -> bool:
+    """Whether a leg of :func:`translational` moves its end in all translations and turns about each of its directions,
+    and nothing is idle: k parallel R give k - 1 translations, at most two."""
+    turning = Counter(joint.axes for joint in chain.joints if joint.letter == "R")
+    return len(chain.joints) == 3 + len(turning) and max(turning.values()) <= 3
 
 
 def spherical() -> Iterator[LegWord]:
@@ -55,20 +61,10 @@ def zero_torsion() -> list[LegWord]:
 
 
 def words() -> Iterator[RobotWord]:
-    """Three equal legs of each family, each segment observed, each of the first two joints driven; mixed zero-torsion
-    robots; the Clavel leg with a Π."""
-    for chain in (*translational(), *spherical()):
+    """Three equal legs of each family, each segment observed, each of the first two joints driven; the Clavel leg with
+    a Π."""
+    for chain in (*translational(), *spherical(), *zero_torsion()):
         for seen in watched(chain):
             yield from (RobotWord.of([each] * 3) for each in driven(seen, range(2)))
-    for text in ("Rt*-Rt-Pin-Rt", "Pk*-Rt-Pin-Rt", "Pz*-Rt-Pin-Rt"):
+    for text in (CLAVEL, "Pk*-Rt-Pin-Rt", "Pz*-Rt-Pin-Rt"):
         yield from (RobotWord.of([seen] * 3) for seen in watched(leg(text)))
-    tilting = zero_torsion()
-    yield from robots([base_driven(chain) for chain in tilting], 3)
-    for chain in tilting:
-        for seen in watched(chain):
-            yield from (RobotWord.of([each] * 3) for each in driven(seen, range(2)))
-    general = list(translational())
-    for one, other in combinations_with_replacement([base_driven(chain) for chain in general
-                                                     if len(chain.joints) == 5], 2):
-        if {one.joints[0].letter, other.joints[0].letter} == {"P"}:
-            yield RobotWord.of([one, one, other])
