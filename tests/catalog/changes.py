@@ -10,6 +10,7 @@ where it says otherwise.
 from __future__ import annotations
 
 import argparse
+import gzip
 import json
 import random
 import subprocess
@@ -59,9 +60,11 @@ def catalog(commit: str) -> dict[str, Record]:
     """The records of a commit, by word."""
     found = {}
     for group in sorted(GROUPS):
-        text = subprocess.run(["git", "show", f"{commit}:catalog/{group}.jsonl"], cwd=ROOT, capture_output=True,
-                              text=True, check=True).stdout
-        found.update({record["word"]: record for record in map(json.loads, text.splitlines()[1:])})
+        for ending in ("jsonl", "jsonl.gz"):
+            shown = subprocess.run(["git", "show", f"{commit}:catalog/{group}.{ending}"], cwd=ROOT, capture_output=True)
+            if shown.returncode == 0:
+                text = gzip.decompress(shown.stdout) if ending == "jsonl.gz" else shown.stdout
+                found.update({record["word"]: record for record in map(json.loads, text.splitlines()[1:])})
     return found
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import gzip
 import os
 import random
 import signal
@@ -19,9 +20,10 @@ from hypothesis import strategies as st
 
 from catalog.stub import REFUSED, broken, died, entry, source
 from hrsynth.catalog import load
-from hrsynth.catalog.build import architectures, build
+from hrsynth.catalog.build import architectures, build, check
 from hrsynth.catalog.journal import Journal
 from hrsynth.catalog.jsonl import decoded, encoded, line
+from hrsynth.catalog.store import store
 from hrsynth.errors import BadRequest, BuildStopped, HrsynthError
 
 TESTS = Path(__file__).resolve().parent.parent
@@ -308,6 +310,27 @@ def test_files_round_trip_and_cut_off_ones_are_refused(whole: dict[str, bytes]):
             decoded(data[:cut], "c")
     with pytest.raises(BadRequest, match=r"another version, found 'format 1, words 9', allowed: .*build it again"):
         decoded(data.replace(b'"catalog":1', b'"catalog":9', 1), "c")
+
+
+def test_a_large_group_is_packed_and_holds_the_same(tmp_path: Path, whole: dict[str, bytes],
+                                                    monkeypatch: pytest.MonkeyPatch):
+    """The same lines, whichever of the two files a group had before; a file that is cut off is refused."""
+    monkeypatch.setattr("hrsynth.catalog.store.PACKED_ABOVE", 20)
+    build(tmp_path, source=source())
+    assert sorted(content(tmp_path)) == ["c.jsonl.gz", "d.jsonl"]
+    assert gzip.decompress((tmp_path / "c.jsonl.gz").read_bytes()) == whole["c.jsonl"]
+    kept = store(tmp_path)
+    assert kept.groups() == ["c", "d"]
+    assert kept.lines("c", {}) == decoded(whole["c.jsonl"], "c")
+    assert check(tmp_path, source=source()) == ()
+    monkeypatch.setattr("hrsynth.catalog.store.PACKED_ABOVE", 1000)
+    build(tmp_path, source=source())
+    assert content(tmp_path) == whole
+    packed = gzip.compress(whole["c.jsonl"], mtime=0)
+    for cut in (0, 1, 9, len(packed) // 2, len(packed) - 1):
+        (tmp_path / "c.jsonl.gz").write_bytes(packed[:cut])
+        with pytest.raises(BadRequest):
+            kept.lines("c", {})
 
 
 @pytest.mark.some(0, 1)

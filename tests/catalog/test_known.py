@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 
 from hrsynth.analysis.observed import ObservedRobot
+from hrsynth.catalog import load
 from hrsynth.catalog.geometry import mechanism
+from hrsynth.catalog.groups import GROUPS
 from hrsynth.catalog.site.known import alias, aliases, bare, is_called, order
 from hrsynth.catalog.site.sentences import RULES, cure, rules
 from hrsynth.catalog.words import parse
@@ -21,13 +23,12 @@ CATALOG = Path(__file__).resolve().parents[2] / "catalog"
 
 
 def records(group: str) -> list[dict[str, object]]:
-    lines = (CATALOG / f"{group}.jsonl").read_text(encoding="utf-8").splitlines()[1:]
-    return [json.loads(line) for line in lines]
+    return [dict(each) for each in load(CATALOG, group=group)]
 
 
 @pytest.mark.slow
 def test_every_known_robot_is_in_the_catalog_under_its_canonical_word():
-    held = {bare(str(each["word"])) for group in ("deltas", "planar", "pods", "spatial")
+    held = {bare(str(each["word"])) for group in GROUPS
             for each in records(group) if "!" not in str(each["word"])}
     assert set(aliases()) <= held
     assert all(str(parse(word)) == word for word in aliases())

@@ -199,7 +199,7 @@ def _stale(kept: Store, group: str, source: WordSource, team: Executor, sample: 
         yield f"{group}: not in {kept.path}"
         return
     words = source.words(group)
-    if isinstance(kept, Folder) and kept.file(group).read_bytes() != encoded(group, lines):
+    if isinstance(kept, Folder) and kept.content(group) != encoded(group, lines):
         yield f"{group}: {kept.file(group)} is not sorted"
     yield from _some(group, "missing", [word for word in words if word not in stored])
     yield from _some(group, "no longer of the group", sorted(stored.keys() - set(words)))

@@ -12,6 +12,8 @@ from .words import VERSION
 Record = Mapping[str, Any]
 """What the catalog says of one architecture; a field that is missing is not known or does not apply."""
 
+_FIRST = '{"word":"'
+
 FORMAT = 1
 """Version of the lines, the journal and the tables."""
 
@@ -56,9 +58,14 @@ def word_of(text: str) -> str:
     return str(record(text)["word"])
 
 
+def leading_word(text: str) -> str:
+    """The word with which a line begins that :func:`line` wrote."""
+    return text[len(_FIRST):text.index('"', len(_FIRST))] if text.startswith(_FIRST) else word_of(text)
+
+
 def encoded(group: str, lines: Iterable[str]) -> bytes:
     """The bytes of a group's file, sorted by word, whatever the order of the lines."""
-    ordered = sorted(lines, key=word_of)
+    ordered = sorted(lines, key=leading_word)
     return "".join(f"{each}\n" for each in [head(group, len(ordered)), *ordered]).encode("ascii")
 
 

@@ -13,7 +13,7 @@ from typing import Any, overload
 from ..errors import BadRequest
 from ..results import Value
 from .fits import fits, require_askable
-from .jsonl import Record, record
+from .jsonl import Record, leading_word, record
 from .store import DATABASES, Store, shipped, store
 from .words import SENSORS, parse
 
@@ -27,6 +27,10 @@ class ReadRecords(Sequence[Record]):
 
     def __len__(self) -> int:
         return len(self._lines)
+
+    def words(self) -> list[str]:
+        """The words of all, none of which is read for that."""
+        return [leading_word(each) for each in self._lines]
 
     @overload
     def __getitem__(self, place: int) -> Record: ...
@@ -100,7 +104,9 @@ class Catalog(Value):
 
     @cached_property
     def _places(self) -> dict[str, int]:
-        return {str(each["word"]): i for i, each in reversed(list(enumerate(self.records)))}
+        words = self.records.words() if isinstance(self.records, ReadRecords) else [
+            str(each["word"]) for each in self.records]
+        return {word: i for i, word in reversed(list(enumerate(words)))}
 
 
 def load(path: str | Path | None = None, **asked: Any) -> Catalog:

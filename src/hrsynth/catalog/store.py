@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import gzip
 import sqlite3
+import zlib
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from importlib import resources
 from pathlib import Path
@@ -19,6 +21,10 @@ from .words import VERSION
 
 DATABASES = (".sqlite", ".sqlite3", ".db")
 """Endings of a store that is one SQLite file."""
+LINES, PACKED = ".jsonl", ".jsonl.gz"
+"""Endings of the files of a folder."""
+PACKED_ABOVE = 10_000
+"""Records of a group above which its file is compressed."""
 PUBLISHED = "published"
 """The shipped catalog of published robots."""
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
@@ -57,18 +63,27 @@ class Store(Protocol):
 
 
 class Folder:
-    """A folder with ``GROUP.jsonl`` for each group."""
+    """A folder with ``GROUP.jsonl`` for each group, or ``GROUP.jsonl.gz`` for a large one."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
 
     def groups(self) -> list[str]:
-        return sorted(file.stem for file in self.path.glob("*.jsonl"))
+        return sorted({file.name.partition(LINES)[0] for file in self.path.glob(f"*{LINES}*")
+                       if file.name.endswith((LINES, PACKED))})
 
     def lines(self, group: str, asked: Mapping[str, Any]) -> list[str]:
+        return decoded(self.content(group), str(self.file(group)))
+
+    def content(self, group: str) -> bytes:
+        """The bytes of a group's lines; raises ``BadRequest`` where they cannot be read."""
         file = self.file(group)
         with _readable(file):
-            return decoded(file.read_bytes(), str(file))
+            content = file.read_bytes()
+        try:
+            return gzip.decompress(content) if file.name.endswith(PACKED) else content
+        except (OSError, EOFError, zlib.error):
+            raise BadRequest(f"{file}: cut off, or not compressed by gzip") from None
 
     def decides(self, asked: Mapping[str, Any]) -> bool:
         return all(value is None for value in asked.values())
@@ -77,17 +92,23 @@ class Folder:
         return len(self.lines(group, {}))
 
     def write(self, group: str, lines: Iterable[str]) -> None:
-        file = self.file(group)
+        lines = list(lines)
+        plain, packed = (self.path / f"{group}{ending}" for ending in (LINES, PACKED))
+        large = len(lines) > PACKED_ABOVE
+        file, other = (packed, plain) if large else (plain, packed)
+        content = encoded(group, lines)
         with writable(file), replacement(file, sync=True) as draft:
-            draft.write_bytes(encoded(group, lines))
+            draft.write_bytes(gzip.compress(content, mtime=0) if large else content)
+        other.unlink(missing_ok=True)
 
     def journal(self, group: str, *, anew: bool = False) -> Journal:
         with writable(self.path):
             self.path.mkdir(exist_ok=True)
-        return _opened(self.file(group), f"{group}.jsonl", group, anew)
+        return _opened(self.path / f"{group}{LINES}", f"{group}{LINES}", group, anew)
 
     def file(self, group: str) -> Path:
-        return self.path / f"{group}.jsonl"
+        packed = self.path / f"{group}{PACKED}"
+        return packed if packed.exists() else self.path / f"{group}{LINES}"
 
 
 class Database:

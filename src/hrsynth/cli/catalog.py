@@ -189,15 +189,20 @@ def _of_tables(name: str, folder: str, kept: str | None) -> _Shown:
 
 
 def site(output: str, workers: int, anew: bool, kept: str | None, json: bool, **asked: Any) -> None:
-    """Write the pages of the architectures that fit."""
-    from ..catalog import load
+    """Write the pages of the architectures that fit; of those with equal legs, where nothing is asked for."""
+    from ..catalog import Catalog, load
     from ..catalog.site import site as run
+    from ..catalog.site.known import equal_legs
     from ..errors import BadRequest
     from ..present.text.catalog import sited
 
     found = load(kept, **asked)
     if not found:
         _require_known(kept, asked)
+    if all(value is None for value in asked.values()):
+        found, every = Catalog([each for each in found if equal_legs(each["word"])]), len(found)
+        if len(found) < every:
+            warn(f"{every - len(found):,} architectures with unequal legs get no page; ask for them, as by --group")
     if seen := [each["word"] for each in found if "see" in each]:
         raise BadRequest("no pages are made of words with sensors", seen[0], "hrsynth catalog show, list")
     if published := [each["word"] for each in found if "choices" in each]:

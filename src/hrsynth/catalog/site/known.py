@@ -37,6 +37,11 @@ def kinds(word: str) -> frozenset[str]:
     return frozenset(re.findall(r"\(([^()]*)\)", re.sub("[*!]", "", word)))
 
 
+def equal_legs(word: str) -> bool:
+    """Whether all legs of a word are of one chain, whatever is driven or observed."""
+    return len(kinds(word)) < 2
+
+
 def is_called(record: Record, text: str) -> bool:
     """Whether a text occurs in a name under which a record's robot is known; words with other legs are not read."""
     return kinds(record["word"]) in called(text) and text.casefold() in known_as(record).casefold()
