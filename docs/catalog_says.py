@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from hrsynth.analysis.verdict import BLIND, CONTROLLABLE, PARTIAL
+from hrsynth.catalog.groups.spatial import translates
 from hrsynth.catalog.query import Catalog, load
 from hrsynth.catalog.words import LegWord, RobotWord, parse
 from hrsynth.present.markdown import replaced, table
@@ -65,6 +66,33 @@ def delta_controllable(word: RobotWord, dof: int) -> bool:
     parallel = len({joint.axes for joint in first}) == 1 and all(
         joint.letter == "P" and joint.axes in ("x", "y", "z") for joint in first)
     return not parallel and 2 * len(word.legs) >= dof
+
+
+def translating(word: RobotWord) -> bool:
+    """Whether a word is of legs that translate (:func:`hrsynth.catalog.groups.spatial.translates`) and of no others."""
+    joints = [joint for leg in word.legs for joint in leg.joints]
+    return all(joint.letter in "RP" and joint.axes in "abhjk" for joint in joints) and all(
+        translates(leg.chain) for leg in word.legs)
+
+
+def split(leg: LegWord, place: int) -> int:
+    """Of how many directions of R some, but not all, come before a place in a leg."""
+    axes = [joint.axes if joint.letter == "R" else "" for joint in leg.joints]
+    return sum(0 < axes[:place].count(axis) < axes.count(axis) for axis in set(axes) - {""})
+
+
+def translation_rank(word: RobotWord) -> int:
+    """What legs that translate see: each the directions of R on both sides of the watched link, all together at most
+    three. Legs with two slides that never turn see the same, since all slides of the catalog are normal to z."""
+    seen, along = 0, 0
+    for leg in word.legs:
+        numbers = split(leg, mark(leg) + 1)
+        steady = [i for i, joint in enumerate(leg.joints) if joint.letter == "P" and not split(leg, i)]
+        if len(steady) == 2:
+            along = max(along, numbers)
+        else:
+            seen += numbers
+    return min(3, seen + along)
 
 
 def studied(catalog: Catalog) -> list[Record]:
@@ -136,6 +164,9 @@ def rules(catalog: Catalog) -> str:
         ("deltas: slides not all parallel, enough legs", agree(
             delta_controllable(parse(each["word"]), each["dof"]) == (each["verdict"] == CONTROLLABLE)
             for each in every if each["group"] == "deltas")),
+        ("legs that translate: directions of R on both sides of the watched link", agree(
+            translation_rank(word) == each["rank"] for each in every if each["group"] in ("mixed", "spatial")
+            if translating(word := parse(each["word"])))),
         ("at least dof/2 legs, in a plane dof", agree(
             each["fewest"] >= numbers(each) for each in every if each["verdict"] == CONTROLLABLE))]
     return table(("rule", "agree"), rows, 1)

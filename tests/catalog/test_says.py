@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import sys
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -15,6 +16,7 @@ from hypothesis import strategies as st
 
 import hrsynth
 from hrsynth.catalog.geometry import mechanism
+from hrsynth.catalog.groups.spatial import translates, translational
 from hrsynth.catalog.words import JointSymbol, LegWord, RobotWord, parse
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -41,7 +43,7 @@ def test_the_tables_are_those_of_the_catalog(page: Path, which: str | None, tabl
 @pytest.mark.slow
 def test_every_record_agrees_with_each_rule() -> None:
     lines = says.rules(hrsynth.catalog.load()).splitlines()[2:]
-    assert len(lines) == 3
+    assert len(lines) == 4
     for line in lines:
         some, _, every = line.split("|")[2].split()
         assert some == every != "0"
@@ -76,6 +78,51 @@ def test_the_theorem_on_planar_robots_is_that_of_their_twists(legs: list[LegWord
     rng = np.random.default_rng(seed)
     seen = [np.linalg.svd(basis)[0][:, basis.shape[1]:].T for basis in (left_free(leg, rng) for leg in legs)]
     assert np.linalg.matrix_rank(np.vstack(seen), tol=1e-7) == says.planar_rank(RobotWord("", (tuple(legs),)))
+
+
+TRANSLATING = [chain for chain in translational() if translates(chain)]
+
+
+@st.composite
+def translating_legs(draw: st.DrawFn) -> LegWord:
+    chain = draw(st.sampled_from(TRANSLATING))
+    after = draw(st.integers(0, len(chain.joints) - 2))
+    return LegWord(tuple(replace(joint, watched=i == after) for i, joint in enumerate(chain.joints)))
+
+
+def seen_of_translations(leg: LegWord, rng: np.random.Generator) -> np.ndarray:
+    """The rates (3, 3) of the watched direction for the platform's three translations, from the twists of the joints:
+    a slide that no turned link carries is normal to z."""
+    turning = {name: rng.normal(size=3) for name in "ab"}
+    axes, twists = [joint.axes if joint.letter == "R" else "" for joint in leg.joints], []
+    for i, axis in enumerate(axes):
+        carried = any(0 < axes[:i].count(name) < axes.count(name) for name in "ab")
+        way = rng.normal(size=3) * ([1, 1, 1] if carried else [1, 1, 0])
+        twists.append([*np.cross(rng.normal(size=3), turning[axis]), *turning[axis]] if axis else [*way, 0, 0, 0])
+    rates = np.linalg.lstsq(np.array(twists).T, np.eye(6, 3))[0]
+    assert np.allclose(np.array(twists).T @ rates, np.eye(6, 3))
+    spin = sum((np.outer(turning[axis], rates[i]) for i, axis in enumerate(axes[: leg.observed + 1]) if axis),
+               np.zeros((3, 3)))
+    return np.cross(spin, rng.normal(size=3), axis=0)
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.lists(translating_legs(), min_size=1, max_size=5), st.integers(0, 2**32 - 1))
+def test_the_theorem_on_translations_is_that_of_their_twists(legs: list[LegWord], seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    seen = np.vstack([seen_of_translations(leg, rng) for leg in legs])
+    assert np.linalg.matrix_rank(seen, tol=1e-7) == says.translation_rank(RobotWord("", (tuple(legs),)))
+
+
+def test_legs_translate_that_leave_all_translations_and_nothing_idle() -> None:
+    """The letters say what the rank of the leg's twists says."""
+    rng = np.random.default_rng(2)
+    for chain in translational():
+        turning = {name: rng.normal(size=3) for name in "ab"}
+        T = np.array([[*np.cross(rng.normal(size=3), turning[joint.axes]), *turning[joint.axes]]
+                      if joint.letter == "R" else [*rng.normal(size=3), 0, 0, 0] for joint in chain.joints]).T
+        rank, turns = (np.linalg.matrix_rank(each, tol=1e-9) for each in (T, T[3:]))
+        assert translates(chain) == (rank == len(chain.joints) and rank - turns == 3)
 
 
 @pytest.mark.some(1)
