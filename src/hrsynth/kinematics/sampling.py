@@ -265,8 +265,8 @@ class _Walks:
             if self.freely:
                 for walker in walkers:
                     idly = 2 * _anywhere(walker.here, self.rng)
-                    walker.here = next((there for part in HALVED if (there := _moved(walker.here, idly, part))),
-                                       walker.here)
+                    walker.here = next((there for part in HALVED
+                                        if (there := _moved(walker.here, idly, part)) is not None), walker.here)
             arrived = self._step(walkers)
             targets = _measured(question.targets, [walker.here for walker in arrived])
             walkers = []
