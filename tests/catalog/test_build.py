@@ -321,7 +321,7 @@ def test_a_large_group_is_packed_and_holds_the_same(tmp_path: Path, whole: dict[
     assert gzip.decompress((tmp_path / "c.jsonl.gz").read_bytes()) == whole["c.jsonl"]
     kept = store(tmp_path)
     assert kept.groups() == ["c", "d"]
-    assert kept.lines("c", {}) == decoded(whole["c.jsonl"], "c")
+    assert kept.lines(["c"], {}) == decoded(whole["c.jsonl"], "c")
     assert check(tmp_path, source=source()) == ()
     monkeypatch.setattr("hrsynth.catalog.store.PACKED_ABOVE", 1000)
     build(tmp_path, source=source())
@@ -330,7 +330,7 @@ def test_a_large_group_is_packed_and_holds_the_same(tmp_path: Path, whole: dict[
     for cut in (0, 1, 9, len(packed) // 2, len(packed) - 1):
         (tmp_path / "c.jsonl.gz").write_bytes(packed[:cut])
         with pytest.raises(BadRequest):
-            kept.lines("c", {})
+            kept.lines(["c"], {})
 
 
 @pytest.mark.some(0, 1)

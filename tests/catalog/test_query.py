@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 import sqlite3
 import time
@@ -16,7 +17,8 @@ import hrsynth
 from catalog.stub import CHAINS, REFUSED, VERDICTS, WORKERS, source
 from hrsynth.catalog import Catalog, load
 from hrsynth.catalog.build import build, check
-from hrsynth.catalog.store import _write_tables, shipped
+from hrsynth.catalog.jsonl import record
+from hrsynth.catalog.store import OLD_COLUMNS, Folder, _write_tables, shipped
 from hrsynth.errors import BadRequest
 
 ASKED = st.fixed_dictionaries({}, optional={
@@ -90,15 +92,20 @@ def test_sqlite_holds_the_same_records(stores: tuple[Path, Path]):
 
 @pytest.mark.parametrize("asked", [{"legs": "?-R*"}, {"text": "two lines"}, {"modes": 6}, {"dof": 3, "legs": 4}])
 def test_sqlite_files_of_older_versions_are_read(asked: dict[str, Any], stores: tuple[Path, Path], tmp_path: Path):
-    """They have neither the names of legs nor texts, modes and what is seen."""
+    """They have the lines beside the columns, and neither the names of legs nor texts, modes and what is seen."""
     older = tmp_path / "older.sqlite"
-    older.write_bytes(stores[1].read_bytes())
-    with sqlite3.connect(older) as file:
-        file.execute("DROP TABLE names")
-        for name in ("see", "modes_bound"):
-            file.execute(f"DROP INDEX records_{name}")
-        for name in ("see", "modes_bound", "texts"):
-            file.execute(f"ALTER TABLE records DROP COLUMN {name}")
+    every = Folder(stores[0])
+    with contextlib.closing(sqlite3.connect(older)) as file:
+        file.execute("CREATE TABLE versions (format INTEGER, catalog INTEGER)")
+        file.execute("INSERT INTO versions VALUES (1, 1)")
+        file.execute(f'CREATE TABLE records ("group", word, {", ".join(OLD_COLUMNS[1:])}, line, '
+                     'PRIMARY KEY ("group", word))')
+        for group in every.groups():
+            for text in every.lines([group], {}):
+                found = record(text)
+                file.execute(f"INSERT INTO records VALUES ({', '.join('?' * (len(OLD_COLUMNS) + 2))})", (
+                    group, found["word"], *(found.get(name) for name in OLD_COLUMNS[1:]), text))
+        file.commit()
     assert list(load(older, **asked)) == list(load(stores[0], **asked))
     assert 0 < len(load(older, **asked)) < 100
 
@@ -107,8 +114,9 @@ def test_sqlite_files_of_older_versions_are_read(asked: dict[str, Any], stores: 
 def test_sqlite_answers_within_50_ms(tmp_path: Path):
     """Any question about the shipped catalog, in processor time, and as the lines answer it."""
     kept, file = shipped(), tmp_path / "all.sqlite"
-    _write_tables(file, {group: kept.lines(group, {}) for group in kept.groups()})
-    for asked in ({}, {"legs": "3-R*"}, {"legs": 3, "verdict": "controllable"}, {"modes": 6}, {"text": "takeover"},
+    _write_tables(file, {group: kept.lines([group], {}) for group in kept.groups()})
+    for asked in ({}, {"legs": "3-R*"}, {"legs": "?-?R*"}, {"legs": "*-R*R*-*"},
+                  {"legs": 3, "verdict": "controllable"}, {"modes": 6}, {"text": "takeover"},
                   {"text": "hexaglide"}, {"dof": 3}, {"motion": "2T1R", "base_motors": True}, {"see": "3point"}):
         spent = []
         for _ in range(3):

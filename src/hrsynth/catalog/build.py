@@ -190,7 +190,7 @@ def check(target: str | Path | Store, groups: Sequence[str] = (), *, source: Wor
 def _stale(kept: Store, group: str, source: WordSource, team: Executor, sample: int | None, seed: int, tell: Tell
            ) -> Iterator[str]:
     try:
-        lines = kept.lines(group, {})
+        lines = kept.lines([group], {})
         stored = {word_of(line): line for line in lines}
     except BadRequest as error:
         yield f"{group}: {error}"

@@ -14,6 +14,8 @@ from .words import counted, sights
 
 ASKED = ("group", "dof", "motion", "verdict", "base_motors", "fewest", "see", "modes", "legs", "text")
 """What can be asked for."""
+OWN = ("word", "notation")
+"""Fields of which few records have the same value."""
 APART = "\x1f"
 """Between the texts of a record."""
 
@@ -62,14 +64,16 @@ def _condition(name: str, value: Any) -> RecordCondition:
             pattern = plain_brackets(value)
             return RecordCondition(
                 lambda record: any(each == value or fnmatchcase(each, pattern) for each in names(record)),
-                "word IN (SELECT word FROM names WHERE name GLOB ?)", (pattern,))
+                "(word GLOB ? OR replace(word, '*', '') GLOB ? OR rowid IN (SELECT record FROM called WHERE name IN "
+                "(SELECT id FROM names WHERE text GLOB ?)))", (pattern,) * 3)
         case "text":
             from .site.known import is_called
 
             text = str(value).casefold()
             return RecordCondition(
                 lambda record: is_called(record, text) or any(text in str(each).casefold() for each in record.values()),
-                None if APART in text else "instr(texts, ?) > 0", (text,))
+                None if APART in text else
+                "(instr(own, ?) OR common IN (SELECT id FROM common_texts WHERE instr(text, ?)))", (text,) * 2)
         case "legs":
             value = int(value)
         case "see":
@@ -81,10 +85,14 @@ def _condition(name: str, value: Any) -> RecordCondition:
 
 def names(record: Record) -> set[str]:
     """The names by which legs are found: word, notation and each leg's chain, with and without the marks of motors."""
+    word = str(record["word"])
+    return {word, word.replace("*", ""), *chains(record)}
+
+
+def chains(record: Record) -> set[str]:
+    """The names but those of the word."""
     notation = str(record.get("notation", ""))
-    found = {str(record["word"]), notation}
-    for term in re.split(r"\+(?![^{]*})", notation):
-        found.add(re.sub(r"^[0-9]+-", "", term))
+    found = {notation, *(re.sub(r"^[0-9]+-", "", term) for term in re.split(r"\+(?![^{]*})", notation))}
     return {name for each in found if each for name in (each, each.replace("*", ""))}
 
 
@@ -93,8 +101,11 @@ def plain_brackets(pattern: str) -> str:
     return pattern.replace("[", "[[]")
 
 
-def texts(record: Record) -> list[str]:
-    """Where a text is sought: the values of all fields, and the names under which the robot is known, casefolded."""
+def texts(record: Record) -> tuple[str, str]:
+    """Where a text is sought, casefolded: the values of the fields that are a record's own, with the names under which
+    the robot is known, and of all others, which many records have in common."""
     from .site.known import known_as
 
-    return [str(each).casefold() for each in (*record.values(), known_as(record))]
+    own = [str(record.get(name, "")) for name in OWN]
+    common = [str(value) for name, value in record.items() if name not in OWN]
+    return APART.join([*own, known_as(record)]).casefold(), APART.join(common).casefold()

@@ -121,7 +121,7 @@ def load(path: str | Path | None = None, **asked: Any) -> Catalog:
     require_askable(asked)
     kept = _there(path)
     groups = _groups(kept, asked)
-    found = Catalog(ReadRecords([line for name in groups for line in kept.lines(name, asked)]))
+    found = Catalog(ReadRecords(kept.lines(groups, asked)))
     return found if kept.decides(asked) else found.where(**asked)
 
 

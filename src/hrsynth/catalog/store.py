@@ -5,24 +5,27 @@ from __future__ import annotations
 import contextlib
 import errno
 import gzip
+import json
 import sqlite3
 import zlib
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from importlib import resources
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, overload
 
 from ..description.files import replacement
 from ..errors import BadRequest, BuildStopped
-from .fits import APART, conditions, names, texts
+from .fits import chains, conditions, texts
 from .journal import ENDING, Journal
-from .jsonl import FORMAT, decoded, encoded, record, require_version, word_of
+from .jsonl import FORMAT, decoded, encoded, leading_word, record, require_version
 from .words import VERSION
 
 DATABASES = (".sqlite", ".sqlite3", ".db")
 """Endings of a store that is one SQLite file."""
 LINES, PACKED = ".jsonl", ".jsonl.gz"
 """Endings of the files of a folder."""
+READ_AT_ONCE = 500
+"""Lines that are read from a SQLite file together."""
 PACKED_ABOVE = 10_000
 """Records of a group above which its file is compressed."""
 PUBLISHED = "published"
@@ -43,8 +46,9 @@ class Store(Protocol):
     def groups(self) -> list[str]:
         """The groups that are stored, by name."""
 
-    def lines(self, group: str, asked: Mapping[str, Any]) -> list[str]:
-        """The lines of a group, sorted by word, without some that do not fit what is asked for (:mod:`.fits`)."""
+    def lines(self, groups: Sequence[str], asked: Mapping[str, Any]) -> Sequence[str]:
+        """The lines of groups, sorted by word in each, without some that do not fit what is asked for
+        (:mod:`.fits`)."""
 
     def decides(self, asked: Mapping[str, Any]) -> bool:
         """Whether these are all lines that fit, and no others."""
@@ -72,8 +76,8 @@ class Folder:
         return sorted({file.name.partition(LINES)[0] for file in self.path.glob(f"*{LINES}*")
                        if file.name.endswith((LINES, PACKED))})
 
-    def lines(self, group: str, asked: Mapping[str, Any]) -> list[str]:
-        return decoded(self.content(group), str(self.file(group)))
+    def lines(self, groups: Sequence[str], asked: Mapping[str, Any]) -> list[str]:
+        return [line for group in groups for line in decoded(self.content(group), str(self.file(group)))]
 
     def content(self, group: str) -> bytes:
         """The bytes of a group's lines; raises ``BadRequest`` where they cannot be read."""
@@ -89,7 +93,7 @@ class Folder:
         return all(value is None for value in asked.values())
 
     def count(self, group: str) -> int:
-        return len(self.lines(group, {}))
+        return len(self.lines([group], {}))
 
     def write(self, group: str, lines: Iterable[str]) -> None:
         lines = list(lines)
@@ -122,13 +126,15 @@ class Database:
         with self._read() as file:
             return [name for name, in file.execute('SELECT DISTINCT "group" FROM records ORDER BY 1')]
 
-    def lines(self, group: str, asked: Mapping[str, Any]) -> list[str]:
+    def lines(self, groups: Sequence[str], asked: Mapping[str, Any]) -> Sequence[str]:
         known = self._known()
         told = [each for name, each in conditions(asked).items() if each.row and known(name)]
-        met, values = ['"group" = ?', *(str(each.row) for each in told)], [v for each in told for v in each.values]
-        with self._read() as file:
-            rows = file.execute(f"SELECT line FROM records WHERE {' AND '.join(met)} ORDER BY word", [group, *values])
-            return [text for text, in rows]
+        met = [f'"group" IN ({", ".join("?" * len(groups))})', *(str(each.row) for each in told)]
+        values = [*groups, *(value for each in told for value in each.values)]
+        with _asked(self.path):
+            file = self._open()
+            rows = file.execute(f'SELECT rowid FROM records WHERE {" AND ".join(met)} ORDER BY "group", word', values)
+            return StoredLines(self.path, file, [number for number, in rows])
 
     def decides(self, asked: Mapping[str, Any]) -> bool:
         known = self._known()
@@ -141,11 +147,12 @@ class Database:
     def _known(self) -> Callable[[str], bool]:
         """Whether the file can tell of what is asked by a name."""
         with self._read() as file:
-            new = file.execute("SELECT count(*) FROM sqlite_master WHERE name = 'names'").fetchone()[0]
+            new = file.execute("SELECT count(*) FROM sqlite_master WHERE name = 'common_texts'").fetchone()[0]
         return lambda name: bool(new) or name in OLD_COLUMNS
 
     def write(self, group: str, lines: Iterable[str]) -> None:
-        kept = {} if not self.path.exists() else {name: self.lines(name, {}) for name in self.groups() if name != group}
+        kept = {} if not self.path.exists() else {
+            name: self.lines([name], {}) for name in self.groups() if name != group}
         with writable(self.path), replacement(self.path, sync=True) as draft:
             draft.unlink(missing_ok=True)
             try:
@@ -164,15 +171,45 @@ class Database:
     @contextlib.contextmanager
     def _read(self) -> Iterator[sqlite3.Connection]:
         """The file to read; raises ``BadRequest`` for something else, or another version."""
+        with _asked(self.path), contextlib.closing(self._open()) as file:
+            yield file
+
+    def _open(self) -> sqlite3.Connection:
         with _readable(self.path):
             self.path.open("rb").close()
-        try:
-            address = f"{self.path.absolute().as_uri()}?mode=ro"
-            with contextlib.closing(sqlite3.connect(address, uri=True)) as file:
-                require_version(file.execute("SELECT format, catalog FROM versions").fetchone(), str(self.path))
-                yield file
-        except sqlite3.Error as error:
-            raise BadRequest(f"{self.path}: no file of the catalog: {error}") from None
+        file = sqlite3.connect(f"{self.path.absolute().as_uri()}?mode=ro", uri=True, check_same_thread=False)
+        require_version(file.execute("SELECT format, catalog FROM versions").fetchone(), str(self.path))
+        return file
+
+
+class StoredLines(Sequence[str]):
+    """Lines of a SQLite file, by the numbers of their rows; they are read, some at a time, when they are looked at."""
+
+    def __init__(self, path: Path, file: sqlite3.Connection, numbers: Sequence[int]) -> None:
+        self._path, self._file, self._numbers, self._read = path, file, numbers, dict[int, list[str]]()
+
+    def __len__(self) -> int:
+        return len(self._numbers)
+
+    @overload
+    def __getitem__(self, place: int) -> str: ...
+
+    @overload
+    def __getitem__(self, place: slice) -> Sequence[str]: ...
+
+    def __getitem__(self, place: int | slice) -> str | Sequence[str]:
+        if isinstance(place, slice):
+            return [self[i] for i in range(*place.indices(len(self)))]
+        part, offset = divmod(range(len(self))[place], READ_AT_ONCE)
+        if part not in self._read:
+            wanted = self._numbers[part * READ_AT_ONCE : (part + 1) * READ_AT_ONCE]
+            with _asked(self._path):
+                older = self._file.execute("SELECT 1 FROM sqlite_master WHERE name = 'lines'").fetchone() is None
+                found = dict(self._file.execute(
+                    f"SELECT rowid, line FROM {'records' if older else 'lines'} WHERE rowid IN "
+                    "(SELECT value FROM json_each(?))", (json.dumps(wanted),)))
+            self._read[part] = [found[number] for number in wanted]
+        return self._read[part][offset]
 
 
 def store(path: str | Path) -> Store:
@@ -196,6 +233,15 @@ def _opened(file: Path, name: str, group: str, anew: bool) -> Journal:
     for draft in file.parent.glob(f".{file.name}.*.tmp"):
         draft.unlink(missing_ok=True)
     return journal
+
+
+@contextlib.contextmanager
+def _asked(file: Path) -> Iterator[None]:
+    """What SQLite complains of is a bad request."""
+    try:
+        yield
+    except sqlite3.Error as error:
+        raise BadRequest(f"{file}: no file of the catalog: {error}") from None
 
 
 @contextlib.contextmanager
@@ -223,21 +269,27 @@ def _write_tables(path: Path, groups: Mapping[str, Iterable[str]]) -> None:
         file.execute("PRAGMA journal_mode = OFF")
         columns = ", ".join(f"{name} {kind}" for name, kind in COLUMNS.items())
         file.execute('CREATE TABLE versions (format INTEGER, catalog INTEGER)')
-        file.execute(f'CREATE TABLE records ("group" TEXT, word TEXT, {columns}, line TEXT, texts TEXT, '
-                     'PRIMARY KEY ("group", word))')  # rows are too long for a table without rowids
+        file.execute(f'CREATE TABLE records ("group" TEXT, word TEXT, {columns}, own TEXT, common INTEGER, '
+                     'PRIMARY KEY ("group", word))')
         file.execute("INSERT INTO versions VALUES (?, ?)", (FORMAT, VERSION))
-        file.execute("CREATE TABLE names (name TEXT, word TEXT, PRIMARY KEY (name, word)) WITHOUT ROWID")
+        file.execute("CREATE TABLE lines (record INTEGER PRIMARY KEY, line TEXT)")
+        for table in ("common_texts", "names"):
+            file.execute(f"CREATE TABLE {table} (id INTEGER PRIMARY KEY, text TEXT)")
+        file.execute("CREATE TABLE called (name INTEGER, record INTEGER, PRIMARY KEY (name, record)) WITHOUT ROWID")
         marks = ", ".join("?" * (len(COLUMNS) + 4))
+        common, called, number = dict[str, int](), dict[str, int](), 0
         for group, lines in sorted(groups.items()):
-            ordered = sorted(lines, key=word_of)
-            file.executemany(f"INSERT INTO records VALUES ({marks})", (_row(group, line) for line in ordered))
-            file.executemany("INSERT OR IGNORE INTO names VALUES (?, ?)", (
-                (name, found["word"]) for found in map(record, ordered) for name in sorted(names(found))))
+            for line in sorted(lines, key=leading_word):
+                found, number = record(line), number + 1
+                own, others = texts(found)
+                file.execute(f"INSERT INTO records VALUES ({marks})", (
+                    group, found["word"], *(found.get(name) for name in COLUMNS), own,
+                    common.setdefault(others, len(common))))
+                file.execute("INSERT INTO lines VALUES (?, ?)", (number, line))
+                file.executemany("INSERT INTO called VALUES (?, ?)", [
+                    (called.setdefault(name, len(called)), number) for name in sorted(chains(found))])
+        for table, known in (("common_texts", common), ("names", called)):
+            file.executemany(f"INSERT INTO {table} VALUES (?, ?)", ((i, text) for text, i in known.items()))
         for name in ("word", *COLUMNS):
             file.execute(f"CREATE INDEX records_{name} ON records ({name})")
         file.commit()
-
-
-def _row(group: str, line: str) -> tuple[Any, ...]:
-    found = record(line)
-    return (group, found["word"], *(found.get(name) for name in COLUMNS), line, APART.join(texts(found)))
