@@ -116,6 +116,24 @@ def test_walks_in_step_end_where_each_ends_alone(robot: str) -> None:
             assert target.wanted.tolist() == same.wanted.tolist()
 
 
+@pytest.mark.some(2)
+@pytest.mark.parametrize("robot", ["quattro", "3rrr_m1", "i4l", "orthoglide", "gough_stewart", "delta", "3rps"])
+def test_samples_do_not_rest_on_rounding(robot: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Other last digits of the loops' Jacobian turn the bases of its kernel, but lead to the same configurations."""
+    drawn = setting_of(robot).everything
+    exactly, rng = PinocchioModel.jacobian, np.random.default_rng(4)
+
+    def rounded(self: PinocchioModel, q: np.ndarray) -> np.ndarray:
+        J = exactly(self, q)
+        return J * (1 + 4e-16 * rng.normal(size=J.shape))
+
+    plain = sample(PinocchioModel(drawn.twin.mechanism), drawn.question, 3)
+    monkeypatch.setattr(PinocchioModel, "jacobian", rounded)
+    other = sample(PinocchioModel(drawn.twin.mechanism), drawn.question, 3)
+    for one, two in zip(plain.members, other.members, strict=True):
+        assert np.abs(drawn.twin.difference(one.configuration.q, two.configuration.q)).max() < 1e-6
+
+
 @pytest.mark.some(1)
 @pytest.mark.parametrize("dimensions", [1000, 1002])
 def test_a_sample_with_a_faint_turn_is_of_the_same_mode(dimensions: int) -> None:

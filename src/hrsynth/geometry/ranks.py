@@ -92,6 +92,12 @@ def range_bases(matrices: Sequence[Array], scale: float | None = None) -> list[t
     return [(U[:, : rank.value], rank) for U, rank in ranks]
 
 
+def random_in(basis: Array, rng: np.random.Generator) -> Array:
+    """A random vector (rows,) of the space that an orthonormal basis (rows, k) spans, whichever basis that is: a normal
+    one, projected."""
+    return np.asarray(basis @ (basis.T @ rng.normal(size=len(basis))))
+
+
 def space_basis(matrix: Array, scale: float | None = None) -> Array:
     """An orthonormal basis (rows, rank) of the column space that depends on the space alone, not on its columns or the
     last digit: coordinate axes where these span it, else those that lie nearest to it, one after the other, as they

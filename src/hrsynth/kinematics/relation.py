@@ -94,6 +94,11 @@ class Measurement(Value):
         """Rows of each observation."""
         return tuple(o.size for o in self.observations)
 
+    @property
+    def size(self) -> int:
+        """Rows of all that is asked."""
+        return self.twist_rows + sum(self.sizes) + 6 * len(self.bodies)
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Relation(Value):

@@ -2,7 +2,8 @@
 
 Each sample is reached from the zero configuration by steps that follow the branch (:mod:`.branch`), halved until they
 do, away from singularities of the loops; and the robot, led again along the poses and directions of the way, arrives.
-What fails is discarded and counted. All samples must agree in what tells operation modes apart (:mod:`.branch`).
+What fails is discarded and counted. Random vectors are drawn in coordinates and projected, so that no step depends on
+which basis of a space rounding gives. All samples must agree in what tells operation modes apart (:mod:`.branch`).
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import numpy as np
 
 from ..budgets import EASY_ITERATIONS
 from ..errors import BadMechanism, BranchPoint, NotMeasured, NotSampled
-from ..geometry.ranks import kernel_basis, largest_angle, range_bases
+from ..geometry.ranks import kernel_basis, largest_angle, random_in, range_bases
 from ..geometry.vectors import Array
 from ..mechanism.observation import Observation
 from ..results import Value
@@ -258,7 +259,7 @@ class _Walks:
         """The samples at the ends of random walks from these configurations, in step; without those that are blocked,
         or whose ranks are not clear."""
         question = self.question
-        noise = self.rng.normal(size=(len(starts), STEPS + 1, relation(starts[0], question).dimension))
+        noise = self.rng.normal(size=(len(starts), STEPS + 1, question.size))
         walkers = [_Walker(start, iter(own), WEAKEST * start.kernel()[1].weakest)
                    for start, own in zip(starts, noise, strict=True)]
         for _ in range(STEPS):
@@ -298,14 +299,12 @@ class _Walks:
 
     def _aim(self, walker: _Walker, basis: Array) -> Array:
         """Where to go next, in this basis of (t, u̇): near where the walk last went, or anywhere."""
-        count = basis.shape[1]
-
         def noise() -> Array:
             drawn = next(walker.noise, None)
-            return drawn if drawn is not None and len(drawn) == count else np.asarray(self.rng.normal(size=count))
+            return np.asarray(self.rng.normal(size=len(basis))) if drawn is None else drawn
 
-        wanted = noise() if walker.wish is None else basis.T @ walker.wish
-        return wanted + 0.2 * noise() / np.sqrt(count)
+        wish = noise() if walker.wish is None else walker.wish
+        return np.asarray(basis.T @ (wish + 0.2 * noise() / np.sqrt(basis.shape[1])))
 
     def _velocities(self, here: Sequence[ClosedConfiguration], aims: Sequence[Callable[[Array], Array]]
                     ) -> list[tuple[Array, Array] | None]:
@@ -415,9 +414,8 @@ def _regular(start: ClosedConfiguration, rng: np.random.Generator) -> bool:
 
 def _anywhere(at: ClosedConfiguration, rng: np.random.Generator) -> Array:
     """A random joint velocity, idle motions included, a unit vector."""
-    kernel, _ = at.kernel()
-    velocity: Array = kernel @ rng.normal(size=kernel.shape[1])
-    return velocity / np.linalg.norm(velocity)
+    velocity = random_in(at.kernel()[0], rng)
+    return np.asarray(velocity / np.linalg.norm(velocity))
 
 
 def random_walk(start: ClosedConfiguration, count: int, seed: int = 0, steps: int = 40
@@ -431,7 +429,7 @@ def random_walk(start: ClosedConfiguration, count: int, seed: int = 0, steps: in
         here, velocity = start, np.zeros(start.twin.nv)
         for _ in range(steps):
             kernel, _ = here.kernel()
-            velocity = kernel @ (kernel.T @ velocity + rng.normal(size=kernel.shape[1]) / 2)
+            velocity = kernel @ (kernel.T @ (velocity + rng.normal(size=len(kernel)) / 2))
             velocity /= np.linalg.norm(velocity)
             moved = next((m for part in HALVED if (m := _moved(here, 2 * velocity, part)) is not None), None)
             if moved is None or moved.kernel()[1].weakest < weakest:

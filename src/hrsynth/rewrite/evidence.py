@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..geometry.ranks import kernel_basis
+from ..geometry.ranks import kernel_basis, random_in
 from ..geometry.vectors import Array, transform, unit
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.pinocchio_model import PinocchioModel
@@ -224,7 +224,7 @@ def _moved(mechanism: Mechanism, reference: str, nodes: set[str], joints: Sequen
         else:
             for _ in range(4):
                 kernel, _ = ClosedConfiguration.of(twin, q).kernel()
-                q, _ = solve(twin, twin.moved(q, 0.12 * kernel @ rng.normal(size=kernel.shape[1])), tolerance=SOLVED)
+                q, _ = solve(twin, twin.moved(q, 0.12 * random_in(kernel, rng)), tolerance=SOLVED)
         X = twin.pose(q, before)
         rotations.append(X[:3, :3] @ home[:3, :3].T)
         anchors.append(transform(X, local))
