@@ -75,7 +75,7 @@ def test_a_zero_of_the_expression_where_the_platform_has_fewer_freedoms_is_no_di
     ("3rrr_m1", None, False), ("rrrrr_m1", None, False), ("gough_stewart", "1,2,3", False), ("quattro", "1,4", False),
     ("3rrr_m2", None, True), ("rrrrr_m1", None, True)])
 def test_a_condition_whose_sign_changes_has_poses_on_its_locus(robot: str, legs: str | None, real: bool) -> None:
-    answer = found(robot, legs, real=real)
+    answer = singular(load(robot), legs, real=real, points=500)
     assert answer.condition.signed
     assert min(answer.checked.sides) > 0
     assert len(answer.examples) > 0
