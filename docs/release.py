@@ -23,10 +23,10 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 NEEDED = ("Makefile", "CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "LICENSE", "README.md", "mkdocs.yml",
-          "requirements/main.txt", "robots/quattro.urdf", "catalog/planar.jsonl.gz", "notebooks/1_the_idea.ipynb",
+          "requirements/main.txt", "robots/quattro.urdf", "catalog/mixed.jsonl.gz", "notebooks/1_the_idea.ipynb",
           "docs/pages/theory.md", "tests/oracle.py", "benchmarks/table.py", "src/hrsynth/claims.toml")
 """What a source archive must hold, of each kind of file something."""
-PACKAGED = ("hrsynth/robots/quattro.urdf", "hrsynth/catalog/shipped/planar.jsonl.gz")
+PACKAGED = ("hrsynth/robots/quattro.urdf", "hrsynth/catalog/shipped/mixed.jsonl.gz")
 """What a wheel must hold besides all files of the package itself: where its links lead."""
 
 

@@ -1,9 +1,8 @@
 """Planar robots, complete: the seven chains of three joints R and P, with every motor and every observed segment.
 
 Three legs on a rigid platform move it with three freedoms, two legs that end on one R move a point with two. Special
-geometry: the rails of all legs that begin with a P are parallel. With chains in which parallelograms take the place of
-P or R joints: equal legs with every motor, and all sets of three legs driven at the base, of four where there is no
-parallelogram.
+geometry: the rails of all legs that begin with a P are parallel; and equal legs in which parallelograms take the place
+of P or R joints. Four legs, one more than freedoms, are driven at the base.
 """
 
 from __future__ import annotations
@@ -48,8 +47,8 @@ def _kinds(rail: str, motors: int, tip: str = "RP") -> list[LegWord]:
 
 
 def words() -> Iterator[RobotWord]:
-    """Robots with three and with two freedoms, of general geometry and with parallel rails; legs of all chains; one leg
-    more than freedoms."""
+    """Robots with three and with two freedoms, of general geometry and with parallel rails; with one leg more than
+    freedoms."""
     for rail in ("h", "x"):
         yield from robots(_kinds(rail, 3), 3)
         yield from robots(_kinds(rail, 2, tip="R"), 2, "point")
@@ -59,7 +58,4 @@ def words() -> Iterator[RobotWord]:
                 yield RobotWord.of([moved] * 3)
                 if chain.joints[-1].letter == "R":
                     yield RobotWord.of([moved] * 2, platform="point")
-    plain, other = ([base_driven(seen) for chain in found for seen in watched(chain)]
-                    for found in (chains(), with_parallelograms()))
-    yield from robots([*plain, *other], 3)
-    yield from robots(plain, 4)
+    yield from robots([base_driven(seen) for chain in chains() for seen in watched(chain)], 4)
