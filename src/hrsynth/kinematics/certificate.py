@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -65,7 +66,7 @@ def certify(samples: Samples, hidden: Mechanism, *, count: int | None = None, bo
 
     ``bodies`` are further links whose twists must agree too. Only the first ``count`` samples are used. Each actuator
     must be the angle of one direction, and where the hidden robot is ``complete`` each direction must have its own
-    actuators (a part-way rewriting is led along every second target).
+    actuators (a part-way rewriting is led along every second target, along all where it misses so).
     """
     members = samples.members[:count]
     question = samples.question
@@ -90,12 +91,18 @@ def certify(samples: Samples, hidden: Mechanism, *, count: int | None = None, bo
         worst = start
         angle = np.pi / 2
         return verdict(f"not assembled at the zero configuration (loop {twin.worst_loop(twin.q0)[0]!r} misses)")
-    ways = [[target if not blind else target.of(lambda o: o.link not in blind)
-             for target in (member.way if complete else member.way[1::2])] for member in members]
-    followed = list(track_paths(twin, ways))
+    ways = [[target if not blind else target.of(lambda o: o.link not in blind) for target in member.way]
+            for member in members]
+    followed = _followed(twin, ways if complete else [way[::-2][::-1] for way in ways])
+    start_target = question.target(samples.start).of(lambda o: o.link not in blind)
+    for denser in (1, CLOSER):
+        missed = [i for i, led in enumerate(followed) if not _arrived(led)]
+        again = [_between([start_target, *ways[i]], denser) for i in missed]
+        for i, led in zip(missed, _followed(twin, again), strict=True):
+            followed[i] = led
     arrived = list[Array]()
     for led in followed:
-        if isinstance(led, NotMeasured) or not led[1] <= FOLLOWED:
+        if isinstance(led, NotMeasured) or not _arrived(led):
             break
         arrived.append(led[0])
     if kept:
@@ -128,6 +135,25 @@ def certify(samples: Samples, hidden: Mechanism, *, count: int | None = None, bo
             angle = np.pi / 2
             return verdict("the virtual actuators do not parametrise the observed directions")
     return verdict("")
+
+
+CLOSER = 8
+"""Parts between two targets of a way, where a robot that is led along it misses one."""
+Led = tuple[Array, float] | NotMeasured
+"""Where a robot was led to, and by how much it misses; or what cannot be measured on the way."""
+
+
+def _followed(twin: PinocchioModel, ways: Sequence[Sequence[Target]]) -> list[Led]:
+    return list(track_paths(twin, ways)) if ways else []
+
+
+def _between(way: Sequence[Target], parts: int) -> list[Target]:
+    """A way after its first target, with so many parts between two targets."""
+    return [one.between(other, part / parts) for one, other in pairwise(way) for part in range(1, parts + 1)]
+
+
+def _arrived(led: Led) -> bool:
+    return not isinstance(led, NotMeasured) and led[1] <= FOLLOWED
 
 
 def _as_they_were(samples: Samples, hidden: Mechanism) -> tuple[str, ...]:

@@ -65,7 +65,8 @@ WEAKEST = 0.05
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Sample(Value):
-    """A closed configuration, the targets passed on the way to it (the last one its own), and ρ there."""
+    """A closed configuration, the targets of all configurations passed on the way to it (the last one its own), and ρ
+    there."""
 
     configuration: ClosedConfiguration
     way: tuple[Target, ...]
@@ -193,26 +194,28 @@ def _firmest(found: Sequence[ClosedConfiguration]) -> ClosedConfiguration:
 
 @dataclass(eq=False)
 class _Walker:
-    """A random walk: where it is, where in (t, u̇) it last went, the targets it passed, the random vectors that it takes
-    first, and how weak the loops may become."""
+    """A random walk: where it is, where in (t, u̇) it last went, the configurations that it passed in its last step, the
+    targets of all that it passed, the random vectors that it takes first, and how weak the loops may become."""
 
     here: ClosedConfiguration
     noise: Iterator[Array]
     weakest: float
     wish: Array | None = None
-    way: list[Target] = field(default_factory=list)
+    passed: Sequence[ClosedConfiguration] = ()
+    way: list[Target | None] = field(default_factory=list)
 
 
 @dataclass(frozen=True, eq=False)
 class _Stride:
     """A step on its way: where it has come to, the joint velocity there and its (t, u̇), which part of it is done and
-    which comes next."""
+    which comes next, and what it passed."""
 
     here: ClosedConfiguration
     velocity: Array
     direction: Array
     came: float = 0.0
     part: float = 1.0
+    passed: tuple[ClosedConfiguration, ...] = ()
 
     def tangent(self) -> Array:
         """The next part of it, (nv,)."""
@@ -268,14 +271,14 @@ class _Walks:
                     idly = 2 * _anywhere(walker.here, self.rng)
                     walker.here = next((there for part in HALVED
                                         if (there := _moved(walker.here, idly, part)) is not None), walker.here)
-            arrived = self._step(walkers)
-            targets = _measured(question.targets, [walker.here for walker in arrived])
-            walkers = []
-            for walker, target in zip(arrived, targets, strict=True):
-                if target is not None:
-                    walker.way.append(target)
-                    walkers.append(walker)
-        steady = [(at, walker.way) for walker in walkers if (at := _steady(walker.here)) is not None]
+            walkers = self._step(walkers)
+            passed = [(walker, at) for walker in walkers for at in walker.passed]
+            targets = _measured(question.targets, [at for _, at in passed])
+            for (walker, _), target in zip(passed, targets, strict=True):
+                walker.way.append(target)
+            walkers = [walker for walker in walkers if None not in walker.way]
+        steady = [(at, [each for each in walker.way if each is not None]) for walker in walkers
+                  if (at := _steady(walker.here)) is not None]
         found = _measured(lambda at: relations(at, question, question.rows_together(at)), [at for at, _ in steady])
         return [Sample(at, tuple(way), each) for (at, way), each in zip(steady, found, strict=True)
                 if each is not None and each.gap >= RANK_GAP]
@@ -290,8 +293,8 @@ class _Walks:
             ends = self._stride({i: _Stride(walker.here, *aim) for i, (walker, aim)
                                  in enumerate(zip(left, aims, strict=True)) if aim is not None},
                                 [walker.weakest for walker in left])
-            for i, (here, direction) in ends.items():
-                left[i].here, left[i].wish = here, direction
+            for i, (passed, direction) in ends.items():
+                left[i].here, left[i].wish, left[i].passed = passed[-1], direction, passed
             left = [walker for i, walker in enumerate(left) if i not in ends]
             for walker in left:
                 walker.wish = None
@@ -322,10 +325,10 @@ class _Walks:
         return found
 
     def _stride(self, going: dict[int, _Stride], weakest: Sequence[float]
-                ) -> dict[int, tuple[ClosedConfiguration, Array]]:
-        """Where steps along (t, u̇) lead, in parts that follow the branch, and their last directions; without those that
-        come too near to a singularity of the loops."""
-        ended: dict[int, tuple[ClosedConfiguration, Array]] = {}
+                ) -> dict[int, tuple[tuple[ClosedConfiguration, ...], Array]]:
+        """The configurations to which steps along (t, u̇) lead, in parts that follow the branch, and their last
+        directions; without those that come too near to a singularity of the loops."""
+        ended: dict[int, tuple[tuple[ClosedConfiguration, ...], Array]] = {}
         while going:
             onward: dict[int, _Stride] = {}
             for (i, at), there in zip(going.items(), self._parts(list(going.values())), strict=True):
@@ -334,10 +337,11 @@ class _Walks:
                     if at.part / 2 >= HALVED[-1]:
                         onward[i] = replace(at, part=at.part / 2)
                 elif there.kernel()[1].weakest >= weakest[i]:
+                    passed = (*at.passed, there)
                     if came < 1:
-                        onward[i] = _Stride(there, at.velocity, at.direction, came, min(2 * at.part, 1 - came))
+                        onward[i] = _Stride(there, at.velocity, at.direction, came, min(2 * at.part, 1 - came), passed)
                     else:
-                        ended[i] = there, at.direction
+                        ended[i] = passed, at.direction
             turned = [i for i, at in onward.items() if at.here is not going[i].here]
             moving = self._velocities([onward[i].here for i in turned], [onward[i].on for i in turned])
             for i, each in zip(turned, moving, strict=True):
@@ -446,8 +450,8 @@ def random_walk(start: ClosedConfiguration, count: int, seed: int = 0, steps: in
 
 def track_paths(twin: PinocchioModel, ways: Sequence[Sequence[Target]], iterations: int = 120
                 ) -> Iterator[tuple[Array, float] | NotMeasured]:
-    """The configurations a twin reaches when it is led from its zero configuration along ways of equal length, and the
-    residuals, or what cannot be measured on a way; all ways in step, or each alone where that is so of one."""
+    """The configurations a twin reaches when it is led from its zero configuration along ways, and the residuals, or
+    what cannot be measured on a way; all ways in step, or each alone where that is so of one."""
     try:
         yield from _tracked(twin, ways, iterations)
     except NotMeasured as error:
@@ -458,7 +462,9 @@ def track_paths(twin: PinocchioModel, ways: Sequence[Sequence[Target]], iteratio
 
 
 def _tracked(twin: PinocchioModel, ways: Sequence[Sequence[Target]], iterations: int) -> list[tuple[Array, float]]:
-    found, stages = [(twin.q0, 0.0)] * len(ways), list(zip(*ways, strict=True))
+    longest = max(map(len, ways))  # a shorter way ends with its last target, again and again
+    found, stages = [(twin.q0, 0.0)] * len(ways), list(zip(*(
+        [*way, *[way[-1]] * (longest - len(way))] for way in ways), strict=True))
     places = Places(twin, stages[0][0] if stages else None)
     for targets in stages:
         tolerance = SOLVED if targets is stages[-1] else PASSED_BY

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..geometry.gauss_newton import Damping, Residual, descend, descend_together
 from ..geometry.screws import point_velocity
-from ..geometry.so3 import logarithm
+from ..geometry.so3 import exponential, logarithm
 from ..geometry.vectors import Array
 from ..mechanism.observation import Observation
 from ..results import Value
@@ -86,6 +86,17 @@ class Target(Value):
     def of(self, chosen: Callable[[Observation], bool]) -> Target:
         """The same pose, with some of the measured values."""
         return replace(self, measured=tuple(pair for pair in self.measured if chosen(pair[0])))
+
+    def between(self, other: Target, fraction: float) -> Target:
+        """What lies ``fraction`` of the way from this target to another of the same kind, all values in proportion."""
+        if fraction == 1:
+            return other
+        pose = other.pose.copy()
+        pose[:3, :3] = exponential(fraction * logarithm(other.pose[:3, :3] @ self.pose[:3, :3].T)) @ self.pose[:3, :3]
+        pose[:3, 3] = (1 - fraction) * self.pose[:3, 3] + fraction * other.pose[:3, 3]
+        return replace(self, pose=pose, measured=tuple(
+            (o, (1 - fraction) * one + fraction * two)
+            for (o, one), (_, two) in zip(self.measured, other.measured, strict=True)))
 
     @cached_property
     def wanted(self) -> Array:
