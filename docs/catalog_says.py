@@ -83,8 +83,9 @@ def split(leg: LegWord, place: int) -> int:
 
 def translation_rank(word: RobotWord) -> int:
     """What legs that translate see: each the directions of R on both sides of the watched link, all together at most
-    three. Legs with two slides that never turn see the same, since all slides of the catalog are normal to z."""
-    seen, along = 0, 0
+    three. Slides of the catalog are normal to z: legs with two that never turn see z, and so does a leg with one that
+    tells two numbers, which are all that is normal to it."""
+    seen, along, known = 0, 0, False
     for leg in word.legs:
         numbers = split(leg, mark(leg) + 1)
         steady = [i for i, joint in enumerate(leg.joints) if joint.letter == "P" and not split(leg, i)]
@@ -92,7 +93,8 @@ def translation_rank(word: RobotWord) -> int:
             along = max(along, numbers)
         else:
             seen += numbers
-    return min(3, seen + along)
+            known |= len(steady) == 1 and numbers == 2
+    return min(3, seen + (0 if known else along))
 
 
 def studied(catalog: Catalog) -> list[Record]:

@@ -12,7 +12,7 @@ from .words import VERSION
 Record = Mapping[str, Any]
 """What the catalog says of one architecture; a field that is missing is not known or does not apply."""
 
-_FIRST = '{"word":"'
+_LINE_START = '{"word":"'
 
 FORMAT = 1
 """Version of the lines, the journal and the tables."""
@@ -60,7 +60,7 @@ def word_of(text: str) -> str:
 
 def leading_word(text: str) -> str:
     """The word with which a line begins that :func:`line` wrote."""
-    return text[len(_FIRST):text.index('"', len(_FIRST))] if text.startswith(_FIRST) else word_of(text)
+    return text[len(_LINE_START):text.index('"', len(_LINE_START))] if text.startswith(_LINE_START) else word_of(text)
 
 
 def encoded(group: str, lines: Iterable[str]) -> bytes:

@@ -259,4 +259,4 @@ def test_a_zero_pose_that_loses_a_freedom_is_called_singular(tmp_path: Path):
     assert check(stays).postures[0].hidden.classes.type2
     assert any("the zero pose is a Type 2 singularity of all legs together" in note.text for note in left.notes)
     assert not check(left).postures[0].hidden.classes.type2
-    assert [each.rank for each in legs(stays).sets] == [each.rank for each in legs(left).sets]
+    assert [each.rank for each in legs(stays).sets] == [each.rank for each in legs(left, seed=1).sets]

@@ -101,7 +101,7 @@ def test_enclosures_hold_the_error_and_its_rates(name, legs):
 @pytest.mark.parametrize(("name", "legs"), [("quattro", "1,4"), ("3rpr_m1", None), ("delta", None)])
 def test_boxes_that_lead_inwards_do_so_at_all_their_poses(name, legs):
     setting = ObservedRobot.of(name, legs)
-    error = PoseError.of(setting, setting.configurations[0])
+    error = PoseError.of(setting, setting.everything.start)
     n, rng = error.size, np.random.default_rng(0)
     middle, half = rng.normal(size=(300, n)) / 5, rng.uniform(0, 0.02, (300, n))
     proved, _ = InwardProver.of(error).inwards(middle, half)
