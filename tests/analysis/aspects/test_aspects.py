@@ -45,11 +45,11 @@ def aspects_of(robot: str, observe: str | None = None) -> Aspects:
 
 @cache
 def walk(robot: str, observe: str | None, count: int = 24, seed: int = 0) -> tuple[ClosedConfiguration, ...]:
-    """Random configurations in the working mode of the first of them."""
+    """Random configurations in the working mode of most of them."""
     aspects = aspects_of(robot, observe)
     found = tuple(random_walk(aspects.setting.samples.start, count, seed))
-    modes = aspects.enclosure(found[0]).forms.modes
-    return tuple(at for at in found if aspects.enclosure(at).forms.modes == modes)
+    modes = [aspects.enclosure(at).forms.modes for at in found]
+    return tuple(at for at, own in zip(found, modes, strict=True) if own == max(modes, key=modes.count))
 
 
 def pairs(robot: str, observe: str | None, count: int, seed: int = 0) -> list[tuple[ClosedConfiguration, ...]]:
