@@ -91,7 +91,7 @@ def furthest(path: list[ClosedConfiguration], joints: list[str]) -> tuple[str, f
 def test_paths_are_led_around_the_limits_that_others_pass(robot: Mechanism):
     """Limits that a path without them leaves: another path keeps to them, or none is found."""
     free = Aspects.of(robot)
-    places = list(random_walk(free.setting.samples.start, 40, 2))
+    places = list(random_walk(free.setting.samples.start, 40, 1))
     led = []
     for one, other in zip(places[:20:2], places[::-3], strict=False):
         plain = free.join(one, other)
