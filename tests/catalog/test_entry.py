@@ -133,8 +133,8 @@ def test_what_does_not_move_has_no_verdict():
 @pytest.mark.some(1)
 @pytest.mark.parametrize("name", TWO_FIRST)
 def test_screws_without_pinocchio_see_the_same(name):
-    """In maximal coordinates: dof, mobility and rank of all legs and of a smallest set, beside the zero configuration. At
-    zero, where a rank is less if the word makes it special (slides normal to z in all legs), that of Pinocchio there."""
+    """In maximal coordinates: dof, mobility and rank of all legs and of a smallest set, beside the zero configuration.
+    At zero, where a rank is less if the word makes it special (slides normal to z in all legs), Pinocchio's there."""
     for text in random.Random(7).sample(words(name), 3):
         found = entry(text)
         if "refused" in found:
