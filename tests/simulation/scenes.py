@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from _pytest.mark import ParameterSet
 
+from hrsynth.analysis.asked import configurations_at
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.analysis.posture import REGULAR, ConfigurationAnalysis
 from hrsynth.batch.reach import reach
@@ -18,6 +19,7 @@ from hrsynth.description import load, shipped
 from hrsynth.errors import PoseNotReached
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.sampling import random_walk
+from hrsynth.mechanism.pose import asked_pose
 from hrsynth.simulation.servo import ServoTask
 
 CONTROLLABLE = [
@@ -35,6 +37,14 @@ def few_first(names: list[str]) -> list[ParameterSet]:
     return [pytest.param(name, marks=[] if name in FEW else pytest.mark.slow) for name in names]
 
 
+GOALS = {
+    "3rpr_m1": "x=-0.0348661,y=-0.0173201,phi=15.870728deg",
+    "3rps": "x=-0.000819689,y=0.00476579,z=0.257054,rpy=-0.238694/0.273538/-0.0330048",
+    "3rrr_m1": "x=-0.0158034,y=0.0130921,phi=17.25872deg", "3upu": "x=0.0617457,y=-0.00740228,z=0.27462",
+    "gough_stewart": "x=0.0498488,y=-0.00885807,z=0.249452,rpy=0.094409/-0.0413902/-0.00108564",
+    "quattro": "x=0.072083,y=-0.0188462,z=-0.695841,phi=-20.228542deg",
+    "quattro_rigid": "x=-0.0652662,y=-0.031127,z=-0.534986", "rrrrr_m1": "x=0.0722611,y=0.220195"}
+"""Poses in general position: the goals whose rests are listed and counted again."""
 Legs = tuple[str, ...]
 
 
@@ -43,6 +53,11 @@ def setting(name: str, watched: Legs | None = None) -> ObservedRobot:
     """A shipped robot, all or some of its legs watched."""
     found = ObservedRobot.of(load(name)) if watched is None else setting(name)
     return found if watched is None else replace(found, observed=tuple(o for o in found.observed if o.leg in watched))
+
+
+def goal(name: str) -> ClosedConfiguration:
+    """The configuration at the pose of GOALS."""
+    return configurations_at(setting(name), [asked_pose(GOALS[name])])[0]
 
 
 @cache

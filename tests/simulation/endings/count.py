@@ -16,13 +16,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.geometry.vectors import Array
 from hrsynth.mechanism.observations.direction import Direction
 from hrsynth.mechanism.observations.point import ImagePoint
 from hrsynth.simulation.endings.endings import endings
 from hrsynth.simulation.endings.rests import Endings
 from oracle import Oracle
+from simulation.scenes import GOALS
 
 EPS = 1e-13
 FOUND, CLOSED, SAME = 1e-9, 1e-9, 1e-4
@@ -228,10 +228,8 @@ def counted(found: Endings, starts: int, seed: int = 1) -> Counted:
 def main() -> None:
     for name in sys.argv[2:]:
         robot, _, legs = name.partition(":")
-        setting = ObservedRobot.of(robot, legs.split(",") if legs else None)
-        at = setting.motion.pose(setting.configurations[3].pose(setting.motion.link))
         began = time.time()
-        found = endings(setting, at=str(at))
+        found = endings(robot, legs or None, at=GOALS[robot])
         listed = time.time()
         result = counted(found, int(sys.argv[1]))
         print(name, f"listed {len(found.rests)} ({len(found.attracting)} stable) in {listed - began:.0f} s; "

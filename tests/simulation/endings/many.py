@@ -23,6 +23,7 @@ from hrsynth.geometry.vectors import Array
 from hrsynth.simulation.endings.endings import endings
 from hrsynth.simulation.endings.rests import Endings
 from oracle import exponential
+from simulation.scenes import GOALS
 
 COUNTS = (("3rpr_m1", None), ("rrrrr_m1", None), ("3rrr_m1", None), ("quattro", "1,4"), ("quattro", "2,3"),
           ("quattro", None), ("quattro_rigid", None), ("gough_stewart", "1,3,5"), ("3rps", None))
@@ -394,10 +395,8 @@ def counted(found: Endings, starts: int, seed: int = 1) -> Counted:
 
 
 def listed(name: str, legs: str | None) -> Endings:
-    """The list that is counted again: all rests with the directions of the fourth sample."""
-    setting = ObservedRobot.of(name, legs)
-    at = setting.motion.pose(setting.configurations[3].pose(setting.motion.link))
-    return endings(setting, at=str(at))
+    """The list that is counted again: all rests with the directions at the robot's goal."""
+    return endings(name, legs, at=GOALS[name])
 
 
 def main() -> None:

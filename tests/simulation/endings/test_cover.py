@@ -17,6 +17,7 @@ from hrsynth.simulation.endings.cover import bounds, cover
 from hrsynth.simulation.endings.joint_error import JointError
 from hrsynth.simulation.endings.pose_error import PoseError
 from hrsynth.simulation.endings.subdivision import Subdivision
+from simulation import scenes
 from strategies import random_rotation, transformed
 
 STEP = 1e-6
@@ -142,8 +143,7 @@ def test_kinds_sum_up_to_the_number_of_the_closures(name, number):
 def test_rests_are_listed_however_far_away_they_are():
     """Of the 3-RPR, whose rods slide without end: at each of 28 poses the gradient by hand over (x, y, ψ) is small
     beside its parts; one is 274 lengths away. Each zero of it that least squares meets is a member."""
-    setting = ObservedRobot.of("3rpr_m1")
-    goal = setting.configurations[3]
+    setting, goal = scenes.setting("3rpr_m1"), scenes.goal("3rpr_m1")
     found = cover(setting, goal)
     assert found.complete
     assert found.bounded

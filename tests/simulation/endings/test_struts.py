@@ -15,6 +15,7 @@ from hrsynth.simulation.endings.endings import RestSearch
 from hrsynth.simulation.endings.pose_error import PoseError
 from hrsynth.simulation.endings.struts import Struts, coincide, meetings, parallel
 from hrsynth.simulation.endings.subdivision import Subdivision
+from simulation import scenes
 from strategies import random_rotation
 
 TURNS = {"as at the goal": 1, "by half a turn": -1}
@@ -31,8 +32,7 @@ def ends(turn):
 @cache
 def asked():
     """The robot, a goal, and the desired directions by hand."""
-    setting = ObservedRobot.of("3upu")
-    goal = setting.configurations[3]
+    setting, goal = scenes.setting("3upu"), scenes.goal("3upu")
     rods = goal.pose(setting.motion.link)[:3, 3] - ends(1)
     return setting, goal, rods / np.linalg.norm(rods, axis=1)[:, None]
 
