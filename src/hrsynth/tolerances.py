@@ -298,6 +298,9 @@ RUN_SHORTEST_STEP = 1e-9
 """Longest step (time constants) with which a servo run that cannot go on has been tried."""
 CRITICAL = 1e-11
 """Gradient of the error along the loops, and loops' residual, at which a critical point is found."""
+DEPENDENT = 1e-13
+"""Squares of singular values of the loops' equations, beside their sum, that do not count in a step that closes them.
+"""
 ERROR_ROUNDING = 1e-14
 """½ ‖e‖² below which it is rounding."""
 SAME_PRICE = 1e-9

@@ -28,6 +28,7 @@ from hrsynth.simulation.endings.search import (
     Critical,
     CriticalPoint,
     Expansion,
+    are_closed,
     in_mode,
     marks,
     starts,
@@ -137,9 +138,11 @@ class Lists:
         return self.every[first:]
 
     def _lead(self, pairs: Sequence[tuple[Array, int]]) -> dict[int, list[CriticalPoint]]:
-        """The rests that are new to which starts lead, by the numbers of the goals."""
-        found = descents([each.search.system for each in self.every], [q for q, _ in pairs], [k for _, k in pairs],
-                         self.idle)
+        """The rests that are new to which starts lead, by the numbers of the goals: those that leave no loop open."""
+        systems = [each.search.system for each in self.every]
+        found = descents(systems, [q for q, _ in pairs], [k for _, k in pairs], self.idle)
+        good = are_closed(systems[0], np.array([point.q for _, point in found]), SAME_ENDING) if found else ()
+        found = [each for each, kept in zip(found, good, strict=True) if kept]
         news: dict[int, list[CriticalPoint]] = {}
         for (k, point), place in zip(found, self.places([point.q for _, point in found]), strict=True):
             if self.every[k].add(point, place):

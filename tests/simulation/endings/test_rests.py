@@ -28,18 +28,20 @@ from hrsynth.mechanism.model import Limits
 from hrsynth.present.text.endings import endings as text
 from hrsynth.simulation.endings.completeness import Covers
 from hrsynth.simulation.endings.cover import bounds
-from hrsynth.simulation.endings.critical_poses import Lift, _held, critical_poses
+from hrsynth.simulation.endings.critical_poses import CriticalPoses, Lift, _held, critical_poses
 from hrsynth.simulation.endings.enclosure import _rates, enclosed
 from hrsynth.simulation.endings.endings import RestSearch, _ways, endings
 from hrsynth.simulation.endings.error import RestEquations
 from hrsynth.simulation.endings.pose_error import PoseError
 from hrsynth.simulation.endings.pose_system import LegSystem
 from hrsynth.simulation.endings.rests import Endings, RestPoint, stability
-from hrsynth.simulation.endings.search import CriticalPoint, descend, starts
+from hrsynth.simulation.endings.search import CriticalPoint, Tangents, ToldApart, anywhere, descend, starts, walked
 from hrsynth.simulation.law import FixedDirections, directions
 from hrsynth.simulation.run import Loop
+from oracle import Oracle
 from simulation.endings import many
 from simulation.endings.count import Descent, counted
+from simulation.scenes import GOALS, Legs, goal, setting
 
 FIVE_BAR, POSE = "rrrrr_m1", "x=0.02,y=0.25"
 @cache
@@ -286,6 +288,46 @@ def test_critical_poses_are_rests_and_joints_go_there() -> None:
     assert done.sum() > len(poses) / 2
     assert np.abs(lift.told(q[done]) - lift.wanted(poses.some(done))).max() < 1e-8
     assert np.abs(RestEquations(search.system, list(q[done].T)).G).max() < 1e-8
+
+
+@pytest.mark.some(1)
+@pytest.mark.parametrize(("name", "legs"), [("quattro", ("1", "4")), ("quattro_rigid", None), ("delta", None)])
+def test_no_loop_is_open_for_the_oracle(name: str, legs: Legs | None) -> None:
+    """Equations that follow from the others at samples do not where loops are singular: they hold all the same where
+    random closings, walks from there and joints of a pose are led; where they do not, nothing is a rest."""
+    found, rng = setting(name, legs), np.random.default_rng(0)
+    search, oracle = RestSearch.of(found, goal(name) if name in GOALS else found.configurations[3]), Oracle(
+        found.mechanism)
+
+    def left(q: np.ndarray) -> np.ndarray:
+        poses = [search.system.system.pose(link, q.T) for link in oracle.index]
+        return np.array([oracle.error(state) for state in np.stack(
+            [np.broadcast_to(X, (len(q), 4, 4)) for X in poses], axis=1)])
+
+    closings = anywhere(search.system, rng, 40)
+    assert len(closings) > 20
+    assert left(closings).max() < 1e-9
+    home = search.system.system.read(search.goal.pose)[None]
+    walks = walked(search.system, np.repeat(home, 20, axis=0), rng, 12)
+    assert np.abs(walks - home).max(axis=1).min() > 0.1
+    assert left(walks).max() < 1e-9
+    error = PoseError.of(found, search.goal)
+    assert error.coordinates is not None
+    p, R = error.coordinates.of([at for q in walks if (at := search._placed(q)) is not None])
+    u = np.array([directions(at, found.samples.question)[0] for q in walks if (at := search._placed(q)) is not None])
+    places = CriticalPoses(error.length * p, R, u, *np.zeros((2, len(p)), dtype=np.intp))
+    q, done = Lift(search.system, search.law.question.observations, error)(places, home)
+    assert done.sum() > len(p) / 2
+    assert left(q[done]).max() < 1e-8
+    known, astray = ToldApart(search.system, found), rng.uniform(-np.pi, np.pi, (30, home.shape[1]))
+    for _ in range(40):
+        at = RestEquations(search.system, list(astray.T))
+        astray = astray + np.clip(Tangents.of(at.DG).closing(at.G), -0.3, 0.3)
+    astray = astray[np.linalg.norm(RestEquations(search.system, list(astray.T)).G, axis=1) < 1e-11]
+    open_ = left(astray) > 1e-3
+    assert open_.any() == (name != "delta")
+    assert known.add([CriticalPoint(each, np.zeros(search.system.size[1]), 0.0, np.ones(4), 0.0)
+                      for each in astray[open_]]) == 0
 
 
 @pytest.mark.parametrize(("name", "legs"), [("quattro", "1,4"), ("3rpr_m1", None), ("gough_stewart", "1,3,5"),

@@ -37,7 +37,7 @@ from ...results import Value
 from ...tolerances import COVER_REACH, FOLLOWED, SAME_ENDING
 from .carried import CarriedVector, SweptChains
 from .cover import bounds
-from .error import RestEquations, RestSystem
+from .error import RestSystem
 from .pose_error import NotEnclosed, PoseError
 from .pose_system import LegSystem, unbound
 from .search import CriticalPoint, descend
@@ -281,8 +281,8 @@ class Lift:
         longest = np.maximum(2 * LONGEST_STEP, 4 * np.abs(wanted).max(axis=1) / steps)
         for _ in range(steps):
             here = q[going]
-            at = RestEquations(self.system, list(here.T))
-            vectors = self.vectors(at.carrier)
+            G, DG = self.system.closures(here)
+            vectors = self.vectors(SweptChains(self.system.system, list(here.T)))
             J = np.zeros((len(here), 3 * len(vectors), size))
             off = -wanted[going]
             for k, each in enumerate(vectors):
@@ -290,7 +290,7 @@ class Lift:
                 off[:, rows] += each.value
                 for part in each.parts:
                     J[:, rows, part.places] += part.sign * np.swapaxes(part.columns, -1, -2)
-            J, off = np.concatenate([at.DG, J], axis=1), np.concatenate([at.G, off], axis=1)
+            J, off = np.concatenate([DG, J], axis=1), np.concatenate([G, off], axis=1)
             r = np.abs(off).max(axis=1)
             good[going] = r < FOLLOWED
             left = ~good[going]

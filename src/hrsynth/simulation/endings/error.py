@@ -16,7 +16,6 @@ from typing import Any, Protocol
 import numpy as np
 
 from ...analysis.branch.loops import GearEquation, JointLoop, LoopRow, LoopSystem, loop_system
-from ...analysis.branch.part import whole
 from ...geometry.affine import crossed, stacked
 from ...geometry.jets import Jet, angle
 from ...geometry.so3 import exponential
@@ -259,10 +258,16 @@ class RestSystem(Value):
         """The same with equations that are independent at configurations (c, N)."""
         system = self.system
         every = [(loop, row) for loop in system.loops for row in loop.rows]
-        _, rates = whole(system, system.loops, system.gears, list(q.T), (len(q),))
-        chosen, count = independent(rates, self.size[1] or None), len(every)
+        chosen, count = independent(self.closures(q)[1], self.size[1] or None), len(every)
         return replace(self, rows=tuple(every[k] for k in chosen if k < count),
                        gears=tuple(system.gears[k - count] for k in chosen if k >= count))
+
+    def closures(self, q: Array) -> tuple[Array, Array]:
+        """All equations of the loops at configurations (c, N), (c, m'), and their derivatives (c, m', N): beyond
+        singularities of the loops ``rows`` may hold where those that were left out as dependent do not."""
+        every = tuple((loop, row) for loop in self.system.loops for row in loop.rows)
+        at = replace(self, rows=every, gears=self.system.gears, terms=()).at(list(q.T))
+        return at.G, at.DG
 
     @property
     def supposes(self) -> bool:

@@ -48,6 +48,7 @@ from ...tolerances import (
     COMMAND_STEP,
     CRITICAL,
     CRITICAL_FLAT,
+    DEPENDENT,
     ERROR_ROUNDING,
     SAME_ENDING,
     SEEN_ABOVE,
@@ -196,13 +197,22 @@ def _shortened(step: Array, longest: float) -> Array:
 
 
 def closed(system: RestSystem, q: Array, steps: int = 12) -> Array:
-    """Configurations (c, N) moved to the nearest closed ones, as far as Newton's method does it."""
+    """Configurations (c, N) moved to the nearest closed ones, as far as Gauss and Newton's method does it."""
     for _ in range(steps):
-        at = RestEquations(system, list(q.T))
-        if np.linalg.norm(at.G, axis=-1).max(initial=0.0) < CRITICAL:
+        G, DG = system.closures(q)
+        if np.linalg.norm(G, axis=-1).max(initial=0.0) < CRITICAL:
             break
-        q = q + _shortened(Tangents.of(at.DG).closing(at.G), LONGEST_STEP)
+        back = np.swapaxes(DG, -1, -2)
+        # all equations, of which some may depend on others: the shortest step
+        gram = DG @ back
+        gram += DEPENDENT * np.maximum(1.0, np.trace(gram, axis1=-2, axis2=-1))[:, None, None] * np.eye(G.shape[-1])
+        q = q + _shortened(times(back, -np.linalg.solve(gram, G[..., None])[..., 0]), LONGEST_STEP)
     return q
+
+
+def are_closed(system: RestSystem, q: Array, within: float = CRITICAL) -> NDArray[np.bool_]:
+    """At which configurations (c, N) all equations of the loops hold, to a residual."""
+    return np.asarray(np.linalg.norm(system.closures(q)[0], axis=-1) < within)
 
 
 def walked(system: RestSystem, q: Array, rng: np.random.Generator, steps: int, longest: float = WALK_STEP) -> Array:
@@ -212,7 +222,7 @@ def walked(system: RestSystem, q: Array, rng: np.random.Generator, steps: int, l
         way = times(tangents.Z, rng.normal(size=(len(q), tangents.Z.shape[-1])))
         there = closed(system, q + longest * rng.uniform(0.2, 1.0, (len(q), 1)) * way / np.abs(way).max(
             axis=-1, keepdims=True), 6)
-        good = np.linalg.norm(RestEquations(system, list(there.T)).G, axis=-1) < CRITICAL
+        good = are_closed(system, there)
         good &= np.abs(there - q).max(axis=-1) < 2 * longest
         q = np.where(good[:, None], there, q)
     return q
@@ -405,8 +415,11 @@ class ToldApart:
         self.families: dict[tuple[int, ...], list[CriticalPoint]] = {}
 
     def add(self, points: Sequence[CriticalPoint]) -> int:
-        """How many isolated ones are new."""
+        """How many isolated ones are new, of those that leave no loop open."""
         new = 0
+        if points:
+            good = are_closed(self.system, np.array([each.q for each in points]), SAME_ENDING)
+            points = [each for each, kept in zip(points, good, strict=True) if kept]
         told = marks(self.system, self.setting, self.bodies, points, self.told)
         for point, mark, across in zip(points, told, self._across(points), strict=True):
             more = len(point.curvatures) > self.freedoms
@@ -476,7 +489,7 @@ def anywhere(system: RestSystem, rng: np.random.Generator, count: int) -> Array:
     slides = np.array([each.slides for each in system.system.coordinates])
     q = rng.uniform(-1.0, 1.0, (count, len(slides))) * np.where(slides, WIDEST_SLIDE, np.pi)
     q = closed(system, q, 40)
-    return q[np.linalg.norm(RestEquations(system, list(q.T)).G, axis=-1) < CRITICAL]
+    return q[are_closed(system, q)]
 
 
 def in_mode(system: RestSystem, setting: ObservedRobot, q: Array) -> NDArray[np.bool_]:
