@@ -27,8 +27,8 @@ from simulation.scenes import GOALS
 
 COUNTS = (("3rpr_m1", None), ("rrrrr_m1", None), ("3rrr_m1", None), ("quattro", "1,4"), ("quattro", "2,3"),
           ("quattro", None), ("quattro_rigid", None), ("gough_stewart", "1,3,5"), ("3rps", None))
-WHOLE = ("3rpr_m1", "rrrrr_m1", "3rrr_m1")
-"""The robots whose lists hold all ends that were seen."""
+WHOLE = (("3rpr_m1", None), ("rrrrr_m1", None), ("3rrr_m1", None), ("quattro", "1,4"), ("quattro", "2,3"))
+"""The robots and legs whose lists hold all ends that were seen."""
 MEMBER, CONTINUUM, MODE, NONE, OUTSIDE = "member", "of a continuum", "another mode", "no rest", "outside"
 X, Y, Z = np.eye(3)
 MOTIONS: dict[str, tuple[Array, Array]] = {

@@ -321,8 +321,8 @@ def test_no_loop_is_open_for_the_oracle(name: str, legs: Legs | None) -> None:
     assert left(q[done]).max() < 1e-8
     known, astray = ToldApart(search.system, found), rng.uniform(-np.pi, np.pi, (30, home.shape[1]))
     for _ in range(40):
-        at = RestEquations(search.system, list(astray.T))
-        astray = astray + np.clip(Tangents.of(at.DG).closing(at.G), -0.3, 0.3)
+        here = RestEquations(search.system, list(astray.T))
+        astray = astray + np.clip(Tangents.of(here.DG).closing(here.G), -0.3, 0.3)
     astray = astray[np.linalg.norm(RestEquations(search.system, list(astray.T)).G, axis=1) < 1e-11]
     open_ = left(astray) > 1e-3
     assert open_.any() == (name != "delta")
@@ -366,7 +366,7 @@ def test_a_thousand_random_starts_find_no_other(name: str, legs: str | None) -> 
     """The same of the robots whose lists are told in the documentation, by the program that leads all at once; of those
     in space the lists are known not to be whole: descent leads nearly always to a member."""
     result = many.counted(many.listed(name, legs), 1000)
-    assert name not in many.WHOLE or not result.outside
+    assert (name, legs) not in many.WHOLE or not result.outside
     assert result.ends["descent", many.MEMBER] > 950
 
 
