@@ -1,8 +1,8 @@
 """Planar robots, complete: the seven chains of three joints R and P, with every motor and every observed segment.
 
 Three legs on a rigid platform move it with three freedoms, two legs that end on one R move a point with two. Special
-geometry: the rails of all legs that begin with a P are parallel; and equal legs in which parallelograms take the place
-of P or R joints. Four legs, one more than freedoms, are driven at the base.
+geometry: the rails of all legs that begin with a P are parallel. Parallelograms take the place of P or R joints, with
+every motor where the legs are equal; else each leg is driven at the base, as four legs are, one more than freedoms.
 """
 
 from __future__ import annotations
@@ -58,4 +58,8 @@ def words() -> Iterator[RobotWord]:
                 yield RobotWord.of([moved] * 3)
                 if chain.joints[-1].letter == "R":
                     yield RobotWord.of([moved] * 2, platform="point")
-    yield from robots([base_driven(seen) for chain in chains() for seen in watched(chain)], 4)
+    simple, mixed = ([base_driven(seen) for chain in kinds for seen in watched(chain)]
+                     for kinds in (chains(), [*chains(), *with_parallelograms()]))
+    yield from robots(simple, 4)
+    yield from robots(mixed, 3)
+    yield from robots([each for each in mixed if each.joints[-1].letter == "R"], 2, "point")
