@@ -424,6 +424,8 @@ BOX_ROUNDING = 1e-12
 """What rounding makes of the edges of a box that equations narrow, relative to them."""
 SMALLEST_BOX = 1e-6
 """Part of the whole box below which a box of poses and joints that is not settled is left open."""
+SINGULAR_BOX = 1e-4
+"""The same of a box in which the equations of the legs may be dependent."""
 
 # The audit of published tables
 

@@ -16,6 +16,7 @@ from hrsynth.geometry.affine import affine
 from hrsynth.simulation.endings.cover import bounds, cover
 from hrsynth.simulation.endings.joint_error import JointError
 from hrsynth.simulation.endings.pose_error import PoseError
+from hrsynth.simulation.endings.reached import narrowed
 from hrsynth.simulation.endings.subdivision import Subdivision
 from simulation import scenes
 from strategies import random_rotation, transformed
@@ -101,6 +102,40 @@ def test_rates_by_pose_and_joints_are_those_of_differences(name):
             assert np.allclose(slope, told[:, k + k * n : k + k * n + n][:, j] * rate, atol=1e-7)
 
 
+@pytest.mark.parametrize("name", ["3rpr_m1", "3rrr_m1", "delta", "orthoglide", "prrrp_m1", "quattro"])
+def test_joints_are_narrowed_to_where_the_legs_close(name):
+    """Of poses in a box, each zero of an equation along its own joint, met by signs of that equation alone, stays
+    within what closed forms leave of the box; of one pose that ends at zeros."""
+    setting, rng = ObservedRobot.of(name), np.random.default_rng(0)
+    error = JointError.of(PoseError.of(setting, setting.everything.start))
+    (n, k), (low, high) = error.size, error.box(*bounds(error.error, 1.0)[:2], 1.0)
+    places, met, cut = np.linspace(0, 1, 1000), 0, 0
+    for half in [0.0, 0.0, 0.0, 0.01, 0.01, 0.01, 0.1, 0.1, 0.1]:
+        pose, room = rng.uniform(low, high)[: n - k], half * (high - low)[: n - k]
+        a, b = np.concatenate([pose - room, low[n - k :]]), np.concatenate([pose + room, high[n - k :]])
+        if half:
+            a[n - k :], b[n - k :] = np.sort(rng.uniform(a, b, (2, n)), axis=0)[:, n - k :]
+        forms = [affine(x[None], each[None], np.zeros(1))
+                 for x, each in zip((a + b) / 2, np.diag((b - a) / 2), strict=True)]
+        inner, outer = narrowed(error, forms, a[None], b[None])
+        for i in range(n - k, n):
+            for _ in range(3):
+                y = np.tile(pose + room * rng.uniform(-1, 1, n - k), (len(places), 1))
+                y = np.hstack([y, np.zeros((len(y), k))])
+                y[:, i] = a[i] + places * (b[i] - a[i])
+                g = error.closing.at([affine(x, np.zeros((len(y), 0)), 0 * x) for x in y.T])[i - n + k].v[0]
+                zeros = y[:-1, i][g[:-1] * g[1:] < 0]
+                met += len(zeros)
+                step = (b[i] - a[i]) / len(places)
+                assert np.all((inner[0, i] <= zeros + step) & (zeros - step <= outer[0, i]))
+                if not half:
+                    ends = [inner[0, i], outer[0, i]] if len(zeros) else []
+                    assert all(np.abs(zeros - end).min() < 2 * step for end in ends)
+            cut += inner[0, i] > outer[0, i] or outer[0, i] - inner[0, i] < 0.9 * (b[i] - a[i])
+    assert met > 20
+    assert cut > 6
+
+
 @pytest.mark.slow
 def test_a_closed_surface_of_poses_has_the_kinds_that_its_shape_asks_for():
     """The PRRRP, two rods on two rails, also in a tilted base: its closures make up a torus, on which the numbers of
@@ -137,6 +172,27 @@ def test_kinds_sum_up_to_the_number_of_the_closures(name, number):
     found = cover(setting, setting.everything.start)
     assert found.complete
     assert sum((-1) ** each.falling for each in found.found) == number
+
+
+@pytest.mark.slow
+def test_the_rests_of_three_sliders_are_all_but_where_they_lock():
+    """The Orthoglide: 80 critical poses, their kinds sum up to nothing; at six places two rods stand square to their
+    rails, side by side."""
+    setting = ObservedRobot.of("orthoglide")
+    found = cover(setting, setting.everything.start)
+    assert found.complete
+    assert [sum(each.falling == k for each in found.found) for k in range(4)] == [8, 32, 32, 8]
+    assert unlisted(setting, found, np.random.default_rng(1)) == []
+    error = PoseError.of(setting, setting.everything.start)
+    assert len(found.locked) == 6
+    for middle, half in found.locked:
+        tips = [error.p + error.shifts @ middle + limb.tip.constant + error.R @ limb.tip.turned - limb.centre
+                for limb in error.limbs]
+        across = [tip - limb.axis * (limb.axis @ tip) for tip, limb in zip(tips, error.limbs, strict=True)]
+        square = [i for i, limb in enumerate(error.limbs) if abs(np.linalg.norm(across[i]) - limb.rod) < 1e-3]
+        assert len(square) == 2
+        assert np.linalg.norm(np.cross(*(across[i] for i in square))) < 5e-3
+        assert np.linalg.norm(half) < 2e-3
 
 
 @pytest.mark.slow

@@ -76,6 +76,11 @@ def _complete(found: Endings) -> list[str]:
              f"{where}"]
     if told.crossings:
         lines += [f"but for rests that fill curves, at {told.crossings} points at which the joints of two legs lock"]
+    if told.locked:
+        most = max(within for _, within in told.locked)
+        lines += [f"but for {len(told.locked)} places, each within {1e3 * most:.2g} mm, at which legs may lock each "
+                  "other:"]
+        lines += [f"  ({', '.join(f'{x:.4g}' for x in p)}) m" for p, _ in told.locked]
     if told.apart:
         lines += [f"{told.apart} of the list lie where was not looked"]
     return lines

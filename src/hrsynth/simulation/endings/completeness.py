@@ -80,7 +80,7 @@ class Covers(Value):
             return list(lists)
         known = self.vanishing
         counts: Counter[tuple[str, ...]] | None = None
-        if known.complete and known.bounded:
+        if known.complete and known.bounded and not known.locked:
             counts = Counter(tuple(leg for leg, u, w in zip(labels, each.directions, desired, strict=True) if u @ w < 0)
                              for each in known.found)
         met = {each.reversed: each for each in lists}

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -40,6 +41,9 @@ class Cover(Value):
     """Rods that slide and turn as they like: where one is shorter than ``SHORTEST_ROD`` it was not looked."""
     struts: Struts | None = None
     """The legs of a platform that translates, whose joints' own singularities and all whose turns were looked at."""
+    locked: tuple[tuple[Array, Array], ...] = ()
+    """Places (middle and half edges, in coordinates about the goal) at which equations of the legs may be dependent, so
+    that legs lock each other: there it was not looked."""
     unread: tuple[str, ...] = ()
     """Legs in space with joints of which it is not known where they lock: there it was not looked."""
 
@@ -56,9 +60,11 @@ class Cover(Value):
         (p, R), k = (each[0] for each in self.error.coordinates.of([at])), self.error.shifts.shape[1]
         if any(limb.solve(limb.tip.value(p[None], R[None]), limb.mode)[0] < SHORTEST_ROD**2 for limb in self.short):
             return False
+        x = self.error.shifts.T @ (p - self.error.p)
+        if any(np.all(np.abs(x - middle[:k]) <= half[:k] + FOLLOWED) for middle, half in self.locked):
+            return False
         if self.box is None:
             return True
-        x = self.error.shifts.T @ (p - self.error.p)
         return bool(np.all(self.box[0][:k] <= x) and np.all(x <= self.box[1][:k]))
 
     @property
@@ -118,18 +124,15 @@ def cover(setting: ObservedRobot, goal: ClosedConfiguration, *, vanishing: bool 
         found += [_on_line(each, family.error, error) if len(each.x) < error.size else each for each in own]
     if vanishing:
         found = [each for each in found if each.error[0] == 0.0]
-    left: list[tuple[Array, Array]] = []
-    for part in (each for each in every if each.left):
-        corners = part.error.spanned(*map(np.array, zip(*part.left, strict=True)))
-        if part.error.error.size < error.size:
-            corners = np.full((len(part.left), error.size), -np.inf), np.full((len(part.left), error.size), np.inf)
-        left += zip(*(each[:, : error.size] for each in corners), strict=True)
+    left, lost = (
+        [corners for part in every for corners in _corners(part.error, boxes(part), error.size)]
+        for boxes in (lambda part: part.left, lambda part: part.lost))
     found = [replace(each, directions=each.directions * own) for own in error.mirrors for each in found]
     free = [each for i, each in enumerate(error.limbs) if i not in whole.joints and isinstance(each, SlidingRod)]
     return Cover(tuple(found), tuple(left), sum(each.share for each in every) / len(every),
                  sum(each.boxes for each in every), bounded or len(charts[0]) > 1, "",
                  (low, high) if len(charts[0]) == 1 else None, error,
-                 () if any(each.short for each in charts[0]) else tuple(free), struts,
+                 () if any(each.short for each in charts[0]) else tuple(free), struts, _joined(lost),
                  () if struts is not None else unread(setting))
 
 
@@ -140,6 +143,29 @@ def _boxes(error: JointError, low: Array, high: Array, reach: float, vanishing: 
         reach = max(reach, COVER_MARGIN * float(ends))
         low, high = np.full(3, -reach), np.full(3, reach)
     return Subdivision(error, *error.box(low, high, reach), vanishing)
+
+
+def _corners(error: JointError, boxes: Sequence[tuple[Array, Array]], size: int) -> Iterator[tuple[Array, Array]]:
+    """The corners of boxes, in coordinates of the pose about the goal; boundless in a chart of fewer."""
+    if not boxes:
+        return
+    low, high = error.spanned(*map(np.array, zip(*boxes, strict=True)))
+    if error.error.size < size:
+        low, high = np.full((len(boxes), size), -np.inf), np.full((len(boxes), size), np.inf)
+    yield from zip(low[:, :size], high[:, :size], strict=True)
+
+
+def _joined(boxes: Sequence[tuple[Array, Array]]) -> tuple[tuple[Array, Array], ...]:
+    """Middle and half edges about each group of boxes (lower, upper corner) that are nearly together."""
+    groups: list[tuple[Array, Array]] = []
+    for low, high in boxes:
+        room = 3 * (high - low)
+        while near := [k for k, (a, b) in enumerate(groups) if np.all((a <= high + room) & (low <= b + room))]:
+            low, high = np.min([low, *(groups[k][0] for k in near)], axis=0), np.max(
+                [high, *(groups[k][1] for k in near)], axis=0)
+            groups = [each for k, each in enumerate(groups) if k not in near]
+        groups.append((low, high))
+    return tuple(((low + high) / 2, (high - low) / 2) for low, high in groups)
 
 
 def unread(setting: ObservedRobot) -> tuple[str, ...]:

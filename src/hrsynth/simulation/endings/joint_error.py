@@ -197,8 +197,8 @@ class JointError(Value):
                 continue
             assert isinstance(limb, OnCrank | OnRail | SlidingRod)
             assert limb.axis is not None
-            z, one = x[error.size + self.joints.index(i)], np.linalg.svd(limb.axis[None])[2][1]
-            c, s, one, two = cosine(z), sine(z), number(one), number(np.cross(limb.axis, one))
+            z, (one, two) = x[error.size + self.joints.index(i)], map(number, _across(limb))
+            c, s = cosine(z), sine(z)
             way, ring = minus(tip, scaled(w, number(limb.centre))), plus(scaled(c, one), scaled(s, two))
             if isinstance(limb, SlidingRod):
                 g.append(dot(way, minus(scaled(c, two), scaled(s, one))) - w * number(limb.aside))
@@ -241,6 +241,25 @@ class JointError(Value):
     def closing(self) -> BoxFormula:
         """g (k)."""
         return traced(lambda y, number: [each.value for each in self.parts(y, number)[0]], self.size[0])
+
+    @cached_property
+    def ways(self) -> BoxFormula:
+        """Of each limb with a joint the tip from the centre: along the axis, and across it (:func:`_across`)."""
+        error = self.error
+
+        def formula(y: Sequence[Any], number: Number) -> list[Any]:
+            one = Dual(number(1.0), [0.0] * self.size[0])
+            found, turned = list[Any](), [each.value for each in self._turned(y, one, number)]
+            point = combination(list(y[: error.shifts.shape[1]]), error.shifts, number)
+            for i in self.joints:
+                limb = error.limbs[i]
+                way = plus(point, number(error.p + limb.tip.constant - limb.centre))
+                if np.any(limb.tip.turned):
+                    way = plus(way, transformed(turned, number(limb.tip.turned)))
+                found += [dot(way, number(each)) for each in (limb.axis, *_across(limb))]
+            return found
+
+        return traced(formula, error.size)
 
     @cached_property
     def errors(self) -> BoxFormula:
@@ -303,6 +322,13 @@ def total(parts: Any) -> Any:
     for each in rest:
         first = first + each
     return first
+
+
+def _across(limb: OnCrank | OnRail | SlidingRod) -> tuple[Array, Array]:
+    """The directions from which a joint's angle counts, and to which it is a quarter of a turn."""
+    assert limb.axis is not None
+    one = np.linalg.svd(limb.axis[None])[2][1]
+    return one, np.cross(limb.axis, one)
 
 
 def _in_plane(error: PoseError, limb: ClosedFormLeg) -> ClosedFormLeg:

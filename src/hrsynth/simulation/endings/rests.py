@@ -164,6 +164,16 @@ class RestCover(Value):
                     "among those that boxes prove")
         return ""
 
+    @property
+    def locked(self) -> tuple[tuple[Array, float], ...]:
+        """The points (m) about which legs may lock each other, and how far about them it was not looked."""
+        error = self.cover.error
+        if error is None:
+            return ()
+        k = error.shifts.shape[1]
+        return tuple((error.length * (error.p + error.shifts @ middle[:k]),
+                      error.length * float(np.linalg.norm(half[:k]))) for middle, half in self.cover.locked)
+
     def _where(self) -> str:
         """Where the open boxes lie."""
         cover = self.cover
@@ -184,6 +194,7 @@ class RestCover(Value):
         return {"complete": self.complete, "proved": len(cover.found), "boxes": cover.boxes, "open": len(cover.open),
                 "share": cover.share, "within_m": self.within, "shorter_m": self.shorter,
                 "turns": len(cover.turns), "turned": self.turned, "apart": self.apart, "crossings": self.crossings,
+                "locked": [{"p": list(p), "within_m": within} for p, within in self.locked],
                 "unread": list(cover.unread), "unmet": self.unmet, "strangers": self.strangers,
                 "reason": self.reason or None}
 

@@ -21,15 +21,18 @@ from ...geometry.affine import AffineForms, affine, combined, stacked
 from ...geometry.vectors import Array
 from ...progress import tell
 from ...results import Value
-from ...tolerances import AFFINE_ROUNDING, BOX_ROUNDING, MET_AGAIN, SMALLEST_BOX, THINNEST_BOX
+from ...tolerances import AFFINE_ROUNDING, BOX_ROUNDING, MET_AGAIN, SINGULAR_BOX, SMALLEST_BOX, THINNEST_BOX
 from .cones import cut
 from .enclosure import negative
 from .joint_error import JointError
+from .reached import narrowed
 
 Flags = NDArray[np.bool_]
 Places = NDArray[np.intp]
 WIDER = (1.25, 4.0)
 """By how much boxes are larger in which exactly one zero is to be proved, one after the other."""
+SINGULAR = -2
+"""In the place of an axis: a box is left open, ∇g may lose rank in it."""
 STRETCHED = 8.0
 """Ratio of a box's edges, as parts of those of the whole, above which the longest is cut."""
 NARROWED = 0.6
@@ -61,6 +64,8 @@ class Subdivision:
     vanishing: bool = False
     boxes: int = 0
     left: list[tuple[Array, Array]] = field(default_factory=list)
+    lost: list[tuple[Array, Array]] = field(default_factory=list)
+    """Small boxes in which the equations of the legs may be dependent."""
     proved: list[tuple[Array, Array]] = field(default_factory=list)
     """Coordinates and multipliers, and the room about them, in which exactly one zero is proved."""
 
@@ -85,8 +90,10 @@ class Subdivision:
             first = max(0, len(middle) - BOXES_AT_ONCE)
             part, size, axis = self._open(middle[first:], half[first:])
             self.boxes += len(middle) - first
-            small = np.all(size <= SMALLEST_BOX * self.whole, axis=1)
-            self.left += list(zip(part[small], size[small], strict=True))
+            lost, small = axis == SINGULAR, np.all(size <= SMALLEST_BOX * self.whole, axis=1)
+            for where, boxes in ((small & ~lost, self.left), (lost, self.lost)):
+                boxes += list(zip(part[where], size[where], strict=True))
+            small |= lost
             again, rest = ~small & (axis < 0), ~small & (axis >= 0)
             below, edges = cut(part[rest], size[rest], axis[rest])
             middle = np.concatenate([middle[:first], part[again], below])
@@ -96,6 +103,10 @@ class Subdivision:
     def _open(self, middle: Array, half: Array) -> tuple[Array, Array, Places]:
         """Boxes (c, n) that are not settled, narrowed, and the axes (c,) across which they are to be cut, −1 of those
         that are to be looked at again first."""
+        low, high = narrowed(self.error, _forms(middle, half), middle - half, middle + half)
+        known = np.all(low <= high, axis=1)
+        low, high = low[known], high[known]
+        middle, half = (low + high) / 2, (high - low) / 2 * (1 + BOX_ROUNDING)
         forms = _forms(middle, half)
         g = stacked(self.error.closing.at(forms)) if self.error.size[1] else AffineForms(
             np.zeros((middle.shape[1] + 1, len(middle), 0)), np.zeros((len(middle), 0)))
@@ -127,14 +138,16 @@ class Subdivision:
                     settled[likely] = self._unique(own[at], size[at], P[at], wider)
                     likely &= ~settled
             gone[look[settled]] = True
-            axis[look] = self._axes(size[look], N[look], F, loose)
+            lost = ~np.isfinite(F.r).all(axis=1) & np.all(size[look] <= SINGULAR_BOX * self.whole, axis=1)
+            axis[look] = np.where(lost, SINGULAR, self._axes(size[look], N[look], F, loose))
         return own[~gone], size[~gone], axis[~gone]
 
     def _settled(self, tube: list[AffineForms], P: Places, N: Places) -> tuple[Flags, AffineForms]:
         """Whether nothing is asked for on a tube, and F there."""
         _, M, slope, margins = self._values(tube)
-        F = _reduced(M, slope, P, N)
+        F, minors = _reduced(M, slope, P, N)
         settled = _away(F)
+        settled |= _away(minors)
         if self.vanishing:
             settled |= _away(stacked(self.error.errors.at(tube)))
         for margin in margins:
@@ -304,7 +317,7 @@ def _tube(middle: Array, half: Array, old: Array, edges: Array, P: Places, N: Pl
     np.put_along_axis(slopes, P[:, :, None], np.where(good[:, :, None], along, 0.0), 1)
     np.put_along_axis(radius, P, np.where(good, doubt, plain), 1)
     loose = np.ones(middle.shape, dtype=bool)
-    np.put_along_axis(loose, P, ~good, 1)
+    np.put_along_axis(loose, P, ~(good & (doubt < NARROWED * plain)), 1)
     return [affine(centre[:, i], slopes[:, i], radius[:, i]) for i in range(middle.shape[1])], loose
 
 
@@ -335,18 +348,23 @@ def _some(forms: AffineForms, P: Places) -> AffineForms:
     return AffineForms(np.take_along_axis(forms.v, index[None], -1), np.take_along_axis(forms.r, index, -1))
 
 
-def _reduced(M: AffineForms, slope: AffineForms, P: Places, N: Places) -> AffineForms:
-    """∇E_N − ∇E_P (∇g_P)⁻¹ ∇g_N, (c, n − k), by Gauss's elimination; no number where a pivot may vanish."""
+def _reduced(M: AffineForms, slope: AffineForms, P: Places, N: Places) -> tuple[AffineForms, AffineForms]:
+    """∇E_N − ∇E_P (∇g_P)⁻¹ ∇g_N, (c, n − k), by Gauss's elimination; no number where a pivot may vanish. And the 2×2
+    minors of what is left of g and E before the last step, which vanish with it and need no last pivot."""
     k, order = P.shape[1], np.concatenate([P, N], axis=1)
     A, rest = _some(M, order), _some(slope, order)
     A = combined(_inverted(A.v[0, ..., :k]), A) if k else A
     rows = [AffineForms(A.v[:, :, i], A.r[:, i]) for i in range(k)]
+    minors = rest
     with np.errstate(all="ignore"):
         for r in range(k):
+            if r == k - 1:
+                one, other = np.triu_indices(N.shape[1] + 1, 1)
+                minors = rows[r][..., one] * rest[..., other] - rows[r][..., other] * rest[..., one]
             tail = rows[r][..., 1:] * rows[r][..., 0].inverse()[..., None]
             rows[r + 1 :] = [each[..., 1:] - tail * each[..., 0][..., None] for each in rows[r + 1 :]]
             rest = rest[..., 1:] - tail * rest[..., 0][..., None]
-    return rest
+    return rest, minors
 
 
 def _away(F: AffineForms) -> Flags:
