@@ -246,10 +246,13 @@ class Subdivision:
             left = left[~done]
             if not len(left):
                 break
-        # nearly flat ones are no better enclosed than by the room, but told where Newton's method puts them
-        inside = np.all(np.abs(x - at)[left] <= room[left], axis=1)
-        x[left] = np.where(inside[:, None], x[left], at[left])
-        reach[left] = room[left] + np.abs(x - at)[left]
+        if len(left):
+            # nearly flat ones: the operator over the room holds the zero, and again over what it reaches
+            inside = np.all(np.abs(x - at)[left] <= room[left], axis=1)
+            x[left] = np.where(inside[:, None], x[left], at[left])
+            reach[left] = np.fmin(room[left], self._krawczyk(at[left], room[left])[1]) + np.abs(x - at)[left]
+            for _ in range(8):
+                reach[left] = np.fmin(reach[left], self._krawczyk(x[left], reach[left])[1])
         if far is not None:
             endless = np.abs(x[:, far]) <= reach[:, far]
             self.left += [(at[i, :n], room[i, :n]) for i in np.flatnonzero(endless)]
@@ -329,7 +332,7 @@ def _pivots(J: Array) -> tuple[Places, Places]:
     open_, used = np.ones((c, k), dtype=bool), np.zeros((c, n), dtype=bool)
     for step in range(k):
         free = open_[:, :, None] & ~used[:, None]
-        r, p = np.divmod(np.where(free, np.abs(A), -1.0).reshape(c, -1).argmax(axis=1), n)
+        r, p = np.divmod(np.where(free, np.abs(A), -1.0).reshape(c, k * n).argmax(axis=1), n)
         pivot = A[rows, r, p]
         factor = A[rows, :, p] / np.where(pivot == 0, 1.0, pivot)[:, None]
         A = A - factor[:, :, None] * A[rows, r][:, None] * open_[:, :, None]
