@@ -182,7 +182,7 @@ def test_the_rests_of_three_sliders_are_all_but_where_they_lock():
     found = cover(setting, setting.everything.start)
     assert found.complete
     assert [sum(each.falling == k for each in found.found) for k in range(4)] == [8, 32, 32, 8]
-    assert unlisted(setting, found, np.random.default_rng(1)) == []
+    assert unlisted(setting, found, np.random.default_rng(1), 12) == []
     error = PoseError.of(setting, setting.everything.start)
     assert len(found.locked) == 6
     for middle, half in found.locked:
