@@ -13,11 +13,10 @@ GROUPS = ("planar", "pods", "deltas", "spatial")
 @cache
 def listed(group: str) -> tuple[str, ...]:
     """The words of a group that the stored catalog does not refuse."""
-    import json
+    from hrsynth.catalog import load
 
-    path = Path(__file__).resolve().parents[2] / "catalog" / f"{group}.jsonl"
-    records = (json.loads(line) for line in path.read_text(encoding="utf-8").splitlines())
-    return tuple(record["word"] for record in records if "word" in record and "refused" not in record)
+    stored = load(Path(__file__).resolve().parents[2] / "catalog").where(group=group)
+    return tuple(record["word"] for record in stored if "refused" not in record)
 
 
 def write(group: str, rng: np.random.Generator, path: Path) -> str:

@@ -92,7 +92,8 @@ def test_the_twelve_symmetric_planar_robots_fall_out():
 
 
 def test_what_is_driven_changes_nothing_else():
-    for text in random.Random(1).sample(words("planar"), 3):
+    can_be_driven = [text for text in words("planar") if "(Pi" not in text]
+    for text in random.Random(1).sample(can_be_driven, 3):
         word = parse(text)
         other = str(RobotWord.of([LegWord(tuple(joint.__class__(joint.letter, joint.axes, i == 0, joint.watched)
                                        for i, joint in enumerate(leg.joints))) for leg in word.legs],
