@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 from hrsynth import load
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.budgets import COVER_BOXES
-from hrsynth.closed_forms.legs import OnRod
+from hrsynth.closed_forms.legs import OnRail, OnRod
 from hrsynth.geometry.affine import affine
 from hrsynth.simulation.endings.cover import bounds, cover
 from hrsynth.simulation.endings.joint_error import JointError
@@ -185,11 +185,12 @@ def test_the_rests_of_three_sliders_are_all_but_where_they_lock():
     assert unlisted(setting, found, np.random.default_rng(1), 12) == []
     error = PoseError.of(setting, setting.everything.start)
     assert len(found.locked) == 6
+    limbs = [limb for limb in error.limbs if isinstance(limb, OnRail)]
     for middle, half in found.locked:
         tips = [error.p + error.shifts @ middle + limb.tip.constant + error.R @ limb.tip.turned - limb.centre
-                for limb in error.limbs]
-        across = [tip - limb.axis * (limb.axis @ tip) for tip, limb in zip(tips, error.limbs, strict=True)]
-        square = [i for i, limb in enumerate(error.limbs) if abs(np.linalg.norm(across[i]) - limb.rod) < 1e-3]
+                for limb in limbs]
+        across = [tip - limb.axis * (limb.axis @ tip) for tip, limb in zip(tips, limbs, strict=True)]
+        square = [i for i, limb in enumerate(limbs) if abs(np.linalg.norm(across[i]) - limb.rod) < 1e-3]
         assert len(square) == 2
         assert np.linalg.norm(np.cross(*(across[i] for i in square))) < 5e-3
         assert np.linalg.norm(half) < 2e-3

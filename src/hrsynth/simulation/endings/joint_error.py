@@ -253,6 +253,8 @@ class JointError(Value):
             point = combination(list(y[: error.shifts.shape[1]]), error.shifts, number)
             for i in self.joints:
                 limb = error.limbs[i]
+                assert isinstance(limb, OnCrank | OnRail | SlidingRod)
+                assert limb.axis is not None
                 way = plus(point, number(error.p + limb.tip.constant - limb.centre))
                 if np.any(limb.tip.turned):
                     way = plus(way, transformed(turned, number(limb.tip.turned)))
