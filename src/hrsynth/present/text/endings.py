@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from .tables import GAP, Rows, camera, head, listing, named, table
@@ -80,7 +81,8 @@ def _complete(found: Endings) -> list[str]:
         most = max(within for _, within in told.locked)
         lines += [f"but for {len(told.locked)} places, each within {1e3 * most:.2g} mm, at which legs may lock each "
                   "other:"]
-        lines += [f"  ({', '.join(f'{x:.4g}' for x in p)}) m" for p, _ in told.locked]
+        places = max(0, math.ceil(-math.log10(most)))
+        lines += [f"  ({', '.join(f'{round(float(x), places) + 0.0:g}' for x in p)}) m" for p, _ in told.locked]
     if told.apart:
         lines += [f"{told.apart} of the list lie where was not looked"]
     return lines
