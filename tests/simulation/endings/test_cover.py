@@ -6,17 +6,19 @@ from itertools import product
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
 from hrsynth import load
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.budgets import COVER_BOXES
-from hrsynth.closed_forms.legs import OnRail, OnRod
+from hrsynth.closed_forms.legs import OnCrank, OnRail, OnRod, SlidingRod
 from hrsynth.geometry.affine import affine
 from hrsynth.simulation.endings.cover import bounds, cover
 from hrsynth.simulation.endings.joint_error import JointError
 from hrsynth.simulation.endings.pose_error import PoseError
-from hrsynth.simulation.endings.reached import narrowed
+from hrsynth.simulation.endings.reached import narrowed, reached
 from hrsynth.simulation.endings.subdivision import Subdivision
 from simulation import scenes
 from strategies import random_rotation, transformed
@@ -134,6 +136,36 @@ def test_joints_are_narrowed_to_where_the_legs_close(name):
             cut += inner[0, i] > outer[0, i] or outer[0, i] - inner[0, i] < 0.9 * (b[i] - a[i])
     assert met > 20
     assert cut > 6
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_no_place_of_a_joint_is_lost(seed):
+    """A crank's and a sliding rod's angle z solves a quadratic in exp(iz), a slider's way one of its own; of a tip in
+    bounds each of these that is between the joint's bounds stays between the narrowed ones."""
+    rng = np.random.default_rng(seed)
+    size = 10.0 ** rng.uniform(-6, 0.5)
+    low = rng.normal(size=3) * rng.choice([1e-6, 0.1, 1.0], 3)
+    high = low + size * rng.uniform(size=3) * rng.choice([0, 1], 3)
+    x, v = (lambda tip: (tip[0], complex(*tip[1:])))(low + (high - low) * rng.uniform(size=3))
+    rod, radius, aside = rng.uniform(0.2, 2.0, 3) * [1, 1, rng.choice([0.0, 0.3, -0.3])]
+    z_axis = np.array([0.0, 0.0, 1.0])
+    limbs = [(OnRail("", axis=z_axis, rod=rod), [x - 1, x + 1] if abs(v) > rod else
+              [x + sign * np.sqrt(rod**2 - abs(v) ** 2) for sign in (-1, 1)]),
+             (OnCrank("", axis=z_axis, rod=rod, radius=radius), [
+                 np.conj(v), -(x**2 + abs(v) ** 2 + radius**2 - rod**2) / radius, v]),
+             (SlidingRod("", axis=z_axis, aside=aside), [-np.conj(v), -2j * aside, v])]
+    bounds = [(low[[i]], high[[i]]) for i in range(3)]
+    for limb, told in limbs:
+        if isinstance(limb, OnRail):
+            places, whole = told if abs(v) <= rod else [], 5.0
+        else:
+            roots = np.roots(told)
+            places, whole = [float(np.angle(w)) for w in roots if abs(abs(w) - 1) < 1e-12], np.pi
+        own = np.sort(rng.uniform(-whole, whole, 2)) if rng.integers(2) else np.array([-whole, whole])
+        inner, outer = reached(limb, *bounds, (own[[0]], own[[1]]))
+        for place in places:
+            if own[0] + 1e-9 < place < own[1] - 1e-9:
+                assert inner[0] - 1e-9 <= place <= outer[0] + 1e-9
 
 
 @pytest.mark.slow

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...closed_forms.legs import OnCrank, OnRail, SlidingRod
+from ...closed_forms.legs import ClosedFormLeg, OnCrank, OnRail, SlidingRod
 from ...geometry.affine import AffineForms
 from ...geometry.vectors import Array
 from ...tolerances import BOX_ROUNDING
@@ -28,37 +28,44 @@ def narrowed(error: JointError, forms: list[AffineForms], low: Array, high: Arra
     ways = error.ways.at(forms[: n - k])
     for place, i in enumerate(error.joints):
         along, one, two = ((each.low, each.high) for each in ways[3 * place : 3 * place + 3])
-        own = low[:, n - k + place], high[:, n - k + place]
-        places, period = _places(error.error.limbs[i], along, one, two)
-        shifts = [0.0] if not np.isfinite(period) else [-period, 0.0, period]
-        met = [(np.maximum(own[0], a + shift - BOX_ROUNDING * (1 + np.abs(a))),
-                np.minimum(own[1], b + shift + BOX_ROUNDING * (1 + np.abs(b)))) for a, b in places for shift in shifts]
-        low[:, n - k + place] = np.min([np.where(a <= b, a, np.inf) for a, b in met], axis=0)
-        high[:, n - k + place] = np.max([np.where(a <= b, b, -np.inf) for a, b in met], axis=0)
+        at = n - k + place
+        low[:, at], high[:, at] = reached(error.error.limbs[i], along, one, two, (low[:, at], high[:, at]))
     return low, high
 
 
-def _places(limb: object, along: Bounds, one: Bounds, two: Bounds) -> tuple[list[Bounds], float]:
-    """Bounds of the joint's two solutions, and how far apart they mean the same; a lower one that is no number where
-    there is no solution."""
+def reached(limb: ClosedFormLeg, along: Bounds, one: Bounds, two: Bounds, own: Bounds) -> Bounds:
+    """The bounds ``own`` of a joint, narrowed to where it can be while the tip is between bounds, from the centre along
+    the axis and in the two directions across."""
+    shifts = [0.0] if isinstance(limb, OnRail) else list(2 * np.pi * np.arange(-2, 3))
+    met = [(np.maximum(own[0], a + shift - BOX_ROUNDING * (1 + np.abs(a))),
+            np.minimum(own[1], b + shift + BOX_ROUNDING * (1 + np.abs(b))))
+           for a, b in _places(limb, along, one, two) for shift in shifts]
+    return (np.min([np.where(a <= b, a, np.inf) for a, b in met], axis=0),
+            np.max([np.where(a <= b, b, -np.inf) for a, b in met], axis=0))
+
+
+def _places(limb: ClosedFormLeg, along: Bounds, one: Bounds, two: Bounds) -> list[Bounds]:
+    """Bounds of the joint's two solutions, but for whole turns; no numbers where there is no solution."""
     far = _root(*(a + b for a, b in zip(_square(one), _square(two), strict=True)))
     with np.errstate(all="ignore"):
         if isinstance(limb, OnRail):
             aside = _root(limb.rod**2 - far[1] ** 2, limb.rod**2 - far[0] ** 2)
-            return [(along[0] + aside[0], along[1] + aside[1]), (along[0] - aside[1], along[1] - aside[0])], np.inf
+            return [(along[0] + aside[0], along[1] + aside[1]), (along[0] - aside[1], along[1] - aside[0])]
         angle = _angle(one, two)
         if isinstance(limb, OnCrank):
-            rest = tuple(each + limb.radius**2 - limb.rod**2 for each in _square(along))
-            share = _share(rest[0], far, limb.radius, least=True), _share(rest[1], far, limb.radius, least=False)
+            low, high = _square(along)
+            doubt = BOX_ROUNDING * (high + limb.radius**2 + limb.rod**2)
+            share = (_share(low + limb.radius**2 - limb.rod**2 - doubt, far, limb.radius, least=True),
+                     _share(high + limb.radius**2 - limb.rod**2 + doubt, far, limb.radius, least=False))
             a, b = _turn(share[1]), _turn(share[0])
             none = (share[0] > 1 + BOX_ROUNDING) | (share[1] < -1 - BOX_ROUNDING)
             a, b = np.where(none, np.nan, a), np.where(none, np.nan, b)
-            return [(angle[0] + a, angle[1] + b), (angle[0] - b, angle[1] - a)], 2 * np.pi
+            return [(angle[0] + a, angle[1] + b), (angle[0] - b, angle[1] - a)]
         assert isinstance(limb, SlidingRod)
         none = far[1] < abs(limb.aside) * (1 - BOX_ROUNDING)
         sides = [np.pi / 2 - _turn(limb.aside / np.maximum(each, 1e-300)) for each in far]
         a, b = np.where(none, np.nan, np.minimum(*sides)), np.maximum(*sides)
-        return [(angle[0] - b, angle[1] - a), (angle[0] + a - np.pi, angle[1] + b - np.pi)], 2 * np.pi
+        return [(angle[0] - b, angle[1] - a), (angle[0] + a - np.pi, angle[1] + b - np.pi)]
 
 
 def _square(x: Bounds) -> Bounds:
