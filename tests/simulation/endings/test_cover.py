@@ -154,7 +154,7 @@ def test_no_place_of_a_joint_is_lost(seed):
              (OnCrank("", axis=z_axis, rod=rod, radius=radius), [
                  np.conj(v), -(x**2 + abs(v) ** 2 + radius**2 - rod**2) / radius, v]),
              (SlidingRod("", axis=z_axis, aside=aside), [-np.conj(v), -2j * aside, v])]
-    bounds = [(low[[i]], high[[i]]) for i in range(3)]
+    along, one, two = ((low[[i]], high[[i]]) for i in range(3))
     for limb, told in limbs:
         if isinstance(limb, OnRail):
             places, whole = told if abs(v) <= rod else [], 5.0
@@ -162,7 +162,7 @@ def test_no_place_of_a_joint_is_lost(seed):
             roots = np.roots(told)
             places, whole = [float(np.angle(w)) for w in roots if abs(abs(w) - 1) < 1e-12], np.pi
         own = np.sort(rng.uniform(-whole, whole, 2)) if rng.integers(2) else np.array([-whole, whole])
-        inner, outer = reached(limb, *bounds, (own[[0]], own[[1]]))
+        inner, outer = reached(limb, along, one, two, (own[[0]], own[[1]]))
         for place in places:
             if own[0] + 1e-9 < place < own[1] - 1e-9:
                 assert inner[0] - 1e-9 <= place <= outer[0] + 1e-9
