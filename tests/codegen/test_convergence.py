@@ -167,6 +167,7 @@ def test_running_errors_hold(formula: tuple[Any, Any, RoundedNumber]) -> None:
     assert float(bounds.low) - 1e-12 <= float(exact) <= float(bounds.high) + 1e-12
 
 
+@pytest.mark.slow
 def test_axes_that_are_parallel_but_for_rounding() -> None:
     """Loops that close to less than the program asks for are open: it says that it finds out."""
     robot, rng = made("four_bar"), np.random.default_rng(0)

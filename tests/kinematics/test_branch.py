@@ -208,6 +208,7 @@ CASSIE = """<mujoco model="leg"><compiler eulerseq="zyx" autolimits="true"/><wor
 at a dead point."""
 
 
+@pytest.mark.slow
 def test_the_verdict_of_a_leg_at_a_dead_point_is_that_of_its_branch(tmp_path: Path) -> None:
     """Where the heel has left its dead point, the leg with the spring sees one freedom, the other none."""
     file = tmp_path / "leg.xml"

@@ -99,7 +99,8 @@ def test_a_crossing_is_told_where_the_side_changes():
 
 
 @pytest.mark.parametrize(("name", "given", "made", "said"), [
-    ("rrrrr_m1", {"start": "x=0", "goal": "x=0.02"}, {"motor": None}, "motors for 1 of the platform's 2 freedoms"),
+    pytest.param("rrrrr_m1", {"start": "x=0", "goal": "x=0.02"}, {"motor": None},
+                 "motors for 1 of the platform's 2 freedoms", marks=pytest.mark.slow),
     ("3rpr_m1", {"start": "x=0,y=0,phi=0.1", "goal": "x=0,y=0,phi=0"}, {"limits": Limits(-1e-3, 1e-3)},
      "the start is beyond the limits of ")])
 def test_a_run_says_what_it_leaves_out(name: str, given: dict[str, str], made: dict[str, Any], said: str):

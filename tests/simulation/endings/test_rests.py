@@ -116,6 +116,7 @@ def test_every_choice_of_signs_is_told() -> None:
     assert sum(signs.boxes or 0 for signs in found.lists) == sum(each.error < 1e-8 for each in found.rests)
 
 
+@pytest.mark.slow
 def test_the_sides_of_rests_are_those_of_the_condition() -> None:
     """With the distal links held in direction the five-bar's end moves as its cranks' ends do: it loses a freedom where
     the cranks are parallel."""
