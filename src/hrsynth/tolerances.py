@@ -426,6 +426,8 @@ SMALLEST_BOX = 1e-6
 """Part of the whole box below which a box of poses and joints that is not settled is left open."""
 SINGULAR_BOX = 1e-4
 """The same of a box in which the equations of the legs may be dependent."""
+LOCKED_PLACE = 0.01
+"""Longest edge of what such boxes fill together, as part of all, to be told as one place; what is longer is open."""
 
 # The audit of published tables
 

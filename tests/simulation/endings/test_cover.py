@@ -290,6 +290,32 @@ def test_a_saddle_near_a_limit_is_found():
     assert min(np.linalg.norm(each.x[:3] - saddle) for each in part.zeros()) < 1e-6
 
 
+def test_only_short_places_are_told_as_ones_that_lock(monkeypatch):
+    """Boxes in which equations may be dependent, made up: small ones, one without an end, which holds one of these, and
+    a chain through the whole."""
+    setting = ObservedRobot.of("3rpr_m1")
+
+    def made(part, *_):
+        ways = [0.0] if part.error.far is None else [-0.1, 0.1] if part.error.far else [0.0]
+        part.lost += [(np.full(len(part.whole), way), 1e-5 * part.whole) for way in ways]
+
+    monkeypatch.setattr(Subdivision, "run", made)
+    found = cover(setting, setting.everything.start)
+    assert not found.complete
+    assert len(found.locked) == 2
+    assert all(np.isfinite(each).all() for place in found.locked for each in place)
+    assert len(found.open) == 1
+
+    def chain(part, *_):
+        if part.error.far is None:
+            part.lost += [(way * part.whole, 1e-2 * part.whole) for way in np.arange(-0.5, 0.5, 0.01)]
+
+    monkeypatch.setattr(Subdivision, "run", chain)
+    found = cover(setting, setting.everything.start)
+    assert not found.complete
+    assert (len(found.locked), len(found.open)) == (0, 1)
+
+
 def test_the_goal_is_listed_as_a_minimum():
     setting = ObservedRobot.of("prrrp_m1")
     goal = setting.configurations[0]

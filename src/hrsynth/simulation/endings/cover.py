@@ -15,7 +15,7 @@ from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...mechanism import JointType
 from ...results import Value
-from ...tolerances import COVER_MARGIN, COVER_REACH, FOLLOWED, SAME_ENDING, SHORTEST_ROD, SMALLEST_BOX
+from ...tolerances import COVER_MARGIN, COVER_REACH, FOLLOWED, LOCKED_PLACE, SAME_ENDING, SHORTEST_ROD, SMALLEST_BOX
 from .joint_error import JointError
 from .pose_error import NotEnclosed, PoseError
 from .struts import Struts
@@ -127,12 +127,17 @@ def cover(setting: ObservedRobot, goal: ClosedConfiguration, *, vanishing: bool 
     left, lost = (
         [corners for part in every for corners in _corners(part.error, boxes(part), error.size)]
         for boxes in (lambda part: part.left, lambda part: part.lost))
+    # what is long, or endless, is no place that can be told by a point
+    places, most = _joined(lost), LOCKED_PLACE * (high - low)[: error.size]
+    small = [bool(np.all(b - a <= most)) for a, b in places]
+    left += [each for each, is_small in zip(places, small, strict=True) if not is_small]
+    locked = [((a + b) / 2, (b - a) / 2) for (a, b), is_small in zip(places, small, strict=True) if is_small]
     found = [replace(each, directions=each.directions * own) for own in error.mirrors for each in found]
     free = [each for i, each in enumerate(error.limbs) if i not in whole.joints and isinstance(each, SlidingRod)]
     return Cover(tuple(found), tuple(left), sum(each.share for each in every) / len(every),
                  sum(each.boxes for each in every), bounded or len(charts[0]) > 1, "",
                  (low, high) if len(charts[0]) == 1 else None, error,
-                 () if any(each.short for each in charts[0]) else tuple(free), struts, _joined(lost),
+                 () if any(each.short for each in charts[0]) else tuple(free), struts, tuple(locked),
                  () if struts is not None else unread(setting))
 
 
@@ -155,8 +160,8 @@ def _corners(error: JointError, boxes: Sequence[tuple[Array, Array]], size: int)
     yield from zip(low[:, :size], high[:, :size], strict=True)
 
 
-def _joined(boxes: Sequence[tuple[Array, Array]]) -> tuple[tuple[Array, Array], ...]:
-    """Middle and half edges about each group of boxes (lower, upper corner) that are nearly together."""
+def _joined(boxes: Sequence[tuple[Array, Array]]) -> list[tuple[Array, Array]]:
+    """The corners of a box about each group of boxes (lower, upper corner) that are nearly together."""
     groups: list[tuple[Array, Array]] = []
     for low, high in boxes:
         room = 3 * (high - low)
@@ -165,7 +170,7 @@ def _joined(boxes: Sequence[tuple[Array, Array]]) -> tuple[tuple[Array, Array], 
                 [high, *(groups[k][1] for k in near)], axis=0)
             groups = [each for k, each in enumerate(groups) if k not in near]
         groups.append((low, high))
-    return tuple(((low + high) / 2, (high - low) / 2) for low, high in groups)
+    return groups
 
 
 def unread(setting: ObservedRobot) -> tuple[str, ...]:

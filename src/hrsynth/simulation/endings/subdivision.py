@@ -131,14 +131,15 @@ class Subdivision:
                                 AffineForms(follow.v[:, look], follow.r[look]))
             settled, F = self._settled(tube, P[look], N[look])
             step = _solved(np.moveaxis(F.v[1:], 0, -1), F.v[0])
-            likely = ~settled & np.isfinite(F.r).all(axis=1) & (tiny[look] | np.all(np.abs(step) < 3.0, axis=1))
+            finite = np.isfinite(F.r).all(axis=1)
+            likely = ~settled & finite & (tiny[look] | np.all(np.abs(step) < 3.0, axis=1))
             for wider in WIDER:
                 at = look[likely]
                 if len(at):
                     settled[likely] = self._unique(own[at], size[at], P[at], wider)
                     likely &= ~settled
             gone[look[settled]] = True
-            lost = ~np.isfinite(F.r).all(axis=1) & np.all(size[look] <= SINGULAR_BOX * self.whole, axis=1)
+            lost = ~finite & np.all(size[look] <= SINGULAR_BOX * self.whole, axis=1)
             axis[look] = np.where(lost, SINGULAR, self._axes(size[look], N[look], F, loose))
         return own[~gone], size[~gone], axis[~gone]
 
@@ -147,7 +148,8 @@ class Subdivision:
         _, M, slope, margins = self._values(tube)
         F, minors = _reduced(M, slope, P, N)
         settled = _away(F)
-        settled |= _away(minors)
+        rest = np.flatnonzero(~settled)
+        settled[rest] = _away(AffineForms(minors.v[:, rest], minors.r[rest]))
         if self.vanishing:
             settled |= _away(stacked(self.error.errors.at(tube)))
         for margin in margins:
