@@ -20,6 +20,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 from hrsynth.analysis.derive import derive
 from hrsynth.analysis.exact import architecture
 from hrsynth.analysis.observed import ObservedRobot
+from hrsynth.catalog import load as load_catalog
+from hrsynth.catalog import store
 from hrsynth.catalog.build import unmoved
 from hrsynth.catalog.entry import entry
 from hrsynth.catalog.geometry import mechanism
@@ -41,6 +43,11 @@ AROUND = 0.1
 """How far these are from the zero configuration (rad, m)."""
 GROWTH = (500, 1600, 5000)
 """Words of the catalog that are made in one build."""
+QUESTIONS: tuple[dict[str, Any], ...] = (
+    {}, {"legs": "3-R*"}, {"legs": "?-?R*"}, {"legs": "*-R*R*-*"}, {"legs": 3, "verdict": "controllable"}, {"modes": 6},
+    {"text": "takeover"}, {"text": "hexaglide"}, {"text": "rrr"}, {"dof": 3}, {"motion": "2T1R", "base_motors": True},
+    {"see": "3point"})
+"""What the catalog is asked for."""
 EXACT, WHOLE, CORES = 12, 3, 2
 """Words of each group of the catalog of which the exact verdict is made on each core, and the whole entry; cores."""
 
@@ -169,7 +176,25 @@ def catalog() -> Iterator[Row]:
         cells = ["{:.0f} s, {:.0f} MB".format(*alone([
             sys.executable, "-m", "hrsynth.cli", "catalog", "build", "planar", "-o", f"{folder}/{count}", "--limit",
             str(count)])) for count in GROWTH]
+        yield questions(Path(folder) / "all.sqlite")
     yield f"catalog build planar, the first {', '.join(f'{count:,}' for count in GROWTH)}", "; ".join(cells), "–", "–"
+
+
+def questions(file: Path) -> Row:
+    """The slowest question of ``catalog list`` about the shipped records in a SQLite file, which is written here."""
+    kept = store.shipped()
+    held = store.Database(file)
+    for group in kept.groups():
+        held.write(group, kept.lines([group], {}))
+    times = []
+    for asked in QUESTIONS:
+        ours, theirs = least(lambda asked=asked: len(load_catalog(file, **asked)),
+                             lambda asked=asked: len(load_catalog(**asked)), turns=3)
+        assert list(load_catalog(file, **asked)) == list(load_catalog(**asked))
+        times.append((ours, theirs, asked))
+    ours, theirs, asked = max(times, key=lambda each: each[0])
+    return (f"the slowest of {len(QUESTIONS)} questions about {len(load_catalog()):,} records in a SQLite file, {asked}",
+            f"{1e3 * ours:.0f} ms", f"{1e3 * theirs:.0f} ms, reading all lines", f"{theirs / ours:.0f}")
 
 
 def verdicts(seed: int) -> float:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import re
 import sqlite3
-import time
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +17,7 @@ from catalog.stub import CHAINS, REFUSED, VERDICTS, WORKERS, source
 from hrsynth.catalog import Catalog, load
 from hrsynth.catalog.build import build, check
 from hrsynth.catalog.jsonl import record
-from hrsynth.catalog.store import OLD_COLUMNS, Folder, _write_tables, shipped
+from hrsynth.catalog.store import OLD_COLUMNS, Database, Folder, _write_tables, shipped
 from hrsynth.errors import BadRequest
 
 ASKED = st.fixed_dictionaries({}, optional={
@@ -111,20 +110,15 @@ def test_sqlite_files_of_older_versions_are_read(asked: dict[str, Any], stores: 
 
 
 @pytest.mark.slow
-def test_sqlite_answers_within_50_ms(tmp_path: Path):
-    """Any question about the shipped catalog, in processor time, and as the lines answer it."""
+def test_sqlite_answers_as_the_lines_do(tmp_path: Path):
+    """What may be asked about the shipped catalog; how long it takes stands in ``benchmarks/others.py``."""
     kept, file = shipped(), tmp_path / "all.sqlite"
     _write_tables(file, {group: kept.lines([group], {}) for group in kept.groups()})
     for asked in ({}, {"legs": "3-R*"}, {"legs": "?-?R*"}, {"legs": "*-R*R*-*"},
-                  {"legs": 3, "verdict": "controllable"}, {"modes": 6}, {"text": "takeover"},
+                  {"legs": 3, "verdict": "controllable"}, {"modes": 6}, {"text": "takeover"}, {"text": "lift 1"},
                   {"text": "hexaglide"}, {"dof": 3}, {"motion": "2T1R", "base_motors": True}, {"see": "3point"}):
-        spent = []
-        for _ in range(3):
-            start = time.process_time()
-            found = load(file, **asked)
-            spent.append(time.process_time() - start)
-        assert list(found) == list(load(**asked))
-        assert min(spent) < 0.05, asked
+        assert Database(file).decides(asked)
+        assert list(load(file, **asked)) == list(load(**asked)), asked
 
 
 def test_sqlite_has_the_same_bytes_however_it_was_built(stores: tuple[Path, Path], tmp_path: Path):

@@ -14,8 +14,9 @@ from .words import counted, sights
 
 ASKED = ("group", "dof", "motion", "verdict", "base_motors", "fewest", "see", "modes", "legs", "text")
 """What can be asked for."""
-OWN = ("word", "notation")
-"""Fields of which few records have the same value."""
+TEXTS = ("notation", "hidden", "steps", "others")
+"""Whose texts are kept once each in a SQLite file: fields of many values, and all others together but the word, with the
+names under which the robot is known."""
 APART = "\x1f"
 """Between the texts of a record."""
 
@@ -72,8 +73,10 @@ def _condition(name: str, value: Any) -> RecordCondition:
             text = str(value).casefold()
             return RecordCondition(
                 lambda record: is_called(record, text) or any(text in str(each).casefold() for each in record.values()),
-                None if APART in text else
-                "(instr(own, ?) OR common IN (SELECT id FROM common_texts WHERE instr(text, ?)))", (text,) * 2)
+                None if APART in text else "(" + " OR ".join(
+                    f"text_{field} IN (SELECT id FROM texts WHERE field = '{field}' AND instr(text, ?))"
+                    for field in TEXTS) + " OR word LIKE ? ESCAPE '!')",
+                (*(text,) * len(TEXTS), "%" + re.sub("[!%_]", r"!\g<0>", text) + "%"))
         case "legs":
             value = int(value)
         case "see":
@@ -101,11 +104,11 @@ def plain_brackets(pattern: str) -> str:
     return pattern.replace("[", "[[]")
 
 
-def texts(record: Record) -> tuple[str, str]:
-    """Where a text is sought, casefolded: the values of the fields that are a record's own, with the names under which
-    the robot is known, and of all others, which many records have in common."""
+def texts(record: Record) -> dict[str, str]:
+    """Where a text is sought beside the word, casefolded."""
     from .site.known import known_as
 
-    own = [str(record.get(name, "")) for name in OWN]
-    common = [str(value) for name, value in record.items() if name not in OWN]
-    return APART.join([*own, known_as(record)]).casefold(), APART.join(common).casefold()
+    fields = TEXTS[:-1]
+    found = {field: str(record.get(field, "")).casefold() for field in fields}
+    others = [str(value) for name, value in record.items() if name not in ("word", *fields)]
+    return found | {TEXTS[-1]: APART.join([*others, known_as(record)]).casefold()}

@@ -15,7 +15,7 @@ from typing import Any, Protocol, overload
 
 from ..description.files import replacement
 from ..errors import BadRequest, BuildStopped
-from .fits import chains, conditions, texts
+from .fits import TEXTS, chains, conditions, texts
 from .journal import ENDING, Journal
 from .jsonl import FORMAT, decoded, encoded, leading_word, record, require_version
 from .words import VERSION
@@ -124,16 +124,19 @@ class Database:
 
     def groups(self) -> list[str]:
         with self._read() as file:
-            return [name for name, in file.execute('SELECT DISTINCT "group" FROM records ORDER BY 1')]
+            return [name for name, in file.execute(
+                'WITH RECURSIVE known(name) AS (SELECT min("group") FROM records UNION ALL SELECT (SELECT min("group") '
+                'FROM records WHERE "group" > name) FROM known WHERE name IS NOT NULL) '
+                'SELECT name FROM known WHERE name IS NOT NULL')]
 
     def lines(self, groups: Sequence[str], asked: Mapping[str, Any]) -> Sequence[str]:
         known = self._known()
         told = [each for name, each in conditions(asked).items() if each.row and known(name)]
-        met = [f'"group" IN ({", ".join("?" * len(groups))})', *(str(each.row) for each in told)]
+        met = [f'+"group" IN ({", ".join("?" * len(groups))})', *(str(each.row) for each in told)]
         values = [*groups, *(value for each in told for value in each.values)]
         with _asked(self.path):
             file = self._open()
-            rows = file.execute(f'SELECT rowid FROM records WHERE {" AND ".join(met)} ORDER BY "group", word', values)
+            rows = file.execute(f'SELECT rowid FROM records WHERE {" AND ".join(met)} ORDER BY rowid', values)
             return StoredLines(self.path, file, [number for number, in rows])
 
     def decides(self, asked: Mapping[str, Any]) -> bool:
@@ -147,7 +150,7 @@ class Database:
     def _known(self) -> Callable[[str], bool]:
         """Whether the file can tell of what is asked by a name."""
         with self._read() as file:
-            new = file.execute("SELECT count(*) FROM sqlite_master WHERE name = 'common_texts'").fetchone()[0]
+            new = file.execute("SELECT count(*) FROM sqlite_master WHERE name = 'texts'").fetchone()[0]
         return lambda name: bool(new) or name in OLD_COLUMNS
 
     def write(self, group: str, lines: Iterable[str]) -> None:
@@ -268,28 +271,29 @@ def _write_tables(path: Path, groups: Mapping[str, Iterable[str]]) -> None:
     with contextlib.closing(sqlite3.connect(path)) as file:
         file.execute("PRAGMA journal_mode = OFF")
         columns = ", ".join(f"{name} {kind}" for name, kind in COLUMNS.items())
+        numbers = ", ".join(f"text_{field} INTEGER" for field in TEXTS)
         file.execute('CREATE TABLE versions (format INTEGER, catalog INTEGER)')
-        file.execute(f'CREATE TABLE records ("group" TEXT, word TEXT, {columns}, own TEXT, common INTEGER, '
+        file.execute(f'CREATE TABLE records ("group" TEXT, word TEXT, {columns}, {numbers}, '
                      'PRIMARY KEY ("group", word))')
         file.execute("INSERT INTO versions VALUES (?, ?)", (FORMAT, VERSION))
         file.execute("CREATE TABLE lines (record INTEGER PRIMARY KEY, line TEXT)")
-        for table in ("common_texts", "names"):
-            file.execute(f"CREATE TABLE {table} (id INTEGER PRIMARY KEY, text TEXT)")
+        file.execute("CREATE TABLE texts (field TEXT, id INTEGER, text TEXT, PRIMARY KEY (field, id)) WITHOUT ROWID")
+        file.execute("CREATE TABLE names (id INTEGER PRIMARY KEY, text TEXT)")
         file.execute("CREATE TABLE called (name INTEGER, record INTEGER, PRIMARY KEY (name, record)) WITHOUT ROWID")
-        marks = ", ".join("?" * (len(COLUMNS) + 4))
-        common, called, number = dict[str, int](), dict[str, int](), 0
+        marks = ", ".join("?" * (len(COLUMNS) + len(TEXTS) + 2))
+        kept, called, number = {field: dict[str, int]() for field in TEXTS}, dict[str, int](), 0
         for group, lines in sorted(groups.items()):
             for line in sorted(lines, key=leading_word):
                 found, number = record(line), number + 1
-                own, others = texts(found)
                 file.execute(f"INSERT INTO records VALUES ({marks})", (
-                    group, found["word"], *(found.get(name) for name in COLUMNS), own,
-                    common.setdefault(others, len(common))))
+                    group, found["word"], *(found.get(name) for name in COLUMNS),
+                    *(kept[field].setdefault(text, len(kept[field])) for field, text in texts(found).items())))
                 file.execute("INSERT INTO lines VALUES (?, ?)", (number, line))
                 file.executemany("INSERT INTO called VALUES (?, ?)", [
                     (called.setdefault(name, len(called)), number) for name in sorted(chains(found))])
-        for table, known in (("common_texts", common), ("names", called)):
-            file.executemany(f"INSERT INTO {table} VALUES (?, ?)", ((i, text) for text, i in known.items()))
+        for field, known in kept.items():
+            file.executemany("INSERT INTO texts VALUES (?, ?, ?)", ((field, i, text) for text, i in known.items()))
+        file.executemany("INSERT INTO names VALUES (?, ?)", ((i, text) for text, i in called.items()))
         for name in ("word", *COLUMNS):
             file.execute(f"CREATE INDEX records_{name} ON records ({name})")
         file.commit()
