@@ -393,7 +393,7 @@ RADIUS_BOXES = 60_000
 """Boxes with which a certified radius is tried, at most."""
 INWARD_BOXES, RADIUS_AT_ONCE = 30_000, 2048
 """Boxes with which a ball is tried into which the law leads, at most, and those that are looked at together."""
-COVER_BOXES = 6_000_000
+COVER_BOXES = 8_000_000
 """Boxes of platform poses that are looked at, at most, where all critical points of the error are to be listed."""
 SIGN_BOXES = 80_000
 """Boxes of platform poses of three freedoms, at most, in which those are sought at which the error vanishes; with more

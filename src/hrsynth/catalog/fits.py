@@ -15,8 +15,8 @@ from .words import counted, sights
 ASKED = ("group", "dof", "motion", "verdict", "base_motors", "fewest", "see", "modes", "legs", "text")
 """What can be asked for."""
 TEXTS = ("notation", "hidden", "steps", "others")
-"""Whose texts are kept once each in a SQLite file: fields of many values, and all others together but the word, with the
-names under which the robot is known."""
+"""Whose texts are kept once each in a SQLite file: fields of many values, and all others together but the word, with
+the names under which the robot is known."""
 APART = "\x1f"
 """Between the texts of a record."""
 

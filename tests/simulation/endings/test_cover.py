@@ -15,11 +15,12 @@ from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.budgets import COVER_BOXES
 from hrsynth.closed_forms.legs import OnCrank, OnRail, OnRod, SlidingRod
 from hrsynth.geometry.affine import affine
-from hrsynth.simulation.endings.cover import bounds, cover
+from hrsynth.simulation.endings.cover import _places, bounds, cover
 from hrsynth.simulation.endings.joint_error import JointError
 from hrsynth.simulation.endings.pose_error import PoseError
 from hrsynth.simulation.endings.reached import narrowed, reached
 from hrsynth.simulation.endings.subdivision import Subdivision
+from hrsynth.tolerances import LOCKED_PLACE, SMALLEST_BOX
 from simulation import scenes
 from strategies import random_rotation, transformed
 
@@ -314,6 +315,50 @@ def test_only_short_places_are_told_as_ones_that_lock(monkeypatch):
     found = cover(setting, setting.everything.start)
     assert not found.complete
     assert (len(found.locked), len(found.open)) == (0, 1)
+
+
+def test_smallest_boxes_about_a_flat_zero_are_settled():
+    """Two legs of this 3-PUU are nearly dependent at a rest: what the numbers of the file leave open of it is longer
+    than the smallest boxes. Each such box about it is settled by the one zero nearby, which Newton's method on
+    differences of E meets as well."""
+    setting = ObservedRobot.of("3puu")
+    error = PoseError.of(setting, setting.everything.start)
+    low, high, _ = bounds(error, 1.0)
+    part = Subdivision(JointError.of(error), *JointError.of(error).box(low, high, 1.0))
+    at = np.array([-0.551676, -0.515349, 0.087138, -1.183327, -1.023015, -1.190909])
+    rng = np.random.default_rng(0)
+    middle = at + 3e-6 * rng.uniform(-1, 1, (12, 6)) * [1, 1, 0, 0, 0, 0]
+    open_, *_ = part._open(middle, np.broadcast_to(0.9 * SMALLEST_BOX * part.whole, middle.shape))
+    assert len(open_) == 0
+    assert part.proved
+    (zero,) = {tuple(np.round(each.x, 5)) for each in part.zeros()}
+    modes = [limb.mode for limb in error.limbs]
+    met = [x for mode in product((-1.0, 1.0), repeat=3) for x in newton(
+        error, [own * sign for own, sign in zip(modes, mode, strict=True)], np.array([zero[:3]]) + 1e-4)]
+    assert min(np.abs(x - zero[:3]).max() for x in met) < 1e-4
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_small_open_boxes_belong_to_the_place_that_they_touch(seed):
+    """A chain of small boxes that begins at a place is of it, while that is no longer than a place may be; what stands
+    apart, or is larger, stays open."""
+    rng = np.random.default_rng(seed)
+    whole, steps = np.ones(3), int(rng.integers(1, 400))
+    way = rng.normal(size=3)
+    way /= np.abs(way).max()
+    chain = [(x - 2e-5, x + 2e-5) for x in (k * 5e-5 * way for k in range(1, steps))]
+    apart, large = (np.full(3, 0.5), np.full(3, 0.50001)), (np.full(3, -1e-3), np.full(3, 0.0))
+    place, order = (np.full(3, -2e-5), np.full(3, 2e-5)), rng.permutation(len(chain) + 2)
+    left = [[*chain, apart, large][i] for i in order]
+    locked, others = _places([place], left, whole)
+    if 5e-5 * (steps - 1) + 4e-5 <= LOCKED_PLACE:
+        ((middle, half),) = locked
+        assert all(np.all(np.abs(each - middle) <= half + 1e-15) for corners in [place, *chain] for each in corners)
+        assert len(others) == 2
+        assert all(any(one is each for each in others) for one in (apart, large))
+    else:
+        assert locked == []
+        assert len(others) == len(left) + 1
 
 
 def test_the_goal_is_listed_as_a_minimum():

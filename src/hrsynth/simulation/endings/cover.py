@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,7 +15,16 @@ from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...mechanism import JointType
 from ...results import Value
-from ...tolerances import COVER_MARGIN, COVER_REACH, FOLLOWED, LOCKED_PLACE, SAME_ENDING, SHORTEST_ROD, SMALLEST_BOX
+from ...tolerances import (
+    COVER_MARGIN,
+    COVER_REACH,
+    FOLLOWED,
+    LOCKED_PLACE,
+    SAME_ENDING,
+    SHORTEST_ROD,
+    SINGULAR_BOX,
+    SMALLEST_BOX,
+)
 from .joint_error import JointError
 from .pose_error import NotEnclosed, PoseError
 from .struts import Struts
@@ -127,11 +136,7 @@ def cover(setting: ObservedRobot, goal: ClosedConfiguration, *, vanishing: bool 
     left, lost = (
         [corners for part in every for corners in _corners(part.error, boxes(part), error.size)]
         for boxes in (lambda part: part.left, lambda part: part.lost))
-    # what is long, or endless, is no place that can be told by a point
-    places, most = _joined(lost), LOCKED_PLACE * (high - low)[: error.size]
-    small = [bool(np.all(b - a <= most)) for a, b in places]
-    left += [each for each, is_small in zip(places, small, strict=True) if not is_small]
-    locked = [((a + b) / 2, (b - a) / 2) for (a, b), is_small in zip(places, small, strict=True) if is_small]
+    locked, left = _places(joined(lost), left, (high - low)[: error.size])
     found = [replace(each, directions=each.directions * own) for own in error.mirrors for each in found]
     free = [each for i, each in enumerate(error.limbs) if i not in whole.joints and isinstance(each, SlidingRod)]
     return Cover(tuple(found), tuple(left), sum(each.share for each in every) / len(every),
@@ -160,7 +165,29 @@ def _corners(error: JointError, boxes: Sequence[tuple[Array, Array]], size: int)
     yield from zip(low[:, :size], high[:, :size], strict=True)
 
 
-def _joined(boxes: Sequence[tuple[Array, Array]]) -> list[tuple[Array, Array]]:
+def _places(places: Sequence[tuple[Array, Array]], left: Sequence[tuple[Array, Array]], whole: Array
+            ) -> tuple[list[tuple[Array, Array]], list[tuple[Array, Array]]]:
+    """Places (corners) where equations may be dependent, as middles and half edges, each with the smallest of the boxes
+    that are left open about it; and what is open besides: also what is long, or endless, and no place that can be told
+    by a point."""
+    locked, others = list[tuple[Array, Array]](), list(left)
+    for a, b in places:
+        low, high = (np.array([each[k] for each in others]).reshape(-1, len(a)) for k in range(2))
+        smallest, beside = np.all(high - low <= SINGULAR_BOX * whole, axis=1), np.zeros(len(others), dtype=bool)
+        while np.all(b - a <= LOCKED_PLACE * whole):
+            near = SINGULAR_BOX * whole
+            new = smallest & ~beside & np.all((low <= b + near) & (a - near <= high), axis=1)
+            if not new.any():
+                locked.append(((a + b) / 2, (b - a) / 2))
+                others = [each for each, is_beside in zip(others, beside, strict=True) if not is_beside]
+                break
+            a, b, beside = np.minimum(a, low[new].min(axis=0)), np.maximum(b, high[new].max(axis=0)), beside | new
+        else:
+            others.append((a, b))
+    return locked, others
+
+
+def joined(boxes: Iterable[Sequence[Array]]) -> list[tuple[Array, Array]]:
     """The corners of a box about each group of boxes (lower, upper corner) that are nearly together."""
     groups: list[tuple[Array, Array]] = []
     for low, high in boxes:

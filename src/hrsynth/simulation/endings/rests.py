@@ -17,11 +17,13 @@ from ...mechanism.pose import Pose
 from ...results import Result, Value
 from ...tolerances import SAME_ENDING
 from ..law import Measures
-from .cover import Cover
+from .cover import Cover, joined
 from .search import CriticalPoints
 
 CRITICAL = "critical"
 STABLE, SADDLE, UNSTABLE, UNDECIDED = "stable", "saddle", "unstable", "undecided"
+MOST_JOINED, PLACES_TOLD = 5000, 4
+"""Open boxes that are told place by place, at most, and how many places."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -171,8 +173,8 @@ class RestCover(Value):
         if error is None:
             return ()
         k = error.shifts.shape[1]
-        return tuple((error.length * (error.p + error.shifts @ middle[:k]),
-                      error.length * float(np.linalg.norm(half[:k]))) for middle, half in self.cover.locked)
+        return tuple((self._point(middle[:k]), error.length * float(np.linalg.norm(half[:k])))
+                     for middle, half in self.cover.locked)
 
     def _where(self) -> str:
         """Where the open boxes lie."""
@@ -180,13 +182,21 @@ class RestCover(Value):
         if cover.error is None:
             return ""
         k = cover.error.shifts.shape[1]
-        low, high = (np.array(each)[:, :k] for each in zip(*cover.open, strict=True))
-        corners = np.stack([low.min(axis=0), high.max(axis=0)])
+        corners = np.array(cover.open)[:, :, :k]
         if not np.isfinite(corners).all():
             return ", some however far away"
-        about = cover.error.length * (cover.error.p + cover.error.shifts @ corners.mean(axis=0))
-        size = cover.error.length * float(np.ptp(corners, axis=0).max())
-        return f", in {size:.3g} m about ({', '.join(f'{x:.3g}' for x in about)})"
+        places = [np.array(each) for each in joined(corners)] if len(corners) <= MOST_JOINED else []
+        if not 0 < len(places) <= PLACES_TOLD:
+            places = [np.stack([corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)])]
+        told = [(f"{cover.error.length * float(np.ptp(each, axis=0).max()):.3g} m about "
+                 f"({', '.join(f'{x:.3g}' for x in self._point(each.mean(axis=0)))})") for each in places]
+        return f", in {' and '.join(told)}"
+
+    def _point(self, x: Array) -> Array:
+        """Where coordinates about the goal put the platform's point (m)."""
+        error = self.cover.error
+        assert error is not None
+        return np.asarray(error.length * (error.p + error.shifts @ x))
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""

@@ -31,6 +31,8 @@ Flags = NDArray[np.bool_]
 Places = NDArray[np.intp]
 WIDER = (1.25, 4.0)
 """By how much boxes are larger in which exactly one zero is to be proved, one after the other."""
+INFLATED = (2.0, 8.0, 32.0)
+"""How many times as large as what is open of a zero such boxes are about one nearby, one after the other."""
 SINGULAR = -2
 """In the place of an axis: a box is left open, ∇g may lose rank in it."""
 STRETCHED = 8.0
@@ -138,6 +140,9 @@ class Subdivision:
                 if len(at):
                     settled[likely] = self._unique(own[at], size[at], P[at], wider)
                     likely &= ~settled
+            close = np.flatnonzero(likely & np.all(size[look] <= SMALLEST_BOX * self.whole, axis=1))
+            if len(close):
+                settled[close] = self._near_zero(own[look[close]], size[look[close]], P[look[close]])
             gone[look[settled]] = True
             lost = ~finite & np.all(size[look] <= SINGULAR_BOX * self.whole, axis=1)
             axis[look] = np.where(lost, SINGULAR, self._axes(size[look], N[look], F, loose))
@@ -180,22 +185,10 @@ class Subdivision:
 
     def _unique(self, middle: Array, half: Array, P: Places, wider: float) -> Flags:
         """Boxes (c, n) in which, made ``wider``, exactly one zero is proved, or that there is none in them."""
-        (n, k), wide = self.error.size, np.maximum(
+        n, wide = self.error.size[0], np.maximum(
             wider * np.maximum(half, THINNEST_BOX * half.max(axis=1, keepdims=True)), MET_AGAIN)
-        _, M, slope, _ = self._values(_forms(middle, 0 * half))
-        back = _inverted(_columns(M.v[0], P))
-        mu = np.nan_to_num(-(np.take_along_axis(slope.v[0], P, 1)[:, None] @ back)[:, 0])
-        # over the wide box μ is μ₀ + δ, with (∇E + μ₀ ∇g)_P + δ ∇g_P = 0
-        _, M, slope, _ = self._values(_forms(middle, wide))
-        turned = np.swapaxes(back, 1, 2)
-        pull = combined(turned, _some(slope + (M * mu[:, :, None]).sum(-2), P))
-        rates = _some(M, P)
-        off = (combined(turned, AffineForms(np.swapaxes(rates.v, -1, -2), np.swapaxes(rates.r, -1, -2)))
-               - np.eye(k)).size.sum(axis=-1).max(axis=1, initial=0.0)
-        with np.errstate(all="ignore"):
-            room = pull.size.max(axis=1, initial=0.0) / (1 - off) * (1 + BOX_ROUNDING)
-        known = np.isfinite(room) & (room >= 0)
-        room = np.where(known, np.maximum(room, MET_AGAIN), 1.0)[:, None] * np.ones(k)
+        mu, room, known = self._multipliers(middle, wide, P)
+        room = np.maximum(room.max(axis=1, keepdims=True, initial=0.0), MET_AGAIN) * np.ones_like(mu)
         at, about = np.concatenate([middle, mu], axis=1), np.concatenate([wide, WIDER[0] * room], axis=1)
         shift, reach = self._krawczyk(at, about)
         with np.errstate(all="ignore"):
@@ -204,6 +197,44 @@ class Subdivision:
         for i in np.flatnonzero(one & ~none):
             self.proved.append((at[i], about[i]))
         return one | none
+
+    def _near_zero(self, middle: Array, half: Array, P: Places) -> Flags:
+        """Boxes (c, n) that lie, with their multipliers, in a box about a zero nearby that is proved to be the only one
+        there; its edges are in the ratio in which the numbers of the file leave the zero open (epsilon-inflation)."""
+        mu, room, known = self._multipliers(middle, half, P)
+        at, own = np.concatenate([middle, mu], axis=1), np.concatenate([half, room], axis=1)
+        x, found = at, np.zeros(len(at), dtype=bool)
+        for _ in range(8):
+            x = x - self._krawczyk(x, 0 * x)[0]
+        open_by = self._krawczyk(x, 0 * x)[1]
+        for times in INFLATED:
+            about = times * open_by
+            with np.errstate(all="ignore"):
+                one = known & ~found & np.all(self._krawczyk(x, about)[1] < about, axis=1)
+                one &= np.all(np.abs(at - x) + own <= about, axis=1)
+            self.proved += [(x[i], about[i]) for i in np.flatnonzero(one)]
+            found |= one
+        return found
+
+    def _multipliers(self, middle: Array, wide: Array, P: Places) -> tuple[Array, Array, Flags]:
+        """Multipliers (c, k) at the middle of boxes, how far they are from there at critical points in them, and
+        whether that is known."""
+        k = self.error.size[1]
+        _, M, slope, _ = self._values(_forms(middle, 0 * middle))
+        back = _inverted(_columns(M.v[0], P))
+        mu = np.nan_to_num(-(np.take_along_axis(slope.v[0], P, 1)[:, None] @ back)[:, 0])
+        # over the box μ is μ₀ + δ, with (∇E + μ₀ ∇g)_P + δ ∇g_P = 0
+        _, M, slope, _ = self._values(_forms(middle, wide))
+        turned = np.swapaxes(back, 1, 2)
+        pull = combined(turned, _some(slope + (M * mu[:, :, None]).sum(-2), P))
+        rates = _some(M, P)
+        off = (combined(turned, AffineForms(np.swapaxes(rates.v, -1, -2), np.swapaxes(rates.r, -1, -2)))
+               - np.eye(k)).size
+        with np.errstate(all="ignore"):
+            most = (pull.size.max(axis=1, initial=0.0) / (1 - off.sum(axis=-1).max(axis=1, initial=0.0)))[:, None]
+            room = (pull.size + (off * most[:, None]).sum(axis=-1)) * (1 + BOX_ROUNDING)
+        known = np.isfinite(room).all(axis=1) & np.all(most >= 0, axis=1)
+        return mu, np.where(known[:, None], room, 1.0), known
 
     def _krawczyk(self, at: Array, about: Array) -> tuple[Array, Array]:
         """Newton's step from coordinates and multipliers (c, n + k), and how far from there the operator over a box
