@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import re
 import sqlite3
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +18,7 @@ import hrsynth
 from catalog.stub import CHAINS, REFUSED, VERDICTS, WORKERS, source
 from hrsynth.catalog import Catalog, load
 from hrsynth.catalog.build import build, check
+from hrsynth.catalog.fits import fits, may_fit
 from hrsynth.catalog.jsonl import record
 from hrsynth.catalog.store import OLD_COLUMNS, Database, Folder, _write_tables, shipped
 from hrsynth.errors import BadRequest
@@ -80,6 +83,35 @@ def test_a_query_finds_what_a_plain_reading_finds(asked: dict[str, Any], stores:
     assert [record["word"] for record in every.where(**asked)] == wanted
     assert [record["word"] for record in load(lines, **asked)] == wanted
     assert [record["word"] for record in load(big, **asked)] == wanted
+
+
+ANY_FIELD = st.fixed_dictionaries({}, optional={
+    "dof": st.sampled_from([2, 3, 3.0, 7]), "base_motors": st.sampled_from([True, False, 1, 0]),
+    "verdict": st.sampled_from([*VERDICTS, ("controllable", "uncontrollable"), "no"]), "legs": st.sampled_from(
+        [3, "3", "4", "?-R*", "*RP*", (2, "3-*")]), "modes": st.sampled_from([6, "6", None]),
+    "text": st.sampled_from(["hexaglide", "Delta", "RRR", "true", "1", "', '", " 2", "1, 2", "[", "lift 1", "ü"])})
+
+
+@given(ANY_FIELD)
+def test_lines_are_left_unread_only_where_they_do_not_fit(asked: dict[str, Any]):
+    """Whatever is asked for, and however the file was written."""
+    every = _every_line()
+    told, hold = may_fit(asked), fits(asked)
+    spaced = [json.dumps(record(line)) for line in every]
+    for line in [*every, *spaced]:
+        assert told(line) or not hold(record(line))
+    assert all(map(told, spaced))
+
+
+@pytest.mark.parametrize("text", ["takeover", "hexaglide", "3-R", "lift 1,2", "['1'", "controllable", "(Rz"])
+def test_a_text_is_found_in_lines_as_in_records(text: str):
+    assert list(load(text=text)) == list(load().where(text=text))
+
+
+@cache
+def _every_line() -> list[str]:
+    kept = shipped()
+    return [line for group in kept.groups() for line in kept.lines([group], {})][::97]
 
 
 def test_sqlite_holds_the_same_records(stores: tuple[Path, Path]):

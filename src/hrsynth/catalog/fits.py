@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from fnmatch import fnmatchcase
+from fnmatch import translate
+from functools import cache
 from typing import Any
 
 from ..errors import BadRequest
-from .jsonl import Record
+from .jsonl import Record, is_written, leading_word
 from .words import counted, sights
 
 ASKED = ("group", "dof", "motion", "verdict", "base_motors", "fewest", "see", "modes", "legs", "text")
@@ -30,12 +32,14 @@ def require_askable(asked: Mapping[str, Any]) -> None:
 
 @dataclass(frozen=True)
 class RecordCondition:
-    """What is asked for by one name, told once: of a record, and of a row of a SQLite file."""
+    """What is asked for by one name, told once: of a record, of its line, and of a row of a SQLite file."""
 
     holds: Callable[[Record], bool]
     row: str | None
     """With a mark for each of the values; None where no row tells."""
     values: tuple[Any, ...]
+    line: Callable[[str], bool] | None = None
+    """Whether it may hold for the record of a line that is not read; None where that is not known."""
 
 
 def conditions(asked: Mapping[str, Any]) -> dict[str, RecordCondition]:
@@ -50,50 +54,68 @@ def fits(asked: Mapping[str, Any]) -> Callable[[Record], bool]:
     return lambda record: all(each.holds(record) for each in every)
 
 
+def may_fit(asked: Mapping[str, Any]) -> Callable[[str], bool]:
+    """Whether the line of a record may fit all that is asked for and not None, without reading it."""
+    every = [each.line for each in conditions(asked).values() if each.line]
+    return lambda line: not is_written(line) or all(told(line) for told in every)
+
+
 def _any_of(every: Sequence[RecordCondition]) -> RecordCondition:
     if len(every) == 1:
         return every[0]
+    lines = [each.line for each in every if each.line]
     rows = [each.row for each in every if each.row is not None]
     return RecordCondition(lambda record: any(each.holds(record) for each in every),
                            f"({' OR '.join(rows) or '0'})" if len(rows) == len(every) else None,
-                           tuple(value for each in every for value in each.values))
+                           tuple(value for each in every for value in each.values),
+                           (lambda line: any(told(line) for told in lines)) if len(lines) == len(every) else None)
 
 
 def _condition(name: str, value: Any) -> RecordCondition:
     match name:
         case "legs" if not isinstance(value, int) and not value.isdecimal():
             pattern = plain_brackets(value)
+            matches = re.compile(translate(pattern)).match
+
+            @cache
+            def has_chain(notation: str) -> bool:
+                return any(each == value or matches(each) for each in chains({"notation": notation}))
+
             return RecordCondition(
-                lambda record: any(each == value or fnmatchcase(each, pattern) for each in names(record)),
+                lambda record: has_chain(str(record.get("notation", ""))) or any(
+                    each == value or matches(each) for each in (record["word"], record["word"].replace("*", ""))),
                 "(word GLOB ? OR replace(word, '*', '') GLOB ? OR rowid IN (SELECT record FROM called WHERE name IN "
                 "(SELECT id FROM names WHERE text GLOB ?)))", (pattern,) * 3)
         case "text":
-            from .site.known import is_called
+            from .site.known import called, is_called, kinds
 
             text = str(value).casefold()
+            # lists and quotes are not written as they are read
+            plain = re.fullmatch(r"[a-z0-9*+!.{|}()-]+( +[a-z0-9*+!.{|}()-]+)*", text) is not None
             return RecordCondition(
                 lambda record: is_called(record, text) or any(text in str(each).casefold() for each in record.values()),
                 None if APART in text else "(" + " OR ".join(
                     f"text_{field} IN (SELECT id FROM texts WHERE field = '{field}' AND instr(text, ?))"
                     for field in TEXTS) + " OR word LIKE ? ESCAPE '!')",
-                (*(text,) * len(TEXTS), "%" + re.sub("[!%_]", r"!\g<0>", text) + "%"))
+                (*(text,) * len(TEXTS), "%" + re.sub("[!%_]", r"!\g<0>", text) + "%"),
+                (lambda line: text in line.casefold() or (
+                    bool(called(text)) and kinds(leading_word(line)) in called(text))) if plain else None)
         case "legs":
             value = int(value)
         case "see":
             value = counted(sights(value))
         case "modes":
             name = "modes_bound"
-    return RecordCondition(lambda record: name in record and bool(record[name] == value), f'"{name}" = ?', (value,))
-
-
-def names(record: Record) -> set[str]:
-    """The names by which legs are found: word, notation and each leg's chain, with and without the marks of motors."""
-    word = str(record["word"])
-    return {word, word.replace("*", ""), *chains(record)}
+    # 1 is True and 3.0 is 3: these are not so written
+    exact = isinstance(value, str) or (isinstance(value, int) and isinstance(value, bool) == (name == "base_motors"))
+    part = f"{json.dumps(name)}:{json.dumps(value)}" if exact else ""
+    return RecordCondition(lambda record: name in record and bool(record[name] == value), f'"{name}" = ?', (value,),
+                           lambda line: part in line)
 
 
 def chains(record: Record) -> set[str]:
-    """The names but those of the word."""
+    """The names by which legs are found beside the word: notation and each leg's chain, with and without the marks of
+    motors."""
     notation = str(record.get("notation", ""))
     found = {notation, *(re.sub(r"^[0-9]+-", "", term) for term in re.split(r"\+(?![^{]*})", notation))}
     return {name for each in found if each for name in (each, each.replace("*", ""))}

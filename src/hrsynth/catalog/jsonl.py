@@ -12,7 +12,7 @@ from .words import VERSION
 Record = Mapping[str, Any]
 """What the catalog says of one architecture; a field that is missing is not known or does not apply."""
 
-_LINE_START = '{"word":"'
+_LINE_START, _GROUP = '{"word":"', '","group":"'
 
 FORMAT = 1
 """Version of the lines, the journal and the tables."""
@@ -56,6 +56,11 @@ def record(text: str) -> Record:
 def word_of(text: str) -> str:
     """The word of a record's line."""
     return str(record(text)["word"])
+
+
+def is_written(text: str) -> bool:
+    """Whether :func:`line` may have written a line: no other spaces, word and group first."""
+    return text.startswith(_LINE_START) and text.startswith(_GROUP, text.index('"', len(_LINE_START)))
 
 
 def leading_word(text: str) -> str:

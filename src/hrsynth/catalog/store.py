@@ -15,7 +15,7 @@ from typing import Any, Protocol, overload
 
 from ..description.files import replacement
 from ..errors import BadRequest, BuildStopped
-from .fits import TEXTS, chains, conditions, texts
+from .fits import TEXTS, chains, conditions, may_fit, texts
 from .journal import ENDING, Journal
 from .jsonl import FORMAT, decoded, encoded, leading_word, record, require_version
 from .words import VERSION
@@ -77,7 +77,8 @@ class Folder:
                        if file.name.endswith((LINES, PACKED))})
 
     def lines(self, groups: Sequence[str], asked: Mapping[str, Any]) -> list[str]:
-        return [line for group in groups for line in decoded(self.content(group), str(self.file(group)))]
+        fits = may_fit(asked)
+        return [line for group in groups for line in decoded(self.content(group), str(self.file(group))) if fits(line)]
 
     def content(self, group: str) -> bytes:
         """The bytes of a group's lines; raises ``BadRequest`` where they cannot be read."""

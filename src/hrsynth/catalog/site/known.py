@@ -44,7 +44,8 @@ def equal_legs(word: str) -> bool:
 
 def is_called(record: Record, text: str) -> bool:
     """Whether a text occurs in a name under which a record's robot is known; words with other legs are not read."""
-    return kinds(record["word"]) in called(text) and text.casefold() in known_as(record).casefold()
+    found = called(text)
+    return bool(found) and kinds(record["word"]) in found and text.casefold() in known_as(record).casefold()
 
 
 def known_as(record: Record) -> str:
