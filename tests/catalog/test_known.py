@@ -13,7 +13,7 @@ from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.catalog import load
 from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.groups import GROUPS
-from hrsynth.catalog.site.known import alias, aliases, bare, is_called, order
+from hrsynth.catalog.known import alias, aliases, bare, is_called, order
 from hrsynth.catalog.site.sentences import RULES, cure, rules
 from hrsynth.catalog.words import parse
 from hrsynth.cli import execute

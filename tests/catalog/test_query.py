@@ -10,6 +10,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -21,6 +22,7 @@ from hrsynth.catalog.build import build, check
 from hrsynth.catalog.fits import fits, may_fit
 from hrsynth.catalog.jsonl import record
 from hrsynth.catalog.store import OLD_COLUMNS, Database, Folder, _write_tables, shipped
+from hrsynth.catalog.words import VERSION
 from hrsynth.errors import BadRequest
 
 ASKED = st.fixed_dictionaries({}, optional={
@@ -122,7 +124,9 @@ def test_sqlite_holds_the_same_records(stores: tuple[Path, Path]):
 
 
 @pytest.mark.parametrize("asked", [{"legs": "?-R*"}, {"text": "two lines"}, {"modes": 6}, {"dof": 3, "legs": 4}])
-def test_sqlite_files_of_older_versions_are_read(asked: dict[str, Any], stores: tuple[Path, Path], tmp_path: Path):
+@pytest.mark.parametrize("rows", ["", " WITHOUT ROWID"])
+def test_sqlite_files_of_older_versions_are_read(asked: dict[str, Any], rows: str, stores: tuple[Path, Path],
+                                                 tmp_path: Path):
     """They have the lines beside the columns, and neither the names of legs nor texts, modes and what is seen."""
     older = tmp_path / "older.sqlite"
     every = Folder(stores[0])
@@ -130,7 +134,7 @@ def test_sqlite_files_of_older_versions_are_read(asked: dict[str, Any], stores: 
         file.execute("CREATE TABLE versions (format INTEGER, catalog INTEGER)")
         file.execute("INSERT INTO versions VALUES (1, 1)")
         file.execute(f'CREATE TABLE records ("group", word, {", ".join(OLD_COLUMNS[1:])}, line, '
-                     'PRIMARY KEY ("group", word))')
+                     f'PRIMARY KEY ("group", word)){rows}')
         for group in every.groups():
             for text in every.lines([group], {}):
                 found = record(text)
@@ -139,6 +143,46 @@ def test_sqlite_files_of_older_versions_are_read(asked: dict[str, Any], stores: 
         file.commit()
     assert list(load(older, **asked)) == list(load(stores[0], **asked))
     assert 0 < len(load(older, **asked)) < 100
+
+
+ODD = [
+    {"dof": "3"}, {"dof": " 3"}, {"modes": "4"}, {"base_motors": "1"}, {"dof": np.int64(3)}, {"base_motors": np.True_},
+    {"text": "\0"}, {"text": "\0r"}, {"legs": "*\0"}, {"legs": "3-R*\0RR"}, {"dof": 10**19}, {"legs": "9" * 5000},
+    {"modes": 10**5000}, {"text": "\udcff"}, {"motion": "\udcff"}, {"text": "%" * 30_000}, {"legs": "*" * 60_000},
+    {"dof": tuple(range(1100))}, {"dof": [3, 4]}, {"legs": np.int64(3)}, {"text": "strasse"}, {"text": ""}]
+"""What SQLite takes for something else, or cannot be told."""
+
+
+@pytest.mark.parametrize("asked", ODD, ids=range(len(ODD)))
+def test_odd_questions_have_the_same_answer_everywhere(asked: dict[str, Any], stores: tuple[Path, Path]):
+    lines, big = stores
+    fit = [each for each in load(lines).where(**asked)]
+    assert list(load(big, **asked)) == list(load(lines, **asked)) == fit
+
+
+@pytest.mark.parametrize("asked", [{"legs": 3.5}, {"legs": b"3"}, {"see": 3}, {"text": 3},
+                                   {"see": "9" * 5000 + "point"}], ids=range(5))
+def test_what_no_record_can_have_is_refused(asked: dict[str, Any], stores: tuple[Path, Path]):
+    for file in stores:
+        with pytest.raises(BadRequest):
+            load(file, **asked)
+
+
+@pytest.mark.parametrize("line", ['{"word":"abc', '{"word":3}', "[]"])
+def test_lines_that_are_cut_are_told(line: str, tmp_path: Path):
+    text = f'{{"format":1,"catalog":{VERSION},"group":"g","count":1}}\n{line}\n'
+    (tmp_path / "g.jsonl").write_text(text)
+    with pytest.raises(BadRequest, match="no record"):
+        len(load(tmp_path).where(dof=3))
+
+
+def test_a_line_with_other_spaces_or_letters_is_read(tmp_path: Path):
+    (tmp_path / "g.jsonl").write_text(f'{{"format":1,"catalog":{VERSION},"group":"g","count":2}}\n'
+                                      '{"word":"a","group":"g", "dof": 3,"verdict":"controll\\u0061ble"}\n'
+                                      '{"word":"b","group":"g","dof":3,"cure":"Stra\\u00dfe","verdict":"no"}\n')
+    assert len(load(tmp_path, dof=3)) == 2
+    assert [each["word"] for each in load(tmp_path, verdict="controllable")] == ["a"]
+    assert [each["word"] for each in load(tmp_path, text="strasse")] == ["b"]
 
 
 @pytest.mark.slow

@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import translate
 from functools import cache
 from typing import Any
 
 from ..errors import BadRequest
 from .jsonl import Record, is_written, leading_word
+from .known import called, is_called, kinds, known_as
 from .words import counted, sights
 
 ASKED = ("group", "dof", "motion", "verdict", "base_motors", "fewest", "see", "modes", "legs", "text")
@@ -21,6 +22,10 @@ TEXTS = ("notation", "hidden", "steps", "others")
 the names under which the robot is known."""
 APART = "\x1f"
 """Between the texts of a record."""
+NUMBERS = ("dof", "base_motors", "fewest", "modes")
+"""What is a number in records."""
+MOST_TOLD, LONGEST_TOLD, LONGEST_NUMBER = 100, 10_000, 18
+"""Values and letters about which a SQLite file is asked, at most, and digits of a number."""
 
 
 def require_askable(asked: Mapping[str, Any]) -> None:
@@ -43,8 +48,9 @@ class RecordCondition:
 
 
 def conditions(asked: Mapping[str, Any]) -> dict[str, RecordCondition]:
-    """The condition of each name for which something is asked; of several values in a tuple one has to be met."""
-    return {name: _any_of([_condition(name, each) for each in (value if isinstance(value, tuple) else (value,))])
+    """The condition of each name for which something is asked; of several values in a tuple or list one has to be met.
+    Raises ``BadRequest`` for a value that none can have."""
+    return {name: _any_of([_condition(name, each) for each in (value if isinstance(value, tuple | list) else (value,))])
             for name, value in asked.items() if value is not None}
 
 
@@ -66,14 +72,29 @@ def _any_of(every: Sequence[RecordCondition]) -> RecordCondition:
     lines = [each.line for each in every if each.line]
     rows = [each.row for each in every if each.row is not None]
     return RecordCondition(lambda record: any(each.holds(record) for each in every),
-                           f"({' OR '.join(rows) or '0'})" if len(rows) == len(every) else None,
+                           f"({' OR '.join(rows) or '0'})" if len(rows) == len(every) <= MOST_TOLD else None,
                            tuple(value for each in every for value in each.values),
                            (lambda line: any(told(line) for told in lines)) if len(lines) == len(every) else None)
 
 
 def _condition(name: str, value: Any) -> RecordCondition:
+    """That of one value; one of NumPy counts as Python's."""
+    found = _told(name, value.item() if hasattr(value, "item") else value)
+    return found if all(_sqlite_can_tell(name, each) for each in found.values) else replace(found, row=None)
+
+
+def _sqlite_can_tell(name: str, value: Any) -> bool:
+    """Whether SQLite takes a value for what it is: it makes numbers of texts, and ends a text at a NUL."""
+    if not isinstance(value, str):
+        return isinstance(value, float) or (isinstance(value, int) and abs(value) < 2**63)
+    return name not in NUMBERS and len(value) <= LONGEST_TOLD and not re.search("[\0\ud800-\udfff]", value)
+
+
+def _told(name: str, value: Any) -> RecordCondition:
+    if name in ("legs", "see", "text") and not isinstance(value, str) and (name, type(value)) != ("legs", int):
+        raise BadRequest(f"the catalog cannot be asked for {name}", value, "a text, or a number of legs")
     match name:
-        case "legs" if not isinstance(value, int) and not value.isdecimal():
+        case "legs" if isinstance(value, str) and not (value.isdecimal() and len(value) < LONGEST_NUMBER):
             pattern = plain_brackets(value)
             matches = re.compile(translate(pattern)).match
 
@@ -87,9 +108,7 @@ def _condition(name: str, value: Any) -> RecordCondition:
                 "(word GLOB ? OR replace(word, '*', '') GLOB ? OR rowid IN (SELECT record FROM called WHERE name IN "
                 "(SELECT id FROM names WHERE text GLOB ?)))", (pattern,) * 3)
         case "text":
-            from .site.known import called, is_called, kinds
-
-            text = str(value).casefold()
+            text = value.casefold()
             # lists and quotes are not written as they are read
             plain = re.fullmatch(r"[a-z0-9*+!.{|}()-]+( +[a-z0-9*+!.{|}()-]+)*", text) is not None
             return RecordCondition(
@@ -107,7 +126,8 @@ def _condition(name: str, value: Any) -> RecordCondition:
         case "modes":
             name = "modes_bound"
     # 1 is True and 3.0 is 3: these are not so written
-    exact = isinstance(value, str) or (isinstance(value, int) and isinstance(value, bool) == (name == "base_motors"))
+    exact = isinstance(value, str) or (isinstance(value, int) and abs(value) < 2**63 and isinstance(
+        value, bool) == (name == "base_motors"))
     part = f"{json.dumps(name)}:{json.dumps(value)}" if exact else ""
     return RecordCondition(lambda record: name in record and bool(record[name] == value), f'"{name}" = ?', (value,),
                            lambda line: part in line)
@@ -128,8 +148,6 @@ def plain_brackets(pattern: str) -> str:
 
 def texts(record: Record) -> dict[str, str]:
     """Where a text is sought beside the word, casefolded."""
-    from .site.known import known_as
-
     fields = TEXTS[:-1]
     found = {field: str(record.get(field, "")).casefold() for field in fields}
     others = [str(value) for name, value in record.items() if name not in ("word", *fields)]

@@ -59,13 +59,14 @@ def word_of(text: str) -> str:
 
 
 def is_written(text: str) -> bool:
-    """Whether :func:`line` may have written a line: no other spaces, word and group first."""
-    return text.startswith(_LINE_START) and text.startswith(_GROUP, text.index('"', len(_LINE_START)))
+    """Whether a line is as :func:`line` writes it, and what is asked for would stand in it letter by letter."""
+    return text.startswith(_LINE_START) and _GROUP in text and '": ' not in text and "\\u" not in text
 
 
 def leading_word(text: str) -> str:
     """The word with which a line begins that :func:`line` wrote."""
-    return text[len(_LINE_START):text.index('"', len(_LINE_START))] if text.startswith(_LINE_START) else word_of(text)
+    end = text.find('"', len(_LINE_START)) if text.startswith(_LINE_START) else -1
+    return text[len(_LINE_START):end] if end > 0 else word_of(text)
 
 
 def encoded(group: str, lines: Iterable[str]) -> bytes:

@@ -14,6 +14,7 @@ from ..errors import BadRequest
 from ..results import Value
 from .fits import fits, require_askable
 from .jsonl import Record, leading_word, record
+from .known import alias, is_called, order
 from .store import DATABASES, Store, shipped, store
 from .words import SENSORS, parse
 
@@ -86,8 +87,6 @@ class Catalog(Value):
     def named(self, text: str) -> list[Record]:
         """The records of robots that are called so, or whose legs are, those first that a list shows first: names that
         begin with the text before others."""
-        from .site.known import alias, is_called, order
-
         has_legs = fits({"legs": text})
         found = [each for each in self if is_called(each, text) or has_legs(each)]
         starts = f", {text}".casefold()

@@ -137,6 +137,9 @@ class Database:
         values = [*groups, *(value for each in told for value in each.values)]
         with _asked(self.path):
             file = self._open()
+            if not _is_new(file):
+                return [line for line, in file.execute(
+                    f'SELECT line FROM records WHERE {" AND ".join(met)} ORDER BY "group", word', values)]
             rows = file.execute(f'SELECT rowid FROM records WHERE {" AND ".join(met)} ORDER BY rowid', values)
             return StoredLines(self.path, file, [number for number, in rows])
 
@@ -151,8 +154,8 @@ class Database:
     def _known(self) -> Callable[[str], bool]:
         """Whether the file can tell of what is asked by a name."""
         with self._read() as file:
-            new = file.execute("SELECT count(*) FROM sqlite_master WHERE name = 'texts'").fetchone()[0]
-        return lambda name: bool(new) or name in OLD_COLUMNS
+            new = _is_new(file)
+        return lambda name: new or name in OLD_COLUMNS
 
     def write(self, group: str, lines: Iterable[str]) -> None:
         kept = {} if not self.path.exists() else {
@@ -182,7 +185,7 @@ class Database:
         with _readable(self.path):
             self.path.open("rb").close()
         file = sqlite3.connect(f"{self.path.absolute().as_uri()}?mode=ro", uri=True, check_same_thread=False)
-        require_version(file.execute("SELECT format, catalog FROM versions").fetchone(), str(self.path))
+        require_version(file.execute("SELECT format, catalog FROM versions").fetchone() or (None, None), str(self.path))
         return file
 
 
@@ -208,12 +211,17 @@ class StoredLines(Sequence[str]):
         if part not in self._read:
             wanted = self._numbers[part * READ_AT_ONCE : (part + 1) * READ_AT_ONCE]
             with _asked(self._path):
-                older = self._file.execute("SELECT 1 FROM sqlite_master WHERE name = 'lines'").fetchone() is None
-                found = dict(self._file.execute(
-                    f"SELECT rowid, line FROM {'records' if older else 'lines'} WHERE rowid IN "
-                    "(SELECT value FROM json_each(?))", (json.dumps(wanted),)))
+                found = dict(self._file.execute("SELECT rowid, line FROM lines WHERE rowid IN "
+                                                "(SELECT value FROM json_each(?))", (json.dumps(wanted),)))
+            if not all(isinstance(found.get(number), str) for number in wanted):
+                raise BadRequest(f"{self._path}: no file of the catalog: rows without a line")
             self._read[part] = [found[number] for number in wanted]
         return self._read[part][offset]
+
+
+def _is_new(file: sqlite3.Connection) -> bool:
+    """Whether texts stand in a table of their own; the lines of older files stand in the rows."""
+    return file.execute("SELECT 1 FROM sqlite_master WHERE name = 'texts'").fetchone() is not None
 
 
 def store(path: str | Path) -> Store:

@@ -66,6 +66,8 @@ PLATFORMS = {"": 1, "point": 1, "bar": 2, "slide": 2}
 """Platforms, and the bodies on which legs end."""
 
 _JOINT = re.compile(r"(?P<letter>2SS|2US|Pi|[RPCUS])(?P<axes>[a-z]*)(?P<motor>\*?)(?P<watched>!?)")
+LONGEST_COUNT = 9
+"""Digits of a number of legs that are read: more than any robot has."""
 _LEGS = re.compile(r"(?P<count>[0-9]*)\((?P<leg>[^()]*)\)")
 _SIGHTS = re.compile(r"(?P<count>[0-9]*)(?P<kind>[a-z_]+)(?P<own>'?)")
 
@@ -222,6 +224,15 @@ def counted(symbols: Iterable[LegWord | SightWord]) -> str:
     return "+".join(f"{count if count > 1 else ''}{each}" for each, count in Counter(map(str, symbols)).items())
 
 
+def unseen(word: RobotWord) -> RobotWord:
+    """The word with no link marked as observed."""
+    return RobotWord.of(*[[_blind(leg) for leg in body] for body in word.bodies], platform=word.platform)
+
+
+def _blind(leg: LegWord) -> LegWord:
+    return LegWord(tuple(replace(joint, watched=False) for joint in leg.joints))
+
+
 def parse(text: str) -> RobotWord:
     """The word that ``text`` writes, canonical; raises ``BadRequest`` with what is wrong in it."""
     robot, at, seen = text.strip().partition("@")
@@ -245,7 +256,7 @@ def sights(text: str) -> tuple[SightWord, ...]:
     known, found = [name for name, kind in kinds().items() if not issubclass(kind, Encoder)], list[SightWord]()
     for term in text.split("+"):
         match = _SIGHTS.fullmatch(term.strip())
-        count = int(match["count"] or 1) if match else 0
+        count = int(match["count"][:LONGEST_COUNT] or 1) if match else 0
         if match is None or match["kind"] not in known or not 1 <= count <= LARGEST_WORD:
             raise BadRequest(f"what is seen, {text!r}: cannot be read", term,
                              f"kinds such as 3point, joined by +: {', '.join(known)}; up to {LARGEST_WORD}")
@@ -259,7 +270,7 @@ def _legs(text: str, part: str) -> list[LegWord]:
         match = _LEGS.fullmatch(term.strip())
         if match is None:
             raise BadRequest(f"word {text!r}: cannot be read", term, "legs such as 3(Rz*-Rz-Rz), joined by +")
-        count = int(match["count"] or 1)
+        count = int(match["count"][:LONGEST_COUNT] or 1)
         if not 1 <= count <= LARGEST_WORD:
             raise BadRequest(f"word {text!r}: number of equal legs", count, f"1 to {LARGEST_WORD}")
         found += [_leg(text, match["leg"])] * count

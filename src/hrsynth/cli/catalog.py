@@ -41,7 +41,7 @@ FILTER = (
     Option("verdict", f"{', '.join(VERDICTS)}.", words=VERDICTS),
     Option("see", "What is seen of the platform instead of legs, as 3point, or 2point+image_line; with ' by a camera "
            "each.", "KINDS"),
-    Option("group", "planar, pods, deltas, spatial, sensors; of published tables 3T0R and the like."),
+    Option("group", "planar, mixed, pods, deltas, spatial, sensors; of published tables 3T0R and the like."),
     Option("base_motors", "All motors on the base, or not.", kind=bool, flags=("--base-motors/--moving-motors",)),
     Option("fewest", "Number of legs that must be watched.", kind=int, low=0),
     Option("modes", "Number of assembly modes, complex ones too.", kind=int, low=0),
@@ -191,8 +191,8 @@ def _of_tables(name: str, folder: str, kept: str | None) -> _Shown:
 def site(output: str, workers: int, anew: bool, kept: str | None, json: bool, **asked: Any) -> None:
     """Write the pages of the architectures that fit; of those with equal legs, where nothing is asked for."""
     from ..catalog import Catalog, load
+    from ..catalog.known import equal_legs
     from ..catalog.site import site as run
-    from ..catalog.site.known import equal_legs
     from ..errors import BadRequest
     from ..present.text.catalog import sited
 
@@ -235,7 +235,7 @@ def audit(folder: str, output: str | None, only: str | None, sample: int | None,
 def _word(text: str, kept: str | None) -> tuple[str, str]:
     """The word of an architecture that is given by it, by a name or by its legs, and what else is called so."""
     from ..catalog import load
-    from ..catalog.site.known import alias
+    from ..catalog.known import alias
     from ..catalog.words import parse
     from ..errors import BadRequest
 

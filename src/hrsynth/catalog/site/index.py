@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ... import __version__
+from ..known import alias, order
 from .folder import FOLDERS
-from .known import alias, order
 from .structures import Structure, named
 
 if TYPE_CHECKING:

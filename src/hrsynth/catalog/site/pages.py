@@ -23,10 +23,10 @@ from ..entry import SAMPLES, model
 from ..executors import Made, Stopped
 from ..geometry import mechanism
 from ..jsonl import Record
+from ..known import alias
 from ..words import parse
 from .folder import FOLDERS
 from .index import rendered
-from .known import alias
 from .sentences import cure, rules
 from .structures import Structure, named
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from hashlib import sha256
 from typing import Any
 
 from ..jsonl import Record, line
-from ..words import LegWord, RobotWord, parse
+from ..words import parse, unseen
 
 LENGTH = 12
 """Digits of a name: two of a million words are alike with a probability of 2e-3."""
@@ -72,12 +72,3 @@ def structures(records: Iterable[Record]) -> tuple[Structure, ...]:
     return tuple(Structure(word, tuple(own[word]), tuple((other, own[other][0].get("verdict", "refused"))
                                                          for other in sorted(kin[word]) if other != word))
                  for word in sorted(own))
-
-
-def unseen(word: RobotWord) -> RobotWord:
-    """The word with no link marked as observed."""
-    return RobotWord.of(*[[_blind(leg) for leg in body] for body in word.bodies], platform=word.platform)
-
-
-def _blind(leg: LegWord) -> LegWord:
-    return LegWord(tuple(replace(joint, watched=False) for joint in leg.joints))

@@ -8,15 +8,14 @@ import tomllib
 from functools import cache
 from importlib import resources
 
-from ..jsonl import Record
-from ..words import parse
-from .structures import unseen
+from .jsonl import Record
+from .words import parse, unseen
 
 
 @cache
 def aliases() -> dict[str, str]:
     """Names by word, without motors and marks of watched links."""
-    text = resources.files("hrsynth.catalog.site").joinpath("aliases.toml").read_text(encoding="utf-8")
+    text = resources.files("hrsynth.catalog").joinpath("aliases.toml").read_text(encoding="utf-8")
     return {word: each["names"] for each in tomllib.loads(text)["robot"] for word in each["words"]}
 
 
