@@ -39,7 +39,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 from ..budgets import LARGEST_WORD
 from ..errors import BadRequest
@@ -66,6 +66,8 @@ PLATFORMS = {"": 1, "point": 1, "bar": 2, "slide": 2}
 """Platforms, and the bodies on which legs end."""
 
 _JOINT = re.compile(r"(?P<letter>2SS|2US|Pi|[RPCUS])(?P<axes>[a-z]*)(?P<motor>\*?)(?P<watched>!?)")
+LEGS_KEPT = 10_000
+"""Legs that were read and are kept."""
 LONGEST_COUNT = 9
 """Digits of a number of legs that are read: more than any robot has."""
 _LEGS = re.compile(r"(?P<count>[0-9]*)\((?P<leg>[^()]*)\)")
@@ -273,8 +275,18 @@ def _legs(text: str, part: str) -> list[LegWord]:
         count = int(match["count"][:LONGEST_COUNT] or 1)
         if not 1 <= count <= LARGEST_WORD:
             raise BadRequest(f"word {text!r}: number of equal legs", count, f"1 to {LARGEST_WORD}")
-        found += [_leg(text, match["leg"])] * count
+        try:
+            found += [_known_leg(match["leg"])] * count
+        except BadRequest:
+            _leg(text, match["leg"])
+            raise
     return found
+
+
+@lru_cache(LEGS_KEPT)
+def _known_leg(chain: str) -> LegWord:
+    """Words have few different legs: what follows from one is found once."""
+    return _leg(chain, chain)
 
 
 def _leg(text: str, chain: str) -> LegWord:

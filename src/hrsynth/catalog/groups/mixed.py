@@ -1,5 +1,5 @@
-"""Spatial robots whose legs are not of one chain: complete for three legs that translate with at most one P each, for
-three spherical ones and for three of zero torsion, each leg driven at the base.
+"""Spatial robots whose legs are not of one chain: complete for three legs that translate, for three spherical ones and
+for three of zero torsion, each leg driven at the base.
 
 Legs that translate (:func:`.spatial.translates`) leave their end all translations, so any three of them make a robot
 that translates; the Clavel leg with a Π is one of them.
@@ -14,9 +14,6 @@ from ..words import RobotWord
 from .legs import base_driven, leg, robots
 from .spatial import CLAVEL, spherical, translates, translational, zero_torsion
 
-SLIDES = 1
-"""The most P of a leg that translates."""
-
 
 def belongs(word: RobotWord) -> bool:
     """Legs of different chains, whatever is driven or observed."""
@@ -25,8 +22,7 @@ def belongs(word: RobotWord) -> bool:
 
 def words() -> Iterator[RobotWord]:
     """All sets of three legs of each family; two legs alike and one other that slide first or not, of five joints."""
-    translating = [chain for chain in translational() if translates(chain)
-                   and sum(joint.letter == "P" for joint in chain.joints) <= SLIDES]
+    translating = filter(translates, translational())
     for family in ([*translating, leg(CLAVEL)], spherical(), zero_torsion()):
         yield from robots([base_driven(chain) for chain in family], 3)
     general = [base_driven(chain) for chain in translational() if len(chain.joints) == 5]
