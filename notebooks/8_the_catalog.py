@@ -1,8 +1,8 @@
 # %% [markdown]
 # # 8. Reading the catalog
 #
-# The robots of the notebooks before are those of the papers. The catalog has some thousand architectures more: planar
-# robots, pods, deltas and spatial ones, each with its hidden robot, its verdict and the legs that must be watched.
+# The robots of the notebooks before are those of the papers. The catalog has a hundred thousand architectures more:
+# planar robots, pods, deltas and spatial ones, each with its hidden robot, its verdict and the legs to be watched.
 # This notebook puts one question to it, and reads the answer with care:
 #
 # > Which robots with three translations and motors on the base can be servoed from two observed legs?
