@@ -189,6 +189,7 @@ def test_the_meter_tells_the_time_left_on_a_terminal(monkeypatch: pytest.MonkeyP
     assert capsys.readouterr().err == ""
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize(("option", "value", "allowed"), [("--verdict", "contrlable", "uncontrollable"),
                                                           ("--group", "foo", "planar")])
 def test_what_no_architecture_has_is_refused(option: str, value: str, allowed: str,

@@ -70,6 +70,8 @@ class Subdivision:
     """Small boxes in which the equations of the legs may be dependent."""
     proved: list[tuple[Array, Array]] = field(default_factory=list)
     """Coordinates and multipliers, and the room about them, in which exactly one zero is proved."""
+    flat: list[tuple[Array, Array]] = field(default_factory=list)
+    """The same of zeros that are flat."""
 
     @property
     def whole(self) -> Array:
@@ -203,18 +205,27 @@ class Subdivision:
         there; its edges are in the ratio in which the numbers of the file leave the zero open (epsilon-inflation)."""
         mu, room, known = self._multipliers(middle, half, P)
         at, own = np.concatenate([middle, mu], axis=1), np.concatenate([half, room], axis=1)
-        x, found = at, np.zeros(len(at), dtype=bool)
+        found = known & self._near(at, own)
+        left = np.flatnonzero(known & ~found)
+        x = at[left]
         for _ in range(8):
             x = x - self._krawczyk(x, 0 * x)[0]
         open_by = self._krawczyk(x, 0 * x)[1]
         for times in INFLATED:
             about = times * open_by
             with np.errstate(all="ignore"):
-                one = known & ~found & np.all(self._krawczyk(x, about)[1] < about, axis=1)
-                one &= np.all(np.abs(at - x) + own <= about, axis=1)
-            self.proved += [(x[i], about[i]) for i in np.flatnonzero(one)]
-            found |= one
+                one = np.all(self._krawczyk(x, about)[1] < about, axis=1)
+                one &= np.all(np.abs(at[left] - x) + own[left] <= about, axis=1)
+            while np.any(new := one & ~found[left]):
+                i = int(new.argmax())
+                self.flat.append((x[i], about[i]))
+                found[left] |= self._near(at[left], own[left])
         return found
+
+    def _near(self, at: Array, half: Array) -> Flags:
+        """Boxes (c, n + k) that lie in one about a flat zero."""
+        return np.any([np.all(np.abs(at - x) + half <= about, axis=1) for x, about in self.flat], axis=0) if (
+            self.flat) else np.zeros(len(at), dtype=bool)
 
     def _multipliers(self, middle: Array, wide: Array, P: Places) -> tuple[Array, Array, Flags]:
         """Multipliers (c, k) at the middle of boxes, how far they are from there at critical points in them, and
@@ -265,10 +276,10 @@ class Subdivision:
 
     def zeros(self) -> list[CriticalBox]:
         """The zeros that were proved, enclosed; those that may be at no finite place are left open."""
-        if not self.proved:
+        if not self.proved and not self.flat:
             return []
         n, far = self.error.size[0], self.error.far
-        at, room = (np.array(each) for each in zip(*self.proved, strict=True))
+        at, room = (np.array(each) for each in zip(*self.proved, *self.flat, strict=True))
         x, reach, left = at.copy(), room.copy(), np.arange(len(at))
         for _ in range(8):
             x = x - self._krawczyk(x, 0 * x)[0]
