@@ -207,6 +207,8 @@ class Subdivision:
         at, own = np.concatenate([middle, mu], axis=1), np.concatenate([half, room], axis=1)
         found = known & self._near(at, own)
         left = np.flatnonzero(known & ~found)
+        if not len(left):
+            return found
         x = at[left]
         for _ in range(8):
             x = x - self._krawczyk(x, 0 * x)[0]
