@@ -86,9 +86,10 @@ class Subdivision:
     def run(self, budget: int, place: int = 0, places: int = 1) -> None:
         """Cut boxes until all are settled, too small, or so many were looked at; of so many ``places`` at which this is
         done, it is told how far they are settled."""
-        middle, half = ((self.low + self.high) / 2)[None], self.whole[None]
+        whole = self.whole
+        middle, half, share = ((self.low + self.high) / 2)[None], whole[None], self.share
         while len(middle) and self.boxes < budget:
-            settled = 1 - self.share - float(np.prod(half / self.whole, axis=1).sum())
+            settled = 1 - share - float(np.prod(half / whole, axis=1).sum())
             tell(f"boxes, {100 * (place + max(settled, self.boxes / budget)) / places:.0f} %")
             # the smallest first: memory stays small
             first = max(0, len(middle) - BOXES_AT_ONCE)
@@ -97,6 +98,7 @@ class Subdivision:
             lost, small = axis == SINGULAR, np.all(size <= SMALLEST_BOX * self.whole, axis=1)
             for where, boxes in ((small & ~lost, self.left), (lost, self.lost)):
                 boxes += list(zip(part[where], size[where], strict=True))
+            share += float(np.prod(size[small & ~lost] / whole, axis=1).sum())
             small |= lost
             again, rest = ~small & (axis < 0), ~small & (axis >= 0)
             below, edges = cut(part[rest], size[rest], axis[rest])
