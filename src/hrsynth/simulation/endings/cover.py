@@ -170,21 +170,20 @@ def _places(places: Sequence[tuple[Array, Array]], left: Sequence[tuple[Array, A
     """Places (corners) where equations may be dependent, as middles and half edges, each with the smallest of the boxes
     that are left open about it; and what is open besides: also what is long, or endless, and no place that can be told
     by a point."""
-    locked, others = list[tuple[Array, Array]](), list(left)
+    locked, long = list[tuple[Array, Array]](), list[tuple[Array, Array]]()
+    low, high = (np.array([each[k] for each in left]).reshape(-1, len(whole)) for k in range(2))
+    near = SINGULAR_BOX * whole
+    smallest, taken = np.all(high - low <= near, axis=1), np.zeros(len(left), dtype=bool)
     for a, b in places:
-        low, high = (np.array([each[k] for each in others]).reshape(-1, len(a)) for k in range(2))
-        smallest, beside = np.all(high - low <= SINGULAR_BOX * whole, axis=1), np.zeros(len(others), dtype=bool)
-        while np.all(b - a <= LOCKED_PLACE * whole):
-            near = SINGULAR_BOX * whole
-            new = smallest & ~beside & np.all((low <= b + near) & (a - near <= high), axis=1)
-            if not new.any():
-                locked.append(((a + b) / 2, (b - a) / 2))
-                others = [each for each, is_beside in zip(others, beside, strict=True) if not is_beside]
-                break
+        beside = np.zeros(len(left), dtype=bool)
+        while np.any(new := smallest & ~beside & ~taken & np.all((low <= b + near) & (a - near <= high), axis=1)):
             a, b, beside = np.minimum(a, low[new].min(axis=0)), np.maximum(b, high[new].max(axis=0)), beside | new
+        if np.all(b - a <= LOCKED_PLACE * whole):
+            locked.append(((a + b) / 2, (b - a) / 2))
+            taken |= beside
         else:
-            others.append((a, b))
-    return locked, others
+            long.append((a, b))
+    return locked, [each for each, is_taken in zip(left, taken, strict=True) if not is_taken] + long
 
 
 def joined(boxes: Iterable[Sequence[Array]]) -> list[tuple[Array, Array]]:

@@ -14,7 +14,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...budgets import BOXES_AT_ONCE
 from ...geometry.affine import AffineForms, affine, combined, stacked
@@ -23,12 +22,22 @@ from ...progress import tell
 from ...results import Value
 from ...tolerances import AFFINE_ROUNDING, BOX_ROUNDING, MET_AGAIN, SINGULAR_BOX, SMALLEST_BOX, THINNEST_BOX
 from .cones import cut
+from .elimination import (
+    Flags,
+    Places,
+    away,
+    columns,
+    entries,
+    inverse,
+    pivots,
+    pseudo_inverse,
+    reduced_gradient,
+    solution,
+)
 from .enclosure import negative
 from .joint_error import JointError
 from .reached import narrowed
 
-Flags = NDArray[np.bool_]
-Places = NDArray[np.intp]
 WIDER = (1.25, 4.0)
 """By how much boxes are larger in which exactly one zero is to be proved, one after the other."""
 INFLATED = (2.0, 8.0, 32.0)
@@ -95,7 +104,7 @@ class Subdivision:
             first = max(0, len(middle) - BOXES_AT_ONCE)
             part, size, axis = self._open(middle[first:], half[first:])
             self.boxes += len(middle) - first
-            lost, small = axis == SINGULAR, np.all(size <= SMALLEST_BOX * self.whole, axis=1)
+            lost, small = axis == SINGULAR, np.all(size <= SMALLEST_BOX * whole, axis=1)
             for where, boxes in ((small & ~lost, self.left), (lost, self.lost)):
                 boxes += list(zip(part[where], size[where], strict=True))
             share += float(np.prod(size[small & ~lost] / whole, axis=1).sum())
@@ -123,8 +132,8 @@ class Subdivision:
         gone = np.any(low > high, axis=1)
         with np.errstate(all="ignore"):
             J = np.where(half[:, None] > 0, np.moveaxis(g.v[1:], 0, -1) / half[:, None], 0.0)
-        P, N = _pivots(J)
-        follow = combined(_inverted(_columns(np.moveaxis(g.v[1:], 0, -1), P)), g)
+        P, N = pivots(J)
+        follow = combined(inverse(columns(np.moveaxis(g.v[1:], 0, -1), P)), g)
         inner = _narrowed(follow, P)
         low, high = np.maximum(low, inner[0]), np.minimum(high, inner[1])
         gone |= np.any(low > high, axis=1)
@@ -136,7 +145,7 @@ class Subdivision:
             tube, loose = _tube(own[look], size[look], middle[look], half[look], P[look], N[look],
                                 AffineForms(follow.v[:, look], follow.r[look]))
             settled, F = self._settled(tube, P[look], N[look])
-            step = _solved(np.moveaxis(F.v[1:], 0, -1), F.v[0])
+            step = solution(np.moveaxis(F.v[1:], 0, -1), F.v[0])
             finite = np.isfinite(F.r).all(axis=1)
             likely = ~settled & finite & (tiny[look] | np.all(np.abs(step) < 3.0, axis=1))
             for wider in WIDER:
@@ -155,12 +164,12 @@ class Subdivision:
     def _settled(self, tube: list[AffineForms], P: Places, N: Places) -> tuple[Flags, AffineForms]:
         """Whether nothing is asked for on a tube, and F there."""
         _, M, slope, margins = self._values(tube)
-        F, minors = _reduced(M, slope, P, N)
-        settled = _away(F)
+        F, minors = reduced_gradient(M, slope, P, N)
+        settled = away(F)
         rest = np.flatnonzero(~settled)
-        settled[rest] = _away(AffineForms(minors.v[:, rest], minors.r[rest]))
+        settled[rest] = away(AffineForms(minors.v[:, rest], minors.r[rest]))
         if self.vanishing:
-            settled |= _away(stacked(self.error.errors.at(tube)))
+            settled |= away(stacked(self.error.errors.at(tube)))
         for margin in margins:
             settled |= margin.high < 0
         return settled, F
@@ -236,13 +245,13 @@ class Subdivision:
         whether that is known."""
         k = self.error.size[1]
         _, M, slope, _ = self._values(_forms(middle, 0 * middle))
-        back = _inverted(_columns(M.v[0], P))
+        back = inverse(columns(M.v[0], P))
         mu = np.nan_to_num(-(np.take_along_axis(slope.v[0], P, 1)[:, None] @ back)[:, 0])
         # over the box μ is μ₀ + δ, with (∇E + μ₀ ∇g)_P + δ ∇g_P = 0
         _, M, slope, _ = self._values(_forms(middle, wide))
         turned = np.swapaxes(back, 1, 2)
-        pull = combined(turned, _some(slope + (M * mu[:, :, None]).sum(-2), P))
-        rates = _some(M, P)
+        pull = combined(turned, entries(slope + (M * mu[:, :, None]).sum(-2), P))
+        rates = entries(M, P)
         off = (combined(turned, AffineForms(np.swapaxes(rates.v, -1, -2), np.swapaxes(rates.r, -1, -2)))
                - np.eye(k)).size
         with np.errstate(all="ignore"):
@@ -255,7 +264,7 @@ class Subdivision:
         """Newton's step from coordinates and multipliers (c, n + k), and how far from there the operator over a box
         about them reaches."""
         pull, K = self._equations(at, about)
-        Y = _inverse(K.v[0])
+        Y = pseudo_inverse(K.v[0])
         with np.errstate(all="ignore"):
             shift = combined(Y, pull)
             off = ((np.eye(at.shape[1]) - combined(Y, K)).size @ about[..., None])[..., 0]
@@ -358,7 +367,7 @@ def _tube(middle: Array, half: Array, old: Array, edges: Array, P: Places, N: Pl
     with np.errstate(all="ignore"):
         ratio = np.where(was > 0, own / was, 0.0)
         shift = np.where(was > 0, np.take_along_axis(middle - old, N, 1) / was, 0.0)
-        J, wide = _columns(np.moveaxis(follow.v[1:], 0, -1), N), np.take_along_axis(edges, P, 1)
+        J, wide = columns(np.moveaxis(follow.v[1:], 0, -1), N), np.take_along_axis(edges, P, 1)
         at = np.take_along_axis(old, P, 1) - wide * (follow.v[0] + (J * shift[:, None]).sum(-1))
         along, doubt = -wide[:, :, None] * J * ratio[:, None], wide * (follow.r + BOX_ROUNDING)
     plain = np.take_along_axis(half, P, 1)
@@ -370,79 +379,3 @@ def _tube(middle: Array, half: Array, old: Array, edges: Array, P: Places, N: Pl
     loose = np.ones(middle.shape, dtype=bool)
     np.put_along_axis(loose, P, ~(good & (doubt < NARROWED * plain)), 1)
     return [affine(centre[:, i], slopes[:, i], radius[:, i]) for i in range(middle.shape[1])], loose
-
-
-def _pivots(J: Array) -> tuple[Places, Places]:
-    """Columns (c, k) of matrices (c, k, n), by elimination with the largest entries, and the others (c, n − k)."""
-    A = np.where(np.isfinite(J), J, 0.0)
-    c, k, n = A.shape
-    rows, P = np.arange(c), np.zeros((c, k), dtype=np.intp)
-    open_, used = np.ones((c, k), dtype=bool), np.zeros((c, n), dtype=bool)
-    for step in range(k):
-        free = open_[:, :, None] & ~used[:, None]
-        r, p = np.divmod(np.where(free, np.abs(A), -1.0).reshape(c, k * n).argmax(axis=1), n)
-        pivot = A[rows, r, p]
-        factor = A[rows, :, p] / np.where(pivot == 0, 1.0, pivot)[:, None]
-        A = A - factor[:, :, None] * A[rows, r][:, None] * open_[:, :, None]
-        P[:, step], open_[rows, r], used[rows, p] = p, False, True
-    return P, np.argsort(used, axis=1, kind="stable")[:, : n - k]
-
-
-def _columns(J: Array, P: Places) -> Array:
-    """Columns (c, k, p) of matrices (c, k, n)."""
-    return np.take_along_axis(J, P[:, None], 2)
-
-
-def _some(forms: AffineForms, P: Places) -> AffineForms:
-    """Some of the last places, others of each box."""
-    index = P.reshape(len(P), *(1,) * (forms.r.ndim - 2), -1)
-    return AffineForms(np.take_along_axis(forms.v, index[None], -1), np.take_along_axis(forms.r, index, -1))
-
-
-def _reduced(M: AffineForms, slope: AffineForms, P: Places, N: Places) -> tuple[AffineForms, AffineForms]:
-    """∇E_N − ∇E_P (∇g_P)⁻¹ ∇g_N, (c, n − k), by Gauss's elimination; no number where a pivot may vanish. And the 2×2
-    minors of what is left of g and E before the last step, which vanish with it and need no last pivot."""
-    k, order = P.shape[1], np.concatenate([P, N], axis=1)
-    A, rest = _some(M, order), _some(slope, order)
-    A = combined(_inverted(A.v[0, ..., :k]), A) if k else A
-    rows = [AffineForms(A.v[:, :, i], A.r[:, i]) for i in range(k)]
-    minors = rest
-    with np.errstate(all="ignore"):
-        for r in range(k):
-            if r == k - 1:
-                one, other = np.triu_indices(N.shape[1] + 1, 1)
-                minors = rows[r][..., one] * rest[..., other] - rows[r][..., other] * rest[..., one]
-            tail = rows[r][..., 1:] * rows[r][..., 0].inverse()[..., None]
-            rows[r + 1 :] = [each[..., 1:] - tail * each[..., 0][..., None] for each in rows[r + 1 :]]
-            rest = rest[..., 1:] - tail * rest[..., 0][..., None]
-    return rest, minors
-
-
-def _away(F: AffineForms) -> Flags:
-    """Whether F (c, d) is enclosed away from zero: a component of it, F along its own middle, or a component in the
-    coordinates in which it is nearest to the box's own."""
-    with np.errstate(all="ignore"):
-        found = np.any(np.abs(F.v[0]) > F.spread * (1 + AFFINE_ROUNDING), axis=1)
-        found |= combined(np.nan_to_num(F.v[0])[:, None, :], F).low[:, 0] > 0
-        near = combined(_inverse(np.moveaxis(F.v[1:], 0, -1)), F)
-        found |= np.any(np.abs(near.v[0]) > near.spread * (1 + AFFINE_ROUNDING), axis=1)
-    return np.asarray(found)
-
-
-def _inverted(A: Array) -> Array:
-    """Inverses (c, k, k); no numbers where there is none."""
-    good = np.asarray(np.isfinite(A).all(axis=(1, 2)))
-    good &= np.abs(np.linalg.det(np.where(good[:, None, None], A, np.eye(A.shape[-1])))) > 0
-    return np.where(good[:, None, None], np.linalg.inv(np.where(good[:, None, None], A, np.eye(A.shape[-1]))), np.nan)
-
-
-def _inverse(A: Array) -> Array:
-    """Pseudo-inverses (c, n, m) of matrices (c, m, n); zero where there is none."""
-    good = np.isfinite(A).all(axis=(1, 2), keepdims=True)
-    found = np.linalg.pinv(np.where(good, A, np.eye(*A.shape[1:])))
-    return np.asarray(np.where(good, found, 0.0))
-
-
-def _solved(A: Array, b: Array) -> Array:
-    """A⁻¹ b."""
-    return np.asarray((_inverse(A) @ np.nan_to_num(b)[..., None])[..., 0])
