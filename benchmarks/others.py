@@ -43,11 +43,6 @@ AROUND = 0.1
 """How far these are from the zero configuration (rad, m)."""
 GROWTH = (500, 1600, 5000)
 """Words of the catalog that are made in one build."""
-QUESTIONS: tuple[dict[str, Any], ...] = (
-    {}, {"legs": "3-R*"}, {"legs": "?-?R*"}, {"legs": "*-R*R*-*"}, {"legs": 3, "verdict": "controllable"}, {"modes": 6},
-    {"text": "takeover"}, {"text": "hexaglide"}, {"text": "rrr"}, {"dof": 3}, {"motion": "2T1R", "base_motors": True},
-    {"see": "3point"})
-"""What the catalog is asked for."""
 EXACT, WHOLE, CORES = 12, 3, 2
 """Words of each group of the catalog of which the exact verdict is made on each core, and the whole entry; cores."""
 
@@ -182,6 +177,8 @@ def catalog() -> Iterator[Row]:
 
 def questions(file: Path) -> Row:
     """The slowest question of ``catalog list`` about the shipped records in a SQLite file, which is written here."""
+    from catalog.stub import QUESTIONS
+
     kept = store.shipped()
     held = store.Database(file)
     for group in kept.groups():

@@ -21,6 +21,11 @@ DELAY = float(os.environ.get("STUB_DELAY", "0"))
 VERDICTS = ("controllable", "partially controllable", "uncontrollable")
 CHAINS = ("R*RR", "RR*R", "UP*S", "P*US", "R*-{2-SS}", "RRR")
 REFUSED = "(c07*)"
+QUESTIONS: tuple[dict[str, Any], ...] = (
+    {}, {"legs": "3-R*"}, {"legs": "?-?R*"}, {"legs": "*-R*R*-*"}, {"legs": 3, "verdict": "controllable"}, {"modes": 6},
+    {"text": "takeover"}, {"text": "hexaglide"}, {"text": "rrr"}, {"dof": 3}, {"motion": "2T1R", "base_motors": True},
+    {"see": "3point"}, {"text": "x", "legs": "*R*"})
+"""What the shipped catalog is asked for."""
 WORKERS = 2 if find_spec("joblib") else 1
 """The extra with joblib may be missing."""
 

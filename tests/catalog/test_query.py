@@ -16,7 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hrsynth
-from catalog.stub import CHAINS, REFUSED, VERDICTS, WORKERS, source
+from catalog.stub import CHAINS, QUESTIONS, REFUSED, VERDICTS, WORKERS, source
 from hrsynth.catalog import Catalog, load
 from hrsynth.catalog.build import build, check
 from hrsynth.catalog.fits import fits, may_fit
@@ -192,9 +192,7 @@ def test_sqlite_answers_as_the_lines_do(tmp_path: Path):
     """What may be asked about the shipped catalog; how long it takes stands in ``benchmarks/others.py``."""
     kept, file = shipped(), tmp_path / "all.sqlite"
     _write_tables(file, {group: kept.lines([group], {}) for group in kept.groups()})
-    for asked in ({}, {"legs": "3-R*"}, {"legs": "?-?R*"}, {"legs": "*-R*R*-*"},
-                  {"legs": 3, "verdict": "controllable"}, {"modes": 6}, {"text": "takeover"}, {"text": "lift 1"},
-                  {"text": "hexaglide"}, {"dof": 3}, {"motion": "2T1R", "base_motors": True}, {"see": "3point"}):
+    for asked in (*QUESTIONS, {"text": "lift 1"}):
         assert Database(file).decides(asked)
         assert list(load(file, **asked)) == list(load(**asked)), asked
 

@@ -13,7 +13,7 @@ from typing import Any
 from ..errors import BadRequest
 from .jsonl import Record, is_written, leading_word
 from .known import called, is_called, kinds, known_as
-from .words import counted, sights
+from .words import LONGEST_COUNT, counted, sights
 
 ASKED = ("group", "dof", "motion", "verdict", "base_motors", "fewest", "see", "modes", "legs", "text")
 """What can be asked for."""
@@ -22,10 +22,11 @@ TEXTS = ("notation", "hidden", "steps", "others")
 the names under which the robot is known."""
 APART = "\x1f"
 """Between the texts of a record."""
-NUMBERS = ("dof", "base_motors", "fewest", "modes")
-"""What is a number in records."""
-MOST_TOLD, LONGEST_TOLD, LONGEST_NUMBER = 100, 10_000, 18
-"""Values and letters about which a SQLite file is asked, at most, and digits of a number."""
+COLUMNS = {"legs": "INTEGER", "dof": "INTEGER", "motion": "TEXT", "verdict": "TEXT", "base_motors": "INTEGER",
+           "fewest": "INTEGER", "see": "TEXT", "modes_bound": "INTEGER"}
+"""Fields of a record that have a column and an index in a SQLite file."""
+MOST_TOLD, LONGEST_TOLD = 100, 10_000
+"""Values and letters about which a SQLite file is asked, at most."""
 
 
 def require_askable(asked: Mapping[str, Any]) -> None:
@@ -63,7 +64,7 @@ def fits(asked: Mapping[str, Any]) -> Callable[[Record], bool]:
 def may_fit(asked: Mapping[str, Any]) -> Callable[[str], bool]:
     """Whether the line of a record may fit all that is asked for and not None, without reading it."""
     every = [each.line for each in conditions(asked).values() if each.line]
-    return lambda line: not is_written(line) or all(told(line) for told in every)
+    return lambda line: all(told(line) for told in every) or not is_written(line)
 
 
 def _any_of(every: Sequence[RecordCondition]) -> RecordCondition:
@@ -80,21 +81,21 @@ def _any_of(every: Sequence[RecordCondition]) -> RecordCondition:
 def _condition(name: str, value: Any) -> RecordCondition:
     """That of one value; one of NumPy counts as Python's."""
     found = _told(name, value.item() if hasattr(value, "item") else value)
-    return found if all(_sqlite_can_tell(name, each) for each in found.values) else replace(found, row=None)
+    return found if all(map(_sqlite_can_tell, found.values)) else replace(found, row=None)
 
 
-def _sqlite_can_tell(name: str, value: Any) -> bool:
-    """Whether SQLite takes a value for what it is: it makes numbers of texts, and ends a text at a NUL."""
+def _sqlite_can_tell(value: Any) -> bool:
+    """Whether SQLite takes a value for what it is; it ends a text at a NUL."""
     if not isinstance(value, str):
         return isinstance(value, float) or (isinstance(value, int) and abs(value) < 2**63)
-    return name not in NUMBERS and len(value) <= LONGEST_TOLD and not re.search("[\0\ud800-\udfff]", value)
+    return len(value) <= LONGEST_TOLD and not re.search("[\0\ud800-\udfff]", value)
 
 
 def _told(name: str, value: Any) -> RecordCondition:
     if name in ("legs", "see", "text") and not isinstance(value, str) and (name, type(value)) != ("legs", int):
         raise BadRequest(f"the catalog cannot be asked for {name}", value, "a text, or a number of legs")
     match name:
-        case "legs" if isinstance(value, str) and not (value.isdecimal() and len(value) < LONGEST_NUMBER):
+        case "legs" if isinstance(value, str) and not (value.isdecimal() and len(value) <= LONGEST_COUNT):
             pattern = plain_brackets(value)
             matches = re.compile(translate(pattern)).match
 
@@ -129,8 +130,11 @@ def _told(name: str, value: Any) -> RecordCondition:
     exact = isinstance(value, str) or (isinstance(value, int) and abs(value) < 2**63 and isinstance(
         value, bool) == (name == "base_motors"))
     part = f"{json.dumps(name)}:{json.dumps(value)}" if exact else ""
-    return RecordCondition(lambda record: name in record and bool(record[name] == value), f'"{name}" = ?', (value,),
-                           lambda line: part in line)
+    # a column of numbers takes a text that looks like one for it
+    is_told = not (isinstance(value, str) and COLUMNS.get(name) == "INTEGER")
+    return RecordCondition(
+        lambda record: name in record and bool(record[name] == value),
+        f'"{name}" = ?' if is_told else None, (value,), (lambda line: part in line) if exact else None)
 
 
 def chains(record: Record) -> set[str]:

@@ -9,7 +9,7 @@ from functools import cache
 from importlib import resources
 
 from .jsonl import Record
-from .words import parse, unseen
+from .words import parse
 
 
 @cache
@@ -55,7 +55,7 @@ def known_as(record: Record) -> str:
 
 def bare(word: str) -> str:
     """A word without motors and marks of watched links."""
-    return str(unseen(parse(word).unmoved))
+    return str(parse(word).unmoved.unmarked)
 
 
 def order(record: Record) -> tuple[bool, bool, bool, bool, bool, bool]:

@@ -8,14 +8,14 @@ import gzip
 import json
 import sqlite3
 import zlib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from importlib import resources
 from pathlib import Path
 from typing import Any, Protocol, overload
 
 from ..description.files import replacement
 from ..errors import BadRequest, BuildStopped
-from .fits import TEXTS, chains, conditions, may_fit, texts
+from .fits import COLUMNS, TEXTS, RecordCondition, chains, conditions, may_fit, texts
 from .journal import ENDING, Journal
 from .jsonl import FORMAT, decoded, encoded, leading_word, record, require_version
 from .words import VERSION
@@ -31,9 +31,6 @@ PACKED_ABOVE = 10_000
 PUBLISHED = "published"
 """The shipped catalog of published robots."""
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
-COLUMNS = {"legs": "INTEGER", "dof": "INTEGER", "motion": "TEXT", "verdict": "TEXT", "base_motors": "INTEGER",
-           "fewest": "INTEGER", "see": "TEXT", "modes_bound": "INTEGER"}
-"""Fields of a record that have a column and an index."""
 OLD_COLUMNS = ("group", "dof", "motion", "verdict", "base_motors", "fewest")
 """What older files can be asked for."""
 
@@ -131,31 +128,25 @@ class Database:
                 'SELECT name FROM known WHERE name IS NOT NULL')]
 
     def lines(self, groups: Sequence[str], asked: Mapping[str, Any]) -> Sequence[str]:
-        known = self._known()
-        told = [each for name, each in conditions(asked).items() if each.row and known(name)]
+        with _asked(self.path):
+            file = self._open()
+            new, told = _is_new(file), _told_by_rows(file, asked)
         met = [f'+"group" IN ({", ".join("?" * len(groups))})', *(str(each.row) for each in told)]
         values = [*groups, *(value for each in told for value in each.values)]
         with _asked(self.path):
-            file = self._open()
-            if not _is_new(file):
+            if not new:
                 return [line for line, in file.execute(
                     f'SELECT line FROM records WHERE {" AND ".join(met)} ORDER BY "group", word', values)]
             rows = file.execute(f'SELECT rowid FROM records WHERE {" AND ".join(met)} ORDER BY rowid', values)
             return StoredLines(self.path, file, [number for number, in rows])
 
     def decides(self, asked: Mapping[str, Any]) -> bool:
-        known = self._known()
-        return all(each.row and known(name) for name, each in conditions(asked).items())
+        with self._read() as file:
+            return len(_told_by_rows(file, asked)) == len(conditions(asked))
 
     def count(self, group: str) -> int:
         with self._read() as file:
             return int(file.execute('SELECT count(*) FROM records WHERE "group" = ?', (group,)).fetchone()[0])
-
-    def _known(self) -> Callable[[str], bool]:
-        """Whether the file can tell of what is asked by a name."""
-        with self._read() as file:
-            new = _is_new(file)
-        return lambda name: new or name in OLD_COLUMNS
 
     def write(self, group: str, lines: Iterable[str]) -> None:
         kept = {} if not self.path.exists() else {
@@ -222,6 +213,12 @@ class StoredLines(Sequence[str]):
 def _is_new(file: sqlite3.Connection) -> bool:
     """Whether texts stand in a table of their own; the lines of older files stand in the rows."""
     return file.execute("SELECT 1 FROM sqlite_master WHERE name = 'texts'").fetchone() is not None
+
+
+def _told_by_rows(file: sqlite3.Connection, asked: Mapping[str, Any]) -> list[RecordCondition]:
+    """The conditions that the rows of a file decide."""
+    new = _is_new(file)
+    return [each for name, each in conditions(asked).items() if each.row and (new or name in OLD_COLUMNS)]
 
 
 def store(path: str | Path) -> Store:

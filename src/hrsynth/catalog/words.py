@@ -112,9 +112,14 @@ class LegWord:
         return LegWord(tuple(replace(joint, motor=False) for joint in self.joints))
 
     @cached_property
+    def unmarked(self) -> LegWord:
+        """The leg of which the default segment is observed."""
+        return LegWord(tuple(replace(joint, watched=False) for joint in self.joints))
+
+    @cached_property
     def chain(self) -> LegWord:
         """The joints alone, in canonical names: nothing is driven, the default segment is observed."""
-        return LegWord(tuple(replace(joint, motor=False, watched=False) for joint in self.joints)).canonical
+        return self.unmoved.unmarked.canonical
 
     @property
     def driven(self) -> LegWord:
@@ -211,6 +216,11 @@ class RobotWord:
                             seen=self.seen)
 
     @property
+    def unmarked(self) -> RobotWord:
+        """The architecture of which the default segment of each leg is observed, and nothing else."""
+        return RobotWord.of(*[[leg.unmarked for leg in body] for body in self.bodies], platform=self.platform)
+
+    @property
     def unseen(self) -> RobotWord:
         """The architecture without its sensors."""
         return replace(self, seen=())
@@ -224,15 +234,6 @@ class RobotWord:
 def counted(symbols: Iterable[LegWord | SightWord]) -> str:
     """Equal ones once with their number, joined by +."""
     return "+".join(f"{count if count > 1 else ''}{each}" for each, count in Counter(map(str, symbols)).items())
-
-
-def unseen(word: RobotWord) -> RobotWord:
-    """The word with no link marked as observed."""
-    return RobotWord.of(*[[_blind(leg) for leg in body] for body in word.bodies], platform=word.platform)
-
-
-def _blind(leg: LegWord) -> LegWord:
-    return LegWord(tuple(replace(joint, watched=False) for joint in leg.joints))
 
 
 def parse(text: str) -> RobotWord:
@@ -276,10 +277,10 @@ def _legs(text: str, part: str) -> list[LegWord]:
         if not 1 <= count <= LARGEST_WORD:
             raise BadRequest(f"word {text!r}: number of equal legs", count, f"1 to {LARGEST_WORD}")
         try:
-            found += [_known_leg(match["leg"])] * count
+            leg = _known_leg(match["leg"])
         except BadRequest:
-            _leg(text, match["leg"])
-            raise
+            leg = _leg(text, match["leg"])  # in words that name all of it
+        found += [leg] * count
     return found
 
 

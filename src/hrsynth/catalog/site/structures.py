@@ -9,7 +9,7 @@ from hashlib import sha256
 from typing import Any
 
 from ..jsonl import Record, line
-from ..words import parse, unseen
+from ..words import parse
 
 LENGTH = 12
 """Digits of a name: two of a million words are alike with a probability of 2e-3."""
@@ -67,7 +67,7 @@ def structures(records: Iterable[Record]) -> tuple[Structure, ...]:
         for part in parts.values():
             word = part[0]["word"] if unmoved in own else unmoved
             own[word] = part
-            alike_unseen.setdefault(str(unseen(parse(unmoved))), []).append(word)
+            alike_unseen.setdefault(str(parse(unmoved).unmarked), []).append(word)
     kin = {word: words for words in alike_unseen.values() for word in words}
     return tuple(Structure(word, tuple(own[word]), tuple((other, own[other][0].get("verdict", "refused"))
                                                          for other in sorted(kin[word]) if other != word))
