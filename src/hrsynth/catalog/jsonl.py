@@ -75,13 +75,21 @@ def encoded(group: str, lines: Iterable[str]) -> bytes:
     return "".join(f"{each}\n" for each in [head(group, len(ordered)), *ordered]).encode("ascii")
 
 
+def head_count(first: str | bytes, file: str) -> int:
+    """The number of records that a file's first line says; raises ``BadRequest`` where it says none."""
+    count = read_head(first, file, f"{file}: no file of the catalog", None, "count")["count"]
+    if not isinstance(count, int):
+        raise BadRequest(f"{file}: number of records", count, "a whole number")
+    return count
+
+
 def decoded(content: bytes, file: str) -> list[str]:
     """The lines of a group's file; raises ``BadRequest`` for another version, a file cut off or of something else."""
     try:
         first, *lines = content.decode("ascii").splitlines() or [""]
     except UnicodeDecodeError:
         first, lines = "", []
-    count = read_head(first, file, f"{file}: no file of the catalog", None, "count")["count"]
+    count = head_count(first, file)
     if len(lines) != count or not content.endswith(b"\n"):
         raise BadRequest(f"{file}: cut off, records", len(lines), str(count))
     return lines

@@ -17,7 +17,7 @@ from ..description.files import replacement
 from ..errors import BadRequest, BuildStopped
 from .fits import COLUMNS, TEXTS, RecordCondition, chains, conditions, may_fit, texts
 from .journal import ENDING, Journal
-from .jsonl import FORMAT, decoded, encoded, leading_word, record, require_version
+from .jsonl import FORMAT, decoded, encoded, head_count, leading_word, record, require_version
 from .words import VERSION
 
 DATABASES = (".sqlite", ".sqlite3", ".db")
@@ -91,7 +91,7 @@ class Folder:
         return all(value is None for value in asked.values())
 
     def count(self, group: str) -> int:
-        return len(self.lines([group], {}))
+        return head_count(self.content(group).partition(b"\n")[0], str(self.file(group)))
 
     def write(self, group: str, lines: Iterable[str]) -> None:
         lines = list(lines)

@@ -13,7 +13,7 @@ import json as javascript
 import shlex
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -109,15 +109,17 @@ def _require_known(kept: str | None, asked: dict[str, Any]) -> None:
     from ..catalog.query import groups_of
     from ..errors import BadRequest
 
-    every = load(kept, group=tuple(groups_of(kept)))
-    for name, known in (("group", groups_of(kept)), ("verdict", VERDICTS),
-                        *((name, every.values(name)) for name in ("motion", "dof", "fewest"))):
-        if asked[name] not in (None, *known):
+    groups = groups_of(kept)
+    every = cache(lambda: load(kept, group=tuple(groups)))
+    named = {"group": groups, "verdict": VERDICTS}
+    for name in (name for name in ("group", "verdict", "motion", "dof", "fewest") if asked[name] is not None):
+        known = named[name] if name in named else every().values(name)
+        if asked[name] not in known:
             raise BadRequest(f"no architecture of the catalog has this --{name}", asked[name],
                              list(map(str, sorted(known))))
-    if asked["legs"] is not None and not every.where(legs=asked["legs"]):
+    if asked["legs"] is not None and not every().where(legs=asked["legs"]):
         raise BadRequest("no architecture of the catalog has such legs", asked["legs"], "their number, "
-                         f"{', '.join(map(str, every.values('legs')))}, or a pattern in which * and ? stand for "
+                         f"{', '.join(map(str, every().values('legs')))}, or a pattern in which * and ? stand for "
                          "letters: 3-R*RR, PUS, 6-*")
 
 
