@@ -25,7 +25,7 @@ def test_all_words_are_there_and_sorted():
 
 
 def test_words_are_canonical_and_in_one_group():
-    words = [record["word"] for group in EVERY for record in load(group=group)]
+    words = [word for group in EVERY for word in load(group=group).words]
     assert len(set(words)) == len(words)
     assert all(str(parse(word)) == word for word in words[::37])
 

@@ -11,7 +11,7 @@ from functools import cache
 from typing import Any
 
 from ..errors import BadRequest
-from .jsonl import Record, is_written, leading_word
+from .jsonl import Record, is_written, leading_word, written_text
 from .known import called, is_called, kinds, known_as
 from .words import LONGEST_COUNT, counted, sights
 
@@ -103,11 +103,15 @@ def _told(name: str, value: Any) -> RecordCondition:
             def has_chain(notation: str) -> bool:
                 return any(each == value or matches(each) for each in chains({"notation": notation}))
 
+            def has_legs(word: str, notation: str) -> bool:
+                return has_chain(notation) or any(
+                    each == value or matches(each) for each in (word, word.replace("*", "")))
+
             return RecordCondition(
-                lambda record: has_chain(str(record.get("notation", ""))) or any(
-                    each == value or matches(each) for each in (record["word"], record["word"].replace("*", ""))),
+                lambda record: has_legs(record["word"], str(record.get("notation", ""))),
                 "(word GLOB ? OR replace(word, '*', '') GLOB ? OR rowid IN (SELECT record FROM called WHERE name IN "
-                "(SELECT id FROM names WHERE text GLOB ?)))", (pattern,) * 3)
+                "(SELECT id FROM names WHERE text GLOB ?)))", (pattern,) * 3,
+                lambda line: "\\" in line or has_legs(leading_word(line), written_text(line, "notation")))
         case "text":
             text = value.casefold()
             # lists and quotes are not written as they are read

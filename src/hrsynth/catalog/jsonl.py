@@ -69,6 +69,11 @@ def leading_word(text: str) -> str:
     return text[len(_LINE_START):end] if end > 0 else word_of(text)
 
 
+def written_text(text: str, name: str) -> str:
+    """The text of a field, without escaped letters, in a line that :func:`line` wrote; empty where there is none."""
+    return text.partition(f'"{name}":"')[2].partition('"')[0]
+
+
 def encoded(group: str, lines: Iterable[str]) -> bytes:
     """The bytes of a group's file, sorted by word, whatever the order of the lines."""
     ordered = sorted(lines, key=leading_word)

@@ -84,13 +84,11 @@ class Catalog(Value):
         require_askable(asked)
         return Catalog(tuple(filter(fits(asked), self.records)))
 
-    def named(self, text: str) -> list[Record]:
-        """The records of robots that are called so, or whose legs are, those first that a list shows first: names that
-        begin with the text before others."""
-        has_legs = fits({"legs": text})
-        found = [each for each in self if is_called(each, text) or has_legs(each)]
-        starts = f", {text}".casefold()
-        return sorted(found, key=lambda each: (starts not in f", {alias(each['word'])}".casefold(), *order(each)))
+    @property
+    def words(self) -> list[str]:
+        """The words of all records, which are not read for that."""
+        return self.records.words() if isinstance(self.records, ReadRecords) else [
+            str(each["word"]) for each in self.records]
 
     def values(self, name: str) -> list[Any]:
         """The values of a field that records have, sorted."""
@@ -103,9 +101,7 @@ class Catalog(Value):
 
     @cached_property
     def _places(self) -> dict[str, int]:
-        words = self.records.words() if isinstance(self.records, ReadRecords) else [
-            str(each["word"]) for each in self.records]
-        return {word: i for i, word in reversed(list(enumerate(words)))}
+        return {word: i for i, word in reversed(list(enumerate(self.words)))}
 
 
 def load(path: str | Path | None = None, **asked: Any) -> Catalog:
@@ -122,6 +118,15 @@ def load(path: str | Path | None = None, **asked: Any) -> Catalog:
     groups = _groups(kept, asked)
     found = Catalog(ReadRecords(kept.lines(groups, asked)))
     return found if kept.decides(asked) else found.where(**asked)
+
+
+def named(text: str, path: str | Path | None = None) -> list[Record]:
+    """The records of robots that are called so, or whose legs are, those first that a list shows first: names that
+    begin with the text before others. ``path`` as for :func:`load`."""
+    called = (each for each in load(path, text=text) if is_called(each, text))
+    found = {each["word"]: each for each in (*called, *load(path, legs=text))}.values()
+    starts = f", {text}".casefold()
+    return sorted(found, key=lambda each: (starts not in f", {alias(each['word'])}".casefold(), *order(each)))
 
 
 def count(path: str | Path | None = None, **asked: Any) -> int:

@@ -236,15 +236,15 @@ def audit(folder: str, output: str | None, only: str | None, sample: int | None,
 
 def _word(text: str, kept: str | None) -> tuple[str, str]:
     """The word of an architecture that is given by it, by a name or by its legs, and what else is called so."""
-    from ..catalog import load
     from ..catalog.known import alias
+    from ..catalog.query import named
     from ..catalog.words import parse
     from ..errors import BadRequest
 
     try:
         return str(parse(text)), ""
     except BadRequest:
-        found = load(kept).named(text) if text.strip() else []
+        found = named(text, kept) if text.strip() else []
         if not found and "(" in text:
             raise
         if not found:
@@ -261,14 +261,16 @@ def _known(word: str, kept: str | None) -> tuple[Any, str]:
     from ..catalog import load
     from ..catalog.build import architectures, made
     from ..catalog.groups import group
+    from ..catalog.query import groups_of
     from ..catalog.store import shipped
-    from ..catalog.words import SENSORS, parse
+    from ..catalog.words import parse
 
+    own = group(parse(word))
     if kept is not None or shipped().groups():
-        found = load(kept, group=SENSORS if parse(word).seen else None)
+        found = load(kept, group=own if own in groups_of(kept) else None)
         if word in found:
             return found[word], ""
-    ((_, line),) = made(architectures().entry, group(parse(word)), [word])
+    ((_, line),) = made(architectures().entry, own, [word])
     return javascript.loads(line), "not in the catalog, studied now"
 
 
