@@ -109,8 +109,8 @@ def _told(name: str, value: Any) -> RecordCondition:
 
             return RecordCondition(
                 lambda record: has_legs(record["word"], str(record.get("notation", ""))),
-                "(word GLOB ? OR replace(word, '*', '') GLOB ? OR rowid IN (SELECT record FROM called WHERE name IN "
-                "(SELECT id FROM names WHERE text GLOB ?)))", (pattern,) * 3,
+                "(chains IN (SELECT chains FROM called WHERE name IN (SELECT id FROM names WHERE text GLOB ?)) "
+                "OR word GLOB ? OR bare GLOB ?)", (pattern,) * 3,
                 lambda line: "\\" in line or has_legs(leading_word(line), written_text(line, "notation")))
         case "text":
             text = value.casefold()

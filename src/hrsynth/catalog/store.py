@@ -279,27 +279,31 @@ def _write_tables(path: Path, groups: Mapping[str, Iterable[str]]) -> None:
         columns = ", ".join(f"{name} {kind}" for name, kind in COLUMNS.items())
         numbers = ", ".join(f"text_{field} INTEGER" for field in TEXTS)
         file.execute('CREATE TABLE versions (format INTEGER, catalog INTEGER)')
-        file.execute(f'CREATE TABLE records ("group" TEXT, word TEXT, {columns}, {numbers}, '
+        # what is asked for most stands first in a row
+        file.execute(f'CREATE TABLE records ({numbers}, chains INTEGER, {columns}, "group" TEXT, word TEXT, bare TEXT, '
                      'PRIMARY KEY ("group", word))')
         file.execute("INSERT INTO versions VALUES (?, ?)", (FORMAT, VERSION))
         file.execute("CREATE TABLE lines (record INTEGER PRIMARY KEY, line TEXT)")
         file.execute("CREATE TABLE texts (field TEXT, id INTEGER, text TEXT, PRIMARY KEY (field, id)) WITHOUT ROWID")
         file.execute("CREATE TABLE names (id INTEGER PRIMARY KEY, text TEXT)")
-        file.execute("CREATE TABLE called (name INTEGER, record INTEGER, PRIMARY KEY (name, record)) WITHOUT ROWID")
-        marks = ", ".join("?" * (len(COLUMNS) + len(TEXTS) + 2))
-        kept, called, number = {field: dict[str, int]() for field in TEXTS}, dict[str, int](), 0
+        file.execute("CREATE TABLE called (name INTEGER, chains INTEGER, PRIMARY KEY (name, chains)) WITHOUT ROWID")
+        marks = ", ".join("?" * (len(COLUMNS) + len(TEXTS) + 4))
+        kept, notations, number = {field: dict[str, int]() for field in TEXTS}, dict[str, int](), 0
         for group, lines in sorted(groups.items()):
             for line in sorted(lines, key=leading_word):
                 found, number = record(line), number + 1
                 file.execute(f"INSERT INTO records VALUES ({marks})", (
-                    group, found["word"], *(found.get(name) for name in COLUMNS),
-                    *(kept[field].setdefault(text, len(kept[field])) for field, text in texts(found).items())))
+                    *(kept[field].setdefault(text, len(kept[field])) for field, text in texts(found).items()),
+                    notations.setdefault(str(found.get("notation", "")), len(notations)),
+                    *(found.get(name) for name in COLUMNS), group, found["word"], found["word"].replace("*", "")))
                 file.execute("INSERT INTO lines VALUES (?, ?)", (number, line))
-                file.executemany("INSERT INTO called VALUES (?, ?)", [
-                    (called.setdefault(name, len(called)), number) for name in sorted(chains(found))])
         for field, known in kept.items():
             file.executemany("INSERT INTO texts VALUES (?, ?, ?)", ((field, i, text) for text, i in known.items()))
-        file.executemany("INSERT INTO names VALUES (?, ?)", ((i, text) for text, i in called.items()))
+        names = dict[str, int]()
+        file.executemany("INSERT INTO called VALUES (?, ?)", (
+            (names.setdefault(name, len(names)), i) for notation, i in notations.items()
+            for name in sorted(chains({"notation": notation}))))
+        file.executemany("INSERT INTO names VALUES (?, ?)", ((i, text) for text, i in names.items()))
         for name in ("word", *COLUMNS):
             file.execute(f"CREATE INDEX records_{name} ON records ({name})")
         file.commit()
