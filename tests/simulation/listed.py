@@ -19,21 +19,11 @@ from hrsynth.constraints.pattern import attached
 from hrsynth.geometry.vectors import Array
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.simulation.ending import ANTIPODAL, BOUNDARY, GOAL, MINIMUM, MODE
-from hrsynth.simulation.endings.endings import RestSearch
+from hrsynth.simulation.endings.descent import LONGEST_STEP, CriticalPoint, Expansion, are_closed, walked
+from hrsynth.simulation.endings.endings import NEARBY, RestSearch
 from hrsynth.simulation.endings.error import DirectionTerm, RestSystem
 from hrsynth.simulation.endings.rests import CRITICAL, RestPoint
-from hrsynth.simulation.endings.search import (
-    LONGEST_STEP,
-    NEARBY,
-    Critical,
-    CriticalPoint,
-    Expansion,
-    are_closed,
-    in_mode,
-    marks,
-    starts,
-    walked,
-)
+from hrsynth.simulation.endings.search import Critical, in_mode, marks, starts
 from hrsynth.simulation.result import Servo
 from hrsynth.tolerances import CRITICAL as AT_ZERO
 from hrsynth.tolerances import CRITICAL_FLAT, SAME_ENDING

@@ -16,7 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.modes.carried import CarriedPlatform, Told, Turn, enclosed, proposals
+from ..analysis.modes.carried import CarriedPlatform, Told, Turn
+from ..analysis.modes.carried_modes import enclosed, proposals
 from ..analysis.modes.conditions import AtAngle, OnPlane, OnRevolution
 from ..analysis.modes.quadrics import UNIT
 from ..analysis.modes.single_loop import SingleLoop

@@ -18,7 +18,8 @@ import numpy as np
 
 from ..analysis.measured import MeasuredRobot
 from ..analysis.modes.branches import Model
-from ..analysis.modes.carried import CarriedPlatform, solve_carried
+from ..analysis.modes.carried import CarriedPlatform
+from ..analysis.modes.carried_modes import solve_carried
 from ..analysis.modes.curves import Circle, Curve, Line, Plane, Point, Reach, Sphere, Surface, shifted
 from ..analysis.modes.modes import AssemblyModes, modes
 from ..analysis.modes.planar_loops import PlanarLoop, PlanarLoops, enclosures, excluded, planar_loops

@@ -12,8 +12,8 @@ from analysis.modes.ankles import LEGS, ankle, carried, counted
 from analysis.modes.test_robots import check_completeness, check_modes, same_modes
 from analysis.modes.test_surfaces import needs_msolve
 from hrsynth.analysis.measured import MeasuredRobot
-from hrsynth.analysis.modes.carried import carried as carried_platform
-from hrsynth.analysis.modes.carried import polished, proposals
+from hrsynth.analysis.modes.carried_modes import polished, proposals
+from hrsynth.analysis.modes.carrier import carried as carried_platform
 from hrsynth.analysis.modes.joint_forms import closings_bound, eigenvalues
 from hrsynth.errors import NotConfined
 from hrsynth.geometry.vectors import pose, rotation_about

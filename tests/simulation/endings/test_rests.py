@@ -29,13 +29,14 @@ from hrsynth.present.text.endings import endings as text
 from hrsynth.simulation.endings.completeness import Covers
 from hrsynth.simulation.endings.cover import bounds
 from hrsynth.simulation.endings.critical_poses import CriticalPoses, Lift, _held, critical_poses
+from hrsynth.simulation.endings.descent import CriticalPoint, Tangents, descend, walked
 from hrsynth.simulation.endings.enclosure import _rates, enclosed
 from hrsynth.simulation.endings.endings import RestSearch, _ways, endings
 from hrsynth.simulation.endings.error import RestEquations
 from hrsynth.simulation.endings.pose_error import PoseError
 from hrsynth.simulation.endings.pose_system import LegSystem
 from hrsynth.simulation.endings.rests import Endings, RestPoint, stability
-from hrsynth.simulation.endings.search import CriticalPoint, Tangents, ToldApart, anywhere, descend, starts, walked
+from hrsynth.simulation.endings.search import ToldApart, anywhere, starts
 from hrsynth.simulation.law import FixedDirections, directions
 from hrsynth.simulation.run import Loop
 from oracle import Oracle

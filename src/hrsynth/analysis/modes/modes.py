@@ -43,7 +43,8 @@ from ..observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike
 from ..question import question
 from ..singularity.agreement import weakest
 from .branches import Model, solve_all
-from .carried import CarriedPlatform, solve_carried
+from .carried import CarriedPlatform
+from .carried_modes import solve_carried
 from .conditions import AtAngle
 from .drift import drift
 from .formed import formed

@@ -27,7 +27,9 @@ from ...mechanism.observations.encoder import Encoder
 from ...tolerances import INDEPENDENT_RATES, NUMBER_ROUNDING, SOLVED
 from ..measured import MeasuredRobot
 from .branches import Model
-from .carried import CarriedPlatform, Turn, as_mode, freedoms_of
+from .carried import CarriedPlatform, Turn
+from .carried_modes import as_mode
+from .carrier import freedoms_of
 from .leg_conditions import Middle
 from .pose_boxes import PRECISION, PoseBox, as_box, zeros
 from .solve import SystemMode, SystemModes

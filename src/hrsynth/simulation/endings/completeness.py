@@ -20,9 +20,10 @@ from ...tolerances import COVER_REACH, SHORTEST_ROD
 from ..law import directions
 from .cover import Cover, cover
 from .critical_poses import CriticalPoses, Lift
+from .descent import descend, sharpened
 from .error import RestSystem
 from .rests import RestCover, RestPoint, SignedModes
-from .search import Critical, descend, sharpened
+from .search import Critical
 
 CLOSING_STARTS = 3000
 """Coordinates that are scattered where the robot is to be closed at proved poses, at most."""

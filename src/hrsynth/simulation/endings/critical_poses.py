@@ -37,10 +37,10 @@ from ...results import Value
 from ...tolerances import COVER_REACH, FOLLOWED, SAME_ENDING
 from .carried import CarriedVector, SweptChains
 from .cover import bounds
+from .descent import CriticalPoint, descend
 from .error import RestSystem
 from .pose_error import NotEnclosed, PoseError
 from .pose_system import LegSystem, unbound
-from .search import CriticalPoint, descend
 
 LONGEST_STEP = 0.25
 """Longest change of a coordinate in a step."""

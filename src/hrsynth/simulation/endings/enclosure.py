@@ -29,8 +29,8 @@ from ...geometry.affine import AffineForms, affine, combined
 from ...geometry.vectors import Array, times
 from ...results import Value
 from ...tolerances import AFFINE_ROUNDING, THINNEST_TUBE
+from .descent import CriticalPoint, Tangents
 from .error import RestEquations, RestSystem
-from .search import CriticalPoint, Tangents
 
 RATE_WIDTHS = (1e-9, 1e-7, 1e-5, 1e-3, 1e-1)
 """Distances, relative ones where an eigenvalue is above 1, at which bounds of it are tried."""

@@ -38,15 +38,18 @@ from ..servo import require_regular, require_seen, require_sight
 from .carried import SweptChains
 from .completeness import Covers
 from .critical_poses import Further, Lift, critical_poses
+from .descent import descend, walked
 from .enclosure import EnclosedPoint, enclosed
 from .error import RestSystem
 from .rests import CRITICAL, Endings, RestPoint, SignedModes, stability
-from .search import NEARBY, Critical, critical_points, descend, in_mode, walked
+from .search import Critical, critical_points, in_mode
 
 MISSED_ROUNDS = 3
 """Rounds in which it is tried to close the robot at the proved poses that are not in the list."""
 MODE_TRIES = 4
 """Walks from a rest that are tried to see its operation mode."""
+NEARBY = 0.02
+"""Step (characteristic lengths, radians) of the first of these walks."""
 
 
 @question()
