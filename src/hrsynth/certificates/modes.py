@@ -22,7 +22,9 @@ from ..analysis.modes.carried import CarriedPlatform
 from ..analysis.modes.carried_modes import solve_carried
 from ..analysis.modes.curves import Circle, Curve, Line, Plane, Point, Reach, Sphere, Surface, shifted
 from ..analysis.modes.modes import AssemblyModes, modes
-from ..analysis.modes.planar_loops import PlanarLoop, PlanarLoops, enclosures, excluded, planar_loops
+from ..analysis.modes.planar_loops import PlanarLoop, PlanarLoops
+from ..analysis.modes.planar_modes import enclosures, excluded
+from ..analysis.modes.planar_reading import planar_loops
 from ..analysis.modes.quadrics import UNIT, PoseSystem, Rounded, WorkingFrame, direction, spokes
 from ..analysis.modes.rigid import Planar, Spatial
 from ..analysis.modes.roots import Roots, is_real

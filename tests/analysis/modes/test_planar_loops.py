@@ -15,7 +15,8 @@ from analysis.modes.gears import closings, five_bar, linkage
 from hrsynth.analysis.measured import MeasuredRobot
 from hrsynth.analysis.modes.modes import AssemblyModes
 from hrsynth.analysis.modes.multiples import Residues
-from hrsynth.analysis.modes.planar_loops import planar_loops, solve_loops, whole_kernel
+from hrsynth.analysis.modes.planar_modes import solve_loops
+from hrsynth.analysis.modes.planar_reading import planar_loops, whole_kernel
 from hrsynth.analysis.modes.search import search
 from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.words import parse
@@ -170,7 +171,7 @@ def test_what_has_no_loops_says_why():
 
 
 def test_what_is_too_large_says_its_size():
-    from hrsynth.analysis.modes import planar_loops as module
+    from hrsynth.analysis.modes import planar_modes as module
 
     found = hrsynth.modes("3rrr_m1")
     with pytest.MonkeyPatch.context() as patch:

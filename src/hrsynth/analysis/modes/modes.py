@@ -49,7 +49,8 @@ from .conditions import AtAngle
 from .drift import drift
 from .formed import formed
 from .motions import SelfMotion, self_motion
-from .planar_loops import PlanarLoops, solve_loops
+from .planar_loops import PlanarLoops
+from .planar_modes import solve_loops
 from .posed import PosedPlatform, most_posed, solve_posed
 from .search import FoundMode, leaves_free, search
 from .sighted import all_loci, behind, opposite, sights

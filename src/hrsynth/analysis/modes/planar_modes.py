@@ -1,0 +1,138 @@
+"""All modes of a planar mechanism: as many closings as there may be, each in a box of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ...budgets import LARGEST_LOOPS, PLANAR_STARTS
+from ...errors import Unsolved
+from ...geometry.vectors import Array, frozen
+from ...kinematics.configuration import ClosedConfiguration
+from ..measured import MeasuredRobot
+from .branches import Model
+from .planar_loops import Exponents, PlanarLoops, SumPart
+from .planar_reading import planar_loops
+from .polynomials import Polynomial
+from .pose_boxes import PoseBox, UnitCircle, zeros
+from .solve import SystemMode, SystemModes
+
+
+def proposals(forms: Sequence[dict[Exponents, complex]], angles: int, enough: int) -> Array:
+    """Common zeros (k, n) that Newton's method finds from random starts, with the conjugate of each, ``enough`` at
+    most."""
+    monomials = sorted({e for form in forms for e in form})
+    M = np.array(monomials, dtype=float)
+    C = np.array([[form.get(e, 0j) for e in monomials] for form in forms])
+    rng, found = np.random.default_rng(0), np.zeros((0, M.shape[1]), dtype=complex)
+    twin = [*range(angles, 2 * angles), *range(angles), *range(2 * angles, M.shape[1])]
+    for _ in range(PLANAR_STARTS):
+        x = rng.normal(size=(64, M.shape[1])) + 1j * rng.normal(size=(64, M.shape[1]))
+        x[:, angles:2 * angles] = 1.0 / x[:, :angles]
+        with np.errstate(all="ignore"):
+            for _ in range(40):
+                values = np.exp(np.log(x) @ M.T)
+                J = ((values[:, None, :] * C) @ M) / x[:, None, :]
+                good = np.all(np.isfinite(J), axis=(1, 2))
+                x, values, J = x[good], values[good], J[good]
+                F = (values @ C.T)[:, :, None]
+                try:
+                    step = np.linalg.solve(J, F)[:, :, 0]
+                except np.linalg.LinAlgError:
+                    step = (np.linalg.pinv(J) @ F)[:, :, 0]
+                x = x - step
+                x[x == 0] = 1e-200
+            close_ = np.abs(step).max(axis=1) < 1e-10 * (1.0 + np.abs(x).max(axis=1))
+        for each in x[close_]:
+            for y in (each, each[twin].conj()):
+                if len(found) < enough and not np.any(np.abs(found - y).max(axis=1, initial=0.0)
+                                                      < 1e-6 * (1.0 + np.abs(y).max())):
+                    found = np.vstack([found, y])
+        if len(found) >= enough:
+            break
+    return found
+
+
+def solve_loops(measured: MeasuredRobot, goal: ClosedConfiguration, error: float = 0.0) -> tuple[Model, SystemModes]:
+    """All modes, with the goal known to ``error`` (m). Raises ``NotConfined``, and ``Unsolved`` where not all closings
+    are enclosed that there may be."""
+    system = planar_loops(measured, goal)
+    system = replace(system, error=system.error + error)
+    found = _judged(system)
+    closing = system.closing if goal.twin.mechanism.couplings else None  # else not all loops need be among those
+    return Model(system, system.placed, system.home, closing=closing), found
+
+
+def _judged(system: PlanarLoops) -> SystemModes:
+    """The modes: as many closings as the degrees in groups of unknowns allow, or else the ranks of multiples."""
+    loops, angles, slides = (f"{n} {word}{'s' * (n != 1)}" for n, word in (
+        (len(system.loops), "loop"), (system.angles, "angle"), (system.slides, "slide")))
+    size = f"{loops}, {angles} and {slides}"
+    most, why, bound = system.most, "degrees in groups of unknowns (Bézout)", "class"
+    if most > LARGEST_LOOPS:
+        raise Unsolved("the loops", f"{size}: up to {most} closings, too many (at most {LARGEST_LOOPS})")
+    boxes, lost = _enclosed(system, proposals(system.forms, system.angles, most))
+    if len(boxes) < most and (fewer := system.residues.most_by_ranks(len(boxes))) is not None and fewer < most:
+        most, why, bound = fewer, "ranks modulo a prime of 62 bits", "rank"
+    start = np.array([1.0] * system.angles + [0.0] * (system.angles + system.slides))
+    at_goal = [box for box in boxes if box.real and box.holds(start)]
+    if len(boxes) < most or lost or len(at_goal) != 1:
+        raise Unsolved("the loops", f"{size}: of {most} closings at most ({why}) {len(boxes)} have boxes")
+    seen = [system.seen(_balls(box)) for box in boxes]
+    if any(all((a - b).contains(0) for a, b in zip(one, other, strict=True))
+           for k, one in enumerate(seen) for other in seen[:k]):
+        raise Unsolved("the loops", f"{size}: several of {most} closings have one pose of the platform")
+    real = [box for box in boxes if box.real]
+    proof = (f"{size}: at most {most} closings by {why}, {len(boxes)} enclosed apart from each other, complex ones "
+             f"too, {len(real)} real")
+    if not system.besides:
+        modes = tuple(_mode(system, box, True) for box in real)
+        return SystemModes(len(boxes), modes, True, proof, bound=bound, enclosed=True)
+    kept = [box for box in real if box is at_goal[0] or not excluded(system, box)]
+    modes = tuple(_mode(system, box, box is at_goal[0]) for box in kept)
+    return SystemModes.of_more(modes, len(real) - len(kept), proof, bound)
+
+
+def enclosures(system: PlanarLoops) -> list[PoseBox]:
+    """Boxes of closings, complex ones too, apart from each other."""
+    return _enclosed(system, proposals(system.forms, system.angles, system.most))[0]
+
+
+def excluded(system: PlanarLoops, box: PoseBox) -> bool:
+    """Whether something that is measured besides is another at each closing in a real box."""
+    return any(not SumPart(each, part, system.slack).value(_balls(box)).contains(0) for each in system.besides
+               for part in (False, True))
+
+
+def _balls(box: PoseBox) -> list[Any]:
+    """The unknowns of a box as complex balls."""
+    from flint import acb, arb
+
+    return [acb(arb(float(m.real), float(r)), arb(float(m.imag), 0.0 if box.real else float(r)))
+            for m, r in zip(box.middle, box.radii, strict=True)]
+
+
+def _enclosed(system: PlanarLoops, proposed: Array) -> tuple[list[PoseBox], int]:
+    """Boxes of closings, apart from each other, and how many proposals have none."""
+    a, slack = system.angles, system.slack
+    equations: list[Polynomial] = [*(SumPart(loop, part, slack) for loop in system.loops for part in (False, True)),
+                                   *(UnitCircle(k, a + k) for k in range(a))]
+    u, v, t = proposed[:, :a], proposed[:, a:2 * a], proposed[:, 2 * a:]
+    return zeros(equations, np.hstack([(u + v) / 2, (u - v) / 2j, t]))
+
+
+def _mode(system: PlanarLoops, box: PoseBox, proved: bool) -> SystemMode:
+    """A real box as a mode, or as one that fits."""
+    a, x = system.angles, box.middle.real
+    q = np.array([*np.arctan2(x[a:2 * a], x[:a]), *x[2 * a:]])
+    spread = [float(each.real.rad()) + float(each.imag.rad()) for each in system.seen(_balls(box))]
+    shift = 2.0 * system.size * max(spread)
+    turn = 0.0 if system.point is not None else 4.0 * max(spread)
+    at = np.array([*np.exp(1j * q[:a]), *np.exp(-1j * q[:a]), *q[a:]])
+    forms = [*system.forms, *(form for each in system.besides for form in each.forms())]
+    residual = max(float(abs(sum(c * complex(np.prod(at ** e)) for e, c in form.items()))) for form in forms)
+    return SystemMode((), max(shift / system.size, turn), shift, turn, residual,
+                      frozen(system.pose_of(system.bodies[0], q)), frozen(q), proved=proved, fits=not proved)
