@@ -14,9 +14,9 @@ from ..analysis.asked import observe
 from ..analysis.derive import derive
 from ..analysis.exact import ExactArchitecture, architecture
 from ..analysis.measured import MeasuredRobot
-from ..analysis.modes.modes import counted as counted_modes
-from ..analysis.modes.modes import expected
 from ..analysis.modes.solve import SystemModes
+from ..analysis.modes.ways import counted as counted_modes
+from ..analysis.modes.ways import expected
 from ..analysis.observed import ObservedRobot, restricted, selected
 from ..analysis.verdict import CONTROLLABLE, Verdict, verdict_of
 from ..errors import BadRequest, HrsynthError, MissingExtra, NotConfined, NotConfirmed, Unsolved

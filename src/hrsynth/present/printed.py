@@ -6,7 +6,8 @@ import math
 from collections.abc import Iterator
 from functools import cache
 
-from ..analysis.modes.modes import AssemblyMode, AssemblyModes, modes
+from ..analysis.modes.assembly_mode import AssemblyMode
+from ..analysis.modes.modes import AssemblyModes, modes
 from ..description import load, shipped
 from ..families.printed import CLAIMS, Place, PrintedClaim
 from .markdown import table as markdown

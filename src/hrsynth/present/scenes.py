@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from ..analysis.modes.assembly_mode import AssemblyMode
 from ..analysis.modes.curves import Circle, Curve, Line, Point, Reach, Sphere, shifted
-from ..analysis.modes.modes import AssemblyMode, AssemblyModes
+from ..analysis.modes.modes import AssemblyModes
 from ..analysis.modes.tips import Tip, TipLoci
 from ..geometry.vectors import Array, inverse, transform
 from .coupler import chains, points, swept, traced

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hrsynth.analysis.modes.modes import AssemblyMode, AssemblyModes
+from hrsynth.analysis.modes.assembly_mode import AssemblyMode
+from hrsynth.analysis.modes.modes import AssemblyModes
 from hrsynth.analysis.observed import motors
 from hrsynth.geometry.vectors import Array, inverse
 from hrsynth.kinematics.configuration import ClosedConfiguration, measure

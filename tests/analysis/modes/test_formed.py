@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from flint import fmpz_mat
 
-from hrsynth.analysis.modes.modes import AssemblyMode, AssemblyModes, modes
+from hrsynth.analysis.modes.assembly_mode import AssemblyMode
+from hrsynth.analysis.modes.modes import AssemblyModes, modes
 from hrsynth.certificates import certificate
 from hrsynth.errors import BadRequest, NoCertificate
 from hrsynth.families.formations import formation

@@ -13,11 +13,12 @@ from analysis.modes.closings import asked, bodies_of, compared, distance, motor_
 from hrsynth.analysis.asked import observe as watched
 from hrsynth.analysis.controllability import legs
 from hrsynth.analysis.measured import MeasuredRobot
-from hrsynth.analysis.modes import modes as ways
+from hrsynth.analysis.modes import ways
 from hrsynth.analysis.modes.branches import Model
 from hrsynth.analysis.modes.drift import drift
-from hrsynth.analysis.modes.modes import AssemblyModes, modes, uncoupled
+from hrsynth.analysis.modes.modes import AssemblyModes, modes
 from hrsynth.analysis.modes.solve import SystemModes
+from hrsynth.analysis.modes.ways import uncoupled
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.budgets import EFFORT
 from hrsynth.description import load, shipped
@@ -353,9 +354,9 @@ def moved_since_zero(at: ClosedConfiguration, joint: Joint) -> float:
     return float(np.arctan2(axis @ [across[2, 1], across[0, 2], across[1, 0]], np.trace(D[:3, :3]) - 1.0))
 
 
-WAYS = {"tips": partial(ways._of_tips, as_written=False, effort=EFFORT),
-        "conditions": partial(ways._of_conditions, effort=EFFORT),
-        "loops": ways._of_loops, "carrier": ways._of_carrier, "single": ways._of_single}
+WAYS = {"tips": partial(ways.of_tips, as_written=False, effort=EFFORT),
+        "conditions": partial(ways.of_conditions, effort=EFFORT),
+        "loops": ways.of_loops, "carrier": ways.of_carrier, "single": ways.of_single}
 
 
 @pytest.mark.some(1, 5)

@@ -17,14 +17,7 @@ from ...kinematics.relation import Measurement
 from ...mechanism import Direction, Joint, JointType
 from ...mechanism.legs import Leg
 from ...mechanism.observations.encoder import Encoder
-from ...tolerances import (
-    CHAIN_ROUNDING,
-    MOVED,
-    RANK_GAP,
-    SAME_DIRECTION,
-    SAME_POINT,
-    SAME_RELATION,
-)
+from ...tolerances import CHAIN_ROUNDING, MOVED, RANK_GAP, SAME_DIRECTION, SAME_POINT, SAME_RELATION
 from ..measured import MeasuredRobot
 from .carried import CarriedPlatform, Told, Turn
 from .conditions import AtAngle, PoseCondition

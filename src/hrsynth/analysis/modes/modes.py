@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -13,124 +11,38 @@ import numpy as np
 from ...batch.reach import reach
 from ...budgets import EFFORT
 from ...constraints.pattern import attached
-from ...errors import (
-    BadRequest,
-    HrsynthError,
-    LoopsNotClosed,
-    MissingExtra,
-    NotConfined,
-    PoseNotReached,
-    TooLarge,
-    Unsolved,
-)
-from ...geometry.vectors import Array, pose_difference
-from ...kinematics.assembly import NOT_FOUND, Assembler, Assembly, of_links
-from ...kinematics.closures import Miss
+from ...errors import BadRequest, MissingExtra, NotConfined, PoseNotReached, TooLarge, Unsolved
+from ...kinematics.assembly import Assembly, of_links
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.limits import outside
-from ...kinematics.pinocchio_model import PinocchioModel
 from ...kinematics.relation import Measurement
-from ...kinematics.tasks import Held, Task
-from ...mechanism.observations.encoder import Encoder
+from ...kinematics.tasks import Task
 from ...mechanism.pose import ModeNumber, Pose, PoseLike, asked_pose
-from ...mechanism.sensors import encoders
 from ...progress import tell
 from ...results import Result
-from ...tolerances import SAME_RELATION
 from ..formation import Formation
 from ..measured import MeasuredRobot
 from ..observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike
 from ..question import question
 from ..singularity.agreement import weakest
-from .branches import Model, solve_all
+from .assembly_mode import AssemblyMode, ModeReader
+from .branches import Model
 from .carried import CarriedPlatform
-from .carried_modes import solve_carried
-from .conditions import AtAngle
 from .drift import drift
 from .formed import formed
 from .motions import SelfMotion, self_motion
 from .planar_loops import PlanarLoops
-from .planar_modes import solve_loops
-from .posed import PosedPlatform, most_posed, solve_posed
+from .posed import PosedPlatform
 from .search import FoundMode, leaves_free, search
-from .sighted import all_loci, behind, opposite, sights
-from .single_loop import solve_loop
-from .solve import SystemMode, SystemModes, continuum
+from .sighted import behind
+from .solve import SystemModes, continuum
 from .tips import TipLoci
+from .ways import better_ways, of_carrier, of_conditions, of_loops, of_single, of_tips, uncoupled
 
 WITHIN = {"formation": "configurations up to trivial motions",
           "translations": "poses turned as this one", "bodies": "poses whose bodies are turned as at this one",
           "planar": "poses in the plane of motion", "spatial": "poses in space", "oriented": "poses in space"}
 """Among which poses the modes are listed, for each way in which the platform moves."""
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class AssemblyMode:
-    """A pose of the platform with the measurements of the goal.
-
-    The exact pose, of the file's decimals, is within ``shift`` (m) and ``turn`` (rad) of ``pose``, infinite where
-    nothing was proved: its position and its turn, or those of the bodies on which legs end where ``enclosed`` names
-    them; ``residual``: the largest distance of a tip from its curve (characteristic lengths). ``goal``: whether it is
-    the pose itself from which the measurements were taken. ``reachable`` and ``assembly``: whether the whole real
-    robot, legs that are not watched included, closes there within its joints' limits, as of :class:`Assembly` (the
-    first None where neither was found); ``open`` names the legs that were not closed, ``beyond`` the joints,
-    ``misses`` what proves of legs that they cannot be closed. ``type2_distance``: the smallest singular value of Mᵀ
-    there, as ``check`` gives it; None where the robot was not closed.
-    """
-
-    pose: Pose
-    shift: float
-    turn: float
-    residual: float
-    goal: bool
-    reachable: bool | None
-    type2_distance: float | None
-    assembly: str = NOT_FOUND
-    open: tuple[str, ...] = ()
-    beyond: tuple[str, ...] = ()
-    misses: tuple[tuple[str, Miss], ...] = ()
-    configuration: ClosedConfiguration | None = None
-    multiplicity: int = 1
-    proved: bool = False
-    """Whether there is exactly one mode within the radius, for all that the file's decimals and closed loops allow."""
-    rounded: bool = False
-    """Whether that is proved for the rounded geometry alone, of which the radius then speaks."""
-    fits: float | None = None
-    """How well all legs fit (characteristic lengths) where more is observed than needed and that is all that is known;
-    the radius is then that of the mode, if it is one."""
-    enclosed: tuple[str, ...] = ()
-    length: float = 1.0
-    """The robot's characteristic length (m)."""
-    bodies: dict[str, Array] | None = None
-    """Poses (4, 4) of the bodies on which legs end; of a formation of all bodies, moved by a trivial motion to where
-    they are nearest to the goal's."""
-    opposite: tuple[str, ...] = ()
-    """What is seen there as the opposite value: then it is *antipodal* and no mode."""
-    behind: tuple[str, ...] | None = None
-    """What is not in front of the camera by which it is seen; None where no camera with a name sees a point."""
-
-    def __repr__(self) -> str:
-        said = "the pose itself" if self.goal else f"assembled: {self.assembly}"
-        return f"<{type(self).__name__}: {self.pose}, {said}>"
-
-    @property
-    def radius(self) -> float:
-        """The larger of the shift (characteristic lengths) and the turn (rad)."""
-        return max(self.shift / self.length, self.turn)
-
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line."""
-        known = bool(np.isfinite(self.radius))
-        return {"pose": self.pose.to_dict(), "radius": self.radius if known else None,
-                "radius_m": self.shift if known else None, "radius_rad": self.turn if known else None,
-                "bodies": list(self.enclosed),
-                "residual": self.residual, "goal": self.goal, "reachable": self.reachable,
-                "assembly": self.assembly, "open": list(self.open), "beyond": list(self.beyond),
-                "reasons": [{"leg": leg, **miss.to_dict()} for leg, miss in self.misses],
-                "type2_distance": self.type2_distance,
-                "multiplicity": self.multiplicity, "proved": self.proved, "rounded": self.rounded,
-                "fits": self.fits, "opposite": list(self.opposite),
-                "behind": None if self.behind is None else list(self.behind)}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -361,28 +273,28 @@ def _listed(setting: ObservedRobot, measured: MeasuredRobot, goal: ClosedConfigu
     answers = list[tuple[TipLoci | None, Model, SystemModes]]()
     exact, better = drift(goal, wanted, setting.normal.moved), None
     free = uncoupled(measured, goal)
-    tips, asked = partial(_of_tips, as_written=as_written, effort=effort), partial(_of_conditions, effort=effort)
-    ways = ((tips, asked, _of_loops, _of_carrier, _of_single) if free is None else
-            (_of_loops, tips, asked, _of_carrier, _of_single))
+    tips, asked = partial(of_tips, as_written=as_written, effort=effort), partial(of_conditions, effort=effort)
+    ways = ((tips, asked, of_loops, of_carrier, of_single) if free is None else
+            (of_loops, tips, asked, of_carrier, of_single))
     for listed in ways:
         if better is not None and listed not in better:
             continue
         try:
-            answers.append(listed(*((measured, goal) if free is None or listed is _of_loops else free), exact))
+            answers.append(listed(*((measured, goal) if free is None or listed is of_loops else free), exact))
         except (NotConfined, Unsolved, TooLarge, MissingExtra) as error:
             reasons.append(error)
-            large = error if listed is _of_loops and isinstance(error, Unsolved) else large
+            large = error if listed is of_loops and isinstance(error, Unsolved) else large
         else:
             if answers[-1][2].complete:
-                better = () if better else _better(answers[-1][1])
+                better = () if better else better_ways(answers[-1][1])
     if not answers:
         raise large or reasons[0]
     # what is measured leaves no freedom: a continuum is that of legs which tips alone do not show
     confined, made, found = max(answers, key=lambda each: (each[2].complete, each[2].continuum is None,
-                                                           not _better(each[1])))
+                                                           not better_ways(each[1])))
     if free is not None and made.closing is None:
         found = replace(found, proof=f"without couplings, which can only rule poses out: {found.proof}")
-    reader = _ModeReader(setting, measured.question if free is None else free[0].question, goal, made)
+    reader = ModeReader(setting, measured.question if free is None else free[0].question, goal, made)
     at_goal = min(found.modes, key=reader.away, default=None)
     ordered = sorted(found.modes, key=lambda mode: mode is not at_goal)
     read = [reader.read(mode, mode is at_goal) for mode in ordered]
@@ -392,174 +304,3 @@ def _listed(setting: ObservedRobot, measured: MeasuredRobot, goal: ClosedConfigu
                          antipodal=tuple(mode for mode in read if mode.opposite))
 
 
-def uncoupled(measured: MeasuredRobot, goal: ClosedConfiguration) -> tuple[MeasuredRobot, ClosedConfiguration] | None:
-    """The robot without its couplings, at the same place, and with what is measured held: so are joints that couplings
-    tie to motors that are held. It has all modes of the robot, and those at which couplings cannot be closed besides.
-    None where it has no couplings, sees less than all freedoms without them, or what is measured is of joints that are
-    one without them."""
-    mechanism, setting = goal.twin.mechanism, measured.setting
-    if not mechanism.couplings:
-        return None
-    held = {each.joint for each in measured.question.observations if isinstance(each, Encoder)}
-    ties = [{mechanism.carrier(each, link).name for link in (each.predecessor, each.successor)}
-            for each in mechanism.couplings]
-    tied = set(held)
-    while more := set().union(*(tie for tie in ties if tie & tied)) - tied:
-        tied |= more
-    try:
-        loose = ObservedRobot.of(replace(setting.mechanism, couplings=(), observations=()))
-        at = of_links(PinocchioModel(loose.mechanism, goal.twin.length), goal.pose)
-    except HrsynthError:
-        return None
-    links, joints = loose.mechanism.links, loose.mechanism.joints
-    if not tied <= joints.keys() or any(link not in links for each in measured.question.observations
-                                        for link in (each.link, each.seen_from or each.link)):
-        return None  # without couplings what they hold apart is one joint
-    of = {name: leg.label for leg in loose.anatomy.legs for name in leg.joints}
-    seen = (*measured.question.observations, *(each for name in sorted(tied - held) for each in encoders(
-        loose.mechanism, loose.mechanism.joints[name], of.get(name, ""))))
-    found = MeasuredRobot(loose, loose.measuring(seen))
-    return (found, at) if found.rank == loose.dof and loose.anatomy.labels == setting.anatomy.labels else None
-
-
-def _better(made: Model) -> tuple[Any, ...]:
-    """Ways that may count complex modes too where a list is that of a part of the conditions on the pose, as the sense
-    of an axis is told besides."""
-    system = made.system
-    senses = sum(isinstance(c, AtAngle) and c.h == 1.0 for c in getattr(system, "conditions", ()))
-    if not isinstance(system, PosedPlatform) or not senses:
-        return ()
-    few = len(system.conditions) - senses <= system.poses.freedoms
-    return (_of_loops, _of_carrier) if few else (_of_loops,)
-
-
-def _of_tips(measured: MeasuredRobot, goal: ClosedConfiguration, exact: float, as_written: bool,
-             effort: float) -> tuple[TipLoci, Model, SystemModes]:
-    confined, seen = all_loci(measured, goal)
-    # a curve that was fitted to a leg's moves is not known to hold its exact tip
-    fitted = confined.doubt is not None or any(tip.doubt is not None for tip in confined.tips)
-    confined = replace(confined, error=np.inf if fitted else max([exact, *(each.error(exact, goal) for each in seen)])
-                       + max([*(tip.moved for tip in confined.tips), *(angle.moved for angle in confined.angles)]),
-                       as_written=as_written)
-    return confined, *solve_all(confined, effort=effort)
-
-
-def _of_conditions(measured: MeasuredRobot, goal: ClosedConfiguration, exact: float, effort: float
-                   ) -> tuple[None, Model, SystemModes]:
-    return None, *solve_posed(measured, goal, exact, effort)
-
-
-def _of_carrier(measured: MeasuredRobot, goal: ClosedConfiguration, exact: float) -> tuple[None, Model, SystemModes]:
-    return None, *solve_carried(measured, goal, exact)
-
-
-def _of_single(measured: MeasuredRobot, goal: ClosedConfiguration, exact: float) -> tuple[None, Model, SystemModes]:
-    return None, *solve_loop(measured, goal, exact)
-
-
-def _of_loops(measured: MeasuredRobot, goal: ClosedConfiguration, exact: float) -> tuple[None, Model, SystemModes]:
-    return None, *solve_loops(measured, goal, exact)
-
-
-def expected(measured: MeasuredRobot, at: ClosedConfiguration) -> int:
-    """How many modes, complex ones too, the degrees of the legs' conditions allow; the largest number where these are
-    not known."""
-    try:
-        return most_posed(measured, at)
-    except (NotConfined, Unsolved):
-        return sys.maxsize
-
-
-def counted(measured: MeasuredRobot, at: ClosedConfiguration) -> SystemModes:
-    """The modes with the measurements at a configuration, without near ones, and not read as poses of the robot's legs:
-    as :func:`modes`, for many configurations of one robot that sees all its freedoms."""
-    found = None
-    if measured.pattern.motion != "oriented":
-        with suppress(NotConfined, Unsolved, TooLarge, MissingExtra):
-            found = solve_all(all_loci(measured, at)[0], near=False)[1]
-    if found is not None and found.complete:
-        return found
-    try:
-        return solve_posed(measured, at)[1]
-    except (NotConfined, Unsolved):
-        if found is None:
-            raise
-        return found
-
-
-class _ModeReader:
-    """Poses of a system read as poses of the robot."""
-
-    def __init__(self, setting: ObservedRobot, question: Measurement, goal: ClosedConfiguration, made: Model) -> None:
-        self.question, self.motion, self.made, self.goal = question, setting.motion, made, goal
-        self.assembler = Assembler(setting.anatomy, goal.twin.length, question.reference)
-        rest, self.seen = sights(setting.anatomy, question, goal)
-        self.measured = Held.at(goal.twin, goal.q, question.reference, rest.observations).measured
-
-    def away(self, mode: SystemMode) -> float:
-        """How far a mode is from the goal (characteristic lengths, differences of rotation matrices)."""
-        return max(pose_difference(X, self.goal.pose(body), self.goal.twin.length)
-                   for body, X in self.made.bodies(mode.q).items())
-
-    def read(self, mode: SystemMode, nearest: bool) -> AssemblyMode:
-        """What a mode is for the robot; of all modes the ``nearest`` to the goal can be it."""
-        bodies, size = self.made.bodies(mode.q), self.goal.twin.length
-        at_goal = nearest and self.away(mode) <= SAME_RELATION
-        near = mode.near
-        held = () if near else self.measured
-        scale = self.made.system.size / size
-        base = self.goal.twin.mechanism.base
-        pose = {base: self.goal.pose(base), **bodies}.__getitem__
-        antipodal = opposite([each.seen for each in self.seen], self.goal, self.question.reference, pose)
-        found = Assembly(self.goal)
-        if antipodal:  # no mode: whether the robot can be assembled is not asked
-            found = Assembly(None, platform=self.assembler.platform(bodies))
-        elif self.made.closing is not None:
-            at = self.made.closing(mode.q)
-            found = Assembly(at, (), tuple(outside(at.twin, at.q)), held=True)
-        elif not at_goal or near or outside(self.goal.twin, self.goal.q):
-            found = self.assembler.at(bodies, held, 0.0 if near else self.known(mode))
-        if found.configuration is not None and self.made.closing is None and not self.geared(found.configuration):
-            found = Assembly(None, self.assembler.anatomy.labels, platform=self.assembler.platform(bodies))
-        X = (found.platform[self.motion.link] if found.platform is not None else self.goal.pose(self.motion.link)
-             if found.configuration is None else found.configuration.pose(self.motion.link))
-        shift, turn = self.radius(mode, bodies, X)
-        return AssemblyMode(
-            self.motion.pose(X), shift, turn, mode.residual * scale, at_goal, found.reachable,
-            None if found.configuration is None else weakest(found.configuration, self.question),
-            found.verdict, found.open, found.beyond, found.misses, found.configuration, mode.multiplicity,
-            mode.proved, mode.rounded, mode.residual * scale if mode.fits else None,
-            () if self.motion.link in bodies else tuple(bodies), size, bodies,
-            antipodal, behind([each.seen for each in self.seen], pose))
-
-    def geared(self, at: ClosedConfiguration) -> bool:
-        """Whether couplings close where legs do."""
-        if not self.goal.twin.mechanism.couplings:
-            return True
-        try:
-            whole = of_links(self.goal.twin, at.pose)
-        except LoopsNotClosed:
-            return False
-        return all(pose_difference(whole.pose(link), at.pose(link), at.twin.length) <= SAME_RELATION
-                   for link in at.twin.mechanism.links)
-
-    def known(self, mode: SystemMode) -> float:
-        """How far the bodies' exact poses can be from the system's (characteristic lengths, radians); 0 where nothing
-        was proved of them: the told poses are meant."""
-        length = self.goal.twin.length
-        found = max(mode.shift / length, mode.turn) + self.made.system.error / length
-        return found if np.isfinite(found) else 0.0
-
-    def radius(self, mode: SystemMode, bodies: dict[str, Array], X: Array) -> tuple[float, float]:
-        """How far the exact pose can be from the pose X (4, 4) that is told (m, rad): the system's, with what its frame
-        at the goal may be off, and what the told pose is from the system's; of the bodies where X is none of theirs."""
-        first, error = next(iter(bodies.values())), self.made.system.error
-        shift, turn = mode.shift + error, mode.turn + error / self.goal.twin.length
-        told = bodies.get(self.motion.link)
-        if told is None:
-            return shift, turn
-        lever = float(np.linalg.norm(told[:3, 3] - first[:3, 3]))
-        if self.made.back:  # the base's turn, as the platform sees it, is about a point of the platform
-            lever += float(np.linalg.norm(told[:3, 3] - self.goal.pose(self.motion.link)[:3, 3]))
-        return (shift + turn * lever + float(np.linalg.norm(X[:3, 3] - told[:3, 3])),
-                turn + float(np.linalg.norm(X[:3, :3] - told[:3, :3])))

@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     from ...analysis.aspects.atlas import Atlas, ModePair
     from ...analysis.aspects.path import PathAnswer, SampledRoad
     from ...analysis.check import Check, GridCheck
-    from ...analysis.modes.modes import AssemblyMode, AssemblyModes
+    from ...analysis.modes.assembly_mode import AssemblyMode
+    from ...analysis.modes.modes import AssemblyModes
     from ...analysis.observed import ObservedRobot
     from ...analysis.posture import Distances, Kinds, Posture
     from ...analysis.singularity.singular import Singularity

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ...analysis.modes.modes import AssemblyMode, modes
+from ...analysis.modes.assembly_mode import AssemblyMode
+from ...analysis.modes.modes import modes
 from ...analysis.observed import ObservedRobot
 from ...errors import HrsynthError
 from ...geometry.vectors import Array, inverse

@@ -35,11 +35,7 @@ from ...mechanism.observation import Observation
 from ...mechanism.observations.direction import SeenAxis
 from ...progress import tell
 from ...results import Value
-from ...tolerances import (
-    CRITICAL_FLAT,
-    SAME_ENDING,
-    SEEN_ABOVE,
-)
+from ...tolerances import CRITICAL_FLAT, SAME_ENDING, SEEN_ABOVE
 from ..law import Law
 from .carried import SweptChains
 from .descent import CriticalPoint, are_closed, closed, descend, walked

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ....analysis.modes.modes import AssemblyMode, AssemblyModes, modes
+from ....analysis.modes.assembly_mode import AssemblyMode
+from ....analysis.modes.modes import AssemblyModes, modes
 from ....analysis.observed import ObservedRobot
 from ....analysis.verdict import CONTROLLABLE, Verdict
 from ....errors import HrsynthError

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from ....analysis.modes.modes import AssemblyMode, AssemblyModes, at_mode, modes
+from ....analysis.modes.assembly_mode import AssemblyMode
+from ....analysis.modes.modes import AssemblyModes, at_mode, modes
 from ....errors import PoseNotReached
 from ....mechanism.pose import ModeNumber
 from ...text.poses import all_of, assembly

@@ -1,0 +1,171 @@
+"""An assembly mode of the robot, and how one of a system is read as such."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...errors import LoopsNotClosed
+from ...geometry.vectors import Array, pose_difference
+from ...kinematics.assembly import NOT_FOUND, Assembler, Assembly, of_links
+from ...kinematics.closures import Miss
+from ...kinematics.configuration import ClosedConfiguration
+from ...kinematics.limits import outside
+from ...kinematics.relation import Measurement
+from ...kinematics.tasks import Held
+from ...mechanism.pose import Pose
+from ...tolerances import SAME_RELATION
+from ..observed import ObservedRobot
+from ..singularity.agreement import weakest
+from .branches import Model
+from .sighted import behind, opposite, sights
+from .solve import SystemMode
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class AssemblyMode:
+    """A pose of the platform with the measurements of the goal.
+
+    The exact pose, of the file's decimals, is within ``shift`` (m) and ``turn`` (rad) of ``pose``, infinite where
+    nothing was proved: its position and its turn, or those of the bodies on which legs end where ``enclosed`` names
+    them; ``residual``: the largest distance of a tip from its curve (characteristic lengths). ``goal``: whether it is
+    the pose itself from which the measurements were taken. ``reachable`` and ``assembly``: whether the whole real
+    robot, legs that are not watched included, closes there within its joints' limits, as of :class:`Assembly` (the
+    first None where neither was found); ``open`` names the legs that were not closed, ``beyond`` the joints,
+    ``misses`` what proves of legs that they cannot be closed. ``type2_distance``: the smallest singular value of Mᵀ
+    there, as ``check`` gives it; None where the robot was not closed.
+    """
+
+    pose: Pose
+    shift: float
+    turn: float
+    residual: float
+    goal: bool
+    reachable: bool | None
+    type2_distance: float | None
+    assembly: str = NOT_FOUND
+    open: tuple[str, ...] = ()
+    beyond: tuple[str, ...] = ()
+    misses: tuple[tuple[str, Miss], ...] = ()
+    configuration: ClosedConfiguration | None = None
+    multiplicity: int = 1
+    proved: bool = False
+    """Whether there is exactly one mode within the radius, for all that the file's decimals and closed loops allow."""
+    rounded: bool = False
+    """Whether that is proved for the rounded geometry alone, of which the radius then speaks."""
+    fits: float | None = None
+    """How well all legs fit (characteristic lengths) where more is observed than needed and that is all that is known;
+    the radius is then that of the mode, if it is one."""
+    enclosed: tuple[str, ...] = ()
+    length: float = 1.0
+    """The robot's characteristic length (m)."""
+    bodies: dict[str, Array] | None = None
+    """Poses (4, 4) of the bodies on which legs end; of a formation of all bodies, moved by a trivial motion to where
+    they are nearest to the goal's."""
+    opposite: tuple[str, ...] = ()
+    """What is seen there as the opposite value: then it is *antipodal* and no mode."""
+    behind: tuple[str, ...] | None = None
+    """What is not in front of the camera by which it is seen; None where no camera with a name sees a point."""
+
+    def __repr__(self) -> str:
+        said = "the pose itself" if self.goal else f"assembled: {self.assembly}"
+        return f"<{type(self).__name__}: {self.pose}, {said}>"
+
+    @property
+    def radius(self) -> float:
+        """The larger of the shift (characteristic lengths) and the turn (rad)."""
+        return max(self.shift / self.length, self.turn)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line."""
+        known = bool(np.isfinite(self.radius))
+        return {"pose": self.pose.to_dict(), "radius": self.radius if known else None,
+                "radius_m": self.shift if known else None, "radius_rad": self.turn if known else None,
+                "bodies": list(self.enclosed),
+                "residual": self.residual, "goal": self.goal, "reachable": self.reachable,
+                "assembly": self.assembly, "open": list(self.open), "beyond": list(self.beyond),
+                "reasons": [{"leg": leg, **miss.to_dict()} for leg, miss in self.misses],
+                "type2_distance": self.type2_distance,
+                "multiplicity": self.multiplicity, "proved": self.proved, "rounded": self.rounded,
+                "fits": self.fits, "opposite": list(self.opposite),
+                "behind": None if self.behind is None else list(self.behind)}
+
+
+class ModeReader:
+    """Poses of a system read as poses of the robot."""
+
+    def __init__(self, setting: ObservedRobot, question: Measurement, goal: ClosedConfiguration, made: Model) -> None:
+        self.question, self.motion, self.made, self.goal = question, setting.motion, made, goal
+        self.assembler = Assembler(setting.anatomy, goal.twin.length, question.reference)
+        rest, self.seen = sights(setting.anatomy, question, goal)
+        self.measured = Held.at(goal.twin, goal.q, question.reference, rest.observations).measured
+
+    def away(self, mode: SystemMode) -> float:
+        """How far a mode is from the goal (characteristic lengths, differences of rotation matrices)."""
+        return max(pose_difference(X, self.goal.pose(body), self.goal.twin.length)
+                   for body, X in self.made.bodies(mode.q).items())
+
+    def read(self, mode: SystemMode, nearest: bool) -> AssemblyMode:
+        """What a mode is for the robot; of all modes the ``nearest`` to the goal can be it."""
+        bodies, size = self.made.bodies(mode.q), self.goal.twin.length
+        at_goal = nearest and self.away(mode) <= SAME_RELATION
+        near = mode.near
+        held = () if near else self.measured
+        scale = self.made.system.size / size
+        base = self.goal.twin.mechanism.base
+        pose = {base: self.goal.pose(base), **bodies}.__getitem__
+        antipodal = opposite([each.seen for each in self.seen], self.goal, self.question.reference, pose)
+        found = Assembly(self.goal)
+        if antipodal:  # no mode: whether the robot can be assembled is not asked
+            found = Assembly(None, platform=self.assembler.platform(bodies))
+        elif self.made.closing is not None:
+            at = self.made.closing(mode.q)
+            found = Assembly(at, (), tuple(outside(at.twin, at.q)), held=True)
+        elif not at_goal or near or outside(self.goal.twin, self.goal.q):
+            found = self.assembler.at(bodies, held, 0.0 if near else self.known(mode))
+        if found.configuration is not None and self.made.closing is None and not self.geared(found.configuration):
+            found = Assembly(None, self.assembler.anatomy.labels, platform=self.assembler.platform(bodies))
+        X = (found.platform[self.motion.link] if found.platform is not None else self.goal.pose(self.motion.link)
+             if found.configuration is None else found.configuration.pose(self.motion.link))
+        shift, turn = self.radius(mode, bodies, X)
+        return AssemblyMode(
+            self.motion.pose(X), shift, turn, mode.residual * scale, at_goal, found.reachable,
+            None if found.configuration is None else weakest(found.configuration, self.question),
+            found.verdict, found.open, found.beyond, found.misses, found.configuration, mode.multiplicity,
+            mode.proved, mode.rounded, mode.residual * scale if mode.fits else None,
+            () if self.motion.link in bodies else tuple(bodies), size, bodies,
+            antipodal, behind([each.seen for each in self.seen], pose))
+
+    def geared(self, at: ClosedConfiguration) -> bool:
+        """Whether couplings close where legs do."""
+        if not self.goal.twin.mechanism.couplings:
+            return True
+        try:
+            whole = of_links(self.goal.twin, at.pose)
+        except LoopsNotClosed:
+            return False
+        return all(pose_difference(whole.pose(link), at.pose(link), at.twin.length) <= SAME_RELATION
+                   for link in at.twin.mechanism.links)
+
+    def known(self, mode: SystemMode) -> float:
+        """How far the bodies' exact poses can be from the system's (characteristic lengths, radians); 0 where nothing
+        was proved of them: the told poses are meant."""
+        length = self.goal.twin.length
+        found = max(mode.shift / length, mode.turn) + self.made.system.error / length
+        return found if np.isfinite(found) else 0.0
+
+    def radius(self, mode: SystemMode, bodies: dict[str, Array], X: Array) -> tuple[float, float]:
+        """How far the exact pose can be from the pose X (4, 4) that is told (m, rad): the system's, with what its frame
+        at the goal may be off, and what the told pose is from the system's; of the bodies where X is none of theirs."""
+        first, error = next(iter(bodies.values())), self.made.system.error
+        shift, turn = mode.shift + error, mode.turn + error / self.goal.twin.length
+        told = bodies.get(self.motion.link)
+        if told is None:
+            return shift, turn
+        lever = float(np.linalg.norm(told[:3, 3] - first[:3, 3]))
+        if self.made.back:  # the base's turn, as the platform sees it, is about a point of the platform
+            lever += float(np.linalg.norm(told[:3, 3] - self.goal.pose(self.motion.link)[:3, 3]))
+        return (shift + turn * lever + float(np.linalg.norm(X[:3, 3] - told[:3, 3])),
+                turn + float(np.linalg.norm(X[:3, :3] - told[:3, :3])))
