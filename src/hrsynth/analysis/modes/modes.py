@@ -12,7 +12,7 @@ import numpy as np
 
 from ...batch.reach import reach
 from ...budgets import EFFORT
-from ...constraints.pattern import attached
+from ...constraints.pattern import moved
 from ...errors import (
     BadRequest,
     HrsynthError,
@@ -100,8 +100,8 @@ class AssemblyMode:
     length: float = 1.0
     """The robot's characteristic length (m)."""
     bodies: dict[str, Array] | None = None
-    """Poses (4, 4) of the bodies on which legs end; of a formation of all bodies, moved by a trivial motion to where
-    they are nearest to the goal's."""
+    """Poses (4, 4) of the bodies on which legs end, where need be of the controlled one; of a formation of all bodies,
+    moved by a trivial motion to where they are nearest to the goal's."""
     opposite: tuple[str, ...] = ()
     """What is seen there as the opposite value: then it is *antipodal* and no mode."""
     behind: tuple[str, ...] | None = None
@@ -262,7 +262,7 @@ def modes(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None,
     free = setting.dof - measured.rank
     if free:
         text = f"the {'motors' if real else 'measurements'} leave {free} of the platform's freedoms undetermined"
-        own = self_motion(goal, measured.question, attached(setting.anatomy), goal=True)
+        own = self_motion(goal, measured.question, moved(setting.anatomy), goal=True)
         return AssemblyModes(setting, kind, goal, pose, continuum(f"{text}: a continuum of dimension {free}", free),
                              (), (), motions=() if own is None else (own,))
     tell("modes")
@@ -326,13 +326,13 @@ def at_mode(listed: AssemblyModes | None, asked: ModeNumber) -> ClosedConfigurat
 
 def _moves(setting: ObservedRobot, question: Measurement, at: ClosedConfiguration) -> bool:
     """Whether a closing lies on a self-motion that can be followed."""
-    return leaves_free(at, question) and self_motion(at, question, attached(setting.anatomy)) is not None
+    return leaves_free(at, question) and self_motion(at, question, moved(setting.anatomy)) is not None
 
 
 def _searched(setting: ObservedRobot, question: Measurement, goal: ClosedConfiguration, pose: Pose, kind: str,
               reason: str) -> AssemblyModes:
     """The modes that a search finds, and why there is no list that could be complete."""
-    done = search(goal, question, attached(setting.anatomy))
+    done = search(goal, question, moved(setting.anatomy))
     size = max((motion.dimension for motion in done.motions), default=None)
     found = SystemModes(None, (), False, f"{done.words}; not counted: {reason}", degenerate=done.degenerate,
                         continuum=size)
@@ -364,6 +364,9 @@ def _listed(setting: ObservedRobot, measured: MeasuredRobot, goal: ClosedConfigu
             (_of_loops, tips, asked, _of_carrier, _of_single))
     for listed in ways:
         if better is not None and listed not in better:
+            continue
+        if listed is not _of_loops and not setting.anatomy.decided:
+            reasons.append(NotConfined(setting.robot.name, "joints inside its platform allow several poses of it"))
             continue
         try:
             answers.append(listed(*((measured, goal) if free is None or listed is _of_loops else free), exact))

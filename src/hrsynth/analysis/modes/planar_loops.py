@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from ...budgets import LARGEST_GEAR, LARGEST_LOOPS, PLANAR_STARTS
-from ...constraints.pattern import attached
+from ...constraints.pattern import moved
 from ...errors import NotConfined, Unsolved
 from ...geometry.vectors import Array, cross, frozen, perpendicular, pose, rotation_about, transform
 from ...kinematics.configuration import ClosedConfiguration
@@ -199,7 +199,7 @@ class PlanarLoops(System):
         return pose(start[:3, 3] + moved, rotation_about(self.normal, angle) @ start[:3, :3])
 
     def placed(self, q: Array) -> dict[str, Array]:
-        """The poses (4, 4) of the bodies on which legs end."""
+        """The poses (4, 4) of the bodies that tell where the platform is."""
         return {body: self.pose_of(body, q) for body in self.bodies}
 
     def closing(self, q: Array) -> ClosedConfiguration:
@@ -250,9 +250,9 @@ def planar_loops(measured: MeasuredRobot, goal: ClosedConfiguration) -> PlanarLo
         for chosen in combinations(seen, size):
             reading = _Reading(measured, goal, chosen)
             found = reading.system([each for each in seen if each not in chosen])
-            if isinstance(found, PlanarLoops):
+            if isinstance(found, PlanarLoops) and found.most:  # none: what is chosen holds some loop twice, others not
                 return found
-            reason = reason or found
+            reason = reason or (found if isinstance(found, str) else "what is measured does not hold its loops")
     raise NotConfined(goal.twin.mechanism.name, reason)
 
 
@@ -263,7 +263,7 @@ class _Reading:
         anatomy = measured.setting.anatomy
         self.mechanism, self.goal, self.seen = goal.twin.mechanism, goal, seen
         self.reference = measured.question.reference
-        self.bodies, self.point = attached(anatomy), anatomy.point
+        self.bodies, self.point = moved(anatomy), anatomy.point
         self.joints = list(self.mechanism.joints.values())
         self.axes = {joint.name: self._moved(joint.predecessor)[:3, :3] @ joint.axis for joint in self.joints
                      if joint.type in KINDS}

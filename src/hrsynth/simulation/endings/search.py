@@ -31,7 +31,7 @@ from ...budgets import (
     FARTHEST_ENDING,
     POSE_WALKS,
 )
-from ...constraints.pattern import attached
+from ...constraints.pattern import moved
 from ...errors import LoopsNotClosed
 from ...geometry.vectors import Array, times
 from ...kinematics.assembly import of_links
@@ -408,7 +408,7 @@ class ToldApart:
     free to move though the platform rests, one is kept that is beyond as few limits as any that was met."""
 
     def __init__(self, system: RestSystem, setting: ObservedRobot) -> None:
-        self.system, self.setting, self.bodies = system, setting, attached(setting.anatomy)
+        self.system, self.setting, self.bodies = system, setting, moved(setting.anatomy)
         self.told, self.freedoms = told_by(setting), setting.samples.members[0].relation.dimension
         self.free = len(self.told) < len(setting.everything.question.observations)
         self.own: dict[tuple[int, ...], list[tuple[Array, CriticalPoint, int]]] = {}
