@@ -265,3 +265,35 @@ def test_measurements_of_one_freedom_hold_it_once():
 def test_a_tool_rests_at_both_its_places():
     found = hrsynth.endings(carried("tool"), see=[f"encoder:{joint}" for joint in "ace"], at="x=0.35,y=0.9")
     assert sorted(rest.kind for rest in found.rests if rest.error < 1e-9) == ["goal", "mode"]
+
+
+def two_segments() -> Mechanism:
+    """A crank carries the platform by two unequal bars, both named as segments of their leg; a slide holds it too."""
+    b = Builder("two_segments")
+    joints = {"a": ("base", "crank", (0, 0)), "b": ("crank", "one", (0, 0.4)), "c": ("crank", "two", (0.15, 0.38)),
+              "d": ("one", "plate", (0.3, 0.75)), "e": ("two", "plate", (0.47, 0.68)),
+              "f": ("base", "tube", (0.9, 0.05)), "g": ("tube", "rod", (0.8, 0.3)), "h": ("rod", "plate", (0.6, 0.7))}
+    b.link("base")
+    for name, (one, other, at) in joints.items():
+        if name not in "eh":
+            b.link(other, at=(*at, 0))
+        b.joint(name, "P" if name == "g" else "R", one, other, at=(*at, 0), motor=name in "ag", loop=name in "eh",
+                axis=(-0.3, 0.65, 0) if name == "g" else (0, 0, 1))
+    for leg, link, along in (("1", "one", (0.3, 0.35)), ("1", "two", (0.32, 0.3)), ("2", "rod", (-0.3, 0.65))):
+        b.observe(leg, link, (*along, 0))
+    return b.build(platform="plate")
+
+
+@pytest.mark.parametrize("observe", [None, "1,2", "one,two,rod"])
+def test_two_segments_of_a_leg_are_both_watched(observe: str | None):
+    """With each one of them there are two modes, of which the other one's direction excludes the second."""
+    found = hrsynth.modes(two_segments(), observe)
+    assert [each.link for each in found.setting.observed] == ["one", "two", "rod"]
+    assert (found.found.complete, len(found.modes)) == (True, 1)
+    assert len(search(found.goal, measured(found).question, moved(found.setting.anatomy)).modes) == 1
+
+
+@pytest.mark.parametrize("link", ["one", "two"])
+def test_one_segment_of_two_has_other_modes(link: str):
+    found = hrsynth.modes(two_segments(), f"{link},rod")
+    assert (found.found.complete, len(found.modes)) == (True, 2)

@@ -12,12 +12,12 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
-from itertools import combinations, permutations
+from itertools import combinations, islice, permutations
 from typing import Any
 
 import numpy as np
 
-from ...budgets import LARGEST_GEAR, LARGEST_LOOPS, PLANAR_STARTS
+from ...budgets import LARGEST_GEAR, LARGEST_LOOPS, LOOP_SYSTEMS, PLANAR_STARTS
 from ...constraints.pattern import moved
 from ...errors import NotConfined, Unsolved
 from ...geometry.vectors import Array, cross, frozen, perpendicular, pose, rotation_about, transform
@@ -245,15 +245,30 @@ def _ball(a: complex, sign: int = 1) -> Any:
 def planar_loops(measured: MeasuredRobot, goal: ClosedConfiguration) -> PlanarLoops:
     """The mechanism with the measurements at a configuration. Raises ``NotConfined`` where it is not planar, or what is
     measured are not directions and joints' coordinates, as many as it has freedoms."""
-    seen, reason = measured.question.observations, ""
+    return next(systems(measured, goal))
+
+
+def systems(measured: MeasuredRobot, goal: ClosedConfiguration) -> Iterator[PlanarLoops]:
+    """The mechanism, with more and more left to be measured besides; last where loops that are left out ask more than
+    their own unknowns can meet, so that closings of the others need not be closings. Raises ``NotConfined``."""
+    seen, reason, looser = measured.question.observations, "", list[PlanarLoops]()
+    many = 0
     for size in range(len(seen), 0, -1):
         for chosen in combinations(seen, size):
             reading = _Reading(measured, goal, chosen)
             found = reading.system([each for each in seen if each not in chosen])
-            if isinstance(found, PlanarLoops) and found.most:  # none: what is chosen holds some loop twice, others not
-                return found
-            reason = reason or (found if isinstance(found, str) else "what is measured does not hold its loops")
-    raise NotConfined(goal.twin.mechanism.name, reason)
+            if isinstance(found, str):
+                reason = reason or found
+            elif not found.most:  # what is chosen holds some loop twice
+                reason = reason or "what is measured does not hold its loops"
+            elif reading.more:
+                looser.append(found)
+            else:
+                many += 1
+                yield found
+    yield from looser[:1]
+    if not many and not looser:
+        raise NotConfined(goal.twin.mechanism.name, reason)
 
 
 class _Reading:
@@ -277,6 +292,8 @@ class _Reading:
         self.middle = np.mean([self._centre(joint) for joint in self.joints], axis=0)
         self.places = {link: i for i, link in enumerate(self.mechanism.links)}
         self.dropped = 0.0
+        self.more = False
+        """Whether the loops that are left out ask more than their own unknowns can meet."""
 
     def _refused(self, reason: str) -> NotConfined:
         return NotConfined(self.mechanism.name, reason)
@@ -308,6 +325,8 @@ class _Reading:
             for part in combinations(loops, size):
                 used = _unknowns([each for loop in part for each in loop])
                 if len(used) == 2 * size and needed <= used:
+                    left = _unknowns([each for loop in loops for each in loop]) - used
+                    self.more = 2 * (len(loops) - size) > len(left)
                     return self._system(turns, moves, shifts, part, more, used)
         used = _unknowns([each for loop in loops for each in loop])
         return (f"{len(loops)} loops, which give {2 * len(loops)} equations, have {sum(not k for k, _ in used)} angles "
@@ -544,9 +563,18 @@ def proposals(forms: Sequence[dict[Exponents, complex]], angles: int, enough: in
 def solve_loops(measured: MeasuredRobot, goal: ClosedConfiguration, error: float = 0.0) -> tuple[Model, SystemModes]:
     """All modes, with the goal known to ``error`` (m). Raises ``NotConfined``, and ``Unsolved`` where not all closings
     are enclosed that there may be."""
-    system = planar_loops(measured, goal)
-    system = replace(system, error=system.error + error)
-    found = _judged(system)
+    refused: Unsolved | None = None
+    for system in islice(systems(measured, goal), LOOP_SYSTEMS):
+        system = replace(system, error=system.error + error)
+        try:
+            found = _judged(system)
+        except Unsolved as unsolved:
+            refused = refused or unsolved
+        else:
+            break
+    else:
+        assert refused is not None
+        raise refused
     closing = system.closing if goal.twin.mechanism.couplings else None  # else not all loops need be among those
     return Model(system, system.placed, system.home, closing=closing), found
 
