@@ -24,7 +24,7 @@ QUICK = {
     "check": ["delta --at x=0.02,y=0.1,z=-0.62", "gough_stewart --grid x=0:0.01:2,rpy=0/0/0", "i4l",
               "rrrrr_m1 --at x=0,y=0.3332050807568877 --grid x=-0.4:0.4:3,y=0.25:0.41:3 -o map.csv"],
     "singular": ["rrrrr_m1 --points 30", "uranesx --points 5", "hexaglide --points 5"],
-    "advise": ["uranesx", "quattro --observe 1,4", "gough_stewart --observe 1"],
+    "advise": ["uranesx", "quattro --observe 1,4", "gough_stewart --observe 1", "i4l --observe 1,2"],
     "branch": ["rrrrr_m1 --box shoulder_1=-0.05:0.05,shoulder_2=-0.05:0.05"],
     "modes": ["3rrr_m1", "delta --observe 1", "3rps", "quattro --observe 1,3 --at x=0.05,y=0.1,z=-0.7,phi=10deg",
               "3rrr_m1 --real --at x=0.02,phi=5deg"],

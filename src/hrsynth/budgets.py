@@ -195,9 +195,9 @@ LARGEST_FORMS, FORMS_SECONDS, FEW_FORMS_SECONDS = 1100, 46.0, 0.1
 core that so many need, and few."""
 CAP_OF_MULTIPLES, LARGEST_MULTIPLES = 4, 250
 """Largest degree in a group of unknowns, and most monomials, of a bound by multiples of quadrics."""
-LARGEST_GEAR, LARGEST_LOOPS, PLANAR_STARTS = 6, 120, 20
-"""Of planar loops: whole numbers of which a gear's ratio is the quotient, closings that are looked for, and how many
-times 64 random starts."""
+LARGEST_GEAR, LARGEST_LOOPS, PLANAR_STARTS, LOOP_SYSTEMS = 6, 120, 20, 3
+"""Of planar loops: whole numbers of which a gear's ratio is the quotient, closings that are looked for, how many times
+64 random starts, and choices of what is measured besides, where more is measured than needed."""
 LARGEST_JOINT_FORMS = 750
 """The same of conditions on a leg's joints."""
 MOST_INFINITE = 4

@@ -17,9 +17,11 @@ import pytest
 
 import hrsynth
 from codegen.robots import BARS, MAIN, answered, box_of, compiled, eigen, four_bar, inside, module_of, own_pose
+from hrsynth.analysis.branch.answer import Toggle
 from hrsynth.codegen.export import ExportedCode, export
 from hrsynth.codegen.languages import namespace
-from hrsynth.errors import BadRequest
+from hrsynth.codegen.tubes import TubedBranch
+from hrsynth.errors import BadRequest, NothingProved
 from hrsynth.geometry.vectors import Array
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.mechanism import Mechanism
@@ -289,3 +291,13 @@ def test_names_are_no_code_in_cpp(name: str, tmp_path: Path) -> None:
     main = f'#include "robot.hpp"\n#include <cstdio>\nint main() {{ std::puts({own}::MOTOR_NAMES[0]); }}'
     found = subprocess.run([compiled(tmp_path, code, main)], capture_output=True, text=True, check=True)
     assert found.stdout == 'motor "*/ q\n\\\n'
+
+
+def test_why_nothing_is_proved_is_said_once_with_the_nearest_place():
+    proof = hrsynth.branch("rrrrr_m1", "shoulder_1=-0.01:0.01,shoulder_2=-0.01:0.01")
+    part, = proof.parts
+    ends = tuple(Toggle(np.array(q), (), (), reason) for q, reason in (
+        ([2.0, 0.0], "it toggles"), ([0.0, 0.5], "it toggles"), ([1.0, 1.0], "it is too small")))
+    with pytest.raises(NothingProved, match=re.escape(
+            "it toggles (at shoulder_1=0, shoulder_2=0.5); it is too small (at shoulder_1=1, shoulder_2=1); try")):
+        TubedBranch.of(replace(proof, parts=(replace(part, cells=(), toggles=ends),)))

@@ -363,7 +363,7 @@ def _observed(anatomy: LegDecomposition, normal: NormalForm, defaults: dict[str,
                 except NoSegment:
                     if not defaults:
                         raise
-        return tuple(defaults.values())
+        observe = tuple(defaults)
     chosen: dict[tuple[str, ...], Observation] = {}
     for name in observe:
         others = [o for o in given_too if o.leg == name]
@@ -372,6 +372,8 @@ def _observed(anatomy: LegDecomposition, normal: NormalForm, defaults: dict[str,
             continue
         if name in anatomy.labels:
             observation = defaults.get(name) or default_observation(anatomy, anatomy.leg(name))
+            chosen |= {o.key: o for o in (observation, *anatomy.mechanism.observations) if o.by_segment
+                       and o.leg == name}
         elif name in normal.into:
             link = normal.into[name]
             if link not in anatomy.mechanism.links:

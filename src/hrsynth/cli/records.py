@@ -467,7 +467,7 @@ class FurtherRecord(TypedDict):
 
     kind: Literal["leg", "direction", "line", "encoder", "offered"]
     of: Annotated[str, "the leg, the link, the joint, or the words of --see"]
-    leg: str
+    leg: Annotated[str | None, "null: of a joint or a link inside the platform"]
     link: NotRequired[str]
     axis: NotRequired[Any]
     actuated: NotRequired[bool]

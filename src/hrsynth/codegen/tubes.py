@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..analysis.branch.answer import BranchProof
+from ..analysis.branch.answer import BranchPart, BranchProof
 from ..analysis.branch.loops import LoopSystem
 from ..analysis.branch.part import DISTANCE, LoopPart, parts_of, whole
 from ..budgets import FARTHEST_MOTOR
@@ -80,7 +80,7 @@ class TubedBranch(Value):
         solved = {tuple(own.unknowns): _solved(proof.system, own) for own in parts_of(proof.system)[0]}
         for part in proof.parts:
             if not part.cells:
-                raise NothingProved(proof.robot.name, part.motors, "; ".join(each.reason for each in part.toggles))
+                raise NothingProved(proof.robot.name, part.motors, _reasons(part))
             driven = tuple(table[name] for name in part.motors)
             cells = tuple(TubeCell(each.low, each.high, each.centre, each.slopes, each.radius) for each in part.cells)
             places = [motors.index(i) for i in driven]
@@ -117,6 +117,15 @@ class TubedBranch(Value):
         values = np.zeros(len(self.system.coordinates))
         values[list(self.motors)], values[list(self.passive)] = q, x
         return whole(self.system, self.system.loops, self.system.gears, values)
+
+
+def _reasons(part: BranchPart) -> str:
+    """Why nothing of a part is proved: each reason once, with the place that is nearest to zero."""
+    nearest: dict[str, Array] = {}
+    for each in sorted(part.toggles, key=lambda each: float(np.linalg.norm(each.q))):
+        nearest.setdefault(each.reason, each.q)
+    return "; ".join(f"{reason} (at {', '.join(f'{name}={x:.4g}' for name, x in zip(part.motors, q, strict=True))})"
+                     for reason, q in nearest.items())
 
 
 def _solved(system: LoopSystem, part: LoopPart) -> tuple[int, ...]:

@@ -104,6 +104,12 @@ def attached(anatomy: LegDecomposition) -> tuple[str, ...]:
     return tuple(dict.fromkeys(leg.attach for leg in anatomy.legs))
 
 
+def placing_links(anatomy: LegDecomposition) -> tuple[str, ...]:
+    """The links of the platform that tell where it is: those on which legs end, and the controlled one where these
+    leave it several poses."""
+    return attached(anatomy) if anatomy.decided else (*attached(anatomy), anatomy.mechanism.platform)
+
+
 def recognise(anatomy: LegDecomposition, question: Measurement, samples: Sequence[ClosedConfiguration]
               ) -> ConstraintPattern:
     """The pattern at the samples; ``motion`` is ``other`` where it is none of the known ones."""

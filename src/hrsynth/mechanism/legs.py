@@ -19,7 +19,7 @@ from ..results import Value, with_value
 from ..tolerances import SAME_POINT
 from . import graphs
 from .composites import WordEdge, WordGraph
-from .model import JointType, Mechanism
+from .model import Joint, JointType, Mechanism
 from .notation import Architecture, Bar, Carrier, Letter, Word
 
 
@@ -82,6 +82,27 @@ class LegDecomposition(Value):
         else:
             return None
         return frame[:3, :3].T @ (centre - frame[:3, 3])
+
+    @cached_property
+    def decided(self) -> bool:
+        """Whether the links on which legs end leave the controlled one a single pose: it is one of them, or hangs on
+        links so known by two joints R or P, neither coaxial nor along one direction. Other joints may leave several."""
+        mechanism = self.mechanism
+        known, waiting = {mechanism.base, *(leg.attach for leg in self.legs)}, set[str]()
+        while waiting != (waiting := set(self.platform) - known):
+            known |= {link for link in waiting if any(
+                self._hold(one, other) for one, other in combinations(mechanism.joints_of(link), 2)
+                if {one.other(link), other.other(link)} <= known)}
+        return mechanism.platform in known
+
+    def _hold(self, one: Joint, other: Joint) -> bool:
+        """Whether two joints with links at rest leave a link one place."""
+        if not {one.type, other.type} <= {JointType.REVOLUTE, JointType.PRISMATIC}:
+            return False
+        if one.type is not other.type or not lines.parallel(one.axis, other.axis):
+            return True
+        apart = lines.distance(other.point, one.point, one.axis)
+        return one.type is JointType.REVOLUTE and apart > SAME_POINT * self.mechanism.length
 
     def floats(self, leg: Leg) -> bool:
         """Whether a leg is no more than the free joint of a body that nothing holds."""

@@ -20,10 +20,12 @@ from hrsynth.analysis.modes.planar_reading import planar_loops, whole_kernel
 from hrsynth.analysis.modes.search import search
 from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.words import parse
-from hrsynth.constraints.pattern import attached
+from hrsynth.constraints.pattern import attached, placing_links
 from hrsynth.description import load, shipped
 from hrsynth.errors import NotConfined, Unsolved
 from hrsynth.geometry.vectors import pose_difference
+from hrsynth.mechanism import Mechanism
+from hrsynth.mechanism.builder import Builder
 
 QUICK = {"rrrrr_m1", "3rrr_m1", "3rpr_m2", "3prp", "prrrp_m1", "rprpr_m2"}
 
@@ -212,3 +214,87 @@ def test_degrees_in_groups_bound_what_ranks_bound():
     line = Residues.of([form([(0, 0), (1, 0), (0, 1)]), form([(0, 0), (1, 1), (2, 0), (0, 2)])])
     assert [each.most_by_degrees() for each in (conics, bilinear, line)] == [4, 2, 2]
     assert [each.most_by_ranks(1) for each in (conics, bilinear, line)] == [4, 2, 2]
+
+
+def carried(platform: str) -> Mechanism:
+    """A four-bar whose coupler carries a tool by two cranks of its own, the first one driven."""
+    b = Builder("carried")
+    joints = {"a": ("base", "one", (0, 0)), "b": ("one", "bar", (0.1, 0.5)), "c": ("base", "two", (0.7, 0.05)),
+              "d": ("two", "bar", (0.62, 0.48)), "e": ("bar", "first", (0.3, 0.6)), "f": ("bar", "second", (0.5, 0.62)),
+              "g": ("first", "tool", (0.35, 0.9)), "h": ("second", "tool", (0.58, 0.83))}
+    b.link("base")
+    for name, (one, other, at) in joints.items():
+        if name not in "dh":
+            b.link(other, at=(*at, 0))
+        b.joint(name, "R", one, other, at=(*at, 0), axis=(0, 0, 1), motor=name in "ae", loop=name in "dh")
+    return b.build(platform=platform)
+
+
+def test_a_tool_that_cranks_on_the_platform_carry_has_both_its_places():
+    """Two places for each one of the coupler: the tool turned about G so that H is mirrored at the line from F to G."""
+    bars, tools = (hrsynth.modes(carried(platform), real=True) for platform in ("bar", "tool"))
+    assert bars.found.complete
+    assert tools.found.complete
+    assert len(tools.modes) == 2 * len(bars.modes) == 4
+    at = [mode.configuration for mode in tools.modes]
+    for mode in bars.modes:
+        assert mode.configuration is not None
+        bar = mode.configuration.pose("bar")
+        F, G = (bar @ [*point, 0, 1] for point in ([0.4, 0.12], [0.25, 0.4]))
+        H = np.array([[*(there.pose("tool") @ [0.23, -0.07, 0, 1])] for there in at
+                      if there is not None and pose_difference(there.pose("bar"), bar, 1.0) < 1e-9])
+        assert len(H) == 2
+        along = (G - F) / np.linalg.norm(G - F)
+        assert H[1] == pytest.approx(2 * (F + (H[0] - F) @ along * along) - H[0], abs=1e-9)
+        assert np.linalg.norm(H[0] - H[1]) > 0.01
+
+
+def test_measurements_of_one_freedom_hold_it_once():
+    """Both cranks of the four-bar and the driven crank of the tool are measured: of the four-bar's two places one fits,
+    the tool has two, which a search finds."""
+    listed = hrsynth.modes(carried("tool"), see=[f"encoder:{joint}" for joint in "ace"])
+    assert listed.found.complete
+    assert len(listed.modes) == 2
+    found = search(listed.goal, measured(listed).question, placing_links(listed.setting.anatomy))
+    assert len(found.modes) == 2
+    for one in found.modes:
+        assert min(pose_difference(one.bodies["tool"], each.configuration.pose("tool"), 1.0)
+                   for each in listed.modes if each.configuration) < 1e-6
+
+
+@pytest.mark.slow
+def test_a_tool_rests_at_both_its_places():
+    found = hrsynth.endings(carried("tool"), see=[f"encoder:{joint}" for joint in "ace"], at="x=0.35,y=0.9")
+    assert sorted(rest.kind for rest in found.rests if rest.error < 1e-9) == ["goal", "mode"]
+
+
+def two_segments() -> Mechanism:
+    """A crank carries the platform by two unequal bars, both named as segments of their leg; a slide holds it too."""
+    b = Builder("two_segments")
+    joints = {"a": ("base", "crank", (0, 0)), "b": ("crank", "one", (0, 0.4)), "c": ("crank", "two", (0.15, 0.38)),
+              "d": ("one", "plate", (0.3, 0.75)), "e": ("two", "plate", (0.47, 0.68)),
+              "f": ("base", "tube", (0.9, 0.05)), "g": ("tube", "rod", (0.8, 0.3)), "h": ("rod", "plate", (0.6, 0.7))}
+    b.link("base")
+    for name, (one, other, at) in joints.items():
+        if name not in "eh":
+            b.link(other, at=(*at, 0))
+        b.joint(name, "P" if name == "g" else "R", one, other, at=(*at, 0), motor=name in "ag", loop=name in "eh",
+                axis=(-0.3, 0.65, 0) if name == "g" else (0, 0, 1))
+    for leg, link, along in (("1", "one", (0.3, 0.35)), ("1", "two", (0.32, 0.3)), ("2", "rod", (-0.3, 0.65))):
+        b.observe(leg, link, (*along, 0))
+    return b.build(platform="plate")
+
+
+@pytest.mark.parametrize("observe", [None, "1,2", "one,two,rod"])
+def test_two_segments_of_a_leg_are_both_watched(observe: str | None):
+    """With each one of them there are two modes, of which the other one's direction excludes the second."""
+    found = hrsynth.modes(two_segments(), observe)
+    assert [each.link for each in found.setting.observed] == ["one", "two", "rod"]
+    assert (found.found.complete, len(found.modes)) == (True, 1)
+    assert len(search(found.goal, measured(found).question, placing_links(found.setting.anatomy)).modes) == 1
+
+
+@pytest.mark.parametrize("link", ["one", "two"])
+def test_one_segment_of_two_has_other_modes(link: str):
+    found = hrsynth.modes(two_segments(), f"{link},rod")
+    assert (found.found.complete, len(found.modes)) == (True, 2)

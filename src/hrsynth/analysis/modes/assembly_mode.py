@@ -62,8 +62,8 @@ class AssemblyMode:
     length: float = 1.0
     """The robot's characteristic length (m)."""
     bodies: dict[str, Array] | None = None
-    """Poses (4, 4) of the bodies on which legs end; of a formation of all bodies, moved by a trivial motion to where
-    they are nearest to the goal's."""
+    """Poses (4, 4) of the bodies on which legs end, where need be of the controlled one; of a formation of all bodies,
+    moved by a trivial motion to where they are nearest to the goal's."""
     opposite: tuple[str, ...] = ()
     """What is seen there as the opposite value: then it is *antipodal* and no mode."""
     behind: tuple[str, ...] | None = None

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...batch.reach import reach
 from ...budgets import EFFORT
-from ...constraints.pattern import attached
+from ...constraints.pattern import placing_links
 from ...errors import BadRequest, MissingExtra, NotConfined, PoseNotReached, TooLarge, Unsolved
 from ...kinematics.assembly import Assembly, of_links
 from ...kinematics.configuration import ClosedConfiguration
@@ -176,7 +176,7 @@ def modes(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None,
     free = setting.dof - measured.rank
     if free:
         text = f"the {'motors' if real else 'measurements'} leave {free} of the platform's freedoms undetermined"
-        own = self_motion(goal, measured.question, attached(setting.anatomy), goal=True)
+        own = self_motion(goal, measured.question, placing_links(setting.anatomy), goal=True)
         return AssemblyModes(setting, kind, goal, pose, continuum(f"{text}: a continuum of dimension {free}", free),
                              (), (), motions=() if own is None else (own,))
     tell("modes")
@@ -240,13 +240,13 @@ def at_mode(listed: AssemblyModes | None, asked: ModeNumber) -> ClosedConfigurat
 
 def _moves(setting: ObservedRobot, question: Measurement, at: ClosedConfiguration) -> bool:
     """Whether a closing lies on a self-motion that can be followed."""
-    return leaves_free(at, question) and self_motion(at, question, attached(setting.anatomy)) is not None
+    return leaves_free(at, question) and self_motion(at, question, placing_links(setting.anatomy)) is not None
 
 
 def _searched(setting: ObservedRobot, question: Measurement, goal: ClosedConfiguration, pose: Pose, kind: str,
               reason: str) -> AssemblyModes:
     """The modes that a search finds, and why there is no list that could be complete."""
-    done = search(goal, question, attached(setting.anatomy))
+    done = search(goal, question, placing_links(setting.anatomy))
     size = max((motion.dimension for motion in done.motions), default=None)
     found = SystemModes(None, (), False, f"{done.words}; not counted: {reason}", degenerate=done.degenerate,
                         continuum=size)
@@ -278,6 +278,9 @@ def _listed(setting: ObservedRobot, measured: MeasuredRobot, goal: ClosedConfigu
             (of_loops, tips, asked, of_carrier, of_single))
     for listed in ways:
         if better is not None and listed not in better:
+            continue
+        if listed is not of_loops and not setting.anatomy.decided:
+            reasons.append(NotConfined(setting.robot.name, "joints inside its platform allow several poses of it"))
             continue
         try:
             answers.append(listed(*((measured, goal) if free is None or listed is of_loops else free), exact))

@@ -184,7 +184,7 @@ class PlanarLoops(System):
         return pose(start[:3, 3] + moved, rotation_about(self.normal, angle) @ start[:3, :3])
 
     def placed(self, q: Array) -> dict[str, Array]:
-        """The poses (4, 4) of the bodies on which legs end."""
+        """The poses (4, 4) of the bodies that tell where the platform is."""
         return {body: self.pose_of(body, q) for body in self.bodies}
 
     def closing(self, q: Array) -> ClosedConfiguration:

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import islice
 from typing import Any
 
 import numpy as np
 
-from ...budgets import LARGEST_LOOPS, PLANAR_STARTS
+from ...budgets import LARGEST_LOOPS, LOOP_SYSTEMS, PLANAR_STARTS
 from ...errors import Unsolved
 from ...geometry.vectors import Array, frozen
 from ...kinematics.configuration import ClosedConfiguration
 from ..measured import MeasuredRobot
 from .branches import Model
 from .planar_loops import Exponents, PlanarLoops, SumPart
-from .planar_reading import planar_loops
+from .planar_reading import systems
 from .polynomials import Polynomial
 from .pose_boxes import PoseBox, UnitCircle, zeros
 from .solve import SystemMode, SystemModes
@@ -59,9 +60,18 @@ def proposals(forms: Sequence[dict[Exponents, complex]], angles: int, enough: in
 def solve_loops(measured: MeasuredRobot, goal: ClosedConfiguration, error: float = 0.0) -> tuple[Model, SystemModes]:
     """All modes, with the goal known to ``error`` (m). Raises ``NotConfined``, and ``Unsolved`` where not all closings
     are enclosed that there may be."""
-    system = planar_loops(measured, goal)
-    system = replace(system, error=system.error + error)
-    found = _judged(system)
+    refused: Unsolved | None = None
+    for system in islice(systems(measured, goal), LOOP_SYSTEMS):
+        system = replace(system, error=system.error + error)
+        try:
+            found = _judged(system)
+        except Unsolved as unsolved:
+            refused = refused or unsolved
+        else:
+            break
+    else:
+        assert refused is not None
+        raise refused
     closing = system.closing if goal.twin.mechanism.couplings else None  # else not all loops need be among those
     return Model(system, system.placed, system.home, closing=closing), found
 

@@ -11,7 +11,7 @@ from itertools import combinations, permutations
 import numpy as np
 
 from ...budgets import LARGEST_GEAR
-from ...constraints.pattern import attached
+from ...constraints.pattern import placing_links
 from ...errors import NotConfined
 from ...geometry.vectors import Array, cross, perpendicular, transform
 from ...kinematics.configuration import ClosedConfiguration
@@ -28,15 +28,30 @@ KINDS = (JointType.REVOLUTE, JointType.PRISMATIC)
 def planar_loops(measured: MeasuredRobot, goal: ClosedConfiguration) -> PlanarLoops:
     """The mechanism with the measurements at a configuration. Raises ``NotConfined`` where it is not planar, or what is
     measured are not directions and joints' coordinates, as many as it has freedoms."""
-    seen, reason = measured.question.observations, ""
+    return next(systems(measured, goal))
+
+
+def systems(measured: MeasuredRobot, goal: ClosedConfiguration) -> Iterator[PlanarLoops]:
+    """The mechanism, with more and more left to be measured besides; last where loops that are left out ask more than
+    their own unknowns can meet, so that closings of the others need not be closings. Raises ``NotConfined``."""
+    seen, reason, looser = measured.question.observations, "", list[PlanarLoops]()
+    many = 0
     for size in range(len(seen), 0, -1):
         for chosen in combinations(seen, size):
             reading = _Reading(measured, goal, chosen)
             found = reading.system([each for each in seen if each not in chosen])
-            if isinstance(found, PlanarLoops):
-                return found
-            reason = reason or found
-    raise NotConfined(goal.twin.mechanism.name, reason)
+            if isinstance(found, str):
+                reason = reason or found
+            elif not found.most:  # what is chosen holds some loop twice
+                reason = reason or "what is measured does not hold its loops"
+            elif reading.more:
+                looser.append(found)
+            else:
+                many += 1
+                yield found
+    yield from looser[:1]
+    if not many and not looser:
+        raise NotConfined(goal.twin.mechanism.name, reason)
 
 
 class _Reading:
@@ -46,7 +61,7 @@ class _Reading:
         anatomy = measured.setting.anatomy
         self.mechanism, self.goal, self.seen = goal.twin.mechanism, goal, seen
         self.reference = measured.question.reference
-        self.bodies, self.point = attached(anatomy), anatomy.point
+        self.bodies, self.point = placing_links(anatomy), anatomy.point
         self.joints = list(self.mechanism.joints.values())
         self.axes = {joint.name: self._moved(joint.predecessor)[:3, :3] @ joint.axis for joint in self.joints
                      if joint.type in KINDS}
@@ -60,6 +75,8 @@ class _Reading:
         self.middle = np.mean([self._centre(joint) for joint in self.joints], axis=0)
         self.places = {link: i for i, link in enumerate(self.mechanism.links)}
         self.dropped = 0.0
+        self.more = False
+        """Whether the loops that are left out ask more than their own unknowns can meet."""
 
     def _refused(self, reason: str) -> NotConfined:
         return NotConfined(self.mechanism.name, reason)
@@ -91,6 +108,8 @@ class _Reading:
             for part in combinations(loops, size):
                 used = _unknowns([each for loop in part for each in loop])
                 if len(used) == 2 * size and needed <= used:
+                    left = _unknowns([each for loop in loops for each in loop]) - used
+                    self.more = 2 * (len(loops) - size) > len(left)
                     return self._system(turns, moves, shifts, part, more, used)
         used = _unknowns([each for loop in loops for each in loop])
         return (f"{len(loops)} loops, which give {2 * len(loops)} equations, have {sum(not k for k, _ in used)} angles "

@@ -78,7 +78,11 @@ def sights(anatomy: LegDecomposition, question: Measurement, goal: ClosedConfigu
 
 
 def _of_leg(anatomy: LegDecomposition, seen: Observation) -> Observation:
-    """The coordinate of a leg's joint, or the direction of a leg's link, as the leg's."""
+    """The coordinate of a leg's joint, or the direction of a leg's link, as the leg's; that of a joint inside the
+    platform as of no leg."""
+    joint = anatomy.mechanism.joints.get(seen.joint) if isinstance(seen, Encoder) else None
+    if joint is not None and set(joint.links) <= set(anatomy.platform):
+        return replace(seen, leg="")
     for leg in anatomy.legs:
         if seen.joint in leg.joints if isinstance(seen, Encoder) else isinstance(seen, Direction) and (
                 seen.link in leg.links):

@@ -21,7 +21,7 @@ from ...analysis.observed import CameraLike, LegsLike, ObservedRobot, RobotLike,
 from ...analysis.posture import ConfigurationAnalysis
 from ...analysis.question import question
 from ...constraints.condition import Condition
-from ...constraints.pattern import ConstraintPattern, attached
+from ...constraints.pattern import ConstraintPattern, placing_links
 from ...errors import HrsynthError, LoopsNotClosed
 from ...geometry.affine import affine
 from ...geometry.vectors import Array, pose_difference, transform
@@ -213,7 +213,7 @@ class RestSearch:
     def alike(self, at: ClosedConfiguration, other: ClosedConfiguration) -> bool:
         """Whether the platform is at the same pose."""
         return all(pose_difference(at.pose(body), other.pose(body), self.goal.twin.length) <= SAME_ENDING
-                   for body in attached(self.setting.anatomy))
+                   for body in placing_links(self.setting.anatomy))
 
     def read(self, found: Critical, box: EnclosedPoint | None = None) -> RestPoint | None:
         """A critical point as a pose of the robot; None where its loops do not close, or a camera does not see what it
@@ -343,6 +343,6 @@ def _ways(rests: Sequence[RestPoint], search: RestSearch) -> list[RestPoint]:
 
 def _told(at: ClosedConfiguration, search: RestSearch) -> Array:
     """Where the platform's bodies are (characteristic lengths), how they are turned, and all that is measured."""
-    poses = [at.pose(body) for body in attached(search.setting.anatomy)]
+    poses = [at.pose(body) for body in placing_links(search.setting.anatomy)]
     return np.concatenate([*(X[:3, 3] / search.goal.twin.length for X in poses), *(X[:3, :3].ravel() for X in poses),
                            *measured(at, search.law.question)[0]])

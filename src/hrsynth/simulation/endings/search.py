@@ -23,7 +23,7 @@ from ...budgets import (
     ENDING_WALK,
     POSE_WALKS,
 )
-from ...constraints.pattern import attached
+from ...constraints.pattern import placing_links
 from ...errors import LoopsNotClosed
 from ...geometry.vectors import Array
 from ...kinematics.assembly import of_links
@@ -150,7 +150,7 @@ class ToldApart:
     free to move though the platform rests, one is kept that is beyond as few limits as any that was met."""
 
     def __init__(self, system: RestSystem, setting: ObservedRobot) -> None:
-        self.system, self.setting, self.bodies = system, setting, attached(setting.anatomy)
+        self.system, self.setting, self.bodies = system, setting, placing_links(setting.anatomy)
         self.told, self.freedoms = told_by(setting), setting.samples.members[0].relation.dimension
         self.free = len(self.told) < len(setting.everything.question.observations)
         self.own: dict[tuple[int, ...], list[tuple[Array, CriticalPoint, int]]] = {}
