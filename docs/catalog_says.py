@@ -1,5 +1,5 @@
 """What the catalog says, as tables and as rules that need no computation; ``python docs/catalog_says.py`` writes the
-tables between the marks of docs/pages/catalog_says.md, and that of published robots on docs/pages/audit.md."""
+tables between the marks of docs/pages/catalog_says.md, and those of published robots on docs/pages/audit.md."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from hrsynth.analysis.verdict import BLIND, CONTROLLABLE, PARTIAL
+from hrsynth.catalog.audit.tables import ROBOT
 from hrsynth.catalog.groups.spatial import translates
 from hrsynth.catalog.query import Catalog, load
 from hrsynth.catalog.words import LegWord, RobotWord, parse
@@ -18,6 +19,10 @@ from hrsynth.present.markdown import replaced, table
 PAGE = Path(__file__).resolve().parent / "pages" / "catalog_says.md"
 AUDIT = PAGE.with_name("audit.md")
 VERDICTS = (CONTROLLABLE, PARTIAL, BLIND)
+BASES = {"z up": (1,), "tangential": (2,), "radial": (3,), "on a cone": (4,), "z up, in pairs": (5,),
+         "tangential, in pairs": (6,), "radial, in pairs": (7,), "on a cone, in pairs": (8,),
+         "all along one line of the base's plane": (9,), "all normal to the base's plane": (10,)}
+"""Couplings to the base (G), by where the axes of the legs' first joints lie."""
 INFINITY, RAIL, GENERAL = "line at infinity", "line across the rails", "line in general position"
 Record = Mapping[str, Any]
 
@@ -189,9 +194,28 @@ def published(catalog: Catalog) -> str:
                   "with a list of modes"), rows, 1)
 
 
+def couplings(catalog: Catalog) -> str:
+    """Verdicts of published robots that move in all ways, by how the first joints of their legs lie on the base."""
+    rows = []
+    for name, numbers in BASES.items():
+        found = studied(Catalog(tuple(each for each in catalog.where(group="3T3R")
+                                      if int(_coupled(each)) in numbers)))
+        counts = Counter(each["verdict"] for each in found)
+        if found:
+            rows.append((name, f"{len(found):,}", *(f"{counts[v]:,}" for v in VERDICTS), _share(counts)))
+    return table(("first joints", "robots", *VERDICTS, "% controllable"), rows, 1)
+
+
+def _coupled(record: Record) -> str:
+    """The number of a published robot's coupling to the base."""
+    match = ROBOT.match(record["word"])
+    assert match is not None
+    return match[4]
+
+
 TABLES = {"motions": motions, "fewest": fewest, "chains": chains, "cures": cures, "rules": rules}
 PAGES: Sequence[tuple[Path, str | None, Mapping[str, Callable[[Catalog], str]]]] = (
-    (PAGE, None, TABLES), (AUDIT, "published", {"published": published}))
+    (PAGE, None, TABLES), (AUDIT, "published", {"published": published, "couplings": couplings}))
 """Each page, the catalog of its tables, and what makes them."""
 
 

@@ -26,7 +26,7 @@ LINES, PACKED = ".jsonl", ".jsonl.gz"
 """Endings of the files of a folder."""
 READ_AT_ONCE = 500
 """Lines that are read from a SQLite file together."""
-PACKED_ABOVE = 10_000
+PACKED_ABOVE = 5_000
 """Records of a group above which its file is compressed."""
 PUBLISHED = "published"
 """The shipped catalog of published robots."""
