@@ -48,6 +48,12 @@ def test_a_turn_about_one_axis_is_told_in_one_way_however_it_was_typed(printed, 
     assert re.search(rf"\bphi={re.escape(told)}deg\b", text)
 
 
+@pytest.mark.parametrize("command", ["modes", "atlas"])
+def test_what_is_held_is_called_what_it_is(printed, command: str):
+    assert "held      what is observed at" in printed(f"{command} 3rpr_m1 --see encoder:slide_1")
+    assert "held      the observed directions at" in printed(f"{command} 3rpr_m1")
+
+
 def test_turns_are_those_of_the_platform(printed):
     assert "phi=0deg" in printed("check quattro --at x=0.02")
     assert "rpy=0/0/0" in printed("check gough_stewart --at x=0.02")

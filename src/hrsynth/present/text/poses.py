@@ -302,7 +302,7 @@ _SIGNS = {SAME: "=", SEPARATED: "|", UNDECIDED_PAIR: "?"}
 def atlas(found: Atlas) -> str:
     """The modes, how many aspects hold them, the table mode by mode, and what was asked of which pairs."""
     listed = found.listed
-    rows = [*head(listed.setting), ("held", f"{_SINCE[listed.kind]} at {listed.pose}")]
+    rows = [*head(listed.setting), ("held", f"{_held(listed)} at {listed.pose}")]
     if listed.found.continuum is not None:
         return listing([*rows, *known("special", listed.found.degenerate)])
     rows += [("modes", f"{listed.count}, {all_of(listed)}"),
