@@ -12,6 +12,7 @@ from hrsynth.batch.reach import reach
 from hrsynth.description import load
 from hrsynth.geometry.vectors import rotation_from_rpy
 from hrsynth.kinematics.coordinates import Coordinates
+from hrsynth.kinematics.steps import track
 from oracle import exponential
 from strategies import planar, transformed
 
@@ -36,6 +37,22 @@ def test_a_platform_has_as_many_coordinates_as_freedoms(name: str):
     coordinates, setting = made(name)
     assert coordinates.names == EXPECTED[name]
     assert len(coordinates.names) == setting.dof
+
+
+@pytest.mark.parametrize(("name", "index"), [("3rrr_m1", 0), ("delta", 2), ("quattro", 2)])
+def test_from_the_edge_of_the_reach_a_coordinate_goes_back(name: str, index: int):
+    """All steps of its way, though at a stretched leg only the smallest ones find it."""
+    coordinates, setting = made(name)
+    start, far = setting.everything.start, coordinates.values.copy()
+    far[index] += 5 * start.twin.length
+    edge, came = track(start, setting.motion, replace(coordinates, values=far))
+    assert came < 1
+    here = Coordinates.of(edge, setting.everything.question, setting.motion)
+    index = here.places.index(coordinates.places[index])
+    way = here.along(edge, index, (0.1 * start.twin.length, 0.0), 4)
+    assert len(way) == 5
+    assert [value for value, _ in way] == pytest.approx(
+        here.values[index] - np.linspace(0.1, 0, 5) * start.twin.length, abs=1e-9)
 
 
 @pytest.mark.some(2)

@@ -28,8 +28,6 @@ NAMES = ("x", "y", "z", "turn about x", "turn about y", "turn about z")
 INDEPENDENT = 0.5
 """How independent the coordinates are at least (the smallest singular value of their rates), as part of what it is of
 those that are it most."""
-HALVINGS = 4
-"""How often a step is halved before a slider stops."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -111,20 +109,20 @@ class Coordinates(Value):
     def ends(self, start: ClosedConfiguration, index: int, spans: tuple[float, float]
              ) -> tuple[ClosedConfiguration, ClosedConfiguration]:
         """Where the robot comes to as one coordinate alone goes down and up from ``start``, within ``spans``."""
-        down, up = (track(start, self.motion, self._changed(index, self.values[index] + span), HALVINGS)[0]
+        down, up = (track(start, self.motion, self._changed(index, self.values[index] + span))[0]
                     for span in (-spans[0], spans[1]))
         return down, up
 
     def _out(self, start: ClosedConfiguration, index: int, span: float, count: int
              ) -> Iterator[tuple[float, ClosedConfiguration]]:
         end = self._changed(index, self.values[index] + span)
-        came = track(start, self.motion, end, HALVINGS)[1] if span else 0.0
+        came = track(start, self.motion, end)[1] if span else 0.0
         if came < 1:
             came *= SLIDER_PART
         here = start
         for step in range(1, count + 1) if came > NO_SLIDER else ():
             aim = self._changed(index, self.values[index] + came * span * step / count)
-            here, arrived = track(here, self.motion, aim, HALVINGS)
+            here, arrived = track(here, self.motion, aim)
             if arrived < 1:
                 return
             yield float(aim.values[index]), here
