@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 import tomllib
+from glob import glob
 from pathlib import Path
 
 import pytest
@@ -26,6 +27,16 @@ def test_the_version_is_one_in_package_changelog_and_citation():
     version, date = re.search(r"^## \[(\d.*)\] - (.*)$", changes, re.MULTILINE).groups()
     assert version == hrsynth.__version__
     assert f"\nversion: {version}\ndate-released: {date}\n" in citation
+
+
+def test_all_files_of_the_catalog_and_all_robots_are_package_data():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    told = project["tool"]["setuptools"]["package-data"]["hrsynth"]
+    packed = {ROOT / "src" / "hrsynth" / file for pattern in told for file in glob(
+        pattern, root_dir=ROOT / "src" / "hrsynth", recursive=True)}
+    shipped = [*(ROOT / "catalog").rglob("*.jsonl*"), *(ROOT / "robots").glob("*.urdf")]
+    assert len(shipped) > 30
+    assert {file.resolve() for file in shipped if file.suffix != ".part"} <= {file.resolve() for file in packed}
 
 
 def test_every_extra_that_is_named_is_there_and_all_holds_them():
