@@ -97,8 +97,10 @@ def of_systems(found: SystemModes, about: Mapping[str, Any], robot: ClosedRobot 
 
 def of_loops(found: AssemblyModes, about: Mapping[str, Any], robot: ClosedRobot | None) -> dict[str, Any]:
     """The certificate of the modes of a planar mechanism from its joints; raises ``NotAccepted``, ``NotConfined``."""
-    measured = MeasuredRobot.driven(found.setting) if found.kind == "real" else MeasuredRobot.watched(found.setting)
-    proposed = _closings(planar_loops(measured, found.goal), found.found.complex or 0)
+    system = None if found.model is None else found.model.system
+    if not isinstance(system, PlanarLoops):
+        system = planar_loops(_measured(found), found.goal)
+    proposed = _closings(system, found.found.complex or 0)
     return _sealed([_system(proposed, robot)], about, robot, found.found.complex or 0)
 
 
@@ -132,14 +134,18 @@ def _as_chain(found: AssemblyModes, about: Mapping[str, Any], robot: ClosedRobot
     """Of a mechanism that is a carried platform, or one loop, besides the way in which its modes were listed; raises
     ``NotAccepted``."""
     assert found.model is not None
-    measured = MeasuredRobot.driven(found.setting) if found.kind == "real" else MeasuredRobot.watched(found.setting)
     for way in ways:
         with suppress(NotConfined, Unsolved, NotAccepted):
-            model, listed = way(measured, found.goal, found.model.system.error)
+            model, listed = way(_measured(found), found.goal, found.model.system.error)
             system = model.system
             if listed.complete and listed.complex == found.found.complex and isinstance(system, CarriedPlatform):
                 return of_chain(system, replace(found, model=model, found=listed), about, robot)
     raise reason
+
+
+def _measured(found: AssemblyModes) -> MeasuredRobot:
+    """What the list holds."""
+    return MeasuredRobot.driven(found.setting) if found.kind == "real" else MeasuredRobot.watched(found.setting)
 
 
 def _sealed(systems: list[dict[str, Any]], about: Mapping[str, Any], robot: ClosedRobot | None, count: int
