@@ -19,10 +19,9 @@ from hrsynth.present.markdown import replaced, table
 PAGE = Path(__file__).resolve().parent / "pages" / "catalog_says.md"
 AUDIT = PAGE.with_name("audit.md")
 VERDICTS = (CONTROLLABLE, PARTIAL, BLIND)
-BASES = {"z up": (1,), "tangential": (2,), "radial": (3,), "on a cone": (4,), "z up, in pairs": (5,),
-         "tangential, in pairs": (6,), "radial, in pairs": (7,), "on a cone, in pairs": (8,),
-         "all along one line of the base's plane": (9,), "all normal to the base's plane": (10,)}
-"""Couplings to the base (G), by where the axes of the legs' first joints lie."""
+BASES = ("z up", "tangential", "radial", "on a cone", "z up, in pairs", "tangential, in pairs", "radial, in pairs",
+         "on a cone, in pairs", "all along one line of the base's plane", "all normal to the base's plane")
+"""Couplings to the base, from G1 on, by where the axes of the legs' first joints lie."""
 INFINITY, RAIL, GENERAL = "line at infinity", "line across the rails", "line in general position"
 Record = Mapping[str, Any]
 
@@ -196,21 +195,13 @@ def published(catalog: Catalog) -> str:
 
 def couplings(catalog: Catalog) -> str:
     """Verdicts of published robots that move in all ways, by how the first joints of their legs lie on the base."""
-    rows = []
-    for name, numbers in BASES.items():
-        found = studied(Catalog(tuple(each for each in catalog.where(group="3T3R")
-                                      if int(_coupled(each)) in numbers)))
-        counts = Counter(each["verdict"] for each in found)
-        if found:
-            rows.append((name, f"{len(found):,}", *(f"{counts[v]:,}" for v in VERDICTS), _share(counts)))
+    counts: dict[int, Counter[str]] = {}
+    for each in studied(catalog.where(group="3T3R")):
+        if match := ROBOT.match(each["word"]):
+            counts.setdefault(int(match[4]), Counter())[each["verdict"]] += 1
+    rows = [(BASES[number - 1], f"{sum(found.values()):,}", *(f"{found[v]:,}" for v in VERDICTS), _share(found))
+            for number, found in sorted(counts.items())]
     return table(("first joints", "robots", *VERDICTS, "% controllable"), rows, 1)
-
-
-def _coupled(record: Record) -> str:
-    """The number of a published robot's coupling to the base."""
-    match = ROBOT.match(record["word"])
-    assert match is not None
-    return match[4]
 
 
 TABLES = {"motions": motions, "fewest": fewest, "chains": chains, "cures": cures, "rules": rules}

@@ -372,8 +372,7 @@ def _observed(anatomy: LegDecomposition, normal: NormalForm, defaults: dict[str,
             continue
         if name in anatomy.labels:
             observation = defaults.get(name) or default_observation(anatomy, anatomy.leg(name))
-            chosen |= {o.key: o for o in (observation, *anatomy.mechanism.observations) if o.by_segment
-                       and o.leg == name}
+            chosen |= {o.key: o for o in anatomy.mechanism.observations if o.by_segment and o.leg == name}
         elif name in normal.into:
             link = normal.into[name]
             if link not in anatomy.mechanism.links:

@@ -99,13 +99,15 @@ def _told(name: str, value: Any) -> RecordCondition:
             pattern = plain_brackets(value)
             matches = re.compile(translate(pattern)).match
 
+            def is_one(*names: str) -> bool:
+                return any(name == value or matches(name) for name in names)
+
             @cache
             def has_chain(notation: str) -> bool:
-                return any(each == value or matches(each) for each in chains({"notation": notation}))
+                return is_one(*chains({"notation": notation}))
 
             def has_legs(word: str, notation: str) -> bool:
-                return has_chain(notation) or any(
-                    each == value or matches(each) for each in (word, word.replace("*", "")))
+                return has_chain(notation) or is_one(word, word.replace("*", ""))
 
             return RecordCondition(
                 lambda record: has_legs(record["word"], str(record.get("notation", ""))),

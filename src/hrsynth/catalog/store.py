@@ -130,10 +130,10 @@ class Database:
     def lines(self, groups: Sequence[str], asked: Mapping[str, Any]) -> Sequence[str]:
         with _asked(self.path):
             file = self._open()
-            new, told = _is_new(file), _told_by_rows(file, asked)
-        met = [f'+"group" IN ({", ".join("?" * len(groups))})', *(str(each.row) for each in told)]
-        values = [*groups, *(value for each in told for value in each.values)]
-        with _asked(self.path):
+            new = _is_new(file)
+            told = _told_by_rows(asked, new)
+            met = [f'+"group" IN ({", ".join("?" * len(groups))})', *(str(each.row) for each in told)]
+            values = [*groups, *(value for each in told for value in each.values)]
             if not new:
                 return [line for line, in file.execute(
                     f'SELECT line FROM records WHERE {" AND ".join(met)} ORDER BY "group", word', values)]
@@ -142,7 +142,7 @@ class Database:
 
     def decides(self, asked: Mapping[str, Any]) -> bool:
         with self._read() as file:
-            return len(_told_by_rows(file, asked)) == len(conditions(asked))
+            return len(_told_by_rows(asked, _is_new(file))) == len(conditions(asked))
 
     def count(self, group: str) -> int:
         with self._read() as file:
@@ -215,9 +215,8 @@ def _is_new(file: sqlite3.Connection) -> bool:
     return file.execute("SELECT 1 FROM sqlite_master WHERE name = 'texts'").fetchone() is not None
 
 
-def _told_by_rows(file: sqlite3.Connection, asked: Mapping[str, Any]) -> list[RecordCondition]:
-    """The conditions that the rows of a file decide."""
-    new = _is_new(file)
+def _told_by_rows(asked: Mapping[str, Any], new: bool) -> list[RecordCondition]:
+    """The conditions that the rows of a file decide, of an older one those that its columns do."""
     return [each for name, each in conditions(asked).items() if each.row and (new or name in OLD_COLUMNS)]
 
 

@@ -112,9 +112,9 @@ def _require_known(kept: str | None, asked: dict[str, Any]) -> None:
     groups = groups_of(kept)
     every = cache(lambda: load(kept, group=tuple(groups)))
     named = {"group": groups, "verdict": VERDICTS}
-    for name in (name for name in ("group", "verdict", "motion", "dof", "fewest") if asked[name] is not None):
-        known = named[name] if name in named else every().values(name)
-        if asked[name] not in known:
+    for name in ("group", "verdict", "motion", "dof", "fewest"):
+        if asked[name] is not None and asked[name] not in (
+                known := named[name] if name in named else every().values(name)):
             raise BadRequest(f"no architecture of the catalog has this --{name}", asked[name],
                              list(map(str, sorted(known))))
     if asked["legs"] is not None and not every().where(legs=asked["legs"]):

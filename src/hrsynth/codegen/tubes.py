@@ -124,8 +124,7 @@ def _reasons(part: BranchPart) -> str:
     nearest: dict[str, Array] = {}
     for each in sorted(part.toggles, key=lambda each: float(np.linalg.norm(each.q))):
         nearest.setdefault(each.reason, each.q)
-    return "; ".join(f"{reason} (at {', '.join(f'{name}={x:.4g}' for name, x in zip(part.motors, q, strict=True))})"
-                     for reason, q in nearest.items())
+    return "; ".join(f"{reason} (at {part.place(q)})" for reason, q in nearest.items())
 
 
 def _solved(system: LoopSystem, part: LoopPart) -> tuple[int, ...]:

@@ -102,6 +102,10 @@ class BranchPart(Value):
         """The share in per cent, never rounded up to all of it."""
         return "100" if self.share == 1.0 else f"{min(100 * self.share, 99.9):.3g}"
 
+    def place(self, q: Array) -> str:
+        """Motor coordinates (n,) in words."""
+        return ", ".join(f"{name}={value:.4g}" for name, value in zip(self.motors, q, strict=True))
+
     def find(self, q: Sequence[float] | Array) -> BranchCell | None:
         """The cell that motor coordinates (n,), in the order of ``motors``, lie in; None outside of what is proved."""
         at = np.asarray(q, dtype=float)

@@ -60,20 +60,18 @@ def proposals(forms: Sequence[dict[Exponents, complex]], angles: int, enough: in
 def solve_loops(measured: MeasuredRobot, goal: ClosedConfiguration, error: float = 0.0) -> tuple[Model, SystemModes]:
     """All modes, with the goal known to ``error`` (m). Raises ``NotConfined``, and ``Unsolved`` where not all closings
     are enclosed that there may be."""
-    refused: Unsolved | None = None
+    refused = list[Unsolved]()
     for system in islice(systems(measured, goal), LOOP_SYSTEMS):
         system = replace(system, error=system.error + error)
         try:
             found = _judged(system)
         except Unsolved as unsolved:
-            refused = refused or unsolved
+            refused.append(unsolved)
         else:
-            break
-    else:
-        assert refused is not None
-        raise refused
-    closing = system.closing if goal.twin.mechanism.couplings else None  # else not all loops need be among those
-    return Model(system, system.placed, system.home, closing=closing), found
+            # without couplings not all loops need be among those
+            closing = system.closing if goal.twin.mechanism.couplings else None
+            return Model(system, system.placed, system.home, closing=closing), found
+    raise refused[0]
 
 
 def _judged(system: PlanarLoops) -> SystemModes:

@@ -34,8 +34,7 @@ def planar_loops(measured: MeasuredRobot, goal: ClosedConfiguration) -> PlanarLo
 def systems(measured: MeasuredRobot, goal: ClosedConfiguration) -> Iterator[PlanarLoops]:
     """The mechanism, with more and more left to be measured besides; last where loops that are left out ask more than
     their own unknowns can meet, so that closings of the others need not be closings. Raises ``NotConfined``."""
-    seen, reason, looser = measured.question.observations, "", list[PlanarLoops]()
-    many = 0
+    seen, reason, tight, looser = measured.question.observations, "", False, list[PlanarLoops]()
     for size in range(len(seen), 0, -1):
         for chosen in combinations(seen, size):
             reading = _Reading(measured, goal, chosen)
@@ -47,10 +46,10 @@ def systems(measured: MeasuredRobot, goal: ClosedConfiguration) -> Iterator[Plan
             elif reading.more:
                 looser.append(found)
             else:
-                many += 1
+                tight = True
                 yield found
     yield from looser[:1]
-    if not many and not looser:
+    if not tight and not looser:
         raise NotConfined(goal.twin.mechanism.name, reason)
 
 

@@ -70,7 +70,7 @@ def ends(part: BranchPart) -> Rows:
 
 
 def _end(part: BranchPart, end: Toggle) -> str:
-    at = ", ".join(f"{name}={value:.4g}" for name, value in zip(part.motors, end.q, strict=True))
+    at = part.place(end.q)
     if not end.joints:
         return f"at {at}: {end.reason}"
     loops = f" (loop {', '.join(end.loops)})" if len(end.loops) == 1 else ""
