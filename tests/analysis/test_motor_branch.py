@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from hrsynth import branch, load
 from hrsynth.analysis.branch.answer import BranchProof
+from hrsynth.analysis.branch.growth import CellGrid, lattice
 from hrsynth.errors import BadRequest, MotorsNotEnough
 from hrsynth.geometry.affine import AffineForms, affine
 from hrsynth.mechanism.builder import Builder
@@ -229,6 +233,46 @@ def test_tubes_hold_what_small_steps_find(name, half):
     proof = branch(robot, box, effort=100)
     assert proof.parts[0].share == 1.0
     assert obeys(proof, np.random.default_rng(1), 3, 6) == 18
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "least", "effort"), [("quattro", 0.009, 100), ("hexa", 0.004, 100)])
+def test_a_box_much_too_large_is_proved_about_zero(name, least, effort):
+    """Whole turns of four and six motors: cells no larger than the one about zero that is proved, most of which are."""
+    proof = branch(name, effort=effort)
+    (part,) = proof.parts
+    assert len(part.cells) > effort // 2
+    assert np.all(np.abs(part.proved) >= least)
+    assert connected(part)
+    assert obeys(proof, np.random.default_rng(2), 3, 10) == 30
+
+
+@settings(deadline=None)
+@given(data=st.data(), n=st.integers(1, 4), most=st.integers(1, 100))
+def test_a_lattice_fills_the_box_about_its_start(data, n, most):
+    """Equal cells but for those that the box ends, at most so many, and what lies beyond: disjoint, and in all the box,
+    in whole numbers; the start is in the first, in its middle where the box does not end it."""
+    def some(low, high):
+        return np.array([data.draw(st.floats(low, high)) for _ in range(n)])
+
+    low, high, half = -some(0, 5), some(0.1, 5), some(1e-4, 2)
+    grid = CellGrid(low, high)
+    cells = lattice(grid, np.zeros(n), half, most)
+    corners = np.array([(cell.low, cell.high) for cell in cells])
+    assert sum(math.prod((b - a).tolist()) for a, b in corners) == 2 ** (40 * n)
+    inner = np.minimum(corners[:, None, 1], corners[None, :, 1]) - np.maximum(corners[:, None, 0], corners[None, :, 0])
+    assert np.all(np.any(inner <= 0, axis=-1) | np.eye(len(cells), dtype=bool))
+    assert sum(not cell.beyond for cell in cells) <= most
+    for k, cell in enumerate(cells):
+        a, b = grid.point(cell.low), grid.point(cell.high)
+        if not cell.beyond:
+            assert np.all(b - a <= 2 * half + 1e-9)
+            free = (cell.low > 0) & (cell.high < 2**40)
+            assert np.all(np.abs(b - a - 2 * half)[free] <= 1e-9)
+        if k == 0:
+            assert not cell.beyond
+            assert np.allclose(a, np.maximum(-half, low), atol=1e-9)
+            assert np.allclose(b, np.minimum(half, high), atol=1e-9)
 
 
 def test_motors_that_do_not_make_a_function_are_refused():

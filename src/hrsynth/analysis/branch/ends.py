@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -23,51 +23,53 @@ TOLD = 4
 
 def toggles(growth: Growth) -> tuple[Toggle, ...]:
     """The ends of a proof, one for each set of joints that can move there."""
-    found: dict[tuple[str, ...], Toggle] = {}
     ends = sorted(growth.endings, key=lambda end: -end.leaf.volume)
-    step = max(1, len(ends) // (TOLD * len(growth.q0) * 2))
-    for end in ends[::step]:
-        toggle = _toggle(growth, end)
+    some = ends[:: max(1, len(ends) // (TOLD * len(growth.q0) * 2))]
+    found: dict[tuple[str, ...], Toggle] = {}
+    for toggle in _toggles(growth, some) if some else ():
         found.setdefault(toggle.joints, toggle)
     return tuple(found.values())
 
 
-def _toggle(growth: Growth, end: BranchEnd) -> Toggle:
-    """Go from where a cell was started through its middle and on; where that ends, a loop toggles."""
+def _toggles(growth: Growth, ends: Sequence[BranchEnd]) -> Iterator[Toggle]:
+    """Go from where cells were started through their middles and on, all together; where that ends, a loop toggles."""
     part = growth.part
     unit = part.system.units[list(part.driven)]
-    middle = (growth.grid.point(end.leaf.low) + growth.grid.point(end.leaf.high)) / 2
-    goal = np.clip(end.q + BEYOND * (middle - end.q), growth.grid.low, growth.grid.high)
-    q, x, last = _followed(part, end.q, end.x, goal)
-    A, home = part.closure(q, x)[1], part.closure(growth.q0, growth.x0)[1]
-    _, strengths, rows = np.linalg.svd(A)
-    weakest = strengths[-1] / max(np.linalg.svd(home, compute_uv=False)[-1], 1e-300)
-    if last == 1.0 or weakest > TOGGLE:
-        why = ("not tried any more: the effort was spent (a smaller --box takes less)" if not end.leaf.failed else
-               "undecided: the cells would have to be smaller")
-        return Toggle(q * unit, (), (), why)
-    moving = np.abs(rows[-1]) > TOGGLE_JOINT * np.abs(rows[-1]).max()
-    places = [i for i, moves in zip(part.unknowns, moving, strict=True) if moves]
-    joints = tuple(dict.fromkeys(part.system.coordinates[i].joint for i in places))
-    loops = tuple(loop.name for loop in part.loops if set(places).intersection(loop.coordinates))
-    return Toggle(q * unit, joints, loops, "a determinant vanishes: these joints can move while all motors rest")
+    start, x0 = np.array([end.q for end in ends]), np.array([end.x for end in ends])
+    middle = np.array([(growth.grid.point(end.leaf.low) + growth.grid.point(end.leaf.high)) / 2 for end in ends])
+    goal = np.clip(start + BEYOND * (middle - start), growth.grid.low, growth.grid.high)
+    home = np.linalg.svd(part.closure(growth.q0, growth.x0)[1], compute_uv=False)[-1]
+    for end, q, x, last in zip(ends, *_followed(part, start, x0, goal), strict=True):
+        _, strengths, rows = np.linalg.svd(part.closure(q, x)[1])
+        if last == 1.0 or strengths[-1] / max(home, 1e-300) > TOGGLE:
+            why = ("not tried any more: the effort was spent (a smaller --box takes less)" if not end.leaf.failed else
+                   "undecided: the cells would have to be smaller")
+            yield Toggle(q * unit, (), (), why)
+            continue
+        moving = np.abs(rows[-1]) > TOGGLE_JOINT * np.abs(rows[-1]).max()
+        places = [i for i, moves in zip(part.unknowns, moving, strict=True) if moves]
+        joints = tuple(dict.fromkeys(part.system.coordinates[i].joint for i in places))
+        loops = tuple(loop.name for loop in part.loops if set(places).intersection(loop.coordinates))
+        yield Toggle(q * unit, joints, loops, "a determinant vanishes: these joints can move while all motors rest")
 
 
-def _followed(part: LoopPart, q: Array, x: Array, goal: Array) -> tuple[Array, Array, float]:
-    """The last closed configuration on the straight way to ``goal`` that short steps reach, and its part of the way."""
-    done, step = 0.0, 0.25
+def _followed(part: LoopPart, q: Array, x: Array, goal: Array) -> tuple[Array, Array, Array]:
+    """The last closed configurations (c, n), (c, p) on the straight ways to ``goal`` that short steps reach, and their
+    parts (c,) of the ways."""
+    x, done, step = x.copy(), np.zeros(len(q)), np.full(len(q), 0.25)
     for _ in range(HALVINGS):
-        if done >= 1.0:
+        on = np.flatnonzero(done < 1.0)
+        if not len(on):
             break
-        ahead = min(1.0, done + step)
-        there, good = part.followed((q + (goal - q) * done)[None], x[None], (q + (goal - q) * ahead)[None])
+        ahead = np.minimum(1.0, done[on] + step[on])
+        here, next_ = (q[on] + (goal - q)[on] * part_of[:, None] for part_of in (done[on], ahead))
+        there, good = part.followed(here, x[on], next_)
         # the closure that follows must be the near one: back again must be where it came from
-        back, same = part.followed((q + (goal - q) * ahead)[None], there, (q + (goal - q) * done)[None])
-        if good[0] and same[0] and np.abs(back - x).max(initial=0.0) < AFFINE_ROUNDING**0.5:
-            done, x = ahead, there[0]
-        else:
-            step /= 2
-    return q + (goal - q) * done, x, done
+        back, same = part.followed(next_, there, here)
+        good = good & same & (np.abs(back - x[on]).max(axis=-1, initial=0.0) < AFFINE_ROUNDING**0.5)
+        done[on[good]], x[on[good]] = ahead[good], there[good]
+        step[on[~good]] /= 2
+    return q + (goal - q) * done[:, None], x, done
 
 
 def turns(growth: Growth) -> tuple[tuple[str, bool], ...]:

@@ -8,8 +8,10 @@ are exact.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise, product
 from typing import Any
 
 import numpy as np
@@ -17,6 +19,7 @@ from numpy.typing import NDArray
 
 from ...budgets import FINEST_BRANCH_CELL
 from ...geometry.vectors import Array
+from ...progress import tell
 from ...tolerances import AFFINE_ROUNDING
 from .cells import BranchTube, middles, prove_all
 from .part import LoopPart
@@ -49,6 +52,8 @@ class GrownCell:
     tube: BranchTube | None = None
     failed: bool = False
     asked: bool = False
+    beyond: bool = False
+    """Whether it is too large to be tried, and is not cut."""
     number: int = -1
     neighbours: set[int] = field(default_factory=set)
 
@@ -56,6 +61,45 @@ class GrownCell:
     def volume(self) -> float:
         """Its part of the box."""
         return float(np.prod((self.high - self.low) / 2.0**FINEST_BRANCH_CELL))
+
+
+def whole_box(n: int) -> list[GrownCell]:
+    """The box of n motors as one cell."""
+    return [GrownCell(np.zeros(n, dtype=np.int64), np.full(n, 2**FINEST_BRANCH_CELL, dtype=np.int64))]
+
+
+def lattice(grid: CellGrid, start: Array, half: Array, most: int) -> list[GrownCell]:
+    """The box as at most so many equal cells of sides 2 half (n,) about a start, as far as they go, the first with the
+    start in its middle, and what lies beyond them on each side."""
+    n = len(start)
+    scale = 2.0**FINEST_BRANCH_CELL / (grid.high - grid.low)
+    middle, reach = np.rint((start - grid.low) * scale).astype(np.int64), np.floor(half * scale).astype(np.int64)
+
+    def edges(k: int, rings: int) -> list[int]:
+        every = {int(middle[k] + j * reach[k]) for j in range(-2 * rings - 1, 2 * rings + 2, 2)}
+        return sorted({min(max(each, 0), 2**FINEST_BRANCH_CELL) for each in every})
+
+    rings = [0] * n
+    for ring in range(1, most):
+        for k in range(n):
+            wider = [*rings[:k], ring, *rings[k + 1 :]]
+            if math.prod(len(edges(i, each)) - 1 for i, each in enumerate(wider)) <= most:
+                rings = wider
+        if max(rings) < ring or all(edges(k, ring) == edges(k, ring + 1) for k in range(n)):
+            break
+    sides = [list(pairwise(edges(k, each))) for k, each in enumerate(rings)]
+    cells = [GrownCell(*np.array(each, dtype=np.int64).T) for each in product(*sides)]
+    cells.sort(key=lambda cell: bool(np.any(cell.low > middle) or np.any(cell.high < middle)))
+    low, high = np.array([side[0][0] for side in sides]), np.array([side[-1][1] for side in sides])
+    outer_low, outer_high = np.zeros(n, dtype=np.int64), np.full(n, 2**FINEST_BRANCH_CELL, dtype=np.int64)
+    for k in range(n):
+        for a, b in ((0, low[k]), (high[k], 2**FINEST_BRANCH_CELL)):
+            if a < b:
+                beyond = GrownCell(outer_low.copy(), outer_high.copy(), beyond=True)
+                beyond.low[k], beyond.high[k] = a, b
+                cells.append(beyond)
+        outer_low[k], outer_high[k] = low[k], high[k]
+    return cells
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,18 +123,16 @@ class Growth:
     most: int
     coarsest: float
     """Part of a side of the box above which a cell is halved without a trial."""
-    leaves: list[GrownCell] = field(default_factory=list)
+    leaves: list[GrownCell]
+    """The cells of the box; the first holds the start."""
     proved: list[GrownCell] = field(default_factory=list)
     endings: list[BranchEnd] = field(default_factory=list)
     tried: int = 0
 
     def run(self) -> Growth:
         """Grow until nothing is left to try, or as many cells were tried as are allowed."""
-        n = len(self.q0)
-        root = GrownCell(np.zeros(n, dtype=np.int64), np.full(n, 2**FINEST_BRANCH_CELL, dtype=np.int64))
-        self.leaves.append(root)
-        waiting: list[tuple[GrownCell, Array, Array]] = [(root, self.q0, self.x0)]
-        root.asked = True
+        waiting: list[tuple[GrownCell, Array, Array]] = [(self.leaves[0], self.q0, self.x0)]
+        self.leaves[0].asked = True
         while waiting and self.tried < self.most:
             waiting.sort(key=lambda each: (each[0].depth, each[0].low.tolist()))
             batch, waiting = waiting[:AT_ONCE], waiting[AT_ONCE:]
@@ -100,6 +142,7 @@ class Growth:
                 waiting += [half for each in coarse for half in self._cut(*each)]
                 continue
             self.tried += len(batch)
+            tell("batches of cells")
             tubes = self._tubes(batch)
             joined = self._joined(batch, tubes)
             for (leaf, q, x), tube in zip(batch, tubes, strict=True):
@@ -231,7 +274,10 @@ class Growth:
         for other in self._beside(leaf):
             if other.tube is None and not other.asked:
                 other.asked = True
-                found.append(self._start(leaf, other))
+                if other.beyond:
+                    self.endings.append(BranchEnd(*self._start(leaf, other)))
+                else:
+                    found.append(self._start(leaf, other))
         return found
 
     def _start(self, leaf: GrownCell, other: GrownCell) -> tuple[GrownCell, Array, Array]:

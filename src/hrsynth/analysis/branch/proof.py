@@ -18,7 +18,7 @@ from .answer import BranchCell, BranchPart, BranchProof
 from .back import way_back
 from .cells import prove_all
 from .ends import toggles, turns
-from .growth import CellGrid, Growth, largest_box
+from .growth import CellGrid, GrownCell, Growth, largest_box, lattice, whole_box
 from .loops import LoopSystem, loop_system
 from .part import LoopPart, parts_of, whole
 from .redundant import closed_to, unexplained
@@ -54,8 +54,9 @@ def branch(robot: RobotLike, box: BoxLike | None = None, *, effort: int = BRANCH
     intervals, source = _box(system, box)
     found, grown = [], []
     for part in parts:
-        growth = Growth(part, _grid(part, intervals), np.zeros(len(part.driven)), np.zeros(len(part.unknowns)),
-                        _depth(part), effort, COARSEST_BRANCH_CELL * _reach(part, intervals)).run()
+        grid, coarsest = _grid(part, intervals), COARSEST_BRANCH_CELL * _reach(part, intervals)
+        growth = Growth(part, grid, np.zeros(len(part.driven)), np.zeros(len(part.unknowns)), _depth(part), effort,
+                        coarsest, _first(grid, coarsest, effort)).run()
         grown.append(growth)
         found.append(_answer(part, growth))
         tell("parts")
@@ -99,6 +100,16 @@ def _reach(part: LoopPart, intervals: Mapping[int, tuple[float, float]]) -> floa
     half = np.minimum(grid.high - grid.low, 2 * np.pi)[None] / 2 * sizes[:, None]
     tubes = prove_all(part, np.zeros(half.shape), half, np.zeros((len(half), len(part.unknowns))))
     return max((float(size) for size, tube in zip(sizes, tubes, strict=True) if tube is not None), default=0.0)
+
+
+def _first(grid: CellGrid, coarsest: float, effort: int) -> list[GrownCell]:
+    """The cells to begin with: the box, or, where the effort is spent before cells that are not too coarse fill it, as
+    many as it allows of those that are proved about zero."""
+    n = len(grid.low)
+    if not coarsest or coarsest**n * effort >= 1:
+        return whole_box(n)
+    half = coarsest / COARSEST_BRANCH_CELL * np.minimum(grid.high - grid.low, 2 * np.pi) / 2
+    return lattice(grid, np.zeros(n), half, effort)
 
 
 def _depth(part: LoopPart) -> int:
