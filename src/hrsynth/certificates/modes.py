@@ -36,7 +36,7 @@ from .bounds import bound
 from .chains import chains
 from .closures import ClosedRobot, written
 from .planar_records import closings
-from .proposed import Proposed
+from .proposed import ProposedRecord
 from .refining import Polynomial, Refining
 from .system_records import propose
 from .verify_certificate import KINDS, NotAccepted, digest, integral, rational, told, value, verify
@@ -113,8 +113,8 @@ def of_chain(system: CarriedPlatform, found: AssemblyModes, about: Mapping[str, 
                      for to in there]
             bodies = [None if k is None else found.model.bodies(modes_[k].q) for k in each.modes]
             try:
-                return _sealed([_system(Proposed(each.record, each.starts, poses, kept, bodies, frame), robot)], about,
-                               robot, found.found.complex or 0)
+                made = _system(ProposedRecord(each.record, each.starts, poses, kept, bodies, frame), robot)
+                return _sealed([made], about, robot, found.found.complex or 0)
             except NotAccepted as reason:
                 why = str(reason)
         else:
@@ -164,7 +164,7 @@ def again(record: dict[str, Any], robot: Mechanism) -> dict[str, Any]:
     return certificate(modes(setting, at=None if start == at else at, real=real))
 
 
-def _system(proposed: Proposed, robot: ClosedRobot | None) -> dict[str, Any]:
+def _system(proposed: ProposedRecord, robot: ClosedRobot | None) -> dict[str, Any]:
     """A system with its boxes and its bound."""
     record, frame = proposed.record, proposed.frame
     equations, halves, points, legs = KINDS[record["kind"]][0](record, rational(record["tips"]))

@@ -15,7 +15,7 @@ from ..analysis.modes.solve import Solved
 from ..analysis.modes.squares import SquareSystem
 from ..geometry.vectors import Array, cross, rotation_about
 from .closures import rounded, written
-from .proposed import Proposed, placed_in, starts_of
+from .proposed import ProposedRecord, placed_in, starts_of
 from .reach_records import point_on, reach_record
 from .verify_certificate import NotAccepted
 
@@ -25,7 +25,7 @@ def in_space(frame: WorkingFrame) -> WorkingFrame:
     return frame if len(frame.R) == 3 else replace(frame, R=np.vstack([frame.R, cross(*frame.R)]))
 
 
-def closings(system: PlanarLoops, count: int) -> Proposed:
+def closings(system: PlanarLoops, count: int) -> ProposedRecord:
     """The closings of a planar mechanism, ``count`` of which fit all that is measured."""
     first, n = system.bodies[0], system.angles
     frame = WorkingFrame(system.goal.pose(first)[:3, 3], np.vstack([system.frame, system.normal]), system.size,
@@ -56,7 +56,7 @@ def closings(system: PlanarLoops, count: int) -> Proposed:
         raise NotAccepted("the closings of the loops are not those of the list")
     poses = [np.column_stack([rotation_about((0.0, 0.0, 1.0), float(np.array(system.turns[first]) @ x[:n])),
                               frame.point(system.pose_of(first, x)[:3, 3])]) for x in q]
-    return Proposed(record, [([*map(complex, box.middle)], box.real) for box in boxes], poses, kept,
+    return ProposedRecord(record, [([*map(complex, box.middle)], box.real) for box in boxes], poses, kept,
                      [system.placed(x) for x in q], frame)
 
 

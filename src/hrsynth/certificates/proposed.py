@@ -14,7 +14,7 @@ from ..geometry.vectors import Array
 
 
 @dataclass(frozen=True, eq=False)
-class Proposed:
+class ProposedRecord:
     """A system in rational numbers without boxes and bound; about where its solutions are, and whether they are real
     (None: too far to be poses); of the real ones the poses (3, 4) as the checker is told them, whether they are modes,
     and the coordinates of the system in which they were found; its working frame."""

@@ -19,17 +19,17 @@ from ..geometry.vectors import Array
 from .closures import ClosedRobot, rounded, written
 from .planar_records import in_space, planar_system
 from .poses import regular
-from .proposed import Proposed, placed_in, starts_of
+from .proposed import ProposedRecord, placed_in, starts_of
 from .reach_records import point_on, reach_record
 from .verify_certificate import NotAccepted
 
 
-def propose(solved: Solved, robot: ClosedRobot | None) -> Proposed:
+def propose(solved: Solved, robot: ClosedRobot | None) -> ProposedRecord:
     """The solutions of a square part of a system."""
     record, starts, poses = _written(solved)
     frame = solved.part.chart.frame if isinstance(solved.part, PoseSystem) else solved.part.frame
     assert frame is not None
-    return Proposed(record, starts, poses, solved.kept,
+    return ProposedRecord(record, starts, poses, solved.kept,
                      [None if robot is None else robot.bodies(mode) for mode in solved.modes], in_space(frame))
 
 
