@@ -21,7 +21,7 @@ from hrsynth.description import load
 from hrsynth.errors import BadRequest, HrsynthError
 from hrsynth.geometry.vectors import Array
 from hrsynth.kinematics.relation import relation
-from hrsynth.kinematics.sampling import random_walk
+from hrsynth.kinematics.walking import random_walk
 from hrsynth.mechanism.observations.direction import Direction
 from kinematics.robots import ROBOTS
 from strategies import parallel_robots

@@ -13,7 +13,7 @@ from hrsynth.batch.engine import Batch
 from hrsynth.errors import BadRequest
 from hrsynth.geometry.vectors import Array
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.kinematics.sampling import random_walk
+from hrsynth.kinematics.walking import random_walk
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.model import Mechanism
 from strategies import random_rotation

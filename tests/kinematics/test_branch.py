@@ -22,7 +22,8 @@ from hrsynth.kinematics.branch import CHANGED, TURNED, alike_after, turned_littl
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.kinematics.relation import Measurement, relation
-from hrsynth.kinematics.sampling import _Walks, random_walk, sample
+from hrsynth.kinematics.sampling import _Walks, sample
+from hrsynth.kinematics.walking import random_walk
 from hrsynth.mechanism import JointType, Mechanism
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.pose import Pose

@@ -14,7 +14,7 @@ from hrsynth.geometry.vectors import Array, hat, unit
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.locked import interaction, leg_twists, split
 from hrsynth.kinematics.relation import Measurement, relation
-from hrsynth.kinematics.sampling import WEAKEST, random_walk
+from hrsynth.kinematics.walking import WEAKEST, random_walk
 from hrsynth.mechanism.legs import Leg
 from hrsynth.mechanism.observations.direction import Direction
 from hrsynth.tolerances import CLOSED

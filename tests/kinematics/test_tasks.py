@@ -9,8 +9,8 @@ from hrsynth.analysis.asked import observe
 from hrsynth.errors import NotMeasured
 from hrsynth.geometry.gauss_newton import Damping, Residual, descend, descend_together
 from hrsynth.geometry.vectors import Array
-from hrsynth.kinematics.sampling import track_paths
 from hrsynth.kinematics.tasks import solve
+from hrsynth.kinematics.tracking import track_paths
 from hrsynth.tolerances import PASSED_BY, SOLVED
 from kinematics.robots import setting_of
 

@@ -18,7 +18,7 @@ from hrsynth.batch.reach import reach
 from hrsynth.description import load, shipped
 from hrsynth.errors import PoseNotReached
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.kinematics.sampling import random_walk
+from hrsynth.kinematics.walking import random_walk
 from hrsynth.mechanism.pose import asked_pose
 from hrsynth.simulation.servo import ServoTask
 

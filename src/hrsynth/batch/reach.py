@@ -15,8 +15,8 @@ from ..kinematics.leg_reach import worst_leg
 from ..kinematics.limits import at_end, wrists_beyond
 from ..kinematics.platform_motion import Goal, PlatformMotion
 from ..kinematics.relation import Measurement
-from ..kinematics.sampling import random_walk
 from ..kinematics.steps import HALVINGS, nearest, track
+from ..kinematics.walking import random_walk
 from ..mechanism.pose import Grid, Pose
 from ..progress import tell
 from ..tolerances import AS_PRINTED

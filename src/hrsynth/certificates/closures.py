@@ -15,7 +15,7 @@ import numpy as np
 
 from ..analysis.measured import MeasuredRobot
 from ..analysis.modes.modes import AssemblyModes
-from ..analysis.modes.quadrics import WorkingFrame
+from ..analysis.modes.quadrics import UNIT, WorkingFrame
 from ..analysis.modes.solve import SystemMode
 from ..constraints.pattern import attached
 from ..geometry.vectors import Array, inverse
@@ -118,3 +118,10 @@ def _locked(mechanism: Mechanism, at: ClosedConfiguration, joint: Joint) -> Iter
 def _seen(mechanism: Mechanism, at: ClosedConfiguration, link: str, other: str, x: Sequence[float]) -> list[Any]:
     D, E = displaced(mechanism, at, link), displaced(mechanism, at, other)
     return [link, other, written(x), written(E[:, :3].T @ (D @ x - x[3] * E[:, 3]))]
+
+
+def rounded(x: Any) -> Any:
+    """Numbers to one part in 2⁻⁵², as fractions."""
+    if np.ndim(x) == 0:
+        return Fraction(round(float(x) * UNIT), UNIT)
+    return [rounded(each) for each in x]

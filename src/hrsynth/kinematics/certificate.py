@@ -21,8 +21,9 @@ from ..tolerances import FOLLOWED, RANK_GAP, SAME_RELATION, SOLVED
 from .configuration import ClosedConfiguration
 from .pinocchio_model import PinocchioModel
 from .relation import Relation, relations
-from .sampling import Sample, Samples, track_paths
+from .sampling import Sample, Samples
 from .tasks import LinkPoses, Target, solve
+from .tracking import track_paths
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..budgets import EASY_ITERATIONS
 from ..errors import BadMechanism, BranchPoint, NotMeasured, NotSampled
-from ..geometry.ranks import kernel_basis, largest_angle, random_in, range_bases
+from ..geometry.ranks import kernel_basis, largest_angle, range_bases
 from ..geometry.vectors import Array
 from ..mechanism.observation import Observation
 from ..results import Value
@@ -27,7 +27,6 @@ from ..tolerances import (
     FOLLOWED,
     INVERTED,
     NUDGE,
-    PASSED_BY,
     RANK_GAP,
     SHARP,
     SOLVED,
@@ -35,18 +34,16 @@ from ..tolerances import (
     SURELY_SOMETHING,
     UNMOVING,
 )
-from .branch import CORRECTED, OperationMode, Signature, follows, group_modes, turns_of
+from .branch import OperationMode, Signature, group_modes, turns_of
 from .configuration import ClosedConfiguration
 from .pinocchio_model import PinocchioModel
 from .relation import Measurement, Relation, relation, relations
 from .tasks import Places, Target, shortened, solve, solve_together
+from .tracking import track_paths
+from .walking import HALVED, STEP, WEAKEST, any_velocity, lands_beside, random_walk, step_along
 
 X = TypeVar("X")
 
-STEP = 0.11
-"""Length of a step: the norm of (t, u̇), in characteristic lengths and radians."""
-HALVED = tuple(2.0**-k for k in range(10))
-"""Parts of a step that are tried; where the last does not follow the branch, a singularity of the loops lies ahead."""
 TURNS = 3
 """Directions that a walk tries before a singularity before it is given up."""
 ASKED = 40
@@ -59,8 +56,6 @@ LEAVING = 24
 """Steps in random directions by which the branches at a singular zero configuration are sought."""
 STEPS = 4
 """Steps from the zero configuration to a sample."""
-WEAKEST = 0.05
-"""Fraction to which the loops' smallest singular value may fall below that of the zero configuration."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -159,7 +154,7 @@ def _mode(at: ClosedConfiguration, question: Measurement) -> OperationMode | Non
 def _ways_out(start: ClosedConfiguration, question: Measurement, rng: np.random.Generator) -> list[ClosedConfiguration]:
     """Configurations beside a singular zero configuration; raises ``BranchPoint`` where they are not of one mode."""
     found = [each for _ in range(LEAVING)
-             if (beside := _moved(start, _anywhere(start, rng), leaving=True)) is not None
+             if (beside := step_along(start, any_velocity(start, rng), leaving=True)) is not None
              and (each := _mode(beside, question)) is not None]
     if not found:
         raise NotSampled(start.twin.mechanism.name, 0, 1)
@@ -268,9 +263,9 @@ class _Walks:
         for _ in range(STEPS):
             if self.freely:
                 for walker in walkers:
-                    idly = 2 * _anywhere(walker.here, self.rng)
+                    idly = 2 * any_velocity(walker.here, self.rng)
                     walker.here = next((there for part in HALVED
-                                        if (there := _moved(walker.here, idly, part)) is not None), walker.here)
+                                        if (there := step_along(walker.here, idly, part)) is not None), walker.here)
             walkers = self._step(walkers)
             passed = [(walker, at) for walker in walkers for at in walker.passed]
             targets = _measured(question.targets, [at for _, at in passed])
@@ -353,14 +348,14 @@ class _Walks:
         return ended
 
     def _parts(self, strides: Sequence[_Stride]) -> list[ClosedConfiguration | None]:
-        """As :func:`_moved`, of the next part of several steps."""
+        """As :func:`.walking.step_along`, of the next part of several steps."""
         twin, tangents = strides[0].here.twin, [stride.tangent() for stride in strides]
         predicted = [twin.moved(stride.here.q, tangent) for stride, tangent in zip(strides, tangents, strict=True)]
         solved = solve_together(Places(twin, None), predicted, [None] * len(strides), tolerance=SOLVED)
         closed = [k for k, (_, residual) in enumerate(solved) if residual <= CLOSED]
         found: list[ClosedConfiguration | None] = [None] * len(strides)
         for k, there in zip(closed, ClosedConfiguration.several(twin, [solved[k][0] for k in closed]), strict=True):
-            if _beside(strides[k].here, tangents[k], predicted[k], there):
+            if lands_beside(strides[k].here, tangents[k], predicted[k], there):
                 found[k] = there
             elif strides[k].part == 1:
                 self.beyond.append(there)
@@ -388,85 +383,9 @@ def _steady(here: ClosedConfiguration) -> ClosedConfiguration | None:
     return here if turn * max(here.residual, SHARP) / here.strengths[-1] <= STEADY_TANGENT else None
 
 
-def _moved(here: ClosedConfiguration, velocity: Array, part: float = 1.0, *, leaving: bool = False
-           ) -> ClosedConfiguration | None:
-    """The configuration a ``part`` of a step along ``velocity`` leads to; None where it does not close near its
-    prediction, or does not follow the branch. ``leaving`` a singular configuration, any branch will do."""
-    step = part * shortened(STEP * velocity, 3 * STEP)
-    predicted = here.twin.moved(here.q, step)
-    q, residual = solve(here.twin, predicted, tolerance=SOLVED)
-    if not residual <= CLOSED:
-        return None
-    there = ClosedConfiguration.of(here.twin, q)
-    if leaving:
-        apart = float(np.linalg.norm(here.twin.difference(predicted, q)))
-        return there if apart <= float(np.linalg.norm(step)) / 2 else None
-    return there if _beside(here, step, predicted, there) else None
-
-
-def _beside(here: ClosedConfiguration, step: Array, predicted: Array, there: ClosedConfiguration) -> bool:
-    """Whether ``there``, where the loops close after a step, is near its prediction and follows the branch."""
-    apart = float(np.linalg.norm(here.twin.difference(predicted, there.q)))
-    return apart <= CORRECTED * float(np.linalg.norm(step)) + 1e-9 and follows(here, step, there)
-
-
 def _regular(start: ClosedConfiguration, rng: np.random.Generator) -> bool:
     """Whether some step from a configuration, however short, follows its branch: not so where branches meet."""
-    velocity = _anywhere(start, rng)
-    return any(_moved(start, velocity, part) is not None for part in (*HALVED[::3], 1e-4, 1e-5))
+    velocity = any_velocity(start, rng)
+    return any(step_along(start, velocity, part) is not None for part in (*HALVED[::3], 1e-4, 1e-5))
 
 
-def _anywhere(at: ClosedConfiguration, rng: np.random.Generator) -> Array:
-    """A random joint velocity, idle motions included, a unit vector."""
-    velocity = random_in(at.kernel()[0], rng)
-    return np.asarray(velocity / np.linalg.norm(velocity))
-
-
-def random_walk(start: ClosedConfiguration, count: int, seed: int = 0, steps: int = 40
-                ) -> Iterator[ClosedConfiguration]:
-    """``count`` random configurations on the component of ``start``: walks of up to ``steps`` small steps in the
-    mechanism's own freedoms, each checked as those of :func:`sample` are; a walk that ends early is begun again."""
-    rng = np.random.default_rng(seed)
-    weakest = WEAKEST * start.kernel()[1].weakest
-    given = failed = 0
-    while given < count:
-        here, velocity = start, np.zeros(start.twin.nv)
-        for _ in range(steps):
-            kernel, _ = here.kernel()
-            velocity = kernel @ (kernel.T @ (velocity + rng.normal(size=len(kernel)) / 2))
-            velocity /= np.linalg.norm(velocity)
-            moved = next((m for part in HALVED if (m := _moved(here, 2 * velocity, part)) is not None), None)
-            if moved is None or moved.kernel()[1].weakest < weakest:
-                failed += 1
-                break
-            here = moved
-            yield here
-            given += 1
-            if given == count:
-                return
-        if failed > 10 * (given + 10):
-            raise NotSampled(start.twin.mechanism.name, given, count)
-
-
-def track_paths(twin: PinocchioModel, ways: Sequence[Sequence[Target]], iterations: int = 120
-                ) -> Iterator[tuple[Array, float] | NotMeasured]:
-    """The configurations a twin reaches when it is led from its zero configuration along ways, and the residuals, or
-    what cannot be measured on a way; all ways in step, or each alone where that is so of one."""
-    try:
-        yield from _tracked(twin, ways, iterations)
-    except NotMeasured as error:
-        for way in ways if len(ways) > 1 else ():
-            yield from track_paths(twin, [way], iterations)
-        if len(ways) == 1:
-            yield error
-
-
-def _tracked(twin: PinocchioModel, ways: Sequence[Sequence[Target]], iterations: int) -> list[tuple[Array, float]]:
-    longest = max(map(len, ways))  # a shorter way ends with its last target, again and again
-    found, stages = [(twin.q0, 0.0)] * len(ways), list(zip(*(
-        [*way, *[way[-1]] * (longest - len(way))] for way in ways), strict=True))
-    places = Places(twin, stages[0][0] if stages else None)
-    for targets in stages:
-        tolerance = SOLVED if targets is stages[-1] else PASSED_BY
-        found = solve_together(places, [q for q, _ in found], targets, tolerance=tolerance, iterations=iterations)
-    return found

@@ -27,7 +27,7 @@ from hrsynth.errors import BadRequest, PoseNotReached
 from hrsynth.geometry.balls import balls, below, centred, jets
 from hrsynth.geometry.vectors import cross, dot, triple
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.kinematics.sampling import random_walk
+from hrsynth.kinematics.walking import random_walk
 from strategies import planar
 
 # Robots whose legs can be closed by hand: planar, five bars, translating, with six freedoms, with two halves.

@@ -15,7 +15,7 @@ from hrsynth.analysis.aspects.words import SAME, SEPARATED
 from hrsynth.closed_forms.legs import ClosedFormLeg
 from hrsynth.description import load
 from hrsynth.geometry.balls import balls
-from hrsynth.kinematics.sampling import random_walk
+from hrsynth.kinematics.walking import random_walk
 from strategies import deltas, planar, pods
 
 SHIPPED = ("3rrr_m1", "3rpr_m1", "3prr_m1", "rrrrr_m1", "rprpr_m1", "prrrp_m1", "gough_stewart", "quattro",

@@ -16,7 +16,7 @@ from hrsynth.analysis.aspects.path import Aspects
 from hrsynth.analysis.aspects.words import SAME, SEPARATED, UNDECIDED
 from hrsynth.description import load
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.kinematics.sampling import random_walk
+from hrsynth.kinematics.walking import random_walk
 from hrsynth.mechanism import JointType, Limits, Mechanism
 from strategies import planar
 

@@ -11,7 +11,7 @@ from analysis.singularity.found import found
 from hrsynth.analysis.singularity.agreement import weakest
 from hrsynth.analysis.singularity.singular import Singularity, singular
 from hrsynth.geometry.vectors import Array, frozen, inverse
-from hrsynth.kinematics.sampling import random_walk
+from hrsynth.kinematics.walking import random_walk
 from hrsynth.mechanism.model import Mechanism
 from hrsynth.present.text.poses import singularity
 from strategies import deltas

@@ -21,8 +21,8 @@ from ...geometry.ranks import kernel_basis, range_basis
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.relation import Measurement, platform_motions, relation
-from ...kinematics.sampling import WEAKEST, random_walk
 from ...kinematics.tasks import solve
+from ...kinematics.walking import WEAKEST, random_walk
 from ...mechanism.sights import CameraObservation
 from ...progress import tell
 from ...results import Value

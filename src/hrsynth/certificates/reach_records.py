@@ -1,0 +1,48 @@
+"""Curves and surfaces as the checker is told them: in rational working coordinates, circles exactly round."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from ..analysis.modes.curves import Circle, Line, Point, Reach, Sphere
+from ..analysis.modes.quadrics import UNIT, Rounded, WorkingFrame, direction, spokes
+from ..geometry.so3 import quaternions
+from ..geometry.vectors import cross, unit
+from .closures import rounded, written
+from .verify_certificate import dot
+
+
+def point_on(curve: Reach, frame: WorkingFrame, turn: float, t: complex) -> Any:
+    """The point (3,) of a curve at an unknown, complex ones too."""
+    assert isinstance(curve, Line | Circle)
+    return curve.at(2.0 * np.arctan(t) + turn if isinstance(curve, Circle) else frame.size * t)  # type: ignore[arg-type]
+
+
+def reach_record(reach: Reach, frame: WorkingFrame, turn: float) -> dict[str, Any]:
+    """A curve or surface in rational working coordinates (sizes)."""
+    centre = rounded(frame.point(reach.centre))
+    if isinstance(reach, Sphere):
+        radius = rounded(reach.radius / frame.size)
+        return {"sphere": written([centre, [radius * radius]])}
+    if isinstance(reach, Circle):
+        return {"circle": written([centre, *_spokes(reach, frame, turn)])}
+    rest = [] if isinstance(reach, Point) else [reach.direction if isinstance(reach, Line) else reach.normal]
+    exact = [[Fraction(int(x), UNIT) for x in direction(each, frame, Rounded)] for each in rest]
+    return {type(reach).__name__.lower(): written([centre, *exact])}
+
+
+def _spokes(circle: Circle, frame: WorkingFrame, turn: float) -> list[list[Fraction]]:
+    """Two spokes of a circle, exactly normal to each other and of one length: those of a rational rotation."""
+    given = spokes(circle, frame, turn, Rounded)
+    a, b = ([Fraction(int(x), UNIT) for x in each] for each in given)
+    if len(a) == 2 or dot(a, b) == 0 == dot(a, a) - dot(b, b):
+        return [a, b]
+    first, second = unit(given[0].astype(float)), unit(given[1].astype(float))
+    w, x, y, z = (Fraction(round(float(c) * UNIT)) for c in quaternions(np.column_stack(
+        [first, second, cross(first, second)])))
+    s = rounded(circle.radius / frame.size) / (w * w + x * x + y * y + z * z)
+    return [[s * (w * w + x * x - y * y - z * z), 2 * s * (x * y + w * z), 2 * s * (x * z - w * y)],
+            [2 * s * (x * y - w * z), s * (w * w - x * x + y * y - z * z), 2 * s * (y * z + w * x)]]

@@ -1,0 +1,143 @@
+"""Systems on poses as the checker is told them, and about where their solutions are."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ..analysis.modes.curves import Circle, Curve, Line, Plane, Point, Reach, Sphere, Surface, shifted
+from ..analysis.modes.quadrics import PoseSystem, WorkingFrame
+from ..analysis.modes.rigid import Planar, Spatial
+from ..analysis.modes.solve import Solved
+from ..analysis.modes.squares import TURNS, SquareSystem
+from ..analysis.modes.translating import Articulated, Translating, coplanar, met_normal
+from ..geometry.vectors import Array
+from .closures import ClosedRobot, rounded, written
+from .planar_records import in_space, planar_system
+from .poses import regular
+from .proposed import ProposedRecord, placed_in, starts_of
+from .reach_records import point_on, reach_record
+from .verify_certificate import NotAccepted
+
+
+def propose(solved: Solved, robot: ClosedRobot | None) -> ProposedRecord:
+    """The solutions of a square part of a system."""
+    record, starts, poses = _written(solved)
+    frame = solved.part.chart.frame if isinstance(solved.part, PoseSystem) else solved.part.frame
+    assert frame is not None
+    return ProposedRecord(record, starts, poses, solved.kept,
+                     [None if robot is None else robot.bodies(mode) for mode in solved.modes], in_space(frame))
+
+
+def _written(solved: Solved) -> tuple[dict[str, Any], list[tuple[list[complex], bool | None]], list[Array]]:
+    """A system in rational numbers without boxes and bound; about where its solutions are, and whether they are real;
+    the real ones' poses, as the checker is told them."""
+    system, part, roots = solved.system, solved.part, solved.roots
+    if isinstance(part, PoseSystem):
+        return _pose_system(solved)
+    if not part.unknowns or part.frame is None:
+        raise NotAccepted("tips at rest leave one pose: there is nothing to enclose")
+    frame, turns = part.frame, part.turns(roots.turn)
+    values, real = starts_of(roots)
+    if isinstance(system, Planar):
+        return planar_system(solved)
+    if isinstance(system, Spatial):
+        legs = [*part.legs, *(k for k in range(len(system.curves)) if k not in part.legs)]
+        origins = iter(turns)
+        curves = [system.curves[k] for k in legs]
+        record = {"kind": "spatial",
+                  "reaches": [reach_record(each, frame, 0.0 if isinstance(each, Point | Surface) else
+                                                         next(origins, 0.0)) for each in curves],
+                  "tips": written(rounded(system.tips[legs] / frame.size)), "square": len(part.legs)}
+        return record, list(zip(values, real, strict=True)), [placed_in(mode.pose, frame, 3) for mode in solved.modes]
+    assert isinstance(system, Translating | Articulated)
+    if isinstance(system, Translating):
+        record, starts = _translating(system, part, frame, turns, values)
+    else:
+        record, starts = _articulated(system, part, frame, turns, values)
+    origin = _middle(part, system) if isinstance(system, Articulated) else frame.origin
+    record |= {"kind": "shifting", "square": len(record["reaches"])}
+    if not part.whole:  # then all legs are told, and what is solved first
+        bodies = [0] * len(system.paths) if isinstance(system, Translating) else system.bodies
+        paths = [shifted(each, frame.origin - origin) for each in system.paths]
+        record["reaches"] = [*record["reaches"], *(reach_record(each, frame, 0.0) for each in paths)]
+        record["bodies"] = [*record["bodies"], *bodies]
+    record["tips"] = [["0"] * 3] * len(record["reaches"])
+    return record, list(zip(starts, real, strict=True)), [_shifted(mode.pose, frame, origin) for mode in solved.modes]
+
+
+def _shifted(X: Array, frame: WorkingFrame, origin: Array) -> Array:
+    """The pose of a body that does not turn, counted from an origin, in working coordinates (3, 4)."""
+    return np.column_stack([np.eye(3), frame.vector(X[:3, 3] - origin)])
+
+
+def _pose_system(solved: Solved) -> tuple[dict[str, Any], list[tuple[list[complex], bool | None]], list[Array]]:
+    """As :func:`_written`, for tips on surfaces too, solved for in the pose's own coordinates."""
+    system, part = solved.system, solved.part
+    assert isinstance(part, PoseSystem)
+    if not part.whole or sum(system.forbids[k] for k in part.legs) != system.freedoms:
+        raise NotAccepted("tips on surfaces, more than needed")
+    frame, (values, real) = part.chart.frame, starts_of(solved.roots)
+    if isinstance(system, Spatial) and part.chart.study is not None:
+        record = {"kind": "pose", "reaches": [reach_record(system.curves[k], frame, 0.0) for k in part.legs],
+                  "tips": written(rounded(system.tips[list(part.legs)] / frame.size)),
+                  "arrows": sum(k >= len(system.points) for k in part.legs),
+                  "hub": written(rounded(frame.point(system.hub))),
+                  "chart": [[str(round(x)) for x in row] for row in part.chart.study[:4, :4]]}
+        poses = [placed_in(mode.pose, frame, 3) for mode in solved.modes]
+        return *regular(record, list(zip(values, real, strict=True))), poses
+    if not isinstance(system, Articulated):
+        raise NotAccepted("tips on surfaces of another platform than the checker knows")
+    turn = TURNS[0]
+    record = {"kind": "shifting", "reaches": [reach_record(system.paths[k], frame, turn) for k in part.legs],
+              "bodies": [system.bodies[k] for k in part.legs], "square": len(part.legs),
+              "slide": reach_record(system.slide, replace(frame, origin=np.zeros(3)), turn),
+              "tips": [["0"] * 3] * len(part.legs)}
+    c, s = math.cos(turn), math.sin(turn)
+    starts = values if isinstance(system.slide, Line) else [
+        [*x[:3], (x[4] * c - x[3] * s) / (1.0 + x[3] * c + x[4] * s)] for x in values]
+    return (record, list(zip(starts, real, strict=True)),
+            [_shifted(mode.pose, frame, frame.origin) for mode in solved.modes])
+
+
+def _translating(system: Translating, part: SquareSystem, frame: WorkingFrame, turns: Sequence[float],
+                 values: Sequence[list[complex]]) -> tuple[dict[str, Any], list[list[complex]]]:
+    """The position of the platform, of which every path is a place: a curve and what it meets, or three surfaces."""
+    curve = part.unknowns[0]
+    chosen: list[Reach] = [system.paths[k] for k in part.legs]
+    if len(chosen) == 2:
+        chosen = [curve, _met(curve, next(each for each in chosen if each is not curve), system.size)]
+    starts = [list(frame.point(point_on(curve, frame, turns[0], t[0]))) for t in values]
+    return {"reaches": [reach_record(each, frame, turns[0]) for each in chosen], "bodies": [0] * len(chosen)}, starts
+
+
+def _articulated(system: Articulated, part: SquareSystem, frame: WorkingFrame, turns: Sequence[float],
+                 values: Sequence[list[complex]]) -> tuple[dict[str, Any], list[list[complex]]]:
+    """The first body's position, counted from the middle of the two paths, and the slide's half-angle tangent."""
+    middle = _middle(part, system)
+    paths = [shifted(system.paths[k], -middle) for k in part.legs]
+    bodies = [system.bodies[k] for k in part.legs]
+    starts = []
+    for t in values:
+        tip = paths[0].at(0.0) if isinstance(paths[0], Point) else point_on(paths[0], frame, turns[0], t[0])
+        slid = point_on(system.slide, frame, turns[-1 if len(t) > 1 else 0], t[-1])
+        starts.append([*frame.vector(tip - slid if bodies[0] else tip), t[-1]])
+    slide = reach_record(system.slide, replace(frame, origin=np.zeros(3)), turns[len(part.unknowns) - 1])
+    reaches = [reach_record(each, frame, turns[0]) for each in paths]
+    return {"reaches": reaches, "bodies": bodies, "slide": slide}, starts
+
+
+def _middle(part: SquareSystem, system: Articulated) -> Array:
+    one, other = (system.paths[k].centre for k in part.legs)
+    return np.asarray((one + other) / 2)
+
+
+def _met(curve: Curve, other: Reach, size: float) -> Reach:
+    """The surface that a curve is met with: of a curve of its plane its sphere, or a plane through it."""
+    if isinstance(other, Circle) and coplanar(curve, other, size):
+        return Sphere(other.centre, other.radius)
+    return other if isinstance(other, Sphere | Plane) else Plane(other.centre, met_normal(curve, other))

@@ -1,0 +1,76 @@
+"""Steps of a mechanism that follow its branch, halved until they do, and random walks of such steps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..errors import NotSampled
+from ..geometry.ranks import random_in
+from ..geometry.vectors import Array
+from ..tolerances import CLOSED, SOLVED
+from .branch import CORRECTED, follows
+from .configuration import ClosedConfiguration
+from .tasks import shortened, solve
+
+STEP = 0.11
+"""Length of a step: the norm of (t, u̇), in characteristic lengths and radians."""
+HALVED = tuple(2.0**-k for k in range(10))
+"""Parts of a step that are tried; where the last does not follow the branch, a singularity of the loops lies ahead."""
+WEAKEST = 0.05
+"""Fraction to which the loops' smallest singular value may fall below that of the zero configuration."""
+
+
+def step_along(here: ClosedConfiguration, velocity: Array, part: float = 1.0, *, leaving: bool = False
+           ) -> ClosedConfiguration | None:
+    """The configuration a ``part`` of a step along ``velocity`` leads to; None where it does not close near its
+    prediction, or does not follow the branch. ``leaving`` a singular configuration, any branch will do."""
+    step = part * shortened(STEP * velocity, 3 * STEP)
+    predicted = here.twin.moved(here.q, step)
+    q, residual = solve(here.twin, predicted, tolerance=SOLVED)
+    if not residual <= CLOSED:
+        return None
+    there = ClosedConfiguration.of(here.twin, q)
+    if leaving:
+        apart = float(np.linalg.norm(here.twin.difference(predicted, q)))
+        return there if apart <= float(np.linalg.norm(step)) / 2 else None
+    return there if lands_beside(here, step, predicted, there) else None
+
+
+def lands_beside(here: ClosedConfiguration, step: Array, predicted: Array, there: ClosedConfiguration) -> bool:
+    """Whether ``there``, where the loops close after a step, is near its prediction and follows the branch."""
+    apart = float(np.linalg.norm(here.twin.difference(predicted, there.q)))
+    return apart <= CORRECTED * float(np.linalg.norm(step)) + 1e-9 and follows(here, step, there)
+
+
+def any_velocity(at: ClosedConfiguration, rng: np.random.Generator) -> Array:
+    """A random joint velocity, idle motions included, a unit vector."""
+    velocity = random_in(at.kernel()[0], rng)
+    return np.asarray(velocity / np.linalg.norm(velocity))
+
+
+def random_walk(start: ClosedConfiguration, count: int, seed: int = 0, steps: int = 40
+                ) -> Iterator[ClosedConfiguration]:
+    """``count`` random configurations on the component of ``start``: walks of up to ``steps`` small steps in the
+    mechanism's own freedoms, each checked as those of :func:`sample` are; a walk that ends early is begun again."""
+    rng = np.random.default_rng(seed)
+    weakest = WEAKEST * start.kernel()[1].weakest
+    given = failed = 0
+    while given < count:
+        here, velocity = start, np.zeros(start.twin.nv)
+        for _ in range(steps):
+            kernel, _ = here.kernel()
+            velocity = kernel @ (kernel.T @ (velocity + rng.normal(size=len(kernel)) / 2))
+            velocity /= np.linalg.norm(velocity)
+            moved = next((m for part in HALVED if (m := step_along(here, 2 * velocity, part)) is not None), None)
+            if moved is None or moved.kernel()[1].weakest < weakest:
+                failed += 1
+                break
+            here = moved
+            yield here
+            given += 1
+            if given == count:
+                return
+        if failed > 10 * (given + 10):
+            raise NotSampled(start.twin.mechanism.name, given, count)
