@@ -381,6 +381,8 @@ MOST_PARTS = 64
 """Into how many parts it is cut at once, at most."""
 MOST_BOUNDED = 2_000
 """Parts of a size that are bounded, about."""
+MOST_BOUNDED_NUMBERS = 20_000
+"""Slopes of such parts in a program, about."""
 INVERSE_STEPS_AT_RUN = 20
 """Steps from motors to motors that it takes at most towards a pose."""
 CONE_BOXES = 60_000

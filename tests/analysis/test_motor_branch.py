@@ -293,6 +293,16 @@ def test_motors_that_do_not_make_a_function_are_refused():
         branch("rrrrr_m1", {"shoulder_1": (-1e9, 1e9)})
 
 
+def test_a_motor_may_be_called_anything_but_a_comma():
+    """The last sign = parts a motor from its interval."""
+    robot = four_bar()
+    named = Mechanism.of("named", robot.links.values(), [
+        replace(joint, name="crank=a:b") if joint.name == "a" else joint for joint in robot.joints.values()],
+        platform=robot.platform, base=robot.base)
+    found = branch(named, "crank=a:b=-0.01:0.02")
+    assert np.array(found.parts[0].asked).ravel() == pytest.approx([-0.01, 0.02])
+
+
 def test_limits_that_limit_nothing_are_a_whole_turn():
     """As some exporters write for a joint without limits."""
     robot = four_bar(coupler=5.0, rocker=5.0)

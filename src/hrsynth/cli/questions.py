@@ -180,6 +180,7 @@ DEPTH = Option("depth", "How the law knows depths in images: exact, desired (tho
                default="exact")
 BOX = Option("box", "Intervals of motors (m, rad), as hip=-1:1,slide=0:0.2 (default: the file's limits, else a whole "
              "turn, or a characteristic length either way).", "INTERVALS")
+CELLS = Option("effort", "Cells that are tried at most, for each part of the loops.", "COUNT", int, BRANCH_CELLS, low=1)
 QUESTIONS = (
     Question("derive", "The hidden robot of a robot, how it is derived, its certificate, and what the controller can "
              "see.",
@@ -220,9 +221,7 @@ QUESTIONS = (
               "gough_stewart --camera eye=base@0.3,0.1,0 --see point:platform@0.1,0,0 --offer point:platform")),
     Question("branch", "Where the joints are proved to be one function of the motors, on the branch of the zero "
              "configuration, and what ends that.",
-             (BOX,
-              Option("effort", "Cells that are tried at most, for each part of the loops.", "COUNT", int, BRANCH_CELLS,
-                     low=1)),
+             (BOX, CELLS),
              ("rrrrr_m1 --box shoulder_1=-0.2:0.2,shoulder_2=-0.2:0.2",), seeded=False),
     Question("modes", "All assembly modes: every pose of the platform with the same measurements.",
              (Option("at", "Pose whose measurements are held, as x=0.02,y=0.1,z=-0.7, or mode:2 of the list without it "
@@ -313,7 +312,7 @@ QUESTIONS = (
              "branch of the zero configuration.",
              (*WATCHED, Option("lang", "c++ (one header, C++17, Eigen) or numpy (one module).", default="c++",
                      words=("c++", "numpy")),
-              BOX, _file("export")),
+              BOX, CELLS, _file("export")),
              ("rrrrr_m1 --box shoulder_1=-0.1:0.1,shoulder_2=-0.1:0.1 -o five_bar.hpp",
               "robot.urdf --lang numpy -o robot.py"), seeded=False),
     Question("view", "A 3D view in the browser: sliders that keep the loops closed, what is observed, assembly modes.",

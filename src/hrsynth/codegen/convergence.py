@@ -29,7 +29,14 @@ from numpy.typing import NDArray
 from ..analysis.branch.cells import TubeTrial, derivatives, drift, inverses, middles, residual
 from ..analysis.branch.loops import curvatures
 from ..analysis.branch.part import LoopBlock, LoopEquation, LoopPart
-from ..budgets import BOUND_HALVINGS, CELLS_TOGETHER, MOST_BOUNDED, MOST_PARTS, NEWTON_STEPS_AT_RUN
+from ..budgets import (
+    BOUND_HALVINGS,
+    CELLS_TOGETHER,
+    MOST_BOUNDED,
+    MOST_BOUNDED_NUMBERS,
+    MOST_PARTS,
+    NEWTON_STEPS_AT_RUN,
+)
 from ..geometry.affine import AffineForms, affine, combined, stacked
 from ..geometry.vectors import Array
 from ..results import Value
@@ -122,6 +129,7 @@ def bounded_cells(branch: TubedBranch, part: TubePart, solved: Sequence[int], ro
     loops = LoopPart(system, part.driven, part.unknowns, (block,), system.loops, system.gears)
     code = _Code(branch, part, loops, equations, closure, list(rows))
     found: list[BoundedCell] = []
+    most = min(MOST_BOUNDED, MOST_BOUNDED_NUMBERS // (len(part.driven) * len(part.unknowns)))
     nothing = np.full(len(rows), np.inf)
     left = [_Parts(BoundedCell(cell, 0, nothing, cell.radius, False), [cell], True) for cell in part.cells]
     for depth in range(BOUND_HALVINGS + 1):
@@ -134,7 +142,7 @@ def bounded_cells(branch: TubedBranch, part: TubePart, solved: Sequence[int], ro
                     continue
                 for each in made:
                     if (each.good(code.units) or depth == BOUND_HALVINGS or not each.divisible
-                            or len(smaller) * 2 ** len(part.driven) >= MOST_BOUNDED):
+                            or len(smaller) * 2 ** len(part.driven) >= most):
                         found.append(each)
                     else:
                         smaller.append(each.split(loops, False))

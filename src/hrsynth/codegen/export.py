@@ -10,6 +10,7 @@ from ..analysis.branch.answer import BranchProof
 from ..analysis.branch.proof import BoxLike, branch
 from ..analysis.observed import CameraLike, LegsLike, ObservedRobot, RobotLike, as_robot
 from ..analysis.question import question
+from ..budgets import BRANCH_CELLS
 from ..errors import BadRequest, HrsynthError
 from ..mechanism.observations.direction import Direction
 from ..progress import tell
@@ -64,13 +65,13 @@ class ExportedCode(Result, shown_as="export"):
 
 @question()
 def export(robot: RobotLike, lang: str = "c++", box: BoxLike | None = None, *, observe: LegsLike = None,
-           camera: CameraLike = None) -> ExportedCode:
+           camera: CameraLike = None, effort: int = BRANCH_CELLS) -> ExportedCode:
     """A program for a controller, in C++ (one header, C++17, Eigen) or NumPy (one module): from the motors' coordinates
     the passive joints and the platform's pose on the branch of the zero configuration, their Jacobians, the motors of a
     pose, and the interaction matrix of the watched directions (``observe``, ``camera`` as for ``derive``).
 
-    It answers where :func:`.branch` proves the branch (``box`` as there) and refuses elsewhere. The same robot gives
-    the same text. Raises what ``branch`` raises, ``NothingProved``, ``BadRequest`` for another language.
+    It answers where :func:`.branch` proves the branch (``box``, ``effort`` as there) and refuses elsewhere. The same
+    robot gives the same text. Raises what ``branch`` raises, ``NothingProved``, ``BadRequest`` for another language.
 
     >>> hrsynth.export("rrrrr_m1", "numpy", {"shoulder_1": (-0.05, 0.05), "shoulder_2": (-0.05, 0.05)}).lang
     'numpy'
@@ -79,13 +80,13 @@ def export(robot: RobotLike, lang: str = "c++", box: BoxLike | None = None, *, o
         raise BadRequest("language", lang, tuple(TEMPLATES))
     given = as_robot(robot)
     watched = _watched(given, observe, camera)
-    proof = branch(given, box) if box is not None else branch(given)
+    proof = branch(given, box, effort=effort)
     if not proof.parts:
         raise BadRequest(f"{proof.robot.name}: loops that its motors move", 0, "one or more")
     tell("code")
     branch_ = TubedBranch.of(proof)
     source = Source.of(branch_, watched, closed_inverse(given, proof, branch_))
-    code = program(source, lang, _told(proof, source, lang, box))
+    code = program(source, lang, _told(proof, source, lang, box, effort))
     return ExportedCode(proof, lang, tuple(each.leg for each in watched), bool(source.legs), source.bounds,
                         sum(len(part.bounded) for part in source.parts), code)
 
@@ -109,7 +110,7 @@ def _watched(robot: Any, observe: LegsLike, camera: CameraLike) -> tuple[Directi
                  and each.seen_from in (None, reference))
 
 
-def _told(proof: BranchProof, source: Source, lang: str, box: BoxLike | None) -> list[str]:
+def _told(proof: BranchProof, source: Source, lang: str, box: BoxLike | None, effort: int) -> list[str]:
     """What the program says of itself."""
     from .. import __version__
 
@@ -118,7 +119,8 @@ def _told(proof: BranchProof, source: Source, lang: str, box: BoxLike | None) ->
     asked = box if isinstance(box, str) else ",".join(f"{name}={low}:{high}" for name, (low, high) in pairs.items())
     file = Path(robot.file).name if robot.file else robot.name
     legs = ",".join(each.leg for each in source.observed)
-    options = "".join(f" --{name} {value}" for name, value in (("observe", legs), ("box", asked)) if value)
+    options = "".join(f" --{name} {value}" for name, value in (
+        ("observe", legs), ("box", asked), ("effort", effort if effort != BRANCH_CELLS else "")) if value)
     lines = [f"Made by hrsynth {__version__}: hrsynth export {file} --lang {lang}{options}",
              f"Robot {robot.name}: {len(proof.motors)} motors, {len(proof.passive)} passive coordinates; idle, held at "
              f"0: {', '.join(proof.held) or 'none'}.", "Motors in their order, and what is refused beyond:"]

@@ -156,7 +156,7 @@ def _parsed(box: BoxLike | None) -> dict[str, tuple[float, float]]:
     if not isinstance(box, Mapping | str):
         raise BadRequest("a box of motors", box, "a dict such as {'hip': (-1, 1)}, or a text such as "
                          "hip=-1:1,slide=0:0.2")
-    pairs = box.items() if isinstance(box, Mapping) else [each.partition("=")[::2] for each in box.split(",")]
+    pairs = box.items() if isinstance(box, Mapping) else [each.rpartition("=")[::2] for each in box.split(",")]
     found = {}
     for name, interval in pairs:
         try:
