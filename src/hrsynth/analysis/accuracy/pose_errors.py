@@ -38,8 +38,8 @@ class ErrorEllipsoid(Value):
 
     ``errors`` (k, 3) are the errors that give the largest one that was found, of directions in radians, else in the
     balls that :class:`.Blur` tells. Of three balls and more ``largest`` is an upper bound, which may be by ``gap`` too
-    large, as a part of the error that is attained. Where a freedom is lost ``largest`` is infinite and ``errors`` is None;
-    where there are no errors both are zero and the directions are None.
+    large, as a part of the error that is attained. Where a freedom is lost ``largest`` is infinite and ``errors`` is
+    None; where there are no errors both are zero and the directions are None.
     """
 
     largest: float
