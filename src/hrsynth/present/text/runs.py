@@ -98,7 +98,8 @@ def basins(found: Basins) -> str:
                      "noise may lead them elsewhere")
     rows.append(("found", notes))
     if found.certified is not None:
-        part = f": {100 * found.covered:.2g} % of its basin, as far as that is drawn" if found.certified.length else ""
+        drawn = found.certified.length and not found.certified.aside
+        part = f": {100 * found.covered:.2g} % of its basin, as far as that is drawn" if drawn else ""
         farther = found.certified.undamped_words
         rows.append(("certified", [f"{found.certified.words}{part}", *([farther] if farther else [])]))
     return listing(rows)
