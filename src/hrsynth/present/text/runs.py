@@ -246,6 +246,8 @@ def selection(found: Selection) -> str:
                       "around the goal runs are certified to end at it; mm, degrees: largest errors at the goal;\n"
                       "modes: those of the start / of the goal, in brackets those that the robot was found to\n"
                       "reach; – not computed. Best first: by others, by certified (alike within a power of two), by mm")
+        radii = [each.ends.radius for each in found.kept if each.ends is not None and each.ends.radius is not None]
+        blocks += [f"distances from the goal: {each}" for each in dict.fromkeys(each.measured for each in radii if each.measured)]
         if found.fewer is not None:
             blocks.append(found.fewer)
     if found.unexamined:

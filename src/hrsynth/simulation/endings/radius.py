@@ -73,9 +73,15 @@ class CertifiedRadius(Value):
         within = self._within(length, None if self.angle is None else self.undamped)
         return f"proved where the law is not damped: {within}"
 
+    @property
+    def measured(self) -> str:
+        """Which point's positions count, where poses tell another's; else empty."""
+        point = " ".join(f"{x:.4g}" for x in self.motion.point)
+        return f"measured at the point ({point}) m of {self.motion.link}" if self.aside else ""
+
     def _within(self, length: float, angle: float | None) -> str:
         turn = "" if angle is None else f" and {np.degrees(angle):.2g}°"
-        at = f", measured at the point ({_listed(self.motion.point)}) m of {self.motion.link}" if self.aside else ""
+        at = f", {self.measured}" if self.measured else ""
         return f"within {1e3 * length:.3g} mm{turn} of the goal{at}"
 
     def holds(self, X: Array) -> bool:
@@ -108,10 +114,6 @@ def certified_radius(setting: ObservedRobot, goal: ClosedConfiguration) -> Certi
     aside = bool(np.linalg.norm(error.motion.point - setting.motion.point) > SAME_POINT * error.length)
     return CertifiedRadius(goal, error.motion, reach * error.length, angle, proved.level, least,
                            proved.boxes + boxes + more, reason, _product(ball) if error.turns.shape[1] else ball, aside)
-
-
-def _listed(vector: Array) -> str:
-    return " ".join(f"{x:.4g}" for x in vector)
 
 
 def _product(radius: float) -> float:
