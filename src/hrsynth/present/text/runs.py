@@ -247,7 +247,8 @@ def selection(found: Selection) -> str:
                       "modes: those of the start / of the goal, in brackets those that the robot was found to\n"
                       "reach; – not computed. Best first: by others, by certified (alike within a power of two), by mm")
         radii = [each.ends.radius for each in found.kept if each.ends is not None and each.ends.radius is not None]
-        blocks += [f"distances from the goal: {each}" for each in dict.fromkeys(each.measured for each in radii if each.measured)]
+        points = dict.fromkeys(each.measured for each in radii if each.measured)
+        blocks += [f"distances from the goal: {each}" for each in points]
         if found.fewer is not None:
             blocks.append(found.fewer)
     if found.unexamined:
