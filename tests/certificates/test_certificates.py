@@ -462,6 +462,15 @@ def test_false_ranks_are_refused():
             print(verify_ranks.verify(changed))
 
 
+def test_freedoms_are_counted_only_where_the_loops_rank_is_told():
+    """Without rank A all joints' rates would count as the platform's freedoms."""
+    record = json.loads(ranks("1,2"))
+    assert "of 4 freedoms" in hrsynth.verify(record, "quattro")
+    record["stacks"] = [each for each in record["stacks"] if each["of"] != ["A"]]
+    record["sha256"] = verify_ranks.digest(record)
+    assert "freedoms" not in hrsynth.verify(record)
+
+
 @pytest.mark.parametrize("sign", [1, -1])
 def test_a_pose_at_infinity_is_never_lost(sign):
     """A bar of length 1 from a pivot, its end on a circle: two poses, one at t = 0 or (sign −1) at t = ∞."""

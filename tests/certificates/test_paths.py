@@ -92,6 +92,25 @@ def test_legs_of_two_robots_separate_nothing():
         checker.verify(sealed(record))
 
 
+@pytest.mark.parametrize(("sense", "mode"), [(1, 1), (1.0, 1), (1, 1.0), (True, 1), (1, True)])
+def test_no_float_rounds_a_zero_away(sense, mode):
+    """The direction (3/5, 4/5, 0) of a rod makes 3 u² − 9/5 u zero, also where a factor ±1 is told as a float."""
+    node = [["3", "4", "0"], ["1", "0", "0", "0"]]
+    leg = {"kind": "slide", "axis": None, "aside": "0", "mode": mode, "tip": [True, ["0"] * 3, ["0"] * 3],
+           "centre": ["0"] * 3}
+    along = ["dot", "u", "x"]
+    false = {"format": "hrsynth-certificate-1", "claim": "path", "verdict": "same aspect", "legs": [[leg]],
+             "vectors": {"u": ["leg", 0, sense, ["0"] * 3], "x": ["point", False, ["0"] * 3, ["1", "0", "0"]],
+                         "o": ["point", False, ["0"] * 3, ["0"] * 3]},
+             "points": ["o"], "path": [node, node], "ends": [node, node],
+             "condition": ["+", ["*", "3", along, along], ["*", "-3", "3/5", along]]}
+    with pytest.raises(checker.PathNotAccepted):
+        checker.verify(sealed(false))
+    false["condition"] = along
+    if type(sense) is type(mode) is int:
+        assert checker.verify(sealed(false)).startswith("same aspect")
+
+
 def spoil(record, rng) -> str:
     """A change that leaves no proof."""
     node = rng.choice(record["path"])

@@ -26,6 +26,7 @@ from hrsynth.geometry.vectors import Array
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.builder import Builder
+from hrsynth.mechanism.model import Limits
 from strategies import planar, random_rotation, transformed
 
 
@@ -99,6 +100,20 @@ def test_code_tells_where_motors_are_the_only_ones() -> None:
     (low,), (high,) = found.proof.back
     assert made.unique([[low], [0.0], [high], [high + 1e-9], [np.nan]]).tolist() == [True, True, True, False, False]
     assert found.to_dict()["back"] == [[low], [high]]
+
+
+def test_limits_of_joints_without_a_motor_are_told_where_they_are_passed() -> None:
+    robot = four_bar()
+    knee = replace(robot.joints["knee"], limits=Limits(-0.05, 0.1))
+    limited = replace(robot, joints={**robot.joints, "knee": knee})
+    found, box = exported(limited, 0.4), box_of(limited, 0.4)
+    made = module_of(found.code)
+    _, x, _, _ = made.forward(np.linspace(-0.4, 0.4, 9)[:, None])
+    assert np.nanmax(np.abs(x[:, made.PASSIVE_NAMES.index("knee")])) > 0.1
+    for text in (found.code, str(found), str(hrsynth.branch(limited, box))):
+        assert "knee -0.05 to 0.1" in text
+        assert "not looked at" in text
+    assert "not looked at" not in f"{exported(robot, 0.4).code}{exported(robot, 0.4)}{hrsynth.branch(robot, box)}"
 
 
 @pytest.mark.slow

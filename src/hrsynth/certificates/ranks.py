@@ -44,7 +44,8 @@ def certificate(found: Derivation) -> dict[str, Any]:
 def seen(record: dict[str, Any]) -> str:
     """What ranks that were proved say of the legs; empty where they are not all there."""
     found = {"".join(sorted(each["of"])): int(each["rank"]) for each in record["stacks"]}
-    if not {"AX", "AXY", "AY"} <= found.keys():
+    needed = {"AX", "AXY", "AY"} | ({"A"} if record["matrices"].get("A") else set())
+    if not needed <= found.keys():
         return ""
     freedoms = found["AX"] - found.get("A", 0)
     return f": the legs see {freedoms - found['AXY'] + found['AY']} of {freedoms} freedoms at this instance"

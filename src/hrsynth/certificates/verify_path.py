@@ -173,7 +173,7 @@ LEGS: dict[str, Any] = {"crank": (crank, True), "rail": (rail, True), "slide": (
 
 def carried(leg: Any, p: Vector, R: list[Vector]) -> Vector:  # what a leg carries at poses
     solve, placed = LEGS[leg["kind"]]
-    need(leg["mode"] in (1, -1), "a working mode")
+    need(type(leg["mode"]) is int and leg["mode"] in (1, -1), "a working mode")
     centre = vector(leg["centre"])
     found = solve(leg, sub(point(leg["tip"], p, R), centre), (leg["mode"] * ONE,) * 2)
     return add(centre, found) if placed else found
@@ -186,7 +186,7 @@ def valued(each: Any, p: Vector, R: list[Vector], legs: list[Vector]) -> Vector:
         return point(rest, p, R)
     if kind == "leg":
         k, sense, offset = rest
-        need(sense in (1, -1) and k in range(len(legs)), "a leg that there is not")
+        need(type(sense) is int and sense in (1, -1) and k in range(len(legs)), "a leg that there is not")
         return add(scaled((sense * ONE,) * 2, legs[k]), vector(offset))
     need(kind == "unit" and len(rest) == 3, "a vector of another kind")
     start, end, axis = rest

@@ -922,13 +922,15 @@ class ConeRecord(TypedDict):
 
 
 class ErrorRecord(TypedDict):
-    """The largest error with its direction, and the least; null where a freedom is lost."""
+    """The largest error with its direction, and the least; null where a freedom is lost. Of three errors and more the
+    largest is an upper bound, by ``gap`` of what is attained too large at most."""
 
     largest: Number
     direction: list[float] | None
     least: Number
     least_direction: list[float] | None
     anisotropy: Number
+    gap: float
 
 
 class SampledRecord(TypedDict):

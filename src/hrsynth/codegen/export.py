@@ -136,6 +136,9 @@ def _told(proof: BranchProof, source: Source, lang: str, box: BoxLike | None, ef
               f"of {robot.length:.6g} m), all loops are", f"closed to {GENERATED_CLOSED:g}, and the joints are in the "
               "cell's tube, in which the loops have one closure (proved).", *_bounds(source),
               "The proof takes the robot's numbers as the file has them."]
+    if proof.limits:
+        lines += ["Limits of joints without a motor are not looked at, an answer may be beyond them:",
+                  *(f"  {each}" for each in proof.limits)]
     return lines
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from functools import cache
 
 import numpy as np
@@ -20,6 +21,7 @@ from hrsynth.description import load
 from hrsynth.errors import BadRequest, HrsynthError, PlaneNotMet, PoseNotReached
 from hrsynth.geometry.vectors import Array
 from hrsynth.mechanism.pose import Grid
+from hrsynth.present.text import runs
 from kinematics.robots import ROBOTS
 from strategies import parallel_robots
 
@@ -129,6 +131,23 @@ def test_extremes_are_attained_and_not_exceeded(robot: str) -> None:
     setting = ObservedRobot.of(load(robot), samples=3)
     cones = CONE * (1 + np.arange(len(setting.observed)) / 3)
     check_extents(setting, cones)
+
+
+@pytest.mark.parametrize("cones", ["0.1deg", "1=0.1deg,2=0.2deg,3=0.1deg,4=0.3deg,5=0.1deg,6=0.1deg"])
+def test_a_bound_that_may_be_too_large_is_told_to_be_one(cones: str) -> None:
+    """Of six cones the text says how far each number may be above what the errors that are told attain."""
+    found = accuracy("gough_stewart", cone=cones)
+    lines = runs.accuracy(found).splitlines()
+    rates, twists = reading(found.setting.everything.start, found.setting.samples.question)
+    J = twists @ np.linalg.pinv(rates, rcond=1e-7)
+    for word, extent, rows in (("position", found.poses[0].position, J[:3]),
+                               ("orientation", found.poses[0].orientation, J[3:])):
+        assert extent.errors is not None
+        over = extent.largest / float(np.linalg.norm(rows @ extent.errors.ravel())) - 1
+        k = next(k for k, line in enumerate(lines) if line.startswith(word))
+        told = re.search(r"an upper bound, at most (\S+) % too large", lines[k + 1])
+        assert (told is not None) == (extent.gap > 1e-6)
+        assert over <= (float(told[1]) / 100 if told else 1e-6) * (1 + 1e-9)
 
 
 @settings(max_examples=8, deadline=None, suppress_health_check=list(HealthCheck))

@@ -20,6 +20,26 @@ from hrsynth.simulation.law import inverted
 from strategies import random_rotation, transformed
 
 
+def test_the_point_is_told_where_poses_tell_another():
+    """A rod of a five-bar is the platform, its frame at the elbow: that stays where the crank does, however far the rod
+    turns, so that the radius cannot be one of the elbow."""
+    setting = ObservedRobot.of(load("rrrrr_m1", platform="dist_2"))
+    start, link = setting.everything.start, setting.motion.link
+    found = certified_radius(setting, start)
+    goal = start.pose(link)
+    assert found.verdict == CERTIFIED
+    turned = goal.copy()
+    turned[:3, :3] = exponential(np.array([0.0, 0.0, 1.0])) @ goal[:3, :3]
+    assert not found.holds(turned)
+    for words in (found.words, found.undamped_words):
+        assert words is None or words.endswith("measured at the point (-0.169 0.107 0) m of dist_2")
+    assert "measured" not in certified_radius(ObservedRobot.of(load("3rrr_m1")), start_of("3rrr_m1")).words
+
+
+def start_of(name):
+    return ObservedRobot.of(load(name)).everything.start
+
+
 def starts(found, rng, count):
     """Platform poses (count, 4, 4) of a region, half of them on its boundary."""
     motion, X = found.motion, found.goal.pose(found.motion.link)

@@ -273,9 +273,9 @@ class Mapper(Value):
 
 
 def _gap(largest: Array, lower: Array) -> float:
-    """The largest gap between the bounds, relative."""
-    here = np.isfinite(largest) & (largest > 0)
-    return float(np.max((largest[here] - lower[here]) / largest[here], initial=0.0))
+    """The largest gap between the bounds, as a part of the lower ones."""
+    here = np.isfinite(largest) & (lower > 0)
+    return float(np.max((largest[here] - lower[here]) / lower[here], initial=0.0))
 
 
 def _weakest(rates: Array, twists: Array, length: float) -> float:

@@ -36,10 +36,10 @@ class ErrorEllipsoid(Value):
     """The largest error in each direction of space, its extremes: ``largest`` with its unit direction (3,), ``least``
     with its own, among the directions in which there are errors at all.
 
-    ``errors`` (k, 3) are the errors that give the largest one, of directions in radians, else in the balls that
-    :class:`.Blur` tells; ``gap`` bounds how much
-    larger, relative, the true maximum may be. Where a freedom is lost ``largest`` is infinite and ``errors`` is None;
-    where there are no errors both are zero and the directions are None.
+    ``errors`` (k, 3) are the errors that give the largest one that was found, of directions in radians, else in the
+    balls that :class:`.Blur` tells. Of three balls and more ``largest`` is an upper bound, which may be by ``gap`` too
+    large, as a part of the error that is attained. Where a freedom is lost ``largest`` is infinite and ``errors`` is
+    None; where there are no errors both are zero and the directions are None.
     """
 
     largest: float
@@ -62,7 +62,7 @@ class ErrorEllipsoid(Value):
         """The record of the command line, lengths or angles in another unit; null where infinite."""
         return {"largest": finite(unit * self.largest), "direction": _listed(self.direction),
                 "least": finite(unit * self.least), "least_direction": _listed(self.least_direction),
-                "anisotropy": self.anisotropy}
+                "anisotropy": self.anisotropy, "gap": self.gap}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -174,8 +174,9 @@ def _extent(part: ErrorMaps | None) -> ErrorEllipsoid:
     pulls = blocks @ w
     sizes = np.linalg.norm(pulls, axis=1)
     errors = part.radii[:, None] * pulls / np.where(sizes > 0, sizes, 1.0)[:, None]
+    lower = max(lower, float(sizes.sum()))
     return ErrorEllipsoid(largest, w, float(_width(blocks, low[:, None])[0]), low, errors,
-                  (largest - lower) / largest if largest else 0.0, span.shape[1] == 1)
+                  max(largest - lower, 0.0) / lower if lower else 0.0, span.shape[1] == 1)
 
 
 def _width(blocks: Array, w: Array) -> Array:

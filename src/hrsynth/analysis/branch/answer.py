@@ -149,6 +149,12 @@ class BranchProof(Result, shown_as="branch"):
         return self.robot
 
     @property
+    def limits(self) -> tuple[str, ...]:
+        """The limits of joints without a motor (m, rad), which nothing here looks at: the branch may go beyond them."""
+        return tuple(f"{name} {low:.6g} to {high:.6g}" for name, (low, high) in self.robot.limited.items()
+                     if name not in self.motors)
+
+    @property
     def proved(self) -> tuple[Array, Array]:
         """The boxes of all parts together, low and high in the order of ``motors``; infinite where no loop has to do
         with a motor."""

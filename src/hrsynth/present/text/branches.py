@@ -15,12 +15,17 @@ def branch(found: BranchProof) -> str:
     rows: Rows = [("robot", found.robot.name), ("motors", ", ".join(found.motors)),
                   ("passive", f"{len(found.passive)} coordinates"
                    + (f", {len(found.held)} idle ones held" if found.held else "")),
-                  ("box", found.box)]
+                  ("box", found.box), *limits(found)]
     for part in found.parts:
         rows += _part(part)
     if not found.parts:
         rows.append(("branch", "no loops: the motors are all there is"))
     return listing(rows + _back(found))
+
+
+def limits(found: BranchProof) -> Rows:
+    """What is not looked at of joints without a motor."""
+    return [("limits", ["not looked at, joints may go beyond them:", *found.limits])] if found.limits else []
 
 
 def _back(found: BranchProof) -> Rows:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from ...analysis.exact import ExactVerdict, power_above
 from ...errors import HrsynthError
 from ...tolerances import RANK_CUTOFF, RANK_GAP, SAME_RELATION, SURELY_SOMETHING
-from .branches import ends
+from .branches import ends, limits
 from .tables import LINE, Rows, camera, head, known, listing, sets, table, watched, wrapped
 
 if TYPE_CHECKING:
@@ -190,6 +190,7 @@ def exported(found: ExportedCode) -> str:
                                      zip(part.motors, *part.proved, strict=True)]
                      + [f"and in all of {part.in_cells}, {100 * part.share:.4g} % of the box"]))
         rows += ends(part)
+    rows += limits(proof)
     if proof.back is not None:
         rows.append(("way back", [f"{name} {low:.6g} to {high:.6g}" for name, low, high in
                                   zip(proof.motors, *proof.back, strict=True)]

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...analysis.accuracy.ranges import ErrorRange
 from ...geometry.vectors import Array
-from ...tolerances import DAMPED, LARGEST_FIRST_ORDER
+from ...tolerances import DAMPED, LARGEST_FIRST_ORDER, SAME_RELATION
 from .tables import GAP, NOT_BOUNDED, Rows, bounded, camera, head, labelled, listing, table
 
 if TYPE_CHECKING:
@@ -98,7 +98,8 @@ def basins(found: Basins) -> str:
                      "noise may lead them elsewhere")
     rows.append(("found", notes))
     if found.certified is not None:
-        part = f": {100 * found.covered:.2g} % of its basin, as far as that is drawn" if found.certified.length else ""
+        drawn = found.certified.length and not found.certified.aside
+        part = f": {100 * found.covered:.2g} % of its basin, as far as that is drawn" if drawn else ""
         farther = found.certified.undamped_words
         rows.append(("certified", [f"{found.certified.words}{part}", *([farther] if farther else [])]))
     return listing(rows)
@@ -157,8 +158,8 @@ def _grid_rows(grid: Grid, reached: str, position: str, orientation: str, spots:
     if spots is not None and spots.count:
         rows.append(("checked", f"against Pinocchio at {spots.count} random poses, largest difference "
                                 f"{spots.difference:.1e}"))
-    if gap > 1e-9:
-        rows.append(("", f"three {each}s and more: upper bounds, nowhere more than {100 * gap:.2g} % too large"))
+    if gap > SAME_RELATION:
+        rows.append(("", f"three {each}s and more: upper bounds, nowhere more than {_percent(gap)} % too large"))
     return rows
 
 
@@ -198,10 +199,18 @@ def _extent(name: str, extent: ErrorEllipsoid, unit: float, word: str, length: f
     if extent.direction is None:
         return [(name, "no error: the platform does not move so")]
     lines = [f"{unit * extent.largest:.4g} {word}, along {_vector(extent.direction)}"]
+    if extent.gap > SAME_RELATION:
+        lines.append(f"an upper bound, at most {_percent(extent.gap)} % too large")
     if extent.anisotropy is not None and extent.least_direction is not None:
         lines.append(f"least along {_vector(extent.least_direction)}: {unit * extent.least:.4g} {word}, anisotropy "
                      f"{extent.anisotropy:.3g}")
     return [(name, lines)]
+
+
+def _percent(gap: float) -> str:
+    """So many per cent with two digits, rounded up."""
+    step = 10.0 ** (math.floor(math.log10(100 * gap)) - 1)
+    return f"{math.ceil(100 * gap / step) * step:.2g}"
 
 
 def _apart(true: float, linear: ErrorEllipsoid) -> bool:
@@ -237,6 +246,9 @@ def selection(found: Selection) -> str:
                       "around the goal runs are certified to end at it; mm, degrees: largest errors at the goal;\n"
                       "modes: those of the start / of the goal, in brackets those that the robot was found to\n"
                       "reach; – not computed. Best first: by others, by certified (alike within a power of two), by mm")
+        radii = [each.ends.radius for each in found.kept if each.ends is not None and each.ends.radius is not None]
+        points = dict.fromkeys(each.measured for each in radii if each.measured)
+        blocks += [f"distances from the goal: {each}" for each in points]
         if found.fewer is not None:
             blocks.append(found.fewer)
     if found.unexamined:

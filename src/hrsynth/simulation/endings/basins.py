@@ -112,9 +112,10 @@ class Basins(Result, shown_as="basins"):
 
     @cached_property
     def region(self) -> tuple[Grid, Flags] | None:
-        """Poses of the drawn set around the goal, and which of them are in what is certified; None where none is."""
+        """Poses of the drawn set around the goal, and which of them are in what is certified; None where none is, or
+        where that is about another point than the one that the set is drawn of."""
         found = self.certified
-        if found is None or not found.length:
+        if found is None or not found.length or found.aside:
             return None
         motion, goal = self.setting.motion, self.target.pose(self.setting.motion.link)
         half = [(found.angle or 0.0) if name == "phi" else found.length for name in self.grid.names]

@@ -22,7 +22,7 @@ from ...geometry.vectors import Array, transform
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
 from ...results import Value
-from ...tolerances import AFFINE_ROUNDING, CERTIFIED_LEVEL, FOLLOWED, RADIUS_SHARES, RANK_CUTOFF
+from ...tolerances import AFFINE_ROUNDING, CERTIFIED_LEVEL, FOLLOWED, RADIUS_SHARES, RANK_CUTOFF, SAME_POINT
 from .cones import ConeProver, ProvedCones, prove_cones, proved_all_over
 from .inward import inward_radius
 from .pose_error import NotEnclosed, PoseError
@@ -49,6 +49,8 @@ class CertifiedRadius(Value):
     reason: str
     undamped: float = 0.0
     """The same of the law where it is not damped (characteristic lengths, radians)."""
+    aside: bool = False
+    """Whether positions are those of another point of the platform than the one that its poses tell."""
 
     @property
     def verdict(self) -> str:
@@ -71,10 +73,16 @@ class CertifiedRadius(Value):
         within = self._within(length, None if self.angle is None else self.undamped)
         return f"proved where the law is not damped: {within}"
 
-    @staticmethod
-    def _within(length: float, angle: float | None) -> str:
+    @property
+    def measured(self) -> str:
+        """Which point's positions count, where poses tell another's; else empty."""
+        point = " ".join(f"{x:.4g}" for x in self.motion.point)
+        return f"measured at the point ({point}) m of {self.motion.link}" if self.aside else ""
+
+    def _within(self, length: float, angle: float | None) -> str:
         turn = "" if angle is None else f" and {np.degrees(angle):.2g}°"
-        return f"within {1e3 * length:.3g} mm{turn} of the goal"
+        at = f", {self.measured}" if self.measured else ""
+        return f"within {1e3 * length:.3g} mm{turn} of the goal{at}"
 
     def holds(self, X: Array) -> bool:
         """Whether a platform pose X (4, 4) is one of those starts."""
@@ -103,8 +111,9 @@ def certified_radius(setting: ObservedRobot, goal: ClosedConfiguration) -> Certi
     least = proved.rise / (error.size * float(np.linalg.norm(proved.prover.W, 2)) ** 2)
     reason = "forms of the legs and the error enclosed in cones about the goal"
     ball, more = inward_radius(error)
+    aside = bool(np.linalg.norm(error.motion.point - setting.motion.point) > SAME_POINT * error.length)
     return CertifiedRadius(goal, error.motion, reach * error.length, angle, proved.level, least,
-                           proved.boxes + boxes + more, reason, _product(ball) if error.turns.shape[1] else ball)
+                           proved.boxes + boxes + more, reason, _product(ball) if error.turns.shape[1] else ball, aside)
 
 
 def _product(radius: float) -> float:
