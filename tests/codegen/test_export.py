@@ -102,18 +102,46 @@ def test_code_tells_where_motors_are_the_only_ones() -> None:
     assert found.to_dict()["back"] == [[low], [high]]
 
 
-def test_limits_of_joints_without_a_motor_are_told_where_they_are_passed() -> None:
+@pytest.mark.parametrize(("lower", "upper", "verdict"), [
+    (-0.05, 0.1, "passed"), (-3.0, 3.0, "kept"), (-3.0, None, "kept"), (None, 0.1, "passed")])
+def test_limits_of_joints_without_a_motor(lower: float | None, upper: float | None, verdict: str) -> None:
+    """Against the knee's angles in small steps of the motor."""
     robot = four_bar()
-    knee = replace(robot.joints["knee"], limits=Limits(-0.05, 0.1))
-    limited = replace(robot, joints={**robot.joints, "knee": knee})
+    limited = robot.changed(joints=[replace(each, limits=Limits(lower, upper)) if each.name == "knee" else each
+                                    for each in robot.joints.values()])
     found, box = exported(limited, 0.4), box_of(limited, 0.4)
     made = module_of(found.code)
-    _, x, _, _ = made.forward(np.linspace(-0.4, 0.4, 9)[:, None])
-    assert np.nanmax(np.abs(x[:, made.PASSIVE_NAMES.index("knee")])) > 0.1
+    _, x, _, _ = made.forward(np.linspace(-0.4, 0.4, 2001)[:, None])
+    knee = x[:, made.PASSIVE_NAMES.index("knee")]
+    (limit,) = found.proof.limits
+    assert limit.least is not None
+    assert limit.most is not None
+    assert limit.least - 1e-12 <= knee.min() < limit.least + 0.1
+    assert limit.most - 0.1 < knee.max() <= limit.most + 1e-12
+    inside = (lower is None or lower <= knee.min()) and (upper is None or knee.max() <= upper)
+    assert limit.verdict == verdict == ("kept" if inside else "passed")
     for text in (found.code, str(found), str(hrsynth.branch(limited, box))):
-        assert "knee -0.05 to 0.1" in text
-        assert "not looked at" in text
-    assert "not looked at" not in f"{exported(robot, 0.4).code}{exported(robot, 0.4)}{hrsynth.branch(robot, box)}"
+        assert f"{verdict} in" in " ".join(text.split())
+    assert "limits" not in f"{exported(robot, 0.4)}{hrsynth.branch(robot, box)}"
+    assert found.to_dict()["limits"] == [limit.to_dict()]
+
+
+def test_limits_are_undecided_within_the_tube_alone() -> None:
+    """A limit at the largest angle: beyond what a tube bounds it is kept, below passed, between not decided."""
+    robot = four_bar()
+    (part,) = hrsynth.branch(robot, box_of(robot, 0.4)).parts
+    k = part.passive.index("knee")
+    top = [cell.centre[k] + np.abs(cell.slopes[k]) @ (cell.high - cell.low) / 2 for cell in part.cells]
+    radius = [cell.radius[k] for cell in part.cells]
+
+    def verdict(upper: float) -> str:
+        limited = robot.changed(joints=[replace(each, limits=Limits(None, upper)) if each.name == "knee" else each
+                                        for each in robot.joints.values()])
+        (limit,) = hrsynth.branch(limited, box_of(limited, 0.4)).limits
+        return limit.verdict
+
+    most, least = max(np.add(top, radius)), max(np.subtract(top, radius))
+    assert [verdict(most + 1e-9), verdict((most + least) / 2), verdict(least - 1e-9)] == ["kept", "undecided", "passed"]
 
 
 @pytest.mark.slow

@@ -539,6 +539,17 @@ class BranchPartRecord(TypedDict):
     redundant: str
 
 
+class BranchLimitRecord(TypedDict):
+    """A joint without a motor, its limits and how far it goes in the proved cells (m, rad)."""
+
+    joint: str
+    lower: float | None
+    upper: float | None
+    least: Annotated[float | None, "null where its loop is cut there"]
+    most: float | None
+    verdict: Annotated[Literal["kept", "passed", "undecided", "not looked at"], "kept and passed are proved"]
+
+
 class Branch(OfRobot):
     """The branch of the zero configuration, from motors to passive joints."""
 
@@ -551,6 +562,7 @@ class Branch(OfRobot):
     back: Annotated[Array | None, "low and high of a box of all motors, no two of which give the platform one pose "
                                   "(proved); null without a proof"]
     regular: Annotated[bool, "whether the proved box has no Type 1 singularity (proved)"]
+    limits: list[BranchLimitRecord]
 
 
 class MissRecord(TypedDict):
@@ -735,6 +747,7 @@ class Exported(OfRobot, WrittenTo):
     error: Annotated[float | None, "how far an answer is off at most (rad, 1, characteristic lengths; proved), or null"]
     back: Annotated[Array | None, "low and high of motors, no two of which give the platform one pose (proved)"]
     parts: list[ExportedPart]
+    limits: list[BranchLimitRecord]
 
 
 class AtlasAnswer(ListedModes):

@@ -60,7 +60,8 @@ class ExportedCode(Result, shown_as="export"):
                 "error": self.bounds.error if self.bounds else None,
                 "back": None if self.proof.back is None else [each.tolist() for each in self.proof.back],
                 "parts": [{"motors": list(part.motors), "share": part.share,
-                           "proved": [each.tolist() for each in part.proved]} for part in self.proof.parts]}
+                           "proved": [each.tolist() for each in part.proved]} for part in self.proof.parts],
+                "limits": [each.to_dict() for each in self.proof.limits]}
 
 
 @question()
@@ -136,9 +137,7 @@ def _told(proof: BranchProof, source: Source, lang: str, box: BoxLike | None, ef
               f"of {robot.length:.6g} m), all loops are", f"closed to {GENERATED_CLOSED:g}, and the joints are in the "
               "cell's tube, in which the loops have one closure (proved).", *_bounds(source),
               "The proof takes the robot's numbers as the file has them."]
-    if proof.limits:
-        lines += ["Limits of joints without a motor are not looked at, an answer may be beyond them:",
-                  *(f"  {each}" for each in proof.limits)]
+    lines += [f"Limits of joints without a motor, {each}" for each in proof.limits_in_words()]
     return lines
 
 

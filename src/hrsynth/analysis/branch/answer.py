@@ -13,6 +13,9 @@ from ...mechanism import Mechanism
 from ...results import Result, Value
 from .loops import LoopSystem
 
+KEPT, PASSED, OPEN, UNSEEN = "kept", "passed", "undecided", "not looked at"
+"""What is proved of a limit over the cells."""
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class BranchCell(Value):
@@ -66,6 +69,31 @@ class Toggle(Value):
         """The record of the command line."""
         return {"motors": self.q.tolist(), "joints": list(self.joints), "loops": list(self.loops),
                 "reason": self.reason}
+
+
+@dataclass(frozen=True)
+class BranchLimit(Value):
+    """A joint without a motor, its limits (m, rad; both None: the cone of a ball), its least and largest coordinate in
+    the proved cells to a tube's radius (None where its loop is cut there), and the verdict: ``kept`` (proved),
+    ``passed`` (proved: beyond them somewhere in the cells), ``undecided``, ``not looked at``."""
+
+    joint: str
+    lower: float | None
+    upper: float | None
+    least: float | None
+    most: float | None
+    verdict: str
+
+    @property
+    def words(self) -> str:
+        """The joint with its limits, and how far it goes."""
+        limits = self.joint if self.lower is None else f"{self.joint} {self.lower:.6g} to {self.upper:.6g}"
+        return limits if self.least is None else f"{limits} (within {self.least:.4g} to {self.most:.4g})"
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line."""
+        return {"joint": self.joint, "lower": _told(self.lower), "upper": _told(self.upper), "least": self.least,
+                "most": self.most, "verdict": self.verdict}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -142,17 +170,13 @@ class BranchProof(Result, shown_as="branch"):
     """Where the box comes from: the file's limits, the caller, a default."""
     tried: int
     """Cells that were tried."""
+    limits: tuple[BranchLimit, ...]
+    """The limits of joints without a motor."""
 
     @property
     def setting(self) -> Mechanism:
         """The robot: what is compared besides the record."""
         return self.robot
-
-    @property
-    def limits(self) -> tuple[str, ...]:
-        """The limits of joints without a motor (m, rad), which nothing here looks at: the branch may go beyond them."""
-        return tuple(f"{name} {low:.6g} to {high:.6g}" for name, (low, high) in self.robot.limited.items()
-                     if name not in self.motors)
 
     @property
     def proved(self) -> tuple[Array, Array]:
@@ -162,6 +186,13 @@ class BranchProof(Result, shown_as="branch"):
         for part in self.parts:
             found[:, [self.motors.index(name) for name in part.motors]] = part.proved
         return found[0], found[1]
+
+    def limits_in_words(self) -> list[str]:
+        """What is known of the limits of joints without a motor."""
+        says = {KEPT: "kept in all proved cells (proved)", PASSED: "passed in the proved cells",
+                OPEN: "not proved to be kept", UNSEEN: "not looked at (balls, and joints at which loops are cut)"}
+        told = {verdict: [each.words for each in self.limits if each.verdict == verdict] for verdict in says}
+        return [f"{says[verdict]}: {', '.join(names)}" for verdict, names in told.items() if names]
 
     def headline(self) -> str:
         """The robot, and how much of the box is proved."""
@@ -173,4 +204,9 @@ class BranchProof(Result, shown_as="branch"):
         """The record of the command line, without the command's own fields."""
         return {"motors": list(self.motors), "passive": list(self.passive), "held": list(self.held), "box": self.box,
                 "tried": self.tried, "parts": [each.to_dict() for each in self.parts],
-                "back": None if self.back is None else [each.tolist() for each in self.back], "regular": self.regular}
+                "back": None if self.back is None else [each.tolist() for each in self.back], "regular": self.regular,
+                "limits": [each.to_dict() for each in self.limits]}
+
+
+def _told(limit: float | None) -> float | None:
+    return None if limit is None or not np.isfinite(limit) else limit

@@ -66,9 +66,10 @@ def _followed(part: LoopPart, q: Array, x: Array, goal: Array) -> tuple[Array, A
         there, good = part.followed(here, x[on], next_)
         # the closure that follows must be the near one: back again must be where it came from
         back, same = part.followed(next_, there, here)
-        good = good & same & (np.abs(back - x[on]).max(axis=-1, initial=0.0) < AFFINE_ROUNDING**0.5)
-        done[on[good]], x[on[good]] = ahead[good], there[good]
-        step[on[~good]] /= 2
+        near = np.abs(back - x[on]).max(axis=-1, initial=0.0) < AFFINE_ROUNDING**0.5
+        reached = np.logical_and.reduce((good, same, near))
+        done[on[reached]], x[on[reached]] = ahead[reached], there[reached]
+        step[on[~reached]] /= 2
     return q + (goal - q) * done[:, None], x, done
 
 

@@ -19,6 +19,7 @@ from .back import way_back
 from .cells import prove_all
 from .ends import toggles, turns
 from .growth import CellGrid, GrownCell, Growth, largest_box, lattice, whole_box
+from .limits import branch_limits
 from .loops import LoopSystem, loop_system
 from .part import LoopPart, parts_of, whole
 from .redundant import closed_to, unexplained
@@ -63,10 +64,10 @@ def branch(robot: RobotLike, box: BoxLike | None = None, *, effort: int = BRANCH
     back, regular = way_back(system, grown)
     units, names = system.units[list(system.driven)], system.names
     passive = tuple(names[i] for part in parts for i in part.unknowns)
-    return BranchProof(mechanism, system, tuple(names[i] for i in system.driven), passive,
-                       tuple(names[i] for i in held), tuple(found),
+    idle = tuple(names[i] for i in held)
+    return BranchProof(mechanism, system, tuple(names[i] for i in system.driven), passive, idle, tuple(found),
                        None if back is None else (back[0] * units, back[1] * units), regular, source,
-                       sum(growth.tried for growth in grown))
+                       sum(growth.tried for growth in grown), tuple(branch_limits(mechanism, motors, found, idle)))
 
 
 Shaped = tuple[LoopSystem, tuple[LoopPart, ...], tuple[int, ...]]

@@ -24,8 +24,9 @@ def branch(found: BranchProof) -> str:
 
 
 def limits(found: BranchProof) -> Rows:
-    """What is not looked at of joints without a motor."""
-    return [("limits", ["not looked at, joints may go beyond them:", *found.limits])] if found.limits else []
+    """What is known of the limits of joints without a motor."""
+    words = found.limits_in_words()
+    return [("limits", words)] if words else []
 
 
 def _back(found: BranchProof) -> Rows:

@@ -1,0 +1,41 @@
+"""Whether joints without a motor keep their limits over a proved branch.
+
+Over a cell |q − q_c| ≤ h the closure lies in the tube |x − x_c − S (q − q_c)| ≤ r, so that each coordinate is at most
+x_c + |S| h + r, and at the corner where x_c + |S| h is met at least x_c + |S| h − r; likewise below.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from ...mechanism import Mechanism
+from ...tolerances import AFFINE_ROUNDING
+from .answer import KEPT, OPEN, PASSED, UNSEEN, BranchLimit, BranchPart
+
+
+def branch_limits(robot: Mechanism, motors: Sequence[str], parts: Sequence[BranchPart], held: Sequence[str]
+                  ) -> Iterator[BranchLimit]:
+    """The limits of all joints without a motor, in the order of the file, with what the proved cells say of them."""
+    for name in robot.joints:
+        if name in robot.wrists:
+            yield BranchLimit(name, None, None, None, None, UNSEEN)
+        if name in motors or name not in robot.limited:
+            continue
+        lower, upper = robot.limited[name]
+        part = next((each for each in parts if name in each.passive and each.cells), None)
+        if part is not None:
+            k = part.passive.index(name)
+            x = np.array([cell.centre[k] for cell in part.cells])
+            swing = np.array([np.abs(cell.slopes[k]) @ (cell.high - cell.low) / 2 for cell in part.cells])
+            r = np.array([cell.radius[k] for cell in part.cells])
+            r = r + AFFINE_ROUNDING * (np.abs(x) + swing + r)
+            least, most = float((x - swing - r).min()), float((x + swing + r).max())
+            passed = (x - swing + r).min() < lower or (x + swing - r).max() > upper
+            verdict = KEPT if lower <= least and most <= upper else PASSED if passed else OPEN
+            yield BranchLimit(name, lower, upper, least, most, verdict)
+        elif name in held:
+            yield BranchLimit(name, lower, upper, 0.0, 0.0, KEPT if lower <= 0 <= upper else PASSED)
+        else:
+            yield BranchLimit(name, lower, upper, None, None, UNSEEN)
