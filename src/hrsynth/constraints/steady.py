@@ -18,6 +18,7 @@ from ..geometry.vectors import Array, cross
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.locked import joint_at
 from ..mechanism import Joint, JointType, Mechanism, Observation
+from ..mechanism.graphs import adjacency, component, components, shortest_path
 from ..mechanism.legs import Leg
 from ..mechanism.observations.direction import Direction
 from ..tolerances import SAME_RELATION
@@ -57,15 +58,12 @@ def _grows(mechanism: Mechanism, leg: Leg, lock: Direction, reference: str, tips
 
 def _way(mechanism: Mechanism, leg: Leg, one: str, other: str) -> list[Joint] | None:
     """The joints between two links of a leg; None where it is no chain."""
-    import networkx as nx
-
-    graph: nx.Graph[str] = nx.Graph()
-    for name in leg.joints:
-        graph.add_edge(*mechanism.joints[name].links, joint=mechanism.joints[name])
-    if graph.number_of_edges() < len(leg.joints) or not nx.is_forest(graph) or not {one, other} <= set(graph):
+    bonds = {frozenset(mechanism.joints[name].links): mechanism.joints[name] for name in leg.joints}
+    graph = adjacency((), bonds)
+    tree = len(leg.joints) == len(graph) - sum(1 for _ in components(graph))
+    if not tree or one not in graph or other not in component(graph, one):
         return None
-    path = nx.shortest_path(graph, one, other)
-    return [graph.edges[pair]["joint"] for pair in pairwise(path)]
+    return [bonds[frozenset(pair)] for pair in pairwise(shortest_path(graph, one, other))]
 
 
 def _lines(joint: Joint, samples: Sequence[ClosedConfiguration]) -> list[tuple[list[Array], list[Array]]]:
