@@ -46,6 +46,8 @@ class LockedLeg(Value):
     eye: BodyPoint | None = None
     virtual: bool = False
     """Whether it is that of an observation."""
+    spins: bool = False
+    """Whether at special poses its end may turn about what is watched besides."""
 
     @property
     def turning(self) -> NamedVector | None:

@@ -26,6 +26,7 @@ from ..results import Value
 from ..tolerances import SAME_RELATION
 from .locked_legs import LockedLeg, forbidden, sights, stopped_turns, virtual_legs
 from .named_vectors import BodyPoint, BodyVector, NamedVector, Segment, Tangent, axis_of, centre_of, poses_at
+from .steady import grows
 
 TURNING_MOTIONS = ("planar", "spatial")
 """Motions of a platform of which turns are a part."""
@@ -165,8 +166,10 @@ def _one_body(anatomy: LegDecomposition, every: tuple[LockedLeg, ...] | None, le
         return None
     if _vanishes(motions[:, 3:]):
         return _translating(anatomy, legs, samples)
-    if any(leg.turns == 0 for leg in legs):
+    if any(leg.turns == 0 and not leg.spins for leg in legs):
         return None if every is None else _translating(anatomy, every, samples)
+    if any(leg.turns < 3 and leg.spins for leg in legs):
+        return None
     normal = _plane_of(motions)
     if normal is not None and all(leg.line is not None or leg.virtual for leg in legs):
         return ConstraintPattern("planar", base, bodies, legs, plane=_normal(anatomy.mechanism, normal))
@@ -292,7 +295,10 @@ def _held(anatomy: LegDecomposition, leg: Leg, locks: tuple[Observation, ...], r
             normal = _named(anatomy, leg, locks, symbol, across, samples)
         if shape[0] in (1, 2) and line is None and normal is None:
             return None
-        return LockedLeg(leg.label, leg.attach, spot, line, normal, shape[0] == 0, shape[1])
+        more = grows(leg, locks, reference, points, samples)
+        if more == "tip":
+            continue
+        return LockedLeg(leg.label, leg.attach, spot, line, normal, shape[0] == 0, shape[1], spins=bool(more))
     return None
 
 

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
+from scipy.spatial.transform import Rotation
 
 from analysis.singularity.found import found
+from hrsynth.analysis.aspects.path import path
+from hrsynth.analysis.check import check
 from hrsynth.analysis.singularity.agreement import weakest
 from hrsynth.analysis.singularity.singular import Singularity, singular
-from hrsynth.geometry.vectors import Array, frozen, inverse
+from hrsynth.geometry.vectors import Array, frozen, inverse, unit
 from hrsynth.kinematics.walking import random_walk
 from hrsynth.mechanism.model import Mechanism
 from hrsynth.present.text.poses import singularity
@@ -94,3 +99,83 @@ def test_what_is_not_found_is_not_said_not_to_be():
     text = singularity(replace(answer, examples=()))
     assert f"not found by {answer.checked.searches} searches, which does not mean that there are none" in text
     assert "no pose" not in text
+
+
+def sliding_platform(watched: float) -> tuple[str, Array, list[Array], list[Array]]:
+    """A 3-PUU that translates, as text; leg 1 is watched along a direction of its rod at an angle to the rod, normal to
+    the U joint's second axis. With it that direction, and rails, first axes and rods of the legs."""
+    random, rows, ends = np.random.default_rng(0), [], []
+    rails, firsts, rods = [], [], []
+    for k in range(3):
+        t = 2 * np.pi * k / 3
+        b = np.array([0.5 * np.cos(t), 0.5 * np.sin(t), -0.1]) + random.normal(size=3) * 0.03
+        c = np.array([0.08 * np.cos(t), 0.08 * np.sin(t), -0.4]) + random.normal(size=3) * 0.02
+        a = unit(np.array([-np.sin(t), np.cos(t), 0.0]) + random.normal(size=3) * 0.35)
+        rod, second = c - b, unit(np.cross(a, c - b))
+        rail = unit(np.array([np.cos(t), np.sin(t), -0.3]) + random.normal(size=3) * 0.2)
+        for kind, name, parent, child, at, axis in (
+                ("prismatic", "g", "base", "s", b, rail), ("continuous", "e{}__1", "s", "h", 0 * b, a),
+                ("continuous", "e{}__2", "h", "r", 0 * b, second)):
+            rows.append(f'<joint name="{name.format(k) if "{" in name else name + str(k)}" type="{kind}">'
+                        f'<parent link="{parent if parent == "base" else parent + str(k)}"/><child link="{child}{k}"/>'
+                        f'<origin xyz="{text(at)}"/><axis xyz="{text(axis)}"/></joint>')
+        rows += [f'<link name="{each}{k}"/>' for each in "shr"]
+        rows.append(f'<transmission name="m{k}"><joint name="g{k}"/></transmission>')
+        if k == 0:
+            home = c
+            rows.append(f'<link name="w"/><joint name="w__1" type="continuous"><parent link="r0"/><child link="w"/>'
+                        f'<origin xyz="{text(rod)}"/><axis xyz="{text(second)}"/></joint><link name="top"/>'
+                        f'<joint name="w__2" type="continuous"><parent link="w"/><child link="top"/>'
+                        f'<axis xyz="{text(a)}"/></joint>')
+        else:
+            rows.append(f'<loop name="w{k}" type="universal"><predecessor link="r{k}"><origin xyz="{text(rod)}"/>'
+                        f'</predecessor><successor link="top"><origin xyz="{text(c - home)}"/></successor>'
+                        f'<axis xyz="{text(second)}"/><axis2 xyz="{text(a)}"/></loop>')
+        rails.append(rail)
+        firsts.append(a)
+        rods.append(rod)
+        ends.append(unit(rod) if k else unit(unit(rod) + watched * a * np.sign(a @ rod)))
+    seen = "".join(f'<observe leg="{k + 1}" link="r{k}" axis="{text(u)}"/>' for k, u in enumerate(ends))
+    told = f'<hrsynth><platform link="top"/>{seen}</hrsynth>'
+    file = f'<robot name="puu"><link name="base"/>{"".join(rows)}{told}</robot>'
+    return file, ends[0], rails, [firsts[0], rods[0], home]
+
+
+def text(numbers: Array) -> str:
+    return " ".join(f"{x:.17g}" for x in numbers)
+
+
+def singular_place(u: Array, rails: list[Array], leg: list[Array]) -> Array:
+    """Where (3,) the platform is when u lies along the first axis of leg 1's U joint, and its rod
+    can then turn its end along the rail of leg 2 but for a motion of its own slide."""
+    a, rod, home = leg
+    b = unit(np.cross(a, rod))
+    goal = a * np.sign(u @ a)
+    folded = Rotation.from_rotvec(b * np.arctan2(np.cross(u, goal) @ b, u @ goal)).apply(rod)
+    n = np.cross(rails[0], rails[1])
+
+    def across(angle: float) -> float:
+        return float(np.cross(a, Rotation.from_rotvec(a * angle).apply(folded)) @ n)
+
+    angle = brentq(across, -0.8, 0.2, xtol=1e-15)
+    return np.asarray(home + Rotation.from_rotvec(a * angle).apply(folded) - rod - 0.2 * rails[0])
+
+
+@pytest.mark.parametrize("watched", [0.0, 0.8])
+def test_a_u_joint_that_turns_about_what_is_watched_is_seen(watched: float, tmp_path: Path):
+    """Leg 1 then lets its end turn about that direction besides; where the rod itself is watched this moves nothing."""
+    file, u, rails, leg = sliding_platform(watched)
+    (tmp_path / "puu.urdf").write_text(file)
+    robot = str(tmp_path / "puu.urdf")
+    answer = singular(robot, "1,2", points=60)
+    assert answer.condition is not None
+    assert answer.condition.never == (watched == 0.0)
+    if not watched:
+        return
+    x = singular_place(u, rails, leg)
+    place = ",".join(f"{name}={value:.15g}" for name, value in zip("xyz", x, strict=True))
+    (there,) = check(robot, "1,2", at=place).to_dict()["configurations"]
+    assert there["type2"]
+    assert there["dof"] == 3
+    near = ",".join(f"{name}={value:.15g}" for name, value in zip("xyz", x + [0, 0.03, 0], strict=True))
+    assert not path(robot, "1,2", start=near, goal=place).certified

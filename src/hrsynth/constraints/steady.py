@@ -1,0 +1,76 @@
+"""Whether what a held leg leaves its end is of one kind at all poses, or grows where a U joint before the watched link
+turns about the watched direction.
+
+Turns about axes a₁ … a_m before a link keep its direction u if Σ θ̇ᵢ aᵢ ∥ u. With a ball among them, or all axes
+parallel, these rates have one dimension at all poses. Let the last two axes else meet in a point C: where u lies in
+their plane they can turn the link about the line through C along u, and the other axes leave C no more than elsewhere.
+Such a turn leaves a tip at rest that stays on this line: the leg's end may then turn about u besides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from ..geometry.vectors import Array, cross
+from ..kinematics.configuration import ClosedConfiguration
+from ..kinematics.locked import joint_at
+from ..mechanism import Joint, JointType, Mechanism, Observation
+from ..mechanism.graphs import adjacency, component, components, shortest_path
+from ..mechanism.legs import Leg
+from ..mechanism.observations.direction import Direction
+from ..tolerances import SAME_RELATION
+from .named_vectors import BodyVector, poses_at
+
+
+def grows(leg: Leg, locks: Sequence[Observation], reference: str, tips: Array, samples: Sequence[ClosedConfiguration]
+          ) -> str:
+    """What a held leg, a chain of joints, may leave its end (tips (n, 3), characteristic lengths) at special poses
+    alone: nothing more (empty), a ``turn`` about the watched direction through the tip, or motions of the ``tip``."""
+    mechanism = samples[0].twin.mechanism
+    found = {_grows(mechanism, leg, lock, reference, tips, samples) for lock in locks if isinstance(lock, Direction)}
+    # several directions: none grows where one does not
+    return "" if not found or "" in found else "tip" if "tip" in found else "turn"
+
+
+def _grows(mechanism: Mechanism, leg: Leg, lock: Direction, reference: str, tips: Array,
+           samples: Sequence[ClosedConfiguration]) -> str:
+    way = _way(mechanism, leg, lock.seen_from or reference, lock.link)
+    if way is None or any(joint.type is JointType.SPHERICAL for joint in way):
+        return ""
+    lines = [(np.array(centres), np.array(axes)) for joint in way if joint.type is not JointType.PRISMATIC
+             for centres, axes in _lines(joint, samples)]
+    if all(_vanishes(cross(axes, lines[0][1])) for _, axes in lines[1:]):
+        return ""
+    (A, a), (B, b) = lines[-2:]
+    across = cross(a, b)
+    if _vanishes(across) or not _vanishes(np.sum((B - A) * across, axis=1)):
+        return "tip"
+    # the point of a next to b
+    size = np.sum(across**2, axis=1, keepdims=True)
+    C = A + a * (np.sum(cross(B - A, b) * across, axis=1, keepdims=True) / size)
+    watched = BodyVector("u", "", lock.link, lock.direction)
+    u = watched.value(poses_at(samples, [lock.link]))
+    return "turn" if _vanishes(cross(tips - C, u)) else "tip"
+
+
+def _way(mechanism: Mechanism, leg: Leg, one: str, other: str) -> list[Joint] | None:
+    """The joints between two links of a leg; None where it is no chain."""
+    bonds = {frozenset(mechanism.joints[name].links): mechanism.joints[name] for name in leg.joints}
+    graph = adjacency((), bonds)
+    tree = len(leg.joints) == len(graph) - sum(1 for _ in components(graph))
+    if not tree or one not in graph or other not in component(graph, one):
+        return None
+    return [bonds[frozenset(pair)] for pair in pairwise(shortest_path(graph, one, other))]
+
+
+def _lines(joint: Joint, samples: Sequence[ClosedConfiguration]) -> list[tuple[list[Array], list[Array]]]:
+    """Centres and directions (n, 3) of each axis of a joint, in the order from its predecessor."""
+    found = [joint_at(at, joint) for at in samples]
+    return [([centre for centre, _ in found], [axes[k] for _, axes in found]) for k in range(len(joint.axes))]
+
+
+def _vanishes(block: Array) -> bool:
+    return bool(np.max(np.abs(block), initial=0.0) < SAME_RELATION)
