@@ -179,3 +179,10 @@ def test_a_u_joint_that_turns_about_what_is_watched_is_seen(watched: float, tmp_
     assert there["dof"] == 3
     near = ",".join(f"{name}={value:.15g}" for name, value in zip("xyz", x + [0, 0.03, 0], strict=True))
     assert not path(robot, "1,2", start=near, goal=place).certified
+
+
+@pytest.mark.parametrize(("name", "legs"), [("linear_delta", "1, 2, 3"), ("3puu", ""), ("prrrp_m1", "")])
+def test_legs_that_may_fold_are_named_where_never_is_said(name: str, legs: str):
+    told = " ".join(singularity(found(name, None)).split())
+    assert "never" in told
+    assert (f"one inside a leg ({legs}) lies flat" in told) == bool(legs)
