@@ -53,8 +53,15 @@ class MeasuredRobot(Value):
 
     @cached_property
     def pattern(self) -> ConstraintPattern:
-        """The pattern of the legs with their measurements held."""
+        """The pattern of the legs with their measurements held, the same at all poses."""
         return recognise(self.setting.anatomy, self.question, self.setting.configurations)
+
+    @cached_property
+    def generic_pattern(self) -> ConstraintPattern:
+        """The same at generic poses: at special ones a held leg may leave its end more."""
+        if self.pattern.motion != "other":
+            return self.pattern
+        return recognise(self.setting.anatomy, self.question, self.setting.configurations, everywhere=False)
 
     @cached_property
     def moving(self) -> tuple[str, Array | None]:

@@ -111,9 +111,10 @@ def placing_links(anatomy: LegDecomposition) -> tuple[str, ...]:
     return attached(anatomy) if anatomy.decided else (*attached(anatomy), anatomy.mechanism.platform)
 
 
-def recognise(anatomy: LegDecomposition, question: Measurement, samples: Sequence[ClosedConfiguration]
-              ) -> ConstraintPattern:
-    """The pattern at the samples; ``motion`` is ``other`` where it is none of the known ones."""
+def recognise(anatomy: LegDecomposition, question: Measurement, samples: Sequence[ClosedConfiguration], *,
+              everywhere: bool = True) -> ConstraintPattern:
+    """The pattern at the samples; ``motion`` is ``other`` where it is none of the known ones, or, unless it need not
+    hold ``everywhere``, where a held leg may leave its end more at special poses."""
     other = ConstraintPattern("other", anatomy.mechanism.base, attached(anatomy))
     base, bodies = anatomy.mechanism.base, attached(anatomy)
     motions = _motions(anatomy, question, samples)
@@ -125,8 +126,8 @@ def recognise(anatomy: LegDecomposition, question: Measurement, samples: Sequenc
             if leg is None:
                 return other
             locks[leg].append(each)
-    held = {leg.label: _held(anatomy, leg, tuple(locks[leg.label]), question.reference, tuple(samples))
-            for leg in anatomy.legs}
+    held = {leg.label: _held(anatomy, leg, tuple(locks[leg.label]), question.reference, tuple(samples),
+                             everywhere) for leg in anatomy.legs}
     alone = motions.shape[1:] == (6, 6) and not any(locks.values())
     if anatomy.mechanism.couplings and not alone:
         return other
@@ -273,8 +274,8 @@ def _normal(mechanism: Mechanism, normal: Array, meaning: str = "normal of the p
 
 @lru_cache(maxsize=LEGS_HELD)
 def _held(anatomy: LegDecomposition, leg: Leg, locks: tuple[Observation, ...], reference: str,
-          samples: tuple[ClosedConfiguration, ...]) -> LockedLeg | None:
-    """The leg's pattern with these observations held, the same at all samples, or None."""
+          samples: tuple[ClosedConfiguration, ...], everywhere: bool) -> LockedLeg | None:
+    """The leg's pattern with these observations held, alike at all samples (``everywhere``: all poses), or None."""
     try:
         systems = leg_twists_together(samples, leg, locks, reference)
     except ValueError:
@@ -295,7 +296,7 @@ def _held(anatomy: LegDecomposition, leg: Leg, locks: tuple[Observation, ...], r
             normal = _named(anatomy, leg, locks, symbol, across, samples)
         if shape[0] in (1, 2) and line is None and normal is None:
             return None
-        more = grows(leg, locks, reference, points, samples)
+        more = grows(leg, locks, reference, points, samples) if everywhere else ""
         if more == "tip":
             continue
         return LockedLeg(leg.label, leg.attach, spot, line, normal, shape[0] == 0, shape[1], spins=bool(more))

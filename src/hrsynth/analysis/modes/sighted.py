@@ -122,9 +122,9 @@ def all_loci(measured: MeasuredRobot, goal: ClosedConfiguration) -> tuple[TipLoc
     setting = measured.setting
     rest, seen = sights(setting.anatomy, measured.question, goal)
     if not seen:
-        return tip_loci(setting.anatomy, rest, measured.pattern, goal), ()
+        return tip_loci(setting.anatomy, rest, measured.generic_pattern, goal), ()
     if rest.observations:
-        pattern = recognise(setting.anatomy, rest, setting.configurations)
+        pattern = recognise(setting.anatomy, rest, setting.configurations, everywhere=False)
         confined = tip_loci(setting.anatomy, rest, pattern, goal)
     else:
         confined = _unheld(measured, goal)

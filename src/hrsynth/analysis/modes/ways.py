@@ -110,7 +110,7 @@ def counted(measured: MeasuredRobot, at: ClosedConfiguration) -> SystemModes:
     """The modes with the measurements at a configuration, without near ones, and not read as poses of the robot's legs:
     as :func:`modes`, for many configurations of one robot that sees all its freedoms."""
     found = None
-    if measured.pattern.motion != "oriented":
+    if measured.generic_pattern.motion != "oriented":
         with suppress(NotConfined, Unsolved, TooLarge, MissingExtra):
             found = solve_all(all_loci(measured, at)[0], near=False)[1]
     if found is not None and found.complete:
