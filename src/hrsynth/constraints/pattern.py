@@ -126,8 +126,9 @@ def recognise(anatomy: LegDecomposition, question: Measurement, samples: Sequenc
             if leg is None:
                 return other
             locks[leg].append(each)
+    translating = len(other.bodies) == 1 and motions.shape[1:][:1] == (6,) and _vanishes(motions[:, 3:])
     held = {leg.label: _held(anatomy, leg, tuple(locks[leg.label]), question.reference, tuple(samples),
-                             everywhere) for leg in anatomy.legs}
+                             everywhere, translating) for leg in anatomy.legs}
     alone = motions.shape[1:] == (6, 6) and not any(locks.values())
     if anatomy.mechanism.couplings and not alone:
         return other
@@ -274,7 +275,8 @@ def _normal(mechanism: Mechanism, normal: Array, meaning: str = "normal of the p
 
 @lru_cache(maxsize=LEGS_HELD)
 def _held(anatomy: LegDecomposition, leg: Leg, locks: tuple[Observation, ...], reference: str,
-          samples: tuple[ClosedConfiguration, ...], everywhere: bool) -> LockedLeg | None:
+          samples: tuple[ClosedConfiguration, ...], everywhere: bool, translating: bool = False
+          ) -> LockedLeg | None:
     """The leg's pattern with these observations held, alike at all samples (``everywhere``: all poses), or None."""
     try:
         systems = leg_twists_together(samples, leg, locks, reference)
@@ -296,7 +298,7 @@ def _held(anatomy: LegDecomposition, leg: Leg, locks: tuple[Observation, ...], r
             normal = _named(anatomy, leg, locks, symbol, across, samples)
         if shape[0] in (1, 2) and line is None and normal is None:
             return None
-        more = grows(leg, locks, reference, points, samples) if everywhere else ""
+        more = grows(leg, locks, reference, points, samples, translating) if everywhere else ""
         if more == "tip":
             continue
         return LockedLeg(leg.label, leg.attach, spot, line, normal, shape[0] == 0, shape[1], spins=bool(more))
