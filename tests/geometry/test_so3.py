@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
@@ -87,6 +87,10 @@ def test_the_rate_at_half_a_turn_and_at_none(axis: Array) -> None:
     assert logarithm_rate(1e-9 * axis) == pytest.approx(np.eye(3), abs=1e-8)
 
 
+@example(np.array([0.0, -1.0, 0.0]), np.array([0.0, 1.0, 5.58119574e-159]))
+@example(np.array([0.0, -1.0, 0.0]), np.array([1e-310, 1.0, 0.0]))
+@example(np.array([0.0, 1.0, 0.0]), np.array([1e-78, 1.0, 1e-80]))
+@example(np.array([0.0, -1.0, 0.0]), np.array([1e-78, 1.0, 1e-80]))
 @given(axes, axes)
 def test_the_smallest_turn_between_two_directions(a: Array, b: Array) -> None:
     for other in (b, -a, a):

@@ -50,7 +50,12 @@ def between(a: Array, b: Array) -> Array:
     """The rotation vectors (..., 3) of the smallest turns that bring unit vectors a (..., 3) to b (..., 3); of opposite
     ones half a turn about some normal."""
     across = cross(a, b)
+    size = np.abs(across).max(axis=-1)[..., None]
+    size = np.where(size > np.finfo(float).tiny, size, 0.0)
     sines = np.linalg.norm(across, axis=-1)[..., None]
+    # the square of a small sine has no digits left
+    scaled = size * np.linalg.norm(across / np.where(size > 0.0, size, 1.0), axis=-1)[..., None]
+    sines = np.where(size > np.finfo(float).tiny**0.25, sines, scaled)
     cosines = np.sum(a * b, axis=-1)[..., None]
     normals = cross(a, np.eye(3)[np.argmin(np.abs(a), axis=-1)])
     opposite = (sines == 0.0) & (cosines < 0.0)
