@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields, is_dataclass, replace
 from functools import wraps
 from inspect import Parameter, signature
+from math import isfinite
 from typing import Any, ClassVar, ParamSpec, TypeVar
 
 from .errors import shortened
@@ -18,6 +19,11 @@ R = TypeVar("R")
 V = TypeVar("V", bound="Value")
 LISTED = 3
 """Members of a tuple that are shown; of more their number is."""
+
+
+def finite(value: float | None) -> float | None:
+    """A number of a record: null where there is none, or it is infinite."""
+    return None if value is None or not isfinite(value) else float(value)
 
 
 class Value:

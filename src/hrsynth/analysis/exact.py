@@ -37,7 +37,7 @@ from ..mechanism.model import JointType
 from ..mechanism.observation import labels_of
 from ..mechanism.observations.direction import SeenAxis
 from ..mechanism.relations import Relations, recognise
-from ..results import Compared
+from ..results import Compared, finite
 from ..tolerances import CLOSED
 from .formation import PLACES, following, sensed
 from .formation import word as formation_word
@@ -205,7 +205,7 @@ class ExactArchitecture:
             kept_too, observed = len(left), ()
         missed = self.relations.missed
         return Basis(len(every) - len(left), kept_too, observed, self.relations.held,
-                     missed if math.isfinite(missed) else None)
+                     finite(missed))
 
     def _regular(self) -> bool:
         """Whether the zero configuration is a regular member of the family, as the instance is; a sample must be."""

@@ -16,6 +16,7 @@ from ..kinematics.configuration import ClosedConfiguration
 from ..mechanism import Joint, Mechanism
 from ..mechanism.observations.edge import tangent
 from ..results import Value
+from ..tolerances import SAME_RELATION
 
 Poses = Mapping[str, Array]
 
@@ -166,3 +167,8 @@ def poses_at(configurations: Sequence[ClosedConfiguration], links: Sequence[str]
     X = np.array([at.twin.poses(at.q, names) for at in configurations])
     X[..., :3, 3] /= configurations[0].twin.length
     return {name: X[:, i] for i, name in enumerate(names)}
+
+
+def vanishes(block: Array) -> bool:
+    """Whether vectors, of any shape, are zero at all configurations."""
+    return bool(np.max(np.abs(block), initial=0.0) < SAME_RELATION)

@@ -25,7 +25,7 @@ from ..mechanism.observations.direction import Direction
 from ..results import Value
 from ..tolerances import SAME_RELATION
 from .locked_legs import LockedLeg, forbidden, sights, stopped_turns, virtual_legs
-from .named_vectors import BodyPoint, BodyVector, NamedVector, Segment, Tangent, axis_of, centre_of, poses_at
+from .named_vectors import BodyPoint, BodyVector, NamedVector, Segment, Tangent, axis_of, centre_of, poses_at, vanishes
 from .steady import grows
 
 TURNING_MOTIONS = ("planar", "spatial")
@@ -126,7 +126,7 @@ def recognise(anatomy: LegDecomposition, question: Measurement, samples: Sequenc
             if leg is None:
                 return other
             locks[leg].append(each)
-    translating = len(other.bodies) == 1 and motions.shape[1:][:1] == (6,) and _vanishes(motions[:, 3:])
+    translating = len(bodies) == 1 and vanishes(motions[:, 3:])
     held = {leg.label: _held(anatomy, leg, tuple(locks[leg.label]), question.reference, tuple(samples),
                              everywhere, translating) for leg in anatomy.legs}
     alone = motions.shape[1:] == (6, 6) and not any(locks.values())
@@ -166,7 +166,7 @@ def _one_body(anatomy: LegDecomposition, every: tuple[LockedLeg, ...] | None, le
     own = [leg for leg in legs if not leg.virtual]
     if len(own) < len(anatomy.legs) and motions.shape[2] < (2 if own else 3):  # the other legs hold as well
         return None
-    if _vanishes(motions[:, 3:]):
+    if vanishes(motions[:, 3:]):
         return _translating(anatomy, legs, samples)
     if any(leg.turns == 0 and not leg.spins for leg in legs):
         return None if every is None else _translating(anatomy, every, samples)
@@ -202,7 +202,7 @@ def _two_bodies(anatomy: LegDecomposition, legs: tuple[LockedLeg, ...], motions:
                 samples: Sequence[ClosedConfiguration]) -> ConstraintPattern | None:
     """Two bodies that only translate, the second along one direction relative to the first."""
     bodies = attached(anatomy)
-    if len(bodies) != 2 or motions.shape[2] != 4 or not _vanishes(motions[:, [3, 4, 5, 9, 10, 11]]):
+    if len(bodies) != 2 or motions.shape[2] != 4 or not vanishes(motions[:, [3, 4, 5, 9, 10, 11]]):
         return None
     relative = [range_basis(F[6:9] - F[:3], 1.0)[0] for F in motions]
     if any(each.shape[1] != 1 for each in relative):
@@ -232,7 +232,7 @@ def moving(anatomy: LegDecomposition, question: Measurement, samples: Sequence[C
     """How a platform of one body moves with nothing held: ``translations``, ``planar`` with the normal, or
     ``spatial``."""
     motions = _motions(anatomy, question, samples)
-    if _vanishes(motions[:, 3:]):
+    if vanishes(motions[:, 3:]):
         return "translations", None
     normal = _plane_of(motions)
     return ("spatial", None) if normal is None else ("planar", normal)
@@ -246,13 +246,9 @@ def _common_plane(mechanism: Mechanism, legs: Sequence[LockedLeg], samples: Sequ
     values = np.concatenate([axis.value(poses_at(samples, axis.links)) for axis in axes])
     lines = [leg.line for leg in legs if leg.line is not None]
     paths = [line.value(poses_at(samples, line.links)) for line in lines]
-    if not _vanishes(cross(values, values[0])) or any(not _vanishes(path @ values[0]) for path in paths):
+    if not vanishes(cross(values, values[0])) or any(not vanishes(path @ values[0]) for path in paths):
         return None
     return _normal(mechanism, values[0])
-
-
-def _vanishes(block: Array) -> bool:
-    return bool(np.max(np.abs(block), initial=0.0) < SAME_RELATION)
 
 
 def _plane_of(motions: Array) -> Array | None:
@@ -275,8 +271,7 @@ def _normal(mechanism: Mechanism, normal: Array, meaning: str = "normal of the p
 
 @lru_cache(maxsize=LEGS_HELD)
 def _held(anatomy: LegDecomposition, leg: Leg, locks: tuple[Observation, ...], reference: str,
-          samples: tuple[ClosedConfiguration, ...], everywhere: bool, translating: bool = False
-          ) -> LockedLeg | None:
+          samples: tuple[ClosedConfiguration, ...], everywhere: bool, translating: bool) -> LockedLeg | None:
     """The leg's pattern with these observations held, alike at all samples (``everywhere``: all poses), or None."""
     try:
         systems = leg_twists_together(samples, leg, locks, reference)

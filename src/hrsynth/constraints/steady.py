@@ -19,11 +19,11 @@ from ..geometry.vectors import Array, cross
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.locked import joint_at
 from ..mechanism import Joint, JointType, Mechanism, Observation
-from ..mechanism.graphs import adjacency, component, components, shortest_path
+from ..mechanism.graphs import adjacency, component, shortest_path
 from ..mechanism.legs import Leg
 from ..mechanism.observations.direction import Direction
-from ..tolerances import SAME_RELATION, SURELY_SOMETHING
-from .named_vectors import BodyVector, poses_at
+from ..tolerances import SURELY_SOMETHING
+from .named_vectors import BodyVector, poses_at, vanishes
 
 
 def grows(leg: Leg, locks: Sequence[Observation], reference: str, tips: Array, samples: Sequence[ClosedConfiguration],
@@ -45,7 +45,7 @@ def _grows(mechanism: Mechanism, leg: Leg, lock: Direction, reference: str, tips
         return ""
     lines = [(np.array(centres), np.array(axes)) for joint in way if joint.type is not JointType.PRISMATIC
              for centres, axes in _lines(joint, samples)]
-    if all(_vanishes(cross(axes, lines[0][1])) for _, axes in lines[1:]):
+    if all(vanishes(cross(axes, lines[0][1])) for _, axes in lines[1:]):
         return ""
     watched = BodyVector("u", "", lock.link, lock.direction)
     u = watched.value(poses_at(samples, [lock.link]))
@@ -53,12 +53,12 @@ def _grows(mechanism: Mechanism, leg: Leg, lock: Direction, reference: str, tips
         return ""
     (A, a), (B, b) = lines[-2:]
     across = cross(a, b)
-    if _vanishes(across) or not _vanishes(np.sum((B - A) * across, axis=1)):
+    if vanishes(across) or not vanishes(np.sum((B - A) * across, axis=1)):
         return "tip"
     # the point of a next to b
     size = np.sum(across**2, axis=1, keepdims=True)
     C = A + a * (np.sum(cross(B - A, b) * across, axis=1, keepdims=True) / size)
-    return "turn" if _vanishes(cross(tips - C, u)) else "tip"
+    return "turn" if vanishes(cross(tips - C, u)) else "tip"
 
 
 def _cannot_turn_back(mechanism: Mechanism, leg: Leg, lock: Direction, u: Array, samples: Sequence[ClosedConfiguration]
@@ -70,16 +70,17 @@ def _cannot_turn_back(mechanism: Mechanism, leg: Leg, lock: Direction, u: Array,
         return False
     axes = [np.array(each) for joint in beyond if joint.type is not JointType.PRISMATIC
             for _, each in _lines(joint, samples)]
-    return not axes or (all(_vanishes(cross(each, axes[0])) for each in axes[1:])
+    return not axes or (all(vanishes(cross(each, axes[0])) for each in axes[1:])
                         and float(np.min(np.linalg.norm(cross(axes[0], u), axis=1))) > SURELY_SOMETHING)
 
 
 def _way(mechanism: Mechanism, leg: Leg, one: str, other: str) -> list[Joint] | None:
     """The joints between two links of a leg; None where it is no chain."""
+    if leg.has_loops:
+        return None
     bonds = {frozenset(mechanism.joints[name].links): mechanism.joints[name] for name in leg.joints}
     graph = adjacency((), bonds)
-    tree = len(leg.joints) == len(graph) - sum(1 for _ in components(graph))
-    if not tree or one not in graph or other not in component(graph, one):
+    if one not in graph or other not in component(graph, one):
         return None
     return [bonds[frozenset(pair)] for pair in pairwise(shortest_path(graph, one, other))]
 
@@ -88,7 +89,3 @@ def _lines(joint: Joint, samples: Sequence[ClosedConfiguration]) -> list[tuple[l
     """Centres and directions (n, 3) of each axis of a joint, in the order from its predecessor."""
     found = [joint_at(at, joint) for at in samples]
     return [([centre for centre, _ in found], [axes[k] for _, axes in found]) for k in range(len(joint.axes))]
-
-
-def _vanishes(block: Array) -> bool:
-    return bool(np.max(np.abs(block), initial=0.0) < SAME_RELATION)

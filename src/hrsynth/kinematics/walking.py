@@ -53,7 +53,7 @@ def any_velocity(at: ClosedConfiguration, rng: np.random.Generator) -> Array:
 def random_walk(start: ClosedConfiguration, count: int, seed: int = 0, steps: int = 40
                 ) -> Iterator[ClosedConfiguration]:
     """``count`` random configurations on the component of ``start``: walks of up to ``steps`` small steps in the
-    mechanism's own freedoms, each checked as those of :func:`sample` are; a walk that ends early is begun again."""
+    mechanism's own freedoms, each checked as by :func:`.sampling.sample`; one that ends early is begun again."""
     rng = np.random.default_rng(seed)
     weakest = WEAKEST * start.kernel()[1].weakest
     given = failed = 0

@@ -37,6 +37,11 @@ class Leg:
     attach: str
     takes_platform: bool = False
 
+    @property
+    def has_loops(self) -> bool:
+        """Whether it is no chain of joints: loops lie inside it."""
+        return len(self.joints) > len(self.links) + 1
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LegDecomposition(Value):

@@ -17,7 +17,7 @@ from ...geometry.vectors import Array, oriented
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.relation import Measurement, relation
 from ...mechanism.pose import Pose
-from ...results import Value
+from ...results import Value, finite
 from ...tolerances import FOLLOWED, INVERTED, RANK_CUTOFF
 from .cones import Blur
 
@@ -226,11 +226,6 @@ def _descended(blocks: Array) -> Array:
         w = np.linalg.eigh(np.einsum("nk,kde->nde", 1 / np.maximum(sizes, floor), squares))[1][:, :, 0]
     w = np.concatenate([w, axes, views.T])
     return np.asarray(w[np.argmin(_width(blocks, w.T))])
-
-
-def finite(value: float) -> float | None:
-    """A number of the record: null where infinite."""
-    return float(value) if np.isfinite(value) else None
 
 
 def _listed(vector: Array | None) -> list[float] | None:

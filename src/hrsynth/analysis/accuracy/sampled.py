@@ -17,10 +17,10 @@ from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
 from ...kinematics.relation import Measurement
 from ...progress import tell
-from ...results import Value
+from ...results import Value, finite
 from .best_fit import ENDS, NOT_FOUND, best_fits, seen, weakest
 from .cones import Blur
-from .pose_errors import PoseErrors, finite
+from .pose_errors import PoseErrors
 
 
 @dataclass(frozen=True, eq=False, repr=False)

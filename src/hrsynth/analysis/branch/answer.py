@@ -10,7 +10,7 @@ import numpy as np
 
 from ...geometry.vectors import Array
 from ...mechanism import Mechanism
-from ...results import Result, Value
+from ...results import Result, Value, finite
 from .loops import LoopSystem
 
 KEPT, PASSED, OPEN, UNSEEN = "kept", "passed", "undecided", "not looked at"
@@ -92,7 +92,7 @@ class BranchLimit(Value):
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
-        return {"joint": self.joint, "lower": _told(self.lower), "upper": _told(self.upper), "least": self.least,
+        return {"joint": self.joint, "lower": finite(self.lower), "upper": finite(self.upper), "least": self.least,
                 "most": self.most, "verdict": self.verdict}
 
 
@@ -206,7 +206,3 @@ class BranchProof(Result, shown_as="branch"):
                 "tried": self.tried, "parts": [each.to_dict() for each in self.parts],
                 "back": None if self.back is None else [each.tolist() for each in self.back], "regular": self.regular,
                 "limits": [each.to_dict() for each in self.limits]}
-
-
-def _told(limit: float | None) -> float | None:
-    return None if limit is None or not np.isfinite(limit) else limit

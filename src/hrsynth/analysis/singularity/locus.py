@@ -22,7 +22,7 @@ from ...kinematics.relation import Measurement
 from ...mechanism import Mechanism
 from ...mechanism.pose import Grid, Pose, as_pose
 from ...progress import tell
-from ...results import Value
+from ...results import Value, finite
 from ...tolerances import ON_PLANE, SAME_RELATION, SAME_SPOT
 from ..measured import MeasuredRobot
 from ..observed import CameraLike, ObservedRobot, SeeLike
@@ -73,7 +73,7 @@ class Locus(Value):
 
 
 def _table(values: Array) -> list[list[float | None]]:
-    return [[float(value) if np.isfinite(value) else None for value in row] for row in values]
+    return [[finite(value) for value in row] for row in values]
 
 
 def locus(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None = None, camera: CameraLike = None, *,

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 
 from ...analysis.accuracy.cones import Blur
-from ...analysis.accuracy.pose_errors import attained, finite
+from ...analysis.accuracy.pose_errors import attained
 from ...analysis.observed import ObservedRobot
 from ...kinematics.configuration import ClosedConfiguration
 from ...mechanism.observations.direction import Direction
+from ...results import finite
 from ..text.tables import NOT_BOUNDED, bounded
 
 CONE = math.radians(0.1)

@@ -136,7 +136,7 @@ def singularity(found: Singularity) -> str:
                  ("factors", [f"{part}: {meaning}" for part, meaning in condition.parts]),
                  ("where", [f"{name}: {meaning}" for name, meaning in condition.where.items()]),
                  ("split off", list(condition.factors))]
-    folding = [leg.label for leg in found.setting.anatomy.legs if len(leg.joints) > len(leg.links) + 1]
+    folding = [leg.label for leg in found.setting.anatomy.legs if leg.has_loops]
     if condition is not None and condition.never and folding:
         rows.append(("loops", f"poses at which one inside a leg ({', '.join(folding)}) lies flat are not looked at"))
     if checked is not None:

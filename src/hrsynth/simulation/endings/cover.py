@@ -203,7 +203,7 @@ def unread(setting: ObservedRobot) -> tuple[str, ...]:
     """The legs whose joints may lock where their closed forms are regular: those with U joints, or with rods side by
     side; of R and P in a plane, and of one rod between balls, the forms tell all."""
     joints = setting.mechanism.joints
-    return tuple(leg.label for leg in setting.anatomy.legs if len(leg.joints) > len(leg.links) + 1
+    return tuple(leg.label for leg in setting.anatomy.legs if leg.has_loops
                  or any(joints[name].type is JointType.UNIVERSAL for name in leg.joints))
 
 
