@@ -8,6 +8,7 @@ import gzip
 import json
 import sqlite3
 import zlib
+from bisect import bisect_left
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from importlib import resources
 from pathlib import Path
@@ -122,23 +123,29 @@ class Database:
 
     def groups(self) -> list[str]:
         with self._read() as file:
-            return [name for name, in file.execute(
-                'WITH RECURSIVE known(name) AS (SELECT min("group") FROM records UNION ALL SELECT (SELECT min("group") '
-                'FROM records WHERE "group" > name) FROM known WHERE name IS NOT NULL) '
-                'SELECT name FROM known WHERE name IS NOT NULL')]
+            return _groups(file)
 
     def lines(self, groups: Sequence[str], asked: Mapping[str, Any]) -> Sequence[str]:
         with _asked(self.path):
             file = self._open()
             new = _is_new(file)
             told = _told_by_rows(asked, new)
-            met = [f'+"group" IN ({", ".join("?" * len(groups))})', *(str(each.row) for each in told)]
-            values = [*groups, *(value for each in told for value in each.values)]
+            met, values = [str(each.row) for each in told], [value for each in told for value in each.values]
             if not new:
+                met.append(f'+"group" IN ({", ".join("?" * len(groups))})')
                 return [line for line, in file.execute(
-                    f'SELECT line FROM records WHERE {" AND ".join(met)} ORDER BY "group", word', values)]
-            rows = file.execute(f'SELECT rowid FROM records WHERE {" AND ".join(met)} ORDER BY rowid', values)
-            return StoredLines(self.path, file, [number for number, in rows])
+                    f'SELECT line FROM records WHERE {" AND ".join(met)} ORDER BY "group", word', [*values, *groups])]
+            # rows are sorted by group: those of a group stand beside each other
+            ranges = [_rows(file, group) for group in groups]
+            if not told:
+                return StoredLines(self.path, file, sorted(number for each in ranges for number in each))
+            # one text of all numbers is read faster than a row for each
+            numbers, = file.execute(f"SELECT json_group_array(rowid) FROM records WHERE {' AND '.join(met)}", values
+                                    ).fetchone()
+            found = sorted(json.loads(numbers))
+            return StoredLines(self.path, file, [
+                number for each in sorted(ranges, key=lambda each: each.start)
+                for number in found[bisect_left(found, each.start) : bisect_left(found, each.stop)]])
 
     def decides(self, asked: Mapping[str, Any]) -> bool:
         with self._read() as file:
@@ -213,6 +220,21 @@ class StoredLines(Sequence[str]):
 def _is_new(file: sqlite3.Connection) -> bool:
     """Whether texts stand in a table of their own; the lines of older files stand in the rows."""
     return file.execute("SELECT 1 FROM sqlite_master WHERE name = 'texts'").fetchone() is not None
+
+
+def _groups(file: sqlite3.Connection) -> list[str]:
+    """The groups that are stored, by name."""
+    return [name for name, in file.execute(
+        'WITH RECURSIVE known(name) AS (SELECT min("group") FROM records UNION ALL SELECT (SELECT min("group") '
+        'FROM records WHERE "group" > name) FROM known WHERE name IS NOT NULL) '
+        'SELECT name FROM known WHERE name IS NOT NULL')]
+
+
+def _rows(file: sqlite3.Connection, group: str) -> range:
+    """The numbers of a group's rows."""
+    first, last = (file.execute(f'SELECT rowid FROM records WHERE "group" = ? ORDER BY word {way} LIMIT 1',
+                                (group,)).fetchone() for way in ("ASC", "DESC"))
+    return range(first[0], last[0] + 1) if first else range(0)
 
 
 def _told_by_rows(asked: Mapping[str, Any], new: bool) -> list[RecordCondition]:
