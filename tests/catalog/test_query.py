@@ -20,9 +20,9 @@ from catalog.stub import CHAINS, QUESTIONS, REFUSED, VERDICTS, WORKERS, source
 from hrsynth.catalog import Catalog, load
 from hrsynth.catalog.build import build, check
 from hrsynth.catalog.fits import fits, may_fit
-from hrsynth.catalog.jsonl import Record, record
+from hrsynth.catalog.jsonl import Record, record, word_of
 from hrsynth.catalog.store import OLD_COLUMNS, Database, Folder, _write_tables, shipped
-from hrsynth.catalog.words import VERSION
+from hrsynth.catalog.words import SENSORS, VERSION
 from hrsynth.errors import BadRequest
 
 ASKED = st.fixed_dictionaries({}, optional={
@@ -192,9 +192,14 @@ def test_sqlite_answers_as_the_lines_do(tmp_path: Path):
     """What may be asked about the shipped catalog; how long it takes stands in ``benchmarks/others.py``."""
     kept, file = shipped(), tmp_path / "all.sqlite"
     _write_tables(file, {group: kept.lines([group], {}) for group in kept.groups()})
+    lines = {word_of(line): line for group in kept.groups() for line in kept.lines([group], {})}
+    names = [group for group in kept.groups() if group != SENSORS]
     for asked in (*QUESTIONS, {"text": "lift 1"}):
         assert Database(file).decides(asked)
-        assert list(load(file, **asked)) == list(load(**asked)), asked
+        found = Database(file).lines(names if asked.get("see") is None else [SENSORS], asked)
+        words = load(**asked).words
+        assert list(found) == [lines[word] for word in words], asked
+        assert load(file, **asked).words == words, asked
 
 
 def test_sqlite_has_the_same_bytes_however_it_was_built(stores: tuple[Path, Path], tmp_path: Path):
