@@ -14,15 +14,17 @@ from hypothesis import strategies as st
 import strategies
 from analysis.singularity.found import found
 from analysis.singularity.test_conditions import CASES, HEAVY
-from hrsynth.analysis.singularity.agreement import Agreement, agreement
+from hrsynth.analysis.singularity.agreement import Agreement, agreement, lose, weakest
 from hrsynth.analysis.singularity.singular import Singularity, singular
 from hrsynth.constraints.condition import Condition, condition
 from hrsynth.constraints.locked_legs import LockedLeg
-from hrsynth.constraints.pattern import ConstraintPattern
+from hrsynth.constraints.pattern import ConstraintPattern, PatternValues
 from hrsynth.description import load, shipped
 from hrsynth.errors import BadRequest, Disagreement
+from hrsynth.geometry.vectors import Array
+from hrsynth.kinematics.walking import random_walk
 from hrsynth.mechanism import Mechanism
-from hrsynth.tolerances import RANK_CUTOFF
+from hrsynth.tolerances import RANK_CUTOFF, RANK_GAP
 
 ANGLE = 1e-8
 
@@ -165,6 +167,45 @@ def test_another_expression_is_told(robot: Sequence[str]) -> None:
         again(answer, answer.pattern, wrong, 150)
     assert caught.value.poses > 0
     assert caught.value.angle < ANGLE
+
+
+class Never(Condition):
+    """The claim that no freedom is ever lost."""
+
+    def rows(self, here: PatternValues) -> Array:
+        return np.broadcast_to(np.eye(3), (len(here.configurations), 3, 3)).copy()
+
+    def expressed(self, here: PatternValues) -> Array:
+        return np.ones(len(here.configurations))
+
+
+@pytest.mark.some(2)
+@pytest.mark.parametrize(("robot", "legs", "real"), [
+    ("3rrr_m1", None, False), ("3rps", None, False), ("3rpr_m1", None, True), ("gough_stewart", None, True),
+    ("3prr_m1", None, True), ("orthoglide", None, True), ("prrrp_parallel", None, True)])
+def test_a_false_never_is_told_though_no_pose_that_was_drawn_is_singular(robot: str, legs: str | None, real: bool
+                                                                          ) -> None:
+    answer = found(robot, legs, real=real)
+    assert answer.checked.smallest > RANK_CUTOFF * RANK_GAP
+    with pytest.raises(Disagreement) as caught:
+        again(answer, answer.pattern, Never("never", sympy.Integer(1), never=True), 20)
+    assert caught.value.poses > 0
+    assert caught.value.angle == 0.0
+
+
+@pytest.mark.some(2)
+@pytest.mark.parametrize(("robot", "legs", "real"), [
+    ("3rrr_m1", None, False), ("3rpr_m1", None, False), ("3rps", None, True), ("gough_stewart", None, True)])
+def test_where_the_rank_is_led_to_zero_the_expression_vanishes(robot: str, legs: str | None, real: bool) -> None:
+    """The descent knows the relation alone, the expression names alone."""
+    answer = found(robot, legs, real=real)
+    start = answer.setting.samples.start
+    ends = [at for drawn in random_walk(start, 40, 3, steps=8) if (at := lose(drawn, answer.question)) is not None
+            and at.kernel()[1].weakest > 0.05 * start.kernel()[1].weakest]
+    assert len(ends) > 4
+    for at in ends:
+        assert weakest(at, answer.question) < RANK_CUTOFF
+        assert abs(answer.condition.expressed(answer.pattern.values_at([at]))[0]) < 1e-6
 
 
 def test_the_right_condition_passes_again() -> None:

@@ -13,15 +13,17 @@ from itertools import pairwise
 import numpy as np
 
 from ...batch.placing import Placer
-from ...budgets import WEAKEST_STARTS
+from ...budgets import RANK_DESCENTS, RANK_STEPS, WEAKEST_STARTS
 from ...constraints.condition import Condition, Named
 from ...constraints.pattern import ConstraintPattern, PatternValues
 from ...errors import Disagreement, NotMeasured
+from ...geometry import gauss_newton
+from ...geometry.gauss_newton import Residual
 from ...geometry.ranks import kernel_basis, range_basis
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.relation import Measurement, platform_motions, relation
-from ...kinematics.tasks import solve
+from ...kinematics.tasks import DAMPING, shortened, solve
 from ...kinematics.walking import WEAKEST, random_walk
 from ...mechanism.sights import CameraObservation
 from ...progress import tell
@@ -32,6 +34,8 @@ from .batch_spectrum import SPOTS, Quick
 CHUNK = 250
 ON_LOCUS = 10
 """Poses on the locus that are constructed, where there are so many."""
+LONGEST_DESCENT = 0.3
+"""Longest step (characteristic lengths, radians) of a descent to where the rank is lost."""
 TRIES = 4
 """Weakest poses from which a pose is sought on a locus across which the expression has no sign, or none was met."""
 
@@ -64,7 +68,8 @@ class Agreement(Value):
 
 def agreement(start: ClosedConfiguration, question: Measurement, pattern: ConstraintPattern, condition: Condition,
               count: int, *, seed: int = 0, placer: Placer | None = None) -> Agreement:
-    """Compare at ``count`` random reachable poses and at poses on the locus.
+    """Compare at ``count`` random reachable poses, at poses on the locus, and where descents of the rank itself from
+    the weakest poses end.
 
     Raises ``Disagreement`` where the rank, the rows behind the words and the expression do not agree. Poses near
     constraint singularities of the loops, where no rank is certain, and those at which a leg keeps the platform from
@@ -118,8 +123,7 @@ def agreement(start: ClosedConfiguration, question: Measurement, pattern: Constr
                     _descents(others, question, pattern, condition)]):
         for at in starts:
             searches += 1
-            if (at is None or not _has_values(at, question) or at.kernel()[1].weakest < loops
-                    or relation(at, question).dof.value < freedoms or _known(at, on_locus, question)):
+            if at is None or _beside(at, question, loops, freedoms) or _known(at, on_locus, question):
                 continue
             sigma = float(_weakest(pattern.values_at([at]), question, condition)[0][0])
             if sigma > RANK_CUTOFF:
@@ -129,6 +133,11 @@ def agreement(start: ClosedConfiguration, question: Measurement, pattern: Constr
                 break
         if on_locus:
             break
+    tell("weakest poses")
+    for _, weak in [*low, *others][:RANK_DESCENTS]:
+        at = lose(weak, question)
+        if at is not None and not _beside(at, question, loops, freedoms):
+            wrong += _is_missed(at, pattern, condition)
     found = Agreement(met, wrong, angle, smallest, (positive, negative), tuple(on_locus), searches)
     if wrong or angle > RANK_CUTOFF * RANK_GAP:
         raise Disagreement(start.twin.mechanism.name, wrong, angle)
@@ -159,6 +168,21 @@ def _has_values(at: ClosedConfiguration, question: Measurement) -> bool:
     except NotMeasured:
         return False
     return True
+
+
+def _beside(at: ClosedConfiguration, question: Measurement, loops: float, freedoms: int) -> bool:
+    """Whether no rank is certain at a configuration, or the platform itself has fewer freedoms there."""
+    return (not _has_values(at, question) or at.kernel()[1].weakest < loops
+            or relation(at, question).dof.value < freedoms)
+
+
+def _is_missed(at: ClosedConfiguration, pattern: ConstraintPattern, condition: Condition) -> bool:
+    """Whether the rows behind the words clearly keep their rank where the relation loses its own."""
+    try:
+        rows = condition.rows(pattern.values_at([at]))
+    except NotMeasured:
+        return False
+    return bool(smallest_of(rows)[0] > RANK_CUTOFF * RANK_GAP)
 
 
 def smallest_of(rows: Array) -> Array:
@@ -336,3 +360,43 @@ def descend(start: ClosedConfiguration, question: Measurement, pattern: Constrai
         if np.linalg.norm(fit.fun) < FOLLOWED:
             return here
     return None
+
+
+def lose(start: ClosedConfiguration, question: Measurement) -> ClosedConfiguration | None:
+    """A pose near ``start`` at which the relation itself loses its rank; None where there is none near.
+
+    Gauss-Newton on M(s) x, with x the twist that M sees least where s = 0 and M that of :func:`_seen`: its norm is the
+    smallest singular value, and at a zero its slope is that with x held.
+    """
+    def evaluate(at: ClosedConfiguration) -> tuple[Array, Array]:
+        rows = _seen(at, question)
+        x = np.linalg.svd(rows)[2][-1]
+        error = rows @ x
+        aside = [_stepped(at, NUDGE * motion) for motion in platform_motions(at, question).T]
+        return error, np.column_stack([(_seen(each, question) @ x - error) / NUDGE for each in aside])
+
+    def advance(at: ClosedConfiguration, found: Residual, factor: float) -> ClosedConfiguration | None:
+        normal = found.J.T @ found.J + factor * found.size**2 * np.eye(found.J.shape[1])
+        step = np.asarray(np.linalg.lstsq(normal, -(found.J.T @ found.error), rcond=INVERTED)[0], dtype=float)
+        there = _stepped(at, platform_motions(at, question) @ shortened(step, LONGEST_DESCENT))
+        return there if there.residual <= CLOSED else None
+
+    try:
+        there, left = gauss_newton.descend(start, evaluate, advance, DAMPING, RANK_STEPS,
+                                           lambda at: at.size <= FOLLOWED)
+    except NotMeasured:
+        return None
+    return there if left.size <= FOLLOWED else None
+
+
+def _seen(at: ClosedConfiguration, question: Measurement) -> Array:
+    """What is measured of each twist of the platform and, below, the part of the twist that the platform cannot have,
+    (rows, twist rows): a matrix that follows the pose without a jump, of the rank of the relation."""
+    found = relation(at, question)
+    back = np.linalg.pinv(found.twist_part, rcond=RANK_CUTOFF)
+    M = found.rates @ back
+    if found.dof.value < found.dimension:
+        still, _ = kernel_basis(found.twist_part, 1.0)
+        idle, _ = range_basis(found.rates @ still, 1.0)
+        M = M - idle @ (idle.T @ M)
+    return np.vstack([M, np.eye(found.twist_rows) - found.twist_part @ back])
