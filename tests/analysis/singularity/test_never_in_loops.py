@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -136,3 +137,21 @@ def test_the_inclination_of_a_legs_link_is_compared_with_the_rank():
     assert answer.condition.never
     assert answer.checked is not None
     assert answer.checked.largest_angle < 1e-9
+
+
+def test_a_second_direction_of_a_leg_may_fail_where_the_first_holds(tmp_path: Path):
+    """An arm and the rod on its U joint are watched: with the arm at rest the rod turns about the direction that is
+    seen of it where that lies along the joint's first axis."""
+    file, _, _, (a, _, _) = sliding_platform(0.8)
+    tree = ElementTree.fromstring(file)
+    slide, bend = (next(each for each in tree.iter("joint") if each.get("name") == name) for name in ("g0", "e0__1"))
+    arm = 0.3 * unit(np.cross(a, Z))
+    slide.set("type", "continuous")
+    (foot, turn), elbow = (next(slide.iter(each)) for each in ("origin", "axis")), next(bend.iter("origin"))
+    foot.set("xyz", text(np.array([float(x) for x in foot.attrib["xyz"].split()]) - arm))
+    turn.set("xyz", text(a))
+    elbow.set("xyz", text(arm))
+    next(tree.iter("hrsynth")).append(ElementTree.Element("observe", leg="1", link="s0", axis=text(unit(arm))))
+    _, answer = told(tmp_path, ElementTree.tostring(tree, "unicode"), "s0,r0")
+    assert answer.condition is not None
+    assert not answer.condition.never
