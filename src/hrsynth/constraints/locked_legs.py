@@ -48,6 +48,8 @@ class LockedLeg(Value):
     """Whether it is that of an observation."""
     spins: bool = False
     """Whether at special poses its end may turn about what is watched besides."""
+    held_by: tuple[str, ...] = ()
+    """The labels of the observations that hold it."""
 
     @property
     def turning(self) -> NamedVector | None:
@@ -161,7 +163,8 @@ def _virtual_leg(seen: Sight, camera: str, bodies: Sequence[str], symbol: str, e
     if (held in (1, 2) and at_tip is None) or (stopped in (1, 2) and turn is None) or stopped == 3:
         return None
     return LockedLeg(seen.leg, body, tip, at_tip if held == 2 else None, at_tip if held == 1 else None, held == 3,
-                     3 - stopped, turn if stopped == 2 else None, turn if stopped == 1 else None, eye, True)
+                     3 - stopped, turn if stopped == 2 else None, turn if stopped == 1 else None, eye, True,
+                     held_by=(seen.leg,))
 
 
 def _candidates(seen: Sight, symbol: str, link: str, reference: str, tip: BodyPoint,

@@ -296,7 +296,8 @@ def _held(anatomy: LegDecomposition, leg: Leg, locks: tuple[Observation, ...], r
         more = grows(leg, locks, reference, points, samples, translating) if everywhere else ""
         if more == "tip":
             continue
-        return LockedLeg(leg.label, leg.attach, spot, line, normal, shape[0] == 0, shape[1], spins=bool(more))
+        return LockedLeg(leg.label, leg.attach, spot, line, normal, shape[0] == 0, shape[1], spins=bool(more),
+                         held_by=tuple(dict.fromkeys(lock.leg for lock in locks)))
     return None
 
 

@@ -248,7 +248,7 @@ def _weakest(here: PatternValues, question: Measurement, condition: Condition) -
     angle = 0.0
     for leg in here.pattern.legs if named else ():
         for (rates, twists, _), block in zip(parts, here.allowances(leg), strict=True):
-            held, _ = kernel_basis(rates[labels == leg.label], 1.0)
+            held, _ = kernel_basis(rates[np.isin(labels, leg.held_by)], 1.0)
             angle = max(angle, float(np.linalg.norm(block @ twists @ held, 2)))
     return sigma, angle
 
