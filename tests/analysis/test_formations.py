@@ -369,6 +369,20 @@ def page() -> str:
     return path.read_text(encoding="utf-8").split("```xml\n")[1].split("```")[0]
 
 
+def test_the_record_of_a_body_and_a_fixed_one(tmp_path):
+    """Nothing that is observed is a segment, and the fixed link becomes the base: the file's own mobility is 6."""
+    file = tmp_path / "two.urdf"
+    file.write_text('<robot name="two"> <link name="ground"/> <link name="b1"/> <link name="b2"/> '
+                    '<joint name="f1" type="floating"> <parent link="ground"/> <child link="b1"/> </joint> '
+                    '<joint name="f2" type="fixed"> <parent link="ground"/> <child link="b2"/> '
+                    '<origin xyz="1 2 0.4"/> </joint> <hrsynth> <camera name="c1" link="b1"/> <camera name="c2" '
+                    'link="b2"/> <observe kind="point" leg="p" camera="c1" link="b2" at="0 0 0"/> '
+                    '<observe kind="position" leg="q" camera="c2" link="b1" at="0 0 0"/> </hrsynth> </robot>')
+    found = derive(file).to_dict()
+    assert found["mobility"]["as_written"] == {"total": 6, "idle": 0}
+    assert found["rank"] == 5
+
+
 def test_the_file_of_the_page_is_a_formation(page: str):
     found = native.parse(page)
     assert found.formation

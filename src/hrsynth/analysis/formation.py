@@ -116,7 +116,9 @@ class Similarities(Value):
         across = np.eye(3) - shifts @ shifts.T
         rows = np.vstack([np.zeros((0, 3)), *(across @ (hat(each[3:6]) + each[6] * np.eye(3)) for each in S.T)])
         shifted = (across @ S[:3]).T.ravel()
-        fixed = np.linalg.lstsq(rows, -shifted, rcond=None)[0] if len(rows) else np.zeros(3)
+        U, sizes, V = np.linalg.svd(rows, full_matrices=False)
+        told = sizes > NAMED  # of translations alone they are rounding, and tell no place
+        fixed = -V[told].T @ (U[:, told].T @ shifted / sizes[told])
         tied = np.linalg.norm(rows @ fixed + shifted) + np.linalg.norm(S[3:6] - axes @ (axes.T @ S[3:6]))
         if shifts.shape[1] + axes.shape[1] + scaled != S.shape[1] or tied > NAMED:
             return None

@@ -210,4 +210,5 @@ def sets_of(count: int) -> tuple[tuple[int, ...], ...]:
 def _chosen(sizes: tuple[int, ...]) -> Array:
     """1 in the rows of the rates that belong to each set, (sets, rows)."""
     owner = np.repeat(np.arange(len(sizes)), sizes)
-    return np.array([np.isin(owner, places) for places in sets_of(len(sizes))], dtype=float).reshape(-1, len(owner))
+    sets = [np.isin(owner, places) for places in sets_of(len(sizes))]
+    return np.array(sets, dtype=float).reshape(len(sets), len(owner))

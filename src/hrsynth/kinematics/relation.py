@@ -57,9 +57,9 @@ class Measurement(Value):
         """:meth:`target` of several configurations of one twin."""
         *_, X, _, values, _ = measure_together(at[0].twin, [each.q for each in at], self.reference, self.observations,
                                                (self.platform,))
-        ends = np.cumsum(self.sizes)[:-1]
+        ends = np.cumsum(self.sizes, dtype=int)
         return [Target(self.platform, x[0], self.point, self.reference,
-                       tuple(zip(self.observations, np.split(own, ends), strict=True)))
+                       tuple(zip(self.observations, np.split(own, ends)[:-1], strict=True)))
                 for x, own in zip(X, values, strict=True)]
 
     def rows(self, at: ClosedConfiguration, *, blind: frozenset[str] = frozenset()) -> Array:

@@ -42,6 +42,20 @@ class Leg:
         """Whether it is no chain of joints: loops lie inside it."""
         return len(self.joints) > len(self.links) + 1
 
+    def looped(self, mechanism: Mechanism) -> tuple[str, ...]:
+        """Its joints that lie in loops inside it, all links beside its own taken as two: the base and the platform."""
+        if not self.has_loops:
+            return ()
+        import networkx as nx
+
+        graph: nx.MultiGraph[str] = nx.MultiGraph()
+        for name in self.joints:
+            one, other = (end if end in self.links or end == mechanism.base else self.attach
+                          for end in mechanism.joints[name].links)
+            graph.add_edge(one, other, name)
+        bridges = set(map(frozenset, nx.bridges(graph)))
+        return tuple(name for one, other, name in graph.edges(keys=True) if frozenset((one, other)) not in bridges)
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LegDecomposition(Value):

@@ -25,7 +25,7 @@ from hrsynth.closed_forms.legs import OnCrank
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, PoseNotReached
 from hrsynth.geometry.balls import balls, below, centred, jets
-from hrsynth.geometry.vectors import cross, dot, triple
+from hrsynth.geometry.vectors import Array, cross, dot, triple
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.walking import random_walk
 from strategies import planar
@@ -374,3 +374,50 @@ def test_poses_that_there_are_not():
         path(robot, start="x=0", goal="x=9")
     with pytest.raises(BadRequest):
         path(robot, start="x=0", goal="z=0.1")
+
+
+def test_what_drives_a_crank_may_not_reach_and_is_not_certified(tmp_path):
+    """A 3-RRR whose third crank a rocker drives through a coupler: legs reach along the straight way, and half way the
+    coupler is 4 mm too long (law of cosines, rotation of the crank)."""
+    angle = np.pi / 2 + np.arange(3) * 2 * np.pi / 3
+    A, B = (size * np.stack([np.cos(angle + turn), np.sin(angle + turn), 0 * angle], 1)
+            for size, turn in ((0.5, 0.0), (0.15, 0.2)))
+    ways = (B - A) / np.linalg.norm(B - A, axis=1)[:, None]
+    E = (A + B) / 2 + 0.18 * np.cross([0, 0, 1], ways)
+    crank = (E - A)[2] / np.linalg.norm((E - A)[2])
+    T = A[2] + 0.15 * (0.8 * crank + 0.6 * np.cross([0, 0, 1], crank))
+    Q = A[2] + np.array([0.25, -0.1, 0])
+    S = Q + 0.04 * np.array([0.2, 0.98, 0])
+
+    def body(kind: str, name: str, ends: tuple[str, str], *at: Array) -> str:
+        names = ("parent", "child") if kind == "joint" else ("predecessor", "successor")
+        places = [f'<origin xyz="{" ".join(map(repr, each.tolist()))}"/>' for each in at]
+        inner = (f'<parent link="{ends[0]}"/><child link="{ends[1]}"/>{places[0]}' if kind == "joint" else "".join(
+            f'<{role} link="{end}">{place}</{role}>' for role, end, place in zip(names, ends, places, strict=True)))
+        return f'<{kind} name="{name}" type="continuous">{inner}<axis xyz="0 0 1"/></{kind}>'
+
+    parts = [f'<link name="{name}"/>' for name in ("base", "plate", "c0", "c1", "c2", "r0", "r1", "r2", "q", "s")]
+    for i in range(3):
+        parts += [body("joint", f"a{i}", ("base", f"c{i}"), A[i]),
+                  body("joint", f"e{i}", (f"c{i}", f"r{i}"), E[i] - A[i])]
+    parts += [body("joint", "b0", ("r0", "plate"), B[0] - E[0]), body("joint", "q", ("base", "q"), Q),
+              body("joint", "s", ("q", "s"), S - Q), body("loop", "t", ("s", "c2"), T - S, T - A[2])]
+    parts += [body("loop", f"b{i}", (f"r{i}", "plate"), B[i] - E[i], B[i] - B[0]) for i in (1, 2)]
+    parts += [f'<transmission name="m{name}"><joint name="{name}"/></transmission>' for name in ("a0", "a1", "q")]
+    file = tmp_path / "driven.urdf"
+    file.write_text(f'<robot name="driven">{"".join(parts)}<hrsynth><platform link="plate"/></hrsynth></robot>')
+
+    start, goal = np.array([0.068115, 0.119031, 0.184460]), np.array([-0.104844, 0.065367, -0.448774])
+    middle, least = start + 0.55 * (goal - start), np.linalg.norm(T - S) - np.linalg.norm(S - Q)
+    c, s = np.cos(middle[2]), np.sin(middle[2])
+    tip = np.array([*middle[:2], 0]) + np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ (B[2] - B[0]) - A[2]
+    far, arm, rod = (np.linalg.norm(each) for each in (tip, (E - A)[2], (B - E)[2]))
+    bend = np.sign(np.cross((E - A)[2], (B - E)[2])[2]) * np.arccos((arm**2 + far**2 - rod**2) / (2 * arm * far))
+    turned = np.arctan2(tip[1], tip[0]) - bend - np.arctan2((E - A)[2, 1], (E - A)[2, 0])
+    c, s = np.cos(turned), np.sin(turned)
+    assert np.linalg.norm(A[2] + np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ (T - A[2]) - Q) < least - 0.004
+
+    answer = path(file, observe="r0,r1,r2", **{name: "x={:.6f},y={:.6f},phi={:.6f}".format(*at)
+                                                for name, at in (("start", start), ("goal", goal))})
+    assert not answer.certified
+    assert "the loops inside leg 3" in answer.reason

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import combinations, permutations
 
 import numpy as np
@@ -13,7 +14,7 @@ from hrsynth.analysis.modes.modes import AssemblyModes, modes
 from hrsynth.certificates import certificate
 from hrsynth.errors import BadRequest, NoCertificate
 from hrsynth.families.formations import formation
-from hrsynth.geometry.vectors import Array
+from hrsynth.geometry.vectors import Array, frozen
 from hrsynth.present.show import text
 from strategies import random_rotation
 
@@ -174,6 +175,20 @@ def test_the_modes_of_a_prism_are_those_of_two_triangles_on_three_rods(seed: int
     found = modes(formation(places, [], PRISM, bodies="plane position"))
     assert len(found.modes) == expected <= 24
     require_modes(found, [], PRISM)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_what_is_moved_along_is_no_other_mode(seed: int):
+    """Distances between points aside of two origins, in a tilted common frame: translations alone are trivial, and no
+    two modes are alike but for one."""
+    rng = np.random.default_rng(seed)
+    made = formation(rng.normal(size=(2, 3)), distances=[(1, 2)] * 6, bodies="position", frame=random_rotation(rng))
+    seen = tuple(replace(each, leg=f"d{k}", at=frozen(rng.normal(size=3))) for k, each in enumerate(made.observations))
+    found = modes(replace(made, observations=seen))
+    assert found.formation is not None
+    assert (len(found.formation.trivial), found.formation.count) == (3, 0)
+    shapes = [np.diff(places_of(each)[0], axis=0) for each in found.modes]
+    assert all(np.abs(a - b).max() > 1e-5 for a, b in combinations(shapes, 2))
 
 
 def test_poses_and_motors_of_formations_are_refused():

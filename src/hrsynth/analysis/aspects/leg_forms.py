@@ -82,12 +82,16 @@ class LegPattern:
     points: tuple[str, ...]
     bounds: tuple[JointLimit, ...] = ()
     """Limits of joints that are kept."""
+    loose: tuple[str, ...] = ()
+    """Labels of legs with loops inside them of which the forms do not say that they close."""
 
     @property
     def fitted(self) -> tuple[str, ...]:
-        """What was fitted to samples and not read from the joints: legs, and vectors by their symbols."""
+        """What was fitted to samples and not read from the joints: legs, and vectors by their symbols; and the legs
+        whose inner loops are closed at samples alone."""
         legs = dict.fromkeys(f"leg {limb.label}" for limb in self.limbs if limb.fitted)
-        return (*legs, *(symbol for symbol, source in self.vectors.items() if source.fitted))
+        loops = (f"the loops inside leg {label}" for label in self.loose)
+        return (*legs, *(symbol for symbol, source in self.vectors.items() if source.fitted), *loops)
 
     def forms(self, at: ClosedConfiguration) -> LegForms:
         """The forms in a configuration's working mode; raises ``NoLegForm`` where a leg does not follow its form."""
@@ -117,7 +121,8 @@ def pattern(anatomy: LegDecomposition, features: Sequence[NamedVector], coordina
             raise NoLegForm(f"leg {leg.label} is neither a rod on a crank or rail nor a rod that slides")
         found += of_leg
     limbs, carried = (tuple(part) for part in zip(*found, strict=True)) if found else ((), ())
+    loose = tuple(leg.label for leg in anatomy.legs if not sight.closes(leg, carried))
     vectors = {f.symbol: sight.source(f, carried) for f in features}
     points = tuple(f.symbol for f in features if isinstance(f, BodyPoint))
     kept = tuple(bounds(sight, lambda feature: sight.source(feature, carried)))
-    return LegPattern(coordinates, limbs, carried, vectors, points, kept)
+    return LegPattern(coordinates, limbs, carried, vectors, points, kept, loose)

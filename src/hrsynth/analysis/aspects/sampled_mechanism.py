@@ -174,6 +174,16 @@ class SampledMechanism:
             return bool(np.linalg.norm(np.cross(arm, slide.axis)) <= EXACT * max(1.0, float(np.linalg.norm(arm))))
         return foot.type is JointType.REVOLUTE and bool(abs(foot.axis @ slide.axis) <= EXACT)
 
+    def closes(self, leg: Leg, carried: Sequence[NamedVector]) -> bool:
+        """Whether the loops inside a leg close where its rods do: pose and limbs decide all joint centres in them. Of
+        other loops (a crank that a rocker drives) the forms say nothing, and they may not reach."""
+        for name in leg.looped(self.mechanism):
+            joint = self.mechanism.joints[name]
+            known = (any(self.sources(self.centre(joint, link), carried)) for link in joint.links)
+            if joint.type is JointType.PRISMATIC or not any(known):
+                return False
+        return True
+
     def source(self, feature: NamedVector, carried: Sequence[NamedVector]) -> VectorExpression:
         """How a vector follows from pose and limbs: read from the joints where that can be, else fitted to samples."""
         found = list(self.sources(feature, carried))
