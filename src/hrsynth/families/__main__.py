@@ -22,6 +22,8 @@ def main(folder: str = "robots", *names: str) -> list[Path]:
     shipped, target = {robot.name: robot.make for robot in ROBOTS}, Path(folder)
     makers: dict[str, Callable[[], Mechanism]] = {
         **shipped, **{name: partial(_linkage, name) for name in LINKAGES}, "six_poses": six_poses}
+    if folder.startswith("-"):
+        raise BadRequest("an option", folder, "none: python -m hrsynth.families [FOLDER [NAME …]]")
     for name in names:
         if name not in makers:
             raise BadRequest("a robot to write", name, sorted(makers))

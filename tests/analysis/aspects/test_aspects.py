@@ -376,10 +376,11 @@ def test_poses_that_there_are_not():
         path(robot, start="x=0", goal="z=0.1")
 
 
-def test_what_drives_a_crank_may_not_reach_and_is_not_certified(tmp_path):
-    """A 3-RRR whose third crank a rocker drives through a coupler: legs reach along the straight way, and half way the
-    coupler is 4 mm too long (law of cosines, rotation of the crank)."""
-    angle = np.pi / 2 + np.arange(3) * 2 * np.pi / 3
+@pytest.mark.parametrize("legs", [3, 4])
+def test_what_drives_a_crank_may_not_reach_and_is_not_certified(legs, tmp_path):
+    """A 3-RRR, or 4-RRR, whose third crank a rocker drives through a coupler: legs reach along the straight way, and
+    half way the coupler is 4 mm too long (law of cosines, rotation of the crank). The third rod is watched or not."""
+    angle = np.pi / 2 + np.array([0, 2, 4, 1])[:legs] * np.pi / 3
     A, B = (size * np.stack([np.cos(angle + turn), np.sin(angle + turn), 0 * angle], 1)
             for size, turn in ((0.5, 0.0), (0.15, 0.2)))
     ways = (B - A) / np.linalg.norm(B - A, axis=1)[:, None]
@@ -396,13 +397,14 @@ def test_what_drives_a_crank_may_not_reach_and_is_not_certified(tmp_path):
             f'<{role} link="{end}">{place}</{role}>' for role, end, place in zip(names, ends, places, strict=True)))
         return f'<{kind} name="{name}" type="continuous">{inner}<axis xyz="0 0 1"/></{kind}>'
 
-    parts = [f'<link name="{name}"/>' for name in ("base", "plate", "c0", "c1", "c2", "r0", "r1", "r2", "q", "s")]
-    for i in range(3):
+    parts = [f'<link name="{name}"/>' for name in (
+        "base", "plate", "q", "s", *(f"{kind}{i}" for kind in "cr" for i in range(legs)))]
+    for i in range(legs):
         parts += [body("joint", f"a{i}", ("base", f"c{i}"), A[i]),
                   body("joint", f"e{i}", (f"c{i}", f"r{i}"), E[i] - A[i])]
     parts += [body("joint", "b0", ("r0", "plate"), B[0] - E[0]), body("joint", "q", ("base", "q"), Q),
               body("joint", "s", ("q", "s"), S - Q), body("loop", "t", ("s", "c2"), T - S, T - A[2])]
-    parts += [body("loop", f"b{i}", (f"r{i}", "plate"), B[i] - E[i], B[i] - B[0]) for i in (1, 2)]
+    parts += [body("loop", f"b{i}", (f"r{i}", "plate"), B[i] - E[i], B[i] - B[0]) for i in range(1, legs)]
     parts += [f'<transmission name="m{name}"><joint name="{name}"/></transmission>' for name in ("a0", "a1", "q")]
     file = tmp_path / "driven.urdf"
     file.write_text(f'<robot name="driven">{"".join(parts)}<hrsynth><platform link="plate"/></hrsynth></robot>')
@@ -417,7 +419,10 @@ def test_what_drives_a_crank_may_not_reach_and_is_not_certified(tmp_path):
     c, s = np.cos(turned), np.sin(turned)
     assert np.linalg.norm(A[2] + np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ (T - A[2]) - Q) < least - 0.004
 
-    answer = path(file, observe="r0,r1,r2", **{name: "x={:.6f},y={:.6f},phi={:.6f}".format(*at)
-                                                for name, at in (("start", start), ("goal", goal))})
+    ends = {name: "x={:.6f},y={:.6f},phi={:.6f}".format(*at) for name, at in (("start", start), ("goal", goal))}
+    answer = path(file, observe="r0,r1,r2" if legs == 3 else "r0,r1,r3", **ends)
+    assert answer.verdict == UNDECIDED
     assert not answer.certified
-    assert "the loops inside leg 3" in answer.reason
+    assert answer.road.reached < 0.55
+    if legs == 4:
+        assert "not whether the loops inside leg" in answer.reason

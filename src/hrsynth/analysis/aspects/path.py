@@ -300,6 +300,11 @@ class Aspects(Value):
             return replace(answer, reason=_unproved(found, enclosures, budget))
         if not leads(found.ways, (p[0], R[0]), (p[1], R[1]), enclosures):
             return replace(answer, reason="no path was proved: what was found does not lead from pose to pose")
+        if self.pattern.loose:
+            ends = answer.start.configuration, answer.goal.configuration
+            return replace(answer, road=self.road(*ends), reason=(
+                "the condition and the reach of all rods are enclosed along the path, not whether the loops inside leg "
+                f"{', '.join(self.pattern.loose)} close on it"))
         return replace(answer, verdict=SAME, certified=not fitted, margin=found.margin, reason=(
             f"the condition and the reach of all legs are enclosed away from zero along the path{forms}"))
 
