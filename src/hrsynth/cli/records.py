@@ -417,12 +417,14 @@ class ExampleRecord(TypedDict):
 
 
 class LocusField(TypedDict):
-    """Tables over the plane (null: not reached), and singular poses where the condition has no sign."""
+    """Tables over the plane (null: not reached); singular poses, and pieces of a curve of them, where the condition has
+    no sign."""
 
     expression: list[list[Number]]
     type2: list[list[Number]]
     type1: list[list[Number]]
     poses: list[list[float]]
+    curve: list[list[list[float]]]
 
 
 class LocusRecord(TypedDict):

@@ -209,9 +209,14 @@ def _drawn_locus(place: Any, plane: MapPlane, field: SingularityMap, name: str) 
     met = field.signed and plane.sign_change(place, field.value, colour, 2.0, style)
     if len(field.spots):
         place.plot(*plane.spots(field.spots), mark, color=colour, markeredgecolor="white", markersize=9)
-    shape = {"linestyle": style} if field.signed else {"linestyle": "", "marker": mark}
-    return entry(f"{name}: Type 2{'' if met or len(field.spots) else ' (none here)'}", color=colour, linewidth=2.0,
-                 **shape)
+    if len(field.curve):
+        from matplotlib.collections import LineCollection
+
+        pieces = np.stack(plane.at(field.curve[..., 0], field.curve[..., 1]), axis=-1)
+        place.add_collection(LineCollection(list(pieces), colors=colour, linewidths=2.0, linestyles=style))
+    shape = {"linestyle": style} if field.signed or len(field.curve) else {"linestyle": "", "marker": mark}
+    met = met or bool(len(field.spots) or len(field.curve))
+    return entry(f"{name}: Type 2{'' if met else ' (none here)'}", color=colour, linewidth=2.0, **shape)
 
 
 def _boundary(place: Any, plane: MapPlane, drawn: Locus) -> list[Any]:

@@ -11,10 +11,12 @@ import pytest
 
 from analysis.singularity.found import found
 from analysis.singularity.test_figures import centre
+from hrsynth.analysis.measured import MeasuredRobot
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.analysis.singularity.locus import Locus, framed
+from hrsynth.analysis.singularity.locus import Locus, _coordinates, framed
 from hrsynth.analysis.singularity.locus import locus as drawn
-from hrsynth.batch.reach import reach
+from hrsynth.analysis.singularity.rank_curve import PlaneOfPoses
+from hrsynth.batch.reach import reach, sweep
 from hrsynth.budgets import COARSE_GRID, LOCUS_SIDES
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, PlaneNotMet
@@ -120,6 +122,47 @@ def test_isolated_singular_poses_are_spots_of_a_plane() -> None:
     assert locus.grid.names == ("x", "z")
     assert not locus.hidden.signed
     assert np.min(np.abs(locus.hidden.spots[:, 0])) < 1e-7
+    assert len(locus.hidden.curve) == 0
+
+
+@pytest.mark.some(1)
+@pytest.mark.parametrize(("robot", "legs", "real", "plane"), [
+    ("3rrr_m1", None, False, "phi=0"), ("3rpr_m1", None, True, "phi=10deg"),
+    ("gough_stewart", "1,2,3", False, None), ("3rrr_m1", None, False, "phi=15deg")])
+def test_where_the_smallest_value_passes_through_zero_the_expression_does(
+        robot: str, legs: str | None, real: bool, plane: str | None) -> None:
+    """The curve knows the relation alone: its crossings of edges are the expression's, and in nine of ten
+    cells in which that changes its sign, or beside them, there is one."""
+    setting = ObservedRobot.of(robot, legs)
+    measured = MeasuredRobot.driven(setting) if real else MeasuredRobot.watched(setting)
+    located = drawn(setting, plane=plane, steps=STEPS)
+    start, motion, question = setting.everything.start, setting.motion, measured.question
+    configurations = sweep(start, setting.samples.question, located.grid, motion, setting.placer)
+    pieces = PlaneOfPoses(question, motion, located.grid).curve(configurations)
+    assert len(pieces) > 2
+    values = (located.real if real else located.hidden).value
+    assert (located.real if real else located.hidden).signed
+    size = np.nanmax(np.abs(values))
+    for piece in pieces:
+        for end in piece:
+            pose = replace(located.grid.fixed, **dict(zip(located.grid.names, end.tolist(), strict=True)))
+            at = reach(min((each for each in configurations if each is not None), key=lambda each: np.linalg.norm(
+                np.array(places(each, located, motion)) - end)), setting.samples.question, pose, motion)
+            assert abs(measured.condition.expressed(measured.pattern.values_at([at]))[0]) < 0.03 * size
+    (_, x), (_, y) = located.grid.axes
+    cell = np.array([x[1] - x[0], y[1] - y[0]])
+    changes = [(i, j) for i, j in np.ndindex(STEPS - 1, STEPS - 1)
+               if np.isfinite(values[i : i + 2, j : j + 2]).all()
+               and np.min(values[i : i + 2, j : j + 2]) < 0 < np.max(values[i : i + 2, j : j + 2])]
+    middles = pieces.mean(axis=1)
+    missed = [(i, j) for i, j in changes if np.abs((middles - [x[i], y[j]]) / cell - 0.5).max(axis=1).min() > 1]
+    assert len(changes) > 2
+    assert len(missed) <= 0.1 * len(changes)
+
+
+def places(at: ClosedConfiguration, located: Locus, motion: PlatformMotion) -> list[float]:
+    """The two coordinates of a pose that vary."""
+    return _coordinates(motion, at, located.grid.names)
 
 
 @pytest.mark.parametrize("degrees", range(5, 360, 50))

@@ -365,15 +365,15 @@ def descend(start: ClosedConfiguration, question: Measurement, pattern: Constrai
 def lose(start: ClosedConfiguration, question: Measurement) -> ClosedConfiguration | None:
     """A pose near ``start`` at which the relation itself loses its rank; None where there is none near.
 
-    Gauss-Newton on M(s) x, with x the twist that M sees least where s = 0 and M that of :func:`_seen`: its norm is the
-    smallest singular value, and at a zero its slope is that with x held.
+    Gauss-Newton on M(s) x, with x the twist that M sees least where s = 0 and M that of :func:`twists_seen`: its norm
+    is the smallest singular value, and at a zero its slope is that with x held.
     """
     def evaluate(at: ClosedConfiguration) -> tuple[Array, Array]:
-        rows = _seen(at, question)
+        rows = twists_seen(at, question)
         x = np.linalg.svd(rows)[2][-1]
         error = rows @ x
         aside = [_stepped(at, NUDGE * motion) for motion in platform_motions(at, question).T]
-        return error, np.column_stack([(_seen(each, question) @ x - error) / NUDGE for each in aside])
+        return error, np.column_stack([(twists_seen(each, question) @ x - error) / NUDGE for each in aside])
 
     def advance(at: ClosedConfiguration, found: Residual, factor: float) -> ClosedConfiguration | None:
         normal = found.J.T @ found.J + factor * found.size**2 * np.eye(found.J.shape[1])
@@ -389,7 +389,7 @@ def lose(start: ClosedConfiguration, question: Measurement) -> ClosedConfigurati
     return there if left.size <= FOLLOWED else None
 
 
-def _seen(at: ClosedConfiguration, question: Measurement) -> Array:
+def twists_seen(at: ClosedConfiguration, question: Measurement) -> Array:
     """What is measured of each twist of the platform and, below, the part of the twist that the platform cannot have,
     (rows, twist rows): a matrix that follows the pose without a jump, of the rank of the relation."""
     found = relation(at, question)

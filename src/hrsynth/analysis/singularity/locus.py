@@ -28,6 +28,7 @@ from ..measured import MeasuredRobot
 from ..observed import CameraLike, ObservedRobot, SeeLike
 from .agreement import descend, spectrum, weakest
 from .batch_spectrum import Quick
+from .rank_curve import PlaneOfPoses
 
 STARTS = 8
 """Valleys of the smallest singular value from which an isolated singular pose is sought."""
@@ -39,14 +40,15 @@ STEPS = 51
 @dataclass(frozen=True, eq=False, repr=False)
 class SingularityMap(Value):
     """A robot over a plane: the expression's value, the smallest singular value (Type 2 where zero) and the inverse of
-    the largest (Type 1 where zero), each (nx, ny), NaN where no pose is reached; ``spots`` are singular poses (k, 2)
-    where the locus is no curve."""
+    the largest (Type 1 where zero), each (nx, ny), NaN where no pose is reached; where the expression has no sign,
+    ``spots`` are singular poses (k, 2) that were found, and ``curve`` pieces (k, 2, 2) of the curve that was."""
 
     value: Array
     signed: bool
     type2: Array
     type1: Array
     spots: Array
+    curve: Array
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -68,7 +70,8 @@ class Locus(Value):
         return {"axes": {name: values.tolist() for name, values in self.grid.axes}, "fixed": self.grid.fixed.to_dict(),
                 "reached": self.reached,
                 **{name: field and {"expression": _table(field.value), "type2": _table(field.type2),
-                                    "type1": _table(field.type1), "poses": field.spots.tolist()}
+                                    "type1": _table(field.type1), "poses": field.spots.tolist(),
+                                    "curve": field.curve.tolist()}
                    for name, field in robots.items()}}
 
 
@@ -124,9 +127,12 @@ def _locus(hidden: MeasuredRobot, real: MeasuredRobot | None, plane: Pose | None
             table = np.full(len(configurations), np.nan)
             table[places] = column
             tables.append(table.reshape(grid.shape))
-        spots = np.zeros((0, 2)) if condition.signed or condition.never else _spots(
-            grid, [here[places.index(i)] for i in _valleys(tables[1])], measured)
-        return SingularityMap(tables[0], condition.signed, tables[1], tables[2], spots)
+        spots, curve = np.zeros((0, 2)), np.zeros((0, 2, 2))
+        if not (condition.signed or condition.never):
+            spots = _spots(grid, [here[places.index(i)] for i in _valleys(tables[1])], measured)
+            curve = PlaneOfPoses(measured.question, motion, grid).curve(configurations)
+            spots = _aside(spots, curve, grid)
+        return SingularityMap(tables[0], condition.signed, tables[1], tables[2], spots, curve)
 
     return Locus(grid, field(hidden), None if real is None else field(real))
 
@@ -246,6 +252,15 @@ def _same_mode(start: ClosedConfiguration, at: ClosedConfiguration, question: Me
     except PoseNotReached:
         return False
     return weakest(there, question) < SAME_RELATION
+
+
+def _aside(spots: Array, curve: Array, grid: Grid) -> Array:
+    """The singular poses that are more than a cell away from a curve."""
+    if not len(curve):
+        return spots
+    cell = np.array([values[1] - values[0] for _, values in grid.axes])
+    away = np.abs((spots[:, None] - curve.reshape(-1, 2)) / cell).max(axis=2).min(axis=1)
+    return np.asarray(spots[away > 1])
 
 
 def _spots(grid: Grid, starts: Sequence[ClosedConfiguration], measured: MeasuredRobot) -> Array:
