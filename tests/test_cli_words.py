@@ -172,3 +172,27 @@ def test_a_wrapped_column_keeps_its_words():
     assert max(map(len, lines)) <= 100
     assert " ".join(line[5:] for line in lines[2:-1]) == words
     assert [line[:1] for line in lines[2:]] == ["a", *" " * (len(lines) - 4), "b"]
+
+
+@pytest.mark.parametrize(("command", "told"), [
+    ("check 3rrr_m1 --at phi=10", "--at phi=10: radians, that is 573 degrees"),
+    ("check 3rrr_m1 --at x=0,phi=0.1 --at phi=-4", "--at phi=-4: radians, that is -229 degrees"),
+    ("path 3rrr_m1 --start phi=0 --goal phi=5", "--goal phi=5: radians, that is 286 degrees"),
+    ("check 3rrr_m1 --at phi=3", None), ("check 3rrr_m1 --at x=4,phi=0.2", None),
+    ("check 3rrr_m1 --at phi=10deg", None)])
+def test_a_turn_of_more_than_half_a_circle_without_a_unit_is_told_in_degrees(
+        command: str, told: str | None, capsys: pytest.CaptureFixture[str]) -> None:
+    capsys.readouterr()
+    execute(command.split())
+    said = capsys.readouterr().err
+    assert ("radians" in said) is (told is not None)
+    assert told is None or told in said
+
+
+@pytest.mark.parametrize(("command", "usual"), [
+    ("basins 3rrr_m1 --goal x=0", "--to"), ("endings 3rrr_m1 --to x=0", "--at"), ("path 3rrr_m1 --at x=0", "--goal")])
+def test_the_pose_of_a_question_is_named_where_another_name_is_given(
+        command: str, usual: str, capsys: pytest.CaptureFixture[str]) -> None:
+    capsys.readouterr()
+    assert execute(command.split()) == 2
+    assert f"allowed: {usual}, the pose that is asked about here" in capsys.readouterr().err

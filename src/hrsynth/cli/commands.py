@@ -15,6 +15,8 @@ from .options import NEEDED, OUTPUT, OWN, READING, WATCHING, Option, warn
 
 HELP = ("-h", "--help")
 HELP_ROW = (", ".join(HELP), "Show this message and exit.")
+POSES = ("--at", "--to", "--goal")
+"""What the pose of a question is called: where the robot is, where runs should end, where one way leads."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +76,9 @@ class DeclaredCommand:
         for name in (word.partition("=")[0] for word in plain if word.startswith("-") and word != "-"):
             from difflib import get_close_matches
 
+            if name in POSES and (own := [each for each in flags if each in POSES]):
+                usual = flags[own[-1]][0].names[0]
+                raise BadRequest(f"{self.name}: no such option", name, f"{usual}, the pose that is asked about here")
             if takers := [each.name for each in beside if any(name in option.names for option in each.options)]:
                 raise BadRequest(f"{self.name} has no such option", name, f"it goes with {', '.join(takers)}")
             raise BadRequest(f"{self.name}: no such option", name, get_close_matches(name, flags) or sorted(flags))

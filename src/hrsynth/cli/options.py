@@ -3,6 +3,7 @@ by them, the help and the completion of shells are made of them."""
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -175,6 +176,16 @@ def told_radians(option: str, text: str | None) -> None:
             continue
         warn(f"--{option} {field.strip()}: radians, that is {math.degrees(angle):.3g} degrees "
              f"({field.strip()}deg would be degrees)")
+
+
+def told_turns(option: str, text: object) -> None:
+    """Say how many degrees a turn of more than half a circle is that was given without a unit."""
+    for pose in text if isinstance(text, list) else [text]:
+        for field in pose.split(",") if isinstance(pose, str) else ():
+            name, _, value = field.partition("=")
+            with contextlib.suppress(ValueError):
+                if name.strip() == "phi" and math.pi < abs(float(value)) < math.inf:
+                    told_radians(option, field)
 
 
 def listed(text: str) -> list[str]:

@@ -27,6 +27,7 @@ from .options import (
     output,
     robot_of,
     told_radians,
+    told_turns,
     warn,
 )
 from .progress import Progress
@@ -79,6 +80,8 @@ class Question:
                 if path is not None:
                     require_other(path, source["robot"], mechanism.file)
                 each.require_drawable(path, mechanism, given)
+            for option in ("at", "start", "goal"):
+                told_turns(option, values.get(option))
             found = function(mechanism, **given)
             for option in ("cone", "noise"):
                 told_radians(option, values.get(option))

@@ -122,7 +122,7 @@ def require_closed(robot: str, loops: Sequence[tuple[JointSpec, Array, Array]], 
         joint = loops[worst][0]
         where = robot if joint.line is None else f"{robot}:{joint.line}"
         raise LoopsNotClosed(where, misses[worst], SAME_GEOMETRY, joint.name,
-                             "; ".join(filter(None, [cure(misses[worst]), "hrsynth lint says how it closes"])))
+                             "; ".join(filter(None, [cure(misses[worst]), "hrsynth lint looks for where it closes"])))
 
 
 def cure(opening: float) -> str:

@@ -266,8 +266,8 @@ def assembly(mode: AssemblyMode) -> list[str]:
         case "no":
             return [f"the real robot cannot be assembled there: {legs([leg for leg, _ in mode.misses])}",
                     *(f"leg {leg}: {miss}" for leg, miss in mode.misses)]
-    where = f"beyond the limits of {', '.join(mode.beyond)}" if mode.beyond else f"without {legs(mode.open)}"
-    return [f"the real robot was not found assembled there but {where}: that says nothing"]
+    where = f"beyond the limits of {', '.join(mode.beyond)}" if mode.beyond else f"with {legs(mode.open)} left open"
+    return [f"the real robot was found assembled there only {where}; whether it can be there otherwise is not known"]
 
 
 def path(found: PathAnswer) -> str:
