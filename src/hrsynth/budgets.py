@@ -135,7 +135,7 @@ SWEEP_DRAWN = 10_000
 
 WEAKEST_STARTS = 8
 """Further starts, the weakest poses of parts of the walk, where the walk crosses no singularity."""
-RANK_DESCENTS, RANK_STEPS = 6, 25
+RANK_DESCENTS, RANK_STEPS = 6, 40
 """Weakest poses from which the rank itself is led to zero, and steps of each."""
 COARSE_GRID = 25
 """Poses a side of the grid that finds how far a plane is reached."""

@@ -16,6 +16,8 @@ from analysis.singularity.found import found
 from analysis.singularity.test_conditions import CASES, HEAVY
 from hrsynth.analysis.singularity.agreement import Agreement, agreement, lose, weakest
 from hrsynth.analysis.singularity.singular import Singularity, singular
+from hrsynth.catalog.geometry import mechanism
+from hrsynth.catalog.words import parse
 from hrsynth.constraints.condition import Condition, condition
 from hrsynth.constraints.locked_legs import LockedLeg
 from hrsynth.constraints.pattern import ConstraintPattern, PatternValues
@@ -206,6 +208,14 @@ def test_where_the_rank_is_led_to_zero_the_expression_vanishes(robot: str, legs:
     for at in ends:
         assert weakest(at, answer.question) < RANK_CUTOFF
         assert abs(answer.condition.expressed(answer.pattern.values_at([at]))[0]) < 1e-6
+
+
+@pytest.mark.slow
+def test_the_rank_is_not_led_into_another_operation_mode() -> None:
+    """Steps that closed the loops anew led this platform from translations to turns, in which it loses one."""
+    answer = singular(mechanism(parse("3(Ra!-Rb*-Rb-Ra-Ra)"), 0), real=True, points=60)
+    assert answer.condition.never
+    assert answer.checked.disagreements == 0
 
 
 def test_the_right_condition_passes_again() -> None:

@@ -24,7 +24,7 @@ from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.relation import Measurement, platform_motions, relation
 from ...kinematics.tasks import DAMPING, shortened, solve
-from ...kinematics.walking import WEAKEST, random_walk
+from ...kinematics.walking import WEAKEST, lands_beside, random_walk
 from ...mechanism.sights import CameraObservation
 from ...progress import tell
 from ...results import Value
@@ -363,7 +363,8 @@ def descend(start: ClosedConfiguration, question: Measurement, pattern: Constrai
 
 
 def lose(start: ClosedConfiguration, question: Measurement) -> ClosedConfiguration | None:
-    """A pose near ``start`` at which the relation itself loses its rank; None where there is none near.
+    """A pose near ``start`` at which the relation itself loses its rank, on steps that follow the branch; None where
+    there is none near.
 
     Gauss-Newton on M(s) x, with x the twist that M sees least where s = 0 and M that of :func:`twists_seen`: its norm
     is the smallest singular value, and at a zero its slope is that with x held.
@@ -378,8 +379,11 @@ def lose(start: ClosedConfiguration, question: Measurement) -> ClosedConfigurati
     def advance(at: ClosedConfiguration, found: Residual, factor: float) -> ClosedConfiguration | None:
         normal = found.J.T @ found.J + factor * found.size**2 * np.eye(found.J.shape[1])
         step = np.asarray(np.linalg.lstsq(normal, -(found.J.T @ found.error), rcond=INVERTED)[0], dtype=float)
-        there = _stepped(at, platform_motions(at, question) @ shortened(step, LONGEST_DESCENT))
-        return there if there.residual <= CLOSED else None
+        tangent = platform_motions(at, question) @ shortened(step, LONGEST_DESCENT)
+        there = _stepped(at, tangent)
+        # not into another operation mode, nor beyond a singularity of the loops
+        follows = there.residual <= CLOSED and lands_beside(at, tangent, at.twin.moved(at.q, tangent), there)
+        return there if follows else None
 
     try:
         there, left = gauss_newton.descend(start, evaluate, advance, DAMPING, RANK_STEPS,
