@@ -130,5 +130,5 @@ def test_tables_fit_their_pages(site: Path, tab: Tab):
         > each.closest('.md-content__inner').getBoundingClientRect().width + 1)"""
     for page in sorted({*site.glob("*.html")} - {site / "404.html"}):
         tab.open(page)
-        tab.page.wait_for_load_state("load")
+        tab.page.wait_for_load_state("networkidle")
         assert not tab.page.evaluate(wide), page.name
