@@ -25,7 +25,7 @@ from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.locked import joint_at
 from ..mechanism import Joint, JointType, Mechanism, Observation
 from ..mechanism.composites import WordEdge, WordGraph
-from ..mechanism.graphs import adjacency, component, shortest_path
+from ..mechanism.graphs import adjacency, component, is_bridge, shortest_path
 from ..mechanism.legs import Leg
 from ..mechanism.observations.direction import Direction, SeenAxis
 from ..mechanism.observations.encoder import Encoder
@@ -205,8 +205,9 @@ def _contraction(mechanism: Mechanism, leg: Leg) -> WordGraph:
 
 def _bridge(words: WordGraph, edge: WordEdge) -> bool:
     """Whether nothing but this edge joins its two sides."""
-    rest = adjacency((), ((each.tail, each.head) for each in words.edges() if each is not edge))
-    return edge.tail not in rest or edge.head not in component(rest, edge.tail)
+    edges = list(words.edges())
+    place = next(k for k, each in enumerate(edges) if each is edge)
+    return is_bridge([(each.tail, each.head) for each in edges], place)
 
 
 def _lines(joint: Joint, start: str, samples: Sequence[ClosedConfiguration]) -> list[tuple[list[Array], list[Array]]]:

@@ -58,6 +58,13 @@ def components(graph: Adjacency, within: Container[str] | None = None) -> Iterat
             yield part
 
 
+def is_bridge(pairs: Sequence[tuple[str, str]], place: int) -> bool:
+    """Whether nothing else joins the two ends of the edge at this place among all edges."""
+    one, other = pairs[place]
+    rest = adjacency((one,), (pair for k, pair in enumerate(pairs) if k != place))
+    return other not in component(rest, one)
+
+
 def paths(graph: Adjacency, start: str, end: str, within: Container[str] | None = None) -> Iterator[list[str]]:
     """All ways from ``start`` to ``end`` that visit no node twice, depth first."""
     way, ahead = [start], [iter(graph[start])]

@@ -46,15 +46,10 @@ class Leg:
         """Its joints that lie in loops inside it, all links beside its own taken as two: the base and the platform."""
         if not self.has_loops:
             return ()
-        import networkx as nx
-
-        graph: nx.MultiGraph[str] = nx.MultiGraph()
-        for name in self.joints:
-            one, other = (end if end in self.links or end == mechanism.base else self.attach
-                          for end in mechanism.joints[name].links)
-            graph.add_edge(one, other, name)
-        bridges = set(map(frozenset, nx.bridges(graph)))
-        return tuple(name for one, other, name in graph.edges(keys=True) if frozenset((one, other)) not in bridges)
+        own = {*self.links, mechanism.base}
+        pairs = [(one if one in own else self.attach, other if other in own else self.attach)
+                 for one, other in (mechanism.joints[name].links for name in self.joints)]
+        return tuple(name for k, name in enumerate(self.joints) if not graphs.is_bridge(pairs, k))
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import Any, Protocol
 
@@ -269,10 +269,13 @@ class Grid(Value):
 
     def poses_at(self, cells: Iterable[Sequence[int]]) -> tuple[Pose, ...]:
         """The poses of cells, each given by its place on every axis."""
-        fixed = {name: getattr(self.fixed, name) for name in PARTS}
-        return tuple(Pose(**{**fixed, **{name: float(values[i]) for (name, values), i in zip(self.axes, cell,
-                                                                                            strict=True)}})
+        return tuple(self.pose([float(values[i]) for (_, values), i in zip(self.axes, cell, strict=True)])
                      for cell in cells)
+
+    def pose(self, values: Sequence[float]) -> Pose:
+        """The pose with these values of the parts that vary."""
+        given: dict[str, Any] = dict(zip(self.names, values, strict=True))
+        return replace(self.fixed, **given)
 
 
 def rpy_of(R: Array) -> tuple[float, float, float]:

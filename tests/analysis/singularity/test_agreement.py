@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 import strategies
 from analysis.singularity.found import found
 from analysis.singularity.test_conditions import CASES, HEAVY
-from hrsynth.analysis.singularity.agreement import Agreement, agreement, lose, weakest
+from hrsynth.analysis.singularity.agreement import Agreement, agreement, weakest
+from hrsynth.analysis.singularity.rank_descent import lose
 from hrsynth.analysis.singularity.singular import Singularity, singular
 from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.words import parse

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 from dataclasses import replace
 from functools import cache
+from itertools import product
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from analysis.singularity.found import found
 from analysis.singularity.test_figures import centre
 from hrsynth.analysis.measured import MeasuredRobot
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.analysis.singularity.locus import Locus, _coordinates, framed
+from hrsynth.analysis.singularity.locus import Locus, framed
 from hrsynth.analysis.singularity.locus import locus as drawn
 from hrsynth.analysis.singularity.rank_curve import PlaneOfPoses
 from hrsynth.batch.reach import reach, sweep
@@ -143,13 +144,13 @@ def test_where_the_smallest_value_passes_through_zero_the_expression_does(
     values = (located.real if real else located.hidden).value
     assert (located.real if real else located.hidden).signed
     size = np.nanmax(np.abs(values))
+    (_, x), (_, y) = located.grid.axes
+    reached = {place: at for place, at in zip(product(x, y), configurations, strict=True) if at is not None}
     for piece in pieces:
         for end in piece:
-            pose = replace(located.grid.fixed, **dict(zip(located.grid.names, end.tolist(), strict=True)))
-            at = reach(min((each for each in configurations if each is not None), key=lambda each: np.linalg.norm(
-                np.array(places(each, located, motion)) - end)), setting.samples.question, pose, motion)
+            near = min(reached, key=lambda place: np.linalg.norm(np.subtract(place, end)))
+            at = reach(reached[near], setting.samples.question, located.grid.pose(end.tolist()), motion)
             assert abs(measured.condition.expressed(measured.pattern.values_at([at]))[0]) < 0.03 * size
-    (_, x), (_, y) = located.grid.axes
     cell = np.array([x[1] - x[0], y[1] - y[0]])
     changes = [(i, j) for i, j in np.ndindex(STEPS - 1, STEPS - 1)
                if np.isfinite(values[i : i + 2, j : j + 2]).all()
@@ -158,11 +159,6 @@ def test_where_the_smallest_value_passes_through_zero_the_expression_does(
     missed = [(i, j) for i, j in changes if np.abs((middles - [x[i], y[j]]) / cell - 0.5).max(axis=1).min() > 1]
     assert len(changes) > 2
     assert len(missed) <= 0.1 * len(changes)
-
-
-def places(at: ClosedConfiguration, located: Locus, motion: PlatformMotion) -> list[float]:
-    """The two coordinates of a pose that vary."""
-    return _coordinates(motion, at, located.grid.names)
 
 
 @pytest.mark.parametrize("degrees", range(5, 360, 50))

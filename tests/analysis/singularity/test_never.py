@@ -101,18 +101,23 @@ def test_what_is_not_found_is_not_said_not_to_be():
     assert "no pose" not in text
 
 
+def sliding_leg(random: np.random.Generator, k: int) -> tuple[Array, Array, Array, Array]:
+    """Of the k-th of three legs about the vertical: foot and end of its rod, first axis at the foot, rail."""
+    t = 2 * np.pi * k / 3
+    b = np.array([0.5 * np.cos(t), 0.5 * np.sin(t), -0.1]) + random.normal(size=3) * 0.03
+    c = np.array([0.08 * np.cos(t), 0.08 * np.sin(t), -0.4]) + random.normal(size=3) * 0.02
+    a = unit(np.array([-np.sin(t), np.cos(t), 0.0]) + random.normal(size=3) * 0.35)
+    return b, c, a, unit(np.array([np.cos(t), np.sin(t), -0.3]) + random.normal(size=3) * 0.2)
+
+
 def sliding_platform(watched: float) -> tuple[str, Array, list[Array], list[Array]]:
     """A 3-PUU that translates, as text; leg 1 is watched along a direction of its rod at an angle to the rod, normal to
     the U joint's second axis. With it that direction, and rails, first axes and rods of the legs."""
     random, rows, ends = np.random.default_rng(0), [], []
     rails, firsts, rods = [], [], []
     for k in range(3):
-        t = 2 * np.pi * k / 3
-        b = np.array([0.5 * np.cos(t), 0.5 * np.sin(t), -0.1]) + random.normal(size=3) * 0.03
-        c = np.array([0.08 * np.cos(t), 0.08 * np.sin(t), -0.4]) + random.normal(size=3) * 0.02
-        a = unit(np.array([-np.sin(t), np.cos(t), 0.0]) + random.normal(size=3) * 0.35)
+        b, c, a, rail = sliding_leg(random, k)
         rod, second = c - b, unit(np.cross(a, c - b))
-        rail = unit(np.array([np.cos(t), np.sin(t), -0.3]) + random.normal(size=3) * 0.2)
         for kind, name, parent, child, at, axis in (
                 ("prismatic", "g", "base", "s", b, rail), ("continuous", "e{}__1", "s", "h", 0 * b, a),
                 ("continuous", "e{}__2", "h", "r", 0 * b, second)):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.linalg import null_space
 
-from analysis.singularity.test_never import singular_place, sliding_platform, text
+from analysis.singularity.test_never import singular_place, sliding_leg, sliding_platform, text
 from hrsynth.analysis.check import check
 from hrsynth.analysis.singularity.singular import Singularity, singular
 from hrsynth.geometry.vectors import Array, unit
@@ -31,12 +31,8 @@ def parallelograms(watched: float) -> tuple[str, Array, list[Array], list[Array]
     rows, rails, firsts, rods, ends, home = [], [], [], [], [], np.zeros(3)
     zero = np.zeros(3)
     for k in range(3):
-        t = 2 * np.pi * k / 3
-        b = np.array([0.5 * np.cos(t), 0.5 * np.sin(t), -0.1]) + random.normal(size=3) * 0.03
-        c = np.array([0.08 * np.cos(t), 0.08 * np.sin(t), -0.4]) + random.normal(size=3) * 0.02
-        a = unit(np.array([-np.sin(t), np.cos(t), 0.0]) + random.normal(size=3) * 0.35)
+        b, c, a, rail = sliding_leg(random, k)
         rod, second = c - b, unit(np.cross(a, c - b))
-        rail = unit(np.array([np.cos(t), np.sin(t), -0.3]) + random.normal(size=3) * 0.2)
         w = 0.06 * a + 0.01 * unit(np.cross(second, a))
         rows += [joint(f"g{k}", "prismatic", "base", f"s{k}", b, rail),
                  joint(f"e{k}", "continuous", f"s{k}", f"h{k}", zero, a),

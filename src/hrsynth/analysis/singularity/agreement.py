@@ -13,29 +13,25 @@ from itertools import pairwise
 import numpy as np
 
 from ...batch.placing import Placer
-from ...budgets import RANK_DESCENTS, RANK_STEPS, WEAKEST_STARTS
+from ...budgets import RANK_DESCENTS, WEAKEST_STARTS
 from ...constraints.condition import Condition, Named
 from ...constraints.pattern import ConstraintPattern, PatternValues
 from ...errors import Disagreement, NotMeasured
-from ...geometry import gauss_newton
-from ...geometry.gauss_newton import Residual
-from ...geometry.ranks import kernel_basis, range_basis
+from ...geometry.ranks import kernel_basis
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.relation import Measurement, platform_motions, relation
-from ...kinematics.tasks import DAMPING, shortened, solve
-from ...kinematics.walking import WEAKEST, lands_beside, random_walk
+from ...kinematics.walking import WEAKEST, random_walk
 from ...mechanism.sights import CameraObservation
 from ...progress import tell
 from ...results import Value
-from ...tolerances import CLOSED, FOLLOWED, INVERTED, NUDGE, RANK_CUTOFF, RANK_GAP, SAME_RELATION, SAME_SPOT, SHARP
+from ...tolerances import CLOSED, FOLLOWED, INVERTED, NUDGE, RANK_CUTOFF, RANK_GAP, SAME_RELATION, SAME_SPOT
 from .batch_spectrum import SPOTS, Quick
+from .rank_descent import lose, rates_of_twists, stepped
 
 CHUNK = 250
 ON_LOCUS = 10
 """Poses on the locus that are constructed, where there are so many."""
-LONGEST_DESCENT = 0.3
-"""Longest step (characteristic lengths, radians) of a descent to where the rank is lost."""
 TRIES = 4
 """Weakest poses from which a pose is sought on a locus across which the expression has no sign, or none was met."""
 
@@ -137,7 +133,7 @@ def agreement(start: ClosedConfiguration, question: Measurement, pattern: Constr
     for _, weak in [*low, *others][:RANK_DESCENTS]:
         at = lose(weak, question)
         if at is not None and not _beside(at, question, loops, freedoms):
-            wrong += _is_missed(at, pattern, condition)
+            wrong += _is_missed(at, question, pattern, condition)
     found = Agreement(met, wrong, angle, smallest, (positive, negative), tuple(on_locus), searches)
     if wrong or angle > RANK_CUTOFF * RANK_GAP:
         raise Disagreement(start.twin.mechanism.name, wrong, angle)
@@ -176,13 +172,14 @@ def _beside(at: ClosedConfiguration, question: Measurement, loops: float, freedo
             or relation(at, question).dof.value < freedoms)
 
 
-def _is_missed(at: ClosedConfiguration, pattern: ConstraintPattern, condition: Condition) -> bool:
+def _is_missed(at: ClosedConfiguration, question: Measurement, pattern: ConstraintPattern, condition: Condition
+               ) -> bool:
     """Whether the rows behind the words clearly keep their rank where the relation loses its own."""
     try:
         rows = condition.rows(pattern.values_at([at]))
     except NotMeasured:
         return False
-    return bool(smallest_of(rows)[0] > RANK_CUTOFF * RANK_GAP)
+    return bool(_differ(_relations([at], question)[0], smallest_of(rows))[0])
 
 
 def smallest_of(rows: Array) -> Array:
@@ -224,18 +221,10 @@ def _relations(chunk: Sequence[ClosedConfiguration], question: Measurement, bodi
     sigma, parts = [], []
     for at in chunk:
         found = relation(at, replace(question, bodies=bodies))
-        twists, rates = found.twist_part, found.rates
-        _, s, Vt = np.linalg.svd(twists, full_matrices=False)
-        kept = int(np.sum(s > RANK_CUTOFF))
-        back = Vt[:kept].T / s[:kept]
-        M = rates @ back
-        if kept < found.dimension:
-            still, _ = kernel_basis(twists, 1.0)
-            idle, _ = range_basis(rates @ still, 1.0)
-            M = M - idle @ (idle.T @ M)
-        values = np.linalg.svd(M, compute_uv=False) if kept else np.zeros(1)
-        sigma.append(float(values[-1]) if kept <= len(M) else 0.0)
-        parts.append((rates, found.basis[found.twist_rows + len(rates) :], float(values[0])))
+        M, _ = rates_of_twists(found)
+        values = np.linalg.svd(M, compute_uv=False) if M.shape[1] else np.zeros(1)
+        sigma.append(float(values[-1]) if M.shape[1] <= len(M) else 0.0)
+        parts.append((rates := found.rates, found.basis[found.twist_rows + len(rates) :], float(values[0])))
     return np.array(sigma), parts
 
 
@@ -268,7 +257,7 @@ def _crossings(walk: Sequence[ClosedConfiguration], signs: Sequence[float], patt
             continue
 
         def there(fraction: float, one: ClosedConfiguration = one, step: Array = step) -> ClosedConfiguration:
-            return _stepped(one, fraction * step)
+            return stepped(one, fraction * step)
 
         def value(fraction: float, there: Callable[[float], ClosedConfiguration] = there) -> float:
             return float(condition.expressed(pattern.values_at([there(fraction)]))[0])
@@ -280,12 +269,6 @@ def _crossings(walk: Sequence[ClosedConfiguration], signs: Sequence[float], patt
         if root.residual <= CLOSED:
             found = _sharpened(ClosedConfiguration.of(twin, root.q), step, pattern, condition)
             yield found if abs(float(condition.expressed(pattern.values_at([found]))[0])) <= FOLLOWED else None
-
-
-def _stepped(here: ClosedConfiguration, step: Array) -> ClosedConfiguration:
-    """Where a step (nv,) leads, closed as sharply as it can be; that it is closed its residual tells."""
-    q, residual = solve(here.twin, here.twin.moved(here.q, step), tolerance=SHARP)
-    return ClosedConfiguration(here.twin, q, residual)
 
 
 def _sharpened(at: ClosedConfiguration, step: Array, pattern: ConstraintPattern, condition: Condition
@@ -336,7 +319,7 @@ def descend(start: ClosedConfiguration, question: Measurement, pattern: Constrai
         shape, x0 = start_rows.shape, np.linalg.svd(start_rows)[2][-1]
 
         def reached(s: Array, here: ClosedConfiguration = here, motion: Array = motion) -> ClosedConfiguration:
-            return _stepped(here, motion @ s)
+            return stepped(here, motion @ s)
 
         def residuals(z: Array, count: int = count, shape: tuple[int, ...] = shape,
                       reached: Callable[[Array], ClosedConfiguration] = reached) -> Array:
@@ -360,47 +343,3 @@ def descend(start: ClosedConfiguration, question: Measurement, pattern: Constrai
         if np.linalg.norm(fit.fun) < FOLLOWED:
             return here
     return None
-
-
-def lose(start: ClosedConfiguration, question: Measurement) -> ClosedConfiguration | None:
-    """A pose near ``start`` at which the relation itself loses its rank, on steps that follow the branch; None where
-    there is none near.
-
-    Gauss-Newton on M(s) x, with x the twist that M sees least where s = 0 and M that of :func:`twists_seen`: its norm
-    is the smallest singular value, and at a zero its slope is that with x held.
-    """
-    def evaluate(at: ClosedConfiguration) -> tuple[Array, Array]:
-        rows = twists_seen(at, question)
-        x = np.linalg.svd(rows)[2][-1]
-        error = rows @ x
-        aside = [_stepped(at, NUDGE * motion) for motion in platform_motions(at, question).T]
-        return error, np.column_stack([(twists_seen(each, question) @ x - error) / NUDGE for each in aside])
-
-    def advance(at: ClosedConfiguration, found: Residual, factor: float) -> ClosedConfiguration | None:
-        normal = found.J.T @ found.J + factor * found.size**2 * np.eye(found.J.shape[1])
-        step = np.asarray(np.linalg.lstsq(normal, -(found.J.T @ found.error), rcond=INVERTED)[0], dtype=float)
-        tangent = platform_motions(at, question) @ shortened(step, LONGEST_DESCENT)
-        there = _stepped(at, tangent)
-        # not into another operation mode, nor beyond a singularity of the loops
-        follows = there.residual <= CLOSED and lands_beside(at, tangent, at.twin.moved(at.q, tangent), there)
-        return there if follows else None
-
-    try:
-        there, left = gauss_newton.descend(start, evaluate, advance, DAMPING, RANK_STEPS,
-                                           lambda at: at.size <= FOLLOWED)
-    except NotMeasured:
-        return None
-    return there if left.size <= FOLLOWED else None
-
-
-def twists_seen(at: ClosedConfiguration, question: Measurement) -> Array:
-    """What is measured of each twist of the platform and, below, the part of the twist that the platform cannot have,
-    (rows, twist rows): a matrix that follows the pose without a jump, of the rank of the relation."""
-    found = relation(at, question)
-    back = np.linalg.pinv(found.twist_part, rcond=RANK_CUTOFF)
-    M = found.rates @ back
-    if found.dof.value < found.dimension:
-        still, _ = kernel_basis(found.twist_part, 1.0)
-        idle, _ = range_basis(found.rates @ still, 1.0)
-        M = M - idle @ (idle.T @ M)
-    return np.vstack([M, np.eye(found.twist_rows) - found.twist_part @ back])

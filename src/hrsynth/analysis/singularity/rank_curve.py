@@ -9,7 +9,7 @@ the value as large as the edge is away from it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,7 @@ from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
 from ...kinematics.relation import Measurement
 from ...mechanism.pose import Grid
-from .agreement import twists_seen
+from .rank_descent import twists_seen
 
 HALVINGS, LEFT, FALLS = 6, 0.1, 0.75
 """How often an edge is halved at most, which part of the value at its ends may be left, and which in its middle: half
@@ -93,9 +93,8 @@ class PlaneOfPoses:
 
     def _between(self, one: _Weakest, other: _Weakest) -> _Weakest | None:
         place = (one.place + other.place) / 2
-        pose = replace(self.grid.fixed, **dict(zip(self.grid.names, place.tolist(), strict=True)))
         try:
-            at = reach(one.at, self.question, pose, self.motion)
+            at = reach(one.at, self.question, self.grid.pose(place.tolist()), self.motion)
         except PoseNotReached:
             return None
         return self._weakest(at, place)
