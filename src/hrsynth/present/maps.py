@@ -216,7 +216,8 @@ def _drawn_locus(place: Any, plane: MapPlane, field: SingularityMap, name: str) 
         place.add_collection(LineCollection(list(pieces), colors=colour, linewidths=2.0, linestyles=style))
     shape = {"linestyle": style} if field.signed or len(field.curve) else {"linestyle": "", "marker": mark}
     met = met or bool(len(field.spots) or len(field.curve))
-    return entry(f"{name}: Type 2{'' if met else ' (none here)'}", color=colour, linewidth=2.0, **shape)
+    lacking = "" if met else " (never)" if field.never else " (none found)"
+    return entry(f"{name}: Type 2{lacking}", color=colour, linewidth=2.0, **shape)
 
 
 def _boundary(place: Any, plane: MapPlane, drawn: Locus) -> list[Any]:
