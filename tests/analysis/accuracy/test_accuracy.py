@@ -24,6 +24,7 @@ from hrsynth.geometry.vectors import Array
 from hrsynth.mechanism.pose import Grid
 from hrsynth.present.maps import _error_entries, _locus
 from hrsynth.present.plots import MapPlane
+from hrsynth.present.show import text
 from hrsynth.present.text import runs
 from kinematics.robots import ROBOTS
 from strategies import parallel_robots
@@ -258,6 +259,25 @@ def test_the_curve_of_a_plane_that_is_swept_is_where_the_cranks_are_parallel() -
 def test_a_box_without_a_determinant_says_that_nothing_is_drawn() -> None:
     found = accuracy(load("quattro_rigid"), cone=CONE, grid="x=-0.3:0.3:5,y=-0.3:0.3:5,z=-0.8:-0.6:3")
     assert "Type 2 singularities are not drawn" in legend(found)
+
+
+@pytest.mark.parametrize(("robot", "grid"), [
+    ("quattro", "x=0.1:0.2:2,z=-0.7"), ("gough_stewart", "x=0.03:0.04:2,phi=10deg"),
+    ("gough_stewart", "y=0.03:0.04:2,rpy=5deg/0/0"), ("3rrr_m1", "x=0.05:0.06:2,phi=0.1:0.2:2"),
+    ("prrrp_m1", "x=0.01:0.02:2")])
+def test_the_pose_that_a_grid_holds_is_told_whole(robot: str, grid: str) -> None:
+    """Asked at what varies and what is told to be held, the error is that of the grid's first pose."""
+    found = accuracy(load(robot), cone=CONE, grid=grid)
+    assert found.field is not None
+    told = re.search(r"^held +(.*)$", text(found), re.MULTILINE)
+    assert told is not None
+    if robot == "prrrp_m1":
+        assert told[1] == "nothing; free, at each pose nearest to the zero configuration: y, phi"
+        return
+    assert {"x", "y", "z"} <= {each.split("=")[0] for each in f"{grid},{told[1]}".split(",")}
+    first = ",".join(f"{name}={float(values[0])!r}" for name, values in found.field.grid.axes)
+    (alone,) = accuracy(load(robot), cone=CONE, at=f"{first},{told[1]}").poses
+    assert alone.position.largest == pytest.approx(float(found.field.position.ravel()[0]), rel=1e-5)
 
 
 def legend(found: Accuracy) -> list[str]:
