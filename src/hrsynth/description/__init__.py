@@ -122,9 +122,9 @@ def save(mechanism: Mechanism | str | Path, path: str | Path, dialect: str | Non
 
     ``dialect`` is ``native``, ``gepetto``, ``mjcf``, ``sdf`` or ``usd``; without it the file's ending decides:
     ``.urdf`` native, ``.xml`` and ``.mjcf`` MJCF, ``.sdf`` SDFormat, ``.usda``, ``.usd`` and ``.usdc`` USD, ``.yaml``
-    Gepetto (with a ``.urdf`` of the same name beside it). A file beside the one named is not replaced by other content.
-    Meshes stay where they are and are named from the new file's folder; with ``meshes="copy"`` they are copied into
-    ``meshes/`` beside it.
+    Gepetto (with a ``.urdf`` of the same name beside it). A file beside the one named is not replaced by other content,
+    and none that is read together with a file that stays. Meshes stay where they are and are named from the new file's
+    folder; with ``meshes="copy"`` they are copied into ``meshes/`` beside it.
 
     Raises
     ------
@@ -148,12 +148,23 @@ def save(mechanism: Mechanism | str | Path, path: str | Path, dialect: str | Non
         for file, content in contents.items():
             if file != target:
                 require_same(file, content)
+            _require_whole(file, contents)
         for file, content in contents.items():
             write_whole(file, content)
     except BaseException:
         taken_back(new)
         raise
     return (*found.lost, *notes)
+
+
+def _require_whole(file: Path, others: Iterable[Path]) -> None:
+    """Raise ``BadRequest`` where a file that is to be replaced is read together with one that stays."""
+    partners = [each.partner(file) for each in formats.dialects().values() if os.path.isfile(file)]
+    written = set(map(os.path.realpath, others))
+    for partner in filter(None, partners):
+        if os.path.realpath(partner) not in written:
+            raise BadRequest(f"cannot write the file: {partner.name} beside it is read together with it", str(file),
+                             f"another name, or {partner.name} moved away")
 
 
 def _dialect(target: Path, name: str | None) -> Dialect:

@@ -71,12 +71,18 @@ def one_file(path: Path) -> tuple[Path, ...]:
     return (path,)
 
 
+def alone(path: Path) -> Path | None:
+    """No other file is read together with one."""
+    return None
+
+
 @dataclass(frozen=True)
 class Dialect:
     """A dialect's name (that of its folder), how its files are known by their content, and the endings of those that it
     writes: none where it is only read. ``files`` are all that are written where one is named, the robot first;
     ``packed`` makes the bytes of a file of its text. ``begins`` is what its files begin with where they are no XML,
-    ``meshes`` the endings of the meshes that it can name, None where any.
+    ``meshes`` the endings of the meshes that it can name, None where any. ``partner`` is the file on the disk that is
+    read together with one.
 
     A file is of the first dialect that knows it, in the order of ``rank``.
     """
@@ -89,3 +95,4 @@ class Dialect:
     begins: tuple[bytes, ...] = ()
     packed: Callable[[str, Path], bytes] = as_text
     meshes: tuple[str, ...] | None = None
+    partner: Callable[[Path], Path | None] = alone

@@ -81,6 +81,24 @@ def test_an_unknown_dialect_is_refused_and_the_given_one_counts(tmp_path: Path):
     assert load(tmp_path / "a.txt").differences(load("3rps")) == []
 
 
+@pytest.mark.parametrize(("tree", "loops"), [("a", "a"), ("tree", "loops"), ("robot", "robot")])
+def test_of_two_files_that_are_read_together_none_is_replaced_alone(tmp_path: Path, tree: str, loops: str):
+    save(load("3rrr_m1"), tmp_path / "a.yaml")
+    pair = [(tmp_path / "a.urdf").rename(tmp_path / f"{tree}.urdf"),
+            (tmp_path / "a.yaml").rename(tmp_path / f"{loops}.yaml")]
+    before = [each.read_bytes() for each in pair]
+    assert load(pair[1]).differences(load("3rrr_m1")) == []
+    for path, other in (pair, pair[::-1]):
+        words = "with other content" if tree == loops and path is pair[1] else f"{other.name} beside it"
+        with pytest.raises(BadRequest, match=words) as caught:
+            save(load("delta"), path)
+        assert "another name" in str(caught.value)
+        assert len(caught.value.lines()) == 1
+    assert [each.read_bytes() for each in pair] == before
+    save(load("delta"), tmp_path / "delta.urdf")
+    save(load("delta"), tmp_path / "delta.urdf")
+
+
 @pytest.mark.parametrize("name", ROBOTS)
 def test_mujoco_loads_what_is_written_and_counts_the_same_freedoms(name: str):
     mujoco = pytest.importorskip("mujoco")

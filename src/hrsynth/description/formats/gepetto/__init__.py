@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from ...dialect import Dialect, RobotFile
-from .settings import ENDINGS, settings_beside
+from .settings import ENDINGS, partner, settings_beside
 
 
 def _files(path: Path) -> tuple[Path, ...]:
@@ -16,4 +16,4 @@ def _knows(file: RobotFile) -> bool:
     return file.root is None or settings_beside(file) is not None
 
 
-DIALECT = Dialect("gepetto", _knows, ENDINGS, _files, rank=-1)
+DIALECT = Dialect("gepetto", _knows, ENDINGS, _files, rank=-1, partner=partner)

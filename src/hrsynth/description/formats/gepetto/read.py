@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from ....errors import BadRobotFile
 from ....geometry.vectors import Array
 from ....mechanism.model import JointType, Motor, Note
 from ... import xml
@@ -16,7 +15,7 @@ from ...chains import CUT, END, WELD
 from ...dialect import RobotFile
 from ...jointgraph import FrameSpec, JointGraph
 from ..urdf.read import read as read_urdf
-from .settings import KEYS, frames_of, in_folder, settings_beside, settings_in
+from .settings import KEYS, frames_of, settings_beside, settings_in, urdf_beside
 
 TYPES = {"SPHERICAL": JointType.SPHERICAL, "FIXED": JointType.FIXED, "UJOINT": JointType.UNIVERSAL,
          "UNIVERSAL": JointType.UNIVERSAL, "REVOLUTE": JointType.REVOLUTE, "PRISMATIC": JointType.PRISMATIC,
@@ -27,7 +26,7 @@ def read(file: RobotFile) -> JointGraph:
     """The joint graph of either file of the two."""
     found = settings_beside(file)
     beside, settings = (file.path, settings_in(file.path)) if found is None else found
-    path = _urdf_beside(file.path, frames_of(settings or {})) if found is None else file.path
+    path = urdf_beside(file.path, frames_of(settings or {})) if found is None else file.path
     if settings is None:
         raise xml.refusal(beside, "none of the keys of this dialect", ", ".join(KEYS))
     notes: list[Note] = []
@@ -38,27 +37,6 @@ def read(file: RobotFile) -> JointGraph:
     if beside.stem != path.stem:
         graph.note("guess", f"closures and motors are those of {beside.name}, beside {path.name}: it names its frames")
     return _Settings(graph, beside, settings).apply()
-
-
-def _urdf_beside(settings: Path, frames: set[str]) -> Path:
-    """The URDF of the same name, ``robot.urdf``, or the only one that has the frames; raises ``BadRobotFile``."""
-    for name in (settings.with_suffix(".urdf").name, "robot.urdf"):
-        if settings.with_name(name).is_file():
-            return settings.with_name(name)
-    others = [path for path in in_folder(settings, ".urdf") if frames and frames <= _names_in(path)]
-    if len(others) == 1:
-        return others[0]
-    raise xml.refusal(settings, f"{len(others) or 'no'} URDF file beside the YAML file" + (
-        " that has the frames of its closures" if others or frames else ""), settings.with_suffix(".urdf").name)
-
-
-def _names_in(path: Path) -> set[str]:
-    """The names of a URDF's links and joints; none where it is no such file."""
-    try:
-        root = xml.document(xml.content(path), str(path), [])
-    except BadRobotFile:
-        return set()
-    return {str(each.get("name")) for each in root.iter("link", "joint")}
 
 
 class _Settings:

@@ -68,6 +68,40 @@ def in_folder(path: Path, *endings: str) -> list[Path]:
     return found if len(found) <= MOST_BESIDE else []
 
 
+def urdf_beside(settings: Path, frames: set[str]) -> Path:
+    """The URDF of the same name, ``robot.urdf``, or the only one that has the frames; raises ``BadRobotFile``."""
+    for name in (settings.with_suffix(".urdf").name, "robot.urdf"):
+        if settings.with_name(name).is_file():
+            return settings.with_name(name)
+    others = [path for path in in_folder(settings, ".urdf") if frames and frames <= _names_in(path)]
+    if len(others) == 1:
+        return others[0]
+    raise xml.refusal(settings, f"{len(others) or 'no'} URDF file beside the YAML file" + (
+        " that has the frames of its closures" if others or frames else ""), settings.with_suffix(".urdf").name)
+
+
+def _names_in(path: Path) -> set[str]:
+    """The names of a URDF's links and joints; none where it is no such file."""
+    try:
+        root = xml.document(xml.content(path), str(path), [])
+    except BadRobotFile:
+        return set()
+    return {str(each.get("name")) for each in root.iter("link", "joint")}
+
+
+def partner(path: Path) -> Path | None:
+    """The file on the disk that is read together with this one: the YAML file of a URDF, the URDF of a YAML file."""
+    try:
+        if path.suffix.lower() in ENDINGS:
+            said = settings_in(path)
+            return None if said is None else urdf_beside(path, frames_of(said))
+        found = settings_beside(RobotFile(path, xml.document(xml.content(path), str(path), [])))
+    except (BadRobotFile, OSError):
+        return None
+    return found[0] if found is not None else next((
+        each for each in in_folder(path, *ENDINGS) if _closing(each) is not None and partner(each) == path), None)
+
+
 def frames_of(said: dict[str, Any]) -> set[str]:
     """The names of the frames that closures are said to join."""
     pairs = said.get("closed_loop")
