@@ -287,7 +287,7 @@ def _general(question: Measurement) -> General:
     size = sympy.Symbol("d", integer=True, positive=True)
     M = sympy.MatrixSymbol("M", sum(question.sizes), size)
     where = {"M": "rates of what is observed for a basis of the platform's motions: M = Y K (X K)^+",
-             "K": "basis of the kernel of A, the wrenches that all joints transmit",
+             "K": "basis of the links' motions on which no wrench that a joint transmits does work",
              "X": "twist of the platform", "Y": "rates of what is observed", "d": "freedoms of the platform"}
     words = "the legs, with their measurements held, transmit no wrench against some motion of the platform"
     return General(words, sympy.Determinant(M.T * M), where=where, question=question)

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from analysis.singularity.found import found
+from hrsynth.constraints.condition import _general
 from hrsynth.constraints.vector_algebra import products, vector
 from hrsynth.description import load, shipped
 from hrsynth.geometry.vectors import inverse
+from hrsynth.present.show import text
 
 
 def planar(kind: str) -> tuple[str, str, str]:
@@ -154,3 +159,13 @@ def test_signs_come_with_the_order_of_a_triple_product() -> None:
     a, b, c = map(vector, "abc")
     assert det(a, b, c) == det(b, c, a) == det(c, a, b) == -det(b, a, c) == -det(a, c, b) == -det(c, b, a)
     assert cross(a, b) != cross(b, a)
+
+
+def test_a_condition_without_named_wrenches_defines_its_symbols_and_tells_no_angle():
+    """Of a robot whose legs have no named wrenches; with names the angle is told."""
+    answer = found("3rrr_m1")
+    general = replace(answer, condition=_general(answer.question))
+    assert "named wrenches" in text(answer)
+    assert "named wrenches" not in text(general)
+    for meaning in general.condition.where.values():
+        assert set(re.findall(r"\b[A-Z]\b", meaning)) <= general.condition.where.keys(), meaning

@@ -13,6 +13,7 @@ import numpy as np
 from ...analysis.aspects.words import SAME, SEPARATED
 from ...analysis.aspects.words import UNDECIDED as UNDECIDED_PAIR
 from ...analysis.posture import CONSTRAINT, REGULAR, UNDECIDED
+from ...constraints.condition import General
 from ...mechanism.pose import Pose
 from ...tolerances import NOISE, RANK_GAP
 from .robots import NO_MATRIX, formation
@@ -143,7 +144,8 @@ def singularity(found: Singularity) -> str:
         rows.append(("checked", [
             f"{checked.points} random poses and {len(checked.on_locus)} on the locus, {checked.disagreements} "
             "disagreements of words, expression and rank",
-            f"largest angle between a leg's named wrenches and the rank's {checked.largest_angle:.1e} rad"]))
+            *([] if isinstance(condition, General) else [
+                f"largest angle between a leg's named wrenches and the rank's {checked.largest_angle:.1e} rad"])]))
         if condition is not None and condition.signed:
             rows.append(("", f"expression positive at {checked.sides[0]}, negative at {checked.sides[1]} of the random "
                          "poses"))
