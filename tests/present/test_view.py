@@ -146,6 +146,16 @@ def test_there_is_a_ghost_for_each_mode_but_the_pose_itself(name: str):
             assert turned(place, d) == pytest.approx(d, abs=1e-5)
 
 
+def test_the_turn_of_a_planar_robots_mode_is_told_as_phi():
+    found = seen("3rrr_m1")
+    listed = modes(load("3rrr_m1"))
+    (mode,) = [each for each in listed.modes if not each.goal][:1]
+    link, home = found.setting.motion.link, found.setting.motion.home
+    turn = mode.configuration.pose(link)[:3, :3] @ home[:3, :3].T
+    degrees = np.degrees(np.arctan2(turn[1, 0], turn[0, 0]))
+    assert found.mode_outlines[0].words.endswith(f", phi {round(degrees, 1):g}°")
+
+
 @pytest.mark.parametrize("name", ["prrrp_m1", pytest.param("uranesx", marks=pytest.mark.slow)])
 def test_rails_are_as_long_as_their_carriages_go(name: str):
     found = seen(name)

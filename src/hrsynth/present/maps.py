@@ -55,6 +55,8 @@ ERRORS = "cividis"
 """A scale that readers with any colour vision see in the same order."""
 LEAST_MAP, LEAST_CURVE = 2.1, 4.4
 """The least width (inches) of one of several maps, and of a map with a scale of its own."""
+STROKES = (("black", 3.4), ("white", 1.6))
+"""Colours and widths of a line that is seen on any colour, drawn one over the other."""
 HIGHEST = 30.0
 """Multiple of the median error at which the scale ends."""
 
@@ -210,13 +212,11 @@ def _drawn_locus(place: Any, plane: MapPlane, field: SingularityMap, name: str) 
     if len(field.spots):
         place.plot(*plane.spots(field.spots), mark, color=colour, markeredgecolor="white", markersize=9)
     if len(field.curve):
-        from matplotlib.collections import LineCollection
-
-        pieces = np.stack(plane.at(field.curve[..., 0], field.curve[..., 1]), axis=-1)
-        place.add_collection(LineCollection(list(pieces), colors=colour, linewidths=2.0, linestyles=style))
+        _pieces(place, plane, field.curve, colors=colour, linewidths=2.0, linestyles=style)
     shape = {"linestyle": style} if field.signed or len(field.curve) else {"linestyle": "", "marker": mark}
     met = met or bool(len(field.spots) or len(field.curve))
-    return entry(f"{name}: Type 2{'' if met else ' (none here)'}", color=colour, linewidth=2.0, **shape)
+    lacking = "" if met else " (never)" if field.never else " (none found)"
+    return entry(f"{name}: Type 2{lacking}", color=colour, linewidth=2.0, **shape)
 
 
 def _boundary(place: Any, plane: MapPlane, drawn: Locus) -> list[Any]:
@@ -319,6 +319,10 @@ def _locus(field: ErrorField, places: Any, plane: MapPlane) -> bool:
 
     if field.determinant is not None:
         return all([_lost(place, plane, field.determinant) for place in places])
+    if field.curve is not None:
+        for place, (colour, width) in product(places, STROKES):
+            _pieces(place, plane, field.curve, colors=colour, linewidths=width)
+        return len(field.curve) > 0
     spots = singular_poses(field)
     for place in places if len(spots) else ():
         place.plot(*plane.spots(spots), "o", color="white", markeredgecolor="black", markersize=3.2,
@@ -328,8 +332,14 @@ def _locus(field: ErrorField, places: Any, plane: MapPlane) -> bool:
 
 def _lost(place: Any, plane: MapPlane, determinant: Array) -> bool:
     """Draw where a determinant changes its sign, white on black; whether it does."""
-    strokes = (("black", 3.4), ("white", 1.6))
-    return all([plane.sign_change(place, determinant, colour, width) for colour, width in strokes])
+    return all([plane.sign_change(place, determinant, colour, width) for colour, width in STROKES])
+
+
+def _pieces(place: Any, plane: MapPlane, curve: Array, **style: Any) -> None:
+    """Draw pieces (k, 2, 2) of a curve."""
+    from matplotlib.collections import LineCollection
+
+    place.add_collection(LineCollection(list(np.stack(plane.at(curve[..., 0], curve[..., 1]), axis=-1)), **style))
 
 
 def _error_curves(field: ErrorField, shown: list[tuple[Array, str]], paper: Paper) -> tuple[Any, bool]:
@@ -352,9 +362,12 @@ def _error_entries(field: ErrorField, locus: bool) -> list[Any]:
     entries: list[Any] = []
     if locus:
         outlined = [Stroke(linewidth=3.4, foreground="black"), Normal()]
-        mark = {"marker": "o", "linestyle": ""} if field.determinant is None else {"path_effects": outlined}
+        spots = field.determinant is None and field.curve is None
+        mark = {"marker": "o", "linestyle": ""} if spots else {"path_effects": outlined}
         entries.append(entry("Type 2 singularities of the hidden robot", color="white", linewidth=1.6,
                              markeredgecolor="black", **mark))
+    elif field.grid.ndim > 2 and field.determinant is None:
+        entries.append(entry("Type 2 singularities are not drawn", linestyle=""))
     if not field.reached.all():
         if field.grid.ndim > 1:
             entries.append(entry("border of what is reached", color="black", linewidth=1.6))

@@ -9,6 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, assume, given, settings
+from matplotlib.figure import Figure
 
 from hrsynth.analysis.accuracy.accuracy import Accuracy, accuracy, errors_at, sees_all
 from hrsynth.analysis.accuracy.cones import Blur, half_angles
@@ -21,6 +22,9 @@ from hrsynth.description import load
 from hrsynth.errors import BadRequest, HrsynthError, PlaneNotMet, PoseNotReached
 from hrsynth.geometry.vectors import Array
 from hrsynth.mechanism.pose import Grid
+from hrsynth.present.maps import _error_entries, _locus
+from hrsynth.present.plots import MapPlane
+from hrsynth.present.show import text
 from hrsynth.present.text import runs
 from kinematics.robots import ROBOTS
 from strategies import parallel_robots
@@ -230,6 +234,58 @@ def test_singular_poses_of_a_plane_are_singular() -> None:
     x, y = map(float, spots[len(spots) // 2])
     near = accuracy(load("quattro_rigid"), "1,3", cone=CONE, at=[f"x={x!r},y={y!r},z=-0.7"])
     assert near.poses[0].position.largest > 1.0
+
+
+def test_the_curve_of_a_plane_that_is_swept_is_where_the_cranks_are_parallel() -> None:
+    """A five-bar is found pose by pose; its cranks of 0.16 m end on two circles about the pose, of 0.2 m."""
+    found = accuracy(load("rrrrr_m1"), cone=CONE, grid="x=-0.15:0.15:21,y=-0.25:0.05:21")
+    assert found.field is not None
+    assert found.field.determinant is None
+    curve = found.field.curve
+    assert curve is not None
+    assert len(curve) > 10
+    for place in curve.reshape(-1, 2):
+        cranks = []
+        for shoulder in ([-0.1, 0], [0.1, 0]):
+            line = place - shoulder
+            length = np.linalg.norm(line)
+            along = (0.16**2 - 0.2**2 + length**2) / (2 * length)
+            aside = np.sqrt(0.16**2 - along**2) * np.array([-line[1], line[0]]) / length
+            cranks.append([(along * line / length + side * aside) / 0.16 for side in (1, -1)])
+        assert min(abs(a[0] * b[1] - a[1] * b[0]) for a in cranks[0] for b in cranks[1]) < 0.03
+    assert "Type 2 singularities of the hidden robot" in legend(found)
+
+
+def test_a_box_without_a_determinant_says_that_nothing_is_drawn() -> None:
+    found = accuracy(load("quattro_rigid"), cone=CONE, grid="x=-0.3:0.3:5,y=-0.3:0.3:5,z=-0.8:-0.6:3")
+    assert "Type 2 singularities are not drawn" in legend(found)
+
+
+@pytest.mark.parametrize(("robot", "grid"), [
+    ("quattro", "x=0.1:0.2:2,z=-0.7"), ("gough_stewart", "x=0.03:0.04:2,phi=10deg"),
+    ("gough_stewart", "y=0.03:0.04:2,rpy=5deg/0/0"), ("3rrr_m1", "x=0.05:0.06:2,phi=0.1:0.2:2"),
+    ("prrrp_m1", "x=0.01:0.02:2")])
+def test_the_pose_that_a_grid_holds_is_told_whole(robot: str, grid: str) -> None:
+    """Asked at what varies and what is told to be held, the error is that of the grid's first pose."""
+    found = accuracy(load(robot), cone=CONE, grid=grid)
+    assert found.field is not None
+    told = re.search(r"^held +(.*)$", text(found), re.MULTILINE)
+    assert told is not None
+    if robot == "prrrp_m1":
+        assert told[1] == "nothing; free, at each pose nearest to the zero configuration: y, phi"
+        return
+    assert {"x", "y", "z"} <= {each.split("=")[0] for each in f"{grid},{told[1]}".split(",")}
+    first = ",".join(f"{name}={float(values[0])!r}" for name, values in found.field.grid.axes)
+    (alone,) = accuracy(load(robot), cone=CONE, at=f"{first},{told[1]}").poses
+    assert alone.position.largest == pytest.approx(float(found.field.position.ravel()[0]), rel=1e-5)
+
+
+def legend(found: Accuracy) -> list[str]:
+    """The words of the legend of a map of errors."""
+    assert found.field is not None
+    plane = MapPlane.of(found.field.grid.axes, found.setting.motion, 0.4, 1.6)
+    drawn = found.field.grid.ndim == 2 and _locus(found.field, [Figure().subplots()], plane)
+    return [each.get_label() for each in _error_entries(found.field, drawn)]
 
 
 @pytest.mark.parametrize(("legs", "cones", "options", "word"), [

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from itertools import product
@@ -25,7 +26,7 @@ from hrsynth.geometry.vectors import unit
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.platform_motion import PlatformMotion
 from hrsynth.mechanism.pose import Pose
-from hrsynth.present.maps import _boundary, locus_map
+from hrsynth.present.maps import _boundary, _drawn_locus, locus_map
 from hrsynth.present.plots import MapPlane
 
 STEPS = 15
@@ -115,6 +116,24 @@ def test_the_edge_of_the_map_is_no_limit_of_reach() -> None:
     for each, marked in ((part, False), (locus, True)):
         plane = MapPlane.of(each.grid.axes, found("3rrr_m1").setting.motion, 0.4, 1.6)
         assert bool(_boundary(Figure().subplots(), plane, each)) == marked
+
+
+@pytest.mark.parametrize(("locus", "words"), [
+    (lambda: drawn(load("linear_delta"), steps=5), "hidden robot: Type 2 (never)"), (planar, "hidden robot: Type 2")])
+def test_what_is_not_met_on_the_grid_is_not_called_never(locus: Callable[[], Locus], words: str) -> None:
+    """*Never* where the rails are not parallel at all, whatever is drawn; else of a part without the curve that none
+    was found."""
+    from matplotlib.figure import Figure
+
+    def told(each: Locus) -> str:
+        plane = MapPlane.of(each.grid.axes, found("3rrr_m1").setting.motion, 0.4, 1.6)
+        return _drawn_locus(Figure().subplots(), plane, each.hidden, "hidden robot").get_label()
+
+    whole = locus()
+    assert told(whole) == words
+    value = np.where(whole.hidden.value > 0, whole.hidden.value, np.nan)
+    part = replace(whole, hidden=replace(whole.hidden, value=value))
+    assert told(part) == (words if whole.hidden.never else f"{words} (none found)")
 
 
 @pytest.mark.slow

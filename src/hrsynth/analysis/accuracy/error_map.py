@@ -24,6 +24,7 @@ from ...results import Value
 from ...tolerances import SAME_RELATION, USUAL_ERROR
 from ..observed import ObservedRobot
 from ..singularity.locus import framed
+from ..singularity.rank_curve import PlaneOfPoses
 from .cones import Blur, unseen
 from .pose_errors import maxima, reading
 
@@ -40,7 +41,8 @@ FINE, COARSE = 201, 41
 class Seen(Value):
     """Poses of a sweep, in any number: whether each is reached, the largest position (m) and orientation error (rad),
     the determinant of the directions' rates (None where they are not as many as freedoms), the smallest singular value
-    of Mᵀ; NaN where not reached, all (n,). ``gap`` bounds how much too large an error may be, relative."""
+    of Mᵀ; NaN where not reached, all (n,). ``gap`` bounds how much too large an error may be, relative; ``curve`` gives
+    pieces (k, 2, 2) of the curve of singular poses, of poses of a plane that were found one by one (else None)."""
 
     reached: Flags
     position: Array
@@ -48,6 +50,7 @@ class Seen(Value):
     determinant: Callable[[], Array | None]
     smallest: Callable[[], Array]
     gap: float
+    curve: Callable[[], Array] | None = None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -83,6 +86,12 @@ class ErrorMap(Value):
         """The determinant whose sign changes at a Type 2 singularity, in the grid's shape; None where there is none."""
         found = self.seen.determinant()
         return None if found is None else found.reshape(self.grid.shape)
+
+    @cached_property
+    def curve(self) -> Array | None:
+        """Pieces (k, 2, 2) of the curve of singular poses in a plane, by its two parts; None where poses were not found
+        one by one."""
+        return None if self.seen.curve is None else self.seen.curve()
 
     @cached_property
     def smallest(self) -> Array:
@@ -231,7 +240,9 @@ class Mapper(Value):
                 rates, twists = reading(at, self.question)
                 table[:2, i] = maxima(at, self.question, self.blur)
                 table[2, i] = _weakest(rates, twists, at.twin.length)
-        return Seen(np.isfinite(table[2]), table[0], table[1], lambda: None, lambda: table[2], 0.0)
+        plane = PlaneOfPoses(self.question, self.setting.motion, grid)
+        return Seen(np.isfinite(table[2]), table[0], table[1], lambda: None, lambda: table[2], 0.0,
+                    partial(plane.curve, found) if grid.ndim == 2 else None)
 
     def spots(self, grid: Grid, seen: Seen, seed: int, count: int = SPOTS, cells: NDArray[np.int64] | None = None
               ) -> Spots:

@@ -41,7 +41,8 @@ STEPS = 51
 class SingularityMap(Value):
     """A robot over a plane: the expression's value, the smallest singular value (Type 2 where zero) and the inverse of
     the largest (Type 1 where zero), each (nx, ny), NaN where no pose is reached; where the expression has no sign,
-    ``spots`` are singular poses (k, 2) that were found, and ``curve`` pieces (k, 2, 2) of the curve that was."""
+    ``spots`` are singular poses (k, 2) that were found, and ``curve`` pieces (k, 2, 2) of the curve that was; ``never``
+    where the condition cannot vanish."""
 
     value: Array
     signed: bool
@@ -49,6 +50,7 @@ class SingularityMap(Value):
     type1: Array
     spots: Array
     curve: Array
+    never: bool
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -132,7 +134,7 @@ def _locus(hidden: MeasuredRobot, real: MeasuredRobot | None, plane: Pose | None
             spots = _spots(grid, [here[places.index(i)] for i in _valleys(tables[1])], measured)
             curve = PlaneOfPoses(measured.question, motion, grid).curve(configurations)
             spots = _aside(spots, curve, grid)
-        return SingularityMap(tables[0], condition.signed, tables[1], tables[2], spots, curve)
+        return SingularityMap(tables[0], condition.signed, tables[1], tables[2], spots, curve, condition.never)
 
     return Locus(grid, field(hidden), None if real is None else field(real))
 

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...analysis.accuracy.ranges import ErrorRange
+from ...batch.grids import poses_over
 from ...geometry.vectors import Array
+from ...mechanism.pose import Grid, Pose
 from ...tolerances import DAMPED, LARGEST_FIRST_ORDER, SAME_RELATION
-from .tables import GAP, NOT_BOUNDED, Rows, bounded, camera, head, labelled, listing, table
+from .tables import GAP, NOT_BOUNDED, Rows, bounded, camera, head, known, labelled, listing, table
 
 if TYPE_CHECKING:
     from ...analysis.accuracy.accuracy import Accuracy
@@ -18,7 +21,7 @@ if TYPE_CHECKING:
     from ...analysis.accuracy.pose_errors import ErrorEllipsoid, PoseErrors
     from ...analysis.accuracy.sampled import Sampled
     from ...analysis.accuracy.swept import SweptErrors
-    from ...mechanism.pose import Grid
+    from ...analysis.observed import ObservedRobot
     from ...selection.loop_ends import LoopEnds
     from ...selection.select import Candidate, ModeCount, Selection
     from ...simulation.endings.basins import Basins
@@ -78,7 +81,8 @@ def basins(found: Basins) -> str:
 
     size = " × ".join(f"{count} {name}" for count, name in zip(found.grid.shape, found.grid.names, strict=True))
     rows = [*head(found.setting), *camera(found.setting), ("to", str(found.goal)),
-            ("starts", [f"{found.starts:,} of {size}: {found.grid}"]), *GAP]
+            ("starts", f"{found.starts:,} of {size}: {replace(found.grid, fixed=Pose())}"),
+            *known("held", held(found.grid, found.setting, found.abreast) or None), *GAP]
     lines = [[letter, each.ending.name, f"{each.count:,}", f"{100 * each.share:.3g} %",
               "" if each.pose is None else str(each.pose), str(each.example)]
              for letter, each in zip(LETTERS, found.ends, strict=False)]
@@ -119,7 +123,7 @@ def accuracy(found: Accuracy) -> str:
     if found.field is not None:
         rows += [*GAP, *field_rows(found)]
     if found.swept is not None:
-        rows += [*GAP, *_swept_rows(found.swept, found.blur.each)]
+        rows += [*GAP, *_swept_rows(found, found.swept)]
     for errors, true in zip(found.poses, found.sampled, strict=True):
         rows += [*GAP, ("pose", str(errors.pose)), *_extent("position", errors.position, 1e3, "mm", length),
                  *_extent("orientation", errors.orientation, 180 / np.pi, "degrees"),
@@ -136,30 +140,48 @@ def field_rows(found: Accuracy) -> list[tuple[str, str]]:
     position = _range(ranges[0], field.position, 1e3, "mm")
     orientation = _range(ranges[1], field.orientation, 180 / np.pi, "degrees")
     reached = f"{np.sum(field.reached)} of {field.reached.size}"
-    return _grid_rows(field.grid, reached, position, orientation, field.spots, field.gap, found.blur.each)
+    return _grid_rows(found, field.grid, reached, position, orientation, field.spots, field.gap)
 
 
-def _swept_rows(swept: SweptErrors, each: str) -> list[tuple[str, str]]:
+def _swept_rows(found: Accuracy, swept: SweptErrors) -> list[tuple[str, str]]:
     """The same of a grid that is in a file, of which no median is known."""
     tally = swept.tally
     reached = f"{tally.reached} of {swept.grid.size}" + (
         f" ({swept.before} were there from a sweep that was broken off)" if swept.before else "")
-    return _grid_rows(swept.grid, reached, _range(tally.position, None, 1e3, "mm"),
-                      _range(tally.orientation, None, 180 / np.pi, "degrees"), swept.spots, tally.gap, each)
+    return _grid_rows(found, swept.grid, reached, _range(tally.position, None, 1e3, "mm"),
+                      _range(tally.orientation, None, 180 / np.pi, "degrees"), swept.spots, tally.gap)
 
 
-def _grid_rows(grid: Grid, reached: str, position: str, orientation: str, spots: Spots | None, gap: float, each: str
-               ) -> list[tuple[str, str]]:
+def held(grid: Grid, setting: ObservedRobot, as_at_home: bool) -> str:
+    """What a grid holds: the whole pose but for what varies, where free parts stay as they are at the zero
+    configuration (``as_at_home``), else what was given and which parts are free."""
+    motion, typed = setting.motion, str(grid.fixed)
+    if not as_at_home:
+        free = ", ".join(motion.free({*grid.names, *grid.fixed.given}))
+        return typed if not free else (
+            f"{typed or 'nothing'}; free, at each pose nearest to the zero configuration: {free}")
+    ends, _ = poses_over(motion, grid, setting.robot.name, grid.places_at(np.array([0, grid.size - 1])))
+    first, last = (dict(part.split("=") for part in str(motion.pose(X)).split(",")) for X in ends)
+    given = dict(part.split("=") for part in typed.split(",") if part)
+    turned = {"phi", "rpy"} & {*grid.names, *given}
+    return ",".join(f"{name}={given.get(name, value)}" for name, value in {**first, **given}.items()
+                    if name in given or (value == last[name] and name not in grid.names
+                                         and not (turned and name in ("phi", "rpy"))))
+
+
+def _grid_rows(found: Accuracy, grid: Grid, reached: str, position: str, orientation: str, spots: Spots | None,
+               gap: float) -> list[tuple[str, str]]:
     size = " × ".join(f"{count} {name}" for count, name in zip(grid.shape, grid.names, strict=True))
     ranges = ", ".join(f"{name} {values[0]:.4g} to {values[-1]:.4g}" for name, values in grid.axes)
-    fixed = str(grid.fixed)
-    rows = [("poses", f"{size}: {ranges}" + (f"; {fixed}" if fixed else "")),
+    rest = held(grid, found.setting, spots is not None)
+    rows = [("poses", f"{size}: {ranges}"), *([("held", rest)] if rest else []),
             ("reached", reached), ("position", position), ("orientation", orientation)]
     if spots is not None and spots.count:
         rows.append(("checked", f"against Pinocchio at {spots.count} random poses, largest difference "
                                 f"{spots.difference:.1e}"))
     if gap > SAME_RELATION:
-        rows.append(("", f"three {each}s and more: upper bounds, nowhere more than {_percent(gap)} % too large"))
+        rows.append(("", f"three {found.blur.each}s and more: upper bounds, nowhere more than {_percent(gap)} % too "
+                         "large"))
     return rows
 
 

@@ -31,10 +31,12 @@ class ModeOutline(Value):
 
     @property
     def words(self) -> str:
-        """The pose, short."""
-        x, y, z = (round(value or 0.0, 3) + 0.0 for value in (self.pose.x, self.pose.y, self.pose.z))
-        turn = np.round(np.degrees(self.pose.rpy or np.zeros(3)), 1) + 0.0
-        turned = ", rpy " + "/".join(f"{angle:g}" for angle in turn) + "°" if turn.any() else ""
+        """The pose, short, its turn by the name by which it is told elsewhere."""
+        told = Pose.parse(str(self.pose))
+        x, y, z = (round(value or 0.0, 3) + 0.0 for value in (told.x, told.y, told.z))
+        name, angles = ("rpy", told.rpy or (0.0,)) if told.phi is None else ("phi", (told.phi,))
+        turn = np.round(np.degrees(angles), 1) + 0.0
+        turned = f", {name} " + "/".join(f"{angle:g}" for angle in turn) + "°" if turn.any() else ""
         return f"x {x:g}, y {y:g}, z {z:g} m{turned}"
 
     def scene(self) -> dict[str, Any]:
