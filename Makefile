@@ -123,7 +123,7 @@ $(BIN)/python:
 # all.txt holds all of dev.txt, and dev.txt all of main.txt: the stamps of the smaller ones are set with the larger
 $(VENV)/%.stamp: requirements/%.txt pyproject.toml | $(BIN)/python
 	@echo "setting up $(VENV) from requirements/$*.txt (once, a minute or two)" >&2
-	@$(PIP) install --require-hashes --requirement requirements/$*.txt
+	@$(PIP) install --no-compile --require-hashes --requirement requirements/$*.txt
 	@$(PIP) install --no-deps --no-build-isolation --editable .
 	@cd $(VENV) && touch $(STAMPS_$*)
 

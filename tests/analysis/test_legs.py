@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from itertools import combinations
 from math import comb
@@ -11,10 +12,12 @@ import pytest
 
 import hrsynth
 from hrsynth.analysis.controllability import Legs, legs
+from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.analysis.verdict import BLIND, CONTROLLABLE, PARTIAL, Verdict
 from hrsynth.description import load
-from hrsynth.errors import BadRequest
+from hrsynth.errors import BadRequest, BadRobotFile
 from hrsynth.geometry.vectors import Array
+from hrsynth.mechanism import Direction, Mechanism
 from hrsynth.tolerances import RANK_GAP
 from kinematics.robots import setting_of, state_of
 from oracle import Oracle
@@ -186,3 +189,38 @@ def test_an_unknown_camera() -> None:
         legs(load("delta"), camera="moon")
     assert caught.value.value == "moon"
     assert "platform" in str(caught.value)
+
+
+def watching_both(robot: str = "rrrrr_m1") -> Mechanism:
+    """A five-bar of which the file names both links of leg 1, and the last of leg 2."""
+    mechanism = load(robot)
+    seen = [("1", "prox_1"), ("1", "dist_1"), ("2", "dist_2")]
+    return replace(mechanism, observations=tuple(Direction(leg, link, np.array([1.0, 0, 0])) for leg, link in seen))
+
+
+def test_all_that_the_file_watches_of_a_leg_counts_in_its_sets() -> None:
+    """The directions of both links of one leg are the place of their end: u1 and u2, whatever the other leg does."""
+    robot = watching_both()
+    setting = ObservedRobot.of(robot)
+    twin, oracle = setting.everything.twin, Oracle(setting.everything.twin.mechanism)
+    state = state_of(twin, setting.configurations[0].q)
+    for chosen in (("1",), ("2",), ("1", "2")):
+        seen = [o for o in robot.observations if o.leg in chosen]
+        basis = oracle.relation(state, seen, point_only=setting.everything.question.point is not None)
+        twists, rates = basis[:-3 * len(seen)], basis[-3 * len(seen):]
+        _, values, right = np.linalg.svd(rates)
+        unseen = np.linalg.matrix_rank(twists @ right[int(np.sum(values > 1e-8)):].T, tol=1e-8)
+        expected = np.linalg.matrix_rank(twists, tol=1e-8) - unseen
+        for asked in (robot, ObservedRobot.of(robot, ["2"])):
+            (verdict,) = (each for each in legs(asked).sets if each.legs == chosen)
+            assert verdict.rank == expected
+    assert legs(robot).minimal == (("1",),)
+
+
+def test_a_second_direction_of_a_link_is_not_passed_over() -> None:
+    robot = watching_both()
+    more = (*robot.observations, Direction("1", "prox_1", np.array([0, 0, 1.0])))
+    with pytest.raises(BadRobotFile, match="a second direction of a link"):
+        legs(replace(robot, observations=more))
+    again = (*robot.observations, Direction("1", "prox_1", np.array([-1.0, 0, 0])))
+    assert legs(replace(robot, observations=again)).minimal == (("1",),)

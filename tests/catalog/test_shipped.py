@@ -36,5 +36,6 @@ def test_some_records_are_fresh():
 
 
 @pytest.mark.long
+@pytest.mark.timeout(43_200)
 def test_all_records_are_fresh():
     assert check(shipped(), workers=2) == ()

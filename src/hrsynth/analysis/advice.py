@@ -77,15 +77,18 @@ def _legs(setting: ObservedRobot) -> Iterator[FurtherMeasurement]:
 
 
 def _directions(setting: ObservedRobot) -> Iterator[FurtherMeasurement]:
-    """Segments of all legs but the observed ones and those that a leg is; links without a direction are left out."""
+    """Segments of all legs but the observed ones and those that a leg is, along the directions that the file
+    names where it does; links without a direction are left out."""
     taken = {o.key for o in setting.observed} | {each.observation.key for each in _legs(setting)}
+    named = {o.key: o for o in setting.all_legs}
     for leg in setting.anatomy.legs:
         ends = (setting.mechanism.platform,) if leg.takes_platform else ()
         for link in (*leg.links, *ends):
             if (leg.label, link) in taken:
                 continue
             try:
-                yield FurtherMeasurement("direction", link, observation_of(setting.anatomy, link), leg.label)
+                yield FurtherMeasurement("direction", link, named.get((leg.label, link))
+                                         or observation_of(setting.anatomy, link), leg.label)
             except HrsynthError:
                 continue
 

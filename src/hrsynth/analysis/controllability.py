@@ -108,7 +108,7 @@ def legs(robot: RobotLike, camera: CameraLike = None, *, observe: LegsLike = Non
     setting = observed(robot, observe, camera, see=see, at=at, seed=seed)
     anatomy = setting.anatomy
     whole = observe is None and all(each.by_segment for each in setting.observed)
-    segments = setting.segments if whole else setting.observed
+    segments = setting.all_legs if whole else setting.observed
     labels = labels_of(segments)
     sets, exact = list[Verdict](), list[ExactVerdict]()
     generic = architecture(setting)

@@ -61,7 +61,7 @@ class ObservedRobot(Value):
     anatomy: LegDecomposition
     observed: tuple[Observation, ...]
     everything: Samples
-    """Samples for the question of all default segments, and of the observed ones besides."""
+    """Samples for the question of all default segments, and besides of the observed ones and those the file names."""
     defaults: int
     """How many of the observations of ``everything`` are default segments; they come first."""
     form: PoseForm = RADIANS
@@ -133,6 +133,12 @@ class ObservedRobot(Value):
     def segments(self) -> tuple[Observation, ...]:
         """The default segments of all legs."""
         return self.everything.question.observations[: self.defaults]
+
+    @property
+    def all_legs(self) -> tuple[Observation, ...]:
+        """What all legs are watched at: their default segments, and the others of them that the file names."""
+        named = (o for o in self.mechanism.observations if o.by_segment and o.leg in self.anatomy.labels)
+        return tuple({o.key: o for o in (*self.segments, *named)}.values())
 
     @property
     def configurations(self) -> tuple[ClosedConfiguration, ...]:
@@ -308,7 +314,8 @@ def _observed_robot(robot: Mechanism, source: Hashable, observe: tuple[str, ...]
     observed = (*chosen, *(o for o in anatomy.mechanism.observations if o.leg in asked))
     offered = tuple(o for o in anatomy.mechanism.observations if o.leg in possible)
     known = {o.key for o in defaults.values()}
-    extra = tuple(o for o in (*observed, *offered) if o.key not in known)
+    named = tuple(o for o in own if o.by_segment)  # of legs that are not asked for too: another set may hold them
+    extra = tuple({o.key: o for o in (*observed, *offered, *named) if o.key not in known}.values())
     first, *others = normal.mechanism.bodies
     question = Measurement(first, None if others else anatomy.point, normal.mechanism.reference,
                            (*defaults.values(), *extra), others=tuple(others))

@@ -21,6 +21,7 @@ from . import graphs
 from .composites import WordEdge, WordGraph
 from .model import Joint, JointType, Mechanism
 from .notation import Architecture, Bar, Carrier, Letter, Word
+from .observations.direction import Direction
 
 
 @dataclass(frozen=True)
@@ -286,6 +287,7 @@ def _freedoms(word: Word) -> int | None:
 def _labelled(anatomy: LegDecomposition) -> LegDecomposition:
     """Labels of the observations where there are any, numbers elsewhere."""
     given: dict[int, str] = {}
+    watched: dict[str, Array] = {}
     defects: list[Defect] = []
     mechanism = anatomy.mechanism
     links = ", ".join(n for leg in anatomy.legs for n in leg.links) or "none"
@@ -302,6 +304,10 @@ def _labelled(anatomy: LegDecomposition) -> LegDecomposition:
         elif any(label == observation.leg and i != index for i, label in given.items()):
             defects.append(Defect(file, line, "a leg's label used for links of two different legs", observation.leg,
                                   "one label a leg"))
+        elif isinstance(observation, Direction) and not lines.parallel(
+                watched.setdefault(observation.link, observation.direction), observation.direction):
+            defects.append(Defect(file, line, "a second direction of a link", observation.link,
+                                  "one a link; more of it as <observe kind=\"direction\">"))
     if defects:
         raise BadRobotFile(defects)
     numbers = [str(i + 1) for i in range(len(anatomy.legs))]

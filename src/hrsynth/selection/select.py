@@ -242,7 +242,7 @@ def select(robot: RobotLike, camera: CameraLike = None, *, observe: LegsLike = N
     if others and criteria.sight is not None:
         setting.by_segments("select with --sight")
     if observe is None and not others:
-        setting = replace(setting, observed=setting.segments)
+        setting = replace(setting, observed=setting.all_legs)
     directed = any(isinstance(o, SeenAxis) for o in setting.observed)
     blur = Blur.of(CONE if cone is None and directed and (noise is None or not others) else cone, noise,
                    setting.observed)

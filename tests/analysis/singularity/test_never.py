@@ -15,10 +15,13 @@ from hrsynth.analysis.aspects.path import path
 from hrsynth.analysis.check import check
 from hrsynth.analysis.singularity.agreement import weakest
 from hrsynth.analysis.singularity.singular import Singularity, singular
+from hrsynth.errors import BadRequest
 from hrsynth.geometry.vectors import Array, frozen, inverse, unit
 from hrsynth.kinematics.walking import random_walk
+from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.model import Mechanism
 from hrsynth.present.text.poses import singularity
+from oracle import Oracle
 from strategies import deltas
 
 
@@ -191,3 +194,23 @@ def test_legs_that_may_fold_are_named_where_never_is_said(name: str, legs: str):
     told = " ".join(singularity(found(name, None)).split())
     assert "never" in told
     assert (f"one inside a leg ({legs}) lies flat" in told) == bool(legs)
+
+
+def test_a_platform_that_rests_is_refused_in_a_line() -> None:
+    """A triangle of three bars with a four-bar beside it: segments move, the platform does not (by the oracle)."""
+    made = Builder("truss")
+    for link in ("base", "a", "platform", "b", "c", "d"):
+        made.link(link)
+    for name, one, other, at in (("1", "base", "a", (0, 0, 0)), ("2", "a", "platform", (0.3, 1, 0)),
+                                 ("3", "platform", "base", (1, 0, 0)), ("4", "a", "b", (-0.5, 1.2, 0)),
+                                 ("5", "b", "c", (-1.3, 1.4, 0)), ("6", "c", "d", (-1.6, 0.5, 0)),
+                                 ("7", "d", "base", (-1.1, 0.1, 0))):
+        made.joint(name, "R", one, other, at, axis=(0, 0, 1), loop=name in "37")
+    made.observe("1", "b", (1, 0, 0))
+    robot = made.build("platform")
+    oracle = Oracle(robot)
+    basis = oracle.relation(np.array([each.pose for each in robot.links.values()]), list(robot.observations))
+    assert basis.shape[1] == 1  # b turns
+    assert np.abs(basis[:6]).max() < 1e-9
+    with pytest.raises(BadRequest, match="the platform has no freedom to lose"):
+        singular(robot, points=20)

@@ -32,7 +32,7 @@ BoxLike = Mapping[str, Sequence[float]] | str
 @question()
 def branch(robot: RobotLike, box: BoxLike | None = None, *, effort: int = BRANCH_CELLS) -> BranchProof:
     """Where the passive coordinates are proved to be one continuous function of the motors, on the branch of the zero
-    configuration (docs/pages/theory.md, branches).
+    configuration (docs/pages/branch.md).
 
     ``box`` gives motors their intervals (m, rad), as a mapping or as text ``hip=-1:1,slide=0:0.2``; by default those of
     the file's limits, and where it has none a whole turn, or a characteristic length either way. ``effort`` is the

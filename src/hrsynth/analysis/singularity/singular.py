@@ -8,6 +8,7 @@ from typing import Any
 from ...budgets import NEIGHBOUR_STEP
 from ...constraints.condition import Condition, always
 from ...constraints.pattern import ConstraintPattern
+from ...errors import BadRequest
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.relation import Measurement, platform_motions, relation
 from ...kinematics.tasks import solve
@@ -96,7 +97,8 @@ def singular(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = No
     """The Type 2 condition of the hidden robot (``real``: of the real robot with its own motors), theory.md 7; MMT 3.3.
 
     Words, expression and rank are compared at ``points`` random reachable poses and at singular poses constructed from
-    the expression; raises ``Disagreement`` where they do not agree, ``BadRequest`` where a robot has no motor.
+    the expression; raises ``Disagreement`` where they do not agree, ``BadRequest`` where a robot has no motor, or a
+    platform that rests while segments of its legs move.
 
     >>> hrsynth.singular("rrrrr_m1", points=200)
     <Singularity: rrrrr_m1, watching 1, 2: the tangents τ1, τ2 are parallel>
@@ -104,6 +106,9 @@ def singular(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = No
     setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed)
     measured = MeasuredRobot.driven(setting) if real else MeasuredRobot.watched(setting)
     question, verdict = measured.question, measured.verdict
+    if not verdict.dof:
+        raise BadRequest(f"{setting.robot.name}: the platform has no freedom to lose", setting.mechanism.platform,
+                         "a platform that can move")
     tell("pattern of the legs' wrenches")
     pattern = measured.pattern
     if verdict.rank < verdict.dof:
