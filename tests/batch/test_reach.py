@@ -306,6 +306,18 @@ def test_a_way_that_touches_a_fold_does_not_pass_it() -> None:
         assert at is None or [np.sign(bend(at, leg)) for leg in "12"] == signs
 
 
+def test_nothing_is_reached_from_a_pose_on_a_fold() -> None:
+    """At x=±0.06, y=0 a rod lies along its crank, 0.04 m from the base joint, to the last digit: the sweep came to it
+    and went on with the elbow on the other side."""
+    everything = ObservedRobot.of("rrrrr_m1").everything
+    found = sweep(everything.start, everything.question, Grid.parse("x=-0.12:0.12:9,y=-0.12:0.06:13"))
+    bends = np.array([[bend(at, leg) for leg in "12"] for at in found if at is not None])
+    usual = [bend(everything.start, leg) for leg in "12"]
+    folded = np.abs(bends) < 1e-4 * np.abs(usual)
+    assert folded.any(axis=0).all()
+    assert np.all(folded | (np.sign(bends) == np.sign(usual)))
+
+
 def test_a_sweep_finds_what_single_poses_find() -> None:
     everything = setting_of("delta").everything
     grid = Grid.parse("x=-0.2:0.2:5,y=-0.2:0.2:4,z=-0.6")

@@ -10,16 +10,18 @@ import numpy as np
 
 from ..budgets import FIRST_CELLS, SWEEP_HALVINGS
 from ..errors import PoseNotReached
+from ..geometry.ranks import range_basis
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.leg_reach import worst_leg
 from ..kinematics.limits import at_end, wrists_beyond
 from ..kinematics.platform_motion import Goal, PlatformMotion
 from ..kinematics.relation import Measurement
 from ..kinematics.steps import HALVINGS, nearest, track
+from ..kinematics.tasks import Task, system
 from ..kinematics.walking import random_walk
 from ..mechanism.pose import Grid, Pose
 from ..progress import tell
-from ..tolerances import AS_PRINTED
+from ..tolerances import AS_PRINTED, NEAR_FOLD
 
 if TYPE_CHECKING:
     from .placing import Placer
@@ -78,25 +80,28 @@ def sweep(start: ClosedConfiguration, question: Measurement, grid: Grid, motion:
             there = there if cell in at_once else nearest(there, goals[cell], home)
         return there if came == 1 and _arrived(there, goals[cell]) else None
 
-    distance = [float(np.linalg.norm(goal.rows(start.twin, start.q)[0])) for goal in goals]
-    return spread(start, grid.shape, distance, lead)
+    return spread(start, grid.shape, goals, lead)
 
 
-def spread(start: ClosedConfiguration, shape: tuple[int, ...], distance: Sequence[float],
+def spread(start: ClosedConfiguration, shape: tuple[int, ...], goals: Sequence[Task],
            lead: Callable[[int, ClosedConfiguration, int], ClosedConfiguration | None]
            ) -> tuple[ClosedConfiguration | None, ...]:
-    """Configurations at the cells of a grid of a ``shape``: ``lead`` gives that of a cell from a configuration nearby
-    with so many halvings, None where it does not come there. It begins at cells of the least ``distance`` from
-    ``start`` and goes on to neighbours."""
+    """Configurations at the ``goals`` of a grid's cells, of a ``shape``: ``lead`` gives that of a cell from a
+    configuration nearby with so many halvings, None where it does not come there. It begins at the goals nearest to
+    ``start`` and goes on to neighbours, but not from a fold: working modes meet there, and small steps go on in any."""
+    twin = start.twin
     found: dict[int, ClosedConfiguration] = {}
     queue: deque[tuple[int, int]] = deque()
+    distance = [float(np.linalg.norm(goal.rows(twin, start.q)[0])) for goal in goals]
+    rank = range_basis(system(twin, start.q, goals[0])[1])[1].value
 
     def settle(cell: int, origin: ClosedConfiguration, halvings: int) -> None:
         there = lead(cell, origin, halvings)
         if there is not None:
             found[cell] = there
-            queue.extend((other, cell) for other in _neighbours(cell, shape) if other not in found)
             tell("poses")
+            if np.linalg.svd(system(twin, there.q, goals[cell])[1], compute_uv=False)[rank - 1] > NEAR_FOLD:
+                queue.extend((other, cell) for other in _neighbours(cell, shape) if other not in found)
 
     for cell in sorted(range(len(distance)), key=lambda i: (round(distance[i], 9), i))[:FIRST_CELLS]:
         settle(cell, start, HALVINGS)
@@ -106,7 +111,7 @@ def spread(start: ClosedConfiguration, shape: tuple[int, ...], distance: Sequenc
         cell, origin = queue.popleft()
         if cell not in found:
             settle(cell, found[origin], SWEEP_HALVINGS)
-    return tuple(found.get(cell) for cell in range(len(distance)))
+    return tuple(found.get(cell) for cell in range(len(goals)))
 
 
 def _neighbours(cell: int, shape: tuple[int, ...]) -> Iterator[int]:

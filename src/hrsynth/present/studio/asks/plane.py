@@ -171,10 +171,9 @@ def one_by_one(mover: Mover, here: ClosedConfiguration, pair: tuple[int, int], v
         there, came = track(origin, motion, aims[cell], halvings)
         return there if came == 1 else None
 
-    distance = [float(np.linalg.norm(aim.rows(here.twin, here.q)[0])) for aim in aims]
     blur = Blur(np.full(len(setting.observed), CONE))
     found = np.full((2, len(aims)), np.nan)
-    for i, at in enumerate(spread(here, (size, size), distance, lead)):
+    for i, at in enumerate(spread(here, (size, size), aims, lead)):
         if at is not None:
             found[:, i] = (weakest(at, question), np.nan) if kind == DISTANCE else attained(at, question, blur)
     table = found[0] if kind == DISTANCE else _shown(found[0], found[1], unit)
