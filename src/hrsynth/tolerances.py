@@ -63,6 +63,12 @@ RANK_GAP = 1e3
 """Smallest ratio of the last kept to the first dropped singular value at which a rank is a verdict."""
 RANK_CUTOFF = 1e-7
 """Singular values below this fraction of the largest are candidates for zero; the gap around it is what decides."""
+LOOPS_SCALE = 1e-5
+"""What the largest singular value of the loops' Jacobian (characteristic lengths, radians) counts as at least: loops
+that hold nothing back, such as a ball where two axes meet, leave rounding alone, which is no rank."""
+NO_SPREAD = 1e-12
+"""Mean distance of joint centres from their centroid, as part of their largest coordinate, that is rounding: they are
+one point."""
 SAME_RELATION = 1e-6
 """Largest principal angle (radians) at which two relations count as the same."""
 UNMOVING = 1e-6

@@ -18,6 +18,7 @@ from hrsynth.description import load
 from hrsynth.errors import BadRequest, BadRobotFile
 from hrsynth.geometry.vectors import Array
 from hrsynth.mechanism import Direction, Mechanism
+from hrsynth.mechanism.builder import Builder
 from hrsynth.tolerances import RANK_GAP
 from kinematics.robots import setting_of, state_of
 from oracle import Oracle
@@ -224,3 +225,24 @@ def test_a_second_direction_of_a_link_is_not_passed_over() -> None:
         legs(replace(robot, observations=more))
     again = (*robot.observations, Direction("1", "prox_1", np.array([-1.0, 0, 0])))
     assert legs(replace(robot, observations=again)).minimal == (("1",),)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_loop_that_holds_nothing_back_has_no_rank(seed: int) -> None:
+    """A platform on two R whose axes meet in the centre of its ball: all joints at one point, the loop is rounding."""
+    rng = np.random.default_rng(seed)
+    centre = rng.normal(size=3)
+    made = Builder("wrist")
+    made.link("base")
+    made.link("a", centre)
+    made.link("platform", centre)
+    made.joint("1", "R", "base", "a", centre, axis=rng.normal(size=3))
+    made.joint("2", "R", "a", "platform", centre, axis=rng.normal(size=3))
+    made.joint("3", "S", "base", "platform", centre, loop=True)
+    made.observe("1", "a", rng.normal(size=3))
+    robot = made.build("platform")
+    assert robot.length == 1
+    basis = Oracle(robot).relation(np.array([each.pose for each in robot.links.values()]), robot.observations)
+    (verdict,) = (each for each in legs(robot).sets if each.legs == ("1",))
+    assert (verdict.dof, verdict.rank) == (np.linalg.matrix_rank(basis[:6], tol=1e-8),
+                                           np.linalg.matrix_rank(basis[6:], tol=1e-8)) == (2, 1)

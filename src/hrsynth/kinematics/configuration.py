@@ -18,7 +18,7 @@ from ..geometry.ranks import Rank, Spectrum, spectra, spectrum
 from ..geometry.vectors import Array, frozen
 from ..mechanism.observation import Observation
 from ..results import Value
-from ..tolerances import CLOSED
+from ..tolerances import CLOSED, LOOPS_SCALE
 from .pinocchio_model import PinocchioModel
 
 
@@ -44,7 +44,7 @@ class ClosedConfiguration(Value):
                 ) -> list[ClosedConfiguration]:
         """:meth:`of` of several, their constraints taken apart together."""
         found = [cls.of(twin, q, tolerance) for q in places]
-        for at, loops in zip(found, spectra([twin.jacobian(at.q) for at in found]), strict=True):
+        for at, loops in zip(found, spectra([twin.jacobian(at.q) for at in found], LOOPS_SCALE), strict=True):
             at.__dict__["loops"] = loops
         return found
 
@@ -59,7 +59,7 @@ class ClosedConfiguration(Value):
     @cached_property
     def loops(self) -> Spectrum:
         """The constraints' Jacobian taken apart."""
-        return spectrum(self.twin.jacobian(self.q))
+        return spectrum(self.twin.jacobian(self.q), LOOPS_SCALE)
 
     def kernel(self) -> tuple[Array, Rank]:
         """A basis of T_qC, shape (nv, mobility), and the constraints' rank."""

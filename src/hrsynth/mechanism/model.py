@@ -18,7 +18,7 @@ import numpy as np
 from ..errors import BadMechanism
 from ..geometry.vectors import Array, frozen, inverse, unit
 from ..results import Result, Value, content
-from ..tolerances import SAME_GEOMETRY
+from ..tolerances import NO_SPREAD, SAME_GEOMETRY
 from .graphs import Adjacency, adjacency
 from .observation import Observation
 from .sights import NamedCamera
@@ -306,12 +306,13 @@ class Mechanism(Result, shown_as="robot"):
 
     @cached_property
     def length(self) -> float:
-        """The characteristic length (m): mean distance of the joint centres from their centroid."""
+        """The characteristic length (m): mean distance of the joint centres from their centroid; 1 where they are
+        one point, up to rounding."""
         if not self.joints:
             return 1.0
         points = np.array([joint.point for joint in self.joints.values()])
         spread = float(np.mean(np.linalg.norm(points - points.mean(axis=0), axis=1)))
-        return spread if spread > 0 else 1.0
+        return spread if spread > NO_SPREAD * float(np.abs(points).max()) else 1.0
 
     @cached_property
     def _joints_of(self) -> dict[str, tuple[Joint, ...]]:
