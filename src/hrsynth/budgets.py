@@ -48,6 +48,8 @@ LINTED_POSES = 3
 """Configurations near the zero one at which a rank must be the same before lint says anything of it."""
 SLIDES = 300
 """Times that hinges' centres are slid along their axes to where two files agree."""
+MOST_SENSES = 6
+"""Axes of a link up to which all senses that they may have in the other file are tried, where the likely ones miss."""
 MOST_MENDING = 8
 """Rounds in which what a mend uncovers is mended too."""
 LOOP_STRIDE = 0.4

@@ -143,6 +143,9 @@ AT_ORIGIN = 1e-12
 """Distance (m) below which a joint's centre is the origin of the link that it carries, where a file is written."""
 WITHOUT_DIRECTION = 1e-9
 """Length up to which a vector in a file has no direction."""
+LIKE_A_WORD = 0.65
+"""Part of two words that agrees (matching letters) from which an unknown one in a file counts as a slip of
+the other."""
 OPPOSITE = 1e-3
 """One plus the cosine of the angle between two axes of a closure below which they point opposite ways."""
 SAME_ROBOT = 1e-5

@@ -104,6 +104,16 @@ def add(fragment: str, path: str = ".") -> Damage:
     return lambda root: root.find(path).append(etree.fromstring(fragment))
 
 
+def tagged(path: str, tag: str) -> Damage:
+    """Misspell the tag of the first element on a path."""
+    def damage(root: Root) -> None:
+        element = root.find(path)
+        assert element is not None
+        element.tag = tag
+
+    return damage
+
+
 def again(path: str, name: str) -> Damage:
     """Append the first element on a path once more, under another name."""
     def damage(root: Root) -> None:
@@ -217,6 +227,7 @@ CASES = [
     Case("unit-angles", put(f"{SHOULDER}/origin", rpy="0 0 360"), ("loop-open",), geometry=False),
     Case("unit-length", scaled(1000.0)),
     Case("unit-inertia", put("link/inertial/inertia", ixx="20000", iyy="30000", izz="40000")),
+    Case("element-unknown", tagged("transmission", "tranmission"), ("motors-few",)),
     Case("axis-length", put(f"{SHOULDER}/axis", xyz="0 0 2")),
     Case("limits-order", put('.//joint[@name="shoulder_1"]', range=f"{UPPER} {LOWER}"), ("motor-unlimited",), ".xml"),
     Case("mass-negative", put(".//body/inertial", mass="-1.5"), ending=".xml"),

@@ -98,14 +98,65 @@ def test_masses_and_inertias_are_compared_in_any_frame(tmp_path: Path):
     assert set(differs(one, third)) == {"differs-mass"}
 
 
-def test_another_zero_is_told_as_that_and_as_nothing_else(tmp_path: Path):
-    """The same robot, counted from another closed pose."""
-    robot = load("3rrr_m1")
-    at = hrsynth.check(robot, at="x=0.02,y=0.01,phi=5deg").postures[0].configuration
+@pytest.mark.parametrize("name", ["3rrr_m1", "3prr_m1", "3rpr_m2", "6pus", "gough_stewart", "3upu"])
+def test_another_zero_is_told_as_that_and_as_nothing_else(name: str, tmp_path: Path):
+    """The same robot, counted from another closed pose: slides lie elsewhere along their axes, of a U joint each link
+    carries one axis."""
+    robot = load(name)
+    at = hrsynth.check(robot, at="x=0.02,y=0.01").postures[0].configuration
     poses = {name: at.pose(name) for name in robot.links}
     there = with_zero(robot, poses)
     one, other = written(tmp_path, "one.urdf", robot), written(tmp_path, "other.urdf", there)
     assert set(differs(one, other)) == {"differs-zero"}
+
+
+def mirrored(robot: Mechanism, seed: int) -> Mechanism:
+    """Its image in any mirror."""
+    T = random_rotation(np.random.default_rng(seed))
+    S = T @ np.diag([1.0, 1.0, -1.0]) @ T.T
+    joints = {each.name: replace(each, point=S @ each.point, axes=tuple(S @ axis for axis in each.axes))
+              for each in robot.joints.values()}
+    links = {}
+    for name, link in robot.links.items():
+        X = link.pose.copy()
+        X[:3, 3] = S @ X[:3, 3]
+        links[name] = replace(link, pose=X)
+    return replace(robot, joints=joints, links=links, observations=())
+
+
+@pytest.mark.parametrize(("name", "same"), [("3rrr_m1", True), ("3rpr_m2", True), ("3prr_m1", True), ("3rps", False),
+                                            ("6pus", False)])
+def test_a_planar_robot_is_its_own_mirror_image(name: str, same: bool):
+    """Turned by half a turn about a line in its plane; a robot in space with skew joints on a link is not."""
+    robot = load(name)
+    if not same:  # shipped ones are symmetric: joints of the platform out of one plane, in no order
+        rng = np.random.default_rng(2)
+        robot = robot.changed(joints=[replace(each, point=each.point + 0.1 * robot.length * rng.normal(size=3))
+                                      for each in robot.joints.values()])
+    else:  # axes weigh more than places where the legs begin near to each other
+        robot = robot.changed(joints=[replace(each, point=0.2 * each.point) for each in robot.joints_of(robot.base)])
+    for seed in range(5):
+        match = RobotMatch(robot, mirrored(robot, seed))
+        missed = max(max(fit.misses.values()) for link in robot.links if (fit := match.fit(link)))
+        assert (missed < 1e-7) == same
+
+
+@pytest.mark.parametrize(("first", "second", "told"), [(0.3, 0.0, False), (0.35, -0.05, False), (0.35, 0.0, True),
+                                                       (-0.3, 0.0, False)])
+def test_a_link_farther_along_the_axis_of_a_hinge_is_another_robot(tmp_path: Path, first: float, second: float,
+                                                                   told: bool):
+    """Each link fits by itself, as a hinge may have its centre anywhere on its axis: not so both links of it. The
+    offset of Denavit and Hartenberg is the sum of both numbers; negative it is the same robot, seen from its back."""
+    files = []
+    for name, (one, two) in {"a": (0.3, 0.0), "b": (first, second)}.items():
+        joints = [("0 0 0", "0 0 1"), (f"{one} 0.05 0.1", "1 0 0"), (f"{two} 0 0.07", "0 1 0"), ("0 0 0.3", "1 0 0")]
+        text = "".join(f'<link name="l{number}"/>' for number in range(5)) + "".join(
+            f'<joint name="q{number}" type="continuous"><parent link="l{number}"/><child link="l{number + 1}"/>'
+            f'<origin xyz="{place}"/><axis xyz="{axis}"/></joint>' for number, (place, axis) in enumerate(joints))
+        files.append(tmp_path / f"{name}.urdf")
+        files[-1].write_text(f'<robot name="arm">{text}<hrsynth><platform link="l4"/></hrsynth></robot>')
+    assert ("differs-geometry" in differs(*files)) == told
+    assert ("differs-geometry" in differs(*files[::-1])) == told
 
 
 def with_zero(robot: Mechanism, poses: dict[str, np.ndarray]) -> Mechanism:
@@ -114,8 +165,8 @@ def with_zero(robot: Mechanism, poses: dict[str, np.ndarray]) -> Mechanism:
     joints = {}
     for each in robot.joints.values():
         X = motion[each.predecessor]
-        joints[each.name] = replace(each, point=X[:3, :3] @ each.point + X[:3, 3],
-                                    axes=tuple(X[:3, :3] @ axis for axis in each.axes))
+        axes = tuple(motion[link][:3, :3] @ axis for link, axis in zip(each.links, each.axes, strict=False))
+        joints[each.name] = replace(each, point=X[:3, :3] @ each.point + X[:3, 3], axes=axes)
     links = {name: replace(link, pose=poses[name]) for name, link in robot.links.items()}
     return replace(robot, links=links, joints=joints)
 

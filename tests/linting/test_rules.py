@@ -268,6 +268,56 @@ def test_frames_that_nobody_closes_are_told(tmp_path: Path):
     assert rules_in(path, close=given)["loop-none"] == 0
 
 
+def arm(*joints: str) -> str:
+    """A serial arm of joints, each as its type, the place of its frame and its axis."""
+    links = "".join(f'<link name="l{number}"/>' for number in range(len(joints) + 1))
+    return f'<robot name="arm">{links}' + "".join(
+        f'<joint name="q{number}" type="{kind}"><parent link="l{number}"/><child link="l{number + 1}"/>'
+        f'<origin xyz="{place}"/><axis xyz="{axis}"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>'
+        for number, (kind, place, axis) in enumerate(each.split("; ") for each in joints)) + "</robot>"
+
+
+SLIDING = ("continuous; 0 0 0.2; 0 0 1", "prismatic; 0 0 0; 0 0 1", "continuous; 0 0 0; 0 1 0")
+
+
+@pytest.mark.parametrize(("joints", "told"), [
+    ((*SLIDING, "continuous; 0.3 0 0; 0 1 0"), False), (SLIDING, False),
+    (("continuous; 0 0 0; 0 1 0", "continuous; 0 0 1; 0 1 0", "continuous; 1 0 0; 0 1 0", "fixed; -1 0 -1; 0 1 0"),
+     True)])
+def test_frames_of_consecutive_joints_may_coincide(tmp_path: Path, joints: tuple[str, ...], told: bool):
+    """A slide at zero brings the joints at its ends together; a four-bar that comes back to its base is told."""
+    path = tmp_path / "arm.urdf"
+    path.write_text(arm(*joints))
+    assert (rules_in(path)["frames-coincide"] > 0) == told
+
+
+@pytest.mark.parametrize(("change", "line", "says", "severity"), [
+    (("<transmission name", "<tranmission name", "</transmission>", "</tranmission>"), "<transmission name",
+     "<tranmission> in robot, nearly <transmission>", "warning"),
+    (('<axis xyz="0 0 1"', '<axis xzy="0 0 1"'), "<axis", "attribute 'xzy' of <axis> in joint", "warning"),
+    (('<axis xyz="0 0 1"', '<Axis xyz="0 0 1"'), "<axis", "nearly <axis>", "warning"),
+    (("<predecessor link=\"dist_2\">\n      <origin xyz", "<predecessor link=\"dist_2\">\n      <origin xy"),
+     "<predecessor link=\"dist_2\">", "attribute 'xy' of <origin> in loop 'wrist_2'", "warning"),
+    (("<hrsynth>", "<hydraulics/>\n<hrsynth>"), "<hrsynth>", "<hydraulics> in robot", "note"),
+    (("<hrsynth>", '<w:thing xmlns:w="urn:w"/>\n<hrsynth>'), "", "", "")])
+def test_what_urdf_does_not_know_is_named_with_its_line(tmp_path: Path, change: tuple[str, ...], line: str, says: str,
+                                                        severity: str):
+    text = shipped()["3rrr_m1"].read_text()
+    assert rules_in(shipped()["3rrr_m1"])["element-unknown"] == 0
+    path = tmp_path / "robot.urdf"
+    for old, new in zip(change[::2], change[1::2], strict=True):
+        assert old in text
+        text = text.replace(old, new, 1)
+    path.write_text(text)
+    found = [each for each in hrsynth.lint(path).findings if each.rule == "element-unknown"]
+    assert len(found) == (1 if says else 0)
+    for each in found:
+        assert says in each.message
+        assert each.severity == severity
+        first = shipped()["3rrr_m1"].read_text().split(line)[0].count("\n") + 1
+        assert each.line == first + ("predecessor" in line)
+
+
 def test_a_singular_zero_pose_and_what_is_read_otherwise_are_told(tmp_path: Path):
     flat = ('<robot name="flat">' + "".join(f'<link name="{name}"/>' for name in ("base", "a", "b", "c")) + "".join(
         f'<joint name="{name}" type="continuous"><parent link="{one}"/><child link="{two}"/><origin xyz="{x} 0 0"/>'

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 
-from ..budgets import SLIDES
+from ..budgets import MOST_SENSES, SLIDES
 from ..geometry.vectors import Array, pose
 from ..mechanism.model import Joint, JointType, Mechanism
 from ..tolerances import EXACT, NOISE, SAME_ROBOT, TURNING_ARM
 
 _ALONG = (JointType.REVOLUTE, JointType.CYLINDRICAL)
+_LINES = (*_ALONG, JointType.PRISMATIC)
 _ACROSS = (JointType.PRISMATIC, JointType.PLANAR)
 
 
@@ -85,19 +87,50 @@ class RobotMatch:
                 found[link] = link
         return found
 
+    def _pairs(self, link: str) -> list[tuple[_JointOn, _JointOn]]:
+        """The joints of a link in both robots, as it carries them."""
+        return [(_on(joint, link), _on(other, self.links[link])) for joint in self.one.joints_of(link)
+                if joint.name in self.joints
+                and (other := self.other.joints[self.joints[joint.name]]).type is joint.type
+                and self.links.get(link) in other.links]
+
     def fit(self, link: str) -> LinkFit | None:
         """How the joints of a link agree in both robots, wherever the link is at zero; None where it has none."""
-        pairs = [(joint, other) for joint in self.one.joints_of(link) if joint.name in self.joints
-                 and (other := self.other.joints[self.joints[joint.name]]).type is joint.type
-                 and self.links.get(link) in other.links]
+        pairs = self._pairs(link)
         if not pairs:
             return None
         upright = np.eye(3) if link == self.one.base else self._upright
-        # axes have no sense of their own: as both files give them, or as they lie in the robot as a whole
+        # axes have no sense of their own: as both files give them, as they lie in the robot as a whole, or any
         found = [_fit(pairs, self.one.length, signs) for signs in (None, upright)]
         best = min(max(each.misses.values()) for each in found)
+        if best > SAME_ROBOT and (count := sum(len(mine.axes) for mine, _ in pairs)) <= MOST_SENSES:
+            found += [_fit(list(_turned(pairs, signs)), self.one.length, None)
+                      for signs in product((1.0, -1.0), repeat=count)]
+            best = min(max(each.misses.values()) for each in found)
         good = [each for each in found if max(each.misses.values()) <= best + NOISE * SAME_ROBOT]
         return max(good, key=lambda each: float(np.trace(upright.T @ each.X[:3, :3])))
+
+    def apart(self, hinge: str) -> float:
+        """By how much (characteristic lengths) the links of a hinge lie elsewhere along its axis in the other robot:
+        no link shows that by itself, as a hinge may have its centre anywhere. 0 where the other joints of one of the
+        links do not tell it, or some way in which they fit fits."""
+        joint = self.one.joints[hinge]
+        if joint.type is not JointType.REVOLUTE or hinge not in self.joints:
+            return 0.0
+        sides, gain = [], 1.0
+        for link in joint.links:
+            pairs = self._pairs(link)
+            if hinge not in [mine.name for mine, _ in pairs]:
+                return 0.0
+            gain = max(gain, _gain(hinge, pairs, self.one.length))
+            count = sum(len(mine.axes) for mine, _ in pairs)
+            ways = product((1.0, -1.0), repeat=count) if count <= MOST_SENSES else [(1.0,) * count]
+            fits = [_fit(list(_turned(pairs, signs)), self.one.length, None) for signs in ways]
+            mine, their = next(pair for pair in pairs if pair[0].name == hinge)
+            sides.append([float((mine.point - fit.X[:3, :3] @ their.point - fit.X[:3, 3]) @ mine.axis)
+                          for fit in fits if max(fit.misses.values()) <= SAME_ROBOT])
+        found = min((abs(a - b) for a, b in product(*sides)), default=0.0) / self.one.length
+        return found if found > SAME_ROBOT * gain else 0.0
 
     @cached_property
     def _upright(self) -> Array:
@@ -106,8 +139,9 @@ class RobotMatch:
         return np.eye(3) if found is None else found.X[:3, :3]
 
 
-def _fit(pairs: Sequence[tuple[Joint, Joint]], length: float, upright: Array | None) -> LinkFit:
-    """The best fit of a link's joints; the centre of a hinge is any point of its axis, slid to where both agree."""
+def _fit(pairs: Sequence[tuple[_JointOn, _JointOn]], length: float, upright: Array | None) -> LinkFit:
+    """The best fit of a link's joints; the centre of a hinge or slide is any point of its axis, slid to where both
+    agree."""
     shift, X, only = np.zeros(len(pairs)), np.eye(4), False
     for _ in range(SLIDES):
         points = [(mine.point, their.point + s * _slide(their)) for (mine, their), s in zip(pairs, shift, strict=True)]
@@ -115,7 +149,7 @@ def _fit(pairs: Sequence[tuple[Joint, Joint]], length: float, upright: Array | N
         X, only = _fitted(points, axes, length, upright)
         before = shift.copy()
         for number, (mine, their) in enumerate(pairs):
-            if their.type in _ALONG:
+            if their.type in _LINES:
                 moved = X[:3, :3] @ their.point + X[:3, 3]
                 shift[number] = float((mine.point - moved) @ (X[:3, :3] @ their.axis))
         if np.max(np.abs(shift - before)) <= EXACT * length:
@@ -123,8 +157,60 @@ def _fit(pairs: Sequence[tuple[Joint, Joint]], length: float, upright: Array | N
     return LinkFit(X, {mine.name: _miss(mine, their, X, length) for mine, their in pairs}, only)
 
 
-def _slide(joint: Joint) -> Array:
-    return np.asarray(joint.axis if joint.type in _ALONG else np.zeros(3))
+@dataclass(frozen=True, eq=False)
+class _JointOn:
+    """A joint as a link carries it: of a U joint the axis that is fixed in the link, and the angle to the other one as
+    its cosine without sign, as the axes have no sense."""
+
+    name: str
+    type: JointType
+    point: Array
+    axes: tuple[Array, ...]
+    cosine: float = 0.0
+
+    @property
+    def axis(self) -> Array:
+        """The only axis."""
+        return self.axes[0]
+
+
+def _on(joint: Joint, link: str) -> _JointOn:
+    if joint.type is not JointType.UNIVERSAL:
+        return _JointOn(joint.name, joint.type, joint.point, joint.axes)
+    own = joint.axes[joint.links.index(link)]
+    return _JointOn(joint.name, joint.type, joint.point, (own,), abs(float(joint.axes[0] @ joint.axes[1])))
+
+
+def _turned(pairs: Sequence[tuple[_JointOn, _JointOn]], signs: Iterable[float]
+            ) -> Iterator[tuple[_JointOn, _JointOn]]:
+    """The pairs with the other robot's axes in these senses."""
+    given = iter(signs)
+    for mine, their in pairs:
+        yield mine, replace(their, axes=tuple(next(given) * axis for axis in their.axes))
+
+
+def _gain(hinge: str, pairs: Sequence[tuple[_JointOn, _JointOn]], length: float) -> float:
+    """How much farther than its joints miss a link may lie off along the axis of a hinge on it; infinite where its
+    joints do not tell that."""
+    rows, asked = [], np.zeros(6)
+    for mine, _ in pairs:
+        def moved(along: Array, point: Array = mine.point) -> Array:
+            return np.concatenate([along, np.cross(point / length, along)])
+
+        if mine.name == hinge:
+            asked = moved(mine.axis)
+        across = np.linalg.svd(mine.axis[None])[2][1:] if mine.axes else np.eye(3)
+        points = {JointType.PLANAR: [mine.axis] if mine.axes else []}.get(
+            mine.type, list(across) if mine.type in _LINES else list(np.eye(3)))
+        rows += [moved(each) for each in points]
+        rows += [np.concatenate([np.zeros(3), each]) for each in across if mine.axes]
+    found = np.linalg.lstsq(np.array(rows).T, asked, rcond=TURNING_ARM)[0]
+    left = float(np.linalg.norm(asked - found @ np.array(rows)))
+    return np.inf if left > TURNING_ARM**2 else 2.0 * float(np.sum(np.abs(found)))
+
+
+def _slide(joint: _JointOn) -> Array:
+    return np.asarray(joint.axis if joint.type in _LINES else np.zeros(3))
 
 
 def _fitted(points: Sequence[tuple[Array, Array]], axes: Sequence[tuple[Array, Array]], length: float,
@@ -146,7 +232,7 @@ def _rotation(H: Array) -> Array:
     return np.asarray(Vt.T @ D @ U.T)
 
 
-def _miss(mine: Joint, their: Joint, X: Array, length: float) -> float:
+def _miss(mine: Joint | _JointOn, their: Joint | _JointOn, X: Array, length: float) -> float:
     """By how much a joint of the other robot, moved by X, is another one: axes as lines without sense."""
     gap = mine.point - (X[:3, :3] @ their.point + X[:3, 3])
     axes = [X[:3, :3] @ axis for axis in their.axes]
@@ -155,6 +241,8 @@ def _miss(mine: Joint, their: Joint, X: Array, length: float) -> float:
     elif mine.type in _ACROSS:
         gap = (gap @ mine.axis) * mine.axis if mine.type is JointType.PLANAR else np.zeros(3)
     turns = [float(np.linalg.norm(np.cross(a, b))) for a, b in zip(mine.axes, axes, strict=True)]
+    if isinstance(mine, _JointOn) and isinstance(their, _JointOn):
+        turns.append(abs(mine.cosine - their.cosine))
     return max([float(np.linalg.norm(gap)) / length, *turns])
 
 

@@ -99,6 +99,16 @@ def _geometry(file: LintedFile) -> Iterator[Spot]:
                                    f"radians), at joint {worst!r}")
 
 
+    fits = _fits(file, match)
+    for name in match.joints:
+        joint = match.one.joints[name]
+        if all(link in fits and max(fits[link].misses.values()) <= SAME_ROBOT for link in joint.links):
+            apart = match.apart(name)
+            if apart > SAME_ROBOT:
+                yield Spot(joint.line, f"joint {name!r}: its links lie elsewhere along its axis than in the other "
+                                       f"file, by {apart:.3g} (characteristic lengths)")
+
+
 def _zero(file: LintedFile) -> Iterator[Spot]:
     match = _match(file)
     if match is None:

@@ -27,6 +27,8 @@ from .names import OWN, remove
 
 CLOSING = ("loop", "constraint", "loop_joint", "joint", "connect", "weld", "coupling")
 """Elements that say how a loop closes, in any dialect."""
+LEAST_BETWEEN = 3
+"""Joints that move in the shortest loop, besides the one that closes it."""
 
 
 def as_written(file: LintedFile) -> tuple[JointGraph, LoopAssembly] | None:
@@ -233,6 +235,23 @@ def _none(file: LintedFile) -> Iterator[Spot]:
         yield Spot(None, "the file closes no loop")
 
 
+def _consecutive(graph: JointGraph, one: str, two: str) -> bool:
+    """Whether the frames are merely those of joints near to each other: less than three joints that move are between
+    them, which a loop has besides the one that closes it, or one carries the other, and that carries more."""
+    carrier = {joint.links[1]: joint for joint in graph.joints.values() if joint.in_tree}
+    ways: list[list[str]] = []
+    for tip in (one, two):
+        way = [tip]
+        while way[-1] in carrier and len(way) <= len(carrier):
+            way.append(carrier[way[-1]].links[0])
+        ways.append(way)
+    between = {*ways[0]} ^ {*ways[1]}
+    if sum(carrier[each].kind is not JointType.FIXED for each in between if each in carrier) < LEAST_BETWEEN:
+        return True
+    inner = [tip for tip, way in ((one, ways[1]), (two, ways[0])) if tip in way]
+    return any(joint.in_tree and joint.links[0] in {one, two} - {*inner} for joint in graph.joints.values() if inner)
+
+
 def _coincide(file: LintedFile) -> Iterator[Spot]:
     graph = file.said
     if graph is None:
@@ -240,7 +259,7 @@ def _coincide(file: LintedFile) -> Iterator[Spot]:
     held = graph.closing | {link for joint in graph.joints.values() if not joint.in_tree for link in joint.links}
     for each in closure_candidates(graph, graph.base or guess.base(file.graph())):
         one, two = each.links
-        if each.coincides and not held & {one, two}:
+        if each.coincides and not held & {one, two} and not _consecutive(graph, one, two):
             yield Spot(graph.links[two].line, f"the frames of {one!r} and {two!r} lie {1000 * each.distance:.3g} mm "
                                               "apart at zero, and nothing keeps them together when the joints move",
                        advice=f"if they should meet: --close {each.wish}")
