@@ -966,6 +966,7 @@ class ErrorsRecord(TypedDict):
     pose: PoseRecord
     position_mm: ErrorRecord
     orientation_deg: ErrorRecord
+    beyond: list[str]
     sampled: SampledRecord | None
 
 

@@ -27,6 +27,7 @@ from ..budgets import AXIS_SEEN, SELECT_ROUNDS
 from ..errors import BadRequest, HrsynthError
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
+from ..kinematics.limits import outside
 from ..mechanism.noise import Noise
 from ..mechanism.observation import labels_of
 from ..mechanism.observations.direction import SeenAxis
@@ -225,11 +226,11 @@ def select(robot: RobotLike, camera: CameraLike = None, *, observe: LegsLike = N
     The fields of :class:`Criteria` can be given by their names: ``size``, ``examine``, ``endings``, ``runs``,
     ``sight``, ``focal``, ``seconds``. The sets are those of the legs or links ``observe`` and of what else the file
     or ``see`` observes, by default of all legs. A set is discarded where it does not see every freedom, where an end is
-    singular or something is behind its camera there, where the camera (``sight``) sees too little of a leg, where start
-    and goal are proved to lie in different aspects, and where a simulated run ends elsewhere. Modes, aspects and
-    endings are asked for the ``examine`` most accurate sets (endings for ``endings`` of them; the radius of directions
-    of segments alone), the others are neither kept nor discarded. Runs are made from the best set on, until ``runs`` of
-    them ended at the goal.
+    singular or beyond limits of joints, or something is behind its camera there, where the camera (``sight``) sees too
+    little of a leg, where start and goal are proved to lie in different aspects, and where a simulated run ends
+    elsewhere. Modes, aspects and endings are asked for the ``examine`` most accurate sets (endings for ``endings`` of
+    them; the radius of directions of segments alone), the others are neither kept nor discarded. Runs are made from the
+    best set on, until ``runs`` of them ended at the goal.
 
     Raises ``BadRequest``, ``PoseNotReached``.
 
@@ -304,7 +305,9 @@ class _Work:
             reasons = [f"{o.kind} {o.leg} is not in front of its camera at the {name}" for name, o in behind if o]
             if reasons:
                 return Candidate(legs, verdict.verdict, reasons[0])
-            reasons = [reason for name, at in ends if (reason := _singular_at(name, analysis.classify(at)))]
+            reasons = [f"the {name} is beyond the limits of {', '.join(joints)}"
+                       for name, at in ends if (joints := outside(at.twin, at.q))]
+            reasons += [reason for name, at in ends if (reason := _singular_at(name, analysis.classify(at)))]
         except HrsynthError as error:
             return Candidate(legs, "undecided", str(error))
         blur = self.blur.chosen([i for i, o in enumerate(self.setting.observed) if o.leg in legs])

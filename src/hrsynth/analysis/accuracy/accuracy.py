@@ -63,7 +63,8 @@ class Accuracy(Result, shown_as="accuracy"):
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line, without the command's own fields."""
         poses = [{"pose": each.pose.to_dict(), "position_mm": each.position.to_dict(1e3),
-                  "orientation_deg": each.orientation.to_dict(180 / np.pi), "sampled": true and true.to_dict()}
+                  "orientation_deg": each.orientation.to_dict(180 / np.pi), "beyond": list(each.beyond),
+                  "sampled": true and true.to_dict()}
                  for each, true in zip(self.poses, self.sampled, strict=True)]
         cones = [{"leg": o.leg, "link": o.link, "cone_deg": float(np.degrees(cone))}
                  for o, cone in zip(self.setting.observed, self.cones, strict=True) if cone]

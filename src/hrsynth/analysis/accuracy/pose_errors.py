@@ -15,6 +15,7 @@ from ...batch.error_bounds import bounds_of_maps, freedom
 from ...geometry.ranks import kernel_basis
 from ...geometry.vectors import Array, oriented
 from ...kinematics.configuration import ClosedConfiguration
+from ...kinematics.limits import outside
 from ...kinematics.relation import Measurement, relation
 from ...mechanism.pose import Pose
 from ...results import Value, finite
@@ -72,6 +73,8 @@ class PoseErrors(Value):
     pose: Pose
     position: ErrorEllipsoid
     orientation: ErrorEllipsoid
+    beyond: tuple[str, ...] = ()
+    """The joints that are beyond their limits at the pose."""
 
 
 def reading(at: ClosedConfiguration, question: Measurement) -> tuple[Array, Array]:
@@ -157,7 +160,7 @@ def _longest(axes: Array | None) -> float:
 def measured(at: ClosedConfiguration, question: Measurement, blur: Blur, pose: Pose) -> PoseErrors:
     """The error maxima at a configuration with their directions."""
     position, orientation = map(_extent, _parts(at, question, blur))
-    return PoseErrors(pose, position, orientation)
+    return PoseErrors(pose, position, orientation, tuple(outside(at.twin, at.q)))
 
 
 def _extent(part: ErrorMaps | None) -> ErrorEllipsoid:

@@ -17,7 +17,7 @@ from ...constraints.condition import General
 from ...mechanism.pose import Pose
 from ...tolerances import NOISE, RANK_GAP
 from .robots import NO_MATRIX, formation
-from .tables import GAP, NOT_BOUNDED, Rows, bounded, camera, head, known, listing, watched
+from .tables import GAP, NOT_BOUNDED, Rows, beyond_limits, bounded, camera, head, known, listing, watched
 
 if TYPE_CHECKING:
     from ...analysis.aspects.atlas import Atlas, ModePair
@@ -54,8 +54,10 @@ def check(found: Check) -> str:
         axes = zip(found.grid.grid.shape, found.grid.grid.names, strict=True)
         size = " × ".join(f"{count} {name}" for count, name in axes)
         fixed, free = str(found.grid.grid.fixed), ", ".join(_free(found.grid))
+        beyond = sum(bool(each.beyond) for each in found.grid.postures if each is not None)
         rows.append(("grid", [
             f"{size}: " + ", ".join(f"{counts[state]} {state}" for state in sorted(counts)),
+            *([f"{beyond} beyond limits of joints"] if beyond else []),
             *([f"held: {fixed}"] if fixed else []),
             f"free, at each pose nearest to the zero configuration: {free}" if free else "no part is free"]))
     return listing(rows)
@@ -74,7 +76,7 @@ def _posture(posture: Posture, length: float, setting: ObservedRobot) -> Rows:
     shown = "directions" if all(each.by_segment for each in setting.observed) else "observations"
     mobility, far, dof = posture.mobility, posture.distances, posture.dof
     whose = "bodies have" if setting.mechanism.formation else "platform has"
-    rows = [*known("limits", f"beyond those of {', '.join(posture.beyond)}" if posture.beyond else None),
+    rows = [*beyond_limits(posture.beyond),
             ("mobility", f"{mobility.total}, of which {mobility.idle} idle; the {whose} " + (
         "one freedom" if dof == 1 else f"{dof} freedoms")),
             *_kinds("hidden robot", f"the {shown} show {posture.hidden.rank} of {dof}", posture.hidden, "not seen"),

@@ -13,7 +13,19 @@ from ...batch.grids import poses_over
 from ...geometry.vectors import Array
 from ...mechanism.pose import Grid, Pose
 from ...tolerances import DAMPED, LARGEST_FIRST_ORDER, SAME_RELATION
-from .tables import GAP, NOT_BOUNDED, Rows, bounded, camera, head, known, labelled, listing, table
+from .tables import (
+    GAP,
+    NOT_BOUNDED,
+    Rows,
+    beyond_limits,
+    bounded,
+    camera,
+    head,
+    known,
+    labelled,
+    listing,
+    table,
+)
 
 if TYPE_CHECKING:
     from ...analysis.accuracy.accuracy import Accuracy
@@ -121,14 +133,21 @@ def accuracy(found: Accuracy) -> str:
             *camera(found.setting), ("errors", f"largest over all errors {found.blur.inside}, to first order")]
     length = found.setting.everything.twin.length
     if found.field is not None:
-        rows += [*GAP, *field_rows(found)]
+        rows += [*GAP, *field_rows(found), *_limits_left(found)]
     if found.swept is not None:
-        rows += [*GAP, *_swept_rows(found, found.swept)]
+        rows += [*GAP, *_swept_rows(found, found.swept), *_limits_left(found)]
     for errors, true in zip(found.poses, found.sampled, strict=True):
-        rows += [*GAP, ("pose", str(errors.pose)), *_extent("position", errors.position, 1e3, "mm", length),
+        rows += [*GAP, ("pose", str(errors.pose)), *beyond_limits(errors.beyond),
+                 *_extent("position", errors.position, 1e3, "mm", length),
                  *_extent("orientation", errors.orientation, 180 / np.pi, "degrees"),
                  *([] if true is None else _samples(errors, true))]
     return listing(rows)
+
+
+def _limits_left(found: Accuracy) -> Rows:
+    """Whose limits a grid passes over."""
+    limited = ", ".join(found.setting.mechanism.limited)
+    return [("limits", f"those of {limited} are not looked at")] if limited else []
 
 
 def field_rows(found: Accuracy) -> list[tuple[str, str]]:

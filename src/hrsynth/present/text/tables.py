@@ -80,6 +80,11 @@ def known(name: str, value: str | None) -> Rows:
     return [] if value is None else [(name, value)]
 
 
+def beyond_limits(joints: Sequence[str]) -> Rows:
+    """The joints that are beyond their limits at a pose."""
+    return known("limits", f"beyond those of {', '.join(joints)}" if joints else None)
+
+
 def head(found: ObservedRobot) -> Rows:
     """The robot and what is observed of it."""
     return [("robot", f"{found.robot.name}   {found.anatomy.architecture()}"),
