@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Container, Iterator, Sequence
+from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -80,15 +81,16 @@ def sweep(start: ClosedConfiguration, question: Measurement, grid: Grid, motion:
             there = there if cell in at_once else nearest(there, goals[cell], home)
         return there if came == 1 and _arrived(there, goals[cell]) else None
 
-    return spread(start, grid.shape, goals, lead)
+    return spread(start, grid.shape, goals, lead, at_once)
 
 
 def spread(start: ClosedConfiguration, shape: tuple[int, ...], goals: Sequence[Task],
-           lead: Callable[[int, ClosedConfiguration, int], ClosedConfiguration | None]
+           lead: Callable[[int, ClosedConfiguration, int], ClosedConfiguration | None], at_once: Container[int] = ()
            ) -> tuple[ClosedConfiguration | None, ...]:
     """Configurations at the ``goals`` of a grid's cells, of a ``shape``: ``lead`` gives that of a cell from a
     configuration nearby with so many halvings, None where it does not come there. It begins at the goals nearest to
-    ``start`` and goes on to neighbours, but not from a fold: working modes meet there, and small steps go on in any."""
+    ``start`` and goes on to neighbours, but not from a fold: working modes meet there, and small steps go on in any.
+    Cells ``at_once`` need no steps."""
     twin = start.twin
     found: dict[int, ClosedConfiguration] = {}
     queue: deque[tuple[int, int]] = deque()
@@ -99,9 +101,13 @@ def spread(start: ClosedConfiguration, shape: tuple[int, ...], goals: Sequence[T
         there = lead(cell, origin, halvings)
         if there is not None:
             found[cell] = there
+            queue.extend((other, cell) for other in _neighbours(cell, shape) if other not in found)
             tell("poses")
-            if np.linalg.svd(system(twin, there.q, goals[cell])[1], compute_uv=False)[rank - 1] > NEAR_FOLD:
-                queue.extend((other, cell) for other in _neighbours(cell, shape) if other not in found)
+
+    @cache
+    def is_fold(cell: int) -> bool:
+        J = system(twin, found[cell].q, goals[cell])[1]
+        return bool(np.linalg.svd(J, compute_uv=False)[rank - 1] <= NEAR_FOLD)
 
     for cell in sorted(range(len(distance)), key=lambda i: (round(distance[i], 9), i))[:FIRST_CELLS]:
         settle(cell, start, HALVINGS)
@@ -109,7 +115,7 @@ def spread(start: ClosedConfiguration, shape: tuple[int, ...], goals: Sequence[T
             break
     while queue:
         cell, origin = queue.popleft()
-        if cell not in found:
+        if cell not in found and (cell in at_once or not is_fold(origin)):
             settle(cell, found[origin], SWEEP_HALVINGS)
     return tuple(found.get(cell) for cell in range(len(goals)))
 

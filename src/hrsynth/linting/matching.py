@@ -104,11 +104,14 @@ class RobotMatch:
         found = [_fit(pairs, self.one.length, signs) for signs in (None, upright)]
         best = min(max(each.misses.values()) for each in found)
         if best > SAME_ROBOT and (count := sum(len(mine.axes) for mine, _ in pairs)) <= MOST_SENSES:
-            found += [_fit(list(_turned(pairs, signs)), self.one.length, None)
-                      for signs in product((1.0, -1.0), repeat=count)]
+            found += self._fits(pairs, product((1.0, -1.0), repeat=count))
             best = min(max(each.misses.values()) for each in found)
         good = [each for each in found if max(each.misses.values()) <= best + NOISE * SAME_ROBOT]
         return max(good, key=lambda each: float(np.trace(upright.T @ each.X[:3, :3])))
+
+    def _fits(self, pairs: Sequence[tuple[_JointOn, _JointOn]], ways: Iterable[Sequence[float]]) -> list[LinkFit]:
+        """Those with the other robot's axes in each of these senses."""
+        return [_fit(list(_turned(pairs, signs)), self.one.length, None) for signs in ways]
 
     def apart(self, hinge: str) -> float:
         """By how much (characteristic lengths) the links of a hinge lie elsewhere along its axis in the other robot:
@@ -125,10 +128,9 @@ class RobotMatch:
             gain = max(gain, _gain(hinge, pairs, self.one.length))
             count = sum(len(mine.axes) for mine, _ in pairs)
             ways = product((1.0, -1.0), repeat=count) if count <= MOST_SENSES else [(1.0,) * count]
-            fits = [_fit(list(_turned(pairs, signs)), self.one.length, None) for signs in ways]
             mine, their = next(pair for pair in pairs if pair[0].name == hinge)
             sides.append([float((mine.point - fit.X[:3, :3] @ their.point - fit.X[:3, 3]) @ mine.axis)
-                          for fit in fits if max(fit.misses.values()) <= SAME_ROBOT])
+                          for fit in self._fits(pairs, ways) if max(fit.misses.values()) <= SAME_ROBOT])
         found = min((abs(a - b) for a, b in product(*sides)), default=0.0) / self.one.length
         return found if found > SAME_ROBOT * gain else 0.0
 
@@ -154,7 +156,8 @@ def _fit(pairs: Sequence[tuple[_JointOn, _JointOn]], length: float, upright: Arr
                 shift[number] = float((mine.point - moved) @ (X[:3, :3] @ their.axis))
         if np.max(np.abs(shift - before)) <= EXACT * length:
             break
-    return LinkFit(X, {mine.name: _miss(mine, their, X, length) for mine, their in pairs}, only)
+    return LinkFit(X, {mine.name: max(_miss(mine, their, X, length), abs(mine.cosine - their.cosine))
+                       for mine, their in pairs}, only)
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,8 +244,6 @@ def _miss(mine: Joint | _JointOn, their: Joint | _JointOn, X: Array, length: flo
     elif mine.type in _ACROSS:
         gap = (gap @ mine.axis) * mine.axis if mine.type is JointType.PLANAR else np.zeros(3)
     turns = [float(np.linalg.norm(np.cross(a, b))) for a, b in zip(mine.axes, axes, strict=True)]
-    if isinstance(mine, _JointOn) and isinstance(their, _JointOn):
-        turns.append(abs(mine.cosine - their.cosine))
     return max([float(np.linalg.norm(gap)) / length, *turns])
 
 

@@ -94,7 +94,7 @@ def basins(found: Basins) -> str:
     size = " × ".join(f"{count} {name}" for count, name in zip(found.grid.shape, found.grid.names, strict=True))
     rows = [*head(found.setting), *camera(found.setting), ("to", str(found.goal)),
             ("starts", f"{found.starts:,} of {size}: {replace(found.grid, fixed=Pose())}"),
-            *known("held", held(found.grid, found.setting, found.abreast) or None), *GAP]
+            *known("held", held(found.grid, found.setting, found.abreast)), *GAP]
     lines = [[letter, each.ending.name, f"{each.count:,}", f"{100 * each.share:.3g} %",
               "" if each.pose is None else str(each.pose), str(each.example)]
              for letter, each in zip(LETTERS, found.ends, strict=False)]
@@ -150,7 +150,7 @@ def _limits_left(found: Accuracy) -> Rows:
     return [("limits", f"those of {limited} are not looked at")] if limited else []
 
 
-def field_rows(found: Accuracy) -> list[tuple[str, str]]:
+def field_rows(found: Accuracy) -> Rows:
     """What a grid holds: its size, what is reached of it, the range of the errors, how they were checked."""
     field, length = found.field, found.setting.everything.twin.length
     assert field is not None
@@ -162,7 +162,7 @@ def field_rows(found: Accuracy) -> list[tuple[str, str]]:
     return _grid_rows(found, field.grid, reached, position, orientation, field.spots, field.gap)
 
 
-def _swept_rows(found: Accuracy, swept: SweptErrors) -> list[tuple[str, str]]:
+def _swept_rows(found: Accuracy, swept: SweptErrors) -> Rows:
     """The same of a grid that is in a file, of which no median is known."""
     tally = swept.tally
     reached = f"{tally.reached} of {swept.grid.size}" + (
@@ -171,13 +171,13 @@ def _swept_rows(found: Accuracy, swept: SweptErrors) -> list[tuple[str, str]]:
                       _range(tally.orientation, None, 180 / np.pi, "degrees"), swept.spots, tally.gap)
 
 
-def held(grid: Grid, setting: ObservedRobot, as_at_home: bool) -> str:
+def held(grid: Grid, setting: ObservedRobot, as_at_home: bool) -> str | None:
     """What a grid holds: the whole pose but for what varies, where free parts stay as they are at the zero
     configuration (``as_at_home``), else what was given and which parts are free."""
     motion, typed = setting.motion, str(grid.fixed)
     if not as_at_home:
         free = ", ".join(motion.free({*grid.names, *grid.fixed.given}))
-        return typed if not free else (
+        return (typed or None) if not free else (
             f"{typed or 'nothing'}; free, at each pose nearest to the zero configuration: {free}")
     ends, _ = poses_over(motion, grid, setting.robot.name, grid.places_at(np.array([0, grid.size - 1])))
     first, last = (dict(part.split("=") for part in str(motion.pose(X)).split(",")) for X in ends)
@@ -185,15 +185,14 @@ def held(grid: Grid, setting: ObservedRobot, as_at_home: bool) -> str:
     turned = {"phi", "rpy"} & {*grid.names, *given}
     return ",".join(f"{name}={given.get(name, value)}" for name, value in {**first, **given}.items()
                     if name in given or (value == last[name] and name not in grid.names
-                                         and not (turned and name in ("phi", "rpy"))))
+                                         and not (turned and name in ("phi", "rpy")))) or None
 
 
 def _grid_rows(found: Accuracy, grid: Grid, reached: str, position: str, orientation: str, spots: Spots | None,
-               gap: float) -> list[tuple[str, str]]:
+               gap: float) -> Rows:
     size = " × ".join(f"{count} {name}" for count, name in zip(grid.shape, grid.names, strict=True))
     ranges = ", ".join(f"{name} {values[0]:.4g} to {values[-1]:.4g}" for name, values in grid.axes)
-    rest = held(grid, found.setting, spots is not None)
-    rows = [("poses", f"{size}: {ranges}"), *([("held", rest)] if rest else []),
+    rows = [("poses", f"{size}: {ranges}"), *known("held", held(grid, found.setting, spots is not None)),
             ("reached", reached), ("position", position), ("orientation", orientation)]
     if spots is not None and spots.count:
         rows.append(("checked", f"against Pinocchio at {spots.count} random poses, largest difference "
