@@ -2,8 +2,8 @@
 # # 10. Kutzbach says −2, and it moves
 #
 # Count the links, count the joints, subtract: Kutzbach's formula gives the freedoms of a mechanism in no time. It is
-# wrong for most robots in this book, and for the linkages of this notebook it is wrong in the most beautiful way: they
-# should be stiffer than a frame, and they move.
+# wrong for most robots in these notebooks, and most beautifully so for the linkages of this one: they should be
+# stiffer than a frame, yet they move.
 
 # %%
 import tempfile
@@ -34,11 +34,11 @@ hrsynth.check(robot)
 
 # %% [markdown]
 # *Mobility 1*. The last line says how that can be: three of the constraints of the loop repeat others, and −2 + 3 = 1.
-# They are counted by the rank of the loop's Jacobian, with its gap, and at twenty configurations, so this is no
-# accident of one pose. The names are those of the file: the loop is cut at that joint.
+# They are counted by the rank of the loop's Jacobian, with its gap, at twenty configurations, so this is no accident
+# of one pose. The loop is named after the joint at which it is cut.
 #
-# Denavit and Hartenberg's formulas know nothing of the program. They say that the ring closes for every angle of one
-# hinge, and that tan θ₁/2 · tan θ₂/2 stays the same all the way:
+# Denavit and Hartenberg's formulas are independent of the program. They say that the ring closes for every angle of
+# one hinge, and that tan θ₁/2 · tan θ₂/2 is constant:
 
 # %%
 twists, start = linkage.twists, linkage.regular(np.random.default_rng(0))
@@ -71,8 +71,9 @@ for name, make in LINKAGES.items():
 # The loop above saved them as robot files. `python -m hrsynth.families FOLDER bennett schatz` does so from the shell.
 # Schatz's is at work in every chemist's Turbula mixer.
 #
-# With one hinge driven and held, a ring has a few closings. These are the assembly modes of the real robot. In dual
-# quaternions a determinant has them among its zeros; of these two of the four are closings, and there are no others:
+# With one hinge driven and held, a ring has a few closings. These are the assembly modes of the real robot. Written in
+# dual quaternions, they are among the four zeros of a determinant. Here two of the zeros are closings, so there are no
+# others:
 
 # %%
 print(hrsynth.modes(hrsynth.load(folder / "plane_symmetric_bricard.urdf"), real=True))
@@ -80,8 +81,8 @@ print(hrsynth.modes(hrsynth.load(folder / "plane_symmetric_bricard.urdf"), real=
 # %% [markdown]
 # ## How special is it?
 #
-# Bennett's condition is an equation. Miss it a little, and the ring does not close at all any more: two unknowns too
-# few for its equations. Here is by how much it stays open at best, if one twist is wrong:
+# Bennett's condition is an equation. If it is missed by a little, the ring does not close at all: it has two unknowns
+# too few for its equations. Here is by how much it stays open at best, if one twist is wrong:
 
 # %%
 from scipy.optimize import least_squares
@@ -94,7 +95,7 @@ for error in np.radians([0.01, 0.1, 1.0]):
 
 # %% [markdown]
 # No file holds such numbers exactly. Robots written with ten decimals miss the condition by 1e-10, and are still meant
-# to move. That is why no rank is told without its gap: the ratio of the smallest singular value that counts to the
+# to move. That is why no rank is printed without its gap: the ratio of the smallest singular value that counts to the
 # largest that does not. Near the limit the program refuses to answer.
 #
 # ## Motors held, and it moves
@@ -109,9 +110,9 @@ found = hrsynth.modes(robot, real=True)
 found
 
 # %% [markdown]
-# This is a *self-motion*: a curve of assembly modes. The program was led along it by small steps, each closed again,
-# until it came back; its length is the circle's. A self-motion is *found* and never proved, because samples of a curve
-# prove nothing. The other two modes lie on none: there the platform is turned.
+# This is a *self-motion*: a curve of assembly modes. The program followed it in small steps, closing the loops after
+# each, until it came back to the start; its length is that of the circle. A self-motion is *found* and never proved,
+# because samples of a curve prove nothing. The other two modes lie on no self-motion: there the platform is turned.
 
 # %%
 (motion,) = found.motions
@@ -125,10 +126,10 @@ place.legend()
 plt.show()
 
 # %% [markdown]
-# A machine with that geometry is no machine at this one pose only. Worse are robots that move like this at *every*
-# pose: M. Husty and A. Karger showed that all Gough-Stewart platforms whose base and platform are similar are like that
-# (*architecturally singular*). Half the angle between neighbouring joints, 20° below and 40° above, makes two such
-# hexagons. Six motors hold it, and the platform is loose, wherever it is:
+# A machine with that geometry is loose only in this orientation of its platform. Worse are robots that move like this
+# at *every* pose: M. Husty and A. Karger showed that all Gough-Stewart platforms whose base and platform are similar
+# are like that (*architecturally singular*). Two such hexagons have 20° (base) and 40° (platform) as half the angle
+# between paired joints. With all six motors held, the platform is loose, wherever it is:
 
 # %%
 print(hrsynth.modes(gough_stewart(base_half=np.radians(20), platform_half=np.radians(40)), real=True))
@@ -138,7 +139,7 @@ print(hrsynth.modes(gough_stewart(base_half=np.radians(20), platform_half=np.rad
 #
 # 1. Sarrus's linkage (1853) was the first to guide along a straight line by hinges alone: `link_2`, between the two
 #    triples of parallel axes, against `link_5`. Show it by samples.
-# 2. Make the platform of the 3-RP̲R one percent smaller than its base. What becomes of the self-motion?
+# 2. Make the platform of the 3-RP̲R one percent smaller than its base. What happens to the self-motion?
 # 3. A five-bar, both distal links watched: each direction that is held leaves the tip a circle. Where does `singular`
 #    say that the controller loses a freedom, and when is that a self-motion?
 
@@ -146,7 +147,7 @@ print(hrsynth.modes(gough_stewart(base_half=np.radians(20), platform_half=np.rad
 # ## Solutions
 
 # %% jupyter={"source_hidden": true} tags=["solution"]
-# 1. the attitude of one link against the other is the same at all configurations, its places lie on a line
+# 1. the orientation of one link relative to the other is the same at all configurations, its positions lie on a line
 setting = hrsynth.observe(hrsynth.load(folder / "sarrus.urdf"))
 poses = np.array([np.linalg.inv(at.pose("link_5")) @ at.pose("link_2") for at in setting.configurations])
 print("largest turn", np.abs(poses[:, :3, :3] - poses[0, :3, :3]).max().round(12))

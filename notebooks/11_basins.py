@@ -1,8 +1,8 @@
 # %% [markdown]
 # # 11. Endings and basins
 #
-# A loop that watches the directions of legs drives their error to zero, or to where it falls no more. Where that is
-# depends on where the robot starts. This notebook colours each start by where its run ends.
+# A servo loop that watches the directions of legs drives their error to zero, or until it falls no further. At which
+# pose it ends depends on where the robot starts. This notebook colours each start by where its run ends.
 
 # %%
 import matplotlib.pyplot as plt
@@ -29,8 +29,8 @@ def shown(found):
 # ## A planar robot
 #
 # The 3-R̲PR with its three rods watched, and starts that are turned as the goal is. A rod that slides through its base
-# joint turns over there: then its direction ends opposite to the desired one. The error u × u* cannot see that
-# (*antipodal*).
+# joint comes out on the other side: its direction then ends opposite to the desired one. The error u × u* cannot see
+# that (*antipodal*).
 
 # %%
 planar = hrsynth.basins("3rpr_m1", to="x=0,y=0,phi=0", grid="x=-0.3:0.3:21,y=-0.3:0.3:21,phi=0", jobs=1)
@@ -38,15 +38,15 @@ print(planar)
 shown(planar)
 
 # %% [markdown]
-# The line *certified* is of another kind than the picture. The picture is a sample: between two starts anything may
-# happen. What is certified is proved for every start within that distance and that turn, by enclosures of the error.
+# The line *certified* says more than the picture. The picture is a sample: between two starts anything may happen.
+# What is certified is proved for every start within that distance and that turn, by enclosures of the error.
 
 # %% [markdown]
 # ## Why four legs are sometimes worse than two
 #
-# Two legs of the Quattro see its four freedoms; four legs see them twice, which is more accurate. But more directions
-# than freedoms can balance where they are not right: their errors pull against each other, and the loop rests. Below
-# the goal x = y = 0, z = −0.5 m there is such a pose. The starts are 10 cm below the goal:
+# Two legs of the Quattro see its four freedoms; four legs see them twice, which is more accurate. But with more
+# directions than freedoms the errors can balance: they pull against each other, and the loop rests. Below the goal x =
+# y = 0, z = −0.5 m there is such a pose. The starts are 10 cm below the goal:
 
 # %%
 goal, starts = "x=0,y=0,z=-0.5,phi=0.3", "x=-0.5:0.5:11,y=-0.5:0.5:11,z=-0.6,phi=0.3"
@@ -61,9 +61,10 @@ shown(two)
 
 # %% [markdown]
 # With two legs nearly three times as many of these starts come to the goal as with four. The other runs of the four
-# legs end at a *local minimum*, where not one direction needs to be right; those of two legs at other poses with the
+# legs end at a *local minimum*, where no direction needs to be right; those of two legs end at other poses with the
 # same directions, or where a leg is stretched. Neither is a good choice for this goal from there, and the picture says
-# so before the robot is moved. Four legs have one pose only with the goal's directions, two legs have more:
+# so before the robot is moved. With four legs watched only one pose has the goal's directions, with two there are
+# more:
 
 # %%
 for legs in (None, ["2", "3"]):
@@ -91,5 +92,5 @@ print(end.pose, np.degrees(np.linalg.norm(np.cross(there, wanted), axis=-1)).rou
 print(round(1 / planar.covered), "times")
 
 # %% jupyter={"source_hidden": true} tags=["solution"]
-# 3. those that come to a singularity of the law on their way
+# 3. those that meet a singularity of the law on their way
 print(planar.damped.sum(), "of", planar.starts)

@@ -2,7 +2,7 @@
 # # 12. Why three corners do not converge
 #
 # A camera that flies freely has six freedoms, and three image points give six numbers. So three corners should be
-# enough to servo by. They are not: this notebook shows the two reasons, and why a fourth corner cures both.
+# enough for servoing. They are not: this notebook shows two reasons, and why a fourth corner removes both.
 
 # %%
 import tempfile
@@ -35,7 +35,7 @@ print(hrsynth.derive(three))
 
 # %% [markdown]
 # The hidden robot has three legs, from the camera to the corners, each with a driven U: where a corner is in the image
-# is where its leg points. In general three such legs hold the camera. But not everywhere.
+# is where its leg points. In general three such legs hold the camera, but not everywhere.
 #
 # ## The danger cylinder
 #
@@ -86,8 +86,8 @@ plt.show()
 #
 # Off the cylinder, the image of three corners still does not say where the camera is. With the distances $d_i$ to the
 # corners, and $d_2 = u d_1$, $d_3 = v d_1$, the three sides of the triangle give two quadratic equations in u and v.
-# One of them is linear in u once the other is subtracted; what remains is Grunert's equation (1841), of degree four in
-# v. Each positive solution is a place from which the corners look the same.
+# Their difference is linear in u; eliminating u leaves Grunert's equation (1841), of degree four in v. Each positive
+# solution is a place from which the corners look the same.
 
 
 # %%
@@ -129,8 +129,8 @@ for C, R in poses:
 # %% [markdown]
 # ## Servoing by three corners
 #
-# The loop drives the image to that of the goal. It is blind to which of the poses it comes to. Whether a start lies in
-# the basin of the goal or of another pose, the image does not say:
+# The loop drives the image to that of the goal. It cannot tell which of the poses it reaches: the image does not show
+# whether a start lies in the basin of the goal or of another pose.
 
 # %%
 rng = np.random.default_rng(4)
@@ -146,13 +146,13 @@ for found in by_three:
     print(f"{found.ended:16}", C.round(3), "nearest of the poses above:", f"{1e3 * nearest:.3g} mm")
 
 # %% [markdown]
-# Runs that end in a *mode* came to another of the poses that Grunert's equation lists. The cylinder and the poses
+# Runs that end in a *mode* reached another of the poses that Grunert's equation lists. The cylinder and the poses
 # belong together: on the cylinder, two of the poses become one.
 #
 # ## The fourth corner
 #
-# With a fourth corner in their plane the image tells the pose, and no cylinder is left: its rows fill the rank where
-# those of the other three lose it.
+# With a fourth corner in their plane the image determines the pose, and no cylinder is left: its rows restore the rank
+# where those of the other three lose it.
 
 # %%
 square = np.vstack([CORNERS, [[0.15, -0.3, 0]]])
@@ -197,5 +197,5 @@ for name, far in (("on", 1.0), ("off", 1.3)):
 print("on:", f"at most {least['on'][1]:.1e};", "off:", f"at least {least['off'][0]:.1e}")
 
 # %% jupyter={"source_hidden": true} tags=["solution"]
-# 3. it bends the ways; the other poses stay
+# 3. it bends the paths; the other poses remain
 print([hrsynth.servo(three, start=start, goal=GOAL, depth="desired").ended for start in starts[:2]])

@@ -22,9 +22,9 @@ robot = hrsynth.load("rrrrr_m1")
 robot
 
 # %% [markdown]
-# Two cranks turn about fixed points A₁, A₂ and are driven by motors. Two rods hang on the cranks' ends B₁, B₂ and
-# meet in the point C, the platform. All joints are revolute, with parallel axes. The letters `R̲RRRR̲` say this: five
-# revolute joints in a row, the underlined ones driven.
+# Two cranks turn about fixed points A₁, A₂ and are driven by motors. Two rods are joined to the cranks' ends B₁, B₂
+# and meet in the point C, the platform. All joints are revolute, with parallel axes. The letters `R̲RRRR̲` say this:
+# five revolute joints in a row, the underlined ones driven.
 #
 # The camera watches the directions u₁, u₂ of the two rods. At the zero configuration of the file:
 
@@ -42,9 +42,9 @@ for i in (0, 1):
 # %% [markdown]
 # ## Where can the platform be?
 #
-# Suppose the directions are known and nothing else. With u₁ held, leg 1 lets its crank turn and nothing more: the rod
-# is carried along without turning. So C = B₁ + l₁ u₁ moves as B₁ does, on a circle, only shifted by the constant
-# vector l₁ u₁. Leg 2 gives another circle. The platform must lie on both:
+# Suppose that only the directions are known. With u₁ held, leg 1 lets its crank turn and nothing more: the rod is
+# carried along without turning. So C = B₁ + l₁ u₁ moves as B₁ does, on a circle, only shifted by the constant vector
+# l₁ u₁. Leg 2 gives another circle. The platform must lie on both:
 
 # %%
 centre = [A[i] + rod[i] * u[i] for i in (0, 1)]
@@ -139,14 +139,14 @@ hrsynth.draw(found)
 #
 # $$e_i = u_i \times u_{di}, \quad \dot e = L^T t, \quad t = -\lambda L^{T+} e$$
 #
-# Started well below the goal, it ends there:
+# Started well below the goal, the robot reaches it:
 
 # %%
 goal = "x=0.02,y=0.3"
 print(repr(hrsynth.servo(robot, start="x=0.02,y=0.1", goal=goal)))
 
 # %% [markdown]
-# But from a start that is much nearer to the goal it ends far away from it, and yet both errors go to zero:
+# But from a start that is much nearer to the goal it ends far away from it, although both errors go to zero:
 
 # %%
 run = hrsynth.servo(robot, start="x=0,y=0.345", goal=goal)
@@ -177,16 +177,16 @@ condition
 # %% [markdown]
 # In words: the tips of the two legs, with their directions held, move along tangents τ₁, τ₂ of the two circles. Where
 # the circles touch, the tangents are parallel, the two modes become one, and the platform is free to move along them.
-# The real robot, driven by its motors, need not be singular there: who looks at the real robot alone may see nothing
-# special.
+# The real robot, driven by its motors, need not be singular there: to see the singularity one has to look at the
+# hidden robot.
 
 # %%
 posture = hrsynth.check(robot, at=["x=0,y=0.3332050807568877"]).postures[0]
 print("hidden robot:", posture.hidden.state, "  real robot:", posture.real.state)
 
 # %% [markdown]
-# The plan of every later notebook is the same: find the hidden robot, and ask it what one asks of any robot. Where
-# are its assembly modes, where its singularities, how accurate is it?
+# Every later notebook follows the same plan: find the hidden robot, and ask about it what one asks about any robot.
+# Where are its assembly modes, where its singularities, how accurate is it?
 #
 # ## Exercises
 #

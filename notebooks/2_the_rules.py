@@ -4,9 +4,9 @@
 # How is a hidden robot found? Notebook 1 guessed it from a picture. This one follows rules, those of MMT 3.2, and
 # checks each of their steps by numbers. The rules work on one leg after another, so a single leg shows them all.
 #
-# Take a leg of a six-legged robot: a motor turns a crank about a fixed axis, a rod hangs on the crank by a universal
-# joint, and the platform hangs on the rod by a ball. Read from the base to the platform this is R̲US, with a line
-# under the driven joint. Our robot has no other leg. Its platform hangs on one ball, so what is controlled is the
+# Take a leg of a six-legged robot: a motor turns a crank about a fixed axis, a universal joint connects the crank with
+# a rod, and a ball joint the rod with the platform. Read from the base to the platform this is R̲US, with a line under
+# the driven joint. Our robot has no other leg. Its platform hangs on a single ball joint, so what is controlled is the
 # ball's centre: a point, with three freedoms.
 
 # %%
@@ -49,8 +49,9 @@ leg
 # Two robots with the same ρ, at the same pose and with the same direction, are the same to a controller that sees u. So
 # ρ is what no rule may change.
 #
-# Numbers check it: at random configurations, an orthonormal basis of ρ of the one robot and of the other, and the
-# largest angle between the two spaces. It is zero up to rounding, or it is not. In between there is a wide gap.
+# This is checked by numbers: at random configurations, take an orthonormal basis of ρ for each of the two robots, and
+# the largest angle between the two spaces. Either it is zero up to rounding, or it is larger by many orders of
+# magnitude.
 
 # %%
 setting = hrsynth.observe(leg)
@@ -64,7 +65,7 @@ def compared(state):
 
 
 def step(state, module, trust=False):
-    """The first proposal of a rule that keeps the relation; each is told with its angle."""
+    """The first proposal of a rule that keeps the relation; each is printed with its angle."""
     print(module.RULE.name.upper(), "–", module.RULE.source)
     for proposal in module.RULE.proposals(state, evidence, "1", waive=trust):
         if isinstance(proposal, Refusal):
@@ -83,7 +84,7 @@ def step(state, module, trust=False):
 # ## Motors off
 #
 # The hidden robot is driven by what the camera sees. The real motors become passive joints. They do not appear in ρ,
-# which speaks of all motions that the loops allow, whoever drives them.
+# which describes all motions that the loops allow, whatever drives them.
 
 # %%
 state = step(start, motors_off)
@@ -96,19 +97,20 @@ state = step(start, motors_off)
 # the base to the rod's end A, and behind U̲ a last joint R lets the rod turn about itself, which no camera sees.
 #
 # The chain PPP-U̲-R has six freedoms. A chain with six freedoms constrains nothing. That is the whole proof that the
-# lift is a hidden robot of *any* robot: nothing has changed but that two of the chain's angles are the direction.
+# lift is a hidden robot of *any* robot: nothing has changed, except that two of the chain's angles now describe the
+# direction.
 
 # %%
 state = step(state, lift)
 
 # %% [markdown]
-# The bar in {RU|PPPU̲R} says that two chains run side by side, from the base to the rod. The result is right, and not
-# pretty. All rules that follow make it simpler.
+# The bar in {RU|PPPU̲R} says that two chains run side by side, from the base to the rod. The result is right but not
+# pretty. All the rules that follow simplify it.
 #
 # ## Where does the direction go?
 #
-# If u kept to a plane, as in a planar robot, one driven R would do. If u were constant, the camera would see nothing
-# at all in this leg. Neither is so here:
+# If u stayed in a plane, as in a planar robot, one driven R would do. If u were constant, the camera would see nothing
+# at all in this leg. Neither is the case here:
 
 # %%
 state = step(state, direction_locus)
@@ -142,9 +144,9 @@ state = step(state, takeover)
 state = step(state, pi_form)
 
 # %% [markdown]
-# `derive` does all this, then compares the result at 20 configurations and not at three. It also says that this one
-# leg is not enough: one direction is two numbers, and the platform has three freedoms. The motion that nobody sees is
-# that of the tip with the direction held, along the tangent of its circle.
+# `derive` does all this, then compares the result at 20 configurations instead of three. It also says that this one
+# leg is not enough: one direction is two numbers, and the platform has three freedoms. The motion that is not seen is
+# that of the tip along the tangent of its circle, with the direction held.
 
 # %%
 hidden = hrsynth.derive(leg)
@@ -164,10 +166,10 @@ oblique = rus("oblique", axis=(0.5, 0.5, 0.7))
 print(hrsynth.derive(oblique))
 
 # %% [markdown]
-# The takeover is refused, and the result is less pretty and right. The paper's own form ΠU̲S, printed below the
+# The takeover is refused, and the result is less pretty, but right. The paper's own form ΠU̲S, printed below the
 # certificate, is equivalent all the same: in both robots the tip is the anchor plus the rod along u, the anchor goes
 # round the same circle, and u can go anywhere. The rule's condition is sufficient, not necessary. A leg with an R in
-# place of the U shows what trust can lead to:
+# place of the U shows what happens if the condition is ignored:
 
 # %%
 b = Builder("RRS")
@@ -199,11 +201,11 @@ trusted = step(state, takeover, trust=True)
 
 # %% [markdown]
 # This is the division of labour: *rules propose, the certificate disposes*. A rule may be too bold. The result is
-# certified all the same, because a step that changes ρ is taken back. A robot that no rule fits keeps its lift, which
-# is always right.
+# certified all the same, because a step that changes ρ is undone. A robot to which no rule applies keeps its lift,
+# which is always right.
 #
 # Two more rules need more than one leg: the removal of legs that are not watched, and the change of joints at the
-# platform that may go with it. Notebook 4 and notebook 5 meet them.
+# platform that may go with it. Notebooks 4 and 5 use them.
 #
 # ## Exercises
 #

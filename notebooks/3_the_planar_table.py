@@ -52,7 +52,7 @@ print("the same hidden legs as in MMT Table 1, each certified")
 #
 # **Not every robot can be controlled like this.** In 3-PPR robots the last segment only slides: its direction never
 # changes, the camera sees nothing at all, and there is no hidden robot. In PRP and RRP robots every leg meets the
-# platform in a slide, so each direction tells the platform's turn, three times over, and nothing of its position:
+# platform in a slide, so each direction shows only the platform's turn, three times over, and nothing of its position:
 
 # %%
 print(derived["3prp"].verdict)
@@ -66,7 +66,7 @@ print(derived["3rrp"].verdict)
 # That is the classical problem of a triangle on two cranks: its third corner draws a *coupler curve*, and the third
 # circle cuts it in up to six points (MMT Fig. 7).
 #
-# Can all six be real? With the shipped dimensions two are. Another geometry does it:
+# Can all six be real? With the shipped dimensions only two are, but there are others with all six:
 
 # %%
 angles = np.radians([93, 208, 329])
@@ -99,7 +99,7 @@ print(condition.condition.expression)
 print(condition.checked.points, "poses compared,", condition.checked.disagreements, "disagreements")
 
 # %% [markdown]
-# At a singular pose that it constructed, the normals do meet (MMT Fig. 8):
+# At a singular pose constructed from the expression, the normals do meet (MMT Fig. 8):
 
 # %%
 robot, example = derived["3rrr_m1"].robot, condition.examples[0]
@@ -138,7 +138,8 @@ print("smallest singular value of Mᵀ there:", example.sigma)
 #
 # 1. Watch the *first* segment of each leg of `3rrr_m1`, the cranks, instead of the last (`observe=["prox_1",
 #    "prox_2", "prox_3"]`). What is the hidden robot now, and how many modes are there? Which well-known robot is it?
-# 2. `3rpr_m1` has hidden legs R̲PR, the same letters as its real legs. Has the real robot the same singularities?
+# 2. `3rpr_m1` has hidden legs R̲PR, the same letters as its real legs. Does the real robot have the same
+#    singularities?
 # 3. Which smallest sets of legs see as much as can be seen (`hrsynth.legs`)? Explain the answer for `3rrp` without a
 #    computer.
 

@@ -3,7 +3,7 @@
 #
 # The Gough-Stewart platform stands on six legs UP̲S: a universal joint on the base, a driven slide, a ball at the
 # platform. Six motors drive six freedoms. How many legs must a camera watch? MMT 4.2.1 says three. Let the program
-# say it: `legs` tries all sets.
+# check: `legs` tries all sets.
 
 # %%
 from collections import Counter
@@ -23,8 +23,8 @@ for size in range(1, 7):
     print(size, "legs watched:", dict(words))
 
 # %% [markdown]
-# A direction in space is two numbers. Three directions are six numbers, and the platform has six freedoms. So three
-# legs are the fewest that could do, and here all choices of three do. Watch legs 1, 3 and 5:
+# A direction in space is two numbers. Three directions are six numbers, and the platform has six freedoms. So at least
+# three legs are needed, and here any three will do. Watch legs 1, 3 and 5:
 
 # %%
 hidden = hrsynth.derive(robot, observe=["1", "3", "5"])
@@ -35,8 +35,8 @@ hrsynth.draw(hidden)
 
 # %% [markdown]
 # Look at the last lines of the table. Legs 2, 4 and 6 have six freedoms each, so they constrain nothing. Without
-# motors they are only carried along, and the hidden robot can do without them: 3-U̲PS, three legs whose universal
-# joints on the base are driven.
+# motors they only move along with the platform, and the hidden robot does not need them: 3-U̲PS, three legs whose
+# universal joints on the base are driven.
 #
 # ## Eight modes
 #
@@ -134,7 +134,7 @@ dict(ends)
 #
 # ## Four planes
 #
-# Where does the camera lose a motion? The platform must move so that each tip moves along its line, v(Bᵢ) ∥ uᵢ.
+# Where does a motion escape the camera? The platform must move so that each tip moves along its line, v(Bᵢ) ∥ uᵢ.
 # Statics says the same more simply: with the virtual motors held, leg i can push the tip only at right angles to uᵢ,
 # so its forces lie in the plane through Bᵢ normal to uᵢ. The three pencils of forces fail to hold the platform when
 # the three planes, and the plane of the three tips, meet in one point (MMT 4.2.1, Fig. 10). `singular` finds this
@@ -147,8 +147,8 @@ print(condition.condition.expression)
 print(condition.checked.points, "poses compared,", condition.checked.disagreements, "disagreements")
 
 # %% [markdown]
-# At a singular pose that it constructed, intersect three of the planes and see whether the fourth goes through that
-# point:
+# At a singular pose constructed from the expression, intersect three of the planes and see whether the fourth goes
+# through that point:
 
 # %%
 example = condition.examples[0]
@@ -183,8 +183,8 @@ plt.show()
 # %% [markdown]
 # ## More legs than needed
 #
-# Watching all six legs removes most of the doubt: a pose is a mode only if all six directions agree. Here only the
-# pose itself is left of the eight.
+# Watching all six legs removes most of the doubt: a pose is a mode only if all six directions agree. Of the eight,
+# only the pose itself is left here.
 
 # %%
 everything = hrsynth.modes(robot, at=POSE)
@@ -193,7 +193,7 @@ print(len(everything.modes), "mode,", len(everything.near), "near modes")
 # %% [markdown]
 # ## Exercises
 #
-# 1. Put the camera on the platform (`camera="platform"`). Which planes must meet now? Guess before you ask.
+# 1. Put the camera on the platform (`camera="platform"`). Which planes must meet now? Guess before you run it.
 # 2. Tsai's 3-UP̲U (`3upu`) only translates. How many legs must be watched? MMT gives the hidden robot 2-U̲PU for two
 #    watched legs. What does the certificate say?
 # 3. How many of the eight modes are real at random poses? Draw twenty and count. Can the number be odd?

@@ -1,10 +1,10 @@
 # %% [markdown]
 # # 5. The Quattro: which legs to watch
 #
-# The Quattro is a fast pick-and-place robot. Four arms turn about horizontal axes; on each hang two parallel rods,
-# {2-SS}; the platform has two halves that can move on each other, which turns the tool. Four freedoms: three
-# translations and the turn φ about the vertical. It is the example of MMT 5 and of the experiments there. This
-# notebook asks: which legs should a camera watch to go from one pose to another?
+# The Quattro is a fast pick-and-place robot. Four arms turn about horizontal axes; two parallel rods, {2-SS}, hang on
+# each; the platform has two halves whose relative motion turns the tool. It has four freedoms: three translations and
+# the turn φ about the vertical. It is the example of MMT 5 and of the experiments there. This notebook asks: which
+# legs should a camera watch to go from one pose to another?
 
 # %%
 import matplotlib.pyplot as plt
@@ -18,9 +18,9 @@ START, GOAL = "x=0,y=0,z=-0.75,phi=0", "x=-0.2,y=0,z=-0.56,phi=0"
 print(hrsynth.legs(robot))
 
 # %% [markdown]
-# Two directions are four numbers, and the platform has four freedoms. Yet not every pair will do. Legs 1 and 2 hang
-# on the same half of the platform, 3 and 4 on the other. Watching both legs of one half shows nothing of the turn of
-# the other half about the hinge. One leg on each half is needed: four pairs are left.
+# Two directions are four numbers, and the platform has four freedoms. Yet not every pair will do. Legs 1 and 2 hang on
+# the same half of the platform, 3 and 4 on the other. Watching both legs of one half does not show how the other half
+# turns about the hinge. One leg on each half is needed, which leaves four pairs.
 #
 # All four have the same hidden robot. In each watched leg the arm becomes a parallelogram, and the legs that are not
 # watched disappear, once the ends of the watched ones are changed:
@@ -33,15 +33,15 @@ hidden
 hrsynth.draw(hidden)
 
 # %% [markdown]
-# The rows `leg removal … no` and `end change … yes` at the end are the story of MMT 4.2.2. If the legs that are not
-# watched are simply dropped, the platform gains freedoms that it must not have. With universal joints in place of
-# balls at the platform, it does not.
+# The rows `leg removal … no` and `end change … yes` at the end retrace MMT 4.2.2. If the legs that are not watched are
+# simply dropped, the platform gains freedoms that it must not have. With universal joints in place of balls at the
+# platform, it does not.
 #
 # ## Assembly modes
 #
-# With its direction held, the tip of a leg goes round a circle, that of its parallelogram. The platform joins two
-# such circles. One of them, carried along the other, sweeps a surface that MMT 4.2.2 calls a Bohemian dome. The goal
-# of the paper's first simulation (MMT 5.1.3), for two of the pairs:
+# With its direction held, the tip of a leg moves on a circle, that of its parallelogram. The platform joins two such
+# circles. One of them, carried along the other, sweeps a surface that MMT 4.2.2 calls a Bohemian dome. The goal of the
+# paper's first simulation (MMT 5.1.3), for two of the pairs:
 
 # %%
 pairs = {legs: hrsynth.derive(robot, observe=list(legs)) for legs in ("14", "23")}
@@ -59,7 +59,7 @@ hrsynth.draw(pairs["14"].modes(at=GOAL))
 #
 # ## Servo runs
 #
-# Both pairs are as good as each other, one might think. Same start, same goal, same control law:
+# One might think that both pairs are equally good. Same start, same goal, same control law:
 
 # %%
 runs = {legs: hrsynth.servo(robot, list(legs), start=START, goal=GOAL) for legs in ("14", "23")}
@@ -70,9 +70,9 @@ for run in runs.values():
 hrsynth.draw(runs["14"])
 
 # %% [markdown]
-# With legs 1 and 4 the directions arrive and the robot does not: it stops at another assembly mode. The same happens
-# in the paper (MMT Figs. 22 and 23). The reason is the one of notebook 1, a singularity of the hidden robot between
-# start and goal, and it is proved:
+# With legs 1 and 4 the directions reach their desired values but the robot does not reach the goal: it stops at
+# another assembly mode. The same happens in the paper (MMT Figs. 22 and 23). The reason is the one of notebook 1, a
+# singularity of the hidden robot between start and goal, and it is proved:
 
 # %%
 for legs in ("14", "23"):
@@ -93,10 +93,9 @@ print("printed minus computed:", round(1e3 * (-0.909 - second.pose.z), 1), "mm")
 # %% [markdown]
 # ## Accuracy
 #
-# A camera errs. If each direction may be off by 0.1°, how far may the platform be off? To first order the error is
-# $\delta t = M^{T+} \delta u$, and the largest one for all $\delta u$ inside the cones is found exactly for two legs
-# (MMT Appendix A.1). A map
-# over the plane z = −0.7 m with φ = 0, as in MMT Figs. 19 and 20:
+# Cameras are not exact. If each direction may be off by 0.1°, how far may the platform be off? To first order the
+# error is $\delta t = M^{T+} \delta u$, and the largest one for all $\delta u$ inside the cones is found exactly for
+# two legs (MMT Appendix A.1). A map over the plane z = −0.7 m with φ = 0, as in MMT Figs. 19 and 20:
 
 # %%
 maps = {legs: hrsynth.accuracy(robot, list(legs), cone="0.1deg", grid="x=-0.5:0.5:81,y=-0.5:0.5:81,z=-0.7,phi=0")
@@ -128,9 +127,9 @@ best
 # ## More legs, and a local minimum
 #
 # Why not watch all four legs? Then eight numbers fix four freedoms, wrong modes are almost ruled out, and the error
-# becomes smaller. There is a price. With more equations than freedoms the error may have *local minima*: poses where
-# the wanted directions are not reached and yet every small motion makes the error larger. The command vanishes there,
-# and the robot stops.
+# becomes smaller. But this has a price. With more equations than freedoms the error may have *local minima*: poses
+# where the wanted directions are not reached and yet every small motion makes the error larger. The command vanishes
+# there, and the robot stops.
 #
 # MMT 5.1.3 prints such a run (Figs. 26 and 27). With the printed dimensions it does not stop:
 
@@ -194,7 +193,7 @@ print("change one millimetre, or 0.01 rad, to each side:", growth.round(7))
 assert (growth > 0).all()
 
 # %% [markdown]
-# Every step makes it worse. So more legs are better on the whole, and are no cure for everything. No rank tells that
+# Every step makes it worse. So more legs are better on the whole, but they do not cure everything. No rank shows that
 # there are no local minima: at this pose Mᵀ has full rank.
 
 # %%

@@ -2,8 +2,8 @@
 # # 6. When it cannot work
 #
 # Some robots cannot be controlled by watching their legs' directions, however good the camera is. MMT 4.3 names them:
-# robots whose motors slide along parallel rails. This notebook shows why, how to see it in the hidden robot at once,
-# and what has to be measured besides.
+# robots whose motors slide along parallel rails. This notebook shows why, how the hidden robot shows it at once, and
+# what else has to be measured.
 
 # %%
 import matplotlib.pyplot as plt
@@ -37,7 +37,7 @@ print("smallest sets that see as much as can be seen:", hrsynth.legs(robot).smal
 
 # %% [markdown]
 # Numbers say the same. Mᵀ gives the rates of the directions from the velocity of the platform. At twenty random
-# configurations of the robot its smallest singular value is zero, up to rounding, beside a largest one of ordinary
+# configurations of the robot its smallest singular value is zero up to rounding, while the largest has an ordinary
 # size:
 
 # %%
@@ -48,7 +48,7 @@ print("largest singular values from", values[:, 0].min().round(2), "to", values[
 print("smallest singular values up to", values[:, -1].max())
 
 # %% [markdown]
-# If the rails are not parallel, all is well. The two robots have the same letters. Their hidden robots have too. It
+# If the rails are not parallel, all is well. The two robots have the same letters, and so do their hidden robots. It
 # is the geometry that decides:
 
 # %%
@@ -60,8 +60,8 @@ print(hrsynth.singular(hrsynth.load("prrrp_m1"), points=100).words)
 # %% [markdown]
 # ## UraneSX, Hexaglide, I4L
 #
-# Machine tools like parallel rails, because they make one direction of the workspace as long as one wants. They pay
-# with that very direction:
+# Machine tools often have parallel rails, because these make the workspace as long as one wants in one direction. But
+# it is in that very direction that nothing is seen:
 
 # %%
 for name in ("uranesx", "hexaglide", "i4l", "linear_delta", "orthoglide"):
@@ -78,10 +78,10 @@ for name in ("uranesx", "hexaglide", "i4l", "linear_delta", "orthoglide"):
 print(hrsynth.derive(hrsynth.load("i4l")).verdict.has_interaction_matrix)
 
 # %% [markdown]
-# ## What must be measured besides?
+# ## What else must be measured?
 #
-# MMT 5.3 suggests more than directions: the lines themselves, not only where they point. `advise` looks for the
-# smallest sets of further measurements that make the robot controllable, and verifies each of them:
+# MMT 5.3 suggests measuring the lines themselves, not only where they point. `advise` looks for the smallest sets of
+# further measurements that make the robot controllable, and verifies each of them:
 
 # %%
 advice = hrsynth.advise(hrsynth.load("uranesx"))

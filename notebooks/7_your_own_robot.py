@@ -44,14 +44,14 @@ robot
 
 # %% [markdown]
 # The frames of a loop lie on its two links, and with all joints at zero they must coincide: here at x = 2.3, z = 1.2,
-# counted from the base along either side. One freedom, one watched direction, that of the crank:
+# measured from the base along either side. One freedom, one watched direction, that of the crank:
 
 # %%
 print(hrsynth.derive(robot, observe=["1"]))
 
 # %% [markdown]
 # The crank is watched and it is driven, so the hidden robot is the real one: the camera is an encoder here. The
-# rocker, which nobody watches, must stay. Without it the bar could turn about the crank's end, as the paper's form
+# rocker, which is not watched, must stay. Without it the bar could turn about the crank's end, as the paper's form
 # below the certificate would.
 #
 # With the crank's direction held, the four-bar has two poses, its bar and rocker folded to one side or the other:
@@ -63,7 +63,7 @@ hrsynth.draw(found)
 # %% [markdown]
 # ## Mistakes
 #
-# A file with mistakes is refused, with all of them at once, each with its line. Nothing is repaired in silence.
+# A file with mistakes is refused; all of them are listed at once, each with its line. Nothing is repaired silently.
 
 # %%
 broken = FOUR_BAR.replace('child link="rocker"', 'child link="rokcer"').replace('type="revolute"', 'type="hinge"')
@@ -88,8 +88,8 @@ except HrsynthError as error:
 # %% [markdown]
 # ## A file of another tool
 #
-# MuJoCo closes loops by equality constraints. Below is a planar five-bar as one finds them: two arms, a `connect`
-# where they meet, two actuators. Nothing in it says which body is the platform.
+# MuJoCo closes loops by equality constraints. Below is a typical planar five-bar: two arms, a `connect` where they
+# meet, two actuators. Nothing in it says which body is the platform.
 
 # %%
 FIVE_BAR = """<mujoco model="five_bar">
@@ -121,15 +121,15 @@ except HrsynthError as error:
 other
 
 # %% [markdown]
-# What was guessed, solved or merged while reading is told, a line each:
+# What was guessed, solved or merged while reading is reported, one line each:
 
 # %%
 for note in other.notes:
     print(note)
 
 # %% [markdown]
-# A `connect` only makes two points meet. In a planar loop it does what a revolute joint does, and is read as one. And
-# then it is the robot of notebook 1 again:
+# A `connect` only makes two points meet. In a planar loop it does what a revolute joint does, and is read as one. So
+# this is the robot of notebook 1 again:
 
 # %%
 print(repr(hrsynth.derive(other)))
@@ -139,7 +139,7 @@ print(repr(hrsynth.modes(other)))
 # ## Writing
 #
 # `save` writes the native dialect, MJCF, SDFormat or Gepetto's URDF with YAML, by the file's ending, and returns what
-# the dialect cannot say. The hidden robot is a mechanism like any other and can be written too, to be looked at,
+# the dialect cannot express. The hidden robot is a mechanism like any other and can be written too, to be looked at,
 # simulated, or derived from again:
 
 # %%

@@ -1,7 +1,7 @@
 # %% [markdown]
 # # 8. Reading the catalog
 #
-# The robots of the notebooks before are those of the papers. The catalog has a hundred thousand architectures more:
+# The robots of the previous notebooks are those of the papers. The catalog has a hundred thousand architectures more:
 # planar robots, pods, deltas and spatial ones, each with its hidden robot, its verdict and the legs to be watched.
 # This notebook puts one question to it, and reads the answer with care:
 #
@@ -25,8 +25,8 @@ for (group, verdict), count in catalog.count("group", "verdict").items():
     print(f"   {group:10}{verdict or 'refused':24}{count}")
 
 # %% [markdown]
-# An architecture is a word. It says the joints of each leg, how their axes lie, and which have motors (`*`), and says
-# nothing of lengths. Here is the Delta:
+# An architecture is a word. It gives the joints of each leg, how their axes lie, and which have motors (`*`), but no
+# lengths. Here is the Delta:
 
 # %%
 print(drawing(parse("3(Rt*-2SSt)")))
@@ -52,8 +52,8 @@ driven = [record for record in fitting if record["driven"]]
 print(len(fitting), "architectures fit,", len(driven), "of them are driven in all three freedoms")
 
 # %% [markdown]
-# That is a lot, because the catalog mixes legs of different kinds in one robot. Robots with equal legs are the usual
-# ones:
+# There are so many because the catalog mixes legs of different kinds in one robot. Robots with equal legs are the
+# usual ones:
 
 # %%
 equal = [record for record in driven if "+" not in record["word"] and "|" not in record["word"]]
@@ -82,8 +82,9 @@ place.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
 plt.show()
 
 # %% [markdown]
-# Two legs make sense: a direction is two numbers, and three freedoms need two of them. The robots that are not
-# controllable lose a freedom whatever is watched. Why, says the field `lost`, and what would help says `cure`:
+# Fewer than two legs can never do: a direction is two numbers, and there are three freedoms. Most of the controllable
+# robots need three. The robots that are not controllable lose a freedom whatever is watched. The field `lost` says
+# which, and `cure` what would help:
 
 # %%
 for record in [each for each in wanted if each["verdict"] != "controllable"][:8]:
@@ -112,10 +113,10 @@ place.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
 plt.show()
 
 # %% [markdown]
-# Legs with no slide are at the top, legs with two of them at the bottom: a link that only slides has a direction that
-# says nothing. For planar robots this is a theorem, with its proof on the page *What the catalog says*. While a watched
-# direction is held, the platform's instantaneous centre stays on a line, and the legs see the rank of their lines. Here
-# it is tried on 3-RRR with random joints; the watched link follows the second R:
+# Legs with no slide are at the top, legs with two slides at the bottom: a link that only slides has a direction that
+# says nothing. For planar robots this is a theorem, with its proof on the page *What the catalog says*. While a
+# watched direction is held, the platform's instantaneous centre stays on a line, and the legs see the rank of their
+# lines. Here is a test on a 3-RRR with random joints; the watched link follows the second R:
 
 # %%
 rng = np.random.default_rng(0)
@@ -131,8 +132,8 @@ print("rank", np.linalg.matrix_rank(np.array(seen)), "of 3;", catalog["3(Rz*-Rz-
 # %% [markdown]
 # ## From a word to a robot
 #
-# A word has no lengths. `mechanism` draws some, always the same for a word, and makes a robot of it. Whatever the
-# notebooks before did with a file can be done with it. Does the catalog say the truth?
+# A word has no lengths. `mechanism` draws some, always the same for a word, and makes a robot of it. Everything that
+# the previous notebooks did with a file can be done with it. Is the catalog right?
 
 # %%
 robot = mechanism(parse("3(Rt*-2SSt)"), delta.get("attempt", 0))

@@ -5,8 +5,8 @@
 # lengths of its legs, and that can go from one of them to another without a singularity. Until then most people had
 # believed that a robot must pass a singularity to change its assembly mode.
 #
-# A camera that watches the legs of a 3-RRR drives such a robot without knowing it. This notebook finds its six poses,
-# proves which of them belong together, and leads the controller from one to another.
+# A controller that watches the legs of a 3-RRR drives such a robot without knowing it. This notebook finds its six
+# poses, proves which of them belong together, and leads the controller from one to another.
 
 # %%
 import matplotlib.pyplot as plt
@@ -34,8 +34,8 @@ print(listed.found.proof)
 hrsynth.draw(listed)
 
 # %% [markdown]
-# All six are real, all six are poses of the real robot, and in all six the camera sees the same. A servo loop that is
-# told to go from the first to the fifth does nothing at all, because there is no error to correct:
+# All six are real, all six can be assembled, and in all six the camera sees the same. A servo loop that is told to go
+# from the first to the fifth does nothing at all, because there is no error to correct:
 
 # %%
 idle = hrsynth.servo(robot, start="mode:1", goal="mode:5")
@@ -55,7 +55,7 @@ print(atlas)
 # without a zero. *Same aspect* is proved by a path: it is cut into intervals, and on each of them interval arithmetic
 # keeps the determinant away from zero. On some paths a leg is stretched out and folds to its other side. That is a
 # singularity of Type 1, at which the camera loses nothing of the platform, but the directions change infinitely fast.
-# One path needs nothing of that kind, and it is a straight line:
+# One path passes no such place, and it is a straight line:
 
 # %%
 one, other = next(pair.numbers for pair in atlas.changes if pair.answer is not None and not pair.answer.crossings)
@@ -76,10 +76,10 @@ print(run)
 hrsynth.draw(run)
 
 # %% [markdown]
-# It ends at the other mode. The directions are those that it began with, and the platform is 13 cm and 108 degrees away
-# from where it was. No rank was lost, no matrix was singular, no error was large. (The way bends a little at first: the
-# desired directions are interpolated between poses of the line, and where the singular value is small that matters.)
-# A program that watches the smallest singular value for a sign of danger sees a regular motion:
+# It ends at the other mode. The directions are those that it began with, and the platform is 13 cm and 108 degrees
+# away from where it was. No rank was lost, no matrix was singular, no error was large. (The path bends a little at
+# first: the desired directions are interpolated between poses of the line, which matters where the singular value is
+# small.) A program that monitors the smallest singular value sees no sign of danger:
 
 # %%
 starts = np.linspace(0, 1, 60)
@@ -97,16 +97,16 @@ assert min(values) > 0
 # %% [markdown]
 # ## Why: cusps
 #
-# Hold the direction of the first rod. The poses that are left make a surface, and the other two directions are a map
-# from it to a plane. Above each point of this plane lie as many modes as the colour says.
+# Hold the direction of the first rod. The remaining poses form a surface, and the other two directions map it to a
+# plane. The colour of a point of this plane is the number of modes above it.
 
 # %%
 hrsynth.draw(atlas)
 
 # %% [markdown]
 # Where the surface is folded two modes meet: these are the Type 2 singularities, the black curve. Where a fold ends in
-# a *cusp* three modes meet. Go around the cusp, once, on one of the outer two, and you are on the other, although you
-# met no fold. Every cusp and node of the drawing is enclosed: there is exactly one within the radius.
+# a *cusp* three modes meet. Start on one of the outer two and go once around the cusp, and you arrive on the other
+# without meeting a fold. Every cusp and node of the drawing is enclosed: there is exactly one within the radius.
 
 # %%
 section, places = atlas.section
@@ -115,8 +115,8 @@ print(len(section.nodes), "nodes,", sum(node[0].radius is not None for node in s
 print("the widest enclosure:", f"{max(cusp.radius for cusp in section.cusps):.1e}")
 
 # %% [markdown]
-# What is an engineer to do? A goal that stays away from the cusps, a start in the goal's own part of its aspect, or one
-# more measurement: an encoder at one crank tells the six poses apart.
+# What is an engineer to do? Choose a goal that stays away from the cusps, or a start in the goal's own part of its
+# aspect, or add a measurement: an encoder at one crank distinguishes the six poses.
 #
 # ## Exercises
 #

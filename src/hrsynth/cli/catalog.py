@@ -28,21 +28,21 @@ if TYPE_CHECKING:
 
 catalog = Group("hrsynth catalog", "The catalog of architectures: what can be controlled by watching legs.")
 VERDICTS = ("controllable", "partially controllable", "uncontrollable")
-KEPT = Option("kept", "A folder or SQLite file, or published: what is shipped of published robots (default: what is "
-              "shipped of words).", "PATH", flags=("--catalog",))
+KEPT = Option("kept", "A folder or SQLite file; or published: the shipped catalog of published robots (default: the "
+              "shipped catalog of words).", "PATH", flags=("--catalog",))
 WORKERS = Option("workers", "Processes that share the work.", None, int, 1, low=1)
-TABLES = Option("tables", "Of published tables (the page 'audit' has their format), not of the words listed here.",
-                "FOLDER")
+TABLES = Option("tables", "Take robots of published tables (their format is on the page 'audit') instead of the words "
+                "listed here.", "FOLDER")
 ANEW = flag("anew", "Discard the results of an interrupted build.")
 FILTER = (
     Option("legs", "Number of legs, or a pattern of the notation or of one leg's chain: 3-R*, PUS.", "LEGS"),
     Option("dof", "Freedoms of the platform.", kind=int, low=0),
-    Option("motion", "Its translations and rotations, as 3T or 2T1R."),
+    Option("motion", "Its translations and rotations, such as 3T or 2T1R."),
     Option("verdict", f"{', '.join(VERDICTS)}.", words=VERDICTS),
-    Option("see", "What is seen of the platform instead of legs, as 3point, or 2point+image_line; with ' by a camera "
-           "each.", "KINDS"),
-    Option("group", "planar, mixed, pods, deltas, spatial, sensors; of published tables 3T0R and the like."),
-    Option("base_motors", "All motors on the base, or not.", kind=bool, flags=("--base-motors/--moving-motors",)),
+    Option("see", "What is seen of the platform instead of legs, such as 3point or 2point+image_line; with ' one "
+           "camera for each.", "KINDS"),
+    Option("group", "planar, mixed, pods, deltas, spatial, sensors; for published tables 3T0R and the like."),
+    Option("base_motors", "Whether all motors are on the base.", kind=bool, flags=("--base-motors/--moving-motors",)),
     Option("fewest", "Number of legs that must be watched.", kind=int, low=0),
     Option("modes", "Number of assembly modes, complex ones too.", kind=int, low=0),
     Option("text", "Text that occurs in any field, or a name: Delta."),
@@ -296,34 +296,33 @@ def _target(output: str | None) -> Path:
 
 
 COMMANDS = (
-    ("build", "Build the catalog, or go on where a build was broken off; the bytes do not depend on who builds.", build,
+    ("build", "Build the catalog, or continue an interrupted build; the bytes do not depend on who builds.", build,
      (Option("groups", "Groups (default: all).", "[GROUP]...", list[str], argument=True),
       output("A folder, or a file that ends in .sqlite (default: catalog/ of the checkout).", "PATH"), TABLES, WORKERS,
       Option("cluster", "A dask cluster that shares the work.", "ADDRESS"),
       flag("check", "Build nothing: compare what is stored (default: what is shipped) with what would be built; exit 3 "
            "if it is stale."),
-      Option("sample", "With --check: compare so many records of each group, drawn at random, and all words.", "N", int,
-             low=0),
+      Option("sample", "With --check: compare only this many records of each group, drawn at random, and all words.",
+             "N", int, low=0),
       Option("limit", "Stop after this many new records; the same command continues.", "N", int, low=0), ANEW, JSON,
       Option("seed", "Seed of --sample.", None, int, 0, low=0))),
     ("list", "The architectures that fit.", entries, (*FILTER, KEPT, JSON)),
-    ("show", "One architecture, drawn and in full; one that is not in the catalog is studied now.", show,
-     (Option("word", "An architecture, as '3(Rz*-Rz-Rz)', or a name or legs: Delta, 3-RPS; with --tables "
-                    "a robot of these.", "WORD", default=NEEDED,
-             argument=True),
+    ("show", "One architecture, drawn and in full; one that is not in the catalog is analysed on request.", show,
+     (Option("word", "An architecture, such as '3(Rz*-Rz-Rz)', or a name or legs: Delta, 3-RPS; with --tables a robot "
+             "of these.", "WORD", default=NEEDED, argument=True),
       output("Write a robot of this architecture (.urdf, or another dialect)."), TABLES, KEPT, JSON)),
-    ("site", "Pages of the architectures that fit: a list that filters, drawings, derivations, robot files; needs no "
-     "server.", site,
+    ("site", "Web pages of the architectures that fit: a list with filters, drawings, derivations, robot files; they "
+     "need no server.", site,
      (output("A new or empty folder, or an older site, which is replaced.", "DIR", NEEDED), *FILTER, WORKERS, ANEW,
       KEPT, JSON)),
     ("audit", "Compare published tables of symmetric parallel robots with what is computed: kind of motion, working "
      "motors, loss of rank.", audit,
-     (Option("folder", "A folder with chains/, robots/ and synthesis/; the page 'audit' has their format.", "FOLDER",
+     (Option("folder", "A folder with chains/, robots/ and synthesis/ (their format is on the page 'audit').", "FOLDER",
              default=NEEDED, argument=True),
-      output("Keep the records, a line a robot; the same command goes on there. It has the instances modulo primes.",
-             "FILE.jsonl"),
-      Option("only", "One group of the tables: 3T1R."),
-      Option("sample", "So many robots of each group, drawn at random.", "N", int, low=1), JSON,
+      output("Keep the records, one line per robot, with the instances modulo primes; the same command continues "
+             "there.", "FILE.jsonl"),
+      Option("only", "One group of the tables, such as 3T1R."),
+      Option("sample", "Only this many robots of each group, drawn at random.", "N", int, low=1), JSON,
       Option("seed", "Seed of --sample and of dimensions and configurations.", None, int, 0, low=0))),
 )
 EXAMPLES = {

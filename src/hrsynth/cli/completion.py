@@ -92,6 +92,7 @@ def add(app: Group) -> None:
 
     add_command(app, "completion", "Completion of commands, options and robots: a script for bash, zsh or fish.",
                 (Option("shell", "bash, zsh or fish.", "SHELL", default=NEEDED, argument=True, words=tuple(SCRIPTS)),
-                 Option("typed", "What was typed so far, asked by a script.", "[WORD]...", list[str], argument=True)),
+                 Option("typed", "What was typed so far (used by the scripts).", "[WORD]...", list[str],
+                        argument=True)),
                 completion, ('bash >> ~/.bashrc', 'zsh >> ~/.zshrc',
                              'fish > ~/.config/fish/completions/hrsynth.fish'))

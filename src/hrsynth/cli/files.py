@@ -80,7 +80,7 @@ def add(app: Group) -> None:
     """Make them commands."""
     add_command(app, "verify", "Check a certificate of modes, derive or path, with integers and fractions alone.",
                 (Option("certificate", "The certificate's file.", "FILE", default=NEEDED, argument=True),
-                 Option("robot", "See that its geometry is that of this robot.", "ROBOT", words=options.shipped),
+                 Option("robot", "Check that its geometry is that of this robot.", "ROBOT", words=options.shipped),
                  JSON), verify,
                 ("c.json", "c.json --robot quattro"))
     add_command(app, "robots", "The shipped robots.",
@@ -89,11 +89,11 @@ def add(app: Group) -> None:
     add_command(app, "convert", "Read a robot in any dialect and write it in another: .urdf native, .yaml Gepetto, "
                 ".xml MJCF, .sdf SDFormat, .usda, .usd or .usdc USD.",
                 (*SOURCE,
-                 Option("target", "The file to write; its extension says the dialect.", "[OUT]", argument=True),
-                 output("The file to write, by option."),
-                 Option("meshes", "keep: meshes stay where they are, named from the new file; copy: into meshes/ "
-                        "beside it.", default="keep", words=("keep", "copy"), group=OUTPUT),
-                 Option("to", "native, gepetto, mjcf, sdf or usd, whatever the ending.", "DIALECT",
+                 Option("target", "The file to write; its extension selects the dialect.", "[OUT]", argument=True),
+                 output("The file to write, given as an option."),
+                 Option("meshes", "keep: meshes stay where they are, and the new file refers to them; copy: into "
+                        "meshes/ beside it.", default="keep", words=("keep", "copy"), group=OUTPUT),
+                 Option("to", "native, gepetto, mjcf, sdf or usd, whatever the extension.", "DIALECT",
                                        words=("native", "gepetto", "mjcf", "sdf", "usd")), JSON), convert,
                 ("quattro quattro.xml", "leg.urdf -o robot.usda --meshes copy",
                  "leg.urdf robot.yaml --to gepetto"))

@@ -370,10 +370,10 @@ def add(app: Group) -> None:
     """Make it a command."""
     add_command(app, "import", "A guided reader: shows what a robot's file says and what is guessed, asks for "
                 "closures, base, platform, motors and segments, writes the native file, and prints the command that "
-                "does so without questions. With --yes, or where there is no terminal, guesses are taken and told.",
+                "does so without questions. With --yes, or without a terminal, guesses are accepted and reported.",
                 (*SOURCE,
                  Option("observe", "Links to watch, at their default segments.", "LINKS", group=WATCHING),
-                 flag("yes", "Ask nothing: take what is guessed."),
+                 flag("yes", "Ask nothing: accept what is guessed."),
                  flag("view", "Show the robot in the browser before the questions."),
                  Option("target", "The file to write, in the native dialect.", "FILE", default=NEEDED,
                         flags=("-o", "--output"), group=output("").group), JSON), importing,

@@ -86,5 +86,5 @@ def add(app: Group) -> None:
         say(javascript.dumps(schema(name), ensure_ascii=False, indent=2))
 
     add_command(app, "schema", "The JSON schema of what a command prints with --json.",
-                (Option("command", "A command, as derive or catalog list.", "COMMAND", list[str], NEEDED, argument=True,
-                        words=_commands),), told, ("derive", "catalog list"))
+                (Option("command", "A command, such as derive or catalog list.", "COMMAND", list[str], NEEDED,
+                        argument=True, words=_commands),), told, ("derive", "catalog list"))

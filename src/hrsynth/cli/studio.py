@@ -13,7 +13,7 @@ from .options import WATCHING, Option, listed, shipped
 if TYPE_CHECKING:
     from ..present.studio.server import StudioServer
 
-PORT = Option("port", "Port of the server (default: any that is free).", None, int, 0, low=0, high=65535)
+PORT = Option("port", "Port of the server (default: any free one).", None, int, 0, low=0, high=65535)
 
 
 def studio(robot: str | None, observe: str | None, camera: str | None, port: int, browser: bool) -> None:
@@ -45,11 +45,11 @@ def serve(server: StudioServer, what: str) -> None:
 
 def add(app: Group) -> None:
     """Make it a command."""
-    add_command(app, "studio", "The page to work in, in the browser: a robot, a folder of robots or what is dropped "
-                "in, its hidden robot, its modes, its accuracy and runs, live.",
+    add_command(app, "studio", "A page to work in, in the browser: a robot, a folder of robots or files that are "
+                "dropped in, with hidden robot, modes, accuracy and runs, live.",
                 (Option("robot", "A robot file in any dialect, a shipped robot's name, example:NAME, or a folder.",
                         "[ROBOT|FOLDER]", argument=True, words=shipped),
-                 Option("observe", "Legs to watch (1,4), links, or all (default: what the file says).", "LEGS",
+                 Option("observe", "Legs to watch (1,4), links, or all (default: those of the file).", "LEGS",
                         group=WATCHING),
                  Option("camera", "The link that carries the camera.", "LINK", group=WATCHING), PORT,
                  Option("browser", "Open the page in the browser.", None, bool, True, ("--browser/--no-browser",))),

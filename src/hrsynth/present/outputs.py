@@ -191,18 +191,19 @@ class Outputs:
 
 
 CERTIFICATE = File("cannot write the certificate", {".json": ".certificates:written"}, "The certificate",
-                   "Write a certificate (.json) that the command verify, or one file of plain Python, checks.",
+                   "Write a certificate (.json), which the command verify, or a single file of plain Python, can "
+                   "check.",
                    "certificate", "certificate_file")
 OUTPUTS = {
     "accuracy": Outputs("text.runs:accuracy", (
         File("cannot write the errors", {**figures("maps:error_map"), CSV: "maps:error_table"}, "The map of errors",
-             "Write the plane or grid: map.png, .pdf, .svg; a table, map.csv; or an array, map.npy, part by part: any "
-             "number of poses, and the same command goes on where it was broken off.", part="field",
+             "Write the plane or grid: map.png, .pdf, .svg; a table, map.csv; or an array, map.npy, part by part: up "
+             "to 10^10 poses, and after an interruption the same command continues.", part="field",
              needs=("plane", "grid"), words="a plane or a grid", drawn=True, streamed=(".npy", "into")),)),
     "advise": Outputs("text.robots:advice"),
     "atlas": Outputs("text.poses:atlas", (
         File("cannot draw the atlas", figures("atlas:picture"), "The picture of the atlas",
-             "Draw the table and, of three rods on cranks in a plane, the singular curve with the modes: atlas.png, "
+             "Draw the table and, for three rods on cranks in a plane, the singular curve with the modes: atlas.png, "
              ".pdf, .svg.", computed="atlas:section", record="section", nothing="atlas:undrawn", drawn=True),)),
     "basins": Outputs("text.runs:basins", (
         File("cannot write the basins", {**figures("basins:picture"), CSV: "basins:table"}, "The map of basins",

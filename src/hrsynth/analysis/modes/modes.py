@@ -137,10 +137,11 @@ def modes(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None,
     """All poses with what is observed at ``at`` (default: the zero configuration), or with ``real`` the motors'
     coordinates: complex solutions counted, real ones enclosed (theory.md 8; MMT 3.3, 4.1.2, 4.2).
 
-    A Π counts as a parallelogram throughout, never crossed; where legs or measurements keep the platform from turning,
-    poses that are turned all the same (another operation mode) are not looked for. ``observe``, ``camera`` and ``see``
-    as for ``derive``; ``at`` may be a closed configuration of an observed robot. Joint centres that nearly coincide and
-    solutions nearly at infinity, are taken to be so where that is clearly meant, unless ``as_written`` is true.
+    A Π stays a parallelogram, never crossed (but in planar mechanisms that are closed loop by loop, and in searches);
+    where legs or measurements keep the platform from turning, turned poses (another operation mode) are not looked for.
+    ``observe``, ``camera`` and ``see`` are as for ``derive``; ``at`` may be a closed configuration of an observed
+    robot. Joint centres that nearly coincide, and solutions nearly at infinity, are taken to be so where that is
+    clearly meant, unless ``as_written`` is true.
     ``effort``: seconds of one core that a list may need, told by its size before it starts. Of a formation all
     configurations, trivial motions taken out, with what is measured at the zero configuration.
 
