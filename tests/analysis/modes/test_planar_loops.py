@@ -298,3 +298,12 @@ def test_two_segments_of_a_leg_are_both_watched(observe: str | None):
 def test_one_segment_of_two_has_other_modes(link: str):
     found = hrsynth.modes(two_segments(), f"{link},rod")
     assert (found.found.complete, len(found.modes)) == (True, 2)
+
+
+def test_a_platform_that_all_conditions_hold_linearly_has_one_place():
+    """A parallelogram whose crank is held: the platform only translates, and its point is told outright."""
+    corners, links = [(0, 0), (0.2, 0.6), (1.2, 0.6), (1.0, 0)], {
+        "base": [0, 3], "a": [0, 1], "platform": [1, 2], "b": [2, 3]}
+    found = hrsynth.modes(linkage(corners, links, "platform", "j0"), real=True)
+    assert len(found.modes) == 1
+    assert "at most 1 pose by conditions that are all linear, 1 enclosed" in found.found.proof

@@ -165,8 +165,9 @@ def _judged(system: PosedPlatform, forms: SquareForms, own: bool) -> SystemModes
     """The modes: as many as the degrees allow, or else as the ranks of all multiples of the conditions do; ``own``:
     whether the goal is one."""
     slack = system.error / system.size
-    product_ = (f"the product of degrees {' · '.join(map(str, forms.degrees))}"
-                f"{f' / {2 ** forms.shape[1]}' if forms.shape[1] else ''} (Bézout)")
+    product_ = ((f"the product of degrees {' · '.join(map(str, forms.degrees))}"
+                 f"{f' / {2 ** forms.shape[1]}' if forms.shape[1] else ''} (Bézout)") if forms.degrees
+                else "conditions that are all linear")
     most, why, named = forms.most, product_, "class"
     proposed = proposals(forms, forms.degree, forms.most, 0)
     boxes, lost = ([], 1) if proposed is None else enclosed(forms, slack, proposed, most)
@@ -182,8 +183,8 @@ def _judged(system: PosedPlatform, forms: SquareForms, own: bool) -> SystemModes
     goal = at_goal[0] if len(at_goal) == 1 else None
     complete = len(boxes) == most and (goal is not None) == own
     real = [box for box in boxes if box.real]
-    proof = (f"at most {most} poses by {why}, {len(boxes)} enclosed apart from each other, complex ones too"
-             f"{told_far(boxes)}, {len(real)} real")
+    proof = (f"at most {most} pose{'s' * (most != 1)} by {why}, {len(boxes)} enclosed apart from each other, "
+             f"complex ones too{told_far(boxes)}, {len(real)} real")
     left = [c for c in system.conditions if c not in forms.planes and c not in forms.others]
     kept = [box for box in real if box is goal or not excluded_by(left, forms.poses, box, slack)]
     fitting = [box for box in kept if not left or box is goal or system.miss(box) <= VANISHES]
