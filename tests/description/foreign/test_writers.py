@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from description.foreign.test_traps import bars, full_mobility, origin, read
-from description.samples import every_joint
+from description.samples import FOUR_BAR, every_joint
 from hrsynth.description import load, save, shipped, spanning
 from hrsynth.description.formats.mjcf.write import write
 from hrsynth.errors import BadRequest
@@ -72,6 +72,19 @@ def test_gears_are_written_where_the_dialect_has_them(tmp_path: Path):
         assert full_mobility(back) == 1
     (lost,) = save(robot, tmp_path / "out.sdf")
     assert "no coupling" in lost.text
+
+
+@pytest.mark.parametrize("ending", [*ENDINGS, ".usda"])
+def test_a_joint_keeps_the_name_that_a_link_has_too(ending: str, tmp_path: Path):
+    if ending == ".usda":
+        pytest.importorskip("pxr")
+    text = FOUR_BAR.replace('"crank"', '"a"').replace('"rocker"', '"b"').replace('"c"', '"b c"').replace('"bar"', '"d"')
+    (tmp_path / "robot.urdf").write_text(text)
+    robot = load(tmp_path / "robot.urdf")
+    save(robot, tmp_path / f"out{ending}")
+    back = load(tmp_path / f"out{ending}")
+    assert bare(back).differences(bare(robot)) == []
+    assert [joint.name for joint in back.joints.values() if joint.actuated] == ["a"]
 
 
 def test_an_unknown_dialect_is_refused_and_the_given_one_counts(tmp_path: Path):
