@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from lxml import etree
 
 from description.foreign.test_traps import bars, full_mobility, origin, read
 from description.samples import FOUR_BAR, every_joint
@@ -125,3 +126,19 @@ def test_mujoco_loads_what_is_written_and_counts_the_same_freedoms(name: str):
     assert np.max(np.abs(data.efc_pos[: data.ne])) < 1e-12
     assert model.nv - rank == full_mobility(robot)
     assert model.nu >= sum(joint.actuated for joint in robot.joints.values())
+
+
+def test_links_and_joints_of_sdf_share_no_name(tmp_path: Path):
+    """As SDFormat demands since 1.7; what comes back is tested above."""
+    save(spanning(every_joint(KINDS, KINDS, 0)), tmp_path / "robot.sdf")
+    names = [each.get("name") for each in etree.parse(tmp_path / "robot.sdf").iter("link", "joint")]
+    assert len(set(names)) == len(names)
+
+
+def test_names_that_sdf_has_no_place_for_are_told(tmp_path: Path):
+    (tmp_path / "robot.urdf").write_text(FOUR_BAR.replace('"crank"', '"a"').replace('"b"', '"b::c"'))
+    (lost,) = save(load(tmp_path / "robot.urdf"), tmp_path / "out.sdf")
+    assert all(each in lost.text for each in ("'a' (of a link and a joint)", "'b::c'"))
+    (tmp_path / "robot.urdf").write_text(FOUR_BAR.replace('"crank"', '"__model__"'))
+    with pytest.raises(BadRequest, match="__model__"):
+        save(load(tmp_path / "robot.urdf"), tmp_path / "out.sdf")
