@@ -1,4 +1,4 @@
-"""What a file says without effect: elements and attributes that no reader of URDF knows, legs that contradict the robot."""
+"""What a file says to no effect: elements and attributes that no reader of URDF knows, legs that are none."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ RULES = (
              "motor, no limit.",
              "nothing, if another program reads it", _unknown),
     LintRule("observe-legs", "error", "observed directions that contradict the robot's legs",
-             "A link that is in no leg, one label for two legs, two labels for one: the file is read, but every command "
-             "that watches legs refuses it.",
+             "A link that is in no leg, one label for two legs, two labels for one: the file is read, but commands "
+             "that watch legs refuse it.",
              "correct the link or the label that the line names", _legs),
 )
