@@ -1,4 +1,4 @@
-"""Limits of the joint that closes a loop count from the zero configuration, also where that is another one than the file's."""
+"""Limits of the joint that closes a loop count from the zero configuration, also where the file has another one."""
 
 from __future__ import annotations
 
@@ -29,10 +29,11 @@ def closed(a: float) -> tuple[float, float, float]:
 
 
 def uneven(folder: Path) -> tuple[Path, float, float]:
-    """The four-bar as a file whose zero has the crank upright, and how its rocker and bar turn to where it has turned 0.3."""
+    """The four-bar as a file with the crank upright at zero, and how far rocker and bar turn while the crank turns 0.3."""
     (bar_0, rocker_0, _), (bar_1, rocker_1, _) = closed(0.0), closed(0.3)
     text = BARS.replace('<origin xyz="0 0 1"/>\n    <axis', f'<origin xyz="0 0 1" rpy="0 {bar_0!r} 0"/>\n    <axis', 1)
-    text = text.replace('<origin xyz="2 0 0"/>\n    <axis', f'<origin xyz="2 0 0" rpy="0 {rocker_0!r} 0"/>\n    <axis', 1)
+    pivot = '<origin xyz="2 0 0"{}/>\n    <axis'
+    text = text.replace(pivot.format(""), pivot.format(f' rpy="0 {rocker_0!r} 0"'), 1)
     text = re.sub(r'(<predecessor link="rocker">\s*<origin xyz=")0 0 1', r"\g<1>0 0 1.2", text)
     path = folder / "bars.urdf"
     path.write_text(text)
