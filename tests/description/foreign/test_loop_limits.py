@@ -29,7 +29,7 @@ def closed(a: float) -> tuple[float, float, float]:
 
 
 def uneven(folder: Path) -> tuple[Path, float, float]:
-    """The four-bar as a file with the crank upright at zero, and how far rocker and bar turn while the crank turns 0.3."""
+    """The four-bar as a file with the crank upright at zero, and how rocker and bar turn while the crank turns 0.3."""
     (bar_0, rocker_0, _), (bar_1, rocker_1, _) = closed(0.0), closed(0.3)
     text = BARS.replace('<origin xyz="0 0 1"/>\n    <axis', f'<origin xyz="0 0 1" rpy="0 {bar_0!r} 0"/>\n    <axis', 1)
     pivot = '<origin xyz="2 0 0"{}/>\n    <axis'
