@@ -35,8 +35,8 @@ TAKEN = frozenset(re.findall(r"\w+", """
     BUFSIZ EDOM EOF ERANGE HUGE_VAL INFINITY M_E M_PI NAN NDEBUG NULL RAND_MAX errno linux stderr stdin stdout unix
     DIRECTIONS DIRECTION_NAMES Jacobians LOWER MOTORS MOTOR_NAMES Motors PASSIVE PASSIVE_NAMES Passive STEPS Solution
     Status UPPER forward inverse jacobians unique"""))
-"""Keywords of C++17, names that something else has where headers are included, macros, and the header's own names, ambiguous
-where the namespace is used."""
+"""Keywords of C++17, names that something else has where headers are included, macros, and the header's own names
+(ambiguous where the namespace is used)."""
 
 
 def namespace(name: str) -> str:
