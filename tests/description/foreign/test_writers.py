@@ -135,6 +135,17 @@ def test_links_and_joints_of_sdf_share_no_name(tmp_path: Path):
     assert len(set(names)) == len(names)
 
 
+def test_which_limits_mjcf_loses_is_told_apart(tmp_path: Path):
+    bound = '<axis xyz="0 1 0"/><limit lower="-1" upper="1"/>\n  </loop>'
+    text = FOUR_BAR.replace('<axis xyz="0 1 0"/>\n  </loop>', bound)
+    (tmp_path / "robot.urdf").write_text(text)
+    lost = [note.text for note in save(load(tmp_path / "robot.urdf"), tmp_path / "out.xml")]
+    assert lost == ["limits of closures are not written: d", "limits of velocity and effort are not written: a"]
+    limits = load(tmp_path / "out.xml", as_written=True).joints["a"].limits
+    assert limits is not None
+    assert (limits.lower, limits.upper) == (-1.0, 1.0)
+
+
 def test_names_that_sdf_has_no_place_for_are_told(tmp_path: Path):
     (tmp_path / "robot.urdf").write_text(FOUR_BAR.replace('"crank"', '"a"').replace('"b"', '"b::c"'))
     (lost,) = save(load(tmp_path / "robot.urdf"), tmp_path / "out.sdf")
