@@ -139,6 +139,16 @@ def test_limits_of_joints_without_a_motor(lower: float | None, upper: float | No
     assert found.to_dict()["limits"] == [limit.to_dict()]
 
 
+def test_motors_that_the_box_takes_beyond_their_limits_are_told() -> None:
+    robot = four_bar()
+    limited = robot.changed(joints=[replace(each, limits=Limits(-0.2, 0.3)) if each.actuated else each
+                                    for each in robot.joints.values()])
+    wide, within = ({"motor": (-half, half)} for half in (0.25, 0.2))
+    assert "motor -0.2 to 0.3 (within -0.25 to 0.25)" in export(limited, box=wide).code
+    assert "passed by the box: motor -0.2 to 0.3" in f"{hrsynth.branch(limited, wide)}"
+    assert "passed" not in f"{hrsynth.branch(limited, within)}{hrsynth.branch(limited)}{hrsynth.branch(robot, wide)}"
+
+
 def test_limits_are_undecided_within_the_tube_alone() -> None:
     """A limit at the largest angle: beyond what a tube bounds it is kept, below passed, between not decided."""
     robot = four_bar()
