@@ -6,6 +6,7 @@ import os
 import re
 import subprocess
 import sys
+import warnings
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -16,7 +17,19 @@ import numpy as np
 import pytest
 
 import hrsynth
-from codegen.robots import BARS, MAIN, answered, box_of, compiled, eigen, four_bar, inside, module_of, own_pose
+from codegen.robots import (
+    BARS,
+    MAIN,
+    answered,
+    box_of,
+    compiled,
+    eigen,
+    four_bar,
+    geared_five_bar,
+    inside,
+    module_of,
+    own_pose,
+)
 from hrsynth.analysis.branch.answer import Toggle
 from hrsynth.codegen.export import ExportedCode, export
 from hrsynth.codegen.languages import namespace
@@ -124,6 +137,16 @@ def test_limits_of_joints_without_a_motor(lower: float | None, upper: float | No
         assert f"{verdict} in" in " ".join(text.split())
     assert "limits" not in f"{exported(robot, 0.4)}{hrsynth.branch(robot, box)}"
     assert found.to_dict()["limits"] == [limit.to_dict()]
+
+
+def test_motors_that_the_box_takes_beyond_their_limits_are_told() -> None:
+    robot = four_bar()
+    limited = robot.changed(joints=[replace(each, limits=Limits(-0.2, 0.3)) if each.actuated else each
+                                    for each in robot.joints.values()])
+    wide, within = ({"motor": (-half, half)} for half in (0.25, 0.2))
+    assert "motor -0.2 to 0.3 (within -0.25 to 0.25)" in export(limited, box=wide).code
+    assert "passed by the box: motor -0.2 to 0.3" in f"{hrsynth.branch(limited, wide)}"
+    assert "passed" not in f"{hrsynth.branch(limited, within)}{hrsynth.branch(limited)}{hrsynth.branch(robot, wide)}"
 
 
 def test_limits_are_undecided_within_the_tube_alone() -> None:
@@ -300,13 +323,14 @@ def test_a_compiler_that_drops_checks_is_refused(tmp_path: Path) -> None:
 
 
 ODD = {"class": "class_", "9 lives": "_9_lives", "std": "std_", "": "robot", "a-b.é": "a_b__",
-       "# coding: utf-7": "__coding__utf_7", "r\n#error \\": "r__error__"}
+       "NULL": "NULL_", "Motors": "Motors_", "# coding: utf-7": "__coding__utf_7", "r\n#error \\": "r__error__"}
 """Names of robots, and their namespaces."""
 
 
 def oddly_named(name: str) -> Mechanism:
     robot = four_bar()
-    joints = {f'{key} "*/ q\n\\': replace(joint, name=f'{key} "*/ q\n\\') for key, joint in robot.joints.items()}
+    names = {key: f'{key} "*/ ???/ q\n\\' for key in robot.joints}
+    joints = {names[key]: replace(joint, name=names[key]) for key, joint in robot.joints.items()}
     return replace(robot, name=name, joints=joints)
 
 
@@ -320,20 +344,31 @@ def test_names_are_no_code(name: str, tmp_path: Path) -> None:
     path.write_text(code, encoding="utf-8")
     made: dict[str, Any] = {}
     exec(compile(path.read_bytes(), str(path), "exec"), made)
-    assert made["MOTOR_NAMES"] == ['motor "*/ q\n\\']
+    assert made["MOTOR_NAMES"] == ['motor "*/ ???/ q\n\\']
     assert made["forward"](np.zeros((1, 1)))[0].tolist() == [made["OK"]]
     assert namespace(name) == ODD[name]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["class", "", "r\n#error \\"])
+@pytest.mark.parametrize("name", ["class", "", "NULL", "Motors", "r\n#error \\"])
 def test_names_are_no_code_in_cpp(name: str, tmp_path: Path) -> None:
     robot = oddly_named(name)
     code = export(robot, "c++", box_of(robot, 0.1)).code
     own = namespace(robot.name)
-    main = f'#include "robot.hpp"\n#include <cstdio>\nint main() {{ std::puts({own}::MOTOR_NAMES[0]); }}'
+    main = (f'#include "robot.hpp"\n#include <cstdio>\nusing namespace {own};\n'
+            "int main() { return int(unique(Motors::Zero())) + std::puts(MOTOR_NAMES[0]) < 0; }")
     found = subprocess.run([compiled(tmp_path, code, main)], capture_output=True, text=True, check=True)
-    assert found.stdout == 'motor "*/ q\n\\\n'
+    assert found.stdout == 'motor "*/ ???/ q\n\\\n'
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, 1e308])
+def test_poses_that_are_none_are_answered_without_a_warning(value: float) -> None:
+    robot = geared_five_bar()  # whose inverse is Newton's method
+    made = module_of(export(robot, "numpy", box_of(robot, 0.1)).code)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert made.forward(np.full((1, 1), value))[0] == [made.OUTSIDE]
+        assert made.inverse(np.full((1, 3, 3), value), np.full((1, 3), value), np.zeros((1, 1)))[0] != [made.OK]
 
 
 def test_why_nothing_is_proved_is_said_once_with_the_nearest_place():

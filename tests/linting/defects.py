@@ -219,6 +219,8 @@ CASES = [
     Case("link-unused", add('<link name="spare"/>'), ("refused", "guessed")),
     Case("reader-drops", both(), reader="mujoco"),
     Case("refused", put("loop", type="helical")),
+    Case("observe-legs", lambda root: root.findall("hrsynth")[0].append(
+        etree.Element("observe", leg="1", link="base", axis="1 0 0"))),
     Case("unsaid", foreign(), robot="rrrrr_m1"),
     Case("guessed", foreign()),
     Case("closure-unread", foreign(add(HOLDER)), ("guessed",)),

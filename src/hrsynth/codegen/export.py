@@ -138,6 +138,7 @@ def _told(proof: BranchProof, source: Source, lang: str, box: BoxLike | None, ef
               "cell's tube, in which the loops have one closure (proved).", *_bounds(source),
               "The proof takes the robot's numbers as the file has them."]
     lines += [f"Limits of joints without a motor, {each}" for each in proof.limits_in_words()]
+    lines += [f"Limit of a motor that the box passes: {each}" for each in proof.motors_beyond()]
     return lines
 
 

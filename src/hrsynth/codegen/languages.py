@@ -31,8 +31,12 @@ TAKEN = frozenset(re.findall(r"\w+", """
     float for friend goto if inline int long mutable namespace new noexcept not not_eq nullptr operator or or_eq private
     protected public register reinterpret_cast return short signed sizeof static static_assert static_cast struct switch
     template this thread_local throw true try typedef typeid typename union unsigned using virtual void volatile wchar_t
-    while xor xor_eq Eigen detail main std"""))
-"""Keywords of C++17, and names that something else has where headers are included."""
+    while xor xor_eq Eigen detail main std
+    BUFSIZ EDOM EOF ERANGE HUGE_VAL INFINITY M_E M_PI NAN NDEBUG NULL RAND_MAX errno linux stderr stdin stdout unix
+    DIRECTIONS DIRECTION_NAMES Jacobians LOWER MOTORS MOTOR_NAMES Motors PASSIVE PASSIVE_NAMES Passive STEPS Solution
+    Status UPPER forward inverse jacobians unique"""))
+"""Keywords of C++17, names that something else has where headers are included, macros, and the header's own names
+(ambiguous where the namespace is used)."""
 
 
 def namespace(name: str) -> str:

@@ -25,6 +25,8 @@ from ..mechanism.model import Joint, JointType, Link, Mechanism, Motor
 from ..tolerances import SAME_DIRECTION, SAME_POINT
 
 TIP = "__tip"
+BODY = "__body"
+"""What follows the name of a link of a chain where joints and links may not share a name (SDFormat)."""
 CUT, WELD, END, SECOND = "__cut", "__weld", "__end", "__second"
 """Ends of the names of what writers of foreign dialects add for a loop N: the link that one half of the cut joint
 carries, the closure in all six directions, the frame on the other link, the second point of a revolute joint."""
@@ -35,7 +37,7 @@ _R, _P = JointType.REVOLUTE, JointType.PRISMATIC
 
 
 def part(name: str, number: int) -> str:
-    """The name of the ``number``-th joint (and of the link that it carries) of the chain of joint ``name``."""
+    """The name of the ``number``-th joint (and of the link that it carries, but for BODY) of the chain of ``name``."""
     return f"{name}__{number}"
 
 
@@ -101,11 +103,11 @@ def merge(mechanism: Mechanism) -> Mechanism:
         if name in joints or len(chain) < 2 or [joint.name for joint in chain] != [
                 part(name, number + 1) for number in range(len(chain))]:
             continue
-        between = [links.get(part(name, number)) for number in range(1, len(chain))]
+        between = [links.get(joint.successor) for joint in chain[:-1]]
         whole = _whole(name, chain, between, mechanism.length) if all(map(bare, between)) else None
         if whole is not None:
-            for number in range(1, len(chain)):
-                del links[part(name, number)]
+            for joint in chain[:-1]:
+                del links[joint.successor]
             wholes[chain[0].name] = whole
             gone |= {joint.name for joint in chain[1:]}
     kept = [wholes.get(name, joint) for name, joint in joints.items() if name not in gone]
@@ -116,7 +118,8 @@ def _whole(name: str, chain: list[Joint], between: list[Link | None], length: fl
     """The joint that a chain is, or None where it is none by its links, geometry, motors or limits."""
     first = chain[0]
     for number, (before, after) in enumerate(pairwise(chain), 1):
-        if not before.successor == after.predecessor == part(name, number):
+        own = part(name, number)
+        if before.successor != after.predecessor or before.successor not in (own, own + BODY):
             return None
     if any(not joint.in_tree or np.linalg.norm(joint.point - first.point) > SAME_POINT * length
            or joint.limits != first.limits or joint.actuated != first.actuated or (joint.xml and joint is not first)

@@ -18,9 +18,9 @@ from .tree import is_connected, spanning
 
 
 def reduce(mechanism: Mechanism, tree: Collection[JointType], loops: Collection[JointType],
-           driven: Collection[JointType] = ()) -> tuple[Mechanism, tuple[Note, ...]]:
+           driven: Collection[JointType] = (), body: str = "") -> tuple[Mechanism, tuple[Note, ...]]:
     """The mechanism with tree joints of types ``tree`` and loops of types ``loops`` (with a motor: ``driven``) only;
-    and what is lost.
+    and what is lost. ``body`` follows the names of links in between.
 
     Raises ``BadRequest`` where a link in between would take the name of another.
     """
@@ -41,7 +41,7 @@ def reduce(mechanism: Mechanism, tree: Collection[JointType], loops: Collection[
         before = joint.predecessor
         for number, (kind, direction) in enumerate(parts, 1):
             name = chains.part(joint.name, number)
-            after = joint.successor if number == len(parts) else link(name, joint)
+            after = joint.successor if number == len(parts) else link(name + body, joint)
             motor = None if joint.motor is None else Motor(chains.part(joint.motor.name, number))
             joints[name] = Joint(name, kind, before, after, joint.point, (direction,), motor, joint.limits)
             before = after

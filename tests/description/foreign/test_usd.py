@@ -309,7 +309,7 @@ def test_layers_that_are_not_there_are_told(tmp_path: Path):
 
 
 def test_joints_and_bodies_of_one_name_keep_their_motors(tmp_path: Path):
-    """A joint called as a link is called otherwise, and so are its motor and the gear that it drives."""
+    """A joint called as a link keeps its name, and so do its motor and the gear that it drives."""
     mimic = ('float physxMimicJoint:rotY:gearing = -2\n rel physxMimicJoint:rotY:referenceJoint = </r/crank_j/crank>')
     inner = 'def Scope "crank_j" {\ndef PhysicsRevoluteJoint "crank" ('
     text = four_bar().replace('def PhysicsRevoluteJoint "a" (', inner)

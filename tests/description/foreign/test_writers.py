@@ -7,9 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from lxml import etree
 
 from description.foreign.test_traps import bars, full_mobility, origin, read
-from description.samples import every_joint
+from description.samples import FOUR_BAR, every_joint
 from hrsynth.description import load, save, shipped, spanning
 from hrsynth.description.formats.mjcf.write import write
 from hrsynth.errors import BadRequest
@@ -74,6 +75,19 @@ def test_gears_are_written_where_the_dialect_has_them(tmp_path: Path):
     assert "no coupling" in lost.text
 
 
+@pytest.mark.parametrize("ending", [*ENDINGS, ".usda"])
+def test_a_joint_keeps_the_name_that_a_link_has_too(ending: str, tmp_path: Path):
+    if ending == ".usda":
+        pytest.importorskip("pxr")
+    text = FOUR_BAR.replace('"crank"', '"a"').replace('"rocker"', '"b"').replace('"c"', '"b c"').replace('"bar"', '"d"')
+    (tmp_path / "robot.urdf").write_text(text)
+    robot = load(tmp_path / "robot.urdf")
+    save(robot, tmp_path / f"out{ending}")
+    back = load(tmp_path / f"out{ending}")
+    assert bare(back).differences(bare(robot)) == []
+    assert [joint.name for joint in back.joints.values() if joint.actuated] == ["a"]
+
+
 def test_an_unknown_dialect_is_refused_and_the_given_one_counts(tmp_path: Path):
     with pytest.raises(BadRequest, match="native, gepetto, mjcf, sdf"):
         save(load("3rps"), tmp_path / "a.urdf", "step")
@@ -112,3 +126,30 @@ def test_mujoco_loads_what_is_written_and_counts_the_same_freedoms(name: str):
     assert np.max(np.abs(data.efc_pos[: data.ne])) < 1e-12
     assert model.nv - rank == full_mobility(robot)
     assert model.nu >= sum(joint.actuated for joint in robot.joints.values())
+
+
+def test_links_and_joints_of_sdf_share_no_name(tmp_path: Path):
+    """As SDFormat demands since 1.7; what comes back is tested above."""
+    save(spanning(every_joint(KINDS, KINDS, 0)), tmp_path / "robot.sdf")
+    names = [each.get("name") for each in etree.parse(tmp_path / "robot.sdf").iter("link", "joint")]
+    assert len(set(names)) == len(names)
+
+
+def test_which_limits_mjcf_loses_is_told_apart(tmp_path: Path):
+    bound = '<axis xyz="0 1 0"/><limit lower="-1" upper="1"/>\n  </loop>'
+    text = FOUR_BAR.replace('<axis xyz="0 1 0"/>\n  </loop>', bound)
+    (tmp_path / "robot.urdf").write_text(text)
+    lost = [note.text for note in save(load(tmp_path / "robot.urdf"), tmp_path / "out.xml")]
+    assert lost == ["limits of closures are not written: d", "limits of velocity and effort are not written: a"]
+    limits = load(tmp_path / "out.xml", as_written=True).joints["a"].limits
+    assert limits is not None
+    assert (limits.lower, limits.upper) == (-1.0, 1.0)
+
+
+def test_names_that_sdf_has_no_place_for_are_told(tmp_path: Path):
+    (tmp_path / "robot.urdf").write_text(FOUR_BAR.replace('"crank"', '"a"').replace('"b"', '"b::c"'))
+    (lost,) = save(load(tmp_path / "robot.urdf"), tmp_path / "out.sdf")
+    assert all(each in lost.text for each in ("'a' (of a link and a joint)", "'b::c'"))
+    (tmp_path / "robot.urdf").write_text(FOUR_BAR.replace('"crank"', '"__model__"'))
+    with pytest.raises(BadRequest, match="__model__"):
+        save(load(tmp_path / "robot.urdf"), tmp_path / "out.sdf")

@@ -194,6 +194,18 @@ class BranchProof(Result, shown_as="branch"):
         told = {verdict: [each.words for each in self.limits if each.verdict == verdict] for verdict in says}
         return [f"{says[verdict]}: {', '.join(names)}" for verdict, names in told.items() if names]
 
+    def motors_beyond(self) -> list[str]:
+        """The motors that the cells take beyond the file's limits, with these."""
+        reach: dict[str, tuple[float, float]] = {}
+        for part in (each for each in self.parts if each.cells):
+            low = np.min([each.low for each in part.cells], axis=0)
+            high = np.max([each.high for each in part.cells], axis=0)
+            reach |= dict(zip(part.motors, zip(low.tolist(), high.tolist(), strict=True), strict=True))
+        limited = self.robot.limited
+        return [f"{name} {limited[name][0]:.6g} to {limited[name][1]:.6g} (within {low:.4g} to {high:.4g})"
+                for name, (low, high) in reach.items()
+                if name in limited and (low < limited[name][0] or high > limited[name][1])]
+
     def headline(self) -> str:
         """The robot, and how much of the box is proved."""
         return f"{self.robot.name}, {len(self.motors)} motors, {len(self.passive)} passive coordinates: " + "; ".join(

@@ -6,13 +6,18 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 
-from ...geometry.vectors import inverse
+import numpy as np
+
+from ...geometry.so3 import quaternions
+from ...geometry.vectors import inverse, unit
 from ...mechanism.model import Joint, JointType, Mechanism
-from ...tolerances import NOISE
+from ...tolerances import EXACT, NOISE
 from .. import numerals, xml
 from ..jointgraph import comma_list
+from ..jointmotion import zero
 from .loops import LoopAssembly, Values
 
+SINGLE = (JointType.REVOLUTE, JointType.PRISMATIC)
 COUNTED_FROM_ZERO = {"safety_controller": ("soft_lower_limit", "soft_upper_limit"),
                      "calibration": ("rising", "falling", "reference_position")}
 """Attributes of elements of a joint that are coordinates of it."""
@@ -35,17 +40,39 @@ def with_limits(joints: Mapping[str, Joint], assembly: LoopAssembly, values: Val
     """The joints with the limits of R and P, and what else of them the file counts from zero, from where ``values`` put
     them."""
     found = dict(joints)
-    for tree_joint, _, _ in assembly.tree:
-        joint = joints[tree_joint.name]
+    told = {spec.name: float(values[spec.name][0]) * assembly.unit(spec) for spec, _, _ in assembly.tree
+            if spec.kind in SINGLE}
+    told |= closing(assembly, values)
+    for name, q in told.items():
+        joint = joints[name]
         limits = joint.limits
-        if joint.type not in (JointType.REVOLUTE, JointType.PRISMATIC):
-            continue
-        if q := float(values[joint.name][0]) * assembly.unit(tree_joint):
+        if q:
             if limits is not None:
                 lower, upper = (None if bound is None else bound - q for bound in (limits.lower, limits.upper))
                 limits = replace(limits, lower=lower, upper=upper)
             found[joint.name] = replace(joint, limits=limits, xml=tuple(_counted(each, q) for each in joint.xml))
     return found
+
+
+def closing(assembly: LoopAssembly, values: Values) -> dict[str, float]:
+    """How far from their zero (m, rad) ``values`` put the R and P at which loops are closed: that of a closure is where
+    all tree joints are at zero, that of a joint of the file's tree where its two frames meet."""
+    there = {spec.name: zero(spec) for spec, _, _ in assembly.tree}
+    now, then = assembly.scaled_poses(values), assembly.scaled_poses(there)
+    found = {}
+    for spec in assembly.loops:
+        if spec.kind not in SINGLE:
+            continue
+        X, Y = spec.frames(now)
+        X_0, Y_0 = spec.frames(then)
+        D, D_0 = inverse(X) @ Y, np.eye(4) if spec.in_tree else inverse(X_0) @ Y_0
+        axis = unit(spec.axes[0])
+        if spec.kind is JointType.PRISMATIC:
+            found[spec.name] = float(axis @ (D[:3, 3] - D_0[:3, 3])) * assembly.length
+        else:
+            turn = quaternions(D[:3, :3] @ D_0[:3, :3].T)
+            found[spec.name] = 2 * math.atan2(float(axis @ turn[1:]), float(turn[0]))
+    return {name: q for name, q in found.items() if abs(q) > EXACT}
 
 
 def _counted(fragment: str, q: float) -> str:

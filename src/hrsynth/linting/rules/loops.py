@@ -13,7 +13,7 @@ from ...description.assembly import guess
 from ...description.assembly.build import rounding
 from ...description.assembly.candidates import closure_candidates
 from ...description.assembly.loops import LoopAssembly, LoopSolution, Values, solve
-from ...description.assembly.zero import count_from, moves
+from ...description.assembly.zero import closing, count_from, moves
 from ...description.jointgraph import JointGraph, JointSpec
 from ...description.jointmotion import displacement, opening
 from ...errors import HrsynthError
@@ -119,11 +119,11 @@ def _rezero(moved: list[tuple[JointSpec, xml.Element]], values: Values, graph: J
             element.insert(0, origin)
         origin.set("xyz", numerals.exact_vector(X[:3, 3]))
         origin.set("rpy", numerals.exact_vector(numerals.rpy(X[:3, :3])))
-        for limit in element.iterfind("limit"):
-            free = (limit.get("free") or "").split()
-            _less(limit, q, *(key for key in ("lower", "upper") if key not in free))
-        for each in element:
-            count_from(each, q)
+        _shifted(element, q)
+    shifts = closing(assembly, values)
+    for element in moved[0][1].getroottree().iter("loop"):
+        if q := shifts.get(str(element.get("name")), 0.0):
+            _shifted(element, q)
     for element in moved[0][1].getroottree().iter("joint"):
         for mimic in element.iterfind("mimic"):
             ratio = NumberAt(mimic, "multiplier").value
@@ -131,6 +131,15 @@ def _rezero(moved: list[tuple[JointSpec, xml.Element]], values: Values, graph: J
             if own := turned.get(element.get("name"), 0.0) - led:
                 offset = (NumberAt(mimic, "offset").value or 0.0) - own
                 mimic.set("offset", numerals.exact(offset if abs(offset) > EXACT else 0.0))
+
+
+def _shifted(element: xml.Element, q: float) -> None:
+    """Count the limits of a joint's element from q, and what else of it is counted from zero."""
+    for limit in element.iterfind("limit"):
+        free = (limit.get("free") or "").split()
+        _less(limit, q, *(key for key in ("lower", "upper") if key not in free))
+    for each in element:
+        count_from(each, q)
 
 
 def _less(element: xml.Element, q: float, *keys: str) -> None:

@@ -1,4 +1,4 @@
-"""Elements and attributes that no reader of URDF knows: they are kept, and what they were to say is in no answer."""
+"""What a file says to no effect: elements and attributes that no reader of URDF knows, legs that are none."""
 
 from __future__ import annotations
 
@@ -6,9 +6,12 @@ import difflib
 from collections.abc import Iterable, Iterator
 
 from ...description import xml
+from ...errors import BadRobotFile, HrsynthError
+from ...mechanism.legs import decompose
+from ...mechanism.normal import normal_form
 from ...tolerances import LIKE_A_WORD
 from ..findings import LintRule, Spot
-from ..subject import LintedFile
+from ..subject import LintedFile, defects_of
 
 _ENDS = ("parent", "child", "predecessor", "successor")
 ROBOT = {"link", "joint", "loop", "coupling", "transmission", "hrsynth", "material", "gazebo", "sensor", "ros2_control",
@@ -21,10 +24,13 @@ WITHIN = {
               "axis2"},
     "loop": {"predecessor", "successor", "axis", "axis2", "limit", "dynamics"},
     "coupling": {"predecessor", "successor", "ratio"},
+    "hrsynth": {"platform", "camera", "observe"},
 }
 """What stands in the elements that say what the robot is."""
 ATTRIBUTES = {
     "origin": {"xyz", "rpy"}, "axis": {"xyz"}, "axis2": {"xyz"}, "ratio": {"value"}, **{tag: {"link"} for tag in _ENDS},
+    "platform": {"link"}, "camera": {"link", "name"},
+    "observe": {"leg", "link", "joint", "axis", "kind", "camera", "at", "radius"},
     "limit": {"lower", "upper", "effort", "velocity", "acceleration", "deceleration", "jerk", "free"},
 }
 """The attributes of their elements."""
@@ -74,7 +80,20 @@ def _near(name: str, known: Iterable[str]) -> str | None:
 
 
 def _named(element: xml.Element) -> str:
-    return f"{element.tag} {element.get('name')!r}"
+    return str(element.tag) if element.get("name") is None else f"{element.tag} {element.get('name')!r}"
+
+
+def _legs(file: LintedFile) -> Iterator[Spot]:
+    robot = file.mechanism
+    if file.refusal is not None or robot is None or not robot.observations:
+        return
+    try:
+        decompose(normal_form(robot).mechanism)
+    except BadRobotFile as error:
+        for line, text in defects_of(error):
+            yield Spot(line, text)
+    except HrsynthError:  # told by other rules, or by the questions that need legs
+        return
 
 
 RULES = (
@@ -82,4 +101,8 @@ RULES = (
              "Readers leave it out without a word, and take the default for what it was to say: an axis along x, no "
              "motor, no limit.",
              "nothing, if another program reads it", _unknown),
+    LintRule("observe-legs", "error", "observed directions that contradict the robot's legs",
+             "A link that is in no leg, one label for two legs, two labels for one: the file is read, but commands "
+             "that watch legs refuse it.",
+             "correct the link or the label that the line names", _legs),
 )

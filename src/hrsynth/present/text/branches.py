@@ -24,8 +24,10 @@ def branch(found: BranchProof) -> str:
 
 
 def limits(found: BranchProof) -> Rows:
-    """What is known of the limits of joints without a motor."""
+    """What is known of the limits of joints without a motor, and of motors that the box takes beyond theirs."""
     words = found.limits_in_words()
+    if beyond := found.motors_beyond():
+        words.append("of motors, passed by the box: " + ", ".join(beyond))
     return [("limits", words)] if words else []
 
 

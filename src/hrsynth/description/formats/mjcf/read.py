@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ....geometry.vectors import Array, frozen, inverse, pose
-from ....mechanism.model import JointType, Limits, Link, Motor
+from ....mechanism.model import JointType, Limits, Link, Motor, fresh_name
 from ... import numerals, xml
 from ...annotations import PREFIX, drop_world, read_annotation
 from ...dialect import RobotFile
@@ -153,7 +153,8 @@ class _MjcfReader(XmlReader):
 
     def _equality(self, element: xml.Element) -> None:
         graph, given = self.result, self.defaults.of(element, None, "equality")
-        name = graph.fresh(element.get("name") or str(element.tag))
+        said = element.get("name")  # which bodies and equalities may share
+        name = fresh_name(said, graph.joints) if said else graph.fresh(str(element.tag))
         if given.get("active", "true") == "false":
             graph.note("ignored", f"the equality {name!r}, which is not active{self._wish(element, given)}")
         elif element.tag in ("connect", "weld"):

@@ -52,12 +52,16 @@ def write(mechanism: Mechanism) -> Written:
 def _lost(robot: Mechanism) -> list[Note]:
     """What MJCF has no words for: one-sided limits, limits of loops, of velocity and effort; names of fixed joints."""
     found = []
-    cut = [joint.name for joint in robot.joints.values() if joint.limits is not None
-           and (not joint.in_tree or None in (joint.limits.lower, joint.limits.upper)
-                or joint.limits.velocity is not None or joint.limits.effort is not None)]
-    if cut:
-        found.append(Note("warning", "limits that are one-sided, of loops, of velocity or effort are not written: "
-                                     + comma_list(cut)))
+    bounded = [(joint, joint.limits) for joint in robot.joints.values() if joint.limits is not None]
+    lost = {"limits of closures": [joint for joint, own in bounded if not joint.in_tree
+                                   and (own.lower, own.upper) != (None, None)],
+            "one-sided limits": [joint for joint, own in bounded if joint.in_tree
+                                 and (own.lower is None) != (own.upper is None)],
+            "limits of velocity and effort": [joint for joint, own in bounded
+                                              if (own.velocity, own.effort) != (None, None)]}
+    for what, joints in lost.items():
+        if joints:
+            found.append(Note("warning", f"{what} are not written: {comma_list([joint.name for joint in joints])}"))
     fixed = [joint.name for joint in robot.joints.values() if joint.in_tree and joint.type is JointType.FIXED]
     if fixed:
         found.append(Note("warning", "the names of fixed joints are not written: " + comma_list(fixed)))

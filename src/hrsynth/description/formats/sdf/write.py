@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 from lxml import etree
 
@@ -10,20 +12,24 @@ from ....geometry.vectors import inverse, pose
 from ....mechanism.model import Joint, JointType, Mechanism, Note
 from ... import numerals, xml
 from ...annotations import NAMESPACE, PREFIX, annotations_of
+from ...chains import BODY
 from ...contents import SIZES, content_of, unsaid
 from ...dialect import Written
+from ...jointgraph import comma_list
 from ...reduction import reduce, require_free_world
 from .content import write_content, write_pose
 
 _NAMES = {JointType.REVOLUTE: "revolute", JointType.PRISMATIC: "prismatic", JointType.SPHERICAL: "ball",
          JointType.UNIVERSAL: "universal", JointType.FIXED: "fixed"}
 WORLD = "world"
+_OWN = re.compile("__.*__", re.DOTALL)
 
 
 def write(mechanism: Mechanism) -> Written:
     """The SDFormat text of a mechanism, and warnings of what is lost."""
-    robot, lost = reduce(mechanism, tuple(_NAMES), tuple(_NAMES), tuple(_NAMES))
+    robot, lost = reduce(mechanism, tuple(_NAMES), tuple(_NAMES), tuple(_NAMES), BODY)
     require_free_world(robot, WORLD, "SDFormat")
+    lost = (*lost, *_names(robot))
     if robot.couplings:
         lost = (*lost, Note("warning", "SDFormat has no coupling of joints on different bodies; not written: "
                                        + ", ".join(coupling.name for coupling in robot.couplings)))
@@ -43,6 +49,18 @@ def write(mechanism: Mechanism) -> Written:
     for key, text in annotations_of(robot, motors=True):
         etree.SubElement(model, f"{{{NAMESPACE}}}{key}").text = text
     return Written((xml.text_of(root),), (*lost, *unsaid(robot, SIZES, dialect="SDFormat")))
+
+
+def _names(robot: Mechanism) -> list[Note]:
+    """Warnings of names that SDFormat's own readers refuse; raises ``BadRequest`` for those of frames of its own."""
+    links, joints = robot.links.keys(), robot.joints.keys()
+    own = sorted(name for name in {*links, *joints} if _OWN.fullmatch(name))
+    if own:
+        raise BadRequest(f"{robot.name}: SDFormat keeps names between double underscores for itself", ", ".join(own),
+                         "other names of links and joints")
+    odd = [f"{name!r} (::)" for name in sorted({*links, *joints}) if "::" in name]
+    odd += [f"{name!r} (of a link and a joint)" for name in sorted(links & joints)]
+    return [Note("warning", "names that Gazebo refuses, rename them: " + comma_list(odd))] if odd else []
 
 
 def _joint(model: xml.Element, robot: Mechanism, joint: Joint) -> None:

@@ -14,7 +14,7 @@ from ....budgets import LARGEST_NUMBER
 from ....errors import BadRobotFile, Defect
 from ....geometry.so3 import rotation_of, turn_about
 from ....geometry.vectors import Array, frozen, inverse, pose, rotation_about, unit
-from ....mechanism.model import JointType, Limits, Link, Motor
+from ....mechanism.model import JointType, Limits, Link, Motor, fresh_name
 from ....tolerances import EXACT, NOISE, SINGLE, WITHOUT_DIRECTION
 from ... import xml
 from ...annotations import PREFIX, drop_world, read_annotation
@@ -269,9 +269,7 @@ class _StageReader:
         if one.link == two.link:
             self.defect(prim.path, "a joint of a body to itself", one.link)
             return
-        name = prim.name
-        if name in graph.joints or name in graph.links:
-            name = graph.fresh(name)
+        name = fresh_name(prim.name, graph.joints)
         free = self._freedoms(prim)
         excluded = values.get("physics:excludeFromArticulation") is True and len(free) < 6
         before = set(graph.joints)
