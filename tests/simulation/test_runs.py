@@ -201,6 +201,47 @@ def test_a_joint_limit_is_a_boundary():
     assert twin.difference(twin.q0, last.q)[twin.coordinates[joint.name][0]] == pytest.approx(half, abs=1e-8)
 
 
+def limited(spans):
+    """The five-bar whose joints have these limits."""
+    robot = load("rrrrr_m1")
+    return robot.changed(joints=[replace(robot.joints[name], limits=Limits(*span)) for name, span in spans.items()])
+
+
+def angles(run, joint):
+    """A joint's angle along a run, (n,)."""
+    twin = run.last.twin
+    return np.array([twin.difference(twin.q0, at.q)[twin.coordinates[joint][0]] for at in run.configurations])
+
+
+def test_limits_a_whole_turn_away_stop_where_they_are():
+    ends = {"start": "x=0.05,y=0.2", "goal": "x=-0.05,y=0.2"}
+    way = angles(servo("rrrrr_m1", **ends).run, "shoulder_1")
+    assert np.all(np.diff(way) * np.sign(way[-1] - way[0]) > -1e-9)
+    turn, low, high = 2 * np.pi, way.min() - 0.1, way.max() + 0.1
+    assert servo(limited({"shoulder_1": (low + turn, high + turn)}), **ends).ended == GOAL
+    # wider than a whole turn: the start lies between the limits after a whole turn alone, and one limit is on the way
+    half = (way[0] + way[-1]) / 2
+    span = sorted([(way[0] + half) / 2, half + np.copysign(turn, half - way[0])])
+    found = servo(limited({"shoulder_1": span}), **ends)
+    assert (found.ended, found.ending.reason) == (BOUNDARY, "joint shoulder_1 is at its limit")
+    assert angles(found.run, "shoulder_1")[-1] == pytest.approx(half, abs=1e-8)
+
+
+def test_a_joint_that_starts_beyond_its_limit_hides_no_other():
+    ends = {"start": "x=0.05,y=0.2", "goal": "x=-0.05,y=0.2"}
+    free = servo("rrrrr_m1", **ends).run
+    one, two = (angles(free, name) for name in ("shoulder_1", "shoulder_2"))
+    half = (two[0] + two[-1]) / 2
+    # the first joint starts beyond its limit by more than the second one comes beyond its own
+    near = one[0] + 0.9 * (one[-1] - one[0])
+    assert abs(near - one[0]) > abs(two[-1] - half)
+    found = servo(limited({"shoulder_1": sorted([near, near + one[-1] - one[0]]),
+                           "shoulder_2": sorted([half, half + two[0] - two[-1]])}), **ends)
+    assert (found.ended, found.ending.reason) == (BOUNDARY, "joint shoulder_2 is at its limit")
+    assert angles(found.run, "shoulder_2")[-1] == pytest.approx(half, abs=1e-8)
+    assert any("beyond the limits of shoulder_1" in each for each in found.notes)
+
+
 # ---- what is refused
 
 
