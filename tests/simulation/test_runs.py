@@ -98,6 +98,48 @@ def test_a_crossing_is_told_where_the_side_changes():
     assert track.smallest[crossing.place + 1] < DAMPED
 
 
+@pytest.mark.parametrize("kind", ["type1", "type2"])
+@pytest.mark.parametrize("bend", np.linspace(-0.15, 0.15, 12))
+def test_a_crossing_is_told_where_a_configuration_lies_on_it(kind: str, bend: float):
+    """A five-bar's second leg is stretched (Type 1), or its cranks are parallel (Type 2), exactly at the middle one of
+    the configurations."""
+    found = setting("rrrrr_m1")
+    at = [five_bar(found, kind, bend, step) for step in np.linspace(-0.3, 0.3, 13)]
+    track = tracked(at, found.samples.question, found.everything.question, found.dof)
+    assert [each.kind for each in track.passages] == [kind]
+
+
+def five_bar(found, kind, bend, step):
+    """The five-bar whose second leg is bent by ``step`` from where it is stretched, or whose cranks make that angle."""
+    A, B, C = np.array([-0.1, 0.1]), np.array([-0.15813199329137 + 0.14906599664569j,
+                                               0.18896249413879 + 0.13298749804626j]), 0.02 + 0.24j
+    (l1, l2), (r1, r2) = abs(B - A), abs(C - B)
+    cranks, rods = np.angle(B - A), np.angle(C - B)
+    if kind == "type1":
+        rod = rods[1] + bend
+        elbow = A[1] + l2 * np.exp(1j * (rod - step))
+        tip = elbow + r2 * np.exp(1j * rod)
+        elbows = np.array([met(tip, r1, A[0], l1), elbow])
+    else:
+        elbows = A + np.array([l1, l2]) * np.exp(1j * (0.9 + bend + np.array([0, step])))
+        tip = met(elbows[1], r2, elbows[0], r1)
+    turned, swung = np.angle(elbows - A) - cranks, np.angle(tip - elbows) - rods
+    twin = found.everything.twin
+    step = np.zeros(twin.model.nv)
+    for name, value in {"shoulder_1": turned[0], "shoulder_2": turned[1], "elbow_1": swung[0] - turned[0],
+                        "elbow_2": swung[1] - turned[1], "end": swung[1] - swung[0]}.items():
+        step[twin.coordinates[name][0]] = value
+    return ClosedConfiguration.of(twin, twin.q0 + step)
+
+
+def met(one, far, two, near):
+    """Where a circle of radius ``far`` about one point meets one of radius ``near`` about another, on the left of the
+    way from the second to the first."""
+    apart = abs(one - two)
+    along = (near**2 - far**2 + apart**2) / (2 * apart)
+    return two + (along + 1j * np.sqrt(near**2 - along**2)) * (one - two) / apart
+
+
 @pytest.mark.parametrize(("name", "given", "made", "said"), [
     pytest.param("rrrrr_m1", {"start": "x=0", "goal": "x=0.02"}, {"motor": None},
                  "motors for 1 of the platform's 2 freedoms", marks=pytest.mark.slow),
