@@ -21,6 +21,7 @@ from hrsynth.kinematics.tasks import solve
 from hrsynth.mechanism.model import Limits
 from hrsynth.mechanism.pose import asked_poses
 from hrsynth.simulation.ending import BOUNDARY, GOAL, MODE
+from hrsynth.simulation.run import LIMIT
 from hrsynth.simulation.servo import servo
 from hrsynth.simulation.track import tracked
 from hrsynth.tolerances import DAMPED
@@ -282,6 +283,18 @@ def test_a_joint_that_starts_beyond_its_limit_hides_no_other():
     assert (found.ended, found.ending.reason) == (BOUNDARY, "joint shoulder_2 is at its limit")
     assert angles(found.run, "shoulder_2")[-1] == pytest.approx(half, abs=1e-8)
     assert any("beyond the limits of shoulder_1" in each for each in found.notes)
+
+
+def test_a_noisy_run_that_meets_a_limit_is_over():
+    """Noise of a degree leads a joint beyond a limit 0.004 rad past the goal; without it the run ends at the goal."""
+    ends = {"start": "x=0.05,y=0.2", "goal": "x=-0.05,y=0.2"}
+    way = angles(servo("rrrrr_m1", **ends).run, "shoulder_1")
+    robot = limited({"shoulder_1": sorted([way[-1] + 0.004 * np.sign(way[-1] - way[0]), 3 * way[0] - 2 * way[-1]])})
+    assert servo(robot, **ends).ended == GOAL
+    found = servo(robot, **ends, noise="1deg")
+    assert (found.run.stopped, found.run.joint) == (LIMIT, "shoulder_1")
+    assert (found.ended, found.ending.reason) == (BOUNDARY, "joint shoulder_1 is at its limit")
+    assert found.spread is None
 
 
 # ---- what is refused
