@@ -816,7 +816,9 @@ def test_every_defect_is_one_line_with_its_place(run, robot, tmp_path: Path, com
 def test_no_loop(run, robot):
     lines = FOUR_BAR.split("\n")
     file = robot("\n".join(lines[:24] + lines[33:]))
-    assert run("derive", file).refused() == [f"hrsynth: {file}:1: no loop: not a parallel robot"]
+    assert run("derive", file).refused() == [
+        f"hrsynth: {file}:1: no loop: not a parallel robot, allowed: a <loop>; of a serial arm or a free body "
+        '<hrsynth serial="true">']
 
 
 def test_a_loop_that_cannot_be_closed_is_named_with_its_residual(run, robot):

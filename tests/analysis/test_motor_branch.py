@@ -287,6 +287,10 @@ def test_motors_that_do_not_make_a_function_are_refused():
         branch(idle)
     with pytest.raises(BadRequest, match="shoulder_9"):
         branch(robot, {"shoulder_9": (-1, 1)})
+    with pytest.raises(BadRequest, match="found 'nowhere', allowed"):
+        branch("rrrrr_m1", box="nowhere=-1:1")
+    with pytest.raises(BadRequest, match="found '1:2', allowed: low < high"):
+        branch("rrrrr_m1", box="shoulder_1=1:2")
     with pytest.raises(BadRequest, match="low < high"):
         branch(robot, "shoulder_1=1:2")
     with pytest.raises(BadRequest, match="at most 1000 rad wide"):

@@ -143,7 +143,9 @@ def test_every_defect_has_its_line(name: str):
 
 def test_no_loop_is_no_parallel_robot():
     lines = FOUR_BAR.split("\n")
-    assert defects("\n".join(lines[:24] + lines[33:])) == [(1, "no loop: not a parallel robot, None, None")]
+    assert defects("\n".join(lines[:24] + lines[33:])) == [
+        (1, "no loop: not a parallel robot, None, a <loop>; of a serial arm or a free body "
+            '<hrsynth serial="true">')]
 
 
 def test_all_defects_are_reported_at_once_in_the_order_of_their_lines():

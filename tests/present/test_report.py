@@ -337,4 +337,4 @@ def test_a_report_speaks_of_what_is_seen_whatever_kind_it_is(tmp_path: Path):
     assert "Fewest observations that show 3 of 3: 1, point_1; point_1, distance_1." in said
     assert "movesB1alongτ1,B4alongr4andB5normaltor5" in said.replace(" ", "")
     assert "At home 1 pose has the same measurements" in said
-    assert "Measurements wrong by 0.1°, 0.001m put the platform off" in said
+    assert "Measurements wrong by 0.1°, 1mm put the platform off" in said

@@ -21,6 +21,7 @@ from hrsynth.kinematics.tasks import solve
 from hrsynth.mechanism.model import Limits
 from hrsynth.mechanism.pose import asked_poses
 from hrsynth.simulation.ending import BOUNDARY, GOAL, MODE
+from hrsynth.simulation.run import LIMIT
 from hrsynth.simulation.servo import servo
 from hrsynth.simulation.track import tracked
 from hrsynth.tolerances import DAMPED
@@ -96,6 +97,48 @@ def test_a_crossing_is_told_where_the_side_changes():
     assert track.passages == (crossing,)
     assert abs(crossing.place - int(np.argmin(track.smallest))) <= 1
     assert track.smallest[crossing.place + 1] < DAMPED
+
+
+@pytest.mark.parametrize("kind", ["type1", "type2"])
+@pytest.mark.parametrize("bend", np.linspace(-0.15, 0.15, 12))
+def test_a_crossing_is_told_where_a_configuration_lies_on_it(kind: str, bend: float):
+    """A five-bar's second leg is stretched (Type 1), or its cranks are parallel (Type 2), exactly at the middle one of
+    the configurations."""
+    found = setting("rrrrr_m1")
+    at = [five_bar(found, kind, bend, step) for step in np.linspace(-0.3, 0.3, 13)]
+    track = tracked(at, found.samples.question, found.everything.question, found.dof)
+    assert [each.kind for each in track.passages] == [kind]
+
+
+def five_bar(found, kind, bend, step):
+    """The five-bar whose second leg is bent by ``step`` from where it is stretched, or whose cranks make that angle."""
+    A, B, C = np.array([-0.1, 0.1]), np.array([-0.15813199329137 + 0.14906599664569j,
+                                               0.18896249413879 + 0.13298749804626j]), 0.02 + 0.24j
+    (l1, l2), (r1, r2) = abs(B - A), abs(C - B)
+    cranks, rods = np.angle(B - A), np.angle(C - B)
+    if kind == "type1":
+        rod = rods[1] + bend
+        elbow = A[1] + l2 * np.exp(1j * (rod - step))
+        tip = elbow + r2 * np.exp(1j * rod)
+        elbows = np.array([met(tip, r1, A[0], l1), elbow])
+    else:
+        elbows = A + np.array([l1, l2]) * np.exp(1j * (0.9 + bend + np.array([0, step])))
+        tip = met(elbows[1], r2, elbows[0], r1)
+    turned, swung = np.angle(elbows - A) - cranks, np.angle(tip - elbows) - rods
+    twin = found.everything.twin
+    step = np.zeros(twin.model.nv)
+    for name, value in {"shoulder_1": turned[0], "shoulder_2": turned[1], "elbow_1": swung[0] - turned[0],
+                        "elbow_2": swung[1] - turned[1], "end": swung[1] - swung[0]}.items():
+        step[twin.coordinates[name][0]] = value
+    return ClosedConfiguration.of(twin, twin.q0 + step)
+
+
+def met(one, far, two, near):
+    """Where a circle of radius ``far`` about one point meets one of radius ``near`` about another, on the left of the
+    way from the second to the first."""
+    apart = abs(one - two)
+    along = (near**2 - far**2 + apart**2) / (2 * apart)
+    return two + (along + 1j * np.sqrt(near**2 - along**2)) * (one - two) / apart
 
 
 @pytest.mark.parametrize(("name", "given", "made", "said"), [
@@ -199,6 +242,59 @@ def test_a_joint_limit_is_a_boundary():
     assert joint.name in found.ending.reason
     last, twin = found.run.last, found.run.last.twin
     assert twin.difference(twin.q0, last.q)[twin.coordinates[joint.name][0]] == pytest.approx(half, abs=1e-8)
+
+
+def limited(spans):
+    """The five-bar whose joints have these limits."""
+    robot = load("rrrrr_m1")
+    return robot.changed(joints=[replace(robot.joints[name], limits=Limits(*span)) for name, span in spans.items()])
+
+
+def angles(run, joint):
+    """A joint's angle along a run, (n,)."""
+    twin = run.last.twin
+    return np.array([twin.difference(twin.q0, at.q)[twin.coordinates[joint][0]] for at in run.configurations])
+
+
+def test_limits_a_whole_turn_away_stop_where_they_are():
+    ends = {"start": "x=0.05,y=0.2", "goal": "x=-0.05,y=0.2"}
+    way = angles(servo("rrrrr_m1", **ends).run, "shoulder_1")
+    assert np.all(np.diff(way) * np.sign(way[-1] - way[0]) > -1e-9)
+    turn, low, high = 2 * np.pi, way.min() - 0.1, way.max() + 0.1
+    assert servo(limited({"shoulder_1": (low + turn, high + turn)}), **ends).ended == GOAL
+    # wider than a whole turn: the start lies between the limits after a whole turn alone, and one limit is on the way
+    half = (way[0] + way[-1]) / 2
+    span = sorted([(way[0] + half) / 2, half + np.copysign(turn, half - way[0])])
+    found = servo(limited({"shoulder_1": span}), **ends)
+    assert (found.ended, found.ending.reason) == (BOUNDARY, "joint shoulder_1 is at its limit")
+    assert angles(found.run, "shoulder_1")[-1] == pytest.approx(half, abs=1e-8)
+
+
+def test_a_joint_that_starts_beyond_its_limit_hides_no_other():
+    ends = {"start": "x=0.05,y=0.2", "goal": "x=-0.05,y=0.2"}
+    free = servo("rrrrr_m1", **ends).run
+    one, two = (angles(free, name) for name in ("shoulder_1", "shoulder_2"))
+    half = (two[0] + two[-1]) / 2
+    # the first joint starts beyond its limit by more than the second one comes beyond its own
+    near = one[0] + 0.9 * (one[-1] - one[0])
+    assert abs(near - one[0]) > abs(two[-1] - half)
+    found = servo(limited({"shoulder_1": sorted([near, near + one[-1] - one[0]]),
+                           "shoulder_2": sorted([half, half + two[0] - two[-1]])}), **ends)
+    assert (found.ended, found.ending.reason) == (BOUNDARY, "joint shoulder_2 is at its limit")
+    assert angles(found.run, "shoulder_2")[-1] == pytest.approx(half, abs=1e-8)
+    assert any("beyond the limits of shoulder_1" in each for each in found.notes)
+
+
+def test_a_noisy_run_that_meets_a_limit_is_over():
+    """Noise of a degree leads a joint beyond a limit 0.004 rad past the goal; without it the run ends at the goal."""
+    ends = {"start": "x=0.05,y=0.2", "goal": "x=-0.05,y=0.2"}
+    way = angles(servo("rrrrr_m1", **ends).run, "shoulder_1")
+    robot = limited({"shoulder_1": sorted([way[-1] + 0.004 * np.sign(way[-1] - way[0]), 3 * way[0] - 2 * way[-1]])})
+    assert servo(robot, **ends).ended == GOAL
+    found = servo(robot, **ends, noise="1deg")
+    assert (found.run.stopped, found.run.joint) == (LIMIT, "shoulder_1")
+    assert (found.ended, found.ending.reason) == (BOUNDARY, "joint shoulder_1 is at its limit")
+    assert found.spread is None
 
 
 # ---- what is refused

@@ -138,7 +138,7 @@ def test_a_led_loop_of_points_follows_more_closely() -> None:
 def test_noise_in_pixels_needs_a_focal_length_and_keeps_the_platform_near_its_goal() -> None:
     with pytest.raises(BadRequest, match="focal"):
         platform(noise="0.3px")
-    with pytest.raises(BadRequest, match="observed in m"):
+    with pytest.raises(BadRequest, match="errors in lengths, found '1mm', allowed: 0"):
         platform(noise="1mm")
     found = hrsynth.servo("gough_stewart", camera=SIZED, see=POINTS, start=START, goal=GOAL, noise="0.3px", time=4.0)
     assert found.spread is not None

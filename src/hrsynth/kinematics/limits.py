@@ -4,6 +4,7 @@ asks for a coordinate or a turn beyond them, and the proof that every closure of
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
@@ -24,11 +25,38 @@ AT_END = 1e-2
 """Angle (rad) from the end of a wrist's interval within which it is named where a way ends."""
 
 
-def margins(twin: PinocchioModel, q: Array) -> dict[str, float]:
-    """How far each R or P that has limits, and each wrist, is from the nearer one (m, rad); negative beyond it."""
-    found = {name: min(value - lower, upper - value) for name, value in coordinates(twin, q).items()
-             for lower, upper in (twin.mechanism.limited[name],)}
-    return found | wrist_margins(twin, q)
+@dataclass(frozen=True, eq=False)
+class Stops:
+    """What stops the joints of a robot that moves on from a configuration: of each R or P that has limits the interval
+    (m, rad) of its coordinate. Turns are not counted modulo 2π on the way, but where the way begins: a coordinate
+    beyond the limits that a whole turn brings between them is taken as that one."""
+
+    spans: Mapping[str, tuple[float, float]]
+
+    @classmethod
+    def of(cls, twin: PinocchioModel, q: Array) -> Stops:
+        """Those of a way that begins at q."""
+        limited, joints = twin.mechanism.limited, twin.mechanism.joints
+        return cls({name: _about(value, *limited[name]) if joints[name].type is JointType.REVOLUTE else limited[name]
+                    for name, value in coordinates(twin, q).items()})
+
+    def margins(self, twin: PinocchioModel, q: Array) -> dict[str, float]:
+        """How far each joint, and each wrist, is from the nearer limit (m, rad); negative beyond it."""
+        found = {name: min(value - lower, upper - value) for name, value in coordinates(twin, q).items()
+                 for lower, upper in (self.spans[name],)}
+        return found | wrist_margins(twin, q)
+
+
+def _about(value: float, lower: float, upper: float) -> tuple[float, float]:
+    """The interval of a turn, shifted by the whole turns that bring it nearest to a value; by none where it holds it.
+    """
+    if lower - SAME_POINT <= value <= upper + SAME_POINT:
+        return lower, upper
+    turn = 2 * np.pi
+    beyond = turn * np.floor((value - lower) / turn) if np.isfinite(lower) else turn * np.ceil((value - upper) / turn)
+    shifts = (beyond, beyond + turn) if np.isfinite(lower) else (beyond, beyond - turn)
+    shift = float(max(shifts, key=lambda shift: min(value - lower - shift, upper + shift - value)))
+    return lower + shift, upper + shift
 
 
 def coordinates(twin: PinocchioModel, q: Array) -> dict[str, float]:

@@ -18,6 +18,8 @@ from .sights import CameraObservation
 EXAMPLE = "0.1deg or 0.002 (radians), 0.3px in a picture, 1mm of lengths; several with commas"
 UNITS = {"px": ("px", 1.0), "deg": ("rad", math.radians(1)), "mm": ("m", 1e-3), "m": ("m", 1.0), "": ("rad", 1.0)}
 """Endings of amounts, the longer ones first: what they are told in, and how much of it one is."""
+IN_WORDS = {"px": ("pixels", "0.3px"), "rad": ("angles", "0.1deg"), "m": ("lengths", "1mm")}
+"""What errors are told in, in words, and how a user writes such an amount."""
 MOST = {"px": WIDEST_NOISE, "rad": math.pi / 2, "m": math.inf}
 
 
@@ -51,9 +53,8 @@ class Noise:
         return dict(self.amounts).get(unit, 0.0)
 
     def __str__(self) -> str:
-        words = {"px": "{:g}px", "m": "{:g}m"}
-        every = [f"{math.degrees(value):.4g}deg" if unit == "rad" else words[unit].format(value)
-                 for unit, value in self.amounts]
+        words = {"px": ("{:g}px", 1.0), "m": ("{:.10g}mm", 1e3), "rad": ("{:.4g}deg", math.degrees(1))}
+        every = [words[unit][0].format(words[unit][1] * value) for unit, value in self.amounts]
         return ", ".join(every) + (", constant over time" if self.bias else "")
 
     def required(self, observations: Sequence[Observation]) -> dict[str, float]:
@@ -62,7 +63,8 @@ class Noise:
         known = frozenset().union(*(each.found_by for each in observations))
         for unit, _ in self.amounts:
             if unit not in known:
-                raise BadRequest(f"noise of what is observed in {unit}", str(self), sorted(known))
+                raise BadRequest(f"noise: nothing that is observed has errors in {IN_WORDS[unit][0]}", str(self),
+                                 [IN_WORDS[each][1] for each in sorted(known)])
         amounts = dict(self.amounts)
         for each in observations:
             if "px" in amounts and "px" in each.found_by and not (

@@ -14,7 +14,6 @@ from ..budgets import RUN_EVALUATIONS
 from ..errors import HrsynthError
 from ..geometry.vectors import Array, pose_difference
 from ..kinematics.configuration import ClosedConfiguration
-from ..kinematics.limits import margins
 from ..mechanism.observations.direction import SeenAxis
 from ..results import Value
 from ..tolerances import DAMPED, SAME_RELATION
@@ -55,8 +54,7 @@ class EndingClassifier(Value):
             loose = "" if run.stopped == REST else "; that this rest draws the state to itself was not found"
             return replace(ending, reason=ending.reason + loose)
         if run.stopped == LIMIT:
-            joint, _ = min(margins(run.last.twin, run.last.q).items(), key=lambda item: item[1])
-            return Ending(BOUNDARY, f"joint {joint} is at its limit")
+            return Ending(BOUNDARY, f"joint {run.joint} is at its limit")
         if run.stopped == UNSEEN:
             return Ending(SIGHT, f"{self._unseen(run.last)}: the loop has nothing to go on")
         if run.stopped == UNMEASURED:

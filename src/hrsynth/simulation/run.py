@@ -18,7 +18,7 @@ from ..errors import LoopsNotClosed, NotMeasured
 from ..geometry.vectors import Array
 from ..kinematics.chart import TangentChart
 from ..kinematics.configuration import ClosedConfiguration
-from ..kinematics.limits import margins
+from ..kinematics.limits import Stops
 from ..kinematics.relation import Measurement
 from ..progress import tell
 from ..results import Value
@@ -65,6 +65,8 @@ class Run(Value):
     configurations: tuple[ClosedConfiguration, ...]
     commands: tuple[Command, ...]
     stopped: str
+    joint: str | None = None
+    """The joint that met its limit."""
 
     @property
     def last(self) -> ClosedConfiguration:
@@ -89,11 +91,13 @@ class Loop(Value):
         """Run until it ends by itself, or ``horizon`` (s)."""
         times, found = [0.0], [(start, self._command(0.0, start))]
         stopped, left, longest = None, RUN_EVALUATIONS, np.inf
-        patience = Patience(1 / self.law.gain, 0.0, found[0][1].size)
+        patience, stops = Patience(1 / self.law.gain, 0.0, found[0][1].size), Stops.of(start.twin, start.q)
+        joint = None
         while stopped is None:
-            stretch = _Stretch(self, TangentChart.around(found[-1][0], self.moving), found[-1][0], left, patience)
+            stretch = _Stretch(self, TangentChart.around(found[-1][0], self.moving), found[-1][0], left, patience,
+                               stops)
             reached, states, stopped = stretch.integrate(times[-1], horizon, longest)
-            left = stretch.left
+            left, joint = stretch.left, stretch.beyond
             times += reached
             found += states
             if stopped in (LOST, UNMEASURED) and longest * self.law.gain > RUN_SHORTEST_STEP:
@@ -105,7 +109,7 @@ class Loop(Value):
                 longest *= 2
                 if self._shift(start, found[-1][0]) > RUN_AWAY:
                     stopped = AWAY
-        return Run(np.array(times), tuple(c for c, _ in found), tuple(c for _, c in found), stopped)
+        return Run(np.array(times), tuple(c for c, _ in found), tuple(c for _, c in found), stopped, joint)
 
     def _shift(self, start: ClosedConfiguration, at: ClosedConfiguration) -> float:
         """How far the platform has moved (characteristic lengths)."""
@@ -119,10 +123,13 @@ class Loop(Value):
 class _Stretch:
     """One stretch of a run, in one chart; configurations are remembered while the integrator works around them."""
 
-    def __init__(self, loop: Loop, chart: TangentChart, start: ClosedConfiguration, left: int, patience: Patience
-                 ) -> None:
+    def __init__(self, loop: Loop, chart: TangentChart, start: ClosedConfiguration, left: int, patience: Patience,
+                 stops: Stops) -> None:
         self.loop, self.chart, self.near, self.left, self.patience = loop, chart, start.q, left, patience
-        self.margin = clearance(start)
+        self.stops = stops
+        self.least = {name: min(0.0, margin) for name, margin in stops.margins(start.twin, start.q).items()}
+        """The least margin of each joint: of one that is beyond its limit, how far it is."""
+        self.beyond: str | None = None
         self._memory: dict[tuple[float, bytes], State] = {}
 
     def state(self, time: float, y: Array) -> State:
@@ -204,7 +211,10 @@ class _Stretch:
 
     def _met(self, at: ClosedConfiguration) -> str | None:
         """What ends a run at a configuration: a joint beyond its limit, something that no camera sees."""
-        if clearance(at) < min(0.0, self.margin):
+        past = {name: margin - self.least[name] for name, margin in self.stops.margins(at.twin, at.q).items()}
+        first = min(past, key=past.__getitem__, default=None)
+        if first is not None and past[first] < 0:
+            self.beyond = first
             return LIMIT
         return UNSEEN if self.loop.law.in_front(at) < SEEN_ABOVE else None
 
@@ -264,8 +274,3 @@ def rest_near(rate: Callable[[Array], Array], y: Array) -> Rest | None:
     except LoopsNotClosed:
         return None
     return None
-
-
-def clearance(at: ClosedConfiguration) -> float:
-    """The smallest of :func:`margins`, infinite where no joint has limits."""
-    return min(margins(at.twin, at.q).values(), default=np.inf)

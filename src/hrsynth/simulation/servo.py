@@ -35,7 +35,7 @@ from .law import FixedDirections, Law, Sense, Trajectory, measured, straight, su
 from .noise import Sensors, Shocks
 from .pictures import LegRenderer, Pictures, drawing, vision
 from .result import Scatter, Servo
-from .run import EFFORT, Loop, Run
+from .run import AWAY, EFFORT, LIMIT, UNMEASURED, UNSEEN, Loop, Run
 from .track import tracked
 
 GAIN = 0.8
@@ -44,6 +44,8 @@ LASTS, NOISY_LASTS = 60.0, 16.0
 """Time constants 1 / λ that a run may take; that it takes where measurements are noisy."""
 SETTLED = 0.5
 """Part of a noisy run after which its errors are counted."""
+OVER = (LIMIT, UNSEEN, UNMEASURED, AWAY)
+"""What ends a run for good: no loop without noise goes on from there."""
 EXACT, EDGES, PICTURES = "exact", "edges", "pictures"
 ALLOWED_NOISE = {EXACT: "an angle, such as 0.1deg", EDGES: "pixels, such as 0.3px",
                  PICTURES: "none: the pictures have their own"}
@@ -232,7 +234,8 @@ class ServoTask:
         """What came of a run; ``simulated`` is the displacement (4, 4) of the platform on the physics bench."""
         setting, motion, given = self.setting, self.setting.motion, self.conditions
         still = run
-        if given.noisy or simulated is not None:
+        over = run.stopped in OVER
+        if (given.noisy or simulated is not None) and not over:
             # where the loop without noise and dynamics goes on to: its ending is the one that is told
             still = Loop(self.law, setting.everything.question, FixedDirections(self.wanted)).simulate(
                 run.last, LASTS / self.law.gain)
@@ -241,7 +244,7 @@ class ServoTask:
         track = tracked(run.configurations, self.law.question, setting.everything.question, setting.dof)
         return Servo(setting, motion.pose(self.start.pose(motion.link)), motion.pose(self.goal.pose(motion.link)),
                      self.wanted, self.law.gain, given.sense, given.amount, run, track, ending, given.depth,
-                     still.last, self.goal, self._scatter(run, still.last) if given.noisy else None,
+                     still.last, self.goal, self._scatter(run, still.last) if given.noisy and not over else None,
                      tuple(self._notes(run, still, simulated)))
 
     def _notes(self, run: Run, still: Run, simulated: Array | None) -> Iterator[str]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,8 @@ from ..results import Value
 from ..tolerances import DAMPED, INVERTED
 
 TYPE_2, TYPE_1, LIMIT, CONSTRAINT = "type2", "type1", "limit", "constraint"
+LOOPS = 2
+"""The place of the loops among the three maps."""
 
 
 @dataclass(frozen=True)
@@ -68,11 +71,16 @@ class _Mark:
     span: Array
     weakest: float
 
+    @cached_property
+    def least(self) -> Array:
+        """The smallest singular values (3,) of rates, twists and loops (a part of the largest)."""
+        return np.array([*(np.linalg.svd(each, compute_uv=False)[-1] for each in (self.rates, self.twists)),
+                         self.weakest])
+
     @property
     def clear(self) -> bool:
         """Whether no map is singular, so that sides can be told."""
-        parts = (self.rates, self.twists)
-        return self.weakest > DAMPED and all(np.linalg.svd(each, compute_uv=False)[-1] > DAMPED for each in parts)
+        return bool(np.all(self.least > DAMPED))
 
     def smallest(self, dof: int) -> float:
         """The smallest singular value of Mᵀ."""
@@ -93,9 +101,14 @@ def tracked(configurations: Sequence[ClosedConfiguration], question: Measurement
     passages: list[Passage] = []
     before = np.ones(3)
     here, last = before.copy(), np.zeros(3, dtype=int)
+    # of each map the last mark at which its sign is more than rounding, and how the tangent space has turned since then
+    known, since = [0, 0, 0], np.ones(3)
     for place in range(1, len(marks)):
-        turned = _turned(marks[place - 1], marks[place])
-        here, last = here * turned, np.where(turned < 0, place, last)
+        since = since * _sign(marks[place].basis.T @ marks[place - 1].basis)
+        for i in np.flatnonzero(marks[place].least > INVERTED):
+            turned = _turned(marks[known[i]], marks[place])[i] * (1.0 if i == LOOPS else since[i])
+            here[i], last[i] = here[i] * turned, place if turned < 0 else last[i]
+            known[i], since[i] = place, 1.0
         if marks[place].clear and np.any(here != before):
             rates, twists, loops = here != before
             if loops:
@@ -116,8 +129,12 @@ def _mark(at: ClosedConfiguration, question: Measurement, moving: Measurement) -
 
 
 def _turned(a: _Mark, b: _Mark) -> Array:
-    """−1 for each of the three maps whose orientation changes between two configurations, else 1."""
-    between = b.basis.T @ a.basis
-    overlaps = [a.rates.T @ b.rates @ between, a.twists.T @ b.twists @ between,
-                a.span.T @ a.loops @ b.loops.T @ a.span]
-    return np.array([np.linalg.slogdet(each)[0] or 1.0 for each in overlaps])
+    """−1 for each of the three maps whose orientation changes between two configurations, else 1: of rates and twists
+    up to the turn of the tangent space."""
+    return np.array([_sign(a.rates.T @ b.rates), _sign(a.twists.T @ b.twists),
+                     _sign(a.span.T @ a.loops @ b.loops.T @ a.span)])
+
+
+def _sign(matrix: Array) -> float:
+    """The sign of a determinant, 1 where it is zero."""
+    return float(np.linalg.slogdet(matrix)[0]) or 1.0

@@ -191,7 +191,7 @@ def test_a_grid_is_its_single_poses_and_leaves_out_what_is_behind_the_camera(tmp
 
 @pytest.mark.parametrize(("name", "given", "word"), [
     ("point", {}, "how wrong the observations may be"), ("point", {"cone": "0.1deg"}, "cones apply to directions only"),
-    ("direction", {"cone": "0.1deg"}, "not to position"), ("point", {"noise": "1mm"}, "in m"),
+    ("direction", {"cone": "0.1deg"}, "not to position"), ("point", {"noise": "1mm"}, "in lengths"),
     ("point", {"noise": "0.3km"}, "not a number"),
 ])
 def test_what_is_no_amount_is_refused_in_a_line(name: str, given: dict[str, str], word: str, tmp_path: Path) -> None:

@@ -142,11 +142,12 @@ def _box(system: LoopSystem, box: BoxLike | None) -> tuple[dict[int, tuple[float
             low, high = max(low, -reach), min(high, reach)
             sources.add("a characteristic length either way" if each.slides else "a whole turn")
         if not low <= 0 <= high or not 0 < high - low <= WIDEST_BRANCH_BOX * unit:
-            raise BadRequest(f"interval of motor {each.name!r}", (low, high), "low < high, with the zero configuration "
-                             f"in it, at most {WIDEST_BRANCH_BOX * unit:.4g} {'m' if each.slides else 'rad'} wide")
+            raise BadRequest(f"interval of motor {each.name!r}", f"{low:g}:{high:g}",
+                             "low < high, with the zero configuration in it, at most "
+                             f"{WIDEST_BRANCH_BOX * unit:.4g} {'m' if each.slides else 'rad'} wide")
         found[i] = low / unit, high / unit
     if given:
-        raise BadRequest("motors of the box", sorted(given), [system.names[i] for i in system.driven])
+        raise BadRequest("motors of the box", ", ".join(sorted(given)), [system.names[i] for i in system.driven])
     return found, ", ".join(sorted(sources))
 
 

@@ -185,7 +185,8 @@ class _NativeReader(UrdfReader):
         self.check_ends()
         watched = self.cameras or self.root.findall("hrsynth/observe[@kind]")
         if not (self.loops or self.root.findall("loop") or self.serial or watched):
-            self.defect(root_line, "no loop: not a parallel robot")
+            self.defect(root_line, "no loop: not a parallel robot", None,
+                        'a <loop>; of a serial arm or a free body <hrsynth serial="true">')
         carriers: dict[str, JointSpec] = {}
         for joint in self.tree.values():
             child = joint.ends[1].link
