@@ -54,6 +54,8 @@ BEYOND = 16
 """Steps of such a walk."""
 LEAVING = 24
 """Steps in random directions by which the branches at a singular zero configuration are sought."""
+NAMED = 6
+"""Links that a refusal names."""
 STEPS = 4
 """Steps from the zero configuration to a sample."""
 
@@ -110,11 +112,13 @@ def sample(twin: PinocchioModel, question: Measurement, count: int, seed: int = 
     """
     leading = {o.key for o in (question.observations if led_by is None else led_by)}
     start = ClosedConfiguration.of(twin, twin.q0)
-    if relation(start, question).dimension == 0:
-        raise BadMechanism(f"{twin.mechanism.name}: neither the platform nor a segment of a leg can move", None,
+    moves = relation(start, question).dimension > 0
+    if not moves and not start.kernel()[0].shape[1]:
+        raise BadMechanism(f"{twin.mechanism.name}: its loops let no link move", None,
                            "a mechanism with at least one freedom")
     rng = np.random.default_rng(seed)
-    roots = [start] if _regular(start, rng) else _ways_out(start, question, rng)
+    regular = _regular(start, rng)
+    roots = [start] if regular and moves else _ways_out(start, question, rng, singular=not regular)
     for freely in (False, True):
         walks = _Walks(question, leading, np.random.default_rng(seed), freely)
         members, discarded, led = walks.sample(roots, count)
@@ -151,17 +155,33 @@ def _mode(at: ClosedConfiguration, question: Measurement) -> OperationMode | Non
     return OperationMode(Signature.of(found), at) if found.gap >= RANK_GAP else None
 
 
-def _ways_out(start: ClosedConfiguration, question: Measurement, rng: np.random.Generator) -> list[ClosedConfiguration]:
-    """Configurations beside a singular zero configuration; raises ``BranchPoint`` where they are not of one mode."""
+def _ways_out(start: ClosedConfiguration, question: Measurement, rng: np.random.Generator, *, singular: bool
+              ) -> list[ClosedConfiguration]:
+    """Configurations beside a ``singular`` zero configuration, or beside one at which nothing that is asked moves to
+    first order (a dead centre); raises ``BranchPoint`` where they are not of one mode, ``BadMechanism`` where nothing
+    that is asked moves there either."""
     found = [each for _ in range(LEAVING)
-             if (beside := step_along(start, any_velocity(start, rng), leaving=True)) is not None
+             if (beside := step_along(start, any_velocity(start, rng), leaving=singular)) is not None
              and (each := _mode(beside, question)) is not None]
     if not found:
         raise NotSampled(start.twin.mechanism.name, 0, 1)
+    if all(each.signature.dimension == 0 for each in found):
+        _refuse_unmoved([each.at for each in found])
     groups = group_modes(found)
     _require_one(groups, question, "several operation modes meet at the zero configuration (its loops have mobility "
                                    f"{start.kernel()[0].shape[1]} there)")
     return [each.at for each in found]
+
+
+def _refuse_unmoved(found: Sequence[ClosedConfiguration]) -> None:
+    """Raise ``BadMechanism`` that names the links that do move."""
+    mechanism = found[0].twin.mechanism
+    moving = [link for link in mechanism.links
+              if any(np.abs(at.velocity(link) @ at.kernel()[0]).max() > SURELY_SOMETHING for at in found)]
+    named = ", ".join(moving[:NAMED]) + (f" and {len(moving) - NAMED} more" if moving[NAMED:] else "")
+    raise BadMechanism(f"{mechanism.name}: neither the platform nor a watched segment moves, but other links do "
+                       f"({named}; mobility {found[0].kernel()[0].shape[1]})", None,
+                       "a platform or a watched segment that moves (--observe LINK)")
 
 
 def _require_one(groups: Sequence[Sequence[OperationMode]], question: Measurement, what: str) -> None:
