@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
 
 from hrsynth.analysis.advice import advise
 from hrsynth.analysis.controllability import legs
@@ -16,7 +18,7 @@ from hrsynth.analysis.verdict import verdict_of
 from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.words import parse
 from hrsynth.description import load
-from hrsynth.errors import BadMechanism, BranchPoint
+from hrsynth.errors import BadMechanism, BranchPoint, Shaky
 from hrsynth.geometry.vectors import rotation_about
 from hrsynth.kinematics.branch import CHANGED, TURNED, alike_after, turned_little
 from hrsynth.kinematics.configuration import ClosedConfiguration
@@ -276,3 +278,33 @@ def test_a_triangle_does_not_move() -> None:
         b.joint(name, "R", *ends, at=at, axis=(0, 1, 0), loop=name == "c")
     with pytest.raises(BadMechanism, match=r"its loops let no link move"):
         ObservedRobot.of(b.build("plate"), samples=2)
+
+
+@pytest.mark.parametrize(("rods", "seed"), [(5, 1), (6, 1)])
+def test_equal_parallel_rods_do_not_turn_their_plate(rods: int, seed: int) -> None:
+    """To first order the plate turns about the rods' direction. Lengths alone: of poses near the first, turned so,
+    the nearest with rods of this length is not turned."""
+    feet = np.c_[np.random.default_rng(seed).normal(size=(rods, 2)), np.zeros(rods)]
+    along = np.array([0.3, 0.1, 0.8])
+    b = Builder("equal_rods")
+    b.link("base")
+    b.link("plate", at=along)
+    for k, foot in enumerate(feet):
+        b.link(f"rod_{k}", at=foot)
+        b.joint(f"u_{k}", "U", "base", f"rod_{k}", at=foot, axis=(1, 0, 0), axis2=np.cross(along, [1, 0, 0]))
+        b.joint(f"s_{k}", "S", f"rod_{k}", "plate", at=foot + along, loop=k > 0)
+    robot = b.build("plate")
+    twin = PinocchioModel(robot)
+    assert ClosedConfiguration.of(twin, twin.q0).kernel()[0].shape[1] == 3
+    with pytest.raises(Shaky, match="mobility 3, but motions lead on in 2 ways"):
+        ObservedRobot.of(robot)
+
+    def misses(pose: np.ndarray) -> np.ndarray:
+        turned = feet @ Rotation.from_rotvec(pose[3:]).as_matrix().T
+        return np.sum((turned + pose[:3] - feet)**2, axis=1) - along @ along
+
+    for turn in (0.02, -0.02):
+        start = np.r_[along, turn * along / np.linalg.norm(along)]
+        closed = least_squares(misses, start, xtol=1e-15, ftol=1e-15, gtol=1e-15)
+        assert np.abs(misses(closed.x)).max() < 1e-9
+        assert np.linalg.norm(closed.x[3:]) < 0.002

@@ -16,13 +16,15 @@ from typing import TypeVar
 import numpy as np
 
 from ..budgets import EASY_ITERATIONS
-from ..errors import BadMechanism, BranchPoint, NotMeasured, NotSampled
+from ..errors import BadMechanism, BranchPoint, NotMeasured, NotSampled, Shaky
 from ..geometry.ranks import kernel_basis, largest_angle, range_bases
 from ..geometry.vectors import Array
 from ..mechanism.observation import Observation
 from ..results import Value
 from ..tolerances import (
     CLOSED,
+    CONTINUED,
+    CONTINUED_STEP,
     EXACT,
     FOLLOWED,
     INVERTED,
@@ -54,6 +56,8 @@ BEYOND = 16
 """Steps of such a walk."""
 LEAVING = 24
 """Steps in random directions by which the branches at a singular zero configuration are sought."""
+SHAKEN = 3
+"""Samples at which a mechanism is seen to be shaky before it is said to be."""
 NAMED = 6
 """Links that a refusal names."""
 STEPS = 4
@@ -128,6 +132,7 @@ def sample(twin: PinocchioModel, question: Measurement, count: int, seed: int = 
         probe = _mode(_firmest(far), question)
         if probe is None or all(map(probe.signature.agrees, signatures)):
             break
+    _require_motions([member.configuration for member in members])
     groups = group_modes([OperationMode(each, member.configuration)
                           for each, member in zip(signatures, members, strict=True)])
     _require_one(groups, question, "the configurations reached differ as only those of several operation modes do")
@@ -182,6 +187,33 @@ def _refuse_unmoved(found: Sequence[ClosedConfiguration]) -> None:
     raise BadMechanism(f"{mechanism.name}: neither the platform nor a watched segment moves, but other links do "
                        f"({named}; mobility {found[0].kernel()[0].shape[1]})", None,
                        "a platform or a watched segment that moves (--observe LINK)")
+
+
+def _require_motions(found: Sequence[ClosedConfiguration]) -> None:
+    """Raise ``Shaky`` where ker A is larger than the tangent space of what closes, all along: so where loops repeat
+    each other to first order and not beyond (docs/pages/theory.md, section 1)."""
+    done = 0
+    for at in sorted(found, key=lambda each: -each.kernel()[1].weakest)[:SHAKEN]:
+        mobility = at.kernel()[0].shape[1]
+        if (ways := ways_on(at)) is None or ways == mobility:
+            return
+        done = max(done, ways)
+    if found:
+        raise Shaky(found[0].twin.mechanism.name, found[0].kernel()[0].shape[1], done)
+
+
+def ways_on(at: ClosedConfiguration) -> int | None:
+    """In how many independent ways small steps along ker A lead to closed configurations; None where one does not
+    close. Where no constraint is redundant that is the mobility."""
+    twin, (kernel, rank) = at.twin, at.kernel()
+    if rank.value == len(twin.residual(at.q)):
+        return kernel.shape[1]
+    predicted = [twin.moved(at.q, CONTINUED_STEP * each) for each in kernel.T]
+    closed = solve_together(Places(twin, None), predicted, [None] * len(predicted), tolerance=SOLVED)
+    if any(residual > CLOSED for _, residual in closed):
+        return None
+    steps = np.array([kernel.T @ twin.difference(at.q, q) for q, _ in closed]) / CONTINUED_STEP
+    return int(np.sum(np.linalg.svd(steps, compute_uv=False) > CONTINUED))
 
 
 def _require_one(groups: Sequence[Sequence[OperationMode]], question: Measurement, what: str) -> None:
