@@ -19,7 +19,7 @@ from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.words import parse
 from hrsynth.description import load
 from hrsynth.errors import BadMechanism, BranchPoint, Shaky
-from hrsynth.geometry.vectors import rotation_about
+from hrsynth.geometry.vectors import Array, rotation_about
 from hrsynth.kinematics.branch import CHANGED, TURNED, alike_after, turned_little
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
@@ -299,9 +299,9 @@ def test_equal_parallel_rods_do_not_turn_their_plate(rods: int, seed: int) -> No
     with pytest.raises(Shaky, match="mobility 3, but motions lead on in 2 ways"):
         ObservedRobot.of(robot)
 
-    def misses(pose: np.ndarray) -> np.ndarray:
+    def misses(pose: Array) -> Array:
         turned = feet @ Rotation.from_rotvec(pose[3:]).as_matrix().T
-        return np.sum((turned + pose[:3] - feet)**2, axis=1) - along @ along
+        return np.asarray(np.sum((turned + pose[:3] - feet)**2, axis=1) - along @ along)
 
     for turn in (0.02, -0.02):
         start = np.r_[along, turn * along / np.linalg.norm(along)]
