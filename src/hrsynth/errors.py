@@ -156,6 +156,16 @@ class NotSampled(Unanswered):
                          f"needed: {wanted}; is the zero configuration singular?")
 
 
+class Shaky(Unanswered):
+    """A mechanism whose loops allow more to first order than it can do, wherever it goes."""
+
+    def __init__(self, robot: str, allowed: int, done: int) -> None:
+        self.robot, self.allowed, self.done = robot, allowed, done
+        super().__init__(f"{robot}: shaky wherever it was tried: to first order its loops have mobility {allowed}, but "
+                         f"motions lead on in {done} way{'s' * (done != 1)} only; no verdict is given, since all ranks "
+                         "here are of first order")
+
+
 class BranchPoint(Unanswered):
     """A zero configuration at which several operation modes meet, or samples of several: what was found of each, and
     a pose in it."""

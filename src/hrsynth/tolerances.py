@@ -81,6 +81,11 @@ INVERTED = 1e-9
 """Singular values below this fraction of the largest are left out where a map is inverted on its range."""
 BOUNDED = 1e-3
 """Part of a limit that a bound leaves for rounding, where it takes the place of singular values."""
+CONTINUED = 0.5
+"""Part of a small step along what the loops allow to first order that is left where they are closed again: below, it
+led nowhere."""
+CONTINUED_STEP = 0.01
+"""Length of such a step (characteristic lengths, radians): all but a hundredth is left on a smooth branch."""
 NUDGE = 1e-6
 """Step (characteristic lengths, radians) over which a slope is taken."""
 NAMED = 1e-6

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
-from itertools import combinations
+from itertools import combinations, pairwise
 from math import comb
 
 import numpy as np
@@ -13,7 +13,7 @@ import pytest
 import hrsynth
 from hrsynth.analysis.controllability import Legs, legs
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.analysis.verdict import BLIND, CONTROLLABLE, PARTIAL, Verdict
+from hrsynth.analysis.verdict import AT_REST, BLIND, CONTROLLABLE, PARTIAL, Verdict
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, BadRobotFile
 from hrsynth.geometry.vectors import Array
@@ -246,3 +246,33 @@ def test_a_loop_that_holds_nothing_back_has_no_rank(seed: int) -> None:
     (verdict,) = (each for each in legs(robot).sets if each.legs == ("1",))
     assert (verdict.dof, verdict.rank) == (np.linalg.matrix_rank(basis[:6], tol=1e-8),
                                            np.linalg.matrix_rank(basis[6:], tol=1e-8)) == (2, 1)
+
+
+def held_plate() -> Mechanism:
+    """In a plane three rods hold a plate (3 freedoms less 3), and a chain of four R between base and plate moves."""
+    b = Builder("held_plate")
+    for link in ("base", "plate", "crank", "coupler", "rocker", "rod_1", "rod_2", "rod_3"):
+        b.link(link)
+    chain = [("base", 2.0, 0.0), ("crank", 2.2, 0.5), ("coupler", 2.0, 1.1), ("rocker", 1.0, 1.0), ("plate", 0.0, 0.0)]
+    for (one, x, z), (other, *_) in pairwise(chain):
+        b.joint(f"of_{one}", "R", one, other, at=(x, 0, z), axis=(0, 1, 0), loop=other == "plate", motor=one == "base")
+    rods = [((-1.0, 0.0), (-0.8, 0.9)), ((0.0, 0.0), (0.7, 1.1)), ((1.0, 0.0), (0.1, 1.4))]
+    for k, (foot, tip) in enumerate(rods, 1):
+        b.joint(f"foot_{k}", "R", "base", f"rod_{k}", at=(foot[0], 0, foot[1]), axis=(0, 1, 0))
+        b.joint(f"tip_{k}", "R", f"rod_{k}", "plate", at=(tip[0], 0, tip[1]), axis=(0, 1, 0), loop=k > 1)
+    return b.build("plate")
+
+
+def test_a_platform_without_freedom_is_not_called_controllable() -> None:
+    """Nothing is proved of it either: that it rests at one instance does not say that it rests at others."""
+    answer = legs(held_plate())
+    assert (answer.dof, answer.setting.mobility.total) == (0, 1)
+    assert {(each.verdict, each.rank) for each in answer.sets} == {(AT_REST, 0)}
+    assert {(each.verdict, each.proved, each.chance) for each in answer.exact} <= {
+        (AT_REST, False, 0.0), (None, False, 0.0)}
+    told = hrsynth.derive(held_plate())
+    assert told.to_dict()["verdict"] == "nothing to control"
+    assert "controllable" not in hrsynth.text(told)
+    advice = hrsynth.advise(held_plate())
+    assert advice.nothing_missing
+    assert "has no freedom" in hrsynth.text(advice)

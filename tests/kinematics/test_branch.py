@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
 
 from hrsynth.analysis.advice import advise
 from hrsynth.analysis.controllability import legs
@@ -16,8 +18,8 @@ from hrsynth.analysis.verdict import verdict_of
 from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.words import parse
 from hrsynth.description import load
-from hrsynth.errors import BranchPoint
-from hrsynth.geometry.vectors import rotation_about
+from hrsynth.errors import BadMechanism, BranchPoint, Shaky
+from hrsynth.geometry.vectors import Array, rotation_about
 from hrsynth.kinematics.branch import CHANGED, TURNED, alike_after, turned_little
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
@@ -238,3 +240,71 @@ def test_the_distance_to_another_verdict_is_told(tilt: float, rank: int, near: b
         if near:
             value = margin["counted" if rank == 2 else "dropped"]
             assert tilt / 10 < value < 10 * tilt
+
+
+def slider_crank(angle: float) -> Mechanism:
+    """A crank of 1 m at an angle from its rail, a rod of 2 m and a slide; the slide carries the platform by a link that
+    never turns."""
+    tip = np.array([np.cos(angle), 0.0, np.sin(angle)])
+    foot = np.array([tip[0] + np.sqrt(4 - tip[2]**2), 0.0, 0.0])
+    end = foot + [1.0, 0.0, 1.0]
+    b = Builder("slider_crank")
+    for link, at in {"base": np.zeros(3), "crank": np.zeros(3), "rod": tip, "slide": foot, "link": foot,
+                     "plate": end}.items():
+        b.link(link, at=at)
+    for name, ends, at in (("a", "base crank", np.zeros(3)), ("b", "crank rod", tip), ("c", "rod slide", foot),
+                           ("d", "slide link", foot), ("e", "link plate", end)):
+        b.joint(name, "R", *ends.split(), at=at, axis=(0, 1, 0), motor=name == "a")
+    for name, link, at in (("p", "slide", foot), ("f", "plate", end)):
+        b.joint(name, "P", "base", link, at=at, axis=(1, 0, 0), loop=True)
+    return b.build("plate")
+
+
+def test_a_platform_at_rest_at_a_dead_centre_moves_beyond_it() -> None:
+    """By hand: x(θ) = cos θ + √(4 − sin² θ) + 1 has x′(0) = 0 and x(0.4) < x(0)."""
+    dead, beside = (ObservedRobot.of(slider_crank(angle), samples=2) for angle in (0.0, 0.4))
+    assert dead.dof == beside.dof == 1
+    places = [member.pose("plate")[0, 3] for member in dead.configurations]
+    assert max(places) < 4.0
+    assert verdict_of(dead, ("1",), dead.samples).verdict == "uncontrollable"
+
+
+def test_a_triangle_does_not_move() -> None:
+    b = Builder("triangle")
+    for link in ("base", "side", "plate"):
+        b.link(link)
+    for name, ends, at in (("a", ("base", "side"), (0, 0, 0)), ("b", ("side", "plate"), (0, 0, 1)),
+                           ("c", ("base", "plate"), (1, 0, 0))):
+        b.joint(name, "R", *ends, at=at, axis=(0, 1, 0), loop=name == "c")
+    with pytest.raises(BadMechanism, match=r"its loops let no link move"):
+        ObservedRobot.of(b.build("plate"), samples=2)
+
+
+@pytest.mark.parametrize(("rods", "seed"), [(5, 1), (6, 1)])
+def test_equal_parallel_rods_do_not_turn_their_plate(rods: int, seed: int) -> None:
+    """To first order the plate turns about the rods' direction. Lengths alone: of poses near the first, turned so,
+    the nearest with rods of this length is not turned."""
+    feet = np.c_[np.random.default_rng(seed).normal(size=(rods, 2)), np.zeros(rods)]
+    along = np.array([0.3, 0.1, 0.8])
+    b = Builder("equal_rods")
+    b.link("base")
+    b.link("plate", at=along)
+    for k, foot in enumerate(feet):
+        b.link(f"rod_{k}", at=foot)
+        b.joint(f"u_{k}", "U", "base", f"rod_{k}", at=foot, axis=(1, 0, 0), axis2=np.cross(along, [1, 0, 0]))
+        b.joint(f"s_{k}", "S", f"rod_{k}", "plate", at=foot + along, loop=k > 0)
+    robot = b.build("plate")
+    twin = PinocchioModel(robot)
+    assert ClosedConfiguration.of(twin, twin.q0).kernel()[0].shape[1] == 3
+    with pytest.raises(Shaky, match="mobility 3, but motions lead on in 2 ways"):
+        ObservedRobot.of(robot)
+
+    def misses(pose: Array) -> Array:
+        turned = feet @ Rotation.from_rotvec(pose[3:]).as_matrix().T
+        return np.asarray(np.sum((turned + pose[:3] - feet)**2, axis=1) - along @ along)
+
+    for turn in (0.02, -0.02):
+        start = np.r_[along, turn * along / np.linalg.norm(along)]
+        closed = least_squares(misses, start, xtol=1e-15, ftol=1e-15, gtol=1e-15)
+        assert np.abs(misses(closed.x)).max() < 1e-9
+        assert np.linalg.norm(closed.x[3:]) < 0.002

@@ -24,7 +24,7 @@ from ..results import Result, Value
 from ..tolerances import RANK_CUTOFF, SAME_PRICE, SAME_RELATION
 from .observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike, as_robot, as_texts, restricted
 from .question import question
-from .verdict import CONTROLLABLE, Verdict, verdict_of
+from .verdict import AT_REST, CONTROLLABLE, Verdict, verdict_of
 
 AXES = {JointType.UNIVERSAL: ("first", "second"), JointType.CYLINDRICAL: ("slide", "turn")}
 """The names of the coordinates of joints that have two."""
@@ -170,8 +170,8 @@ class Advice(Result, shown_as="advise"):
 
     @property
     def nothing_missing(self) -> bool:
-        """Whether the robot is controllable as it is."""
-        return self.now.verdict == CONTROLLABLE
+        """Whether the robot is controllable as it is, or has nothing to control."""
+        return self.now.verdict in (CONTROLLABLE, AT_REST)
 
     @property
     def cured(self) -> bool:
@@ -219,7 +219,7 @@ def advise(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None
     setting = ObservedRobot.of(robot, observe, camera, see=see, offer=offered or None, seed=seed)
     prices = _prices(price)
     now = verdict_of(setting, setting.labels, setting.samples)
-    if now.verdict == CONTROLLABLE:
+    if now.verdict in (CONTROLLABLE, AT_REST):
         return Advice(setting, now, (), 0, True)
     everything = candidates(setting, offered)
     samples = setting.measuring((*setting.observed, *(each.observation for each in everything)))

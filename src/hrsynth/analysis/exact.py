@@ -163,10 +163,10 @@ class ExactArchitecture:
             seen, instances = self._rank(observed)
             basis = self.basis
             trivial = self._trivial(observed) if self.mechanism.formation else None
-            chance = self._chance(observed) if seen == self.dof and not basis.observed else 0.0
+            chance = self._chance(observed) if seen == self.dof > 0 and not basis.observed else 0.0
         except NotRecognised as error:
             return ExactVerdict(legs, None, None, self.dof, False, 0, str(error))
-        proved = seen == self.dof and not basis.observed
+        proved = seen == self.dof and not basis.observed and (self.dof > 0 or trivial is not None)
         random = f"exact at {instances} random instance" + "s" * (instances > 1)
         reason = "proved in exact arithmetic" if proved else random
         if chance:
@@ -264,7 +264,7 @@ class ExactArchitecture:
             together, rates = self.instance(number).ranks(places)
             _same("dim ρ of these legs", together, dimension)
             best = max(best, self.dof - together + rates)
-            if best == self.dof:
+            if best == self.dof > 0:  # that nothing moves at one instance does not say that nothing does at others
                 return best, 1
         return best, INSTANCES
 

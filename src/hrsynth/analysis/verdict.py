@@ -17,10 +17,14 @@ from .freedoms import Freedom, name_freedoms, point_text
 from .observed import ObservedRobot
 
 CONTROLLABLE, PARTIAL, BLIND = "controllable", "partially controllable", "uncontrollable"
+AT_REST = "nothing to control"
+"""Of a platform that does not move, whatever its legs do."""
 
 
 def word(rank: int, dof: int) -> str:
     """The verdict where ``rank`` of the platform's ``dof`` freedoms are seen."""
+    if not dof:
+        return AT_REST
     return CONTROLLABLE if rank == dof else PARTIAL if rank else BLIND
 
 

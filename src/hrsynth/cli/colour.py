@@ -8,7 +8,7 @@ import sys
 
 VERDICTS = {
     "green": ("controllable", "regular", "same aspect", "goal", "passed"),
-    "yellow": ("partially controllable", "not decided", "undecided"),
+    "yellow": ("partially controllable", "nothing to control", "not decided", "undecided"),
     "red": ("uncontrollable", "separated", "FAILED", r"Type [123] singularity", "constraint singularity", "boundary",
             "local minimum", "antipodal", "lost from sight"),
 }

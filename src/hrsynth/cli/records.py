@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal, NotRequired, TypedDict
 
-Word = Literal["controllable", "partially controllable", "uncontrollable", "rigid", "flexible"]
+Word = Literal["controllable", "partially controllable", "uncontrollable", "nothing to control", "rigid", "flexible"]
 Number = float | None
 Array = list[Any]
 Twist = Annotated[list[float], "vx, vy, vz, wx, wy, wz at the platform frame's origin, base axes (m, rad)"]

@@ -16,13 +16,15 @@ from typing import TypeVar
 import numpy as np
 
 from ..budgets import EASY_ITERATIONS
-from ..errors import BadMechanism, BranchPoint, NotMeasured, NotSampled
+from ..errors import BadMechanism, BranchPoint, NotMeasured, NotSampled, Shaky
 from ..geometry.ranks import kernel_basis, largest_angle, range_bases
 from ..geometry.vectors import Array
 from ..mechanism.observation import Observation
 from ..results import Value
 from ..tolerances import (
     CLOSED,
+    CONTINUED,
+    CONTINUED_STEP,
     EXACT,
     FOLLOWED,
     INVERTED,
@@ -54,6 +56,10 @@ BEYOND = 16
 """Steps of such a walk."""
 LEAVING = 24
 """Steps in random directions by which the branches at a singular zero configuration are sought."""
+SHAKEN = 3
+"""Samples at which a mechanism is seen to be shaky before it is said to be."""
+NAMED = 6
+"""Links that a refusal names."""
 STEPS = 4
 """Steps from the zero configuration to a sample."""
 
@@ -110,11 +116,13 @@ def sample(twin: PinocchioModel, question: Measurement, count: int, seed: int = 
     """
     leading = {o.key for o in (question.observations if led_by is None else led_by)}
     start = ClosedConfiguration.of(twin, twin.q0)
-    if relation(start, question).dimension == 0:
-        raise BadMechanism(f"{twin.mechanism.name}: neither the platform nor a segment of a leg can move", None,
+    moves = relation(start, question).dimension > 0
+    if not moves and not start.kernel()[0].shape[1]:
+        raise BadMechanism(f"{twin.mechanism.name}: its loops let no link move", None,
                            "a mechanism with at least one freedom")
     rng = np.random.default_rng(seed)
-    roots = [start] if _regular(start, rng) else _ways_out(start, question, rng)
+    regular = _regular(start, rng)
+    roots = [start] if regular and moves else _ways_out(start, question, rng, singular=not regular)
     for freely in (False, True):
         walks = _Walks(question, leading, np.random.default_rng(seed), freely)
         members, discarded, led = walks.sample(roots, count)
@@ -124,6 +132,7 @@ def sample(twin: PinocchioModel, question: Measurement, count: int, seed: int = 
         probe = _mode(_firmest(far), question)
         if probe is None or all(map(probe.signature.agrees, signatures)):
             break
+    _require_motions([member.configuration for member in members])
     groups = group_modes([OperationMode(each, member.configuration)
                           for each, member in zip(signatures, members, strict=True)])
     _require_one(groups, question, "the configurations reached differ as only those of several operation modes do")
@@ -151,17 +160,60 @@ def _mode(at: ClosedConfiguration, question: Measurement) -> OperationMode | Non
     return OperationMode(Signature.of(found), at) if found.gap >= RANK_GAP else None
 
 
-def _ways_out(start: ClosedConfiguration, question: Measurement, rng: np.random.Generator) -> list[ClosedConfiguration]:
-    """Configurations beside a singular zero configuration; raises ``BranchPoint`` where they are not of one mode."""
+def _ways_out(start: ClosedConfiguration, question: Measurement, rng: np.random.Generator, *, singular: bool
+              ) -> list[ClosedConfiguration]:
+    """Configurations beside a ``singular`` zero configuration, or beside one at which nothing that is asked moves to
+    first order (a dead centre); raises ``BranchPoint`` where they are not of one mode, ``BadMechanism`` where nothing
+    that is asked moves there either."""
     found = [each for _ in range(LEAVING)
-             if (beside := step_along(start, any_velocity(start, rng), leaving=True)) is not None
+             if (beside := step_along(start, any_velocity(start, rng), leaving=singular)) is not None
              and (each := _mode(beside, question)) is not None]
     if not found:
         raise NotSampled(start.twin.mechanism.name, 0, 1)
+    if all(each.signature.dimension == 0 for each in found):
+        _refuse_unmoved([each.at for each in found])
     groups = group_modes(found)
     _require_one(groups, question, "several operation modes meet at the zero configuration (its loops have mobility "
                                    f"{start.kernel()[0].shape[1]} there)")
     return [each.at for each in found]
+
+
+def _refuse_unmoved(found: Sequence[ClosedConfiguration]) -> None:
+    """Raise ``BadMechanism`` that names the links that do move."""
+    mechanism = found[0].twin.mechanism
+    moving = [link for link in mechanism.links
+              if any(np.abs(at.velocity(link) @ at.kernel()[0]).max() > SURELY_SOMETHING for at in found)]
+    named = ", ".join(moving[:NAMED]) + (f" and {len(moving) - NAMED} more" if moving[NAMED:] else "")
+    raise BadMechanism(f"{mechanism.name}: neither the platform nor a watched segment moves, but other links do "
+                       f"({named}; mobility {found[0].kernel()[0].shape[1]})", None,
+                       "a platform or a watched segment that moves (--observe LINK)")
+
+
+def _require_motions(found: Sequence[ClosedConfiguration]) -> None:
+    """Raise ``Shaky`` where ker A is larger than the tangent space of what closes, all along: so where loops repeat
+    each other to first order and not beyond (docs/pages/theory.md, section 1)."""
+    done = 0
+    for at in sorted(found, key=lambda each: -each.kernel()[1].weakest)[:SHAKEN]:
+        mobility = at.kernel()[0].shape[1]
+        if (ways := ways_on(at)) is None or ways == mobility:
+            return
+        done = max(done, ways)
+    if found:
+        raise Shaky(found[0].twin.mechanism.name, found[0].kernel()[0].shape[1], done)
+
+
+def ways_on(at: ClosedConfiguration) -> int | None:
+    """In how many independent ways small steps along ker A lead to closed configurations; None where one does not
+    close. Where no constraint is redundant that is the mobility."""
+    twin, (kernel, rank) = at.twin, at.kernel()
+    if rank.value == len(twin.residual(at.q)):
+        return kernel.shape[1]
+    predicted = [twin.moved(at.q, CONTINUED_STEP * each) for each in kernel.T]
+    closed = solve_together(Places(twin, None), predicted, [None] * len(predicted), tolerance=SOLVED)
+    if any(residual > CLOSED for _, residual in closed):
+        return None
+    steps = np.array([kernel.T @ twin.difference(at.q, q) for q, _ in closed]) / CONTINUED_STEP
+    return int(np.sum(np.linalg.svd(steps, compute_uv=False) > CONTINUED))
 
 
 def _require_one(groups: Sequence[Sequence[OperationMode]], question: Measurement, what: str) -> None:

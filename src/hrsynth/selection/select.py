@@ -298,7 +298,7 @@ class _Work:
             verdict = verdict_of(setting, legs, setting.samples)
             if verdict.verdict != CONTROLLABLE:
                 lost = "; ".join(freedom.name for freedom in verdict.lost)
-                return Candidate(legs, verdict.verdict, f"{verdict.verdict}, not seen: {lost}")
+                return Candidate(legs, verdict.verdict, verdict.verdict + (f", not seen: {lost}" if lost else ""))
             analysis = ConfigurationAnalysis.of(setting)
             ends = (("start", self.start), ("goal", self.goal))
             behind = [(name, unseen(at, setting.samples.question)) for name, at in ends]

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from ...mechanism import Mechanism
     from ..view.view import View
 
+NO_FREEDOM = "the platform has no freedom"
 NO_MATRIX = "there is no interaction matrix: observed links move while the platform rests"
 _KINDS = {"leg": "leg (direction of its default segment)", "direction": "direction of another link",
           "line": "position of an observed line", "encoder": "encoder on a joint", "offered": "--see"}
@@ -64,7 +65,8 @@ def derivation(found: Derivation) -> str:
     rows: Rows = [
         name, ("dof", dof), seen, *camera(observed),
         ("hidden robot", str(hidden) if hidden else "none: every observed direction is constant"),
-        ("verdict", [found.verdict.verdict, *([near(found.verdict)] if found.verdict.near else [])]),
+        ("verdict", [found.verdict.verdict, *([NO_FREEDOM] if not found.dof else []),
+                     *([near(found.verdict)] if found.verdict.near else [])]),
         *formation(found.verdict.formation),
         ("mode", _modes(observed)),
         ("architecture", exact_words(found.exact, found.verdict.rank)),
@@ -154,7 +156,7 @@ def legs(found: Legs) -> str:
     if found.setting.mechanism.formation:
         lost = f"not seen (at {found.where})"
     lines = [f"{found.robot}   {found.architecture}   {found.dof} dof", "",
-             *wrapped(f"smallest sets of the best rank: {found.smallest}", more="  "), "",
+             *wrapped(f"smallest sets of the best rank: {found.smallest}" if found.dof else NO_FREEDOM, more="  "), "",
              table(rows, ("legs", "verdict", "rank", "exact", lost)), "",
              *(line for leg, seen in watched(found.setting).items()
                for line in wrapped(f"leg {leg}: {', '.join(seen)}", more="  "))]
@@ -213,7 +215,7 @@ def advice(found: Advice) -> str:
 
 def _missing(found: Advice) -> list[str]:
     if found.nothing_missing:
-        return ["Nothing is missing"]
+        return ["Nothing is missing" if found.now.dof else NO_FREEDOM.capitalize()]
     limits = [] if found.cured else ["No set of legs, links, lines and encoders sees more"]
     if not found.complete:
         limits = [f"Not every set was tried or decided: {found.tried} tried, {found.undecided} undecided"]

@@ -51,6 +51,8 @@ def which(verdict: Verdict) -> str:
     legs = named("leg", verdict.legs)
     if verdict == CONTROLLABLE:
         return f"Watch {legs}."
+    if not verdict.dof:
+        return "The platform has no freedom: there is nothing to control."
     if not verdict.rank:
         return ("Watching the legs does not help: their directions do not change with the platform wherever it was "
                 "tried.")
@@ -61,6 +63,8 @@ def which(verdict: Verdict) -> str:
 
 def blind(verdict: Verdict) -> list[str]:
     """What follows where a freedom is not seen."""
+    if not verdict.dof:
+        return []
     legs = named("leg", verdict.legs)
     seen = f"{legs[0].upper()}{legs[1:]} see{'s' * (len(verdict.legs) == 1)} as much as all of them together."
     return [seen if verdict.rank else "However well the directions are measured, they say nothing of the platform.",
