@@ -434,6 +434,8 @@ SHORT_SHARE = 0.1
 """Part of the least distance of two base points up to which boxes about a short rod reach."""
 COVER_MARGIN = 1.25
 """How many times as far as the farthest base point boxes of positions reach, before those of poses far away."""
+KNOWN_NUMBER = 1e-12
+"""How far a number of the file may be off, lengths in characteristic lengths, for which boxes prove a list of rests."""
 BOX_ROUNDING = 1e-12
 """What rounding makes of the edges of a box that equations narrow, relative to them."""
 SMALLEST_BOX = 1e-6

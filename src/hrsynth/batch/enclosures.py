@@ -20,8 +20,9 @@ Term = tuple[float, float]
 """A number, and how far it may be off."""
 
 
-def traced(formula: Callable[..., Sequence[Any]], inputs: int) -> BoxFormula:
-    """A formula from ``inputs`` numbers and from what makes components of the robot's numbers, as code for boxes."""
+def traced(formula: Callable[..., Sequence[Any]], inputs: int, off: float = FOLLOWED) -> BoxFormula:
+    """A formula from ``inputs`` numbers and from what makes components of the robot's numbers, each of which may be
+    ``off`` by so much, as code for boxes."""
     tape = Tape([])
 
     def number(value: Any) -> Any:
@@ -29,7 +30,7 @@ def traced(formula: Callable[..., Sequence[Any]], inputs: int) -> BoxFormula:
             return [number(each) for each in value]
         return tape.number(0.0 if abs(value) < CHAIN_ROUNDING else float(value))
 
-    return BoxFormula.of(tape, formula([tape.load(i) for i in range(inputs)], number))
+    return BoxFormula.of(tape, formula([tape.load(i) for i in range(inputs)], number), off)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -42,8 +43,8 @@ class BoxFormula(Value):
     outputs: Sequence[int | Term]
 
     @classmethod
-    def of(cls, tape: Tape, outputs: Sequence[Any]) -> BoxFormula:
-        """The code of some of a tape's symbols."""
+    def of(cls, tape: Tape, outputs: Sequence[Any], off: float = FOLLOWED) -> BoxFormula:
+        """The code of some of a tape's symbols; the robot's numbers may be ``off`` by so much."""
         from flint import arb
 
         used = tape.needed(list(enumerate(outputs)))
@@ -59,7 +60,7 @@ class BoxFormula(Value):
         for i in sorted(used):
             name, *arguments = tape.code[i]
             if name == "number":
-                known[i] = arb(tape.numbers[arguments[0]], FOLLOWED)
+                known[i] = arb(tape.numbers[arguments[0]], off)
             elif fixed[i]:
                 known[i] = _ball(name, [known[a] if isinstance(a, int) else arb(a) for a in arguments])
             else:

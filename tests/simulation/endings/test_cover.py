@@ -11,10 +11,12 @@ from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
 from hrsynth import load
+from hrsynth.analysis.asked import configurations_at
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.budgets import COVER_BOXES
 from hrsynth.closed_forms.legs import OnCrank, OnRail, OnRod, SlidingRod
 from hrsynth.geometry.affine import affine
+from hrsynth.mechanism.pose import asked_pose
 from hrsynth.simulation.endings.cover import _places, bounds, cover
 from hrsynth.simulation.endings.joint_error import JointError
 from hrsynth.simulation.endings.pose_error import PoseError
@@ -64,10 +66,10 @@ def newton(error, modes, x, steps=20):
     return x[np.linalg.norm(slopes(error, modes, x), axis=1) < 1e-7] if len(x) else x
 
 
-def unlisted(setting, found, rng, count=40):
+def unlisted(setting, found, rng, count=40, goal=None):
     """Zeros that Newton's method meets in reach, in all working modes, farther than 1e-4 from all members and from open
-    boxes."""
-    error = PoseError.of(setting, setting.everything.start)
+    boxes; the goal by default is the zero configuration."""
+    error = PoseError.of(setting, goal or setting.everything.start)
     missed = []
     listed = np.array([each.x[: error.size] for each in found.found]).reshape(-1, error.size)
     for modes in product(*((-1.0, 1.0) if isinstance(limb, OnRod) else (limb.mode,) for limb in error.limbs)):
@@ -227,6 +229,24 @@ def test_the_rests_of_three_sliders_are_all_but_where_they_lock():
         assert len(square) == 2
         assert np.linalg.norm(np.cross(*(across[i] for i in square))) < 5e-3
         assert np.linalg.norm(half) < 2e-3
+
+
+@pytest.mark.long
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize(("name", "at", "kinds"), [
+    ("linear_delta", "x=0.061,y=-0.0337", None), ("3puu", "x=0.02,y=-0.03", None),
+    ("delta", "x=0.061,y=-0.0337,z=-0.63", None)])
+def test_rests_of_platforms_that_translate_are_listed(name, at, kinds):
+    """Sliders that are inclined, and cranks: nothing is left open but the places that lock; the kinds sum up to nothing,
+    and no other rest is met."""
+    setting = ObservedRobot.of(name)
+    goal = configurations_at(setting, [asked_pose(at)])[0]
+    found = cover(setting, goal)
+    assert found.complete
+    assert found.bounded
+    assert [sum(each.falling == k for each in found.found) for k in range(4)] == kinds
+    assert sum((-1) ** k * count for k, count in enumerate(kinds)) == 0
+    assert unlisted(setting, found, np.random.default_rng(1), 12, goal) == []
 
 
 @pytest.mark.slow

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import product
 from typing import Any
 
@@ -41,8 +41,10 @@ from ...geometry.duals import Dual
 from ...geometry.so3 import exponential
 from ...geometry.vectors import Array, hat
 from ...results import Value
-from ...tolerances import FOLLOWED, SHORTEST_ROD
+from ...tolerances import FOLLOWED, KNOWN_NUMBER, SHORTEST_ROD
 from .pose_error import Number, PoseError
+
+_traced = partial(traced, off=KNOWN_NUMBER)
 
 
 def rodless(error: PoseError) -> Array:
@@ -240,7 +242,7 @@ class JointError(Value):
     @cached_property
     def closing(self) -> BoxFormula:
         """g (k)."""
-        return traced(lambda y, number: [each.value for each in self.parts(y, number)[0]], self.size[0])
+        return _traced(lambda y, number: [each.value for each in self.parts(y, number)[0]], self.size[0])
 
     @cached_property
     def ways(self) -> BoxFormula:
@@ -261,18 +263,18 @@ class JointError(Value):
                 found += [dot(way, number(each)) for each in (limb.axis, *_across(limb))]
             return found
 
-        return traced(formula, error.size)
+        return _traced(formula, error.size)
 
     @cached_property
     def errors(self) -> BoxFormula:
         """u × u* of all that is observed."""
-        return traced(lambda y, number: [e.value for u, wanted in self._seen(y, number) for e in cross(u, wanted)],
+        return _traced(lambda y, number: [e.value for u, wanted in self._seen(y, number) for e in cross(u, wanted)],
                       self.size[0])
 
     @cached_property
     def directions(self) -> BoxFormula:
         """u of all that is observed."""
-        return traced(lambda y, number: [each.value for u, _ in self._seen(y, number) for each in u], self.size[0])
+        return _traced(lambda y, number: [each.value for u, _ in self._seen(y, number) for each in u], self.size[0])
 
     def _seen(self, y: Sequence[Any], number: Number) -> list[tuple[Sequence[Dual], list[Dual]]]:
         """The observed directions and the desired ones."""
@@ -291,7 +293,7 @@ class JointError(Value):
             return [*(each.value for each in g), *(rate for each in g for rate in each.rates), *slopes,
                     *(each.value for each in margins)]
 
-        return traced(formula, n)
+        return _traced(formula, n)
 
     def _cosines(self, y: Sequence[Any], number: Number) -> list[Dual]:
         return [dot(u, wanted) for u, wanted in self._seen(y, number)]
@@ -315,7 +317,7 @@ class JointError(Value):
             return [rate for each in (*rows, *(each.value for each in g))
                     for rate in (each.rates if isinstance(each, Dual) else none)]
 
-        return traced(formula, n + k)
+        return _traced(formula, n + k)
 
 
 def total(parts: Any) -> Any:

@@ -11,6 +11,7 @@ coordinates P in terms of N alone.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -42,6 +43,8 @@ WIDER = (1.25, 4.0)
 """By how much boxes are larger in which exactly one zero is to be proved, one after the other."""
 INFLATED = (2.0, 8.0, 32.0)
 """How many times as large as what is open of a zero such boxes are about one nearby, one after the other."""
+AROUND = (256.0, 64.0, 16.0, 4.0)
+"""How many times as large as the smallest boxes those are about a zero nearby, one after the other."""
 SINGULAR = -2
 """In the place of an axis: a box is left open, ∇g may lose rank in it."""
 STRETCHED = 8.0
@@ -153,9 +156,11 @@ class Subdivision:
                 if len(at):
                     settled[likely] = self._unique(own[at], size[at], P[at], wider)
                     likely &= ~settled
-            close = np.flatnonzero(likely & np.all(size[look] <= SMALLEST_BOX * self.whole, axis=1))
-            if len(close):
-                settled[close] = self._near_zero(own[look[close]], size[look[close]], P[look[close]])
+            smallest = np.all(size[look] <= SMALLEST_BOX * self.whole, axis=1)
+            for close, seek in ((likely & tiny[look] & ~smallest, False), (likely & smallest, True)):
+                if np.any(close) and (seek or self.flat):
+                    at = look[close]
+                    settled[close] = self._near_zero(own[at], size[at], P[at], seek)
             gone[look[settled]] = True
             lost = ~finite & np.all(size[look] <= SINGULAR_BOX * self.whole, axis=1)
             axis[look] = np.where(lost, SINGULAR, self._axes(size[look], N[look], F, loose))
@@ -211,21 +216,21 @@ class Subdivision:
             self.proved.append((at[i], about[i]))
         return one | none
 
-    def _near_zero(self, middle: Array, half: Array, P: Places) -> Flags:
+    def _near_zero(self, middle: Array, half: Array, P: Places, seek: bool) -> Flags:
         """Boxes (c, n) that lie, with their multipliers, in a box about a zero nearby that is proved to be the only one
-        there; its edges are in the ratio in which the numbers of the file leave the zero open (epsilon-inflation)."""
+        there: a known one, or one to ``seek``, with equal edges, or with edges in the ratio in which the numbers of the
+        file leave the zero open (epsilon-inflation)."""
         mu, room, known = self._multipliers(middle, half, P)
         at, own = np.concatenate([middle, mu], axis=1), np.concatenate([half, room], axis=1)
         found = known & self._near(at, own)
         left = np.flatnonzero(known & ~found)
-        if not len(left):
+        if not len(left) or not seek:
             return found
         x = at[left]
         for _ in range(8):
             x = x - self._krawczyk(x, 0 * x)[0]
         open_by = self._krawczyk(x, 0 * x)[1]
-        for times in INFLATED:
-            about = times * open_by
+        for about in (*self._around(x, P[left]), *(times * open_by for times in INFLATED)):
             with np.errstate(all="ignore"):
                 one = np.all(self._krawczyk(x, about)[1] < about, axis=1)
                 one &= np.all(np.abs(at[left] - x) + own[left] <= about, axis=1)
@@ -234,6 +239,15 @@ class Subdivision:
                 self.flat.append((x[i], about[i]))
                 found[left] |= self._near(at[left], own[left])
         return found
+
+    def _around(self, x: Array, P: Places) -> Iterator[Array]:
+        """Half the edges (c, n + k) of boxes about zeros x, the largest first: equal ones of the coordinates, those of
+        the multipliers as they follow."""
+        n = self.error.size[0]
+        for times in AROUND:
+            wide = np.full((len(x), n), times * SMALLEST_BOX * float(self.whole.max()))
+            _, room, _ = self._multipliers(x[:, :n], wide, P)
+            yield np.concatenate([wide, WIDER[0] * room], axis=1)
 
     def _near(self, at: Array, half: Array) -> Flags:
         """Boxes (c, n + k) that lie in one about a flat zero."""
