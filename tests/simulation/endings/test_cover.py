@@ -237,7 +237,7 @@ def test_the_rests_of_three_sliders_are_all_but_where_they_lock():
     ("linear_delta", "x=0.061,y=-0.0337", None), ("3puu", "x=0.02,y=-0.03", None),
     ("delta", "x=0.061,y=-0.0337,z=-0.63", None)])
 def test_rests_of_platforms_that_translate_are_listed(name, at, kinds):
-    """Sliders that are inclined, and cranks: nothing is left open but the places that lock; the kinds sum up to nothing,
+    """On inclined slides, and on cranks: nothing is left open but the places that lock; the kinds sum up to nothing,
     and no other rest is met."""
     setting = ObservedRobot.of(name)
     goal = configurations_at(setting, [asked_pose(at)])[0]
