@@ -438,8 +438,10 @@ KNOWN_NUMBER = 1e-12
 """How far a number of the file may be off, lengths in characteristic lengths, for which boxes prove a list of rests."""
 BOX_ROUNDING = 1e-12
 """What rounding makes of the edges of a box that equations narrow, relative to them."""
-SMALLEST_BOX = 1e-6
+SMALLEST_BOX = 1e-8
 """Part of the whole box below which a box of poses and joints that is not settled is left open."""
+COVER_ROOM = 1e-6
+"""How much farther than linear programs say boxes go, in characteristic lengths: these are solved to 1e-7."""
 SINGULAR_BOX = 1e-4
 """The same of a box in which the equations of the legs may be dependent."""
 LOCKED_PLACE = 0.01

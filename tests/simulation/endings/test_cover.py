@@ -339,20 +339,22 @@ def test_only_short_places_are_told_as_ones_that_lock(monkeypatch):
 
 @pytest.mark.slow
 def test_smallest_boxes_about_a_flat_zero_are_settled():
-    """Two legs of this 3-PUU are nearly dependent at a rest: what the numbers of the file leave open of it is longer
-    than the smallest boxes. Each such box about it is settled by the one zero nearby, which Newton's method on
-    differences of E meets as well."""
+    """Two legs of this 3-PUU are nearly dependent at a rest: F hardly grows along one way from it. Each of the smallest
+    boxes there is settled by the one zero nearby, which Newton's method on differences of E meets as well."""
     setting = ObservedRobot.of("3puu")
     error = PoseError.of(setting, setting.everything.start)
     low, high, _ = bounds(error, 1.0)
     part = Subdivision(JointError.of(error), *JointError.of(error).box(low, high, 1.0))
-    at = np.array([-0.551676, -0.515349, 0.087138, -1.183327, -1.023015, -1.190909])
-    rng = np.random.default_rng(0)
-    middle = at + 3e-6 * rng.uniform(-1, 1, (12, 6)) * [1, 1, 0, 0, 0, 0]
-    open_, *_ = part._open(middle, np.broadcast_to(0.9 * SMALLEST_BOX * part.whole, middle.shape))
-    assert len(open_) == 0
-    assert len(part._open(middle, np.broadcast_to(0.9 * SMALLEST_BOX * part.whole, middle.shape))[0]) == 0
+    at = np.array([[-0.551676, -0.515349, 0.087138, -1.183327, -1.023015, -1.190909]])
+    x = np.concatenate([at, part._multipliers(at, 0 * at, np.array([[3, 4, 5]]))[0]], axis=1)
+    for _ in range(20):
+        x = x - part._krawczyk(x, 0 * x)[0]
+    way = np.linalg.svd(part._equations(x, 0 * x)[1].v[0, 0])[2][-1, :6]
+    middle = x[:, :6] + 4e-6 * np.linspace(-1, 1, 12)[:, None] * way / np.abs(way).max()
+    half = np.broadcast_to(SMALLEST_BOX * part.whole, middle.shape)
+    assert part._near_zero(middle, half, np.broadcast_to([3, 4, 5], (12, 3))).all()
     assert 0 < len(part.flat) < 5
+    assert len(part._open(middle, half)[0]) == 0
     (zero,) = {tuple(np.round(each.x, 5)) for each in part.zeros()}
     modes = [limb.mode for limb in error.limbs]
     met = [x for mode in product((-1.0, 1.0), repeat=3) for x in newton(

@@ -18,12 +18,12 @@ from ...results import Value
 from ...tolerances import (
     COVER_MARGIN,
     COVER_REACH,
+    COVER_ROOM,
     FOLLOWED,
     LOCKED_PLACE,
     SAME_ENDING,
     SHORTEST_ROD,
     SINGULAR_BOX,
-    SMALLEST_BOX,
 )
 from .joint_error import JointError
 from .pose_error import NotEnclosed, PoseError
@@ -237,7 +237,7 @@ def bounds(error: PoseError, reach: float) -> tuple[Array, Array, bool]:
             found = linprog(sign * axis, A_ub=np.array(rows), b_ub=limits, bounds=(None, None)) if rows else None
             reached = found is not None and found.status == 0
             bounded &= reached
-            bounds.append(sign * found.fun - sign * SMALLEST_BOX if found is not None and reached else -sign * reach)
+            bounds.append(sign * found.fun - sign * COVER_ROOM if found is not None and reached else -sign * reach)
     low, high = np.array(bounds[::2]), np.array(bounds[1::2])
     turns = np.ones(error.turns.shape[1])
     return np.concatenate([low, -turns]), np.concatenate([high, turns]), bounded

@@ -43,7 +43,7 @@ WIDER = (1.25, 4.0)
 """By how much boxes are larger in which exactly one zero is to be proved, one after the other."""
 INFLATED = (2.0, 8.0, 32.0)
 """How many times as large as what is open of a zero such boxes are about one nearby, one after the other."""
-AROUND = (256.0, 64.0, 16.0, 4.0)
+AROUND = 16.0 ** np.arange(4, 0, -1)
 """How many times as large as the smallest boxes those are about a zero nearby, one after the other."""
 SINGULAR = -2
 """In the place of an axis: a box is left open, ∇g may lose rank in it."""
@@ -156,11 +156,9 @@ class Subdivision:
                 if len(at):
                     settled[likely] = self._unique(own[at], size[at], P[at], wider)
                     likely &= ~settled
-            smallest = np.all(size[look] <= SMALLEST_BOX * self.whole, axis=1)
-            for close, seek in ((likely & tiny[look] & ~smallest, False), (likely & smallest, True)):
-                if np.any(close) and (seek or self.flat):
-                    at = look[close]
-                    settled[close] = self._near_zero(own[at], size[at], P[at], seek)
+            close = np.flatnonzero(likely & tiny[look])
+            if len(close):
+                settled[close] = self._near_zero(own[look[close]], size[look[close]], P[look[close]])
             gone[look[settled]] = True
             lost = ~finite & np.all(size[look] <= SINGULAR_BOX * self.whole, axis=1)
             axis[look] = np.where(lost, SINGULAR, self._axes(size[look], N[look], F, loose))
@@ -216,15 +214,15 @@ class Subdivision:
             self.proved.append((at[i], about[i]))
         return one | none
 
-    def _near_zero(self, middle: Array, half: Array, P: Places, seek: bool) -> Flags:
+    def _near_zero(self, middle: Array, half: Array, P: Places) -> Flags:
         """Boxes (c, n) that lie, with their multipliers, in a box about a zero nearby that is proved to be the only one
-        there: a known one, or one to ``seek``, with equal edges, or with edges in the ratio in which the numbers of the
-        file leave the zero open (epsilon-inflation)."""
+        there: its edges are equal, or in the ratio in which the numbers of the file leave the zero open
+        (epsilon-inflation)."""
         mu, room, known = self._multipliers(middle, half, P)
         at, own = np.concatenate([middle, mu], axis=1), np.concatenate([half, room], axis=1)
         found = known & self._near(at, own)
         left = np.flatnonzero(known & ~found)
-        if not len(left) or not seek:
+        if not len(left):
             return found
         x = at[left]
         for _ in range(8):
