@@ -5,7 +5,7 @@ The planes are n_i · (p + R b_i) = h_i, N has the rows n_i. So p = N⁺ (h_i �
 that all planes share. Where rows depend on each other, Σ λ_i n_i = 0, this asks Σ λ_i (n_i · R b_i − h_i) = 0 of R
 alone: a quadratic form of its quaternion q. One of rank two with both signs is a product of two factors: there are two
 families of poses, q at right angles to a vector, both smooth, which meet where both factors vanish. Another form is one
-equation more.
+equation more. Where families meet, what is critical in one need not be so in the other.
 
 Coordinates: s, the components of q along a basis of a family but one, which is 1, and the joints of :mod:`.joint_error`.
 Charts with each of the components as 1, the others between −1 and 1, together hold all turns.
@@ -28,12 +28,13 @@ from ...closed_forms.legs import SlidingRod
 from ...geometry.affine import affine, stacked
 from ...geometry.components import Components, combination, cross, plus, scaled
 from ...geometry.duals import Dual
+from ...geometry.so3 import quaternions
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
 from ...mechanism import JointType, Mechanism
 from ...mechanism.legs import Leg
-from ...tolerances import AFFINE_ROUNDING, EXACT, FOLLOWED, RANK_CUTOFF
+from ...tolerances import AFFINE_ROUNDING, EXACT, FOLLOWED, RANK_CUTOFF, SAME_ENDING
 from .joint_error import JointError, total
 from .pose_error import NotEnclosed, Number, PoseError, require_directions
 from .pose_system import bends
@@ -106,6 +107,11 @@ class PlaneError(JointError):
 
     def looked(self, bounded: bool) -> tuple[JointError, ...]:
         return self.charts
+
+    def holds(self, R: Array) -> bool:
+        """Whether a rotation is one of the family, as near as two are told apart."""
+        q = quaternions(R)
+        return bool(np.abs(q - self.span @ (self.span.T @ q)).max() < SAME_ENDING)
 
     @property
     def ends(self) -> Array:
