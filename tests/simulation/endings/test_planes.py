@@ -66,7 +66,8 @@ def drawn(error, rng, count=4):
         limb = error.error.limbs[i]
         one = np.linalg.svd(limb.axis[None])[2][1]
         two = np.cross(limb.axis, one)
-        y[:, error.freedoms + i] = np.arctan2(found[:, i] @ two, found[:, i] @ one) + np.pi * rng.integers(2, size=count)
+        either = np.pi * rng.integers(2, size=count)
+        y[:, error.freedoms + i] = np.arctan2(found[:, i] @ two, found[:, i] @ one) + either
     return y
 
 
@@ -90,20 +91,20 @@ def test_poses_keep_their_points_in_the_planes():
 
 
 def test_rates_are_those_of_differences():
-    """Of the equations and of E, nearby and far away, and with the product of the factors as an equation: far away those by
-    turns are rates over w."""
+    """Of the equations and of E, nearby and far away, and with the product of the factors as an equation; far away
+    those by turns are rates over w."""
     rng = np.random.default_rng(0)
     one, other = (np.linalg.svd(each.span.T)[2][3] for each in families())
     whole = replace(families()[0], span=np.linalg.qr(rng.normal(size=(4, 4)))[0],
                     forms=(np.outer(one, other) + np.outer(other, one))[None])
     for error in (chart for family in (*families(), whole) for chart in family.charts[::5]):
         (n, k), y = error.size, drawn(error, rng)
-        told, l = at(error.slopes, y), len(error.forms)
+        told, own = at(error.slopes, y), k - len(error.forms)
         for j in range(n):
             step = STEP * np.eye(n)[j]
             rate = np.ones((len(y), k))
             if error.far is not None and 1 <= j < error.freedoms:
-                rate[:, : k - l] = y[:, error.far, None]
+                rate[:, :own] = y[:, error.far, None]
             g = (at(error.closing, y + step) - at(error.closing, y - step)) / (2 * STEP)
             assert np.allclose(g, told[:, k : k + k * n].reshape(-1, k, n)[..., j] * rate, atol=1e-7)
             u = [at(error.directions, y + sign * step).reshape(-1, 3, 3) for sign in (1, -1)]
@@ -159,8 +160,8 @@ def test_where_closures_meet_a_slope_along_one_of_them_is_no_rest():
     def along(turn):
         """E on the goal's family, its turns about axes of the base's plane."""
         own = exponential(np.pi * np.array([np.cos(axis), np.sin(axis), 0.0]) * (1 + turn / np.pi))
-        shift = np.linalg.lstsq(TANGENTS[:, :2], PLATFORM * np.einsum("ij,ij->i", WAYS @ own.T, TANGENTS), rcond=None)[0]
-        way = rods(np.array([*-shift, 0.3328]), own)
+        off = PLATFORM * np.einsum("ij,ij->i", WAYS @ own.T, TANGENTS)
+        way = rods(np.array([*-np.linalg.lstsq(TANGENTS[:, :2], off, rcond=None)[0], 0.3328]), own)
         assert np.abs((way * TANGENTS).sum(axis=1)).max() < 1e-12
         return level(np.stack([(way * WAYS).sum(axis=1), way[:, 2]], axis=1))
 
@@ -230,7 +231,8 @@ def test_all_rests_of_the_two_families_are_listed():
         assert [falling.count(k) for k in range(4)] == kinds
     rng, met = np.random.default_rng(0), np.zeros(40, dtype=int)
     for _ in range(4):
-        some = listed[rng.integers(40, size=1500)] + rng.normal(size=(1500, 6)) * rng.choice([0.01, 0.1, 0.3], (1500, 1))
+        away = rng.choice([0.01, 0.1, 0.3], (1500, 1))
+        some = listed[rng.integers(40, size=1500)] + rng.normal(size=(1500, 6)) * away
         for y in zeros(np.concatenate([some, rng.normal(size=(1500, 3))], axis=1)):
             away = np.abs(listed - y[:6]).max(axis=1)
             if np.abs(y[6:]).max() < 1e4:

@@ -134,7 +134,8 @@ def cover(setting: ObservedRobot, goal: ClosedConfiguration, *, vanishing: bool 
     locked, left = _places(joined(lost), left, (high - low)[: error.size])
     meeting = [each for each in found if each.error[0] > 0 and sum(
         isinstance(family, PlaneError) and family.holds(each.R) for family in families) > 1]
-    locked += [(each.x[: error.size], each.radius[: error.size] + FOLLOWED) for each in meeting]
+    near = SINGULAR_BOX * (high - low)[: error.size]
+    locked += [(each.x[: error.size], np.maximum(each.radius[: error.size], near)) for each in meeting]
     found = [each for each in found if each not in meeting]
     found = [replace(each, directions=each.directions * own) for own in error.mirrors for each in found]
     free = [each for i, each in enumerate(error.limbs) if i not in families[0].joints and isinstance(each, SlidingRod)]

@@ -7,8 +7,8 @@ alone: a quadratic form of its quaternion q. One of rank two with both signs is 
 families of poses, q at right angles to a vector, both smooth, which meet where both factors vanish. Another form is one
 equation more. Where families meet, what is critical in one need not be so in the other.
 
-Coordinates: s, the components of q along a basis of a family but one, which is 1, and the joints of :mod:`.joint_error`.
-Charts with each of the components as 1, the others between −1 and 1, together hold all turns.
+Coordinates: s, the components of q along a basis of a family but one, which is 1, and the joints as in
+:mod:`.joint_error`. Charts with each of the components as 1, the others between −1 and 1, together hold all turns.
 """
 
 from __future__ import annotations
