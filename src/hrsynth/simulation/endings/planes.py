@@ -34,7 +34,7 @@ from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
 from ...mechanism import JointType, Mechanism
 from ...mechanism.legs import Leg
-from ...tolerances import AFFINE_ROUNDING, EXACT, FOLLOWED, RANK_CUTOFF, SAME_ENDING
+from ...tolerances import AFFINE_ROUNDING, EXACT, FOLLOWED, SAME_ENDING
 from .joint_error import JointError, total
 from .pose_error import NotEnclosed, Number, PoseError, require_directions
 from .pose_system import bends
@@ -85,7 +85,7 @@ class PlaneError(JointError):
         rest = np.array([each[0] - n @ limb.tip.constant for each, n, limb in zip(h, N, limbs, strict=True)])
         arms = np.array([np.outer(n, limb.tip.turned).ravel() for n, limb in zip(N, limbs, strict=True)])
         U, sizes, V = np.linalg.svd(N)
-        rank, back = int(np.sum(sizes > RANK_CUTOFF)), np.linalg.pinv(N, rcond=RANK_CUTOFF)
+        rank, back = int(np.sum(sizes > EXACT)), np.linalg.pinv(N, rcond=EXACT)
         along, follow = V[rank:].T, -back @ arms
         offset = back @ rest - error.p
         offset -= along @ (along.T @ offset)
@@ -222,9 +222,10 @@ class PlaneError(JointError):
             endless = (w.low <= 0) & (w.high >= 0)
             low[endless, :3], high[endless, :3] = -np.inf, np.inf
         shifts = self.error.shifts
-        if self.far is None or np.isfinite(low).all():
+        with np.errstate(invalid="ignore"):
             at, room = (low + high)[:, :3] / 2 @ shifts, (high - low)[:, :3] / 2 @ np.abs(shifts)
-            low[:, :3], high[:, :3] = at - room, at + room
+        known = np.isfinite(low).all(axis=1)
+        low[known, :3], high[known, :3] = (at - room)[known], (at + room)[known]
         joints, wide = middle[:, f:], half[:, f:]
         return np.concatenate([low, joints - wide], axis=1), np.concatenate([high, joints + wide], axis=1)
 
@@ -252,13 +253,12 @@ def factors(span: Array, forms: Sequence[Array]) -> Iterator[tuple[Array, list[A
         return
     first, *rest = forms
     values, vectors = np.linalg.eigh(span.T @ first @ span)
-    large = np.abs(values) > RANK_CUTOFF
+    large = np.abs(values) > EXACT
     if not large.any():
         yield from factors(span, rest)
     elif large.sum() == 2 and values[large].prod() < 0:
-        plus_, minus_ = (np.sqrt(np.abs(value)) * each for value, each in zip(
-            values[large], vectors.T[large], strict=True))
-        for normal in (plus_ + minus_, plus_ - minus_):
+        one, other = np.sqrt(np.abs(values[large]))[:, None] * vectors.T[large]
+        for normal in (one + other, one - other):
             yield from factors(span @ np.linalg.svd(normal[None])[2][1:].T, rest)
     elif values.min() < 0 < values.max():
         yield from ((own, [first, *left]) for own, left in factors(span, rest))
