@@ -7,6 +7,8 @@ from functools import cache
 import numpy as np
 import pytest
 
+from hrsynth.analysis.observed import ObservedRobot
+from hrsynth.description import load, shipped
 from hrsynth.geometry.affine import affine
 from hrsynth.geometry.so3 import exponential
 from hrsynth.simulation.endings.cover import cover
@@ -243,3 +245,22 @@ def test_all_rests_of_the_two_families_are_listed():
                 assert away.min() < 1e-6
                 met[away.argmin()] += 1
     assert np.all(met > 0)
+
+
+@pytest.mark.long
+def test_rests_of_a_robot_without_symmetry_are_one_family(tmp_path):
+    """A leg of the 3-RPS and its ball moved by 3 and 2 cm: the form of turns is no product; kinds sum up to nothing."""
+    text = shipped()["3rps"].read_text()
+    for old, new in (("-0.2 0.34641016151378 0", "-0.17 0.36641016151378 0"),
+                     ("-0.075 0.12990381056767 0", "-0.045 0.14990381056767 0")):
+        assert text.count(f'"{old}"') == 1
+        text = text.replace(f'"{old}"', f'"{new}"')
+    (tmp_path / "robot.urdf").write_text(text)
+    setting = ObservedRobot.of(load(tmp_path / "robot.urdf"))
+    (family,) = PlaneError.families(setting, setting.everything.start)
+    assert len(family.forms) == 1
+    found = cover(setting, setting.everything.start)
+    assert found.complete
+    assert not found.locked
+    falling = [each.falling for each in found.found]
+    assert [falling.count(k) for k in range(4)] == [56, 120, 128, 64]
