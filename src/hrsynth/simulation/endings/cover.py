@@ -153,9 +153,10 @@ def _families(setting: ObservedRobot, goal: ClosedConfiguration, vanishing: bool
     try:
         error = PoseError.of(setting, goal)
     except NotEnclosed as why:
-        planes = PlaneError.families(setting, goal)
-        if not planes:
-            raise why
+        try:
+            planes = PlaneError.families(setting, goal)
+        except NotEnclosed:
+            raise why from None
         return _read(planes[0].error), [*planes], None
     _read(error)
     if error.turns.shape[1] > 1:

@@ -1,5 +1,5 @@
-"""The error to a goal of a platform whose legs each keep a point of it in a plane of the base: the parts of its pose
-depend on each other.
+"""The error to a goal of a platform on rods that slide, each of which keeps a point of it in a plane of the base: the
+parts of its pose depend on each other.
 
 The planes are n_i · (p + R b_i) = h_i, N has the rows n_i. So p = N⁺ (h_i − n_i · R b_i)_i + D s, with D the directions
 that all planes share. Where rows depend on each other, Σ λ_i n_i = 0, this asks Σ λ_i (n_i · R b_i − h_i) = 0 of R
@@ -71,7 +71,8 @@ class PlaneError(JointError):
             error = PoseError.along(setting, goal, coordinates)
         except NoLegForm as why:
             raise NotEnclosed(str(why)) from why
-        if [str(limb.label) for limb in error.limbs] != [leg.label for leg in legs]:
+        if [str(limb.label) for limb in error.limbs] != [leg.label for leg in legs] or not all(
+                isinstance(limb, SlidingRod) for limb in error.limbs):
             raise depends
         N, places = np.array(normals), coordinates.of([goal, *configurations])
         h = [limb.tip.value(*places) @ n for limb, n in zip(error.limbs, N, strict=True)]
@@ -96,14 +97,9 @@ class PlaneError(JointError):
 
     @property
     def charts(self) -> tuple[JointError, ...]:
-        """Those that together hold all poses of the family, as far as :attr:`endless`."""
+        """Those that together hold all poses of the family."""
         near = [replace(self, one=k) for k in range(self.span.shape[1])]
-        slide = all(isinstance(each, SlidingRod) for each in self.error.limbs)
-        return (*near, *(replace(each, far=k) for each in near for k in range(self.along.shape[1]) if slide))
-
-    @property
-    def endless(self) -> bool:
-        return not self.along.shape[1] or all(isinstance(each, SlidingRod) for each in self.error.limbs)
+        return (*near, *(replace(each, far=k) for each in near for k in range(self.along.shape[1])))
 
     def looked(self, bounded: bool) -> tuple[JointError, ...]:
         return self.charts
@@ -267,8 +263,7 @@ def factors(span: Array, forms: Sequence[Array]) -> Iterator[tuple[Array, list[A
 def _normal(mechanism: Mechanism, leg: Leg) -> Array | None:
     """The normal of the plane in which a leg's ball stays: its other joints turn about this direction, or slide at
     right angles to it."""
-    joints = [mechanism.joints[name] for name in leg.joints]
-    own, ball = joints[:-1], joints[-1]
+    *own, ball = [mechanism.joints[name] for name in leg.joints]
     turns = [each for each in own if each.type is JointType.REVOLUTE]
     slides = [each for each in own if each.type is JointType.PRISMATIC]
     if leg.has_loops or ball.type is not JointType.SPHERICAL or leg.attach not in ball.links or not turns or (
