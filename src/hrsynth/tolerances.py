@@ -315,6 +315,9 @@ CRITICAL = 1e-11
 DEPENDENT = 1e-13
 """Squares of singular values of the loops' equations, beside their sum, that do not count in a step that closes them.
 """
+CLOSURES_MEET = 1e-6
+"""Singular value of the loops' equations, beside the largest, at which a motion more is free: closures meet there, and
+E is critical if it is so along this motion as well, to this slope."""
 ERROR_ROUNDING = 1e-14
 """½ ‖e‖² below which it is rounding."""
 SAME_PRICE = 1e-9

@@ -26,6 +26,7 @@ from ...tolerances import (
     SINGULAR_BOX,
 )
 from .joint_error import JointError
+from .planes import PlaneError
 from .pose_error import NotEnclosed, PoseError
 from .struts import Struts
 from .subdivision import CriticalBox, Subdivision
@@ -108,17 +109,11 @@ def cover(setting: ObservedRobot, goal: ClosedConfiguration, *, vanishing: bool 
     legs reach, however far away where all rods slide in a plane, otherwise in a box that is ``reach`` characteristic
     lengths wide either way. ``vanishing``: those alone at which the error vanishes."""
     try:
-        error = PoseError.of(setting, goal)
-        if error.fitted:
-            raise NotEnclosed(f"forms are fitted to samples: {', '.join(error.fitted)}")
-        if error.turns.shape[1] > 1:
-            raise NotEnclosed("the platform turns about more than one axis")
+        error, families, struts = _families(setting, goal, vanishing)
     except NotEnclosed as why:
         return Cover((), (), 1.0, 0, False, str(why))
-    (low, high, bounded), whole = bounds(error, reach), JointError.of(error)
-    struts = Struts.of(setting, goal, error)
-    families = [whole] if struts is None else [*struts.whole(), *([] if vanishing else struts.locked())]
-    charts = [(each,) if bounded else each.charts for each in families]
+    low, high, bounded = bounds(error, reach)
+    charts, endless = [each.looked(bounded) for each in families], families[0].endless
     parts = [[_boxes(each, low, high, reach, vanishing) for each in some] for some in charts]
     every = [part for some in parts for part in some]
     # the small ones first: what they do not use is left for the others
@@ -137,13 +132,45 @@ def cover(setting: ObservedRobot, goal: ClosedConfiguration, *, vanishing: bool 
         [corners for part in every for corners in _corners(part.error, boxes(part), error.size)]
         for boxes in (lambda part: part.left, lambda part: part.lost))
     locked, left = _places(joined(lost), left, (high - low)[: error.size])
+    meeting = [each for each in found if each.error[0] > 0 and sum(
+        isinstance(family, PlaneError) and family.holds(each.R) for family in families) > 1]
+    near = SINGULAR_BOX * (high - low)[: error.size]
+    locked += [(each.x[: error.size], np.maximum(each.radius[: error.size], near)) for each in meeting]
+    found = [each for each in found if each not in meeting]
     found = [replace(each, directions=each.directions * own) for own in error.mirrors for each in found]
-    free = [each for i, each in enumerate(error.limbs) if i not in whole.joints and isinstance(each, SlidingRod)]
+    free = [each for i, each in enumerate(error.limbs) if i not in families[0].joints and isinstance(each, SlidingRod)]
     return Cover(tuple(found), tuple(left), sum(each.share for each in every) / len(every),
-                 sum(each.boxes for each in every), bounded or len(charts[0]) > 1, "",
-                 (low, high) if len(charts[0]) == 1 else None, error,
+                 sum(each.boxes for each in every), bounded or endless, "",
+                 None if endless and not bounded else (low, high), error,
                  () if any(each.short for each in charts[0]) else tuple(free), struts, tuple(locked),
                  () if struts is not None else unread(setting))
+
+
+def _families(setting: ObservedRobot, goal: ClosedConfiguration, vanishing: bool
+              ) -> tuple[PoseError, list[JointError], Struts | None]:
+    """The error, and all that boxes are to look at: the parts of which the closures are made up; raises
+    ``NotEnclosed``."""
+    try:
+        error = PoseError.of(setting, goal)
+    except NotEnclosed as why:
+        try:
+            planes = PlaneError.families(setting, goal)
+        except NotEnclosed:
+            raise why from None
+        return _read(planes[0].error), [*planes], None
+    _read(error)
+    if error.turns.shape[1] > 1:
+        raise NotEnclosed("the platform turns about more than one axis")
+    struts = Struts.of(setting, goal, error)
+    return (error, [JointError.of(error)], None) if struts is None else (
+        error, [*struts.whole(), *([] if vanishing else struts.locked())], struts)
+
+
+def _read(error: PoseError) -> PoseError:
+    """An error whose forms are read from joints; raises ``NotEnclosed`` where they are not."""
+    if error.fitted:
+        raise NotEnclosed(f"forms are fitted to samples: {', '.join(error.fitted)}")
+    return error
 
 
 def _boxes(error: JointError, low: Array, high: Array, reach: float, vanishing: bool) -> Subdivision:

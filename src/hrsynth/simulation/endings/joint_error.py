@@ -86,6 +86,15 @@ class JointError(Value):
                 *(replace(self, short=each) for each in about))
 
     @property
+    def endless(self) -> bool:
+        """Whether these hold all poses however far away."""
+        return len(self.charts) > 1
+
+    def looked(self, bounded: bool) -> tuple[JointError, ...]:
+        """Those that are to be looked at, of poses that are ``bounded`` by the legs' reach or not."""
+        return (self,) if bounded else self.charts
+
+    @property
     def ends(self) -> Array:
         """Where the platform's point is, from that of the goal, when rods that slide and turn as they like in space
         have no length, (limbs, 3); none where length and direction of one do not tell where the platform is."""
@@ -96,9 +105,19 @@ class JointError(Value):
         return rodless(error) - error.p
 
     @property
+    def freedoms(self) -> int:
+        """Coordinates of the pose."""
+        return self.error.size
+
+    @property
+    def turning(self) -> tuple[int, ...]:
+        """Those of them that turn the platform; and which equations, after all coordinates, ask of these alone."""
+        return tuple(range(self.error.shifts.shape[1], self.freedoms))
+
+    @property
     def size(self) -> tuple[int, int]:
         """Coordinates and equations."""
-        return self.error.size + len(self.joints), len(self.joints)
+        return self.freedoms + len(self.joints), len(self.joints)
 
     @property
     def periods(self) -> Array:
@@ -165,23 +184,13 @@ class JointError(Value):
     def parts(self, y: Sequence[Any], known: Number) -> tuple[list[Dual], list[Sequence[Dual]], list[Dual]]:
         """g, the observed directions, and of limbs without a joint the reach margins less what a rod is to be long (of
         those far away times w²), with their rates by the coordinates (n,), of which ``known`` makes numbers as well."""
-        error, n, k = self.error, self.size[0], self.error.shifts.shape[1]
+        error, n = self.error, self.size[0]
         none = [0.0] * n
 
         def number(value: Any) -> Any:
             return [number(each) for each in value] if np.ndim(value) else Dual(known(value), none)
 
-        x = [Dual(y[i], [float(i == j) for j in range(n)]) for i in range(n)]
-        w, place = number(1.0), list(x[:k])
-        if self.far is not None:
-            w, place[self.far] = x[self.far], w
-        point, u = combination(place, error.shifts, number), list[Dual]()
-        if self.short is not None:
-            v = [x[1], x[2]]
-            v.insert(self.short[1], w)
-            u = scaled(number(1.0) / sqrt(dot(v, v)), v)
-            point = plus(number(self.ends[self.short[0]]), scaled(x[0], u))
-        turned = self._turned(y, w, known)
+        w, point, turned, u = self._placed(y, known, number)
         g, margins, told = list[Dual](), list[Dual](), list[Sequence[Dual]]()
         least = self.shortest if self.short is None else 0.0
         for i, limb in enumerate(error.limbs):
@@ -199,7 +208,8 @@ class JointError(Value):
                 continue
             assert isinstance(limb, OnCrank | OnRail | SlidingRod)
             assert limb.axis is not None
-            z, (one, two) = x[error.size + self.joints.index(i)], map(number, _across(limb))
+            at, (one, two) = self.freedoms + self.joints.index(i), map(number, _across(limb))
+            z = Dual(y[at], [float(at == j) for j in range(n)])
             c, s = cosine(z), sine(z)
             way, ring = minus(tip, scaled(w, number(limb.centre))), plus(scaled(c, one), scaled(s, two))
             if isinstance(limb, SlidingRod):
@@ -217,6 +227,23 @@ class JointError(Value):
             elif each.rule is not None:
                 seen.append(plus(transformed(turned, number(each.rule.turned)), number(each.rule.constant)))
         return g, seen, margins
+
+    def _placed(self, y: Sequence[Any], known: Number, number: Number
+                ) -> tuple[Dual, Components, list[Dual], list[Dual]]:
+        """w, the shift of the platform's point and the platform's rotation by rows, both times w, and u of a chart
+        about a short rod."""
+        n, k = self.size[0], self.error.shifts.shape[1]
+        x = [Dual(y[i], [float(i == j) for j in range(n)]) for i in range(self.freedoms)]
+        w, place = number(1.0), list(x[:k])
+        if self.far is not None:
+            w, place[self.far] = x[self.far], w
+        point, u = combination(place, self.error.shifts, number), list[Dual]()
+        if self.short is not None:
+            v = [x[1], x[2]]
+            v.insert(self.short[1], w)
+            u = scaled(number(1.0) / sqrt(dot(v, v)), v)
+            point = plus(number(self.ends[self.short[0]]), scaled(x[0], u))
+        return w, point, self._turned(y, w, known), u
 
     def _turned(self, y: Sequence[Any], w: Dual, known: Number) -> list[Dual]:
         """w R by rows: R₀ + sin ψ K R₀ + (1 − cos ψ) K² R₀."""
@@ -250,9 +277,13 @@ class JointError(Value):
         error = self.error
 
         def formula(y: Sequence[Any], number: Number) -> list[Any]:
-            one = Dual(number(1.0), [0.0] * self.size[0])
-            found, turned = list[Any](), [each.value for each in self._turned(y, one, number)]
-            point = combination(list(y[: error.shifts.shape[1]]), error.shifts, number)
+            none, found = [0.0] * self.size[0], list[Any]()
+
+            def still(value: Any) -> Any:
+                return [still(each) for each in value] if np.ndim(value) else Dual(number(value), none)
+
+            _, place, rotation, _ = self._placed(y, number, still)
+            point, turned = ([each.value for each in some] for some in (place, rotation))
             for i in self.joints:
                 limb = error.limbs[i]
                 assert isinstance(limb, OnCrank | OnRail | SlidingRod)
@@ -263,7 +294,7 @@ class JointError(Value):
                 found += [dot(way, number(each)) for each in (limb.axis, *_across(limb))]
             return found
 
-        return _traced(formula, error.size)
+        return _traced(formula, self.freedoms)
 
     @cached_property
     def errors(self) -> BoxFormula:

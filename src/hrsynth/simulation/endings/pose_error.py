@@ -138,30 +138,29 @@ class PoseError(Value):
     @classmethod
     def of(cls, setting: ObservedRobot, goal: ClosedConfiguration) -> PoseError:
         """That of what is observed, about a configuration; raises ``NotEnclosed``."""
-        mechanism = setting.mechanism
-        others = [each for each in setting.observed if not isinstance(each, Direction)]
-        if others:
-            raise NotEnclosed(f"of leg {others[0].leg} something else than a direction is measured")
-        if mechanism.reference != mechanism.base or any(each.seen_from is not None for each in setting.observed):
-            raise NotEnclosed("directions are not seen from the base")
-        if mechanism.couplings:
-            raise NotEnclosed("joints are coupled")
+        require_directions(setting)
         configurations = [setting.everything.start, *setting.configurations]
         reason = "the parts of the platform's pose that change depend on each other"
         for each in path_coordinates(setting.anatomy, setting.samples.question, setting.dof, configurations):
             try:
-                known = pattern(setting.anatomy, [], each, configurations)
-                limbs = known.forms(goal).limbs
+                return cls.along(setting, goal, each)
             except NoLegForm as why:
                 reason = str(why)
-                continue
-            seen = tuple(_seen(o, known, limbs, [goal, *configurations]) for o in setting.observed)
-            p, R = each.of([goal])
-            rules = tuple(f"direction of leg {o.leg}" for o in seen if o.rule is not None)
-            return cls(each.length, each.motion, p[0], R[0], each.motion.translations,
-                       each.motion.rotations if each.turning else np.zeros((3, 0)), limbs, seen,
-                       (*known.fitted, *rules), (*mechanism.limited, *mechanism.wrists), coordinates=each)
         raise NotEnclosed(reason)
+
+    @classmethod
+    def along(cls, setting: ObservedRobot, goal: ClosedConfiguration, coordinates: PathCoordinates) -> PoseError:
+        """That over what changes in the platform's pose; raises ``NotEnclosed``, or ``NoLegForm`` where a leg has
+        none."""
+        configurations, mechanism = [setting.everything.start, *setting.configurations], setting.mechanism
+        known = pattern(setting.anatomy, [], coordinates, configurations)
+        limbs = known.forms(goal).limbs
+        seen = tuple(_seen(o, known, limbs, [goal, *configurations]) for o in setting.observed)
+        (p, R), motion = coordinates.of([goal]), coordinates.motion
+        rules = tuple(f"direction of leg {o.leg}" for o in seen if o.rule is not None)
+        return cls(coordinates.length, motion, p[0], R[0], motion.translations,
+                   motion.rotations if coordinates.turning else np.zeros((3, 0)), limbs, seen,
+                   (*known.fitted, *rules), (*mechanism.limited, *mechanism.wrists), coordinates=coordinates)
 
     @property
     def size(self) -> int:
@@ -257,6 +256,18 @@ class PoseError(Value):
         carried = limb.at(tip, number, limb.mode)[1]
         return scaled(seen.sense / number(limb.rod), minus(tip, carried)) if isinstance(limb, OnRod) else scaled(
             seen.sense, carried)
+
+
+def require_directions(setting: ObservedRobot) -> None:
+    """Raises ``NotEnclosed`` where something else is measured than directions, seen from the base."""
+    mechanism = setting.mechanism
+    others = [each for each in setting.observed if not isinstance(each, Direction)]
+    if others:
+        raise NotEnclosed(f"of leg {others[0].leg} something else than a direction is measured")
+    if mechanism.reference != mechanism.base or any(each.seen_from is not None for each in setting.observed):
+        raise NotEnclosed("directions are not seen from the base")
+    if mechanism.couplings:
+        raise NotEnclosed("joints are coupled")
 
 
 def _seen(observation: Observation, known: LegPattern, limbs: Sequence[ClosedFormLeg],

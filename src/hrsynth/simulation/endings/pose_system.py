@@ -192,7 +192,7 @@ class LegSystem(Value):
             free = i in held and limb is not None and unbound(limb)
             joint = 4 if free else int(limb is not None and not unbound(limb))
             wanted = np.zeros(3) if seen is None else np.array(error._direction(seen, *goal, lambda value: value))
-            pieces.append(Piece(point.follows, point.constant, _bends(error.R @ point.turned, error.turns), limb,
+            pieces.append(Piece(point.follows, point.constant, bends(error.R @ point.turned, error.turns), limb,
                                 slice(place, place + joint) if joint else None, i in held, seen, wanted))
             place += joint
             count += joint + (i in held and not free)
@@ -241,7 +241,7 @@ class LegSystem(Value):
         q = y[:, self.quaternion]
         if not q.shape[1]:
             return np.broadcast_to(self.error.R, (len(y), 3, 3))
-        forms = np.stack([_bends(column, self.error.turns) for column in self.error.R.T])
+        forms = np.stack([bends(column, self.error.turns) for column in self.error.R.T])
         return np.asarray(np.einsum("akij,ci,cj->cka", forms, q, q))
 
     def directions(self, y: Array) -> Array:
@@ -395,7 +395,7 @@ def _quaternions(turns: Array) -> Array:
     return basis
 
 
-def _bends(h: Array, turns: Array) -> Array:
+def bends(h: Array, turns: Array) -> Array:
     """R h as quadratic forms (3, m + 1, m + 1) of a quaternion whose vector is in the span of turns (3, m)."""
     form = np.zeros((3, 4, 4))
     form[:, 0, 0] = h

@@ -24,11 +24,11 @@ def narrowed(error: JointError, forms: list[AffineForms], low: Array, high: Arra
     lower above the upper one where a leg has them nowhere. Charts of their own are as they were."""
     if error.far is not None or error.short is not None:
         return low, high
-    low, high, (n, k) = low.copy(), high.copy(), error.size
-    ways = error.ways.at(forms[: n - k])
+    low, high, pose = low.copy(), high.copy(), error.freedoms
+    ways = error.ways.at(forms[:pose])
     for place, i in enumerate(error.joints):
         along, one, two = ((each.low, each.high) for each in ways[3 * place : 3 * place + 3])
-        at = n - k + place
+        at = pose + place
         low[:, at], high[:, at] = reached(error.error.limbs[i], along, one, two, (low[:, at], high[:, at]))
     return low, high
 

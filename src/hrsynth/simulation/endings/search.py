@@ -25,7 +25,7 @@ from ...budgets import (
 )
 from ...constraints.pattern import placing_links
 from ...errors import LoopsNotClosed
-from ...geometry.vectors import Array
+from ...geometry.vectors import Array, times
 from ...kinematics.assembly import of_links
 from ...kinematics.branch import Signature
 from ...kinematics.configuration import ClosedConfiguration
@@ -35,11 +35,11 @@ from ...mechanism.observation import Observation
 from ...mechanism.observations.direction import SeenAxis
 from ...progress import tell
 from ...results import Value
-from ...tolerances import CRITICAL_FLAT, SAME_ENDING, SEEN_ABOVE
+from ...tolerances import CLOSURES_MEET, CRITICAL_FLAT, SAME_ENDING, SEEN_ABOVE
 from ..law import Law
 from .carried import SweptChains
 from .descent import CriticalPoint, are_closed, closed, descend, walked
-from .error import DirectionTerm, RestSystem
+from .error import DirectionTerm, RestEquations, RestSystem
 
 BESIDE = 0.5
 """So many times as many starts lie a few random steps beside rests that were found, where there are no closed forms."""
@@ -160,7 +160,8 @@ class ToldApart:
         """How many isolated ones are new, of those that leave no loop open."""
         new = 0
         if points:
-            good = are_closed(self.system, np.array([each.q for each in points]), SAME_ENDING)
+            q = np.array([each.q for each in points])
+            good = are_closed(self.system, q, SAME_ENDING) & along_all(self.system, q)
             points = [each for each, kept in zip(points, good, strict=True) if kept]
         told = marks(self.system, self.setting, self.bodies, points, self.told)
         for point, mark, across in zip(points, told, self._across(points), strict=True):
@@ -248,6 +249,17 @@ def in_mode(system: RestSystem, setting: ObservedRobot, q: Array) -> NDArray[np.
         kept[k] = law.in_front(at) > SEEN_ABOVE and (
             not system.size[1] or drawn.signature.agrees(Signature.of(relation(at, drawn.question))))
     return kept
+
+
+def along_all(system: RestSystem, q: Array) -> NDArray[np.bool_]:
+    """At which of critical points (c, N) E is critical along all motions that the loops leave to first order: where two
+    families of closures meet, multipliers without bound would hold any slope across these."""
+    rates = system.closures(q)[1]
+    if system.supposes or not rates.shape[1]:
+        return np.ones(len(q), dtype=bool)
+    _, sizes, ways = np.linalg.svd(rates, full_matrices=False)
+    slopes = np.abs(times(ways, np.nan_to_num(RestEquations(system, list(q.T)).slope)))
+    return ~np.any((sizes < CLOSURES_MEET * sizes[:, :1]) & (slopes > CLOSURES_MEET), axis=1)
 
 
 def marks(system: RestSystem, setting: ObservedRobot, bodies: Sequence[str], points: Sequence[CriticalPoint],

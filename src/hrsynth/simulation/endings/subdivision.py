@@ -332,11 +332,11 @@ class Subdivision:
         """What boxes with one zero each hold."""
         (n, k), error, far = self.error.size, self.error.error, self.error.far
         K, forms = self._equations(x, reach)[1], _forms(x[:, :n], reach[:, :n])
-        if far is not None and error.turns.shape[1]:
+        if far is not None:
             # rates by the turn itself, so that K is symmetric at the zero
-            place = error.shifts.shape[1]
-            row = K[..., place, :] * forms[far].padded(len(K.v))[..., None]
-            K.v[..., place, :], K.r[:, place] = row.v, row.r
+            for place in self.error.turning:
+                row = K[..., place, :] * forms[far].padded(len(K.v))[..., None]
+                K.v[..., place, :], K.r[:, place] = row.v, row.r
         falling = negative(K) - k
         e, u = stacked(self.error.errors.at(forms)), stacked(self.error.directions.at(_forms(x[:, :n], 0 * x[:, :n])))
         least, most = np.maximum(np.maximum(e.low, -e.high), 0.0), e.size
