@@ -217,11 +217,14 @@ class Subdivision:
     def _near_zero(self, middle: Array, half: Array, P: Places) -> Flags:
         """Boxes (c, n) that lie, with their multipliers, in a box about a zero nearby that is proved to be the only one
         there: its edges are equal, or in the ratio in which the numbers of the file leave the zero open
-        (epsilon-inflation)."""
+        (epsilon-inflation). New ones are sought from the smallest boxes alone."""
+        smallest = np.all(half <= SMALLEST_BOX * self.whole, axis=1)
+        if not self.flat and not smallest.any():
+            return smallest
         mu, room, known = self._multipliers(middle, half, P)
         at, own = np.concatenate([middle, mu], axis=1), np.concatenate([half, room], axis=1)
         found = known & self._near(at, own)
-        left = np.flatnonzero(known & ~found)
+        left = np.flatnonzero(known & ~found & smallest)
         if not len(left):
             return found
         x = at[left]
