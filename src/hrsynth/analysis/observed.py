@@ -116,7 +116,7 @@ class ObservedRobot(Value):
             if not each.by_segment:
                 raise BadRequest(f"{self.robot.name}: {what} knows directions of segments only",
                                  f"{each.kind} {each.leg}",
-                                 "legs to watch (export and the studio know these alone)")
+                                 "legs to watch by the directions of their segments")
         return self
 
     @property
