@@ -13,12 +13,11 @@ from hrsynth.geometry.so3 import logarithm
 from hrsynth.geometry.vectors import rotation_about
 from hrsynth.kinematics.assembly import ASSEMBLED, BEYOND, Assembler
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.kinematics.limits import wrist_margins
+from hrsynth.kinematics.limits import Stops, wrist_margins
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.normal import normal_form
 from hrsynth.mechanism.pose import Pose
-from hrsynth.simulation.run import clearance
 from strategies import oblique, pods, random_direction, random_rotation, transformed
 
 Rng = np.random.Generator
@@ -158,7 +157,8 @@ def test_a_robot_is_assembled_where_its_three_axes_can_turn(seed: int) -> None:
         possible = three_angles(axes, A.T @ B) is not None
         seen.add(possible)
         assert (found.verdict, found.beyond) == ((ASSEMBLED, ()) if possible else (BEYOND, (name,)))
-        for value in (wrist_margins(at.twin, at.q)[name], clearance(at), at.twin.mechanism.wrists[name].margin()):
+        for value in (wrist_margins(at.twin, at.q)[name], Stops.of(at.twin, at.q).margins(at.twin, at.q)[name],
+                      at.twin.mechanism.wrists[name].margin()):
             assert (value >= 0) == possible
     assert seen == {True, False}
 
