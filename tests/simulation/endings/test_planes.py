@@ -16,6 +16,7 @@ from hrsynth.simulation.endings.critical_poses import CriticalPoses, Lift
 from hrsynth.simulation.endings.descent import CriticalPoint
 from hrsynth.simulation.endings.endings import RestSearch
 from hrsynth.simulation.endings.planes import PlaneError, factors
+from hrsynth.simulation.endings.pose_error import NotEnclosed
 from hrsynth.simulation.endings.search import ToldApart
 from simulation import scenes
 
@@ -144,6 +145,9 @@ def test_forms_of_rank_two_are_factors():
     assert span.shape == (4, 4)
     assert left[0] is form
     assert list(factors(np.eye(4), [np.eye(4)])) == []
+    for touching in (np.outer(a, a), np.outer(a, a) + np.outer(b, b)):
+        with pytest.raises(NotEnclosed):
+            list(factors(np.eye(4), [touching]))
 
 
 def test_where_closures_meet_a_slope_along_one_of_them_is_no_rest():

@@ -74,7 +74,7 @@ def servo(found: Servo) -> str:
         if s.aside:
             rows.append(("", f"holds it aside: on average {1e3 * s.offset:.3g} mm from there, at "
                              f"({' '.join(f'{value:.4g}' for value in s.mean)})"))
-    rows.append(("", list(found.notes)))
+    rows.append(("notes" if found.spread is None and found.notes else "", list(found.notes)))
     least = track.to_dict(run.times.tolist())
     if least["smallest"] is not None:
         rows.append(("on the way", f"smallest singular value of Mᵀ {least['smallest']:.3g}, at {least['at']:.3g} s"))

@@ -243,7 +243,8 @@ TURNED = np.stack([bends(each, np.eye(3)) for each in np.eye(3)], axis=1).reshap
 
 
 def factors(span: Array, forms: Sequence[Array]) -> Iterator[tuple[Array, list[Array]]]:
-    """Spaces (4, r) of quaternions in whose union forms vanish, each with the forms that do not vanish all over it."""
+    """Spaces (4, r) of quaternions in whose union forms vanish, each with the forms that do not vanish all over it;
+    raises ``NotEnclosed`` where one vanishes with its slope."""
     if not forms:
         yield span, []
         return
@@ -256,8 +257,10 @@ def factors(span: Array, forms: Sequence[Array]) -> Iterator[tuple[Array, list[A
         one, other = np.sqrt(np.abs(values[large]))[:, None] * vectors.T[large]
         for normal in (one + other, one - other):
             yield from factors(span @ np.linalg.svd(normal[None])[2][1:].T, rest)
-    elif values.min() < 0 < values.max():
+    elif values[large].min() < 0 < values[large].max():
         yield from ((own, [first, *left]) for own, left in factors(span, rest))
+    elif not large.all():
+        raise NotEnclosed("poses at which planes of legs touch each other")
 
 
 def _normal(mechanism: Mechanism, leg: Leg) -> Array | None:
