@@ -14,7 +14,7 @@ u = v / |v| with one component of v being 1. E is smooth at d = 0, where the poi
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import product
@@ -181,15 +181,23 @@ class JointError(Value):
         turn = exponential(y[:, k : self.error.size] @ self.error.turns.T)
         return self.error.p + y[:, :k] @ self.error.shifts.T, turn @ self.error.R
 
-    def parts(self, y: Sequence[Any], known: Number) -> tuple[list[Dual], list[Sequence[Dual]], list[Dual]]:
-        """g, the observed directions, and of limbs without a joint the reach margins less what a rod is to be long (of
-        those far away times w²), with their rates by the coordinates (n,), of which ``known`` makes numbers as well."""
-        error, n = self.error, self.size[0]
-        none = [0.0] * n
+    def unknowns(self, y: Sequence[Any], places: Iterable[int]) -> list[Dual]:
+        """Some of the coordinates with their rates."""
+        return [Dual(y[i], [float(i == j) for j in range(self.size[0])]) for i in places]
+
+    def fixed(self, known: Number) -> Number:
+        """What makes numbers with rates, which vanish, of the robot's numbers and lists of them."""
+        none = [0.0] * self.size[0]
 
         def number(value: Any) -> Any:
             return [number(each) for each in value] if np.ndim(value) else Dual(known(value), none)
 
+        return number
+
+    def parts(self, y: Sequence[Any], known: Number) -> tuple[list[Dual], list[Sequence[Dual]], list[Dual]]:
+        """g, the observed directions, and of limbs without a joint the reach margins less what a rod is to be long (of
+        those far away times w²), with their rates by the coordinates (n,), of which ``known`` makes numbers as well."""
+        error, number = self.error, self.fixed(known)
         w, point, turned, u = self._placed(y, known, number)
         g, margins, told = list[Dual](), list[Dual](), list[Sequence[Dual]]()
         least = self.shortest if self.short is None else 0.0
@@ -209,7 +217,7 @@ class JointError(Value):
             assert isinstance(limb, OnCrank | OnRail | SlidingRod)
             assert limb.axis is not None
             at, (one, two) = self.freedoms + self.joints.index(i), map(number, _across(limb))
-            z = Dual(y[at], [float(at == j) for j in range(n)])
+            (z,) = self.unknowns(y, [at])
             c, s = cosine(z), sine(z)
             way, ring = minus(tip, scaled(w, number(limb.centre))), plus(scaled(c, one), scaled(s, two))
             if isinstance(limb, SlidingRod):
@@ -232,8 +240,7 @@ class JointError(Value):
                 ) -> tuple[Dual, Components, list[Dual], list[Dual]]:
         """w, the shift of the platform's point and the platform's rotation by rows, both times w, and u of a chart
         about a short rod."""
-        n, k = self.size[0], self.error.shifts.shape[1]
-        x = [Dual(y[i], [float(i == j) for j in range(n)]) for i in range(self.freedoms)]
+        k, x = self.error.shifts.shape[1], self.unknowns(y, range(self.freedoms))
         w, place = number(1.0), list(x[:k])
         if self.far is not None:
             w, place[self.far] = x[self.far], w
@@ -277,12 +284,8 @@ class JointError(Value):
         error = self.error
 
         def formula(y: Sequence[Any], number: Number) -> list[Any]:
-            none, found = [0.0] * self.size[0], list[Any]()
-
-            def still(value: Any) -> Any:
-                return [still(each) for each in value] if np.ndim(value) else Dual(number(value), none)
-
-            _, place, rotation, _ = self._placed(y, number, still)
+            found = list[Any]()
+            _, place, rotation, _ = self._placed(y, number, self.fixed(number))
             point, turned = ([each.value for each in some] for some in (place, rotation))
             for i in self.joints:
                 limb = error.limbs[i]
@@ -336,12 +339,8 @@ class JointError(Value):
         none = [0.0] * n
 
         def formula(y: Sequence[Any], number: Number) -> list[Any]:
-            x = [Dual(y[i], [float(i == j) for j in range(n)]) for i in range(n)]
+            x, known = self.unknowns(y, range(n)), self.fixed(number)
             mu = [Dual(each, none) for each in y[n:]]
-
-            def known(value: Any) -> Dual:
-                return Dual(number(value), none)
-
             g, cosines = self.parts(x, known)[0], self._cosines(x, known)
             rows = [total([*(c.value * c.rates[j] * -1.0 for c in cosines),
                            *(each.rates[j] * own for each, own in zip(g, mu, strict=True))]) for j in range(n)]

@@ -138,8 +138,7 @@ class PlaneError(JointError):
 
     def _placed(self, y: Sequence[Any], known: Number, number: Number
                 ) -> tuple[Dual, Components, list[Dual], list[Dual]]:
-        n, k = self.size[0], self.along.shape[1]
-        x = [Dual(y[i], [float(i == j) for j in range(n)]) for i in range(self.freedoms)]
+        k, x = self.along.shape[1], self.unknowns(y, range(self.freedoms))
         w, place = number(1.0), list(x[:k])
         if self.far is not None:
             w, place[self.far] = x[self.far], w
@@ -171,12 +170,11 @@ class PlaneError(JointError):
         """As for a pose that is free; and the forms that vanish."""
         g, seen, margins = super().parts(y, known)
         if len(self.forms):
-            n, k = self.size[0], self.along.shape[1]
-            q = [Dual(y[i], [float(i == j) for j in range(n)]) for i in range(k, self.freedoms)]
-            q.insert(self.one, Dual(known(1.0), [0.0] * n))
+            q, number = self.unknowns(y, range(self.along.shape[1], self.freedoms)), self.fixed(known)
+            q.insert(self.one, number(1.0))
             for form in self.forms:
                 own, r = self.span.T @ form @ self.span, len(q)
-                g.append(total(q[i] * q[j] * Dual(known(own[i, j] * (1 if i == j else 2)), [0.0] * n)
+                g.append(total(q[i] * q[j] * number(own[i, j] * (1 if i == j else 2))
                                for i in range(r) for j in range(i, r)))
         return g, seen, margins
 
@@ -190,9 +188,7 @@ class PlaneError(JointError):
         """w, the platform's point from the goal's, times w, and the axis of its turn from the goal's, times the sine of
         its angle."""
         def formula(y: Sequence[Any], known: Number) -> list[Any]:
-            def number(value: Any) -> Any:
-                return [number(each) for each in value] if np.ndim(value) else Dual(known(value), [0.0] * self.size[0])
-
+            number = self.fixed(known)
             w, point, _, _ = self._placed(y, known, number)
             k = self.along.shape[1]
             R = self._rotation([Dual(each, [0.0] * self.size[0]) for each in y[k : self.freedoms]], number)
