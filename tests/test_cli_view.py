@@ -70,6 +70,7 @@ def test_a_port_that_is_taken_is_refused(capfd: pytest.CaptureFixture[str]):
         assert_refused(ask(capfd, "rrrrr_m1", "--no-open", "--port", port), 2, "cannot serve the page")
 
 
+@pytest.mark.slow
 def test_the_page_is_told_what_the_command_line_says(capfd: pytest.CaptureFixture[str], tmp_path: Path,
                                                      monkeypatch: pytest.MonkeyPatch):
     """The processes that answer read the same robot, and what the page copies is what was typed."""

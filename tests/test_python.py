@@ -92,6 +92,7 @@ def test_a_certificate_is_about_its_robot_alone():
             hrsynth.verify(record, other)
 
 
+@pytest.mark.slow
 def test_a_family_is_written_with_a_sentence_a_file(tmp_path: Path):
     ask = [sys.executable, "-m", "hrsynth.families", str(tmp_path)]
     done = subprocess.run([*ask, "bennett", "six_poses"], capture_output=True, text=True, check=True)

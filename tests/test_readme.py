@@ -67,6 +67,7 @@ def test_the_table_of_kinds_is_fresh():
     assert block(page, observation_kinds.START) == observation_kinds.table(), "the page is stale: make readme"
 
 
+@pytest.mark.slow
 def test_the_table_of_the_catalog_is_fresh():
     assert block(CATALOG, catalog.START) == catalog.table(), "the page is stale: make readme"
 

@@ -27,6 +27,7 @@ def outcomes(case: Case, claim: str) -> set[str]:
     return {said.outcome for said in case.found if said.claim == claim}
 
 
+@pytest.mark.some(6)
 @pytest.mark.parametrize("kind", ALL)
 def test_every_kind_makes_a_robot_whose_loops_close(kind, tmp_path):
     for seed in range(2):

@@ -306,6 +306,7 @@ def test_a_way_that_touches_a_fold_does_not_pass_it() -> None:
         assert at is None or [np.sign(bend(at, leg)) for leg in "12"] == signs
 
 
+@pytest.mark.slow
 def test_nothing_is_reached_from_a_pose_on_a_fold() -> None:
     """At x=±0.06, y=0 a rod lies along its crank, 0.04 m from the base joint, to the last digit: the sweep came to it
     and went on with the elbow on the other side."""

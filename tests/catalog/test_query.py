@@ -96,6 +96,7 @@ ANY_FIELD = st.fixed_dictionaries({}, optional={
 
 @settings(deadline=None)
 @given(ANY_FIELD)
+@pytest.mark.slow
 def test_lines_are_left_unread_only_where_they_do_not_fit(asked: dict[str, Any]):
     """Whatever is asked for, and however the file was written."""
     told, hold = may_fit(asked), fits(asked)

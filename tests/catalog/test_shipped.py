@@ -20,10 +20,12 @@ def test_the_files_are_those_of_the_groups_and_small():
     assert sum(file.stat().st_size for file in shipped().path.glob("*.jsonl*")) <= LARGEST
 
 
+@pytest.mark.slow
 def test_all_words_are_there_and_sorted():
     assert check(shipped(), sample=0) == ()
 
 
+@pytest.mark.slow
 def test_words_are_canonical_and_in_one_group():
     words = [word for group in EVERY for word in load(group=group).words]
     assert len(set(words)) == len(words)

@@ -47,6 +47,7 @@ def test_a_motor_changes_no_leg_s_label(name):
             tuple(leg.unmoved for leg in word.driven.legs)
 
 
+@pytest.mark.slow
 def test_groups_are_as_large_as_their_grammar_says():
     """Sets of k of n legs are (n + k - 1) over k: 11 planar ones, 28 with a parallelogram, 76 that translate, 26
     spherical ones. With a slide first, the rails of a set may be parallel as well."""

@@ -125,7 +125,7 @@ def mirrored(robot: Mechanism, seed: int) -> Mechanism:
 
 
 @pytest.mark.parametrize(("name", "same"), [("3rrr_m1", True), ("3rpr_m2", True), ("3prr_m1", True), ("3rps", False),
-                                            ("6pus", False)])
+                                            pytest.param("6pus", False, marks=pytest.mark.slow)])
 def test_a_planar_robot_is_its_own_mirror_image(name: str, same: bool):
     """Turned by half a turn about a line in its plane; a robot in space with skew joints on a link is not."""
     robot = load(name)

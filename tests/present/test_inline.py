@@ -20,6 +20,7 @@ def found():
     return hrsynth.view("3rrr_m1", hidden=True)
 
 
+@pytest.mark.slow
 def test_a_notebook_holds_the_page_itself(found, tmp_path):
     shown = found._repr_html_()
     (inner,) = re.findall(r'srcdoc="([^"]*)"', shown)
@@ -37,6 +38,7 @@ def test_a_view_is_written_as_a_page_alone(found, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_a_view_is_served_until_it_is_stopped(found):
     pytest.importorskip("uvicorn")
     server = found.serve(open_=False)

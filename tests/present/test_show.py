@@ -137,6 +137,7 @@ def test_pictures_of_results_are_shown_in_notebooks_and_saved(command: str, tmp_
         picture.save(tmp_path / "p.jpg")
 
 
+@pytest.mark.slow
 def test_pictures_of_grids():
     robot = load("rrrrr_m1")
     grid = "x=-0.02:0.02:3,y=0.3:0.34:3"

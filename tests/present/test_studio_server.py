@@ -222,6 +222,7 @@ def server_tabs(server: StudioServer) -> list[str]:
     return os.listdir(server.folder.name)
 
 
+@pytest.mark.slow
 def test_a_tab_that_goes_away_in_the_middle_takes_all_with_it(server: StudioServer):
     with opened(server) as page:
         processes = [page.ask(kind)["answer"]["process"] for kind in ("move", "open")]
@@ -324,6 +325,7 @@ def test_a_message_that_is_too_large_ends_the_tab(server: StudioServer):
         assert closed.value.rcvd.code == 1009
 
 
+@pytest.mark.slow
 def test_too_many_questions_at_once_are_refused(page: Page, monkeypatch: pytest.MonkeyPatch):
     from hrsynth.present.studio import processes
 

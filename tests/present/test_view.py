@@ -69,6 +69,7 @@ def test_a_slider_moves_one_coordinate_and_keeps_the_others(name: str):
                     assert angle * axis[k] == pytest.approx(wanted, abs=DRAWN)
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("name", ROBOTS)
 def test_the_hidden_robot_shows_the_same_directions_and_platform(name: str):
     found = seen(name)
@@ -146,6 +147,7 @@ def test_there_is_a_ghost_for_each_mode_but_the_pose_itself(name: str):
             assert turned(place, d) == pytest.approx(d, abs=1e-5)
 
 
+@pytest.mark.slow
 def test_the_turn_of_a_planar_robots_mode_is_told_as_phi():
     found = seen("3rrr_m1")
     listed = modes(load("3rrr_m1"))

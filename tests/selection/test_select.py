@@ -55,6 +55,7 @@ def first(watched: str) -> Candidate:
     return work().first(tuple(watched.split(",")))
 
 
+@pytest.mark.slow
 def test_every_set_is_told_once_the_kept_ones_first_by_accuracy() -> None:
     sets = [each.legs for each in found().candidates]
     assert len(set(sets)) == len(sets) == 3 + 3

@@ -66,6 +66,7 @@ def test_the_camera_sees_all_rods_and_exact_edges_give_exact_directions(name: st
     assert sense(0.0, scene.start.pose, u) == pytest.approx(u, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_a_carried_camera_sees_the_same_directions_from_its_link():
     robot = load("delta")
     carried = robot.platform

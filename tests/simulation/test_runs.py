@@ -285,6 +285,7 @@ def test_a_joint_that_starts_beyond_its_limit_hides_no_other():
     assert any("beyond the limits of shoulder_1" in each for each in found.notes)
 
 
+@pytest.mark.slow
 def test_a_noisy_run_that_meets_a_limit_is_over():
     """Noise of a degree leads a joint beyond a limit 0.004 rad past the goal; without it the run ends at the goal."""
     ends = {"start": "x=0.05,y=0.2", "goal": "x=-0.05,y=0.2"}

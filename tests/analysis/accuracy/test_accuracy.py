@@ -156,6 +156,7 @@ def test_a_bound_that_may_be_too_large_is_told_to_be_one(cones: str) -> None:
 
 @settings(max_examples=8, deadline=None, suppress_health_check=list(HealthCheck))
 @given(parallel_robots())
+@pytest.mark.slow
 def test_extremes_of_random_robots(robot) -> None:
     try:
         setting = ObservedRobot.of(robot, samples=3)
@@ -236,6 +237,7 @@ def test_singular_poses_of_a_plane_are_singular() -> None:
     assert near.poses[0].position.largest > 1.0
 
 
+@pytest.mark.slow
 def test_the_curve_of_a_plane_that_is_swept_is_where_the_cranks_are_parallel() -> None:
     """A five-bar is found pose by pose; its cranks of 0.16 m end on two circles about the pose, of 0.2 m."""
     found = accuracy(load("rrrrr_m1"), cone=CONE, grid="x=-0.15:0.15:21,y=-0.25:0.05:21")
@@ -312,6 +314,7 @@ def test_bad_requests(legs: str, cones: str, options: dict, word: str) -> None:
     assert len(caught.value.lines()) == 1
 
 
+@pytest.mark.slow
 def test_poses_and_planes_out_of_reach() -> None:
     with pytest.raises(PoseNotReached):
         accuracy(load("quattro"), "1,4", cone=CONE, at=["x=3"])

@@ -137,6 +137,7 @@ def test_opposite_signs_are_separated_and_equal_signs_never(robot: str, observe:
         assert answer.certified or answer.verdict == UNDECIDED
 
 
+@pytest.mark.slow
 def test_nine_of_ten_pairs_on_one_side_are_joined():
     aspects = aspects_of("3rrr_m1")
     verdicts = [aspects.join(*pair).verdict for pair in pairs("3rrr_m1", None, 30, seed=3)]

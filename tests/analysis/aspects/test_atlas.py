@@ -138,6 +138,7 @@ def test_intervals_that_are_used_up_leave_pairs_undecided(monkeypatch: pytest.Mo
     assert any("used up" in pair.reason for pair in found.pairs)
 
 
+@pytest.mark.slow
 def test_a_continuum_has_an_empty_table_and_no_picture(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     found = atlas(hrsynth.load("quattro"), "1")
     assert found.table == []

@@ -92,6 +92,7 @@ def test_three_modes_meet_at_a_cusp(drawn: HeldLegSection):
         assert cusp.radius < 1e-4
 
 
+@pytest.mark.slow
 def test_two_modes_meet_twice_at_a_node(drawn: HeldLegSection):
     for one, other in drawn.nodes:
         assert np.max(np.abs(np.exp(1j * np.array(one.directions)) - np.exp(1j * np.array(other.directions)))) < 1e-9

@@ -70,6 +70,7 @@ def test_shipped_robots_with_their_own_motors(robot: str) -> None:
     check(singular(load(robot), real=True, points=1000), 1000)
 
 
+@pytest.mark.slow
 def test_a_zero_of_the_expression_where_the_platform_has_fewer_freedoms_is_no_disagreement() -> None:
     """det(p1, p2, p3) also vanishes where the platform itself has two freedoms: nothing is lost to the motors there."""
     check(singular(load("3upu"), real=True, points=40), 40)
@@ -196,7 +197,7 @@ def test_a_false_never_is_told_though_no_pose_that_was_drawn_is_singular(robot: 
     assert caught.value.angle == 0.0
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(1)
 @pytest.mark.parametrize(("robot", "legs", "real"), [
     ("3rrr_m1", None, False), ("3rpr_m1", None, False), ("3rps", None, True), ("gough_stewart", None, True)])
 def test_where_the_rank_is_led_to_zero_the_expression_vanishes(robot: str, legs: str | None, real: bool) -> None:

@@ -143,6 +143,7 @@ def test_spatial_vanishes_where_four_planes_meet(seed: int) -> None:
     assert at(expression("hexa", "1,2,3"), tips | lines | {"tau1": tips["B1"] - point}) != 0
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_two_bodies_are_the_determinant_of_six_velocity_equations(seed: int) -> None:
     """v = λ1 τ1 and v + μ e = λ2 τ4 in the six unknowns v, μ, λ."""

@@ -169,6 +169,7 @@ def singular_place(u: Array, rails: list[Array], leg: list[Array]) -> Array:
     return np.asarray(home + Rotation.from_rotvec(a * angle).apply(folded) - rod - 0.2 * rails[0])
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("watched", [0.0, 0.8])
 def test_a_u_joint_that_turns_about_what_is_watched_is_seen(watched: float, tmp_path: Path):
     """Leg 1 then lets its end turn about that direction besides; where the rod itself is watched this moves nothing."""

@@ -62,6 +62,7 @@ def told(tmp_path: Path, file: str, *asked: object, **more: object) -> tuple[str
 
 
 @pytest.mark.parametrize("watched", [0.0, 0.8])
+@pytest.mark.slow
 def test_a_rod_of_a_parallelogram_that_turns_about_what_is_watched_is_seen(watched: float, tmp_path: Path):
     file, u, rails, leg = parallelograms(watched)
     robot, answer = told(tmp_path, file, "1,2")
@@ -111,6 +112,7 @@ def still_crank() -> float:
 
 
 @pytest.mark.parametrize("real", [False, True])
+@pytest.mark.slow
 def test_a_crank_at_rest_lets_its_rocker_move_at_a_dead_point(real: bool, tmp_path: Path):
     assert still_crank() < 1e-9
     _, answer = told(tmp_path, four_bar("crank"), real=real)
@@ -119,6 +121,7 @@ def test_a_crank_at_rest_lets_its_rocker_move_at_a_dead_point(real: bool, tmp_pa
 
 
 @pytest.mark.parametrize("see", ["inclination:r0/0.3,0.5,0.8", "position:r0@0.1,0.2,0.3"])
+@pytest.mark.slow
 def test_other_observations_of_a_legs_link_may_fail_at_special_poses(see: str, tmp_path: Path):
     """The rod of a U joint turns about the vertical where this lies in the plane of the joint's axes."""
     _, answer = told(tmp_path, sliding_platform(0.0)[0], "2", see=[see])
@@ -135,6 +138,7 @@ def test_the_inclination_of_a_legs_link_is_compared_with_the_rank():
     assert answer.checked.largest_angle < 1e-9
 
 
+@pytest.mark.slow
 def test_a_second_direction_of_a_leg_may_fail_where_the_first_holds(tmp_path: Path):
     """An arm and the rod on its U joint are watched: with the arm at rest the rod turns about the direction that is
     seen of it where that lies along the joint's first axis."""

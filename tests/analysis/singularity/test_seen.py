@@ -40,6 +40,7 @@ def off_the_cylinder(P: Array, C: Array) -> float:
     return float(np.linalg.norm(away - (away @ n) / (n @ n) * n) - np.linalg.norm(P[0] - centre))
 
 
+@pytest.mark.slow
 def test_three_points_name_the_danger_cylinder() -> None:
     found = seen(*POINTS[:3])
     assert found.words == "C lies on the danger cylinder, the circular cylinder over the circle through B1, B2, B3"

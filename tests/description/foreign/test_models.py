@@ -86,6 +86,7 @@ def test_three_observed_legs_control_all_six_freedoms(name: str, architecture: s
     assert sum(joint.type.freedoms for joint in found.hidden.joints.values() if joint.actuated) == 6
 
 
+@pytest.mark.slow
 def test_a_part_of_a_leg_is_a_robot_of_its_own():
     leg = load(MODELS / "gepetto-digit-like", base="tarsus", platform="foot")
     found = check(leg)

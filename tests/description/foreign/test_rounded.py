@@ -145,6 +145,7 @@ def test_a_tilted_robot_of_no_round_numbers_is_the_same(name: str, decimals: int
     assert answer(again(tilted, tmp_path / "robot.sdf", decimals)) == answer(robot)
 
 
+@pytest.mark.slow
 def test_rounded_directions_of_observe_are_those_of_segments(tmp_path: Path):
     """Watched along its rods a Delta is watched along the rods that are read; lint writes these directions."""
     robot = load("delta")

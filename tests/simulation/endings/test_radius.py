@@ -20,6 +20,7 @@ from hrsynth.simulation.law import inverted
 from strategies import random_rotation, transformed
 
 
+@pytest.mark.slow
 def test_the_point_is_told_where_poses_tell_another():
     """A rod of a five-bar is the platform, its frame at the elbow: that stays where the crank does, however far the rod
     turns, so that the radius cannot be one of the elbow."""
@@ -146,6 +147,7 @@ def test_the_law_without_damping_leads_inwards(name, legs, least):
     assert np.all(ends(setting, wide, starts(wide, np.random.default_rng(4), 200)) < 1e-6)
 
 
+@pytest.mark.slow
 def test_a_ball_ends_before_the_law_leads_away():
     """The first pose along many rays at which it does is a little beyond the ball that is proved."""
     setting = ObservedRobot.of("rrrrr_m1")

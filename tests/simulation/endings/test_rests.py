@@ -206,6 +206,7 @@ def test_what_is_said_to_be_all_is_what_boxes_prove(name: str) -> None:
     assert (twice.strangers, twice.complete) == (1, False)
 
 
+@pytest.mark.slow
 def test_of_one_pose_the_enclosed_rest_is_told() -> None:
     """Where loops are singular, a mode is found to half the digits: its error did not vanish, and it was *critical*
     beside nothing that said *mode* (quattro, legs 1 and 4, z = −0.7)."""
@@ -269,6 +270,7 @@ def test_a_thousand_starts_at_once_find_no_other() -> None:
     assert len(result.met) > 25
 
 
+@pytest.mark.slow
 def test_critical_poses_are_rests_and_joints_go_there() -> None:
     """Each pose that is found without joints is one at which the robot rests, its directions are those of that rest;
     the joints that are found from the goal alone have both where they are to be."""
