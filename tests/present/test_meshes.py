@@ -58,7 +58,6 @@ def test_solids_stand_for_the_rods_of_their_links(tmp_path: Path):
 @pytest.mark.parametrize("address", [
     "part.stl", pytest.param("package://some_robot/part.stl", marks=pytest.mark.slow),
     pytest.param("file://{folder}/part.stl", marks=pytest.mark.slow)])
-@pytest.mark.slow
 def test_mesh_files_beside_the_robot_are_read(tmp_path: Path, address: str):
     import trimesh
 
