@@ -16,23 +16,17 @@ from typing import TypeVar
 import numpy as np
 
 from ..budgets import EASY_ITERATIONS
-from ..errors import BadMechanism, BranchPoint, NotMeasured, NotSampled, Shaky
-from ..geometry.ranks import kernel_basis, largest_angle, range_bases
+from ..errors import BadMechanism, NotMeasured, NotSampled
+from ..geometry.ranks import range_bases
 from ..geometry.vectors import Array
 from ..mechanism.observation import Observation
 from ..results import Value
 from ..tolerances import (
     CLOSED,
-    CONTINUED,
-    CONTINUED_STEP,
-    EXACT,
     FOLLOWED,
     INVERTED,
-    NUDGE,
     RANK_GAP,
-    SHARP,
     SOLVED,
-    STEADY_TANGENT,
     SURELY_SOMETHING,
     UNMOVING,
 )
@@ -40,28 +34,26 @@ from .branch import OperationMode, Signature, group_modes, turns_of
 from .configuration import ClosedConfiguration
 from .pinocchio_model import PinocchioModel
 from .relation import Measurement, Relation, relation, relations
-from .tasks import Places, Target, shortened, solve, solve_together
+from .sampled_mode import (
+    STEPS,
+    far_walks,
+    firmest,
+    is_regular,
+    mode_at,
+    other_modes,
+    require_motions,
+    require_one,
+    ways_out,
+    well_closed,
+)
+from .tasks import Places, Target, shortened, solve_together
 from .tracking import track_paths
-from .walking import HALVED, STEP, WEAKEST, any_velocity, lands_beside, random_walk, step_along
+from .walking import HALVED, STEP, WEAKEST, any_velocity, lands_beside, step_along
 
 X = TypeVar("X")
 
 TURNS = 3
 """Directions that a walk tries before a singularity before it is given up."""
-ASKED = 40
-"""Configurations beyond a singularity that are asked whether they may be of another operation mode."""
-MET = 6
-"""How many of those that may are confirmed by walks from there."""
-BEYOND = 16
-"""Steps of such a walk."""
-LEAVING = 24
-"""Steps in random directions by which the branches at a singular zero configuration are sought."""
-SHAKEN = 3
-"""Samples at which a mechanism is seen to be shaky before it is said to be."""
-NAMED = 6
-"""Links that a refusal names."""
-STEPS = 4
-"""Steps from the zero configuration to a sample."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -121,122 +113,23 @@ def sample(twin: PinocchioModel, question: Measurement, count: int, seed: int = 
         raise BadMechanism(f"{twin.mechanism.name}: its loops let no link move", None,
                            "a mechanism with at least one freedom")
     rng = np.random.default_rng(seed)
-    regular = _regular(start, rng)
-    roots = [start] if regular and moves else _ways_out(start, question, rng, singular=not regular)
+    regular = is_regular(start, rng)
+    roots = [start] if regular and moves else ways_out(start, question, rng, singular=not regular)
     for freely in (False, True):
         walks = _Walks(question, leading, np.random.default_rng(seed), freely)
         members, discarded, led = walks.sample(roots, count)
         signatures = [Signature.of(member.relation) for member in members]
-        if freely or not (far := _far(roots[0])):
+        if freely or not (far := far_walks(roots[0])):
             break
-        probe = _mode(_firmest(far), question)
+        probe = mode_at(firmest(far), question)
         if probe is None or all(map(probe.signature.agrees, signatures)):
             break
-    _require_motions([member.configuration for member in members])
+    require_motions([member.configuration for member in members])
     groups = group_modes([OperationMode(each, member.configuration)
                           for each, member in zip(signatures, members, strict=True)])
-    _require_one(groups, question, "the configurations reached differ as only those of several operation modes do")
+    require_one(groups, question, "the configurations reached differ as only those of several operation modes do")
     own = groups[0][0].signature
-    return Samples(question, twin, start, tuple(members), discarded, _others(walks.beyond, own, question), led)
-
-
-def _others(beyond: Sequence[ClosedConfiguration], own: Signature, question: Measurement) -> tuple[OperationMode, ...]:
-    """The operation modes other than one's own to which configurations belong, each confirmed by walks from there."""
-    some = beyond[:: max(1, len(beyond) // ASKED)]
-    strange = [at for at in some if (each := _mode(at, question)) and not each.signature.agrees(own)]
-    found = group_modes([each for at in strange[:MET]
-                     if (far := _far(at, BEYOND)) and (each := _mode(_firmest(far), question))])
-    return tuple(group[0] for group in found if not group[0].signature.agrees(own))
-
-
-def _mode(at: ClosedConfiguration, question: Measurement) -> OperationMode | None:
-    """The operation mode that a configuration shows; None where its ranks are not clear, as beside a singularity."""
-    if (steady := _steady(at)) is None or steady.kernel()[1].dropped > EXACT:
-        return None
-    try:
-        found = relation(steady, question)
-    except NotMeasured:
-        return None
-    return OperationMode(Signature.of(found), at) if found.gap >= RANK_GAP else None
-
-
-def _ways_out(start: ClosedConfiguration, question: Measurement, rng: np.random.Generator, *, singular: bool
-              ) -> list[ClosedConfiguration]:
-    """Configurations beside a ``singular`` zero configuration, or beside one at which nothing that is asked moves to
-    first order (a dead centre); raises ``BranchPoint`` where they are not of one mode, ``BadMechanism`` where nothing
-    that is asked moves there either."""
-    found = [each for _ in range(LEAVING)
-             if (beside := step_along(start, any_velocity(start, rng), leaving=singular)) is not None
-             and (each := _mode(beside, question)) is not None]
-    if not found:
-        raise NotSampled(start.twin.mechanism.name, 0, 1)
-    if all(each.signature.dimension == 0 for each in found):
-        _refuse_unmoved([each.at for each in found])
-    groups = group_modes(found)
-    _require_one(groups, question, "several operation modes meet at the zero configuration (its loops have mobility "
-                                   f"{start.kernel()[0].shape[1]} there)")
-    return [each.at for each in found]
-
-
-def _refuse_unmoved(found: Sequence[ClosedConfiguration]) -> None:
-    """Raise ``BadMechanism`` that names the links that do move."""
-    mechanism = found[0].twin.mechanism
-    moving = [link for link in mechanism.links
-              if any(np.abs(at.velocity(link) @ at.kernel()[0]).max() > SURELY_SOMETHING for at in found)]
-    named = ", ".join(moving[:NAMED]) + (f" and {len(moving) - NAMED} more" if moving[NAMED:] else "")
-    raise BadMechanism(f"{mechanism.name}: neither the platform nor a watched segment moves, but other links do "
-                       f"({named}; mobility {found[0].kernel()[0].shape[1]})", None,
-                       "a platform or a watched segment that moves (--observe LINK)")
-
-
-def _require_motions(found: Sequence[ClosedConfiguration]) -> None:
-    """Raise ``Shaky`` where ker A is larger than the tangent space of what closes, all along: so where loops repeat
-    each other to first order and not beyond (docs/pages/theory.md, section 1)."""
-    done = 0
-    for at in sorted(found, key=lambda each: -each.kernel()[1].weakest)[:SHAKEN]:
-        mobility = at.kernel()[0].shape[1]
-        if (ways := ways_on(at)) is None or ways == mobility:
-            return
-        done = max(done, ways)
-    if found:
-        raise Shaky(found[0].twin.mechanism.name, found[0].kernel()[0].shape[1], done)
-
-
-def ways_on(at: ClosedConfiguration) -> int | None:
-    """In how many independent ways small steps along ker A lead to closed configurations; None where one does not
-    close. Where no constraint is redundant that is the mobility."""
-    twin, (kernel, rank) = at.twin, at.kernel()
-    if rank.value == len(twin.residual(at.q)):
-        return kernel.shape[1]
-    predicted = [twin.moved(at.q, CONTINUED_STEP * each) for each in kernel.T]
-    closed = solve_together(Places(twin, None), predicted, [None] * len(predicted), tolerance=SOLVED)
-    if any(residual > CLOSED for _, residual in closed):
-        return None
-    steps = np.array([kernel.T @ twin.difference(at.q, q) for q, _ in closed]) / CONTINUED_STEP
-    return int(np.sum(np.linalg.svd(steps, compute_uv=False) > CONTINUED))
-
-
-def _require_one(groups: Sequence[Sequence[OperationMode]], question: Measurement, what: str) -> None:
-    if len(groups) > 1:
-        first, at = groups[0][0].signature, groups[0][0].at
-        others = [groups[1][0].signature, *[first] * (len(groups) - 1)]
-        raise BranchPoint(at.twin.mechanism.name, what, [
-            group[0].beside(other, [o.leg for o in question.observations]) for group, other in zip(groups, others,
-                                                                                           strict=True)])
-
-
-def _far(start: ClosedConfiguration, steps: int = STEPS) -> list[ClosedConfiguration]:
-    """The configurations of two random walks in all of the mechanism's freedoms, the second half of each."""
-    try:
-        walk = list(random_walk(start, 2 * steps, steps=steps))
-    except NotSampled:
-        return []
-    return [at for number, at in enumerate(walk) if number % steps >= steps // 2]
-
-
-def _firmest(found: Sequence[ClosedConfiguration]) -> ClosedConfiguration:
-    """The configuration farthest from a singularity of the loops."""
-    return max(found, key=lambda at: at.kernel()[1].weakest)
+    return Samples(question, twin, start, tuple(members), discarded, other_modes(walks.beyond, own, question), led)
 
 
 @dataclass(eq=False)
@@ -325,7 +218,7 @@ class _Walks:
                 walker.way.append(target)
             walkers = [walker for walker in walkers if None not in walker.way]
         steady = [(at, [each for each in walker.way if each is not None]) for walker in walkers
-                  if (at := _steady(walker.here)) is not None]
+                  if (at := well_closed(walker.here)) is not None]
         found = _measured(lambda at: relations(at, question, question.rows_together(at)), [at for at, _ in steady])
         return [Sample(at, tuple(way), each) for (at, way), each in zip(steady, found, strict=True)
                 if each is not None and each.gap >= RANK_GAP]
@@ -421,23 +314,3 @@ def _measured(ask: Callable[[list[ClosedConfiguration]], Iterable[X]], places: S
         return list(ask(list(places))) if places else []
     except NotMeasured:
         return [None] if len(places) == 1 else [each for place in places for each in _measured(ask, [place])]
-
-
-def _steady(here: ClosedConfiguration) -> ClosedConfiguration | None:
-    """The same configuration, its loops closed so well that T_qC does not turn by the residual; None where numbers do
-    not allow that, near a singularity."""
-    if here.residual <= STEADY_TANGENT * here.kernel()[1].weakest ** 2:
-        return here
-    twin = here.twin
-    here = ClosedConfiguration.of(twin, solve(twin, here.q, tolerance=SHARP, iterations=5)[0])
-    aside, _ = kernel_basis(twin.jacobian(twin.moved(here.q, NUDGE * here.loops.right[:, -1])))
-    turn = largest_angle(here.kernel()[0], aside) / NUDGE  # radians for each unit of the weakest direction
-    return here if turn * max(here.residual, SHARP) / here.strengths[-1] <= STEADY_TANGENT else None
-
-
-def _regular(start: ClosedConfiguration, rng: np.random.Generator) -> bool:
-    """Whether some step from a configuration, however short, follows its branch: not so where branches meet."""
-    velocity = any_velocity(start, rng)
-    return any(step_along(start, velocity, part) is not None for part in (*HALVED[::3], 1e-4, 1e-5))
-
-
