@@ -311,8 +311,7 @@ def test_two_legs_of_3upu_need_the_third() -> None:
     assert all("refused" in step.reason for step in refused)
 
 
-@pytest.mark.slow
-@pytest.mark.some(1)
+@pytest.mark.some(0, 1)
 @pytest.mark.parametrize("seed", [0, 3])
 def test_unobserved_legs_near_a_fold(seed: int) -> None:
     """A sample at which the robot cannot follow itself, for want of the directions of the other legs, is no sample."""

@@ -235,8 +235,8 @@ def test_tubes_hold_what_small_steps_find(name, half):
     assert obeys(proof, np.random.default_rng(1), 3, 6) == 18
 
 
-@pytest.mark.parametrize(("name", "least", "effort"), [
-    pytest.param("quattro", 0.009, 100, marks=pytest.mark.long), pytest.param("hexa", 0.004, 100, marks=SLOW)])
+@pytest.mark.long
+@pytest.mark.parametrize(("name", "least", "effort"), [("quattro", 0.009, 100), ("hexa", 0.004, 100)])
 def test_a_box_much_too_large_is_proved_about_zero(name, least, effort):
     """Whole turns of four and six motors: cells no larger than the one about zero that is proved, most of which are."""
     proof = branch(name, effort=effort)

@@ -105,7 +105,7 @@ def test_lines_are_left_unread_only_where_they_do_not_fit(asked: dict[str, Any])
         assert told(spaced)
 
 
-@pytest.mark.slow
+@pytest.mark.some(0, 3)
 @pytest.mark.parametrize("text", ["takeover", "hexaglide", "3-R", "lift 1,2", "['1'", "controllable", "(Rz"])
 def test_a_text_is_found_in_lines_as_in_records(text: str):
     assert list(load(text=text)) == list(load().where(text=text))

@@ -222,7 +222,7 @@ def alone(kinds: str) -> str:
 @pytest.mark.some(1)
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize(("kinds", "count"), [
-    ("2LLC", 40), ("PSSS", 12), pytest.param("CCSS", 20, marks=pytest.mark.slow),
+    ("2LLC", 40), ("PSSS", 12), pytest.param("CCSS", 20, marks=pytest.mark.long),
     *(pytest.param(kinds, 500, marks=pytest.mark.long) for kinds in ("CCSS", "EEEEEE", "LLC"))])
 def test_false_certificates_with_zeros_at_infinity_or_of_poses_are_refused(kinds, count):
     assert sum(attacked(alone(kinds), count, 5).values()) == count
@@ -297,7 +297,7 @@ CHAINS: dict[str, tuple[Callable[[], AssemblyModes], str]] = {
     "a turn and a slide": (lambda: hrsynth.modes(carried("RP", 1), real=True), "6 real of 6"),
     **{name: (partial(driven, name), f"{count} real of {count}") for name, count in LISTED.items()
        if name != "sarrus"}}
-QUICK = {"an ankle", "bennett", "goldberg"}
+HEAVY = {"an ankle": [], "bennett": [], "goldberg": [], "myard": [pytest.mark.long]}
 
 
 @cache
@@ -311,7 +311,7 @@ def chained(name: str) -> str:
 
 
 @pytest.mark.some(1, 3)
-@pytest.mark.parametrize("name", [pytest.param(each, marks=[] if each in QUICK else [pytest.mark.slow])
+@pytest.mark.parametrize("name", [pytest.param(each, marks=HEAVY.get(each, [pytest.mark.slow]))
                                   for each in CHAINS])
 def test_platforms_that_a_leg_carries_and_single_loops(name: str):
     """Without loops as many poses as are listed; with them the goal closes exactly, all others fit or miss."""

@@ -228,7 +228,8 @@ def test_letters_and_lines_of_drawings_stand_out():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("pairs", "color"), [(list(permutations((1, 2, 3), 2)), "good"), ([(1, 2), (2, 3)], "bad")])
+@pytest.mark.parametrize(("pairs", "color"), [(list(permutations((1, 2, 3), 2)), "good"),
+                                              pytest.param([(1, 2), (2, 3)], "bad", marks=pytest.mark.long)])
 def test_a_formation_is_as_good_in_the_table_as_in_the_headline(pairs: list[tuple[int, int]], color: str):
     made = formation([(0, 0, 0), (1, 0.1, 0), (0.5, 0.9, 0.2)], pairs, bodies="position")
     root = read(report(derive(made)))

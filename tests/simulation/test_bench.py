@@ -64,7 +64,7 @@ def test_the_simulated_robot_ends_where_the_loop_without_dynamics_does():
     check_together("delta")
 
 
-@pytest.mark.some(0, 6)
+@pytest.mark.some(0, 3)
 @pytest.mark.parametrize("name", [name for name in CONTROLLABLE if name != "delta"])
 def test_the_other_simulated_robots_do_too(name: str):
     check_together(name)

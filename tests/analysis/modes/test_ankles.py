@@ -150,7 +150,7 @@ def test_motors_on_all_joints_of_a_leg_leave_it_no_way():
         carried_platform(measured, measured.setting.everything.start, 1e-12)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_lists_of_parallel_hinges_do_not_depend_on_how_a_robot_stands():
     robot, rng = carried("RR", 3), np.random.default_rng(1)
     robot = robot.changed(joints=[replace(robot.joints[f"joint_{k}"], axes=(np.eye(3)[2],)) for k in range(2)])

@@ -205,7 +205,7 @@ def test_thin_tips_are_within_the_window(degrees: int) -> None:
     assert np.abs(window - [corners.min(axis=0), corners.max(axis=0)]).max() <= 1.25 * step
 
 
-@pytest.mark.some(1)
+@pytest.mark.some(1, 1)
 @pytest.mark.parametrize(("robot", "plane"), [("3rrr_m1", "phi=0"), ("prrrp_m1", None), ("rrrrr_m1", None)])
 def test_nothing_that_is_reached_touches_the_window(robot: str, plane: str | None) -> None:
     reached = np.isfinite(drawn(load(robot), plane=plane, steps=21).hidden.type2)

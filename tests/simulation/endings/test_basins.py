@@ -261,7 +261,7 @@ def test_ends_do_not_depend_on_how_the_work_is_shared_out(monkeypatch: pytest.Mo
     assert [each.ending.name for each in found.ends] == [each.ending.name for each in small().ends]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_ends_do_not_depend_on_the_number_of_processes(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(module, "FLOW_PART", 20)
     both = [hrsynth.basins("3rpr_m1", to="x=0,y=0,phi=0", grid=GRID, jobs=jobs) for jobs in (1, 2)]

@@ -209,7 +209,7 @@ def test_kinds_sum_up_to_the_number_of_the_closures(name, number):
     assert sum((-1) ** each.falling for each in found.found) == number
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_rests_of_three_sliders_are_all_but_where_they_lock():
     """The Orthoglide: 80 critical poses, their kinds sum up to nothing; at six places two rods stand square to their
     rails, side by side."""

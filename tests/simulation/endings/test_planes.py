@@ -219,7 +219,7 @@ def zeros(x, steps=60):
         return y[(np.abs(lagrange(y)).max(axis=1) < 1e-11) & (np.abs(y[:, :6]).max(axis=1) < 100)]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_all_rests_of_the_two_families_are_listed():
     """18 poses at which the platform is turned about axes of the base's plane, 22 half turns: Newton's method on
     Lagrange's equations over the three points meets all of them and no other; their kinds sum up to nothing in each of

@@ -460,7 +460,7 @@ def test_rests_of_all_kinds_are_those_of_the_law(see: list[str], tmp_path: Path)
             assert (away.max() < 1e-4) == (each.stable is True)
 
 
-@pytest.mark.some(0, 1)
+@pytest.mark.long
 @pytest.mark.parametrize(("depth", "mixed"), [("desired", False), ("constant:1", True)])
 def test_rests_with_supposed_depths_are_those_of_the_law(depth: str, mixed: bool, tmp_path: Path) -> None:
     """There the law commands nothing, and its differences have the eigenvalues that are told."""
@@ -499,7 +499,7 @@ def test_a_flat_direction_never_attracts_for_sure(curvatures: list[float], word:
     assert stability(curvatures) == word
 
 
-@pytest.mark.slow
+@pytest.mark.some(0, 1)
 @pytest.mark.parametrize("reach", [0.3, 2.25])
 def test_rests_within_the_limits_of_joints_are_counted(reach: float) -> None:
     robot = hrsynth.load(FIVE_BAR)

@@ -144,7 +144,8 @@ def test_on_the_lines_on_which_a_rod_lies_along_its_axis_all_are_found(turn):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("turn", TURNS.values(), ids=TURNS)
+@pytest.mark.parametrize("turn", [pytest.param(turn, id=name, marks=pytest.mark.long) if name == "as at the goal" else
+                                  pytest.param(turn, id=name) for name, turn in TURNS.items()])
 def test_rests_are_those_of_the_joints_by_hand(turn):
     """At each of 24 points, 11 with the rods as they like, 3 with one of no length, 10 with one along its axis, and
     each choice of reversed rods, the gradient over the joints vanishes; each zero by itself that Newton's method meets
