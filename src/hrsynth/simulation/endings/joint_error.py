@@ -44,7 +44,7 @@ from ...results import Value
 from ...tolerances import FOLLOWED, KNOWN_NUMBER, SHORTEST_ROD
 from .pose_error import Number, PoseError
 
-_traced = partial(traced, off=KNOWN_NUMBER)
+robot_traced = partial(traced, off=KNOWN_NUMBER)
 
 
 def rodless(error: PoseError) -> Array:
@@ -216,7 +216,7 @@ class JointError(Value):
                 continue
             assert isinstance(limb, OnCrank | OnRail | SlidingRod)
             assert limb.axis is not None
-            at, (one, two) = self.freedoms + self.joints.index(i), map(number, _across(limb))
+            at, (one, two) = self.freedoms + self.joints.index(i), map(number, across(limb))
             (z,) = self.unknowns(y, [at])
             c, s = cosine(z), sine(z)
             way, ring = minus(tip, scaled(w, number(limb.centre))), plus(scaled(c, one), scaled(s, two))
@@ -276,11 +276,11 @@ class JointError(Value):
     @cached_property
     def closing(self) -> BoxFormula:
         """g (k)."""
-        return _traced(lambda y, number: [each.value for each in self.parts(y, number)[0]], self.size[0])
+        return robot_traced(lambda y, number: [each.value for each in self.parts(y, number)[0]], self.size[0])
 
     @cached_property
     def ways(self) -> BoxFormula:
-        """Of each limb with a joint the tip from the centre: along the axis, and across it (:func:`_across`)."""
+        """Of each limb with a joint the tip from the centre: along the axis, and across it (:func:`across`)."""
         error = self.error
 
         def formula(y: Sequence[Any], number: Number) -> list[Any]:
@@ -294,21 +294,21 @@ class JointError(Value):
                 way = plus(point, number(error.p + limb.tip.constant - limb.centre))
                 if np.any(limb.tip.turned):
                     way = plus(way, transformed(turned, number(limb.tip.turned)))
-                found += [dot(way, number(each)) for each in (limb.axis, *_across(limb))]
+                found += [dot(way, number(each)) for each in (limb.axis, *across(limb))]
             return found
 
-        return _traced(formula, self.freedoms)
+        return robot_traced(formula, self.freedoms)
 
     @cached_property
     def errors(self) -> BoxFormula:
         """u × u* of all that is observed."""
-        return _traced(lambda y, number: [e.value for u, wanted in self._seen(y, number) for e in cross(u, wanted)],
+        return robot_traced(lambda y, number: [e.value for u, wanted in self._seen(y, number) for e in cross(u, wanted)],
                       self.size[0])
 
     @cached_property
     def directions(self) -> BoxFormula:
         """u of all that is observed."""
-        return _traced(lambda y, number: [each.value for u, _ in self._seen(y, number) for each in u], self.size[0])
+        return robot_traced(lambda y, number: [each.value for u, _ in self._seen(y, number) for each in u], self.size[0])
 
     def _seen(self, y: Sequence[Any], number: Number) -> list[tuple[Sequence[Dual], list[Dual]]]:
         """The observed directions and the desired ones."""
@@ -327,7 +327,7 @@ class JointError(Value):
             return [*(each.value for each in g), *(rate for each in g for rate in each.rates), *slopes,
                     *(each.value for each in margins)]
 
-        return _traced(formula, n)
+        return robot_traced(formula, n)
 
     def _cosines(self, y: Sequence[Any], number: Number) -> list[Dual]:
         return [dot(u, wanted) for u, wanted in self._seen(y, number)]
@@ -347,7 +347,7 @@ class JointError(Value):
             return [rate for each in (*rows, *(each.value for each in g))
                     for rate in (each.rates if isinstance(each, Dual) else none)]
 
-        return _traced(formula, n + k)
+        return robot_traced(formula, n + k)
 
 
 def total(parts: Any) -> Any:
@@ -358,7 +358,7 @@ def total(parts: Any) -> Any:
     return first
 
 
-def _across(limb: OnCrank | OnRail | SlidingRod) -> tuple[Array, Array]:
+def across(limb: OnCrank | OnRail | SlidingRod) -> tuple[Array, Array]:
     """The directions from which a joint's angle counts, and to which it is a quarter of a turn."""
     assert limb.axis is not None
     one = np.linalg.svd(limb.axis[None])[2][1]
