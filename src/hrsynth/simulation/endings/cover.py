@@ -76,8 +76,8 @@ class Cover(Value):
         (p, R), k = (each[0] for each in self.error.coordinates.of([at])), self.error.shifts.shape[1]
         if any(limb.solve(limb.tip.value(p[None], R[None]), limb.mode)[0] < SHORTEST_ROD**2 for limb in self.short):
             return False
-        if self.loop is not None and any(abs(limb.solve(limb.tip.value(p[None], R[None]), limb.mode)[0][0]) < SAME_ENDING
-                                         for limb in self.loop.idle):
+        idle = () if self.loop is None else self.loop.idle
+        if any(abs(limb.solve(limb.tip.value(p[None], R[None]), limb.mode)[0][0]) < SAME_ENDING for limb in idle):
             return False
         x = self.error.shifts.T @ (p - self.error.p)
         if any(np.all(np.abs(x - middle[:k]) <= half[:k] + FOLLOWED) for middle, half in self.locked):
@@ -133,8 +133,8 @@ def cover(setting: ObservedRobot, goal: ClosedConfiguration, *, vanishing: bool 
     found: list[CriticalBox] = []
     for family, some in zip(families, parts, strict=True):
         own: list[CriticalBox] = []
-        for part, zero in ((part, zero) for part in some for zero in part.zeros()):
-            if not any(_same(zero, other, family) for other in own) and (zero.error[0] == 0.0 or not part.vanishing):
+        for zero in (zero for each in some for zero in each.zeros() if zero.error[0] == 0.0 or not each.vanishing):
+            if not any(_same(zero, other, family) for other in own):
                 own.append(zero)
         found += [_on_line(each, family.error, error) if len(each.x) < error.size else each for each in own]
     left, lost = (

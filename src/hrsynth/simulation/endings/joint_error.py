@@ -44,7 +44,7 @@ from ...results import Value
 from ...tolerances import FOLLOWED, KNOWN_NUMBER, SHORTEST_ROD
 from .pose_error import Number, PoseError
 
-robot_traced = partial(traced, off=KNOWN_NUMBER)
+of_robot = partial(traced, off=KNOWN_NUMBER)
 
 
 def rodless(error: PoseError) -> Array:
@@ -276,7 +276,7 @@ class JointError(Value):
     @cached_property
     def closing(self) -> BoxFormula:
         """g (k)."""
-        return robot_traced(lambda y, number: [each.value for each in self.parts(y, number)[0]], self.size[0])
+        return of_robot(lambda y, number: [each.value for each in self.parts(y, number)[0]], self.size[0])
 
     @cached_property
     def ways(self) -> BoxFormula:
@@ -297,18 +297,18 @@ class JointError(Value):
                 found += [dot(way, number(each)) for each in (limb.axis, *across(limb))]
             return found
 
-        return robot_traced(formula, self.freedoms)
+        return of_robot(formula, self.freedoms)
 
     @cached_property
     def errors(self) -> BoxFormula:
         """u × u* of all that is observed."""
-        return robot_traced(lambda y, number: [e.value for u, wanted in self._seen(y, number) for e in cross(u, wanted)],
+        return of_robot(lambda y, number: [e.value for u, wanted in self._seen(y, number) for e in cross(u, wanted)],
                       self.size[0])
 
     @cached_property
     def directions(self) -> BoxFormula:
         """u of all that is observed."""
-        return robot_traced(lambda y, number: [each.value for u, _ in self._seen(y, number) for each in u], self.size[0])
+        return of_robot(lambda y, number: [each.value for u, _ in self._seen(y, number) for each in u], self.size[0])
 
     def _seen(self, y: Sequence[Any], number: Number) -> list[tuple[Sequence[Dual], list[Dual]]]:
         """The observed directions and the desired ones."""
@@ -327,7 +327,7 @@ class JointError(Value):
             return [*(each.value for each in g), *(rate for each in g for rate in each.rates), *slopes,
                     *(each.value for each in margins)]
 
-        return robot_traced(formula, n)
+        return of_robot(formula, n)
 
     def _cosines(self, y: Sequence[Any], number: Number) -> list[Dual]:
         return [dot(u, wanted) for u, wanted in self._seen(y, number)]
@@ -347,7 +347,7 @@ class JointError(Value):
             return [rate for each in (*rows, *(each.value for each in g))
                     for rate in (each.rates if isinstance(each, Dual) else none)]
 
-        return robot_traced(formula, n + k)
+        return of_robot(formula, n + k)
 
 
 def total(parts: Any) -> Any:

@@ -23,14 +23,16 @@ from ...batch.enclosures import BoxFormula
 from ...closed_forms.legs import ClosedFormLeg, OnCrank, OnRail, SlidingRod
 from ...geometry.affine import AffineForms, stacked
 from ...geometry.components import Components, cosine, cross, dot, minus, plus, scaled, sine
-from ...geometry.duals import Dual
 from ...geometry.vectors import Array
 from ...tolerances import EXACT, FOLLOWED, MET_AGAIN, SINGULAR_BOX
 from .elimination import Flags, Places, away, pivots
-from .joint_error import JointError, across, robot_traced
+from .joint_error import JointError, across, of_robot
 from .pose_error import NotEnclosed, Number, PoseError
 from .reached import reached
-from .subdivision import CriticalBox, Subdivision, box_forms
+from .subdivision import CriticalBox, Subdivision, forms_of
+
+NARROWINGS = 16
+"""How many times the place of a zero is narrowed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,12 +172,12 @@ class LoopError(JointError):
 
     @cached_property
     def closing(self) -> BoxFormula:
-        return robot_traced(lambda y, number: self.vectors(y, number)[1], self.size[0])
+        return of_robot(lambda y, number: self.vectors(y, number)[1], self.size[0])
 
     @cached_property
     def left(self) -> BoxFormula:
         """What is left beside g."""
-        return robot_traced(self.rest, self.size[0])
+        return of_robot(self.rest, self.size[0])
 
     @cached_property
     def slips(self) -> BoxFormula:
@@ -184,7 +186,7 @@ class LoopError(JointError):
             n, _, u = self.vectors(y, number)[0]
             return [sine(y[self.freedoms - 2] - y[self.freedoms - 1]), *cross(n, u)]
 
-        return robot_traced(formula, self.size[0])
+        return of_robot(formula, self.size[0])
 
     @cached_property
     def bends(self) -> BoxFormula:
@@ -193,7 +195,7 @@ class LoopError(JointError):
             x, number = self.unknowns(y, range(self.size[0])), self.fixed(known)
             return [rate for each in (*self.vectors(x, number)[1], *self.rest(x, number)) for rate in each.rates]
 
-        return robot_traced(formula, self.size[0])
+        return of_robot(formula, self.size[0])
 
     @cached_property
     def ways(self) -> BoxFormula:
@@ -203,7 +205,7 @@ class LoopError(JointError):
             return [dot(n, number(way)) for each in self.terms if each.one is not None
                     for way in (each.axis, each.one, np.cross(each.axis, each.one))]
 
-        return robot_traced(formula, self.freedoms)
+        return of_robot(formula, self.freedoms)
 
     @cached_property
     def told(self) -> BoxFormula:
@@ -224,10 +226,10 @@ class LoopError(JointError):
             point = minus(point, number(arm))
             return [*(dot(point, number(way)) for way in error.shifts.T), *y[m + 2 :], *y[m : m + 2]]
 
-        return robot_traced(formula, self.size[0])
+        return of_robot(formula, self.size[0])
 
     def spanned(self, middle: Array, half: Array) -> tuple[Array, Array]:
-        found = stacked(self.told.at(box_forms(middle, half)))
+        found = stacked(self.told.at(forms_of(middle, half)))
         return found.low, found.high
 
 
@@ -239,7 +241,7 @@ class LoopSubdivision(Subdivision):
 
     def _narrow(self, middle: Array, half: Array) -> tuple[Array, Array]:
         low, high, m = middle - half, middle + half, self.error.freedoms
-        ways = self.error.ways.at(box_forms(middle, half)[:m])
+        ways = self.error.ways.at(forms_of(middle, half)[:m])
         turning = [k for k, each in enumerate(self.error.terms, m) if each.one is not None]
         for k, i in enumerate(turning):
             along, one, two = ((each.low, each.high) for each in ways[3 * k : 3 * k + 3])
@@ -251,7 +253,7 @@ class LoopSubdivision(Subdivision):
         F = stacked(self.error.left.at(tube))
         settled = away(F)
         # where n may lie along both rods |λ| may have no bound: the closure itself may be singular
-        small = np.all(np.array([each.spread for each in tube]).T <= SINGULAR_BOX * self.whole, axis=1)
+        small = np.all(np.stack([each.spread for each in tube], axis=1) <= SINGULAR_BOX * self.whole, axis=1)
         slips = stacked(self.error.slips.at(tube))
         F.r[small & ~settled & ~np.any((slips.low > 0) | (slips.high < 0), axis=1)] = np.inf
         return settled, F
@@ -260,9 +262,9 @@ class LoopSubdivision(Subdivision):
         return np.zeros((len(middle), 0)), np.zeros((len(middle), 0)), np.ones(len(middle), dtype=bool)
 
     def _equations(self, at: Array, about: Array) -> tuple[AffineForms, AffineForms]:
-        forms = box_forms(at, 0 * at)
+        forms = forms_of(at, 0 * at)
         F = stacked([*self.error.closing.at(forms), *self.error.left.at(forms)])
-        K = stacked(self.error.bends.at(box_forms(at, about)))
+        K = stacked(self.error.bends.at(forms_of(at, about)))
         shape = (*F.r.shape, at.shape[1])
         return F, AffineForms(K.v.reshape(-1, *shape), K.r.reshape(shape))
 
@@ -270,21 +272,30 @@ class LoopSubdivision(Subdivision):
         """The rests at zeros, each once: over the pose exactly one is proved in a box that holds all that lie in that
         of the zero. Those are left out which a leg that is not watched does not reach; what is not decided is left
         open."""
-        over, found, known = self.error.over_pose, list[CriticalBox](), list[Array]()
+        over, kept = self.error.over_pose, list[int]()
+        # with more equations than unknowns there need be no zero: what is told of it is narrowed, from the whole room
+        at, room = (np.array(each) for each in zip(*self.proved, *self.flat, strict=True))
+        reach = room + np.abs(x - at)
+        for _ in range(NARROWINGS):
+            reach = np.fmin(reach, self._krawczyk(x, reach)[1])
         y, (low, high) = np.mean(self.error.spanned(x, 0 * x), axis=0), self.error.spanned(x, reach)
-        for at, half, place, room in zip(x, reach, y, np.maximum(high - y, y - low), strict=True):
-            apart = [np.abs(other - place) for other in known]
-            if any(np.all(np.minimum(each, np.abs(over.periods - each)) + room < MET_AGAIN) for each in apart):
-                continue
-            part, box = Subdivision(over, place - np.pi, place + np.pi), np.full((1, len(place)), MET_AGAIN)
-            rates = part._values(box_forms(place[None], 0 * box))[1]
-            part._unique(place[None], box, pivots(rates.v[0])[0], 1.0)
-            zeros = part.zeros() if np.all(room < MET_AGAIN) else []
-            margins = [each for zero in zeros for each in part._values(box_forms(zero.x[None], zero.radius[None]))[3]]
-            if len(zeros) != 1 or any(each.low[0] <= 0 <= each.high[0] for each in margins):
-                self.left.append((at, half))
-                continue
-            known.append(place)
-            if all(each.low[0] > 0 for each in margins):
-                found += zeros
-        return found
+        room = np.maximum(high - y, y - low)
+        for k in range(len(x)):
+            apart = np.abs(y[kept] - y[k])
+            if not np.any(np.all(np.minimum(apart, np.abs(over.periods - apart)) + room[k] < MET_AGAIN, axis=1)):
+                kept.append(k)
+        x, reach, y, room = (each[kept] for each in (x, reach, y, room))
+        part, box = Subdivision(over, y.min(axis=0), y.max(axis=0)), np.full(y.shape, MET_AGAIN)
+        rates = part._values(forms_of(y, 0 * y))[1]
+        proved = part._unique(y, box, pivots(rates.v[0])[0], 1.0)
+        if not proved.any() or len(part.proved) < proved.sum():
+            self.left += list(zip(x, reach, strict=True))
+            return []
+        zeros = dict(zip(np.flatnonzero(proved).tolist(), part.zeros(), strict=True))
+        at, about = (np.array([getattr(each, name) for each in zeros.values()]) for name in ("x", "radius"))
+        margins = stacked(part._values(forms_of(at, about))[3] or [0.0 * forms_of(at, about)[0] + 1.0])
+        reached, beyond = np.all(margins.low > 0, axis=1), np.any(margins.high < 0, axis=1)
+        proved[proved] = reached | beyond
+        proved &= np.all(room < MET_AGAIN, axis=1)
+        self.left += list(zip(x[~proved], reach[~proved], strict=True))
+        return [each for (k, each), good in zip(zeros.items(), reached, strict=True) if good and proved[k]]
