@@ -74,7 +74,8 @@ def _complete(found: Endings) -> list[str]:
     apart = [f"the joints of {named('leg', told.cover.unread)} lock"] if told.cover.unread else []
     if told.unstretched is not None:
         apart += [f"leg {' or '.join(told.unstretched)} is stretched"] if told.unstretched else []
-        apart += ["a watched direction is at right angles to the desired one"]
+        apart += ["a watched direction is at right angles to the desired one" if told.across == 1 else
+                  "both watched directions are at right angles to the desired ones"]
     where += f", but for poses at which {', or '.join(apart)}" if apart else ""
     lines = [f"all rests, proved by {told.cover.boxes:,} boxes of poses: no other in any working mode of the legs, "
              f"{where}"]

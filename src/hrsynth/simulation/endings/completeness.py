@@ -101,7 +101,7 @@ class Covers(Value):
             return None
         told = self.every
         places = [told.place(each.configuration, directions(each.configuration, self.question)[0]) for each in rests]
-        held = [told.holds(each.configuration) and (told.loop is None or not each.across)
+        held = [told.holds(each.configuration) and (told.loop is None or len(each.across) < told.loop.flat)
                 for each, place in zip(rests, places, strict=True) if place is None]
         within = None if told.bounded or told.error is None else COVER_REACH * told.error.length
         shorter = SHORTEST_ROD * told.error.length if told.short and told.error is not None else None

@@ -61,7 +61,8 @@ class Cover(Value):
 
     loop: LoopError | None = None
     """The loop of two watched legs, of which rests were sought by the force that closes it: it was not looked where a
-    leg that is not watched is stretched, nor where a watched direction is at right angles to the desired one."""
+    leg that is not watched is stretched, nor where as many watched directions as are ``flat`` are at right angles to
+    the desired ones."""
 
     @property
     def complete(self) -> bool:
@@ -133,10 +134,12 @@ def cover(setting: ObservedRobot, goal: ClosedConfiguration, *, vanishing: bool 
     found: list[CriticalBox] = []
     for family, some in zip(families, parts, strict=True):
         own: list[CriticalBox] = []
-        for zero in (zero for each in some for zero in each.zeros() if zero.error[0] == 0.0 or not each.vanishing):
+        for zero in (zero for each in some for zero in each.zeros()
+                     if zero.error[0] == 0.0 or not each.vanishing or family.square is not None):
             if not any(_same(zero, other, family) for other in own):
                 own.append(zero)
-        found += [_on_line(each, family.error, error) if len(each.x) < error.size else each for each in own]
+        own = [_on_line(each, family.error, error) if len(each.x) < error.size else each for each in own]
+        found += [each for each in own if loop is None or not any(_alike(each, other, loop) for other in found)]
     left, lost = (
         [corners for part in every for corners in _corners(part.error, boxes(part), error.size)]
         for boxes in (lambda part: part.left, lambda part: part.lost))
@@ -174,10 +177,11 @@ def _families(setting: ObservedRobot, goal: ClosedConfiguration, vanishing: bool
     if struts is not None:
         return error, [*struts.whole(), *([] if vanishing else struts.locked())], struts
     families: list[JointError] = [JointError.of(error)]
-    # with fewer freedoms what is at right angles to the desired directions does not fill curves
-    if not vanishing and error.size > error.shifts.shape[1]:
+    # in a plane what is at right angles to the desired directions does not fill curves
+    if not vanishing and error.size > 2:
         with suppress(NotEnclosed):
-            families.append(LoopError.about(error))
+            loop = LoopError.about(error)
+            families += [*(replace(families[0], square=k) for k in range(2) if loop.flat > 1), loop]
     return error, families, None
 
 
@@ -284,6 +288,15 @@ def bounds(error: PoseError, reach: float) -> tuple[Array, Array, bool]:
     low, high = np.array(bounds[::2]), np.array(bounds[1::2])
     turns = np.ones(error.turns.shape[1])
     return np.concatenate([low, -turns]), np.concatenate([high, turns]), bounded
+
+
+def _alike(one: CriticalBox, other: CriticalBox, loop: LoopError) -> bool:
+    """Whether two enclosed zeros are at one pose with the same directions of two rods."""
+    size = loop.error.size
+    away = np.abs(one.x[:size] - other.x[:size])
+    away = np.minimum(away, np.abs(loop.periods[:size] - away))
+    return bool(np.all(away <= one.radius[:size] + other.radius[:size] + FOLLOWED)
+                and np.abs(one.directions - other.directions).max() < SAME_ENDING)
 
 
 def _same(one: CriticalBox, other: CriticalBox, error: JointError) -> bool:

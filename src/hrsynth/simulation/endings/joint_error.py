@@ -57,7 +57,9 @@ class JointError(Value):
     """The error to a goal in these coordinates; ``joints`` are the limbs with a joint among them, the others are closed
     forms of the pose; ``far``: which of the shifts is w in a chart of poses far away; ``short``: which limb is so in a
     chart about it, and which component of v is 1. Other rods without a joint are to be ``shortest`` long at least;
-    the desired directions are those at the ``goal`` (its pose and limbs), from which ``error`` may be turned."""
+    the desired directions are those at the ``goal`` (its pose and limbs), from which ``error`` may be turned. Where
+    only poses are asked for at which the error vanishes, that of the ``square`` watched direction may be at right
+    angles to the desired one instead."""
 
     error: PoseError
     joints: tuple[int, ...]
@@ -65,6 +67,7 @@ class JointError(Value):
     far: int | None = None
     short: tuple[int, int] | None = None
     shortest: float = SHORTEST_ROD
+    square: int | None = None
 
     @classmethod
     def of(cls, error: PoseError, goal: PoseError | None = None, shortest: float = SHORTEST_ROD) -> JointError:
@@ -304,6 +307,13 @@ class JointError(Value):
         """u × u* of all that is observed."""
         return of_robot(lambda y, number: [e.value for u, wanted in self._seen(y, number) for e in cross(u, wanted)],
                       self.size[0])
+
+    @cached_property
+    def asked(self) -> BoxFormula:
+        """What vanishes where only such poses are asked for."""
+        return of_robot(lambda y, number: [
+            each.value for k, (u, wanted) in enumerate(self._seen(y, number))
+            for each in ([dot(u, wanted)] if k == self.square else cross(u, wanted))], self.size[0])
 
     @cached_property
     def directions(self) -> BoxFormula:

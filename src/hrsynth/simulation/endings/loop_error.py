@@ -28,7 +28,7 @@ from ...tolerances import EXACT, FOLLOWED, MET_AGAIN, SINGULAR_BOX
 from .elimination import Flags, Places, away, pivots
 from .joint_error import JointError, across, of_robot
 from .pose_error import NotEnclosed, Number, PoseError
-from .reached import reached
+from .reached import reached as joint_bounds
 from .subdivision import CriticalBox, Subdivision, forms_of
 
 NARROWINGS = 16
@@ -80,6 +80,12 @@ class LoopError(JointError):
     def over_pose(self) -> JointError:
         """The same error over the pose and the joints of the watched limbs."""
         return JointError(self.error, self.joints, self.error, shortest=0.0)
+
+    @property
+    def flat(self) -> int:
+        """How many watched directions are at right angles to the desired ones, the others along theirs, where rests
+        without a force fill curves or surfaces in space."""
+        return 1 if self.error.size > self.error.shifts.shape[1] else 2
 
     @property
     def idle(self) -> list[ClosedFormLeg]:
@@ -246,7 +252,7 @@ class LoopSubdivision(Subdivision):
         for k, i in enumerate(turning):
             along, one, two = ((each.low, each.high) for each in ways[3 * k : 3 * k + 3])
             rod = SlidingRod("", axis=self.error.terms[i - m].axis)
-            low[:, i], high[:, i] = reached(rod, along, one, two, (low[:, i], high[:, i]))
+            low[:, i], high[:, i] = joint_bounds(rod, along, one, two, (low[:, i], high[:, i]))
         return low, high
 
     def _settled(self, tube: list[AffineForms], P: Places, N: Places) -> tuple[Flags, AffineForms]:
@@ -285,17 +291,19 @@ class LoopSubdivision(Subdivision):
             if not np.any(np.all(np.minimum(apart, np.abs(over.periods - apart)) + room[k] < MET_AGAIN, axis=1)):
                 kept.append(k)
         x, reach, y, room = (each[kept] for each in (x, reach, y, room))
-        part, box = Subdivision(over, y.min(axis=0), y.max(axis=0)), np.full(y.shape, MET_AGAIN)
-        rates = part._values(forms_of(y, 0 * y))[1]
-        proved = part._unique(y, box, pivots(rates.v[0])[0], 1.0)
-        if not proved.any() or len(part.proved) < proved.sum():
-            self.left += list(zip(x, reach, strict=True))
-            return []
-        zeros = dict(zip(np.flatnonzero(proved).tolist(), part.zeros(), strict=True))
-        at, about = (np.array([getattr(each, name) for each in zeros.values()]) for name in ("x", "radius"))
-        margins = stacked(part._values(forms_of(at, about))[3] or [0.0 * forms_of(at, about)[0] + 1.0])
-        reached, beyond = np.all(margins.low > 0, axis=1), np.any(margins.high < 0, axis=1)
-        proved[proved] = reached | beyond
-        proved &= np.all(room < MET_AGAIN, axis=1)
-        self.left += list(zip(x[~proved], reach[~proved], strict=True))
-        return [each for (k, each), good in zip(zeros.items(), reached, strict=True) if good and proved[k]]
+        part = Subdivision(over, -np.ones(y.shape[1]), np.ones(y.shape[1]))
+        P = pivots(part._values(forms_of(y, 0 * y))[1].v[0])[0]
+        settled = np.all(room < MET_AGAIN, axis=1) & part._unique(y, np.full(y.shape, MET_AGAIN), P, 1.0)
+        rest = np.flatnonzero(~settled)
+        if len(rest):
+            settled[rest] = part._near_zero(y[rest], room[rest], P[rest])
+        zeros = part.zeros()
+        if zeros:
+            forms = forms_of(*(np.array([getattr(each, name) for each in zeros]) for name in ("x", "radius")))
+            margins = stacked([*part._values(forms)[3], 0.0 * forms[0] + 1.0])
+            reached, beyond = np.all(margins.low > 0, axis=1), np.any(margins.high < 0, axis=1)
+            for zero in (each for each, known in zip(zeros, reached | beyond, strict=True) if not known):
+                settled[np.abs(y - zero.x).max(axis=1).argmin()] = False
+            zeros = [each for each, good in zip(zeros, reached, strict=True) if good]
+        self.left += list(zip(x[~settled], reach[~settled], strict=True))
+        return zeros

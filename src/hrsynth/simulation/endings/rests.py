@@ -150,9 +150,14 @@ class RestCover(Value):
 
     @property
     def unstretched(self) -> tuple[str, ...] | None:
-        """The legs that are not watched, where rests were looked for only at which none of them is stretched and no
-        watched direction is at right angles to the desired one; None where they were looked for everywhere."""
+        """The legs that are not watched, where rests were looked for only while none of them is stretched; None where
+        they were looked for everywhere."""
         return None if self.cover.loop is None else tuple(str(each.label) for each in self.cover.loop.idle)
+
+    @property
+    def across(self) -> int | None:
+        """At so many watched directions at right angles to the desired ones rests were not looked for."""
+        return None if self.cover.loop is None else self.cover.loop.flat
 
     @property
     def complete(self) -> bool:
@@ -212,7 +217,7 @@ class RestCover(Value):
                 "turns": len(cover.turns), "turned": self.turned, "apart": self.apart, "crossings": self.crossings,
                 "locked": [{"p": list(p), "within_m": within} for p, within in self.locked],
                 "unread": list(cover.unread),
-                "unstretched": None if self.unstretched is None else list(self.unstretched),
+                "unstretched": None if self.unstretched is None else list(self.unstretched), "across": self.across,
                 "unmet": self.unmet, "strangers": self.strangers, "reason": self.reason or None}
 
 

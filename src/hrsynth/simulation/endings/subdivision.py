@@ -131,7 +131,7 @@ class Subdivision:
         low, high = _narrowed(g)
         if self.vanishing:
             low, high = (pick(one, other) for pick, one, other in zip(
-                (np.maximum, np.minimum), (low, high), _narrowed(stacked(self.error.errors.at(forms))), strict=True))
+                (np.maximum, np.minimum), (low, high), _narrowed(stacked(self.error.asked.at(forms))), strict=True))
         gone = np.any(low > high, axis=1)
         with np.errstate(all="ignore"):
             J = np.where(half[:, None] > 0, np.moveaxis(g.v[1:], 0, -1) / half[:, None], 0.0)
@@ -176,7 +176,7 @@ class Subdivision:
         rest = np.flatnonzero(~settled)
         settled[rest] = away(AffineForms(minors.v[:, rest], minors.r[rest]))
         if self.vanishing:
-            settled |= away(stacked(self.error.errors.at(tube)))
+            settled |= away(stacked(self.error.asked.at(tube)))
         for margin in margins:
             settled |= margin.high < 0
         return settled, F
