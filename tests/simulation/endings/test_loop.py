@@ -7,8 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hrsynth.analysis.asked import configurations_at
 from hrsynth.closed_forms.legs import OnRail
+from hrsynth.mechanism.pose import asked_pose
 from hrsynth.simulation.endings.cover import bounds, cover
+from hrsynth.simulation.endings.endings import RestSearch
 from hrsynth.simulation.endings.joint_error import JointError
 from hrsynth.simulation.endings.loop_error import LoopError, LoopSubdivision
 from hrsynth.simulation.endings.pose_error import PoseError
@@ -196,6 +199,26 @@ def test_no_other_rest_is_met_by_hand(legs: str, count: int) -> None:
     away = np.abs(met[:, None] - np.array(places)).max(axis=2)
     assert away.min(axis=1).max() < 1e-6
     assert len(set(away.argmin(axis=1))) > 0.8 * count
+
+
+@pytest.mark.some(0, 1)
+@pytest.mark.parametrize(("name", "at", "legs", "count", "square"), [
+    ("delta", "x=0.061,y=-0.0337,z=-0.63", "12", 30, 3), ("quattro_rigid", scenes.GOALS["quattro_rigid"], "14", 28, 3)])
+def test_a_platform_that_translates_rests_also_across_one_direction(
+        name: str, at: str, legs: str, count: int, square: int) -> None:
+    """Boxes and the search over all joints list the same rests while the other legs are not stretched, those among them
+    at which one direction is along the desired one and the other at right angles."""
+    setting = scenes.setting(name, tuple(legs))
+    (goal,) = configurations_at(setting, [asked_pose(at)])
+    found = RestSearch.of(setting, goal).answer(0, complete=True)
+    assert found.complete
+    assert found.cover is not None
+    assert (found.cover.across, found.cover.unmet, found.cover.strangers) == (2, 0, 0)
+    inside = [each for each in found.rests if not each.boundary and len(each.across) < 2]
+    assert len(inside) == len(found.cover.cover.found) == count
+    across = [each for each in inside if each.across]
+    assert len(across) == square
+    assert all(abs(each.error - 1) < 1e-9 for each in across)
 
 
 @pytest.mark.long

@@ -78,7 +78,9 @@ class Cover(Value):
         if any(limb.solve(limb.tip.value(p[None], R[None]), limb.mode)[0] < SHORTEST_ROD**2 for limb in self.short):
             return False
         idle = () if self.loop is None else self.loop.idle
-        if any(abs(limb.solve(limb.tip.value(p[None], R[None]), limb.mode)[0][0]) < SAME_ENDING for limb in idle):
+        with np.errstate(invalid="ignore"):
+            margins = [limb.solve(limb.tip.value(p[None], R[None]), limb.mode)[0][0] for limb in idle]
+        if any(abs(margin) < SAME_ENDING for margin in margins):
             return False
         x = self.error.shifts.T @ (p - self.error.p)
         if any(np.all(np.abs(x - middle[:k]) <= half[:k] + FOLLOWED) for middle, half in self.locked):

@@ -24,7 +24,7 @@ from ...closed_forms.legs import ClosedFormLeg, OnCrank, OnRail, SlidingRod
 from ...geometry.affine import AffineForms, stacked
 from ...geometry.components import Components, cosine, cross, dot, minus, plus, scaled, sine
 from ...geometry.vectors import Array
-from ...tolerances import EXACT, FOLLOWED, MET_AGAIN, SINGULAR_BOX
+from ...tolerances import EXACT, FOLLOWED, MET_AGAIN, SINGULAR_BOX, SMALLEST_BOX
 from .elimination import Flags, Places, away, pivots
 from .joint_error import JointError, across, of_robot
 from .pose_error import NotEnclosed, Number, PoseError
@@ -291,7 +291,9 @@ class LoopSubdivision(Subdivision):
             if not np.any(np.all(np.minimum(apart, np.abs(over.periods - apart)) + room[k] < MET_AGAIN, axis=1)):
                 kept.append(k)
         x, reach, y, room = (each[kept] for each in (x, reach, y, room))
-        part = Subdivision(over, -np.ones(y.shape[1]), np.ones(y.shape[1]))
+        # as wide as the smallest boxes are to be in which a zero nearby is sought
+        whole = np.full(y.shape[1], max(1.0, float(room.max()) / SMALLEST_BOX))
+        part = Subdivision(over, -whole, whole)
         P = pivots(part._values(forms_of(y, 0 * y))[1].v[0])[0]
         settled = np.all(room < MET_AGAIN, axis=1) & part._unique(y, np.full(y.shape, MET_AGAIN), P, 1.0)
         rest = np.flatnonzero(~settled)
