@@ -840,9 +840,11 @@ class RestCoverRecord(TypedDict):
     """What boxes of platform poses prove of a list of rests: `proved` critical poses; `open` boxes, a `share` of all;
     `within_m` of the goal, null where legs end the box; rods that slide and are shorter than `shorter_m` are left out,
     null where there are none, as is a platform that only translates and is turned otherwise than in one of `turns`
-    turns, at `turned` poses of the list, and poses at which the joints of the legs `unread` lock; `apart` of the list
-    lie where was not looked. At `crossings` points of the platform rests fill curves, as two legs' joints lock. `unmet`
-    of those that are proved are not in the list, `strangers` of the list are not among them."""
+    turns, at `turned` poses of the list, and poses at which the joints of the legs `unread` lock, and (null where
+    these were looked at) those at which one of the legs `unstretched` is stretched or so many watched directions as
+    `across` says are at right angles to the desired ones; `apart` of the list lie where was not looked. At `crossings`
+    points of the platform rests fill curves, as two legs' joints lock. `unmet` of those that are proved are not in the
+    list, `strangers` of the list are not among them."""
 
     complete: bool
     proved: int
@@ -856,6 +858,8 @@ class RestCoverRecord(TypedDict):
     apart: int
     crossings: int
     unread: list[str]
+    unstretched: list[str] | None
+    across: int | None
     unmet: int
     strangers: int
     reason: str | None

@@ -71,8 +71,12 @@ def _complete(found: Endings) -> list[str]:
     elif told.turned:
         where += ", with the platform turned as at the goal"
     where += "" if told.shorter is None else f", no rod shorter than {1e3 * told.shorter:.3g} mm"
-    if told.cover.unread:
-        where += f", but for poses at which the joints of {named('leg', told.cover.unread)} lock"
+    apart = [f"the joints of {named('leg', told.cover.unread)} lock"] if told.cover.unread else []
+    if told.unstretched is not None:
+        apart += [f"leg {' or '.join(told.unstretched)} is stretched"] if told.unstretched else []
+        apart += ["a watched direction is at right angles to the desired one" if told.across == 1 else
+                  "both watched directions are at right angles to the desired ones"]
+    where += f", but for poses at which {', or '.join(apart)}" if apart else ""
     lines = [f"all rests, proved by {told.cover.boxes:,} boxes of poses: no other in any working mode of the legs, "
              f"{where}"]
     if told.crossings:

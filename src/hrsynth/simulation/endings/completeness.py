@@ -101,7 +101,8 @@ class Covers(Value):
             return None
         told = self.every
         places = [told.place(each.configuration, directions(each.configuration, self.question)[0]) for each in rests]
-        held = [told.holds(each.configuration) for each, place in zip(rests, places, strict=True) if place is None]
+        held = [told.holds(each.configuration) and (told.loop is None or len(each.across) < told.loop.flat)
+                for each, place in zip(rests, places, strict=True) if place is None]
         within = None if told.bounded or told.error is None else COVER_REACH * told.error.length
         shorter = SHORTEST_ROD * told.error.length if told.short and told.error is not None else None
         return RestCover(told, len(told.found) - len(set(places) - {None}), sum(held), within, shorter,

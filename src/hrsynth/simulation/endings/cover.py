@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,6 +27,7 @@ from ...tolerances import (
     SINGULAR_BOX,
 )
 from .joint_error import JointError
+from .loop_error import LoopError, LoopSubdivision
 from .planes import PlaneError
 from .pose_error import NotEnclosed, PoseError
 from .struts import Struts
@@ -57,6 +59,11 @@ class Cover(Value):
     unread: tuple[str, ...] = ()
     """Legs in space with joints of which it is not known where they lock: there it was not looked."""
 
+    loop: LoopError | None = None
+    """The loop of two watched legs, of which rests were sought by the force that closes it: it was not looked where a
+    leg that is not watched is stretched, nor where as many watched directions as are ``flat`` are at right angles to
+    the desired ones."""
+
     @property
     def complete(self) -> bool:
         """Whether these are all critical points there."""
@@ -69,6 +76,11 @@ class Cover(Value):
             return False
         (p, R), k = (each[0] for each in self.error.coordinates.of([at])), self.error.shifts.shape[1]
         if any(limb.solve(limb.tip.value(p[None], R[None]), limb.mode)[0] < SHORTEST_ROD**2 for limb in self.short):
+            return False
+        idle = () if self.loop is None else self.loop.idle
+        with np.errstate(invalid="ignore"):
+            margins = [limb.solve(limb.tip.value(p[None], R[None]), limb.mode)[0][0] for limb in idle]
+        if any(abs(margin) < SAME_ENDING for margin in margins):
             return False
         x = self.error.shifts.T @ (p - self.error.p)
         if any(np.all(np.abs(x - middle[:k]) <= half[:k] + FOLLOWED) for middle, half in self.locked):
@@ -114,7 +126,9 @@ def cover(setting: ObservedRobot, goal: ClosedConfiguration, *, vanishing: bool 
         return Cover((), (), 1.0, 0, False, str(why))
     low, high, bounded = bounds(error, reach)
     charts, endless = [each.looked(bounded) for each in families], families[0].endless
-    parts = [[_boxes(each, low, high, reach, vanishing) for each in some] for some in charts]
+    loop = next((each for each in families if isinstance(each, LoopError)), None)
+    parts = [[_boxes(each, low, high, reach, vanishing or loop not in (None, each)) for each in some]
+             for some in charts]
     every = [part for some in parts for part in some]
     # the small ones first: what they do not use is left for the others
     for k, part in enumerate(reversed(every)):
@@ -122,12 +136,12 @@ def cover(setting: ObservedRobot, goal: ClosedConfiguration, *, vanishing: bool 
     found: list[CriticalBox] = []
     for family, some in zip(families, parts, strict=True):
         own: list[CriticalBox] = []
-        for zero in (zero for part in some for zero in part.zeros()):
+        for zero in (zero for each in some for zero in each.zeros()
+                     if zero.error[0] == 0.0 or not each.vanishing or family.square is not None):
             if not any(_same(zero, other, family) for other in own):
                 own.append(zero)
-        found += [_on_line(each, family.error, error) if len(each.x) < error.size else each for each in own]
-    if vanishing:
-        found = [each for each in found if each.error[0] == 0.0]
+        own = [_on_line(each, family.error, error) if len(each.x) < error.size else each for each in own]
+        found += [each for each in own if loop is None or not any(_alike(each, other, loop) for other in found)]
     left, lost = (
         [corners for part in every for corners in _corners(part.error, boxes(part), error.size)]
         for boxes in (lambda part: part.left, lambda part: part.lost))
@@ -143,7 +157,7 @@ def cover(setting: ObservedRobot, goal: ClosedConfiguration, *, vanishing: bool 
                  sum(each.boxes for each in every), bounded or endless, "",
                  None if endless and not bounded else (low, high), error,
                  () if any(each.short for each in charts[0]) else tuple(free), struts, tuple(locked),
-                 () if struts is not None else unread(setting))
+                 () if struts is not None else unread(setting), loop)
 
 
 def _families(setting: ObservedRobot, goal: ClosedConfiguration, vanishing: bool
@@ -162,8 +176,15 @@ def _families(setting: ObservedRobot, goal: ClosedConfiguration, vanishing: bool
     if error.turns.shape[1] > 1:
         raise NotEnclosed("the platform turns about more than one axis")
     struts = Struts.of(setting, goal, error)
-    return (error, [JointError.of(error)], None) if struts is None else (
-        error, [*struts.whole(), *([] if vanishing else struts.locked())], struts)
+    if struts is not None:
+        return error, [*struts.whole(), *([] if vanishing else struts.locked())], struts
+    families: list[JointError] = [JointError.of(error)]
+    # in a plane what is at right angles to the desired directions does not fill curves
+    if not vanishing and error.size > 2:
+        with suppress(NotEnclosed):
+            loop = LoopError.about(error)
+            families += [*(replace(families[0], square=k) for k in range(2) if loop.flat > 1), loop]
+    return error, families, None
 
 
 def _read(error: PoseError) -> PoseError:
@@ -179,7 +200,8 @@ def _boxes(error: JointError, low: Array, high: Array, reach: float, vanishing: 
     if ends:
         reach = max(reach, COVER_MARGIN * float(ends))
         low, high = np.full(3, -reach), np.full(3, reach)
-    return Subdivision(error, *error.box(low, high, reach), vanishing)
+    corners = error.box(low, high, reach)
+    return LoopSubdivision(error, *corners) if isinstance(error, LoopError) else Subdivision(error, *corners, vanishing)
 
 
 def _corners(error: JointError, boxes: Sequence[tuple[Array, Array]], size: int) -> Iterator[tuple[Array, Array]]:
@@ -268,6 +290,15 @@ def bounds(error: PoseError, reach: float) -> tuple[Array, Array, bool]:
     low, high = np.array(bounds[::2]), np.array(bounds[1::2])
     turns = np.ones(error.turns.shape[1])
     return np.concatenate([low, -turns]), np.concatenate([high, turns]), bounded
+
+
+def _alike(one: CriticalBox, other: CriticalBox, loop: LoopError) -> bool:
+    """Whether two enclosed zeros are at one pose with the same directions of two rods."""
+    size = loop.error.size
+    away = np.abs(one.x[:size] - other.x[:size])
+    away = np.minimum(away, np.abs(loop.periods[:size] - away))
+    return bool(np.all(away <= one.radius[:size] + other.radius[:size] + FOLLOWED)
+                and np.abs(one.directions - other.directions).max() < SAME_ENDING)
 
 
 def _same(one: CriticalBox, other: CriticalBox, error: JointError) -> bool:

@@ -44,7 +44,7 @@ from ...results import Value
 from ...tolerances import FOLLOWED, KNOWN_NUMBER, SHORTEST_ROD
 from .pose_error import Number, PoseError
 
-_traced = partial(traced, off=KNOWN_NUMBER)
+of_robot = partial(traced, off=KNOWN_NUMBER)
 
 
 def rodless(error: PoseError) -> Array:
@@ -57,7 +57,9 @@ class JointError(Value):
     """The error to a goal in these coordinates; ``joints`` are the limbs with a joint among them, the others are closed
     forms of the pose; ``far``: which of the shifts is w in a chart of poses far away; ``short``: which limb is so in a
     chart about it, and which component of v is 1. Other rods without a joint are to be ``shortest`` long at least;
-    the desired directions are those at the ``goal`` (its pose and limbs), from which ``error`` may be turned."""
+    the desired directions are those at the ``goal`` (its pose and limbs), from which ``error`` may be turned. Where
+    only poses are asked for at which the error vanishes, that of the ``square`` watched direction may be at right
+    angles to the desired one instead."""
 
     error: PoseError
     joints: tuple[int, ...]
@@ -65,6 +67,7 @@ class JointError(Value):
     far: int | None = None
     short: tuple[int, int] | None = None
     shortest: float = SHORTEST_ROD
+    square: int | None = None
 
     @classmethod
     def of(cls, error: PoseError, goal: PoseError | None = None, shortest: float = SHORTEST_ROD) -> JointError:
@@ -216,7 +219,7 @@ class JointError(Value):
                 continue
             assert isinstance(limb, OnCrank | OnRail | SlidingRod)
             assert limb.axis is not None
-            at, (one, two) = self.freedoms + self.joints.index(i), map(number, _across(limb))
+            at, (one, two) = self.freedoms + self.joints.index(i), map(number, across(limb))
             (z,) = self.unknowns(y, [at])
             c, s = cosine(z), sine(z)
             way, ring = minus(tip, scaled(w, number(limb.centre))), plus(scaled(c, one), scaled(s, two))
@@ -276,11 +279,11 @@ class JointError(Value):
     @cached_property
     def closing(self) -> BoxFormula:
         """g (k)."""
-        return _traced(lambda y, number: [each.value for each in self.parts(y, number)[0]], self.size[0])
+        return of_robot(lambda y, number: [each.value for each in self.parts(y, number)[0]], self.size[0])
 
     @cached_property
     def ways(self) -> BoxFormula:
-        """Of each limb with a joint the tip from the centre: along the axis, and across it (:func:`_across`)."""
+        """Of each limb with a joint the tip from the centre: along the axis, and across it (:func:`across`)."""
         error = self.error
 
         def formula(y: Sequence[Any], number: Number) -> list[Any]:
@@ -294,21 +297,28 @@ class JointError(Value):
                 way = plus(point, number(error.p + limb.tip.constant - limb.centre))
                 if np.any(limb.tip.turned):
                     way = plus(way, transformed(turned, number(limb.tip.turned)))
-                found += [dot(way, number(each)) for each in (limb.axis, *_across(limb))]
+                found += [dot(way, number(each)) for each in (limb.axis, *across(limb))]
             return found
 
-        return _traced(formula, self.freedoms)
+        return of_robot(formula, self.freedoms)
 
     @cached_property
     def errors(self) -> BoxFormula:
         """u × u* of all that is observed."""
-        return _traced(lambda y, number: [e.value for u, wanted in self._seen(y, number) for e in cross(u, wanted)],
+        return of_robot(lambda y, number: [e.value for u, wanted in self._seen(y, number) for e in cross(u, wanted)],
                       self.size[0])
+
+    @cached_property
+    def asked(self) -> BoxFormula:
+        """What vanishes where only such poses are asked for."""
+        return of_robot(lambda y, number: [
+            each.value for k, (u, wanted) in enumerate(self._seen(y, number))
+            for each in ([dot(u, wanted)] if k == self.square else cross(u, wanted))], self.size[0])
 
     @cached_property
     def directions(self) -> BoxFormula:
         """u of all that is observed."""
-        return _traced(lambda y, number: [each.value for u, _ in self._seen(y, number) for each in u], self.size[0])
+        return of_robot(lambda y, number: [each.value for u, _ in self._seen(y, number) for each in u], self.size[0])
 
     def _seen(self, y: Sequence[Any], number: Number) -> list[tuple[Sequence[Dual], list[Dual]]]:
         """The observed directions and the desired ones."""
@@ -327,7 +337,7 @@ class JointError(Value):
             return [*(each.value for each in g), *(rate for each in g for rate in each.rates), *slopes,
                     *(each.value for each in margins)]
 
-        return _traced(formula, n)
+        return of_robot(formula, n)
 
     def _cosines(self, y: Sequence[Any], number: Number) -> list[Dual]:
         return [dot(u, wanted) for u, wanted in self._seen(y, number)]
@@ -347,7 +357,7 @@ class JointError(Value):
             return [rate for each in (*rows, *(each.value for each in g))
                     for rate in (each.rates if isinstance(each, Dual) else none)]
 
-        return _traced(formula, n + k)
+        return of_robot(formula, n + k)
 
 
 def total(parts: Any) -> Any:
@@ -358,7 +368,7 @@ def total(parts: Any) -> Any:
     return first
 
 
-def _across(limb: OnCrank | OnRail | SlidingRod) -> tuple[Array, Array]:
+def across(limb: OnCrank | OnRail | SlidingRod) -> tuple[Array, Array]:
     """The directions from which a joint's angle counts, and to which it is a quarter of a turn."""
     assert limb.axis is not None
     one = np.linalg.svd(limb.axis[None])[2][1]

@@ -149,6 +149,17 @@ class RestCover(Value):
         return 0 if self.cover.struts is None else self.cover.struts.crossings
 
     @property
+    def unstretched(self) -> tuple[str, ...] | None:
+        """The legs that are not watched, where rests were looked for only while none of them is stretched; None where
+        they were looked for everywhere."""
+        return None if self.cover.loop is None else tuple(str(each.label) for each in self.cover.loop.idle)
+
+    @property
+    def across(self) -> int | None:
+        """At so many watched directions at right angles to the desired ones rests were not looked for."""
+        return None if self.cover.loop is None else self.cover.loop.flat
+
+    @property
     def complete(self) -> bool:
         """Whether the list holds all rests in the box."""
         return self.cover.complete and not self.unmet and not self.strangers
@@ -205,8 +216,9 @@ class RestCover(Value):
                 "share": cover.share, "within_m": self.within, "shorter_m": self.shorter,
                 "turns": len(cover.turns), "turned": self.turned, "apart": self.apart, "crossings": self.crossings,
                 "locked": [{"p": list(p), "within_m": within} for p, within in self.locked],
-                "unread": list(cover.unread), "unmet": self.unmet, "strangers": self.strangers,
-                "reason": self.reason or None}
+                "unread": list(cover.unread),
+                "unstretched": None if self.unstretched is None else list(self.unstretched), "across": self.across,
+                "unmet": self.unmet, "strangers": self.strangers, "reason": self.reason or None}
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -121,17 +121,17 @@ class Subdivision:
     def _open(self, middle: Array, half: Array) -> tuple[Array, Array, Places]:
         """Boxes (c, n) that are not settled, narrowed, and the axes (c,) across which they are to be cut, −1 of those
         that are to be looked at again first."""
-        low, high = narrowed(self.error, _forms(middle, half), middle - half, middle + half)
+        low, high = self._narrow(middle, half)
         known = np.all(low <= high, axis=1)
         low, high = low[known], high[known]
         middle, half = (low + high) / 2, (high - low) / 2 * (1 + BOX_ROUNDING)
-        forms = _forms(middle, half)
+        forms = forms_of(middle, half)
         g = stacked(self.error.closing.at(forms)) if self.error.size[1] else AffineForms(
             np.zeros((middle.shape[1] + 1, len(middle), 0)), np.zeros((len(middle), 0)))
         low, high = _narrowed(g)
         if self.vanishing:
             low, high = (pick(one, other) for pick, one, other in zip(
-                (np.maximum, np.minimum), (low, high), _narrowed(stacked(self.error.errors.at(forms))), strict=True))
+                (np.maximum, np.minimum), (low, high), _narrowed(stacked(self.error.asked.at(forms))), strict=True))
         gone = np.any(low > high, axis=1)
         with np.errstate(all="ignore"):
             J = np.where(half[:, None] > 0, np.moveaxis(g.v[1:], 0, -1) / half[:, None], 0.0)
@@ -164,6 +164,10 @@ class Subdivision:
             axis[look] = np.where(lost, SINGULAR, self._axes(size[look], N[look], F, loose))
         return own[~gone], size[~gone], axis[~gone]
 
+    def _narrow(self, middle: Array, half: Array) -> tuple[Array, Array]:
+        """The corners of boxes (c, n) with the joints where closed forms say that they can be."""
+        return narrowed(self.error, forms_of(middle, half), middle - half, middle + half)
+
     def _settled(self, tube: list[AffineForms], P: Places, N: Places) -> tuple[Flags, AffineForms]:
         """Whether nothing is asked for on a tube, and F there."""
         _, M, slope, margins = self._values(tube)
@@ -172,7 +176,7 @@ class Subdivision:
         rest = np.flatnonzero(~settled)
         settled[rest] = away(AffineForms(minors.v[:, rest], minors.r[rest]))
         if self.vanishing:
-            settled |= away(stacked(self.error.errors.at(tube)))
+            settled |= away(stacked(self.error.asked.at(tube)))
         for margin in margins:
             settled |= margin.high < 0
         return settled, F
@@ -259,11 +263,11 @@ class Subdivision:
         """Multipliers (c, k) at the middle of boxes, how far they are from there at critical points in them, and
         whether that is known."""
         k = self.error.size[1]
-        _, M, slope, _ = self._values(_forms(middle, 0 * middle))
+        _, M, slope, _ = self._values(forms_of(middle, 0 * middle))
         back = inverse(columns(M.v[0], P))
         mu = np.nan_to_num(-(np.take_along_axis(slope.v[0], P, 1)[:, None] @ back)[:, 0])
         # over the box μ is μ₀ + δ, with (∇E + μ₀ ∇g)_P + δ ∇g_P = 0
-        _, M, slope, _ = self._values(_forms(middle, wide))
+        _, M, slope, _ = self._values(forms_of(middle, wide))
         turned = np.swapaxes(back, 1, 2)
         pull = combined(turned, entries(slope + (M * mu[:, :, None]).sum(-2), P))
         rates = entries(M, P)
@@ -288,13 +292,13 @@ class Subdivision:
     def _equations(self, at: Array, about: Array) -> tuple[AffineForms, AffineForms]:
         """(∇E + μ ∇g, g) (c, n + k) at places, and its derivatives over boxes about these."""
         n, k = self.error.size
-        g, M, slope, _ = self._values(_forms(at[:, :n], 0 * at[:, :n]))
+        g, M, slope, _ = self._values(forms_of(at[:, :n], 0 * at[:, :n]))
         mu = at[:, n:]
         pull = slope + (M * mu[:, :, None]).sum(-2)
         phi = AffineForms(np.concatenate([pull.v, g.v], axis=-1), np.concatenate([pull.r, g.r], axis=-1))
-        out = stacked(self.error.bends.at(_forms(at, about)))
+        out = stacked(self.error.bends.at(forms_of(at, about)))
         # the rates of g along the fields, which multiply μ: those by the coordinates but for a far chart
-        rates = self._values(_forms(at, about)[:n])[1]
+        rates = self._values(forms_of(at, about)[:n])[1]
         c, K = len(at), AffineForms(np.zeros((len(out.v), len(at), n + k, n + k)), np.zeros((len(at), n + k, n + k)))
         K.v[..., :n, :n], K.r[:, :n, :n] = out.v[..., : n * n].reshape(-1, c, n, n), out.r[:, : n * n].reshape(c, n, n)
         K.v[..., n:, :n] = out.v[..., n * n :].reshape(len(out.v), c, k, n)
@@ -334,14 +338,14 @@ class Subdivision:
     def _told(self, x: Array, reach: Array) -> list[CriticalBox]:
         """What boxes with one zero each hold."""
         (n, k), error, far = self.error.size, self.error.error, self.error.far
-        K, forms = self._equations(x, reach)[1], _forms(x[:, :n], reach[:, :n])
+        K, forms = self._equations(x, reach)[1], forms_of(x[:, :n], reach[:, :n])
         if far is not None:
             # rates by the turn itself, so that K is symmetric at the zero
             for place in self.error.turning:
                 row = K[..., place, :] * forms[far].padded(len(K.v))[..., None]
                 K.v[..., place, :], K.r[:, place] = row.v, row.r
         falling = negative(K) - k
-        e, u = stacked(self.error.errors.at(forms)), stacked(self.error.directions.at(_forms(x[:, :n], 0 * x[:, :n])))
+        e, u = stacked(self.error.errors.at(forms)), stacked(self.error.directions.at(forms_of(x[:, :n], 0 * x[:, :n])))
         least, most = np.maximum(np.maximum(e.low, -e.high), 0.0), e.size
         p, R = self.error.pose(x[:, :n])
         low, high = self.error.spanned(x[:, :n], reach[:, :n])
@@ -351,7 +355,7 @@ class Subdivision:
                 for i in range(len(x))]
 
 
-def _forms(middle: Array, half: Array) -> list[AffineForms]:
+def forms_of(middle: Array, half: Array) -> list[AffineForms]:
     """The coordinates of boxes (c, n), and what cutting and narrowing them may have rounded."""
     eye, off = np.eye(middle.shape[1]), AFFINE_ROUNDING * (1 + np.abs(middle))
     return [affine(middle[:, i], half[:, i, None] * eye[i], off[:, i]) for i in range(len(eye))]
