@@ -50,6 +50,8 @@ class ConstraintPattern(Value):
     plane: NamedVector | None = None
     """The normal of the plane in which everything moves, of ``translations`` that in which all tips move, or None."""
     slide: NamedVector | None = None
+    turning: bool = False
+    """Of ``translations``: whether the platform turns where nothing is held; it may then be held turned otherwise."""
 
     @property
     def features(self) -> tuple[NamedVector, ...]:
@@ -169,7 +171,7 @@ def _one_body(anatomy: LegDecomposition, every: tuple[LockedLeg, ...] | None, le
     if vanishes(motions[:, 3:]):
         return _translating(anatomy, legs, samples)
     if any(leg.turns == 0 and not leg.spins for leg in legs):
-        return None if every is None else _translating(anatomy, every, samples)
+        return None if every is None else replace(_translating(anatomy, every, samples), turning=True)
     if any(leg.turns < 3 and leg.spins for leg in legs):
         return None
     normal = _plane_of(motions)

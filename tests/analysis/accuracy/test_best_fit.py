@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -18,9 +19,10 @@ from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.batch.reach import reach
 from hrsynth.description import load
 from hrsynth.errors import HrsynthError
-from hrsynth.geometry.vectors import Array
+from hrsynth.geometry.vectors import Array, pose, rotation_about, unit
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.tasks import solve
+from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.pose import Pose
 from hrsynth.simulation.law import FixedDirections, Law
 from hrsynth.simulation.run import Loop
@@ -157,3 +159,64 @@ def test_best_fits_of_random_robots(robot) -> None:
     assume(weakest(at, setting.samples.question) > 0.1)
     for way in ways(setting, at, 2e-3, 2, 1):
         check_fit(setting, at, way)
+
+
+def test_an_arm_that_hardly_sees_one_of_its_turns_is_followed_to_the_whole_error():
+    """A camera on an arm sees three points and the depth of a fourth one. Gauss and Newton on the arm's product of
+    exponentials, in NumPy, come to rest where the sample says, near the linear law."""
+    rng = np.random.default_rng(1)
+    axes = [unit(v) for v in rng.normal(size=(6, 3))]
+    centres = np.vstack([np.zeros(3), np.cumsum(0.3 * rng.normal(size=(5, 3)), axis=0)])
+    points = [centres[-1] + [*rng.uniform(-0.5, 0.5, 2), rng.uniform(1.5, 2.5)] for _ in range(4)]
+    b = Builder("arm")
+    b.link("base")
+    for k, (centre, axis) in enumerate(zip(centres, axes, strict=True), 1):
+        b.link(f"l{k}", at=centre)
+        b.joint(f"q{k}", "R", "base" if k == 1 else f"l{k - 1}", f"l{k}", at=centre, axis=axis, motor=True)
+    sights = [f"{kind}:world@{','.join(map(repr, map(float, point)))}"
+              for kind, point in zip(("point", "point", "point", "depth"), points, strict=True)]
+    found = accuracy(b.build(platform="l6"), camera="hand=l6@0,0,0/0,0,0/800", see=sights, noise="0.3px,1mm",
+                     nonlinear=4)
+    (linear,), (true,), length = found.poses, found.sampled, found.setting.mechanism.length
+
+    def displaced(q: Array) -> Array:
+        D = np.eye(4)
+        for centre, axis, angle in zip(centres, axes, q, strict=True):
+            R = rotation_about(axis, angle)
+            D = D @ pose(centre - R @ centre, R)
+        return D
+
+    def measured(q: Array) -> Array:
+        D = displaced(q)
+        seen = [D[:3, :3].T @ (point - D[:3, 3]) - centres[-1] for point in points]
+        return np.array([x for y in seen[:3] for x in y[:2] / y[2]] + [seen[3][2] / length])
+
+    def rates(q: Array) -> Array:
+        return np.array([(measured(q + d) - measured(q - d)) / 2e-6 for d in 1e-6 * np.eye(6)]).T
+
+    moves = np.array([(displaced(d) - displaced(-d)) @ [*centres[-1], 1] / 2e-6 for d in 1e-6 * np.eye(6)])[:, :3].T
+    d = linear.position.direction
+    worst = (moves @ np.linalg.pinv(rates(np.zeros(6)))).T @ d
+    e = np.concatenate([*(0.3 / 800 * unit(worst[2 * k:2 * k + 2]) for k in range(3)),
+                        [0.001 / length * np.sign(worst[6])]])
+    far = []
+    for sign in (1, -1):
+        q = np.zeros(6)
+        for part in np.linspace(0.02, 1, 50):
+            for _ in range(20):
+                q = q - np.linalg.pinv(rates(q)) @ (measured(q) - measured(np.zeros(6)) - sign * part * e)
+        far.append(np.linalg.norm((displaced(q) @ [*centres[-1], 1])[:3] - centres[-1]))
+    assert (true.missed, true.not_found) == (0, 0)
+    assert max(far) == pytest.approx(true.position, rel=1e-2)
+
+
+@pytest.mark.parametrize(("share", "not_found", "told"), [
+    (1.0, 0, False), (0.2, 0, True), (0.2, 3, False), (1.5, 3, True), (1.5, 0, True)])
+def test_samples_that_were_lost_on_the_way_do_not_speak_against_the_linear_law(share: float, not_found: int,
+                                                                                told: bool):
+    """A smaller error of samples that were not followed to their end says nothing, a larger one does."""
+    found = accuracy("rrrrr_m1", cone="0.06deg", nonlinear=4)
+    (linear,), (true,) = found.poses, found.sampled
+    assert true is not None
+    other = replace(true, position=share * linear.position.largest, not_found=not_found)
+    assert ("unreliable" in str(replace(found, sampled=(other,)))) == told

@@ -13,7 +13,9 @@ from hrsynth.analysis.modes.modes import AssemblyModes, modes
 from hrsynth.analysis.modes.reaches import reaches
 from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.words import parse
-from hrsynth.geometry.vectors import Array, unit
+from hrsynth.geometry.vectors import Array, cross, perpendicular, unit
+from hrsynth.mechanism.builder import Builder
+from strategies import ring
 
 SAME = 1e-6
 """Distance (m, pure numbers) at which two poses are one."""
@@ -135,3 +137,29 @@ def test_an_offset_parts_the_two_lines_of_a_u():
         assert 1e-3 * offset < np.linalg.norm(one.miss(other.centre)) < 3 * offset
     with pytest.raises(Underived, match="lie only"):
         reaches(offset_u(1e-8))
+
+
+def test_a_u_joint_that_carries_the_platform_holds_it_turned_by_half_a_turn_too():
+    """Direction and length of a leg U-P are measured: about its direction, normal to the U's second axis, the platform
+    can be turned by half a turn."""
+    rng, b = np.random.default_rng(1), Builder("half_a_turn")
+    u = unit(np.array([0.1, 0.2, 1.5]))
+    first = unit(cross(u, rng.normal(size=3)))
+    b.link("base")
+    b.link("tube")
+    b.link("plate", at=u)
+    b.joint("u", "U", "base", "tube", axis=first, axis2=cross(u, first))
+    b.joint("p", "P", "tube", "plate", at=u, axis=u)
+    for k, A in enumerate(ring(rng, 3, 1.2)):
+        B = 1.5 * u + 0.4 * A
+        along = unit(B - A)
+        b.link(f"cylinder_{k}", at=A)
+        b.link(f"rod_{k}", at=B)
+        b.joint(f"u_{k}", "U", "base", f"cylinder_{k}", at=A, axis=(e := perpendicular(along)), axis2=cross(along, e))
+        b.joint(f"p_{k}", "P", f"cylinder_{k}", f"rod_{k}", at=(A + B) / 2, axis=along, motor=True)
+        b.joint(f"s_{k}", "S", f"rod_{k}", "plate", at=B, loop=True)
+    b.observe("1", "tube", u)
+    found = modes(b.build(platform="plate"), "1", see=["encoder:p"])
+    turned = [mode.bodies["plate"][:3, :3] for mode in found.modes]
+    assert [mode.assembly for mode in found.modes] == ["yes", "yes"]
+    assert min(np.abs(R - (2 * np.outer(u, u) - np.eye(3))).max() for R in turned) < 1e-9

@@ -307,3 +307,30 @@ def test_a_platform_that_all_conditions_hold_linearly_has_one_place():
     found = hrsynth.modes(linkage(corners, links, "platform", "j0"), real=True)
     assert len(found.modes) == 1
     assert "at most 1 pose by conditions that are all linear, 1 enclosed" in found.found.proof
+
+
+def test_a_platform_on_the_crank_that_a_four_bar_turns_has_four_places():
+    """The crank AB is held, and the platform hangs on it at H. A slide through H leads to G on the rocker: for each of
+    the two places of the four-bar's coupler the platform points to G or away from it."""
+    b, (A, B, C, D, H, G) = Builder("on_the_crank"), np.array(
+        [(0.73, -0.05), (0.0, 0.0), (-2.24, -0.08), (0.26, -2.18), (-1.48, 1.42), (1.86, 1.87)])
+    joints = {"a": ("R", "base", "crank", A), "b": ("R", "crank", "coupler", B), "c": ("R", "coupler", "rocker", C),
+              "d": ("R", "rocker", "base", D), "e": ("R", "rocker", "tube", G),
+              "f": ("P", "tube", "plate", (G + H) / 2), "g": ("R", "plate", "crank", H)}
+    b.link("base")
+    for name, (kind, one, other, at) in joints.items():
+        if name not in "dg":
+            b.link(other, at=(*at, 0))
+        b.joint(name, kind, one, other, at=(*at, 0), axis=(0, 0, 1) if kind == "R" else (*(H - G), 0),
+                motor=name == "a", loop=name in "dg")
+    found = hrsynth.modes(b.build(platform="plate"), real=True)
+    along = (D - B) / np.linalg.norm(D - B)
+    mirrored = B + 2 * (C - B) @ along * along - (C - B)  # the other place of C; G is carried by the rocker CD
+    turn = complex(*(mirrored - D)) / complex(*(C - D))
+    there = complex(*D) + turn * complex(*(G - D))
+    towards = [complex(*G) - complex(*H), there - complex(*H)]
+    units = [each / abs(each) for each in towards]
+    wanted = [sense * each / units[0] for each in units for sense in (1, -1)]
+    turns = [complex(X[0, 0], X[1, 0]) for mode in found.modes for X in [mode.bodies["plate"]]]
+    assert (found.found.complete, found.found.complex, len(found.modes)) == (True, 4, 4)
+    assert max(min(abs(each - turn) for turn in turns) for each in wanted) < 1e-8

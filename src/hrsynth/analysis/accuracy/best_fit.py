@@ -59,14 +59,19 @@ class _Bowl:
     def chart(self) -> TangentChart:
         return TangentChart.around(self.at, self.question)
 
-    def slope(self, at: ClosedConfiguration, wanted: Values) -> Array:
-        """∇F (n,) in y at a configuration."""
+    def errors(self, at: ClosedConfiguration, wanted: Values) -> tuple[Array, Array]:
+        """All errors e at a configuration, and their rates J (rows, n) in y."""
         u, rates = seen(at, self.question)
         every = list(zip(self.question.observations, u, wanted, strict=True))
         kernel, _ = at.kernel()
         forth = kernel @ np.linalg.pinv(self.chart.slope(at.q) @ kernel, rcond=INVERTED)
         rows = np.vstack([o.error_slope(v, w) @ r for (o, v, w), r in zip(every, rates, strict=True)]) @ forth
-        return np.asarray(np.concatenate([o.error(v, w) for o, v, w in every]) @ rows)
+        return np.concatenate([o.error(v, w) for o, v, w in every]), np.asarray(rows)
+
+    def slope(self, at: ClosedConfiguration, wanted: Values) -> Array:
+        """∇F = eᵀJ (n,) in y at a configuration."""
+        e, J = self.errors(at, wanted)
+        return np.asarray(e @ J)
 
     def hessian(self, wanted: Values) -> Array:
         """∇²F (n, n) at y = 0, by central differences of ∇F."""
@@ -78,11 +83,14 @@ class _Bowl:
         return np.asarray((H + H.T) / 2)
 
     def minimum(self, H: Array, wanted: Values, guess: Array) -> ClosedConfiguration | None:
-        """The critical point next to ``guess`` (n,) by Newton steps with a Hessian; None where they do not contract, or
-        lead further away than the guess did."""
+        """The critical point next to ``guess`` (n,) by Newton steps with the Hessian H of y = 0, its part JᵀJ taken
+        anew at each point; None where they do not contract, or lead further away than the guess did."""
         y, at, last = guess, self.chart.at(guess, self.at.q), float(np.linalg.norm(guess))
+        J = self.errors(self.at, wanted)[1]
+        rest = H - J.T @ J
         for _ in range(CORRECTIONS):
-            step = np.linalg.solve(H, -self.slope(at, wanted))
+            e, J = self.errors(at, wanted)
+            step = np.linalg.solve(rest + J.T @ J, -(e @ J))
             size = float(np.linalg.norm(step))
             if size <= FOLLOWED:
                 return at

@@ -35,7 +35,7 @@ from ...tolerances import CLOSED, FOLLOWED, MOVED, SAME_POINT, SAME_RELATION, SO
 from .chain import Underived, chain
 from .curves import Circle, Line, Plane, Point, Reach, Sphere
 from .reaches import reaches
-from .turns import kept_angle
+from .turns import kept_angle, orientations
 
 MOVES = (-0.4, -0.15, 0.15, 0.4)
 """How far a leg is moved along a freedom to check where its tip can be (characteristic lengths, radians)."""
@@ -106,11 +106,13 @@ def tip_loci(anatomy: LegDecomposition, question: Measurement, pattern: Constrai
     """Where all watched legs' tips can be with the directions held at their values at ``goal``.
 
     Raises ``NotConfined`` where that is no point, line, circle, sphere or plane, or the platform's motion none of those
-    known.
+    known, or where a platform that turns can be held turned otherwise.
     """
     name = anatomy.mechanism.name
     if pattern.motion == "other":
         raise NotConfined(name, "the pattern of its legs is not a known one")
+    if pattern.turning and not any(_turned_once(anatomy, question, leg, goal) for leg in pattern.legs):
+        raise NotConfined(name, "its legs may hold the platform turned otherwise")
     plane = None if pattern.plane is None else _value(pattern.plane, goal)
     end = (plane if plane is not None and pattern.motion == "planar" else
            "free" if pattern.motion in ("spatial", "oriented") or anatomy.point is not None else "kept")
@@ -119,6 +121,20 @@ def tip_loci(anatomy: LegDecomposition, question: Measurement, pattern: Constrai
                    if pattern.motion == "oriented" and leg.turns < 3)
     slide, doubt = (None, None) if pattern.slide is None else _slide(anatomy, pattern, goal)
     return TipLoci(goal, pattern.motion, tips, pattern.bodies, plane, slide, angles, doubt=doubt)
+
+
+def _turned_once(anatomy: LegDecomposition, question: Measurement, leg: LockedLeg, goal: ClosedConfiguration
+                 ) -> bool:
+    """Whether the joints of a held leg leave its end one orientation, that at the goal, in all of its branches."""
+    if leg.virtual or leg.turns:
+        return False
+    own = [o for o in question.observations if o.leg == leg.label]
+    tip = _value(leg.tip, goal) * goal.twin.length
+    try:
+        known = [bodies for bodies, _ in orientations(chain(anatomy, anatomy.leg(leg.label), own, goal, tip, "free"))]
+    except Underived:
+        return False
+    return len(known) == 1 and known[0][-1] is not None
 
 
 def _angle(anatomy: LegDecomposition, question: Measurement, leg: LockedLeg, goal: ClosedConfiguration) -> KeptAngle:

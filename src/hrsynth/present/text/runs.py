@@ -226,7 +226,8 @@ def _samples(errors: PoseErrors, true: Sampled) -> Rows:
     if true.not_found:
         lines.append(f"{true.not_found} of them were not followed to the end: the solver gave up, which says nothing "
                      "of the robot")
-    if _apart(true.position, errors.position) or _apart(true.orientation, errors.orientation):
+    whole = not true.not_found
+    if _apart(true.position, errors.position, whole) or _apart(true.orientation, errors.orientation, whole):
         lines.append("they differ from the maxima above, which are unreliable here")
     return [("samples", lines)]
 
@@ -253,8 +254,11 @@ def _percent(gap: float) -> str:
     return f"{math.ceil(100 * gap / step) * step:.2g}"
 
 
-def _apart(true: float, linear: ErrorEllipsoid) -> bool:
-    return np.isfinite(linear.largest) and abs(true - linear.largest) > PARTS_FROM_LINEAR * max(linear.largest, 1e-12)
+def _apart(true: float, linear: ErrorEllipsoid, whole: bool) -> bool:
+    """Whether the largest true error shows that the linear one is unreliable; a smaller one does not unless the samples
+    were followed to the ``whole`` of their errors."""
+    apart = true - linear.largest if not whole else abs(true - linear.largest)
+    return np.isfinite(linear.largest) and apart > PARTS_FROM_LINEAR * max(linear.largest, 1e-12)
 
 
 def _vector(vector: Array) -> str:
