@@ -836,6 +836,13 @@ class SignedModesRecord(TypedDict):
     complete: bool
 
 
+class LockedPlaceRecord(TypedDict):
+    """A place `p` (m) of the platform's point about which legs may lock each other; so far about it was not looked."""
+
+    p: list[float]
+    within_m: float
+
+
 class RestCoverRecord(TypedDict):
     """What boxes of platform poses prove of a list of rests: `proved` critical poses; `open` boxes, a `share` of all;
     `within_m` of the goal, null where legs end the box; rods that slide and are shorter than `shorter_m` are left out,
@@ -857,6 +864,7 @@ class RestCoverRecord(TypedDict):
     turned: int
     apart: int
     crossings: int
+    locked: list[LockedPlaceRecord]
     unread: list[str]
     unstretched: list[str] | None
     across: int | None
