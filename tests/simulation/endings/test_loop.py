@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hrsynth.analysis.asked import configurations_at
-from hrsynth.closed_forms.legs import OnRail
+from hrsynth.closed_forms.legs import OnCrank, OnRail
 from hrsynth.mechanism.pose import asked_pose
 from hrsynth.simulation.endings.cover import bounds, cover
 from hrsynth.simulation.endings.endings import RestSearch
@@ -23,8 +23,9 @@ STARTS = 1000
 
 def subdivided(error, low, high, vanishing=False):
     """The zeros of boxes that all are settled."""
-    corners = error.box(low, high, 1.0)
-    part = LoopSubdivision(error, *corners) if isinstance(error, LoopError) else Subdivision(error, *corners, vanishing)
+    low, high = error.box(low, high, 1.0)
+    part = (LoopSubdivision(error, low, high) if isinstance(error, LoopError) else
+            Subdivision(error, low, high, vanishing=vanishing))
     part.run(1_000_000)
     zeros = part.zeros()
     assert not part.left
@@ -54,6 +55,7 @@ def test_in_a_plane_they_are_the_rests_at_which_a_force_closes_the_loop(rail: bo
     error = PoseError.of(scenes.setting("rrrrr_m1"), scenes.goal("rrrrr_m1"))
     if rail:
         first = error.limbs[0]
+        assert isinstance(first, OnCrank)
         tip = first.tip.value(error.p[None], error.R[None])
         end = first.solve(tip, first.mode)[1][0]
         slider = OnRail("slider", first.tip, 1.0, centre=end, axis=error.shifts @ [0.6, 0.8], rod=first.rod)
