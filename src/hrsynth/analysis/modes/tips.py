@@ -32,7 +32,7 @@ from ...mechanism.composites import WordGraph
 from ...mechanism.legs import LegDecomposition, decompose
 from ...results import Value
 from ...tolerances import CLOSED, FOLLOWED, MOVED, SAME_POINT, SAME_RELATION, SOLVED
-from .chain import Underived, chain
+from .chain import Chain, Underived, chain
 from .curves import Circle, Line, Plane, Point, Reach, Sphere
 from .reaches import reaches
 from .turns import kept_angle, orientations
@@ -123,15 +123,20 @@ def tip_loci(anatomy: LegDecomposition, question: Measurement, pattern: Constrai
     return TipLoci(goal, pattern.motion, tips, pattern.bodies, plane, slide, angles, doubt=doubt)
 
 
+def _held(anatomy: LegDecomposition, question: Measurement, leg: LockedLeg, at: ClosedConfiguration,
+          end: Array | str) -> Chain:
+    """The chain to a leg's tip, its observations held; raises ``Underived``."""
+    own = [o for o in question.observations if o.leg == leg.label]
+    return chain(anatomy, anatomy.leg(leg.label), own, at, _value(leg.tip, at) * at.twin.length, end)
+
+
 def _turned_once(anatomy: LegDecomposition, question: Measurement, leg: LockedLeg, goal: ClosedConfiguration
                  ) -> bool:
     """Whether the joints of a held leg leave its end one orientation, that at the goal, in all of its branches."""
     if leg.virtual or leg.turns:
         return False
-    own = [o for o in question.observations if o.leg == leg.label]
-    tip = _value(leg.tip, goal) * goal.twin.length
     try:
-        known = [bodies for bodies, _ in orientations(chain(anatomy, anatomy.leg(leg.label), own, goal, tip, "free"))]
+        known = [bodies for bodies, _ in orientations(_held(anatomy, question, leg, goal, "free"))]
     except Underived:
         return False
     return len(known) == 1 and known[0][-1] is not None
@@ -139,10 +144,8 @@ def _turned_once(anatomy: LegDecomposition, question: Measurement, leg: LockedLe
 
 def _angle(anatomy: LegDecomposition, question: Measurement, leg: LockedLeg, goal: ClosedConfiguration) -> KeptAngle:
     """The angle that a leg keeps; raises ``NotConfined`` where its joints do not show one."""
-    own = [o for o in question.observations if o.leg == leg.label]
-    tip = _value(leg.tip, goal) * goal.twin.length
     try:
-        found = chain(anatomy, anatomy.leg(leg.label), own, goal, tip, "free")
+        found = _held(anatomy, question, leg, goal, "free")
         axis, direction = kept_angle(found)
     except Underived as error:
         raise NotConfined(anatomy.mechanism.name, f"how leg {leg.label} turns the platform is not known: {error}"
@@ -158,7 +161,7 @@ def _tip(anatomy: LegDecomposition, question: Measurement, leg: LockedLeg, goal:
     own = [o for o in question.observations if o.leg == leg.label]
 
     def branches(at: ClosedConfiguration) -> tuple[list[tuple[Reach, float]], float]:
-        return reaches(chain(anatomy, anatomy.leg(leg.label), own, at, _value(leg.tip, at) * at.twin.length, end))
+        return reaches(_held(anatomy, question, leg, at, end))
 
     try:
         found, moved = branches(goal)

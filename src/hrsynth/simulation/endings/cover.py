@@ -294,11 +294,8 @@ def bounds(error: PoseError, reach: float) -> tuple[Array, Array, bool]:
 
 def _alike(one: CriticalBox, other: CriticalBox, loop: LoopError) -> bool:
     """Whether two enclosed zeros are at one pose with the same directions of two rods."""
-    size = loop.error.size
-    away = np.abs(one.x[:size] - other.x[:size])
-    away = np.minimum(away, np.abs(loop.periods[:size] - away))
-    return bool(np.all(away <= one.radius[:size] + other.radius[:size] + FOLLOWED)
-                and np.abs(one.directions - other.directions).max() < SAME_ENDING)
+    return (_meet(one, other, loop, list(range(loop.error.size)))
+            and bool(np.abs(one.directions - other.directions).max() < SAME_ENDING))
 
 
 def _same(one: CriticalBox, other: CriticalBox, error: JointError) -> bool:
@@ -306,9 +303,14 @@ def _same(one: CriticalBox, other: CriticalBox, error: JointError) -> bool:
     watched meet."""
     watched = {each.limb for each in error.error.seen}
     own = [*range(error.error.size), *(k for k, i in enumerate(error.joints, error.error.size) if i in watched)]
+    apart = np.linalg.norm(np.cross(one.directions, other.directions), axis=1).max(initial=0.0)
+    return _meet(one, other, error, own) and bool(apart < SAME_ENDING)
+
+
+def _meet(one: CriticalBox, other: CriticalBox, error: JointError, own: list[int]) -> bool:
+    """Whether enclosures of two zeros meet in some of the coordinates, but for periods."""
     away, periods = np.abs(one.x - other.x)[own], error.periods[own]
     turns = np.isfinite(periods)
     away[turns] %= periods[turns]
     away[turns] = np.minimum(away[turns], periods[turns] - away[turns])
-    apart = np.linalg.norm(np.cross(one.directions, other.directions), axis=1).max(initial=0.0)
-    return bool(np.all(away <= (one.radius + other.radius)[own] + FOLLOWED) and apart < SAME_ENDING)
+    return bool(np.all(away <= (one.radius + other.radius)[own] + FOLLOWED))

@@ -306,7 +306,7 @@ class JointError(Value):
     def errors(self) -> BoxFormula:
         """u × u* of all that is observed."""
         return of_robot(lambda y, number: [e.value for u, wanted in self._seen(y, number) for e in cross(u, wanted)],
-                      self.size[0])
+                        self.size[0])
 
     @cached_property
     def asked(self) -> BoxFormula:
