@@ -309,8 +309,8 @@ def _same(one: CriticalBox, other: CriticalBox, error: JointError) -> bool:
 
 def _meet(one: CriticalBox, other: CriticalBox, error: JointError, own: list[int]) -> bool:
     """Whether enclosures of two zeros meet in some of the coordinates, but for periods."""
-    away, periods = np.abs(one.x - other.x)[own], error.periods[own]
+    away, periods = np.abs(one.x[own] - other.x[own]), error.periods[own]
     turns = np.isfinite(periods)
     away[turns] %= periods[turns]
     away[turns] = np.minimum(away[turns], periods[turns] - away[turns])
-    return bool(np.all(away <= (one.radius + other.radius)[own] + FOLLOWED))
+    return bool(np.all(away <= one.radius[own] + other.radius[own] + FOLLOWED))
