@@ -353,6 +353,7 @@ def test_check_refuses_in_one_line_and_writes_nothing(run, tmp_path: Path, monke
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("asked", [["x=9", "x=0.01"], ["x=0.01", "x=9", "x=0.02", "y=-8"], ["x=9", "mode:2"]])
 def test_check_tells_every_pose_and_ends_as_at_one_that_is_not_reached(run, asked: list[str]):
     arguments = ["check", "3rrr_m1", *(word for pose in asked for word in ("--at", pose))]
@@ -514,7 +515,7 @@ def test_singular_text(run):
 @pytest.mark.slow
 def test_singular_draws_the_locus(run, tmp_path: Path):
     picture = tmp_path / "locus.png"
-    data = run("singular", "rrrrr_m1", "--points", "30", "--steps", "9", "-o", picture, "--json").data
+    data = run("singular", "3rrr_m1", "--points", "30", "--plane", "phi=0", "--steps", "9", "-o", picture, "--json").data
     assert picture.read_bytes().startswith(b"\x89PNG")
     assert data["file"] == str(picture)
     assert data["locus"]["axes"].keys() == {"x", "y"}
@@ -675,6 +676,7 @@ def test_servo_json_is_the_contract(run, tmp_path: Path):
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 def test_servo_text_names_the_mode_and_how_far_it_is(run):
     answer = run("servo", "quattro_rigid", "--observe", "1,2", "--start", "x=0.1,y=0.04,z=-0.93", "--goal",
                  "x=0,y=-0.25,z=-0.7", "--gain", "5")
@@ -700,7 +702,7 @@ def test_servo_refuses_what_does_not_fit(run, arguments: list[str], words: list[
     assert all(word in line for word in words)
 
 
-@pytest.mark.some(1)
+@pytest.mark.some(1, 6)
 @pytest.mark.parametrize("arguments", [
     ["derive", "--at", "x=9"], ["legs", "--at", "x=9"], ["check", "--at", "x=9"], ["check", "--grid", "x=8:9:2"],
     ["modes", "--at", "x=9"], ["path", "--start", "x=0", "--goal", "x=9"], ["path", "--start", "x=9", "--goal", "x=0"],

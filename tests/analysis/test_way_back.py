@@ -137,7 +137,7 @@ def test_a_motor_that_the_platform_does_not_feel_is_not_led_back_to():
     assert not proof.regular
 
 
-@pytest.mark.parametrize(("name", "half"), [("rrrrr_m1", 0.1), pytest.param("delta", 0.04, marks=pytest.mark.slow),
+@pytest.mark.parametrize(("name", "half"), [("rrrrr_m1", 0.1), pytest.param("delta", 0.04, marks=pytest.mark.long),
                                             pytest.param("gough_stewart", 0.001, marks=pytest.mark.long)])
 def test_motors_of_shipped_robots_are_functions_of_the_pose(name, half):
     """Poses of different motors differ, by small steps of plain NumPy."""

@@ -333,7 +333,7 @@ def test_a_large_group_is_packed_and_holds_the_same(tmp_path: Path, whole: dict[
             kept.lines(["c"], {})
 
 
-@pytest.mark.some(0, 1)
+@pytest.mark.long
 @pytest.mark.parametrize("words_each", [2, 4])
 def test_the_catalog_itself_has_the_same_bytes_from_two_workers(words_each: int, tmp_path: Path):
     """A few words of every group: that they are made here or elsewhere, alone or after others, changes nothing."""

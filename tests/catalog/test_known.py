@@ -43,7 +43,7 @@ def test_names_are_found_without_reading_every_word(group: str):
         assert is_called(each, "tripod") == (name is not None and "tripod" in name), each["word"]
 
 
-@pytest.mark.some(1)
+@pytest.mark.some(1, 2)
 @pytest.mark.parametrize(("text", "word"), [
     ("Delta", "3(Rt*-2SSt)"), ("3-RPS", "3(Rt-Pl*-S)"), ("stewart", "6(S-Pl*-S)"), ("Hexaglide", "6(Px*-Uyn-S)"),
     ("3-R*RR", "3(Rz*-Rz-Rz)"), ("'3(Rz-Rz*-Rz)'", "3(Rz-Rz*-Rz)")])

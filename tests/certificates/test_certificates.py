@@ -84,7 +84,7 @@ NEEDED = {name: [mark for mark, names in ((pytest.mark.slow, LONGER), (needs_mso
           for name in sorted(FAMILIES | MEETING | SURFACES)}
 
 
-@pytest.mark.some(2, 12)
+@pytest.mark.some(2, 8)
 @pytest.mark.parametrize("name", [pytest.param(name, marks=marks) for name, marks in NEEDED.items()])
 def test_random_platforms(name):
     """The checker's bound, which trusts no resultant, is the engine's count."""
@@ -269,7 +269,7 @@ def looped(name: str) -> str:
     return json.dumps(hrsynth.certificate(LOOPS[name]()))
 
 
-@pytest.mark.some(1, 2)
+@pytest.mark.some(1, 1)
 @pytest.mark.parametrize("name", LOOPS)
 def test_loops_of_planar_mechanisms(name):
     """Their lists have no tips on curves; the degrees bound them."""

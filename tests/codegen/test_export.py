@@ -115,6 +115,7 @@ def test_code_tells_where_motors_are_the_only_ones() -> None:
     assert found.to_dict()["back"] == [[low], [high]]
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize(("lower", "upper", "verdict"), [
     (-0.05, 0.1, "passed"), (-3.0, 3.0, "kept"), (-3.0, None, "kept"), (None, 0.1, "passed")])
 def test_limits_of_joints_without_a_motor(lower: float | None, upper: float | None, verdict: str) -> None:

@@ -141,7 +141,7 @@ def test_motors_of_poses_in_closed_form() -> None:
     check_motors_of_poses("rrrrr_m2", 100)
 
 
-@pytest.mark.slow
+@pytest.mark.some(0, 8)
 @pytest.mark.parametrize("name", FORMS)
 def test_motors_of_poses_for_each_form(name: str) -> None:
     check_motors_of_poses(name, 150)

@@ -57,7 +57,7 @@ def text_of(robot: Mechanism, seed: int) -> str:
 
 
 @pytest.mark.slow
-@settings(max_examples=12, deadline=None, phases=[Phase.generate],
+@settings(max_examples=6, deadline=None, phases=[Phase.generate],
           suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much])
 @given(robot=st.one_of(planar_robots(("RRR", "RPR", "PRR", "RRP")), delta_like()), seed=st.integers(0, 99),
        chosen=st.lists(st.sampled_from(sorted(DEFECTS)), min_size=1, unique=True))

@@ -353,7 +353,7 @@ SOME = ("3rps", "rrrrr_m1")
 NAMES = [name if name in SOME else pytest.param(name, marks=pytest.mark.slow) for name in shipped()]
 
 
-@pytest.mark.some(3, 33)
+@pytest.mark.some(3, 12)
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("ending", ["", ".xml", ".sdf", ".yaml"])
 def test_shipped_robots_raise_no_alarm_in_any_dialect(name: str, ending: str, tmp_path: Path):

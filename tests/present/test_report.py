@@ -325,7 +325,7 @@ def test_accuracy_is_about_directions_that_see_everything():
         parts.error_plane(found.setting, 0)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_report_speaks_of_what_is_seen_whatever_kind_it_is(tmp_path: Path):
     """A leg and two kinds besides on a planar robot: sets, condition, modes and accuracy are of all three."""
     page = tmp_path / "report.html"

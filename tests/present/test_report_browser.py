@@ -13,7 +13,7 @@ from hrsynth.cli import execute
 
 pytestmark = pytest.mark.browser
 
-FIVE = [("rrrrr_m1", "all"), ("3rrr_m1", "all"), ("gough_stewart", "all"), ("quattro", "1,4"), ("uranesx", "all")]
+FIVE = [("quattro", "1,4"), ("rrrrr_m1", "all"), ("3rrr_m1", "all"), ("gough_stewart", "all"), ("uranesx", "all")]
 PICTURES = "[...document.images].every(i => i.complete && i.naturalWidth > 100)"
 DRAWN = "[...document.querySelectorAll('figure svg')].every(s => s.getBoundingClientRect().width > 100)"
 WIDE = "document.documentElement.scrollWidth <= document.documentElement.clientWidth"

@@ -75,7 +75,7 @@ def test_each_option_goes_somewhere(question):
     assert {name for file in files for name in (*file.needs, *file.takes)} <= {each.name for each in question.options}
 
 
-@pytest.mark.some(1)
+@pytest.mark.some(1, 3)
 @pytest.mark.parametrize("command", ASKED)
 def test_a_result_is_printed_as_by_the_command_line(command: str, capsys: pytest.CaptureFixture[str]):
     found = answer(command)
@@ -125,7 +125,7 @@ def test_a_derivation_holds_the_directions_at_the_pose_it_is_given():
 
 
 @pytest.mark.some(1)
-@pytest.mark.parametrize("command", ["modes", "servo", pytest.param("singular", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("command", ["modes", "servo", pytest.param("singular", marks=pytest.mark.long)])
 def test_pictures_of_results_are_shown_in_notebooks_and_saved(command: str, tmp_path):
     options = {"steps": 9} if command == "singular" else {}
     picture = hrsynth.draw(answer(command), **options)

@@ -34,6 +34,7 @@ def law_joints_hold(found: View) -> None:
             assert worst < CLOSED, (machine.key, worst)
 
 
+@pytest.mark.some(0, 5)
 @pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.slow) if name == "quattro" else name
                                   for name in ROBOTS])
 def test_all_loops_are_closed_at_every_position_of_every_slider(name: str):
@@ -87,6 +88,7 @@ def test_the_hidden_robot_shows_the_same_directions_and_platform(name: str):
             assert u == pytest.approx(v, abs=DRAWN)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ROBOTS)
 def test_every_joint_is_drawn_once_and_every_rod_ends_in_joint_centres(name: str):
     found = seen(name)

@@ -147,7 +147,7 @@ def test_the_general_form_keeps_all_legs(robot: str, legs: tuple[str, ...] | Non
         assert "{R-PP}" in state.architecture().ascii
 
 
-@pytest.mark.some(0, 8)
+@pytest.mark.some(0, 4)
 @pytest.mark.parametrize(("robot", "legs"), CASES, ids=name)
 def test_no_accepted_step_changes_the_relation_anywhere(robot: str, legs: tuple[str, ...] | None) -> None:
     assert obeys(setting_of(robot, legs, None, 3), thorough=True).steps

@@ -39,7 +39,7 @@ def test_what_a_film_does_not_draw_is_refused_before_the_run(tmp_path: Path, cap
     assert ".png" in line
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.skipif(find_spec("mujoco") is None, reason="the extra bench is not installed")
 def test_a_film_ends_with_the_watched_leg_over_its_wanted_place():
     """At the goal what is seen covers what is to be seen: no pale colour is left, and there was some at the start."""

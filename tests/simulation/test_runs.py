@@ -59,7 +59,7 @@ def test_starts_near_the_goal_end_there(name: str):
     check_near(name)
 
 
-@pytest.mark.some(0, 6)
+@pytest.mark.some(0, 3)
 @pytest.mark.parametrize("name", REST)
 def test_starts_near_the_goal_end_there_for_the_other_robots(name: str):
     check_near(name)

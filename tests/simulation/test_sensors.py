@@ -81,7 +81,7 @@ def test_a_platform_comes_to_its_goal_with_any_sensors(see: tuple[str, ...]) -> 
     np.testing.assert_allclose(X, wanted, atol=1e-8)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_depth_that_is_only_supposed_bends_the_way_and_may_make_the_goal_repel() -> None:
     """The depths at the goal bend the way. One depth for all, which is not that of the point that stands out, does
     more: at the goal itself a motion grows under the law, and the run ends elsewhere."""

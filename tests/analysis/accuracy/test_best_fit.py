@@ -161,6 +161,7 @@ def test_best_fits_of_random_robots(robot) -> None:
         check_fit(setting, at, way)
 
 
+@pytest.mark.slow
 def test_an_arm_that_hardly_sees_one_of_its_turns_is_followed_to_the_whole_error():
     """A camera on an arm sees three points and the depth of a fourth one. Gauss and Newton on the arm's product of
     exponentials, in NumPy, come to rest where the sample says, near the linear law."""

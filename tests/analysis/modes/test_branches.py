@@ -139,6 +139,7 @@ def test_an_offset_parts_the_two_lines_of_a_u():
         reaches(offset_u(1e-8))
 
 
+@pytest.mark.slow
 def test_a_u_joint_that_carries_the_platform_holds_it_turned_by_half_a_turn_too():
     """Direction and length of a leg U-P are measured: about its direction, normal to the U's second axis, the platform
     can be turned by half a turn."""

@@ -85,7 +85,7 @@ def read(folder: Path, text: str, **given: object):
     return load(path, **given)
 
 
-@pytest.mark.some(1, 25)
+@pytest.mark.some(1, 10)
 @pytest.mark.parametrize("ending", [".usda", pytest.param(".usd", marks=pytest.mark.slow),
                                     pytest.param(".usdc", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", ROBOTS)
@@ -98,7 +98,7 @@ def test_a_shipped_robot_comes_back_the_same(name: str, ending: str, tmp_path: P
     assert back.notes == ()
 
 
-@pytest.mark.some(0, 8)
+@pytest.mark.some(0, 4)
 @pytest.mark.parametrize("name", ROBOTS)
 def test_its_hidden_robot_is_the_same(name: str, tmp_path: Path):
     save(load(name), tmp_path / "robot.usdc")

@@ -235,7 +235,7 @@ def test_the_plain_answer_agrees_with_legs_and_modes(robot: str):
 
 
 @pytest.mark.parametrize("kind", ["robot", "figure", pytest.param("page", marks=pytest.mark.slow),
-                                  pytest.param("report", marks=pytest.mark.slow)])
+                                  pytest.param("report", marks=pytest.mark.long)])
 def test_what_is_exported_is_the_file_that_its_name_says(kind: str, tmp_path: Path):
     found = ask("export", "rrrrr_m1", kind=kind)
     file = tmp_path / found["name"]
@@ -335,7 +335,7 @@ def test_what_was_guessed_of_a_foreign_file_is_told_and_can_be_changed(tmp_path:
     assert changed["failed"] or changed["command"].endswith(f"--platform {wrong}")
 
 
-@pytest.mark.some(0, 8)
+@pytest.mark.some(0, 4)
 @pytest.mark.parametrize("robot", list(shipped()))
 def test_along_every_slider_the_loops_stay_closed(robot: str):
     """Step by step, as a hand draws it, with the hidden robot; how quickly is measured in ``benchmarks/studio.py``."""

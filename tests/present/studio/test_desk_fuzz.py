@@ -47,7 +47,7 @@ def test_the_fuzz_knows_every_question():
     assert tuple(sorted(FIELDS)) == names()
 
 
-@pytest.mark.some(1)
+@pytest.mark.some(1, 4)
 @pytest.mark.parametrize("what", [pytest.param(what, marks=pytest.mark.slow) if what in LONG else what
                                   for what in sorted(FIELDS)])
 def test_no_field_of_any_question_is_trusted(what: str):

@@ -107,6 +107,7 @@ def test_rates_by_pose_and_joints_are_those_of_differences(name):
             assert np.allclose(slope, told[:, k + k * n : k + k * n + n][:, j] * rate, atol=1e-7)
 
 
+@pytest.mark.some(3)
 @pytest.mark.parametrize("name", ["3rpr_m1", "3rrr_m1", "delta", "orthoglide", "prrrp_m1", "quattro"])
 def test_joints_are_narrowed_to_where_the_legs_close(name):
     """Of poses in a box, each zero of an equation along its own joint, met by signs of that equation alone, stays

@@ -48,6 +48,7 @@ def places(zeros, freedoms):
     return np.concatenate([x[:, :freedoms], np.cos(x[:, freedoms:]), np.sin(x[:, freedoms:])], axis=1)
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("rail", [False, True])
 def test_in_a_plane_they_are_the_rests_at_which_a_force_closes_the_loop(rail: bool) -> None:
     """Of a five-bar, and of one with a slider: where not every direction is along the desired one or at right angles
