@@ -515,7 +515,8 @@ def test_singular_text(run):
 @pytest.mark.slow
 def test_singular_draws_the_locus(run, tmp_path: Path):
     picture = tmp_path / "locus.png"
-    data = run("singular", "3rrr_m1", "--points", "30", "--plane", "phi=0", "--steps", "9", "-o", picture, "--json").data
+    data = run("singular", "3rrr_m1", "--points", "30", "--plane", "phi=0", "--steps", "9", "-o", picture,
+               "--json").data
     assert picture.read_bytes().startswith(b"\x89PNG")
     assert data["file"] == str(picture)
     assert data["locus"]["axes"].keys() == {"x", "y"}

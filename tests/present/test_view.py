@@ -88,7 +88,7 @@ def test_the_hidden_robot_shows_the_same_directions_and_platform(name: str):
             assert u == pytest.approx(v, abs=DRAWN)
 
 
-@pytest.mark.slow
+@pytest.mark.some(1)
 @pytest.mark.parametrize("name", ROBOTS)
 def test_every_joint_is_drawn_once_and_every_rod_ends_in_joint_centres(name: str):
     found = seen(name)
