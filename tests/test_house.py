@@ -93,8 +93,6 @@ class Import(NamedTuple):
     text: str
     head: bool
     """Whether it runs when the module is imported."""
-    runs: bool
-    """Whether it runs at all: not under ``if TYPE_CHECKING``."""
 
 
 class Source(NamedTuple):
@@ -110,16 +108,16 @@ def source_of(path: Path) -> Source:
     """A module, read once."""
     tree, imports, classes = tree_of(path), list[Import](), list[tuple[int, str]]()
     package = ["hrsynth", *path.relative_to(PACKAGE).parent.parts]
-    pending: list[tuple[ast.AST, bool, bool]] = [(tree, True, True)]
+    pending: list[tuple[ast.AST, bool]] = [(tree, True)]
     while pending:
-        node, head, runs = pending.pop()
+        node, head = pending.pop()
         if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
-            head = runs = False
+            head = False
         if isinstance(node, ast.Import | ast.ImportFrom):
             level = node.level if isinstance(node, ast.ImportFrom) else 0
             base = package[: len(package) - level + 1] if level else []
             base += (node.module or "").split(".") if isinstance(node, ast.ImportFrom) and node.module else []
-            imports += [Import(node.lineno, ".".join([*base, alias.name]), ast.unparse(node), head, runs)
+            imports += [Import(node.lineno, ".".join([*base, alias.name]), ast.unparse(node), head)
                         for alias in node.names]
         elif isinstance(node, ast.ClassDef):
             classes.append((node.lineno, node.name))
@@ -127,7 +125,7 @@ def source_of(path: Path) -> Source:
             head = False
         elif isinstance(node, ast.expr):
             continue  # holds none of these
-        pending += [(child, head, runs) for child in ast.iter_child_nodes(node)]
+        pending += [(child, head) for child in ast.iter_child_nodes(node)]
     return Source(tuple(imports), tuple(classes), tuple(constants(tree)))
 
 
@@ -177,13 +175,13 @@ def test_no_module_imports_itself_in_the_end():
     graph = nx.DiGraph()
     for own, path in modules.items():
         for each in source_of(path).imports:
-            parts = tuple(each.name.split(".")[1:]) if each.runs and each.name.startswith("hrsynth.") else ()
+            parts = tuple(each.name.split(".")[1:]) if each.name.startswith("hrsynth.") else ()
             while parts and parts not in modules:
                 parts = parts[:-1]
             if parts and parts != own:
                 graph.add_edge(own, parts)
     parts = [" ".join(sorted(map(".".join, part))) for part in nx.strongly_connected_components(graph) if len(part) > 1]
-    assert_none(parts, "modules that import each other in a circle")
+    assert_none(parts, "modules that import each other in a circle, for types or inside functions included")
 
 
 TABLES = {"tolerances", "budgets"}

@@ -25,16 +25,16 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations, product
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from .curves import Circle, Line, Plane, Point, Sphere
 from .quadrics import UNIT, direction, normals
+from .rigid import Spatial
 from .roots import PRECISION
-
-if TYPE_CHECKING:
-    from .rigid import Spatial
+from .systems import System
+from .translating import Articulated
 
 DEGREE = 40
 """The degree of X: of the poses of a rigid body among 16 coordinates."""
@@ -80,7 +80,32 @@ class _Condition:
         return a, b, c
 
 
-def rigid_bound(system: Spatial, legs: Sequence[int]) -> Bound:
+def least_bound(system: System, legs: Sequence[int]) -> Bound | None:
+    """How many complex poses meet the conditions of a choice of legs, as many as freedoms, at most where they are
+    finitely many, and why; None where that is not known."""
+    if sum(system.forbids[k] for k in legs) != system.freedoms:
+        return None
+    if isinstance(system, Spatial):
+        return _of_a_body(system, legs)
+    return _of_two_bodies(system, legs) if isinstance(system, Articulated) else None
+
+
+def _of_two_bodies(system: Articulated, legs: Sequence[int]) -> Bound | None:
+    """Bézout for p in space and the slide's circle (degree 2): of a body's spheres all but one are planes by their
+    differences, and those of the other body are linear in p then: 2 · 2 m, m the other body's conditions; without
+    spheres 2 m. With a line for the slide one sphere of each body is left: 2 each."""
+    sides = [[k for k in legs if system.bodies[k] == body] for body in (0, 1)]
+    counts = [sum(system.forbids[k] for k in side) for side in sides]
+    round_ = [any(isinstance(system.curves[k], Circle | Sphere) for k in side) for side in sides]
+    if not all(counts):
+        return None
+    if isinstance(system.slide, Line):
+        return Bound(2 ** sum(round_), "a sphere of each body, planes besides (Bézout)", "product")
+    found = [(4 if round_[body] else 2) * counts[1 - body] for body in (0, 1) if round_[body] or not any(round_)]
+    return Bound(min(found), "the product of degrees in space and on the circle (Bézout)", "product")
+
+
+def _of_a_body(system: Spatial, legs: Sequence[int]) -> Bound:
     """The least of the bounds that hold for the six conditions of some legs."""
     curves = [system.curves[k] for k in legs]
     if sorted(system.forbids[k] for k in legs) == [1, 2, 3]:

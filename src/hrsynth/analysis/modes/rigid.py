@@ -16,7 +16,6 @@ from ...errors import BadRequest
 from ...geometry.so3 import exponential, logarithm
 from ...geometry.vectors import Array, cross, pose
 from ...tolerances import SAME_DIRECTION, SAME_POINT
-from .bounds import Bound, rigid_bound
 from .curves import Circle, Curve, Line, Point, Surface, curves_of, extent, length
 from .polynomials import Equation
 from .quadrics import (
@@ -213,12 +212,6 @@ class Spatial(System):
     def spread(self, q: Array, apart: Mapping[int, float]) -> tuple[float, float]:
         """How far the platform's frame (m) and turn (rad) can be from those at q; see ``registered``."""
         return registered(self.tips, apart, self.arrows)
-
-    def bound(self, legs: Sequence[int]) -> Bound | None:
-        """How many poses meet as many conditions as freedoms at most; see :mod:`.bounds`."""
-        if sum(self.forbids[k] for k in legs) != self.freedoms:
-            return None
-        return rigid_bound(self, legs)
 
     def chart(self, number: int) -> PoseParametrization:
         """Study's coordinates, with a linear form of the quaternion that depends on the number made 1."""

@@ -12,7 +12,7 @@ import numpy as np
 from ...geometry.vectors import Array, frozen
 from ...results import Value
 from ...tolerances import FARTHEST, NEARLY_DOUBLE, SAME_RELATION, TIP_ROUNDING, VANISHES
-from .bounds import Bound
+from .bounds import Bound, least_bound
 from .curves import Point
 from .fits import Meant, as_meant, dimension, excluded, meets, residual, stationary, torn, words
 from .multiples import most_zeros
@@ -179,7 +179,7 @@ def _proposed(system: System, near: bool, goal: Array | None,
         return _too_few(system)
     part = None
     for part in islice(wholes(system), CHOICES):
-        most = system.bound(part.legs)
+        most = least_bound(system, part.legs)
         roots = None
         for number in range(CHARTS):
             part = replace(part, chart=system.chart(number)) if number else part

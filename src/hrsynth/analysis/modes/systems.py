@@ -20,7 +20,6 @@ from ...errors import BadRequest
 from ...geometry.vectors import Array, frozen, pose
 from ...results import Value
 from ...tolerances import FARTHEST, TIP_ROUNDING
-from .bounds import Bound
 from .curves import Point, Reach, curves_of, extent, length, shifted
 from .quadrics import SLACK, UNIT, Balls, PoseParametrization, Within, WorkingFrame, spatial_frame
 from .squares import SquareSystem
@@ -150,11 +149,6 @@ class System(Value):
     def squares(self) -> Iterator[SquareSystem]:
         """The choices of legs that can be solved by elimination, best first."""
         raise NotImplementedError
-
-    def bound(self, legs: Sequence[int]) -> Bound | None:
-        """How many complex poses meet the conditions of a choice of legs, as many as freedoms, at most where they are
-        finitely many, and why; None where that is not known."""
-        return None
 
     def chart(self, number: int) -> PoseParametrization:
         """Coordinates of the pose; where there are many charts, that of a number."""

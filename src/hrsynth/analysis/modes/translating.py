@@ -13,7 +13,6 @@ import numpy as np
 from ...errors import BadRequest
 from ...geometry.vectors import Array, cross
 from ...tolerances import PARALLEL, TIP_ROUNDING, VANISHES
-from .bounds import Bound
 from .curves import Circle, Curve, Line, Plane, Point, Reach, Sphere, Surface, extent, length, shifted
 from .polynomials import Equation
 from .quadrics import (
@@ -181,20 +180,6 @@ class Articulated(Shifting):
         """How far the bodies can be from their places at q (m); they do not turn."""
         sides = [[each for k, each in apart.items() if self.bodies[k] == body] for body in (0, 1)]
         return max(min(side, default=math.inf) for side in sides), 0.0
-
-    def bound(self, legs: Sequence[int]) -> Bound | None:
-        """Bézout for p in space and the slide's circle (degree 2): of a body's spheres all but one are planes by their
-        differences, and those of the other body are linear in p then: 2 · 2 m, m the other body's conditions; without
-        spheres 2 m. With a line for the slide one sphere of each body is left: 2 each."""
-        sides = [[k for k in legs if self.bodies[k] == body] for body in (0, 1)]
-        counts = [sum(self.forbids[k] for k in side) for side in sides]
-        round_ = [any(isinstance(self.curves[k], Circle | Sphere) for k in side) for side in sides]
-        if sum(counts) != self.freedoms or not all(counts):
-            return None
-        if isinstance(self.slide, Line):
-            return Bound(2 ** sum(round_), "a sphere of each body, planes besides (Bézout)", "product")
-        found = [(4 if round_[body] else 2) * counts[1 - body] for body in (0, 1) if round_[body] or not any(round_)]
-        return Bound(min(found), "the product of degrees in space and on the circle (Bézout)", "product")
 
     def chart(self, number: int) -> PoseParametrization:
         """p, cos θ and sin θ, or s."""
