@@ -69,6 +69,10 @@ def spec_of(attributes: Mapping[str, str], line: int | None = None) -> SightSpec
     for name in (own, *needs):
         if not name.endswith("?") and name not in attributes:
             raise BadRequest(f"observe {kind} without the attribute", name)
+    used = (own, *(name.removesuffix("?") for name in needs))
+    for name in ("link", "joint", "at", "axis", "radius"):
+        if name in attributes and name not in used:
+            raise BadRequest(f"observe {kind} with an attribute it does not use", name, list(dict.fromkeys(used)))
     if "axis" in numbers and not any(numbers["axis"]):
         raise BadRequest(f"observe {kind}: axis", attributes["axis"], "a non-zero vector")
     radius = numbers["radius"][0] if "radius" in numbers else None
