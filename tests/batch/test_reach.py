@@ -10,6 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from hrsynth.analysis.observed import ObservedRobot
+from hrsynth.batch.grids import beyond_rods
 from hrsynth.batch.reach import generic_motion, reach, sweep
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, PoseNotReached
@@ -194,6 +195,39 @@ def test_random_robots_reach_the_poses_of_their_samples(mechanism) -> None:
     motion = motion_of(setting)
     for member in setting.everything.members:
         check_reached(setting, motion, member.way[0].pose)
+
+
+@pytest.mark.some(6)
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_what_rods_keep_away_is_not_reached(robot: str) -> None:
+    """No pose that the robot takes is said to be beyond its rods; far away all are, where a chain has only centres."""
+    setting = setting_of(robot)
+    motion = motion_of(setting)
+    poses = [motion.goal(had(motion, member.configuration.pose(motion.link))) for member in setting.everything.members]
+    assert beyond_rods(setting.mechanism, motion, poses) == set()
+    if robot in ("rrrrr_m1", "3rrr_m1", "delta", "quattro"):
+        far = motion.goal(replace(had(motion, motion.home), x=9.0))
+        assert beyond_rods(setting.mechanism, motion, [*poses, far]) == {len(poses)}
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_beyond_rods_is_beyond_the_circles_of_a_five_bar(seed: int) -> None:
+    """Where its end is, two cranks and two rods tell by hand: both distances to the base joints."""
+    rng = np.random.default_rng(seed)
+    five = transformed(planar(["RRR", "RRR"], rng, [{0}, {0}], point=True), random_rotation(rng), rng.normal(size=3))
+    setting = ObservedRobot.of(five)
+    motion = motion_of(setting)
+    joints = [[setting.mechanism.joints[name].point for name in leg.joints] for leg in setting.anatomy.legs]
+    end = motion.position(motion.home)
+    across = motion.translations @ rng.uniform(-1.5, 1.5, (motion.translations.shape[1], 200))
+    goals = [replace(motion.at_home(), values=end + each, phi=None, rotation=None) for each in across.T]
+    inside = np.ones(200, dtype=bool)
+    for a, b, *_ in joints:
+        crank, rod = np.linalg.norm(b - a), np.linalg.norm(end - b)
+        far = np.linalg.norm(end + across.T - a, axis=1)
+        inside &= (far <= crank + rod) & (far >= abs(crank - rod))
+    assert beyond_rods(setting.mechanism, motion, goals) == set(np.flatnonzero(~inside))
+    assert 0 < inside.sum() < 200
 
 
 def test_the_turn_about_an_axis() -> None:

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
 
 import numpy as np
 
+from ..errors import HrsynthError
 from ..geometry.so3 import exponential
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.platform_motion import Goal, PlatformMotion
+from ..mechanism import JointType, Mechanism
+from ..mechanism.graphs import adjacency, shortest_path
+from ..mechanism.legs import decompose
 from ..mechanism.pose import Grid
-from ..tolerances import FOLLOWED, RANK_CUTOFF
+from ..tolerances import AS_PRINTED, FOLLOWED, RANK_CUTOFF
 from .engine import Flags
 from .placing import Placer
 
@@ -30,6 +35,40 @@ def ready(placer: Placer, motion: PlatformMotion, goals: Sequence[Goal]
     closed, turning = ([i for i in missed if _freedoms_left(motion, goals[i]) == left] for left in (0, 1))
     some = np.concatenate([placer.batch.reached(X[closed]), _some_turn(placer, motion, X[turning])])
     return found, {i for i, reached in zip([*closed, *turning], some, strict=True) if not reached}
+
+
+def beyond_rods(mechanism: Mechanism, motion: PlatformMotion, goals: Sequence[Goal]) -> set[int]:
+    """The places of goals whose point is farther from a joint of the base than the rods between them reach, or nearer.
+
+    Centres of R, U and S joints keep their distances on each link. So along a chain of them the point is at most the
+    sum of its distances away from the first one, and at least twice the longest less that sum."""
+    placed = [i for i, goal in enumerate(goals) if _freedoms_left(motion, goal) <= motion.rotations.shape[1]]
+    points = np.array([motion.position(pose_of(motion, goals[i])) for i in placed]).reshape(-1, 3)
+    missed = np.zeros(len(placed), dtype=bool)
+    for chain in _chains(mechanism, motion):
+        rods = np.linalg.norm(np.diff(chain, axis=0), axis=1)
+        most, least = rods.sum(), 2 * rods.max() - rods.sum()
+        far = np.linalg.norm(points - chain[0], axis=1)
+        missed |= (far > most + AS_PRINTED * (1 + most)) | (far < least - AS_PRINTED * (1 + most))
+    return {i for i, out in zip(placed, missed, strict=True) if out}
+
+
+def _chains(mechanism: Mechanism, motion: PlatformMotion) -> Iterator[Array]:
+    """Through each leg the centres (n, 3) of the joints from the base to the platform's point, which comes last."""
+    try:
+        anatomy = decompose(mechanism)
+    except HrsynthError:
+        return
+    centred = (JointType.REVOLUTE, JointType.UNIVERSAL, JointType.SPHERICAL)
+    for leg in anatomy.legs:
+        within = {mechanism.base, *anatomy.platform, motion.link, *leg.links}
+        bonds = {frozenset(joint.links): joint for joint in mechanism.joints.values()
+                 if joint.type in centred and within.issuperset(joint.links)}
+        try:
+            links = shortest_path(adjacency(within, bonds), mechanism.base, motion.link)
+        except KeyError:
+            continue
+        yield np.array([*(bonds[frozenset(pair)].point for pair in pairwise(links)), motion.position(motion.home)])
 
 
 def pose_of(motion: PlatformMotion, goal: Goal) -> Array:

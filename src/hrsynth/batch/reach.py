@@ -69,9 +69,10 @@ def sweep(start: ClosedConfiguration, question: Measurement, grid: Grid, motion:
     motion = motion or generic_motion(start, question)
     goals = [motion.goal(pose, start.twin.mechanism.name) for pose in grid.poses()]
     home = motion.at_home()
-    from .grids import ready
+    from .grids import beyond_rods, ready
 
-    at_once, hopeless = ({}, set()) if placer is None else ready(placer, motion, goals)
+    at_once, hopeless = ({}, beyond_rods(start.twin.mechanism, motion, goals)) if placer is None else (
+        ready(placer, motion, goals))
 
     def lead(cell: int, origin: ClosedConfiguration, halvings: int) -> ClosedConfiguration | None:
         if cell in hopeless:
