@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import json
 import sys
 from pathlib import Path
 
@@ -29,7 +30,20 @@ def expand(path: Path) -> xml.Element:
     except subprocess.TimeoutExpired:
         raise xml.refusal(path, "xacro does not come to an end", f"{XACRO_SECONDS} seconds") from None
     if run.returncode:
-        lines = [line for line in run.stderr.splitlines() if line.strip()]
-        raise xml.refusal(path, "xacro refuses it: " + " ".join(lines[-1:])[:200],
-                          "a file that xacro expands")
-    return xml.document(run.stdout, str(path))
+        file, line, said = _said(run.stderr)
+        raise xml.refusal(path if file is None else xml.beside(path, file),
+                          f"xacro refuses it: {said[:300]}", "a file that xacro expands", line=line)
+    places, _, text = run.stdout.partition("\n")
+    root = xml.document(text, str(path))
+    xml.placed(root, path, json.loads(places))
+    return root
+
+
+def _said(errors: str) -> tuple[str | None, int | None, str]:
+    """File, line and text of what the process says last."""
+    last = "".join([line for line in errors.splitlines() if line.strip()][-1:])
+    try:
+        found = json.loads(last)
+        return found["file"], found["line"], found["said"]
+    except (ValueError, TypeError, KeyError):
+        return None, None, last
