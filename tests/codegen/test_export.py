@@ -323,7 +323,9 @@ def test_a_compiler_that_drops_checks_is_refused(tmp_path: Path) -> None:
 
 
 ODD = {"class": "class_", "9 lives": "_9_lives", "std": "std_", "": "robot", "a-b.é": "a_b__",
-       "NULL": "NULL_", "Motors": "Motors_", "# coding: utf-7": "__coding__utf_7", "r\n#error \\": "r__error__"}
+       "NULL": "NULL_",
+       "gamma": "gamma_", "y0": "y0_", "link": "link_", "size_t": "size_t_", "CHAR_BIT": "CHAR_BIT_",
+       "Motors": "Motors_", "# coding: utf-7": "__coding__utf_7", "r\n#error \\": "r__error__"}
 """Names of robots, and their namespaces."""
 
 
@@ -350,7 +352,7 @@ def test_names_are_no_code(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["class", "", "NULL", "Motors", "r\n#error \\"])
+@pytest.mark.parametrize("name", ["class", "", "NULL", "Motors", "gamma", "r\n#error \\"])
 def test_names_are_no_code_in_cpp(name: str, tmp_path: Path) -> None:
     robot = oddly_named(name)
     code = export(robot, "c++", box_of(robot, 0.1)).code
@@ -359,6 +361,25 @@ def test_names_are_no_code_in_cpp(name: str, tmp_path: Path) -> None:
             "int main() { return int(unique(Motors::Zero())) + std::puts(MOTOR_NAMES[0]) < 0; }")
     found = subprocess.run([compiled(tmp_path, code, main)], capture_output=True, text=True, check=True)
     assert found.stdout == 'motor "*/ ???/ q\n\\\n'
+
+
+def test_no_name_of_the_c_library_is_a_namespace(tmp_path: Path) -> None:
+    """None of its names without underscores, of its types and macros, is what a robot's namespace is called."""
+    names = set(" ".join(path.read_text(encoding="utf-8", errors="replace") for path in (
+        Path("/usr/include/math.h"), Path("/usr/include/stdio.h"), Path("/usr/include/stdlib.h"),
+        Path("/usr/include/unistd.h"), Path("/usr/include/time.h"), Path("/usr/include/string.h")) if path.exists()
+    ).replace("(", " ( ").split())
+    names = sorted({each for each in names if re.fullmatch("[a-z][a-z0-9]*|[a-z][a-z0-9_]*_t", each)
+                    and not re.search("f[0-9]+x?$", each)} | {
+        "gamma", "y0", "int8_t", "FILE", "INT_MAX", "CHAR_BIT", "FE_INVALID"})
+    lines = [f"namespace {namespace(each)} {{}}" for each in names]
+    (tmp_path / "main.cpp").write_text("\n".join(["#include <Eigen/Core>", "#include <cstdio>", "#include <ctime>",
+                                                  "#include <iostream>", *lines]))
+    done = subprocess.run(["g++", "-std=c++17", "-fsyntax-only", f"-isystem{eigen()}", "main.cpp"], cwd=tmp_path,
+                          capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr[:2000]
+    assert [namespace(each) for each in ("delta", "MYROBOT", "EXO_2", "irb_140t")] == [
+        "delta", "MYROBOT", "EXO_2", "irb_140t"]
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, 1e308])

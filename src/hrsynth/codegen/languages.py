@@ -5,8 +5,10 @@ from __future__ import annotations
 import json
 import math
 import re
+import tomllib
 from collections.abc import Sequence
 from functools import cache
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..budgets import INVERSE_STEPS_AT_RUN, NEWTON_STEPS_AT_RUN
@@ -32,17 +34,27 @@ TAKEN = frozenset(re.findall(r"\w+", """
     protected public register reinterpret_cast return short signed sizeof static static_assert static_cast struct switch
     template this thread_local throw true try typedef typeid typename union unsigned using virtual void volatile wchar_t
     while xor xor_eq Eigen detail main std
-    BUFSIZ EDOM EOF ERANGE HUGE_VAL INFINITY M_E M_PI NAN NDEBUG NULL RAND_MAX errno linux stderr stdin stdout unix
+    BUFSIZ EDOM EOF FILE ERANGE HUGE_VAL INFINITY M_E M_PI NAN NDEBUG NULL RAND_MAX errno linux stderr stdin stdout unix
     DIRECTIONS DIRECTION_NAMES Jacobians LOWER MOTORS MOTOR_NAMES Motors PASSIVE PASSIVE_NAMES Passive STEPS Solution
     Status UPPER forward inverse jacobians unique"""))
 """Keywords of C++17, names that something else has where headers are included, macros, and the header's own names
 (ambiguous where the namespace is used)."""
+RESERVED = re.compile(r"[a-z]\w*_t|(CHAR|CLOCK|DBL|EIGEN|FE|FLT|FP|INT\d*|LC|LONG|M|SEEK|SHRT|SIZE|UINT\d*)_[A-Z0-9_]+")
+"""Types of the C library, and its macros."""
 
 
 def namespace(name: str) -> str:
     """The name of a robot as a namespace of C++."""
     found = re.sub(r"[^0-9A-Za-z_]|^(?=\d)", "_", name) or "robot"
-    return f"{found}_" if found in TAKEN else found
+    taken = found in TAKEN or found in _c_names() or RESERVED.fullmatch(found)
+    return f"{found}_" if taken else found
+
+
+@cache
+def _c_names() -> frozenset[str]:
+    """What the C library calls its functions."""
+    text = Path(__file__).with_name("c_names.toml").read_text(encoding="utf-8")
+    return frozenset(tomllib.loads(text)["names"].split())
 
 
 def _comment(text: str) -> str:
