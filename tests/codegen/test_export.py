@@ -106,6 +106,44 @@ def test_a_four_bar_part_of_a_turn() -> None:
     assert np.isnan(p[:4]).all()
 
 
+@pytest.mark.parametrize("size", [1000.0, 1e6])
+def test_a_robot_in_large_numbers_is_answered_as_the_same_in_small_ones(size: float, tmp_path: Path) -> None:
+    """Millimetres that a file takes for metres: as many steps are proved, and poses have their motors."""
+    small, large = (exported(four_bar(bars=tuple(np.array(BARS) * each)), 0.4) for each in (1.0, size))
+    assert small.bounds is not None
+    assert large.bounds is not None
+    assert large.bounds.steps == small.bounds.steps
+    q = np.linspace(-0.399, 0.399, 41)
+    tip, angle = coupler(q)
+    motor = np.linspace(0.3, 0.3, 41) + q  # the crank's end is the origin of the coupler's frame
+    X = np.stack([np.cos(motor) * BARS[1], np.sin(motor) * BARS[1], 0 * q], axis=-1)
+    turn = angle - coupler(np.zeros(1))[1]
+    R = np.zeros((41, 3, 3))
+    R[:, 0, 0], R[:, 1, 1], R[:, 1, 0], R[:, 0, 1], R[:, 2, 2] = (np.cos(turn), np.cos(turn), np.sin(turn),
+                                                                  -np.sin(turn), 1.0)
+    np.testing.assert_allclose(np.linalg.norm(tip - X[:, :2], axis=1), BARS[2])
+    made = module_of(large.code)
+    assert np.all(made.forward(q[:, None])[0] == made.OK)
+    status, back = made.inverse(R, size * X, 0.9 * q[:, None])
+    assert np.all(status == made.OK)
+    np.testing.assert_allclose(back[:, 0], q, atol=1e-11)
+
+
+def test_motors_of_a_pose_in_a_box_of_more_than_a_turn() -> None:
+    """The crank's angle is that of its end, but for whole turns: the one nearest to the middle of the box."""
+    found = export(four_bar(), "numpy", {"motor": (-2.5, 5.0)})
+    assert found.closed
+    made = module_of(found.code)
+    q = np.linspace(-2.5, 5.0, 61)
+    status, _, R, p = made.forward(q[:, None])
+    assert np.all(status == made.OK)
+    status, back = made.inverse(R, p)
+    assert np.all(status == made.OK)
+    turns = (back[:, 0] - q) / (2 * np.pi)
+    np.testing.assert_allclose(turns, np.round(turns), atol=1e-12)
+    assert np.all(np.abs(back[:, 0] - 1.25) <= np.pi + 1e-12)
+
+
 def test_code_tells_where_motors_are_the_only_ones() -> None:
     found = exported(four_bar(), 0.4)
     assert found.proof.back is not None

@@ -134,8 +134,9 @@ def _told(proof: BranchProof, source: Source, lang: str, box: BoxLike | None, ef
                      "covers is refused. Wholly covered is")
         lines += [f"  {name}: {a!r} to {b!r}" for name, a, b in zip(part.motors, low, high, strict=True)]
     lines += [f"An answer is given where the last step of Newton's method is at most {GENERATED_LAST_STEP:g} (rad, or "
-              f"of {robot.length:.6g} m), all loops are", f"closed to {GENERATED_CLOSED:g}, and the joints are in the "
-              "cell's tube, in which the loops have one closure (proved).", *_bounds(source),
+              f"of {robot.length:.6g} m), all loops are",
+              f"closed to {GENERATED_CLOSED:g} (cosines, or of {branch_.far:.6g} m), and the joints are in the cell's "
+              "tube, in which the loops have one closure (proved).", *_bounds(source),
               "The proof takes the robot's numbers as the file has them."]
     lines += [f"Limits of joints without a motor, {each}" for each in proof.limits_in_words()]
     lines += [f"Limit of a motor that the box passes: {each}" for each in proof.motors_beyond()]

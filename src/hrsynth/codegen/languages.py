@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 
 from ..budgets import INVERSE_STEPS_AT_RUN, NEWTON_STEPS_AT_RUN
 from ..tolerances import (
-    GENERATED_CLOSED,
     GENERATED_LAST_STEP,
     GENERATED_NEAR,
     GENERATED_REACHED,
@@ -88,7 +87,7 @@ def program(source: Source, language: str, told: Sequence[str]) -> str:
         "direction_names": [observation.leg for observation in source.observed],
         "turning": [int(not branch.system.coordinates[i].slides) for i in branch.motors],
         "length": repr(float(mechanism.length)), "near": GENERATED_NEAR, "last_step": GENERATED_LAST_STEP,
-        "legs": source.legs and traced(source.legs), "closed": GENERATED_CLOSED, "reached": GENERATED_REACHED,
+        "legs": source.legs and traced(source.legs), "far": repr(branch.far), "reached": GENERATED_REACHED,
         "turn": repr(2 * math.pi), "singular": GENERATED_SINGULAR}
     return _templates().get_template(TEMPLATES[language]).render(**values)
 

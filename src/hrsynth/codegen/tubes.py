@@ -15,6 +15,7 @@ from ..budgets import FARTHEST_MOTOR
 from ..errors import NothingProved
 from ..geometry.vectors import Array
 from ..results import Value
+from ..tolerances import GENERATED_CLOSED
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -111,6 +112,18 @@ class TubedBranch(Value):
     def unit_name(self, i: int) -> str:
         """Its unit's name."""
         return "m" if self.system.coordinates[i].slides else "rad"
+
+    @property
+    def far(self) -> float:
+        """The length (m) of which the tolerances of lengths are parts: a metre, or the characteristic length where that
+        is more, so that rounding of large numbers is no error."""
+        return max(1.0, float(self.system.mechanism.length))
+
+    def closed(self, rows: Sequence[int]) -> Array:
+        """What equations, by their places among all, may be off where their loops count as closed."""
+        units = [self.far if row.kind == "point" else 1.0 for loop in self.system.loops for row in loop.rows]
+        units += [self.far if self.system.coordinates[gear.second].slides else 1.0 for gear in self.system.gears]
+        return np.asarray(GENERATED_CLOSED * np.array(units)[list(rows)])
 
     def evaluate(self, q: Array, x: Array) -> tuple[Array, Array]:
         """All equations (e,) and their derivatives (e, N) at q and x, in the order of ``motors`` and ``passive``."""
