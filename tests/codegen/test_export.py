@@ -106,6 +106,56 @@ def test_a_four_bar_part_of_a_turn() -> None:
     assert np.isnan(p[:4]).all()
 
 
+def sliding() -> Mechanism:
+    """A platform on two chains of slides, which never turns."""
+    b = Builder("slides")
+    for name in ("base", "one", "plate", "two", "other"):
+        b.link(name)
+    b.joint("x", "P", "base", "one", (0, 0, 0), axis=(1, 0, 0), motor=True)
+    b.joint("y", "P", "one", "plate", (0, 0.5, 0), axis=(0, 1, 0))
+    b.joint("z", "P", "base", "two", (1, 0, 0), axis=(0.1, 1, 0), motor=True)
+    b.joint("u", "P", "two", "other", (1, 0.5, 0), axis=(1, 0.2, 0))
+    b.joint("end", "R", "plate", "other", (0.7, 0.5, 0), axis=(0, 0, 1), loop=True)
+    return b.build(platform="plate")
+
+
+@pytest.mark.slow
+def test_a_robot_of_slides_alone_compiles(tmp_path: Path) -> None:
+    """Nothing turns, so that some of its rates are zero; its place by linear equations."""
+    robot = sliding()
+    code = export(robot, "c++", {"x": (-0.3, 0.3), "z": (-0.3, 0.3)}).code
+    q = np.array([[0.1, -0.2], [-0.3, 0.3]])
+    rows = answered(compiled(tmp_path, code, MAIN, "-DNAME=slides"), q)
+    assert np.all(rows[:, :2] == 0)
+    along, across = np.array([1, 0.2]) / np.hypot(1, 0.2), np.array([0.1, 1]) / np.hypot(0.1, 1)
+    for (x, z), row in zip(q, rows, strict=True):
+        # x e_x + y e_y = z across + u along
+        y, _ = np.linalg.solve(np.column_stack([[0, 1], -along]), z * across - [x, 0])
+        assert np.any(np.abs(row[2:] - y) < 1e-14)
+
+
+def test_a_motor_in_no_loop_keeps_to_what_is_asked() -> None:
+    """What lies beyond its interval is refused, as it is for the motors of loops; so is what is beyond its limits."""
+    b = Builder("carried")
+    for name in ("base", "cart", "crank", "coupler", "rocker", "hand"):
+        b.link(name)
+    b.joint("rail", "P", "base", "cart", (0, 0, 0), axis=(1, 0, 0), motor=True)
+    for name, near, far, at in (("motor", "cart", "crank", (0, 0, 0)), ("knee", "crank", "coupler", (0.2, 0.5, 0)),
+                                ("pivot", "cart", "rocker", (1, 0, 0)), ("wrist", "rocker", "hand", (1.1, 0.3, 0))):
+        b.joint(name, "R", near, far, at, axis=(0, 0, 1), motor=name in ("motor", "wrist"))
+    b.joint("tip", "R", "coupler", "rocker", (1.2, 0.9, 0), axis=(0, 0, 1), loop=True)
+    robot = b.build(platform="hand")
+    robot = replace(robot, joints=robot.joints | {"wrist": replace(robot.joints["wrist"], limits=Limits(-0.5, 2.0))})
+    made = module_of(export(robot, "numpy", {"rail": (-0.3, 0.2), "motor": (-0.1, 0.1), "wrist": (-1, 1)}).code)
+    rows = [[0.2, 0, 1], [-0.3, 0.1, -0.5], [0.2001, 0, 0], [-0.31, 0, 0], [0, 0, 1.01], [0, 0, -0.51]]
+    assert made.forward(rows)[0].tolist() == [made.OK] * 2 + [made.OUTSIDE] * 4
+
+
+def test_a_motor_is_given_one_interval() -> None:
+    with pytest.raises(BadRequest, match="motor twice"):
+        hrsynth.branch(four_bar(), "motor=-0.1:0.1,motor=-0.2:0.2")
+
+
 @pytest.mark.parametrize("size", [1000.0, 1e6])
 def test_a_robot_in_large_numbers_is_answered_as_the_same_in_small_ones(size: float, tmp_path: Path) -> None:
     """Millimetres that a file takes for metres: as many steps are proved, and poses have their motors."""

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ..analysis.branch.answer import BranchProof
-from ..analysis.branch.proof import BoxLike, branch
+from ..analysis.branch.proof import BoxLike, branch, parsed_box
 from ..analysis.observed import CameraLike, LegsLike, ObservedRobot, RobotLike, as_robot
 from ..analysis.question import question
 from ..budgets import BRANCH_CELLS
@@ -85,7 +85,7 @@ def export(robot: RobotLike, lang: str = "c++", box: BoxLike | None = None, *, o
     if not proof.parts:
         raise BadRequest(f"{proof.robot.name}: loops that its motors move", 0, "one or more")
     tell("code")
-    branch_ = TubedBranch.of(proof)
+    branch_ = TubedBranch.of(proof, parsed_box(box))
     source = Source.of(branch_, watched, closed_inverse(given, proof, branch_))
     code = program(source, lang, _told(proof, source, lang, box, effort))
     return ExportedCode(proof, lang, tuple(each.leg for each in watched), bool(source.legs), source.bounds,

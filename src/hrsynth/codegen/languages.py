@@ -20,6 +20,7 @@ from ..tolerances import (
 )
 from .inverse import traced
 from .source import Source
+from .trace import TracedFunction
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -62,6 +63,13 @@ def _comment(text: str) -> str:
     return re.sub(r"coding(?=[:=])", "coding ", line)
 
 
+def _unused(arguments: str, function: TracedFunction) -> str:
+    """The arguments of a function of C++ that it may not use, as they stand after ``(void)``."""
+    stored = {array for array, _, _ in function.stores}
+    names = re.findall(r"& (\w+)", arguments)
+    return ", (void)".join(name for name in names if name not in stored)
+
+
 def program(source: Source, language: str, told: Sequence[str]) -> str:
     """The program in a language, with lines ``told`` at its head; the same each time."""
     branch, mechanism = source.branch, source.branch.system.mechanism
@@ -100,5 +108,6 @@ def _templates() -> Environment:
                        keep_trailing_newline=True)
     made.filters["quoted"] = lambda names: ", ".join(json.dumps(name, ensure_ascii=False) for name in names)
     made.filters["comment"] = _comment
+    made.filters["unused"] = _unused
     made.filters["name_of"] = lambda place, names: names[place]
     return made
