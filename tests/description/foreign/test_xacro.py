@@ -75,6 +75,16 @@ def test_it_is_the_robot_that_the_package_expands_it_to(tmp_path: Path, monkeypa
     assert native.write(native.parse(text)) == text
 
 
+def test_expressions_alone_are_expanded(tmp_path: Path):
+    """A file without a macro or property that declares the prefix."""
+    plain = native.write(load(written(tmp_path)))
+    assert 'xyz="-0.3 0 0"' in plain
+    (tmp_path / "robot.urdf.xacro").write_text(plain.replace('xyz="-0.3 0 0"', 'xyz="${-0.6 / 2} 0 0"', 1).replace(
+        "<robot ", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" ', 1))
+    (tmp_path / "plain.urdf").write_text(plain)
+    assert load(tmp_path / "robot.urdf.xacro").differences(load(tmp_path / "plain.urdf")) == []
+
+
 @pytest.mark.parametrize(("old", "new", "place", "words"), [
     ('parent link="base"', 'parent link="bass"', "<joint name=\"shoulder", "unknown link, found bass"),
     ('xyz="${x} 0 0"', 'xyz="${x} 0"', 'xyz="${x} 0"', "allowed: 3 numbers"),

@@ -12,9 +12,14 @@ from ... import xml
 
 
 def is_needed(root: xml.Element) -> bool:
-    """Whether a URDF document uses elements of xacro."""
-    tags = (element.tag for element in root.iter()) if root.tag == "robot" else ()
-    return any(isinstance(tag, str) and "xacro}" in tag for tag in tags)
+    """Whether a URDF document uses elements of xacro, or declares its prefix and has expressions."""
+    if root.tag != "robot":
+        return False
+    if any("xacro}" in element.tag for element in root.iter("*") if isinstance(element.tag, str)):
+        return True
+    declared = any(str(uri).endswith("xacro") for uri in root.nsmap.values())
+    return declared and any(start in str(value) for element in root.iter("*") for value in element.attrib.values()
+                            for start in ("${", "$("))
 
 
 def expand(path: Path) -> xml.Element:
