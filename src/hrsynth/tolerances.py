@@ -391,9 +391,10 @@ PART_TUBE = 0.6
 GENERATED_LAST_STEP = 3e-12
 """Largest last step of an answer (characteristic lengths, radians)."""
 GENERATED_CLOSED = 1e-11
-"""What its loops' equations may be off (m, cosines) where it gives an answer."""
+"""What its loops' equations may be off where it gives an answer (cosines, metres, or characteristic lengths where these
+are more than a metre)."""
 GENERATED_REACHED = 1e-12
-"""Difference (m, rad) from a pose at which it has reached it."""
+"""Difference from a pose at which it has reached it (rad, and lengths as above)."""
 GENERATED_SINGULAR = 1e-14
 """Pivot of the normal equations, as part of the largest of the diagonal, below which it finds rates singular."""
 

@@ -106,6 +106,94 @@ def test_a_four_bar_part_of_a_turn() -> None:
     assert np.isnan(p[:4]).all()
 
 
+def sliding() -> Mechanism:
+    """A platform on two chains of slides, which never turns."""
+    b = Builder("slides")
+    for name in ("base", "one", "plate", "two", "other"):
+        b.link(name)
+    b.joint("x", "P", "base", "one", (0, 0, 0), axis=(1, 0, 0), motor=True)
+    b.joint("y", "P", "one", "plate", (0, 0.5, 0), axis=(0, 1, 0))
+    b.joint("z", "P", "base", "two", (1, 0, 0), axis=(0.1, 1, 0), motor=True)
+    b.joint("u", "P", "two", "other", (1, 0.5, 0), axis=(1, 0.2, 0))
+    b.joint("end", "R", "plate", "other", (0.7, 0.5, 0), axis=(0, 0, 1), loop=True)
+    return b.build(platform="plate")
+
+
+@pytest.mark.slow
+def test_a_robot_of_slides_alone_compiles(tmp_path: Path) -> None:
+    """Nothing turns, so that some of its rates are zero; its place by linear equations."""
+    robot = sliding()
+    code = export(robot, "c++", {"x": (-0.3, 0.3), "z": (-0.3, 0.3)}).code
+    q = np.array([[0.1, -0.2], [-0.3, 0.3]])
+    rows = answered(compiled(tmp_path, code, MAIN, "-DNAME=slides"), q)
+    assert np.all(rows[:, :2] == 0)
+    along, across = np.array([1, 0.2]) / np.hypot(1, 0.2), np.array([0.1, 1]) / np.hypot(0.1, 1)
+    for (x, z), row in zip(q, rows, strict=True):
+        # x e_x + y e_y = z across + u along
+        y, _ = np.linalg.solve(np.column_stack([[0, 1], -along]), z * across - [x, 0])
+        assert np.any(np.abs(row[2:] - y) < 1e-14)
+
+
+def test_a_motor_in_no_loop_keeps_to_what_is_asked() -> None:
+    """What lies beyond its interval is refused, as it is for the motors of loops; so is what is beyond its limits."""
+    b = Builder("carried")
+    for name in ("base", "cart", "crank", "coupler", "rocker", "hand"):
+        b.link(name)
+    b.joint("rail", "P", "base", "cart", (0, 0, 0), axis=(1, 0, 0), motor=True)
+    for name, near, far, at in (("motor", "cart", "crank", (0, 0, 0)), ("knee", "crank", "coupler", (0.2, 0.5, 0)),
+                                ("pivot", "cart", "rocker", (1, 0, 0)), ("wrist", "rocker", "hand", (1.1, 0.3, 0))):
+        b.joint(name, "R", near, far, at, axis=(0, 0, 1), motor=name in ("motor", "wrist"))
+    b.joint("tip", "R", "coupler", "rocker", (1.2, 0.9, 0), axis=(0, 0, 1), loop=True)
+    robot = b.build(platform="hand")
+    robot = replace(robot, joints=robot.joints | {"wrist": replace(robot.joints["wrist"], limits=Limits(-0.5, 2.0))})
+    made = module_of(export(robot, "numpy", {"rail": (-0.3, 0.2), "motor": (-0.1, 0.1), "wrist": (-1, 1)}).code)
+    rows = [[0.2, 0, 1], [-0.3, 0.1, -0.5], [0.2001, 0, 0], [-0.31, 0, 0], [0, 0, 1.01], [0, 0, -0.51]]
+    assert made.forward(rows)[0].tolist() == [made.OK] * 2 + [made.OUTSIDE] * 4
+
+
+def test_a_motor_is_given_one_interval() -> None:
+    with pytest.raises(BadRequest, match="motor twice"):
+        hrsynth.branch(four_bar(), "motor=-0.1:0.1,motor=-0.2:0.2")
+
+
+@pytest.mark.parametrize("size", [1000.0, 1e6])
+def test_a_robot_in_large_numbers_is_answered_as_the_same_in_small_ones(size: float, tmp_path: Path) -> None:
+    """Millimetres that a file takes for metres: as many steps are proved, and poses have their motors."""
+    small, large = (exported(four_bar(bars=tuple(np.array(BARS) * each)), 0.4) for each in (1.0, size))
+    assert small.bounds is not None
+    assert large.bounds is not None
+    assert large.bounds.steps == small.bounds.steps
+    q = np.linspace(-0.399, 0.399, 41)
+    tip, angle = coupler(q)
+    motor = np.linspace(0.3, 0.3, 41) + q  # the crank's end is the origin of the coupler's frame
+    X = np.stack([np.cos(motor) * BARS[1], np.sin(motor) * BARS[1], 0 * q], axis=-1)
+    turn = angle - coupler(np.zeros(1))[1]
+    R = np.zeros((41, 3, 3))
+    R[:, 0, 0], R[:, 1, 1], R[:, 1, 0], R[:, 0, 1], R[:, 2, 2] = (np.cos(turn), np.cos(turn), np.sin(turn),
+                                                                  -np.sin(turn), 1.0)
+    np.testing.assert_allclose(np.linalg.norm(tip - X[:, :2], axis=1), BARS[2])
+    made = module_of(large.code)
+    assert np.all(made.forward(q[:, None])[0] == made.OK)
+    status, back = made.inverse(R, size * X, 0.9 * q[:, None])
+    assert np.all(status == made.OK)
+    np.testing.assert_allclose(back[:, 0], q, atol=1e-11)
+
+
+def test_motors_of_a_pose_in_a_box_of_more_than_a_turn() -> None:
+    """The crank's angle is that of its end, but for whole turns: the one nearest to the middle of the box."""
+    found = export(four_bar(), "numpy", {"motor": (-2.5, 5.0)})
+    assert found.closed
+    made = module_of(found.code)
+    q = np.linspace(-2.5, 5.0, 61)
+    status, _, R, p = made.forward(q[:, None])
+    assert np.all(status == made.OK)
+    status, back = made.inverse(R, p)
+    assert np.all(status == made.OK)
+    turns = (back[:, 0] - q) / (2 * np.pi)
+    np.testing.assert_allclose(turns, np.round(turns), atol=1e-12)
+    assert np.all(np.abs(back[:, 0] - 1.25) <= np.pi + 1e-12)
+
+
 def test_code_tells_where_motors_are_the_only_ones() -> None:
     found = exported(four_bar(), 0.4)
     assert found.proof.back is not None
@@ -324,7 +412,9 @@ def test_a_compiler_that_drops_checks_is_refused(tmp_path: Path) -> None:
 
 
 ODD = {"class": "class_", "9 lives": "_9_lives", "std": "std_", "": "robot", "a-b.é": "a_b__",
-       "NULL": "NULL_", "Motors": "Motors_", "# coding: utf-7": "__coding__utf_7", "r\n#error \\": "r__error__"}
+       "NULL": "NULL_",
+       "gamma": "gamma_", "y0": "y0_", "link": "link_", "size_t": "size_t_", "CHAR_BIT": "CHAR_BIT_",
+       "Motors": "Motors_", "# coding: utf-7": "__coding__utf_7", "r\n#error \\": "r__error__"}
 """Names of robots, and their namespaces."""
 
 
@@ -351,7 +441,7 @@ def test_names_are_no_code(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["class", "", "NULL", "Motors", "r\n#error \\"])
+@pytest.mark.parametrize("name", ["class", "", "NULL", "Motors", "gamma", "r\n#error \\"])
 def test_names_are_no_code_in_cpp(name: str, tmp_path: Path) -> None:
     robot = oddly_named(name)
     code = export(robot, "c++", box_of(robot, 0.1)).code
@@ -360,6 +450,25 @@ def test_names_are_no_code_in_cpp(name: str, tmp_path: Path) -> None:
             "int main() { return int(unique(Motors::Zero())) + std::puts(MOTOR_NAMES[0]) < 0; }")
     found = subprocess.run([compiled(tmp_path, code, main)], capture_output=True, text=True, check=True)
     assert found.stdout == 'motor "*/ ???/ q\n\\\n'
+
+
+def test_no_name_of_the_c_library_is_a_namespace(tmp_path: Path) -> None:
+    """None of its names without underscores, of its types and macros, is what a robot's namespace is called."""
+    names = set(" ".join(path.read_text(encoding="utf-8", errors="replace") for path in (
+        Path("/usr/include/math.h"), Path("/usr/include/stdio.h"), Path("/usr/include/stdlib.h"),
+        Path("/usr/include/unistd.h"), Path("/usr/include/time.h"), Path("/usr/include/string.h")) if path.exists()
+    ).replace("(", " ( ").split())
+    names = sorted({each for each in names if re.fullmatch("[a-z][a-z0-9]*|[a-z][a-z0-9_]*_t", each)
+                    and not re.search("f[0-9]+x?$", each)} | {
+        "gamma", "y0", "int8_t", "FILE", "INT_MAX", "CHAR_BIT", "FE_INVALID"})
+    lines = [f"namespace {namespace(each)} {{}}" for each in names]
+    (tmp_path / "main.cpp").write_text("\n".join(["#include <Eigen/Core>", "#include <cstdio>", "#include <ctime>",
+                                                  "#include <iostream>", *lines]))
+    done = subprocess.run(["g++", "-std=c++17", "-fsyntax-only", f"-isystem{eigen()}", "main.cpp"], cwd=tmp_path,
+                          capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr[:2000]
+    assert [namespace(each) for each in ("delta", "MYROBOT", "EXO_2", "irb_140t")] == [
+        "delta", "MYROBOT", "EXO_2", "irb_140t"]
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, 1e308])

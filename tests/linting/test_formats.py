@@ -166,5 +166,7 @@ def test_a_mend_of_a_file_that_xacro_made_is_left_to_its_source(tmp_path: Path):
         "</robot>", '<xacro:property name="x" value="1"/></robot>'))
     found = hrsynth.lint(path, fix=True)
     negative = [each for each in found.findings if each.rule == "mass-negative"]
-    assert [(each.line, each.mends) for each in negative] == [(None, False)]
+    (tmp_path / "plain.urdf").write_text(text)
+    (plain,) = (each for each in hrsynth.lint(tmp_path / "plain.urdf").findings if each.rule == "mass-negative")
+    assert [(each.line, each.mends) for each in negative] == [(plain.line, False)]
     assert (found.written, found.mended) == (None, ())

@@ -46,7 +46,6 @@ from ..tolerances import (
     BOUND_WIDER,
     FREE_WIDER,
     FREEST_WIDER,
-    GENERATED_CLOSED,
     GENERATED_ERROR,
     GENERATED_LAST_STEP,
     GENERATED_NEAR,
@@ -127,7 +126,7 @@ def bounded_cells(branch: TubedBranch, part: TubePart, solved: Sequence[int], ro
     among += [LoopEquation(gear) for gear in system.gears]
     block = LoopBlock(part.unknowns, tuple(among[i] for i in solved))
     loops = LoopPart(system, part.driven, part.unknowns, (block,), system.loops, system.gears)
-    code = _Code(branch, part, loops, equations, closure, list(rows))
+    code = _Code(branch, part, loops, equations, closure, list(rows), branch.closed(solved))
     found: list[BoundedCell] = []
     most = min(MOST_BOUNDED, MOST_BOUNDED_NUMBERS // (len(part.driven) * len(part.unknowns)))
     nothing = np.full(len(rows), np.inf)
@@ -160,6 +159,8 @@ class _Code:
     equations: TracedFunction
     closure: TracedFunction
     rows: list[int]
+    closed: Array
+    """What the solved equations may be off where their loops count as closed."""
 
     @property
     def solved(self) -> Sequence[LoopEquation]:
@@ -279,7 +280,7 @@ def _bounds(code: _Code, cells: Sequence[TubeCell], known: Sequence[bool], wider
             second = step(first, e + first / 2)
             alive &= _within(first, wide - a) & _within(second, wide - a)
             ends = (_within(e + first, near) & _within(first + second, last)
-                    & np.all(_times(rates, first) + errors <= GENERATED_CLOSED, axis=-1))
+                    & np.all(_times(rates, first) + errors <= code.closed, axis=-1))
             steps[alive & ends & (steps == 0)] = count
             e = np.maximum(first, second)
         # 4. what an answer is worth: the program's tube is wider by a step that is near

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ..analysis.branch.answer import BranchProof
-from ..analysis.branch.proof import BoxLike, branch
+from ..analysis.branch.proof import BoxLike, branch, parsed_box
 from ..analysis.observed import CameraLike, LegsLike, ObservedRobot, RobotLike, as_robot
 from ..analysis.question import question
 from ..budgets import BRANCH_CELLS
@@ -85,7 +85,7 @@ def export(robot: RobotLike, lang: str = "c++", box: BoxLike | None = None, *, o
     if not proof.parts:
         raise BadRequest(f"{proof.robot.name}: loops that its motors move", 0, "one or more")
     tell("code")
-    branch_ = TubedBranch.of(proof)
+    branch_ = TubedBranch.of(proof, parsed_box(box))
     source = Source.of(branch_, watched, closed_inverse(given, proof, branch_))
     code = program(source, lang, _told(proof, source, lang, box, effort))
     return ExportedCode(proof, lang, tuple(each.leg for each in watched), bool(source.legs), source.bounds,
@@ -134,8 +134,9 @@ def _told(proof: BranchProof, source: Source, lang: str, box: BoxLike | None, ef
                      "covers is refused. Wholly covered is")
         lines += [f"  {name}: {a!r} to {b!r}" for name, a, b in zip(part.motors, low, high, strict=True)]
     lines += [f"An answer is given where the last step of Newton's method is at most {GENERATED_LAST_STEP:g} (rad, or "
-              f"of {robot.length:.6g} m), all loops are", f"closed to {GENERATED_CLOSED:g}, and the joints are in the "
-              "cell's tube, in which the loops have one closure (proved).", *_bounds(source),
+              f"of {robot.length:.6g} m), all loops are",
+              f"closed to {GENERATED_CLOSED:g} (cosines, or of {branch_.far:.6g} m), and the joints are in the cell's "
+              "tube, in which the loops have one closure (proved).", *_bounds(source),
               "The proof takes the robot's numbers as the file has them."]
     lines += [f"Limits of joints without a motor, {each}" for each in proof.limits_in_words()]
     lines += [f"Limit of a motor that the box passes: {each}" for each in proof.motors_beyond()]

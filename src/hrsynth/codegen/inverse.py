@@ -193,13 +193,17 @@ def _on_rail(batch: Batch, mechanism: Mechanism, leg: Leg, coordinate: TreeCoord
 
 def _rule(coordinate: TreeCoordinate, form: ClosedFormLeg, reads: str, batch: Batch, X: Array, q: Array
           ) -> LegMotor | None:
-    """The closed form of a coordinate that gives motors q (n,), the first of them zero, at their poses (n, 4, 4)."""
+    """The closed form of a coordinate that gives motors q (n,), the first of them zero, but for whole turns, at their
+    poses (n, 4, 4)."""
     position, R = list(X[:, :3, 3].T), list(X[:, :3, :3].reshape(-1, 9).T)
     rule = LegMotor(coordinate, form, reads, batch.coordinates.point, 0.0)
     with np.errstate(invalid="ignore", divide="ignore"):
         at_zero = rule.read([x[0] for x in position], [x[0] for x in R])[1]
         rule = replace(rule, zero=np.asarray(at_zero, dtype=float))
         margin, found = rule.at(position, R)
-        if not (np.all(np.asarray(margin) > 0) and np.all(np.abs(found - q) <= SAME_GEOMETRY)):
+        off = found - q
+        if not coordinate.slides:  # the program finds the turn that lies in the box
+            off = off - 2 * np.pi * np.round(off / (2 * np.pi))
+        if not (np.all(np.asarray(margin) > 0) and np.all(np.abs(off) <= SAME_GEOMETRY)):
             return None
     return rule

@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 import math
 import re
+import tomllib
 from collections.abc import Sequence
 from functools import cache
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..budgets import INVERSE_STEPS_AT_RUN, NEWTON_STEPS_AT_RUN
 from ..tolerances import (
-    GENERATED_CLOSED,
     GENERATED_LAST_STEP,
     GENERATED_NEAR,
     GENERATED_REACHED,
@@ -19,6 +20,7 @@ from ..tolerances import (
 )
 from .inverse import traced
 from .source import Source
+from .trace import TracedFunction
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -32,23 +34,40 @@ TAKEN = frozenset(re.findall(r"\w+", """
     protected public register reinterpret_cast return short signed sizeof static static_assert static_cast struct switch
     template this thread_local throw true try typedef typeid typename union unsigned using virtual void volatile wchar_t
     while xor xor_eq Eigen detail main std
-    BUFSIZ EDOM EOF ERANGE HUGE_VAL INFINITY M_E M_PI NAN NDEBUG NULL RAND_MAX errno linux stderr stdin stdout unix
+    BUFSIZ EDOM EOF FILE ERANGE HUGE_VAL INFINITY M_E M_PI NAN NDEBUG NULL RAND_MAX errno linux stderr stdin stdout unix
     DIRECTIONS DIRECTION_NAMES Jacobians LOWER MOTORS MOTOR_NAMES Motors PASSIVE PASSIVE_NAMES Passive STEPS Solution
     Status UPPER forward inverse jacobians unique"""))
 """Keywords of C++17, names that something else has where headers are included, macros, and the header's own names
 (ambiguous where the namespace is used)."""
+RESERVED = re.compile(r"[a-z]\w*_t|(CHAR|CLOCK|DBL|EIGEN|FE|FLT|FP|INT\d*|LC|LONG|M|SEEK|SHRT|SIZE|UINT\d*)_[A-Z0-9_]+")
+"""Types of the C library, and its macros."""
 
 
 def namespace(name: str) -> str:
     """The name of a robot as a namespace of C++."""
     found = re.sub(r"[^0-9A-Za-z_]|^(?=\d)", "_", name) or "robot"
-    return f"{found}_" if found in TAKEN else found
+    taken = found in TAKEN or found in _c_names() or RESERVED.fullmatch(found)
+    return f"{found}_" if taken else found
+
+
+@cache
+def _c_names() -> frozenset[str]:
+    """What the C library calls its functions."""
+    text = Path(__file__).with_name("c_names.toml").read_text(encoding="utf-8")
+    return frozenset(tomllib.loads(text)["names"].split())
 
 
 def _comment(text: str) -> str:
     """A text as it can stand in a comment: names of a file end none, continue none, and choose no encoding."""
     line = "".join(each if each.isprintable() and each != "\\" else "_" for each in text)
     return re.sub(r"coding(?=[:=])", "coding ", line)
+
+
+def _unused(arguments: str, function: TracedFunction) -> str:
+    """The arguments of a function of C++ that it may not use, as they stand after ``(void)``."""
+    stored = {array for array, _, _ in function.stores}
+    names = re.findall(r"& (\w+)", arguments)
+    return ", (void)".join(name for name in names if name not in stored)
 
 
 def program(source: Source, language: str, told: Sequence[str]) -> str:
@@ -76,7 +95,7 @@ def program(source: Source, language: str, told: Sequence[str]) -> str:
         "direction_names": [observation.leg for observation in source.observed],
         "turning": [int(not branch.system.coordinates[i].slides) for i in branch.motors],
         "length": repr(float(mechanism.length)), "near": GENERATED_NEAR, "last_step": GENERATED_LAST_STEP,
-        "legs": source.legs and traced(source.legs), "closed": GENERATED_CLOSED, "reached": GENERATED_REACHED,
+        "legs": source.legs and traced(source.legs), "far": repr(branch.far), "reached": GENERATED_REACHED,
         "turn": repr(2 * math.pi), "singular": GENERATED_SINGULAR}
     return _templates().get_template(TEMPLATES[language]).render(**values)
 
@@ -89,5 +108,6 @@ def _templates() -> Environment:
                        keep_trailing_newline=True)
     made.filters["quoted"] = lambda names: ", ".join(json.dumps(name, ensure_ascii=False) for name in names)
     made.filters["comment"] = _comment
+    made.filters["unused"] = _unused
     made.filters["name_of"] = lambda place, names: names[place]
     return made

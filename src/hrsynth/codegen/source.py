@@ -31,6 +31,8 @@ class SourcePart(Value):
     """The places of G among E."""
     count: int
     """How many equations there are in all."""
+    closed: tuple[float, ...]
+    """What each of them may be off in an answer."""
     root: int
     nodes: tuple[Node, ...]
     depth: int
@@ -108,8 +110,9 @@ def _part(branch: TubedBranch, tracer: FormulaTracer, part: TubePart) -> SourceP
     root, nodes = cell_tree(lower, upper, [(cell.lower, cell.upper) for cell in tried])
     cells = tuple((tuple(cell.centre), tuple(cell.middle), tuple(cell.slopes.ravel()), tuple(cell.radius))
                   for cell in tried)
-    return SourcePart(tuple(driven), tuple(unknowns), equations, slopes, closure, tuple(own), len(every), root,
-                      tuple(nodes), tree_depth(root, nodes), _floats(cells), _floats(tuple(units)),
+    return SourcePart(tuple(driven), tuple(unknowns), equations, slopes, closure, tuple(own), len(every),
+                      _floats(tuple(branch.closed(every))), root, tuple(nodes), tree_depth(root, nodes), _floats(cells),
+                      _floats(tuple(units)),
                       tuple(map(float, lower)), tuple(map(float, upper)), tuple(bounded))
 
 

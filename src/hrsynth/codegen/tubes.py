@@ -3,8 +3,9 @@ in metres and radians (docs/pages/theory.md, section 12)."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from ..budgets import FARTHEST_MOTOR
 from ..errors import NothingProved
 from ..geometry.vectors import Array
 from ..results import Value
+from ..tolerances import GENERATED_CLOSED
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -71,8 +73,9 @@ class TubedBranch(Value):
     """The box of motors (m,) in which no two are proved to have one pose."""
 
     @classmethod
-    def of(cls, proof: BranchProof) -> TubedBranch:
-        """The parts of a proof that have cells; raises ``NothingProved`` where one has none."""
+    def of(cls, proof: BranchProof, asked: Mapping[str, tuple[float, float]] = MappingProxyType({})) -> TubedBranch:
+        """The parts of a proof that have cells; a motor that is in none keeps to its limits and to the interval that is
+        ``asked`` for. Raises ``NothingProved`` where a part has no cells."""
         system, table = proof.system, {name: i for i, name in enumerate(proof.system.names)}
         motors = tuple(table[name] for name in proof.motors)
         lower, upper = np.full(len(motors), -np.inf), np.full(len(motors), np.inf)
@@ -91,7 +94,8 @@ class TubedBranch(Value):
         for place, i in enumerate(motors):
             low, high = proof.robot.limited.get(system.coordinates[i].joint, (-np.inf, np.inf))
             if not np.isfinite(lower[place]):  # in no loop
-                lower[place], upper[place] = max(low, -FARTHEST_MOTOR), min(high, FARTHEST_MOTOR)
+                ends = asked.get(system.coordinates[i].name, (-FARTHEST_MOTOR, FARTHEST_MOTOR))
+                lower[place], upper[place] = max(low, ends[0]), min(high, ends[1])
         return cls(system.metric, motors, lower, upper, tuple(parts), proof.back)
 
     @property
@@ -111,6 +115,18 @@ class TubedBranch(Value):
     def unit_name(self, i: int) -> str:
         """Its unit's name."""
         return "m" if self.system.coordinates[i].slides else "rad"
+
+    @property
+    def far(self) -> float:
+        """The length (m) of which the tolerances of lengths are parts: a metre, or the characteristic length where that
+        is more, so that rounding of large numbers is no error."""
+        return max(1.0, float(self.system.mechanism.length))
+
+    def closed(self, rows: Sequence[int]) -> Array:
+        """What equations, by their places among all, may be off where their loops count as closed."""
+        units = [self.far if row.kind == "point" else 1.0 for loop in self.system.loops for row in loop.rows]
+        units += [self.far if self.system.coordinates[gear.second].slides else 1.0 for gear in self.system.gears]
+        return np.asarray(GENERATED_CLOSED * np.array(units)[list(rows)])
 
     def evaluate(self, q: Array, x: Array) -> tuple[Array, Array]:
         """All equations (e,) and their derivatives (e, N) at q and x, in the order of ``motors`` and ``passive``."""

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import re
 import stat
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from functools import lru_cache
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 from lxml import etree
 
@@ -121,6 +123,39 @@ def _is_wrong(comment: bytes) -> bool:
     return comment.startswith(b"<!--") and b"--" in comment[4:-2]
 
 
+PLACES = "{urn:hrsynth}places"
+"""The attribute of a root element that has files and lines of a document that a program made: the elements' own lines
+count them."""
+MOST_PLACES = 65535
+"""Lines that an element can have."""
+
+
+def beside(main: Path, file: str) -> str:
+    """The name of a file as that of the ``main`` one is given, where it lies in its folder or below."""
+    folder, own = main.resolve().parent, Path(file).resolve()
+    return str(main.parent / own.relative_to(folder)) if own.is_relative_to(folder) else file
+
+
+def placed(root: Element, main: Path, places: Sequence[tuple[str, int] | None]) -> None:
+    """Give the elements of a document, in its order, their places: file (None for ``main``) and line."""
+    table: dict[tuple[str | None, int] | None, int] = {}
+    names = {str(main.resolve()): None}
+    for element, place in zip(root.iter("*"), places, strict=True):
+        own = None
+        if place is not None:
+            file, line = place
+            own = names.get(file, file) and beside(main, file), line
+        number = table.setdefault(own, len(table) + 1)
+        element.sourceline = number if number <= MOST_PLACES else 0  # type: ignore[assignment]
+    root.set(PLACES, json.dumps(list(table)))
+
+
+@lru_cache(maxsize=8)
+def _places(text: str) -> list[list[Any] | None]:
+    found: list[list[Any] | None] = json.loads(text)
+    return found
+
+
 class SourceLine(int):
     """A line of a file that a document includes."""
 
@@ -128,8 +163,16 @@ class SourceLine(int):
 
 
 def line(element: Element) -> int | None:
-    """The line of its file that an element starts in; a :class:`Line` where the document includes that file."""
+    """The line of its file that an element starts in; a :class:`SourceLine` where the document includes that file."""
     number: object = element.sourceline
+    table = element.getroottree().getroot().get(PLACES)
+    if table is not None:
+        place = _places(table)[number - 1] if isinstance(number, int) and number else None
+        if place is None:
+            return None
+        own = SourceLine(place[1])
+        own.file = place[0]
+        return int(own) if own.file is None else own
     if not isinstance(number, int) or element.base is None:
         return number if isinstance(number, int) else None
     found = SourceLine(number)
@@ -164,7 +207,7 @@ def new(tag: str, *children: Element, **attributes: str) -> Element:
 def unknown(element: Element, attributes: Iterable[str], tags: Iterable[str]) -> tuple[str, ...]:
     """What this project does not know of an element: ``@name=value`` for attributes, then child elements."""
     known_attributes, known_tags = set(attributes), set(tags)
-    given = sorted((str(name), str(value)) for name, value in element.attrib.items())
+    given = sorted((str(name), str(value)) for name, value in element.attrib.items() if name != PLACES)
     found = [f"@{name}={value}" for name, value in given if name not in known_attributes]
     return (*found, *(canonical(child) for child in children(element) if child.tag not in known_tags))
 

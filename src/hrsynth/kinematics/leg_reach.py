@@ -18,6 +18,8 @@ from .tasks import solve
 
 WAY = 10
 """Points of the way at which a leg alone is led towards a pose, so that it keeps its working mode."""
+ASIDE = 8
+"""Random starts from which a leg that seems to miss is led again: a stretched one does not bend by itself."""
 DAMPING = Damping(start=1e-3, eased=0.2, least=1e-12, most=1e7)
 
 
@@ -50,12 +52,22 @@ def alone(anatomy: LegDecomposition, leg: Leg) -> Mechanism:
 
 
 def _miss(twin: PinocchioModel, motion: PlatformMotion, goal: Goal) -> Array:
-    """The error of a goal that is left when the leg comes as near as its loops and the platform's manner allow."""
+    """The error of a goal that is left when the leg comes as near as its loops and the platform's manner allow: from
+    zero, else from wherever it comes nearest."""
     at = ClosedConfiguration.of(twin, twin.q0, FOLLOWED)
-    X = at.pose(motion.link)
+    X, manner = at.pose(motion.link), motion.manner()
     for number in range(1, WAY + 1):
-        at = _approached(at, goal.towards(X, number / WAY), motion.manner(), 200 if number == WAY else 10)
-    return goal.rows(twin, at.q)[0]
+        at = _approached(at, goal.towards(X, number / WAY), manner, 200 if number == WAY else 10)
+    least = goal.rows(twin, at.q)[0]
+    rng = np.random.default_rng(0)
+    for _ in range(ASIDE):
+        if np.linalg.norm(least) <= FOLLOWED:
+            break
+        q, residual = solve(twin, twin.moved(at.q, rng.uniform(-1, 1, twin.nv)), manner, tolerance=SOLVED)
+        if residual <= CLOSED:
+            found = _approached(ClosedConfiguration.of(twin, q), goal, manner, 200)
+            least = min(least, goal.rows(twin, found.q)[0], key=lambda error: float(np.linalg.norm(error)))
+    return least
 
 
 def _approached(at: ClosedConfiguration, goal: Goal, manner: Goal, iterations: int) -> ClosedConfiguration:

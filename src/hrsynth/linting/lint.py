@@ -112,7 +112,7 @@ def findings(file: LintedFile, ignore: Sequence[str] = ()) -> list[tuple[Finding
     found = []
     for rule in lint_rules().values():
         for spot in rule.find(file) if rule.name not in ignore else ():
-            where, line = getattr(spot.line, "file", file.file), None if file.expanded else spot.line
+            where, line = getattr(spot.line, "file", file.file), spot.line
             mend = None if file.expanded else spot.mend
             found.append((Finding(rule.name, spot.severity or rule.severity, where, line, spot.message,
                                   spot.advice or rule.advice, mend is not None), mend))

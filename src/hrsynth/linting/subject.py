@@ -47,7 +47,7 @@ class LintedFile:
         self._opened = replace(opened, root=self.root)
         self.expanded = text is None and self.root is not None and xacro.is_needed(
             xml.document(self.data, self.file, []))
-        """Whether a program made the document of what stands in the file, where lines and mends are not those of it."""
+        """Whether a program made the document of what stands in the file, which no mend can be written to."""
         self._remembered: dict[str, Any] = {}
         self.dialect = None if self.root is None else DIALECTS.get(str(self.root.tag))
 

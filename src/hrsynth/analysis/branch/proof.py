@@ -124,7 +124,7 @@ def _grid(part: LoopPart, intervals: Mapping[int, tuple[float, float]]) -> CellG
 
 def _box(system: LoopSystem, box: BoxLike | None) -> tuple[dict[int, tuple[float, float]], str]:
     """The interval of each driven coordinate, in the system's units, and where they come from."""
-    given = _parsed(box)
+    given = parsed_box(box)
     limits = system.mechanism.limited
     found, sources = {}, set()
     for i in system.driven:
@@ -151,7 +151,7 @@ def _box(system: LoopSystem, box: BoxLike | None) -> tuple[dict[int, tuple[float
     return found, ", ".join(sorted(sources))
 
 
-def _parsed(box: BoxLike | None) -> dict[str, tuple[float, float]]:
+def parsed_box(box: BoxLike | None) -> dict[str, tuple[float, float]]:
     """The intervals that are asked for, by motor."""
     if box is None:
         return {}
@@ -159,8 +159,10 @@ def _parsed(box: BoxLike | None) -> dict[str, tuple[float, float]]:
         raise BadRequest("a box of motors", box, "a dict such as {'hip': (-1, 1)}, or a text such as "
                          "hip=-1:1,slide=0:0.2")
     pairs = box.items() if isinstance(box, Mapping) else [each.rpartition("=")[::2] for each in box.split(",")]
-    found = {}
+    found: dict[str, tuple[float, float]] = {}
     for name, interval in pairs:
+        if str(name).strip() in found:
+            raise BadRequest("motors of the box", f"{str(name).strip()} twice", "each motor once")
         try:
             low, high = (float(v) for v in (interval.split(":") if isinstance(interval, str) else interval))
         except (TypeError, ValueError):

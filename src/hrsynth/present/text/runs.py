@@ -216,10 +216,14 @@ def _range(found: ErrorRange, errors: Array | None, unit: float, word: str) -> s
 
 
 def _samples(errors: PoseErrors, true: Sampled) -> Rows:
+    met = f"smallest singular value of Mᵀ met {true.weakest:.3g}" if np.isfinite(true.weakest) else "Mᵀ is not met"
+    if np.isfinite(true.usual):
+        near = not true.weakest >= max(NEAR_SINGULARITY * true.usual, DAMPED)
+        met += f", at the pose {true.usual:.3g}" + (": a singularity is near" if near else "")
+    else:
+        met += "; at the pose there is no Mᵀ: observed links move while the platform rests"
     lines = [f"{true.count} true errors give up to {1e3 * true.position:.4g} mm, {np.degrees(true.orientation):.4g} "
-             "degrees",
-             f"smallest singular value of Mᵀ met {true.weakest:.3g}, at the pose {true.usual:.3g}"
-             + (": a singularity is near" if not true.weakest >= max(NEAR_SINGULARITY * true.usual, DAMPED) else "")]
+             "degrees", met]
     if true.ended:
         lines.append(f"for {len(true.ended)} of them the best fit becomes flat on the way, first at "
                      f"{true.ended[0]:.2g} of the error: a controller slips away there, farther than computed")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import json
 import sys
 from pathlib import Path
 
@@ -11,9 +12,14 @@ from ... import xml
 
 
 def is_needed(root: xml.Element) -> bool:
-    """Whether a URDF document uses elements of xacro."""
-    tags = (element.tag for element in root.iter()) if root.tag == "robot" else ()
-    return any(isinstance(tag, str) and "xacro}" in tag for tag in tags)
+    """Whether a URDF document uses elements of xacro, or declares its prefix and has expressions."""
+    if root.tag != "robot":
+        return False
+    if any("xacro}" in element.tag for element in root.iter("*") if isinstance(element.tag, str)):
+        return True
+    declared = any(str(uri).endswith("xacro") for uri in root.nsmap.values())
+    return declared and any(start in str(value) for element in root.iter("*") for value in element.attrib.values()
+                            for start in ("${", "$("))
 
 
 def expand(path: Path) -> xml.Element:
@@ -29,7 +35,20 @@ def expand(path: Path) -> xml.Element:
     except subprocess.TimeoutExpired:
         raise xml.refusal(path, "xacro does not come to an end", f"{XACRO_SECONDS} seconds") from None
     if run.returncode:
-        lines = [line for line in run.stderr.splitlines() if line.strip()]
-        raise xml.refusal(path, "xacro refuses it: " + " ".join(lines[-1:])[:200],
-                          "a file that xacro expands")
-    return xml.document(run.stdout, str(path))
+        file, line, said = _said(run.stderr)
+        raise xml.refusal(path if file is None else xml.beside(path, file),
+                          f"xacro refuses it: {said[:300]}", "a file that xacro expands", line=line)
+    places, _, text = run.stdout.partition("\n")
+    root = xml.document(text, str(path))
+    xml.placed(root, path, json.loads(places))
+    return root
+
+
+def _said(errors: str) -> tuple[str | None, int | None, str]:
+    """File, line and text of what the process says last."""
+    last = "".join([line for line in errors.splitlines() if line.strip()][-1:])
+    try:
+        found = json.loads(last)
+        return found["file"], found["line"], found["said"]
+    except (ValueError, TypeError, KeyError):
+        return None, None, last
