@@ -121,8 +121,9 @@ def condition(pattern: ConstraintPattern, question: Measurement) -> Condition:
     """The condition of a pattern: by name where it is a known one, else by the screws of all joints."""
     if pattern.motion in ("other", "oriented"):
         return _general(question)
-    if any(leg.fixed for leg in pattern.legs) and pattern.motion == "translations":
-        return Named("never: a held leg leaves the platform no motion", _number(1), never=True, pattern=pattern)
+    if pattern.motion == "translations" and (fixed := [leg for leg in pattern.legs if leg.fixed]):
+        what = "motion" if any(leg.turns == 0 for leg in fixed) else "translation"
+        return Named(f"never: a held leg leaves the platform no {what}", _number(1), never=True, pattern=pattern)
     lines = [leg for leg in pattern.legs if leg.line is not None]
     if pattern.motion == "translations":
         return _translations(pattern, lines)
