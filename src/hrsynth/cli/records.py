@@ -453,6 +453,7 @@ class Singular(OfRobot, WrittenTo):
     lost: list[FreedomRecord]
     always: bool
     never: bool
+    unexamined: list[str]
     words: str
     expression: str
     where: dict[str, str]

@@ -121,8 +121,9 @@ def condition(pattern: ConstraintPattern, question: Measurement) -> Condition:
     """The condition of a pattern: by name where it is a known one, else by the screws of all joints."""
     if pattern.motion in ("other", "oriented"):
         return _general(question)
-    if any(leg.fixed for leg in pattern.legs) and pattern.motion == "translations":
-        return Named("never: a held leg leaves the platform no motion", _number(1), never=True, pattern=pattern)
+    if pattern.motion == "translations" and (fixed := [leg for leg in pattern.legs if leg.fixed]):
+        what = "motion" if any(leg.turns == 0 for leg in fixed) else "translation"
+        return Named(f"never: a held leg leaves the platform no {what}", _number(1), never=True, pattern=pattern)
     lines = [leg for leg in pattern.legs if leg.line is not None]
     if pattern.motion == "translations":
         return _translations(pattern, lines)
@@ -167,7 +168,10 @@ def _translations(pattern: ConstraintPattern, lines: Sequence[LockedLeg]) -> Con
         first = symbols[0]
         expression = sum(dot(cross(first, b), cross(first, b)) for b in symbols[1:])
         expression += sum(dot(first, n) ** 2 for n in normals)
-        words = f"{names} are parallel, and so are the planes in which the other tips move"
+        planes = [leg.normal.symbol for leg in pattern.legs if leg.normal is not None]
+        across = f"the plane{'s' * (len(planes) > 1)} normal to {_and(planes)}"
+        words = (f"{symbols[0]} is parallel to {across}" if len(symbols) == 1 else
+                 f"{names} are {'all ' if len(lines) > 2 else ''}parallel, also to {across}")
     if constant and not normals and len(lines) > 1:
         several = "all " if len(lines) > 2 else ""
         never = f"never: {names} are constant and not {several}parallel"

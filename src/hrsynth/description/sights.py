@@ -123,6 +123,10 @@ def parse_see(text: str, cameras: Sequence[str]) -> SightSpec:
     else:
         link, *more = re.split("/(?=[^/]*,[^/]*$)", place)
         at = ""
+        if where := re.search("@([^@/]*,[^@/]*)$", link):
+            form = f"{head}:{'JOINT' if 'joint' in needs else 'LINK'}"
+            raise BadRequest(f"--see {text}: a place, of which the kind {kind} has none", where[1],
+                             form + "/dx,dy,dz" * ("axis" in needs) + "[/dx,dy,dz]" * ("axis?" in needs))
     attributes = {"kind": kind, "joint" if "joint" in needs else "link": link or at}
     if "at" in needs:
         if not link:

@@ -15,6 +15,7 @@ from hrsynth.analysis.aspects.path import path
 from hrsynth.analysis.check import check
 from hrsynth.analysis.singularity.agreement import weakest
 from hrsynth.analysis.singularity.singular import Singularity, singular
+from hrsynth.description import load
 from hrsynth.errors import BadRequest
 from hrsynth.geometry.vectors import Array, frozen, inverse, unit
 from hrsynth.kinematics.walking import random_walk
@@ -195,6 +196,50 @@ def test_legs_that_may_fold_are_named_where_never_is_said(name: str, legs: str):
     told = " ".join(singularity(found(name, None)).split())
     assert "never" in told
     assert (f"one inside a leg ({legs}) lies flat" in told) == bool(legs)
+
+
+def couples(at: Array) -> Array:
+    """Of the 3-UPU, shifted from its zero configuration: the moments (3, 3), one a leg, that its U joints hold."""
+    robot, held = load("3upu"), []
+    for k in "123":
+        foot, tip = robot.joints[f"shoulder_{k}"], robot.joints[f"wrist_{k}"].point + at
+        held.append(unit(np.cross(foot.axes[0], np.cross(foot.axes[0], tip - foot.point))))
+    return np.array(held)
+
+
+def test_never_does_not_speak_of_constraint_singularities() -> None:
+    """Where the three moments are dependent the 3-UPU can turn about the seen point, which rests."""
+    answer = singular("3upu", see=["position:platform@0,0,0"], points=60)
+    assert answer.condition is not None
+    assert answer.condition.never
+    assert any("constraint singularities" in each for each in answer.unexamined)
+    assert "constraint singularities" in singularity(answer)
+    draws = 0.5 * np.random.default_rng(0).normal(size=(500, 3))
+    home, here = np.linalg.det(couples(np.zeros(3))), sorted(draws, key=lambda x: float(np.linalg.norm(x)))
+    ray = next(x for x in here if np.linalg.det(couples(x)) * home < 0)
+    place = load("3upu").links["platform"].pose[:3, 3] + ray * brentq(lambda t: np.linalg.det(couples(t * ray)), 0, 1)
+    at = ",".join(f"{name}={value:.15g}" for name, value in zip("xyz", place, strict=True))
+    (there,) = check("3upu", see=["position:platform@0,0,0"], at=at).to_dict()["configurations"]
+    assert there["dof"] == 4
+    assert there["rank_M"] == 3
+
+
+def test_constraint_singularities_are_not_named_where_legs_cannot_turn_the_platform() -> None:
+    """A 3-PRRR: each leg turns the platform about its own direction alone, and these are different."""
+    made = Builder("cartesian")
+    for link in ("base", "platform", *(f"{part}{k}" for k in range(3) for part in "sud")):
+        made.link(link)
+    random = np.random.default_rng(1)
+    for k in range(3):
+        a, places = unit(np.eye(3)[k] + 0.2 * random.normal(size=3)), random.normal(size=(4, 3))
+        bodies = ("base", f"s{k}", f"u{k}", f"d{k}", "platform")
+        for n, kind in enumerate("PRRR"):
+            made.joint(f"{kind}{n}_{k}", kind, bodies[n], bodies[n + 1], places[n], axis=a, motor=n == 0,
+                       loop=n == 3 and k > 0)
+    answer = singular(made.build("platform"), see=["position:platform@0,0,0"], points=60)
+    assert answer.condition is not None
+    assert answer.condition.never
+    assert answer.unexamined == ()
 
 
 def test_a_platform_that_rests_is_refused_in_a_line() -> None:

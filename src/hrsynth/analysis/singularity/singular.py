@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 from ...budgets import NEIGHBOUR_STEP
 from ...constraints.condition import Condition, always
 from ...constraints.pattern import ConstraintPattern
+from ...constraints.turning import may_turn
 from ...errors import BadRequest
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.relation import Measurement, platform_motions, relation
@@ -65,6 +67,20 @@ class Singularity(Result, shown_as="singular"):
         """Whether a freedom is lost everywhere: partial controllability."""
         return self.condition is None
 
+    @cached_property
+    def unexamined(self) -> tuple[str, ...]:
+        """Poses that *never* does not speak of: in words, none where it is not said."""
+        if self.condition is None or not self.condition.never:
+            return ()
+        anatomy, found = self.setting.anatomy, []
+        folding = [leg.label for leg in anatomy.legs if leg.has_loops]
+        if folding:
+            found.append(f"poses at which one inside a leg ({', '.join(folding)}) lies flat are not looked at")
+        if may_turn(anatomy, self.pattern.legs, self.setting.configurations):
+            found.append("poses at which they lose rank, so that the platform may turn (constraint singularities), are "
+                         "not looked at")
+        return tuple(found)
+
     def headline(self) -> str:
         """The robot and the condition in words."""
         return f"{self.setting.headline()}: {self.words}"
@@ -81,6 +97,7 @@ class Singularity(Result, shown_as="singular"):
             "dof": self.verdict.dof, "verdict": self.verdict.verdict,
             "lost": [freedom.to_dict() for freedom in self.verdict.lost],
             "always": self.always, "never": found is not None and found.never,
+            "unexamined": list(self.unexamined),
             "words": self.words, "expression": "0" if found is None else str(found.expression),
             "where": {} if found is None else dict(found.where),
             "factors": [] if found is None else list(found.factors),

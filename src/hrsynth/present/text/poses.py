@@ -139,9 +139,7 @@ def singularity(found: Singularity) -> str:
                  ("factors", [f"{part}: {meaning}" for part, meaning in condition.parts]),
                  ("where", [f"{name}: {meaning}" for name, meaning in condition.where.items()]),
                  ("split off", list(condition.factors))]
-    folding = [leg.label for leg in found.setting.anatomy.legs if leg.has_loops]
-    if condition is not None and condition.never and folding:
-        rows.append(("loops", f"poses at which one inside a leg ({', '.join(folding)}) lies flat are not looked at"))
+    rows.append(("loops", list(found.unexamined)))
     if checked is not None:
         rows.append(("checked", [
             f"{checked.points} random poses and {len(checked.on_locus)} on the locus, {checked.disagreements} "
