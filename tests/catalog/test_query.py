@@ -172,7 +172,8 @@ def test_values_of_a_field_are_those_of_all_records(name: str, stores: tuple[Pat
 
 READ_BY: dict[str, dict[str, Any]] = {
     **{name: {name: "none"} for name in FIELDS}, "legs": {"legs": 3}, "modes_bound": {"modes": 3},
-    "see": {"see": "point"}, **{name: {"text": ""} for name in TEXTS if name != "steps"}, "folded word": {"text": "nowhere"},
+    "see": {"see": "point"}, **{name: {"text": ""} for name in TEXTS if name != "steps"},
+    "folded word": {"text": "nowhere"},
     **{name: {"legs": "?x*"} for name in ("notation as written", "chain", "word", "bare word")}}
 """A question for which each column is read; no record here has steps."""
 
