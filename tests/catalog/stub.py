@@ -12,6 +12,7 @@ import signal
 import sys
 import time
 from importlib.util import find_spec
+from itertools import combinations
 from typing import Any
 
 from hrsynth.catalog.build import WordSource, build
@@ -21,11 +22,18 @@ DELAY = float(os.environ.get("STUB_DELAY", "0"))
 VERDICTS = ("controllable", "partially controllable", "uncontrollable")
 CHAINS = ("R*RR", "RR*R", "UP*S", "P*US", "R*-{2-SS}", "RRR")
 REFUSED = "(c07*)"
+ASKED: dict[str, tuple[Any, ...]] = {
+    "legs": ("*R*", "3-R*", "*-R*R*-*", "?-?R*", "PUS", "*(Rz*", "*", 3), "dof": (3, 2, 9), "motion": ("3T", "2T1R"),
+    "verdict": ("partially controllable", "controllable"), "see": ("3point", "3point'"), "group": ("mixed", "planar"),
+    "base_motors": (True, False), "fewest": (2, 0), "modes": (2, 6),
+    "text": ("takeover", "x", "rrr", "hexaglide", "lift 1", "(Rz", "the lines", "")}
+"""What the shipped catalog is asked for by each name."""
 QUESTIONS: tuple[dict[str, Any], ...] = (
-    {}, {"legs": "3-R*"}, {"legs": "?-?R*"}, {"legs": "*-R*R*-*"}, {"legs": 3, "verdict": "controllable"}, {"modes": 6},
-    {"text": "takeover"}, {"text": "hexaglide"}, {"text": "rrr"}, {"dof": 3}, {"motion": "2T1R", "base_motors": True},
-    {"see": "3point"}, {"text": "x", "legs": "*R*"})
-"""What the shipped catalog is asked for."""
+    {}, *({name: value} for name, every in ASKED.items() for value in every),
+    *({name: ASKED[name][0], other: value} for name, other in combinations(ASKED, 2) for value in ASKED[other][:2]),
+    {"legs": 3, "verdict": "controllable"}, {"text": "x", "legs": "*-R*R*-*", "verdict": "partially controllable"},
+    {"legs": ("3-R*", "*S"), "text": ("x", "rrr")}, {"text": "rrr", "legs": "*P*", "base_motors": True})
+"""What it is asked for: by each name alone, by two, and by more."""
 WORKERS = 2 if find_spec("joblib") else 1
 """The extra with joblib may be missing."""
 

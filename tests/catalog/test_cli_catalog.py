@@ -19,6 +19,7 @@ from hrsynth.catalog.drawing import drawing
 from hrsynth.catalog.words import parse
 from hrsynth.cli import execute
 from hrsynth.cli.progress import Progress
+from hrsynth.present.text.catalog import SHOWN, entries
 
 
 @pytest.fixture
@@ -45,6 +46,23 @@ def check_refused(answer: tuple[int, str, str], said: str, status: int = 2) -> N
 def folder(tmp_path: Path) -> Path:
     build(tmp_path / "small", source=source())
     return tmp_path / "small"
+
+
+def test_a_list_reads_only_the_entries_that_it_prints():
+    class Read(list[dict[str, object]]):
+        read = 0
+
+        def __getitem__(self, place):
+            found = super().__getitem__(place)
+            self.read += len(found) if isinstance(place, slice) else 1
+            return found
+
+    records = Read([{"word": str(i), "refused": "so"} for i in range(1000)])
+    told = entries(records, 2000).splitlines()
+    assert [line.split()[0] for line in told[2:-2]] == [str(i) for i in range(SHOWN)]
+    assert told[-1].startswith("1000 of 2000 architectures, the first 100 shown")
+    assert records.read == SHOWN
+    assert "shown" not in entries(records[:SHOWN], 2000)
 
 
 def test_build_writes_and_tells_what_it_did(run, tmp_path: Path):

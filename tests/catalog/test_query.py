@@ -19,9 +19,10 @@ import hrsynth
 from catalog.stub import CHAINS, QUESTIONS, REFUSED, VERDICTS, WORKERS, source
 from hrsynth.catalog import Catalog, load
 from hrsynth.catalog.build import build, check
-from hrsynth.catalog.fits import fits, may_fit
+from hrsynth.catalog.fits import FIELDS, TEXTS, fits, may_fit
 from hrsynth.catalog.jsonl import Record, record, word_of
-from hrsynth.catalog.store import OLD_COLUMNS, Database, Folder, _write_tables, shipped
+from hrsynth.catalog.query import count, groups_of, values
+from hrsynth.catalog.store import Database, Folder, _write_tables, shipped
 from hrsynth.catalog.words import SENSORS, VERSION
 from hrsynth.errors import BadRequest
 
@@ -126,26 +127,72 @@ def test_sqlite_holds_the_same_records(stores: tuple[Path, Path]):
     assert sorted(file.name for file in big.parent.iterdir()) == ["big.sqlite", "lines"]
 
 
-@pytest.mark.parametrize("asked", [{"legs": "?-R*"}, {"text": "two lines"}, {"modes": 6}, {"dof": 3, "legs": 4}])
-@pytest.mark.parametrize("rows", ["", " WITHOUT ROWID"])
-def test_sqlite_files_of_older_versions_are_read(asked: dict[str, Any], rows: str, stores: tuple[Path, Path],
-                                                 tmp_path: Path):
-    """They have the lines beside the columns, and neither the names of legs nor texts, modes and what is seen."""
-    older = tmp_path / "older.sqlite"
-    every = Folder(stores[0])
-    with contextlib.closing(sqlite3.connect(older)) as file:
+OLD_COLUMNS = ("group", "dof", "motion", "verdict", "base_motors", "fewest")
+
+
+def older(layout: str, every: Folder, path: Path) -> Path:
+    """A file as older versions wrote it: lines beside columns, or in a table of their own, by the numbers of rows."""
+    kept, rows = ("", "") if layout == "apart" else (", line", " WITHOUT ROWID" if layout == "without rowid" else "")
+    with contextlib.closing(sqlite3.connect(path)) as file:
         file.execute("CREATE TABLE versions (format INTEGER, catalog INTEGER)")
         file.execute("INSERT INTO versions VALUES (1, 1)")
-        file.execute(f'CREATE TABLE records ("group", word, {", ".join(OLD_COLUMNS[1:])}, line, '
+        file.execute(f'CREATE TABLE records ("group", word, {", ".join(OLD_COLUMNS[1:])}{kept}, '
                      f'PRIMARY KEY ("group", word)){rows}')
+        if layout == "apart":
+            file.execute("CREATE TABLE lines (record INTEGER PRIMARY KEY, line TEXT)")
         for group in every.groups():
             for text in every.lines([group], {}):
                 found = record(text)
-                file.execute(f"INSERT INTO records VALUES ({', '.join('?' * (len(OLD_COLUMNS) + 2))})", (
-                    group, found["word"], *(found.get(name) for name in OLD_COLUMNS[1:]), text))
+                row = (group, found["word"], *(found.get(name) for name in OLD_COLUMNS[1:]), *([text] if kept else []))
+                number = file.execute(f"INSERT INTO records VALUES ({', '.join('?' * len(row))})", row).lastrowid
+                if layout == "apart":
+                    file.execute("INSERT INTO lines VALUES (?, ?)", (number, text))
         file.commit()
-    assert list(load(older, **asked)) == list(load(stores[0], **asked))
-    assert 0 < len(load(older, **asked)) < 100
+    return path
+
+
+@pytest.mark.parametrize("asked", [{"legs": "?-R*"}, {"text": "two lines"}, {"modes": 6}, {"dof": 3, "legs": 4}])
+@pytest.mark.parametrize("layout", ["beside", "without rowid", "apart"])
+def test_sqlite_files_of_older_versions_are_read(asked: dict[str, Any], layout: str, stores: tuple[Path, Path],
+                                                 tmp_path: Path):
+    file = older(layout, Folder(stores[0]), tmp_path / "older.sqlite")
+    assert list(load(file, **asked)) == list(load(stores[0], **asked))
+    assert 0 < len(load(file, **asked)) < 100
+    assert count(file) == 100
+    assert groups_of(file) == ["c", "d"]
+    assert values("dof", file) == load(stores[0]).values("dof")
+
+
+@pytest.mark.parametrize("name", FIELDS)
+def test_values_of_a_field_are_those_of_all_records(name: str, stores: tuple[Path, Path]):
+    lines, big = stores
+    assert values(name, big) == values(name, lines) == load(lines).values(name)
+    assert values(name, big) or name == "see"
+
+
+READ_BY: dict[str, dict[str, Any]] = {
+    **{name: {name: "none"} for name in FIELDS}, "legs": {"legs": 3}, "modes_bound": {"modes": 3},
+    "see": {"see": "point"}, **{name: {"text": ""} for name in TEXTS if name != "steps"},
+    "folded word": {"text": "nowhere"},
+    **{name: {"legs": "?x*"} for name in ("notation as written", "chain", "word", "bare word")}}
+"""A question for which each column is read; no record here has steps."""
+
+
+@pytest.mark.parametrize("change", ["letters = substr(letters, 2)", "ends = substr(ends, 1 + ends_width)",
+                                    "numbers = x'ffffffff'", "letters_width = 3", "name = 'other'"])
+def test_a_file_whose_columns_are_spoilt_is_told(change: str, stores: tuple[Path, Path], tmp_path: Path):
+    file = tmp_path / "spoilt.sqlite"
+    with contextlib.closing(sqlite3.connect(stores[1])) as whole:
+        assert {name for name, in whole.execute("SELECT name FROM columns")} == {"steps", *READ_BY}
+    for name, asked in READ_BY.items():
+        Database(stores[1]).lines(["c", "d"], asked)
+        file.write_bytes(stores[1].read_bytes())
+        with contextlib.closing(sqlite3.connect(file)) as opened:
+            opened.execute(f"UPDATE columns SET {change} WHERE name = ?", (name,))
+            opened.commit()
+        if not (change.startswith("numbers") and name.endswith("word")):  # words have none
+            with pytest.raises(BadRequest, match="no file of the catalog: "):
+                Database(file).lines(["c", "d"], asked)
 
 
 ODD = [
@@ -227,9 +274,9 @@ def test_a_catalog_is_a_collection(stores: tuple[Path, Path]):
     assert every[REFUSED]["refused"] == f"{REFUSED}: refused on two lines"
     counts = every.count("group", "verdict")
     assert sum(counts.values()) == 100
-    for (group, verdict), count in counts.items():
+    for (group, verdict), number in counts.items():
         fit = every.where(group=group, verdict=verdict) if verdict else every.where(text="refused on")
-        assert len(fit) == count
+        assert len(fit) == number
     assert list(every.where(dof=3).where(verdict="controllable")) == list(every.where(verdict="controllable", dof=3))
 
 

@@ -1,32 +1,47 @@
-"""Whether a record fits what is asked for, and a row of a SQLite file."""
+"""Whether a record fits what is asked for, its line, and the rows of a SQLite file."""
 
 from __future__ import annotations
 
 import json
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fnmatch import translate
 from functools import cache
-from typing import Any
+from typing import Any, Protocol
+
+import numpy as np
 
 from ..errors import BadRequest
 from .jsonl import Record, is_written, leading_word, written_text
 from .known import called, is_called, kinds, known_as
+from .search import Flags
 from .words import LONGEST_COUNT, counted, sights
 
 ASKED = ("group", "dof", "motion", "verdict", "base_motors", "fewest", "see", "modes", "legs", "text")
 """What can be asked for."""
 TEXTS = ("notation", "hidden", "steps", "others")
-"""Whose texts are kept once each in a SQLite file: fields of many values, and all others together but the word, with
-the names under which the robot is known."""
+"""Columns of a SQLite file in which a text is sought: fields, and all others together but the word, with the names
+under which the robot is known."""
 APART = "\x1f"
 """Between the texts of a record."""
-COLUMNS = {"legs": "INTEGER", "dof": "INTEGER", "motion": "TEXT", "verdict": "TEXT", "base_motors": "INTEGER",
-           "fewest": "INTEGER", "see": "TEXT", "modes_bound": "INTEGER"}
-"""Fields of a record that have a column and an index in a SQLite file."""
-MOST_TOLD, LONGEST_TOLD = 100, 10_000
-"""Values and letters about which a SQLite file is asked, at most."""
+FIELDS = ("group", "legs", "dof", "motion", "verdict", "base_motors", "fewest", "see", "modes_bound")
+"""Fields of a record that have a column of their own in a SQLite file."""
+MOST_TOLD = 100
+"""Values about which the columns of a SQLite file are asked, at most."""
+
+
+class Rows(Protocol):
+    """The rows of a SQLite file, asked all together (:class:`.columns.Columns`)."""
+
+    def having(self, name: str, test: Callable[[Any], bool]) -> Flags:
+        """Those of records that have a field whose value meets a test."""
+
+    def holding(self, text: str) -> Flags:
+        """Those of records in which a casefolded text occurs in some field, or in a name."""
+
+    def called(self, pattern: str) -> Flags:
+        """Those of records whose word, notation, or chain of some leg fits a pattern."""
 
 
 def require_askable(asked: Mapping[str, Any]) -> None:
@@ -38,12 +53,11 @@ def require_askable(asked: Mapping[str, Any]) -> None:
 
 @dataclass(frozen=True)
 class RecordCondition:
-    """What is asked for by one name, told once: of a record, of its line, and of a row of a SQLite file."""
+    """What is asked for by one name, told once: of a record, of its line, and of all rows of a SQLite file."""
 
     holds: Callable[[Record], bool]
-    row: str | None
-    """With a mark for each of the values; None where no row tells."""
-    values: tuple[Any, ...]
+    rows: Callable[[Rows], Flags] | None
+    """For which rows it holds; None where no column tells."""
     line: Callable[[str], bool] | None = None
     """Whether it may hold for the record of a line that is not read; None where that is not known."""
 
@@ -71,24 +85,16 @@ def _any_of(every: Sequence[RecordCondition]) -> RecordCondition:
     if len(every) == 1:
         return every[0]
     lines = [each.line for each in every if each.line]
-    rows = [each.row for each in every if each.row is not None]
+    rows = [each.rows for each in every if each.rows]
     return RecordCondition(lambda record: any(each.holds(record) for each in every),
-                           f"({' OR '.join(rows) or '0'})" if len(rows) == len(every) <= MOST_TOLD else None,
-                           tuple(value for each in every for value in each.values),
+                           (lambda columns: np.any([told(columns) for told in rows], 0)
+                            ) if 0 < len(rows) == len(every) <= MOST_TOLD else None,
                            (lambda line: any(told(line) for told in lines)) if len(lines) == len(every) else None)
 
 
 def _condition(name: str, value: Any) -> RecordCondition:
     """That of one value; one of NumPy counts as Python's."""
-    found = _told(name, value.item() if hasattr(value, "item") else value)
-    return found if all(map(_sqlite_can_tell, found.values)) else replace(found, row=None)
-
-
-def _sqlite_can_tell(value: Any) -> bool:
-    """Whether SQLite takes a value for what it is; it ends a text at a NUL."""
-    if not isinstance(value, str):
-        return isinstance(value, float) or (isinstance(value, int) and abs(value) < 2**63)
-    return len(value) <= LONGEST_TOLD and not re.search("[\0\ud800-\udfff]", value)
+    return _told(name, value.item() if hasattr(value, "item") else value)
 
 
 def _told(name: str, value: Any) -> RecordCondition:
@@ -96,8 +102,7 @@ def _told(name: str, value: Any) -> RecordCondition:
         raise BadRequest(f"the catalog cannot be asked for {name}", value, "a text, or a number of legs")
     match name:
         case "legs" if isinstance(value, str) and not (value.isdecimal() and len(value) <= LONGEST_COUNT):
-            pattern = plain_brackets(value)
-            matches = re.compile(translate(pattern)).match
+            matches = re.compile(translate(plain_brackets(value))).match
 
             def is_one(*names: str) -> bool:
                 return any(name == value or matches(name) for name in names)
@@ -111,8 +116,7 @@ def _told(name: str, value: Any) -> RecordCondition:
 
             return RecordCondition(
                 lambda record: has_legs(record["word"], str(record.get("notation", ""))),
-                "(chains IN (SELECT chains FROM called WHERE name IN (SELECT id FROM names WHERE text GLOB ?)) "
-                "OR word GLOB ? OR bare GLOB ?)", (pattern,) * 3,
+                lambda rows: rows.called(value),
                 lambda line: "\\" in line or has_legs(leading_word(line), written_text(line, "notation")))
         case "text":
             text = value.casefold()
@@ -120,10 +124,7 @@ def _told(name: str, value: Any) -> RecordCondition:
             plain = re.fullmatch(r"[a-z0-9*+!.{|}()-]+( +[a-z0-9*+!.{|}()-]+)*", text) is not None
             return RecordCondition(
                 lambda record: is_called(record, text) or any(text in str(each).casefold() for each in record.values()),
-                None if APART in text else "(" + " OR ".join(
-                    f"text_{field} IN (SELECT id FROM texts WHERE field = '{field}' AND instr(text, ?))"
-                    for field in TEXTS) + " OR word LIKE ? ESCAPE '!')",
-                (*(text,) * len(TEXTS), "%" + re.sub("[!%_]", r"!\g<0>", text) + "%"),
+                None if APART in text else lambda rows: rows.holding(text),
                 (lambda line: text in line.casefold() or (
                     bool(called(text)) and kinds(leading_word(line)) in called(text))) if plain else None)
         case "legs":
@@ -136,11 +137,10 @@ def _told(name: str, value: Any) -> RecordCondition:
     exact = isinstance(value, str) or (isinstance(value, int) and abs(value) < 2**63 and isinstance(
         value, bool) == (name == "base_motors"))
     part = f"{json.dumps(name)}:{json.dumps(value)}" if exact else ""
-    # a column of numbers takes a text that looks like one for it
-    is_told = not (isinstance(value, str) and COLUMNS.get(name) == "INTEGER")
     return RecordCondition(
         lambda record: name in record and bool(record[name] == value),
-        f'"{name}" = ?' if is_told else None, (value,), (lambda line: part in line) if exact else None)
+        lambda rows: rows.having(name, lambda found: bool(found == value)),
+        (lambda line: part in line) if exact else None)
 
 
 def chains(record: Record) -> set[str]:

@@ -141,6 +141,11 @@ def groups_of(path: str | Path | None = None) -> list[str]:
     return _there(path).groups()
 
 
+def values(name: str, path: str | Path | None = None) -> list[Any]:
+    """The values of a field, one of ``FIELDS``, that records of all groups have, sorted."""
+    return _there(path).values(name)
+
+
 def _groups(kept: Store, asked: Mapping[str, Any]) -> list[str]:
     """The groups in which is what is asked for."""
     wanted = asked.get("group")

@@ -8,32 +8,35 @@ import gzip
 import json
 import sqlite3
 import zlib
-from bisect import bisect_left
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from importlib import resources
 from pathlib import Path
 from typing import Any, Protocol, overload
 
+import numpy as np
+
 from ..description.files import replacement
 from ..errors import BadRequest, BuildStopped
-from .fits import COLUMNS, TEXTS, RecordCondition, chains, conditions, may_fit, texts
+from .columns import Columns, ColumnWriter
+from .fits import ASKED, conditions, may_fit
 from .journal import ENDING, Journal
 from .jsonl import FORMAT, decoded, encoded, head_count, leading_word, record, require_version
+from .search import Whole
 from .words import VERSION
 
 DATABASES = (".sqlite", ".sqlite3", ".db")
 """Endings of a store that is one SQLite file."""
 LINES, PACKED = ".jsonl", ".jsonl.gz"
 """Endings of the files of a folder."""
-READ_AT_ONCE = 500
+READ_AT_ONCE = 100
 """Lines that are read from a SQLite file together."""
+PAGE = 16_384
+"""Bytes of a page of a SQLite file: columns of some megabytes are read in few."""
 PACKED_ABOVE = 5_000
 """Records of a group above which its file is compressed."""
 PUBLISHED = "published"
 """The shipped catalog of published robots."""
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
-OLD_COLUMNS = ("group", "dof", "motion", "verdict", "base_motors", "fewest")
-"""What older files can be asked for."""
 
 
 class Store(Protocol):
@@ -53,6 +56,9 @@ class Store(Protocol):
 
     def count(self, group: str) -> int:
         """How many lines a group has."""
+
+    def values(self, name: str) -> list[Any]:
+        """The values of a field that records have, one of ``FIELDS``, each once, sorted."""
 
     def write(self, group: str, lines: Iterable[str]) -> None:
         """Replace a group."""
@@ -94,6 +100,9 @@ class Folder:
     def count(self, group: str) -> int:
         return head_count(self.content(group).partition(b"\n")[0], str(self.file(group)))
 
+    def values(self, name: str) -> list[Any]:
+        return _values(self.lines(self.groups(), {}), name)
+
     def write(self, group: str, lines: Iterable[str]) -> None:
         lines = list(lines)
         plain, packed = (self.path / f"{group}{ending}" for ending in (LINES, PACKED))
@@ -115,45 +124,45 @@ class Folder:
 
 
 class Database:
-    """One SQLite file with the same lines, indexes on what is asked for most, the names by which legs are found and the
-    text of each record. Files of older versions have fewer of these."""
+    """One SQLite file with the same lines, and columns that tell which of them fit (:mod:`.columns`). Those of older
+    versions are read as a folder is."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
 
     def groups(self) -> list[str]:
         with self._read() as file:
-            return _groups(file)
+            asked = "name FROM groups" if _is_new(file) else 'DISTINCT "group" FROM records'
+            return [name for name, in file.execute(f"SELECT {asked} ORDER BY 1")]
 
     def lines(self, groups: Sequence[str], asked: Mapping[str, Any]) -> Sequence[str]:
         with _asked(self.path):
             file = self._open()
-            new = _is_new(file)
-            told = _told_by_rows(asked, new)
-            met, values = [str(each.row) for each in told], [value for each in told for value in each.values]
-            if not new:
-                met.append(f'+"group" IN ({", ".join("?" * len(groups))})')
-                return [line for line, in file.execute(
-                    f'SELECT line FROM records WHERE {" AND ".join(met)} ORDER BY "group", word', [*values, *groups])]
-            # rows are sorted by group: those of a group stand beside each other
-            ranges = [_rows(file, group) for group in groups]
-            if not told:
-                return StoredLines(self.path, file, sorted(number for each in ranges for number in each))
-            # one text of all numbers is read faster than a row for each
-            numbers, = file.execute(f"SELECT json_group_array(rowid) FROM records WHERE {' AND '.join(met)}", values
-                                    ).fetchone()
-            found = sorted(json.loads(numbers))
-            return StoredLines(self.path, file, [
-                number for each in sorted(ranges, key=lambda each: each.start)
-                for number in found[bisect_left(found, each.start) : bisect_left(found, each.stop)]])
+            if not _is_new(file):
+                fits = may_fit(asked)
+                return [line for group in sorted(groups) for line in _old_lines(file, group) if fits(line)]
+            found = np.concatenate([np.full(count, name in groups) for name, count in file.execute(
+                "SELECT name, count FROM groups ORDER BY name")] or [np.zeros(0, bool)])
+            columns, told = Columns(self.path, file, found), conditions(asked)
+            for name in ASKED:  # patterns and texts last, of rows that are still there
+                if name in told and (rows := told[name].rows) and found.any():
+                    found &= rows(columns)
+            return StoredLines(self.path, file, np.flatnonzero(found))
 
     def decides(self, asked: Mapping[str, Any]) -> bool:
         with self._read() as file:
-            return len(_told_by_rows(asked, _is_new(file))) == len(conditions(asked))
+            return all(each.rows and _is_new(file) for each in conditions(asked).values())
 
     def count(self, group: str) -> int:
         with self._read() as file:
-            return int(file.execute('SELECT count(*) FROM records WHERE "group" = ?', (group,)).fetchone()[0])
+            asked = "sum(count) FROM groups WHERE name" if _is_new(file) else 'count(*) FROM records WHERE "group"'
+            return int(file.execute(f"SELECT {asked} = ?", (group,)).fetchone()[0] or 0)
+
+    def values(self, name: str) -> list[Any]:
+        with self._read() as file:
+            if _is_new(file):
+                return Columns(self.path, file, np.zeros(0, bool)).values(name)
+        return _values(self.lines(self.groups(), {}), name)
 
     def write(self, group: str, lines: Iterable[str]) -> None:
         kept = {} if not self.path.exists() else {
@@ -190,7 +199,7 @@ class Database:
 class StoredLines(Sequence[str]):
     """Lines of a SQLite file, by the numbers of their rows; they are read, some at a time, when they are looked at."""
 
-    def __init__(self, path: Path, file: sqlite3.Connection, numbers: Sequence[int]) -> None:
+    def __init__(self, path: Path, file: sqlite3.Connection, numbers: Whole) -> None:
         self._path, self._file, self._numbers, self._read = path, file, numbers, dict[int, list[str]]()
 
     def __len__(self) -> int:
@@ -207,9 +216,9 @@ class StoredLines(Sequence[str]):
             return [self[i] for i in range(*place.indices(len(self)))]
         part, offset = divmod(range(len(self))[place], READ_AT_ONCE)
         if part not in self._read:
-            wanted = self._numbers[part * READ_AT_ONCE : (part + 1) * READ_AT_ONCE]
+            wanted = self._numbers[part * READ_AT_ONCE : (part + 1) * READ_AT_ONCE].tolist()
             with _asked(self._path):
-                found = dict(self._file.execute("SELECT rowid, line FROM lines WHERE rowid IN "
+                found = dict(self._file.execute("SELECT record, line FROM lines WHERE record IN "
                                                 "(SELECT value FROM json_each(?))", (json.dumps(wanted),)))
             if not all(isinstance(found.get(number), str) for number in wanted):
                 raise BadRequest(f"{self._path}: no file of the catalog: rows without a line")
@@ -218,28 +227,20 @@ class StoredLines(Sequence[str]):
 
 
 def _is_new(file: sqlite3.Connection) -> bool:
-    """Whether texts stand in a table of their own; the lines of older files stand in the rows."""
-    return file.execute("SELECT 1 FROM sqlite_master WHERE name = 'texts'").fetchone() is not None
+    """Whether there are columns; files of older versions have only lines that can be used."""
+    return file.execute("SELECT 1 FROM sqlite_master WHERE name = 'columns'").fetchone() is not None
 
 
-def _groups(file: sqlite3.Connection) -> list[str]:
-    """The groups that are stored, by name."""
-    return [name for name, in file.execute(
-        'WITH RECURSIVE known(name) AS (SELECT min("group") FROM records UNION ALL SELECT (SELECT min("group") '
-        'FROM records WHERE "group" > name) FROM known WHERE name IS NOT NULL) '
-        'SELECT name FROM known WHERE name IS NOT NULL')]
+def _old_lines(file: sqlite3.Connection, group: str) -> Iterator[str]:
+    """The lines of a group in a file of an older version: in the table of records, or in one of their own."""
+    apart = file.execute("SELECT 1 FROM sqlite_master WHERE name = 'lines'").fetchone()
+    where = "records JOIN lines ON record = records.rowid" if apart else "records"
+    return (line for line, in file.execute(f'SELECT line FROM {where} WHERE "group" = ? ORDER BY word', (group,)))
 
 
-def _rows(file: sqlite3.Connection, group: str) -> range:
-    """The numbers of a group's rows."""
-    first, last = (file.execute(f'SELECT rowid FROM records WHERE "group" = ? ORDER BY word {way} LIMIT 1',
-                                (group,)).fetchone() for way in ("ASC", "DESC"))
-    return range(first[0], last[0] + 1) if first else range(0)
-
-
-def _told_by_rows(asked: Mapping[str, Any], new: bool) -> list[RecordCondition]:
-    """The conditions that the rows of a file decide, of an older one those that its columns do."""
-    return [each for name, each in conditions(asked).items() if each.row and (new or name in OLD_COLUMNS)]
+def _values(lines: Iterable[str], name: str) -> list[Any]:
+    """The values of a field in lines, each once, sorted."""
+    return sorted({value for each in lines if (value := record(each).get(name)) is not None})
 
 
 def store(path: str | Path) -> Store:
@@ -297,34 +298,19 @@ def _write_tables(path: Path, groups: Mapping[str, Iterable[str]]) -> None:
     """Write a new file: the same bytes for the same lines."""
     with contextlib.closing(sqlite3.connect(path)) as file:
         file.execute("PRAGMA journal_mode = OFF")
-        columns = ", ".join(f"{name} {kind}" for name, kind in COLUMNS.items())
-        numbers = ", ".join(f"text_{field} INTEGER" for field in TEXTS)
-        file.execute('CREATE TABLE versions (format INTEGER, catalog INTEGER)')
-        # what is asked for most stands first in a row
-        file.execute(f'CREATE TABLE records ({numbers}, chains INTEGER, {columns}, "group" TEXT, word TEXT, bare TEXT, '
-                     'PRIMARY KEY ("group", word))')
+        file.execute(f"PRAGMA page_size = {PAGE}")
+        file.execute("CREATE TABLE versions (format INTEGER, catalog INTEGER)")
         file.execute("INSERT INTO versions VALUES (?, ?)", (FORMAT, VERSION))
+        file.execute("CREATE TABLE groups (name TEXT PRIMARY KEY, count INTEGER) WITHOUT ROWID")
         file.execute("CREATE TABLE lines (record INTEGER PRIMARY KEY, line TEXT)")
-        file.execute("CREATE TABLE texts (field TEXT, id INTEGER, text TEXT, PRIMARY KEY (field, id)) WITHOUT ROWID")
-        file.execute("CREATE TABLE names (id INTEGER PRIMARY KEY, text TEXT)")
-        file.execute("CREATE TABLE called (name INTEGER, chains INTEGER, PRIMARY KEY (name, chains)) WITHOUT ROWID")
-        marks = ", ".join("?" * (len(COLUMNS) + len(TEXTS) + 4))
-        kept, notations, number = {field: dict[str, int]() for field in TEXTS}, dict[str, int](), 0
+        columns, number = ColumnWriter(), 0
         for group, lines in sorted(groups.items()):
+            first = number
             for line in sorted(lines, key=leading_word):
-                found, number = record(line), number + 1
-                file.execute(f"INSERT INTO records VALUES ({marks})", (
-                    *(kept[field].setdefault(text, len(kept[field])) for field, text in texts(found).items()),
-                    notations.setdefault(str(found.get("notation", "")), len(notations)),
-                    *(found.get(name) for name in COLUMNS), group, found["word"], found["word"].replace("*", "")))
+                columns.add(record(line))
                 file.execute("INSERT INTO lines VALUES (?, ?)", (number, line))
-        for field, known in kept.items():
-            file.executemany("INSERT INTO texts VALUES (?, ?, ?)", ((field, i, text) for text, i in known.items()))
-        names = dict[str, int]()
-        file.executemany("INSERT INTO called VALUES (?, ?)", (
-            (names.setdefault(name, len(names)), i) for notation, i in notations.items()
-            for name in sorted(chains({"notation": notation}))))
-        file.executemany("INSERT INTO names VALUES (?, ?)", ((i, text) for text, i in names.items()))
-        for name in ("word", *COLUMNS):
-            file.execute(f"CREATE INDEX records_{name} ON records ({name})")
+                number += 1
+            if number > first:
+                file.execute("INSERT INTO groups VALUES (?, ?)", (group, number - first))
+        columns.write(file)
         file.commit()

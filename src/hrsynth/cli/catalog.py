@@ -13,7 +13,7 @@ import json as javascript
 import shlex
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -106,20 +106,19 @@ def entries(kept: str | None, json: bool, **asked: Any) -> None:
 def _require_known(kept: str | None, asked: dict[str, Any]) -> None:
     """Raise ``BadRequest`` for what is asked and no record of the catalog has at all: why none fits."""
     from ..catalog import load
-    from ..catalog.query import groups_of
+    from ..catalog.query import groups_of, values
     from ..errors import BadRequest
 
     groups = groups_of(kept)
-    every = cache(lambda: load(kept, group=tuple(groups)))
     named = {"group": groups, "verdict": VERDICTS}
     for name in ("group", "verdict", "motion", "dof", "fewest"):
         if asked[name] is not None and asked[name] not in (
-                known := named[name] if name in named else every().values(name)):
+                known := named[name] if name in named else values(name, kept)):
             raise BadRequest(f"no architecture of the catalog has this --{name}", asked[name],
                              list(map(str, sorted(known))))
-    if asked["legs"] is not None and not every().where(legs=asked["legs"]):
+    if asked["legs"] is not None and not load(kept, group=tuple(groups), legs=asked["legs"]):
         raise BadRequest("no architecture of the catalog has such legs", asked["legs"], "their number, "
-                         f"{', '.join(map(str, every().values('legs')))}, or a pattern in which * and ? stand for "
+                         f"{', '.join(map(str, values('legs', kept)))}, or a pattern in which * and ? stand for "
                          "letters: 3-R*RR, PUS, 6-*")
 
 

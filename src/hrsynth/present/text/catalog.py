@@ -18,9 +18,9 @@ Record = Mapping[str, Any]
 
 
 def entries(records: Sequence[Record], total: int) -> str:
-    """A line an entry, the first of many, and how many of all they are."""
+    """A line an entry, the first of many, and how many of all they are; no others are looked at."""
     count = f"{len(records)} of {total} architectures"
-    if records[SHOWN:]:
+    if len(records) > SHOWN:
         count += f", the first {SHOWN} shown (all with --json; --legs, --motion, --verdict … ask for fewer)"
     return f"{table([_row(record) for record in records[:SHOWN]], HEADS)}\n\n{count}" if records else count
 
