@@ -817,7 +817,7 @@ def test_no_loop(run, robot):
     lines = FOUR_BAR.split("\n")
     file = robot("\n".join(lines[:24] + lines[33:]))
     assert run("derive", file).refused() == [
-        f"hrsynth: {file}:1: no loop: not a parallel robot, allowed: a <loop>; of a serial arm or a free body "
+        f"hrsynth: {file}:1: no loop: not a parallel robot, allowed: a <loop>; for a serial arm or a free body "
         '<hrsynth serial="true">']
 
 
@@ -853,7 +853,7 @@ def test_observe_elements_that_contradict_the_legs(run, robot, observes: list[tu
 
 
 def test_files_that_are_none(run, robot, tmp_path: Path):
-    assert "a folder of no robot file" in run("derive", tmp_path).refused()[0]
+    assert "a folder with no robot file" in run("derive", tmp_path).refused()[0]
     sparse = tmp_path / "junk.urdf"
     with open(sparse, "wb") as stream:
         stream.truncate(200_000_000)

@@ -195,4 +195,4 @@ def test_the_pose_of_a_question_is_named_where_another_name_is_given(
         command: str, usual: str, capsys: pytest.CaptureFixture[str]) -> None:
     capsys.readouterr()
     assert execute(command.split()) == 2
-    assert f"allowed: {usual}, the pose that is asked about here" in capsys.readouterr().err
+    assert f"allowed: {usual} for the pose of this question" in capsys.readouterr().err

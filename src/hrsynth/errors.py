@@ -124,9 +124,9 @@ class MotorsNotEnough(Unanswered):
 
     def __init__(self, robot: str, joints: Sequence[str]) -> None:
         self.robot, self.joints = robot, tuple(joints)
-        super().__init__(f"{robot}: at the zero configuration the platform can move while all motors rest, by "
-                         f"{shortened(', '.join(joints))}: no function of the motors; more motors, or another zero "
-                         "configuration")
+        super().__init__(f"{robot}: at the zero configuration the platform can move while all motors are held, through "
+                         f"{shortened(', '.join(joints))}: its pose is not a function of the motors; add motors, "
+                         "or choose another zero configuration")
 
 
 class RankUndecided(Unanswered):
@@ -142,9 +142,9 @@ class StructureUndecided(Unanswered):
 
     def __init__(self, robot: str, tolerance: float, one: str, other: str) -> None:
         self.robot, self.tolerance, self.one, self.other = robot, tolerance, one, other
-        super().__init__(f"{robot}: the numbers are rounded and near to two robots, to {tolerance:.1g} (characteristic "
-                         f"lengths, radians): that with {one}, or {other}; give more decimals, another --tolerance, or "
-                         "--as-written")
+        super().__init__(f"{robot}: the rounded numbers fit two robots to {tolerance:.1g} (characteristic "
+                         f"lengths, radians): one with {one}, one with {other}; give more decimals, another "
+                         "--tolerance, or --as-written")
 
 
 class NotSampled(Unanswered):
@@ -162,7 +162,7 @@ class Shaky(Unanswered):
     def __init__(self, robot: str, allowed: int, done: int) -> None:
         self.robot, self.allowed, self.done = robot, allowed, done
         super().__init__(f"{robot}: shaky wherever it was tried: to first order its loops have mobility {allowed}, but "
-                         f"motions lead on in {done} way{'s' * (done != 1)} only; no verdict is given, since all ranks "
+                         f"it can move on in only {done} way{'s' * (done != 1)}; no verdict is given, since all ranks "
                          "here are of first order")
 
 
@@ -182,7 +182,7 @@ class MeaningUndecided(Unanswered):
 
     def __init__(self, what: str, largest: float, smallest: float, gap: float) -> None:
         super().__init__(f"{what} are {largest:.2g} sizes of the mechanism apart, others {smallest:.2g}: not "
-                         f"{gap:g} times as far, so that it is not clear which are meant; --as-written takes the "
+                         f"{gap:g} times as far, so it is not clear which are meant; --as-written takes the "
                          "numbers as they are")
 
 
@@ -211,12 +211,12 @@ class PoseNotReached(Unanswered):
             if wrist is not None:
                 reason = f"joint {wrist}, which stands for several R through one point, is near the end of its turns"
             elif leg is None:
-                reason = ("each leg alone can close there, but the straight way to it is blocked (a leg at its limit, "
+                reason = ("each leg alone can close there, but the straight path to it is blocked (a leg at its limit, "
                           "another working mode)")
             else:
                 turn = f" and {degrees:.3g} degrees" if degrees > 1e-6 else ""
                 reason = f"leg {leg} alone misses it by {millimetres:.4g} mm{turn}"
-            reason += f"; from {origin} the robot comes {100 * came:.3g} % of the way, to {last}"
+            reason += f"; from {origin} the robot gets {100 * came:.3g} % of the way, to {last}"
         self.reason = reason
         super().__init__(f"{robot}: the pose {pose} is not reached: {self.reason}")
 
@@ -253,7 +253,7 @@ class NotConfined(Unanswered):
 
     def __init__(self, robot: str, reason: str) -> None:
         self.robot, self.reason = robot, reason
-        super().__init__(f"{robot}: its assembly modes cannot be listed, which is not supported here: {reason}")
+        super().__init__(f"{robot}: its assembly modes cannot be listed, not supported here: {reason}")
 
 
 class NotConfirmed(Unanswered):
@@ -336,7 +336,7 @@ class BuildStopped(Unanswered):
 
     def __init__(self, reason: str, kept: str | None = None, what: str = "build") -> None:
         self.reason, self.kept = reason, kept
-        rest = "" if kept is None else f"; what was built is kept in {kept}, the same command continues"
+        rest = "" if kept is None else f"; what was built is kept in {kept}; the same command continues"
         super().__init__(f"the {what} stopped: {reason}{rest}")
 
 

@@ -61,12 +61,12 @@ def verify(source: Mapping[str, Any] | str | Path, robot: Mechanism | str | Path
         except NotAccepted as reason:
             raise CertificateRefused(name, str(reason)) from None
         except (OSError, ValueError, RecursionError) as error:
-            why = getattr(error, "strerror", None) or "it is no JSON"
+            why = getattr(error, "strerror", None) or "it is not JSON"
             raise BadRequest(f"the certificate cannot be read: {why}", name,
                              "a file that modes, derive or path wrote with --certificate") from None
     try:
         if not isinstance(record, dict):
-            raise NotAccepted("it is no object")
+            raise NotAccepted("it is not an object")
         checkers = {"path": verify_path, "ranks": verify_ranks}
         proved = checkers.get(str(record.get("claim")), verify_certificate).verify(record)
     except (NotAccepted, PathNotAccepted, RanksNotAccepted) as reason:
@@ -76,11 +76,11 @@ def verify(source: Mapping[str, Any] | str | Path, robot: Mechanism | str | Path
         try:
             own = {"modes": modes, "ranks": ranks, "path": paths}[record["claim"]].again(record, robot)
         except (BadRequest, PoseNotReached) as error:
-            raise CertificateRefused(name, f"it is not about {robot.name}: {error}") from None
+            raise CertificateRefused(name, f"it is not for {robot.name}: {error}") from None
         except (KeyError, TypeError, ValueError, AttributeError) as error:
-            raise CertificateRefused(name, f"it does not say which legs and pose it is about ({error!r})") from None
+            raise CertificateRefused(name, f"it does not say which legs and pose it is for ({error!r})") from None
         if not _same(record, own):
-            raise CertificateRefused(name, f"it is not about {robot.name}: other geometry, legs or pose")
+            raise CertificateRefused(name, f"it is not for {robot.name}: other geometry, legs or pose")
     return f"{proved}{ranks.seen(record)}" if record["claim"] == "ranks" else proved
 
 

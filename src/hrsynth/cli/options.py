@@ -134,11 +134,11 @@ SOURCE = (
            "repeat for more.", "A:B[:TYPE]", kind=list[str], group=READING),
     Option("freeze", "Joints to hold at zero.", "JOINTS", default="", group=READING),
     Option("keyframe",
-           "Take as zero pose a posture that the file, or an SRDF file beside it, names; or FILE.srdf:NAME.",
+           "Zero pose: a named posture of the file, or of an SRDF file next to it; or FILE.srdf:NAME.",
            "NAME", group=READING),
     Option("unit", "The unit of the file's lengths: m, mm, cm or in.", "UNIT", group=READING,
            words=("m", "mm", "cm", "in")),
-    Option("tolerance", "Deviation up to which axes and centres are taken as parallel, meeting and so on, and made so "
+    Option("tolerance", "Deviation up to which axes and centres count as parallel, meeting and so on, and are made so "
            "(characteristic lengths, radians; default: from the digits of the file's numbers).", None, float,
            group=READING),
     flag("as_written",
@@ -179,8 +179,8 @@ def told_radians(option: str, text: str | None) -> None:
             angle = float(field.rpartition("=")[2])
         except ValueError:
             continue
-        warn(f"--{option} {field.strip()}: radians, that is {math.degrees(angle):.3g} degrees "
-             f"({field.strip()}deg would be degrees)")
+        warn(f"--{option} {field.strip()}: taken as radians, {math.degrees(angle):.3g} degrees "
+             f"({field.strip()}deg for degrees)")
 
 
 def told_turns(option: str, text: object) -> None:

@@ -73,8 +73,8 @@ def load(robot: str | Path | Mechanism, *, base: str | None = None, platform: st
                                keyframe=keyframe, unit=unit, tolerance=tolerance, as_written=as_written)
     if isinstance(robot, Mechanism):
         if overrides.any or tolerance is not None or base is not None or observe is not None:
-            raise BadRequest("what a file does not say is given for a robot that was read", robot.name,
-                             "the file of a robot, or its name")
+            raise BadRequest("options that say what a file does not are given for a robot that is already read",
+                             robot.name, "the file of a robot, or its name")
         return robot
     return read(file_of(robot), overrides)
 
@@ -163,7 +163,7 @@ def _require_whole(file: Path, others: Iterable[Path]) -> None:
     written = set(map(os.path.realpath, others))
     for partner in filter(None, partners):
         if os.path.realpath(partner) not in written:
-            raise BadRequest(f"cannot write the file: {partner.name} beside it is read together with it", str(file),
+            raise BadRequest(f"cannot write the file: {partner.name} next to it would be read with it", str(file),
                              f"another name, or {partner.name} moved away")
 
 

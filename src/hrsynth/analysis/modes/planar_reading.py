@@ -154,7 +154,7 @@ class _Reading:
         rows += [self._row({one: 1, other: -1}) for one, other in self._held(self.seen, [j.name for j in geared])]
         if len(graphs.spanning_forest(self.mechanism.links, list({j.name: j for j in geared}.values()),
                                       [0.0] * len(geared))) < len({joint.name for joint in geared}):
-            raise self._refused("its gears are in a ring")
+            raise self._refused("its gears form a cycle")
         tied = whole_kernel(rows)
         assert tied is not None
         equal = [*(joint.links for joint in self.joints if joint.type.slides), *self._held(self.seen)]

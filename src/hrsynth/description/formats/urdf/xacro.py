@@ -27,7 +27,7 @@ def expand(path: Path) -> xml.Element:
     try:
         run = subprocess.run(command, capture_output=True, text=True, timeout=XACRO_SECONDS, check=False)
     except subprocess.TimeoutExpired:
-        raise xml.refusal(path, "xacro does not come to an end", f"{XACRO_SECONDS} seconds") from None
+        raise xml.refusal(path, "xacro did not finish", f"{XACRO_SECONDS} seconds") from None
     if run.returncode:
         lines = [line for line in run.stderr.splitlines() if line.strip()]
         raise xml.refusal(path, "xacro refuses it: " + " ".join(lines[-1:])[:200],
