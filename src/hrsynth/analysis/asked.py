@@ -46,7 +46,7 @@ def observe(robot: RobotLike, legs: LegsLike = None, camera: CameraLike = None, 
     if at is None:
         return ObservedRobot.of(robot, legs, camera, see=see, samples=samples, seed=seed)
     if isinstance(robot, ObservedRobot):
-        raise BadRequest(f"{robot.headline()}: what is watched is asked twice", str(at),
+        raise BadRequest(f"{robot.headline()}: what is watched is given twice", str(at),
                          "nothing besides an observed robot")
     require_platform(robot, at)
     asked = asked_pose(at)
@@ -60,7 +60,7 @@ def observe(robot: RobotLike, legs: LegsLike = None, camera: CameraLike = None, 
 def require_platform(robot: Mechanism, where: object) -> None:
     """Refuses the pose or grid ``where`` of a formation: it would be that of its first body, the others staying."""
     if robot.formation:
-        raise BadRequest(f"{robot.name}: a pose is that of one platform, and this is a formation", str(where),
+        raise BadRequest(f"{robot.name}: a pose belongs to one platform, and this is a formation", str(where),
                          f"nothing: {', '.join(robot.bodies)} stand where the file has them (--platform LINK makes one "
                          "the platform)")
 

@@ -849,9 +849,9 @@ class RestCoverRecord(TypedDict):
     null where there are none, as is a platform that only translates and is turned otherwise than in one of `turns`
     turns, at `turned` poses of the list, and poses at which the joints of the legs `unread` lock, and (null where
     these were looked at) those at which one of the legs `unstretched` is stretched or so many watched directions as
-    `across` says are at right angles to the desired ones; `apart` of the list lie where was not looked. At `crossings`
-    points of the platform rests fill curves, as two legs' joints lock. `unmet` of those that are proved are not in the
-    list, `strangers` of the list are not among them."""
+    `across` says are at right angles to the desired ones; `apart` of the list lie where nothing was searched. At
+    `crossings` points of the platform rests fill curves, as two legs' joints lock. `unmet` of those that are proved
+    are not in the list, `strangers` of the list are not among them."""
 
     complete: bool
     proved: int

@@ -41,7 +41,7 @@ class Pose:
 
     def __post_init__(self) -> None:
         if self.phi is not None and self.rpy is not None:
-            raise BadRequest("a pose is given both phi and rpy", str(self), "one of them")
+            raise BadRequest("a pose has both phi and rpy", str(self), "one of them")
         for name, values in self.given.items():
             if not all(map(math.isfinite, values)):
                 raise BadRequest(f"pose: {name} is not finite", "/".join(map(str, values)), "a finite number")

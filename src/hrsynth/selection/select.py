@@ -361,7 +361,7 @@ class _Work:
                 continue
             if left is None and (begun == most or time.monotonic() > self.until):
                 left = f"the {begun} most accurate were" if begun == most else (
-                    f"the time was over after the {begun} most accurate, on a faster machine there would be more")
+                    f"the time ran out after the {begun} most accurate, on a faster machine there would be more")
             if left is not None:
                 found.append(replace(candidate, examined=False))
                 continue

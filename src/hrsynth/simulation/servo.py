@@ -76,7 +76,7 @@ class Conditions:
     physics: bool = False
     """Whether a mock-up in MuJoCo is driven, with dynamics."""
     depth: str = "exact"
-    """The depth of what is seen in images, as the law supposes it: ``exact``, ``desired`` (that at the goal) or
+    """The depth of what is seen in images, as the law assumes it: ``exact``, ``desired`` (that at the goal) or
     ``constant:0.5`` (m)."""
     duration: float | None = None
     """Leads the desired values along the straight way of poses in so many seconds instead of at once."""

@@ -201,7 +201,7 @@ def modes(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None,
 def _formed(setting: ObservedRobot, where: object, real: bool) -> AssemblyModes:
     """The modes of a formation; refuses poses and motors, which are those of one platform."""
     if where is not None or real:
-        raise BadRequest(f"{setting.robot.name}: poses and motors are those of one platform, and this is a formation",
+        raise BadRequest(f"{setting.robot.name}: poses and motors belong to one platform, and this is a formation",
                          "real" if real else str(where),
                          "nothing: what is measured at the file's configuration is held")
     tell("modes")
@@ -230,7 +230,7 @@ def at_mode(listed: AssemblyModes | None, asked: ModeNumber) -> ClosedConfigurat
     if not 1 <= asked.number <= count:
         raise BadRequest(f"{name}: a mode at {listed.pose}", str(asked),
                          f"mode:1 to mode:{count}" if count else "no mode" if listed.found.continuum is None else
-                         "poses that are no continuum")
+                         "poses that do not form a continuum")
     mode = listed.modes[asked.number - 1]
     at = listed.goal if mode.goal else mode.configuration
     if at is None:

@@ -294,7 +294,7 @@ class BasinSearch:
         told = told[len(shown):]
         if len(away):
             numbers[away] = outcomes.number(told[0])
-        numbers[runs.stopped == OVER] = outcomes.number(Outcome(Ending(TIME, "the time was over")))
+        numbers[runs.stopped == OVER] = outcomes.number(Outcome(Ending(TIME, "the time ran out")))
         same = [outcome.alike(outcomes.all[numbers[run]], length)
                 for run, outcome in zip(checked, chain(*alone), strict=True) if numbers[run] >= 0]
         for run, outcome in zip(followed, told[min(len(away), 1):], strict=True):
@@ -349,7 +349,7 @@ def hindrances(setting: ObservedRobot) -> tuple[str, ...]:
              for kind in kinds]
     if setting.mechanism.limited:
         found.append("a joint has limits")
-    return tuple(found) or (("a leg is no closed form",) if setting.placer is None else ())
+    return tuple(found) or (("a leg has no closed form",) if setting.placer is None else ())
 
 
 def place_of(motion: PlatformMotion, X: Array, names: Sequence[str]) -> Array:
