@@ -147,7 +147,7 @@ def accuracy(found: Accuracy) -> str:
 def _limits_left(found: Accuracy) -> Rows:
     """Whose limits a grid passes over."""
     limited = ", ".join(found.setting.mechanism.limited)
-    return [("limits", f"those of {limited} are not looked at")] if limited else []
+    return [("limits", f"those of {limited} are not checked")] if limited else []
 
 
 def field_rows(found: Accuracy) -> Rows:
