@@ -168,7 +168,7 @@ def test_what_has_no_loops_says_why():
             planar_loops(MeasuredRobot.watched(observed), observed.everything.start)
         assert not hrsynth.modes(observed).found.complete
     observed = hrsynth.observe("delta")
-    with pytest.raises(NotConfined, match="none of a planar mechanism"):
+    with pytest.raises(NotConfined, match="not one of a planar mechanism"):
         planar_loops(MeasuredRobot.watched(observed), observed.everything.start)
 
 
