@@ -141,7 +141,7 @@ def singularity(found: Singularity) -> str:
                  ("split off", list(condition.factors))]
     folding = [leg.label for leg in found.setting.anatomy.legs if leg.has_loops]
     if condition is not None and condition.never and folding:
-        rows.append(("loops", f"poses at which one inside a leg ({', '.join(folding)}) lies flat are not looked at"))
+        rows.append(("loops", f"poses at which a loop inside a leg ({', '.join(folding)}) lies flat are not examined"))
     if checked is not None:
         rows.append(("checked", [
             f"{checked.points} random poses and {len(checked.on_locus)} on the locus, {checked.disagreements} "
