@@ -47,7 +47,7 @@ _ANSWERS, _GRIDS = AnswerMemory(REMEMBERED_ANSWERS), AnswerMemory(REMEMBERED_GRI
 
 
 def forget() -> None:
-    """Forget all answers and samples that are remembered.
+    """Clear all answers and samples from the cache.
 
     >>> hrsynth.forget()
     """

@@ -23,8 +23,8 @@ from .verify_ranks import RanksNotAccepted
 
 def certificate(found: AssemblyModes | Derivation | PathAnswer) -> dict[str, Any]:
     """The certificate of a complete list of modes, of a derivation's verdict in exact arithmetic, or of a path: plain
-    data, as ``verify`` and one file, ``verify_certificate.py``, ``verify_ranks.py`` or ``verify_path.py``, check it.
-    Raises ``NoCertificate``.
+    data that ``verify`` checks, or one of the files ``verify_certificate.py``, ``verify_ranks.py`` and
+    ``verify_path.py``. Raises ``NoCertificate``.
 
     >>> hrsynth.certificate(hrsynth.modes("3rrr_m1"))["complex"]
     6
@@ -44,10 +44,10 @@ def written(found: AssemblyModes | Derivation | PathAnswer) -> bytes:
 
 
 def verify(source: Mapping[str, Any] | str | Path, robot: Mechanism | str | Path | None = None) -> str:
-    """What a certificate, or the file of one, proves, in words, by the checker's own computation; with ``robot`` also
-    that its geometry is that robot's, to ``SAME_RELATION`` of its size.
+    """What a certificate, or a certificate file, proves, in words, by the checker's own computation; with ``robot`` it
+    is also checked that its geometry is that robot's, to ``SAME_RELATION`` of its size.
 
-    Raises ``CertificateRefused`` where it does not hold, ``BadRequest`` for a file that cannot be read.
+    Raises ``CertificateRefused`` if it does not hold, ``BadRequest`` for a file that cannot be read.
 
     >>> hrsynth.verify(hrsynth.certificate(hrsynth.modes("3rrr_m1")))
     '2 real of 6 complex poses, and no other; the robot closes at 2 of the real ones, to 1e-9'

@@ -24,7 +24,7 @@ from .tubes import TubedBranch
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ExportedCode(Result, shown_as="export"):
-    """A program, its language, and the proof that it stands on; ``legs`` are those whose directions it gives."""
+    """A program, its language, and the proof on which it rests; ``legs`` are those whose directions it gives."""
 
     proof: BranchProof
     lang: str
@@ -68,8 +68,8 @@ class ExportedCode(Result, shown_as="export"):
 def export(robot: RobotLike, lang: str = "c++", box: BoxLike | None = None, *, observe: LegsLike = None,
            camera: CameraLike = None, effort: int = BRANCH_CELLS) -> ExportedCode:
     """A program for a controller, in C++ (one header, C++17, Eigen) or NumPy (one module): from the motors' coordinates
-    the passive joints and the platform's pose on the branch of the zero configuration, their Jacobians, the motors of a
-    pose, and the interaction matrix of the watched directions (``observe``, ``camera`` as for ``derive``).
+    it computes the passive joints and the platform's pose on the branch of the zero configuration, their Jacobians, the
+    motors for a pose, and the interaction matrix of the watched directions (``observe``, ``camera`` as for ``derive``).
 
     It answers where :func:`.branch` proves the branch (``box``, ``effort`` as there) and refuses elsewhere. The same
     robot gives the same text. Raises what ``branch`` raises, ``NothingProved``, ``BadRequest`` for another language.
