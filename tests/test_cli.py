@@ -184,7 +184,7 @@ def test_a_file_that_cannot_be_written_is_told_before_any_work(run, tmp_path: Pa
     taken = tmp_path / file.format("taken")
     taken.mkdir()
     for path, reason in ((tmp_path / "none" / file.format("x"), "no such folder"), (taken, "a directory"),
-                         (tmp_path / file.format("x" * 300), "its folder takes no such file")):
+                         (tmp_path / file.format("x" * 300), "no such file can be made in its folder")):
         (line,) = run(*most, path).refused()
         assert line.startswith(f"hrsynth: cannot write the file: {reason}"), line
     assert list(tmp_path.iterdir()) == [taken]
@@ -768,7 +768,7 @@ def test_nothing_is_written_over_the_file_that_is_read(run, robot):
     for arguments in (("convert", file, file), ("convert", file, link), ("convert", link, file),
                       ("convert", file.with_name("..") / file.parent.name / file.name, file),
                       ("convert", file, file, "--to", "sdf"), ("derive", file, "-o", file)):
-        assert "it is the one that is read" in run(*arguments).refused()[0]
+        assert "it is the one being read" in run(*arguments).refused()[0]
     assert file.read_bytes() == once
 
 
