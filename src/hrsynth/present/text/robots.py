@@ -164,7 +164,7 @@ def legs(found: Legs) -> str:
               for reason in dict.fromkeys(each.reason for each in found.exact if not each.exact)]
     chance = max(each.chance for each in found.exact)
     if chance:
-        lines.append(f"exact but for a chance below {power_above(chance)}: identities tested at random instances")
+        lines.append(f"exact except for a chance below {power_above(chance)}: identities tested at random instances")
     lines += [f"legs {', '.join(each.legs)}: {near(each)}" for each in found.sets if each.near]
     lines += _modes(found.setting)
     if not found.complete:
