@@ -87,7 +87,7 @@ class Criteria:
 @dataclass(frozen=True)
 class ModeCount:
     """How many assembly modes there are with the directions of a pose, in how many of them the robot was found
-    assembled, and whether these are proved to be all; ``why`` they are not listed, else empty."""
+    assembled, and whether these are proved to be all; ``why`` they are not listed, otherwise empty."""
 
     count: int | None
     reachable: int | None
@@ -189,12 +189,12 @@ class Selection(Result, shown_as="select"):
 
     @property
     def unexamined(self) -> tuple[Candidate, ...]:
-        """The sets of which it is not known whether they would be kept."""
+        """The sets for which it is not known whether they would be kept."""
         return tuple(each for each in self.candidates if not each.examined)
 
     @property
     def fewer(self) -> str | None:
-        """Why the best set serves better than one that holds more legs, None where that is not seen."""
+        """Why the best set serves better than one with more legs, None if that is not seen."""
         known = [(each.legs, each.ends) for each in self.kept if each.ends is not None]
         return fewer_are_better(known[0], known[1:]) if known and known[0][0] == self.kept[0].legs else None
 

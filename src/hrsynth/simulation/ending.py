@@ -28,7 +28,7 @@ ENDINGS = (GOAL, MODE, ANTIPODAL, MINIMUM, BOUNDARY, SIGHT, TIME, UNDECIDED)
 @dataclass(frozen=True, eq=False, repr=False)
 class Ending(Value):
     """How a run ended and why that is its name; ``matched`` is the number of the assembly mode, counted from 1 in the
-    list of all modes of the goal's directions (None where it is none of them, or where they cannot be listed)."""
+    list of all modes of the goal's directions (None if it is none of them, or if they cannot be listed)."""
 
     name: str
     reason: str
@@ -108,7 +108,7 @@ class EndingClassifier(Value):
 
 
 def rest(setting: ObservedRobot, at: ClosedConfiguration, last: Command) -> Ending:
-    """What a configuration is at which the command vanishes and the error does not: a singularity of the hidden robot,
+    """What a configuration is at which the command vanishes but the error does not: a singularity of the hidden robot,
     the limit of a leg's reach, or neither."""
     posture = ConfigurationAnalysis.of(setting).classify(at)
     where = f"‖e‖ = {last.size:.3g} and the command vanishes"
