@@ -39,8 +39,8 @@ FILTER = (
     Option("dof", "Freedoms of the platform.", kind=int, low=0),
     Option("motion", "Its translations and rotations, such as 3T or 2T1R."),
     Option("verdict", f"{', '.join(VERDICTS)}.", words=VERDICTS),
-    Option("see", "What is seen of the platform instead of legs, such as 3point or 2point+image_line; with ' one "
-           "camera for each.", "KINDS"),
+    Option("see", "What is seen of the platform instead of legs, such as 3point or 2point+image_line; add ' for one "
+           "camera each.", "KINDS"),
     Option("group", "planar, mixed, pods, deltas, spatial, sensors; for published tables 3T0R and the like."),
     Option("base_motors", "Whether all motors are on the base.", kind=bool, flags=("--base-motors/--moving-motors",)),
     Option("fewest", "Number of legs that must be watched.", kind=int, low=0),

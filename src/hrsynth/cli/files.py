@@ -78,7 +78,7 @@ def verify(certificate: str, robot: str | None, json: bool) -> None:
 
 def add(app: Group) -> None:
     """Make them commands."""
-    add_command(app, "verify", "Check a certificate of modes, derive or path, with integers and fractions alone.",
+    add_command(app, "verify", "Check a certificate of modes, derive or path, using only integers and fractions.",
                 (Option("certificate", "The certificate's file.", "FILE", default=NEEDED, argument=True),
                  Option("robot", "Check that its geometry is that of this robot.", "ROBOT", words=options.shipped),
                  JSON), verify,

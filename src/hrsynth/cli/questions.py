@@ -168,7 +168,7 @@ POINTS = ("--camera eye=base@0.3,0.1,0 --see point:platform@0.1,0,0 --see point:
           "--see point:platform@0,0.1,0.1")
 """Three image points by a camera beside the robot: an example."""
 FIGURE = (
-    Option("width", "Width of a figure, as 88mm or 3.5in: it is laid out for that, with text of 8pt.", "LENGTH",
+    Option("width", "Width of a figure, such as 88mm or 3.5in, laid out for that with text of 8pt.", "LENGTH",
            group=OUTPUT),
     Option("font", "Font of a figure, its size, or both: serif, 8pt, 'DejaVu Sans 8pt'.", group=OUTPUT),
 )
@@ -307,7 +307,7 @@ QUESTIONS = (
                      "else the loop may end.", None, int, 20, low=0),
               Option("sight", "Pose of the camera on the link that carries it (x right, y down, z ahead), such as "
                      "x=0,y=0,z=0.5,rpy=180deg/0/0; or auto.", "POSE"),
-              Option("focal", "Focal length of the camera, of 640 by 480 pixels.", "PIXELS", float, 800.0),
+              Option("focal", "Focal length of the camera, for pictures of 640 × 480 pixels.", "PIXELS", float, 800.0),
               Option("examine", "For how many sets, the most accurate first, to compute modes, aspects and runs.", None,
                      int, 20, low=1),
               Option("seconds", "Deprecated, because the answer then depends on the machine: time after which no "
