@@ -73,7 +73,7 @@ def load(robot: str | Path | Mechanism, *, base: str | None = None, platform: st
                                keyframe=keyframe, unit=unit, tolerance=tolerance, as_written=as_written)
     if isinstance(robot, Mechanism):
         if overrides.any or tolerance is not None or base is not None or observe is not None:
-            raise BadRequest("options that say what a file does not are given for a robot that is already read",
+            raise BadRequest("options that fill in a robot file are given for a robot that is already read",
                              robot.name, "the file of a robot, or its name")
         return robot
     return read(file_of(robot), overrides)
