@@ -98,7 +98,7 @@ def drawn(formula: str) -> str:
 
 def gallery() -> str:
     """Every picture that is kept, with the command that draws it."""
-    head = ("---\nhide: [toc]\n---\n\n# Gallery\n\nEvery picture is drawn by one command, which stands beneath it; "
+    head = ("---\nhide: [toc]\n---\n\n# Gallery\n\nEvery picture is drawn by one command, shown below it; "
             "`make pictures` draws them all again.\n\n<div class=\"gallery\" markdown>\n")
     cells = []
     for name in pictures.PICTURES:

@@ -185,7 +185,7 @@ def test_a_file_that_cannot_be_written_is_told_before_any_work(run, tmp_path: Pa
     taken = tmp_path / file.format("taken")
     taken.mkdir()
     for path, reason in ((tmp_path / "none" / file.format("x"), "no such folder"), (taken, "a directory"),
-                         (tmp_path / file.format("x" * 300), "its folder takes no such file")):
+                         (tmp_path / file.format("x" * 300), "no such file can be made in its folder")):
         (line,) = run(*most, path).refused()
         assert line.startswith(f"hrsynth: cannot write the file: {reason}"), line
     assert list(tmp_path.iterdir()) == [taken]
@@ -772,7 +772,7 @@ def test_nothing_is_written_over_the_file_that_is_read(run, robot):
     for arguments in (("convert", file, file), ("convert", file, link), ("convert", link, file),
                       ("convert", file.with_name("..") / file.parent.name / file.name, file),
                       ("convert", file, file, "--to", "sdf"), ("derive", file, "-o", file)):
-        assert "it is the one that is read" in run(*arguments).refused()[0]
+        assert "it is the one being read" in run(*arguments).refused()[0]
     assert file.read_bytes() == once
 
 
@@ -821,7 +821,7 @@ def test_no_loop(run, robot):
     lines = FOUR_BAR.split("\n")
     file = robot("\n".join(lines[:24] + lines[33:]))
     assert run("derive", file).refused() == [
-        f"hrsynth: {file}:1: no loop: not a parallel robot, allowed: a <loop>; of a serial arm or a free body "
+        f"hrsynth: {file}:1: no loop: not a parallel robot, allowed: a <loop>; for a serial arm or a free body "
         '<hrsynth serial="true">']
 
 
@@ -857,7 +857,7 @@ def test_observe_elements_that_contradict_the_legs(run, robot, observes: list[tu
 
 
 def test_files_that_are_none(run, robot, tmp_path: Path):
-    assert "a folder of no robot file" in run("derive", tmp_path).refused()[0]
+    assert "a folder with no robot file" in run("derive", tmp_path).refused()[0]
     sparse = tmp_path / "junk.urdf"
     with open(sparse, "wb") as stream:
         stream.truncate(200_000_000)

@@ -88,9 +88,9 @@ def test_a_planar_robot_has_the_plane_in_which_it_moves(capsys: pytest.CaptureFi
 
 
 def test_an_angle_without_a_unit_is_told_in_degrees(capsys: pytest.CaptureFixture[str]) -> None:
-    for cone, words in (("0.1", ["--cone 0.1: radians, that is 5.73 degrees"]), ("0.1deg", []),
-                        ("1=0.1deg,4=0.002", ["--cone 4=0.002: radians, that is 0.115 degrees"])):
+    for cone, words in (("0.1", ["--cone 0.1: taken as radians, 5.73 degrees"]), ("0.1deg", []),
+                        ("1=0.1deg,4=0.002", ["--cone 4=0.002: taken as radians, 0.115 degrees"])):
         status, _, err = told(capsys, "accuracy", "quattro", "--observe", "1,4", "--cone", cone, "--json")
         assert status == 0
-        found = [line.removeprefix("hrsynth: ") for line in err.splitlines() if "radians, that is" in line]
+        found = [line.removeprefix("hrsynth: ") for line in err.splitlines() if "taken as radians" in line]
         assert [line.partition(" (")[0] for line in found] == words

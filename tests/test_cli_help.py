@@ -123,7 +123,7 @@ def test_a_flag_can_be_denied_and_words_that_repeat_are_all_taken():
     ("derive quattro --seed 1.5", "--seed, found '1.5'"), ("derive quattro --seed=-1", "--seed, found '-1'"),
     ("servo delta --gain 1e9", "--gain, found '1e9', allowed: a number, at most 1e+06"),
     ("modes delta --effort nan", "--effort, found 'nan'"),
-    ("derive quattro a b", "derive takes no more words, found 'a b'"),
+    ("derive quattro a b", "derive takes no more arguments, found 'a b'"),
     ("derive quattro --at", "--at: expected one argument, allowed: POSE"),
     ("derive quattro -o --observe 1,4", "-o needs a value, found '--observe', allowed: FILE, or -o=--observe"),
     ("legs delta --observe --at 1", "--observe needs a value, found '--at'"),
@@ -173,7 +173,7 @@ def test_the_old_names_of_start_and_goal_are_taken_and_told(capsys):
             told.append(capsys.readouterr())
         assert told[0].out == told[1].out
         assert told[1].err == ""
-        assert told[0].err == f"hrsynth: {old} is called {new} now; the old name goes with 0.4\n"
+        assert told[0].err == f"hrsynth: {old} is now called {new}; the old name will be removed in 0.4\n"
 
 
 @pytest.mark.parametrize(("typed", "expected"), [

@@ -166,7 +166,7 @@ def test_its_record_holds_the_command(tmp_path: Path, capsys, monkeypatch):
 @pytest.mark.parametrize(("asked", "said"), [
     (["import", "3rps", "-o", "out.xml"], ".urdf"), (["import", "nobody", "-o", "out.urdf"], "neither a file"),
     (["import", "3rps", "-o", "away/out.urdf"], "no such folder"),
-    (["import", "open.urdf", "-o", "open.urdf"], "the one that is read"),
+    (["import", "open.urdf", "-o", "open.urdf"], "the one being read"),
     (["import", "open.urdf", "-o", "out.urdf"], "--platform"),
     (["import", "open.urdf", "--platform", "x", "-o", "out.urdf"], "no such platform"),
     (["import", "3rps"], "--output")])

@@ -175,9 +175,9 @@ def test_a_wrapped_column_keeps_its_words():
 
 
 @pytest.mark.parametrize(("command", "told"), [
-    ("check 3rrr_m1 --at phi=10", "--at phi=10: radians, that is 573 degrees"),
-    ("check 3rrr_m1 --at x=0,phi=0.1 --at phi=-4", "--at phi=-4: radians, that is -229 degrees"),
-    ("path 3rrr_m1 --start phi=0 --goal phi=5", "--goal phi=5: radians, that is 286 degrees"),
+    ("check 3rrr_m1 --at phi=10", "--at phi=10: taken as radians, 573 degrees"),
+    ("check 3rrr_m1 --at x=0,phi=0.1 --at phi=-4", "--at phi=-4: taken as radians, -229 degrees"),
+    ("path 3rrr_m1 --start phi=0 --goal phi=5", "--goal phi=5: taken as radians, 286 degrees"),
     ("check 3rrr_m1 --at phi=3", None), ("check 3rrr_m1 --at x=4,phi=0.2", None),
     ("check 3rrr_m1 --at phi=10deg", None)])
 def test_a_turn_of_more_than_half_a_circle_without_a_unit_is_told_in_degrees(
@@ -195,4 +195,4 @@ def test_the_pose_of_a_question_is_named_where_another_name_is_given(
         command: str, usual: str, capsys: pytest.CaptureFixture[str]) -> None:
     capsys.readouterr()
     assert execute(command.split()) == 2
-    assert f"allowed: {usual}, the pose that is asked about here" in capsys.readouterr().err
+    assert f"allowed: {usual} for the pose of this question" in capsys.readouterr().err

@@ -88,7 +88,7 @@ def test_a_certificate_is_about_its_robot_alone():
     record = hrsynth.certificate(hrsynth.modes("rrrrr_m1"))
     hrsynth.verify(record, "rrrrr_m1")
     for other in ("delta", "3rrr_m1"):
-        with pytest.raises(CertificateRefused, match=f"it is not about {other}"):
+        with pytest.raises(CertificateRefused, match=f"it is not for {other}"):
             hrsynth.verify(record, other)
 
 

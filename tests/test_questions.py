@@ -116,7 +116,7 @@ def test_a_robot_is_taken_by_value_name_path_and_as_observed(tmp_path):
                                              hrsynth.observe("3rrr_m1"))]
     assert all(each == found[0] for each in found)
     assert hrsynth.load(robot) is robot
-    with pytest.raises(BadRequest, match="that was read"):
+    with pytest.raises(BadRequest, match="already read"):
         hrsynth.load(robot, platform="base")
 
 
@@ -132,9 +132,9 @@ def test_every_function_refuses_what_is_no_robot(name):
 
 def test_names_that_were_are_taken_with_a_warning():
     accuracy: Any = hrsynth.accuracy
-    with pytest.warns(DeprecationWarning, match="cones is called cone now"):
+    with pytest.warns(DeprecationWarning, match="cones is now called cone"):
         old = accuracy("3rrr_m1", cones="0.1deg")
-    with pytest.warns(DeprecationWarning, match="samples is called nonlinear now"):
+    with pytest.warns(DeprecationWarning, match="samples is now called nonlinear"):
         accuracy("3rrr_m1", cone="0.1deg", samples=4)
     with warnings.catch_warnings():
         warnings.simplefilter("error")

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 
 class HrsynthError(Exception):
-    """Base of all errors of this package; ``exit_status`` is what the command line answers with."""
+    """Base of all errors of this package; ``exit_status`` is the exit status of the command line."""
 
     exit_status = 2
     file: str | None = None
@@ -20,7 +20,7 @@ class HrsynthError(Exception):
         return _error, (type(self), self.args), self.__dict__
 
     def lines(self) -> list[str]:
-        """One line a defect, without the program's name."""
+        """One line per defect, without the program's name."""
         text = " ".join(str(self).split())
         return [text if self.file is None else f"{self.file}: {text}"]
 
@@ -51,7 +51,7 @@ class Defect:
 
 
 class BadRobotFile(HrsynthError):
-    """A robot file with defects, all of them once, in the order of their lines."""
+    """A robot file with its defects, each once, in the order of their lines."""
 
     def __init__(self, defects: Iterable[Defect]) -> None:
         self.defects = tuple(sorted(dict.fromkeys(defects), key=lambda d: (d.line is None, d.line or 0)))
@@ -62,7 +62,7 @@ class BadRobotFile(HrsynthError):
 
 
 def shortened(text: str, length: int = 200) -> str:
-    """A text on one line, its end left out where it is too long."""
+    """A text on one line, cut off at the end if it is too long."""
     line = " ".join(text.split())
     return line if len(line) <= length else line[: length - 1] + "…"
 
@@ -86,7 +86,7 @@ class NoSegment(BadRequest):
 
 
 class FileTooLarge(BadRequest):
-    """A file that is larger than what is taken: its name, and bytes at most."""
+    """A file that is larger than what is accepted: its name, and the limit in bytes."""
 
     def __init__(self, name: str, most: int) -> None:
         self.name, self.most = name, most
@@ -98,17 +98,18 @@ class BadMechanism(BadRequest):
 
 
 class NotMeasured(BadRequest):
-    """A measurement that has no value where the links are: a camera in the cylinder or at the point that it sees."""
+    """A measurement that has no value at a configuration: a camera inside the cylinder, or at the point, that it
+    sees."""
 
 
 class Unanswered(HrsynthError):
-    """Base of those where the request is sound and has no answer."""
+    """Base of the errors for sound requests that have no answer."""
 
     exit_status = 3
 
 
 class LoopsNotClosed(Unanswered):
-    """Loops are open: the residual that is left, the loop that misses most, and what may help, if known."""
+    """Loops are open: the residual that is left, the loop with the largest miss, and what may help, if known."""
 
     def __init__(self, robot: str, residual: float, tolerance: float, loop: str, cure: str = "") -> None:
         self.robot, self.residual, self.tolerance, self.loop = robot, residual, tolerance, loop
@@ -119,14 +120,14 @@ class LoopsNotClosed(Unanswered):
 
 
 class MotorsNotEnough(Unanswered):
-    """At zero the platform can move while all motors rest: too few motors, or a singular zero configuration; the joints
-    that move then."""
+    """At zero the platform can move while all motors are held: too few motors, or a singular zero configuration; with
+    the joints that then move."""
 
     def __init__(self, robot: str, joints: Sequence[str]) -> None:
         self.robot, self.joints = robot, tuple(joints)
-        super().__init__(f"{robot}: at the zero configuration the platform can move while all motors rest, by "
-                         f"{shortened(', '.join(joints))}: no function of the motors; more motors, or another zero "
-                         "configuration")
+        super().__init__(f"{robot}: at the zero configuration the platform can move while all motors are held, through "
+                         f"{shortened(', '.join(joints))}: its pose is not a function of the motors; add motors, "
+                         "or choose another zero configuration")
 
 
 class RankUndecided(Unanswered):
@@ -138,13 +139,13 @@ class RankUndecided(Unanswered):
 
 
 class StructureUndecided(Unanswered):
-    """Rounded numbers that are as near to one structure as to another."""
+    """Rounded numbers that fit one structure as well as another."""
 
     def __init__(self, robot: str, tolerance: float, one: str, other: str) -> None:
         self.robot, self.tolerance, self.one, self.other = robot, tolerance, one, other
-        super().__init__(f"{robot}: the numbers are rounded and near to two robots, to {tolerance:.1g} (characteristic "
-                         f"lengths, radians): that with {one}, or {other}; give more decimals, another --tolerance, or "
-                         "--as-written")
+        super().__init__(f"{robot}: the rounded numbers fit two robots to {tolerance:.1g} (characteristic "
+                         f"lengths, radians): one with {one}, one with {other}; give more decimals, another "
+                         "--tolerance, or --as-written")
 
 
 class NotSampled(Unanswered):
@@ -157,17 +158,17 @@ class NotSampled(Unanswered):
 
 
 class Shaky(Unanswered):
-    """A mechanism whose loops allow more to first order than it can do, wherever it goes."""
+    """A mechanism whose loops allow more motion to first order than it really has, wherever it goes."""
 
     def __init__(self, robot: str, allowed: int, done: int) -> None:
         self.robot, self.allowed, self.done = robot, allowed, done
         super().__init__(f"{robot}: shaky wherever it was tried: to first order its loops have mobility {allowed}, but "
-                         f"motions lead on in {done} way{'s' * (done != 1)} only; no verdict is given, since all ranks "
+                         f"it can move on in only {done} way{'s' * (done != 1)}; no verdict is given, since all ranks "
                          "here are of first order")
 
 
 class BranchPoint(Unanswered):
-    """A zero configuration at which several operation modes meet, or samples of several: what was found of each, and
+    """A zero configuration at which several operation modes meet, or samples from several: what was found of each, and
     a pose in it."""
 
     def __init__(self, robot: str, what: str, modes: Iterable[str]) -> None:
@@ -178,16 +179,16 @@ class BranchPoint(Unanswered):
 
 class MeaningUndecided(Unanswered):
     """Whether a special geometry is meant: the largest defect that would be accepted, the smallest that would not (both
-    in sizes of the mechanism), and how far apart they have to be."""
+    in sizes of the mechanism), and how far apart they must be."""
 
     def __init__(self, what: str, largest: float, smallest: float, gap: float) -> None:
         super().__init__(f"{what} are {largest:.2g} sizes of the mechanism apart, others {smallest:.2g}: not "
-                         f"{gap:g} times as far, so that it is not clear which are meant; --as-written takes the "
+                         f"{gap:g} times as far, so it is not clear which are meant; --as-written takes the "
                          "numbers as they are")
 
 
 class NothingProved(Unanswered):
-    """A branch of which no cell at all is proved, for a reason: there is no function to write."""
+    """A branch of which no cell at all is proved, and why: there is no function to write."""
 
     def __init__(self, robot: str, motors: Iterable[str], reason: str) -> None:
         super().__init__(f"{robot}: no code is written: around the zero configuration nothing is proved for "
@@ -195,10 +196,9 @@ class NothingProved(Unanswered):
 
 
 class PoseNotReached(Unanswered):
-    """A pose that the robot does not reach from ``origin``: the leg that misses it most and by how much
-    (mm, degrees), or None where each leg alone reaches it; how far the robot came (0 to 1), and to which pose; the
-    ``wrist``, a joint that stands for several R, that is near the end of its turns there; another ``reason`` instead
-    of these."""
+    """A pose that the robot does not reach from ``origin``: the leg that misses it most and by how much (mm, degrees),
+    or None if each leg alone reaches it; how far the robot came (0 to 1), and to which pose; the ``wrist``, a joint
+    that stands for several R, that is near the end of its turns there; or another ``reason`` instead of these."""
 
     def __init__(self, robot: str, pose: str, came: float, last: str, leg: str | None = None,
                  millimetres: float = 0.0, degrees: float = 0.0, origin: str = "its zero configuration",
@@ -211,28 +211,28 @@ class PoseNotReached(Unanswered):
             if wrist is not None:
                 reason = f"joint {wrist}, which stands for several R through one point, is near the end of its turns"
             elif leg is None:
-                reason = ("each leg alone can close there, but the straight way to it is blocked (a leg at its limit, "
+                reason = ("each leg alone can close there, but the straight path to it is blocked (a leg at its limit, "
                           "another working mode)")
             else:
                 turn = f" and {degrees:.3g} degrees" if degrees > 1e-6 else ""
                 reason = f"leg {leg} alone misses it by {millimetres:.4g} mm{turn}"
-            reason += f"; from {origin} the robot comes {100 * came:.3g} % of the way, to {last}"
+            reason += f"; from {origin} the robot gets {100 * came:.3g} % of the way, to {last}"
         self.reason = reason
         super().__init__(f"{robot}: the pose {pose} is not reached: {self.reason}")
 
     @classmethod
     def of_all(cls, refused: Sequence[PoseNotReached]) -> PoseNotReached:
-        """The first of some poses that are not reached, which tells a line of each."""
+        """The first of several poses that are not reached; it reports one line for each."""
         refused[0].others = tuple(refused[1:])
         return refused[0]
 
     def lines(self) -> list[str]:
-        """A line of this pose, and one of each of the others."""
+        """One line for this pose, and one for each of the others."""
         return super().lines() + [line for each in self.others for line in each.lines()]
 
 
 class PlaneNotMet(Unanswered):
-    """A plane or grid of poses of which the robot reaches none: why."""
+    """A plane or grid of poses none of which the robot reaches, and why."""
 
     def __init__(self, robot: str, plane: str, reason: str) -> None:
         self.robot, self.plane, self.reason = robot, plane, reason
@@ -249,15 +249,15 @@ class Disagreement(Unanswered):
 
 
 class NotConfined(Unanswered):
-    """A robot whose tips, with the directions held, move on something else than points, lines and circles."""
+    """A robot whose tips, with the directions held, move on something other than points, lines and circles."""
 
     def __init__(self, robot: str, reason: str) -> None:
         self.robot, self.reason = robot, reason
-        super().__init__(f"{robot}: its assembly modes cannot be listed, which is not supported here: {reason}")
+        super().__init__(f"{robot}: its assembly modes cannot be listed, not supported here: {reason}")
 
 
 class NotConfirmed(Unanswered):
-    """An architecture without a verdict that is exact and that closed configurations confirm: why."""
+    """An architecture without an exact verdict that closed configurations confirm, and why."""
 
     def __init__(self, robot: str, what: str) -> None:
         self.robot, self.what = robot, what
@@ -275,7 +275,7 @@ class NotCertified(Unanswered):
 
 
 class NoCertificate(Unanswered):
-    """A list of modes, or a verdict, for which there is no certificate: why."""
+    """A list of modes, or a verdict, for which there is no certificate, and why."""
 
     def __init__(self, robot: str, reason: str) -> None:
         self.robot, self.reason = robot, reason
@@ -291,7 +291,7 @@ class CertificateRefused(Unanswered):
 
 
 class MissingExtra(Unanswered):
-    """Something that needs an optional package which is not installed: what, and the extra that brings it."""
+    """Something that needs an optional package which is not installed: what, and the extra that installs it."""
 
     met: ClassVar[int] = 0
     """How often that happened: an answer that goes on without a package is not remembered."""
@@ -313,8 +313,8 @@ class Unsolved(Unanswered):
 
 
 class TooLarge(Unanswered):
-    """A system that needs more effort than is allowed: what, how large it is, about how many seconds, and how many may
-    be spent."""
+    """A system that needs more effort than is allowed: what, how large it is, the estimated time in seconds, and the
+    limit."""
 
     def __init__(self, what: str, size: str, needed: float, effort: float) -> None:
         self.needed = needed
@@ -323,7 +323,7 @@ class TooLarge(Unanswered):
 
 
 class NotRendered(Unanswered):
-    """Pictures that cannot be rendered on this machine: why."""
+    """Pictures that cannot be rendered on this machine, and why."""
 
     def __init__(self, reason: str) -> None:
         self.reason = reason
@@ -331,17 +331,17 @@ class NotRendered(Unanswered):
 
 
 class BuildStopped(Unanswered):
-    """A build of the catalog, or a sweep to a file, that cannot go on: why, and the journal that keeps what was done,
-    if any."""
+    """A build of the catalog, or a sweep to a file, that cannot continue: why, and the journal that keeps what was
+    done, if any."""
 
     def __init__(self, reason: str, kept: str | None = None, what: str = "build") -> None:
         self.reason, self.kept = reason, kept
-        rest = "" if kept is None else f"; what was built is kept in {kept}, the same command continues"
+        rest = "" if kept is None else f"; what was built is kept in {kept}; the same command continues"
         super().__init__(f"the {what} stopped: {reason}{rest}")
 
 
 class CatalogStale(Unanswered):
-    """A stored catalog that is not what is built today: what differs, a line each."""
+    """A stored catalog that differs from what would be built today: what differs, one line each."""
 
     def __init__(self, complaints: Iterable[str]) -> None:
         self.complaints = tuple(complaints)

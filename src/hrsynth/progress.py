@@ -11,7 +11,7 @@ _part: ContextVar[str] = ContextVar("part", default="")
 
 
 def tell(stage: str) -> None:
-    """One more step of a stage of the question that is being answered."""
+    """Report one more step of a stage of the question that is being answered."""
     listener = _listener.get()
     if listener is not None:
         listener(_part.get() + stage)
@@ -19,7 +19,7 @@ def tell(stage: str) -> None:
 
 @contextmanager
 def part(name: str) -> Iterator[None]:
-    """Tell each stage within as one of a part of the question, as ``set 3 of 20: modes``."""
+    """Report each stage within as one of a part of the question, as ``set 3 of 20: modes``."""
     token = _part.set(f"{_part.get()}{name}: ")
     try:
         yield
@@ -29,7 +29,7 @@ def part(name: str) -> Iterator[None]:
 
 @contextmanager
 def following(listener: Callable[[str], None]) -> Iterator[None]:
-    """Tell a function each step of all that is asked within: ``with following(print): derive(robot)``.
+    """Report each step of all that is asked within to a function: ``with following(print): derive(robot)``.
 
     >>> stages = []
     >>> with hrsynth.following(stages.append):

@@ -92,13 +92,13 @@ class Compared(Value):
 
 
 class Result(Compared):
-    """An answer: its ``repr`` is one line, its ``str`` the text of the command line, in a notebook the same as HTML.
+    """An answer: its ``repr`` is one line, its ``str`` the text of the command line; a notebook shows the same as HTML.
 
-    Two are equal where they say the same of the same robot.
+    Two are equal if they say the same about the same robot.
 
-    ``shown_as`` names its outputs in the table of ``present/outputs.py``. What shows them stands above all questions:
-    the package sets ``public``, which gives its public functions ``text`` and ``html`` and loads them when something is
-    shown.
+    ``shown_as`` names its outputs in the table of ``present/outputs.py``. What shows them is in a layer above all
+    questions: the package sets ``public``, which gives its public functions ``text`` and ``html`` and loads them when
+    something is shown.
     """
 
     shown_as: ClassVar[str]
@@ -135,8 +135,7 @@ class Result(Compared):
 
 
 def require_keywords(function: Callable[..., Any], given: Iterable[str], more: Iterable[str] = ()) -> None:
-    """Raise ``TypeError`` for a keyword that a function has not, with the nearest of those that it has; ``more`` are
-    those behind its ``**``."""
+    """Raise ``TypeError`` for an unknown keyword, with the nearest known one; ``more`` are those behind its ``**``."""
     known = [name for name, each in signature(function).parameters.items() if each.kind is not Parameter.VAR_KEYWORD]
     known += more
     for name in given:

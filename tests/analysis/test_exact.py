@@ -396,7 +396,7 @@ def test_a_robot_may_see_less_than_its_architecture() -> None:
 @pytest.mark.parametrize(("robot", "observe", "verdict", "words"), [
     ("3rrr_m1", None, CONTROLLABLE, "controllable, proved in exact arithmetic"),
     ("quattro_rigid", None, CONTROLLABLE,
-     "controllable, proved in exact arithmetic, but for a chance below 1e-16"),
+     "controllable, proved in exact arithmetic, except for a chance below 1e-16"),
     ("uranesx", None, PARTIAL, "partially controllable, exact at 5 random instances"),
     ("3ppr_m1", None, BLIND, "uncontrollable, exact at 5 random instances")])
 def test_the_architecture_in_a_derivation(robot: str, observe: None, verdict: str, words: str) -> None:
@@ -425,7 +425,7 @@ def test_the_architecture_in_a_table_of_legs() -> None:
     assert "exact" in header.split()
     assert sum("proved" in line for line in lines) == sum(each.verdict == CONTROLLABLE for each in found.sets) == 9
     assert sum("5 instances" in line for line in lines) == 6
-    assert "exact but for a chance below 1e-14: identities tested at random instances" in lines
+    assert "exact except for a chance below 1e-14: identities tested at random instances" in lines
     assert not any("chance" in line for line in text.legs(legs(prepare_robot("3rrr_m1"))).splitlines())
 
 

@@ -406,7 +406,7 @@ def test_poses_of_a_formation_are_refused():
     made = drawn(3, "position", [(1, 2), (2, 3), (1, 3)])[0]
     for asked in (lambda: check(made, at=["x=1"]), lambda: check(made, grid="x=0:1:3,y=0:1:3"),
                   lambda: derive(made, at="x=1"), lambda: legs(made, at="x=1")):
-        with pytest.raises(BadRequest, match="a pose is that of one platform, and this is a formation"):
+        with pytest.raises(BadRequest, match="a pose belongs to one platform, and this is a formation"):
             asked()
 
 

@@ -52,5 +52,5 @@ def test_one_observed_robot_is_sampled_once() -> None:
 def test_what_is_watched_is_asked_once(more: dict[str, str]) -> None:
     observed = hrsynth.observe(load("delta"), "1,2")
     assert ObservedRobot.of(observed) is observed
-    with pytest.raises(BadRequest, match="asked twice"):
+    with pytest.raises(BadRequest, match="given twice"):
         derive(observed, **more)

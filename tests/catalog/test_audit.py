@@ -240,7 +240,7 @@ def test_the_command_line(tables: Path, tmp_path: Path, capsys: pytest.CaptureFi
     assert "rows compared" in capsys.readouterr().out
     for arguments, said in (([str(tmp_path / "none")], "no folder of tables"), ([str(tmp_path)], "no table of robots"),
                             ([str(tables), "--only", "4T"], "no group of these tables"),
-                            ([str(tables), "-o", "x.csv"], "a line each")):
+                            ([str(tables), "-o", "x.csv"], "one per line")):
         assert execute(["catalog", "audit", *arguments]) == 2
         assert said in capsys.readouterr().err
 

@@ -88,7 +88,7 @@ def test_known_robots_come_first_then_those_with_equal_legs():
 def test_every_rule_has_its_sentence():
     assert {rule.name for rule in known_rules()} <= set(RULES)
     said = list(rules({"steps": ["motors off", "lift 1,2,3", "leg removal 2"]}))
-    assert said[1].startswith("A virtual chain that holds nothing is set beside legs 1, 2 and 3;")
+    assert said[1].startswith("A virtual chain that constrains nothing is added to legs 1, 2 and 3;")
     assert said[2] == "The platform and the watched legs move as before without leg 2: left out."
 
 

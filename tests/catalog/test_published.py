@@ -64,7 +64,7 @@ def test_the_command_line(tables: Path, tmp_path: Path, capsys: pytest.CaptureFi
     assert execute(["derive", str(robot), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["verdict"] == "controllable"
     for arguments, said in ((["show", "P3RRR1G1P1", "--catalog", str(kept), "-o", str(robot)], "--tables FOLDER"),
-                            (["show", "P9", "--tables", str(tables)], "no robot of these tables"),
+                            (["show", "P9", "--tables", str(tables)], "not a robot of these tables"),
                             (["site", "--catalog", str(kept), "-o", str(tmp_path / "site")], "no pages are made"),
                             (["build", "--tables", str(tables)], "-o FOLDER"),
                             (["build", "--tables", str(tmp_path), "-o", str(kept)], "no table of robots"),

@@ -222,7 +222,7 @@ def test_what_no_record_can_have_is_refused(asked: dict[str, Any], stores: tuple
 def test_lines_that_are_cut_are_told(line: str, tmp_path: Path):
     text = f'{{"format":1,"catalog":{VERSION},"group":"g","count":1}}\n{line}\n'
     (tmp_path / "g.jsonl").write_text(text)
-    with pytest.raises(BadRequest, match="no record"):
+    with pytest.raises(BadRequest, match="not a record"):
         len(load(tmp_path).where(dof=3))
 
 
@@ -303,9 +303,9 @@ def test_what_cannot_be_asked_or_read_is_refused(stores: tuple[Path, Path], tmp_
         load(tmp_path)
     text = tmp_path / "text.sqlite"
     text.write_text("no database, but long enough to be looked at as one" * 20)
-    with pytest.raises(BadRequest, match="no file of the catalog"):
+    with pytest.raises(BadRequest, match="not a catalog file"):
         load(text)
-    with pytest.raises(BadRequest, match="no file of the catalog"):
+    with pytest.raises(BadRequest, match="not a catalog file"):
         build(text, source=source())
     newer = tmp_path / "newer.sqlite"
     newer.write_bytes(big.read_bytes())
@@ -325,12 +325,12 @@ def test_a_fresh_catalog_is_not_stale(stores: tuple[Path, Path]):
 @pytest.mark.parametrize(("old", "new", "said"), [
     ('"dof":', '"DOF":', "c: 59 of 60 compared with other records today, the first (c00)"),
     ('"catalog":1', '"catalog":8', "another version"),
-    ('"count":60', '"count":61', "cut off, records, found 60, allowed: 61"),
+    ('"count":60', '"count":61', "truncated, records, found 60, allowed: 61"),
     ('{"word":"(c01)"', '{"word":"(b01)"', "c: 1 missing, the first (c01)"),
     ('{"word":"(c01)"', '{"word":"(b01)"', "c: 1 no longer of the group, the first (b01)"),
     ('{"word":"(c01)"', '{"word":"(c90)"', "is not sorted"),
-    ('{"word":"(c01)"', '{"words":"(c01)"', "no record of the catalog"),
-    ('{"word":"(c01)"', '"word":"(c01)"', "no record of the catalog")])
+    ('{"word":"(c01)"', '{"words":"(c01)"', "not a record of the catalog"),
+    ('{"word":"(c01)"', '"word":"(c01)"', "not a record of the catalog")])
 def test_what_is_stale_is_told(old: str, new: str, said: str, stores: tuple[Path, Path], tmp_path: Path):
     for file in stores[0].iterdir():
         (tmp_path / file.name).write_text(file.read_text().replace(old, new, -1 if "dof" in old else 1))

@@ -58,7 +58,7 @@ DEFECTS: dict[str, tuple[list, list[tuple[int, str]]]] = {
     "joint of a missing parent": ([(14, '<parent link="cranc"/>')], [
         (14, "joint 'b': unknown link, cranc, an existing name, such as crank")]),
     "joint of a missing child": ([(15, '<child link="zzz"/>')], [
-        (4, "second root beside 'base': no joint's child, bar"), (15, "joint 'b': unknown link, zzz"),
+        (4, "second root besides 'base': not the child of any joint, bar"), (15, "joint 'b': unknown link, zzz"),
     ]),
     "joint without a child": ([(21, "")], [(5, "second root"), (19, "joint without <child>, c")]),
     "second origin": ([(18, '</joint><link name="e"/><joint name="g" type="fixed"><parent link="bar"/><child link="e"/>'
@@ -77,13 +77,13 @@ DEFECTS: dict[str, tuple[list, list[tuple[int, str]]]] = {
     "two numbers": ([(16, '<origin xyz="0 1"/>')], [(16, "xyz of <origin>, 0 1, 3 numbers")]),
     "no numbers": ([(16, '<origin xyz=""/>')], [(16, "3 numbers")]),
     "four numbers": ([(17, '<axis xyz="0 1 0 0"/>')], [(17, "xyz of <axis>, 0 1 0 0, 3 numbers")]),
-    "two roots": ([(5, '<link name="rocker"/><link name="moon"/>')], [(5, "second root beside 'base'")]),
+    "two roots": ([(5, '<link name="rocker"/><link name="moon"/>')], [(5, "second root besides 'base'")]),
     "two parents": ([(18, '</joint><joint name="g" type="fixed"><parent link="rocker"/><child link="bar"/></joint>')],
-                    [(18, "joint 'g': its child has a parent already, by joint 'b' (a loop is written as")]),
+                    [(18, "joint 'g': its child already has a parent, through joint 'b' (a loop is written as")]),
     "ring": ([(7, '<parent link="bar"/>')], [
-        (13, "tree joints that make a ring (a loop is written as <loop>), a b")]),
+        (13, "tree joints that form a cycle (a loop is written as <loop>), a b")]),
     "ring of all": ([(7, '<parent link="bar"/>'), (20, '<parent link="bar"/>'), (2, "")], [
-        (13, "tree joints that make a ring")]),
+        (13, "tree joints that form a cycle")]),
     "joint to itself": ([(20, '<parent link="rocker"/>')], [(5, "second root"), (19, "'c' joins a link to itself")]),
     "no platform": ([(38, "")], [(37, "no <platform>")]),
     "no own element": ([(37, ""), (38, ""), (39, ""), (40, "")], [(1, "no <hrsynth> element")]),
@@ -144,7 +144,7 @@ def test_every_defect_has_its_line(name: str):
 def test_no_loop_is_no_parallel_robot():
     lines = FOUR_BAR.split("\n")
     assert defects("\n".join(lines[:24] + lines[33:])) == [
-        (1, "no loop: not a parallel robot, None, a <loop>; of a serial arm or a free body "
+        (1, "no loop: not a parallel robot, None, a <loop>; for a serial arm or a free body "
             '<hrsynth serial="true">')]
 
 
@@ -246,5 +246,5 @@ def test_a_label_that_no_list_of_legs_could_name_is_refused(label: str) -> None:
     text = FOUR_BAR
     if "<observe" not in text:
         text = text.replace("</hrsynth>", '<observe leg="1" link="bar"/></hrsynth>')
-    with pytest.raises(BadRobotFile, match="no list of legs could name"):
+    with pytest.raises(BadRobotFile, match="does not fit into a list of legs"):
         native.parse(text.replace('leg="1"', f'leg="{label}"'))

@@ -50,7 +50,7 @@ def test_junk_of_200_megabytes_is_refused_without_reading(tmp_path: Path):
 
 
 def test_what_is_no_file_is_refused(tmp_path: Path):
-    assert "a folder of no robot file" in refused(tmp_path)
+    assert "a folder with no robot file" in refused(tmp_path)
     assert "no such file" in refused(tmp_path / "missing.urdf")
     assert "cannot be read" in refused(tmp_path / ("x" * 5000 + ".urdf"))
     assert "cannot be read" in refused("a\0b.urdf")

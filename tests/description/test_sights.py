@@ -120,9 +120,9 @@ WRONG = [
     ('<camera name="eye" link="object"/>', "a second camera of this name, found eye"),
     ('<camera name="ear" link="thing"/>', "camera 'ear': unknown link, found thing"),
     ('<camera name="ear" link="base"> <image focal="-1"/> </camera>', "focal of <image>, found -1, allowed: more"),
-    ('<observe kind="point" leg="a,b" link="object" at="0 0 0"/>', "a label that no list could name, found a,b"),
+    ('<observe kind="point" leg="a,b" link="object" at="0 0 0"/>', "a label that does not fit into a list, found a,b"),
     (2 * '<observe kind="point" leg="a" link="object" at="0 0 0"/>',
-     "a second one of this label, found a"),
+     "a second one with this label, found a"),
 ]
 
 

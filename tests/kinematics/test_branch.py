@@ -297,7 +297,7 @@ def test_equal_parallel_rods_do_not_turn_their_plate(rods: int, seed: int) -> No
     robot = b.build("plate")
     twin = PinocchioModel(robot)
     assert ClosedConfiguration.of(twin, twin.q0).kernel()[0].shape[1] == 3
-    with pytest.raises(Shaky, match="mobility 3, but motions lead on in 2 ways"):
+    with pytest.raises(Shaky, match="mobility 3, but it can move on in only 2 ways"):
         ObservedRobot.of(robot)
 
     def misses(pose: Array) -> Array:

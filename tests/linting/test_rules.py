@@ -207,7 +207,7 @@ def test_redundant_constraints_are_named_and_counted(tmp_path: Path):
     """A planar loop closed by a hinge has 3 constraints too many, six balls have none."""
     found = [each for each in hrsynth.lint("3rrr_m1").findings if each.rule == "constraint-redundant"]
     assert [each.message for each in found] == [
-        f"3 of the 5 constraints of 'wrist_{leg}' repeat what the loops before it say" for leg in (2, 3)]
+        f"3 of the 5 constraints of 'wrist_{leg}' repeat those of the loops before it" for leg in (2, 3)]
     assert rules_in(shipped()["gough_stewart"])["constraint-redundant"] == 0
 
 

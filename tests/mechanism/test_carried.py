@@ -114,7 +114,7 @@ def test_words_of_relations_name_joints() -> None:
     robot = observed(load("delta"))
     relations = recognised(robot, walked(robot, 2, seed=1))
     words = {tie.words(relations) for tie in ties(relations)}
-    assert any("a parallelogram but for slides along" in text or ": a parallelogram" in text for text in words)
+    assert any("a parallelogram except for slides along" in text or ": a parallelogram" in text for text in words)
     assert all(any(name in text for name in robot.joints) or "observed" in text for text in words)
 
 

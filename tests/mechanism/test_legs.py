@@ -93,7 +93,7 @@ def watched(*observations: tuple[str, str]) -> Mechanism:
 
 
 @pytest.mark.parametrize(("observations", "what"), [
-    ([("1", "base")], "in no leg"), ([("1", "platform")], "in no leg"),
+    ([("1", "base")], "not in a leg"), ([("1", "platform")], "not in a leg"),
     ([("1", "dist_1"), ("1", "dist_2")], "two different legs"), ([("1", "dist_1"), ("2", "prox_1")], "is labelled")])
 def test_labels_that_contradict_the_legs_are_refused(observations: list, what: str) -> None:
     with pytest.raises(BadRobotFile, match=what):

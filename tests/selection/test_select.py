@@ -138,7 +138,7 @@ def test_what_is_not_examined_is_neither_kept_nor_discarded(examine: int, second
     for each in part.unexamined:
         assert (each.discarded, each.start_modes, each.aspect, each.run) == (None, None, None, None)
     assert part.to_dict()["not_examined"]["count"] == len(left)
-    assert ("time was over" if seconds else f"the {examine} most accurate") in str(part.left)
+    assert ("time ran out" if seconds else f"the {examine} most accurate") in str(part.left)
     assert "not examined" in str(part)
 
 

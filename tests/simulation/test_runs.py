@@ -211,7 +211,7 @@ def test_a_trajectory_is_followed_where_parts_of_the_pose_depend_on_each_other(n
 
 def test_a_blocked_trajectory_tells_that_it_began_at_the_start(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr("hrsynth.kinematics.steps.track", lambda here, motion, goal: (here, 0.5))
-    with pytest.raises(PoseNotReached, match="from the start the robot comes"):
+    with pytest.raises(PoseNotReached, match="from the start the robot gets"):
         servo(load("delta"), start="x=0,y=0,z=-0.6", goal="x=0.1,y=0,z=-0.6", duration=2.0)
 
 

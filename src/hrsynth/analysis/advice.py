@@ -35,9 +35,9 @@ class FurtherMeasurement(Value):
     """A measurement that could be added.
 
     ``kind`` is leg (its default segment), direction (of another link), line (the position of a line whose direction is
-    observed), encoder or offered (by the user); ``of`` names the leg, the link or the joint, of what is offered the
-    words of ``--see``. An encoder says which coordinate of the joint it reads where there are two, and whether a motor
-    drives the joint.
+    observed), encoder or offered (by the user); ``of`` names the leg, the link or the joint, or repeats the words of
+    ``--see`` for what is offered. An encoder says which coordinate of the joint it reads if there are two, and whether
+    a motor drives the joint.
     """
 
     kind: str
@@ -151,8 +151,8 @@ class Cure(Value):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Advice(Result, shown_as="advise"):
-    """What is missing. ``now`` is the verdict as it stands; ``sets`` are all the cheapest sets of the best rank within
-    reach (the smallest ones, where all prices are alike), empty where nothing is missing or nothing helps."""
+    """What is missing. ``now`` is the present verdict; ``sets`` are all the cheapest sets of the best rank that can be
+    reached (the smallest ones if all prices are equal), empty if nothing is missing or nothing helps."""
 
     setting: ObservedRobot
     now: Verdict
@@ -201,13 +201,13 @@ class Advice(Result, shown_as="advise"):
 def advise(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
            offer: SeeLike = None, price: str = "", most: int | None = None, seed: int = 0) -> Advice:
     """The cheapest sets of further measurements with which u̇ = 0 forces t = 0 (theory.md 6; MMT 5.3): the smallest,
-    where ``price`` does not say, as ``encoder=0.5,point=3``, what one of a kind costs (default: 1).
+    unless ``price``, as ``encoder=0.5,point=3``, says what one measurement of a kind costs (default: 1).
 
-    ``observe`` holds leg labels or link names (default: all legs), ``camera`` the link that carries the camera. Added
-    can be the default segment of a further leg, the direction of any other link of a leg, the position of a line whose
-    direction is observed, an encoder on any joint, and what is offered (``offer``: texts as of ``see``; one without its
-    place, ``point:plate``, is several places of that link). Every set that is returned is verified at all samples; of
-    the smallest ones at most ``most`` are. Raises ``BadRequest`` for unknown names, ``RankUndecided`` where what is
+    ``observe`` holds leg labels or link names (default: all legs), ``camera`` the link that carries the camera.
+    Candidates are the default segment of a further leg, the direction of any other link of a leg, the position of a
+    line whose direction is observed, an encoder on any joint, and what is offered (``offer``: texts as for ``see``; one
+    without a place, ``point:plate``, stands for several places of that link). Every returned set is verified at all
+    samples; at most ``most`` of the smallest are. Raises ``BadRequest`` for unknown names, ``RankUndecided`` if what is
     seen now has no clear rank.
 
     >>> hrsynth.advise("3rrr_m1", "1,2")

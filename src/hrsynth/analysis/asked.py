@@ -23,18 +23,18 @@ if TYPE_CHECKING:
 @spelled
 def observe(robot: RobotLike, legs: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
             at: PoseLike | None = None, samples: int = SAMPLES, seed: int = 0) -> ObservedRobot:
-    """A robot with what is watched of it, its normal form and samples of its motion: what every question takes.
+    """A robot with what is watched of it, its normal form and samples of its motion: the starting point of every
+    question.
 
-    ``legs`` holds leg labels or link names (a string sets them apart by commas); None or ``["all"]`` means all legs at
-    their default segments. ``camera`` names the link that carries the camera; ``NAME=LINK@x,y,z/r,p,y`` is a further
-    one, by a name, in the link's frame (x right, y down, z ahead; metres, radians or ``deg``). ``see`` holds other
-    observations, ``[CAMERA=]KIND:LINK@x,y,z/dx,dy,dz/radius`` (:mod:`hrsynth.mechanism.observations`), in the place of
-    all legs where ``legs`` is None. ``at`` is a pose that takes the place of
-    the zero configuration: on the branch of that where it reaches the pose, else in another operation mode that was
-    met; or a mode of the zero configuration with what is watched, ``mode:2``, at which ``modes`` found the robot
-    assembled.
+    ``legs`` holds leg labels or link names (in a string, separated by commas); None or ``["all"]`` means all legs at
+    their default segments. ``camera`` names the link that carries the camera; ``NAME=LINK@x,y,z/r,p,y`` is a further,
+    named one, in the link's frame (x right, y down, z ahead; metres, radians or ``deg``). ``see`` holds other
+    observations, ``[CAMERA=]KIND:LINK@x,y,z/dx,dy,dz/radius`` (:mod:`hrsynth.mechanism.observations`), which replace
+    all legs if ``legs`` is None. ``at`` is a pose that replaces the zero configuration: on the same branch if that
+    reaches the pose, otherwise in another operation mode that was met; or a mode of the zero configuration with what is
+    watched, ``mode:2``, at which ``modes`` found the robot assembled.
 
-    Raises ``BadRequest`` for labels, links, parts of a pose and modes that there are not, ``PoseNotReached``.
+    Raises ``BadRequest`` for unknown labels, links, parts of a pose and modes, ``PoseNotReached``.
 
     >>> robot = hrsynth.observe("3rrr_m1", [1, 2])
     >>> robot
@@ -46,7 +46,7 @@ def observe(robot: RobotLike, legs: LegsLike = None, camera: CameraLike = None, 
     if at is None:
         return ObservedRobot.of(robot, legs, camera, see=see, samples=samples, seed=seed)
     if isinstance(robot, ObservedRobot):
-        raise BadRequest(f"{robot.headline()}: what is watched is asked twice", str(at),
+        raise BadRequest(f"{robot.headline()}: what is watched is given twice", str(at),
                          "nothing besides an observed robot")
     require_platform(robot, at)
     asked = asked_pose(at)
@@ -60,7 +60,7 @@ def observe(robot: RobotLike, legs: LegsLike = None, camera: CameraLike = None, 
 def require_platform(robot: Mechanism, where: object) -> None:
     """Refuses the pose or grid ``where`` of a formation: it would be that of its first body, the others staying."""
     if robot.formation:
-        raise BadRequest(f"{robot.name}: a pose is that of one platform, and this is a formation", str(where),
+        raise BadRequest(f"{robot.name}: a pose belongs to one platform, and this is a formation", str(where),
                          f"nothing: {', '.join(robot.bodies)} stand where the file has them (--platform LINK makes one "
                          "the platform)")
 

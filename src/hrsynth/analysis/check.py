@@ -55,7 +55,7 @@ class GridCheck(Value):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Check(Result, shown_as="check"):
-    """What is observed, the postures at the poses asked for, the loop constraints that are always redundant."""
+    """What is observed, the postures at the requested poses, and the loop constraints that are always redundant."""
 
     setting: ObservedRobot
     postures: tuple[Posture, ...]
@@ -99,16 +99,17 @@ class Check(Result, shown_as="check"):
 @question(formations=True)
 def check(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
           at: PoseLike | Iterable[PoseLike] = (), grid: Grid | str | None = None, seed: int = 0) -> Check:
-    """Mobility, ranks with gaps, Type 1, 2, 3, Zlatanov's six, constraint singularities and redundant constraints
-    (docs/pages/theory.md, section 7) at the poses ``at`` (default: the zero configuration) and over ``grid``.
+    """Mobility, ranks with gaps, Type 1, 2, 3, Zlatanov's six numbers, constraint singularities and redundant
+    constraints (docs/pages/theory.md, section 7) at the poses ``at`` (default: the zero configuration) and over
+    ``grid``.
 
-    What is said of the hidden robot is read from the real robot's relation with the observed directions, which is the
-    hidden robot's own (theory.md 3); the real robot's kinds take its motors' coordinates for what is measured. Generic
-    values are those of random samples. ``observe`` and ``camera`` as for ``derive``.
+    Statements about the hidden robot are read from the real robot's relation with the observed directions, which is
+    also the hidden robot's (theory.md 3); those about the real robot take its motors' coordinates as what is measured.
+    Generic values are those of random samples. ``observe`` and ``camera`` are as for ``derive``.
 
-    Of several poses those out of reach are told in ``unreached``. Raises ``BadRequest`` for names that there are not
-    and for parts of a pose that the platform cannot change, ``PoseNotReached`` where no pose is reached,
-    ``PlaneNotMet`` where none of a grid is.
+    Of several poses, those out of reach are listed in ``unreached``. Raises ``BadRequest`` for unknown names and for
+    parts of a pose that the platform cannot change, ``PoseNotReached`` if no pose is reached, ``PlaneNotMet`` if none
+    of a grid is.
 
     >>> hrsynth.check("3rrr_m1", at=["x=0,y=0,phi=0", [0.01, 0, 0]])
     <Check: 3rrr_m1, watching 1, 2, 3: x=0,y=0,z=0,phi=0deg regular; x=0.01,y=0,z=0,phi=0deg regular>

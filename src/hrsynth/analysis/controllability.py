@@ -98,9 +98,9 @@ def _smallest(labels: tuple[str, ...], rank: Callable[[tuple[str, ...]], int]) -
 @question(formations=True)
 def legs(robot: RobotLike, camera: CameraLike = None, *, observe: LegsLike = None, see: SeeLike = None,
          at: PoseLike | None = None, seed: int = 0) -> Legs:
-    """The verdict of every set of legs (theory.md 6), on the branch of the zero configuration, or of the pose ``at``
-    (``mode:2``: a mode with all legs watched): all legs at their default segments, or those of ``observe``, labels or
-    links, and what is seen with ``see``: observations count one by one.
+    """The verdict of every set of legs (theory.md 6), on the branch of the zero configuration or of the pose ``at``
+    (``mode:2``: a mode with all legs watched): of all legs at their default segments, or of the labels or links in
+    ``observe``, together with what is seen with ``see``; observations count one by one.
 
     >>> hrsynth.legs("3rrr_m1").minimal
     (('1', '2', '3'),)

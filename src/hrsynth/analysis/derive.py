@@ -59,7 +59,7 @@ class PaperForm(Value):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Derivation(Result, shown_as="derive"):
-    """A robot, what is observed, its hidden robot (None where every leg is blind), how it came about, and the proof."""
+    """A robot, what is observed, its hidden robot (None if every leg is blind), how it was derived, and the proof."""
 
     robot: Mechanism
     setting: ObservedRobot
@@ -77,7 +77,7 @@ class Derivation(Result, shown_as="derive"):
 
     @cached_property
     def steps(self) -> tuple[Step, ...]:
-        """All attempts, each compared with the real robot by itself."""
+        """All attempts, each compared separately with the real robot."""
         check = _check(self.setting.samples, STEP_SAMPLES)
         return tuple(step.measured(check) for step in self.taken)
 
@@ -135,14 +135,14 @@ class Derivation(Result, shown_as="derive"):
 @question(formations=True)
 def derive(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
            at: PoseLike | None = None, form: str = "simplified", paper: bool = True, seed: int = 0) -> Derivation:
-    """The certified hidden robot of a robot and the legs that are watched (MMT 3.2; docs/pages/theory.md, sections 3
-    to 5).
+    """The certified hidden robot of a robot and the legs that are watched (MMT 3.2; docs/pages/theory.md, sections 3 to
+    5).
 
     ``observe`` holds leg labels or link names (default: all legs); ``camera`` names the link that carries the camera
-    (default: the base), or further cameras, and ``see`` what these see (:func:`hrsynth.observe`); ``at`` is a pose that
-    takes the place of the zero configuration, in another operation mode if need be, or one of its modes (``mode:2``);
-    an observed robot says all of that itself. ``form`` is ``simplified`` or ``general``; ``paper``: with the paper's
-    own form beside it. Raises ``BadRequest`` for unknown names, ``NotCertified`` if even the exact lift fails.
+    (default: the base), or further cameras, and ``see`` says what these see (:func:`hrsynth.observe`); ``at`` is a pose
+    that replaces the zero configuration, in another operation mode if necessary, or one of its modes (``mode:2``); an
+    observed robot already has all of that. ``form`` is ``simplified`` or ``general``; ``paper``: also give the paper's
+    own form. Raises ``BadRequest`` for unknown names, ``NotCertified`` if even the exact lift fails.
 
     >>> found = hrsynth.derive("3rrr_m1", [1, 2, 3])
     >>> found

@@ -9,7 +9,7 @@ rank X − rank [X; Y] + rank Y of the platform's freedoms, ranks on ker A.
 1. every relation of F holds on the robot's branch, carried or kept (:attr:`ExactArchitecture.basis`; merely *observed*
    ones are named, and the word is not *proved*);
 2. rank [A; Y] = rank [A; Y; X] at one instance: exact (:meth:`ExactArchitecture._rank`);
-3. rank [A; Y; X] there is the largest on F, but for a chance (:meth:`ExactArchitecture._chance`);
+3. rank [A; Y; X] there is the largest on F, except for a chance (:meth:`ExactArchitecture._chance`);
 4. the robot is a regular member of F: numerical (:meth:`ExactArchitecture._regular`).
 
 A *deficient* verdict holds the largest rank of several instances: it is probabilistic. What a single link's dimensions
@@ -170,7 +170,7 @@ class ExactArchitecture:
         random = f"exact at {instances} random instance" + "s" * (instances > 1)
         reason = "proved in exact arithmetic" if proved else random
         if chance:
-            reason += f", but for a chance below {power_above(chance)}"
+            reason += f", except for a chance below {power_above(chance)}"
         if basis.observed:
             reason += f" of geometry with {len(basis.observed)} relations observed at samples ({basis.observed[0]})"
         reason += basis.nearly

@@ -78,7 +78,7 @@ class ObservedRobot(Value):
         names = legs_asked(robot, observe, see)
         if isinstance(robot, ObservedRobot):
             if (observe, camera, see, offer) != (None,) * 4:
-                raise BadRequest(f"{robot.headline()}: what is watched is asked twice",
+                raise BadRequest(f"{robot.headline()}: what is watched is given twice",
                                  observe or camera or see or offer, "nothing besides an observed robot")
             return robot
         tell("sampling")

@@ -47,7 +47,7 @@ _ANSWERS, _GRIDS = AnswerMemory(REMEMBERED_ANSWERS), AnswerMemory(REMEMBERED_GRI
 
 
 def forget() -> None:
-    """Forget all answers and samples that are remembered.
+    """Clear all answers and samples from the cache.
 
     >>> hrsynth.forget()
     """
@@ -77,8 +77,8 @@ def question(*, formations: bool = False, **old: str) -> Callable[[Callable[P, R
             for name in sorted(old.keys() & given.keys()):
                 if old[name] in given:
                     raise TypeError(f"{function.__name__}: {name} is the old name of {old[name]}, which is given too")
-                warnings.warn(f"{function.__name__}: {name} is called {old[name]} now; the old name goes with the next "
-                              "version", DeprecationWarning, stacklevel=2)
+                warnings.warn(f"{function.__name__}: {name} is now called {old[name]}; the old name will be "
+                              "removed in the next version", DeprecationWarning, stacklevel=2)
                 given[old[name]] = given.pop(name)
             require_keywords(function, given)
             try:
@@ -88,7 +88,7 @@ def question(*, formations: bool = False, **old: str) -> Callable[[Callable[P, R
             robot = bound.arguments["robot"] = as_robot(bound.arguments["robot"])
             source = robot if isinstance(robot, Mechanism) else robot.robot
             if source.formation and not formations:
-                raise BadRequest(f"{source.name}: {function.__name__} asks about one platform, and this is a formation",
+                raise BadRequest(f"{source.name}: {function.__name__} is about one platform, and this is a formation",
                                  ", ".join(source.bodies), "a file with a <platform>, or derive, legs, check")
             if any(given.get(name) is not None for name in ("seconds", "into")):
                 return function(*bound.args, **bound.kwargs)

@@ -31,13 +31,13 @@ def map(question: str | Callable[..., Any], robots: RobotLike | Iterable[RobotLi
         poses: PoseLike | Iterable[PoseLike] | None = None, legs: Iterable[LegsLike] | None = None,
         jobs: int | None = None, errors: str = RAISE, **options: Any) -> list[Any]:
     """The answers to one question about each of the ``robots``, with each of the sets of ``legs``, at each of the
-    ``poses``: in this order, poses fastest, whoever is done first.
+    ``poses``: in this order, poses fastest, whichever is finished first.
 
-    ``question`` is a public function or its name, or a function of your own with the same parameters: a pose is given
-    to it as ``at``, or as ``goal`` where it has no ``at``, a set of legs as ``observe``; ``options`` are the same for
-    all. There are ``jobs`` processes, by default as many as cores; with 1 all is done in this one. A robot's samples
-    are drawn once in each process that is asked about it. ``errors`` is ``raise``, or ``keep``: what a question raised,
-    or reading its robot (an ``HrsynthError``), then stands in the place of its answer. The error says what was asked.
+    ``question`` is a public function or its name, or your own function with the same parameters: it gets a pose as
+    ``at``, or as ``goal`` if it has no ``at``, and a set of legs as ``observe``; ``options`` are the same for all.
+    There are ``jobs`` processes, by default one per core; with 1 everything is done in this process. A robot's samples
+    are drawn once in each process that is asked about it. ``errors`` is ``raise``, or ``keep``: an error of a question,
+    or of reading its robot (an ``HrsynthError``), then takes the place of the answer. The error says what was asked.
 
     Raises ``BadRequest``, and what the question raises.
 

@@ -42,11 +42,11 @@ ROWS = ("reached", "u", "M")
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Evaluation(Value):
-    """What a batch says of n poses with k legs watched; NaN where a pose is not reached.
+    """What a batch says about n poses with k legs watched; NaN where a pose is not reached.
 
-    ``interaction_matrix`` is Mᵀ (n, 3 k, d): the rates of the directions for the twists of ``twists`` ((6, d) or
-    (n, 6, d), m and rad; zero for the rates of slides, which are in characteristic lengths).
-    ``position`` (m) and ``orientation`` (rad) are the error maxima, None without cones.
+    ``interaction_matrix`` is Mᵀ (n, 3 k, d): the rates of the directions for the twists of ``twists`` ((6, d) or (n, 6,
+    d), m and rad; zero for the rates of slides, which are in characteristic lengths). ``position`` (m) and
+    ``orientation`` (rad) are the error maxima, None without cones.
     """
 
     reached: Flags
@@ -68,8 +68,8 @@ class Evaluation(Value):
 
     @cached_property
     def determinant(self) -> Array | None:
-        """The determinant (n,) of the directions' independent rates, None where they are not as many as freedoms; its
-        sign changes where a path crosses a Type 2 singularity."""
+        """The determinant (n,) of the directions' independent rates, None if their number is not that of the freedoms;
+        its sign changes where a path crosses a Type 2 singularity."""
         u, M = self.directions, self.interaction_matrix.reshape(len(self.reached), len(self.normals), 3, -1)
         rows = []
         for i, normal in enumerate(self.normals):
@@ -81,9 +81,9 @@ class Evaluation(Value):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Batch(Value):
-    """A compiled mechanism: each leg a closed form or solved by iteration, None where it hangs on a link that does not
-    go with the platform's pose; ``iterative`` are those that are solved, by which the platform's freedoms follow from
-    its pose too where no closed form says them."""
+    """A compiled mechanism: each leg a closed form or solved by iteration, None if it hangs on a link that does not
+    move with the platform's pose; ``iterative`` are those that are solved, from which the platform's freedoms follow if
+    no closed form gives them."""
 
     coordinates: PlatformCoordinates
     home: Array
@@ -102,8 +102,8 @@ class Batch(Value):
     @classmethod
     def of(cls, anatomy: LegDecomposition, observations: Sequence[Observation], motion: PlatformMotion,
            configurations: Sequence[ClosedConfiguration]) -> Batch | None:
-        """Compile a mechanism with one direction a leg; None where something else is observed, or not from the base,
-        or a wrist cannot make every turn.
+        """Compile a mechanism with one direction per leg; None if something else is observed, or not from the base, or
+        a wrist cannot make every turn.
 
         ``configurations`` are closed ones, the zero configuration first: what is recognised must hold at all of them.
         """
@@ -158,15 +158,15 @@ class Batch(Value):
     def evaluate(self, X: ArrayLike, legs: Sequence[str] | str | None = None, cones: ArrayLike | None = None, *,
                  slides: ArrayLike | None = None, compiled: Compiled | None = None) -> Evaluation:
         """Everything at platform poses X (n, 4, 4) with ``legs`` watched (default: all), ``cones`` their half-angles
-        (rad; one, or one a leg). ``slides`` (n, m) are the coordinates of the P joints :attr:`slides` (m), by which
-        links of the platform slide on it: then the legs on these can be watched as well, and Mᵀ has a column more for
-        each (default: only what the pose alone says).
+        (rad; one, or one per leg). ``slides`` (n, m) are the coordinates of the P joints :attr:`slides` (m), by which
+        links of the platform slide on it: then the legs on these can be watched as well, and Mᵀ has one more column for
+        each (default: only what the pose alone determines).
 
         X are poses that the platform can take as far as its own freedoms go; that is not checked. A pose that is not
-        finite is not reached. ``compiled`` asks for numba, or forbids it (default: where its kernels are compiled
-        already and worth their start); "jax" asks for jax, on the device that it has. Raises
-        ``BadRequest`` for legs that are not compiled, poses of another shape, half-angles of cones that are not between
-        0 and a right angle, and results that are too large.
+        finite is not reached. ``compiled`` asks for numba, or forbids it (default: if its kernels are already compiled
+        and worth starting); "jax" asks for jax, on the device that it has. Raises ``BadRequest`` for legs that are not
+        compiled, poses of another shape, half-angles of cones that are not between 0 and a right angle, and results
+        that are too large.
         """
         X = np.asarray(X, dtype=float)
         if X.ndim != 3 or X.shape[1:] != (4, 4):
@@ -207,7 +207,7 @@ class Batch(Value):
         return margins.T, u.T.reshape(n, k, 3), M.T.reshape(n, k, 3, d)
 
     def reached(self, X: Array) -> Flags:
-        """Where closed forms alone reach the poses X (n, 4, 4); what else ``evaluate`` says is left out."""
+        """Where closed forms alone reach the poses X (n, 4, 4), without the rest of ``evaluate``."""
         return np.asarray(self._program(()).run(X, ROWS[:1])[0] > 0)
 
     def sweep(self, parts: Iterable[Array], legs: Sequence[str] | str | None = None, cones: ArrayLike | None = None

@@ -79,7 +79,7 @@ def unmoved(word: str) -> str:
 
 
 def made(entry: Callable[[str], dict[str, Any]], group: str, words: Iterable[str]) -> Made:
-    """The records of words; one that is refused says why, in one line. Raises ``Stopped`` for a defect of our own."""
+    """The records of words; a refused one says why, in one line. Raises ``Stopped`` for a defect of our own."""
     return [(word, line({**_record(entry, word), "word": word, "group": group})) for word in words]
 
 
@@ -113,8 +113,8 @@ def build(target: str | Path, groups: Sequence[str] = (), *, source: WordSource 
           ) -> tuple[Built, ...]:
     """Build groups (default: all) into a folder, or a file that ends in ``.sqlite``.
 
-    A group is written when it is complete. The journals go when all groups are, so that a build which was broken off
-    goes on where it was, unless ``anew``. With ``limit`` it breaks off by itself after so many new records. ``workers``
+    A group is written when it is complete. The journals are removed when all groups are, so an interrupted build
+    continues where it stopped, unless ``anew``. With ``limit`` it stops after so many new records. ``workers``
     processes share the work, or the dask cluster at an address.
 
     Raises
@@ -124,7 +124,7 @@ def build(target: str | Path, groups: Sequence[str] = (), *, source: WordSource 
     BuildStopped
         For a full disk, a worker or a cluster that died; what was built is kept.
     MissingExtra
-        Where joblib or dask is not installed.
+        If joblib or dask is not installed.
     """
     source, tell = source or architectures(), tell or (lambda *_: None)
     kept, team, done = store(target), executor(workers, cluster), list[Built]()
@@ -175,7 +175,7 @@ def made_by(team: Executor, source: WordSource, group: str, words: Sequence[str]
 def check(target: str | Path | Store, groups: Sequence[str] = (), *, source: WordSource | None = None, workers: int = 1,
           cluster: str | None = None, sample: int | None = None, seed: int = 0, tell: Tell | None = None
           ) -> tuple[str, ...]:
-    """What is stale in a stored catalog, a line each; nothing if it is what ``build`` would write.
+    """What is stale in a stored catalog, one line each; nothing if it is what ``build`` would write.
 
     The words of the groups (default: all) are compared one by one, and the records of all of them or of ``sample``
     words of each group, drawn with ``seed``.

@@ -29,7 +29,7 @@ class Journal:
         except OSError as error:
             raise BadRequest(f"cannot write the journal: {error.strerror}", str(path)) from None
         try:
-            require_alone(self._file, "another build writes this journal", path)
+            require_alone(self._file, "another build is writing this journal", path)
             if anew:
                 os.ftruncate(self._file, 0)
             self._places = self._read(group)
@@ -78,7 +78,7 @@ class Journal:
                 if not raw.endswith(b"\n"):
                     break
                 if self._end == 0:
-                    read_head(raw, str(self.path), "no journal of a build", str(self.path))
+                    read_head(raw, str(self.path), "not the journal of a build", str(self.path))
                 else:
                     with contextlib.suppress(ValueError, BadRequest):
                         places[word_of(raw.decode("ascii"))] = self._end, len(raw) - 1

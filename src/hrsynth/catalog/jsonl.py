@@ -37,7 +37,7 @@ def read_head(text: str | bytes, file: str, otherwise: str, value: str | None, *
         known = json.loads(text)
         versions, *_ = (known["format"], known["catalog"]), *(known[name] for name in needed)
     except (ValueError, TypeError, KeyError):
-        raise BadRequest(f"{otherwise}: its first line is not a head", value) from None
+        raise BadRequest(f"{otherwise}: its first line is not a header", value) from None
     require_version(versions, file)
     return dict(known)
 
@@ -50,7 +50,7 @@ def record(text: str) -> Record:
             return dict(found)
     except (ValueError, TypeError, KeyError):
         pass
-    raise BadRequest("no record of the catalog", text[:60], "an object of JSON with a word")
+    raise BadRequest("not a record of the catalog", text[:60], "an object of JSON with a word")
 
 
 def word_of(text: str) -> str:
@@ -82,7 +82,7 @@ def encoded(group: str, lines: Iterable[str]) -> bytes:
 
 def head_count(first: str | bytes, file: str) -> int:
     """The number of records that a file's first line says; raises ``BadRequest`` where it says none."""
-    count = read_head(first, file, f"{file}: no file of the catalog", None, "count")["count"]
+    count = read_head(first, file, f"{file}: not a catalog file", None, "count")["count"]
     if not isinstance(count, int):
         raise BadRequest(f"{file}: number of records", count, "a whole number")
     return count
@@ -96,7 +96,7 @@ def decoded(content: bytes, file: str) -> list[str]:
         first, lines = "", []
     count = head_count(first, file)
     if len(lines) != count or not content.endswith(b"\n"):
-        raise BadRequest(f"{file}: cut off, records", len(lines), str(count))
+        raise BadRequest(f"{file}: truncated, records", len(lines), str(count))
     return lines
 
 

@@ -66,7 +66,7 @@ def published_robot(folder: str, name: str) -> PublishedRobot:
     """The robot of a folder of tables that is called so; raises ``BadRequest``."""
     robots = _robots(folder)
     if name not in robots:
-        raise BadRequest("no robot of these tables", name, f"{next(iter(robots))} …")
+        raise BadRequest("not a robot of these tables", name, f"{next(iter(robots))} …")
     return robots[name]
 
 

@@ -72,14 +72,13 @@ class Catalog(Value):
         return self.records[self._places[name]]
 
     def where(self, **asked: Any) -> Catalog:
-        """The records that fit all that is asked for and not None; raises ``BadRequest`` for what cannot be asked.
+        """The records that fit all given criteria (those that are not None); raises ``BadRequest`` for unknown ones.
 
         ``group``, ``dof``, ``motion`` ("3T", "2T1R"), ``verdict``, ``base_motors``, ``fewest`` (legs of the smallest
         set that sees all that can be seen), ``modes`` (complex ones of such a set) and ``see`` ("3point": what is seen
-        of the platform instead of legs) have to be equal. ``legs`` is
-        their number, or a pattern of ``*`` and ``?`` for the notation or for the chain of one leg, with or without the
-        marks of motors. ``text`` has to occur in some field, or in a name
-        under which the robot is known. Several values in a tuple: one of them.
+        of the platform instead of legs) must be equal. ``legs`` is their number, or a pattern of ``*`` and ``?`` for
+        the notation or for the chain of one leg, with or without motor marks. ``text`` must occur in some field, or in
+        a name under which the robot is known. Several values in a tuple: any of them.
         """
         require_askable(asked)
         return Catalog(tuple(filter(fits(asked), self.records)))
@@ -109,8 +108,7 @@ def load(path: str | Path | None = None, **asked: Any) -> Catalog:
     (docs/pages/audit.md). ``asked`` as for ``Catalog.where``.
 
     What is seen of platforms instead of legs (the group ``sensors``) is left out unless ``group`` or ``see`` asks for
-    it.
-    Of a SQLite file only the records that fit are read. Raises ``BadRequest`` where there is none or one of
+    it. Of a SQLite file only the records that fit are read. Raises ``BadRequest`` if there is no catalog, or one of
     another version.
     """
     require_askable(asked)

@@ -92,7 +92,7 @@ class Folder:
         try:
             return gzip.decompress(content) if file.name.endswith(PACKED) else content
         except (OSError, EOFError, zlib.error):
-            raise BadRequest(f"{file}: cut off, or not compressed by gzip") from None
+            raise BadRequest(f"{file}: truncated, or not compressed with gzip") from None
 
     def decides(self, asked: Mapping[str, Any]) -> bool:
         return all(value is None for value in asked.values())
@@ -221,7 +221,7 @@ class StoredLines(Sequence[str]):
                 found = dict(self._file.execute("SELECT record, line FROM lines WHERE record IN "
                                                 "(SELECT value FROM json_each(?))", (json.dumps(wanted),)))
             if not all(isinstance(found.get(number), str) for number in wanted):
-                raise BadRequest(f"{self._path}: no file of the catalog: rows without a line")
+                raise BadRequest(f"{self._path}: not a catalog file: rows without a line")
             self._read[part] = [found[number] for number in wanted]
         return self._read[part][offset]
 
@@ -272,7 +272,7 @@ def _asked(file: Path) -> Iterator[None]:
     try:
         yield
     except sqlite3.Error as error:
-        raise BadRequest(f"{file}: no file of the catalog: {error}") from None
+        raise BadRequest(f"{file}: not a catalog file: {error}") from None
 
 
 @contextlib.contextmanager

@@ -23,8 +23,8 @@ from .verify_ranks import RanksNotAccepted
 
 def certificate(found: AssemblyModes | Derivation | PathAnswer) -> dict[str, Any]:
     """The certificate of a complete list of modes, of a derivation's verdict in exact arithmetic, or of a path: plain
-    data, as ``verify`` and one file, ``verify_certificate.py``, ``verify_ranks.py`` or ``verify_path.py``, check it.
-    Raises ``NoCertificate``.
+    data that ``verify`` checks, or one of the files ``verify_certificate.py``, ``verify_ranks.py`` and
+    ``verify_path.py``. Raises ``NoCertificate``.
 
     >>> hrsynth.certificate(hrsynth.modes("3rrr_m1"))["complex"]
     6
@@ -44,10 +44,10 @@ def written(found: AssemblyModes | Derivation | PathAnswer) -> bytes:
 
 
 def verify(source: Mapping[str, Any] | str | Path, robot: Mechanism | str | Path | None = None) -> str:
-    """What a certificate, or the file of one, proves, in words, by the checker's own computation; with ``robot`` also
-    that its geometry is that robot's, to ``SAME_RELATION`` of its size.
+    """What a certificate, or a certificate file, proves, in words, by the checker's own computation; with ``robot`` it
+    is also checked that its geometry is that robot's, to ``SAME_RELATION`` of its size.
 
-    Raises ``CertificateRefused`` where it does not hold, ``BadRequest`` for a file that cannot be read.
+    Raises ``CertificateRefused`` if it does not hold, ``BadRequest`` for a file that cannot be read.
 
     >>> hrsynth.verify(hrsynth.certificate(hrsynth.modes("3rrr_m1")))
     '2 real of 6 complex poses, and no other; the robot closes at 2 of the real ones, to 1e-9'
@@ -61,12 +61,12 @@ def verify(source: Mapping[str, Any] | str | Path, robot: Mechanism | str | Path
         except NotAccepted as reason:
             raise CertificateRefused(name, str(reason)) from None
         except (OSError, ValueError, RecursionError) as error:
-            why = getattr(error, "strerror", None) or "it is no JSON"
+            why = getattr(error, "strerror", None) or "it is not JSON"
             raise BadRequest(f"the certificate cannot be read: {why}", name,
                              "a file that modes, derive or path wrote with --certificate") from None
     try:
         if not isinstance(record, dict):
-            raise NotAccepted("it is no object")
+            raise NotAccepted("it is not an object")
         checkers = {"path": verify_path, "ranks": verify_ranks}
         proved = checkers.get(str(record.get("claim")), verify_certificate).verify(record)
     except (NotAccepted, PathNotAccepted, RanksNotAccepted) as reason:
@@ -76,11 +76,11 @@ def verify(source: Mapping[str, Any] | str | Path, robot: Mechanism | str | Path
         try:
             own = {"modes": modes, "ranks": ranks, "path": paths}[record["claim"]].again(record, robot)
         except (BadRequest, PoseNotReached) as error:
-            raise CertificateRefused(name, f"it is not about {robot.name}: {error}") from None
+            raise CertificateRefused(name, f"it is not for {robot.name}: {error}") from None
         except (KeyError, TypeError, ValueError, AttributeError) as error:
-            raise CertificateRefused(name, f"it does not say which legs and pose it is about ({error!r})") from None
+            raise CertificateRefused(name, f"it does not say which legs and pose it is for ({error!r})") from None
         if not _same(record, own):
-            raise CertificateRefused(name, f"it is not about {robot.name}: other geometry, legs or pose")
+            raise CertificateRefused(name, f"it is not for {robot.name}: other geometry, legs or pose")
     return f"{proved}{ranks.seen(record)}" if record["claim"] == "ranks" else proved
 
 

@@ -28,7 +28,7 @@ def bound(record: dict[str, Any], equations: Sequence[Polynomial], halves: Seque
     if record["kind"] == "pose":
         if poses(equations, halves, record) == count:
             return {"kind": "poses"}
-        raise NotAccepted(f"{count} solutions are enclosed, but there may be more, for all that the checker knows")
+        raise NotAccepted(f"{count} solutions are enclosed, but there may be more, as far as the checker can tell")
     if record["kind"] == "loops":
         for grouping in groupings(record["angles"], record["slides"]):
             with suppress(TypeError):  # no bound

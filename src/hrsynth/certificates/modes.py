@@ -212,7 +212,7 @@ def _pose(record: dict[str, Any], box: dict[str, Any], points: Any, placed: Arra
         except NotAccepted:
             continue
         return given
-    raise NotAccepted("a pose that its box does not put where it was told")
+    raise NotAccepted("a pose that is not where its box puts it")
 
 
 def _no_poses(equations: Sequence[Polynomial], halves: Sequence[bool]) -> list[list[complex]]:

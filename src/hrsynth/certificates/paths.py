@@ -160,4 +160,4 @@ def _tree(expression: Any) -> Any:
         return ["*", *[_tree(expression.base)] * int(expression.exp)]
     if type(expression).__name__ in ("dot", "cross", "det"):
         return [type(expression).__name__, *map(_tree, expression.args)]
-    raise PathNotAccepted("a condition that is no expression in vectors")
+    raise PathNotAccepted("a condition that is not an expression in vectors")

@@ -59,7 +59,7 @@ def reach_of(record):  # a kind, its centre; direction, normal, spokes of a circ
     (kind, values), = record.items()
     lengths = {"point": [3], "line": [3] * 2, "circle": [3] * 3, "plane": [3] * 2, "sphere": [3, 1]}
     _, *rest = vectors = rational(values)
-    need(kind in lengths and [len(v) for v in vectors] == lengths[kind], f"{kind!r} is no curve or surface")
+    need(kind in lengths and [len(v) for v in vectors] == lengths[kind], f"{kind!r} is not a curve or surface")
     need(kind != "circle" or dot(*rest) == 0 == dot(rest[0], rest[0]) - dot(rest[1], rest[1]), "the spokes of a circle")
     need(kind == "point" or (any(rest[0]) and (kind != "sphere" or rest[0][0] > 0)), f"a {kind} without extent")
     return kind, vectors
@@ -292,7 +292,7 @@ def modes(record):
         equations, halves, points, legs = KINDS[system["kind"]][0](system, tips)
         equations = [integral(p) for p in equations]
         need(len(equations) == len(halves), f"{len(equations)} equations in {len(halves)} unknowns")
-        need((equations, legs) not in seen, "a system that is told twice")
+        need((equations, legs) not in seen, "a system that is given twice")
         boxes, counted, seen = [], [], [*seen, (equations, legs)]
         flat = [times(Fraction(1, 2 ** max(map(abs, p.values())).bit_length()), p) for p in equations]
         bound = {"rank": rank, "poses": poses, "degrees": degrees}[system["bound"]["kind"]](equations, halves, system)
@@ -313,11 +313,11 @@ def modes(record):
             elif "misses" in each:
                 need(any(least(p, m, r) > 0 for p in legs[each["misses"]]), "a leg that may not miss")
             elif away:
-                need(finite or bound == 40 or system["kind"] != "pose", "a box that may be told twice")
+                need(finite or bound == 40 or system["kind"] != "pose", "a box that may be given twice")
                 apart += any(map(any, (value(p, m) for p in equations))) or all(any(value(w, m)) for _, _, w in points)
             else:
                 need(any(abs(v) > r for _, v in m), "a box that may be real has no pose")
-                need(finite and not legs and not system.get("normals"), "a box that may be a pose, or none")
+                need(finite and not legs and not system.get("normals"), "a box that may or may not be a pose")
             real, counted = real + ("pose" in each), counted + [(m, r)] * (not away and "misses" not in each)
         own, complex_ = {"loops": points, "chain": points[:3]}.get(system["kind"], []), complex_ + len(counted)
         need(all(any(differ(p, w, *one, *other) for N, _, w in own for p in N) or not own
@@ -381,13 +381,13 @@ def digest(record):
     rest = {key: each for key, each in record.items() if key != "sha256"}
     return hashlib.sha256(json.dumps(rest, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
 def once(pairs):  # an object of JSON; of two keys a reader may see one, Python the other
-    need(len(dict(pairs)) == len(pairs), "a key that is told twice")
+    need(len(dict(pairs)) == len(pairs), "a duplicate key")
     return dict(pairs)
 def verify(record):  # what a certificate proves, in words; raises NotAccepted
     try:
         need(isinstance(record, dict) and record.get("format") == "hrsynth-certificate-1", "this is no certificate")
-        need(record["sha256"] == digest(record), "the file was changed: another digest")
-        need(record["claim"] == "modes", "it is of another claim: verify_path.py and verify_ranks.py check those")
+        need(record["sha256"] == digest(record), "the file was changed: its digest differs")
+        need(record["claim"] == "modes", "it is for another claim: verify_path.py and verify_ranks.py check those")
         return modes(record)
     except Exception as error:
         raise error if isinstance(error, NotAccepted) else NotAccepted(f"no certificate: {error!r}") from None

@@ -186,7 +186,7 @@ def valued(each: Any, p: Vector, R: list[Vector], legs: list[Vector]) -> Vector:
         return point(rest, p, R)
     if kind == "leg":
         k, sense, offset = rest
-        need(type(sense) is int and sense in (1, -1) and k in range(len(legs)), "a leg that there is not")
+        need(type(sense) is int and sense in (1, -1) and k in range(len(legs)), "a leg that does not exist")
         return add(scaled((sense * ONE,) * 2, legs[k]), vector(offset))
     need(kind == "unit" and len(rest) == 3, "a vector of another kind")
     start, end, axis = rest
@@ -217,7 +217,7 @@ def condition(record: Any, legs: Any, p: Vector, q: Vector) -> Interval:  # its 
     values = {symbol: valued(each, p, R, held) for symbol, each in record["vectors"].items()}
     values |= {symbol: sub(values[symbol], values[record["points"][0]]) for symbol in record["points"]}
     found = evaluated(record["condition"], values)
-    need(isinstance(found, tuple), "a condition that is no number")
+    need(isinstance(found, tuple), "a condition that is not a number")
     return found
 
 
@@ -258,7 +258,7 @@ def digest(record: Any) -> str:
 
 
 def once(pairs: Any) -> Any:  # an object of JSON; of two keys a reader may see one, Python the other
-    need(len(dict(pairs)) == len(pairs), "a key that is told twice")
+    need(len(dict(pairs)) == len(pairs), "a duplicate key")
     return dict(pairs)
 
 
@@ -266,7 +266,7 @@ def verify(record: Any) -> str:  # what a certificate proves, in words; raises P
     try:
         need(isinstance(record, dict) and record.get("format") == "hrsynth-certificate-1", "this is no certificate")
         need(record["claim"] == "path", "it is not of a path: verify_certificate.py and verify_ranks.py check others")
-        need(record["sha256"] == digest(record), "the file was changed: another digest")
+        need(record["sha256"] == digest(record), "the file was changed: its digest differs")
         return path(record)
     except Exception as error:
         raise error if isinstance(error, PathNotAccepted) else PathNotAccepted(f"no certificate: {error!r}") from None

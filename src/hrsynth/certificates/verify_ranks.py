@@ -41,13 +41,13 @@ def digest(record):
     rest = {key: each for key, each in record.items() if key != "sha256"}
     return hashlib.sha256(json.dumps(rest, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
 def once(pairs):  # an object of JSON; of two keys a reader may see one, Python the other
-    need(len(dict(pairs)) == len(pairs), "a key that is told twice")
+    need(len(dict(pairs)) == len(pairs), "a duplicate key")
     return dict(pairs)
 def verify(record):  # what a certificate proves, in words; raises RanksNotAccepted
     try:
         need(isinstance(record, dict) and record.get("format") == "hrsynth-certificate-1", "this is no certificate")
-        need(record["sha256"] == digest(record), "the file was changed: another digest")
-        need(record["claim"] == "ranks", "it is of another claim: verify_certificate.py and verify_path.py check those")
+        need(record["sha256"] == digest(record), "the file was changed: its digest differs")
+        need(record["claim"] == "ranks", "it is for another claim: verify_certificate.py, verify_path.py check those")
         return ranks(record)
     except Exception as error:
         raise error if isinstance(error, RanksNotAccepted) else RanksNotAccepted(f"no certificate: {error!r}") from None

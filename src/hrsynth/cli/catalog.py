@@ -39,8 +39,8 @@ FILTER = (
     Option("dof", "Freedoms of the platform.", kind=int, low=0),
     Option("motion", "Its translations and rotations, such as 3T or 2T1R."),
     Option("verdict", f"{', '.join(VERDICTS)}.", words=VERDICTS),
-    Option("see", "What is seen of the platform instead of legs, such as 3point or 2point+image_line; with ' one "
-           "camera for each.", "KINDS"),
+    Option("see", "What is seen of the platform instead of legs, such as 3point or 2point+image_line; add ' for one "
+           "camera each.", "KINDS"),
     Option("group", "planar, mixed, pods, deltas, spatial, sensors; for published tables 3T0R and the like."),
     Option("base_motors", "Whether all motors are on the base.", kind=bool, flags=("--base-motors/--moving-motors",)),
     Option("fewest", "Number of legs that must be watched.", kind=int, low=0),
@@ -66,7 +66,7 @@ def build(groups: list[str] | None, output: str | None, tables: str | None, work
         if given:
             raise BadRequest(f"{option} {'with' if check else 'without'} --check", None)
     if tables is not None and output is None:
-        raise BadRequest("--tables without a catalog of their own", None, "-o FOLDER or -o FILE.sqlite")
+        raise BadRequest("--tables needs a catalog of its own", None, "-o FOLDER or -o FILE.sqlite")
     source = None if tables is None else _published(tables)
     if check:
         from ..catalog.build import check as run
@@ -203,11 +203,12 @@ def site(output: str, workers: int, anew: bool, kept: str | None, json: bool, **
     if all(value is None for value in asked.values()):
         found, every = Catalog([each for each in found if equal_legs(each["word"])]), len(found)
         if len(found) < every:
-            warn(f"{every - len(found):,} architectures with unequal legs get no page; ask for them, as by --group")
+            warn(f"{every - len(found):,} architectures with unequal legs get no page; "
+                 "select them, for example by --group")
     if seen := [each["word"] for each in found if "see" in each]:
-        raise BadRequest("no pages are made of words with sensors", seen[0], "hrsynth catalog show, list")
+        raise BadRequest("no pages are made for words with sensors", seen[0], "hrsynth catalog show, list")
     if published := [each["word"] for each in found if "choices" in each]:
-        raise BadRequest("no pages are made of published robots", published[0], "hrsynth catalog show, list")
+        raise BadRequest("no pages are made for published robots", published[0], "hrsynth catalog show, list")
     with Progress(counted=True) as progress:
         done = run(found, output, workers=workers, anew=anew, tell=progress.count)
     if done.differ:
@@ -224,7 +225,7 @@ def audit(folder: str, output: str | None, only: str | None, sample: int | None,
     from ..present.text.audit import audited
 
     if output is not None and Path(output).suffix != ".jsonl":
-        raise BadRequest("records are kept a line each", output, "a file that ends in .jsonl")
+        raise BadRequest("records are kept one per line", output, "a file that ends in .jsonl")
     with Progress(counted=True) as progress:
         found = run(folder, only=only, sample=sample, seed=seed, kept=output,
                     tell=lambda _, done, total: progress.count("robots", done, total)).to_dict()
@@ -247,11 +248,11 @@ def _word(text: str, kept: str | None) -> tuple[str, str]:
         if not found and "(" in text:
             raise
         if not found:
-            raise BadRequest("no architecture of the catalog is called so, or has such legs", text,
-                             f"a word such as '3(Rz*-Rz-Rz)'; hrsynth catalog list --text {shlex.quote(text)} seeks it "
-                             "in all fields") from None
+            raise BadRequest("no architecture of the catalog has this name or such legs", text,
+                             f"a word such as '3(Rz*-Rz-Rz)'; hrsynth catalog list --text {shlex.quote(text)} searches "
+                             "all fields") from None
     word = found[0]["word"]
-    more = [f"{len(found)} are called so: {', '.join(each['word'] for each in found[1:4])} …"] if found[1:] else []
+    more = [f"{len(found)} have this name: {', '.join(each['word'] for each in found[1:4])} …"] if found[1:] else []
     return word, "; ".join([*filter(None, [alias(word)]), *more])
 
 
@@ -295,7 +296,7 @@ def _target(output: str | None) -> Path:
 
 
 COMMANDS = (
-    ("build", "Build the catalog, or continue an interrupted build; the bytes do not depend on who builds.", build,
+    ("build", "Build the catalog, or continue an interrupted build; the bytes are the same whoever builds it.", build,
      (Option("groups", "Groups (default: all).", "[GROUP]...", list[str], argument=True),
       output("A folder, or a file that ends in .sqlite (default: catalog/ of the checkout).", "PATH"), TABLES, WORKERS,
       Option("cluster", "A dask cluster that shares the work.", "ADDRESS"),

@@ -78,13 +78,13 @@ class DeclaredCommand:
 
             if name in POSES and (own := [each for each in flags if each in POSES]):
                 usual = flags[own[-1]][0].names[0]
-                raise BadRequest(f"{self.name}: no such option", name, f"{usual}, the pose that is asked about here")
+                raise BadRequest(f"{self.name}: no such option", name, f"{usual} for the pose of this question")
             if takers := [each.name for each in beside if any(name in option.names for option in each.options)]:
-                raise BadRequest(f"{self.name} has no such option", name, f"it goes with {', '.join(takers)}")
+                raise BadRequest(f"{self.name} has no such option", name, f"it belongs to {', '.join(takers)}")
             raise BadRequest(f"{self.name}: no such option", name, get_close_matches(name, flags) or sorted(flags))
         for name in (word.partition("=")[0] for word in joined):
             if name in flags and name in flags[name][0].old:
-                warn(f"{name} is called {flags[name][0].names[0]} now; the old name goes with 0.4")
+                warn(f"{name} is now called {flags[name][0].names[0]}; the old name will be removed in 0.4")
         given: dict[str, list[Any]] = vars(found)
         plain += rest
         for option in self.options:
@@ -98,7 +98,7 @@ class DeclaredCommand:
         read = {each: [each.read("--" if value == [] else value) for value in given[each.name]]
                 for each in self.options if each.name in given}
         if plain:
-            raise BadRequest(f"{self.name} takes no more words", " ".join(plain))
+            raise BadRequest(f"{self.name} takes no more arguments", " ".join(plain))
         missing = [each.shown for each in self.options if each.default is NEEDED and each not in read]
         if missing:
             raise BadRequest(f"{self.name} needs {' and '.join(missing)}")

@@ -78,7 +78,7 @@ def verify(certificate: str, robot: str | None, json: bool) -> None:
 
 def add(app: Group) -> None:
     """Make them commands."""
-    add_command(app, "verify", "Check a certificate of modes, derive or path, with integers and fractions alone.",
+    add_command(app, "verify", "Check a certificate of modes, derive or path, using only integers and fractions.",
                 (Option("certificate", "The certificate's file.", "FILE", default=NEEDED, argument=True),
                  Option("robot", "Check that its geometry is that of this robot.", "ROBOT", words=options.shipped),
                  JSON), verify,
@@ -92,7 +92,7 @@ def add(app: Group) -> None:
                  Option("target", "The file to write; its extension selects the dialect.", "[OUT]", argument=True),
                  output("The file to write, given as an option."),
                  Option("meshes", "keep: meshes stay where they are, and the new file refers to them; copy: into "
-                        "meshes/ beside it.", default="keep", words=("keep", "copy"), group=OUTPUT),
+                        "meshes/ next to it.", default="keep", words=("keep", "copy"), group=OUTPUT),
                  Option("to", "native, gepetto, mjcf, sdf or usd, whatever the extension.", "DIALECT",
                                        words=("native", "gepetto", "mjcf", "sdf", "usd")), JSON), convert,
                 ("quattro quattro.xml", "leg.urdf -o robot.usda --meshes copy",

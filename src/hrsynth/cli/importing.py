@@ -45,8 +45,8 @@ def importing(target: str, observe: str | None, yes: bool, view: bool, json: boo
     motors = [name for name, joint in mechanism.joints.items() if joint.actuated]
     notes = [str(note) for note in mechanism.notes]
     if not motors:
-        notes.append("open: no joint is driven, of the real robot's motors nothing can be said (--motors JOINTS names "
-                     "the driven ones)")
+        notes.append("open: no joint is driven, so nothing can be said about the real robot's motors "
+                     "(--motors JOINTS names the driven ones)")
         if not asking:
             warn(notes[-1])
     for warning in lost:
@@ -169,7 +169,7 @@ class _Dialog:
         except HrsynthError as error:
             if not self.asked:
                 raise
-            say("\n".join(["", *error.lines(), "That cannot be read so; the questions again.", ""]))
+            say("\n".join(["", *error.lines(), "This cannot be read that way; here are the questions again.", ""]))
             return None
 
     def _show_file(self, found: ImportChoices) -> None:
@@ -239,7 +239,7 @@ class _Dialog:
             return ",".join(dict.fromkeys(_one(word, named, named) for word in _words(text)))
 
         as_told = "as told" if driven else "none"
-        answer = _answer("Which joints are driven? Numbers or names with commas", as_told,
+        answer = _answer("Which joints are driven? Numbers or names, with commas between", as_told,
                          lambda text: text if text == as_told else chosen(text), self._view)
         self.source["motors"] = None if answer == as_told else answer
 
@@ -279,10 +279,10 @@ class _Dialog:
             observe_links(mechanism, named)
             return ",".join(named)
 
-        return _answer("Is that what is watched, or other links? Names with commas", "so", chosen)
+        return _answer("Watch these, or other links? Names, with commas between", "so", chosen)
 
     def _confirmed(self) -> bool | None:
-        there = " (it is there already, and is replaced)" if Path(self.target).exists() else ""
+        there = " (it already exists and will be replaced)" if Path(self.target).exists() else ""
 
         def meant(text: str) -> bool | None:
             words = {"yes": True, "y": True, "no": False, "n": False, "again": None, "a": None}
@@ -329,7 +329,7 @@ def _answer(question: str, default: str | None, meant: Callable[[str], T], view:
         except HrsynthError as error:
             say(f"  {error.lines()[0]}")
         except ValueError as error:
-            say(f"  {text!r:.60} is no answer: {error}")
+            say(f"  {text!r:.60} is not an answer: {error}")
 
 
 def _words(text: str) -> list[str]:
@@ -370,10 +370,10 @@ def add(app: Group) -> None:
     """Make it a command."""
     add_command(app, "import", "A guided reader: shows what a robot's file says and what is guessed, asks for "
                 "closures, base, platform, motors and segments, writes the native file, and prints the command that "
-                "does so without questions. With --yes, or without a terminal, guesses are accepted and reported.",
+                "does the same without questions. With --yes, or without a terminal, it accepts and reports guesses.",
                 (*SOURCE,
                  Option("observe", "Links to watch, at their default segments.", "LINKS", group=WATCHING),
-                 flag("yes", "Ask nothing: accept what is guessed."),
+                 flag("yes", "Ask no questions: accept the guesses."),
                  flag("view", "Show the robot in the browser before the questions."),
                  Option("target", "The file to write, in the native dialect.", "FILE", default=NEEDED,
                         flags=("-o", "--output"), group=output("").group), JSON), importing,

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 NEEDED: Any = ...
 """The default of what must be given."""
-OWN, WATCHING, OUTPUT, READING = "Options", "What is watched", "Output", "The robot, where its file does not say"
+OWN, WATCHING, OUTPUT, READING = "Options", "What is watched", "Output", "What the file does not say"
 """Groups of options, in the order of the help."""
 
 
@@ -108,8 +108,8 @@ def shipped() -> Iterable[str]:
 
 
 JSON = flag("json", "Print the result as one JSON object; its schema: hrsynth schema COMMAND.", OUTPUT)
-OBSERVE = Option("observe", "Legs to watch (1,4), links, or all (default: those of the file, else all; with --see "
-                 "none).",
+OBSERVE = Option("observe", "Legs to watch (1,4), links, or all (default: those of the file, otherwise all; none with "
+                 "--see).",
                  "LEGS", group=WATCHING)
 CAMERA = Option("camera", "The link that carries the camera; or a further camera with a name and its place on a link "
                 "(metres; radians or deg; focal length, width and height in pixels); repeat for more.",
@@ -128,17 +128,17 @@ SOURCE = (
     Option("robot", "A robot file in any dialect, a shipped robot's name, or example:NAME.", "ROBOT", default=NEEDED,
            argument=True, words=shipped),
     Option("base", "Consider only what lies between this link and the platform.", "LINK", group=READING),
-    Option("platform", "The platform, where the file names none.", "LINK", group=READING),
-    Option("motors", "The driven joints, where the file names none.", "JOINTS", group=READING),
+    Option("platform", "The platform, if the file names none.", "LINK", group=READING),
+    Option("motors", "The driven joints, if the file names none.", "JOINTS", group=READING),
     Option("close", "A closure: the frames of two links, or points A@x,y,z in them, meet (default: in a point); "
            "repeat for more.", "A:B[:TYPE]", kind=list[str], group=READING),
     Option("freeze", "Joints to hold at zero.", "JOINTS", default="", group=READING),
     Option("keyframe",
-           "Take as zero pose a posture that the file, or an SRDF file beside it, names; or FILE.srdf:NAME.",
+           "Zero pose: a named posture of the file, or of an SRDF file next to it; or FILE.srdf:NAME.",
            "NAME", group=READING),
     Option("unit", "The unit of the file's lengths: m, mm, cm or in.", "UNIT", group=READING,
            words=("m", "mm", "cm", "in")),
-    Option("tolerance", "Deviation up to which axes and centres are taken as parallel, meeting and so on, and made so "
+    Option("tolerance", "Deviation up to which axes and centres count as parallel, meeting and so on, and are made so "
            "(characteristic lengths, radians; default: from the digits of the file's numbers).", None, float,
            group=READING),
     flag("as_written",
@@ -179,8 +179,8 @@ def told_radians(option: str, text: str | None) -> None:
             angle = float(field.rpartition("=")[2])
         except ValueError:
             continue
-        warn(f"--{option} {field.strip()}: radians, that is {math.degrees(angle):.3g} degrees "
-             f"({field.strip()}deg would be degrees)")
+        warn(f"--{option} {field.strip()}: taken as radians, {math.degrees(angle):.3g} degrees "
+             f"({field.strip()}deg for degrees)")
 
 
 def told_turns(option: str, text: object) -> None:

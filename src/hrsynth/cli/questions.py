@@ -168,7 +168,7 @@ POINTS = ("--camera eye=base@0.3,0.1,0 --see point:platform@0.1,0,0 --see point:
           "--see point:platform@0,0.1,0.1")
 """Three image points by a camera beside the robot: an example."""
 FIGURE = (
-    Option("width", "Width of a figure, as 88mm or 3.5in: it is laid out for that, with text of 8pt.", "LENGTH",
+    Option("width", "Width of a figure, such as 88mm or 3.5in, laid out for that with text of 8pt.", "LENGTH",
            group=OUTPUT),
     Option("font", "Font of a figure, its size, or both: serif, 8pt, 'DejaVu Sans 8pt'.", group=OUTPUT),
 )
@@ -183,7 +183,7 @@ DEPTH = Option("depth", "Depths in images that the control law uses: exact, desi
                "constant:METRES.", default="exact")
 BOX = Option("box", "Intervals of motors (m, rad), such as hip=-1:1,slide=0:0.2 (default: the file's limits, else a "
              "whole turn, or a characteristic length either way).", "INTERVALS")
-CELLS = Option("effort", "Most cells to try, for each part of the loops.", "COUNT", int, BRANCH_CELLS, low=1)
+CELLS = Option("effort", "Most cells to try for each part of the loops.", "COUNT", int, BRANCH_CELLS, low=1)
 QUESTIONS = (
     Question("derive", "The hidden robot of a robot, how it is derived, its certificate, and what the controller can "
              "see.",
@@ -223,15 +223,15 @@ QUESTIONS = (
               "uranesx --offer point:platform --price point=3",
               "gough_stewart --camera eye=base@0.3,0.1,0 --see point:platform@0.1,0,0 --offer point:platform")),
     Question("branch", "Where the joints are proved to be one function of the motors, on the branch of the zero "
-             "configuration, and what ends that.",
+             "configuration, and where that ends.",
              (BOX, CELLS),
              ("rrrrr_m1 --box shoulder_1=-0.2:0.2,shoulder_2=-0.2:0.2",), seeded=False),
     Question("modes", "All assembly modes: every pose of the platform with the same measurements.",
              (Option("at", "Pose whose measurements are held, such as x=0.02,y=0.1,z=-0.7; or mode:2 of the list "
                      "printed without --at (default: the zero configuration).", "POSE"),
               *WATCHED, SEE, flag("real", "Hold the real robot's own motors instead."),
-              Option("effort", "Most seconds of one core for a list, estimated from its size; what needs more is left "
-                     "out, and reported.", "SECONDS", float, EFFORT, low=0),
+              Option("effort", "Time limit for a list (estimated seconds on one core); what needs more is left out, "
+                     "and reported.", "SECONDS", float, EFFORT, low=0),
               _file("modes"), _file("modes", "certificate")),
              ("quattro --observe 1,3 --at x=0.05,y=0.1,z=-0.7", "3rrr_m1 --real -o modes.png",
               "quattro --observe 1,4 --certificate c.json", f"gough_stewart {POINTS}")),
@@ -278,7 +278,7 @@ QUESTIONS = (
                      "PART=VALUE"),
               Option("grid", "A line, plane or box of starts, such as x=-0.3:0.3:50,y=-0.3:0.3:50,z=-0.7 "
                      "(from:to:count).", "GRID"),
-              Option("steps", "Starts along each side of the plane (default: 100; 15 if each is simulated by itself).",
+              Option("steps", "Starts along each side of the plane (default: 100; 15 if each is simulated separately).",
                      None, int, low=2, high=300),
               Option("jobs", "Processes (default: one per core).", None, int, low=1),
               _file("basins")),
@@ -301,14 +301,14 @@ QUESTIONS = (
              (START, _goal("Goal pose."),
               Option("cone", "Half-angle of the cone about each direction, or one per leg: 1=0.1deg,2=0.2deg,… "
                      "(default: 0.1deg).", "ANGLE"),
-              NOISE, *WATCHED, SEE, Option("size", "Most legs in a set.", None, int, 4, low=1),
+              NOISE, *WATCHED, SEE, Option("size", "Largest number of legs in a set.", None, int, 4, low=1),
               Option("runs", "How many sets, best first, must pass a simulated run.", None, int, 3, low=0),
-              Option("endings", "For how many of the examined sets, the most accurate first, it is computed where "
+              Option("endings", "For how many of the examined sets, the most accurate first, to compute where "
                      "else the loop may end.", None, int, 20, low=0),
               Option("sight", "Pose of the camera on the link that carries it (x right, y down, z ahead), such as "
                      "x=0,y=0,z=0.5,rpy=180deg/0/0; or auto.", "POSE"),
-              Option("focal", "Focal length of the camera, of 640 by 480 pixels.", "PIXELS", float, 800.0),
-              Option("examine", "Sets, the most accurate first, whose modes, aspects and runs are computed.", None,
+              Option("focal", "Focal length of the camera, for pictures of 640 × 480 pixels.", "PIXELS", float, 800.0),
+              Option("examine", "For how many sets, the most accurate first, to compute modes, aspects and runs.", None,
                      int, 20, low=1),
               Option("seconds", "Deprecated, because the answer then depends on the machine: time after which no "
                      "further set is examined.", None, float)),

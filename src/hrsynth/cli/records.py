@@ -1,8 +1,8 @@
 """What every command prints with `--json`: one object, whose type is here. `hrsynth schema COMMAND` prints the JSON
 schema that is made of it, and this page shows all of them.
 
-Lengths are metres and angles radians unless a name says otherwise (`_mm`, `_deg`). `null` stands for what is not
-there or not decided. Arrays over a grid are nested in the order of its `axes`.
+Lengths are metres and angles radians unless a name says otherwise (`_mm`, `_deg`). `null` stands for what is
+absent or not decided. Arrays over a grid are nested in the order of its `axes`.
 """
 
 from __future__ import annotations
@@ -18,26 +18,26 @@ Gap = Annotated[float, "the smallest ratio of a singular value that counts to on
 
 
 class Head(TypedDict):
-    """What every object begins with."""
+    """The fields with which every object begins."""
 
     command: str
     version: str
 
 
 class OfRobot(Head):
-    """What the answer about a robot begins with."""
+    """The fields with which an answer about a robot begins."""
 
     robot: str
 
 
 class WrittenTo(TypedDict):
-    """The file that was asked for with -o."""
+    """The file that was requested with -o."""
 
     file: str | None
 
 
 class PoseRecord(TypedDict):
-    """A pose of the platform frame in the base frame; null where a part is free. `phi` is there where it was given."""
+    """A pose of the platform frame in the base frame; null for free parts. `phi` is present if it was given."""
 
     x: Number
     y: Number
@@ -47,8 +47,8 @@ class PoseRecord(TypedDict):
 
 
 class Watched(TypedDict):
-    """An observation: its label (a leg's, where it is a segment), the link, what kind; the camera that has a name and
-    sees it, point (m) and axis in the link's frame (null where there are none); the joint of an encoder."""
+    """An observation: its label (that of a leg if it is a segment), the link and the kind; the named camera that sees
+    it, and its point (m) and axis in the link's frame (null if there are none); the joint of an encoder."""
 
     leg: str
     link: str
@@ -60,7 +60,7 @@ class Watched(TypedDict):
 
 
 class WatchedAxis(Watched):
-    """An observation, and why it is it."""
+    """An observation, and why it was chosen."""
 
     why: str
 
@@ -80,13 +80,13 @@ class MobilityRecord(TypedDict):
 
 
 class MobilityWritten(MobilityRecord):
-    """The same, and of the file as it is written."""
+    """The same, also for the file as it is written."""
 
     as_written: MobilityRecord
 
 
 class MobilityMaybeWritten(MobilityRecord):
-    """The same, null where the file's own mechanism could not be sampled."""
+    """The same; null if the file's own mechanism could not be sampled."""
 
     as_written: MobilityRecord | None
 
@@ -100,7 +100,7 @@ class MarginRecord(TypedDict):
 
 
 class RelationsRecord(TypedDict):
-    """The relations of lengths and angles that the exact verdict stands on."""
+    """The relations of lengths and angles on which the exact verdict rests."""
 
     carried: int
     kept: int
@@ -124,7 +124,7 @@ class ArchitectureRecord(TypedDict):
 
 
 class FlexRecord(TypedDict):
-    """Independent motions of some bodies of a formation, while all others rest and no measured value changes."""
+    """Independent motions of some bodies of a formation while all others rest and no measured value changes."""
 
     links: list[str]
     count: int
@@ -132,8 +132,8 @@ class FlexRecord(TypedDict):
 
 
 class FormationRecord(TypedDict):
-    """What is not seen of a formation: trivial motions, flexes; `special` is the line or plane that holds all points
-    that are sensed here and generically not, in words."""
+    """What is not seen of a formation: trivial motions and flexes; `special` describes the line or plane that holds all
+    sensed points here, but not generically."""
 
     bodies: list[str]
     trivial: list[str]
@@ -142,7 +142,7 @@ class FormationRecord(TypedDict):
 
 
 class NotationRecord(TypedDict):
-    """The architectures; those of the hidden robot are null where every leg is blind."""
+    """The architectures; those of the hidden robot are null if every leg is blind."""
 
     real: str
     hidden: str | None
@@ -273,7 +273,7 @@ class ClassCounts(TypedDict):
 
 
 class KindsRecord(TypedDict):
-    """What one relation says at a configuration; null where a rank is not decided."""
+    """What one relation says at a configuration; null if a rank is not decided."""
 
     gap: Gap
     type1: bool | None
@@ -298,7 +298,7 @@ class ConstraintRecord(TypedDict):
 
 
 class RedundantRecord(TypedDict):
-    """Redundant constraints of a loop, which is named as in the file; at all configurations where `generic`."""
+    """Redundant constraints of a loop, named as in the file; `generic`: at all configurations."""
 
     loop: str
     rows: int
@@ -317,7 +317,7 @@ class DistancesRecord(TypedDict):
 
 
 class PostureRecord(KindsRecord):
-    """All that is said of one configuration; ``beyond`` names the joints that are beyond their limits there."""
+    """Everything about one configuration; ``beyond`` names the joints that are beyond their limits there."""
 
     pose: PoseRecord
     beyond: list[str]
@@ -343,7 +343,7 @@ class GridAxes(TypedDict):
 
 
 class FixedParts(TypedDict, total=False):
-    """The parts of the pose that a grid holds."""
+    """The parts of the pose that a grid holds fixed."""
 
     x: float
     y: float
@@ -353,7 +353,7 @@ class FixedParts(TypedDict, total=False):
 
 
 class GridRecord(GridAxes):
-    """The grid: what it held, what it left free, the kind of singularity and the distances at each pose."""
+    """The grid: what it holds fixed, what it leaves free, the kind of singularity and the distances at each pose."""
 
     fixed: FixedParts
     free: list[str]
@@ -367,7 +367,7 @@ class GridRecord(GridAxes):
 
 
 class Unreached(TypedDict):
-    """A pose that was asked for, as it was written, and why it is not reached."""
+    """A requested pose, as it was written, and why it is not reached."""
 
     pose: str
     reason: str
@@ -395,7 +395,7 @@ class MeasuredRecord(TypedDict):
 
 
 class CheckedRecord(TypedDict):
-    """How words, expression and rank were compared; the rest is there where they were."""
+    """How words, expression and rank were compared; the other fields are present if they were."""
 
     points: int
     disagreements: int
@@ -417,8 +417,8 @@ class ExampleRecord(TypedDict):
 
 
 class LocusField(TypedDict):
-    """Tables over the plane (null: not reached); singular poses, and pieces of a curve of them, where the condition has
-    no sign."""
+    """Tables over the plane (null: not reached); singular poses, and pieces of the curve on which they lie, if the
+    condition has no sign."""
 
     expression: list[list[Number]]
     type2: list[list[Number]]
@@ -438,7 +438,7 @@ class LocusRecord(TypedDict):
 
 
 class FactorRecord(TypedDict):
-    """A factor of the expression, and what it means that it vanishes."""
+    """A factor of the expression, and what its vanishing means."""
 
     expression: str
     meaning: str
@@ -477,7 +477,8 @@ class FurtherRecord(TypedDict):
 
 
 class CureRecord(TypedDict):
-    """A cheapest set of further measurements, and what is seen with it; a measurement costs 1 if no price is given."""
+    """A cheapest set of further measurements, and what is seen with it; a measurement costs 1 unless a price is
+    given."""
 
     measurements: list[FurtherRecord]
     verdict: Word
@@ -509,14 +510,14 @@ class BranchCellRecord(TypedDict):
     low: list[float]
     high: list[float]
     centre: list[float]
-    slopes: Annotated[Array, "a row a passive coordinate, a column a motor"]
+    slopes: Annotated[Array, "one row per passive coordinate, one column per motor"]
     radius: list[float]
     weakest: Annotated[float, "a lower bound of the smallest singular value of the loops' Jacobian over the tube"]
     neighbours: Annotated[list[int], "cells with a common face, proved to hold the same closure there"]
 
 
 class ToggleRecord(TypedDict):
-    """Where a proof ends; joints that can move there while all motors rest, as far as numbers tell."""
+    """Where a proof ends; the joints that were found (numerically) to move there while all motors are held."""
 
     motors: list[float]
     joints: list[str]
@@ -531,9 +532,9 @@ class BranchPartRecord(TypedDict):
     passive: list[str]
     q0: list[float]
     x0: list[float]
-    asked: Annotated[Array, "low and high of the box that was asked for"]
+    asked: Annotated[Array, "low and high of the requested box"]
     proved: Annotated[Array, "low and high of a box about the zero configuration in the union of the cells"]
-    share: Annotated[float, "volume of all cells, as part of the box"]
+    share: Annotated[float, "volume of all cells, as a share of the box"]
     box_share: float
     cells: list[BranchCellRecord]
     toggles: list[ToggleRecord]
@@ -543,12 +544,12 @@ class BranchPartRecord(TypedDict):
 
 
 class BranchLimitRecord(TypedDict):
-    """A joint without a motor, its limits and how far it goes in the proved cells (m, rad)."""
+    """A joint without a motor, its limits and its range in the proved cells (m, rad)."""
 
     joint: str
     lower: float | None
     upper: float | None
-    least: Annotated[float | None, "null where its loop is cut there"]
+    least: Annotated[float | None, "null if its loop is cut there"]
     most: float | None
     verdict: Annotated[Literal["kept", "passed", "undecided", "not looked at"], "kept and passed are proved"]
 
@@ -585,7 +586,8 @@ class PlaceRecord(TypedDict):
 
 
 class ModeRecord(TypedDict):
-    """An assembly mode; its radius is null where it is not known, `fits` where its place is decided by all legs."""
+    """An assembly mode; its radius is null if it is not known; `fits` says how well all legs fit if only some of them
+    place it."""
 
     pose: PoseRecord
     radius: Number
@@ -619,7 +621,7 @@ class MeantRecord(TypedDict):
 
 
 class SelfMotionRecord(TypedDict):
-    """A motion with the measurements at rest, as far as it was followed from a pose."""
+    """A motion that leaves the measurements unchanged, as far as it was followed from a pose."""
 
     pose: PoseRecord
     dimension: int
@@ -653,7 +655,7 @@ class ListedModes(OfRobot, WrittenTo):
 
 
 class AssemblyModesRecord(ListedModes):
-    """All assembly modes, and the certificate that was asked for."""
+    """All assembly modes, and the requested certificate."""
 
     certificate_file: str | None
 
@@ -666,14 +668,14 @@ class PathEndRecord(TypedDict):
 
 
 class CrossingRecord(TypedDict):
-    """A leg that changes its working mode, and at which pose of the path."""
+    """A leg that changes its working mode, and the pose of the path at which it does."""
 
     leg: str
     at: int
 
 
 class SampledRoadRecord(TypedDict):
-    """The straight way, sampled: the smallest |value| and where, changes of its sign, the part that was reached."""
+    """The straight path, sampled: the smallest |value| and where, changes of its sign, the part that was reached."""
 
     poses: int
     least: float
@@ -704,7 +706,7 @@ class PathRecord(TypedDict):
 
 
 class Path(OfRobot, PathRecord):
-    """The same of a robot, and the certificate that was asked for."""
+    """The same for a robot, and the requested certificate."""
 
     certificate_file: str | None
 
@@ -721,7 +723,7 @@ class PairRecord(TypedDict):
 
 
 class AspectsRecord(TypedDict):
-    """How many aspects hold the modes at least and at most, and which modes are together."""
+    """The least and largest possible number of aspects of the modes, and which modes share one."""
 
     least: int
     most: int
@@ -729,7 +731,7 @@ class AspectsRecord(TypedDict):
 
 
 class ExportedPart(TypedDict):
-    """Motors with the passive coordinates that they decide alone: how much of the box is proved, a box that is."""
+    """Motors with the passive coordinates that they alone decide: how much of the box is proved, and a box that is."""
 
     motors: list[str]
     share: float
@@ -737,7 +739,7 @@ class ExportedPart(TypedDict):
 
 
 class Exported(OfRobot, WrittenTo):
-    """What code was made of."""
+    """What the code was made of."""
 
     lang: Literal["c++", "numpy"]
     motors: list[str]
@@ -754,7 +756,7 @@ class Exported(OfRobot, WrittenTo):
 
 
 class AtlasAnswer(ListedModes):
-    """Which modes can be led to each other; `table` is by their numbers."""
+    """Which modes can be reached from each other; `table` is by their numbers."""
 
     table: list[list[str]]
     pairs: list[PairRecord]
@@ -827,8 +829,8 @@ class RestRecord(TypedDict):
 
 
 class SignedModesRecord(TypedDict):
-    """How many poses there are with the directions of some legs reversed, complex ones too, and how many by boxes of
-    poses; null where that is not known."""
+    """How many poses have the directions of some legs reversed, complex ones included, and how many by boxes of poses;
+    null if that is not known."""
 
     reversed: list[str]
     modes: int | None
@@ -838,21 +840,22 @@ class SignedModesRecord(TypedDict):
 
 
 class LockedPlaceRecord(TypedDict):
-    """A place `p` (m) of the platform's point about which legs may lock each other; so far about it was not looked."""
+    """A place `p` (m) of the platform's point at which legs may lock each other; nothing was searched within this
+    distance of it."""
 
     p: list[float]
     within_m: float
 
 
 class RestCoverRecord(TypedDict):
-    """What boxes of platform poses prove of a list of rests: `proved` critical poses; `open` boxes, a `share` of all;
-    `within_m` of the goal, null where legs end the box; rods that slide and are shorter than `shorter_m` are left out,
-    null where there are none, as is a platform that only translates and is turned otherwise than in one of `turns`
-    turns, at `turned` poses of the list, and poses at which the joints of the legs `unread` lock, and (null where
-    these were looked at) those at which one of the legs `unstretched` is stretched or so many watched directions as
-    `across` says are at right angles to the desired ones; `apart` of the list lie where was not looked. At `crossings`
-    points of the platform rests fill curves, as two legs' joints lock. `unmet` of those that are proved are not in the
-    list, `strangers` of the list are not among them."""
+    """What boxes of platform poses prove about a list of rests: `proved` critical poses; `open` boxes, a `share` of
+    all; `within_m` of the goal, null if the legs bound the box. Left out are: sliding rods shorter than `shorter_m`
+    (null if there are none); a platform that only translates, in any but one of `turns` turns, at `turned` poses of the
+    list; poses at which the joints of the legs `unread` lock; and (null if these were searched) those at which one of
+    the legs `unstretched` is stretched or `across` watched directions are at right angles to the desired ones. `apart`
+    of the list lie where nothing was searched. At `crossings` points of the platform rests fill curves, because two
+    legs' joints lock. `unmet` of the proved ones are not in the list, `strangers` of the list are not among the proved
+    ones."""
 
     complete: bool
     proved: int
@@ -875,8 +878,8 @@ class RestCoverRecord(TypedDict):
 
 
 class EndingsAnswer(OfRobot, WrittenTo):
-    """All poses at which a loop can rest: where all velocities are seen, where fewer are (`singular`), and one of each
-    of those that fill curves or surfaces (`continua`)."""
+    """All poses at which a loop can rest: where all velocities are seen, where fewer are (`singular`), and one from
+    each family that fills a curve or surface (`continua`)."""
 
     at: PoseRecord
     observed: list[Watched]
@@ -896,8 +899,8 @@ class EndingsAnswer(OfRobot, WrittenTo):
 
 
 class BasinEndRecord(TypedDict):
-    """Where runs end, as one of them was seen to; how many starts, and what part of all, end there; `pose` and `error`
-    (‖e‖) are null where they do not come to rest at one pose."""
+    """Where runs end, shown by one of them; how many starts, and what share of all, end there; `pose` and `error` (‖e‖)
+    are null if they do not come to rest at one pose."""
 
     ended: str
     reason: str
@@ -910,8 +913,8 @@ class BasinEndRecord(TypedDict):
 
 
 class CertifiedRecord(TypedDict):
-    """From how far around the goal every start is proved to end there, and what part that is of the goal's basin among
-    the starts; from how far as long as the law is not damped, where that is farther."""
+    """The distance from the goal within which every start is proved to end there, and what share of the goal's basin
+    among the starts that covers; the larger distance that holds as long as the law is not damped, if there is one."""
 
     words: str
     radius_m: float
@@ -922,8 +925,8 @@ class CertifiedRecord(TypedDict):
 
 class BasinsAnswer(OfRobot, WrittenTo):
     """Where runs from each pose of a grid end: `cells` are numbers of `ends`, counted from 0, -1 where the robot cannot
-    start; `damped` starts come to a singularity on their way. `abreast`: whether they were integrated abreast; then
-    `followed` were simulated one by one instead, and of `checked` others `agreed` ended at the same pose."""
+    start; `damped` starts meet a singularity on the way. `abreast`: whether they were integrated together; `followed`
+    of them were then simulated one by one instead, and of `checked` others `agreed` ended at the same pose."""
 
     to: PoseRecord
     observed: list[Watched]
@@ -950,8 +953,8 @@ class ConeRecord(TypedDict):
 
 
 class ErrorRecord(TypedDict):
-    """The largest error with its direction, and the least; null where a freedom is lost. Of three errors and more the
-    largest is an upper bound, by ``gap`` of what is attained too large at most."""
+    """The largest error with its direction, and the least; null where a freedom is lost. With three errors or more the
+    largest is an upper bound, too large by at most ``gap`` (relative to what is attained)."""
 
     largest: Number
     direction: list[float] | None
@@ -1000,8 +1003,8 @@ class ErrorRangeRecord(TypedDict):
 
 
 class SweptRecord(TypedDict):
-    """Poses whose errors are in the file, how many of them are reached, and how many were there before from a sweep
-    that was broken off."""
+    """Poses whose errors are in the file, how many of them are reached, and how many were there before from an
+    interrupted sweep."""
 
     poses: int
     reached: int
@@ -1011,8 +1014,8 @@ class SweptRecord(TypedDict):
 
 
 class AccuracyAnswer(OfRobot, WrittenTo):
-    """The largest errors at poses; of a plane or grid also its axes and a table of each error, or what was swept to a
-    file. ``noise``: by unit (px, m, rad), of what is no direction; ``exact``: what has none."""
+    """The largest errors at poses; for a plane or grid also its axes and a table of each error, or what was swept to a
+    file. ``noise``: by unit (px, m, rad), of observations that are not directions; ``exact``: those without errors."""
 
     observed: list[Watched]
     camera: str
@@ -1044,7 +1047,7 @@ class CountRecord(TypedDict):
 
 
 class EndCounts(TypedDict):
-    """The modes of the two ends; null where they were not asked."""
+    """The modes of the two ends; null if they were not requested."""
 
     start: CountRecord | None
     goal: CountRecord | None
@@ -1058,8 +1061,8 @@ class DecisionRecord(TypedDict):
 
 
 class LoopEndsRecord(TypedDict):
-    """The rests that were found to attract besides the goal, how many and their kinds, and the certified radius; null
-    what is not known, and the reason."""
+    """The rests other than the goal that were found to attract, how many and their kinds, and the certified radius;
+    null for what is not known, with the reason."""
 
     attracting: int | None
     kinds: list[str] | None
@@ -1069,7 +1072,7 @@ class LoopEndsRecord(TypedDict):
 
 
 class CandidateRecord(TypedDict):
-    """A set of legs; null what was not asked."""
+    """A set of legs; null for what was not computed."""
 
     legs: list[str]
     verdict: Word
@@ -1131,7 +1134,7 @@ class ViewAnswer(OfRobot, WrittenTo):
 
 
 class ShippedRobot(TypedDict):
-    """A robot; of one that is shipped what it is, where it is told and with which dimensions."""
+    """A robot; for a shipped one also what it is, where it is described and with which dimensions."""
 
     name: str
     file: str
@@ -1158,7 +1161,8 @@ class Convert(OfRobot):
 
 
 class Import(OfRobot):
-    """A robot that was read with answers or guesses and written, and the command that does so without questions."""
+    """A robot that was read with answers or guesses and written, and the command that does the same without
+    questions."""
 
     file: str
     repeat: str
@@ -1189,7 +1193,7 @@ class MotorChoiceRecord(TypedDict):
 
 
 class Entry(TypedDict, total=False):
-    """An architecture of the catalog; of one that is refused only its word, its group, its notation and why."""
+    """An architecture of the catalog; a refused one has only its word, group, notation and the reason."""
 
     word: str
     group: str
@@ -1241,7 +1245,7 @@ class CatalogShow(Head, WrittenTo):
 
 
 class BuiltGroup(TypedDict):
-    """A group: how many words it has, how many were made now and before; its file is null while it is not complete."""
+    """A group: how many words it has, how many were made now and before; its file is null until it is complete."""
 
     group: str
     words: int
@@ -1275,7 +1279,7 @@ class CatalogSite(Head):
 
 
 class AuditedKind(TypedDict):
-    """How often a kind of disagreement occurs that is settled so."""
+    """How often a kind of disagreement occurs that is settled in this way."""
 
     kind: str
     settled: str
@@ -1283,7 +1287,7 @@ class AuditedKind(TypedDict):
 
 
 class AuditedSight(TypedDict):
-    """How many robots have this verdict when all legs are watched, at generic dimensions, and so many legs at least
+    """How many robots have this verdict, at generic dimensions with all legs watched, and need at least so many legs to
     show as much as all."""
 
     verdict: str
@@ -1292,8 +1296,8 @@ class AuditedSight(TypedDict):
 
 
 class AuditedGroup(TypedDict):
-    """A group of published robots: how many were compared, how many move as stated or further, and of the stated losses
-    of rank and numbers of working choices of motors how many agree."""
+    """A group of published robots: how many were compared, and how many move as stated or further; how many of the
+    stated losses of rank, and of the stated numbers of working choices of motors, agree."""
 
     group: str
     robots: int
@@ -1313,7 +1317,7 @@ class AuditedGroup(TypedDict):
 
 
 class TableDisagreementRecord(TypedDict):
-    """A figure of a table that is not what is computed, with its file and line, its kind and what settles it."""
+    """A figure of a table that differs from what is computed, with its file and line, its kind and what settles it."""
 
     robot: str
     group: str
@@ -1333,8 +1337,8 @@ class NoLegChain(TypedDict):
 
 
 class CatalogAudit(Head):
-    """Published tables compared: `rows` of them, `compared` ones, those that `agree` in all that is stated; `kinds`
-    and `settlements` in words; `file` has the records with their instances modulo primes."""
+    """Published tables compared: `rows` of them, `compared` ones, those that `agree` with everything that is stated;
+    `kinds` and `settlements` in words; `file` has the records with their instances modulo primes."""
 
     folder: str
     rows: int
@@ -1350,8 +1354,8 @@ class CatalogAudit(Head):
 
 
 class FindingRecord(TypedDict):
-    """What a rule found; `line` is null where it is about the whole file, `fix` what to do about it, and `mends`
-    whether --fix does it."""
+    """What a rule found; `line` is null if it concerns the whole file, `fix` says what to do about it, and `mends`
+    whether --fix does so."""
 
     rule: str
     severity: Literal["error", "warning", "note"]
@@ -1371,7 +1375,7 @@ class LintCounts(TypedDict):
 
 
 class LintAnswer(Head, WrittenTo):
-    """What is wrong, doubtful or lost in files; `mended` is what --fix did, `file` where that is written."""
+    """What is wrong, doubtful or lost in files; `mended` is what --fix did, `file` where the result is written."""
 
     files: list[str]
     findings: list[FindingRecord]

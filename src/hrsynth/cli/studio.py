@@ -45,7 +45,7 @@ def serve(server: StudioServer, what: str) -> None:
 
 def add(app: Group) -> None:
     """Make it a command."""
-    add_command(app, "studio", "A page to work in, in the browser: a robot, a folder of robots or files that are "
+    add_command(app, "studio", "An interactive page in the browser: a robot, a folder of robots or files that are "
                 "dropped in, with hidden robot, modes, accuracy and runs, live.",
                 (Option("robot", "A robot file in any dialect, a shipped robot's name, example:NAME, or a folder.",
                         "[ROBOT|FOLDER]", argument=True, words=shipped),

@@ -24,7 +24,7 @@ from .tubes import TubedBranch
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ExportedCode(Result, shown_as="export"):
-    """A program, its language, and the proof that it stands on; ``legs`` are those whose directions it gives."""
+    """A program, its language, and the proof on which it rests; ``legs`` are those whose directions it gives."""
 
     proof: BranchProof
     lang: str
@@ -68,8 +68,8 @@ class ExportedCode(Result, shown_as="export"):
 def export(robot: RobotLike, lang: str = "c++", box: BoxLike | None = None, *, observe: LegsLike = None,
            camera: CameraLike = None, effort: int = BRANCH_CELLS) -> ExportedCode:
     """A program for a controller, in C++ (one header, C++17, Eigen) or NumPy (one module): from the motors' coordinates
-    the passive joints and the platform's pose on the branch of the zero configuration, their Jacobians, the motors of a
-    pose, and the interaction matrix of the watched directions (``observe``, ``camera`` as for ``derive``).
+    it computes the passive joints and the platform's pose on the branch of the zero configuration, their Jacobians, the
+    motors for a pose, and the interaction matrix of the watched directions (``observe``, ``camera`` as for ``derive``).
 
     It answers where :func:`.branch` proves the branch (``box``, ``effort`` as there) and refuses elsewhere. The same
     robot gives the same text. Raises what ``branch`` raises, ``NothingProved``, ``BadRequest`` for another language.
@@ -124,14 +124,14 @@ def _told(proof: BranchProof, source: Source, lang: str, box: BoxLike | None, ef
         ("observe", legs), ("box", asked), ("effort", effort if effort != BRANCH_CELLS else "")) if value)
     lines = [f"Made by hrsynth {__version__}: hrsynth export {file} --lang {lang}{options}",
              f"Robot {robot.name}: {len(proof.motors)} motors, {len(proof.passive)} passive coordinates; idle, held at "
-             f"0: {', '.join(proof.held) or 'none'}.", "Motors in their order, and what is refused beyond:"]
+             f"0: {', '.join(proof.held) or 'none'}.", "Motors in order; values outside these ranges are refused:"]
     rows = zip(proof.motors, branch_.lower.tolist(), branch_.upper.tolist(), branch_.motors, strict=True)
     lines += [f"  q[{k}] {name}: {low!r} to {high!r} {branch_.unit_name(i)}"
               for k, (name, low, high, i) in enumerate(rows)]
     for part in proof.parts:
         low, high = (each.tolist() for each in part.proved)
         lines.append(f"{part.in_cells}, {100 * part.share:.4g} % of the box that was asked for; what no cell "
-                     "covers is refused. Wholly covered is")
+                     "covers is refused. Fully covered:")
         lines += [f"  {name}: {a!r} to {b!r}" for name, a, b in zip(part.motors, low, high, strict=True)]
     lines += [f"An answer is given where the last step of Newton's method is at most {GENERATED_LAST_STEP:g} (rad, or "
               f"of {robot.length:.6g} m), all loops are",
@@ -152,4 +152,4 @@ def _bounds(source: Source) -> list[str]:
             f"{bounds.joints:.2g} (rad, or of that length) of the",
             f"closure (the joints that are solved for), the platform within {bounds.rotation:.2g} and "
             f"{bounds.position:.2g}:", "proved, rounding in double precision included."] + [
-        f"Whether {bounds.others} more equations of the loops hold, the program finds out."] * (bounds.others > 0)
+        f"Whether {bounds.others} more equations of the loops hold is checked at run time."] * (bounds.others > 0)

@@ -126,7 +126,7 @@ def _two_rays_axis(one: LockedLeg, two: LockedLeg, axis: LockedLeg) -> ClosedFor
     if eye is None:
         return ClosedForm(f"{r1}, {r2} and {u} × {names} are parallel to one plane", expression)
     words = f"{eye} lies in the plane through {one.tip.symbol}, {two.tip.symbol} that is parallel to {u} × {names}"
-    means = (f"that plane: |{eye}{one.tip.symbol}| |{eye}{two.tip.symbol}| times the expression but for its sign, a "
+    means = (f"that plane: |{eye}{one.tip.symbol}| |{eye}{two.tip.symbol}| times the expression up to sign, a "
              "proved identity")
     return ClosedForm(words, expression, ((dot(cross(b, cross(u, b)), vector(eye) - _named(one.tip)), means),))
 

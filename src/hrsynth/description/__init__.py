@@ -41,30 +41,30 @@ def load(robot: str | Path | Mechanism, *, base: str | None = None, platform: st
          motors: Iterable[str] | str | None = None, observe: Iterable[str] | str | None = None,
          close: Iterable[str] | str = (), freeze: Iterable[str] | str = (), keyframe: str | None = None,
          unit: str | None = None, tolerance: float | None = None, as_written: bool = False) -> Mechanism:
-    """The mechanism of a robot file in any dialect, of a shipped robot given by its name, or of one of the package
-    example-robot-data (``example:cassie``); a mechanism is given back as it is.
+    """The mechanism of a robot file in any dialect, of a shipped robot given by its name, or of one from the package
+    example-robot-data (``example:cassie``); a mechanism is returned unchanged.
 
-    What a file does not say may be given: the ``platform`` link, the joints of the ``motors``, the links to
-    ``observe`` at their default segments, closures ``A:B[:type]`` that make the frames of two links (or points
-    ``A@x,y,z`` in them) meet, joints to ``freeze``, a ``keyframe`` that the file or an SRDF file beside it names, which
-    becomes the zero pose (or ``FILE.srdf:NAME``), the ``unit`` of the file's lengths (m, mm, cm, in). With ``base``
-    only what lies between base and platform remains. Lists may be texts with commas. What was guessed or solved is told
-    in the mechanism's ``notes``.
+    What a file does not say can be given: the ``platform`` link, the joints of the ``motors``, the links to ``observe``
+    at their default segments, closures ``A:B[:type]`` that make the frames of two links (or points ``A@x,y,z`` in them)
+    meet, joints to ``freeze``, a ``keyframe`` named in the file or in an SRDF file next to it, which becomes the zero
+    pose (or ``FILE.srdf:NAME``), the ``unit`` of the file's lengths (m, mm, cm, in). With ``base`` only what lies
+    between base and platform remains. Lists may be texts with commas. What was guessed or solved is reported in the
+    mechanism's ``notes``.
 
-    Numbers of few decimals are read as they are meant: relations of joints (axes parallel, perpendicular, through one
-    point; equal rods …) that hold to ``tolerance`` (characteristic lengths, radians; None: by the file's digits) are
-    made exact with the least change, and told; with ``as_written`` none is.
+    Numbers with few decimals are read as they are meant: relations of joints (axes parallel, perpendicular, through one
+    point; equal rods …) that hold to ``tolerance`` (characteristic lengths, radians; None: from the file's digits) are
+    made exact with the least change, and reported; with ``as_written`` none is.
 
     Raises
     ------
     BadRequest
-        For a name that is neither; with the names closest to it. For what has to be given, and for names given that
-        the file does not have.
+        For an unknown name, with the names closest to it. If something must be given, and for given names that the file
+        does not have.
     BadRobotFile
         With every defect of the file and its line.
     LoopsNotClosed, RankUndecided, StructureUndecided
-        For a file whose loops stay open, or in which rounded numbers leave no gap between free and held, or are as near
-        to another robot.
+        For a file whose loops stay open, or in which rounded numbers leave no gap between free and held, or fit another
+        robot as well.
 
     >>> hrsynth.load("3rrr_m1")
     <Mechanism: 3rrr_m1, 8 links, 9 joints, 3 motors>
@@ -73,8 +73,8 @@ def load(robot: str | Path | Mechanism, *, base: str | None = None, platform: st
                                keyframe=keyframe, unit=unit, tolerance=tolerance, as_written=as_written)
     if isinstance(robot, Mechanism):
         if overrides.any or tolerance is not None or base is not None or observe is not None:
-            raise BadRequest("what a file does not say is given for a robot that was read", robot.name,
-                             "the file of a robot, or its name")
+            raise BadRequest("options that fill in a robot file are given for a robot that is already read",
+                             robot.name, "the file of a robot, or its name")
         return robot
     return read(file_of(robot), overrides)
 
@@ -117,19 +117,19 @@ def targets(path: str | Path, dialect: str | None = None) -> tuple[Path, ...]:
 @spelled
 def save(mechanism: Mechanism | str | Path, path: str | Path, dialect: str | None = None, *, meshes: str = "keep"
          ) -> tuple[Note, ...]:
-    """Write a robot file, whole or not at all, of a mechanism or of a robot by its file or name; what the dialect
-    cannot say is returned as warnings.
+    """Write a robot file, completely or not at all, of a mechanism or of a robot given by its file or name; what the
+    dialect cannot express is returned as warnings.
 
-    ``dialect`` is ``native``, ``gepetto``, ``mjcf``, ``sdf`` or ``usd``; without it the file's ending decides:
+    ``dialect`` is ``native``, ``gepetto``, ``mjcf``, ``sdf`` or ``usd``; without it the file's extension decides:
     ``.urdf`` native, ``.xml`` and ``.mjcf`` MJCF, ``.sdf`` SDFormat, ``.usda``, ``.usd`` and ``.usdc`` USD, ``.yaml``
-    Gepetto (with a ``.urdf`` of the same name beside it). A file beside the one named is not replaced by other content,
-    and none that is read together with a file that stays. Meshes stay where they are and are named from the new file's
-    folder; with ``meshes="copy"`` they are copied into ``meshes/`` beside it.
+    Gepetto (with a ``.urdf`` of the same name next to it). A companion of the named file is not replaced by other
+    content, nor is a file that is read together with one that stays. Meshes stay where they are and are named from the
+    new file's folder; with ``meshes="copy"`` they are copied into ``meshes/`` next to it.
 
     Raises
     ------
     BadRequest
-        For an unknown dialect or ending; where the file cannot be written, or the mechanism not be said in the dialect.
+        For an unknown dialect or extension; if the file cannot be written, or the dialect cannot express the mechanism.
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
@@ -163,7 +163,7 @@ def _require_whole(file: Path, others: Iterable[Path]) -> None:
     written = set(map(os.path.realpath, others))
     for partner in filter(None, partners):
         if os.path.realpath(partner) not in written:
-            raise BadRequest(f"cannot write the file: {partner.name} beside it is read together with it", str(file),
+            raise BadRequest(f"cannot write the file: {partner.name} next to it would be read with it", str(file),
                              f"another name, or {partner.name} moved away")
 
 

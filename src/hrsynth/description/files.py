@@ -28,14 +28,14 @@ def require_folder(path: str | Path) -> None:
         tried.touch()
         tried.unlink()
     except (OSError, ValueError) as error:
-        raise _unwritten(f"its folder takes no such file ({_reason(error)})", path) from None
+        raise _unwritten(f"no such file can be made in its folder ({_reason(error)})", path) from None
 
 
 def require_other(path: str | Path, *sources: str | Path | None) -> None:
     """Raise ``BadRequest`` where a file to write is one that was read."""
     real = os.path.realpath(path)
     if any(source is not None and os.path.realpath(source) == real for source in sources):
-        raise BadRequest("cannot write the file: it is the one that is read", str(path), "another file")
+        raise BadRequest("cannot write the file: it is the one being read", str(path), "another file")
 
 
 def require_same(path: Path, content: bytes) -> None:
@@ -45,7 +45,7 @@ def require_same(path: Path, content: bytes) -> None:
     except (OSError, ValueError) as error:
         raise _unwritten(_reason(error), path) from None
     if not same:
-        raise BadRequest("cannot write the file beside: it is there already, with other content", str(path),
+        raise BadRequest("cannot write the file that goes with it: it already exists, with other content", str(path),
                          "another name, or that file moved away")
 
 

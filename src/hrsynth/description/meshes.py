@@ -153,9 +153,9 @@ def carried(robot: Mechanism, target: Path, endings: tuple[str, ...] | None, *, 
     if len(files) > MOST_MESHES:
         raise BadRequest(f"{robot.name}: files of meshes", len(files), f"up to {MOST_MESHES}")
     notes = []
-    for names, what in ((missing, "meshes that are not there" + (" are not written" if endings else "")),
+    for names, what in ((missing, "missing meshes" + (" are not written" if endings else "")),
                         (foreign, f"meshes are not written, as only binary files {', '.join(endings or ())} can be"),
-                        (strange, "files that are not called as meshes are not copied"),
+                        (strange, "files whose names are not those of meshes are not copied"),
                         (inside, "meshes lie in the USD file (--meshes copy makes files of them)")):
         if names:
             notes.append(Note("warning", f"{what}: {comma_list(names, 4)}"))

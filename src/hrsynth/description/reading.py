@@ -87,6 +87,6 @@ def _in_folder(path: Path) -> Path:
                    for each in path.glob(pattern)
                    if each.name not in ("package.xml", "model.config"))
     if len(files) != 1:
-        raise xml.refusal(path, "a folder of " + (f"{len(files)} robot files" if files else "no robot file"),
+        raise xml.refusal(path, "a folder with " + (f"{len(files)} robot files" if files else "no robot file"),
                           "robot.urdf with robot.yaml, or one robot file")
     return files[0]

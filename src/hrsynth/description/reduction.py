@@ -29,7 +29,7 @@ def reduce(mechanism: Mechanism, tree: Collection[JointType], loops: Collection[
 
     def link(name: str, joint: Joint) -> str:
         if name in links or name in given.joints:
-            raise BadRequest(f"a link in between of joint {joint.name!r} would take the name of another part", name)
+            raise BadRequest(f"an intermediate link of joint {joint.name!r} would take the name of another part", name)
         links[name] = Link(name, pose(joint.point))
         return name
 
@@ -73,4 +73,4 @@ def _without_idle_joints(mechanism: Mechanism) -> Mechanism:
 def require_free_world(robot: Mechanism, world: str, dialect: str) -> None:
     """Raise ``BadRequest`` where a link has the name that a dialect keeps for the base."""
     if world in robot.links and robot.base != world:
-        raise BadRequest(f"{robot.name}: {dialect} keeps this name for the base", world, "another link name")
+        raise BadRequest(f"{robot.name}: {dialect} reserves this name for the base", world, "another link name")

@@ -106,7 +106,7 @@ def _eye(mechanism: Mechanism, seen: Observation) -> str | None:
     for camera in mechanism.cameras:
         if camera.link == seen.seen_from:
             return camera.name
-    raise BadRequest(f"{seen.kind} {seen.leg!r} is seen from a link without a camera that has a name", seen.seen_from)
+    raise BadRequest(f"{seen.kind} {seen.leg!r} is seen from a link without a named camera", seen.seen_from)
 
 
 def parse_see(text: str, cameras: Sequence[str]) -> SightSpec:
@@ -256,7 +256,7 @@ def _with_sight(mechanism: Mechanism, spec: SightSpec) -> Mechanism:
     label = spec.leg or next(f"{spec.kind}_{n}" for n in count(1) if f"{spec.kind}_{n}" not in taken)
     found = resolved(mechanism, replace(spec, leg=label))
     if {each.key for each in found} & {each.key for each in mechanism.observations}:
-        raise BadRequest(f"observe {spec}: a second one of this label", label, "a label of its own")
+        raise BadRequest(f"observe {spec}: a second one with this label", label, "a label of its own")
     return replace(mechanism, observations=(*mechanism.observations, *found))
 
 
@@ -264,7 +264,7 @@ def resolved(mechanism: Mechanism, spec: SightSpec) -> tuple[Observation, ...]:
     """The observations (of a joint with two coordinates, two) that a description says; raises ``BadRequest``."""
     label, kind = str(spec.leg), kinds()[spec.kind]
     if label == "all" or "," in label:
-        raise BadRequest(f"observe {spec}: a label that no list could name", label, "one without commas, not all")
+        raise BadRequest(f"observe {spec}: a label that does not fit into a list", label, "one without commas, not all")
     if kind is Encoder:
         if spec.link not in mechanism.joints:
             raise BadRequest("observe encoder: unknown joint", spec.link, sorted(mechanism.joints))
@@ -288,7 +288,7 @@ def resolved(mechanism: Mechanism, spec: SightSpec) -> tuple[Observation, ...]:
     assert issubclass(kind, CameraObservation)
     if spec.radius is not None and not (abs(spec.radius) if kind.signed else spec.radius) > 0:
         raise BadRequest(f"observe {spec}: radius (m)", spec.radius,
-                         "another number than 0" if kind.signed else "more than 0")
+                         "a number other than 0" if kind.signed else "more than 0")
     axis = None if spec.axis is None else frozen(spec.axis)
     return (kind(label, link, at=frozen(spec.at or (0, 0, 0)), axis=axis, radius=spec.radius, camera=camera,
                  line=spec.line),)

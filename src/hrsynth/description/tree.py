@@ -42,7 +42,7 @@ def _cut(mechanism: Mechanism) -> Mechanism:
     """The mechanism with a new spanning tree."""
     lost = set(mechanism.links) - graphs.component(mechanism.adjacency, mechanism.base)
     if lost:
-        raise BadMechanism("a link that no chain of joints joins to the base", min(lost))
+        raise BadMechanism("a link that no chain of joints connects to the base", min(lost))
     joints = list(mechanism.joints.values())
     chosen = {joint.name for joint in graphs.spanning_forest(mechanism.links, joints, [_cost(j) for j in joints])}
 

@@ -104,7 +104,7 @@ def _mended(data: bytes, what: str, notes: list[Note]) -> bytes:
     prefix, root = _PREFIX.search(what), _ROOT.match(data)
     if prefix is not None and root is not None:
         notes.append(Note("ignored", f"no xmlns:{prefix['prefix']} declares the prefix {prefix['prefix']!r}; its "
-                                     "elements are read all the same"))
+                                     "elements are read anyway"))
         declared = f' xmlns:{prefix["prefix"]}="urn:undeclared:{prefix["prefix"]}"'.encode()
         return data[: root.end()] + declared + data[root.end():]
     if "comment" not in what.lower():

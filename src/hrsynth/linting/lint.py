@@ -55,14 +55,14 @@ def lint(files: str | Path | Iterable[str | Path], *, compare: str | Path | None
          output: str | Path | None = None, **said: Any) -> Lint:
     """Everything that is wrong, doubtful or lost in robot files, by the rules of ``hrsynth.linting.rules``.
 
-    ``compare`` is another file of the same robot: where the two differ is found too. ``reader`` names programs
-    that shall read the files: a closure that one of them loses is an error. ``ignore`` names rules to leave out. With
-    ``fix`` all that there is one way to mend is mended, and the file written, whole or not at all, to ``output`` or in
-    its place; what is found then is what is left. What no file says itself is given as for ``load`` (``platform``,
-    ``close`` …).
+    ``compare`` is another file of the same robot: differences between the two are reported too. ``reader`` names
+    programs that should read the files: a closure that one of them loses is an error. ``ignore`` names rules to leave
+    out. With ``fix`` everything that can be mended in only one way is mended, and the file is written, completely or
+    not at all, to ``output`` or over the original; the findings are then those that remain. What no file says is given
+    as for ``load`` (``platform``, ``close`` …).
 
-    Raises ``BadRobotFile`` for what cannot be opened, or is no document; ``BadRequest`` for names that there are not,
-    for several files with ``output``, and where the file cannot be written.
+    Raises ``BadRobotFile`` for what cannot be opened or is not a document; ``BadRequest`` for unknown names, for
+    several files with ``output``, and if the file cannot be written.
 
     >>> hrsynth.lint("3rrr_m1")
     <Lint: 1 file: 0 errors, 0 warnings, 6 notes>

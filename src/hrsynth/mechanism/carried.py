@@ -52,7 +52,7 @@ class Tie:
             case "zero":
                 return f"{points}: {'one point' if pair else 'a parallelogram'}"
             case "parallel":
-                return f"{points}: {'on a line' if pair else 'a parallelogram but for slides'} along {axes}"
+                return f"{points}: {'on a line' if pair else 'a parallelogram except for slides'} along {axes}"
             case "normal":
                 return f"{points}: in a plane normal to {axes}"
             case _:

@@ -296,18 +296,18 @@ def _labelled(anatomy: LegDecomposition) -> LegDecomposition:
         line = getattr(observation, "line", None)
         index = next((i for i, leg in enumerate(anatomy.legs) if anatomy.leg_of(observation.link) == leg), None)
         if index is None:
-            defects.append(Defect(file, line, "observe of a link that is in no leg", observation.link,
+            defects.append(Defect(file, line, "observe of a link that is not in a leg", observation.link,
                                   "links of the legs: " + links))
         elif given.setdefault(index, observation.leg) != observation.leg:
             defects.append(Defect(file, line, f"link {observation.link!r} is in the leg labelled {given[index]!r}, "
                                   "but is labelled", observation.leg, given[index]))
         elif any(label == observation.leg and i != index for i, label in given.items()):
             defects.append(Defect(file, line, "a leg's label used for links of two different legs", observation.leg,
-                                  "one label a leg"))
+                                  "one label per leg"))
         elif isinstance(observation, Direction) and not lines.parallel(
                 watched.setdefault(observation.link, observation.direction), observation.direction):
             defects.append(Defect(file, line, "a second direction of a link", observation.link,
-                                  "one a link; more of it as <observe kind=\"direction\">"))
+                                  "one per link; others as <observe kind=\"direction\">"))
     if defects:
         raise BadRobotFile(defects)
     numbers = [str(i + 1) for i in range(len(anatomy.legs))]

@@ -58,7 +58,7 @@ class JointType(StrEnum):
 
 @dataclass(frozen=True)
 class Limits:
-    """Limits of a joint's coordinate, kept for writing back; None where the file gives none."""
+    """Limits of a joint's coordinate, kept for writing back; None if the file gives none."""
 
     lower: float | None = None
     upper: float | None = None
@@ -174,7 +174,7 @@ class Coupling:
 
 @dataclass(frozen=True)
 class Note:
-    """Something that a file does not say and that was settled while it was read: a ``guess`` that an option overrides,
+    """Something that a file does not say and that was settled while reading it: a ``guess`` that an option overrides,
     or what was ``solved``, ``merged``, ``ignored`` or left ``open``."""
 
     kind: str
@@ -213,12 +213,13 @@ class Mechanism(Result, shown_as="robot"):
     observation could tell; ``platform`` is then only the first of them."""
 
     def headline(self) -> str:
-        """The name, and how much there is of it."""
+        """The name, and the number of its parts."""
         motors = sum(joint.actuated for joint in self.joints.values())
         return f"{self.name}, {len(self.links)} links, {len(self.joints)} joints, {motors} motors"
 
     def said(self) -> tuple[Any, ...]:
-        """All but where it was read from: two mechanisms with the same links, joints and observations are equal."""
+        """Everything except where it was read from: two mechanisms with the same links, joints and observations are
+        equal."""
         return self._content
 
     @cached_property
@@ -285,7 +286,7 @@ class Mechanism(Result, shown_as="robot"):
         return adjacency(self.links, (joint.links for joint in self.joints.values()))
 
     def carrier(self, coupling: Coupling, link: str) -> Joint:
-        """The joint whose coordinate a coupling means by a link; raises ``BadMechanism`` where there is none."""
+        """The joint whose coordinate a coupling means by a link; raises ``BadMechanism`` if there is none."""
         for joint in self.joints.values():
             if joint.successor == link and joint.in_tree and joint.type.freedoms == 1:
                 return joint
@@ -293,7 +294,7 @@ class Mechanism(Result, shown_as="robot"):
 
     @cached_property
     def limited(self) -> dict[str, tuple[float, float]]:
-        """The joints whose coordinates are limited: lower and upper limit (m, rad), infinite where there is none."""
+        """The joints whose coordinates are limited: lower and upper limit (m, rad), infinite if there is none."""
         given = {name: (joint.limits.lower, joint.limits.upper) for name, joint in self.joints.items()
                  if joint.limits is not None and (joint.limits.lower, joint.limits.upper) != (None, None)}
         return {name: (-np.inf if lower is None else lower, np.inf if upper is None else upper)
@@ -306,8 +307,8 @@ class Mechanism(Result, shown_as="robot"):
 
     @cached_property
     def length(self) -> float:
-        """The characteristic length (m): mean distance of the joint centres from their centroid; 1 where they are
-        one point, up to rounding."""
+        """The characteristic length (m): mean distance of the joint centres from their centroid; 1 if they coincide, up
+        to rounding."""
         if not self.joints:
             return 1.0
         points = np.array([joint.point for joint in self.joints.values()])
@@ -350,7 +351,7 @@ class Mechanism(Result, shown_as="robot"):
         return fresh_name(name, self.links.keys() | self.joints.keys())
 
     def differences(self, other: Mechanism, tolerance: float = SAME_GEOMETRY) -> list[str]:
-        """What differs from ``other``, in words; empty where they are the same mechanism (names, order, geometry)."""
+        """What differs from ``other``, in words; empty if they are the same mechanism (names, order, geometry)."""
         found: list[str] = []
 
         def compare(what: str, mine: object, theirs: object) -> None:

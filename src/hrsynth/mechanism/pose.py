@@ -29,7 +29,7 @@ EXAMPLE = "x=0.02,y=0.1,z=-0.7, and phi=10deg or rpy=0.1/0/0"
 @dataclass(frozen=True)
 class Pose:
     """Parts of a platform's pose; None is free. ``phi`` is the turn from the zero configuration about the base frame's
-    z (of a planar robot about the normal of its plane), ``rpy`` URDF's fixed-axis roll, pitch, yaw."""
+    z (for a planar robot about the normal of its plane), ``rpy`` URDF's fixed-axis roll, pitch, yaw."""
 
     x: float | None = None
     y: float | None = None
@@ -41,7 +41,7 @@ class Pose:
 
     def __post_init__(self) -> None:
         if self.phi is not None and self.rpy is not None:
-            raise BadRequest("a pose is given both phi and rpy", str(self), "one of them")
+            raise BadRequest("a pose has both phi and rpy", str(self), "one of them")
         for name, values in self.given.items():
             if not all(map(math.isfinite, values)):
                 raise BadRequest(f"pose: {name} is not finite", "/".join(map(str, values)), "a finite number")
@@ -50,7 +50,7 @@ class Pose:
 
     @classmethod
     def parse(cls, text: str) -> Pose:
-        """The pose that ``x=0.02,y=0.1,z=-0.7,phi=10deg`` says; raises ``BadRequest``."""
+        """The pose written as ``x=0.02,y=0.1,z=-0.7,phi=10deg``; raises ``BadRequest``."""
         parts = _fields(text, "pose")
         fields: dict[str, Any] = {name: _triple(value, text) if name == "rpy" else _number(value, name, text)
                                   for name, value in parts}
@@ -58,8 +58,8 @@ class Pose:
 
     @classmethod
     def of(cls, X: Array, point: Array | None = None) -> Pose:
-        """The pose of a homogeneous matrix X_BP (4, 4); of a point body the position of ``point`` (in the platform's
-        frame) alone."""
+        """The pose of a homogeneous matrix X_BP (4, 4); for a point body only the position of ``point`` (in the
+        platform's frame)."""
         x, y, z = map(float, X[:3, 3] if point is None else X[:3, :3] @ point + X[:3, 3])
         if point is not None:
             return cls(x, y, z)
@@ -80,7 +80,7 @@ class Pose:
 
     @property
     def rotation(self) -> Array | None:
-        """R_BP (3, 3) where rpy is given."""
+        """R_BP (3, 3) if rpy is given."""
         return None if self.rpy is None else rotation_from_rpy(*self.rpy)
 
     def to_dict(self) -> dict[str, Any]:
@@ -95,14 +95,14 @@ class Pose:
 
 @dataclass(frozen=True)
 class PoseForm:
-    """How a user writes poses that turn about several axes: a turn by ``phi`` where it is one, rpy in ``degrees``."""
+    """How a user writes poses that turn about several axes: a turn by ``phi`` if it is one, rpy in ``degrees``."""
 
     phi: bool = False
     degrees: bool = False
 
     @classmethod
     def of(cls, poses: Iterable[Pose | ModeNumber]) -> PoseForm:
-        """The manner of these poses."""
+        """The form in which these poses are written."""
         typed = [each for each in poses if isinstance(each, Pose)]
         return cls(any(each.phi is not None or "phi=" in each.shown for each in typed),
                    any("deg" in each.shown for each in typed))
@@ -136,7 +136,7 @@ POSES = (f"a text such as {EXAMPLE}; a dict of these; numbers x, y, z or x, y, z
 
 
 def as_pose(given: PoseLike) -> Pose:
-    """The pose that is given in any of the ways of ``PoseLike`` but by the number of a mode; raises ``BadRequest``."""
+    """The pose given in any of the ways of ``PoseLike`` except by the number of a mode; raises ``BadRequest``."""
     if isinstance(given, Pose):
         return given
     if isinstance(given, str):
@@ -201,14 +201,14 @@ def asked_pose(given: PoseLike) -> Pose | ModeNumber:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Grid(Value):
-    """A line, plane or box of poses: the parts that vary with their values, over a pose that holds the rest."""
+    """A line, plane or box of poses: the parts that vary with their values, over a pose that gives the rest."""
 
     axes: tuple[tuple[str, Array], ...]
     fixed: Pose
 
     @classmethod
     def parse(cls, text: str, largest: int = LARGEST_GRID) -> Grid:
-        """The grid that ``x=-0.3:0.3:21,y=0:0.1:5,z=-0.7`` says (from:to:count), of at most ``largest`` poses; raises
+        """The grid written as ``x=-0.3:0.3:21,y=0:0.1:5,z=-0.7`` (from:to:count), of at most ``largest`` poses; raises
         ``BadRequest``."""
         axes: list[tuple[str, Array]] = []
         single: list[str] = []
@@ -289,7 +289,7 @@ def rpy_of(R: Array) -> tuple[float, float, float]:
 
 
 def positive_half_turn(angle: float) -> float:
-    """An angle that was computed; half a turn, which has no sense, is a positive one."""
+    """A computed angle; half a turn, which has no sense, is made positive."""
     return -angle if abs(angle + math.pi) < HALF_TURN else angle
 
 

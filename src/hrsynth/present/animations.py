@@ -87,7 +87,7 @@ def captions(found: Servo, moments: list[int]) -> Iterator[str]:
         since = moments[max(0, k - AFTER)]
         passed = [each for each in passages if since < each.place <= number]
         if k == 0:
-            yield "The start. Pale: where the watched legs are to lie. Bright: where they lie."
+            yield "The start. Pale: where the watched legs should be. Bright: where they are."
         elif k == len(moments) - 1:
             turned = f" and {np.degrees(radians):.2g}°" if np.degrees(radians) > LEAST_TURN else ""
             yield f"The end: {ENDS[found.ended]}. The platform is {1e3 * metres:.3g} mm{turned} from the goal."
@@ -95,9 +95,9 @@ def captions(found: Servo, moments: list[int]) -> Iterator[str]:
             yield ("A singularity is crossed: for a moment the legs do not show how the platform moves."
                    if passed[-1].kind == TYPE_2 else "A leg passes its limit.")
         elif sizes[number] > REST_OF_RUN * sizes.max():
-            yield "The controller turns the watched legs towards the directions that they are to have."
+            yield "The controller turns the watched legs towards their desired directions."
         else:
-            yield "The watched legs have their directions; the platform comes to rest."
+            yield "The watched legs have their desired directions; the platform comes to rest."
 
 
 class Sheet:

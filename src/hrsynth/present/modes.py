@@ -56,7 +56,7 @@ def picture(found: AssemblyModes, paper: Paper = PNG) -> bytes:
 def why_undrawn(found: AssemblyModes) -> str | None:
     """Why there is nothing to draw: a formation, a continuum of modes, or none at all."""
     if found.formation is not None:
-        return "a formation has no platform, on which ends of legs would be drawn"
+        return "a formation has no platform on which to draw the ends of legs"
     if found.found.continuum is not None or not (found.modes or found.near):
         return found.found.degenerate or "there is no mode"
     return None

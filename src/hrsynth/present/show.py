@@ -71,8 +71,8 @@ def record(command: str, robot: str | None, fields: dict[str, Any]) -> str:
 
 
 def html(result: Result) -> str:
-    """What a notebook shows: a view as it moves; else the same text in columns, with lines that are not broken, motors
-    underlined by markup, which any font can.
+    """What a notebook shows: a view that moves; otherwise the same text in columns, without line breaks, motors
+    underlined by markup, which works in any font.
 
     >>> hrsynth.html(hrsynth.derive("3rrr_m1"))[:4]
     '<pre'
@@ -90,10 +90,10 @@ def html(result: Result) -> str:
 @spelled
 def draw(result: Result, file: str | Path | None = None, *, plane: Pose | str | None = None, steps: int = 51,
          width: str | None = None, font: str | None = None) -> Picture:
-    """A picture of a result, written to ``file`` (.png, .pdf or .svg; of a servo run .gif too) where one is named: the
-    kinematic schemes of a derivation's robots (.svg), and as ``-o`` draws them assembly modes, an atlas, a servo run,
+    """A picture of a result, written to ``file`` (.png, .pdf or .svg; for a servo run also .gif) if one is given: the
+    kinematic schemes of a derivation's robots (.svg) and, as with ``-o``, assembly modes, an atlas, a servo run,
     checked or accuracy poses over a grid, and where a freedom is lost over a ``plane`` of poses (``steps`` a side).
-    ``width`` (``"88mm"``) and ``font`` (``"serif 8pt"``) as on the command line.
+    ``width`` (``"88mm"``) and ``font`` (``"serif 8pt"``) are as on the command line.
 
     >>> picture = hrsynth.draw(hrsynth.modes("3rrr_m1"), width="88mm")
     >>> picture

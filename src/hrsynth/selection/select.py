@@ -55,7 +55,7 @@ TYPES = {"type1": "a Type 1 singularity", "type2": "a Type 2 singularity", "type
 
 @dataclass(frozen=True)
 class Criteria:
-    """What is looked at; :func:`select` takes each of these by its name. Raises ``BadRequest``."""
+    """The criteria of :func:`select`, which takes each of them by its name. Raises ``BadRequest``."""
 
     size: int = 4
     """Legs of the largest sets."""
@@ -87,7 +87,7 @@ class Criteria:
 @dataclass(frozen=True)
 class ModeCount:
     """How many assembly modes there are with the directions of a pose, in how many of them the robot was found
-    assembled, and whether these are proved to be all; ``why`` they are not listed, else empty."""
+    assembled, and whether these are proved to be all; ``why`` they are not listed, otherwise empty."""
 
     count: int | None
     reachable: int | None
@@ -118,8 +118,8 @@ class Decision(Compared):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Candidate(Value):
-    """What is known of a set of legs; None where it was not asked, because the set was discarded before or was not
-    ``examined``: then it is neither kept nor discarded."""
+    """What is known about a set of legs; None for what was not computed, because the set was discarded before or was
+    not ``examined``: then it is neither kept nor discarded."""
 
     legs: tuple[str, ...]
     verdict: str
@@ -189,12 +189,12 @@ class Selection(Result, shown_as="select"):
 
     @property
     def unexamined(self) -> tuple[Candidate, ...]:
-        """The sets of which it is not known whether they would be kept."""
+        """The sets for which it is not known whether they would be kept."""
         return tuple(each for each in self.candidates if not each.examined)
 
     @property
     def fewer(self) -> str | None:
-        """Why the best set serves better than one that holds more legs, None where that is not seen."""
+        """Why the best set serves better than one with more legs, None if that is not seen."""
         known = [(each.legs, each.ends) for each in self.kept if each.ends is not None]
         return fewer_are_better(known[0], known[1:]) if known and known[0][0] == self.kept[0].legs else None
 
@@ -219,18 +219,18 @@ def select(robot: RobotLike, camera: CameraLike = None, *, observe: LegsLike = N
            start: PoseLike, goal: PoseLike, cone: Cones | None = None, noise: str | Noise | None = None,
            criteria: Criteria, seed: int = 0) -> Selection:
     """All sets of legs, or of what is observed, for the displacement from ``start`` to ``goal``, ranked by how many
-    poses besides the goal were found to attract the loop, by the certified radius (those of one power of two are
-    alike), then by the largest position error at the goal for cones about the directions (``cone``: the half-angle of
-    all, or one a leg, by default 0.1°; MMT A.2) and ``noise`` of what else is observed (as ``0.3px,1mm,0.1deg``).
+    poses besides the goal were found to attract the loop, by the certified radius (radii within one power of two are
+    equal), then by the largest position error at the goal for cones about the directions (``cone``: the half-angle for
+    all, or one per leg, by default 0.1°; MMT A.2) and ``noise`` of other observations (as ``0.3px,1mm,0.1deg``).
 
     The fields of :class:`Criteria` can be given by their names: ``size``, ``examine``, ``endings``, ``runs``,
-    ``sight``, ``focal``, ``seconds``. The sets are those of the legs or links ``observe`` and of what else the file
-    or ``see`` observes, by default of all legs. A set is discarded where it does not see every freedom, where an end is
-    singular or beyond limits of joints, or something is behind its camera there, where the camera (``sight``) sees too
-    little of a leg, where start and goal are proved to lie in different aspects, and where a simulated run ends
-    elsewhere. Modes, aspects and endings are asked for the ``examine`` most accurate sets (endings for ``endings`` of
-    them; the radius of directions of segments alone), the others are neither kept nor discarded. Runs are made from the
-    best set on, until ``runs`` of them ended at the goal.
+    ``sight``, ``focal``, ``seconds``. The sets are those of the legs or links ``observe`` and of what else the file or
+    ``see`` observes, by default of all legs. A set is discarded if it does not see every freedom, if an end is singular
+    or beyond joint limits, or something is behind its camera there, if the camera (``sight``) sees too little of a leg,
+    if start and goal are proved to lie in different aspects, or if a simulated run ends elsewhere. Modes, aspects and
+    endings are computed for the ``examine`` most accurate sets (endings for ``endings`` of them; the radius only for
+    directions of segments); the others are neither kept nor discarded. Runs are made from the best set on, until
+    ``runs`` of them have ended at the goal.
 
     Raises ``BadRequest``, ``PoseNotReached``.
 
@@ -361,7 +361,7 @@ class _Work:
                 continue
             if left is None and (begun == most or time.monotonic() > self.until):
                 left = f"the {begun} most accurate were" if begun == most else (
-                    f"the time was over after the {begun} most accurate, on a faster machine there would be more")
+                    f"the time ran out after the {begun} most accurate, on a faster machine there would be more")
             if left is not None:
                 found.append(replace(candidate, examined=False))
                 continue

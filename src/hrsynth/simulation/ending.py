@@ -28,7 +28,7 @@ ENDINGS = (GOAL, MODE, ANTIPODAL, MINIMUM, BOUNDARY, SIGHT, TIME, UNDECIDED)
 @dataclass(frozen=True, eq=False, repr=False)
 class Ending(Value):
     """How a run ended and why that is its name; ``matched`` is the number of the assembly mode, counted from 1 in the
-    list of all modes of the goal's directions (None where it is none of them, or where they cannot be listed)."""
+    list of all modes of the goal's directions (None if it is none of them, or if they cannot be listed)."""
 
     name: str
     reason: str
@@ -51,12 +51,12 @@ class EndingClassifier(Value):
             return self._served(run.last, values)
         if run.stopped in (REST, POISED):
             ending = rest(self.setting, run.last, last)
-            loose = "" if run.stopped == REST else "; that this rest draws the state to itself was not found"
+            loose = "" if run.stopped == REST else "; this rest was not found to attract"
             return replace(ending, reason=ending.reason + loose)
         if run.stopped == LIMIT:
             return Ending(BOUNDARY, f"joint {run.joint} is at its limit")
         if run.stopped == UNSEEN:
-            return Ending(SIGHT, f"{self._unseen(run.last)}: the loop has nothing to go on")
+            return Ending(SIGHT, f"{self._unseen(run.last)}: the loop has nothing to act on")
         if run.stopped == UNMEASURED:
             return Ending(SIGHT, "a point or line comes to the camera's centre, or the camera into a cylinder: what is "
                                  "measured has no value there")
@@ -67,7 +67,7 @@ class EndingClassifier(Value):
         if run.stopped == AWAY:
             return Ending(BOUNDARY, "the platform runs away, nothing limits its slides")
         over = (f"more than {RUN_EVALUATIONS:,} configurations would be needed" if run.stopped == EFFORT
-                else "the time was over")
+                else "the time ran out")
         return Ending(TIME, f"{over}, with ‖e‖ = {last.size:.3g}")
 
     def _unseen(self, at: ClosedConfiguration) -> str:
@@ -108,7 +108,7 @@ class EndingClassifier(Value):
 
 
 def rest(setting: ObservedRobot, at: ClosedConfiguration, last: Command) -> Ending:
-    """What a configuration is at which the command vanishes and the error does not: a singularity of the hidden robot,
+    """What a configuration is at which the command vanishes but the error does not: a singularity of the hidden robot,
     the limit of a leg's reach, or neither."""
     posture = ConfigurationAnalysis.of(setting).classify(at)
     where = f"‖e‖ = {last.size:.3g} and the command vanishes"

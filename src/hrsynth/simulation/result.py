@@ -40,7 +40,7 @@ class Scatter:
 
     @property
     def aside(self) -> bool:
-        """Whether noise holds the platform aside rather than moving it about."""
+        """Whether noise shifts the platform rather than shaking it."""
         return self.offset > ASIDE * self.rms_metres
 
     def to_dict(self) -> dict[str, Any]:
@@ -54,8 +54,8 @@ class Scatter:
 class Servo(Result, shown_as="servo"):
     """A servo run: what was asked, the run, its ending, what it passed.
 
-    With noise the ending is that of the same loop without noise, run on from where the noisy one stopped; ``spread`` is
-    how far the noisy one kept from there.
+    With noise the ending is that of the same loop without noise, continued from where the noisy run stopped; ``spread``
+    is how far the noisy run stayed from there.
     """
 
     setting: ObservedRobot

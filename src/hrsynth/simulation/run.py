@@ -58,7 +58,7 @@ class Run(Value):
     """What happened: times (n,), the configurations and commands at them, and why it stopped: the error vanished
     (``served``), a stable rest was reached (``rest``), the command vanished where none was found (``poised``), a joint
     met its limit (``limit``), what is observed left a camera's sight (``unseen``), the loops' rank falls (``open``),
-    the platform ran away (``away``), the time was over (``time``), the integrator's ``RUN_EVALUATIONS`` configurations
+    the platform ran away (``away``), the time ran out (``time``), the integrator's ``RUN_EVALUATIONS`` configurations
     were (``effort``), or it could not go on (``lost``)."""
 
     times: Array

@@ -76,7 +76,7 @@ class Conditions:
     physics: bool = False
     """Whether a mock-up in MuJoCo is driven, with dynamics."""
     depth: str = "exact"
-    """The depth of what is seen in images, as the law supposes it: ``exact``, ``desired`` (that at the goal) or
+    """The depth of what is seen in images, as the law assumes it: ``exact``, ``desired`` (that at the goal) or
     ``constant:0.5`` (m)."""
     duration: float | None = None
     """Leads the desired values along the straight way of poses in so many seconds instead of at once."""
@@ -108,7 +108,7 @@ class Conditions:
 
     @property
     def amount(self) -> Noise | None:
-        """The noise, read."""
+        """The parsed noise."""
         assert not isinstance(self.noise, str)
         return self.noise
 
@@ -130,12 +130,12 @@ def servo(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None,
           start: PoseLike, goal: PoseLike, conditions: Conditions, seed: int = 0) -> Servo:
     """The servo loop of MMT 2.3 from the pose ``start`` towards what is measured at ``goal``.
 
-    ``observe``, ``camera`` and ``see`` as for ``derive``; each kind of observation has its error. The fields of
+    ``observe``, ``camera`` and ``see`` are as for ``derive``; each kind of observation has its error. The fields of
     :class:`Conditions` can be given by their names: ``gain``, ``sense``, ``noise``, ``bias``, ``lens``, ``physics``,
     ``depth``, ``duration``, ``time``.
 
-    Raises ``BadRequest`` for names that there are not, observations that do not see the platform, singular poses and
-    those at which something is behind its camera; ``PoseNotReached`` for poses out of reach; ``MissingExtra``.
+    Raises ``BadRequest`` for unknown names, observations that do not see the platform, singular poses and those at
+    which something is behind its camera; ``PoseNotReached`` for poses out of reach; ``MissingExtra``.
 
     >>> hrsynth.servo("3rrr_m1", start="x=0,y=0,phi=0", goal="x=0.02,y=0,phi=0", gain=0.8)
     <Servo: 3rrr_m1, watching 1, 2, 3: ended at x=0.02,y=0,z=0,phi=0deg, goal>

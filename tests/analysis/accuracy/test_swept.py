@@ -86,7 +86,7 @@ def test_another_question_does_not_go_on(tmp_path: Path, monkeypatch: pytest.Mon
                                          ) -> None:
     part, journal = broken_off(tmp_path / "s.npy", monkeypatch)
     before = part.read_bytes(), journal.read_bytes()
-    with pytest.raises(BadRequest, match="another sweep to this file was broken off"):
+    with pytest.raises(BadRequest, match="another sweep to this file was interrupted"):
         swept_to(tmp_path / "s.npy", 50, monkeypatch, **other)
     assert (part.read_bytes(), journal.read_bytes()) == before
 

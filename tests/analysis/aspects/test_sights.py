@@ -172,4 +172,4 @@ def test_where_nothing_is_enclosed_the_way_is_sampled(tmp_path: Path) -> None:
         assert found.road.reached == 1
         assert 0 < found.road.least <= min(abs(found.start.value), abs(found.goal.value)) * (1 + 1e-9)
         assert "sampled" in hrsynth.text(found)
-        assert "straight way" in hrsynth.text(found)
+        assert "straight path" in hrsynth.text(found)

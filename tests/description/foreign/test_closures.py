@@ -217,7 +217,7 @@ def test_a_yaml_file_of_another_name_gives_the_closures(tmp_path: Path):
     (tmp_path / "unlike.yaml").write_text(yaml.replace("one", "none"))
     assert is_the_four_bar(load(tmp_path / "robot.urdf"))
     (tmp_path / "more.yml").write_text(yaml)
-    with pytest.raises(BadRobotFile, match=r"2 YAML files beside it close its loops.*closures.yaml, more.yml"):
+    with pytest.raises(BadRobotFile, match=r"2 YAML files next to it close its loops.*closures.yaml, more.yml"):
         load(tmp_path / "robot.urdf")
     (tmp_path / "robot.yaml").write_text(yaml)
     assert is_the_four_bar(load(tmp_path / "robot.urdf"))

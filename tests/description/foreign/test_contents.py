@@ -117,7 +117,7 @@ def test_what_a_dialect_cannot_hold_is_one_sentence(tmp_path: Path):
     for said in ("no body can have", "nowhere.dae", "<gripper> of links"):
         assert sum(said in line for line in lost) == 1
     (note,) = save(full, tmp_path / "out.urdf")
-    assert note.text == "meshes that are not there: nowhere.dae"
+    assert note.text == "missing meshes: nowhere.dae"
     assert "nowhere.dae" in (tmp_path / "out.urdf").read_text()
 
 

@@ -173,10 +173,10 @@ def test_yaml_is_data(yaml: str, tmp_path: Path):
 
 def test_what_is_no_robot_file_or_folder(tmp_path: Path):
     assert_refused(made(tmp_path, "<html/>", "page.xml"))
-    assert_refused(made(tmp_path, "a: 1", "alone.yaml"), "no URDF file beside")
+    assert_refused(made(tmp_path, "a: 1", "alone.yaml"), "no URDF file next to")
     for text, name in ((ONE["urdf"], "a.urdf"), (ONE["sdf"], "b.sdf")):
         made(tmp_path / "two" if (tmp_path / "two").is_dir() else _folder(tmp_path / "two"), text, name)
-    with pytest.raises(HrsynthError, match="a folder of 2 robot files"):
+    with pytest.raises(HrsynthError, match="a folder with 2 robot files"):
         load(tmp_path / "two")
 
 

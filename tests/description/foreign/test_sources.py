@@ -172,7 +172,7 @@ MESSAGES = {
     "ring": ("urdf", "<robot name='r'><link name='o'/><link name='a'/><link name='b'/>\n"
              "<joint name='j1' type='continuous'><parent link='a'/><child link='b'/></joint>\n"
              "<joint name='j2' type='continuous'><parent link='b'/><child link='a'/></joint></robot>",
-             ["robot.urdf:3: joints that carry each other in a ring, found j2, j1, allowed: a tree"]),
+             ["robot.urdf:3: joints that form a cycle, found j2, j1, allowed: a tree"]),
     "gearbox": ("urdf", FILES["urdf: gazebo"]["robot.urdf"].replace("</robot>",
                 "<gazebo><joint name='g' type='gearbox'>"
                 "<parent>rocker</parent><child>bar</child></joint></gazebo></robot>"),

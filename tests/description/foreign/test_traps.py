@@ -176,7 +176,7 @@ def test_missing_second_axes_are_the_default_and_a_guess(tmp_path: Path):
         (joint,) = robot.joints.values()
         assert joint.type is JointType.UNIVERSAL
         assert np.allclose(joint.axes, [[1, 0, 0], [0, 0, 1]])
-        assert any("0 0 1 as the format's default" in note.text for note in robot.notes)
+        assert any("0 0 1, the format's default" in note.text for note in robot.notes)
     oblique = read(tmp_path, text.format("revolute2", "0 1 1"), "sdf")
     assert [joint.type.value for joint in oblique.joints.values()] == ["R", "R"]
 

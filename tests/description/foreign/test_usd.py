@@ -265,7 +265,7 @@ REFUSED = [
     ('#usda 1.0\n( subLayers = [@../outside.usda@] )\n', "outside of the file's folder"),
     ('#usda 1.0\ndef "r" (references = @https://hrsynth.example/r.usd@) {}\n', "outside of the file's folder"),
     ('#usda 1.0\ndef "r" (payload = @/etc/passwd@) {}\n', "outside of the file's folder"),
-    ('#usda 1.0\ndef "r" (references = @robot.urdf@) {}\n', "no USD file"),
+    ('#usda 1.0\ndef "r" (references = @robot.urdf@) {}\n', "not a USD file"),
     ('#usda 1.0\ndef "r" (clips = { dictionary default = { asset[] assetPaths = [@/etc/passwd@] } }) {}\n', "clips"),
     ("#usda 1.0\ndef Xform {", "OpenUSD"), ("#usda 1.0\n", "no rigid bodies"), ("PXR-USDC" + "x" * 200, "OpenUSD"),
     ("PK\x03\x04....", "package"), (stage("").replace("metersPerUnit = 1", "metersPerUnit = 0"), "metersPerUnit"),

@@ -103,7 +103,7 @@ def test_of_two_files_that_are_read_together_none_is_replaced_alone(tmp_path: Pa
     before = [each.read_bytes() for each in pair]
     assert load(pair[1]).differences(load("3rrr_m1")) == []
     for path, other in (pair, pair[::-1]):
-        words = "with other content" if tree == loops and path is pair[1] else f"{other.name} beside it"
+        words = "with other content" if tree == loops and path is pair[1] else f"{other.name} next to it"
         with pytest.raises(BadRequest, match=words) as caught:
             save(load("delta"), path)
         assert "another name" in str(caught.value)

@@ -53,7 +53,7 @@ def opened(tab: Tab, address: str, name: str, size: str = "wide") -> Any:
 
 def answered(page: Any) -> None:
     """Wait until nothing is under way."""
-    page.locator("#answer", has_text=re.compile(r"^(?!.*being worked out)")).wait_for(timeout=SLOW)
+    page.locator("#answer", has_text=re.compile(r"^(?!.*Working out)")).wait_for(timeout=SLOW)
     until(page, IDLE)
 
 
@@ -487,7 +487,7 @@ def test_the_end_of_the_server_is_told(tab: Tab):
     server = studio(open_=False)
     page = enter(tab, server.address)
     server.stop()
-    page.locator("#lost-link", has_text="start it once more").wait_for(timeout=SLOW)
+    page.locator("#lost-link", has_text="start it again").wait_for(timeout=SLOW)
     page.wait_for_timeout(1000)
     assert all("WebSocket" in complaint for complaint in tab.complaints)
     tab.complaints.clear()

@@ -360,7 +360,7 @@ def test_a_goal_behind_the_camera_is_told_to_be_the_goal():
 def test_why_runs_are_simulated_one_by_one_is_told():
     seen = hrsynth.observe("gough_stewart", camera="eye=base@0,0,-0.6", see=POINTS)
     assert module.hindrances(seen) == ("observations of kind point are fed back",)
-    assert module.hindrances(ObservedRobot.of("rrrrr_m1")) == ("a leg is no closed form",)
+    assert module.hindrances(ObservedRobot.of("rrrrr_m1")) == ("a leg has no closed form",)
     assert module.hindrances(ObservedRobot.of("3rrr_m1")) == ()
 
 

@@ -34,8 +34,8 @@ WORST = 3
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Accuracy(Result, shown_as="accuracy"):
-    """The error maxima for cones about the observed directions, and noise of what else is observed: at single poses,
-    over a grid, and where asked for what samples of true errors give (None otherwise)."""
+    """The error maxima for cones about the observed directions, and for noise of other observations: at single poses,
+    over a grid, and, if requested, what samples of true errors give (None otherwise)."""
 
     setting: ObservedRobot
     blur: Blur
@@ -47,7 +47,7 @@ class Accuracy(Result, shown_as="accuracy"):
 
     @property
     def cones(self) -> Array:
-        """Half-angles (k,) of the observed directions (rad), 0 of what is no direction."""
+        """Half-angles (k,) of the observed directions (rad), 0 for observations that are not directions."""
         return self.blur.cones
 
     def headline(self) -> str:
@@ -81,17 +81,17 @@ def accuracy(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = No
     """The largest position and orientation error of the platform over all errors of what is observed, to first order
     (docs/pages/theory.md, section 10; MMT A.1): max over unit w of Σ ψ_i ‖(J_i P_i)ᵀ w‖, J = M^{T+}.
 
-    ``cone`` is the half-angle of the cones about directions, of all or one a leg; ``noise`` how wrong other kinds may
-    be, as ``0.3px,1mm,0.1deg`` (of directions too, without a cone). At the poses ``at``, over ``plane`` (what is
-    reached of it, ``steps`` poses a side), or over ``grid``; default: the zero configuration. In a grid free parts stay
-    as at the zero configuration where legs are known subproblems. The platform comes to rest where ``servo`` does;
-    poses of a grid at which something is not in front of its camera are left out. ``nonlinear`` true errors are tried
-    at each single pose, of a grid at its worst ones. The errors (m, rad) of a plane or grid of any size are written
-    part by part ``into`` a file .npy; a sweep that was broken off goes on when it is asked again. ``observe``,
-    ``camera`` and ``see`` as for ``derive``.
+    ``cone`` is the half-angle of the cones about directions, one for all legs or one per leg; ``noise`` gives the
+    errors of other kinds, as ``0.3px,1mm,0.1deg`` (also of directions without a cone). The poses are ``at``, those over
+    ``plane`` (as far as it is reached, ``steps`` poses a side), or those over ``grid``; default: the zero
+    configuration. In a grid free parts stay as at the zero configuration if the legs are known subproblems. The
+    platform comes to rest where ``servo`` does; poses of a grid at which something is not in front of its camera are
+    left out. ``nonlinear`` true errors are tried at each single pose, in a grid at its worst poses. ``into`` a file
+    .npy, the errors (m, rad) of a plane or grid of any size are written part by part; the same call continues an
+    interrupted sweep. ``observe``, ``camera`` and ``see`` are as for ``derive``.
 
-    Raises ``BadRequest`` for names that there are not, cones that are none, what does not see every freedom (the error
-    is infinite everywhere) or is behind its camera, ``PoseNotReached``, ``PlaneNotMet``.
+    Raises ``BadRequest`` for unknown names, for invalid cones, if not every freedom is seen (the error is infinite
+    everywhere) or something is behind its camera; ``PoseNotReached``, ``PlaneNotMet``.
 
     >>> hrsynth.accuracy("3rrr_m1", cone="0.1deg", at="x=0,y=0,phi=0")
     <Accuracy: 3rrr_m1, watching 1, 2, 3: 0.414 mm at x=0,y=0,z=0,phi=0deg>

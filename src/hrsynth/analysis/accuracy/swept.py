@@ -151,7 +151,7 @@ class _SweepDraft:
         try:
             told = json.loads(lines[0])
             if told["asked"] != asked:
-                raise BadRequest("another sweep to this file was broken off", str(self.journal),
+                raise BadRequest("another sweep to this file was interrupted", str(self.journal),
                                  "the same question, another file, or that journal removed")
             done = Tally.read(lines[-1]) if lines[1:] else Tally()
             there = self.part.stat().st_size if self.part.exists() else 0

@@ -54,8 +54,8 @@ class ModePair(Value):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Atlas(Result, shown_as="atlas"):
-    """All modes with the directions at one pose, and of each two what :class:`ModePair` says; ``places`` are the real
-    robot's configurations at them (None where it was not found assembled)."""
+    """All modes with the directions at one pose, and for each two of them what :class:`ModePair` says; ``places`` are
+    the real robot's configurations at them (None if it was not found assembled)."""
 
     aspects: Aspects
     listed: AssemblyModes
@@ -67,7 +67,7 @@ class Atlas(Result, shown_as="atlas"):
         return f"{self.listed.headline()}, aspects: {self.aspects_met}"
 
     def verdict(self, one: int, other: int) -> str:
-        """The verdict on two modes by their numbers; each lies in one aspect with itself."""
+        """The verdict on two modes by their numbers; each mode is in one aspect with itself."""
         return SAME if one == other else self._by_numbers[min(one, other), max(one, other)].verdict
 
     @cached_property
@@ -82,7 +82,7 @@ class Atlas(Result, shown_as="atlas"):
 
     @cached_property
     def groups(self) -> tuple[tuple[int, ...], ...]:
-        """The modes at which the robot is assembled, those together that lie in one aspect."""
+        """The modes at which the robot is assembled, grouped by aspect."""
         found: list[tuple[int, ...]] = []
         for number in (k for k, at in enumerate(self.places, 1) if at is not None):
             if not any(number in group for group in found):
@@ -129,7 +129,7 @@ class Atlas(Result, shown_as="atlas"):
 
     @property
     def cuspidal(self) -> bool | None:
-        """Whether two modes lie in one aspect; None where that is not shown at this pose: it may be so at others."""
+        """Whether two modes lie in one aspect; None if that is not shown at this pose: it may be so at others."""
         return True if self.changes else None
 
     def to_dict(self) -> dict[str, Any]:
@@ -142,7 +142,7 @@ class Atlas(Result, shown_as="atlas"):
 @question()
 def atlas(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
           at: PoseLike | ClosedConfiguration | None = None, seed: int = 0, budget: int = BUDGET) -> Atlas:
-    """Of all modes with the directions at ``at`` (as for ``modes``), which two lie in one aspect (as for ``path``), and
+    """Which two of all modes with the directions at ``at`` (as for ``modes``) lie in one aspect (as for ``path``), and
     whether that shows the hidden robot to be cuspidal: that it can go from one mode to another, with the same
     directions, without a Type 2 singularity.
 

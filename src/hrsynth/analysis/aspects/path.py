@@ -35,7 +35,7 @@ from .words import SAME, SEPARATED, UNDECIDED
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PathEnd(Value):
-    """A pose that was asked for: the whole pose reached, its configuration, and the condition's value there."""
+    """A requested pose: the whole pose that is reached, its configuration, and the value of the condition there."""
 
     pose: Pose
     configuration: ClosedConfiguration
@@ -48,8 +48,8 @@ class PathEnd(Value):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SampledRoad(Value):
-    """The condition at ``count`` poses on the straight way between two: the smallest |value|, ``at`` which pose; how
-    often its sign changes from one to the next (None of a value without sign); the part of the way that was
+    """The condition at ``count`` poses on the straight path between two poses: the smallest |value|, and ``at`` which
+    pose; how often its sign changes from one to the next (None for a value without sign); the part of the path that was
     ``reached``, and what was first seen not to be in front of its camera. Nothing is known between the poses."""
 
     count: int
@@ -324,17 +324,17 @@ class Aspects(Value):
 def path(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
          start: PoseLike, goal: PoseLike, seed: int = 0, budget: int = BUDGET) -> PathAnswer:
     """Whether a path without Type 2 singularity of the hidden robot joins two poses (docs/pages/theory.md, section 9).
-    Of what is seen the path goes through poses at which it has a value, in front of the camera or not.
+    The path passes only through poses at which everything seen has a value, in front of the camera or not.
 
-    Both are reached from the zero configuration in its working mode; or, where no small steps lead to a pose that is a
-    mode of the other, as ``modes`` found the robot assembled there. On the way legs may pass their limits into other
-    working modes (Type 1). A certificate encloses, by interval arithmetic, the condition's value away from zero, the
-    reach of every leg and the limits of R and P joints all along the path, for all poses within
+    Both poses are reached from the zero configuration in its working mode; or, if no small steps lead to a pose that is
+    a mode of the other, as ``modes`` found the robot assembled there. On the way legs may pass their limits into other
+    working modes (Type 1). A certificate encloses, by interval arithmetic, the value of the condition away from zero,
+    the reach of every leg and the limits of R and P joints all along the path, for all poses within
     ``tolerances.FOLLOWED`` of it; opposite signs of an expression at the two ends separate them. At most ``budget``
-    intervals are tried. Where nothing can be enclosed the straight way is sampled. ``observe``, ``camera`` and ``see``
-    as for ``derive``.
+    intervals are tried. If nothing can be enclosed the straight path is sampled. ``observe``, ``camera`` and ``see``
+    are as for ``derive``.
 
-    Raises ``BadRequest`` for names and parts of a pose that there are not, ``PoseNotReached``.
+    Raises ``BadRequest`` for unknown names and parts of a pose, ``PoseNotReached``.
 
     >>> hrsynth.path("3rrr_m1", start="x=0,y=0,phi=0", goal="x=0.02,y=0,phi=5deg")
     <PathAnswer: 3rrr_m1, watching 1, 2, 3: same aspect>

@@ -20,11 +20,12 @@ KEPT, PASSED, OPEN, UNSEEN = "kept", "passed", "undecided", "not looked at"
 @dataclass(frozen=True, eq=False, repr=False)
 class BranchCell(Value):
     """A cell low ≤ q ≤ high (n,) of a part's motors, and the tube |x − centre − slopes (q − middle)| ≤ radius (p,) of
-    its passive coordinates that holds exactly one closure for every q of the cell (m, rad).
+    its passive coordinates that contains exactly one closure for every q of the cell (m, rad).
 
     ``weakest`` is a lower bound over the tube of the smallest singular value of D_xG (characteristic lengths, radians;
-    of each of its triangular blocks the smallest); ``neighbours`` are the numbers of the cells with a common face in
-    which the closure is proved to be the same."""
+    the smallest over its triangular blocks); ``neighbours`` are the numbers of the cells with a common face in which
+    the closure is proved to be the same.
+    """
 
     low: Array
     high: Array
@@ -57,8 +58,8 @@ class BranchCell(Value):
 @dataclass(frozen=True, eq=False, repr=False)
 class Toggle(Value):
     """A place where the proof ends, found in floating point: motors ``q`` (n,) of a part at which, as far as numbers
-    tell, the ``joints`` can move while all motors rest (a determinant vanishes); ``loops`` are those that they close.
-    Without joints: no such place was found, the proof was given up for its ``reason``."""
+    tell, the ``joints`` can move while all motors are held (a determinant vanishes); ``loops`` are those that they
+    close. Without joints: no such place was found, and the proof was given up for its ``reason``."""
 
     q: Array
     joints: tuple[str, ...]
@@ -74,8 +75,8 @@ class Toggle(Value):
 @dataclass(frozen=True)
 class BranchLimit(Value):
     """A joint without a motor, its limits (m, rad; both None: the cone of a ball), its least and largest coordinate in
-    the proved cells to a tube's radius (None where its loop is cut there), and the verdict: ``kept`` (proved),
-    ``passed`` (proved: beyond them somewhere in the cells), ``undecided``, ``not looked at``."""
+    the proved cells to a tube's radius (None if its loop is cut there), and the verdict: ``kept`` (proved), ``passed``
+    (proved: beyond them somewhere in the cells), ``undecided``, ``not looked at``."""
 
     joint: str
     lower: float | None
@@ -86,7 +87,7 @@ class BranchLimit(Value):
 
     @property
     def words(self) -> str:
-        """The joint with its limits, and how far it goes."""
+        """The joint with its limits, and its range."""
         limits = self.joint if self.lower is None else f"{self.joint} {self.lower:.6g} to {self.upper:.6g}"
         return limits if self.least is None else f"{limits} (within {self.least:.4g} to {self.most:.4g})"
 
@@ -99,8 +100,8 @@ class BranchLimit(Value):
 @dataclass(frozen=True, eq=False, repr=False)
 class BranchPart(Value):
     """Motors and the passive coordinates that follow from them alone, with the cells in which that is proved; ``cells``
-    are connected to the zero configuration, the first holds it. ``asked``, ``proved``: boxes, low and high (n,) each;
-    ``share``: volume of all cells, as part of the box that was asked for; ``box_share`` that of ``proved``, the largest
+    are connected to the zero configuration, which the first contains. ``asked``, ``proved``: boxes, low and high (n,)
+    each; ``share``: volume of all cells, as a share of the requested box; ``box_share`` that of ``proved``, the largest
     box about the zero configuration that was found in their union. ``turns``: for each motor whose box is a whole turn
     proved from end to end, whether the closure at the end is that of the beginning."""
 
@@ -135,7 +136,7 @@ class BranchPart(Value):
         return ", ".join(f"{name}={value:.4g}" for name, value in zip(self.motors, q, strict=True))
 
     def find(self, q: Sequence[float] | Array) -> BranchCell | None:
-        """The cell that motor coordinates (n,), in the order of ``motors``, lie in; None outside of what is proved."""
+        """The cell that contains motor coordinates (n,), in the order of ``motors``; None outside of what is proved."""
         at = np.asarray(q, dtype=float)
         return next((cell for cell in self.cells if cell.holds(at)), None)
 
@@ -180,15 +181,14 @@ class BranchProof(Result, shown_as="branch"):
 
     @property
     def proved(self) -> tuple[Array, Array]:
-        """The boxes of all parts together, low and high in the order of ``motors``; infinite where no loop has to do
-        with a motor."""
+        """The boxes of all parts together, low and high in the order of ``motors``; infinite for motors in no loop."""
         found = np.full((2, len(self.motors)), np.inf) * [[-1], [1]]
         for part in self.parts:
             found[:, [self.motors.index(name) for name in part.motors]] = part.proved
         return found[0], found[1]
 
     def limits_in_words(self) -> list[str]:
-        """What is known of the limits of joints without a motor."""
+        """What is known about the limits of joints without a motor."""
         says = {KEPT: "kept in all proved cells (proved)", PASSED: "passed in the proved cells",
                 OPEN: "not proved to be kept", UNSEEN: "not looked at (balls, and joints at which loops are cut)"}
         told = {verdict: [each.words for each in self.limits if each.verdict == verdict] for verdict in says}

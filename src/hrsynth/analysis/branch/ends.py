@@ -42,7 +42,7 @@ def _toggles(growth: Growth, ends: Sequence[BranchEnd]) -> Iterator[Toggle]:
     for end, q, x, last in zip(ends, *_followed(part, start, x0, goal), strict=True):
         _, strengths, rows = np.linalg.svd(part.closure(q, x)[1])
         if last == 1.0 or strengths[-1] / max(home, 1e-300) > TOGGLE:
-            why = ("not tried any more: the effort was spent (a smaller --box takes less)" if not end.leaf.failed else
+            why = ("not tried: the effort was used up (a smaller --box needs less)" if not end.leaf.failed else
                    "undecided: the cells would have to be smaller")
             yield Toggle(q * unit, (), (), why)
             continue

@@ -34,12 +34,12 @@ def branch(robot: RobotLike, box: BoxLike | None = None, *, effort: int = BRANCH
     """Where the passive coordinates are proved to be one continuous function of the motors, on the branch of the zero
     configuration (docs/pages/branch.md).
 
-    ``box`` gives motors their intervals (m, rad), as a mapping or as text ``hip=-1:1,slide=0:0.2``; by default those of
-    the file's limits, and where it has none a whole turn, or a characteristic length either way. ``effort`` is the
-    number of cells that are tried at most, for each part of the loops.
+    ``box`` gives the motors' intervals (m, rad), as a mapping or as text ``hip=-1:1,slide=0:0.2``; the default is the
+    file's limits or, without them, a whole turn, or a characteristic length either way. ``effort`` is the largest
+    number of cells to try for each part of the loops.
 
-    Raises ``MotorsNotEnough`` where the motors do not determine the platform at the zero configuration, ``BadRequest``
-    for motors that there are not or that depend on each other, ``LoopsNotClosed``.
+    Raises ``MotorsNotEnough`` if the motors do not determine the platform at the zero configuration, ``BadRequest`` for
+    unknown motors or motors that depend on each other, ``LoopsNotClosed``.
 
     >>> hrsynth.branch("rrrrr_m1", {"shoulder_1": (-0.05, 0.05), "shoulder_2": (-0.05, 0.05)})
     <BranchProof: rrrrr_m1, 2 motors, 2 passive coordinates: shoulder_1, shoulder_2: 100 % of the box proved, 1 cell>

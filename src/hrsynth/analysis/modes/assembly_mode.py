@@ -28,14 +28,14 @@ from .solve import SystemMode
 class AssemblyMode:
     """A pose of the platform with the measurements of the goal.
 
-    The exact pose, of the file's decimals, is within ``shift`` (m) and ``turn`` (rad) of ``pose``, infinite where
-    nothing was proved: its position and its turn, or those of the bodies on which legs end where ``enclosed`` names
-    them; ``residual``: the largest distance of a tip from its curve (characteristic lengths). ``goal``: whether it is
-    the pose itself from which the measurements were taken. ``reachable`` and ``assembly``: whether the whole real
-    robot, legs that are not watched included, closes there within its joints' limits, as of :class:`Assembly` (the
-    first None where neither was found); ``open`` names the legs that were not closed, ``beyond`` the joints,
-    ``misses`` what proves of legs that they cannot be closed. ``type2_distance``: the smallest singular value of Mᵀ
-    there, as ``check`` gives it; None where the robot was not closed.
+    The exact pose, of the file's decimals, is within ``shift`` (m) and ``turn`` (rad) of ``pose``, infinite if nothing
+    was proved: its position and its turn, or those of the bodies on which legs end if ``enclosed`` names them;
+    ``residual``: the largest distance of a tip from its curve (characteristic lengths). ``goal``: whether it is the
+    pose itself from which the measurements were taken. ``reachable`` and ``assembly``: whether the whole real robot,
+    including legs that are not watched, closes there within its joints' limits, as in :class:`Assembly` (the first is
+    None if neither was found); ``open`` names the legs that were not closed, ``beyond`` the joints, ``misses`` what
+    proves that legs cannot be closed. ``type2_distance``: the smallest singular value of Mᵀ there, as ``check`` gives
+    it; None if the robot was not closed.
     """
 
     pose: Pose

@@ -153,7 +153,8 @@ def _carrier(measured: MeasuredRobot, leg: Leg, rest: Measurement, goal: ClosedC
             continue
         if not isinstance(each, Direction) or each.link not in links or (
                 each.seen_from or rest.reference) != mechanism.base:
-            raise NotConfined(mechanism.name, f"what is measured at leg {leg.label} is no direction seen from the base")
+            raise NotConfined(mechanism.name, f"what is measured at leg {leg.label} is not a direction seen from "
+                              "the base")
         d = goal.pose(each.link)[:3, :3] @ each.direction
         first = perpendicular(d)
         told += [(AtAngle(leg.label, none, d, e, h), links[each.link])

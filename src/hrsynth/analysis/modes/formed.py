@@ -68,10 +68,10 @@ def formed(setting: ObservedRobot) -> FormedModes:
         generic = setting.samples.members[0]
         usual = formation_at(generic.configuration, question, generic.relation, setting.anatomy).count
         if formation.count == usual or (sliding is not None and not sliding.spheres):
-            words = f"no measured value tells of {flexes}: a continuum of dimension {formation.count}"
+            words = f"no measured value shows {flexes}: a continuum of dimension {formation.count}"
             return FormedModes(formation, (), words, degenerate=words, continuum=formation.count)
         return FormedModes(formation, (goal,), "others are not searched for: the configuration is singular",
-                           degenerate=f"to first order no measured value tells of {flexes}")
+                           degenerate=f"to first order no measured value shows {flexes}")
     if formation.group is None:
         return FormedModes(formation, (goal,), "others are not searched for: a trivial motion ties a turn or a scale "
                            "to another")

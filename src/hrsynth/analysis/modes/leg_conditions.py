@@ -99,7 +99,7 @@ def leg_conditions(anatomy: LegDecomposition, leg: Leg, question: Measurement, g
                     reasons.append(str(error))
         except Underived as error:
             reasons.append(str(error))
-    raise NotConfined(anatomy.mechanism.name, f"what leg {leg.label} asks of the platform is not known: "
+    raise NotConfined(anatomy.mechanism.name, f"what leg {leg.label} requires of the platform is not known: "
                                               f"{'; '.join(dict.fromkeys(reasons))}")
 
 

@@ -49,10 +49,10 @@ WITHIN = {"formation": "configurations up to trivial motions",
 class AssemblyModes(Result, shown_as="modes"):
     """All assembly modes with the measurements of one pose, the goal.
 
-    ``complex``, ``complete``, ``proof``, ``degenerate`` and ``continuum`` as for :class:`SystemModes`; ``kind`` is
+    ``complex``, ``complete``, ``proof``, ``degenerate`` and ``continuum`` are as for :class:`SystemModes`; ``kind`` is
     ``hidden`` or ``real``; ``motions`` are continua of modes, with what moves, as far as they were followed, and
-    ``modes`` those that lie on none; ``confined`` holds the curves of the tips (None where the measurements never
-    decide the pose, or where the modes were searched for because no such curves are known).
+    ``modes`` those that lie on none; ``confined`` holds the curves of the tips (None if the measurements never decide
+    the pose, or if the modes were searched for because no such curves are known).
     """
 
     setting: ObservedRobot
@@ -72,7 +72,7 @@ class AssemblyModes(Result, shown_as="modes"):
 
     @property
     def within(self) -> str | None:
-        """Among which poses the modes are all."""
+        """The poses among which these modes are all."""
         if self.formation is not None:
             return WITHIN["formation"]
         if self.confined is not None:
@@ -137,21 +137,21 @@ def modes(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None,
     """All poses with what is observed at ``at`` (default: the zero configuration), or with ``real`` the motors'
     coordinates: complex solutions counted, real ones enclosed (theory.md 8; MMT 3.3, 4.1.2, 4.2).
 
-    A Π stays a parallelogram, never crossed (but in planar mechanisms that are closed loop by loop, and in searches);
-    where legs or measurements keep the platform from turning, turned poses (another operation mode) are not looked for.
-    ``observe``, ``camera`` and ``see`` are as for ``derive``; ``at`` may be a closed configuration of an observed
-    robot. Joint centres that nearly coincide, and solutions nearly at infinity, are taken to be so where that is
-    clearly meant, unless ``as_written`` is true.
-    ``effort``: seconds of one core that a list may need, told by its size before it starts. Of a formation all
-    configurations, trivial motions taken out, with what is measured at the zero configuration.
+    A Π stays a parallelogram, never crossed (except in planar mechanisms that are closed loop by loop, and in
+    searches); if legs or measurements keep the platform from turning, turned poses (another operation mode) are not
+    searched for. ``observe``, ``camera`` and ``see`` are as for ``derive``; ``at`` may be a closed configuration of an
+    observed robot. Joint centres that nearly coincide, and solutions nearly at infinity, are taken to be so if that is
+    clearly meant, unless ``as_written`` is true. ``effort`` is the time limit for a list (seconds on one core),
+    estimated from its size before it starts. For a formation: all configurations, trivial motions aside, with what is
+    measured at the zero configuration.
 
-    Where the tips' paths are none of those known, or the solver that they need gives up or is not installed, the whole
-    robot is closed from random starts (:mod:`.search`): modes that are found, of any kind of closing, and nothing says
-    that they are all. So it is where modes lie on a self-motion: there the equations have infinitely many solutions, or
+    If the tips' paths are of no known kind, or the solver that they need gives up or is not installed, the whole robot
+    is closed from random starts (:mod:`.search`): these modes are found, for any kind of closing, and nothing says that
+    they are all. The same is done if modes lie on a self-motion: the equations then have infinitely many solutions, or
     rounding makes some of them seem isolated.
 
-    Raises ``BadRequest`` for names that there are not, ``PoseNotReached`` for a pose out of reach, ``MeaningUndecided``
-    where special geometry may be meant or not.
+    Raises ``BadRequest`` for unknown names, ``PoseNotReached`` for a pose out of reach, ``MeaningUndecided`` if it is
+    not clear whether special geometry is meant.
 
     >>> hrsynth.modes("3rrr_m1", at="x=0,y=0,phi=0")
     <AssemblyModes: 3rrr_m1, watching 1, 2, 3: 2 real of 6 complex (hidden robot) at x=0,y=0,z=0,phi=0deg>
@@ -201,7 +201,7 @@ def modes(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None,
 def _formed(setting: ObservedRobot, where: object, real: bool) -> AssemblyModes:
     """The modes of a formation; refuses poses and motors, which are those of one platform."""
     if where is not None or real:
-        raise BadRequest(f"{setting.robot.name}: poses and motors are those of one platform, and this is a formation",
+        raise BadRequest(f"{setting.robot.name}: poses and motors belong to one platform, and this is a formation",
                          "real" if real else str(where),
                          "nothing: what is measured at the file's configuration is held")
     tell("modes")
@@ -230,7 +230,7 @@ def at_mode(listed: AssemblyModes | None, asked: ModeNumber) -> ClosedConfigurat
     if not 1 <= asked.number <= count:
         raise BadRequest(f"{name}: a mode at {listed.pose}", str(asked),
                          f"mode:1 to mode:{count}" if count else "no mode" if listed.found.continuum is None else
-                         "poses that are no continuum")
+                         "poses that do not form a continuum")
     mode = listed.modes[asked.number - 1]
     at = listed.goal if mode.goal else mode.configuration
     if at is None:

@@ -68,7 +68,7 @@ class _Reading:
         for joint in self.joints:
             along = abs(float(self.axes.get(joint.name, np.zeros(3)) @ self.normal))
             if joint.type not in KINDS or abs(along - (not joint.type.slides)) > SAME_DIRECTION:
-                raise self._refused(f"joint {joint.name} is none of a planar mechanism")
+                raise self._refused(f"joint {joint.name} is not one of a planar mechanism")
         first = perpendicular(self.normal)
         self.frame = np.array([first, cross(self.normal, first)]) / goal.twin.length
         self.middle = np.mean([self._centre(joint) for joint in self.joints], axis=0)
@@ -143,7 +143,7 @@ class _Reading:
             if not one.type.slides:
                 q = Fraction(ratio).limit_denominator(LARGEST_GEAR)
                 if abs(float(q) - ratio) > SAME_GEOMETRY or abs(q) > LARGEST_GEAR:
-                    raise self._refused(f"coupling {name}: {ratio:g} is no quotient of whole numbers up to "
+                    raise self._refused(f"coupling {name}: {ratio:g} is not a quotient of whole numbers up to "
                                         f"{LARGEST_GEAR}")
                 row = Counter[str]()
                 for joint, factor in ((one, -q.numerator), (other, q.denominator)):
@@ -154,7 +154,7 @@ class _Reading:
         rows += [self._row({one: 1, other: -1}) for one, other in self._held(self.seen, [j.name for j in geared])]
         if len(graphs.spanning_forest(self.mechanism.links, list({j.name: j for j in geared}.values()),
                                       [0.0] * len(geared))) < len({joint.name for joint in geared}):
-            raise self._refused("its gears are in a ring")
+            raise self._refused("its gears form a cycle")
         tied = whole_kernel(rows)
         assert tied is not None
         equal = [*(joint.links for joint in self.joints if joint.type.slides), *self._held(self.seen)]
@@ -177,7 +177,7 @@ class _Reading:
                 if joints is None and float(np.linalg.norm(cross(direction, self.normal))) > SAME_DIRECTION:
                     yield each.link, each.seen_from or self.reference
             elif not isinstance(each, Encoder) or each.joint not in self.mechanism.joints:
-                raise self._refused(f"{each.kind} {each.leg} is no direction and no joint's coordinate")
+                raise self._refused(f"{each.kind} {each.leg} is neither a direction nor a joint's coordinate")
             elif not self.mechanism.joints[each.joint].type.slides and (joints is None or each.joint in joints):
                 yield self.mechanism.joints[each.joint].links
 

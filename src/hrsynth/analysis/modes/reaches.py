@@ -32,7 +32,7 @@ def reaches(chain: Chain) -> tuple[list[tuple[Reach, float]], float]:
     for known, gain in orientations(chain):
         reach, radii = place(chain, known)
         if isinstance(reach, Quadrics):
-            raise Underived("two parts that move on a surface which is no plane and no sphere")
+            raise Underived("two parts that move on a surface that is neither a plane nor a sphere")
         moved = max(moved, radii)
         gap = min((apart(reach, other, chain.length) for other, _ in found), default=np.inf)
         if gap > SAME_POINT:

@@ -117,7 +117,7 @@ def single_loop(measured: MeasuredRobot, goal: ClosedConfiguration, error: float
         if isinstance(each, Encoder):
             continue
         if not isinstance(each, Direction) or (each.seen_from or measured.question.reference) != mechanism.base:
-            raise NotConfined(mechanism.name, "what is measured is no direction seen from the base")
+            raise NotConfined(mechanism.name, "what is measured is not a direction seen from the base")
         k = [link for _, link in way].index(each.link) + 1
         d = goal.pose(each.link)[:3, :3] @ each.direction
         for side in (way[:k], way[k:]):
@@ -286,7 +286,7 @@ def _five(loop: SingleLoop) -> SystemModes:
     """Five joints: zeros of a determinant in one of them, that which tells most."""
     found = [each for first in range(LARGEST_CHAIN) if (each := _zeros(_Linear(loop, first))) is not None]
     if not found:
-        raise Unsolved("the loop", f"{LARGEST_CHAIN} free joints: a determinant does not tell its closings apart")
+        raise Unsolved("the loop", f"{LARGEST_CHAIN} free joints: a determinant does not distinguish its closings")
     return min(found, key=lambda each: (not each.complete, max(mode.radius for mode in each.modes)))
 
 

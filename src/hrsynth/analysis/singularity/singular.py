@@ -49,7 +49,8 @@ class Example(Value):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Singularity(Result, shown_as="singular"):
-    """Where a robot loses a freedom of its platform to what is measured: what is observed, or its own motors."""
+    """Where a robot loses a freedom of its platform with respect to what is measured: what is observed, or its own
+    motors."""
 
     setting: ObservedRobot
     question: Measurement
@@ -114,8 +115,8 @@ def singular(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = No
     """The Type 2 condition of the hidden robot (``real``: of the real robot with its own motors), theory.md 7; MMT 3.3.
 
     Words, expression and rank are compared at ``points`` random reachable poses and at singular poses constructed from
-    the expression; raises ``Disagreement`` where they do not agree, ``BadRequest`` where a robot has no motor, or a
-    platform that rests while segments of its legs move.
+    the expression; raises ``Disagreement`` if they do not agree, ``BadRequest`` if a robot has no motor, or a platform
+    that rests while segments of its legs move.
 
     >>> hrsynth.singular("rrrrr_m1", points=200)
     <Singularity: rrrrr_m1, watching 1, 2: the tangents τ1, τ2 are parallel>

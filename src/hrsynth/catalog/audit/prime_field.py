@@ -35,7 +35,7 @@ class PrimeField:
         """A multiple of π/120 as a turn."""
         part = Fraction(angle / math.pi * 120).limit_denominator(1)
         if abs(float(part) - angle / math.pi * 120) > 1e-9:
-            raise NotExact(f"an angle of {angle} rad is no multiple of π/120")
+            raise NotExact(f"an angle of {angle} rad is not a multiple of π/120")
         z, back = (pow(self.root, int(k) % 240, self.p) for k in (part, -part))
         return (z + back) * self.half % self.p, (z - back) * self.half * pow(self.i, -1, self.p) % self.p
 

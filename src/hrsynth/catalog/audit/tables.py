@@ -159,7 +159,7 @@ def _chains(path: Path, defects: list[Defect]) -> Iterator[LegChain]:
     for line, row in _rows(path, 2, defects):
         match = CHAIN.match(row[0])
         if match is None or int(match[1]) != len(match[2]):
-            defects.append(Defect(str(path), line, "no name of a chain", row[0], "S4PRRR1, S6RRPRRR12V2"))
+            defects.append(Defect(str(path), line, "not the name of a chain", row[0], "S4PRRR1, S6RRPRRR12V2"))
             continue
         try:
             yield _chain(row, match[2])
@@ -176,12 +176,12 @@ def _chain(row: list[str], kinds: str) -> LegChain:
         values = [cell(each) for each in cells[1:7]]
         own = CELLS.index("theta" if kind == "R" else "d")
         if not (isinstance(values[own], str) and str(values[own]).startswith("q")):
-            raise ValueError(f"joint {i + 1}: {CELLS[own]} of {kind} is no coordinate q{i + 1}")
+            raise ValueError(f"joint {i + 1}: {CELLS[own]} of {kind} is not coordinate q{i + 1}")
         joints.append(PublishedJoint(kind, tuple(values)))
     end = row[1 + 8 * len(kinds): 4 + 8 * len(kinds)]
     turns = [cell(each) if each else 0.0 for each in [*end, "", "", ""][:3]]
     if any(isinstance(each, str) for each in turns):
-        raise ValueError("the turn of the end is no number")
+        raise ValueError("the turn of the end is not a number")
     return LegChain(row[0], tuple(joints), (float(turns[0]), float(turns[1]), float(turns[2])))
 
 
@@ -221,7 +221,7 @@ def _drives(path: Path, defects: list[Defect]) -> dict[tuple[str, str], list[Mot
             continue
         loss = rest[0] if rest else ""
         if loss and not loss.isdigit():
-            defects.append(Defect(str(path), line, "the loss of rank is no whole number", loss))
+            defects.append(Defect(str(path), line, "the loss of rank is not a whole number", loss))
             continue
         driven = tuple(tuple(j for j in range(joints) if cells[i * joints + j] == "1") for i in range(legs))
         found.setdefault((group[0], name[1]), []).append(
@@ -238,7 +238,7 @@ def _synthesis(path: Path, defects: list[Defect]) -> Iterator[tuple[tuple[str, s
     for line, row in _rows(path, 1, defects):
         numbers = [int(each) if each.isdigit() else None for each in [*row[2:6], "", "", "", ""][:4]]
         if not CHAIN.match(row[0]) or numbers[0] is None or numbers[1] is None:
-            defects.append(Defect(str(path), line, "no combination of a chain, G and P", ";".join(row[:4])))
+            defects.append(Defect(str(path), line, "not a combination of a chain, G and P", ";".join(row[:4])))
             continue
         yield (group[0], row[0], numbers[0], numbers[1]), (numbers[2], numbers[3])
 
@@ -248,12 +248,12 @@ def _robots(path: Path, chains: dict[str, LegChain], drives: dict[tuple[str, str
             ) -> Iterator[PublishedRobot]:
     group = GROUP.search(path.name)
     if group is None:
-        found.defects.append(Defect(str(path), None, "the name says no group", path.name, "sym_3T0R_list.csv"))
+        found.defects.append(Defect(str(path), None, "the name gives no group", path.name, "sym_3T0R_list.csv"))
         return
     for line, row in _rows(path, 1, found.defects):
         match = ROBOT.match(row[0])
         if match is None:
-            found.defects.append(Defect(str(path), line, "no name of a robot", row[0], "P3PRRR1G2P2"))
+            found.defects.append(Defect(str(path), line, "not the name of a robot", row[0], "P3PRRR1G2P2"))
             continue
         name = f"S{len(match[2])}{match[2]}{match[3]}"
         if name not in chains:
@@ -262,7 +262,7 @@ def _robots(path: Path, chains: dict[str, LegChain], drives: dict[tuple[str, str
         base, platform = int(match[4]), int(match[5])
         if not {base, platform} <= {*COUPLINGS} or (
                 int(match[1]) != 6 and (base in BASE_PAIRS or platform in PLATFORM_PAIRS)):
-            found.defects.append(Defect(str(path), line, "no known couplings", f"G{base}P{platform}",
+            found.defects.append(Defect(str(path), line, "unknown couplings", f"G{base}P{platform}",
                                         "1 to 10, pairs (G5 to G8, P4 to P6) of six legs"))
             continue
         status, count = working.get((group[0], name, base, platform), (None, None))

@@ -59,7 +59,7 @@ def _locked(folder: Path) -> Iterator[None]:
     folder.mkdir(exist_ok=True)
     handle = os.open(folder, os.O_RDONLY | os.O_CLOEXEC)
     try:
-        require_alone(handle, "another build writes this site", folder)
+        require_alone(handle, "another build is writing this site", folder)
         yield
     finally:
         os.close(handle)

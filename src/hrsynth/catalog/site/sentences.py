@@ -10,14 +10,14 @@ from ..jsonl import Record
 
 RULES = {
     "motors off": "The motors are set free: the controller moves what the camera measures, not the motors.",
-    "lift": "A virtual chain that holds nothing is set beside {legs}; its driven U joint measures the watched "
+    "lift": "A virtual chain that constrains nothing is added to {legs}; its driven U joint measures the watched "
             "direction.",
-    "anchor locus": "In {legs} the point that carries this U joint moves on a surface or a curve, or rests, so that "
+    "anchor locus": "In {legs} the point that carries this U joint moves on a surface or a curve, or is fixed, so that "
                     "fewer virtual sliders carry it.",
     "direction locus": "In {legs} the watched direction turns about one axis or does not turn, so that one driven R "
                        "joint or none measures it.",
     "takeover": "In {legs} the virtual actuator takes the place of the real joint before the watched segment.",
-    "companion": "In {legs} the rod beside the watched one goes along with it.",
+    "companion": "In {legs} the rod next to the watched one moves with it.",
     "end change": "In {legs} the last S joint becomes a U joint.",
     "pi form": "In {legs} a planar parallelogram (Π) carries the actuator, for it moves on a circle.",
     "prismatic merge": "In {legs} the virtual actuator takes the place of the real joint on the base.",

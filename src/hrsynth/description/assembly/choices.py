@@ -47,7 +47,7 @@ def choices(path: Path, overrides: Overrides) -> ImportChoices:
     does."""
     graph = formats.read(robot_file(path, overrides, strict=False))
     if isinstance(graph, Mechanism):
-        raise BadRequest(f"{path}: nothing is left open in it", graph.name)
+        raise BadRequest(f"{path}: its dialect leaves nothing open", graph.name)
     closures.join_halves(graph)
     overrides.apply(graph)
     closures.merge_points(graph)

@@ -42,7 +42,7 @@ def without_coordinates(mechanism: Mechanism) -> Mechanism:
     if in_space:
         rest = rest.changed(joints=[Joint(first.name, JointType.FREE, bodies[0], bodies[1],
                                           mechanism.links[bodies[1]].pose[:3, 3])])
-    note = Note("merged", f"the joints {', '.join(names)} place the platform and forbid nothing: read as "
+    note = Note("merged", f"the joints {', '.join(names)} place the platform and constrain nothing: read as "
                           + ("a free joint" if in_space else "no leg"))
     return spanning(replace(rest, notes=(*mechanism.notes, note)))
 
@@ -61,7 +61,7 @@ def with_weighed_motors(mechanism: Mechanism) -> Mechanism:
     free = mobility(mechanism)
     if driven <= free:
         return mechanism
-    note = Note("open", f"{driven} coordinates are driven, but there are {free} freedoms: some motors may stand on "
+    note = Note("open", f"{driven} coordinates are driven, but there are {free} freedoms: some motors may be on "
                         "passive joints (--motors JOINTS to name the driven ones)")
     return replace(mechanism, notes=(*mechanism.notes, note))
 

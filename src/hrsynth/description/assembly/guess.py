@@ -81,7 +81,7 @@ def formation(graph: JointGraph, base: str) -> str | None:
 
 
 def platform(graph: JointGraph, base: str) -> str:
-    """The link that most ways join to the base; else the only frame on a fixed joint; else the link farthest away.
+    """The link that most ways connect to the base; else the only frame on a fixed joint; else the link farthest away.
 
     Raises ``BadRequest`` with the candidates where several are as good.
     """
@@ -139,7 +139,7 @@ class _RigidBodies:
         most = max(ways.values(), default=0)
         best = [body for body in others if ways.get(body) == most]
         if most >= 3 and len(best) == 1:
-            return best[0], f"which {most} ways join to the base", ()
+            return best[0], f"which {most} ways connect to the base", ()
         if len(framed) == 1:
             return framed[0], "the only frame on a fixed joint", ()
         distance = graphs.distances(self.near, self.base)

@@ -57,7 +57,7 @@ def _ends(reader: XmlReader, element: xml.Element, tags: tuple[str, str], frame_
         name = _said(element, tag)
         frame = None if name is None else frame_of(name)
         if frame is None:
-            reader.defect(line, f"<{local(element)}>: <{tag}> is no link or frame", name)
+            reader.defect(line, f"<{local(element)}>: <{tag}> is not a link or frame", name)
         else:
             found.append(frame)
     if len(found) < 2:
@@ -103,13 +103,13 @@ def _bushing(reader: XmlReader, graph: JointGraph, element: xml.Element, frame_o
             (1, 0): JointType.PRISMATIC, (1, 1): JointType.CYLINDRICAL}.get((len(free[0]), len(free[1])))
     if kind is None or (kind is JointType.CYLINDRICAL and free[0] != free[1]):
         graph.note("open", f"the bushing between {ends[0].link!r} and {ends[1].link!r} is not stiff against "
-                           f"{len(free[0])} translations and {len(free[1])} turns, which is no joint of a loop: left "
+                           f"{len(free[0])} translations and {len(free[1])} rotations, which no loop joint is: left "
                            f"out (--close {links}:TYPE for the joint that it is meant to be)")
         return
     axis = np.eye(3)[(free[1] or free[0] or (2,))[0]]
     graph.close(name, kind, ends, [axis], xml.line(element))
     graph.note("guess", f"{name!r} between {ends[0].link!r} and {ends[1].link!r} is read as a {kind.name.lower()} "
-                        "joint: it holds what its stiffness is not zero for")
+                        "joint: it constrains the motions for which its stiffness is not zero")
 
 
 def _vector(reader: XmlReader, element: xml.Element, tag: str) -> Array:

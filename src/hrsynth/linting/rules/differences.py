@@ -210,20 +210,20 @@ def _rule(name: str, severity: str, title: str, find: Callable[[LintedFile], Ite
 
 RULES = (
     _rule("joint", "error", "a joint or closure that one file has", _joints,
-          "What has no partner by name, place or structure. A closure for which one dialect has no words is often lost "
-          "so."),
+          "It has no partner by name, place or structure. Closures that a dialect does not have are often lost this "
+          "way."),
     _rule("type", "error", "joints of different types", _types),
     _rule("ends", "error", "joints between other links, another base or platform", _ends),
-    _rule("geometry", "error", "joints that lie elsewhere on a link", _geometry,
-          "Compared link by link, so that it does not matter where the link is at zero, how its frame lies, or where "
-          "on its axis a hinge has its origin."),
-    _rule("zero", "warning", "another zero configuration", _zero,
-          "Coordinates of the one are not those of the other: offsets of motors, limits and keyframes shift."),
+    _rule("geometry", "error", "joints placed differently on a link", _geometry,
+          "Compared link by link, so it does not matter where the link is at zero, how its frame is placed, or where "
+          "along its axis a hinge has its origin."),
+    _rule("zero", "warning", "a different zero configuration", _zero,
+          "Coordinates of one file are not those of the other: motor offsets, limits and keyframes shift."),
     _rule("sense", "warning", "a joint that counts in the opposite sense", _senses,
-          "A command for the one moves the other backwards."),
+          "A command for one moves the other backwards."),
     _rule("motor", "error", "a joint that is driven in one file", _motors),
-    _rule("limit", "warning", "other limits", _limits,
-          "Counted from the zero of each file."),
-    _rule("mass", "warning", "other masses or inertias", _masses),
-    _rule("gear", "error", "other gears", _gears),
+    _rule("limit", "warning", "different limits", _limits,
+          "Measured from the zero of each file."),
+    _rule("mass", "warning", "different masses or inertias", _masses),
+    _rule("gear", "error", "different gears", _gears),
 )

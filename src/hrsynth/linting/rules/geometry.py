@@ -81,9 +81,9 @@ def _place(element: xml.Element, X: Array) -> None:
 
 
 RULES = (
-    LintRule("geometry-rounded", "warning", "relations that hold but for printed digits",
-             "Axes parallel to six digits, rods of almost one length: over-constrained loops lock or lose rank by it "
-             "in programs that take the digits as they stand. This program makes such relations good, and says so.",
+    LintRule("geometry-rounded", "warning", "relations that hold up to printed digits",
+             "Axes parallel to six digits, rods of almost equal length: over-constrained loops lock or lose rank in "
+             "programs that take the digits literally. This program corrects such relations, and says so.",
              "write the numbers with all their digits (in other dialects: hrsynth convert IN OUT)", _rounded,
              mends=True),
 )

@@ -79,20 +79,20 @@ def _unlimited(file: LintedFile) -> Iterator[Spot]:
 
 RULES = (
     LintRule("limits-order", "error", "lower limit above upper limit",
-             "No value of the coordinate satisfies both. Some readers refuse the file, others leave the limits out.",
+             "No value of the coordinate satisfies both. Some readers refuse the file, others ignore the limits.",
              "exchange the two numbers", _order, mends=True),
     LintRule("limits-empty", "warning", "both limits are the same number",
-             "Exporters write 0 and 0 where they know no range. Simulators then hold the joint still; this program "
-             "reads the joint as free.",
+             "Exporters write 0 and 0 where they know no range. Simulators then lock the joint; this program reads it "
+             "as free.",
              "write the true range; a revolute joint without one is of type continuous", _empty),
     LintRule("limits-zero", "warning", "limits exclude the zero of the joint",
-             "Loops are closed, mechanisms compared and most controllers started at the zero configuration. Where "
-             "limits forbid it, simulators start with a jump.",
-             "count the coordinate from another pose, or widen the limits", _zero),
-    LintRule("limits-demanded", "warning", "URDF demands limits of this joint",
-             "A revolute or prismatic joint without <limit> is refused by urdfdom, and with it by most of ROS.",
+             "Loops are closed, mechanisms compared and most controllers started at the zero configuration. If limits "
+             "exclude it, simulators start with a jump.",
+             "measure the coordinate from another pose, or widen the limits", _zero),
+    LintRule("limits-demanded", "warning", "URDF requires limits for this joint",
+             "urdfdom, and with it most of ROS, refuses a revolute or prismatic joint without <limit>.",
              "make a revolute joint continuous; give a prismatic one its range", _demanded, mends=True),
     LintRule("motor-unlimited", "note", "a driven joint without a range",
-             "Paths, grids and the choice of legs respect limits only where the file gives them.",
+             "Paths, grids and the choice of legs respect limits only if the file gives them.",
              "write the motor's range", _unlimited),
 )

@@ -222,8 +222,8 @@ def _redundant(file: LintedFile) -> Iterator[Spot]:
     dead = set(found.dead())
     for name, count in found.redundant(rows).items():
         if name not in dead:
-            yield Spot(_line(file, name), f"{count} of the {rows(name)} constraints of {name!r} repeat what the loops "
-                                          "before it say")
+            yield Spot(_line(file, name), f"{count} of the {rows(name)} constraints of {name!r} repeat those of the "
+                                          "loops before it")
 
 
 def unclosed(robot: Mechanism) -> bool:
@@ -277,27 +277,27 @@ def _coincide(file: LintedFile) -> Iterator[Spot]:
 RULES = (
     LintRule("loop-open", "error", "loops that are open at the zero configuration",
              "A simulator pulls them shut with a jump, and where two closings are possible the wrong one may be taken. "
-             "This program solves for the nearest closed pose, tells the joints that it moves, and counts from there.",
-             "correct the dimension that is mistyped, or, if all are right, count the joints that moved from where the "
-             "loops close", _open,
+             "This program finds the nearest closed pose, reports the joints that it moves, and counts from there.",
+             "correct the mistyped dimension or, if all are right, measure the joints that moved from where the loops "
+             "close", _open,
              mends=True),
     LintRule("loop-mirrored", "error", "a closure whose two axes point opposite ways",
-             "The hinge fits, but to make the axes agree a link has to be turned by half a turn: the robot is read as "
+             "The hinge fits, but making the axes agree turns a link by half a turn: the robot is read as "
              "its mirror image, or not at all.",
-             "turn one of the two axes round", _mirrored, mends=True),
+             "reverse one of the two axes", _mirrored, mends=True),
     LintRule("constraint-dead", "warning", "a closure or gear that constrains nothing",
-             "What is closed twice is over-determined: solvers of constraint forces have no single answer, and rounded "
+             "What is closed twice is overdetermined: solvers of constraint forces have no single answer, and rounded "
              "numbers may lock the loop.",
              "remove it", _dead, mends=True),
     LintRule("constraint-redundant", "note", "constraints that repeat others",
-             "Normal in planar and over-constrained loops, in ideal geometry harmless. Solvers of constraint forces "
-             "have no single answer, and rounded numbers may lock the loop.",
+             "Normal in planar and over-constrained loops, and harmless in ideal geometry. Solvers of constraint "
+             "forces have no single answer, and rounded numbers may lock the loop.",
              "nothing, or a joint with more freedoms (a ball instead of a hinge)", _redundant),
     LintRule("loop-none", "warning", "no loop",
-             "What closes loops was perhaps lost on the way, or stands in a file or launch script beside this one.",
+             "The closures were perhaps lost in a conversion, or are in a file or launch script next to this one.",
              "close it: --close A:B[:TYPE], where A and B are frames that meet", _none),
     LintRule("frames-coincide", "warning", "frames that coincide and are not closed",
-             "Two frames at one place, on links that move apart, are how several tools mark a loop; one that nobody "
-             "closes is an open chain.",
+             "Several tools mark a loop by two frames at the same place on links that move apart; a loop that is not "
+             "closed is an open chain.",
              "if they should meet: --close A:B", _coincide),
 )

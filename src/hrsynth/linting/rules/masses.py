@@ -98,14 +98,15 @@ RULES = (
              "No body has one: simulators refuse the file, or the robot gains energy.",
              "drop the sign", _negative, mends=True),
     LintRule("mass-zero", "warning", "a moving link with an inertia but no mass",
-             "Gazebo leaves such links out, with their joints; MuJoCo refuses them.",
-             "write the link's mass, or leave out <inertial> of a link without a body", _zero),
+             "Gazebo drops such links, with their joints; MuJoCo refuses them.",
+             "write the link's mass, or omit <inertial> for a link without a body", _zero),
     LintRule("inertia-triangle", "error", "an inertia that no body has",
              "Principal moments are not negative, and the largest is at most the sum of the two others (triangle "
              "inequality). MuJoCo and Gazebo refuse others; elsewhere simulations blow up.",
-             "take the nearest inertia of a body: negative second moments set to zero", _impossible, mends=True),
+             "take the nearest inertia that a body can have: negative second moments set to zero", _impossible,
+             mends=True),
     LintRule("inertia-missing", "warning", "a moving link without <inertial> in a file that has some",
-             "Gazebo leaves links without <inertial> out when it reads a URDF, with all that hangs on them; MuJoCo "
+             "When Gazebo reads a URDF it drops links without <inertial>, with all that is attached to them; MuJoCo "
              "refuses moving bodies without mass.",
              "write the link's mass and inertia", _missing),
 )

@@ -98,11 +98,11 @@ def _legs(file: LintedFile) -> Iterator[Spot]:
 
 RULES = (
     LintRule("element-unknown", "note", "an element or attribute that URDF does not know",
-             "Readers leave it out without a word, and take the default for what it was to say: an axis along x, no "
+             "Readers ignore it silently, and use the default instead of what it was meant to say: an axis along x, no "
              "motor, no limit.",
              "nothing, if another program reads it", _unknown),
     LintRule("observe-legs", "error", "observed directions that contradict the robot's legs",
              "A link that is in no leg, one label for two legs, two labels for one: the file is read, but commands "
              "that watch legs refuse it.",
-             "correct the link or the label that the line names", _legs),
+             "correct the link or label named in the message", _legs),
 )

@@ -42,13 +42,13 @@ def _many(file: LintedFile) -> Iterator[Spot]:
 
 RULES = (
     LintRule("motor-none", "note", "no motor",
-             "Which joints are driven decides Type 2 singularities of the real robot; URDF+ and plain URDF often do "
-             "not say it.",
-             "name them: a <transmission> each, or --motors JOINTS", _none),
+             "The Type 2 singularities of the real robot depend on which joints are driven; URDF+ and plain URDF "
+             "often do not say so.",
+             "name them: one <transmission> each, or --motors JOINTS", _none),
     LintRule("motors-few", "warning", "motors that do not determine the platform",
-             "With every motor held the platform still moves, near the zero configuration.",
+             "With all motors held the platform can still move, near the zero configuration.",
              "name the motor that is missing, or hold or drive the joint that is left free", _few),
     LintRule("motors-many", "warning", "more driven coordinates than the mechanism has",
-             "Tools put an actuator on every joint, passive ones too. Driven so, the motors work against each other.",
-             "drop the motors of passive joints, or name the driven ones: --motors JOINTS", _many),
+             "Tools put an actuator on every joint, passive ones too. The motors then work against each other.",
+             "remove the motors of passive joints, or name the driven ones: --motors JOINTS", _many),
 )

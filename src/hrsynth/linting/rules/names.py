@@ -37,7 +37,7 @@ def _case(file: LintedFile) -> Iterator[Spot]:
         often = Counter(name.casefold() for name in table)
         for name in table:
             if often[name.casefold()] > 1:
-                yield Spot(table[name].line, f"{what} {name!r}: another {what} has the same name but for capitals")
+                yield Spot(table[name].line, f"{what} {name!r}: another {what} has the same name except for capitals")
 
 
 def _reserved(file: LintedFile) -> Iterator[Spot]:
@@ -96,19 +96,19 @@ def remove(element: xml.Element) -> None:
 
 RULES = (
     LintRule("name-clash", "note", "a joint with the name of a link",
-             "URDF allows it. SDFormat has one space of names and refuses it, and frames of that name are ambiguous "
-             "in ROS and Gepetto.",
-             "rename one of them, where it is named too", _clash),
+             "URDF allows it. SDFormat has a single namespace and refuses it, and frames with that name are "
+             "ambiguous in ROS and Gepetto.",
+             "rename one of them, wherever it is referred to", _clash),
     LintRule("name-case", "note", "two names that differ in capitals only",
-             "They are confused by people, and by file systems where names become files.",
+             "People confuse them, and so do file systems where names become file names.",
              "rename one of them", _case),
-    LintRule("name-reserved", "warning", "a name that SDFormat keeps for itself",
-             "Names with ::, names between double underscores and `world` have a meaning of their own in SDFormat; in "
+    LintRule("name-reserved", "warning", "a name that SDFormat reserves",
+             "Names with ::, names between double underscores and `world` have special meanings in SDFormat; in "
              "Gazebo, Drake and MuJoCo `world` is the ground.",
              "rename the link", _reserved),
-    LintRule("motor-name", "warning", "two motors of one name",
+    LintRule("motor-name", "warning", "two motors with the same name",
              "Controllers find motors by their names.", "rename one of them", _motors),
     LintRule("link-unused", "warning", "a link that no joint connects",
-             "Most readers refuse a second root; this one leaves out what does not hang together with the base.",
+             "Most readers refuse a second root; this one drops what is not connected to the base.",
              "remove it, or add its joint", _unused, mends=True),
 )

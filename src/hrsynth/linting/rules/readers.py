@@ -102,7 +102,7 @@ def _listed(known: dict[str, str]) -> str:
 RULES = (
     LintRule("reader-drops", "note", "a closure that other programs do not read",
              "The file loads there as an open tree: it falls apart in simulation, and its Jacobians are those of "
-             "another robot. With --reader NAME only that program is asked about.",
+             "another robot. With --reader NAME only that program is considered.",
              "write the file in a dialect that the program reads: hrsynth convert IN OUT.xml for MuJoCo, OUT.sdf for "
              "Gazebo Classic, OUT.yaml for Gepetto's tools", _dropped),
 )

@@ -44,23 +44,24 @@ _left_out = noted("ignored", text=r"(?!\d+ links that no joint)")  # those have 
 
 RULES = (
     LintRule("refused", "error", "what this program refuses to read",
-             "Every command answers this file with this line.", "correct what the line says", _refused),
-    LintRule("unsaid", "warning", "what the file does not say, and no structure tells",
-             "Commands need it as an option.", "give the option that the line names", _asks),
+             "Every command answers this file with this message.", "correct what the message says", _refused),
+    LintRule("unsaid", "warning", "what the file does not say, and its structure does not show",
+             "Commands need it as an option.", "give the option named in the message", _asks),
     LintRule("guessed", "note", "what the file does not say, guessed from its structure",
-             "A guess is taken only where structure leaves one choice; the answer depends on it all the same.",
-             "say it in the file, or by the option that the line names", noted("guess")),
+             "A guess is made only where the structure leaves one choice; the answer still depends on it.",
+             "say it in the file, or with the option named in the message", noted("guess")),
     LintRule("ignored", "warning", "what the reader leaves out",
-             "What is left out is in no answer.", "remove it, or correct the name that it gives", _left_out),
+             "No answer takes it into account.", "remove it, or correct the name that it gives", _left_out),
     LintRule("closure-unread", "warning", "what may close a loop and is not read",
-             "Plugins and elements of simulators that hold links together, of which the file does not say enough.",
-             "close the loop as the line says", _unread),
+             "Simulator plugins and elements that hold links together, but about which the file does not say enough.",
+             "close the loop as the message says", _unread),
     LintRule("merged", "note", "what is read as something else",
-             "Closures and joints that mean one joint are read as that joint, and relations that hold but for printed "
-             "digits are made good.", "nothing, if it is meant so", noted("merged", text=rf"(?!{ROUNDED.pattern})")),
+             "Closures and joints that stand for one joint are read as that joint, and relations that hold up to "
+             "printed digits are corrected.",
+             "nothing, if that is intended", noted("merged", text=rf"(?!{ROUNDED.pattern})")),
     LintRule("zero-singular", "warning", "a singular zero configuration",
-             "Ranks at that pose are not those nearby: motors are at a dead point, or the loops gain a freedom. This "
-             "program counts from a pose nearby.",
+             "Ranks at that pose differ from those nearby: motors are at a dead point, or the loops gain a freedom. "
+             "This program uses a nearby pose as zero.",
              "choose another zero configuration (hrsynth convert writes the one that is used)",
              noted("solved", text="the zero pose")),
 )

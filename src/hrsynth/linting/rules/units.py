@@ -103,24 +103,24 @@ def _inertia(file: LintedFile) -> Iterator[Spot]:
             continue
         gyration = float(np.sqrt(max(float(np.max(np.linalg.eigvalsh(each.inertia))), 0.0) / mass))
         if gyration > WIDEST_BODY * robot.length:
-            yield Spot(xml.line(each.element), f"link {each.link!r}: mass {mass:g} kg and inertia as of a body "
+            yield Spot(xml.line(each.element), f"link {each.link!r}: mass {mass:g} kg and the inertia of a body "
                                                f"{gyration:.3g} m wide, in a robot of {robot.length:.3g} m")
 
 
 RULES = (
     LintRule("unit-limits", "warning", "limits that look like degrees",
-             "URDF and SDFormat count in radians: 90 is fourteen turns, so the limit limits nothing.",
+             "URDF and SDFormat use radians: 90 is fourteen turns, so the limit has no effect.",
              "convert them to radians", _limits, mends=True),
     LintRule("unit-angles", "warning", "roll, pitch, yaw that look like degrees",
-             "URDF counts in radians: 90 is fourteen turns and a bit, so the frame is turned by 116 degrees.",
+             "URDF uses radians: 90 is fourteen turns and a bit, so the frame is turned by 116 degrees.",
              "convert them to radians", _angles, mends=True),
     LintRule("unit-length", "warning", "a robot as large as a house, or as small as a grain",
-             "Modelling tools export millimetres, readers take metres.", "scale it, or say --unit mm to every command",
-             _length),
-    LintRule("unit-inertia", "warning", "an inertia of another unit than the mass",
+             "Modelling tools export millimetres, readers expect metres.",
+             "scale it, or give --unit mm to every command", _length),
+    LintRule("unit-inertia", "warning", "an inertia in another unit than the mass",
              "Tools export kg mm² or g mm². An inertia is at most its mass times the square of the body's extent.",
              "convert the inertia to kg m²", _inertia),
     LintRule("axis-length", "note", "an axis whose length is not one",
-             "This program and most others take its direction; some scale the joint's speed by it.",
+             "This program and most others use only its direction; some scale the joint's speed by its length.",
              "divide it by its length", _axis, mends=True),
 )

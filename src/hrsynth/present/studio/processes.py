@@ -140,7 +140,7 @@ class WorkerProcess:
         except TimeoutError:
             return gone(number, f"that takes longer than {self.seconds:g} seconds and was given up", "TooSlow")
         except (OSError, EOFError):
-            return gone(number, "the process that was to answer has ended: it may have run out of memory", "Ended")
+            return gone(number, "the process that should answer has ended: it may have run out of memory", "Ended")
         finally:
             if not whole:
                 self._end()

@@ -41,7 +41,7 @@ def error(setting: ObservedRobot, at: ClosedConfiguration) -> dict[str, Any]:
     no bound, or none to first order."""
     unit = unit_of(setting)
     if not all(isinstance(each, Direction) for each in setting.observed):
-        return {**nothing(unit, "not told: what is watched is no direction"), "step": None}
+        return {**nothing(unit, "not given: what is watched is not a direction"), "step": None}
     metres, radians = attained(at, setting.samples.question, Blur(np.full(len(setting.observed), CONE)))
     if np.isfinite([metres, radians]).all() and not (bounded(metres, at.twin.length) and bounded(radians)):
         return nothing(unit, NOT_BOUNDED)
@@ -57,7 +57,7 @@ def told(mm: float | None, deg: float | None, unit: str, turns: bool) -> dict[st
     step, size = step_of(value, unit), f"{rounded(value)}{SIGNS[unit]}"
     turned = f"{rounded(deg)}°" if turns and unit == "mm" else ""
     return {"mm": mm, "deg": deg, "unit": unit, "step": step, "size": f"{size} and {turned}" if turned else size,
-            "words": f"about {size} wrong per 0.1°: {NAMES[step]}{f'; turned by about {turned}' if turned else ''}"}
+            "words": f"about {size} off per 0.1°: {NAMES[step]}{f'; turned by about {turned}' if turned else ''}"}
 
 
 def nothing(unit: str, words: str) -> dict[str, Any]:

@@ -42,11 +42,11 @@ MAIN = "studio.html"
 @spelled
 def studio(robot: str | Path | Mechanism | None = None, observe: Iterable[str | int] | str | None = None,
            camera: str | None = None, *, port: int = 0, open_: bool = True) -> StudioServer:
-    """Serve the page to work in on this machine, with a robot, a folder of robots or nothing, and open it in the
-    browser: a server with ``address`` and ``stop()``, which also ends with this process. Port 0 is any that is free.
+    """Serve the studio on this machine, with a robot, a folder of robots or nothing, and open it in the browser:
+    returns a server with ``address`` and ``stop()``, which also ends with this process. Port 0 is any free port.
 
-    Raises ``BadRequest`` for a name of no robot and a port that cannot be had, ``BadRobotFile`` for a file that there
-    is none, ``MissingExtra``.
+    Raises ``BadRequest`` for an unknown robot and a port that is not available, ``BadRobotFile`` for a missing file,
+    ``MissingExtra``.
 
     >>> server = hrsynth.studio("3rrr_m1", open_=False)
     >>> server.stop()

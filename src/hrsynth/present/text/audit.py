@@ -46,7 +46,7 @@ def _legend(record: Mapping[str, Any]) -> str:
                        "that of the stated motion"),
             ("counts", "robots with a stated number of working choices")]
     lost = len(record["without_chain"])
-    return listing([*rows, *([("no chain", f"{lost:,} robots more, whose leg chain is in no table")] if lost else [])])
+    return listing([*rows, *([("no chain", f"{lost:,} more robots, whose leg chain is in no table")] if lost else [])])
 
 
 def _kinds(groups: Iterable[Mapping[str, Any]]) -> Iterable[tuple[str, str, str, str]]:

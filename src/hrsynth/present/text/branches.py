@@ -37,12 +37,12 @@ def _back(found: BranchProof) -> Rows:
         return []
     rows: Rows = [("", "")]
     if found.back is None:
-        rows.append(("way back", "undecided: the motors of a pose are found, others in the box may have the same"))
+        rows.append(("way back", "undecided: motors for a pose are found, others in the box may give the same pose"))
     else:
         (low, high), (least, most) = found.back, found.proved
         whole = bool((low == least).all() and (high == most).all())
-        rows.append(("way back", "no two motors in the proved box have one pose of the platform, proved" if whole else
-                     "no two motors in a part of the proved box have one pose of the platform, proved"))
+        rows.append(("way back", "no two motor settings in the proved box give the same platform pose, proved" if whole
+                     else "no two motor settings in a part of the proved box give the same platform pose, proved"))
         if not whole:
             rows.append(("that part", [f"{name} {a:.6g} to {b:.6g}" for name, a, b in
                                        zip(found.motors, low, high, strict=True)]))
@@ -59,7 +59,7 @@ def _part(part: BranchPart) -> Rows:
         return [*rows, ("branch", "undecided: no cell about the zero configuration could be proved")]
     weakest = min(cell.weakest for cell in part.cells)
     whole = part.share == 1.0
-    but = " but for the redundant equations, which are bounded" if part.closed_to else ""
+    but = " except for the redundant equations, which are bounded" if part.closed_to else ""
     rows += [("branch", ("one branch, proved in the whole box" if whole else
                          f"one branch, proved in {part.percent} % of the box") + but),
              ("cells", f"{len(part.cells)}; smallest singular value of the loops at least {weakest:.3g}")]

@@ -20,7 +20,7 @@ def endings(found: Endings) -> str:
     others = [each for each in found.rests if each.stability not in ("stable", "undecided")]
     boxed = [each for each in found.rests if each.proved]
     rows: Rows = [*head(found.setting), *camera(found.setting), ("goal", str(found.pose)),
-                  *([] if found.depth == "exact" else [("depth", f"{found.depth}, as the law supposes it")]), *GAP,
+                  *([] if found.depth == "exact" else [("depth", f"{found.depth}, as the law assumes it")]), *GAP,
                   ("attract", table([_line(each) for each in drawn], HEADS).splitlines()), *GAP]
     if any(each.beyond for each in drawn):
         inside = [each for each in drawn if not each.beyond]
@@ -76,19 +76,19 @@ def _complete(found: Endings) -> list[str]:
         apart += [f"leg {' or '.join(told.unstretched)} is stretched"] if told.unstretched else []
         apart += ["a watched direction is at right angles to the desired one" if told.across == 1 else
                   "both watched directions are at right angles to the desired ones"]
-    where += f", but for poses at which {', or '.join(apart)}" if apart else ""
+    where += f", except for poses at which {', or '.join(apart)}" if apart else ""
     lines = [f"all rests, proved by {told.cover.boxes:,} boxes of poses: no other in any working mode of the legs, "
              f"{where}"]
     if told.crossings:
-        lines += [f"but for rests that fill curves, at {told.crossings} points at which the joints of two legs lock"]
+        lines += [f"except for rests that fill curves, at {told.crossings} points at which the joints of two legs lock"]
     if told.locked:
         most = max(within for _, within in told.locked)
-        lines += [f"but for {len(told.locked)} places, each within {1e3 * most:.2g} mm, at which legs may lock each "
+        lines += [f"except for {len(told.locked)} places, each within {1e3 * most:.2g} mm, at which legs may lock each "
                   "other:"]
         places = max(0, math.ceil(-math.log10(most)))
         lines += [f"  ({', '.join(f'{round(float(x), places) + 0.0:g}' for x in p)}) m" for p, _ in told.locked]
     if told.apart:
-        lines += [f"{told.apart} of the list lie where was not looked"]
+        lines += [f"{told.apart} of the list lie where nothing was searched"]
     return lines
 
 

@@ -183,7 +183,7 @@ def modes(found: AssemblyModes) -> str:
                  proved(mode) if mode.fits is not None else f"{proved(mode)}, residual {mode.residual:.1e}",
                  *ahead(mode), *at_mode(mode, found.kind)])]
     for number, mode in enumerate(found.antipodal, 1):
-        rows += [*GAP, (f"antipodal {number}", [f"{mode.pose}   no mode: the opposite value of "
+        rows += [*GAP, (f"antipodal {number}", [f"{mode.pose}   not a mode: the opposite value of "
                                                 f"{', '.join(mode.opposite)}", proved(mode), *ahead(mode)])]
     for number, mode in enumerate(found.near, 1):
         rows += [*GAP, (f"near {number}", [f"{mode.pose}   residual {mode.residual:.2e}: almost a mode"
@@ -201,7 +201,7 @@ def _formed(found: AssemblyModes, rows: Rows) -> str:
             told = [f"{body}: {Pose.of(X)}" for body, X in (mode.bodies or {}).items()]
             rows += [*GAP, (f"{word} {number}", [
                 *["the configuration itself"] * mode.goal,
-                *[f"no mode: the opposite value of {', '.join(mode.opposite)}"] * bool(mode.opposite), *told,
+                *[f"not a mode: the opposite value of {', '.join(mode.opposite)}"] * bool(mode.opposite), *told,
                 f"residual {mode.residual:.1e}",
                 *[f"beyond the limits of {', '.join(mode.beyond)}"] * bool(mode.beyond)])]
     return listing(rows)
@@ -277,7 +277,7 @@ def path(found: PathAnswer) -> str:
     value = "expression" if found.signed else "smallest singular value"
     rows = [*head(found.setting), ("from", f"{found.start.pose}   ({value} {found.start.value:.4g})"),
             ("to", f"{found.goal.pose}   ({value} {found.goal.value:.4g})"),
-            *known("", "start and goal are the same pose: there is no way to go" if found.stays else None),
+            *known("", "start and goal are the same pose: there is no path to find" if found.stays else None),
             ("verdict", [f"{found.verdict} ({'certified' if found.certified else 'not certified'})", found.reason])]
     if found.margin is not None:
         where = "all along the path" if found.certified and found.ways else "at both poses"
@@ -294,10 +294,10 @@ def path(found: PathAnswer) -> str:
 def road(found: SampledRoad, value: str) -> list[str]:
     """What poses on the straight way say."""
     signs = {None: "", 0: ", the same sign at all of them"}.get(found.changes, f", {found.changes} changes of its sign")
-    lines = [f"|{value}| at least {found.least:.3g} at {found.count} poses of the straight way, least at {found.at}"
+    lines = [f"|{value}| at least {found.least:.3g} at {found.count} poses of the straight path, least at {found.at}"
              f"{signs}"]
     if found.reached < 1:
-        lines.append(f"the robot was not led further than {100 * found.reached:.0f} % of that way")
+        lines.append(f"the robot was not followed further than {100 * found.reached:.0f} % of that path")
     return lines + [f"{found.lost} is not in front of its camera all along it"] * (found.lost is not None)
 
 
@@ -337,7 +337,7 @@ def aspect_groups(found: Atlas) -> str:
 def _cuspidal(found: Atlas) -> list[str]:
     changes = found.changes
     if not changes:
-        return ["not shown by the modes at this pose, which says nothing of other poses"]
+        return ["not shown by the modes at this pose, which says nothing about other poses"]
     direct = [pair for pair in changes if pair.answer is not None and not pair.answer.crossings]
     one, other = (direct or changes)[0].numbers
     how = "no leg changes its working mode" if direct else "legs change their working modes"

@@ -58,7 +58,7 @@ def derivation(found: Derivation) -> str:
     mobility, hidden, paper, observed = found.mobility, found.hidden_architecture, found.paper, found.setting
     dof = [f"{found.dof} (mobility {mobility.total}, of which {mobility.idle} idle)"]
     if observed.anatomy.point is not None:
-        dof.append("the platform is a point: its velocity is what is controlled, its turn is idle")
+        dof.append("the platform is a point: its velocity is controlled, its rotation is idle")
     name, seen = head(observed)
     if found.verdict.formation is not None:
         dof[0] = f"{found.dof} of {len(found.verdict.formation.bodies)} bodies{dof[0].removeprefix(str(found.dof))}"
@@ -164,13 +164,13 @@ def legs(found: Legs) -> str:
               for reason in dict.fromkeys(each.reason for each in found.exact if not each.exact)]
     chance = max(each.chance for each in found.exact)
     if chance:
-        lines.append(f"exact but for a chance below {power_above(chance)}: identities tested at random instances")
+        lines.append(f"exact except for a chance below {power_above(chance)}: identities tested at random instances")
     lines += [f"legs {', '.join(each.legs)}: {near(each)}" for each in found.sets if each.near]
     lines += _modes(found.setting)
     if not found.complete:
         lines.append("not all sets are listed, there are too many: " + (
             "no other set as small has the best rank at the samples" if found.minimal_complete else
-            "of the smallest none can be left out, but a smaller one may exist"))
+            "from the smallest sets no leg can be left out, but a smaller set may exist"))
     return "\n".join(lines)
 
 
@@ -180,11 +180,11 @@ def exported(found: ExportedCode) -> str:
     rows: Rows = [("robot", proof.robot.name), ("language", found.lang), ("motors", ", ".join(proof.motors)),
                   ("joints", f"{len(proof.passive)} passive, {len(proof.held)} idle (held)"),
                   ("directions", ", ".join(found.legs) or "none"),
-                  ("inverse", "in closed form" if found.closed else "by Newton's method, from motors that are near"),
+                  ("inverse", "in closed form" if found.closed else "by Newton's method, from nearby motors"),
                   ("steps", [f"{bounds.steps} of Newton's method are enough, and an answer is within "
                              f"{bounds.error:.2g} of",
                              "the closure (rad, 1 or characteristic lengths), rounding included, proved",
-                             *[f"whether {bounds.others} more equations of the loops hold, it finds out"
+                             *[f"whether {bounds.others} more equations of the loops hold is checked at run time"
                                for _ in range(bounds.others > 0)]]
                    if bounds else "not bounded in all cells: what is not confirmed is undecided")]
     for part in proof.parts:
@@ -196,7 +196,7 @@ def exported(found: ExportedCode) -> str:
     if proof.back is not None:
         rows.append(("way back", [f"{name} {low:.6g} to {high:.6g}" for name, low, high in
                                   zip(proof.motors, *proof.back, strict=True)]
-                     + ["no two motors in this box have one pose of the platform, proved"]))
+                     + ["no two motor settings in this box give the same platform pose, proved"]))
     return listing([*rows, ("size", f"{len(found.code.encode()) / 1024:.0f} kB")])
 
 
@@ -247,7 +247,7 @@ def _asked(found: Advice) -> list[str]:
         if all(m.kind in ("leg", "offered") or (m.kind == "encoder" and m.of in found.setting.robot.joints
                                                 and m.axis is None) for m in each.measurements):
             legs = ",".join([*found.setting.labels, *(m.of for m in each.measurements if m.kind == "leg")])
-            return ["asked of other commands: " + " ".join([f"--observe {legs}", *(f"--see {text}" for text in see)])]
+            return ["for other commands: " + " ".join([f"--observe {legs}", *(f"--see {text}" for text in see)])]
     return []
 
 

@@ -72,7 +72,7 @@ def servo(found: Servo) -> str:
                               f"degrees of there, root mean square {1e3 * s.rms_metres:.2g} mm and "
                               f"{_degrees(s.rms_radians)} degrees"))
         if s.aside:
-            rows.append(("", f"holds it aside: on average {1e3 * s.offset:.3g} mm from there, at "
+            rows.append(("", f"keeps it away: on average {1e3 * s.offset:.3g} mm from there, at "
                              f"({' '.join(f'{value:.4g}' for value in s.mean)})"))
     rows.append(("notes" if found.spread is None and found.notes else "", list(found.notes)))
     least = track.to_dict(run.times.tolist())
@@ -103,14 +103,14 @@ def basins(found: Basins) -> str:
              for number, (letter, each) in enumerate(zip(LETTERS, found.ends, strict=False))]
     notes = []
     if not found.abreast:
-        notes.append(f"each start simulated by itself: {', '.join(hindrances(found.setting))}")
+        notes.append(f"each start simulated separately: {', '.join(hindrances(found.setting))}")
     elif found.checked:
-        notes.append(f"integrated abreast; of {found.checked} starts that were simulated by themselves besides, "
+        notes.append(f"integrated together; of {found.checked} starts that were also simulated separately, "
                      f"{found.agreed} ended at the same pose")
     if found.abreast and found.followed:
-        notes.append(f"{found.followed} runs could not be followed so, and were simulated by themselves")
+        notes.append(f"{found.followed} runs could not be followed this way and were simulated separately")
     if count := int(np.sum(found.damped)):
-        notes.append(f"{count:,} runs ({100 * count / found.starts:.2g} %) come to a singularity on their way: there "
+        notes.append(f"{count:,} runs ({100 * count / found.starts:.2g} %) come to a singularity on the way, where "
                      "noise may lead them elsewhere")
     rows.append(("found", notes))
     if found.certified is not None:
@@ -147,7 +147,7 @@ def accuracy(found: Accuracy) -> str:
 def _limits_left(found: Accuracy) -> Rows:
     """Whose limits a grid passes over."""
     limited = ", ".join(found.setting.mechanism.limited)
-    return [("limits", f"those of {limited} are not looked at")] if limited else []
+    return [("limits", f"those of {limited} are not checked")] if limited else []
 
 
 def field_rows(found: Accuracy) -> Rows:
@@ -166,7 +166,7 @@ def _swept_rows(found: Accuracy, swept: SweptErrors) -> Rows:
     """The same of a grid that is in a file, of which no median is known."""
     tally = swept.tally
     reached = f"{tally.reached} of {swept.grid.size}" + (
-        f" ({swept.before} were there from a sweep that was broken off)" if swept.before else "")
+        f" ({swept.before} were there from an interrupted sweep)" if swept.before else "")
     return _grid_rows(found, swept.grid, reached, _range(tally.position, None, 1e3, "mm"),
                       _range(tally.orientation, None, 180 / np.pi, "degrees"), swept.spots, tally.gap)
 
@@ -198,7 +198,7 @@ def _grid_rows(found: Accuracy, grid: Grid, reached: str, position: str, orienta
         rows.append(("checked", f"against Pinocchio at {spots.count} random poses, largest difference "
                                 f"{spots.difference:.1e}"))
     if gap > SAME_RELATION:
-        rows.append(("", f"three {found.blur.each}s and more: upper bounds, nowhere more than {_percent(gap)} % too "
+        rows.append(("", f"three {found.blur.each}s or more: upper bounds, nowhere more than {_percent(gap)} % too "
                          "large"))
     return rows
 

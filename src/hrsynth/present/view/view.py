@@ -99,7 +99,7 @@ class View(Result, shown_as="view"):
 
     def serve(self, port: int = 0, *, open_: bool = True) -> Any:
         """Serve the view on this machine, where all sliders move together, and open it in the browser: a server with
-        ``address`` and ``stop()``. Port 0 is any that is free. Raises ``BadRequest``."""
+        ``address`` and ``stop()``. Port 0 is any free port. Raises ``BadRequest``."""
         return function("studio.server:view_server")(self, port, open_)
 
     def to_dict(self) -> dict[str, Any]:
@@ -129,11 +129,11 @@ class View(Result, shown_as="view"):
 @question()
 def view(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
          hidden: bool = False, seed: int = 0) -> View:
-    """What there is to see of a robot, and with ``hidden`` of its hidden robot too: every position of a slider is a
-    closed configuration, in which one of the platform's coordinates alone differs from the zero configuration's.
+    """A 3D view of a robot, with ``hidden`` also of its hidden robot: every position of a slider is a closed
+    configuration in which only one of the platform's coordinates differs from the zero configuration.
 
-    ``observe``, ``camera`` and ``see`` as for ``derive``, which also says what is raised. Assembly modes that cannot be
-    listed and meshes that are missing are told in ``notes``.
+    ``observe``, ``camera`` and ``see`` are as for ``derive``, which also says what is raised. Assembly modes that
+    cannot be listed and missing meshes are reported in ``notes``.
 
     >>> hrsynth.view("3rrr_m1")
     <View: 3rrr_m1, 3 sliders, 1 other assembly modes>

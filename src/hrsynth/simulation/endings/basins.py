@@ -65,8 +65,8 @@ NOT_REACHED = -1
 
 @dataclass(frozen=True, eq=False, repr=False)
 class BasinEnd(Value):
-    """Where runs end: the ``ending`` of one of them, simulated one by one; the platform's pose X (4, 4) and ‖e‖ where
-    they come to rest at one; how many starts, and what part of all, end there; ``example`` is the pose of one of them,
+    """Where runs end: the ``ending`` of one of them, simulated separately; the platform's pose X (4, 4) and ‖e‖ if they
+    come to rest at one pose; how many starts, and what share of all, end there; ``example`` is the pose of one of them,
     as ``servo`` takes it."""
 
     ending: Ending
@@ -87,9 +87,9 @@ class BasinEnd(Value):
 @dataclass(frozen=True, eq=False, repr=False)
 class Basins(Result, shown_as="basins"):
     """Where runs from each pose of a grid end: ``cells`` holds the number of the end, in the grid's shape, −1 where the
-    robot cannot start; ``damped`` the starts whose runs come to a singularity, where the law is damped. ``abreast``
-    says whether they were integrated abreast; then ``followed`` of them were simulated one by one because that could
-    not go on, and of ``checked`` others ``agreed`` ended at the same pose."""
+    robot cannot start; ``damped`` the starts whose runs meet a singularity, where the law is damped. ``abreast`` says
+    whether they were integrated together; ``followed`` of them were then simulated one by one because that could not
+    continue, and of ``checked`` others ``agreed`` ended at the same pose."""
 
     setting: ObservedRobot
     goal: Pose
@@ -145,7 +145,7 @@ class Basins(Result, shown_as="basins"):
                            and pose_difference(X, each.X, length) <= RUNS_ALIKE), None) for each in self.ends)
 
     def headline(self) -> str:
-        """The robot and what part of the starts comes to the goal."""
+        """The robot and what share of the starts ends at the goal."""
         share = next((each.share for each in self.ends if each.ending.name == GOAL), 0.0)
         return f"{self.setting.headline()}: {100 * share:.3g} % of {self.starts:,} starts end at the goal {self.goal}"
 
@@ -165,17 +165,17 @@ class Basins(Result, shown_as="basins"):
 def basins(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
            to: PoseLike, plane: PoseLike | None = None, grid: str | None = None, steps: int | None = None,
            jobs: int | None = None, depth: str = "exact", seed: int = 0) -> Basins:
-    """Where the loop that servoes what is observed at the pose ``to`` ends, from each start of a plane of poses (by
-    default one through the goal, all of it that is reached, ``steps`` poses a side) or of a ``grid``, a line, plane or
+    """Where the loop ends that servoes what is observed at the pose ``to``, from each start of a plane of poses (by
+    default one through the goal, as far as it is reached, ``steps`` poses a side) or of a ``grid``, a line, plane or
     box such as ``x=-0.3:0.3:50,y=-0.3:0.3:50,z=-0.7``.
 
-    ``observe``, ``camera`` and ``see`` as for ``derive``. The law is that of ``servo`` with exact measurements
-    (and a ``depth``). Robots
-    whose legs are closed forms and watched by their directions are integrated abreast, others one by one. There are
-    ``jobs`` processes, by default as many as cores; the answer does not depend on them.
+    ``observe``, ``camera`` and ``see`` are as for ``derive``. The law is that of ``servo`` with exact measurements (and
+    a ``depth``). Robots whose legs have closed forms and are watched by their directions are integrated together,
+    others one by one. There are ``jobs`` processes, by default one per core; the answer does not depend on their
+    number.
 
-    Raises ``BadRequest`` for names that there are not, legs that do not see the platform, a singular goal, too many
-    starts; ``PoseNotReached``, ``PlaneNotMet`` for poses out of reach.
+    Raises ``BadRequest`` for unknown names, legs that do not see the platform, a singular goal, too many starts;
+    ``PoseNotReached``, ``PlaneNotMet`` for poses out of reach.
 
     >>> hrsynth.basins("3rrr_m1", to="x=0,y=0,phi=0", grid="x=-0.02:0.02:5,y=-0.02:0.02:5,phi=0")
     <Basins: 3rrr_m1, watching 1, 2, 3: 100 % of 25 starts end at the goal x=0,y=0,z=0,phi=0deg>
@@ -294,7 +294,7 @@ class BasinSearch:
         told = told[len(shown):]
         if len(away):
             numbers[away] = outcomes.number(told[0])
-        numbers[runs.stopped == OVER] = outcomes.number(Outcome(Ending(TIME, "the time was over")))
+        numbers[runs.stopped == OVER] = outcomes.number(Outcome(Ending(TIME, "the time ran out")))
         same = [outcome.alike(outcomes.all[numbers[run]], length)
                 for run, outcome in zip(checked, chain(*alone), strict=True) if numbers[run] >= 0]
         for run, outcome in zip(followed, told[min(len(away), 1):], strict=True):
@@ -349,7 +349,7 @@ def hindrances(setting: ObservedRobot) -> tuple[str, ...]:
              for kind in kinds]
     if setting.mechanism.limited:
         found.append("a joint has limits")
-    return tuple(found) or (("a leg is no closed form",) if setting.placer is None else ())
+    return tuple(found) or (("a leg has no closed form",) if setting.placer is None else ())
 
 
 def place_of(motion: PlatformMotion, X: Array, names: Sequence[str]) -> Array:

@@ -56,16 +56,16 @@ NEARBY = 0.02
 def endings(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
             at: PoseLike, depth: str = "exact", complete: bool = False, seed: int = 0) -> Endings:
     """All poses at which the loop can rest that servoes what is observed at ``at``: the goal, modes and antipodal
-    poses, where the error vanishes, and critical poses, where it does not; which of them attract.
+    poses, where the error vanishes, and critical poses, where it does not; and which of them attract.
 
-    ``observe``, ``camera`` and ``see`` as for ``derive``; each kind of observation has its error. The law rests exactly
-    at the critical points of ½ ‖e‖² on the closed loops (theory.md 11); those at which a camera does not see what it is
-    to see are left out. They are sought from random walks on the branch of the zero configuration. ``complete``: prove
-    that they are all, by subdivision of a box of platform poses (seconds to minutes), as far as that goes. ``depth`` is
-    that of ``servo``; where the law supposes depths, what it commands is no gradient, and rests are found alone.
+    ``observe``, ``camera`` and ``see`` are as for ``derive``; each kind of observation has its error. The law rests
+    exactly at the critical points of ½ ‖e‖² on the closed loops (theory.md 11); those at which a camera does not see
+    what it has to see are left out. They are sought from random walks on the branch of the zero configuration.
+    ``complete``: try to prove that they are all, by subdivision of a box of platform poses (seconds to minutes).
+    ``depth`` is that of ``servo``; if the law assumes depths, its command is not a gradient, and rests are only found.
 
-    Raises ``BadRequest`` for names that there are not, observations that do not see the platform, a singular goal, one
-    at which something is behind its camera; ``PoseNotReached`` for a pose out of reach.
+    Raises ``BadRequest`` for unknown names, observations that do not see the platform, a singular goal, or one at which
+    something is behind its camera; ``PoseNotReached`` for a pose out of reach.
 
     >>> hrsynth.endings("rrrrr_m1", at="x=0,y=0.25").attracting[0].kind
     'goal'

@@ -263,7 +263,7 @@ def require_directions(setting: ObservedRobot) -> None:
     mechanism = setting.mechanism
     others = [each for each in setting.observed if not isinstance(each, Direction)]
     if others:
-        raise NotEnclosed(f"of leg {others[0].leg} something else than a direction is measured")
+        raise NotEnclosed(f"of leg {others[0].leg} something other than a direction is measured")
     if mechanism.reference != mechanism.base or any(each.seen_from is not None for each in setting.observed):
         raise NotEnclosed("directions are not seen from the base")
     if mechanism.couplings:

@@ -32,18 +32,17 @@ class RestPoint:
     ``stability`` stable (it attracts), saddle, unstable (nothing is drawn to it) or undecided; ``curvatures`` are the
     eigenvalues of the Hessian of ½ ‖e‖² along the motions of the loops (characteristic lengths, radians), ascending.
 
-    Exactly one rest lies within ``shift`` (m) and ``turn`` (rad) of ``pose``, infinite where it was only found;
-    ``decided``: whether the signs of the curvatures are proved. ``reversed``
-    names legs whose direction is opposite to the desired one, ``across`` those at right angles to it. ``singular`` says
-    why fewer velocities are seen there than at other poses, None where all are; ``boundary`` whether that is a leg's
-    reach. Linearised, the loop without damping has the eigenvalues −gain · ``rates``, each enclosed, 1 at all poses
-    where the error vanishes (empty where that is not proved, or fewer velocities are seen). ``side`` says on which side
-    of the Type 2 locus of the hidden robot the pose lies, ``goal`` on that of the goal, ``other`` in another aspect,
-    None where the condition has no sign, or vanishes.
+    Exactly one rest lies within ``shift`` (m) and ``turn`` (rad) of ``pose``, infinite if it was only found;
+    ``decided``: whether the signs of the curvatures are proved. ``reversed`` names legs whose direction is opposite to
+    the desired one, ``across`` those at right angles to it. ``singular`` says why fewer velocities are seen there than
+    at other poses, None if all are; ``boundary`` whether that is a leg's reach. Linearised, the loop without damping
+    has the eigenvalues −gain · ``rates``, each enclosed, 1 at all poses where the error vanishes (empty if that is not
+    proved, or fewer velocities are seen). ``side`` says on which side of the Type 2 locus of the hidden robot the pose
+    lies, ``goal`` on that of the goal, ``other`` in another aspect, None if the condition has no sign, or vanishes.
 
-    ``assembly`` is ``beyond limits`` where joints (``beyond``) are outside their limits, else ``yes``;
-    ``other_legs`` are in another working mode than at the goal (None where that is not known); in so many working
-    modes (``ways``) it was found, from so many starts (``met``).
+    ``assembly`` is ``beyond limits`` if joints (``beyond``) are outside their limits, otherwise ``yes``; ``other_legs``
+    are in another working mode than at the goal (None if that is not known); ``ways`` is the number of working modes in
+    which it was found, ``met`` the number of starts that led to it.
     """
 
     pose: Pose
@@ -78,7 +77,7 @@ class RestPoint:
 
     @property
     def stable(self) -> bool | None:
-        """Whether it attracts; None where that is not decided."""
+        """Whether it attracts; None if that is not decided."""
         return None if self.stability == UNDECIDED else self.stability == STABLE
 
     def __repr__(self) -> str:
@@ -99,9 +98,9 @@ class RestPoint:
 @dataclass(frozen=True, eq=False, repr=False)
 class SignedModes(Value):
     """The poses at which the error vanishes with the directions of the legs ``reversed`` opposite to the desired ones:
-    the list of all modes with these, None where it could not be made or none was met; ``boxes``: how many poses boxes
-    prove there to be, None where they prove nothing, in so many ``turns`` of a platform that translates (lists of modes
-    know that of the goal)."""
+    the list of all modes with these, None if it could not be made or none was met; ``boxes``: how many such poses boxes
+    prove, None if they prove nothing, in ``turns`` turns of a platform that translates (lists of modes cover that of
+    the goal)."""
 
     reversed: tuple[str, ...]
     listed: AssemblyModes | None
@@ -129,11 +128,11 @@ class SignedModes(Value):
 @dataclass(frozen=True, eq=False, repr=False)
 class RestCover(Value):
     """Whether the rests are all, by boxes of platform poses: what subdivision found (:class:`Cover`), how many of its
-    critical points are no rest of the list (``unmet``), and how many isolated rests in its box are none of its critical
-    points (``strangers``); ``within`` (m) is how far the box reaches from the goal where legs do not end it, else None;
-    rods that slide and are ``shorter`` (m) were not looked at, None where there are none; of the list so many are at
-    poses at which a platform that only translates is ``turned`` otherwise, which were not looked at either, and so many
-    are ``apart`` in all, as they lie where was not looked."""
+    critical points are not rests of the list (``unmet``), and how many isolated rests in its box are not among its
+    critical points (``strangers``); ``within`` (m) is how far the box reaches from the goal if the legs do not bound
+    it, otherwise None; sliding rods that are ``shorter`` (m) were not searched for, None if there are none; ``turned``
+    rests of the list are at poses at which a platform that only translates is turned differently, which were not
+    searched either, and ``apart`` rests of the list in all lie where nothing was searched."""
 
     cover: Cover
     unmet: int
@@ -145,18 +144,18 @@ class RestCover(Value):
 
     @property
     def crossings(self) -> int:
-        """At so many points of a platform on struts rests fill curves, as two legs' joints lock."""
+        """The number of points of a platform on struts at which rests fill curves, because two legs' joints lock."""
         return 0 if self.cover.struts is None else self.cover.struts.crossings
 
     @property
     def unstretched(self) -> tuple[str, ...] | None:
-        """The legs that are not watched, where rests were looked for only while none of them is stretched; None where
-        they were looked for everywhere."""
+        """The legs that are not watched, if rests were searched for only while none of them is stretched; None if they
+        were searched for everywhere."""
         return None if self.cover.loop is None else tuple(str(each.label) for each in self.cover.loop.idle)
 
     @property
     def across(self) -> int | None:
-        """At so many watched directions at right angles to the desired ones rests were not looked for."""
+        """The number of watched directions at right angles to the desired ones at which rests were not searched for."""
         return None if self.cover.loop is None else self.cover.loop.flat
 
     @property
@@ -166,7 +165,7 @@ class RestCover(Value):
 
     @property
     def reason(self) -> str:
-        """Why it does not, as far as is known."""
+        """Why it does not, as far as known."""
         cover = self.cover
         if cover.reason:
             return cover.reason
@@ -179,7 +178,8 @@ class RestCover(Value):
 
     @property
     def locked(self) -> tuple[tuple[Array, float], ...]:
-        """The points (m) about which legs may lock each other, and how far about them it was not looked."""
+        """The points (m) near which legs may lock each other, and the distance from them within which nothing was
+        searched."""
         error = self.cover.error
         if error is None:
             return ()
@@ -224,12 +224,12 @@ class RestCover(Value):
 @dataclass(frozen=True, eq=False, repr=False)
 class Endings(Result, shown_as="endings"):
     """All that was found of where the loop can rest with the directions of one pose, the goal: ``rests`` one by one,
-    the goal first, then those that attract; ``continua``: one rest each of those that fill curves or surfaces.
-    ``lists`` are those of the modes and of the antipodal poses of each combination of signs, those first that were
-    met; equations of the loops ``measured`` are met as well as numbers tell and not enclosed; ``search`` says how rests
-    were sought, ``cover`` whether they are all (None where that was not asked). ``depth`` is how the law knows depths
-    in images; where it supposes them, ``curvatures`` are real parts of eigenvalues of the linearised loop over −gain.
-    """
+    the goal first, then those that attract; ``continua``: one rest from each family that fills a curve or surface.
+    ``lists`` are those of the modes and of the antipodal poses of each combination of signs, those that were met first;
+    the equations of the loops ``measured`` are met only as well as numbers tell and are not enclosed; ``search`` says
+    how rests were sought, ``cover`` whether they are all (None if that was not asked). ``depth`` is how the law knows
+    depths in images; if it assumes them, ``curvatures`` are real parts of eigenvalues of the linearised loop over
+    −gain."""
 
     setting: ObservedRobot
     goal: ClosedConfiguration
@@ -260,7 +260,8 @@ class Endings(Result, shown_as="endings"):
 
     @property
     def singular(self) -> tuple[RestPoint, ...]:
-        """The rests of the damped law at which fewer are: there the law without damping is not continuous."""
+        """The rests of the damped law at which fewer velocities are seen: there the law without damping is not
+        continuous."""
         return tuple(each for each in self.rests if each.singular is not None)
 
     @property
@@ -287,7 +288,7 @@ class Endings(Result, shown_as="endings"):
 
 
 def stability(curvatures: Sequence[float] | Array, least: float = SAME_ENDING) -> str:
-    """What the eigenvalues of a Hessian say, of which small ones say nothing."""
+    """What the eigenvalues of a Hessian say; small ones say nothing."""
     values = np.asarray(curvatures)
     if np.any(values < -least):
         return SADDLE if np.any(values > least) else UNSTABLE

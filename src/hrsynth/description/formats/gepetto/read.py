@@ -35,7 +35,7 @@ def read(file: RobotFile) -> JointGraph:
     graph.dialect = "Gepetto"
     graph.notes[:0] = notes
     if beside.stem != path.stem:
-        graph.note("guess", f"closures and motors are those of {beside.name}, beside {path.name}: it names its frames")
+        graph.note("guess", f"closures and motors are from {beside.name}, next to {path.name}: it names its frames")
     return _Settings(graph, beside, settings).apply()
 
 
@@ -68,7 +68,7 @@ class _Settings:
     def _types(self) -> None:
         names, kinds = self._list("joint_name"), self._list("joint_type")
         if len(names) != len(kinds):
-            raise xml.refusal(self.path, "joint_name and joint_type are not equally long", None)
+            raise xml.refusal(self.path, "joint_name and joint_type differ in length", None)
         for raw, kind in zip(names, kinds, strict=True):
             name = self._name("joint_name", raw)
             joint = self.graph.joints.get(name)
@@ -90,7 +90,7 @@ class _Settings:
                 raise xml.refusal(self.path, "closed_loop: not pairs of frames", "[[frame, frame], …]")
             links = [self._link(self._name("closed_loop", name)) for name in pair]
             if links[0] == links[1]:
-                raise xml.refusal(self.path, f"closed_loop: {pair[0]!r} and {pair[1]!r} are one link", "two links")
+                raise xml.refusal(self.path, f"closed_loop: {pair[0]!r} and {pair[1]!r} are the same link", "two links")
             point = words[number] == "3d"
             stems = [str(frame).removesuffix(suffix) for frame, suffix in zip(pair, (CUT, END), strict=True)]
             name = self.graph.fresh(f"loop_{number + 1}" if stems[0] != stems[1] else stems[0] if point or
@@ -122,8 +122,8 @@ class _Settings:
         if "name_mot" not in self.said:
             wanted = [name for name, joint in joints.items() if "mot" in name and joint.type is not JointType.FIXED]
             if wanted:
-                self.graph.note("guess", "the motors are " + ", ".join(wanted) + ": their names hold 'mot', as this "
-                                         "dialect has it (--motors to change them)")
+                self.graph.note("guess", "the motors are " + ", ".join(wanted) + ": their names contain 'mot', the "
+                                         "convention of this dialect (--motors to change them)")
         for name in wanted:
             if name not in joints or joints[name].type is JointType.FIXED:
                 raise xml.refusal(self.path, f"name_mot: no joint {name!r} that moves", "joints of the URDF")

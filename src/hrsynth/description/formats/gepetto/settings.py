@@ -54,7 +54,7 @@ def settings_beside(file: RobotFile) -> tuple[Path, dict[str, Any]] | None:
     named = [(path, found) for path in in_folder(file.path, *ENDINGS) if (found := _closing(path)) is not None
              and frames_of(found) <= {str(each.get("name")) for each in file.root.iter("link", "joint")}]
     if len(named) > 1:
-        raise xml.refusal(file.path, f"{len(named)} YAML files beside it close its loops", "one of them named instead",
+        raise xml.refusal(file.path, f"{len(named)} YAML files next to it close its loops", "one of them named instead",
                           value=", ".join(path.name for path, _ in named))
     return named[0] if named else None
 
@@ -76,7 +76,7 @@ def urdf_beside(settings: Path, frames: set[str]) -> Path:
     others = [path for path in in_folder(settings, ".urdf") if frames and frames <= _names_in(path)]
     if len(others) == 1:
         return others[0]
-    raise xml.refusal(settings, f"{len(others) or 'no'} URDF file beside the YAML file" + (
+    raise xml.refusal(settings, f"{len(others) or 'no'} URDF file next to the YAML file" + (
         " that has the frames of its closures" if others or frames else ""), settings.with_suffix(".urdf").name)
 
 

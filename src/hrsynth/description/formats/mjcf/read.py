@@ -163,7 +163,7 @@ class _MjcfReader(XmlReader):
                 kind = JointType.SPHERICAL if element.tag == "connect" else JointType.FIXED
                 graph.close(name, kind, ends, line=xml.line(element))
             elif ends is not None:
-                self.defect(xml.line(element), f"{element.tag} {name!r} holds a body to itself", ends[0].link)
+                self.defect(xml.line(element), f"{element.tag} {name!r} ties a body to itself", ends[0].link)
         elif element.tag == "joint":
             self._gear(element, given, name)
         else:
@@ -238,7 +238,7 @@ class _MjcfReader(XmlReader):
             except ValueError:
                 found = None
             if found is None:
-                graph.note("ignored", f"the keyframe {name!r}: its qpos has not the coordinates of the joints")
+                graph.note("ignored", f"the keyframe {name!r}: its qpos does not match the joints' coordinates")
             else:
                 graph.postures[name] = found
 

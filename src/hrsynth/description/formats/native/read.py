@@ -168,7 +168,7 @@ class _NativeReader(UrdfReader):
         leg, link = self.attribute(element, "leg"), self.attribute(element, "link")
         self.known(link, xml.line(element), "observe: unknown link")
         if leg is not None and (leg == "all" or "," in leg):
-            self.defect(xml.line(element), "observe: a leg's label that no list of legs could name", leg,
+            self.defect(xml.line(element), "observe: a leg label that does not fit into a list of legs", leg,
                         "a label without commas, other than all")
         if self.attribute(element, "axis") is None:
             return
@@ -186,25 +186,25 @@ class _NativeReader(UrdfReader):
         watched = self.cameras or self.root.findall("hrsynth/observe[@kind]")
         if not (self.loops or self.root.findall("loop") or self.serial or watched):
             self.defect(root_line, "no loop: not a parallel robot", None,
-                        'a <loop>; of a serial arm or a free body <hrsynth serial="true">')
+                        'a <loop>; for a serial arm or a free body <hrsynth serial="true">')
         carriers: dict[str, JointSpec] = {}
         for joint in self.tree.values():
             child = joint.ends[1].link
             if child is None or child == joint.ends[0].link:
                 continue
             if child in carriers:
-                self.defect(joint.line, f"joint {joint.name!r}: its child has a parent already, by joint "
+                self.defect(joint.line, f"joint {joint.name!r}: its child already has a parent, through joint "
                                         f"{carriers[child].name!r} (a loop is written as <loop>)", child)
             else:
                 carriers[child] = joint
         order = list(self.tree)
         for ring in self.rings():
             names = sorted((joint.name for joint in ring), key=order.index)
-            self.defect(self.tree[names[-1]].line, "tree joints that make a ring (a loop is written as <loop>)",
+            self.defect(self.tree[names[-1]].line, "tree joints that form a cycle (a loop is written as <loop>)",
                         " ".join(names))
         roots = [name for name in self.links if name not in carriers]
         for name in roots[1:]:
-            self.defect(self.links[name].line, f"second root beside {roots[0]!r}: no joint's child", name)
+            self.defect(self.links[name].line, f"second root besides {roots[0]!r}: not the child of any joint", name)
         if not roots:
             return None
         self.check_platform(roots[0])
@@ -219,8 +219,9 @@ class _NativeReader(UrdfReader):
             told = [*(each.link for each in self.seen), *(each.link for each in self.cameras)]
             self.platform, count = first_body(self.links, whole, base, told)
             if self.platform is None:
-                self.defect(line, f"no <platform>, and no formation, with {count} of the bodies that nothing but the "
-                                  f"base joins observed or observing", None, "a <platform>, or two such bodies")
+                self.defect(line, f"no <platform>, and no formation: {count} of the bodies that are joined to "
+                                  "nothing but the base observe or are observed", None,
+                            "a <platform>, or two such bodies")
         if self.platform is None:
             return
         if self.platform == base:

@@ -126,7 +126,7 @@ class _NativeWriter:
 
     def _between(self, name: str, joint: Joint) -> xml.Element:
         if name in self.mechanism.links or name in self.mechanism.joints:
-            raise BadRequest(f"a link in between of joint {joint.name!r} would take the name of another part", name)
+            raise BadRequest(f"an intermediate link of joint {joint.name!r} would take the name of another part", name)
         return xml.new("link", name=name)
 
     def _loop(self, joint: Joint) -> xml.Element:

@@ -93,7 +93,7 @@ def _axis(reader: XmlReader, graph: JointGraph, joint: xml.Element, tag: str, fr
     """An axis in the joint's frame: up to 1.4 it is given in the model's, later in the joint's unless the file says."""
     element, xyz = joint.find(tag), joint.find(f"{tag}/xyz")
     if element is None:
-        graph.assumed.setdefault(f"<{tag}> 0 0 1 as the format's default, of joints that have none", []).append(name)
+        graph.assumed.setdefault(f"<{tag}> 0 0 1, the format's default, for joints that have none", []).append(name)
     vector = reader.unit(numbers(reader, xyz, (0, 0, 1)), xml.line(joint), f"<{tag}> of joint {name!r}", "0 0 0")
     frame = None if xyz is None else xyz.get("expressed_in")
     of_model = text(element, "use_parent_model_frame") in ("1", "true")

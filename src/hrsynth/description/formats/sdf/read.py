@@ -178,7 +178,7 @@ class _SdfReader(XmlReader):
         chain: list[str] = []
         while name != WORLD and name not in self.poses:
             if name in chain or name not in self.frames:
-                what = "frames relative to each other in a ring" if name in chain else "unknown frame"
+                what = "frames relative to each other in a cycle" if name in chain else "unknown frame"
                 self.defect(line, what, name)
                 return ORIGIN
             chain.append(name)

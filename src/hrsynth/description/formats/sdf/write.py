@@ -56,7 +56,7 @@ def _names(robot: Mechanism) -> list[Note]:
     links, joints = robot.links.keys(), robot.joints.keys()
     own = sorted(name for name in {*links, *joints} if _OWN.fullmatch(name))
     if own:
-        raise BadRequest(f"{robot.name}: SDFormat keeps names between double underscores for itself", ", ".join(own),
+        raise BadRequest(f"{robot.name}: SDFormat reserves names between double underscores", ", ".join(own),
                          "other names of links and joints")
     odd = [f"{name!r} (::)" for name in sorted({*links, *joints}) if "::" in name]
     odd += [f"{name!r} (of a link and a joint)" for name in sorted(links & joints)]
@@ -69,7 +69,7 @@ def _joint(model: xml.Element, robot: Mechanism, joint: Joint) -> None:
     element = etree.SubElement(model, "joint", name=joint.name, type=kind)
     etree.SubElement(element, "parent").text = joint.predecessor
     if joint.successor == WORLD:
-        raise BadRequest(f"{robot.name}: joint {joint.name!r} has the world for its successor", WORLD, "a link")
+        raise BadRequest(f"{robot.name}: joint {joint.name!r} has the world as its successor", WORLD, "a link")
     etree.SubElement(element, "child").text = joint.successor
     write_pose(element, pose((inverse(robot.links[joint.successor].pose) @ np.append(joint.point, 1.0))[:3]))
     for tag, axis in zip(("axis", "axis2"), joint.axes, strict=False):

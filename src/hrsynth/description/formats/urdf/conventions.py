@@ -59,7 +59,7 @@ def gazebo(reader: UrdfReader, graph: JointGraph) -> None:
         if not all(reader.known(link, xml.line(element), what) for link in (parent, child)):
             continue
         if parent not in poses or child not in poses:
-            reader.defect(xml.line(element), "joint of <gazebo>: a link that hangs on nothing", element.get("name"))
+            reader.defect(xml.line(element), "joint of <gazebo>: a link attached to nothing", element.get("name"))
             continue
         X_MJ = poses[child] @ sdf.pose_of(reader, element.find("pose"))
         frames = sdf.JointFrames(inverse(poses[parent]) @ X_MJ, inverse(poses[child]) @ X_MJ, X_MJ, np.eye(3))

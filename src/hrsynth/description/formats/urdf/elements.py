@@ -80,7 +80,7 @@ class UrdfReader(XmlReader):
     def joint(self, element: xml.Element) -> None:
         """A ``<joint>`` of the tree."""
         for mimic in element.findall("mimic"):
-            self.defect(xml.line(mimic), "a <mimic> is a gear between two joints, which this dialect writes otherwise",
+            self.defect(xml.line(mimic), "a <mimic> is a gear between two joints, written differently in this dialect",
                         element.get("name"), "a <coupling> with predecessor, successor and ratio")
         self.add(element, TREE_TYPES, self.tree_ends(element), ["origin", "parent", "child"])
 
@@ -210,7 +210,7 @@ class UrdfReader(XmlReader):
                 self.defect(joint.line, f"{name!r} joins a link to itself", joint.ends[0].link)
 
     def rings(self) -> Iterator[list[JointSpec]]:
-        """The tree joints that carry each other in a ring, each ring once, from the base's side outward."""
+        """The tree joints that form a cycle, each ring once, from the base's side outward."""
         carrier: dict[str | None, JointSpec] = {}
         for joint in self.tree.values():
             if joint.ends[1].link not in (None, joint.ends[0].link):

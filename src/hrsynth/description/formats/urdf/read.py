@@ -63,7 +63,7 @@ class _TolerantReader(UrdfReader):
         self.add(element, TYPES, self.tree_ends(element), ["origin", "parent", "child", "mimic"])
         if child is not None and link in self.carried and name in self.tree:
             self.loops[name] = replace(self.tree.pop(name), in_tree=False)
-            self.notes.append(("merged", f"joint {name!r} is a second one with the child {link!r}: it closes a loop"))
+            self.notes.append(("merged", f"joint {name!r} is the second with the child {link!r}: it closes a loop"))
         elif child is not None:
             self.carried.add(link)
         for mimic in element.findall("mimic")[:1]:
@@ -101,7 +101,7 @@ class _TolerantReader(UrdfReader):
             self.defect(xml.line(self.root), "no links")
         for ring in self.rings():
             names = comma_list(joint.name for joint in ring)
-            self.defect(ring[0].line, "joints that carry each other in a ring", names, "a tree that hangs on one link")
+            self.defect(ring[0].line, "joints that form a cycle", names, "a tree with one root")
         self.require_sound()
 
     def add_gears(self, graph: JointGraph) -> None:

@@ -33,7 +33,7 @@ def expand(path: Path) -> xml.Element:
     try:
         run = subprocess.run(command, capture_output=True, text=True, timeout=XACRO_SECONDS, check=False)
     except subprocess.TimeoutExpired:
-        raise xml.refusal(path, "xacro does not come to an end", f"{XACRO_SECONDS} seconds") from None
+        raise xml.refusal(path, "xacro did not finish", f"{XACRO_SECONDS} seconds") from None
     if run.returncode:
         file, line, said = _said(run.stderr)
         raise xml.refusal(path if file is None else xml.beside(path, file),

@@ -92,9 +92,9 @@ class _StageReader:
         name = own[0].values.get(f"{PREFIX}:name") if own else None
         graph = self.result = JointGraph(str(name or told["name"] or "robot"), self.file, "USD")
         if not told["metres_told"]:
-            graph.note("guess", "lengths are in centimetres, as USD has it where no metersPerUnit stands")
+            graph.note("guess", "lengths are in centimetres, USD's default without metersPerUnit")
         if told["missing"]:
-            graph.note("ignored", f"what other files hold that are not there: {comma_list(told['missing'])}")
+            graph.note("ignored", f"contents of other files, which are missing: {comma_list(told['missing'])}")
         for prim in self.prims.values():
             if prim.has("PhysicsRigidBodyAPI"):
                 self._body(prim)
@@ -146,7 +146,7 @@ class _StageReader:
         U, sizes, V = np.linalg.svd(W[:3, :3])
         if not sizes[-1] > WITHOUT_DIRECTION * max(1.0, sizes[0]):
             if told["shape"] or found.has("PhysicsRigidBodyAPI"):
-                self.defect(found.path, "a transform that leaves no volume")
+                self.defect(found.path, "a transform with zero volume")
             return found
         R = W[:3, :3] if np.max(np.abs(W[:3, :3].T @ W[:3, :3] - np.eye(3))) < EXACT else U @ V
         R = -R if np.linalg.det(R) < 0 else R
@@ -184,7 +184,7 @@ class _StageReader:
             else:
                 solids[carrier].append(solid)
         if lost:
-            self.result.note("ignored", f"{len(lost)} shapes that other dialects have no words for: {comma_list(lost)}")
+            self.result.note("ignored", f"{len(lost)} shapes that other dialects do not have: {comma_list(lost)}")
         for path, link in self.bodies.items():
             content = fragments(Content(inertials[path], tuple(solids[path])))
             self.result.links[link] = Link(link, xml=content)
@@ -455,7 +455,7 @@ class _StageReader:
             near = replace(joint.ends[0], X=frozen(inverse(self.poses[joint.links[0]]) @ S))
             graph.joints[name] = replace(joint, ends=(near, joint.ends[1]), axes=axes, limits=limits)
         if apart:
-            graph.note("guess", "the bodies of these joints are not where they hold them, and are put there: "
+            graph.note("guess", "the bodies of these joints do not lie where the joints hold them, and are put there: "
                                 + comma_list(apart))
 
     def _says(self, prim: _Prim) -> None:

@@ -56,7 +56,7 @@ def _run(path: Path, *arguments: str) -> bytes:
         own = {key: value for key, value in os.environ.items() if key != "PXR_AR_DEFAULT_SEARCH_PATH"}
         run = subprocess.run(command, capture_output=True, timeout=USD_SECONDS, check=False, env=own)
     except (subprocess.TimeoutExpired, ValueError):
-        raise xml.refusal(path, "OpenUSD does not come to an end", f"{USD_SECONDS} seconds") from None
+        raise xml.refusal(path, "OpenUSD did not finish", f"{USD_SECONDS} seconds") from None
     if run.returncode:
         lines = [line for line in run.stderr.decode("utf-8", "replace").splitlines() if line.startswith("refused: ")]
         what = lines[-1].removeprefix("refused: ") if lines else "OpenUSD does not open it"

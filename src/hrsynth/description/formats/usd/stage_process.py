@@ -59,7 +59,7 @@ def require_inside(start: Path, largest: int, most: int) -> list[str]:
             if other is None or not other.resolve().is_relative_to(folder):
                 refuse(f"a layer outside of the file's folder, found {asset}, {cure}")
             elif other.suffix.lower() not in ENDINGS:
-                refuse(f"a layer that is no USD file, found {asset}, allowed: {', '.join(ENDINGS)}")
+                refuse(f"a layer that is not a USD file, found {asset}, allowed: {', '.join(ENDINGS)}")
             elif other.is_file():
                 pending.append(other)
             else:
@@ -136,7 +136,7 @@ def obj(stage: Any, path: str) -> str:
     for count in counts:
         face = list(corners[at:at + count])[::turn]
         if any(not 0 <= corner < len(points) for corner in face) or len(face) < count:
-            refuse(f"the faces of mesh {path} name points that there are not")
+            refuse(f"the faces of mesh {path} name points that do not exist")
         lines.append("f " + " ".join(str(corner + 1) for corner in face))
         at += count
     return "\n".join(lines) + "\n"

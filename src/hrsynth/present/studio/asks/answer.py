@@ -67,7 +67,7 @@ def blind(verdict: Verdict) -> list[str]:
         return []
     legs = named("leg", verdict.legs)
     seen = f"{legs[0].upper()}{legs[1:]} see{'s' * (len(verdict.legs) == 1)} as much as all of them together."
-    return [seen if verdict.rank else "However well the directions are measured, they say nothing of the platform.",
+    return [seen if verdict.rank else "However well the directions are measured, they say nothing about the platform.",
             "Something else must be measured as well: the command advise lists what would do."]
 
 
@@ -77,9 +77,9 @@ def rest(setting: ObservedRobot) -> list[str]:
     value = wrong[wrong["unit"]]
     if value is None:
         first = ("At the zero configuration a freedom is lost, so that the error has no bound there."
-                 if wrong["words"] == LOST else f"How wrong the platform is then is {wrong['words']}.")
+                 if wrong["words"] == LOST else f"The error of the platform is then {wrong['words']}.")
     else:
-        first = f"At home the platform is then about {wrong['size']} wrong per 0.1°."
+        first = f"At home the platform is then off by about {wrong['size']} per 0.1°."
     return [first, _elsewhere(setting)]
 
 

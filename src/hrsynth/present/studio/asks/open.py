@@ -122,5 +122,5 @@ def offers(request: Request, found: ImportChoices) -> Iterator[dict[str, Any]]:
         yield offer("close", list(said.get("close", ())), "frames that lie near to each other could meet",
                     [[], near, *([each] for each in near)])
     yield offer("unit", said.get("unit", "m"), "of the file's lengths", list(UNITS))
-    yield offer("as_written", said.get("as_written", False), "else what is parallel, or meets, but for rounding is "
-                "made so", [False, True])
+    yield offer("as_written", said.get("as_written", False), "otherwise what is parallel, or meets, up to "
+                "rounding is made so", [False, True])

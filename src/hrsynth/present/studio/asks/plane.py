@@ -231,4 +231,4 @@ def _words(kind: str, unit: str, found: PoseField, length: float) -> str:
     most = float(here.max())
     near = bounded(most / 1e3, length) if unit == "mm" else bounded(np.radians(most))
     worst = f"{rounded(most)}{SIGNS[unit]}" if near else f"more, {NOT_BOUNDED}"
-    return f"{part}; there the platform is wrong per 0.1° by {rounded(float(here.min()))}{SIGNS[unit]} to {worst}."
+    return f"{part}; there the platform is off, per 0.1°, by {rounded(float(here.min()))}{SIGNS[unit]} to {worst}."

@@ -111,7 +111,7 @@ class Link {
   async upload(file) {
     const address = `upload?tab=${encodeURIComponent(this.tab)}&name=${encodeURIComponent(file.name)}`;
     const reply = await fetch(address, { method: "POST", body: file }).catch(() => null);
-    if (!reply) throw new Refused(`${file.name} could not be sent: the connection broke off`, "Lost");
+    if (!reply) throw new Refused(`${file.name} could not be sent: the connection was lost`, "Lost");
     const said = await reply.json().catch(() => ({}));
     if (!reply.ok) throw new Refused(said.error || `${file.name} was refused (${reply.status})`, "BadRequest");
     return said.file;

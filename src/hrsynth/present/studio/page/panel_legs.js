@@ -35,7 +35,7 @@ class LegsPanel extends Panel {
   /* The link that carries the camera: another one is another question from the start. */
   cameras({ machines: [{ links }] }) {
     const { studio } = this, [base, ...others] = links;
-    return choice("The camera stands on", [["", base], ...others.map((link) => [link, link])], studio.camera ?? "",
+    return choice("The camera is on", [["", base], ...others.map((link) => [link, link])], studio.camera ?? "",
       (link) => studio.open(studio.robot, { watch: studio.seen, camera: link || null }));
   }
 

@@ -95,7 +95,7 @@ class RobotPanel extends Panel {
     this.guesses.hidden = !guesses?.length;
     this.guesses.open = Boolean(failed) || /^(file|folder):/.test(robot.source);
     this.guesses.replaceChildren(element("summary", { textContent: `What was read into the file (${dialect})` }),
-      element("p", { textContent: "Choose otherwise where this is wrong: the robot is then opened anew." }),
+      element("p", { textContent: "Change what is wrong here: the robot is then opened again." }),
       ...(guesses || []).map((guess) => this.guess(guess, robot)));
   }
 

@@ -11,7 +11,7 @@ class ServoPanel extends Panel {
     this.picture = new CameraPicture();
     this.words = element("p", { "aria-live": "polite" });
     this.now = element("p", { className: "numbers" });
-    this.body.append(element("p", { textContent: "Move the platform (or fly to a mode), then set where the run starts and where it is to end." }),
+    this.body.append(element("p", { textContent: "Move the platform (or fly to a mode), then set where the run starts and where it should end." }),
       this.places, element("div", { className: "row" }, this.run), this.words, this.player.root, this.now, this.picture.root);
   }
 
@@ -88,9 +88,9 @@ class CameraPicture {
   constructor() {
     this.svg = document.createElementNS(CameraPicture.SVG, "svg");
     this.svg.setAttribute("role", "img");
-    this.svg.setAttribute("aria-label", "The camera's picture: watched legs solid, where they are to come to dashed");
+    this.svg.setAttribute("aria-label", "The camera's picture: watched legs solid, where they should end up dashed");
     this.root = element("figure", { className: "camera", hidden: true }, this.svg,
-      element("figcaption", { textContent: "The camera's picture. Dashed: where the legs are to come to." }));
+      element("figcaption", { textContent: "The camera's picture. Dashed: where the legs should end up." }));
   }
 
   clear() { this.root.hidden = true; }

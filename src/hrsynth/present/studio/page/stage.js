@@ -7,8 +7,8 @@ const { clear, label, turn, vector } = Solids;
 const { Machine, Direction, outline } = Robots;
 const { LostArrows, Plane, ellipsoid, sights } = Overlays;
 const CLICK = 6, NEAR = { mouse: 7, pen: 10, touch: 18 }, ASK_EACH = 120, SAME = 1e-3;  /* px, px, ms, rad or characteristic lengths */
-const NO_WEBGL = "The 3D picture needs WebGL 2, which this browser does not give: all words and numbers are still there.";
-const LOST = "The graphics card has gone; the picture comes back with it.";
+const NO_WEBGL = "The 3D picture needs WebGL 2, which this browser does not provide: all text and numbers are still there.";
+const LOST = "The graphics context was lost; the picture comes back with it.";
 
 return class Stage {
   /* `reduced`: nothing moves by itself; `over`: elements that lie on the pane's top or bottom, where nothing is to be seen. */

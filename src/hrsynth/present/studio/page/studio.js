@@ -33,7 +33,7 @@ class Studio {
   /* The connection is gone; it is back, with an empty folder for this tab. */
   lost(refused) {
     $("lost-link").hidden = false;
-    $("lost-link").textContent = refused || "The connection to hrsynth is lost. Trying again … If you have ended it, start it once more and open the address that it prints.";
+    $("lost-link").textContent = refused || "The connection to hrsynth is lost. Trying again … If you have stopped it, start it again and open the address that it prints.";
   }
 
   async back() {
@@ -108,7 +108,7 @@ class Studio {
   async answer() {
     if (!this.panels.robot) return;
     const { robot } = this;
-    $("answer").textContent = "Which legs to watch is being worked out …";
+    $("answer").textContent = "Working out which legs to watch …";
     $("answer-actions").replaceChildren();
     const found = await this.link.ask("answer", { robot, camera: this.camera }).catch((error) => ({ sentences: [error.message] }));
     if (!found || robot !== this.robot) return;
