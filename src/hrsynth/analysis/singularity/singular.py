@@ -70,16 +70,16 @@ class Singularity(Result, shown_as="singular"):
 
     @cached_property
     def unexamined(self) -> tuple[str, ...]:
-        """Poses that *never* does not speak of: in words, none where it is not said."""
+        """Poses to which *never* does not apply, in words; none where it is not said."""
         if self.condition is None or not self.condition.never:
             return ()
         anatomy, found = self.setting.anatomy, []
         folding = [leg.label for leg in anatomy.legs if leg.has_loops]
         if folding:
-            found.append(f"poses at which one inside a leg ({', '.join(folding)}) lies flat are not looked at")
+            found.append(f"poses at which a loop inside a leg ({', '.join(folding)}) lies flat are not examined")
         if may_turn(anatomy, self.pattern.legs, self.setting.configurations):
-            found.append("poses at which they lose rank, so that the platform may turn (constraint singularities), are "
-                         "not looked at")
+            found.append("poses at which the loops lose rank, so that the platform may turn (constraint "
+                         "singularities), are not examined")
         return tuple(found)
 
     def headline(self) -> str:
