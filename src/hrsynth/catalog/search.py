@@ -13,8 +13,8 @@ Flags = NDArray[np.bool_]
 Whole = NDArray[Any]
 WIDTHS = (1, 2, 4)
 """Bytes of a number."""
-FEW = 0.2
-"""Part of all texts below which their letters are copied before they are searched."""
+COPIED = 5
+"""Where one in so many texts, or fewer, are searched, their letters are copied first."""
 TOGETHER = 2
 """Letters after the first that are compared at all places; others only where these are met."""
 
@@ -48,7 +48,7 @@ class Texts:
     def at(self, places: Whole) -> Texts:
         """The texts at these places, which are in order."""
         starts, ends = self.starts[places], self.ends[places]
-        if len(places) > FEW * len(self):
+        if COPIED * len(places) > len(self):
             return Texts(self.letters, starts, ends)
         after = np.cumsum(ends - starts)
         moved = Texts.ending(self.letters[:0], after)
