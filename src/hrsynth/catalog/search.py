@@ -15,6 +15,8 @@ WIDTHS = (1, 2, 4)
 """Bytes of a number."""
 COPIED = 5
 """Where one in so many texts, or fewer, are searched, their letters are copied first."""
+AT_ONCE = 8000
+"""Texts that are compared with a pattern together."""
 TOGETHER = 2
 """Letters after the first that are compared at all places; others only where these are met."""
 
@@ -65,6 +67,15 @@ class Texts:
         Each part between two ``*`` is taken where it occurs first after the one before: if there is any way to fit the
         pattern, this is one.
         """
+        return np.concatenate([each._fitting(pattern) for each in self._parts()] or [np.zeros(0, bool)])
+
+    def _parts(self) -> Iterator[Texts]:
+        """Some texts at a time, so few that what is computed of them stays in the processor's cache."""
+        for i in range(0, len(self), AT_ONCE):
+            starts, ends = self.starts[i : i + AT_ONCE], self.ends[i : i + AT_ONCE]
+            yield Texts(self.letters[starts[0] : ends[-1]], starts - starts[0], ends - starts[0])
+
+    def _fitting(self, pattern: str) -> Flags:
         first, *parts = pattern.split("*")
         begin = self._stands(self.starts, first)
         if not parts:
