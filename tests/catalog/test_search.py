@@ -6,9 +6,11 @@ import re
 from fnmatch import translate
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from hrsynth.catalog import search
 from hrsynth.catalog.search import Texts, narrowed
 
 LETTERS = st.text(st.sampled_from("abR*?[-(\n\0\u00df\u20ac\udcff"), max_size=12)
@@ -30,6 +32,13 @@ def test_texts_fit_a_pattern_as_each_does(every: list[str], pattern: str, data: 
     some = texts.at(np.array(places, int))
     assert some.matching(pattern).tolist() == [fits(every[i], pattern) for i in places]
     assert some.holding(pattern).tolist() == [pattern in every[i] for i in places]
+
+
+def test_texts_beyond_those_that_are_compared_together_are_found(monkeypatch: pytest.MonkeyPatch):
+    every = [f"{i}-{i * i}" for i in range(50)]
+    for count in (1, 7, 50, 51):
+        monkeypatch.setattr(search, "AT_ONCE", count)
+        assert Texts.of(every).matching("*4-1*").tolist() == [fits(text, "*4-1*") for text in every]
 
 
 @given(every=MANY, text=st.one_of(LETTERS, PLAIN), data=st.data())

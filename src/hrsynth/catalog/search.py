@@ -13,8 +13,10 @@ Flags = NDArray[np.bool_]
 Whole = NDArray[Any]
 WIDTHS = (1, 2, 4)
 """Bytes of a number."""
-FEW = 0.2
-"""Part of all texts below which their letters are copied before they are searched."""
+COPIED = 5
+"""Where one in so many texts, or fewer, are searched, their letters are copied first."""
+AT_ONCE = 8000
+"""Texts that are compared with a pattern together."""
 TOGETHER = 2
 """Letters after the first that are compared at all places; others only where these are met."""
 
@@ -48,7 +50,7 @@ class Texts:
     def at(self, places: Whole) -> Texts:
         """The texts at these places, which are in order."""
         starts, ends = self.starts[places], self.ends[places]
-        if len(places) > FEW * len(self):
+        if COPIED * len(places) > len(self):
             return Texts(self.letters, starts, ends)
         after = np.cumsum(ends - starts)
         moved = Texts.ending(self.letters[:0], after)
@@ -65,6 +67,15 @@ class Texts:
         Each part between two ``*`` is taken where it occurs first after the one before: if there is any way to fit the
         pattern, this is one.
         """
+        return np.concatenate([each._fitting(pattern) for each in self._parts()] or [np.zeros(0, bool)])
+
+    def _parts(self) -> Iterator[Texts]:
+        """Some texts at a time, so few that what is computed of them stays in the processor's cache."""
+        for i in range(0, len(self), AT_ONCE):
+            starts, ends = self.starts[i : i + AT_ONCE], self.ends[i : i + AT_ONCE]
+            yield Texts(self.letters[starts[0] : ends[-1]], starts - starts[0], ends - starts[0])
+
+    def _fitting(self, pattern: str) -> Flags:
         first, *parts = pattern.split("*")
         begin = self._stands(self.starts, first)
         if not parts:
