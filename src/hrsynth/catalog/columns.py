@@ -92,7 +92,7 @@ class Columns:
 
     def _part(self, name: str, part: str) -> Whole:
         """Numbers of a column: of letters, where texts end, which text a row has."""
-        row = self._file.execute(f"SELECT record, {part}_width FROM columns WHERE name = ?", (name,)).fetchone()
+        row = self._file.execute(f"SELECT rowid, {part}_width FROM columns WHERE name = ?", (name,)).fetchone()
         if row is None or row[1] not in WIDTHS:
             raise self._unreadable(name)
         with self._file.blobopen("columns", part, row[0], readonly=True) as content:
@@ -121,7 +121,7 @@ class ColumnWriter:
     def write(self, file: sqlite3.Connection) -> None:
         """The columns in a table of their own: the same bytes for the same records."""
         parts = ", ".join(f"{part}_width INTEGER, {part} BLOB" for part in PARTS)
-        file.execute(f"CREATE TABLE columns (record INTEGER PRIMARY KEY, name TEXT UNIQUE, {parts})")
+        file.execute(f"CREATE TABLE columns (name TEXT PRIMARY KEY, {parts})")
         for name, known in self._kept.items():
             _write(file, name, known, self._numbers[name])
         owned = [(chain, i) for i, notation in enumerate(self._kept[NOTATION])
@@ -144,5 +144,5 @@ def _write(file: sqlite3.Connection, name: str, every: Iterable[str], numbers: S
     """A column: texts, and the numbers of those of all rows."""
     found = Texts.of(every)
     parts = (narrowed(each) for each in (found.letters, found.ends, np.array(numbers, np.int64)))
-    file.execute(f"INSERT INTO columns VALUES (NULL, ?{', ?' * 2 * len(PARTS)})", (
+    file.execute(f"INSERT INTO columns VALUES (?{', ?' * 2 * len(PARTS)})", (
         name, *(value for part in parts for value in (part.itemsize, part.tobytes()))))
