@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 
+import hrsynth
 from hrsynth.analysis import posture as posture_module
 from hrsynth.analysis.check import MEASURES, UNREACHABLE, Check, check
 from hrsynth.analysis.classes import Counts, interaction_matrix, redundant_rows, surplus
@@ -330,3 +331,10 @@ def test_the_singular_pose_really_moves() -> None:
     target = answer.setting.samples.question.target
     for (_, a), (_, b) in zip(target(ahead).measured, target(behind).measured, strict=True):
         np.testing.assert_allclose(a, b, atol=1e-8)
+
+
+def test_a_set_that_never_shows_all_is_not_called_regular_alone():
+    found = hrsynth.check("delta", ["1"])
+    assert repr(found).endswith("regular, shows 2 of 3>")
+    assert "the directions show 2 of 3: as few as at any pose, not singular" in hrsynth.text(found)
+    assert repr(hrsynth.check("delta")).endswith("regular>")

@@ -467,3 +467,33 @@ def test_a_second_attempt_keeps_to_the_form_that_was_asked_for(monkeypatch: pyte
     assert next(answers, None) is None
     assert found.hidden_architecture is not None
     assert found.hidden_architecture.ascii == expected
+
+
+def test_a_zero_configuration_that_shows_fewer_freedoms_is_named():
+    """How fast the watched rods of a 3-RRR turn, by hand: of the platform's three freedoms they show two there."""
+    assert derived("3rrr_m1").rank_at_zero is None
+    assert "rank_at_zero" not in derived("3rrr_m1").to_dict()
+    checked = hrsynth.singular("3rrr_m1", points=5).checked
+    assert checked is not None
+    at = checked.on_locus[0]
+    robot = at.twin.mechanism
+
+    def place(joint: str) -> np.ndarray:
+        link = robot.joints[joint].predecessor
+        X = at.pose(link) @ np.linalg.inv(robot.links[link].pose)
+        return (X @ np.append(robot.joints[joint].point, 1))[:2]
+
+    def across(v: np.ndarray) -> np.ndarray:
+        return np.array([-v[1], v[0]])
+
+    rates = []
+    for k in "123":
+        foot, elbow, tip = place(f"shoulder_{k}"), place(f"elbow_{k}"), place(f"wrist_{k}")
+        moves = np.column_stack([np.eye(2), across(tip)])
+        rates.append(np.linalg.solve(np.column_stack([across(elbow - foot), across(tip - elbow)]), moves)[1])
+    values = np.linalg.svd(np.array(rates), compute_uv=False)
+    assert values[2] < 1e-9 * values[0] < values[1]
+    found = derive("3rrr_m1", at=at.pose("platform"))
+    assert found.verdict.verdict == CONTROLLABLE
+    assert found.rank_at_zero == found.to_dict()["rank_at_zero"] == 2
+    assert "only 2 of 3 freedoms seen: the zero configuration is a Type 2 singularity" in hrsynth.text(found)

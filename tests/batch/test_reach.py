@@ -377,3 +377,16 @@ def test_on_the_edge_of_the_workspace_a_leg_is_stretched(degrees: float) -> None
     at = reach(everything.start, everything.question, Pose(float(x), float(y)))
     assert abs(bend(at, "2")) < 1e-9
     assert abs(bend(at, "1")) > 0.1
+
+
+def test_parts_that_depend_on_each_other_are_said_to() -> None:
+    """Roll and pitch of the 3-RPS decide its yaw: half of tan ψ is known from the planes of its legs (M. Z. Huang,
+    1987); the nearest pose that is told is one of these, and can be asked for."""
+    setting = setting_of("3rps")
+    everything = setting.everything
+    with pytest.raises(PoseNotReached, match="has 3 freedoms, and parts of this pose depend on each other") as refused:
+        reach(everything.start, everything.question, Pose.parse("z=0.32,rpy=0.1/0.05/0"))
+    assert "blocked" not in str(refused.value)
+    near = reach(everything.start, everything.question, Pose.parse(refused.value.last))
+    R = near.pose(motion_of(setting).link)[:3, :3] @ motion_of(setting).home[:3, :3].T
+    assert abs(R[0, 1] - R[1, 0]) < 1e-6

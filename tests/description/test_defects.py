@@ -128,6 +128,9 @@ DEFECTS: dict[str, tuple[list, list[tuple[int, str]]]] = {
                                    '<transmission name="m">')],
                              [(34, "coupling without <ratio>, g"), (34, "second coupling of the same name, g"),
                               (34, "coupling without <successor>, g"), (34, "value of <ratio>, 1 2, one number")]),
+    "gear that holds": ([(34, '<coupling name="g"><predecessor link="crank"/><successor link="bar"/>'
+                              '<ratio value="-0"/></coupling><transmission name="m">')],
+                        [(34, "ratio of a coupling, which would hold its second joint, -0, a number other than 0")]),
     "document type": ([(1, '<!DOCTYPE robot [<!ENTITY a "b">]>\n<robot name="&a;">')],
                       [(1, "a document type declaration")]),
 }

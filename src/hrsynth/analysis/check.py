@@ -79,7 +79,10 @@ class Check(Result, shown_as="check"):
 
     def headline(self) -> str:
         """The robot, and the state of its hidden robot at each pose."""
-        states = [f"{each.pose} {each.hidden.state}" for each in self.postures]
+        dof, states = self.setting.dof, list[str]()
+        for each in self.postures:
+            rank = each.hidden.rank
+            states.append(f"{each.pose} {each.hidden.state}" + ("" if rank == dof else f", shows {rank} of {dof}"))
         states += [f"{each.pose} not reached" for each in self.unreached]
         return f"{self.setting.headline()}: {'; '.join(states)}"
 

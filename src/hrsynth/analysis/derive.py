@@ -13,6 +13,7 @@ from ..errors import BadRequest, NotCertified
 from ..geometry.ranks import range_basis
 from ..geometry.vectors import Array
 from ..kinematics.certificate import Certificate, certify
+from ..kinematics.relation import relation
 from ..kinematics.sampling import Samples
 from ..mechanism import Mechanism
 from ..mechanism.legs import LegDecomposition
@@ -22,7 +23,7 @@ from ..results import Result, Value
 from ..rewrite.evidence import Evidence
 from ..rewrite.state import State
 from ..rewrite.strategy import FORMS, GENERAL, OBSERVED_STAGES, Check, Rewriting, Step, Strategy, trusting
-from ..tolerances import SAME_RELATION
+from ..tolerances import RANK_GAP, SAME_RELATION
 from .asked import observe as observed_robot
 from .exact import ExactVerdict
 from .exact import architecture as exact_architecture
@@ -81,6 +82,16 @@ class Derivation(Result, shown_as="derive"):
         check = _check(self.setting.samples, STEP_SAMPLES)
         return tuple(step.measured(check) for step in self.taken)
 
+    @cached_property
+    def rank_at_zero(self) -> int | None:
+        """How many freedoms the zero configuration shows, where these are fewer than elsewhere (it is singular); None
+        where they are as many, or the number is not decided."""
+        if self.setting.mechanism.formation:
+            return None
+        start = relation(self.setting.samples.start, self.setting.samples.question)
+        rank = self.dof - start.unobserved_twists.shape[1]
+        return max(rank, 0) if rank < self.verdict.rank and start.gap >= RANK_GAP else None
+
     @property
     def dof(self) -> int:
         """The robot's dof."""
@@ -120,6 +131,7 @@ class Derivation(Result, shown_as="derive"):
             "verdict": self.verdict.verdict,
             "lost": [freedom.to_dict() for freedom in self.verdict.lost],
             "rank": self.verdict.rank, "margin": self.verdict.margin,
+            **({} if self.rank_at_zero is None else {"rank_at_zero": self.rank_at_zero}),
             **({} if self.verdict.formation is None else {"formation": self.verdict.formation.to_dict()}),
             "point_platform": self.setting.anatomy.point is not None,
             "has_interaction_matrix": self.verdict.has_interaction_matrix,

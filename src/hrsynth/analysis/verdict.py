@@ -19,6 +19,8 @@ from .observed import ObservedRobot
 CONTROLLABLE, PARTIAL, BLIND = "controllable", "partially controllable", "uncontrollable"
 AT_REST = "nothing to control"
 """Of a platform that does not move, whatever its legs do."""
+ELSEWHERE = "with the platform at"
+"""What the name of a lost freedom has where the zero configuration is not a generic one."""
 
 
 def word(rank: int, dof: int) -> str:
@@ -119,4 +121,4 @@ def _lost(setting: ObservedRobot, samples: Samples, legs: tuple[str, ...], count
     named = name_freedoms(found, setting.anatomy, legs, position)
     if position is None:
         return named
-    return tuple(replace(each, name=f"{each.name} (with the platform at {point_text(position)})") for each in named)
+    return tuple(replace(each, name=f"{each.name} ({ELSEWHERE} {point_text(position)})") for each in named)

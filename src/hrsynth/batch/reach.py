@@ -27,6 +27,9 @@ from ..tolerances import AS_PRINTED, NEAR_FOLD
 if TYPE_CHECKING:
     from .placing import Placer
 
+NEARER = 0.1
+"""Part of the way to a pose from which on it is worth telling where the way ends."""
+
 
 def generic_motion(start: ClosedConfiguration, question: Measurement) -> PlatformMotion:
     """What the platform generically does, from a few random configurations."""
@@ -49,9 +52,22 @@ def reach(start: ClosedConfiguration, question: Measurement, pose: Pose,
     if came < 1 or not _arrived(found, goal):
         leg, lengths, angles = worst_leg(start.twin, motion, goal)
         last = str(motion.pose(here.pose(motion.link)))
-        raise PoseNotReached(robot, str(pose), came, last, leg, 1e3 * lengths, float(np.degrees(angles)),
-                             wrist=at_end(here))
+        wrist = at_end(here)
+        reason = None if leg or wrist else _dependent(start, motion, goal, came, last)
+        raise PoseNotReached(robot, str(pose), came, last, leg, 1e3 * lengths, float(np.degrees(angles)), wrist=wrist,
+                             reason=reason)
     return found
+
+
+def _dependent(start: ClosedConfiguration, motion: PlatformMotion, goal: Goal, came: float, last: str) -> str | None:
+    """That parts of a wanted pose depend on each other, or on nothing that moves; None where they do not."""
+    rows = goal.rows(start.twin, start.q)[1]
+    if range_basis(rows @ start.kernel()[0], 1.0)[1].value == len(rows):
+        return None
+    nearest_one = f"; the nearest that small steps lead to is {last}" if came > NEARER else ""
+    return (f"each leg alone can close there, but the platform has {motion.dof} "
+            f"{'freedom' if motion.dof == 1 else 'freedoms'}, and parts of this pose depend on each other or cannot be "
+            f"chosen there{nearest_one}")
 
 
 def _arrived(at: ClosedConfiguration, goal: Goal) -> bool:

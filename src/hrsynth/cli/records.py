@@ -218,6 +218,7 @@ class Derive(OfRobot, Modes):
     verdict: Word
     lost: list[FreedomRecord]
     rank: int
+    rank_at_zero: NotRequired[Annotated[int, "at a zero configuration that shows fewer freedoms than others do"]]
     margin: MarginRecord
     formation: NotRequired[FormationRecord]
     point_platform: bool

@@ -228,9 +228,11 @@ def _ends(place: Any, plane: MapPlane, found: Basins, level: float | None) -> bo
     for letter, each in zip(LETTERS, found.ends, strict=False):
         if each.X is None:
             continue
-        u, v = plane.spots(place_of(motion, each.X, plane.names)[None])
-        if not (plane.x[0] <= u[0] <= plane.x[-1] and plane.y[0] <= v[0] <= plane.y[-1]):
+        values = place_of(motion, each.X, plane.names)
+        x, y = (float(tick_values(name, value)) for name, value in zip(plane.names, values, strict=True))
+        if not (plane.x[0] <= x <= plane.x[-1] and plane.y[0] <= y <= plane.y[-1]):
             continue
+        u, v = plane.spots(values[None])
         inside = _inside(found, each, level)
         place.plot(u, v, MARKS[each.ending.name], markersize=14 if each.ending.name == GOAL else 8, zorder=5,
                    markerfacecolor="black" if inside else "none", markeredgecolor="black", markeredgewidth=1.2)

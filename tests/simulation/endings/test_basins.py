@@ -9,6 +9,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from matplotlib.axes import Axes
 from scipy.integrate import solve_ivp
 
 import hrsynth
@@ -27,6 +28,7 @@ from hrsynth.simulation.endings.abreast import Abreast, Runs
 from hrsynth.simulation.endings.flow import Flow
 from hrsynth.simulation.law import DAMPED, directions
 from hrsynth.simulation.servo import ServoTask
+from strategies import transformed
 
 HORIZON = 60.0
 
@@ -314,6 +316,20 @@ def test_lines_and_boxes_are_drawn(grid: str, tmp_path):
     assert (tmp_path / "basins.png").read_bytes().startswith(b"\x89PNG")
     assert "100 %" in repr(found)
     assert "goal" in hrsynth.text(found)
+
+
+@pytest.mark.slow
+def test_ends_are_drawn_where_a_robot_stands_aslant_too(tmp_path, monkeypatch: pytest.MonkeyPatch):
+    R = rotation_from_rpy(0.5, -0.3, 0.2)
+    robot = transformed(hrsynth.load("3rrr_m1"), R, np.array([0.1, 0.2, 0.3]))
+    x, y, _ = hrsynth.observe(robot).motion.home[:3, 3]
+    grid = f"x={x - 0.01}:{x + 0.01}:2,y={y - 0.01}:{y + 0.01}:2,phi=0"
+    found = hrsynth.basins(robot, to=f"x={x},y={y},phi=0", grid=grid, jobs=1)
+    drawn = []
+    plot = Axes.plot
+    monkeypatch.setattr(Axes, "plot", lambda *given, **style: (drawn.append(given[1:]), plot(*given, **style))[1])
+    hrsynth.draw(found, tmp_path / "basins.png")
+    assert any(len(given) > 2 and given[2] == MARKS["goal"] and np.size(given[0]) == 1 for given in drawn)
 
 
 @pytest.mark.slow

@@ -14,7 +14,7 @@ from ..maps import error_map
 from ..modes import picture, why_undrawn
 from ..portrait import Portrait
 from ..text.poses import all_of, at_mode, proved
-from ..text.robots import exact_words, unseen
+from ..text.robots import at_zero, exact_words, lost, unseen
 from ..text.runs import field_rows
 from ..text.tables import labelled
 from .answer import answer, good, held, set_rows, things, wrong
@@ -64,7 +64,7 @@ def _template() -> Any:
         "angle": lambda value: "" if value is None else f"{value:.1e}"}
     environment.tests["refused"] = lambda part: isinstance(part, Refused)
     environment.globals.update(
-        all_of=all_of, at_mode=at_mode, collected=collected, exact_words=exact_words,
+        all_of=all_of, at_mode=at_mode, collected=collected, exact_words=exact_words, lost=lost, at_zero=at_zero,
         field_rows=field_rows, formula=formula, good=good, most=LARGEST_LIST, proved=proved, rank_gap=RANK_GAP,
         same_relation=SAME_RELATION, sources=SOURCES, version=__version__, set_rows=set_rows, unseen=unseen)
     return environment.get_template("page.html.j2")

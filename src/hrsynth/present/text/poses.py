@@ -79,7 +79,8 @@ def _posture(posture: Posture, length: float, setting: ObservedRobot) -> Rows:
     rows = [*beyond_limits(posture.beyond),
             ("mobility", f"{mobility.total}, of which {mobility.idle} idle; the {whose} " + (
         "one freedom" if dof == 1 else f"{dof} freedoms")),
-            *_kinds("hidden robot", f"the {shown} show {posture.hidden.rank} of {dof}", posture.hidden, "not seen"),
+            *_kinds("hidden robot", f"the {shown} show {posture.hidden.rank} of {dof}", posture.hidden, "not seen",
+                    whole=posture.hidden.rank == dof),
             *([] if posture.formation is None else [("verdict here", posture.formation.verdict)]),
             *formation(posture.formation)]
     if far.condition is not None and far.type2 is not None and far.type1 is not None:
@@ -101,8 +102,8 @@ def _posture(posture: Posture, length: float, setting: ObservedRobot) -> Rows:
     return [*rows, ("loops' margin", f"{far.constraints:.3g} (weakest singular value, as part of the largest)")]
 
 
-def _kinds(name: str, what: str, kinds: Kinds, lost: str) -> Rows:
-    state = STATES[kinds.state]
+def _kinds(name: str, what: str, kinds: Kinds, lost: str, *, whole: bool = True) -> Rows:
+    state = STATES[kinds.state] if whole or kinds.state != REGULAR else "as few as at any pose, not singular"
     if kinds.classes is not None and kinds.classes.RO < 0:
         state += f", but special: {-kinds.classes.RO} fewer are lost than at generic poses"
     title = f"{what}: {state} (smallest rank gap {kinds.gap:.1e}, needed {RANK_GAP:.0e})"

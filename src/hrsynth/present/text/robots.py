@@ -7,6 +7,7 @@ from math import comb, degrees, prod
 from typing import TYPE_CHECKING
 
 from ...analysis.exact import ExactVerdict, power_above
+from ...analysis.verdict import ELSEWHERE
 from ...errors import HrsynthError
 from ...tolerances import RANK_CUTOFF, RANK_GAP, SAME_RELATION, SURELY_SOMETHING
 from .branches import ends, limits
@@ -70,7 +71,7 @@ def derivation(found: Derivation) -> str:
         *formation(found.verdict.formation),
         ("mode", _modes(observed)),
         ("architecture", exact_words(found.exact, found.verdict.rank)),
-        ("lost at zero", [freedom.name for freedom in found.verdict.lost]),
+        *lost(found.verdict), ("at zero", at_zero(found)),
         ("", [] if found.verdict.has_interaction_matrix else NO_MATRIX),
         ("certificate", certificate(found.certificate)),
     ]
@@ -81,6 +82,21 @@ def derivation(found: Derivation) -> str:
     steps = [(step.rule, step.leg or "all", "yes" if step.accepted else "no",
               "" if step.largest_angle is None else f"{step.largest_angle:.1e}", step.reason) for step in found.steps]
     return "\n".join([listing(rows), "", table(steps, ("rule", "leg", "taken", "angle", "why"))])
+
+
+def lost(found: Verdict) -> Rows:
+    """The freedoms that are not seen; at zero, where their names do not say where the platform is."""
+    names = [freedom.name for freedom in found.lost]
+    return [("lost" if any(ELSEWHERE in name for name in names) else "lost at zero", names)]
+
+
+def at_zero(found: Derivation) -> list[str]:
+    """That the zero configuration shows fewer freedoms than others, where it does."""
+    rank = found.rank_at_zero
+    if rank is None:
+        return []
+    return [f"{f'only {rank}' if rank else 'none'} of {found.dof} freedoms seen: the zero configuration is a Type 2 "
+            "singularity (hrsynth check)"]
 
 
 def formation(found: Formation | None) -> Rows:
@@ -152,7 +168,7 @@ def legs(found: Legs) -> str:
     rows = [(", ".join(each.legs), each.verdict, f"{each.rank} of {each.dof}", exact_cell(exact, each.rank),
              unseen(each))
             for each, exact in zip(found.sets, found.exact, strict=True)]
-    lost = "lost" if any("platform at (" in row[-1] for row in rows) else f"lost (at {found.where})"
+    lost = "lost" if any(ELSEWHERE in row[-1] for row in rows) else f"lost (at {found.where})"
     if found.setting.mechanism.formation:
         lost = f"not seen (at {found.where})"
     lines = [f"{found.robot}   {found.architecture}   {found.dof} dof", "",
@@ -209,7 +225,7 @@ def advice(found: Advice) -> str:
     """What is seen now, then the smallest sets of measurements that cure it, by kind."""
     now = found.now
     rows = [*head(found.setting), *camera(found.setting), ("verdict", f"{now.verdict} (rank {now.rank} of {now.dof})"),
-            ("lost at zero", [freedom.name for freedom in now.lost])]
+            *lost(now)]
     return "\n".join([listing(rows), "", *_missing(found)])
 
 

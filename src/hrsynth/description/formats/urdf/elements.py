@@ -169,6 +169,9 @@ class UrdfReader(XmlReader):
             self.defect(xml.line(element), "coupling without <ratio>", name)
         elif self.attribute(ratio, "value") is not None:
             value = float(self.numbers(ratio, "value", (1,))[0])
+            if value == 0:
+                self.defect(xml.line(ratio), "ratio of a coupling, which would hold its second joint",
+                            ratio.get("value"), "a number other than 0, or a fixed joint")
             if name and one.link and two.link:
                 self.couplings.append(Coupling(name, one.link, two.link, value, xml.line(element)))
 
