@@ -356,7 +356,7 @@ def test_a_graphics_card_that_goes_is_told_and_comes_back(open_page):
     tab = open_page("3rrr_m1")
     ask(tab, "window.card = stage.renderer.getContext().getExtension('WEBGL_lose_context'); card.loseContext()")
     tab.page.get_by_role("alert").wait_for()
-    assert "graphics card" in tab.page.get_by_role("alert").inner_text()
+    assert "graphics context" in tab.page.get_by_role("alert").inner_text()
     ask(tab, "card.restoreContext()")
     tab.page.wait_for_function("!document.querySelector('[role=alert]')")
     rest(tab)
