@@ -60,14 +60,14 @@ def reach(start: ClosedConfiguration, question: Measurement, pose: Pose,
 
 
 def _dependent(start: ClosedConfiguration, motion: PlatformMotion, goal: Goal, came: float, last: str) -> str | None:
-    """That parts of a wanted pose depend on each other, or on nothing that moves; None where they do not."""
+    """That parts of a wanted pose depend on each other, and the nearest pose found; None where they do not."""
     rows = goal.rows(start.twin, start.q)[1]
     if range_basis(rows @ start.kernel()[0], 1.0)[1].value == len(rows):
         return None
     nearest_one = f"; the nearest that small steps lead to is {last}" if came > NEARER else ""
     return (f"each leg alone can close there, but the platform has {motion.dof} "
-            f"{'freedom' if motion.dof == 1 else 'freedoms'}, and parts of this pose depend on each other or cannot be "
-            f"chosen there{nearest_one}")
+            f"{'freedom' if motion.dof == 1 else 'freedoms'}, and parts of this pose depend on each other"
+            f"{nearest_one}")
 
 
 def _arrived(at: ClosedConfiguration, goal: Goal) -> bool:
