@@ -17,7 +17,7 @@ from ..kinematics.leg_reach import worst_leg
 from ..kinematics.limits import at_end, wrists_beyond
 from ..kinematics.platform_motion import Goal, PlatformMotion
 from ..kinematics.relation import Measurement
-from ..kinematics.steps import HALVINGS, nearest, track
+from ..kinematics.steps import HALVINGS, are_dependent, nearest, track
 from ..kinematics.tasks import Task, system
 from ..kinematics.walking import random_walk
 from ..mechanism.pose import Grid, Pose
@@ -61,13 +61,12 @@ def reach(start: ClosedConfiguration, question: Measurement, pose: Pose,
 
 def _dependent(start: ClosedConfiguration, motion: PlatformMotion, goal: Goal, came: float, last: str) -> str | None:
     """That parts of a wanted pose depend on each other, and the nearest pose found; None where they do not."""
-    rows = goal.rows(start.twin, start.q)[1]
-    if range_basis(rows @ start.kernel()[0], 1.0)[1].value == len(rows):
+    if not are_dependent(start, goal.rows(start.twin, start.q)[1]):
         return None
     nearest_one = f"; the nearest that small steps lead to is {last}" if came > NEARER else ""
-    return (f"each leg alone can close there, but the platform has {motion.dof} "
-            f"{'freedom' if motion.dof == 1 else 'freedoms'}, and parts of this pose depend on each other"
-            f"{nearest_one}")
+    freedoms = "1 freedom" if motion.dof == 1 else f"{motion.dof} freedoms"
+    return (f"each leg alone can close there, but the platform has {freedoms}, and parts of this pose depend on each "
+            f"other{nearest_one}")
 
 
 def _arrived(at: ClosedConfiguration, goal: Goal) -> bool:

@@ -36,7 +36,7 @@ def track(here: ClosedConfiguration, motion: PlatformMotion, goal: GuidedTask,
     home = motion.at_home()
     error, rows = goal.rows(here.twin, here.q)
     longest = 1 / max(1, int(np.ceil(np.linalg.norm(error) / STRIDE)))
-    if range_basis(rows @ here.kernel()[0], 1.0)[1].value < len(rows):
+    if are_dependent(here, rows):
         here = _eased(here, goal, X, longest)
         there = _stepped(here, goal, home)
         miss = float(np.linalg.norm(goal.rows(here.twin, here.q)[0]))
@@ -56,6 +56,11 @@ def track(here: ClosedConfiguration, motion: PlatformMotion, goal: GuidedTask,
         else:
             step /= 2
     return here, 1.0
+
+
+def are_dependent(here: ClosedConfiguration, rows: Array) -> bool:
+    """Whether the parts of a goal with Jacobian ``rows`` (k, nv) cannot be chosen one by one with closed loops."""
+    return range_basis(rows @ here.kernel()[0], 1.0)[1].value < len(rows)
 
 
 def led(here: ClosedConfiguration, motion: PlatformMotion, goal: Goal, last: bool
