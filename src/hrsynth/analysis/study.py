@@ -42,7 +42,7 @@ def map(question: str | Callable[..., Any], robots: RobotLike | Iterable[RobotLi
     Raises ``BadRequest``, and what the question raises.
 
     >>> hrsynth.map("check", ["3rrr_m1"], poses=["x=0,y=0,phi=0", "x=0.01,y=0,phi=0"], legs=["1,2", "all"], jobs=1)[0]
-    <Check: 3rrr_m1, watching 1, 2: x=0,y=0,z=0,phi=0deg regular>
+    <Check: 3rrr_m1, watching 1, 2: x=0,y=0,z=0,phi=0deg regular, shows 2 of 3>
     """
     function: Callable[..., Any] = _function(question)
     if errors not in (RAISE, KEEP):
