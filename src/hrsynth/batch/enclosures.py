@@ -7,17 +7,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from ..geometry.affine import AffineForms
+from ..geometry.affine import AffineForms, stacked
 from ..results import Value
 from ..tolerances import CHAIN_ROUNDING, FOLLOWED
+from .box_machine import MachineCode, Term, worth
 from .tape import Symbol, Tape
-
-Term = tuple[float, float]
-"""A number, and how far it may be off."""
 
 
 def traced(formula: Callable[..., Sequence[Any]], inputs: int, off: float = FOLLOWED) -> BoxFormula:
@@ -75,8 +74,25 @@ class BoxFormula(Value):
                 done[k].append(a)
         return cls(steps, done, given)
 
+    @cached_property
+    def machine(self) -> MachineCode:
+        """The same for the machine that numba compiles."""
+        return MachineCode.of(self.steps, self.done, self.outputs)
+
+    def together(self, inputs: Sequence[AffineForms]) -> AffineForms:
+        """What is given out (boxes, outputs), for inputs of shape (boxes,); no number where a formula has a pole in a
+        box."""
+        return self.machine.run(inputs) if worth(len(self.steps), len(inputs[0].r)) else stacked(self._rows(inputs))
+
     def at(self, inputs: Sequence[AffineForms]) -> list[AffineForms]:
-        """What is given out, for inputs of shape (boxes,); no number where a formula has a pole in a box."""
+        """The same, one after the other."""
+        if not worth(len(self.steps), len(inputs[0].r)):
+            return self._rows(inputs)
+        found = self.machine.run(inputs)
+        return [found[..., k] for k in range(len(self.outputs))]
+
+    def _rows(self, inputs: Sequence[AffineForms]) -> list[AffineForms]:
+        """In NumPy, each operation on all boxes."""
         found: dict[int, AffineForms] = {}
         pairs: dict[int, tuple[AffineForms, AffineForms]] = {}
         with np.errstate(all="ignore"):

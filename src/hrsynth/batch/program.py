@@ -251,9 +251,15 @@ def sweep(x, c, o, first, end):
 '''
 
 
-@lru_cache(maxsize=64)
 def _sweep_of(text: str) -> Callable[..., None]:
-    """The sweep of a module's text, compiled or from numba's cache, which goes by the file that holds the text."""
+    """The sweep of a module's text."""
+    sweep: Callable[..., None] = compiled_module(text).sweep
+    return sweep
+
+
+@lru_cache(maxsize=64)
+def compiled_module(text: str) -> Any:
+    """The module of a text, compiled or from numba's cache, which goes by the file that holds the text."""
     import importlib.util
 
     file = _file_of(text)
@@ -267,8 +273,7 @@ def _sweep_of(text: str) -> Callable[..., None]:
     module = importlib.util.module_from_spec(spec)
     sys.modules[file.stem] = module  # where numba looks for it when it reads its cache
     spec.loader.exec_module(module)
-    sweep: Callable[..., None] = module.sweep
-    return sweep
+    return module
 
 
 def _file_of(text: str) -> Path:

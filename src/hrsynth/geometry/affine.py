@@ -1,20 +1,32 @@
 """Affine forms: quantities that depend on n noise symbols ε in [−1, 1], as c + s · ε ± r, for many boxes at once.
 
 What is first order in ε is kept exactly, so that a formula's enclosure is off by second order only (J. Stolfi, L. H. de
-Figueiredo, Self-Validated Numerical Methods, 1997). Every rounding of the floats is added to r; sines come from balls.
-Arrays of floats that are met count as a geometry's numbers, known to ``tolerances.CHAIN_ROUNDING`` except 0 and ±1;
-single numbers count as exact.
+Figueiredo, Self-Validated Numerical Methods, 1997). Every rounding of the floats is added to r. Arrays of floats that
+are met count as a geometry's numbers, known to ``tolerances.CHAIN_ROUNDING`` except 0 and ±1; single numbers count as
+exact.
+
+What becomes of sums of slopes and of radii is said once, in functions of numbers: of arrays here, of one box after the
+other where :mod:`..batch.box_machine` has them compiled.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from ..tolerances import AFFINE_ROUNDING, CHAIN_ROUNDING
 from .vectors import Array, cross
+
+Numbers = TypeVar("Numbers", Array, Any)
+HALF_PI = (1.57079632673412561417e00, 6.07710050630396597660e-11, 2.02226624871116645580e-21)
+"""π/2 as a sum: the first two have 33 bits each, so that products with whole numbers below 2²⁰ are exact."""
+FARTHEST_TURN = 1e6
+"""Angles above which sines come from balls: whole quarters of a turn are below 2²⁰ up to here."""
+SINE_SERIES = tuple((-1.0) ** k / math.factorial(2 * k + 1) for k in range(9))
+COSINE_SERIES = tuple((-1.0) ** k / math.factorial(2 * k) for k in range(10))
 
 
 class AffineForms:
@@ -29,7 +41,7 @@ class AffineForms:
     @property
     def spread(self) -> Array:
         """How far a value can be from the centre v[0], an upper bound (…)."""
-        return (np.abs(self.v[1:]).sum(axis=0) + self.r) * (1 + AFFINE_ROUNDING)
+        return spread(np.abs(self.v[1:]).sum(axis=0), self.r)
 
     @property
     def size(self) -> Array:
@@ -66,15 +78,11 @@ class AffineForms:
             size = np.abs(self.v).sum(axis=0)
             return _rounded(self.v * k, self.r * np.abs(k) + _doubt(k) * (size + self.r), size * np.abs(k))
         a, b = self.v, other.v
-        slopes_a, slopes_b = np.abs(a[1:]).sum(axis=0), np.abs(b[1:]).sum(axis=0)
-        middle_a, middle_b = np.abs(a[0]), np.abs(b[0])
-        v = a * b[0] + b * a[0]
-        both = a[1:] * b[1:]
+        v, both = a * b[0] + b * a[0], a[1:] * b[1:]
         # ε_k² is ½ ± ½, other products of two symbols are 0 ± 1
         v[0] = a[0] * b[0] + 0.5 * both.sum(axis=0)
-        r = ((middle_a + slopes_a) * other.r + (middle_b + slopes_b) * self.r + self.r * other.r
-             + slopes_a * slopes_b - 0.5 * np.abs(both).sum(axis=0))
-        return _rounded(v, r, (middle_a + slopes_a) * (middle_b + slopes_b))
+        slopes_a, slopes_b, shared = (np.abs(each).sum(axis=0) for each in (a[1:], b[1:], both))
+        return AffineForms(v, product_radius(a[0], slopes_a, self.r, b[0], slopes_b, other.r, shared))
 
     __rmul__ = __mul__
 
@@ -90,8 +98,7 @@ class AffineForms:
 
     def scaled(self, factor: float, doubt: float) -> AffineForms:
         """The values times a number that is known to ``doubt``."""
-        size = np.abs(self.v).sum(axis=0)
-        return _rounded(self.v * factor, self.r * abs(factor) + doubt * (size + self.r), size * abs(factor))
+        return AffineForms(self.v * factor, scaled_radius(np.abs(self.v).sum(axis=0), self.r, factor, doubt))
 
     def shifted(self, term: float, doubt: float) -> AffineForms:
         """The values and a number that is known to ``doubt``."""
@@ -100,29 +107,20 @@ class AffineForms:
         return _rounded(v, self.r + doubt, np.abs(v[0]))
 
     def inverse(self) -> AffineForms:
-        """1 / value: on [a, b], a > 0, it lies between its secant and the tangent of the same slope −1 / (a b). Not
-        finite where the values may vanish."""
-        sign = np.sign(self.v[0])
-        a, b = np.abs(self.v[0]) - self.spread, np.abs(self.v[0]) + self.spread
+        """1 / value; not finite where the values may vanish."""
         with np.errstate(all="ignore"):
-            a = np.where(a > AFFINE_ROUNDING * b, a, np.nan)
-            top, least = 1 / a + 1 / b, 2 / np.sqrt(a * b)
-            return self._along(-1 / (a * b), sign * (top + least) / 2, np.abs(top - least) / 2, top)
+            return self._along(*inverse_line(self.v[0], self.spread))
 
     def sqrt(self) -> AffineForms:
-        """√value for those values that are not negative: on [a, b] it lies between its secant and the tangent of the
-        same slope 1 / (√a + √b). No number where all are negative."""
+        """√value for those values that are not negative; no number where all are negative."""
         with np.errstate(all="ignore"):
-            a, b = np.sqrt(np.maximum(self.low, 0.0)), np.sqrt(self.high)
-            both = a + b
-            least, top = a * b / both, both / 4
-            return self._along(1 / both, (top + least) / 2, (top - least) / 2, both)
+            return self._along(*root_line(self.v[0], self.spread))
 
     def _along(self, slope: Array, shift: Array, off: Array, size: Array) -> AffineForms:
         """slope · values + shift ± off, for results of a ``size``."""
         v = self.v * slope
         v[0] += shift
-        return _rounded(v, self.r * np.abs(slope) + off, 4 * (size + np.abs(v).sum(axis=0)))
+        return AffineForms(v, line_radius(self.r, slope, off, size, np.abs(v).sum(axis=0)))
 
     def padded(self, count: int) -> AffineForms:
         """The same with more symbols, on which it does not depend."""
@@ -133,21 +131,15 @@ class AffineForms:
         return _rounded(self.v.sum(axis=axis), self.r.sum(axis=axis), np.abs(self.v).sum(axis=0).sum(axis=axis))
 
     def sines(self) -> tuple[AffineForms, AffineForms]:
-        """Sine and cosine: with d = s · ε ± r and |d| ≤ w, cos d is 1 − w²/4 + ε w²/4 for some ε, and sin d is
-        d ± w³/6."""
-        sine, cosine = _sines(self.v[0])
-        w = self.spread
-        bend, skew = w * w / 4, w**3 / 6
-        found = []
+        """Sine and cosine."""
+        sine, cosine = sines(self.v[0])
+        w, found = self.spread, []
         for value, rate in ((sine, cosine), (cosine, -sine)):
             v = self.v * rate
-            v[0] = value * (1 - bend)
-            r = np.abs(rate) * (self.r + skew)
-            if self.bend is None:
-                r = r + np.abs(value) * bend
-            else:
-                v[self.bend] += value * bend
-            found.append(_rounded(v, r + AFFINE_ROUNDING, 1 + w))
+            v[0], along, r = sine_line(value, rate, self.r, w, self.bend is not None)
+            if self.bend is not None:
+                v[self.bend] += along
+            found.append(AffineForms(v, r))
         return found[0], found[1]
 
     def _like(self, other: Any) -> AffineForms:
@@ -200,7 +192,7 @@ def combined(Y: Array, forms: AffineForms) -> AffineForms:
 
 def _rounded(v: Array, r: Array, size: Array) -> AffineForms:
     """Forms with the rounding of numbers of a ``size`` added to their radius."""
-    return AffineForms(v, (r + AFFINE_ROUNDING * size) * (1 + AFFINE_ROUNDING))
+    return AffineForms(v, rounded(r, size))
 
 
 def _doubt(k: Array) -> Array:
@@ -209,10 +201,90 @@ def _doubt(k: Array) -> Array:
     return np.where((size == 0) | (size == 1), 0.0, CHAIN_ROUNDING * (1 + size))
 
 
-def _sines(x: Array) -> tuple[Array, Array]:
-    """Sines and cosines of floats, to half a unit in the last place."""
-    from flint import arb
+def rounded(r: Numbers, size: Numbers) -> Numbers:
+    """A radius with the rounding of numbers of a ``size``."""
+    return (r + AFFINE_ROUNDING * size) * (1 + AFFINE_ROUNDING)
 
-    pairs = [arb(v).sin_cos() for v in x.ravel().tolist()]
-    sine, cosine = (np.array([float(pair[k].mid()) for pair in pairs]).reshape(x.shape) for k in (0, 1))
+
+def spread(slopes: Numbers, r: Numbers) -> Numbers:
+    """How far a value can be from its centre: the sum of its ``slopes``' sizes and its radius."""
+    return (slopes + r) * (1 + AFFINE_ROUNDING)
+
+
+def product_radius(a: Numbers, slopes_a: Numbers, r_a: Numbers, b: Numbers, slopes_b: Numbers, r_b: Numbers,
+                   both: Numbers) -> Numbers:
+    """The radius of a product: of centres, sums of slopes' sizes, radii, and the sum of the sizes of products of slopes
+    of the same symbol, half of which is in the centre."""
+    size_a, size_b = abs(a) + slopes_a, abs(b) + slopes_b
+    return rounded(size_a * r_b + size_b * r_a + r_a * r_b + slopes_a * slopes_b - 0.5 * both, size_a * size_b)
+
+
+def scaled_radius(size: Numbers, r: Numbers, factor: float, doubt: float) -> Numbers:
+    """The radius of values, the sum of whose centre's and slopes' sizes is ``size``, times a number known to
+    ``doubt``."""
+    return rounded(r * abs(factor) + doubt * (size + r), size * abs(factor))
+
+
+def inverse_line(centre: Numbers, width: Numbers) -> tuple[Numbers, Numbers, Numbers, Numbers]:
+    """Slope, shift, error and size of a line near 1 / value: on [a, b], a > 0, it lies between its secant and the
+    tangent of the same slope −1 / (a b). No numbers where the values may vanish."""
+    sign, middle = np.sign(centre), abs(centre)
+    a, b = middle - width, middle + width
+    a = np.where(a > AFFINE_ROUNDING * b, a, np.nan)
+    top, least = 1 / a + 1 / b, 2 / np.sqrt(a * b)
+    return -1 / (a * b), sign * (top + least) / 2, abs(top - least) / 2, top
+
+
+def root_line(centre: Numbers, width: Numbers) -> tuple[Numbers, Numbers, Numbers, Numbers]:
+    """The same of √value, of those values that are not negative: on [a, b] it lies between its secant and the tangent
+    of the same slope 1 / (√a + √b). No numbers where all are negative."""
+    off = AFFINE_ROUNDING * abs(centre)
+    a, b = np.sqrt(np.maximum(centre - width - off, 0.0)), np.sqrt(centre + width + off)
+    both = a + b
+    least, top = a * b / both, both / 4
+    return 1 / both, (top + least) / 2, (top - least) / 2, both
+
+
+def line_radius(r: Numbers, slope: Numbers, off: Numbers, size: Numbers, found: Numbers) -> Numbers:
+    """The radius of slope · values + shift ± off, for results of a ``size``, and ``found`` of centre and slopes."""
+    return rounded(r * abs(slope) + off, 4 * (size + found))
+
+
+def sine_line(value: Numbers, rate: Numbers, r: Numbers, w: Numbers, bent: bool) -> tuple[Numbers, Numbers, Numbers]:
+    """Centre, what is along the symbol of the bend if it has one, and radius of a sine with a ``rate`` at the centre:
+    with d = s · ε ± r and |d| ≤ w, cos d is 1 − w²/4 + ε w²/4 for some ε, and sin d is d ± w³/6."""
+    bend = w * w / 4
+    along = value * bend
+    r = abs(rate) * (r + w * w * w / 6)
+    return value * (1 - bend), along, rounded((r if bent else r + abs(along)) + AFFINE_ROUNDING, 1 + w)
+
+
+def turned_sines(x: Numbers) -> tuple[Numbers, Numbers]:
+    """Sine and cosine of angles up to ``FARTHEST_TURN``, each within 2⁻⁵⁰: the angle less whole quarters k of a turn,
+    the first part of π/2 exactly and each of the others with one rounding (2⁻⁵⁴), then Taylor's series, which are off
+    by 10⁻¹⁹, with a dozen roundings of numbers below 1 of which the last three count (W. J. Cody, W. Waite, Software
+    Manual for the Elementary Functions, 1980, chapter 8)."""
+    k = np.rint(x / HALF_PI[0])
+    y = ((x - k * HALF_PI[0]) - k * HALF_PI[1]) - k * HALF_PI[2]
+    z = y * y
+    s, c = z * SINE_SERIES[8], z * COSINE_SERIES[9]
+    for n in range(7, 0, -1):
+        s, c = z * (SINE_SERIES[n] + s), z * (COSINE_SERIES[n + 1] + c)
+    s, c = y + y * s, 1.0 + z * (COSINE_SERIES[1] + c)
+    quarter = k - 4 * np.floor(k / 4)
+    odd = quarter - 2 * np.floor(quarter / 2)
+    return ((1 - 2 * np.floor(quarter / 2)) * ((1 - odd) * s + odd * c),
+            (1 - quarter * (3 - quarter)) * ((1 - odd) * c + odd * s))
+
+
+def sines(x: Array) -> tuple[Array, Array]:
+    """Sines and cosines of floats, each within 2⁻⁵⁰."""
+    with np.errstate(invalid="ignore"):
+        sine, cosine = turned_sines(x)
+    far = np.abs(x) > FARTHEST_TURN
+    if np.any(far):
+        from flint import arb
+
+        pairs = [arb(v).sin_cos() for v in x[far].tolist()]
+        sine[far], cosine[far] = ([float(pair[k].mid()) for pair in pairs] for k in range(2))
     return sine, cosine

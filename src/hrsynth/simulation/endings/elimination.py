@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import lru_cache
+from itertools import combinations
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
+from ...batch.enclosures import BoxFormula, traced
 from ...geometry.affine import AffineForms, combined
 from ...geometry.vectors import Array
 from ...tolerances import AFFINE_ROUNDING
@@ -46,17 +52,29 @@ def reduced_gradient(M: AffineForms, slope: AffineForms, P: Places, N: Places) -
     k, order = P.shape[1], np.concatenate([P, N], axis=1)
     A, rest = entries(M, order), entries(slope, order)
     A = combined(inverse(A.v[0, ..., :k]), A) if k else A
-    rows = [AffineForms(A.v[:, :, i], A.r[:, i]) for i in range(k)]
-    minors = rest
-    with np.errstate(all="ignore"):
-        for r in range(k):
+    n = order.shape[1]
+    found = _eliminated(k, n).together([*(A[..., i, j] for i in range(k) for j in range(n)),
+                                        *(rest[..., j] for j in range(n))])
+    return found[..., : N.shape[1]], found[..., N.shape[1] :]
+
+
+@lru_cache(maxsize=64)
+def _eliminated(k: int, n: int) -> BoxFormula:
+    """What Gauss's elimination leaves of k rows of n numbers and one more, and the minors before its last step."""
+    def formula(y: Sequence[Any], number: Any) -> list[Any]:
+        rows, rest = [list(y[n * i : n * i + n]) for i in range(k)], list(y[n * k :])
+        minors = rest
+        for r, (first, *own) in enumerate(rows):
             if r == k - 1:
-                one, other = np.triu_indices(N.shape[1] + 1, 1)
-                minors = rows[r][..., one] * rest[..., other] - rows[r][..., other] * rest[..., one]
-            tail = rows[r][..., 1:] * rows[r][..., 0].inverse()[..., None]
-            rows[r + 1 :] = [each[..., 1:] - tail * each[..., 0][..., None] for each in rows[r + 1 :]]
-            rest = rest[..., 1:] - tail * rest[..., 0][..., None]
-    return rest, minors
+                both = list(zip(rows[r], rest, strict=True))
+                minors = [a * d - c * b for (a, b), (c, d) in combinations(both, 2)]
+            tail = [each * (1.0 / first) for each in own]
+            for later in [*rows[r + 1 :], rest]:
+                head = later.pop(0)
+                later[:] = [each - part * head for each, part in zip(later, tail, strict=True)]
+        return [*rest, *minors]
+
+    return traced(formula, n * (k + 1))
 
 
 def away(F: AffineForms) -> Flags:
@@ -73,15 +91,25 @@ def away(F: AffineForms) -> Flags:
 def inverse(A: Array) -> Array:
     """Inverses (c, k, k); no numbers where there is none."""
     good = np.asarray(np.isfinite(A).all(axis=(1, 2)))
-    good &= np.abs(np.linalg.det(np.where(good[:, None, None], A, np.eye(A.shape[-1])))) > 0
-    return np.where(good[:, None, None], np.linalg.inv(np.where(good[:, None, None], A, np.eye(A.shape[-1]))), np.nan)
+    safe = A if good.all() else np.where(good[:, None, None], A, np.eye(A.shape[-1]))
+    try:
+        found = np.linalg.inv(safe)
+    except np.linalg.LinAlgError:
+        good &= np.abs(np.linalg.det(safe)) > 0
+        found = np.linalg.inv(np.where(good[:, None, None], A, np.eye(A.shape[-1])))
+    return np.asarray(found if good.all() else np.where(good[:, None, None], found, np.nan))
 
 
 def pseudo_inverse(A: Array) -> Array:
-    """Pseudo-inverses (c, n, m) of matrices (c, m, n); zero where there is none."""
-    good = np.isfinite(A).all(axis=(1, 2), keepdims=True)
-    found = np.linalg.pinv(np.where(good, A, np.eye(*A.shape[1:])))
-    return np.asarray(np.where(good, found, 0.0))
+    """Pseudo-inverses (c, n, m) of matrices (c, m, n), inverses where there are; zero where there are no numbers."""
+    square = A.shape[1] == A.shape[2]
+    found = inverse(A) if square else np.full((len(A), A.shape[2], A.shape[1]), np.nan)
+    none = ~np.isfinite(found).all(axis=(1, 2))
+    if none.any():
+        # of zeros it is zero
+        numbers = np.isfinite(A[none]).all(axis=(1, 2), keepdims=True)
+        found[none] = np.linalg.pinv(np.where(numbers, A[none], 0.0))
+    return found
 
 
 def solution(A: Array, b: Array) -> Array:

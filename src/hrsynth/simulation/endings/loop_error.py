@@ -235,7 +235,7 @@ class LoopError(JointError):
         return of_robot(formula, self.size[0])
 
     def spanned(self, middle: Array, half: Array) -> tuple[Array, Array]:
-        found = stacked(self.told.at(forms_of(middle, half)))
+        found = self.told.together(forms_of(middle, half))
         return found.low, found.high
 
 
@@ -256,11 +256,11 @@ class LoopSubdivision(Subdivision):
         return low, high
 
     def _settled(self, tube: list[AffineForms], P: Places, N: Places) -> tuple[Flags, AffineForms]:
-        F = stacked(self.error.left.at(tube))
+        F = self.error.left.together(tube)
         settled = away(F)
         # where n may lie along both rods |λ| may have no bound: the closure itself may be singular
         small = np.all(np.stack([each.spread for each in tube], axis=1) <= SINGULAR_BOX * self.whole, axis=1)
-        slips = stacked(self.error.slips.at(tube))
+        slips = self.error.slips.together(tube)
         F.r[small & ~settled & ~np.any((slips.low > 0) | (slips.high < 0), axis=1)] = np.inf
         return settled, F
 
@@ -270,7 +270,7 @@ class LoopSubdivision(Subdivision):
     def _equations(self, at: Array, about: Array) -> tuple[AffineForms, AffineForms]:
         forms = forms_of(at, 0 * at)
         F = stacked([*self.error.closing.at(forms), *self.error.left.at(forms)])
-        K = stacked(self.error.bends.at(forms_of(at, about)))
+        K = self.error.bends.together(forms_of(at, about))
         shape = (*F.r.shape, at.shape[1])
         return F, AffineForms(K.v.reshape(-1, *shape), K.r.reshape(shape))
 

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...budgets import BOXES_AT_ONCE
-from ...geometry.affine import AffineForms, affine, combined, stacked
+from ...geometry.affine import AffineForms, affine, combined
 from ...geometry.vectors import Array
 from ...progress import tell
 from ...results import Value
@@ -126,12 +126,12 @@ class Subdivision:
         low, high = low[known], high[known]
         middle, half = (low + high) / 2, (high - low) / 2 * (1 + BOX_ROUNDING)
         forms = forms_of(middle, half)
-        g = stacked(self.error.closing.at(forms)) if self.error.size[1] else AffineForms(
+        g = self.error.closing.together(forms) if self.error.size[1] else AffineForms(
             np.zeros((middle.shape[1] + 1, len(middle), 0)), np.zeros((len(middle), 0)))
         low, high = _narrowed(g)
         if self.vanishing:
             low, high = (pick(one, other) for pick, one, other in zip(
-                (np.maximum, np.minimum), (low, high), _narrowed(stacked(self.error.asked.at(forms))), strict=True))
+                (np.maximum, np.minimum), (low, high), _narrowed(self.error.asked.together(forms)), strict=True))
         gone = np.any(low > high, axis=1)
         with np.errstate(all="ignore"):
             J = np.where(half[:, None] > 0, np.moveaxis(g.v[1:], 0, -1) / half[:, None], 0.0)
@@ -176,7 +176,7 @@ class Subdivision:
         rest = np.flatnonzero(~settled)
         settled[rest] = away(AffineForms(minors.v[:, rest], minors.r[rest]))
         if self.vanishing:
-            settled |= away(stacked(self.error.asked.at(tube)))
+            settled |= away(self.error.asked.together(tube))
         for margin in margins:
             settled |= margin.high < 0
         return settled, F
@@ -193,15 +193,11 @@ class Subdivision:
 
     def _values(self, forms: list[AffineForms]) -> tuple[AffineForms, AffineForms, AffineForms, list[AffineForms]]:
         """g (c, k), its rates (c, k, n), those of E (c, n), reach margins."""
-        (n, k), out = self.error.size, self.error.slopes.at(forms)
-        like = forms[0]
-        if not k:
-            none = AffineForms(np.zeros((*like.v.shape, 0)), np.zeros((*like.r.shape, 0)))
-            return none, AffineForms(none.v[..., None] * np.zeros(n), none.r[..., None] * np.zeros(n)), stacked(
-                out[:n]), out[n:]
-        M = stacked(out[k : k + k * n])
-        return (stacked(out[:k]), AffineForms(M.v.reshape(*M.v.shape[:-1], k, n), M.r.reshape(-1, k, n)),
-                stacked(out[k + k * n : k + k * n + n]), out[k + k * n + n :])
+        (n, k), out = self.error.size, self.error.slopes.together(forms)
+        g, M, slope, margins = (out[..., part] for part in np.split(
+            np.arange(out.r.shape[1]), [k, k + k * n, k + k * n + n]))
+        return (g, AffineForms(M.v.reshape(*M.v.shape[:-1], k, n), M.r.reshape(-1, k, n)), slope,
+                [margins[..., i] for i in range(margins.r.shape[1])])
 
     def _unique(self, middle: Array, half: Array, P: Places, wider: float) -> Flags:
         """Boxes (c, n) in which, made ``wider``, exactly one zero is proved, or that there is none in them."""
@@ -296,7 +292,7 @@ class Subdivision:
         mu = at[:, n:]
         pull = slope + (M * mu[:, :, None]).sum(-2)
         phi = AffineForms(np.concatenate([pull.v, g.v], axis=-1), np.concatenate([pull.r, g.r], axis=-1))
-        out = stacked(self.error.bends.at(forms_of(at, about)))
+        out = self.error.bends.together(forms_of(at, about))
         # the rates of g along the fields, which multiply μ: those by the coordinates but for a far chart
         rates = self._values(forms_of(at, about)[:n])[1]
         c, K = len(at), AffineForms(np.zeros((len(out.v), len(at), n + k, n + k)), np.zeros((len(at), n + k, n + k)))
@@ -345,7 +341,7 @@ class Subdivision:
                 row = K[..., place, :] * forms[far].padded(len(K.v))[..., None]
                 K.v[..., place, :], K.r[:, place] = row.v, row.r
         falling = negative(K) - k
-        e, u = stacked(self.error.errors.at(forms)), stacked(self.error.directions.at(forms_of(x[:, :n], 0 * x[:, :n])))
+        e, u = self.error.errors.together(forms), self.error.directions.together(forms_of(x[:, :n], 0 * x[:, :n]))
         least, most = np.maximum(np.maximum(e.low, -e.high), 0.0), e.size
         p, R = self.error.pose(x[:, :n])
         low, high = self.error.spanned(x[:, :n], reach[:, :n])
