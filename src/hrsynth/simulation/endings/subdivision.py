@@ -196,7 +196,7 @@ class Subdivision:
         (n, k), out = self.error.size, self.error.slopes.together(forms)
         g, M, slope, margins = (out[..., part] for part in np.split(
             np.arange(out.r.shape[1]), [k, k + k * n, k + k * n + n]))
-        return (g, AffineForms(M.v.reshape(*M.v.shape[:-1], k, n), M.r.reshape(-1, k, n)), slope,
+        return (g, AffineForms(M.v.reshape(*M.v.shape[:-1], k, n), M.r.reshape(len(M.r), k, n)), slope,
                 [margins[..., i] for i in range(margins.r.shape[1])])
 
     def _unique(self, middle: Array, half: Array, P: Places, wider: float) -> Flags:
