@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from ..budgets import BRANCH_CELLS, EFFORT
+from ..budgets import BRANCH_CELLS, COVER_BOXES, EFFORT
 from ..present.outputs import OUTPUTS
 from ..progress import following
 from .colour import painted, say
@@ -269,6 +269,8 @@ QUESTIONS = (
              (Option("at", "The goal: pose whose measurements are desired, such as x=0.02,y=0.1,z=-0.7; or mode:2.",
                      "POSE", default=NEEDED), *WATCHED, SEE, DEPTH,
               flag("complete", "Try to prove that the list is complete, by boxes of platform poses."),
+              Option("effort", "Most boxes of poses to look at (10,000 to 40,000 take a second).", "COUNT", int,
+                     COVER_BOXES, low=1),
               _file("endings")),
              ("3rrr_m1 --at x=0.02,y=0,phi=10deg", "quattro --observe 1,4 --at x=0.05,y=0.1,z=-0.7 -o endings.png")),
     Question("basins", "Where the servo loop to a goal ends, from each start of a line, plane or box of poses.",

@@ -10,7 +10,7 @@ from itertools import product
 import numpy as np
 
 from ...analysis.observed import ObservedRobot
-from ...budgets import COVER_BOXES, SIGN_BOXES, SIGN_CHOICES
+from ...budgets import SIGN_BOXES, SIGN_CHOICES
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.relation import Measurement
@@ -41,15 +41,14 @@ class Covers(Value):
 
     @classmethod
     def of(cls, setting: ObservedRobot, goal: ClosedConfiguration, system: RestSystem, question: Measurement,
-           complete: bool) -> Covers:
-        """Those of a goal."""
-        budget = COVER_BOXES if complete else SIGN_BOXES
+           boxes: int | None) -> Covers:
+        """Those of a goal; all critical ones with as many ``boxes`` at most, if that is asked."""
         with part("poses without an error"):
-            found = cover(setting, goal, vanishing=True, budget=budget)
-        if not complete:
+            found = cover(setting, goal, vanishing=True, budget=boxes or SIGN_BOXES)
+        if boxes is None:
             return cls(system, question, found, None)
         with part("all rests"):
-            return cls(system, question, found, cover(setting, goal))
+            return cls(system, question, found, cover(setting, goal, budget=boxes))
 
     def missed(self, known: Sequence[ClosedConfiguration], q: Array, idle: int, turn: int = 0
                ) -> list[Critical]:

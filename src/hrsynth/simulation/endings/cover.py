@@ -63,6 +63,8 @@ class Cover(Value):
     """The loop of two watched legs, of which rests were sought by the force that closes it: it was not looked where a
     leg that is not watched is stretched, nor where as many watched directions as are ``flat`` are at right angles to
     the desired ones."""
+    spent: bool = False
+    """Whether boxes are left open because no more were allowed."""
 
     @property
     def complete(self) -> bool:
@@ -157,7 +159,7 @@ def cover(setting: ObservedRobot, goal: ClosedConfiguration, *, vanishing: bool 
                  sum(each.boxes for each in every), bounded or endless, "",
                  None if endless and not bounded else (low, high), error,
                  () if any(each.short for each in charts[0]) else tuple(free), struts, tuple(locked),
-                 () if struts is not None else unread(setting), loop)
+                 () if struts is not None else unread(setting), loop, any(each.spent for each in every))
 
 
 def _families(setting: ObservedRobot, goal: ClosedConfiguration, vanishing: bool

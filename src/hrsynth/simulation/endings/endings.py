@@ -20,6 +20,7 @@ from ...analysis.modes.modes import AssemblyModes, modes
 from ...analysis.observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike
 from ...analysis.posture import ConfigurationAnalysis
 from ...analysis.question import question
+from ...budgets import COVER_BOXES
 from ...constraints.condition import Condition
 from ...constraints.pattern import ConstraintPattern, placing_links
 from ...errors import HrsynthError, LoopsNotClosed
@@ -54,14 +55,16 @@ NEARBY = 0.02
 
 @question()
 def endings(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
-            at: PoseLike, depth: str = "exact", complete: bool = False, seed: int = 0) -> Endings:
+            at: PoseLike, depth: str = "exact", complete: bool = False, effort: int = COVER_BOXES, seed: int = 0
+            ) -> Endings:
     """All poses at which the loop can rest that servoes what is observed at ``at``: the goal, modes and antipodal
     poses, where the error vanishes, and critical poses, where it does not; and which of them attract.
 
     ``observe``, ``camera`` and ``see`` are as for ``derive``; each kind of observation has its error. The law rests
     exactly at the critical points of ½ ‖e‖² on the closed loops (theory.md 11); those at which a camera does not see
     what it has to see are left out. They are sought from random walks on the branch of the zero configuration.
-    ``complete``: try to prove that they are all, by subdivision of a box of platform poses (seconds to minutes).
+    ``complete``: try to prove that they are all, by subdivision of a box of platform poses (seconds to minutes) into
+    ``effort`` boxes at most.
     ``depth`` is that of ``servo``; if the law assumes depths, its command is not a gradient, and rests are only found.
 
     Raises ``BadRequest`` for unknown names, observations that do not see the platform, a singular goal, or one at which
@@ -81,7 +84,7 @@ def endings(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = Non
     search = RestSearch.of(setting, goal, depth)
     require_sight(setting, search.law, "goal", goal)
     tell("rests")
-    return search.answer(seed, complete=complete)
+    return search.answer(seed, complete=complete, effort=effort)
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,9 +110,10 @@ class RestSearch:
                    np.array(values) if by_directions else values, depth)
 
     def answer(self, seed: int = 0, *, minima: bool = False, rounds: Iterable[Array] | None = None,
-               complete: bool = False) -> Endings:
+               complete: bool = False, effort: int = COVER_BOXES) -> Endings:
         """The rests that were found; ``minima`` and ``rounds`` as for :func:`.critical_points`, of minima alone neither
-        lists nor enclosures; ``complete``: whether it is to be proved that they are all."""
+        lists nor enclosures; ``complete``: whether it is to be proved that they are all, with ``effort`` boxes at
+        most."""
         setting, motion = self.setting, self.setting.motion
         further = None if minima or self.system.supposes else self._further(seed)
         found = critical_points(self.system, setting, self.goal, seed, minima=minima, rounds=rounds, further=further,
@@ -118,7 +122,7 @@ class RestSearch:
         isolated = self._in_mode(found.isolated)
         covers = None
         if not minima and all(each.by_segment for each in setting.observed):
-            covers = Covers.of(setting, self.goal, self.system, self.law.question, complete)
+            covers = Covers.of(setting, self.goal, self.system, self.law.question, effort if complete else None)
         for turn in range(MISSED_ROUNDS):
             if covers is None:
                 break

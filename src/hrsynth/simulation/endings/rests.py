@@ -170,7 +170,8 @@ class RestCover(Value):
         if cover.reason:
             return cover.reason
         if cover.open:
-            return f"{len(cover.open):,} boxes, {cover.share:.2g} of all, are left open{self._where()}"
+            more = f"; {cover.boxes:,} were looked at, more with --effort" if cover.spent else ""
+            return f"{len(cover.open):,} boxes, {cover.share:.2g} of all, are left open{self._where()}{more}"
         if self.unmet or self.strangers:
             return (f"{self.unmet} poses that boxes prove are not in the list, {self.strangers} of the list are not "
                     "among those that boxes prove")

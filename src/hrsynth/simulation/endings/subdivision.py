@@ -77,6 +77,8 @@ class Subdivision:
     high: Array
     vanishing: bool = False
     boxes: int = 0
+    spent: bool = False
+    """Whether there were boxes left as so many had been looked at as were allowed."""
     left: list[tuple[Array, Array]] = field(default_factory=list)
     lost: list[tuple[Array, Array]] = field(default_factory=list)
     """Small boxes in which the equations of the legs may be dependent."""
@@ -117,6 +119,7 @@ class Subdivision:
             middle = np.concatenate([middle[:first], part[again], below])
             half = np.concatenate([half[:first], size[again], edges])
         self.left += list(zip(middle, half, strict=True))
+        self.spent = len(middle) > 0
 
     def _open(self, middle: Array, half: Array) -> tuple[Array, Array, Places]:
         """Boxes (c, n) that are not settled, narrowed, and the axes (c,) across which they are to be cut, −1 of those
