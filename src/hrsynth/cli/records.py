@@ -600,6 +600,7 @@ class ModeRecord(TypedDict):
     reachable: bool | None
     assembly: Literal["yes", "beyond limits", "no", "not found"]
     open: list[str]
+    open_couplings: Annotated[list[str], "couplings that were not closed where all legs were"]
     beyond: list[str]
     reasons: list[MissRecord]
     type2_distance: Number
@@ -632,6 +633,9 @@ class SelfMotionRecord(TypedDict):
     returns: bool
     goal: bool
     met: int
+    beyond: Annotated[list[str], "joints that are beyond their limits somewhere on the way"]
+    within_m: Annotated[float, "how far the platform went with all joints within their limits"]
+    within_rad: float
 
 
 class ListedModes(OfRobot, WrittenTo):
