@@ -1379,6 +1379,14 @@ class LintCounts(TypedDict):
     note: int
 
 
+class UnreadRecord(TypedDict):
+    """A file that could not be opened, or is no document, and why."""
+
+    file: str
+    line: int | None
+    message: str
+
+
 class LintAnswer(Head, WrittenTo):
     """What is wrong, doubtful or lost in files; `mended` is what --fix did, `file` where the result is written."""
 
@@ -1386,6 +1394,7 @@ class LintAnswer(Head, WrittenTo):
     findings: list[FindingRecord]
     counts: LintCounts
     mended: list[FindingRecord]
+    unread: list[UnreadRecord]
 
 
 RECORDS: dict[str, Any] = {
