@@ -743,6 +743,14 @@ class ExportedPart(TypedDict):
     proved: Annotated[Array, "low and high of each motor (m, rad)"]
 
 
+class FreeMotorRecord(TypedDict):
+    """A motor in no loop, and the interval in which the program answers (m, rad)."""
+
+    motor: str
+    lower: float
+    upper: float
+
+
 class Exported(OfRobot, WrittenTo):
     """What the code was made of."""
 
@@ -758,6 +766,7 @@ class Exported(OfRobot, WrittenTo):
     back: Annotated[Array | None, "low and high of motors, no two of which give the platform one pose (proved)"]
     parts: list[ExportedPart]
     limits: list[BranchLimitRecord]
+    free: list[FreeMotorRecord]
 
 
 class AtlasAnswer(ListedModes):

@@ -66,7 +66,8 @@ def _turns(file: LintedFile) -> Iterator[tuple[str, xml.Element, list[NumberAt]]
         elif (file.dialect == "sdf" and element.tag == "pose" and len((element.text or "").split()) == 6
               and element.get("degrees") not in ("true", "1") and element.get("rotation_format") != "quat_xyzw"):
             of = element.getparent()
-            yield (f"the pose of <{of.tag}> {of.get('name') or ''}".rstrip(), element,
+            name = "" if of is None else f" of <{of.tag}> {of.get('name') or ''}".rstrip()
+            yield (f"the pose{name}", element,
                    [NumberAt(element, None, place) for place in (3, 4, 5)])
 
 
