@@ -461,7 +461,8 @@ def test_no_name_of_the_c_library_is_a_namespace(tmp_path: Path) -> None:
     """None of its names, types and macros is what a robot's namespace is called."""
     names = set(" ".join(path.read_text(encoding="utf-8", errors="replace") for path in (
         Path("/usr/include/math.h"), Path("/usr/include/stdio.h"), Path("/usr/include/stdlib.h"),
-        Path("/usr/include/unistd.h"), Path("/usr/include/time.h"), Path("/usr/include/string.h"), Path("/usr/include/pthread.h"),
+        Path("/usr/include/unistd.h"), Path("/usr/include/time.h"), Path("/usr/include/string.h"),
+        Path("/usr/include/pthread.h"),
         Path("/usr/include/sched.h"), Path("/usr/include/signal.h"), Path("/usr/include/wchar.h")) if path.exists()
     ).replace("(", " ( ").split())
     names = sorted({each for each in names if re.fullmatch("[a-z][a-z0-9_]*", each)

@@ -555,6 +555,16 @@ class BranchLimitRecord(TypedDict):
     verdict: Annotated[Literal["kept", "passed", "undecided", "not looked at"], "kept and passed are proved"]
 
 
+class MotorBeyondRecord(TypedDict):
+    """A motor that the proved cells take beyond its limits in the file, these, and its range in the cells (m, rad)."""
+
+    motor: str
+    lower: float | None
+    upper: float | None
+    least: float
+    most: float
+
+
 class Branch(OfRobot):
     """The branch of the zero configuration, from motors to passive joints."""
 
@@ -568,6 +578,7 @@ class Branch(OfRobot):
                                   "(proved); null without a proof"]
     regular: Annotated[bool, "whether the proved box has no Type 1 singularity (proved)"]
     limits: list[BranchLimitRecord]
+    motors_beyond: list[MotorBeyondRecord]
 
 
 class MissRecord(TypedDict):
