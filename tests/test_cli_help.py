@@ -262,3 +262,15 @@ def test_colour_is_for_terminals_whose_user_wants_it(more: dict[str, str], colou
     assert ("\x1b[" in text) is coloured
     assert ("\x1b[32mcontrollable\x1b[0m" in text) is coloured
     assert re.sub(r"\x1b\[\d*m", "", text) == plain
+
+
+def test_groups_of_commands_have_examples_too(capsys):
+    assert execute(["catalog", "-h"]) == 0
+    assert "Examples:\n  hrsynth catalog list --legs 3-R*RR --verdict controllable\n" in capsys.readouterr().out
+
+
+def test_a_command_without_a_record_is_told_from_no_command(capsys):
+    assert execute(["schema", "studio"]) == 2
+    assert "this command prints no JSON, found 'studio'" in capsys.readouterr().err
+    assert execute(["schema", "stodio"]) == 2
+    assert "no record of the command, found 'stodio'" in capsys.readouterr().err

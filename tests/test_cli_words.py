@@ -196,3 +196,8 @@ def test_the_pose_of_a_question_is_named_where_another_name_is_given(
     capsys.readouterr()
     assert execute(command.split()) == 2
     assert f"allowed: {usual} for the pose of this question" in capsys.readouterr().err
+
+
+def test_ranges_have_units(printed):
+    told = printed("accuracy 3rrr_m1 --cone 0.1deg --grid x=-0.01:0.01:2,phi=0:0.1:2,y=0")
+    assert "x -0.01 to 0.01 m, phi 0 to 0.1 rad" in told

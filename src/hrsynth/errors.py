@@ -42,7 +42,12 @@ class Defect:
 
     def __str__(self) -> str:
         where = self.file if self.line is None else f"{self.file}:{self.line}"
-        text = f"{where}: {self.what}"
+        return " ".join(f"{where}: {self.text}".split())
+
+    @property
+    def text(self) -> str:
+        """What is wrong, without where."""
+        text = self.what
         if self.value is not None:
             text += f", found {self.value}"
         if self.allowed is not None:

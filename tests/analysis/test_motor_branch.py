@@ -368,3 +368,14 @@ def test_a_gear_comes_back_after_whole_turns_alone(ratio):
         (part,) = branch(b.build(platform=platform)).parts
         assert part.share == 1.0
         assert part.turns == (("m", ratio == round(ratio)),)
+
+
+def test_motors_that_a_box_takes_beyond_their_limits_are_in_the_record():
+    robot = four_bar()
+    limited = replace(robot, joints=robot.joints | {"a": replace(robot.joints["a"], limits=Limits(-0.05, None))})
+    found = branch(limited, {"a": (-0.1, 0.1)})
+    low, high = (pick(each) for pick, each in ((min, [cell.low[0] for cell in found.parts[0].cells]),
+                                               (max, [cell.high[0] for cell in found.parts[0].cells])))
+    assert found.to_dict()["motors_beyond"] == [
+        {"motor": "a", "lower": -0.05, "upper": None, "least": low, "most": high}]
+    assert branch(robot, {"a": (-0.1, 0.1)}).to_dict()["motors_beyond"] == []

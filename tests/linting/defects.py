@@ -167,6 +167,15 @@ def scaled(factor: float) -> Damage:
     return damage
 
 
+def turned(path: str, yaw: str) -> Damage:
+    """Give the first pose of SDFormat on a path another yaw."""
+    def damage(root: Root) -> None:
+        element = root.find(path)
+        element.text = " ".join([*(element.text or "").split()[:5], yaw])
+
+    return damage
+
+
 def rounded(decimals: int) -> Damage:
     """All places and axes with so many decimals."""
     def damage(root: Root) -> None:
@@ -237,6 +246,7 @@ CASES = [
     Case("constraint-dead", again("equality/connect", "again"), ("merged",), ".xml", "3rps"),
     Case("mass-negative", texts(".//link/inertial/mass", "-1.5"), ending=".sdf"),
     Case("inertia-triangle", texts(".//link/inertial/inertia/izz", "0.09"), ending=".sdf"),
+    Case("unit-angles", turned(".//link/pose", "-360"), ("loop-open",), ".sdf", geometry=False),
     Case("limits-order", both(texts(".//limit/lower", UPPER), texts(".//limit/upper", LOWER)), ("motor-unlimited",),
          ".sdf"),
 ]

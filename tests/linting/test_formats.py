@@ -21,6 +21,12 @@ from linting.defects import CASES, damaged, put, sound
 ROOT = Path(__file__).resolve().parents[2]
 TEXT = {"type": "object", "required": ["text"], "properties": {"text": {"type": "string", "minLength": 1}}}
 LEVEL = {"enum": ["none", "note", "warning", "error"]}
+LOCATIONS = {"type": "array", "items": {
+    "type": "object", "additionalProperties": False, "properties": {"physicalLocation": {
+        "type": "object", "required": ["artifactLocation"], "additionalProperties": False, "properties": {
+            "artifactLocation": {"type": "object", "required": ["uri"], "properties": {
+                "uri": {"type": "string", "pattern": "^(file:///)?[^ \\\\]*$"}}},
+            "region": {"type": "object", "properties": {"startLine": {"type": "integer", "minimum": 1}}}}}}}}
 SARIF = {
     "type": "object", "required": ["version", "runs"], "additionalProperties": False,
     "properties": {"$schema": {"type": "string", "format": "uri"}, "version": {"const": "2.1.0"}, "runs": {
@@ -39,14 +45,12 @@ SARIF = {
                 "results": {"type": "array", "items": {
                     "type": "object", "required": ["message"], "additionalProperties": False, "properties": {
                         "ruleId": {"type": "string"}, "ruleIndex": {"type": "integer", "minimum": -1}, "level": LEVEL,
-                        "message": TEXT, "locations": {"type": "array", "items": {
-                            "type": "object", "additionalProperties": False, "properties": {"physicalLocation": {
-                                "type": "object", "required": ["artifactLocation"], "additionalProperties": False,
-                                "properties": {
-                                    "artifactLocation": {"type": "object", "required": ["uri"], "properties": {
-                                        "uri": {"type": "string", "pattern": "^(file:///)?[^ \\\\]*$"}}},
-                                    "region": {"type": "object", "properties": {
-                                        "startLine": {"type": "integer", "minimum": 1}}}}}}}}}}}}}}}}
+                        "message": TEXT, "locations": LOCATIONS}}}, "invocations": {"type": "array", "items": {
+                            "type": "object", "required": ["executionSuccessful"], "additionalProperties": False,
+                            "properties": {"executionSuccessful": {"type": "boolean"}, "toolExecutionNotifications": {
+                                "type": "array", "items": {
+                                    "type": "object", "required": ["message"], "additionalProperties": False,
+                                    "properties": {"message": TEXT, "level": LEVEL, "locations": LOCATIONS}}}}}}}}}}}
 """What SARIF 2.1.0 says of the parts that are written."""
 
 
@@ -107,9 +111,43 @@ def test_text_names_place_rule_and_mend(bad: Path):
 def test_the_exit_status_tells(bad: Path, capsys, arguments: list[str], status: int):
     assert execute(["lint", str(bad), *arguments]) == status
     printed = capsys.readouterr()
-    assert (printed.out == "") is (status == 2)
+    assert (printed.out == "") is (status == 2 and arguments != ["more.urdf"])  # what can be read is told
     assert bool(printed.err) is (status == 2)
     assert "Traceback" not in printed.err
+
+
+def test_what_can_be_read_is_told_where_other_files_cannot(bad: Path, tmp_path: Path, capsys):
+    broken = tmp_path / "broken.urdf"
+    broken.write_text("<robot\n")
+    alone = hrsynth.lint([bad])
+    found = hrsynth.lint([broken, bad, "more.urdf"])
+    assert [each.to_dict() for each in found.findings] == [each.to_dict() for each in alone.findings]
+    assert [each.file for each in found.unread] == [str(broken), "more.urdf"]
+    assert found.headline() == f"{alone.headline()}; 2 more could not be read"
+    assert execute(["lint", str(broken), str(bad)]) == 2
+    printed = capsys.readouterr()
+    assert printed.out.startswith(str(alone).rsplit("\n", 1)[0])
+    assert printed.err == f"hrsynth: {broken}:2: {found.unread[0].text}\n"
+    assert github(found).startswith(f"::error file={broken},line=2,title=unread::malformed XML")
+    log = json.loads(sarif(found))
+    assert [each.message for each in Draft202012Validator(SARIF).iter_errors(log)] == []
+    assert not log["runs"][0]["invocations"][0]["executionSuccessful"]
+    assert execute(["lint", str(broken), "more.urdf"]) == 2
+    assert capsys.readouterr().out == ""
+
+
+def test_a_refusal_in_another_file_on_the_same_line_is_told(tmp_path: Path):
+    """An error of one file hides no refusal of a file that it includes."""
+    pytest.importorskip("xacro")
+    head = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">\n'
+    (tmp_path / "part.xacro").write_text(head + """<link name="tip"/>\n
+        <joint name="b" type="helical"><parent link="arm"/><child link="tip"/><axis xyz="0 0 1"/></joint></robot>""")
+    (tmp_path / "robot.xacro").write_text(head + """<link name="base"/><link name="arm"/>
+        <joint name="a" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 0 1"/>
+        <limit lower="1" upper="-1" effort="1" velocity="1"/></joint>
+        <xacro:include filename="part.xacro"/></robot>""")
+    found = {(each.rule, Path(each.file).name, each.line) for each in hrsynth.lint(tmp_path / "robot.xacro").findings}
+    assert {("limits-order", "robot.xacro", 4), ("refused", "part.xacro", 4)} <= found
 
 
 def test_json_and_fix_on_the_command_line(bad: Path, capsys):

@@ -398,8 +398,11 @@ def test_all_files_that_cannot_be_opened_are_named(tmp_path: Path):
     (tmp_path / "a.urdf").write_text("<robot")
     (tmp_path / "c.urdf").write_text(sound())
     with pytest.raises(BadRobotFile) as caught:
-        hrsynth.lint([tmp_path / name for name in ("a.urdf", "b.urdf", "c.urdf")])
+        hrsynth.lint([tmp_path / name for name in ("a.urdf", "b.urdf")])
     assert {Path(each.file).name for each in caught.value.defects} == {"a.urdf", "b.urdf"}
+    found = hrsynth.lint([tmp_path / name for name in ("a.urdf", "b.urdf", "c.urdf")])
+    assert found.unread == caught.value.defects
+    assert [Path(each).name for each in found.files] == ["c.urdf"]
 
 
 def test_comments_and_unknown_elements_stay_where_something_is_mended(tmp_path: Path):

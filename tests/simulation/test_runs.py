@@ -347,3 +347,16 @@ def test_every_reached_pose_is_a_start():
     found = setting("delta")
     at = reach(found.everything.start, found.everything.question, found.motion.pose(found.motion.home), found.motion)
     assert run_between("delta", at, at).ended == GOAL
+
+
+def test_a_run_whose_time_ends_tells_the_rest_it_is_on_its_way_to():
+    """Near the goal ė = −λe: what is left falls by e every 1/λ. A longer run ends at the rest that is told."""
+    asked = {"start": "x=0.01,y=0", "goal": "x=0,y=0", "gain": 0.5}
+    short = servo("3rrr_m1", time=6.0, **asked)
+    assert short.ended == "time"
+    assert short.ending.reason.endswith(
+        "; it was still on its way to a rest that attracts, found at the goal, where the distance left falls by a "
+        "factor of e every 2 s")
+    assert servo("3rrr_m1", **asked).ended == "goal"
+    far = servo("3rrr_m1", start="x=0.05,y=0", goal="x=0,y=0", time=1.0)
+    assert "rest" not in far.ending.reason

@@ -121,4 +121,4 @@ def _lost(setting: ObservedRobot, samples: Samples, legs: tuple[str, ...], count
     named = name_freedoms(found, setting.anatomy, legs, position)
     if position is None:
         return named
-    return tuple(replace(each, name=f"{each.name} ({ELSEWHERE} {point_text(position)})") for each in named)
+    return tuple(replace(each, name=f"{each.name} ({ELSEWHERE} {point_text(position)} m)") for each in named)

@@ -26,7 +26,8 @@ if TYPE_CHECKING:
     from ..catalog.build import WordSource
     from ..mechanism import Mechanism
 
-catalog = Group("hrsynth catalog", "The catalog of architectures: what can be controlled by watching legs.")
+catalog = Group("hrsynth catalog", "The catalog of architectures: what can be controlled by watching legs.",
+                examples=("list --legs 3-R*RR --verdict controllable", "show Delta -o delta.urdf", "list -h"))
 VERDICTS = ("controllable", "partially controllable", "uncontrollable")
 KEPT = Option("kept", "A folder or SQLite file; or published: the shipped catalog of published robots (default: the "
               "shipped catalog of words).", "PATH", flags=("--catalog",))

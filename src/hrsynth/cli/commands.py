@@ -114,9 +114,7 @@ class DeclaredCommand:
         for group in (OWN, WATCHING, OUTPUT, READING):
             rows = [(each.shown, each.told) for each in self.options if each.group == group and not each.argument]
             parts += _section(group, rows + [HELP_ROW] * (group == OUTPUT))
-        if self.examples:
-            parts.append("\n".join([f"{heading('Examples')}:", *(f"  {self.path} {each}" for each in self.examples)]))
-        return "\n\n".join(parts)
+        return "\n\n".join([*parts, *_examples(self.path, self.examples)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,6 +125,7 @@ class Group:
     help: str
     version: Callable[[], str] | None = None
     commands: dict[str, DeclaredCommand | Group] = field(default_factory=dict)
+    examples: Sequence[str] = ()
 
     def main(self, words: Sequence[str]) -> None:
         """Run the command that the first word names on those after it; without one show the help."""
@@ -151,13 +150,19 @@ class Group:
         version = [] if self.version is None else [("--version", "Print the version.")]
         return "\n\n".join([*_head(self.path, ["[OPTIONS]", "COMMAND", "[ARGS]..."], self.help),
                             *_section("Options", [*version, HELP_ROW]),
-                            *_section("Commands", [(name, each.help) for name, each in self.commands.items()])])
+                            *_section("Commands", [(name, each.help) for name, each in self.commands.items()]),
+                            *_examples(self.path, self.examples)])
 
 
 def add_command(group: Group, name: str, help: str, options: Sequence[Option], run: Callable[..., None],
                 examples: Sequence[str] = ()) -> None:
     """Add a command; the examples follow its name in its help."""
     group.commands[name] = DeclaredCommand(f"{group.path} {name}", help, options, run, examples)
+
+
+def _examples(path: str, examples: Sequence[str]) -> list[str]:
+    """What follows a command's name, a line each; none where there are none."""
+    return ["\n".join([f"{heading('Examples')}:", *(f"  {path} {each}" for each in examples)])] if examples else []
 
 
 def _width() -> int:

@@ -33,7 +33,7 @@ def lint(files: list[str], format: str, fail_on: str, json: bool, reader: list[s
     """Print what is found; exit status 1 where it is bad enough."""
     import hrsynth
 
-    from ..errors import BadRequest
+    from ..errors import BadRequest, BadRobotFile
     from ..present.show import record
     from ..present.text import lint as shown
 
@@ -51,6 +51,10 @@ def lint(files: list[str], format: str, fail_on: str, json: bool, reader: list[s
         say(painted(hrsynth.text(found)))
     else:
         say(shown.github(found) if format == "github" else shown.sarif(found))
+    if found.unread:
+        for defect in found.unread:
+            say(f"hrsynth: {defect}", err=True)
+        raise SystemExit(BadRobotFile.exit_status)
     if fail_on != "nothing" and found.reaches(fail_on):
         raise SystemExit(1)
 

@@ -555,6 +555,16 @@ class BranchLimitRecord(TypedDict):
     verdict: Annotated[Literal["kept", "passed", "undecided", "not looked at"], "kept and passed are proved"]
 
 
+class MotorBeyondRecord(TypedDict):
+    """A motor that the proved cells take beyond its limits in the file, these, and its range in the cells (m, rad)."""
+
+    motor: str
+    lower: float | None
+    upper: float | None
+    least: float
+    most: float
+
+
 class Branch(OfRobot):
     """The branch of the zero configuration, from motors to passive joints."""
 
@@ -568,6 +578,7 @@ class Branch(OfRobot):
                                   "(proved); null without a proof"]
     regular: Annotated[bool, "whether the proved box has no Type 1 singularity (proved)"]
     limits: list[BranchLimitRecord]
+    motors_beyond: list[MotorBeyondRecord]
 
 
 class MissRecord(TypedDict):
@@ -600,6 +611,7 @@ class ModeRecord(TypedDict):
     reachable: bool | None
     assembly: Literal["yes", "beyond limits", "no", "not found"]
     open: list[str]
+    open_couplings: Annotated[list[str], "couplings that were not closed where all legs were"]
     beyond: list[str]
     reasons: list[MissRecord]
     type2_distance: Number
@@ -632,6 +644,9 @@ class SelfMotionRecord(TypedDict):
     returns: bool
     goal: bool
     met: int
+    beyond: Annotated[list[str], "joints that are beyond their limits somewhere on the way"]
+    within_m: Annotated[float, "how far the platform went with all joints within their limits"]
+    within_rad: float
 
 
 class ListedModes(OfRobot, WrittenTo):
@@ -739,6 +754,14 @@ class ExportedPart(TypedDict):
     proved: Annotated[Array, "low and high of each motor (m, rad)"]
 
 
+class FreeMotorRecord(TypedDict):
+    """A motor in no loop, and the interval in which the program answers (m, rad)."""
+
+    motor: str
+    lower: float
+    upper: float
+
+
 class Exported(OfRobot, WrittenTo):
     """What the code was made of."""
 
@@ -754,6 +777,7 @@ class Exported(OfRobot, WrittenTo):
     back: Annotated[Array | None, "low and high of motors, no two of which give the platform one pose (proved)"]
     parts: list[ExportedPart]
     limits: list[BranchLimitRecord]
+    free: list[FreeMotorRecord]
 
 
 class AtlasAnswer(ListedModes):
@@ -1375,6 +1399,14 @@ class LintCounts(TypedDict):
     note: int
 
 
+class UnreadRecord(TypedDict):
+    """A file that could not be opened, or is no document, and why."""
+
+    file: str
+    line: int | None
+    message: str
+
+
 class LintAnswer(Head, WrittenTo):
     """What is wrong, doubtful or lost in files; `mended` is what --fix did, `file` where the result is written."""
 
@@ -1382,6 +1414,7 @@ class LintAnswer(Head, WrittenTo):
     findings: list[FindingRecord]
     counts: LintCounts
     mended: list[FindingRecord]
+    unread: list[UnreadRecord]
 
 
 RECORDS: dict[str, Any] = {

@@ -82,7 +82,9 @@ def add(app: Group) -> None:
 
         name = " ".join(command)
         if name not in RECORDS:
-            raise BadRequest("no record of the command", name, tuple(RECORDS))
+            what = ("this command prints no JSON" if name in app.commands and not isinstance(app.commands[name], Group)
+                    else "no record of the command")
+            raise BadRequest(what, name, tuple(RECORDS))
         say(javascript.dumps(schema(name), ensure_ascii=False, indent=2))
 
     add_command(app, "schema", "The JSON schema of what a command prints with --json.",

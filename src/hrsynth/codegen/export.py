@@ -36,6 +36,8 @@ class ExportedCode(Result, shown_as="export"):
     cells: int
     """How many cells the program holds."""
     code: str
+    free: tuple[tuple[str, float, float], ...] = ()
+    """Motors in no loop, with the interval (m, rad) in which the program answers."""
 
     @property
     def robot(self) -> Any:
@@ -61,7 +63,8 @@ class ExportedCode(Result, shown_as="export"):
                 "back": None if self.proof.back is None else [each.tolist() for each in self.proof.back],
                 "parts": [{"motors": list(part.motors), "share": part.share,
                            "proved": [each.tolist() for each in part.proved]} for part in self.proof.parts],
-                "limits": [each.to_dict() for each in self.proof.limits]}
+                "limits": [each.to_dict() for each in self.proof.limits],
+                "free": [{"motor": name, "lower": low, "upper": high} for name, low, high in self.free]}
 
 
 @question()
@@ -89,7 +92,7 @@ def export(robot: RobotLike, lang: str = "c++", box: BoxLike | None = None, *, o
     source = Source.of(branch_, watched, closed_inverse(given, proof, branch_))
     code = program(source, lang, _told(proof, source, lang, box, effort))
     return ExportedCode(proof, lang, tuple(each.leg for each in watched), bool(source.legs), source.bounds,
-                        sum(len(part.bounded) for part in source.parts), code)
+                        sum(len(part.bounded) for part in source.parts), code, _free(proof, branch_))
 
 
 def _watched(robot: Any, observe: LegsLike, camera: CameraLike) -> tuple[Direction, ...]:
@@ -109,6 +112,13 @@ def _watched(robot: Any, observe: LegsLike, camera: CameraLike) -> tuple[Directi
         return ()
     return tuple(each for each in observed.observed if isinstance(each, Direction) and each.link in links
                  and each.seen_from in (None, reference))
+
+
+def _free(proof: BranchProof, branch_: TubedBranch) -> tuple[tuple[str, float, float], ...]:
+    """The motors in no loop, and where the program answers."""
+    moving = {name for part in proof.parts for name in part.motors}
+    return tuple((name, float(low), float(high)) for name, low, high in
+                 zip(proof.motors, branch_.lower, branch_.upper, strict=True) if name not in moving)
 
 
 def _told(proof: BranchProof, source: Source, lang: str, box: BoxLike | None, effort: int) -> list[str]:
@@ -133,8 +143,11 @@ def _told(proof: BranchProof, source: Source, lang: str, box: BoxLike | None, ef
         lines.append(f"{part.in_cells}, {100 * part.share:.4g} % of the box that was asked for; what no cell "
                      "covers is refused. Fully covered:")
         lines += [f"  {name}: {a!r} to {b!r}" for name, a, b in zip(part.motors, low, high, strict=True)]
+    free = [name for name, _, _ in _free(proof, branch_)]
+    lines += [f"Motors in no loop, on which nothing but poses depends: {', '.join(free)}."] * bool(free)
     lines += [f"An answer is given where the last step of Newton's method is at most {GENERATED_LAST_STEP:g} (rad, or "
-              f"of {robot.length:.6g} m), all loops are",
+              f"of {robot.length:.6g} m: how",
+              "far the centres of the joints that the file has are from their middle on average), all loops are",
               f"closed to {GENERATED_CLOSED:g} (cosines, or of {branch_.far:.6g} m), and the joints are in the cell's "
               "tube, in which the loops have one closure (proved).", *_bounds(source),
               "The proof takes the robot's numbers as the file has them."]

@@ -39,8 +39,9 @@ TAKEN = frozenset(re.findall(r"\w+", """
     Status UPPER forward inverse jacobians unique"""))
 """Keywords of C++17, names that something else has where headers are included, macros, and the header's own names
 (ambiguous where the namespace is used)."""
-RESERVED = re.compile(r"[a-z]\w*_t|(CHAR|CLOCK|DBL|EIGEN|FE|FLT|FP|INT\d*|LC|LONG|M|SEEK|SHRT|SIZE|UINT\d*)_[A-Z0-9_]+")
-"""Types of the C library, and its macros."""
+RESERVED = re.compile(r"[a-z]\w*_t|(CHAR|CLOCK|DBL|EIGEN|FE|FLT|FP|INT\d*|LC|LONG|M|SEEK|SHRT|SIZE|UINT\d*)_[A-Z0-9_]+"
+                      r"|(pthread|sched|posix|fmaximum|fminimum)_\w+|\w+_unlocked|__\w+__|_[A-Z]\w*")
+"""Types of the C library, its macros and families of functions, and what is the compiler's own (``__linux__``)."""
 
 
 def namespace(name: str) -> str:

@@ -41,7 +41,8 @@ none of these."""
 class Assembly:
     """What became of a robot at a pose: the configuration, or None and the legs that were not closed (``open``), with
     what proves of legs that they cannot be (``misses``); joints that are outside their limits there (``beyond``), and
-    whether all closures of a leg are (``held``); the poses (4, 4) of the platform's links."""
+    whether all closures of a leg are (``held``); the poses (4, 4) of the platform's links; couplings that were not
+    closed where all legs are (``gears``)."""
 
     configuration: ClosedConfiguration | None
     open: tuple[str, ...] = ()
@@ -49,6 +50,7 @@ class Assembly:
     platform: Mapping[str, Array] | None = None
     misses: tuple[tuple[str, Miss], ...] = ()
     held: bool = False
+    gears: tuple[str, ...] = ()
 
     @property
     def verdict(self) -> str:

@@ -208,6 +208,10 @@ class PinocchioModel:
         """What the gears leave over."""
         return np.asarray(self._gears @ pin.difference(self.model, self.q0, q))
 
+    def turned(self, q: Array) -> dict[str, float]:
+        """What each coupling leaves over (m, rad)."""
+        return dict(zip((each.name for each in self.mechanism.couplings), self._turned(q).tolist(), strict=True))
+
     def jacobian(self, q: Array) -> Array:
         """The derivative of :meth:`residual` at closure, shape (rows, nv)."""
         self.at(q)

@@ -46,14 +46,14 @@ class NumberAt:
 
     def put(self, text: str) -> None:
         """Write another one."""
-        if self.attribute is None:
-            self.element.text = text
-            return
         if self.word is not None:
-            words = (self.element.get(self.attribute) or "").split()
+            words = ((self.element.get(self.attribute) if self.attribute else self.element.text) or "").split()
             words[self.word] = text
             text = " ".join(words)
-        self.element.set(self.attribute, text)
+        if self.attribute is None:
+            self.element.text = text
+        else:
+            self.element.set(self.attribute, text)
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,19 +21,23 @@ from .subject import LintedFile
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Lint(Result, shown_as="lint"):
-    """What was found in which files, and what was mended and where that is written."""
+    """What was found in which files, and what was mended and where that is written; ``unread``: why others of several
+    files could not be opened."""
 
     files: tuple[str, ...]
     findings: tuple[Finding, ...]
     mended: tuple[Finding, ...] = ()
     written: str | None = None
     rules: tuple[str, ...] = field(default=(), repr=False)
+    unread: tuple[Defect, ...] = ()
 
     def headline(self) -> str:
         """How much was found."""
         counts = self.counts
         found = ", ".join(f"{counts[name]} {name}{'s' * (counts[name] != 1)}" for name in reversed(SEVERITIES))
-        return f"{len(self.files)} file{'s' * (len(self.files) != 1)}: {found}"
+        unread = len({each.file for each in self.unread})
+        return f"{len(self.files)} file{'s' * (len(self.files) != 1)}: {found}" + (
+            f"; {unread} more could not be read" if unread else "")
 
     @property
     def counts(self) -> dict[str, int]:
@@ -41,13 +45,14 @@ class Lint(Result, shown_as="lint"):
         return {name: sum(each.severity == name for each in self.findings) for name in SEVERITIES}
 
     def reaches(self, severity: str) -> bool:
-        """Whether a finding is at least that bad."""
-        return any(each.rank >= SEVERITIES.index(severity) for each in self.findings)
+        """Whether a finding is at least that bad; a file that cannot be read is."""
+        return bool(self.unread) or any(each.rank >= SEVERITIES.index(severity) for each in self.findings)
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
         return {"files": list(self.files), "findings": [each.to_dict() for each in self.findings],
-                "counts": self.counts, "mended": [each.to_dict() for each in self.mended], "file": self.written}
+                "counts": self.counts, "mended": [each.to_dict() for each in self.mended], "file": self.written,
+                "unread": [{"file": each.file, "line": each.line, "message": each.text} for each in self.unread]}
 
 
 def lint(files: str | Path | Iterable[str | Path], *, compare: str | Path | None = None,
@@ -61,8 +66,9 @@ def lint(files: str | Path | Iterable[str | Path], *, compare: str | Path | None
     not at all, to ``output`` or over the original; the findings are then those that remain. What no file says is given
     as for ``load`` (``platform``, ``close`` …).
 
-    Raises ``BadRobotFile`` for what cannot be opened or is not a document; ``BadRequest`` for unknown names, for
-    several files with ``output``, and if the file cannot be written.
+    Of several files those that cannot be opened, or are no documents, are told in ``unread``. Raises ``BadRobotFile``
+    if there is no other; ``BadRequest`` for unknown names, for several files with ``output``, and if the file cannot be
+    written.
 
     >>> hrsynth.lint("3rrr_m1")
     <Lint: 1 file: 0 errors, 0 warnings, 6 notes>
@@ -88,7 +94,7 @@ def lint(files: str | Path | Iterable[str | Path], *, compare: str | Path | None
             opened.append(LintedFile(file_of(path), given, readers=programs, other=other))
         except BadRobotFile as error:
             defects += error.defects
-    if defects:
+    if not opened:
         raise BadRobotFile(defects)
     mended, written = list[Finding](), None
     if fix:
@@ -103,7 +109,7 @@ def lint(files: str | Path | Iterable[str | Path], *, compare: str | Path | None
         opened = [after for _, after, _ in every]
     found = [each for file in opened for each, _ in findings(file, skipped)]
     return Lint(tuple(file.file for file in opened), tuple(found), tuple(mended), written,
-                tuple(name for name in lint_rules() if name not in skipped))
+                tuple(name for name in lint_rules() if name not in skipped), tuple(dict.fromkeys(defects)))
 
 
 def findings(file: LintedFile, ignore: Sequence[str] = ()) -> list[tuple[Finding, Mend | None]]:
@@ -116,8 +122,9 @@ def findings(file: LintedFile, ignore: Sequence[str] = ()) -> list[tuple[Finding
             mend = None if file.expanded else spot.mend
             found.append((Finding(rule.name, spot.severity or rule.severity, where, line, spot.message,
                                   spot.advice or rule.advice, mend is not None), mend))
-    told = {each.line for each, _ in found if each.rule != "refused" and each.severity == "error"} - {None}
-    found = [pair for pair in found if pair[0].rule != "refused" or pair[0].line not in told]
+    told = {(each.file, each.line) for each, _ in found
+            if each.rule != "refused" and each.severity == "error" and each.line is not None}
+    found = [pair for pair in found if pair[0].rule != "refused" or (pair[0].file, pair[0].line) not in told]
     return sorted(found, key=lambda pair: (pair[0].line is None, pair[0].line or 0, -pair[0].rank))
 
 

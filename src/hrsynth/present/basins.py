@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import re
+from collections import Counter
 from typing import Any
 
 import numpy as np
@@ -41,18 +42,31 @@ ROOM = 3.0
 """Cells from the border of a basin at which its letter has room."""
 SEEN, RING = 0.05, 26
 """Part of a map's width below which what is certified is not seen; the diameter (points) of the ring about it."""
+DARKEST, LIGHTEST = 0.4, 0.5
+"""Where a kind has more ends than shades: the darkest, as part of the first shade; the lightest, as part of what the
+last one lacks of white."""
 DAMPED: dict[str, Any] = {"facecolor": "none", "edgecolor": "0.25", "hatch": "....", "linewidth": 0.0}
 """How starts are drawn whose runs come to a singularity."""
 
 
 def colours(ends: tuple[BasinEnd, ...]) -> list[str]:
-    """A colour an end: one hue a kind; those of a kind beyond its last shade share it."""
-    found, met = [], dict.fromkeys(SHADES, 0)
-    for each in ends:
-        shades = SHADES[each.ending.name]
-        found.append(shades[min(met[each.ending.name], len(shades) - 1)])
-        met[each.ending.name] += 1
-    return found
+    """A colour an end: one hue a kind, no two the same."""
+    shades = {kind: iter(_shades(kind, count)) for kind, count in Counter(each.ending.name for each in ends).items()}
+    return [next(shades[each.ending.name]) for each in ends]
+
+
+def _shades(kind: str, count: int) -> list[str]:
+    """So many colours of a kind: its own, or where these are too few, as many from dark to light."""
+    from matplotlib.colors import to_hex, to_rgb
+
+    given = SHADES[kind]
+    if count <= len(given):
+        return list(given[:count])
+    first, last = (np.array(to_rgb(each)) for each in (given[0], given[-1]))
+    stops = np.array([DARKEST * first, first, *[last] * (len(given) > 1), 1.0 - LIGHTEST * (1.0 - last)])
+    at = np.linspace(0, len(stops) - 1, count)
+    red, green, blue = (np.interp(at, range(len(stops)), part).tolist() for part in stops.T)
+    return [to_hex(each) for each in zip(red, green, blue, strict=True)]
 
 
 @styled
@@ -63,13 +77,13 @@ def picture(found: Basins, paper: Paper = PNG) -> bytes:
     from matplotlib.patheffects import Normal, Stroke
 
     figure, layers = (_strip if found.grid.ndim == 1 else _maps)(found, paper)
-    shades, grid, larger, beside = colours(found.ends), found.grid, False, False
+    shades, grid, larger, drawn = colours(found.ends), found.grid, False, set[tuple[str, bool]]()
     for place, plane, cells, damped, level in layers:
         _layer(place, plane, cells, damped, shades)
         if plane is None:
-            beside |= _ends_on_line(place, found)
+            drawn |= _ends_on_line(place, found)
         else:
-            beside |= _ends(place, plane, found, level)
+            drawn |= _ends(place, plane, found, level)
             larger |= _certified(place, plane, found, level)
             plane.finish(place, plane.x, plane.y)
     entries = [Patch(facecolor=shade, label=_told(letter, each))
@@ -83,9 +97,10 @@ def picture(found: Basins, paper: Paper = PNG) -> bytes:
         entries.append(Patch(label="the run comes to a singularity", **DAMPED))
     if (found.cells == NOT_REACHED).any():
         entries.append(missing_entry())
-    kinds = dict.fromkeys(each.ending.name for each in found.ends if each.X is not None)
-    entries += [entry(ENDS[kind], linestyle="", marker=MARKS[kind], color="black") for kind in kinds]
-    if beside:
+    kinds = dict.fromkeys(each.ending.name for each in found.ends)
+    entries += [entry(ENDS[kind], linestyle="", marker=MARKS[kind], color="black") for kind in kinds
+                if {(kind, True), (kind, False)} & drawn]
+    if any(not inside for _, inside in drawn):
         others = " or ".join("φ" if name == "phi" else name for name in _held(found, 0.0))
         entries.append(entry(f"hollow: at another {others}", linestyle="", marker="o", markerfacecolor="none",
                              color="black"))
@@ -112,10 +127,10 @@ def _strip(found: Basins, paper: Paper) -> tuple[Any, list[Any]]:
     return figure, [(place, None, found.cells, found.damped, None)]
 
 
-def _ends_on_line(place: Any, found: Basins) -> bool:
-    """The ends where they lie, those of the line filled: whether one is not of the line."""
+def _ends_on_line(place: Any, found: Basins) -> set[tuple[str, bool]]:
+    """The ends where they lie, those of the line filled: which kinds are drawn, and whether as one of the line."""
     (name,) = found.grid.names
-    (low, high), beside = place.get_xlim(), False
+    (low, high), drawn = place.get_xlim(), set()
     for letter, each in zip(LETTERS, found.ends, strict=False):
         here = None if each.X is None else float(tick_values(name, place_of(found.setting.motion, each.X, (name,)))[0])
         if here is not None and low <= here <= high:
@@ -124,8 +139,8 @@ def _ends_on_line(place: Any, found: Basins) -> bool:
                        markerfacecolor="black" if inside else "none")
             place.annotate(letter, (here, 0.5), (0, 13), textcoords="offset points", ha="center",
                            path_effects=outlined())
-            beside |= not inside
-    return beside
+            drawn.add((each.ending.name, inside))
+    return drawn
 
 
 def _maps(found: Basins, paper: Paper) -> tuple[Any, list[Any]]:
@@ -221,9 +236,9 @@ def outlined() -> list[Any]:
     return [Stroke(linewidth=2.5, foreground="white"), Normal()]
 
 
-def _ends(place: Any, plane: MapPlane, found: Basins, level: float | None) -> bool:
-    """The ends where they lie, those of the plane filled: whether one is not of the plane."""
-    motion, beside = found.setting.motion, False
+def _ends(place: Any, plane: MapPlane, found: Basins, level: float | None) -> set[tuple[str, bool]]:
+    """The ends where they lie, those of the plane filled: which kinds are drawn, and whether as one of the plane."""
+    motion, drawn = found.setting.motion, set()
     spots: list[tuple[float, float, str]] = []
     for letter, each in zip(LETTERS, found.ends, strict=False):
         if each.X is None:
@@ -237,12 +252,12 @@ def _ends(place: Any, plane: MapPlane, found: Basins, level: float | None) -> bo
         place.plot(u, v, MARKS[each.ending.name], markersize=14 if each.ending.name == GOAL else 8, zorder=5,
                    markerfacecolor="black" if inside else "none", markeredgecolor="black", markeredgewidth=1.2)
         spots.append((float(u[0]), float(v[0]), letter))
-        beside |= not inside
+        drawn.add((each.ending.name, inside))
     for k, (x, y, letter) in enumerate(spots):
         turn = 2 * np.pi * (k + 0.5) / len(spots)
         place.annotate(letter, (x, y), (13 * np.cos(turn), 13 * np.sin(turn)), textcoords="offset points", fontsize=9,
                        ha="center", va="center", zorder=6, path_effects=outlined())
-    return beside
+    return drawn
 
 
 def table(found: Basins) -> bytes:

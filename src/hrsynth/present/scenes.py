@@ -110,8 +110,9 @@ def _placed(found: AssemblyModes, plot: _Plot, label: str, mode: AssemblyMode) -
     said = "not found" if mode.reachable is None else "not assembled"
     if mode.goal:
         words = "the pose itself"
-    elif mode.open:
-        words = f"{said}: " + ("legs " if len(mode.open) > 1 else "leg ") + ", ".join(mode.open)
+    elif mode.left_open:
+        words = f"{said}: " + ", ".join(f"{noun}{'s' * (len(names) > 1)} {', '.join(names)}"
+                                        for noun, names in mode.left_open)
     else:
         words = f"{said}: beyond limits" if mode.beyond else "assembled"
     return Placed(label, state, words, plot.marked(mode), bodies, strokes)

@@ -68,7 +68,14 @@ class EndingClassifier(Value):
             return Ending(BOUNDARY, "the platform runs away, nothing limits its slides")
         over = (f"more than {RUN_EVALUATIONS:,} configurations would be needed" if run.stopped == EFFORT
                 else "the time ran out")
-        return Ending(TIME, f"{over}, with ‖e‖ = {last.size:.3g}")
+        way = ""
+        if run.ahead is not None:
+            there, slow = run.ahead
+            goal = self.same_pose(there, self.goal.pose(self.setting.motion.link))
+            pose = "the goal" if goal else str(self.setting.motion.pose(there.pose(self.setting.motion.link)))
+            way = (f"; it was still on its way to a rest that attracts, found at {pose}, where the distance left falls "
+                   f"by a factor of e every {slow:.3g} s")
+        return Ending(TIME, f"{over}, with ‖e‖ = {last.size:.3g}{way}")
 
     def _unseen(self, at: ClosedConfiguration) -> str:
         """What a camera has lost."""

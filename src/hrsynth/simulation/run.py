@@ -67,6 +67,9 @@ class Run(Value):
     stopped: str
     joint: str | None = None
     """The joint that met its limit."""
+    ahead: tuple[ClosedConfiguration, float] | None = None
+    """Where its time ended on the way to a rest that attracts: that rest, and how long (s) it takes there until what is
+    left of the slowest motion is one in e."""
 
     @property
     def last(self) -> ClosedConfiguration:
@@ -109,7 +112,27 @@ class Loop(Value):
                 longest *= 2
                 if self._shift(start, found[-1][0]) > RUN_AWAY:
                     stopped = AWAY
-        return Run(np.array(times), tuple(c for c, _ in found), tuple(c for _, c in found), stopped, joint)
+        ahead = self._ahead(times[-1], found[-1][0]) if stopped in (TIME, EFFORT) and self.sensed is None else None
+        return Run(np.array(times), tuple(c for c, _ in found), tuple(c for _, c in found), stopped, joint, ahead)
+
+    def _ahead(self, time: float, at: ClosedConfiguration) -> tuple[ClosedConfiguration, float] | None:
+        """The rest that attracts and towards which the robot moves, where Newton's method finds one near."""
+        if time < self.steady:
+            return None
+        chart = TangentChart.around(at, self.moving)
+
+        def rate(y: Array) -> Array:
+            there = chart.at(y, at.q)
+            return chart.slope(there.q) @ self._command(time, there).velocity
+
+        home = np.zeros(chart.basis.shape[1])
+        try:
+            found = rest_near(rate, home)
+            if found is None or found.growth >= -NEUTRAL_GROWTH * self.law.gain or rate(home) @ found.y <= 0:
+                return None
+            return chart.at(found.y, at.q), -1 / found.growth
+        except (LoopsNotClosed, NotMeasured):
+            return None
 
     def _shift(self, start: ClosedConfiguration, at: ClosedConfiguration) -> float:
         """How far the platform has moved (characteristic lengths)."""

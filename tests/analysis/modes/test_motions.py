@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from hrsynth.description import load, shipped
 from hrsynth.geometry.vectors import Array, rotation_about, unit
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.builder import Builder
+from hrsynth.mechanism.model import Limits
 
 
 def tilted(seed: int) -> tuple[np.random.Generator, Array]:
@@ -166,11 +168,20 @@ def test_two_circles_in_one_move_a_five_bar():
         b.joint(f"shoulder_{k}", "R", "base", f"arm_{k}", at=at, axis=tilt[:, 2], motor=True)
         b.joint(f"elbow_{k}", "R", f"arm_{k}", f"rod_{k}", at=knee, axis=tilt[:, 2])
     b.joint("tip", "R", "rod_1", "rod_2", at=flat(np.array([tip + arm]), tilt)[0], axis=tilt[:, 2], loop=True)
-    found = hrsynth.modes(b.build(platform="rod_1"))
+    robot = b.build(platform="rod_1")
+    found = hrsynth.modes(robot)
     (motion,) = found.motions
     assert (motion.goal, motion.dimension, motion.returns) == (True, 1, True)
     assert motion.shift == pytest.approx(2 * math.pi * np.linalg.norm(arm), rel=0.01)
     assert found.modes == ()
+    assert (motion.beyond, motion.to_dict()["within_m"]) == ((), motion.shift)
+    # both arms turn alike: with the first held to 0.7 rad either way, the tip goes as far on its circle
+    arm_1 = replace(robot.joints["shoulder_1"], limits=Limits(-0.7, 0.7))
+    ended = hrsynth.modes(robot.changed(joints=[arm_1]))
+    assert ended.motions[0].beyond == ("shoulder_1",)
+    assert ended.motions[0].shift == motion.shift
+    assert ended.motions[0].inside == (pytest.approx(1.4 * np.linalg.norm(arm), rel=0.15), 0.0)
+    assert "until it came back, beyond the limits of shoulder_1; within all limits over 0." in hrsynth.text(ended)
 
 
 @pytest.mark.slow

@@ -37,6 +37,7 @@ from hrsynth.mechanism import Joint, JointType, Mechanism
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.model import Coupling
 from hrsynth.mechanism.pose import Pose
+from hrsynth.present.show import text
 from kinematics.robots import state_of
 from oracle import Oracle
 from strategies import PLANAR_WORDS, POD_WORDS, deltas, planar, pods, random_rotation, reordered, transformed
@@ -323,10 +324,56 @@ def test_couplings_in_space_rule_poses_out(name: str, one: str, other: str, rati
     for mode, of_free in zip(found.modes, free.modes, strict=True):
         if mode.configuration is not None:
             assert distance(free, of_free, mode.configuration) < 1e-9
-            places = [moved_since_zero(mode.configuration, joint) for joint in ends]
+            places = [moved_since_zero(found, mode.configuration, joint) for joint in ends]
             assert places[1] == pytest.approx(ratio * places[0], abs=1e-8)
+        elif of_free.configuration is not None and mode.gears:
+            places = [moved_since_zero(free, of_free.configuration, joint) for joint in ends]
+            assert abs(places[1] - ratio * places[0]) > 1e-6
+            assert (mode.open, mode.gears, mode.to_dict()["open_couplings"]) == ((), ("gear",), ["gear"])
+            assert "only with coupling gear left open" in text(found)
         if real:
             assert mode.assembly == of_free.assembly
+
+
+def test_a_coupling_that_is_left_open_is_named():
+    """Legs that close where a coupling does not are no legs that are left open."""
+    robot = load(shipped()["3rps"])
+    ends = [robot.joints[joint] for joint in ("slide_2", "slide_1")]
+    coupled = robot.changed(joints=[replace(ends[1], motor=None)], couplings=(
+        Coupling("gear", ends[0].successor, ends[1].successor, 1.0),))
+    found, free = modes(coupled), modes(robot)
+    assert any(mode.gears for mode in found.modes)
+    for mode, of_free in zip(found.modes, free.modes, strict=True):
+        places = [moved_since_zero(free, of_free.configuration, joint) for joint in ends]
+        assert (mode.gears == ("gear",)) is (abs(places[1] - places[0]) > 1e-6)
+        assert mode.open == ()
+
+
+def test_there_is_no_matrix_at_a_stretched_leg():
+    """Arm and rod of leg 1 lie in a line: they bend while the platform rests, as the law of cosines says to first
+    order, so no twist of the platform gives the rod's rate."""
+    corners = np.array([[-1, 0], [1, 0], [0, 2.5], [-0.4, 0.8], [1.1, 0.9], [-0.5, 2.0], [0.2, 1.6], [0.5, 1.5],
+                        [0.3, 1.9]])
+    feet, knees, tips = np.column_stack([corners, np.zeros(9)]).reshape(3, 3, 3)
+    b = Builder("stretched")
+    b.link("base")
+    b.link("platform", at=tips.mean(axis=0))
+    for k, (A, K, B) in enumerate(zip(feet, knees, tips, strict=True), 1):
+        b.link(f"arm_{k}", at=A)
+        b.link(f"rod_{k}", at=K)
+        b.joint(f"shoulder_{k}", "R", "base", f"arm_{k}", at=A, axis=(0, 0, 1), motor=True)
+        b.joint(f"elbow_{k}", "R", f"arm_{k}", f"rod_{k}", at=K, axis=(0, 0, 1))
+        b.joint(f"wrist_{k}", "R", f"rod_{k}", "platform", at=B, axis=(0, 0, 1), loop=k > 1)
+    stretched = b.build(platform="platform")
+    for real, said in ((False, "there is no interaction matrix"), (True, "the motors can move there")):
+        found = modes(stretched, real=real)
+        assert said in text(found)
+        for mode in found.modes:
+            if mode.configuration is not None:
+                knee, moved = mode.configuration.pose("rod_1")[:3, 3], mode.configuration.pose("platform")
+                tip = moved[:3, :3] @ (tips[0] - tips.mean(axis=0)) + moved[:3, 3]
+                straight = np.linalg.norm(np.cross(knee - feet[0], tip - knee)) < 1e-7
+                assert (mode.type2_distance is None) is bool(straight)
 
 
 def test_a_joint_that_a_coupling_holds_apart_from_another_is_no_joint_without_it():
@@ -343,9 +390,10 @@ def test_a_joint_that_a_coupling_holds_apart_from_another_is_no_joint_without_it
     assert uncoupled(MeasuredRobot.watched(setting), setting.everything.start) is not None
 
 
-def moved_since_zero(at: ClosedConfiguration, joint: Joint) -> float:
-    """The turn (rad) or the slide (m) of a joint of one freedom, from the poses of its links."""
-    links = at.twin.mechanism.links
+def moved_since_zero(found: AssemblyModes, at: ClosedConfiguration, joint: Joint) -> float:
+    """The turn (rad) or the slide (m) of a joint of one freedom since the zero configuration of the robot (a mode's own
+    twin has its zero at the mode), from the poses of its links."""
+    links = found.setting.everything.start.twin.mechanism.links
     before, after = (at.pose(link) @ inverse(links[link].pose) for link in joint.links)
     D, axis = inverse(before) @ after, joint.axes[0]
     if joint.type is JointType.PRISMATIC:

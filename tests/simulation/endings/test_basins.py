@@ -10,6 +10,7 @@ from functools import cache
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
 from scipy.integrate import solve_ivp
 
 import hrsynth
@@ -19,10 +20,11 @@ from hrsynth.errors import BadRequest, PlaneNotMet
 from hrsynth.geometry.screws import point_velocity
 from hrsynth.geometry.vectors import rotation_from_rpy
 from hrsynth.mechanism.pose import asked_pose
-from hrsynth.present.basins import MARKS, SHADES, picture
+from hrsynth.present.basins import MARKS, SHADES, colours, picture
 from hrsynth.present.outputs import OUTPUTS
 from hrsynth.present.paper import PNG
-from hrsynth.simulation.ending import ENDINGS
+from hrsynth.present.runs import ENDS
+from hrsynth.simulation.ending import ENDINGS, Ending
 from hrsynth.simulation.endings import basins as module
 from hrsynth.simulation.endings.abreast import Abreast, Runs
 from hrsynth.simulation.endings.flow import Flow
@@ -388,6 +390,24 @@ def test_hollow_marks_are_in_the_legend_where_there_is_one(grid: str, hollow: bo
     found = hrsynth.basins("3rrr_m1", to="x=0,y=0,phi=0", grid=grid, jobs=1)
     drawn = picture(found, replace(PNG, ending=".svg")).decode()
     assert ("hollow: at another" in drawn) == hollow
+
+
+def test_the_legend_has_the_marks_that_are_drawn_and_no_others():
+    """A mark of an end beyond the map is not drawn; ends of one kind have colours of their own, however many."""
+    found = hrsynth.basins("3rrr_m1", to="x=0,y=0,phi=0", grid="x=-0.02:0.02:2,y=-0.02:0.02:2,phi=0", jobs=1)
+    (goal,) = found.ends
+    near, far = goal.X.copy(), goal.X.copy()
+    near[0, 3] += 0.01
+    far[0, 3] += 1.0
+    for X, told in ((near, True), (far, False)):
+        ends = (goal, *(replace(goal, ending=Ending("boundary", "a leg is stretched"), X=X) for _ in range(7)))
+        drawn = picture(replace(found, ends=ends), replace(PNG, ending=".svg")).decode()
+        assert (ENDS["boundary"] in drawn) is told
+        assert ENDS["goal"] in drawn
+        shades = np.array([to_rgb(each) for each in colours(ends)])
+        apart = np.abs(shades[:, None] - shades).max(axis=2) + np.eye(len(ends))
+        assert apart.min() > 0.05
+    assert colours(found.ends) == [SHADES["goal"][0]]
 
 
 def test_starts_out_of_reach_are_refused():

@@ -16,8 +16,10 @@ from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.budgets import COVER_BOXES
 from hrsynth.closed_forms.legs import OnCrank, OnRail, OnRod, SlidingRod
 from hrsynth.geometry.affine import affine
+from hrsynth.geometry.vectors import Array
 from hrsynth.mechanism.pose import asked_pose
 from hrsynth.simulation.endings.cover import _places, bounds, cover
+from hrsynth.simulation.endings.flow import Places
 from hrsynth.simulation.endings.joint_error import JointError
 from hrsynth.simulation.endings.pose_error import PoseError
 from hrsynth.simulation.endings.reached import narrowed, reached
@@ -400,3 +402,20 @@ def test_what_is_not_covered_says_why():
     found = cover(setting, setting.everything.start)
     assert not found.complete
     assert "more than one axis" in found.reason
+
+
+def test_progress_claims_no_more_than_is_settled(monkeypatch: pytest.MonkeyPatch):
+    """Each round settles one of two halves: the space left is halved, and the boxes that were looked at are counted."""
+    class Halved(Subdivision):
+        def _open(self, middle: Array, half: Array) -> tuple[Array, Array, Places]:
+            return middle[-1:], half[-1:], np.zeros(1, dtype=np.intp)
+
+    told: list[str] = []
+    monkeypatch.setattr("hrsynth.simulation.endings.subdivision.tell", told.append)
+    Halved(None, -np.ones(2), np.ones(2)).run(12, 1, 3)  # type: ignore[arg-type]
+    assert told[:3] == [
+        "boxes of search 2 of 3: 0 % of the space settled, 0 looked at of at most 12, 1 waiting",
+        "boxes of search 2 of 3: 0 % of the space settled, 1 looked at of at most 12, 2 waiting",
+        "boxes of search 2 of 3: 50 % of the space settled, 3 looked at of at most 12, 2 waiting"]
+    settled = 100 * (1 - 0.5 ** (len(told) - 2))
+    assert told[-1].startswith(f"boxes of search 2 of 3: {int(settled)} % of the space settled")

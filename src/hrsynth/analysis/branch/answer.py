@@ -196,14 +196,20 @@ class BranchProof(Result, shown_as="branch"):
 
     def motors_beyond(self) -> list[str]:
         """The motors that the cells take beyond the file's limits, with these."""
+        return [f"{name} {lower:.6g} to {upper:.6g} (within {low:.4g} to {high:.4g})"
+                for name, (lower, upper), (low, high) in self.beyond]
+
+    @property
+    def beyond(self) -> list[tuple[str, tuple[float, float], tuple[float, float]]]:
+        """The motors that the cells take beyond the file's limits: their name, these, and from where to where they go.
+        """
         reach: dict[str, tuple[float, float]] = {}
         for part in (each for each in self.parts if each.cells):
             low = np.min([each.low for each in part.cells], axis=0)
             high = np.max([each.high for each in part.cells], axis=0)
             reach |= dict(zip(part.motors, zip(low.tolist(), high.tolist(), strict=True), strict=True))
         limited = self.robot.limited
-        return [f"{name} {limited[name][0]:.6g} to {limited[name][1]:.6g} (within {low:.4g} to {high:.4g})"
-                for name, (low, high) in reach.items()
+        return [(name, limited[name], (low, high)) for name, (low, high) in reach.items()
                 if name in limited and (low < limited[name][0] or high > limited[name][1])]
 
     def headline(self) -> str:
@@ -217,4 +223,7 @@ class BranchProof(Result, shown_as="branch"):
         return {"motors": list(self.motors), "passive": list(self.passive), "held": list(self.held), "box": self.box,
                 "tried": self.tried, "parts": [each.to_dict() for each in self.parts],
                 "back": None if self.back is None else [each.tolist() for each in self.back], "regular": self.regular,
-                "limits": [each.to_dict() for each in self.limits]}
+                "limits": [each.to_dict() for each in self.limits],
+                "motors_beyond": [{"motor": name, **{key: value if np.isfinite(value) else None for key, value in
+                                                     zip(("lower", "upper"), ends, strict=True)},
+                                   "least": low, "most": high} for name, ends, (low, high) in self.beyond]}

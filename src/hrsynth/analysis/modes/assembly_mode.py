@@ -13,10 +13,10 @@ from ...kinematics.assembly import NOT_FOUND, Assembler, Assembly, of_links
 from ...kinematics.closures import Miss
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.limits import outside
-from ...kinematics.relation import Measurement
+from ...kinematics.relation import Measurement, relation
 from ...kinematics.tasks import Held
 from ...mechanism.pose import Pose
-from ...tolerances import SAME_RELATION
+from ...tolerances import CLOSED, SAME_RELATION
 from ..observed import ObservedRobot
 from ..singularity.agreement import weakest
 from .branches import Model
@@ -33,9 +33,9 @@ class AssemblyMode:
     ``residual``: the largest distance of a tip from its curve (characteristic lengths). ``goal``: whether it is the
     pose itself from which the measurements were taken. ``reachable`` and ``assembly``: whether the whole real robot,
     including legs that are not watched, closes there within its joints' limits, as in :class:`Assembly` (the first is
-    None if neither was found); ``open`` names the legs that were not closed, ``beyond`` the joints, ``misses`` what
-    proves that legs cannot be closed. ``type2_distance``: the smallest singular value of Mᵀ there, as ``check`` gives
-    it; None if the robot was not closed.
+    None if neither was found); ``open`` names the legs that were not closed, ``gears`` the couplings where all legs
+    were, ``beyond`` the joints, ``misses`` what proves that legs cannot be closed. ``type2_distance``: the smallest
+    singular value of Mᵀ there, as ``check`` gives it; None if the robot was not closed, or if there is no Mᵀ.
     """
 
     pose: Pose
@@ -68,10 +68,16 @@ class AssemblyMode:
     """What is seen there as the opposite value: then it is *antipodal* and no mode."""
     behind: tuple[str, ...] | None = None
     """What is not in front of the camera by which it is seen; None where no camera with a name sees a point."""
+    gears: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         said = "the pose itself" if self.goal else f"assembled: {self.assembly}"
         return f"<{type(self).__name__}: {self.pose}, {said}>"
+
+    @property
+    def left_open(self) -> tuple[tuple[str, tuple[str, ...]], ...]:
+        """What was not closed there: of legs or couplings the noun and the names."""
+        return tuple(each for each in (("leg", self.open), ("coupling", self.gears)) if each[1])
 
     @property
     def radius(self) -> float:
@@ -85,7 +91,8 @@ class AssemblyMode:
                 "radius_m": self.shift if known else None, "radius_rad": self.turn if known else None,
                 "bodies": list(self.enclosed),
                 "residual": self.residual, "goal": self.goal, "reachable": self.reachable,
-                "assembly": self.assembly, "open": list(self.open), "beyond": list(self.beyond),
+                "assembly": self.assembly, "open": list(self.open),
+                "open_couplings": list(self.gears), "beyond": list(self.beyond),
                 "reasons": [{"leg": leg, **miss.to_dict()} for leg, miss in self.misses],
                 "type2_distance": self.type2_distance,
                 "multiplicity": self.multiplicity, "proved": self.proved, "rounded": self.rounded,
@@ -125,29 +132,38 @@ class ModeReader:
             found = Assembly(at, (), tuple(outside(at.twin, at.q)), held=True)
         elif not at_goal or near or outside(self.goal.twin, self.goal.q):
             found = self.assembler.at(bodies, held, 0.0 if near else self.known(mode))
-        if found.configuration is not None and self.made.closing is None and not self.geared(found.configuration):
-            found = Assembly(None, self.assembler.anatomy.labels, platform=self.assembler.platform(bodies))
+        if found.configuration is not None and self.made.closing is None and (gears := self.open(found.configuration)):
+            found = Assembly(None, platform=self.assembler.platform(bodies), gears=gears)
         X = (found.platform[self.motion.link] if found.platform is not None else self.goal.pose(self.motion.link)
              if found.configuration is None else found.configuration.pose(self.motion.link))
         shift, turn = self.radius(mode, bodies, X)
         return AssemblyMode(
             self.motion.pose(X), shift, turn, mode.residual * scale, at_goal, found.reachable,
-            None if found.configuration is None else weakest(found.configuration, self.question),
+            self.distance(found.configuration),
             found.verdict, found.open, found.beyond, found.misses, found.configuration, mode.multiplicity,
             mode.proved, mode.rounded, mode.residual * scale if mode.fits else None,
             () if self.motion.link in bodies else tuple(bodies), size, bodies,
-            antipodal, behind([each.seen for each in self.seen], pose))
+            antipodal, behind([each.seen for each in self.seen], pose), found.gears)
 
-    def geared(self, at: ClosedConfiguration) -> bool:
-        """Whether couplings close where legs do."""
-        if not self.goal.twin.mechanism.couplings:
-            return True
+    def distance(self, at: ClosedConfiguration | None) -> float | None:
+        """The smallest singular value of Mᵀ, where there is one."""
+        return None if at is None or relation(at, self.question).RI else weakest(at, self.question)
+
+    def open(self, at: ClosedConfiguration) -> tuple[str, ...]:
+        """The couplings that do not close where legs do."""
+        twin = self.goal.twin
+        if not twin.mechanism.couplings:
+            return ()
         try:
-            whole = of_links(self.goal.twin, at.pose)
+            whole = of_links(twin, at.pose)
         except LoopsNotClosed:
-            return False
-        return all(pose_difference(whole.pose(link), at.pose(link), at.twin.length) <= SAME_RELATION
-                   for link in at.twin.mechanism.links)
+            pass
+        else:
+            if all(pose_difference(whole.pose(link), at.pose(link), at.twin.length) <= SAME_RELATION
+                   for link in at.twin.mechanism.links):
+                return ()
+        left = twin.turned(twin.read({link: at.pose(link) for link in twin.mechanism.links}.__getitem__))
+        return tuple(name for name, miss in left.items() if abs(miss) > CLOSED) or tuple(left)
 
     def known(self, mode: SystemMode) -> float:
         """How far the bodies' exact poses can be from the system's (characteristic lengths, radians); 0 where nothing

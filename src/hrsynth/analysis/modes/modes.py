@@ -234,8 +234,9 @@ def at_mode(listed: AssemblyModes | None, asked: ModeNumber) -> ClosedConfigurat
     mode = listed.modes[asked.number - 1]
     at = listed.goal if mode.goal else mode.configuration
     if at is None:
+        left = " and ".join(f"{noun} {', '.join(names)}" for noun, names in mode.left_open)
         raise PoseNotReached(name, f"{asked} ({mode.pose})", 0.0, str(listed.pose), reason="the robot was not found "
-                             f"assembled there without leg {', '.join(mode.open)}")
+                             f"assembled there: {left} stayed open")
     return at if at.twin is listed.goal.twin else of_links(listed.goal.twin, at.pose)
 
 

@@ -11,7 +11,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import islice
+from itertools import islice, takewhile
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,7 @@ from ...geometry.screws import point_velocity
 from ...geometry.so3 import logarithm
 from ...geometry.vectors import Array, pose, pose_difference, transform
 from ...kinematics.configuration import ClosedConfiguration
+from ...kinematics.limits import outside
 from ...kinematics.pinocchio_model import PinocchioModel
 from ...kinematics.relation import Measurement
 from ...kinematics.tasks import Held, shortened, solve, system
@@ -46,7 +47,9 @@ class SelfMotion:
     ``dimension``: in how many independent ways the platform's bodies were led to closings nearby; ``links``: those that
     are elsewhere, or turned, on the way; ``shift`` (m) and ``turn`` (rad): how far the platform went; ``returns``:
     whether it came back to where it began; ``goal``: whether it began at the pose from
-    which the measurements were taken; ``met``: how many starts of a search ended on it, as far as could be told.
+    which the measurements were taken; ``met``: how many starts of a search ended on it, as far as could be told;
+    ``beyond``: joints that are outside their limits somewhere on the way, and how far the platform went with all
+    within theirs (``inside``: m, rad).
     """
 
     configuration: ClosedConfiguration
@@ -59,16 +62,20 @@ class SelfMotion:
     met: int = 0
     way: tuple[dict[str, Array], ...] = field(default=(), repr=False)
     """The poses (4, 4) of the platform's bodies on the way."""
+    beyond: tuple[str, ...] = ()
+    inside: tuple[float, float] = (0.0, 0.0)
 
     @cached_property
     def words(self) -> str:
-        """What moves, and how far it was followed."""
+        """What moves, and how far it was followed; where limits end it."""
         mechanism = self.configuration.twin.mechanism
         resting = [link for link in mechanism.links if link not in self.links and link != mechanism.base]
         moving = ", ".join(self.links) if resting else "all links"
-        parts = [f"{self.shift:.3g} m"] * (self.shift > 0) + [f"{self.turn:.3g} rad"] * (self.turn > 0)
-        far = " and ".join(parts) + (", until it came back" if self.returns else "")
-        return f"of dimension {self.dimension}, which moves {moving} (followed over {far})"
+        far = _far(self.shift, self.turn) + (", until it came back" if self.returns else "")
+        ends = "" if not self.beyond else (
+            f", beyond the limits of {', '.join(self.beyond)}; within all limits over {_far(*self.inside)}"
+            if any(self.inside) else f", all of it beyond the limits of {', '.join(self.beyond)}")
+        return f"of dimension {self.dimension}, which moves {moving} (followed over {far}{ends})"
 
     def passes(self, at: ClosedConfiguration, question: Measurement) -> bool:
         """Whether it was followed by where the platform's bodies are at a closing, to a step."""
@@ -82,7 +89,14 @@ class SelfMotion:
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
         return {"dimension": self.dimension, "links": list(self.links), "followed_m": self.shift,
-                "followed_rad": self.turn, "returns": self.returns, "goal": self.goal, "met": self.met}
+                "followed_rad": self.turn, "returns": self.returns, "goal": self.goal, "met": self.met,
+                "beyond": list(self.beyond), "within_m": self.inside[0] if self.beyond else self.shift,
+                "within_rad": self.inside[1] if self.beyond else self.turn}
+
+
+def _far(shift: float, turn: float) -> str:
+    """A way of the platform (m, rad)."""
+    return " and ".join([f"{shift:.3g} m"] * (shift > 0) + [f"{turn:.3g} rad"] * (turn > 0))
 
 
 def self_motion(at: ClosedConfiguration, question: Measurement, bodies: Sequence[str],
@@ -106,7 +120,9 @@ def self_motion(at: ClosedConfiguration, question: Measurement, bodies: Sequence
     middle = [walk.places[len(walk.places) // 2] for walk in walks]
     size = min(each for each in [ways.shape[1], *(walker.around(q)[0].shape[1] for q in middle)] if each)
     return SelfMotion(at, size, walker.moved(at.q, places), longest.shift * twin.length, longest.turn, longest.returns,
-                      goal, way=tuple(map(walker.bodies, places)))
+                      goal, way=tuple(map(walker.bodies, places)),
+                      beyond=tuple(dict.fromkeys(name for walk in walks for name in walk.beyond)),
+                      inside=(longest.inside[0] * twin.length, longest.inside[1]))
 
 
 def followed(at: ClosedConfiguration, question: Measurement, twist: Array, count: int
@@ -124,12 +140,15 @@ def followed(at: ClosedConfiguration, question: Measurement, twist: Array, count
 @dataclass(frozen=True, eq=False)
 class _Followed:
     """Configurations along one tangent and back along the other, how far the platform went (characteristic lengths,
-    radians), and whether it came back."""
+    radians), and whether it came back; joints that are beyond their limits on the way, and how far the platform went
+    before the first."""
 
     places: tuple[Array, ...]
     shift: float
     turn: float
     returns: bool
+    beyond: tuple[str, ...] = ()
+    inside: tuple[float, float] = (0.0, 0.0)
 
     @property
     def far(self) -> float:
@@ -203,13 +222,18 @@ class _Follower:
     def walk(self, q: Array, w: Array) -> _Followed:
         """As far as the motion leads along the bodies' twist w (rows,), and then the other way."""
         places, shift, turn, returns = [q], 0.0, 0.0, False
+        inside, beyond = np.zeros(2), dict.fromkeys(outside(self.twin, q))
+        home = not beyond
         for sign in (1.0, -1.0):
-            before = self._platform(q)
+            before, taken = self._platform(q), list[tuple[Array, bool]]()
             for number, there in enumerate(self.steps(q, sign * w), 1):
                 now = self._platform(there)
                 places.append(there)
-                shift += float(np.linalg.norm(now[:3, 3] - before[:3, 3])) / self.twin.length
-                turn += float(np.linalg.norm(logarithm(now[:3, :3] @ before[:3, :3].T)))
+                step = np.array([np.linalg.norm(now[:3, 3] - before[:3, 3]) / self.twin.length,
+                                 np.linalg.norm(logarithm(now[:3, :3] @ before[:3, :3].T))])
+                shift, turn = shift + float(step[0]), turn + float(step[1])
+                beyond |= dict.fromkeys(past := outside(self.twin, there))
+                taken.append((step, not past))
                 along, before = now[:3, 3] - before[:3, 3], now
                 returns = number > 2 and bodies_apart(self.bodies(there), self.bodies(q), self.question,
                                                       self.twin.length) <= MOTION_STEP / 2
@@ -217,10 +241,14 @@ class _Follower:
                     left = self._platform(q)[:3, 3] - now[:3, 3]
                     shift += math.copysign(float(np.linalg.norm(left)), float(left @ along)) / self.twin.length
                     break
+            for way in (taken, taken[::-1]) if returns else (taken,):  # what comes back is another way out
+                inside += sum((step for step, _ in takewhile(lambda each: home and each[1], way)), np.zeros(2))
             if returns:
                 break
         small = SAME_RELATION * len(places)
-        return _Followed(tuple(places), shift if shift > small else 0.0, turn if turn > small else 0.0, returns)
+        inside[inside <= small] = 0.0
+        return _Followed(tuple(places), shift if shift > small else 0.0, turn if turn > small else 0.0, returns,
+                         tuple(beyond), (float(inside[0]), float(inside[1])))
 
     def steps(self, q: Array, w: Array) -> Iterator[Array]:
         """Closed configurations one step apart, until no step is closed again or the motion ends."""

@@ -50,15 +50,25 @@ def _limits(file: LintedFile) -> Iterator[Spot]:
 
 
 def _angles(file: LintedFile) -> Iterator[Spot]:
-    if file.dialect != "urdf" or file.root is None:
-        return
-    for element in file.root.iter():
-        words = (element.get("rpy") or "").split() if isinstance(element.tag, str) else []
-        ends = [NumberAt(element, "rpy", place) for place in range(len(words))]
+    for what, element, ends in _turns(file):
         sure = any(in_degrees(end.value) for end in ends)
         if sure or any(TURN_IN_RADIANS < abs(end.value or 0.0) <= 360 for end in ends):
-            yield Spot(xml.line(element), f"rpy {' '.join(words)}, of <{element.tag}>",
+            yield Spot(xml.line(element), f"rpy {' '.join(str(end.text) for end in ends)}, of {what}",
                        _converted(ends) if sure else None)
+
+
+def _turns(file: LintedFile) -> Iterator[tuple[str, xml.Element, list[NumberAt]]]:
+    """All roll, pitch, yaw that a document gives in radians: what has them, where they stand."""
+    for element in file.root.iter() if file.root is not None else ():
+        if file.dialect == "urdf" and isinstance(element.tag, str):
+            count = len((element.get("rpy") or "").split())
+            yield f"<{element.tag}>", element, [NumberAt(element, "rpy", place) for place in range(count)]
+        elif (file.dialect == "sdf" and element.tag == "pose" and len((element.text or "").split()) == 6
+              and element.get("degrees") not in ("true", "1") and element.get("rotation_format") != "quat_xyzw"):
+            of = element.getparent()
+            name = "" if of is None else f" of <{of.tag}> {of.get('name') or ''}".rstrip()
+            yield (f"the pose{name}", element,
+                   [NumberAt(element, None, place) for place in (3, 4, 5)])
 
 
 def _length(file: LintedFile) -> Iterator[Spot]:
@@ -112,7 +122,7 @@ RULES = (
              "URDF and SDFormat use radians: 90 is fourteen turns, so the limit has no effect.",
              "convert them to radians", _limits, mends=True),
     LintRule("unit-angles", "warning", "roll, pitch, yaw that look like degrees",
-             "URDF uses radians: 90 is fourteen turns and a bit, so the frame is turned by 116 degrees.",
+             "URDF and SDFormat use radians: 90 is fourteen turns and a bit, so the frame is turned by 116 degrees.",
              "convert them to radians", _angles, mends=True),
     LintRule("unit-length", "warning", "a robot as large as a house, or as small as a grain",
              "Modelling tools export millimetres, readers expect metres.",

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 from ... import __version__
+from ...linting.findings import Finding
 
 if TYPE_CHECKING:
-    from ...linting.findings import Finding
+    from ...errors import Defect
     from ...linting.lint import Lint
 
 SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
@@ -37,7 +38,8 @@ def lint(found: Lint) -> str:
 
 def github(found: Lint) -> str:
     """A workflow command of GitHub's a finding."""
-    return "\n".join(_command(each) for each in found.findings)
+    unread = [Finding("unread", "error", each.file, each.line, each.text) for each in found.unread]
+    return "\n".join(_command(each) for each in (*unread, *found.findings))
 
 
 def _command(finding: Finding) -> str:
@@ -67,10 +69,14 @@ def sarif(found: Lint) -> str:
                 "message": {"text": each.message}, "locations": [{"physicalLocation": _location(each)}]}
                for each in found.findings]
     run = {"tool": {"driver": driver}, "columnKind": "unicodeCodePoints", "results": results}
+    if found.unread:
+        told = [{"level": "error", "message": {"text": each.text},
+                 "locations": [{"physicalLocation": _location(each)}]} for each in found.unread]
+        run["invocations"] = [{"executionSuccessful": False, "toolExecutionNotifications": told}]
     return json.dumps({"$schema": SCHEMA, "version": "2.1.0", "runs": [run]}, ensure_ascii=False, indent=2)
 
 
-def _location(finding: Finding) -> dict[str, Any]:
+def _location(finding: Finding | Defect) -> dict[str, Any]:
     path = Path(finding.file)
     uri = path.as_uri() if path.is_absolute() else quote(path.as_posix().replace(os.sep, "/"))
     region = {} if finding.line is None else {"region": {"startLine": int(finding.line)}}

@@ -251,15 +251,16 @@ def proved(mode: AssemblyMode) -> str:
 def at_mode(mode: AssemblyMode, kind: str) -> list[str]:
     """What the real robot does at a mode."""
     if mode.type2_distance is None:
-        return assembly(mode)
+        seen = NO_MATRIX if kind == "hidden" else "the motors can move there while the platform rests"
+        return [*assembly(mode), *[seen] * (mode.configuration is not None)]
     matrix = "Mᵀ" if kind == "hidden" else "the motors' Jacobian (motor rates by platform twist)"
     return [*assembly(mode), f"smallest singular value of {matrix} {mode.type2_distance:.3g}"]
 
 
 def assembly(mode: AssemblyMode) -> list[str]:
     """Whether the real robot can be assembled at a mode, and why not."""
-    def legs(labels: Sequence[str]) -> str:
-        return f"{'legs' if len(labels) > 1 else 'leg'} {', '.join(labels)}"
+    def several(noun: str, labels: Sequence[str]) -> str:
+        return f"{noun}{'s' * (len(labels) > 1)} {', '.join(labels)}"
 
     match mode.assembly:
         case "yes":
@@ -267,9 +268,10 @@ def assembly(mode: AssemblyMode) -> list[str]:
         case "beyond limits":
             return [f"the real robot can be assembled there only beyond the limits of {', '.join(mode.beyond)}"]
         case "no":
-            return [f"the real robot cannot be assembled there: {legs([leg for leg, _ in mode.misses])}",
+            return [f"the real robot cannot be assembled there: {several('leg', [leg for leg, _ in mode.misses])}",
                     *(f"leg {leg}: {miss}" for leg, miss in mode.misses)]
-    where = f"beyond the limits of {', '.join(mode.beyond)}" if mode.beyond else f"with {legs(mode.open)} left open"
+    where = (f"beyond the limits of {', '.join(mode.beyond)}" if mode.beyond else
+             f"with {' and '.join(several(*each) for each in mode.left_open)} left open")
     return [f"the real robot was found assembled there only {where}; whether it can be there otherwise is not known"]
 
 

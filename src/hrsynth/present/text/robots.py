@@ -208,6 +208,7 @@ def exported(found: ExportedCode) -> str:
                                      zip(part.motors, *part.proved, strict=True)]
                      + [f"and in all of {part.in_cells}, {100 * part.share:.4g} % of the box"]))
         rows += ends(part)
+    rows += [("in no loop", [f"{name} {low:.6g} to {high:.6g}" for name, low, high in found.free])] * bool(found.free)
     rows += limits(proof)
     if proof.back is not None:
         rows.append(("way back", [f"{name} {low:.6g} to {high:.6g}" for name, low, high in

@@ -191,7 +191,8 @@ def held(grid: Grid, setting: ObservedRobot, as_at_home: bool) -> str | None:
 def _grid_rows(found: Accuracy, grid: Grid, reached: str, position: str, orientation: str, spots: Spots | None,
                gap: float) -> Rows:
     size = " × ".join(f"{count} {name}" for count, name in zip(grid.shape, grid.names, strict=True))
-    ranges = ", ".join(f"{name} {values[0]:.4g} to {values[-1]:.4g}" for name, values in grid.axes)
+    ranges = ", ".join(f"{name} {values[0]:.4g} to {values[-1]:.4g} {'rad' if name == 'phi' else 'm'}"
+                       for name, values in grid.axes)
     rows = [("poses", f"{size}: {ranges}"), *known("held", held(grid, found.setting, spots is not None)),
             ("reached", reached), ("position", position), ("orientation", orientation)]
     if spots is not None and spots.count:

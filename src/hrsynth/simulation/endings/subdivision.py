@@ -99,12 +99,15 @@ class Subdivision:
 
     def run(self, budget: int, place: int = 0, places: int = 1) -> None:
         """Cut boxes until all are settled, too small, or so many were looked at; of so many ``places`` at which this is
-        done, it is told how far they are settled."""
+        done, it is told which it is at, how much space is settled, and how many boxes wait: the last per cent of space
+        may need most boxes."""
         whole = self.whole
         middle, half, share = ((self.low + self.high) / 2)[None], whole[None], self.share
         while len(middle) and self.boxes < budget:
             settled = 1 - share - float(np.prod(half / whole, axis=1).sum())
-            tell(f"boxes, {100 * (place + max(settled, self.boxes / budget)) / places:.0f} %")
+            which = "" if places == 1 else f" of search {place + 1} of {places}"
+            tell(f"boxes{which}: {np.floor(100 * settled):.0f} % of the space settled, {self.boxes:,} looked at of at "
+                 f"most {budget:,}, {len(middle):,} waiting")
             # the smallest first: memory stays small
             first = max(0, len(middle) - BOXES_AT_ONCE)
             part, size, axis = self._open(middle[first:], half[first:])
