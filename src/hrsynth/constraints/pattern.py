@@ -142,7 +142,8 @@ def recognise(anatomy: LegDecomposition, question: Measurement, samples: Sequenc
     every = None if None in held.values() else (*(leg for leg in held.values() if leg is not None), *virtual)
     other = replace(other, legs=legs)
     if anatomy.point is not None:
-        found: ConstraintPattern | None = _translating(anatomy, legs, samples)
+        velocities = [relation(at, question.of_platform).twists for at in samples]
+        found: ConstraintPattern | None = _translations(anatomy, every, legs, velocities, samples)
     elif len(other.bodies) == 1:
         found = _one_body(anatomy, every, legs, motions, samples)
     else:
@@ -169,7 +170,7 @@ def _one_body(anatomy: LegDecomposition, every: tuple[LockedLeg, ...] | None, le
     if len(own) < len(anatomy.legs) and motions.shape[2] < (2 if own else 3):  # the other legs hold as well
         return None
     if vanishes(motions[:, 3:]):
-        return _translating(anatomy, legs, samples)
+        return _translations(anatomy, every, legs, list(motions[:, :3]), samples)
     if any(leg.turns == 0 and not leg.spins for leg in legs):
         return None if every is None else replace(_translating(anatomy, every, samples), turning=True)
     if any(leg.turns < 3 and leg.spins for leg in legs):
@@ -186,6 +187,22 @@ def _one_body(anatomy: LegDecomposition, every: tuple[LockedLeg, ...] | None, le
         motion = "spatial" if all(leg.turns == 3 or leg.virtual for leg in every) else "oriented"
         return ConstraintPattern(motion, base, bodies, every)
     return None
+
+
+def _translations(anatomy: LegDecomposition, every: tuple[LockedLeg, ...] | None, legs: tuple[LockedLeg, ...],
+                  motions: Sequence[Array], samples: Sequence[ClosedConfiguration]) -> ConstraintPattern | None:
+    """The pattern of translations, bases (3, d) of which are given: of the ``legs`` that are watched where these leave
+    the tips none but such, else of ``every`` leg, since the others hold as well; None where one of them has none."""
+    if len(motions) == len(samples) and all(_within(leg, motions, samples) for leg in legs):
+        return _translating(anatomy, legs, samples)
+    return None if every is None else _translating(anatomy, every, samples)
+
+
+def _within(leg: LockedLeg, motions: Sequence[Array], samples: Sequence[ClosedConfiguration]) -> bool:
+    """Whether a leg lets its tip move in these directions (3, d) alone, at all samples."""
+    poses = poses_at(samples, [link for feature in leg.features for link in feature.links])
+    across = forbidden(leg, {feature.symbol: feature.value(poses) for feature in leg.features})
+    return all(vanishes((np.eye(3) - F @ F.T) @ (np.eye(3) - N)) for F, N in zip(motions, across, strict=True))
 
 
 def _translating(anatomy: LegDecomposition, legs: tuple[LockedLeg, ...],
