@@ -136,6 +136,8 @@ def condition(pattern: ConstraintPattern, question: Measurement) -> Condition:
     fixed = [leg for leg in pattern.legs if leg.fixed]
     if pattern.motion == "spatial" and len(normals) == len(pattern.legs) == 6:
         return _complex(pattern, normals)
+    if pattern.motion == "planar" and not pattern.flat:
+        return _gram(pattern)
     if pattern.motion == "planar" and (len(lines), len(fixed)) == (1, 1):
         return _pivot(pattern, lines[0], fixed[0])
     if len(lines) == len(pattern.legs):
@@ -263,6 +265,10 @@ def _gram(pattern: ConstraintPattern) -> Condition:
         name = "" if moving is None else _symbol(moving)
         across = "I" if leg.fixed else f"I - {name} {name}^T" if leg.line is not None else f"{name} {name}^T"
         matrices.append((N.name, across))
+    if pattern.motion == "planar":
+        total += sympy.MatrixSymbol("P", 6, 6)
+        n = _symbol(pattern.plane)
+        matrices.append(("P", f"diag({n} {n}^T, I - {n} {n}^T)"))
     moves = _moves(pattern.legs)
     if pattern.motion == "bodies":
         halves = "the platform's halves can translate, one along e relative to the other"

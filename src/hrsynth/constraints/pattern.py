@@ -49,6 +49,8 @@ class ConstraintPattern(Value):
     legs: tuple[LockedLeg, ...] = ()
     plane: NamedVector | None = None
     """The normal of the plane in which everything moves, of ``translations`` that in which all tips move, or None."""
+    flat: bool = True
+    """Of ``planar``: whether the lines along which the held legs let their tips move are in that plane."""
     slide: NamedVector | None = None
     turning: bool = False
     """Of ``translations``: whether the platform turns where nothing is held; it may then be held turned otherwise."""
@@ -148,10 +150,24 @@ def recognise(anatomy: LegDecomposition, question: Measurement, samples: Sequenc
         found = _one_body(anatomy, every, legs, motions, samples)
     else:
         found = _two_bodies(anatomy, legs, motions, samples)
+    if found is not None and found.plane is not None and found.motion == "planar" and not all(
+            _turns_about(found.plane, own, leg_twists_together(samples, leg, locks[leg.label], question.reference),
+                         samples)
+            for leg in anatomy.legs if locks[leg.label] and (own := held[leg.label]) is not None and own.turns < 3):
+        return other
     # where the turns of all legs are alike, a leg whose tip may move anywhere holds nothing
     binding = () if found is None else tuple(leg for leg in found.legs if not leg.free or (
         found.motion in TURNING_MOTIONS and leg.turning is not None) or (found.motion == "oriented" and leg.turns < 3))
     return replace(found, legs=binding) if found is not None and binding else other
+
+
+def _turns_about(normal: NamedVector, leg: LockedLeg, systems: Sequence[Array],
+                 samples: Sequence[ClosedConfiguration]) -> bool:
+    """Whether a held leg, which allows these twists (6, k), lets its end turn about the normal through its tip."""
+    poses = poses_at(samples, [*normal.links, *leg.tip.links])
+    n, B = normal.value(poses), leg.tip.value(poses)
+    turns = np.hstack([cross(B, n), n])
+    return all(vanishes(t - T @ (T.T @ t)) for t, T in zip(turns, systems, strict=True))
 
 
 def _leg_of(seen: Observation, anatomy: LegDecomposition, question: Measurement) -> str | None:
@@ -177,7 +193,9 @@ def _one_body(anatomy: LegDecomposition, every: tuple[LockedLeg, ...] | None, le
         return None
     normal = _plane_of(motions)
     if normal is not None and all(leg.line is not None or leg.virtual for leg in legs):
-        return ConstraintPattern("planar", base, bodies, legs, plane=_normal(anatomy.mechanism, normal))
+        flat = all(vanishes(leg.line.value(poses_at(samples, leg.line.links)) @ normal)
+                   for leg in legs if leg.line is not None)
+        return ConstraintPattern("planar", base, bodies, legs, plane=_normal(anatomy.mechanism, normal), flat=flat)
     if every is not None and all(leg.turns == 1 and leg.normal is None and not leg.virtual for leg in every):
         plane = _common_plane(anatomy.mechanism, every, samples)
         return None if plane is None else ConstraintPattern("planar", base, bodies, every, plane=plane)
