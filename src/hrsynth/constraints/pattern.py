@@ -6,8 +6,8 @@ whole platform can still do must be in all of them (theory.md 7). This module fi
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from itertools import combinations
 
@@ -52,8 +52,17 @@ class ConstraintPattern(Value):
     flat: bool = True
     """Of ``planar``: whether the lines along which the held legs let their tips move are in that plane."""
     slide: NamedVector | None = None
+    steady: Mapping[str, Array] = field(default_factory=dict)
+    """Of ``translations``: the links of the named vectors that never turn, with their rotations R_BL (3, 3)."""
     turning: bool = False
     """Of ``translations``: whether the platform turns where nothing is held; it may then be held turned otherwise."""
+
+    def constant(self, vector: NamedVector | None) -> Array | None:
+        """The direction (3,), in the base, of a vector that is fixed in a link that never turns; None of others."""
+        if not isinstance(vector, BodyVector):
+            return None
+        R = np.eye(3) if vector.link == self.base else self.steady.get(vector.link)
+        return None if R is None else R @ vector.direction
 
     @property
     def features(self) -> tuple[NamedVector, ...]:
@@ -232,7 +241,10 @@ def _translating(anatomy: LegDecomposition, legs: tuple[LockedLeg, ...],
         _, s, Vt = np.linalg.svd(np.concatenate([line.value(poses) for line in lines]))
         if s[1] > SAME_RELATION * s[0] > s[2]:
             plane = _normal(anatomy.mechanism, Vt[2], "direction normal to the lines along which the tips move")
-    return ConstraintPattern("translations", anatomy.mechanism.base, attached(anatomy), legs, plane=plane)
+    found = ConstraintPattern("translations", anatomy.mechanism.base, attached(anatomy), legs, plane=plane)
+    turns = {link: X[:, :3, :3] for link, X in poses_at(samples, [link for each in found.features for link in each.links
+                                                                  ]).items()}
+    return replace(found, steady={link: frozen(R[0]) for link, R in turns.items() if vanishes(R - R[0])})
 
 
 def _two_bodies(anatomy: LegDecomposition, legs: tuple[LockedLeg, ...], motions: Array,
