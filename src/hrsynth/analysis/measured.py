@@ -8,6 +8,7 @@ from functools import cached_property, lru_cache
 from ..budgets import REMEMBERED
 from ..constraints.condition import Condition, condition
 from ..constraints.pattern import ConstraintPattern, moving, recognise
+from ..constraints.turning import unexamined
 from ..geometry.vectors import Array
 from ..kinematics.relation import Measurement
 from ..kinematics.sampling import Samples
@@ -72,3 +73,8 @@ class MeasuredRobot(Value):
     def condition(self) -> Condition:
         """When a freedom is lost that is seen generically."""
         return condition(self.pattern, self.question)
+
+    @cached_property
+    def unexamined(self) -> tuple[str, ...]:
+        """Poses to which the condition does not apply, in words."""
+        return unexamined(self.setting.anatomy, self.pattern, self.condition, self.setting.configurations)

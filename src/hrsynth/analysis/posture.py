@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from ..budgets import REMEMBERED
-from ..geometry.ranks import range_basis
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.limits import outside
@@ -239,7 +238,8 @@ class ConfigurationAnalysis(Value):
         usual = self.setting.motion.twists[: found.twist_rows]
         if usual.shape[1] != self.usual.dof:
             return found.twists
-        return range_basis(found.twists - usual @ (usual.T @ found.twists), 1.0)[0]
+        beside = np.linalg.svd(found.twists - usual @ (usual.T @ found.twists), full_matrices=False)[0]
+        return np.asarray(beside[:, : found.dof.value - self.usual.dof])
 
     def _named(self, at: ClosedConfiguration, twists: Array) -> tuple[Freedom, ...]:
         """Twists (3 or 6, k) in characteristic lengths as named freedoms."""

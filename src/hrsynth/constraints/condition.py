@@ -136,6 +136,8 @@ def condition(pattern: ConstraintPattern, question: Measurement) -> Condition:
     fixed = [leg for leg in pattern.legs if leg.fixed]
     if pattern.motion == "spatial" and len(normals) == len(pattern.legs) == 6:
         return _complex(pattern, normals)
+    if pattern.motion == "planar" and not pattern.flat:
+        return _gram(pattern)
     if pattern.motion == "planar" and (len(lines), len(fixed)) == (1, 1):
         return _pivot(pattern, lines[0], fixed[0])
     if len(lines) == len(pattern.legs):
@@ -151,7 +153,7 @@ def _translations(pattern: ConstraintPattern, lines: Sequence[LockedLeg]) -> Con
     symbols = [vector(_symbol(leg.line)) for leg in lines]
     normals = [vector(_symbol(leg.normal)) for leg in pattern.legs if leg.normal is not None]
     names = _listed(leg.line for leg in lines)
-    constant = all(isinstance(leg.line, BodyVector) and leg.line.link == pattern.base for leg in lines)
+    constant = all(pattern.constant(leg.line) is not None for leg in lines)
     signed = False
     if not lines:
         expression = sum(det(*triple) ** 2 for triple in combinations(normals, 3))
@@ -188,11 +190,11 @@ def _apart(pattern: ConstraintPattern) -> str | None:
     rows, reasons = [], []
     for leg in pattern.legs:
         line, axis = leg.line, leg.line.axis if isinstance(leg.line, Tangent) else leg.normal
-        if isinstance(line, BodyVector) and line.link == pattern.base:
-            rows.append(np.eye(3) - np.outer(line.direction, line.direction))
+        if (u := pattern.constant(line)) is not None:
+            rows.append(np.eye(3) - np.outer(u, u))
             reasons.append(f"along {_symbol(line)}")
-        elif isinstance(axis, BodyVector) and axis.link == pattern.base:
-            rows.append(axis.direction[None])
+        elif axis is not None and (n := pattern.constant(axis)) is not None:
+            rows.append(n[None])
             reasons.append(f"normal to the {axis.meaning}")
     if not rows or np.linalg.svd(np.vstack(rows), compute_uv=False)[2:].sum() <= SAME_RELATION:
         return None
@@ -263,6 +265,10 @@ def _gram(pattern: ConstraintPattern) -> Condition:
         name = "" if moving is None else _symbol(moving)
         across = "I" if leg.fixed else f"I - {name} {name}^T" if leg.line is not None else f"{name} {name}^T"
         matrices.append((N.name, across))
+    if pattern.motion == "planar":
+        total += sympy.MatrixSymbol("P", 6, 6)
+        n = _symbol(pattern.plane)
+        matrices.append(("P", f"diag({n} {n}^T, I - {n} {n}^T)"))
     moves = _moves(pattern.legs)
     if pattern.motion == "bodies":
         halves = "the platform's halves can translate, one along e relative to the other"
@@ -304,9 +310,9 @@ def always(pattern: ConstraintPattern, lost: Sequence[str]) -> str:
     if pattern.motion == "spatial" and (names := _on_one_line(pattern.legs)):
         return f"{text}, because {names} are on one line, about which the platform can turn"
     if pattern.motion != "planar" and len(lines) == len(pattern.legs) > 0:
-        constant = all(isinstance(leg.line, BodyVector) and leg.line.link == pattern.base for leg in lines)
-        parallel = constant and all(_parallel(lines[0].line, leg.line) for leg in lines)
-        if parallel and len(lines) > 1:
+        vectors = [u for leg in lines if (u := pattern.constant(leg.line)) is not None]
+        if len(vectors) == len(lines) > 1 and all(np.linalg.norm(np.cross(u, vectors[0])) < SAME_RELATION
+                                                  for u in vectors):
             return f"{text}, because {_listed(leg.line for leg in lines)} are parallel"
     return text
 
@@ -318,11 +324,6 @@ def _on_one_line(legs: Sequence[LockedLeg]) -> str:
     arms = np.array([leg.tip.place - legs[0].tip.place for leg in legs[1:]])
     flat = np.linalg.svd(arms, compute_uv=False)
     return ", ".join(leg.tip.symbol for leg in legs) if flat[1:].sum() <= SAME_RELATION * flat[0] else ""
-
-
-def _parallel(a: NamedVector | None, b: NamedVector | None) -> bool:
-    return (isinstance(a, BodyVector) and isinstance(b, BodyVector)
-            and bool(np.linalg.norm(np.cross(a.direction, b.direction)) < SAME_RELATION))
 
 
 def _listed(features: Iterable[NamedVector | None]) -> str:

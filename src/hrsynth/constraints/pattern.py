@@ -6,8 +6,8 @@ whole platform can still do must be in all of them (theory.md 7). This module fi
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from itertools import combinations
 
@@ -49,9 +49,20 @@ class ConstraintPattern(Value):
     legs: tuple[LockedLeg, ...] = ()
     plane: NamedVector | None = None
     """The normal of the plane in which everything moves, of ``translations`` that in which all tips move, or None."""
+    flat: bool = True
+    """Of ``planar``: whether the lines along which the held legs let their tips move are in that plane."""
     slide: NamedVector | None = None
+    steady: Mapping[str, Array] = field(default_factory=dict)
+    """Of ``translations``: the links of the named vectors that never turn, with their rotations R_BL (3, 3)."""
     turning: bool = False
     """Of ``translations``: whether the platform turns where nothing is held; it may then be held turned otherwise."""
+
+    def constant(self, vector: NamedVector | None) -> Array | None:
+        """The direction (3,), in the base, of a vector that is fixed in a link that never turns; None of others."""
+        if not isinstance(vector, BodyVector):
+            return None
+        R = np.eye(3) if vector.link == self.base else self.steady.get(vector.link)
+        return None if R is None else R @ vector.direction
 
     @property
     def features(self) -> tuple[NamedVector, ...]:
@@ -142,15 +153,30 @@ def recognise(anatomy: LegDecomposition, question: Measurement, samples: Sequenc
     every = None if None in held.values() else (*(leg for leg in held.values() if leg is not None), *virtual)
     other = replace(other, legs=legs)
     if anatomy.point is not None:
-        found: ConstraintPattern | None = _translating(anatomy, legs, samples)
+        velocities = [relation(at, question.of_platform).twists for at in samples]
+        found: ConstraintPattern | None = _translations(anatomy, every, legs, velocities, samples)
     elif len(other.bodies) == 1:
         found = _one_body(anatomy, every, legs, motions, samples)
     else:
         found = _two_bodies(anatomy, legs, motions, samples)
+    if found is not None and found.plane is not None and found.motion == "planar" and not all(
+            _turns_about(found.plane, own, leg_twists_together(samples, leg, locks[leg.label], question.reference),
+                         samples)
+            for leg in anatomy.legs if locks[leg.label] and (own := held[leg.label]) is not None and own.turns < 3):
+        return other
     # where the turns of all legs are alike, a leg whose tip may move anywhere holds nothing
     binding = () if found is None else tuple(leg for leg in found.legs if not leg.free or (
         found.motion in TURNING_MOTIONS and leg.turning is not None) or (found.motion == "oriented" and leg.turns < 3))
     return replace(found, legs=binding) if found is not None and binding else other
+
+
+def _turns_about(normal: NamedVector, leg: LockedLeg, systems: Sequence[Array],
+                 samples: Sequence[ClosedConfiguration]) -> bool:
+    """Whether a held leg, which allows these twists (6, k), lets its end turn about the normal through its tip."""
+    poses = poses_at(samples, [*normal.links, *leg.tip.links])
+    n, B = normal.value(poses), leg.tip.value(poses)
+    turns = np.hstack([cross(B, n), n])
+    return all(vanishes(t - T @ (T.T @ t)) for t, T in zip(turns, systems, strict=True))
 
 
 def _leg_of(seen: Observation, anatomy: LegDecomposition, question: Measurement) -> str | None:
@@ -169,14 +195,16 @@ def _one_body(anatomy: LegDecomposition, every: tuple[LockedLeg, ...] | None, le
     if len(own) < len(anatomy.legs) and motions.shape[2] < (2 if own else 3):  # the other legs hold as well
         return None
     if vanishes(motions[:, 3:]):
-        return _translating(anatomy, legs, samples)
+        return _translations(anatomy, every, legs, list(motions[:, :3]), samples)
     if any(leg.turns == 0 and not leg.spins for leg in legs):
         return None if every is None else replace(_translating(anatomy, every, samples), turning=True)
     if any(leg.turns < 3 and leg.spins for leg in legs):
         return None
     normal = _plane_of(motions)
     if normal is not None and all(leg.line is not None or leg.virtual for leg in legs):
-        return ConstraintPattern("planar", base, bodies, legs, plane=_normal(anatomy.mechanism, normal))
+        flat = all(vanishes(leg.line.value(poses_at(samples, leg.line.links)) @ normal)
+                   for leg in legs if leg.line is not None)
+        return ConstraintPattern("planar", base, bodies, legs, plane=_normal(anatomy.mechanism, normal), flat=flat)
     if every is not None and all(leg.turns == 1 and leg.normal is None and not leg.virtual for leg in every):
         plane = _common_plane(anatomy.mechanism, every, samples)
         return None if plane is None else ConstraintPattern("planar", base, bodies, every, plane=plane)
@@ -188,6 +216,22 @@ def _one_body(anatomy: LegDecomposition, every: tuple[LockedLeg, ...] | None, le
     return None
 
 
+def _translations(anatomy: LegDecomposition, every: tuple[LockedLeg, ...] | None, legs: tuple[LockedLeg, ...],
+                  motions: Sequence[Array], samples: Sequence[ClosedConfiguration]) -> ConstraintPattern | None:
+    """The pattern of translations, bases (3, d) of which are given: of the ``legs`` that are watched where these leave
+    the tips none but such, else of ``every`` leg, since the others hold as well; None where one of them has none."""
+    if len(motions) == len(samples) and all(_within(leg, motions, samples) for leg in legs):
+        return _translating(anatomy, legs, samples)
+    return None if every is None else _translating(anatomy, every, samples)
+
+
+def _within(leg: LockedLeg, motions: Sequence[Array], samples: Sequence[ClosedConfiguration]) -> bool:
+    """Whether a leg lets its tip move in these directions (3, d) alone, at all samples."""
+    poses = poses_at(samples, [link for feature in leg.features for link in feature.links])
+    across = forbidden(leg, {feature.symbol: feature.value(poses) for feature in leg.features})
+    return all(vanishes((np.eye(3) - F @ F.T) @ (np.eye(3) - N)) for F, N in zip(motions, across, strict=True))
+
+
 def _translating(anatomy: LegDecomposition, legs: tuple[LockedLeg, ...],
                  samples: Sequence[ClosedConfiguration]) -> ConstraintPattern:
     lines = [leg.line for leg in legs if leg.line is not None]
@@ -197,7 +241,10 @@ def _translating(anatomy: LegDecomposition, legs: tuple[LockedLeg, ...],
         _, s, Vt = np.linalg.svd(np.concatenate([line.value(poses) for line in lines]))
         if s[1] > SAME_RELATION * s[0] > s[2]:
             plane = _normal(anatomy.mechanism, Vt[2], "direction normal to the lines along which the tips move")
-    return ConstraintPattern("translations", anatomy.mechanism.base, attached(anatomy), legs, plane=plane)
+    found = ConstraintPattern("translations", anatomy.mechanism.base, attached(anatomy), legs, plane=plane)
+    turns = {link: X[:, :3, :3] for link, X in poses_at(samples, [link for each in found.features for link in each.links
+                                                                  ]).items()}
+    return replace(found, steady={link: frozen(R[0]) for link, R in turns.items() if vanishes(R - R[0])})
 
 
 def _two_bodies(anatomy: LegDecomposition, legs: tuple[LockedLeg, ...], motions: Array,

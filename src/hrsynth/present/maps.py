@@ -215,7 +215,8 @@ def _drawn_locus(place: Any, plane: MapPlane, field: SingularityMap, name: str) 
         _pieces(place, plane, field.curve, colors=colour, linewidths=2.0, linestyles=style)
     shape = {"linestyle": style} if field.signed or len(field.curve) else {"linestyle": "", "marker": mark}
     met = met or bool(len(field.spots) or len(field.curve))
-    lacking = "" if met else " (never)" if field.never else " (none found)"
+    never = " (never)" if field.everywhere else " (never where examined)"
+    lacking = "" if met else never if field.never else " (none found)"
     return entry(f"{name}: Type 2{lacking}", color=colour, linewidth=2.0, **shape)
 
 

@@ -15,6 +15,8 @@ from hrsynth.analysis.aspects.path import path
 from hrsynth.analysis.check import check
 from hrsynth.analysis.singularity.agreement import weakest
 from hrsynth.analysis.singularity.singular import Singularity, singular
+from hrsynth.catalog.geometry import mechanism
+from hrsynth.catalog.words import parse
 from hrsynth.description import load
 from hrsynth.errors import BadRequest
 from hrsynth.geometry.vectors import Array, frozen, inverse, unit
@@ -240,6 +242,22 @@ def test_constraint_singularities_are_not_named_where_legs_cannot_turn_the_platf
     assert answer.condition is not None
     assert answer.condition.never
     assert answer.unexamined == ()
+
+
+@pytest.mark.parametrize("up", [0.0, 0.5])
+def test_what_is_fixed_in_a_platform_that_translates_is_constant(up: float) -> None:
+    """Depth and a line of the platform: a translation keeps both where it is along the line and in a plane z = const.,
+    so there is none at all if the line is not in such a plane, and one everywhere else."""
+    axis = unit(np.array([1.0, 0.3, up]))
+    seen = ["depth:platform@0.1,0,0", f"line:platform@0.1,0.1,0/{text(axis).replace(' ', ',')}"]
+    answer = singular(mechanism(parse("3(Pk*-Ra-Ra-Ra)"), 0), see=seen, points=30)
+    z = answer.setting.mechanism.links["platform"].pose[:3, :3] @ axis @ np.array([0.0, 0.0, 1.0])
+    assert (abs(z) > 0.1) == (up > 0.0)
+    assert answer.always == (up == 0.0)
+    assert (answer.condition is not None and answer.condition.never) == (up > 0.0)
+    if up:
+        sizes = [weakest(at, answer.question) for at in random_walk(answer.setting.everything.start, 30, seed=5)]
+        assert min(sizes) > 1e-3
 
 
 def test_a_platform_that_rests_is_refused_in_a_line() -> None:

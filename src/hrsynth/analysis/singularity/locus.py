@@ -42,7 +42,7 @@ class SingularityMap(Value):
     """A robot over a plane: the expression's value, the smallest singular value (Type 2 where zero) and the inverse of
     the largest (Type 1 where zero), each (nx, ny), NaN where no pose is reached; where the expression has no sign,
     ``spots`` are singular poses (k, 2) that were found, and ``curve`` pieces (k, 2, 2) of the curve that was; ``never``
-    where the condition cannot vanish."""
+    where the condition cannot vanish, ``everywhere`` where it applies to all poses."""
 
     value: Array
     signed: bool
@@ -51,6 +51,7 @@ class SingularityMap(Value):
     spots: Array
     curve: Array
     never: bool
+    everywhere: bool
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -134,7 +135,8 @@ def _locus(hidden: MeasuredRobot, real: MeasuredRobot | None, plane: Pose | None
             spots = _spots(grid, [here[places.index(i)] for i in _valleys(tables[1])], measured)
             curve = PlaneOfPoses(measured.question, motion, grid).curve(configurations)
             spots = _aside(spots, curve, grid)
-        return SingularityMap(tables[0], condition.signed, tables[1], tables[2], spots, curve, condition.never)
+        return SingularityMap(tables[0], condition.signed, tables[1], tables[2], spots, curve, condition.never,
+                              not measured.unexamined)
 
     return Locus(grid, field(hidden), None if real is None else field(real))
 

@@ -9,7 +9,7 @@ from typing import Any
 from ...budgets import NEIGHBOUR_STEP
 from ...constraints.condition import Condition, always
 from ...constraints.pattern import ConstraintPattern
-from ...constraints.turning import may_turn
+from ...constraints.turning import unexamined
 from ...errors import BadRequest
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.relation import Measurement, platform_motions, relation
@@ -70,17 +70,8 @@ class Singularity(Result, shown_as="singular"):
 
     @cached_property
     def unexamined(self) -> tuple[str, ...]:
-        """Poses to which *never* does not apply, in words; none where it is not said."""
-        if self.condition is None or not self.condition.never:
-            return ()
-        anatomy, found = self.setting.anatomy, []
-        folding = [leg.label for leg in anatomy.legs if leg.has_loops]
-        if folding:
-            found.append(f"poses at which a loop inside a leg ({', '.join(folding)}) lies flat are not examined")
-        if may_turn(anatomy, self.pattern.legs, self.setting.configurations):
-            found.append("poses at which the loops lose rank, so that the platform may turn (constraint "
-                         "singularities), are not examined")
-        return tuple(found)
+        """Poses to which the condition does not apply, in words; none where it is computed at each pose anew."""
+        return unexamined(self.setting.anatomy, self.pattern, self.condition, self.setting.configurations)
 
     def headline(self) -> str:
         """The robot and the condition in words."""
