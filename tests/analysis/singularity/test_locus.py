@@ -119,7 +119,8 @@ def test_the_edge_of_the_map_is_no_limit_of_reach() -> None:
 
 
 @pytest.mark.parametrize(("locus", "words"), [
-    (lambda: drawn(load("linear_delta"), steps=5), "hidden robot: Type 2 (never)"), (planar, "hidden robot: Type 2")])
+    (lambda: drawn(load("linear_delta"), steps=5), "hidden robot: Type 2 (never where examined)"),
+    (planar, "hidden robot: Type 2")])
 def test_what_is_not_met_on_the_grid_is_not_called_never(locus: Callable[[], Locus], words: str) -> None:
     """*Never* where the rails are not parallel at all, whatever is drawn; else of a part without the curve that none
     was found."""
