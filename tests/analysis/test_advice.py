@@ -63,8 +63,7 @@ def rate_rows(oracle: Oracle, state: Array, basis: Array, observations: Sequence
 
 
 class Independent:
-    """What stays lost with any further measurements, by maximal coordinates at a state of a random walk, or ``at_zero``.
-    """
+    """What stays lost with any further measurements, by maximal coordinates in a random walk, or ``at_zero``."""
 
     def __init__(self, robot: Mechanism, observe: str | None, camera: str | None = None, seed: int = 1, *,
                  at_zero: bool = False) -> None:
