@@ -235,9 +235,9 @@ def _chain(row: list[str], kinds: str) -> LegChain:
         if values[own] != f"q{i + 1}":
             raise ValueError(f"joint {i + 1}: {CELLS[own]} of {kind} is not coordinate q{i + 1}")
         for k, value in enumerate(values):
-            turns = CELLS[k].startswith(ANGLES)
-            if k != own and isinstance(value, str) and (value.startswith("q") or value.startswith(ANGLES) != turns):
-                raise ValueError(f"joint {i + 1}: {value} is no {'angle' if turns else 'length'}, but in {CELLS[k]}")
+            angle = CELLS[k].startswith(ANGLES)
+            if k != own and isinstance(value, str) and (value.startswith("q") or value.startswith(ANGLES) != angle):
+                raise ValueError(f"joint {i + 1}: {value} is no {'angle' if angle else 'length'}, but in {CELLS[k]}")
         joints.append(PublishedJoint(kind, tuple(values)))
     end = row[1 + 8 * len(kinds): 4 + 8 * len(kinds)]
     turns = [cell(each) if each else 0.0 for each in [*end, "", "", ""][:3]]
