@@ -419,6 +419,8 @@ AUDIT_TRIALS = 12
 """Random starts of each published robot, and again as many where its dimensions are to obey a relation."""
 AUDIT_POSES = 4
 """Poses at which dimensions have to close at once there."""
+LARGEST_CELL = 1e6
+"""The largest number in a cell of a published table, and the largest inverse of one that is not zero."""
 AUDIT_BATCH = 128
 """Robots that are closed together."""
 AUDIT_DRAWS = 12

@@ -63,13 +63,15 @@ def rate_rows(oracle: Oracle, state: Array, basis: Array, observations: Sequence
 
 
 class Independent:
-    """What stays lost with any further measurements, by maximal coordinates at a state of a random walk."""
+    """What stays lost with any further measurements, by maximal coordinates in a random walk, or ``at_zero``."""
 
-    def __init__(self, robot: Mechanism, observe: str | None, camera: str | None = None, seed: int = 1) -> None:
+    def __init__(self, robot: Mechanism, observe: str | None, camera: str | None = None, seed: int = 1, *,
+                 at_zero: bool = False) -> None:
         setting = ObservedRobot.of(robot, observe, camera, samples=1)
         self.everything = candidates(setting)
         oracle = Oracle(setting.mechanism)
-        self.state = list(oracle.random_walk(np.random.default_rng(seed), 2))[-1]
+        self.state = np.array([link.pose for link in setting.mechanism.links.values()]) if at_zero else list(
+            oracle.random_walk(np.random.default_rng(seed), 2))[-1]
         basis = oracle.kernel(self.state)[0]
         point = setting.anatomy.point
         twist = oracle.twist(basis, setting.mechanism.platform)
@@ -123,6 +125,20 @@ def test_all_cures_and_only_those_are_found(robot: str, observe: str, camera: st
     assert sets <= cures
     listed = {name for each in sets for name in each}
     assert all(any(name not in listed and name[0] == "Direction" for name in each) for each in cures - sets)
+
+
+@pytest.mark.parametrize(("robot", "observe", "fewer"), [("3rps", "1", 10), ("quattro", "1", 0), ("uranesx", "all", 0)])
+def test_cures_that_are_none_at_zero_are_told(robot: str, observe: str, fewer: int) -> None:
+    """Where the zero configuration is singular with a set, by the oracle there; what is asked next cures there too."""
+    answer, oracle = found(robot, observe), Independent(load(robot), observe, at_zero=True)
+    dof = answer.now.dof
+    shown = [dof - oracle.lost(frozenset(name_of(m.observation) for m in each.measurements)) for each in answer.sets]
+    assert [each.rank_at_zero for each in answer.sets] == [None if rank == dof else rank for rank in shown]
+    assert sum(rank < dof for rank in shown) == fewer
+    assert [each.to_dict().get("rank_at_zero", dof) for each in answer.sets] == shown
+    said = text.advice(answer)
+    assert ("at the zero configuration, a Type 2 singularity" in said) == (fewer > 0)
+    assert not fewer or f"\n{fewer} of these see fewer freedoms" in said
 
 
 @settings(max_examples=5, deadline=None, suppress_health_check=list(HealthCheck))

@@ -207,13 +207,104 @@ def test_tables_with_holes_are_read(tables: Path, tmp_path: Path):
     assert found.groups[0]["counts"] == 0
 
 
+NINES = "9" * 5000
+LIST, CHAIN, MOTORS, TRIED = ("robots/sym_2T1R_list.csv", "chains/S3RRR.csv", "robots/actuation.csv",
+                              "synthesis/2T1R.csv")
+DRIVEN = "sym_2T1R;P3RRR1G1P1A2;0;1;0;0;1;0;0;1;0;"
+
+
+@pytest.mark.parametrize(("table", "old", "new", "line", "said"), [
+    (LIST, None, "P3RRR1G\u00b2P1;S3RRR1", 4, "not the name of a robot"),
+    (LIST, None, "P\u0663RRR1G1P1", 4, "not the name of a robot"),
+    (LIST, None, "P0RRR1G1P1;S3RRR1", 4, "not the name of a robot"),
+    (LIST, None, f"P3RRR1G{NINES}P1", 4, "not the name of a robot"),
+    (LIST, None, "\0\0;x", 4, r"found '\x00\x00'"),
+    (LIST, None, b"x\xe4;", 4, "not UTF-8"),
+    (LIST, None, "P3RRR1G1P1;S3RRR1", 4, "told before, in sym_2T1R_list.csv:2"),
+    (LIST, None, "P3RRR1G1P2;S3PRP1", 4, "the chain of P3RRR1G1P2 is not that of its name"),
+    (LIST, "Name;Chain;Joints\n", "", 1, "a row where a head line should be"),
+    (LIST, "P3", "x\u2028y\nP3", 2, "not the name of a robot"),
+    (CHAIN, "a3", "pi/0", 3, "neither a number, a multiple of pi nor a name"),
+    (CHAIN, "a3", "1_000", 3, "neither a number, a multiple of pi nor a name"),
+    (CHAIN, "a3", "1e300", 3, "a cell is larger than"),
+    (CHAIN, "a3", "-1e-300", 3, "nearer to zero"),
+    (CHAIN, "a3", "9" * 400 + "*pi", 3, "a cell is larger than"),
+    (CHAIN, "a3", "alpha3", 3, "joint 3: alpha3 is no length, but in a"),
+    (CHAIN, "R;0;0;0;a3", "R;a3;0;0;a3", 3, "joint 3: a3 is no angle, but in beta"),
+    (CHAIN, "a3", "q3", 3, "joint 3: q3 is no length, but in a"),
+    (CHAIN, "q2", "q9", 3, "joint 2: theta of R is not coordinate q2"),
+    (CHAIN, None, "S3RRR1;R;0;0;0;0;q1;d1;0;R;0;0;0;a2;q2;d2;0;R;0;0;0;a3;q3;d3;0", 4, "told before, in S3RRR.csv:3"),
+    (MOTORS, None, DRIVEN + "\u00b2;", 8, "the loss of rank is not a whole number"),
+    (MOTORS, None, DRIVEN + NINES, 8, "the loss of rank is not a whole number"),
+    (MOTORS, None, DRIVEN.replace("A2", "A" + NINES), 8, "no choice of motors"),
+    (MOTORS, None, DRIVEN.replace(";0;1;0;", ";;1;0;", 1), 8, "not 3 × 3 joints"),
+    (MOTORS, None, DRIVEN.replace("A2", "A1") + "0;", 8, "told before, in actuation.csv:1"),
+    (MOTORS, None, DRIVEN.replace("G1P1", "G2P1") + "0;", 8, "of a robot that its group does not list"),
+    (TRIED, None, "S3RRR1;3;2;1;\u00b2;2", 4, "not a whole number"),
+    (TRIED, None, "S3RRR1;3;2;1;0;two", 4, "not a whole number"),
+    (TRIED, None, f"S3RRR1;3;2;1;0;{NINES}", 4, "not a whole number"),
+    (TRIED, None, "S3RRR1;3;1;1;0;3", 4, "told before, in 2T1R.csv:2")],
+    ids=lambda value: ascii(value)[:24] if isinstance(value, str | bytes) else None)
+def test_rows_that_cannot_be_read_are_told_in_one_line(tmp_path: Path, table: str, old: str | None, new: str | bytes,
+                                                       line: int, said: str):
+    """Each with its file and line; all other rows are read."""
+    folder = write(tmp_path / "tables")
+    path = folder / table
+    text = path.read_text()
+    content = text.encode() + (new if isinstance(new, bytes) else new.encode()) if old is None else text.replace(
+        old, str(new), 1).encode()
+    path.write_bytes(content)
+    found = read(folder)
+    (defect,) = [each for each in found.defects if each.file == str(path)]
+    assert (defect.line, said in str(defect)) == (line, True), str(defect)
+    assert len(str(defect)) < 300 + len(str(path))
+    assert str(defect).isprintable()
+    assert len(found.robots) + len(found.no_chain) == 6 - (old == "Name;Chain;Joints\n")
+
+
+@pytest.mark.parametrize(("name", "content", "said"), [
+    ("robots/sym_9T9R_list.csv", b"Name\nP3RRR1G1P1\n", "the name gives no group"),
+    ("robots/sym_0T0R_list.csv", b"Name\nP3RRR1G1P1\n", "the name gives no group"),
+    ("robots/sym_13T0R_list.csv", b"Name\nP3RRR1G1P1\n", "the name gives no group"),
+    ("robots/sym_1T1R_list.csv", b"", "no rows"),
+    ("robots/sym_1T1R_list.csv", "Name\nP3RRR1G1P1\n".encode("utf-16"), "cannot be read: not UTF-8"),
+    ("robots/actuation.csv", None, "cannot be read: Is a directory"),
+    ("chains/S3RRR.csv", b"Name\n;Type\n", "no rows"),
+    ("synthesis/other.csv", b"Chain\n", "the name gives no group")])
+def test_tables_that_cannot_be_read_are_told_in_one_line(tmp_path: Path, name: str, content: bytes | None, said: str):
+    folder = write(tmp_path / "tables")
+    path = folder / name
+    if content is None:
+        path.unlink()
+        path.mkdir()
+    else:
+        path.write_bytes(content)
+    (defect,) = read(folder).defects
+    assert (defect.file, said in str(defect)) == (str(path), True)
+
+
+def test_nothing_need_have_been_tried(tmp_path: Path):
+    folder = write(tmp_path / "tables")
+    (folder / TRIED).write_text("Chain;Legs;G;P;Status;Number\n")
+    (folder / MOTORS).write_text("")
+    found = read(folder)
+    assert (found.defects, [each.working for each in found.robots if each.group == "2T1R"]) == ([], [None, None])
+
+
+def test_counts_are_those_of_as_many_legs(tmp_path: Path):
+    """What was tried with other numbers of legs says nothing of a robot."""
+    folder = write(tmp_path / "tables")
+    (folder / TRIED).write_text("Chain;Legs;G;P;Status;Number\nS3RRR1;4;1;1;0;1\nS3RRR1;3;1;1;0;2\n")
+    assert robot(folder, "P3RRR1G1P1").working == 2
+
+
 @pytest.mark.parametrize(("text", "value"), [("pi/2", np.pi / 2), ("-pi", -np.pi), ("2*pi/3", 2 * np.pi / 3),
                                              ("0.25", 0.25), ("alpha2", "alpha2")])
 def test_cells(text: str, value: float | str):
     assert cell(text) == value
 
 
-@pytest.mark.parametrize("text", ["", "nan", "pi2", "a", "1/0"])
+@pytest.mark.parametrize("text", ["", "nan", "pi2", "a", "1/0", "pi/0", "1_0", "\u0663", "1e7", "1e-7"])
 def test_what_is_no_cell(text: str):
     with pytest.raises(ValueError, match="cell"):
         cell(text)

@@ -25,7 +25,7 @@ from analysis.modes.ankles import ankle, carried
 from analysis.modes.draws import FAMILIES, MEETING, SURFACES, planar, spatial
 from analysis.modes.gears import five_bar, linkage
 from analysis.modes.laws import draw, needs_msolve
-from analysis.modes.test_planar_loops import LINKS, STEPHENSON
+from analysis.modes.test_planar_loops import LINKS, STEPHENSON, on_three_legs
 from analysis.modes.test_spheres import NAMED
 from certificates.mutations import FALSE, false, means_the_same, scribbled
 from families.test_linkages import LISTED, drawn
@@ -260,6 +260,7 @@ LOOPS: dict[str, Callable[[], AssemblyModes]] = {
     "more than needed": lambda: hrsynth.modes(five_bar(-1.0)[0]),
     "six-bar": lambda: hrsynth.modes(linkage(STEPHENSON, LINKS, "coupler", "j6"), real=True),
     "two bodies": lambda: hrsynth.modes(linkage(STEPHENSON, LINKS, "c", "j0"), real=True),
+    "a tool on a plate on three legs": lambda: hrsynth.modes(on_three_legs(), real=True),
     "a slide on the platform": lambda: hrsynth.modes(
         mechanism(parse("(Rz!-Rz*-Ph)+(Rz!-Rz-Rz*)+(Rz!-Rz*-Rz)")), real=True)}
 

@@ -23,14 +23,14 @@ from ..results import Result, Value
 from ..rewrite.evidence import Evidence
 from ..rewrite.state import State
 from ..rewrite.strategy import FORMS, GENERAL, OBSERVED_STAGES, Check, Rewriting, Step, Strategy, trusting
-from ..tolerances import RANK_GAP, SAME_RELATION
+from ..tolerances import SAME_RELATION
 from .asked import observe as observed_robot
 from .exact import ExactVerdict
 from .exact import architecture as exact_architecture
 from .freedoms import Freedom, name_freedoms
 from .observed import CameraLike, LegsLike, Mobility, ObservedRobot, RobotLike, SeeLike
 from .question import question
-from .verdict import Verdict, verdict_of
+from .verdict import Verdict, fewer_at_zero, verdict_of
 
 if TYPE_CHECKING:
     from ..mechanism.pose import PoseLike
@@ -86,11 +86,7 @@ class Derivation(Result, shown_as="derive"):
     def rank_at_zero(self) -> int | None:
         """How many freedoms the zero configuration shows, where these are fewer than elsewhere (it is singular); None
         where they are as many, or the number is not decided."""
-        if self.setting.mechanism.formation:
-            return None
-        start = relation(self.setting.samples.start, self.setting.samples.question)
-        rank = self.dof - start.unobserved_twists.shape[1]
-        return max(rank, 0) if rank < self.verdict.rank and start.gap >= RANK_GAP else None
+        return fewer_at_zero(relation(self.setting.samples.start, self.setting.samples.question), self.verdict)
 
     @property
     def dof(self) -> int:

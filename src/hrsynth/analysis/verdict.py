@@ -8,7 +8,7 @@ from typing import Any
 
 from ..errors import RankUndecided
 from ..geometry.ranks import Rank
-from ..kinematics.relation import look, relation
+from ..kinematics.relation import Relation, look, relation
 from ..kinematics.sampling import Samples
 from ..results import Result
 from ..tolerances import RANK_CUTOFF, RANK_GAP, SURELY_SOMETHING, SURELY_ZERO
@@ -98,6 +98,15 @@ def verdict_of(setting: ObservedRobot, legs: Sequence[str], samples: Samples) ->
     said = word(rank, dof) if formation is None else formation.verdict
     return Verdict(tuple(legs), said, dof, rank, lost, gap, graph, max(each.seen.weakest for each in found),
                    min(each.seen.dropped for each in found), formation)
+
+
+def fewer_at_zero(start: Relation, found: Verdict) -> int | None:
+    """How many freedoms the zero configuration shows, where these are fewer than elsewhere (it is singular); None where
+    they are as many, the number is not decided, or several bodies are asked of. ``start`` is ρ there."""
+    if found.formation is not None:
+        return None
+    rank = found.dof - start.unobserved_twists.shape[1]
+    return max(rank, 0) if rank < found.rank and start.gap >= RANK_GAP else None
 
 
 def _formation(setting: ObservedRobot, samples: Samples, count: int) -> Formation:

@@ -8,7 +8,7 @@ from contextlib import suppress
 from itertools import product
 from typing import Any
 
-from ..analysis.modes.planar_loops import groupings
+from ..analysis.modes.planar_loops import groupings, unknowns
 from .refining import Polynomial
 from .verify_certificate import PRIME, NotAccepted, degrees, multiples, poses, rank
 
@@ -30,7 +30,8 @@ def bound(record: dict[str, Any], equations: Sequence[Polynomial], halves: Seque
             return {"kind": "poses"}
         raise NotAccepted(f"{count} solutions are enclosed, but there may be more, as far as the checker can tell")
     if record["kind"] == "loops":
-        for grouping in groupings(record["angles"], record["slides"]):
+        loops = [unknowns(((slide, turns) for _, slide, turns in loop), record["angles"]) for loop in record["loops"]]
+        for grouping in groupings(record["angles"], record["slides"], loops):
             with suppress(TypeError):  # no bound
                 least = min(least, int(degrees(equations, halves, record | {"bound": {"groups": grouping}})))
             if least == count:

@@ -486,6 +486,7 @@ class CureRecord(TypedDict):
     rank: int
     gap: Gap
     price: float
+    rank_at_zero: NotRequired[Annotated[int, "at a zero configuration that shows fewer freedoms than others do"]]
 
 
 class Advise(OfRobot):

@@ -15,6 +15,7 @@ from analysis.modes.gears import closings, five_bar, linkage
 from hrsynth.analysis.measured import MeasuredRobot
 from hrsynth.analysis.modes.modes import AssemblyModes
 from hrsynth.analysis.modes.multiples import Residues
+from hrsynth.analysis.modes.planar_loops import blocks
 from hrsynth.analysis.modes.planar_modes import solve_loops
 from hrsynth.analysis.modes.planar_reading import planar_loops, whole_kernel
 from hrsynth.analysis.modes.search import search
@@ -247,6 +248,39 @@ def test_a_tool_that_cranks_on_the_platform_carry_has_both_its_places():
         along = (G - F) / np.linalg.norm(G - F)
         assert H[1] == pytest.approx(2 * (F + (H[0] - F) @ along * along) - H[0], abs=1e-9)
         assert np.linalg.norm(H[0] - H[1]) > 0.01
+
+
+def on_three_legs() -> Mechanism:
+    """A plate on three RRR legs carries a tool by two cranks, the first of which is driven as the legs' are."""
+    b = Builder("on_three_legs")
+    legs = [((0, 0), (0.02, 0.35), (0.35, 0.3)), ((1, 0.02), (1.03, 0.38), (0.66, 0.33)),
+            ((0.48, 0.97), (0.75, 0.93), (0.5, 0.6))]
+    b.link("base")
+    for k, (A, M, B) in enumerate(legs, 1):
+        b.link(f"prox_{k}", at=(*A, 0))
+        b.link(f"dist_{k}", at=(*M, 0))
+        if k == 1:
+            b.link("plate", at=(*B, 0))
+        for name, one, other, at in (("a", "base", f"prox_{k}", A), ("m", f"prox_{k}", f"dist_{k}", M),
+                                     ("b", f"dist_{k}", "plate", B)):
+            b.joint(f"{name}_{k}", "R", one, other, at=(*at, 0), axis=(0, 0, 1), motor=name == "a",
+                    loop=name == "b" and k > 1)
+    for name, F, G in (("first", (0.4, 0.4), (0.42, 0.72)), ("second", (0.6, 0.42), (0.68, 0.7))):
+        b.link(name, at=(*F, 0))
+        if name == "first":
+            b.link("tool", at=(*G, 0))
+        b.joint(f"{name}_f", "R", "plate", name, at=(*F, 0), axis=(0, 0, 1), motor=name == "first")
+        b.joint(f"{name}_g", "R", name, "tool", at=(*G, 0), axis=(0, 0, 1), loop=name == "second")
+    return b.build(platform="tool")
+
+
+def test_unknowns_of_loops_come_in_the_order_in_which_they_close():
+    """Two loops hold four unknowns, a third one two more and one of theirs; of two that share three each alone is short
+    of equations."""
+    one, two, three = frozenset({0, 1, 3}), frozenset({0, 2, 3, 1}), frozenset({3, 4, 5})
+    assert blocks([three, one, two]) == [[0, 1, 2, 3], [4, 5]]
+    assert blocks([one, two]) == [[0, 1, 2, 3]]
+    assert blocks([frozenset({0, 1}), frozenset({0, 1, 2, 5}), frozenset({1})]) == [[0, 1], [2, 5]]
 
 
 def test_measurements_of_one_freedom_hold_it_once():

@@ -7,9 +7,10 @@ v exchanged (C. W. Wampler, J. Mech. Des. 121, 1999, 387). The unknowns of the e
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -35,6 +36,10 @@ class PlanarLoop:
     terms: Sum
     angles: int
     slides: int
+
+    def used(self) -> frozenset[int]:
+        """Its angles, and its slides after all angles."""
+        return unknowns(self.terms, self.angles)
 
     def forms(self) -> Iterator[dict[Exponents, complex]]:
         """Itself and its conjugate, as polynomials in all u, all v and all t."""
@@ -171,7 +176,7 @@ class PlanarLoops(System):
     @cached_property
     def most(self) -> int:
         """How many isolated closings the degrees allow, with unknowns eliminated or not."""
-        groups = groupings(self.angles, self.slides)
+        groups = groupings(self.angles, self.slides, [loop.used() for loop in self.loops])
         return min(self.residues.most_by_degrees(), *(bezout(self.forms, each) for each in groups))
 
     def pose_of(self, link: str, q: Array) -> Array:
@@ -227,12 +232,37 @@ def _ball(a: complex, sign: int = 1) -> Any:
     return acb(a.real, sign * a.imag)
 
 
-def groupings(angles: int, slides: int) -> Iterator[list[list[int]]]:
-    """Ways to group all u, all v and all t: by kinds, each alone, few unknowns in all ways."""
+def groupings(angles: int, slides: int, loops: Sequence[frozenset[int]]) -> Iterator[list[list[int]]]:
+    """Ways to group all u, all v and all t: by kinds, each alone, few unknowns in all ways; where some loops close
+    before others, those of each part by themselves. Of angles and slides, ``loops`` are those that each loop has."""
     u, v, t = ([*range(k, k + n)] for k, n in ((0, angles), (angles, angles), (2 * angles, slides)))
     n = 2 * angles + slides
     alone = [[k] for k in t]
     for groups in ([u, v, t], [u + v + t], [u, v, *alone], [u + v, t], [[k] for k in range(n)],
                    [*map(list, zip(u, v, strict=True)), t]):
         yield [*filter(None, groups)]
+    if len(parts := blocks(loops)) > 1:
+        own = [([u[k] for k in part if k < angles], [v[k] for k in part if k < angles],
+                [t[k - angles] for k in part if k >= angles]) for part in parts]
+        yield [group for part in own for group in part if group]
+        yield [group for x, y, z in own for group in (x + y, z) if group]
+        yield [x + y + z for x, y, z in own]
     yield from partitions([*range(n)]) if n <= MOST_GROUPED else ()
+
+
+def unknowns(terms: Iterable[tuple[int, Exponents]], angles: int) -> frozenset[int]:
+    """The angles, and the slides after all angles, of a loop's terms: (slide, how often each angle)."""
+    return frozenset(k for slide, e in terms for k in (
+        *(j for j, times in enumerate(e) if times), *([angles + slide] if slide >= 0 else [])))
+
+
+def blocks(loops: Sequence[frozenset[int]]) -> list[list[int]]:
+    """The unknowns of loops in the order in which these close: those of as few loops as have two unknowns each, then in
+    the same way what the others have besides."""
+    left, found = [*filter(None, loops)], list[list[int]]()
+    while left:
+        own = next((own for size in range(1, len(left)) for part in combinations(left, size)
+                    if len(own := frozenset[int]().union(*part)) == 2 * size), frozenset[int]().union(*left))
+        found.append(sorted(own))
+        left = [*filter(None, (each - own for each in left))]
+    return found

@@ -1,8 +1,8 @@
 """Published tables of symmetric parallel robots, read: leg chains, robots, their motors, what a synthesis found.
 
-The format is told in docs/pages/audit.md. A table may lack columns at its end, and any cell may be empty: what is not
-stated is None. What cannot be read is a :class:`~hrsynth.errors.Defect` with its file and line, and the rows that need
-it are left out.
+The format is told in docs/pages/audit.md. A table may lack columns at its end, and figures that it states may be empty:
+what is not stated is None. What cannot be read, contradicts itself or is told twice is a
+:class:`~hrsynth.errors.Defect` with its file and line, and the rows that need it are left out.
 """
 
 from __future__ import annotations
@@ -14,14 +14,17 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
-from ...errors import BadRequest, Defect
+from ...budgets import LARGEST_CELL
+from ...errors import BadRequest, Defect, shortened
 
-CHAIN = re.compile(r"S(\d)([PR]+)(\d+(?:V\d+)?)$")
-ROBOT = re.compile(r"P(\d)([PR]+)(\d+(?:V\d+)?)G(\d+)P(\d+)$")
-DRIVEN = re.compile(r"(.+)A(\d+)$")
-GROUP = re.compile(r"(\d)T(\d)R")
-ANGLE = re.compile(r"([+-]?)(?:(\d+(?:\.\d+)?)\*)?pi(?:/(\d+(?:\.\d+)?))?$")
-NAME = re.compile(r"(?:alpha|beta|theta|[abdq])\d+$")
+CHAIN = re.compile(r"S(\d)([PR]+)(\d{1,9}(?:V\d{1,9})?)$", re.ASCII)
+ROBOT = re.compile(r"P([1-9])([PR]+)(\d{1,9}(?:V\d{1,9})?)G(\d{1,9})P(\d{1,9})$", re.ASCII)
+DRIVEN = re.compile(r"(.+)A(\d{1,9})$", re.ASCII)
+GROUP = re.compile(r"(?<!\d)(?!0T0R)([0-3])T([0-3])R(?![\dA-Za-z])", re.ASCII)
+WHOLE = re.compile(r"\d{1,9}", re.ASCII)
+NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?$", re.ASCII)
+ANGLE = re.compile(r"([+-]?)(?:(\d+(?:\.\d+)?)\*)?pi(?:/(\d+(?:\.\d+)?))?$", re.ASCII)
+NAME = re.compile(r"(?:alpha|beta|theta|[abdq])\d{1,9}$", re.ASCII)
 CELLS = ("beta", "b", "alpha", "a", "theta", "d", "offset")
 """The cells of a joint, after its type."""
 ANGLES = ("alpha", "beta", "theta")
@@ -131,40 +134,94 @@ def read(folder: str | Path) -> PublishedTables:
     if not lists:
         raise BadRequest("no table of robots", str(root / "robots"), "sym_3T0R_list.csv and the like")
     found = PublishedTables()
-    chains = {chain.name: chain for path in sorted((root / "chains").glob("*.csv"))
-              for chain in _chains(path, found.defects)}
-    drives = _drives(root / "robots" / "actuation.csv", found.defects)
+    once = _Once(found.defects)
+    chains = {chain.name: chain for path in sorted((root / "chains").glob("*.csv")) for chain in _chains(path, once)}
+    drives = _drives(root / "robots" / "actuation.csv", once)
     working = {key: value for path in sorted((root / "synthesis").glob("*.csv"))
-               for key, value in _synthesis(path, found.defects)}
+               for key, value in _synthesis(path, once)}
     for path in lists:
-        found.robots += _robots(path, chains, drives, working, found)
+        found.robots += _robots(path, chains, drives, working, found, once)
+    for (group, robot), choices in drives.items():
+        if once.has(group) and not once.has(group, robot):
+            found.defects += [Defect(each.file, each.line, "a choice of motors of a robot that its group does not list",
+                                     f"{robot}A{each.number}") for each in choices]
     found.robots.sort(key=lambda robot: (robot.group, robot.name))
     return found
 
 
-def _rows(path: Path, heads: int, defects: list[Defect]) -> Iterator[tuple[int, list[str]]]:
-    """The filled rows of a table after its heads, with their lines."""
+class _Once:
+    """Where each thing is told first; telling it again is a defect."""
+
+    def __init__(self, defects: list[Defect]) -> None:
+        self.defects = defects
+        self._where: dict[tuple[object, ...], str] = {}
+
+    def has(self, *key: object) -> bool:
+        return key in self._where
+
+    def new(self, path: Path, line: int, name: str, *key: object) -> bool:
+        """Whether what a row says was not said before."""
+        if key in self._where:
+            self.defects.append(Defect(str(path), line, f"told before, in {self._where[key]}", shown(name)))
+            return False
+        self._where[key] = f"{path.name}:{line}"
+        return True
+
+    def whole(self, group: str) -> None:
+        """The list of a group was read without a defect."""
+        self._where[(group,)] = group
+
+
+def shown(text: str) -> str:
+    """A cell as a message shows it: on one line, not too long."""
+    return shortened(text if text.isprintable() else ascii(text), 60)
+
+
+def _rows(path: Path, heads: int, defects: list[Defect], named: re.Pattern[str] | None = None, *,
+          bare: bool = False) -> Iterator[tuple[int, list[str]]]:
+    """The filled rows of a table after its heads, with their lines; a head that is ``named`` as a row is none. There is
+    a row, if the table may not be ``bare``."""
     try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        defects.append(Defect(str(path), None, f"cannot be read: {getattr(error, 'strerror', None) or 'not UTF-8'}"))
+        content = path.read_bytes()
+    except OSError as error:
+        defects.append(Defect(str(path), None, f"cannot be read: {error.strerror}"))
         return
-    for number, line in enumerate(text.splitlines(), 1):
-        cells = [cell.strip().strip('"') for cell in line.split(";")]
-        if number > heads and any(cells):
+    if content.startswith((b"\xff\xfe", b"\xfe\xff")):
+        defects.append(Defect(str(path), None, "cannot be read: not UTF-8"))
+        return
+    filled = False
+    lines = content.removeprefix(b"\xef\xbb\xbf").replace(b"\r\n", b"\n").replace(b"\r", b"\n").split(b"\n")
+    for number, line in enumerate(lines, 1):
+        try:
+            cells = [each.strip().strip('"') for each in line.decode("utf-8").split(";")]
+        except UnicodeDecodeError:
+            filled = True
+            defects.append(Defect(str(path), number, "not UTF-8", shown(line.decode("utf-8", "backslashreplace"))))
+            continue
+        if number <= heads:
+            if named is not None and named.match(cells[0]):
+                defects.append(Defect(str(path), number, "a row where a head line should be", shown(cells[0])))
+        elif any(cells):
+            filled = True
             yield number, cells
+    if not filled and not bare:
+        defects.append(Defect(str(path), None, "no rows"))
 
 
-def _chains(path: Path, defects: list[Defect]) -> Iterator[LegChain]:
-    for line, row in _rows(path, 2, defects):
+def _chains(path: Path, once: _Once) -> Iterator[LegChain]:
+    for line, row in _rows(path, 2, once.defects, CHAIN):
         match = CHAIN.match(row[0])
         if match is None or int(match[1]) != len(match[2]):
-            defects.append(Defect(str(path), line, "not the name of a chain", row[0], "S4PRRR1, S6RRPRRR12V2"))
+            once.defects.append(Defect(str(path), line, "not the name of a chain", shown(row[0]),
+                                       "S4PRRR1, S6RRPRRR12V2"))
             continue
         try:
-            yield _chain(row, match[2])
+            found = _chain(row, match[2])
         except ValueError as error:
-            defects.append(Defect(str(path), line, str(error), row[0]))
+            once.defects.append(Defect(str(path), line, str(error), shown(row[0])))
+            continue
+        if once.new(path, line, row[0], "chain", row[0]):
+            yield found
 
 
 def _chain(row: list[str], kinds: str) -> LegChain:
@@ -175,8 +232,12 @@ def _chain(row: list[str], kinds: str) -> LegChain:
             raise ValueError(f"joint {i + 1} is not a whole {kind} joint")
         values = [cell(each) for each in cells[1:7]]
         own = CELLS.index("theta" if kind == "R" else "d")
-        if not (isinstance(values[own], str) and str(values[own]).startswith("q")):
+        if values[own] != f"q{i + 1}":
             raise ValueError(f"joint {i + 1}: {CELLS[own]} of {kind} is not coordinate q{i + 1}")
+        for k, value in enumerate(values):
+            angle = CELLS[k].startswith(ANGLES)
+            if k != own and isinstance(value, str) and (value.startswith("q") or value.startswith(ANGLES) != angle):
+                raise ValueError(f"joint {i + 1}: {value} is no {'angle' if angle else 'length'}, but in {CELLS[k]}")
         joints.append(PublishedJoint(kind, tuple(values)))
     end = row[1 + 8 * len(kinds): 4 + 8 * len(kinds)]
     turns = [cell(each) if each else 0.0 for each in [*end, "", "", ""][:3]]
@@ -187,75 +248,102 @@ def _chain(row: list[str], kinds: str) -> LegChain:
 
 def cell(text: str) -> Cell:
     """A number, a multiple of π, or a name; raises ``ValueError``."""
-    match = ANGLE.match(text)
-    if match is not None:
-        value = float(match[2] or 1) * math.pi / float(match[3] or 1)
-        return -value if match[1] == "-" else value
     if NAME.match(text):
         return text
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise ValueError(f"a cell is neither a number, a multiple of pi nor a name: {text or 'empty'}")
+    if (match := ANGLE.match(text)) is not None and float(match[3] or 1):
+        value = float(match[2] or 1) * math.pi / float(match[3] or 1)
+        value = -value if match[1] == "-" else value
+    else:
+        value = float(text) if NUMBER.match(text) else math.nan
+    if math.isnan(value):
+        raise ValueError(f"a cell is neither a number, a multiple of pi nor a name: {shown(text) or 'empty'}")
+    if abs(value) > LARGEST_CELL or 0 < abs(value) < 1 / LARGEST_CELL:
+        raise ValueError(f"a cell is larger than {LARGEST_CELL:g}, or nearer to zero than its inverse: {shown(text)}")
     return value
 
 
-def _drives(path: Path, defects: list[Defect]) -> dict[tuple[str, str], list[MotorChoice]]:
+def _whole(text: str) -> int | None:
+    """A whole number; None where nothing is stated. Raises ``ValueError``."""
+    if text and not WHOLE.fullmatch(text):
+        raise ValueError(text)
+    return int(text) if text else None
+
+
+def _drives(path: Path, once: _Once) -> dict[tuple[str, str], list[MotorChoice]]:
     """The choices of motors by group and robot."""
     found: dict[tuple[str, str], list[MotorChoice]] = {}
-    if not path.is_file():
+    if not path.exists():
         return found
-    for line, row in _rows(path, 0, defects):
+    for line, row in _rows(path, 0, once.defects, bare=True):
         group, name = GROUP.search(row[0]), DRIVEN.match(row[1] if len(row) > 1 else "")
         robot = ROBOT.match(name[1]) if name else None
         if group is None or name is None or robot is None:
-            defects.append(Defect(str(path), line, "no choice of motors", ";".join(row[:2]), "sym_3T0R;P3PRRR1G1P1A1"))
+            once.defects.append(Defect(str(path), line, "no choice of motors", shown(";".join(row[:2])),
+                                       "sym_3T0R;P3PRRR1G1P1A1"))
             continue
         legs, joints = int(robot[1]), len(robot[2])
         cells, rest = row[2: 2 + legs * joints], row[2 + legs * joints:]
-        if len(cells) < legs * joints or any(each not in ("0", "1", "") for each in cells):
+        if len(cells) < legs * joints or any(each not in ("0", "1") for each in cells):
             what = f"not {legs} × {joints} joints that are driven (1) or not (0)"
-            defects.append(Defect(str(path), line, what, row[1]))
+            once.defects.append(Defect(str(path), line, what, shown(row[1])))
             continue
-        loss = rest[0] if rest else ""
-        if loss and not loss.isdigit():
-            defects.append(Defect(str(path), line, "the loss of rank is not a whole number", loss))
+        try:
+            loss = _whole(rest[0]) if rest else None
+        except ValueError:
+            once.defects.append(Defect(str(path), line, "the loss of rank is not a whole number", shown(rest[0])))
             continue
         driven = tuple(tuple(j for j in range(joints) if cells[i * joints + j] == "1") for i in range(legs))
-        found.setdefault((group[0], name[1]), []).append(
-            MotorChoice(int(name[2]), driven, int(loss) if loss else None, rest[1] if len(rest) > 1 else "", str(path),
-                        line))
+        if once.new(path, line, row[1], "choice", group[0], name[1], int(name[2])):
+            found.setdefault((group[0], name[1]), []).append(MotorChoice(
+                int(name[2]), driven, loss, rest[1] if len(rest) > 1 else "", str(path), line))
     return found
 
 
-def _synthesis(path: Path, defects: list[Defect]) -> Iterator[tuple[tuple[str, str, int, int], tuple[int | None, ...]]]:
-    """(group, chain, G, P) of each combination that was tried, with its status and number of working choices."""
+Combination = tuple[str, str, int, int, int]
+"""Group, chain, legs, G and P."""
+
+
+def _synthesis(path: Path, once: _Once) -> Iterator[tuple[Combination, tuple[int | None, int | None]]]:
+    """Each combination that was tried, with its status and number of working choices."""
     group = GROUP.match(path.name)
     if group is None:
+        once.defects.append(Defect(str(path), None, "the name gives no group", shown(path.name), "3T0R.csv"))
         return
-    for line, row in _rows(path, 1, defects):
-        numbers = [int(each) if each.isdigit() else None for each in [*row[2:6], "", "", "", ""][:4]]
-        if not CHAIN.match(row[0]) or numbers[0] is None or numbers[1] is None:
-            defects.append(Defect(str(path), line, "not a combination of a chain, G and P", ";".join(row[:4])))
+    for line, row in _rows(path, 1, once.defects, CHAIN, bare=True):
+        try:
+            legs, base, platform, status, count = map(_whole, [*row[1:6], *[""] * 5][:5])
+        except ValueError as error:
+            once.defects.append(Defect(str(path), line, "not a whole number", shown(str(error))))
             continue
-        yield (group[0], row[0], numbers[0], numbers[1]), (numbers[2], numbers[3])
+        if not CHAIN.match(row[0]) or legs is None or base is None or platform is None:
+            once.defects.append(Defect(str(path), line, "not a combination of a chain, legs, G and P",
+                                       shown(";".join(row[:4]))))
+            continue
+        key = group[0], row[0], legs, base, platform
+        if once.new(path, line, ";".join(row[:4]), "tried", *key):
+            yield key, (status, count)
 
 
 def _robots(path: Path, chains: dict[str, LegChain], drives: dict[tuple[str, str], list[MotorChoice]],
-            working: dict[tuple[str, str, int, int], tuple[int | None, ...]], found: PublishedTables
+            working: dict[Combination, tuple[int | None, int | None]], found: PublishedTables, once: _Once
             ) -> Iterator[PublishedRobot]:
     group = GROUP.search(path.name)
     if group is None:
-        found.defects.append(Defect(str(path), None, "the name gives no group", path.name, "sym_3T0R_list.csv"))
+        found.defects.append(Defect(str(path), None, "the name gives no group", shown(path.name), "sym_3T0R_list.csv"))
         return
-    for line, row in _rows(path, 1, found.defects):
+    before = len(found.defects)
+    for line, row in _rows(path, 1, found.defects, ROBOT):
         match = ROBOT.match(row[0])
         if match is None:
-            found.defects.append(Defect(str(path), line, "not the name of a robot", row[0], "P3PRRR1G2P2"))
+            found.defects.append(Defect(str(path), line, "not the name of a robot", shown(row[0]), "P3PRRR1G2P2"))
+            continue
+        if not once.new(path, line, row[0], group[0], row[0]):
             continue
         name = f"S{len(match[2])}{match[2]}{match[3]}"
+        if any(row[1:2]) and row[1] != name:
+            found.defects.append(Defect(str(path), line, f"the chain of {row[0]} is not that of its name",
+                                        shown(row[1]), name))
+            continue
         if name not in chains:
             found.no_chain.append((group[0], row[0], name))
             continue
@@ -265,6 +353,8 @@ def _robots(path: Path, chains: dict[str, LegChain], drives: dict[tuple[str, str
             found.defects.append(Defect(str(path), line, "unknown couplings", f"G{base}P{platform}",
                                         "1 to 10, pairs (G5 to G8, P4 to P6) of six legs"))
             continue
-        status, count = working.get((group[0], name, base, platform), (None, None))
+        status, count = working.get((group[0], name, int(match[1]), base, platform), (None, None))
         yield PublishedRobot(group[0], row[0], chains[name], int(match[1]), base, platform, count, status,
-                    tuple(drives.get((group[0], row[0]), ())), str(path), line)
+                             tuple(drives.get((group[0], row[0]), ())), str(path), line)
+    if len(found.defects) == before:
+        once.whole(group[0])

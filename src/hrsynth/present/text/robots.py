@@ -252,14 +252,27 @@ def _missing(found: Advice) -> list[str]:
              *(f"  {line}" for group in groups.items() for way in _ways(*group)
                for line in wrapped(way, LINE - 2, more="    "))]
     starred = any(m.actuated for each in found.sets for m in each.measurements)
-    return [*lines, *(["* a joint with a motor"] if starred else []), *_asked(found), *limits]
+    return [*lines, *(["* a joint with a motor"] if starred else []), *_singular(found), *_asked(found), *limits]
+
+
+def _singular(found: Advice) -> list[str]:
+    """The sets with which the zero configuration shows fewer freedoms than others do."""
+    fewer = [[m.name for m in each.measurements] for each in found.sets if each.rank_at_zero is not None]
+    if not fewer:
+        return []
+    which = "all of these" if len(fewer) == len(found.sets) else f"{len(fewer)} of these"
+    more = "" if len(fewer) <= _SHOWN else f"  and {len(fewer) - _SHOWN} more (rank_at_zero with --json)"
+    see = "sees fewer freedoms" if len(fewer) == 1 else "see fewer freedoms"
+    title = f"{which} {see} at the zero configuration, a Type 2 singularity with them:"
+    return [title] if len(fewer) == len(found.sets) else [
+        title, *(f"  {line}" for line in wrapped("  ".join(sets(fewer[:_SHOWN])) + more, LINE - 2, more="  "))]
 
 
 def _asked(found: Advice) -> list[str]:
-    """The options of other commands that ask with the first set that has such."""
+    """The options of other commands that ask with the first set that has such, and cures at zero too where one does."""
     if not all(each.by_segment for each in found.setting.observed):
         return []
-    for each in found.sets:
+    for each in sorted(found.sets, key=lambda each: each.rank_at_zero is not None):
         see = [m.of if m.kind == "offered" else f"encoder:{m.of}" for m in each.measurements if m.kind != "leg"]
         if all(m.kind in ("leg", "offered") or (m.kind == "encoder" and m.of in found.setting.robot.joints
                                                 and m.axis is None) for m in each.measurements):
