@@ -143,6 +143,18 @@ class RankUndecided(Unanswered):
         super().__init__(f"{what}: the singular values leave a gap of {gap:.3g}, needed: {needed:.3g}")
 
 
+class HeldByRounding(RankUndecided):
+    """Loops that hold directions by no more than what was open: with exact numbers they may move that way."""
+
+    def __init__(self, robot: str, directions: int, open_by: float) -> None:
+        self.robot, self.directions, self.open_by = robot, directions, open_by
+        verb = "holds" if directions == 1 else "hold"
+        Unanswered.__init__(
+            self, f"{robot}: its rounded numbers leave the loops open by {open_by:.1g} (characteristic lengths, "
+                  f"radians), and {directions} of their constraints {verb} by no more than that: whether the loops can "
+                  "move that way is undecided; give more decimals")
+
+
 class StructureUndecided(Unanswered):
     """Rounded numbers that fit one structure as well as another."""
 
@@ -159,7 +171,8 @@ class NotSampled(Unanswered):
     def __init__(self, robot: str, reached: int, wanted: int) -> None:
         self.robot, self.reached, self.wanted = robot, reached, wanted
         super().__init__(f"{robot}: only {reached} closed configurations could be reached away from singularities, "
-                         f"needed: {wanted}; is the zero configuration singular?")
+                         f"needed: {wanted}; is the zero configuration singular, or do the loops move only where the "
+                         "file's numbers have more digits?")
 
 
 class Shaky(Unanswered):

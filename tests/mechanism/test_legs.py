@@ -13,6 +13,7 @@ from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.legs import LegDecomposition, decompose
 from hrsynth.mechanism.normal import normal_form
 from hrsynth.mechanism.sensors import default_observation, observation_of
+from oracle import Oracle
 
 
 def anatomy(name: str) -> LegDecomposition:
@@ -152,3 +153,48 @@ def test_a_tool_on_one_revolute_keeps_its_turn() -> None:
     assert (found.dof, found.mobility.total, found.mobility.idle) == (4, 4, 0)
     assert found.verdict.verdict == "partially controllable"
     assert [freedom.name for freedom in found.verdict.lost] == ["rotation about the axis of wrist"]
+
+
+def bars_below_rods(watch: str) -> Mechanism:
+    """A plate on three rods (R below, S above), each on the tip of a five-bar of the base, in three planes; one link of
+    each leg is watched."""
+    b = Builder("bars_below_rods")
+    b.link("base")
+    b.link("plate", at=(0, 0, 1.2))
+    for i, angle in enumerate((0.1, 2.2, 4.0)):
+        radial, across = np.array([np.cos(angle), np.sin(angle), 0]), np.array([-np.sin(angle), np.cos(angle), 0])
+        points = [0.8 * radial + x * across + np.array([0, 0, z]) for x, z in
+                  ((-0.3, 0), (-0.45, 0.3), (0, 0.6), (0.5, 0.35), (0.3, 0))]
+        links = ["base", *(f"{part}_{i}" for part in ("left", "tip", "upper", "right"))]
+        for link, at in zip(links[1:], points, strict=False):
+            b.link(link, at=at)
+        for k, at in enumerate(points):
+            b.joint(f"bar_{i}_{k}", "R", links[k], links[(k + 1) % 5], at=at, axis=radial, motor=k == 0, loop=k == 4)
+        start, end = points[2] + 0.05 * radial, 0.3 * radial + np.array([0, 0, 1.2])
+        b.link(f"rod_{i}", at=start)
+        b.joint(f"foot_{i}", "R", f"tip_{i}", f"rod_{i}", at=start, axis=across)
+        b.joint(f"ball_{i}", "S", f"rod_{i}", "plate", at=end, loop=i > 0)
+        along = points[2] - points[1] if watch == "tip" else end - start if watch == "rod" else points[1] - points[0]
+        b.observe(str(i + 1), f"{watch}_{i}", along)
+    return b.build("plate")
+
+
+def test_what_is_watched_is_in_a_leg_and_not_in_the_platform() -> None:
+    from hrsynth.analysis.derive import derive
+
+    articulated = decompose(bars_below_rods("left"))
+    assert len(articulated.legs) == 6
+    assert set(articulated.platform) == {"plate", *(f"{part}_{i}" for i in range(3) for part in ("tip", "rod"))}
+    for watch in ("rod", "tip"):
+        robot = bars_below_rods(watch)
+        found = decompose(robot)
+        assert found.platform == ("plate",)
+        assert [set(leg.links) for leg in found.legs] == [
+            {f"{part}_{i}" for part in ("left", "tip", "upper", "right", "rod")} for i in range(3)]
+        oracle = Oracle(robot)
+        basis = oracle.relation(next(oracle.random_walk(np.random.default_rng(2), 1)))
+        _, sizes, right = np.linalg.svd(basis[6:])
+        unseen = basis[:6] @ right[int((sizes > 1e-8).sum()):].T
+        lost = int((np.linalg.svd(unseen, compute_uv=False) > 1e-8).sum())
+        verdict = derive(robot).verdict
+        assert (verdict.dof, len(verdict.lost)) == (6, lost)

@@ -1,7 +1,8 @@
 """Legs and platform, found by structure: never by names.
 
 The platform is the smallest set of links around the platform link that leaves the greatest number of legs, each joined
-to the base and to one link of the platform (an articulated platform has several links). In a single loop in which one
+to the base and to one link of the platform (an articulated platform has several links). A link whose segment the file
+watches is part of a leg: it is in the platform only if it is the platform link. In a single loop in which one
 chain has one freedom more than the other, the platform link is the last segment of the shorter one: the legs share the
 end joint.
 """
@@ -193,16 +194,10 @@ def decompose(mechanism: Mechanism) -> LegDecomposition:
     platform = _platform(mechanism, graph)
     order = {name: i for i, name in enumerate(mechanism.links)}
     legs: list[Leg] = []
-    moving = {name for name in mechanism.links if name != mechanism.base and name not in platform}
-    live = [j for j in mechanism.joints.values() if j.type is not JointType.FREE]
-    joined = graphs.adjacency((name for name in mechanism.links if name in moving),
-                              (j.links for j in live if moving.issuperset(j.links)))
-    for part in graphs.components(joined):
-        joints = [j for j in live if part & set(j.links)]
-        ends = {j.other(link) for j in joints for link in j.links if link in part} - part
-        if mechanism.base in ends and len(ends) == 2:
-            legs.append(Leg("", tuple(sorted(part, key=order.__getitem__)), tuple(j.name for j in joints),
-                            next(iter(ends - {mechanism.base}))))
+    for part, joints, end in _parts(mechanism, platform):
+        if end is not None:
+            legs.append(Leg("", tuple(sorted(part, key=order.__getitem__)), tuple(j.name for j in joints), end))
+    live = _live(mechanism)
     for joint in live:
         if mechanism.base in joint.links and joint.other(mechanism.base) in platform:
             legs.append(Leg("", (), (joint.name,), joint.other(mechanism.base)))
@@ -219,6 +214,26 @@ def decompose(mechanism: Mechanism) -> LegDecomposition:
     return _labelled(LegDecomposition(mechanism, tuple(sorted(platform, key=order.__getitem__)), tuple(legs)))
 
 
+def _live(mechanism: Mechanism) -> list[Joint]:
+    """The joints but for those of bodies that nothing holds."""
+    return [j for j in mechanism.joints.values() if j.type is not JointType.FREE]
+
+
+def _parts(mechanism: Mechanism, platform: set[str]) -> list[tuple[set[str], list[Joint], str | None]]:
+    """What is left without base and platform, part by part: its links, its joints, and the platform's link on which it
+    ends, if it is a leg: joined to the base and to one link of the platform."""
+    moving = {name for name in mechanism.links if name != mechanism.base and name not in platform}
+    live, found = _live(mechanism), []
+    joined = graphs.adjacency((name for name in mechanism.links if name in moving),
+                              (j.links for j in live if moving.issuperset(j.links)))
+    for part in graphs.components(joined):
+        joints = [j for j in live if part & set(j.links)]
+        ends = {j.other(link) for j in joints for link in j.links if link in part} - part
+        leg = mechanism.base in ends and len(ends) == 2
+        found.append((part, joints, next(iter(ends - {mechanism.base})) if leg else None))
+    return found
+
+
 def _platform(mechanism: Mechanism, graph: graphs.Adjacency) -> set[str]:
     """The smallest set around the platform link that leaves the most legs (articulated platforms)."""
     base, root = mechanism.base, mechanism.platform
@@ -231,6 +246,7 @@ def _platform(mechanism: Mechanism, graph: graphs.Adjacency) -> set[str]:
     reachable = set(distance)
     branching = sorted((n for n in reachable - {root} if len(rest[n]) >= 3 and n not in contacts),
                        key=lambda n: (distance[n], order[n]))[:12]
+    watched = {observation.link for observation in mechanism.observations if observation.by_segment} - {base, root}
 
     def legs_of(members: set[str]) -> int:
         count = sum(1 for part in graph[base] if part in members)
@@ -249,7 +265,9 @@ def _platform(mechanism: Mechanism, graph: graphs.Adjacency) -> set[str]:
             members = {root, *chosen}
             members |= {n for n in reachable - members - contacts
                         if len(rest[n]) == 2 and all(m in members for m in rest[n])}
-            if graphs.component(rest, root, members) == members and (found := legs_of(members)) > score:
+            if graphs.component(rest, root, members) != members or (found := legs_of(members)) <= score:
+                continue
+            if watched <= {link for part, _, end in _parts(mechanism, members) if end is not None for link in part}:
                 best, score = members, found
     return best
 

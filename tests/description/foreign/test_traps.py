@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 from description.foreign.examples import FILES, MJCF, TREE, A, B, C, D, at, ends, mjcf, urdf
 from description.foreign.test_dialects import lines, mobility
 from hrsynth.description import load
-from hrsynth.errors import BadRequest, HrsynthError, LoopsNotClosed, RankUndecided
+from hrsynth.errors import BadRequest, HeldByRounding, HrsynthError, LoopsNotClosed, RankUndecided
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.mechanism import JointType, Mechanism
@@ -344,3 +345,25 @@ def test_candidates_are_named_where_no_guess_is_safe(tmp_path: Path):
     with pytest.raises(BadRequest, match="--platform LINK, such as left, right"):
         read(tmp_path, two)
     assert at("base", A) == "0.0 0.0 0.0"
+
+
+def test_loops_that_rounding_may_hold_are_refused_as_such(tmp_path: Path):
+    """Bricard's loops move by a relation of their lengths and twists, which rounded numbers miss: their screws have
+    rank five for the exact numbers, six for the rounded ones, by a singular value of the size of the rounding."""
+    from hrsynth.families.__main__ import main
+    from hrsynth.families.linkages import LINKAGES
+
+    linkage = LINKAGES["line_symmetric_bricard"]()
+    angles = linkage.closed(np.linspace(0.5, 1.5, 6), 0.9)
+    assert angles is not None
+    screws = linkage.axes(angles)
+    exact = np.linalg.svd(screws, compute_uv=False)
+    rounded = np.linalg.svd(screws.round(5), compute_uv=False)
+    assert exact[5] < 1e-12 < 1e-7 < rounded[5] < 1e-4
+    main(str(tmp_path), "line_symmetric_bricard")
+    whole = (tmp_path / "line_symmetric_bricard.urdf").read_text()
+    text = re.sub(r"-?\d+\.\d+(e-?\d+)?", lambda number: f"{float(number[0]):.5f}", whole)
+    with pytest.raises(HeldByRounding, match="1 of their constraints holds by no more than that") as caught:
+        read(tmp_path, text)
+    assert "gap" not in str(caught.value)
+    assert caught.value.directions == 1

@@ -16,7 +16,7 @@ from itertools import combinations
 import numpy as np
 
 from ...budgets import FINER_TRIES, LARGEST_RELATED
-from ...errors import RankUndecided, StructureUndecided
+from ...errors import HeldByRounding, RankUndecided, StructureUndecided
 from ...geometry.gauss_newton import Damping, Residual, descend
 from ...geometry.ranks import decomposed
 from ...geometry.vectors import Array, unit
@@ -76,7 +76,9 @@ def as_meant(mechanism: Mechanism, residual: float, tolerance: float, possible: 
     StructureUndecided
         Where a slightly different tolerance would make another robot of it.
     RankUndecided
-        Where the loops leave no gap between free and held all the same, or hold a direction by what was open alone.
+        Where the loops leave no gap between free and held all the same.
+    HeldByRounding
+        Where they hold a direction by what was open alone.
     """
     fine = tolerance
     for _ in range(FINER_TRIES):
@@ -95,8 +97,10 @@ def as_meant(mechanism: Mechanism, residual: float, tolerance: float, possible: 
             raise StructureUndecided(str(mechanism.file), tolerance, one, two)
     meant = LoopAssembly.of(ideal.mechanism)
     rank, firm = meant.rank(meant.zero()), meant.rank(meant.zero(), max(RANK_CUTOFF, NO_FINER * residual))
-    if rank.gap < RANK_GAP or firm.value != rank.value:
-        raise RankUndecided(f"{mechanism.file}: loops with rounded numbers", min(rank.gap, firm.gap), RANK_GAP)
+    if rank.gap < RANK_GAP:
+        raise RankUndecided(f"{mechanism.file}: loops with rounded numbers", rank.gap, RANK_GAP)
+    if firm.value != rank.value:
+        raise HeldByRounding(str(mechanism.file), rank.value - firm.value, residual)
     if ideal.mended:
         written = LoopAssembly.of(mechanism)
         gap = written.rank(written.zero(), max(RANK_CUTOFF, NO_FINER * tolerance)).gap
