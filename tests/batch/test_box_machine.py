@@ -44,6 +44,12 @@ def boxes(rng: np.random.Generator, count: int, bend: bool) -> list[AffineForms]
                    INPUTS + 1 if bend and not i else None) for i in range(INPUTS)]
 
 
+def same(one: AffineForms, other: AffineForms) -> bool:
+    """Whether two forms have the same numbers, to the last bit."""
+    return (np.array_equal(one.v, other.v, equal_nan=True)
+            and np.array_equal(one.r, other.r, equal_nan=True))
+
+
 @settings(deadline=None)
 @given(st.data(), st.integers(0, 1000), st.booleans())
 def test_compiled_code_gives_the_numbers_of_arrays(data: st.DataObject, seed: int, bend: bool) -> None:
@@ -51,8 +57,7 @@ def test_compiled_code_gives_the_numbers_of_arrays(data: st.DataObject, seed: in
     formula = traced(lambda y, number: leaves(data.draw, y, number), INPUTS)
     forms = boxes(np.random.default_rng(seed), 37, bend)
     one, other = stacked(formula._rows(forms)), formula.machine.run(forms)
-    np.testing.assert_array_equal(other.v, one.v)
-    np.testing.assert_array_equal(other.r, one.r)
+    assert same(one, other)
 
 
 def test_small_work_stays_in_numpy(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -66,8 +71,7 @@ def test_small_work_stays_in_numpy(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(box_machine.Work, "done", 1e12)
     monkeypatch.setattr(BoxFormula, "_rows", lambda *_: pytest.fail("not compiled"))
     for each in (formula.together(forms), stacked(formula.at(forms))):
-        np.testing.assert_array_equal(each.v, plain.v)
-        np.testing.assert_array_equal(each.r, plain.r)
+        assert same(each, plain)
 
 
 @settings(deadline=None)
@@ -83,7 +87,8 @@ def test_sines_are_those_of_balls(x: float) -> None:
 @pytest.mark.parametrize("x", [np.nan, np.inf])
 def test_sines_of_what_is_no_angle_warn_of_nothing(x: float) -> None:
     with np.errstate(all="raise"):
-        sines(np.array([x]))
+        found = sines(np.array([x]))
+    assert all(each.shape == (1,) for each in found)
 
 
 @settings(deadline=None)
