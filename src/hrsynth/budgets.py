@@ -406,8 +406,9 @@ SIGN_BOXES = 80_000
 freedoms only where all critical ones are asked for."""
 SIGN_CHOICES = 64
 """Choices of reversed legs, at most, that are told one by one."""
-BOX_STEPS_IN_NUMPY = 20_000_000
-"""Operations on boxes that are done in NumPy, a second or two, before numba's start pays."""
+BOX_STEPS_IN_NUMPY, BOXES_A_CALL = 40_000_000, 600
+"""Operations on boxes that are done in NumPy, a second or two, before numba's start pays; and how many boxes take as
+long as a call."""
 BOXES_AT_ONCE = 4096
 """Boxes of those that are looked at together."""
 

@@ -17,7 +17,7 @@ from hrsynth.geometry.affine import AffineForms, affine, sines, stacked
 from hrsynth.geometry.components import cosine, sine, sqrt
 
 flint = pytest.importorskip("flint")
-INPUTS = 4
+INPUTS = 9
 OPERATIONS: dict[str, Callable[[Any, Any], Any]] = {
     "+": lambda a, b: a + b, "-": lambda a, b: b - a, "*": lambda a, b: a * b, "/": lambda a, _: 1.0 / a,
     "sqrt": lambda a, _: sqrt(a), "sin": lambda a, _: sine(a), "cos": lambda a, _: cosine(a)}
@@ -51,11 +51,11 @@ def same(one: AffineForms, other: AffineForms) -> bool:
 
 
 @settings(deadline=None)
-@given(st.data(), st.integers(0, 1000), st.booleans())
-def test_compiled_code_gives_the_numbers_of_arrays(data: st.DataObject, seed: int, bend: bool) -> None:
+@given(st.data(), st.integers(0, 1000), st.booleans(), st.sampled_from([2, 3, 16, 37]))
+def test_compiled_code_gives_the_numbers_of_arrays(data: st.DataObject, seed: int, bend: bool, count: int) -> None:
     pytest.importorskip("numba")
     formula = traced(lambda y, number: leaves(data.draw, y, number), INPUTS)
-    forms = boxes(np.random.default_rng(seed), 37, bend)
+    forms = boxes(np.random.default_rng(seed), count, bend)
     one, other = stacked(formula._rows(forms)), formula.machine.run(forms)
     assert same(one, other)
 
@@ -106,7 +106,7 @@ def test_forms_hold_what_balls_say(seed: int) -> None:
     before, flint.ctx.prec = flint.ctx.prec, 200
     try:
         for k in range(20):
-            a, b, c, _ = (flint.arb(float(each.v[0, k])) + sum(
+            a, b, c, *_ = (flint.arb(float(each.v[0, k])) + sum(
                 (flint.arb(float(s)) * float(e) for s, e in zip(each.v[1:, k], noise[k], strict=True)), flint.arb(0))
                 for each in forms)
             exact = [a.sin() * b.cos() - c / 3, 1 / (a * a + 0.5), (b * b + 0.25).sqrt() * 0.3]

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..budgets import BOX_STEPS_IN_NUMPY
+from ..budgets import BOX_STEPS_IN_NUMPY, BOXES_A_CALL
 from ..geometry import affine
 from ..geometry.affine import (
     FARTHEST_TURN,
@@ -65,15 +65,22 @@ LANES = {lanes}
 
 
 class Work:
-    """Steps on boxes that this process has done in NumPy."""
+    """Operations on boxes that this process has done in NumPy."""
 
     done = 0
 
 
 def worth(steps: int, boxes: int) -> bool:
-    """Whether numba is there, and worth its start: after so many steps on boxes in NumPy."""
-    Work.done += steps * boxes
-    return Work.done > BOX_STEPS_IN_NUMPY and boxes > LANES and find_spec("numba") is not None
+    """Whether numba is there, and worth its start: after so much was done in NumPy, where each step costs as much as
+    some hundred boxes before the first. Sums of one box have another order there."""
+    Work.done += steps * (boxes + BOXES_A_CALL)
+    return Work.done > BOX_STEPS_IN_NUMPY and boxes > 1 and _compilable()
+
+
+@lru_cache(maxsize=1)
+def _compilable() -> bool:
+    """Whether numba is installed."""
+    return find_spec("numba") is not None
 
 
 @dataclass(frozen=True, eq=False, repr=False)

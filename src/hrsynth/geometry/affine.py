@@ -155,7 +155,8 @@ class AffineForms:
 
 def affine(centre: Array, slopes: Array, radius: Array, bend: int | None = None) -> AffineForms:
     """Forms of floats that are exact: centres (…), slopes (…, n), radii (…)."""
-    return AffineForms(np.concatenate([centre[None], np.moveaxis(slopes, -1, 0)]), radius, bend)
+    # symbols first in memory too: sums over them then have one order
+    return AffineForms(np.ascontiguousarray(np.concatenate([centre[None], np.moveaxis(slopes, -1, 0)])), radius, bend)
 
 
 def stacked(parts: Sequence[Any], axis: int = -1) -> Any:
