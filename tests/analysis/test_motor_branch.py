@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hrsynth import branch, load
+from hrsynth import branch, load, modes
 from hrsynth.analysis.branch.answer import BranchProof
 from hrsynth.analysis.branch.growth import CellGrid, lattice
 from hrsynth.errors import BadRequest, MotorsNotEnough
@@ -379,3 +379,14 @@ def test_motors_that_a_box_takes_beyond_their_limits_are_in_the_record():
     assert found.to_dict()["motors_beyond"] == [
         {"motor": "a", "lower": -0.05, "upper": None, "least": low, "most": high}]
     assert branch(robot, {"a": (-0.1, 0.1)}).to_dict()["motors_beyond"] == []
+
+
+def test_a_robot_without_motors_is_refused_as_everywhere() -> None:
+    robot = load("rrrrr_m1")
+    still = replace(robot, joints={name: replace(joint, motor=None) for name, joint in robot.joints.items()})
+    said = []
+    for ask in (lambda: branch(still), lambda: modes(still, real=True)):
+        with pytest.raises(BadRequest, match="has no motor, allowed: one or more: --motors names them") as refused:
+            ask()
+        said.append(str(refused.value))
+    assert said[0] == said[1]

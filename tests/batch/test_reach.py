@@ -390,3 +390,25 @@ def test_parts_that_depend_on_each_other_are_said_to() -> None:
     near = reach(everything.start, everything.question, Pose.parse(refused.value.last))
     R = near.pose(motion_of(setting).link)[:3, :3] @ motion_of(setting).home[:3, :3].T
     assert abs(R[0, 1] - R[1, 0]) < 1e-6
+
+
+def test_a_grid_goes_on_where_the_nearest_pose_is_a_dead_end() -> None:
+    """Level, the 3-RPS does not move its point sideways to first order; tilted by θ about one axis it is off by half
+    its radius times 1 - cos θ (Huang), so poses aside are there: each is met alone, and by a grid about the level one.
+    """
+    everything, motion = setting_of("3rps").everything, motion_of(setting_of("3rps"))
+    found = sweep(everything.start, everything.question, Grid.parse("x=-0.1:0.1:3,y=0,z=0.9"))
+    for x, at in zip((-0.1, 0.0, 0.1), found, strict=True):
+        assert at is not None
+        X = at.pose(motion.link)
+        np.testing.assert_allclose(motion.position(X), [x, 0, 0.9], atol=1e-9)
+        R = X[:3, :3] @ motion.home[:3, :3].T
+        assert abs(R[0, 1] - R[1, 0]) < 1e-6
+        assert abs(0.5 * 0.15 * (R[0, 0] - R[1, 1]) - x) < 1e-6
+
+
+def test_one_part_does_not_depend_on_itself() -> None:
+    everything = setting_of("3rps").everything
+    with pytest.raises(PoseNotReached, match="at the zero configuration none of them changes this part") as refused:
+        reach(everything.start, everything.question, Pose.parse("x=0.5"))
+    assert "depend on each other" not in str(refused.value)

@@ -59,14 +59,24 @@ def reach(start: ClosedConfiguration, question: Measurement, pose: Pose,
     return found
 
 
+def dependence(start: ClosedConfiguration, motion: PlatformMotion, goal: Goal, what: str) -> str | None:
+    """That parts of wanted poses (``what``) depend on each other at the zero configuration; None where they do not. A
+    part alone depends on nothing: there the platform does not begin to change it."""
+    rows = goal.rows(start.twin, start.q)[1]
+    if not are_dependent(start, rows):
+        return None
+    freedoms = "1 freedom" if motion.dof == 1 else f"{motion.dof} freedoms"
+    if len(rows) == 1:
+        return (f"the platform has {freedoms}, and at the zero configuration none of them changes this part to first "
+                "order")
+    return f"the platform has {freedoms}, and parts of {what} depend on each other"
+
+
 def _dependent(start: ClosedConfiguration, motion: PlatformMotion, goal: Goal, came: float, last: str) -> str | None:
     """That parts of a wanted pose depend on each other, and the nearest pose found; None where they do not."""
-    if not are_dependent(start, goal.rows(start.twin, start.q)[1]):
-        return None
+    words = dependence(start, motion, goal, "this pose")
     nearest_one = f"; the nearest that small steps lead to is {last}" if came > NEARER else ""
-    freedoms = "1 freedom" if motion.dof == 1 else f"{motion.dof} freedoms"
-    return (f"each leg alone can close there, but the platform has {freedoms}, and parts of this pose depend on each "
-            f"other{nearest_one}")
+    return None if words is None else f"each leg alone can close there, but {words}{nearest_one}"
 
 
 def _arrived(at: ClosedConfiguration, goal: Goal) -> bool:
@@ -104,9 +114,9 @@ def spread(start: ClosedConfiguration, shape: tuple[int, ...], goals: Sequence[T
            lead: Callable[[int, ClosedConfiguration, int], ClosedConfiguration | None], at_once: Container[int] = ()
            ) -> tuple[ClosedConfiguration | None, ...]:
     """Configurations at the ``goals`` of a grid's cells, of a ``shape``: ``lead`` gives that of a cell from a
-    configuration nearby with so many halvings, None where it does not come there. It begins at the goals nearest to
-    ``start`` and goes on to neighbours, but not from a fold: working modes meet there, and small steps go on in any.
-    Cells ``at_once`` need no steps."""
+    configuration nearby with so many halvings, None where it does not come there. It begins at the goal nearest to
+    ``start``, and at further ones where no neighbour is reached from it, and goes on to neighbours, but not from a
+    fold: working modes meet there, and small steps go on in any. Cells ``at_once`` need no steps."""
     twin = start.twin
     found: dict[int, ClosedConfiguration] = {}
     queue: deque[tuple[int, int]] = deque()
@@ -125,14 +135,19 @@ def spread(start: ClosedConfiguration, shape: tuple[int, ...], goals: Sequence[T
         J = system(twin, found[cell].q, goals[cell])[1]
         return bool(np.linalg.svd(J, compute_uv=False)[rank - 1] <= NEAR_FOLD)
 
-    for cell in sorted(range(len(distance)), key=lambda i: (round(distance[i], 9), i))[:FIRST_CELLS]:
-        settle(cell, start, HALVINGS)
-        if found:
+    alone = False
+    for first in sorted(range(len(distance)), key=lambda i: (round(distance[i], 9), i))[:FIRST_CELLS]:
+        if first in found:
+            continue
+        before = len(found)
+        settle(first, start, HALVINGS)
+        while queue:
+            cell, origin = queue.popleft()
+            if cell not in found and (cell in at_once or not is_fold(origin)):
+                settle(cell, found[origin], SWEEP_HALVINGS)
+        alone |= len(found) == before + 1
+        if found and not alone:
             break
-    while queue:
-        cell, origin = queue.popleft()
-        if cell not in found and (cell in at_once or not is_fold(origin)):
-            settle(cell, found[origin], SWEEP_HALVINGS)
     return tuple(found.get(cell) for cell in range(len(goals)))
 
 

@@ -363,3 +363,12 @@ def test_what_an_ascent_attains_lies_between_the_two_bounds(name: str):
             assert np.linalg.norm(axes[0]) == pytest.approx(found[0], rel=1e-9)
             products = axes @ axes.T
             assert products == pytest.approx(np.diag(np.diag(products)), abs=1e-9 * products[0, 0])
+
+
+def test_a_grid_says_that_parts_of_its_poses_depend_on_each_other() -> None:
+    """The 3-RPS cannot turn its level platform about the vertical (Huang); a five-bar moves its point as it is told."""
+    with pytest.raises(PlaneNotMet, match="3 freedoms, and parts of these poses depend on each other"):
+        accuracy(load("3rps"), cone=CONE, grid="x=5:6:3,y=5,z=0.9")
+    with pytest.raises(PlaneNotMet) as refused:
+        accuracy(load("rrrrr_m1"), cone=CONE, grid="x=50:60:3,y=50")
+    assert "depend" not in str(refused.value)

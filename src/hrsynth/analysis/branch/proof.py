@@ -50,7 +50,7 @@ def branch(robot: RobotLike, box: BoxLike | None = None, *, effort: int = BRANCH
     mechanism = given if isinstance(given, Mechanism) else given.robot
     motors = [name for name, joint in mechanism.joints.items() if joint.actuated]
     if not motors:
-        raise BadRequest(f"{mechanism.name}: motors", 0, "one or more: --motors names them")
+        raise BadRequest(f"{mechanism.name} has no motor", None, "one or more: --motors names them")
     system, parts, held = _shaped(mechanism, motors, box)
     intervals, source = _box(system, box)
     found, grown = [], []

@@ -159,6 +159,7 @@ def field_rows(found: Accuracy) -> Rows:
     position = _range(ranges[0], field.position, 1e3, "mm")
     orientation = _range(ranges[1], field.orientation, 180 / np.pi, "degrees")
     reached = f"{np.sum(field.reached)} of {field.reached.size}"
+    reached += f"; {field.dependent}" if field.dependent else ""
     return _grid_rows(found, field.grid, reached, position, orientation, field.spots, field.gap)
 
 
