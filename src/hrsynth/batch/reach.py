@@ -66,10 +66,8 @@ def dependence(start: ClosedConfiguration, motion: PlatformMotion, goal: Goal, w
     if not are_dependent(start, rows):
         return None
     freedoms = "1 freedom" if motion.dof == 1 else f"{motion.dof} freedoms"
-    if len(rows) == 1:
-        return (f"the platform has {freedoms}, and at the zero configuration none of them changes this part to first "
-                "order")
-    return f"the platform has {freedoms}, and parts of {what} depend on each other"
+    why = "none of them changes this part" if len(rows) == 1 else f"parts of {what} depend on each other"
+    return f"the platform has {freedoms}, and at the zero configuration {why} to first order"
 
 
 def _dependent(start: ClosedConfiguration, motion: PlatformMotion, goal: Goal, came: float, last: str) -> str | None:

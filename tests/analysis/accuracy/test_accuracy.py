@@ -366,8 +366,8 @@ def test_what_an_ascent_attains_lies_between_the_two_bounds(name: str):
 
 
 def test_a_grid_says_that_parts_of_its_poses_depend_on_each_other() -> None:
-    """The 3-RPS cannot turn its level platform about the vertical (Huang); a five-bar moves its point as it is told."""
-    with pytest.raises(PlaneNotMet, match="3 freedoms, and parts of these poses depend on each other"):
+    """The point of a level 3-RPS moves along the vertical alone, to first order; that of a five-bar as it is told."""
+    with pytest.raises(PlaneNotMet, match="3 freedoms, and at the zero configuration parts of these poses depend on"):
         accuracy(load("3rps"), cone=CONE, grid="x=5:6:3,y=5,z=0.9")
     with pytest.raises(PlaneNotMet) as refused:
         accuracy(load("rrrrr_m1"), cone=CONE, grid="x=50:60:3,y=50")
