@@ -27,6 +27,8 @@ AT_REST = 500
 """Pause before the shell's picture (ms)."""
 LOCAL = ("file:", "data:", "blob:", "about:", "http://127.0.0.1:", "http://localhost:")
 """What a page may ask for."""
+LEFT = "net::ERR_ABORTED"
+"""What becomes of a request whose page is left before it is answered."""
 
 
 @dataclass
@@ -42,7 +44,8 @@ class Tab:
         tab = cls(page)
         page.on("console", lambda said: said.type == "error" and tab.complaints.append(f"console: {said.text}"))
         page.on("pageerror", lambda error: tab.complaints.append(f"uncaught: {error}"))
-        page.on("requestfailed", lambda asked: tab.complaints.append(f"not loaded: {asked.url[:200]}"))
+        page.on("requestfailed", lambda asked: asked.failure == LEFT
+                or tab.complaints.append(f"not loaded: {asked.url[:200]}"))
         page.on("request", lambda asked: asked.url.startswith(LOCAL)
                 or tab.complaints.append(f"asks the network for {asked.url[:200]}"))
         return tab
