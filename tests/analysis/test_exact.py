@@ -429,6 +429,15 @@ def test_the_architecture_in_a_table_of_legs() -> None:
     assert not any("chance" in line for line in text.legs(legs(prepare_robot("3rrr_m1"))).splitlines())
 
 
+@pytest.fixture
+def none_remembered() -> Iterator[None]:
+    """Architectures of this test alone: what is patched in them is not met by another."""
+    architecture.cache_clear()
+    yield
+    architecture.cache_clear()
+
+
+@pytest.mark.usefixtures("none_remembered")
 def test_what_is_not_decided_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     def crowded(*_: object) -> Instance:
         raise NotRecognised("crowded")
