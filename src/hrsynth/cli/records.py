@@ -873,6 +873,16 @@ class LockedPlaceRecord(TypedDict):
     within_m: float
 
 
+class BoxedRestRecord(TypedDict):
+    """A pose about which boxes prove exactly one rest that is not in the list, because the robot could not be closed
+    there or the command as computed does not vanish; `error` encloses ‖e‖; `pose` is that of the point alone from
+    which boxes count if the platform's turn follows from it."""
+
+    pose: PoseRecord
+    stability: Literal["stable", "saddle", "unstable", "undecided"]
+    error: list[float]
+
+
 class RestCoverRecord(TypedDict):
     """What boxes of platform poses prove about a list of rests: `proved` critical poses; `open` boxes, a `share` of
     all; `within_m` of the goal, null if the legs bound the box. Left out are: sliding rods shorter than `shorter_m`
@@ -880,8 +890,8 @@ class RestCoverRecord(TypedDict):
     list; poses at which the joints of the legs `unread` lock; and (null if these were searched) those at which one of
     the legs `unstretched` is stretched or `across` watched directions are at right angles to the desired ones. `apart`
     of the list lie where nothing was searched. At `crossings` points of the platform rests fill curves, because two
-    legs' joints lock. `unmet` of the proved ones are not in the list, `strangers` of the list are not among the proved
-    ones."""
+    legs' joints lock. `alone` are the proved ones that are not in the list, `strangers` of the list are not among
+    the proved ones."""
 
     complete: bool
     proved: int
@@ -898,7 +908,7 @@ class RestCoverRecord(TypedDict):
     unread: list[str]
     unstretched: list[str] | None
     across: int | None
-    unmet: int
+    alone: list[BoxedRestRecord]
     strangers: int
     reason: str | None
 

@@ -216,7 +216,7 @@ def test_a_platform_that_translates_rests_also_across_one_direction(
     found = RestSearch.of(setting, goal).answer(0, complete=True)
     assert found.complete
     assert found.cover is not None
-    assert (found.cover.across, found.cover.unmet, found.cover.strangers) == (2, 0, 0)
+    assert (found.cover.across, found.cover.alone, found.cover.strangers) == (2, (), 0)
     inside = [each for each in found.rests if not each.boundary and len(each.across) < 2]
     assert len(inside) == len(found.cover.cover.found) == count
     across = [each for each in inside if each.across]

@@ -190,17 +190,26 @@ def test_rates_are_those_of_the_law() -> None:
 @pytest.mark.parametrize("name", ["prrrp_m1", pytest.param("rrrrr_m1", marks=pytest.mark.slow),
                                   pytest.param("3prr_m1", marks=pytest.mark.slow)])
 def test_what_is_said_to_be_all_is_what_boxes_prove(name: str) -> None:
-    """Each proved critical pose is a rest of the list, and each rest one of them; of a shorter list it is not said."""
+    """Each proved critical pose is a rest of the list, and each rest one of them; what a shorter list lacks is told
+    beside it, of one with a rest more it is not said."""
     setting = ObservedRobot.of(name)
     search = RestSearch.of(setting, setting.everything.start)
     found = search.answer(complete=True)
     assert found.complete
     assert found.cover is not None
     assert len(found.rests) == len(found.cover.cover.found)
-    covers = Covers(search.system, search.law.question, found.cover.cover, found.cover.cover)
-    short = covers.judged(found.rests[1:])
-    assert short is not None
-    assert (short.unmet, short.complete) == (1, False)
+    covers = Covers(search.system, setting, found.cover.cover, found.cover.cover)
+    assert found.cover.alone == ()
+    counted_from = found.cover.cover.error.coordinates
+    for k, each in enumerate(found.rests):
+        short = covers.judged([*found.rests[:k], *found.rests[k + 1:]])
+        assert short is not None
+        assert short.complete
+        (missing,) = short.alone
+        assert counted_from.motion.goal(missing.pose).met(each.configuration.pose(counted_from.motion.link), 1e-6)
+        assert missing.stability == each.stability
+        assert missing.error[0] - 1e-9 <= each.error <= missing.error[1] + 1e-9
+        assert f"{missing.stability} at {missing.pose}" in text(replace(found, cover=short))
     twice = covers.judged([*found.rests, replace(found.rests[0], configuration=nearby(found, found.rests[0]))])
     assert twice is not None
     assert (twice.strangers, twice.complete) == (1, False)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from .tables import GAP, Rows, camera, head, listing, named, table
 
 if TYPE_CHECKING:
-    from ...simulation.endings.rests import Endings, RestPoint, SignedModes
+    from ...simulation.endings.rests import Endings, RestCover, RestPoint, SignedModes
 
 LISTED_SADDLES = 12
 """Rests that do not attract which are told one by one."""
@@ -61,7 +61,8 @@ def _complete(found: Endings) -> list[str]:
     if found.cover is None:
         return [f"the others are found, not proved to be all: {found.search.words}"]
     if not found.cover.complete:
-        return [f"the others are found, not proved to be all: {found.search.words}", found.cover.reason]
+        return [f"the others are found, not proved to be all: {found.search.words}", found.cover.reason,
+                *_alone(found.cover)]
     told, turns = found.cover, len(found.cover.cover.turns)
     where = ("wherever the legs reach" if told.within is None else
              f"with the point within {told.within:.3g} m of the goal's either way")
@@ -89,7 +90,17 @@ def _complete(found: Endings) -> list[str]:
         lines += [f"  ({', '.join(f'{round(float(x), places) + 0.0:g}' for x in p)}) m" for p, _ in told.locked]
     if told.apart:
         lines += [f"{told.apart} of the list lie where nothing was searched"]
-    return lines
+    return [*lines, *_alone(told)]
+
+
+def _alone(cover: RestCover) -> list[str]:
+    """Rests that boxes alone prove, those that attract first."""
+    some = sorted(cover.alone, key=lambda each: each.stability in ("saddle", "unstable"))
+    left = len(some) - LISTED_SADDLES
+    return [*([f"{len(some)} of the rests that boxes prove are not listed above, as the robot could not be closed "
+               "there or the command as computed does not vanish:"] if some else []),
+            *(f"  {each.stability} at {each.pose}, ‖e‖ = {each.error[0]:.3g}" for each in some[:LISTED_SADDLES]),
+            *([f"  and {left} more (--json lists them)"] if left > 0 else [])]
 
 
 def _enclosed(found: Endings, boxed: list[RestPoint]) -> list[str]:

@@ -14,6 +14,7 @@ from ...budgets import SIGN_BOXES, SIGN_CHOICES
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.relation import Measurement
+from ...mechanism.pose import Pose
 from ...progress import part
 from ...results import Value
 from ...tolerances import COVER_REACH, SHORTEST_ROD
@@ -22,8 +23,9 @@ from .cover import Cover, cover
 from .critical_poses import CriticalPoses, Lift
 from .descent import descend, sharpened
 from .error import RestSystem
-from .rests import RestCover, RestPoint, SignedModes
+from .rests import SADDLE, STABLE, UNDECIDED, UNSTABLE, BoxedRest, RestCover, RestPoint, SignedModes
 from .search import Critical
+from .subdivision import CriticalBox
 
 CLOSING_STARTS = 3000
 """Coordinates that are scattered where the robot is to be closed at proved poses, at most."""
@@ -35,20 +37,24 @@ class Covers(Value):
     ones."""
 
     system: RestSystem
-    question: Measurement
+    setting: ObservedRobot
     vanishing: Cover
     every: Cover | None
 
+    @property
+    def question(self) -> Measurement:
+        """What is observed."""
+        return self.setting.samples.question
+
     @classmethod
-    def of(cls, setting: ObservedRobot, goal: ClosedConfiguration, system: RestSystem, question: Measurement,
-           boxes: int | None) -> Covers:
+    def of(cls, setting: ObservedRobot, goal: ClosedConfiguration, system: RestSystem, boxes: int | None) -> Covers:
         """Those of a goal; all critical ones with as many ``boxes`` at most, if that is asked."""
         with part("poses without an error"):
             found = cover(setting, goal, vanishing=True, budget=boxes or SIGN_BOXES)
         if boxes is None:
-            return cls(system, question, found, None)
+            return cls(system, setting, found, None)
         with part("all rests"):
-            return cls(system, question, found, cover(setting, goal, budget=boxes))
+            return cls(system, setting, found, cover(setting, goal, budget=boxes))
 
     def missed(self, known: Sequence[ClosedConfiguration], q: Array, idle: int, turn: int = 0
                ) -> list[Critical]:
@@ -104,5 +110,17 @@ class Covers(Value):
                 for each, place in zip(rests, places, strict=True) if place is None]
         within = None if told.bounded or told.error is None else COVER_REACH * told.error.length
         shorter = SHORTEST_ROD * told.error.length if told.short and told.error is not None else None
-        return RestCover(told, len(told.found) - len(set(places) - {None}), sum(held), within, shorter,
+        alone = tuple(self._alone(told, each) for k, each in enumerate(told.found) if k not in places)
+        return RestCover(told, alone, sum(held), within, shorter,
                          sum(told.turned(each.configuration) for each in rests), len(held) - sum(held))
+
+    def _alone(self, told: Cover, box: CriticalBox) -> BoxedRest:
+        """A critical point that is no rest of the list."""
+        error = told.error
+        assert error is not None
+        seen = error.coordinates
+        assert seen is not None
+        X, motion = seen.frame(box.p / seen.length, box.R if seen.turning else np.eye(3)), self.setting.motion
+        pose = motion.pose(X) if seen.turning else Pose.of(X, seen.motion.point)
+        state = {None: UNDECIDED, 0: STABLE, error.size: UNSTABLE}.get(box.falling, SADDLE)
+        return BoxedRest(pose, state, box.error)

@@ -122,7 +122,7 @@ class RestSearch:
         isolated = self._in_mode(found.isolated)
         covers = None
         if not minima and all(each.by_segment for each in setting.observed):
-            covers = Covers.of(setting, self.goal, self.system, self.law.question, effort if complete else None)
+            covers = Covers.of(setting, self.goal, self.system, effort if complete else None)
         for turn in range(MISSED_ROUNDS):
             if covers is None:
                 break

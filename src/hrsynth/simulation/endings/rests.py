@@ -126,16 +126,31 @@ class SignedModes(Value):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
+class BoxedRest(Value):
+    """A pose about which boxes prove exactly one critical point of E, ‖e‖ in ``error``, that is no rest of the list:
+    the robot was not closed there, or the command as it is computed does not vanish, as where joints nearly lock.
+    ``pose`` is that of the point alone from which boxes count if the platform's turn follows from it."""
+
+    pose: Pose
+    stability: str
+    error: tuple[float, float]
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line."""
+        return {"pose": self.pose.to_dict(), "stability": self.stability, "error": list(self.error)}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class RestCover(Value):
-    """Whether the rests are all, by boxes of platform poses: what subdivision found (:class:`Cover`), how many of its
-    critical points are not rests of the list (``unmet``), and how many isolated rests in its box are not among its
+    """Whether the rests are all, by boxes of platform poses: what subdivision found (:class:`Cover`), those of its
+    critical points that are not rests of the list (``alone``), and how many isolated rests in its box are not among its
     critical points (``strangers``); ``within`` (m) is how far the box reaches from the goal if the legs do not bound
     it, otherwise None; sliding rods that are ``shorter`` (m) were not searched for, None if there are none; ``turned``
     rests of the list are at poses at which a platform that only translates is turned differently, which were not
     searched either, and ``apart`` rests of the list in all lie where nothing was searched."""
 
     cover: Cover
-    unmet: int
+    alone: tuple[BoxedRest, ...]
     strangers: int
     within: float | None
     shorter: float | None = None
@@ -160,8 +175,8 @@ class RestCover(Value):
 
     @property
     def complete(self) -> bool:
-        """Whether the list holds all rests in the box."""
-        return self.cover.complete and not self.unmet and not self.strangers
+        """Whether the list and what is told ``alone`` hold all rests in the box."""
+        return self.cover.complete and not self.strangers
 
     @property
     def reason(self) -> str:
@@ -172,9 +187,8 @@ class RestCover(Value):
         if cover.open:
             more = f"; {cover.boxes:,} were looked at, more with --effort" if cover.spent else ""
             return f"{len(cover.open):,} boxes, {cover.share:.2g} of all, are left open{self._where()}{more}"
-        if self.unmet or self.strangers:
-            return (f"{self.unmet} poses that boxes prove are not in the list, {self.strangers} of the list are not "
-                    "among those that boxes prove")
+        if self.strangers:
+            return f"{self.strangers} of the list are not among those that boxes prove"
         return ""
 
     @property
@@ -219,7 +233,8 @@ class RestCover(Value):
                 "locked": [{"p": list(p), "within_m": within} for p, within in self.locked],
                 "unread": list(cover.unread),
                 "unstretched": None if self.unstretched is None else list(self.unstretched), "across": self.across,
-                "unmet": self.unmet, "strangers": self.strangers, "reason": self.reason or None}
+                "alone": [each.to_dict() for each in self.alone], "strangers": self.strangers,
+                "reason": self.reason or None}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -246,7 +261,8 @@ class Endings(Result, shown_as="endings"):
 
     @property
     def complete(self) -> bool:
-        """Whether these are proved to be all: in all working modes of the watched legs, within ``cover``'s box."""
+        """Whether these, and those that ``cover`` tells ``alone``, are proved to be all: in all working modes of the
+        watched legs, within ``cover``'s box."""
         return self.cover is not None and self.cover.complete
 
     @property
