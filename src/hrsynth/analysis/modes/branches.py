@@ -36,6 +36,8 @@ class Model(Value):
     """Whether the system's pose is that of the base, as the platform sees it."""
     closing: Callable[[Array], ClosedConfiguration] | None = None
     """The whole robot at the system's coordinates, where these tell it."""
+    confined: TipLoci | None = None
+    """The curves of the tips, where these give the system."""
 
 
 def model(confined: TipLoci) -> Model:
@@ -43,7 +45,8 @@ def model(confined: TipLoci) -> Model:
     at = {body: confined.goal.pose(body) for body in confined.bodies}
     curves = tuple(tip.curve for tip in confined.tips)
     made = {"translations": _translating, "bodies": _articulated}.get(confined.motion, _rigid)(confined, at, curves)
-    return replace(made, system=replace(made.system, error=confined.error, as_written=confined.as_written))
+    return replace(made, confined=confined,
+                   system=replace(made.system, error=confined.error, as_written=confined.as_written))
 
 
 def _translating(confined: TipLoci, at: dict[str, Array], curves: tuple[Reach, ...]) -> Model:
