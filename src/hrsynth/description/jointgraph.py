@@ -13,8 +13,8 @@ from ..geometry.vectors import Array, frozen, hat, inverse, perpendicular, unit
 from ..mechanism import graphs
 from ..mechanism.model import JointType, Limits, Link, Motor, Note, fresh_name
 from ..mechanism.observations.direction import Direction
+from ..mechanism.screws import elementary
 from ..mechanism.sights import NamedCamera
-from . import chains
 from .numerals import Digits
 from .sights import SightSpec
 
@@ -71,7 +71,7 @@ class JointSpec:
     def parts(self) -> list[tuple[Array, Array | None]]:
         """Of each one-freedom joint that it is a chain of the axis a, and [a]ₓ where it turns about that."""
         return [(axis, None if kind is JointType.PRISMATIC else hat(unit(axis)))
-                for kind, axis in chains.parts(self.kind, self.axes)]
+                for kind, axis in elementary(self.kind, self.axes)]
 
     @cached_property
     def across(self) -> Array:

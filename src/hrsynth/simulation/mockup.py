@@ -16,7 +16,9 @@ import numpy as np
 
 from ..errors import BadMechanism
 from ..geometry.vectors import Array
+from ..kinematics.pinocchio_model import across
 from ..mechanism import Joint, JointType, Mechanism
+from ..mechanism.screws import elementary
 
 GRAVITY = 9.81
 """m/s²."""
@@ -100,24 +102,13 @@ def _cut(mechanism: Mechanism) -> tuple[list[tuple[Joint, str]], list[Joint]]:
 
 def coordinates(joint: Joint) -> Iterator[tuple[str, str, Array]]:
     """Name, type (hinge, slide or ball) and axis of the simulated joints that make up a joint."""
-    kind = joint.type
-    if kind is JointType.SPHERICAL:
+    if joint.type is JointType.SPHERICAL:
         yield joint.name, "ball", np.array([0.0, 0.0, 1.0])
-    elif kind is JointType.REVOLUTE:
-        yield joint.name, "hinge", joint.axis
-    elif kind is JointType.PRISMATIC:
-        yield joint.name, "slide", joint.axis
-    elif kind is JointType.UNIVERSAL:
-        for number, axis in enumerate(joint.axes):
-            yield f"{joint.name}__{number}", "hinge", axis
-    elif kind is JointType.CYLINDRICAL:
-        yield f"{joint.name}__0", "slide", joint.axis
-        yield f"{joint.name}__1", "hinge", joint.axis
-    elif kind is JointType.PLANAR:
-        x = np.linalg.svd(joint.axis[None])[2][1]
-        yield f"{joint.name}__0", "slide", x
-        yield f"{joint.name}__1", "slide", np.cross(joint.axis, x)
-        yield f"{joint.name}__2", "hinge", joint.axis
+        return
+    found = elementary(joint.type, joint.axes, across)
+    for number, (kind, axis) in enumerate(found):
+        yield (f"{joint.name}__{number}" if len(found) > 1 else joint.name,
+               "slide" if kind is JointType.PRISMATIC else "hinge", axis)
 
 
 def _joints(made: Mockup, body: Xml.Element, joint: Joint, extra: float = 0.0) -> None:

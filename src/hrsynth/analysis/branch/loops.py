@@ -22,6 +22,7 @@ from ...geometry.affine import crossed, dotted
 from ...geometry.so3 import turns_about
 from ...geometry.vectors import Array, cross, frozen, hat, inverse, perpendicular, transform
 from ...mechanism import Joint, JointType, Mechanism, graphs
+from ...mechanism.screws import elementary
 from ...results import Value
 from ...tolerances import ROUNDED_AXIS, SAME_POINT
 
@@ -386,25 +387,9 @@ def _weight(joint: Joint, mechanism: Mechanism, driven: Sequence[str], geared: s
 
 def parts(joint: Joint) -> list[tuple[str, bool, Array]]:
     """The coordinates of a joint in their order: name, whether it slides, axis."""
-    name = joint.name
-    match joint.type:
-        case JointType.REVOLUTE:
-            return [(name, False, joint.axis)]
-        case JointType.PRISMATIC:
-            return [(name, True, joint.axis)]
-        case JointType.UNIVERSAL:
-            return [(f"{name}.{k}", False, axis) for k, axis in enumerate(joint.axes, 1)]
-        case JointType.CYLINDRICAL:
-            return [(f"{name}.1", True, joint.axis), (f"{name}.2", False, joint.axis)]
-        case JointType.SPHERICAL:
-            return [(f"{name}.{k}", False, axis) for k, axis in enumerate(np.eye(3), 1)]
-        case JointType.PLANAR:
-            x = perpendicular(joint.axis)
-            return [(f"{name}.1", True, x), (f"{name}.2", True, cross(joint.axis, x)), (f"{name}.3", False, joint.axis)]
-        case JointType.FREE:
-            return [(f"{name}.{k}", k < 4, np.eye(3)[(k - 1) % 3]) for k in range(1, 7)]
-        case _:
-            return []
+    found = elementary(joint.type, joint.axes)
+    return [(f"{joint.name}.{k}" if len(found) > 1 else joint.name, kind is JointType.PRISMATIC, axis)
+            for k, (kind, axis) in enumerate(found, 1)]
 
 
 def _gears(mechanism: Mechanism, coordinates: Sequence[TreeCoordinate], length: float) -> tuple[GearEquation, ...]:
