@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..geometry.vectors import Array, frozen, hat, inverse, perpendicular, unit
+from ..geometry.vectors import Array, frozen, hat, inverse, plane_axes, unit
 from ..mechanism import graphs
 from ..mechanism.model import JointType, Limits, Link, Motor, Note, fresh_name
 from ..mechanism.observations.direction import Direction
@@ -76,8 +76,7 @@ class JointSpec:
     @cached_property
     def across(self) -> Array:
         """Two unit vectors normal to the first axis and to each other, (2, 3)."""
-        x = perpendicular(self.axes[0])
-        return np.array([x, np.cross(self.axes[0], x)])
+        return plane_axes(self.axes[0])
 
     def frames(self, poses: Mapping[str, Array]) -> tuple[Array, Array]:
         """The poses (4, 4) of both joint frames, where the links have ``poses``."""

@@ -20,7 +20,7 @@ from ...errors import BadMechanism
 from ...geometry import lines
 from ...geometry.affine import crossed, dotted
 from ...geometry.so3 import turns_about
-from ...geometry.vectors import Array, cross, frozen, hat, inverse, perpendicular, transform
+from ...geometry.vectors import Array, cross, frozen, hat, inverse, plane_axes, transform
 from ...mechanism import Joint, JointType, Mechanism, graphs
 from ...mechanism.screws import elementary
 from ...results import Value
@@ -451,7 +451,7 @@ def equations(joint: Joint) -> list[LoopRow]:
     if joint.type is JointType.FIXED:
         return [LoopRow("point", e) for e in E] + [LoopRow("direction", E[k], E[(k + 1) % 3]) for k in range(3)]
     axis = joint.axis
-    across = perpendicular(axis), cross(axis, perpendicular(axis))
+    across = plane_axes(axis)
     aligned = [LoopRow("direction", e, axis) for e in across]
     match joint.type:
         case JointType.REVOLUTE:

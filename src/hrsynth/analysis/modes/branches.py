@@ -12,7 +12,7 @@ import numpy as np
 
 from ...budgets import BRANCH_CHOICES, EFFORT
 from ...errors import TooLarge
-from ...geometry.vectors import Array, inverse, perpendicular, pose, pose_difference, transform
+from ...geometry.vectors import Array, inverse, plane_axes, pose, pose_difference, transform
 from ...kinematics.configuration import ClosedConfiguration
 from ...results import Value
 from ...tolerances import RANK_GAP, SAME_POINT
@@ -62,8 +62,7 @@ def _rigid(confined: TipLoci, at: dict[str, Array], curves: tuple[Reach, ...]) -
     p, n = at[confined.bodies[0]][:3, 3], confined.plane if confined.motion == "planar" else None
     X_goal = pose(p)
     if n is not None:
-        first = perpendicular(n)
-        X_goal = pose(p, np.column_stack([first, np.cross(n, first), n]))
+        X_goal = pose(p, np.column_stack([*plane_axes(n), n]))
     back = inverse(X_goal)
     tips = np.array([_point(back @ at[tip.body], tip.place) for tip in confined.tips]).reshape(-1, 3)
     if n is None:
