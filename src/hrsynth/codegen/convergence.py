@@ -304,8 +304,7 @@ def _levelled(B: AffineForms, motors: int) -> tuple[Array, Array]:
     v[0] = np.eye(p)
     v[1 : 1 + motors] = -B.v[1 : 1 + motors]
     P = AffineForms(v, np.zeros_like(B.r))
-    rows = [(P[..., i, :, None] * B).sum(-2) for i in range(p)]
-    made = AffineForms(np.stack([row.v for row in rows], axis=-2), np.stack([row.r for row in rows], axis=-2))
+    made = stacked([(P[..., i, :, None] * B).sum(-2) for i in range(p)], axis=-2)
     return P.size, (np.eye(p) - made).size
 
 

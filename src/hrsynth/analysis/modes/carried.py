@@ -106,7 +106,7 @@ def _sphere(c: PoseCondition) -> bool:
 
 
 @dataclass(frozen=True, eq=False)
-class _Equation(Zero):
+class CarriedEquation(Zero):
     """A condition in all c, all s and slides t (0 and 1 besides), with numbers in balls."""
 
     freedoms: tuple[Turn, ...]
@@ -266,9 +266,9 @@ class CarriedPlatform(System):
                     best = most, chosen
         return () if best is None else best[1]
 
-    def equation(self, each: Told) -> _Equation:
+    def equation(self, each: Told) -> CarriedEquation:
         """A condition in balls."""
-        return _Equation(each.condition, Poses.spatial(), self.error / self.size, self.freedoms_, each.joints)
+        return CarriedEquation(each.condition, Poses.spatial(), self.error / self.size, self.freedoms_, each.joints)
 
     def unknowns(self, q: Array) -> Array:
         """All c, all s and slides t."""
