@@ -165,3 +165,10 @@ def plane_axes(normal: Array, near: ArrayLike | None = None) -> Array:
     it; shape (2, 3)."""
     first = perpendicular(normal, near)
     return np.array([first, cross(normal, first)])
+
+
+def nested(values: Array) -> list[Any]:
+    """Nested lists of numbers, None where they are not finite."""
+    found = values.astype(object)
+    found[~np.isfinite(values)] = None
+    return list(found.tolist())
