@@ -330,8 +330,6 @@ VANISHED = 1e-8
 angles."""
 CRITICAL_FLAT = 1e-7
 """Curvature of the error below which it counts as none while a critical point is sought."""
-POSE_STEP, POSE_MARGIN_STEP = 1e-5, 1e-4
-"""Differences of coordinates by which the Hessian over the pose and derivatives of reach margins are measured."""
 FLOWED = 3e-5
 """Error of a step (characteristic lengths, radians) of many runs at once."""
 RUNS_ALIKE = 1e-5

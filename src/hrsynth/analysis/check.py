@@ -11,7 +11,7 @@ import numpy as np
 from ..batch.reach import sweep
 from ..errors import HrsynthError, PlaneNotMet, PoseNotReached
 from ..kinematics.configuration import ClosedConfiguration
-from ..mechanism.pose import SCALARS, Grid, PoseLike, asked_poses
+from ..mechanism.pose import Grid, PoseLike, asked_poses
 from ..progress import tell
 from ..results import Result, Value
 from .asked import asked_at, require_platform
@@ -46,10 +46,7 @@ class GridCheck(Value):
         """The record of the command line: arrays nested in the order of ``axes``."""
         shape = self.grid.shape
         nested = {name: np.array(self.values(name), dtype=object).reshape(shape).tolist() for name in MEASURES}
-        fixed = {name: values[0] for name, values in self.grid.fixed.given.items() if name in SCALARS}
-        rpy = {} if self.grid.fixed.rpy is None else {"rpy": list(self.grid.fixed.rpy)}
-        return {"axes": list(self.grid.names), **{name: values.tolist() for name, values in self.grid.axes},
-                "fixed": {**fixed, **rpy}, "free": list(self.free),
+        return {**self.grid.to_dict(), "free": list(self.free),
                 "state": np.array(self.states, dtype=object).reshape(shape).tolist(), **nested}
 
 

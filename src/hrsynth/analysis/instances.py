@@ -67,11 +67,6 @@ class Instance:
     sightings: tuple[Sighting | None, ...]
     """Of each observation, where camera and link are; None of an encoder."""
 
-    @property
-    def idle(self) -> int:
-        """Dimension of the motions that neither move the platform nor change an observed direction."""
-        return self.mobility - self.ranks(range(len(self.rates)))[0]
-
     def twists(self) -> dict[str, Numbers]:
         """The twists of all links on the basis of ker A (6, mobility)."""
         rows = np.vstack(list(self.links.values()))

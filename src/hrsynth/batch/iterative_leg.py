@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..budgets import CHAIN_STEP, CHAIN_STEPS
 from ..geometry.so3 import exponential, logarithm
-from ..geometry.vectors import Array, cross, hat, inverse, perpendicular
+from ..geometry.vectors import Array, cross, hat, inverse, plane_axes, times
 from ..mechanism import Joint, JointType, Mechanism
 from ..mechanism.legs import Leg
 from ..mechanism.observations.direction import Direction
@@ -56,8 +56,7 @@ class Ties(Value):
         frame = np.eye(4)
         frame[:3, 3] = joint.point
         if joint.axes:
-            x = perpendicular(joint.axis)
-            frame[:3, :3] = np.column_stack((x, np.cross(joint.axis, x), joint.axis))
+            frame[:3, :3] = np.column_stack((*plane_axes(joint.axis), joint.axis))
         a, b = inverse(X_i) @ frame, inverse(X_j) @ frame
         kind = joint.type.value
         self.forces.extend((i, j, a[:3, k], a[:3, 3] / length, b[:3, 3] / length) for k in _FORCES.get(kind, ()))
@@ -93,19 +92,19 @@ class Ties(Value):
         """How far each row is from being kept, (n, rows)."""
         (i, j, normal, at_i, at_j), (k, m, alpha, beta, level) = self._stacked
         R, o = X[..., :3, :3], X[..., :3, 3]
-        way = o[:, j] + turned(R[:, j], at_j) - o[:, i] - turned(R[:, i], at_i)
-        return np.concatenate([np.sum(turned(R[:, i], normal) * way, axis=2),
-                               np.sum(turned(R[:, k], alpha) * turned(R[:, m], beta), axis=2) - level], axis=1)
+        way = o[:, j] + times(R[:, j], at_j) - o[:, i] - times(R[:, i], at_i)
+        return np.concatenate([np.sum(times(R[:, i], normal) * way, axis=2),
+                               np.sum(times(R[:, k], alpha) * times(R[:, m], beta), axis=2) - level], axis=1)
 
     def rates(self, X: Array) -> Array:
         """Its derivatives by the twists of all links, (n, rows, links, 6)."""
         (i, j, normal, _, at_j), (k, m, alpha, beta, _) = self._stacked
         R, o = X[..., :3, :3], X[..., :3, 3]
         J = np.zeros((len(X), self.count, X.shape[1], 6))
-        rows, force, arm = np.arange(len(i)), turned(R[:, i], normal), turned(R[:, j], at_j)
+        rows, force, arm = np.arange(len(i)), times(R[:, i], normal), times(R[:, j], at_j)
         J[:, rows, i, :3], J[:, rows, j, :3] = -force, force
         J[:, rows, i, 3:], J[:, rows, j, 3:] = cross(force, o[:, j] + arm - o[:, i]), cross(arm, force)
-        rows, moment = np.arange(len(i), self.count), cross(turned(R[:, m], beta), turned(R[:, k], alpha))
+        rows, moment = np.arange(len(i), self.count), cross(times(R[:, m], beta), times(R[:, k], alpha))
         J[:, rows, k, 3:], J[:, rows, m, 3:] = -moment, moment
         return J
 
@@ -275,8 +274,3 @@ def moved(X: Array, twists: Array) -> Array:
     found[..., :3, 3] += twists[..., :3]
     found[..., :3, :3] = exponential(twists[..., 3:]) @ X[..., :3, :3]
     return found
-
-
-def turned(R: Array, vectors: Array) -> Array:
-    """Vectors (rows, 3) each turned by its own of n rows of rotations (n, rows, 3, 3)."""
-    return np.asarray((R @ vectors[..., None])[..., 0])

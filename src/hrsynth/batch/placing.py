@@ -16,12 +16,13 @@ from ..budgets import FAST_DIRECTIONS
 from ..closed_forms.legs import ClosedFormLeg, OnCrank, OnRail, PlatformDirection
 from ..errors import NotSampled
 from ..geometry.so3 import between, exponential, quaternions
-from ..geometry.vectors import Array, cross, frozen, hat, inverse
+from ..geometry.vectors import Array, frozen, hat, inverse
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.pinocchio_model import PinocchioModel, across
 from ..mechanism import Joint, JointType, Mechanism
 from ..mechanism.legs import Leg, LegDecomposition
 from ..mechanism.observations.direction import Direction
+from ..mechanism.screws import elementary
 from ..results import Value
 from ..tolerances import CLOSED
 from .engine import Batch, Flags
@@ -246,17 +247,9 @@ def rates(twin: PinocchioModel, frames: Mapping[str, Array], link: str) -> tuple
 def _screws(joint: Joint, A: Array, B: Array, length: float) -> Array:
     """The twists (n, 6, k) at the base's origin for unit velocities of a joint's coordinates, A and B (n, 4, 4) what
     brought its links from the zero configuration."""
-    R, slides, turns = A[:, :3, :3], np.zeros((0, 3)), np.array(joint.axes).reshape(-1, 3)
-    match joint.type:
-        case JointType.PRISMATIC:
-            slides, turns = turns, slides
-        case JointType.CYLINDRICAL:
-            slides = turns
-        case JointType.SPHERICAL:
-            turns = np.eye(3)
-        case JointType.PLANAR:
-            x = across(joint.axis)
-            slides = np.array([x, cross(joint.axis, x)])
+    R, found = A[:, :3, :3], elementary(joint.type, joint.axes, across)
+    slides, turns = (np.array([axis for kind, axis in found if kind is each]).reshape(-1, 3)
+                     for each in (JointType.PRISMATIC, JointType.REVOLUTE))
     turned = R @ turns.T
     if joint.type is JointType.UNIVERSAL:
         turned[:, :, 1] = B[:, :3, :3] @ turns[1]
@@ -278,12 +271,6 @@ def _moved(twin: PinocchioModel, frames: Mapping[str, Array]) -> dict[str, Array
 def _coordinates(joint: Joint, R: Array, shift: Array) -> list[Array]:
     """The coordinates of each of a joint's parts, (n, 1) or (n, 4), in the order of the twin's."""
     match joint.type:
-        case JointType.REVOLUTE:
-            return [_angle(R, joint.axis)]
-        case JointType.PRISMATIC:
-            return [shift @ joint.axis[:, None]]
-        case JointType.CYLINDRICAL:
-            return [shift @ joint.axis[:, None], _angle(R, joint.axis)]
         case JointType.UNIVERSAL:
             first, second = joint.axes
             normal = np.cross(first, second)
@@ -293,11 +280,9 @@ def _coordinates(joint: Joint, R: Array, shift: Array) -> list[Array]:
             return [one, _angle(rest, second)]
         case JointType.SPHERICAL:
             return [quaternions(R)[:, [1, 2, 3, 0]]]
-        case JointType.PLANAR:
-            x = across(joint.axis)
-            return [shift @ x[:, None], shift @ np.cross(joint.axis, x)[:, None], _angle(R, joint.axis)]
         case _:
-            return []
+            return [shift @ axis[:, None] if kind is JointType.PRISMATIC else _angle(R, axis)
+                    for kind, axis in elementary(joint.type, joint.axes, across)]
 
 
 def _angle(R: Array, axis: Array) -> Array:

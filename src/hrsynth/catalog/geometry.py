@@ -29,7 +29,6 @@ from ..tolerances import SQUARE_AXES
 from .words import COMPOSITE, JointSymbol, LegWord, RobotWord
 
 Z = np.array([0.0, 0.0, 1.0])
-Rng = np.random.Generator
 
 
 @lru_cache(maxsize=8)

@@ -10,17 +10,17 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from itertools import permutations, product
+from itertools import product
 from math import gcd, prod
 from typing import Any
 
 import numpy as np
 
-from ..analysis.modes.carried import CarriedPlatform, Told, Turn
+from ..analysis.modes.carried import CarriedPlatform, Told, Turn, permanent
 from ..analysis.modes.carried_modes import enclosed, proposals
 from ..analysis.modes.conditions import AtAngle, OnPlane, OnRevolution
 from ..analysis.modes.quadrics import UNIT
-from ..analysis.modes.single_loop import SingleLoop
+from ..analysis.modes.single_loop import SingleLoop, dual_product
 from ..geometry.vectors import Array
 from .closures import written
 from .refining import Polynomial
@@ -147,9 +147,9 @@ def _normals(joints: Sequence[Any]) -> list[Any]:
     units = [_dual(each) for each in joints]
     rows = []
     for chosen in product((0, 1), repeat=len(units)):
-        total = [Fraction(k == 0) for k in range(8)]
+        total = np.array([Fraction(k == 0) for k in range(8)])
         for unit in (u for u, use in zip(units, chosen, strict=True) if use):
-            total = _times(total, unit)
+            total = dual_product(total, unit)
         common = prod({c.denominator for c in total})
         rows.append([int(c * common * (1 if k in (0, 4) else -1)) for k, c in enumerate(total)])
     kernel, size = fmpz_mat(rows).nullspace()
@@ -165,22 +165,12 @@ def _normals(joints: Sequence[Any]) -> list[Any]:
     return [[str(c) for c in v] for v in found]
 
 
-def _dual(joint: Any) -> list[Fraction]:
+def _dual(joint: Any) -> Array:
     """h of a joint."""
     kind, (a, o) = joint[0], rational(joint[1:])
     zero = [Fraction(0)] * 3
     first, second = (a, cross(o, a)) if kind == "R" else (zero, [c / 2 for c in a])
-    return [Fraction(0), *first, Fraction(0), *second]
-
-
-def _times(a: Sequence[Fraction], b: Sequence[Fraction]) -> list[Fraction]:
-    """The product of dual quaternions (8,)."""
-    def of(p: Sequence[Fraction], q: Sequence[Fraction]) -> list[Fraction]:
-        across = cross(p[1:], q[1:])
-        return [p[0] * q[0] - sum(x * y for x, y in zip(p[1:], q[1:], strict=True)),
-                *(p[0] * y + q[0] * x + z for x, y, z in zip(p[1:], q[1:], across, strict=True))]
-
-    return [*of(a[:4], b[:4]), *(x + y for x, y in zip(of(a[:4], b[4:]), of(a[4:], b[:4]), strict=True))]
+    return np.array([Fraction(0), *first, Fraction(0), *second])
 
 
 def _solved(record: dict[str, Any]) -> Starts:
@@ -188,8 +178,7 @@ def _solved(record: dict[str, Any]) -> Starts:
     the degrees allow (a permanent)."""
     equations = [integral(p) for p in KINDS["chain"][0](record, rational(record["tips"]))[0]]
     n, found, rng = len(equations), list[Array](), np.random.default_rng(0)
-    degrees = [[max(e[k] for e in p) for k in range(n)] for p in equations]
-    most = sum(prod(degrees[i][j] for i, j in enumerate(order)) for order in permutations(range(n)))
+    most = permanent(np.array([[max(e[k] for e in p) for k in range(n)] for p in equations]))
     values, slopes = [_float(p) for p in equations], [[_float(slope(p, k), p) for k in range(n)] for p in equations]
     for _ in range(SETS):
         x = rng.normal(size=(STARTS, n)) + 1j * rng.normal(size=(STARTS, n))

@@ -26,8 +26,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..analysis.branch.carried_vectors import SweptChains, Total, add_bend, row_product
 from ..analysis.branch.cells import TubeTrial, derivatives, drift, inverses, middles, residual
-from ..analysis.branch.loops import curvatures
+from ..analysis.branch.loops import JointLoop
 from ..analysis.branch.part import LoopBlock, LoopEquation, LoopPart
 from ..budgets import (
     BOUND_HALVINGS,
@@ -37,7 +38,7 @@ from ..budgets import (
     MOST_PARTS,
     NEWTON_STEPS_AT_RUN,
 )
-from ..geometry.affine import AffineForms, affine, combined, stacked
+from ..geometry.affine import AffineForms, combined, stacked
 from ..geometry.vectors import Array
 from ..results import Value
 from ..tolerances import (
@@ -303,31 +304,22 @@ def _levelled(B: AffineForms, motors: int) -> tuple[Array, Array]:
     v[0] = np.eye(p)
     v[1 : 1 + motors] = -B.v[1 : 1 + motors]
     P = AffineForms(v, np.zeros_like(B.r))
-    rows = [(P[..., i, :, None] * B).sum(-2) for i in range(p)]
-    made = AffineForms(np.stack([row.v for row in rows], axis=-2), np.stack([row.r for row in rows], axis=-2))
+    made = stacked([(P[..., i, :, None] * B).sum(-2) for i in range(p)], axis=-2)
     return P.size, (np.eye(p) - made).size
 
 
 def _curved(solved: Sequence[LoopEquation], trial: TubeTrial, radius: Array, Y: Array, P: Array) -> Array:
     """Bounds (c, p, p, p) of |Y D²_xG|, the last two dimensions the unknowns."""
-    place, p = trial.part.place, len(trial.part.unknowns)
-    forms = trial.forms(radius)
-    rows: list[dict[tuple[int, int], Any]] = [{} for _ in solved]  # gears are linear
-    for loop in trial.part.loops:
-        own = [(k, each.row) for k, each in enumerate(solved) if each.of is loop]
-        found = curvatures(trial.part.system, loop, forms, [row for _, row in own if row is not None])
-        for (k, _), slope in zip(own, found, strict=True):
-            rows[k] = slope
-    pairs = sorted({pair for row in rows for pair in row if pair[0] in place and pair[1] in place})
-    Q = np.zeros((len(trial.x), p, p, p))
-    if not pairs:
-        return Q
-    zero = affine(np.zeros(len(Q)), np.zeros((len(Q), trial.symbols[1])), np.zeros(len(Q)))
-    H = stacked([stacked([zero + row.get(pair, 0.0) for pair in pairs]) for row in rows], axis=-2)
-    size = P @ combined(Y, H).size
-    for k, (i, j) in enumerate(pairs):
-        Q[:, :, place[i], place[j]] = Q[:, :, place[j], place[i]] = size[:, :, k]
-    return Q
+    forms, unknowns = trial.forms(radius), np.array(trial.part.unknowns, dtype=np.intp)
+    carrier, like, p = SweptChains(trial.part.system, forms), forms[unknowns[0]] * 0.0, len(unknowns)
+    pairs, rows = (np.repeat(unknowns, p), np.tile(unknowns, p)), list[Any]()
+    for each in solved:
+        bend = Total(like, (len(forms), len(forms)))
+        if each.row is not None and isinstance(each.of, JointLoop):  # gears are linear
+            add_bend(bend, row_product(carrier, each.of, each.row))
+        rows.append(bend.sum[(..., *pairs)])
+    size = P @ combined(Y, stacked(rows, axis=-2)).size
+    return size.reshape(-1, p, p, p)
 
 
 def platform_error(branch: TubedBranch, ranges: Array, errors: Array, function: TracedFunction) -> tuple[float, float]:

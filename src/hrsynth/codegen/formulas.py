@@ -12,7 +12,7 @@ import numpy as np
 from ..analysis.branch.loops import JointLoop, LoopSystem, Swept, mapped, residuals
 from ..geometry.affine import dotted
 from ..geometry.components import arctan2
-from ..geometry.vectors import perpendicular
+from ..geometry.vectors import plane_axes
 from ..mechanism import Joint, JointType
 
 Row = tuple[Any, dict[int, Any]]
@@ -76,9 +76,8 @@ def cut_coordinate(system: LoopSystem, values: Sequence[Any], loop: JointLoop, w
         else:
             start, moved, across = mapped(one.R, second), mapped(other.R, second), mapped(one.R, flat)
     else:
-        normal = perpendicular(joint.axis)
-        start, moved = mapped(one.R, normal), mapped(other.R, normal)
-        across = mapped(one.R, np.cross(joint.axis, normal))
+        normal, side = plane_axes(joint.axis)
+        start, moved, across = mapped(one.R, normal), mapped(other.R, normal), mapped(one.R, side)
     # d(turn) = axis·(ω_B − ω_A), the other axis of a U being normal to this one
     return arctan2(*(np.ravel(dotted(each, moved))[0] for each in (across, start))), {
         i: dotted(axis, _turn(swept, place)) * sign for place, i, swept, sign in sides}

@@ -14,13 +14,11 @@ joint of that name joins the link. Points and axes are compared at the zero conf
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
-from ..geometry.vectors import Array, perpendicular
 from ..mechanism.model import Joint, JointType, Link, Mechanism, Motor
 from ..tolerances import SAME_DIRECTION, SAME_POINT
 
@@ -44,28 +42,6 @@ def part(name: str, number: int) -> str:
 def part_names(name: str, count: int) -> list[str]:
     """The names of the joints that a joint (or its motors) is written as: its own where it is one."""
     return [name] if count <= 1 else [part(name, number + 1) for number in range(count)]
-
-
-def parts(kind: JointType, axes: Sequence[Array]) -> list[tuple[JointType, Array]]:
-    """The one-freedom joints, type and axis, that a joint is a chain of, one a freedom.
-
-    ``axes`` are those of the joint in the frame of the first link of the chain, and so are the axes of the parts.
-    """
-    match kind:
-        case JointType.REVOLUTE | JointType.PRISMATIC:
-            return [(kind, axes[0])]
-        case JointType.UNIVERSAL:
-            return [(_R, axes[0]), (_R, axes[1])]
-        case JointType.SPHERICAL:
-            return [(_R, axis) for axis in np.eye(3)]
-        case JointType.FREE:
-            return [*((_P, axis) for axis in np.eye(3)), *((_R, axis) for axis in np.eye(3))]
-        case JointType.CYLINDRICAL:
-            return [(_P, axes[0]), (_R, axes[0])]
-        case JointType.PLANAR:
-            first = perpendicular(axes[0])
-            return [(_P, first), (_P, np.cross(axes[0], first)), (_R, axes[0])]
-    return []
 
 
 def merge(mechanism: Mechanism) -> Mechanism:

@@ -9,12 +9,12 @@ from functools import cached_property
 
 import numpy as np
 
-from ..geometry.vectors import Array, frozen, hat, inverse, perpendicular, unit
+from ..geometry.vectors import Array, frozen, hat, inverse, plane_axes, unit
 from ..mechanism import graphs
 from ..mechanism.model import JointType, Limits, Link, Motor, Note, fresh_name
 from ..mechanism.observations.direction import Direction
+from ..mechanism.screws import elementary
 from ..mechanism.sights import NamedCamera
-from . import chains
 from .numerals import Digits
 from .sights import SightSpec
 
@@ -71,13 +71,12 @@ class JointSpec:
     def parts(self) -> list[tuple[Array, Array | None]]:
         """Of each one-freedom joint that it is a chain of the axis a, and [a]ₓ where it turns about that."""
         return [(axis, None if kind is JointType.PRISMATIC else hat(unit(axis)))
-                for kind, axis in chains.parts(self.kind, self.axes)]
+                for kind, axis in elementary(self.kind, self.axes)]
 
     @cached_property
     def across(self) -> Array:
         """Two unit vectors normal to the first axis and to each other, (2, 3)."""
-        x = perpendicular(self.axes[0])
-        return np.array([x, np.cross(self.axes[0], x)])
+        return plane_axes(self.axes[0])
 
     def frames(self, poses: Mapping[str, Array]) -> tuple[Array, Array]:
         """The poses (4, 4) of both joint frames, where the links have ``poses``."""

@@ -12,6 +12,7 @@ from dataclasses import replace
 from ..errors import BadRequest
 from ..geometry.vectors import pose
 from ..mechanism.model import Joint, JointType, Link, Mechanism, Motor, Note
+from ..mechanism.screws import elementary
 from . import chains
 from .chains import CUT, WELD
 from .tree import is_connected, spanning
@@ -37,7 +38,7 @@ def reduce(mechanism: Mechanism, tree: Collection[JointType], loops: Collection[
         if joint.type in tree:
             joints[joint.name] = joint
             return
-        parts = chains.parts(joint.type, joint.axes)
+        parts = elementary(joint.type, joint.axes)
         before = joint.predecessor
         for number, (kind, direction) in enumerate(parts, 1):
             name = chains.part(joint.name, number)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -71,16 +70,6 @@ class Jet:
         return Jet(value, self.slope * first[..., None],
                    self.bend * first[..., None, None]
                    + _tensor(self.slope, self.slope) * second[..., None, None])
-
-
-def inner(a: Sequence[Jet], b: Sequence[Jet]) -> Jet:
-    """a · b."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def moment(a: Sequence[Jet], b: Sequence[Jet]) -> list[Jet]:
-    """a × b."""
-    return [a[i] * b[k] - a[k] * b[i] for i, k in ((1, 2), (2, 0), (0, 1))]
 
 
 def turn(s: Jet, c: Jet) -> Jet:

@@ -158,3 +158,17 @@ def perpendicular(axis: ArrayLike, near: ArrayLike | None = None) -> Array:
         if np.linalg.norm(rest) > 1e-6:
             return unit(rest)
     raise AssertionError("three coordinate axes cannot all be parallel to one vector")
+
+
+def plane_axes(normal: Array, near: ArrayLike | None = None) -> Array:
+    """Two unit vectors that make a right-handed triad with a unit normal, the first one as :func:`perpendicular` finds
+    it; shape (2, 3)."""
+    first = perpendicular(normal, near)
+    return np.array([first, cross(normal, first)])
+
+
+def nested(values: Array) -> list[Any]:
+    """Nested lists of numbers, None where they are not finite."""
+    found = values.astype(object)
+    found[~np.isfinite(values)] = None
+    return list(found.tolist())

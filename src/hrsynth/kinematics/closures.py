@@ -21,7 +21,7 @@ import numpy as np
 
 from ..geometry.balls import Field, around
 from ..geometry.so3 import logarithm
-from ..geometry.vectors import Array, cross, dot, inverse, perpendicular
+from ..geometry.vectors import Array, dot, inverse, plane_axes
 from ..tolerances import OUT_OF_REACH, SAME_GEOMETRY
 from .ways import Part
 
@@ -200,9 +200,8 @@ class _Law:
 def _kept(first: Part, moving: Part | None, last: Part, x: Array, target: Field, end: LegEnd) -> list[_Law]:
     """What the first part keeps of a point x of the last that ``moving`` moves to the target."""
     if first.axis is not None and first.slides:
-        n = perpendicular(first.axis)
         words = f"{_name(last)} would be at {{sought}} across the rail {_name(first)}, and reaches {{span}}"
-        return [_height(moving, end.ball(x), normal, target, words) for normal in (n, cross(first.axis, n))]
+        return [_height(moving, end.ball(x), normal, target, words) for normal in plane_axes(first.axis)]
     square = _square(target - end.ball(first.point))
     laws = [_distance(moving, end.ball(x), end.ball(first.point), square, _far(first, last))]
     if first.axis is not None:

@@ -17,8 +17,9 @@ import pinocchio as pin
 from ..budgets import LARGEST_MODEL
 from ..errors import BadMechanism, BadRequest
 from ..geometry.so3 import logarithm, turns_about
-from ..geometry.vectors import Array, cross, inverse, transform
+from ..geometry.vectors import Array, inverse, transform
 from ..mechanism import Joint, JointType, Mechanism, graphs
+from ..mechanism.screws import elementary
 from ..tolerances import SAME_GEOMETRY
 from .loop_rows import LoopRows, Places, numbers
 
@@ -118,25 +119,14 @@ class PinocchioModel:
         """Pinocchio's joint models for a joint seen from ``parent``."""
         turned = joint if joint.predecessor == parent else joint.turned()
         match joint.type:
-            case JointType.REVOLUTE:
-                return [pin.JointModelRevoluteUnaligned(turned.axis)]
-            case JointType.PRISMATIC:
-                return [pin.JointModelPrismaticUnaligned(turned.axis)]
-            case JointType.UNIVERSAL:
-                return [pin.JointModelRevoluteUnaligned(axis) for axis in turned.axes]
-            case JointType.CYLINDRICAL:
-                return [pin.JointModelPrismaticUnaligned(turned.axis), pin.JointModelRevoluteUnaligned(turned.axis)]
             case JointType.SPHERICAL:
                 return [pin.JointModelSpherical()]
-            case JointType.PLANAR:
-                x = across(turned.axis)
-                return [pin.JointModelPrismaticUnaligned(x),
-                        pin.JointModelPrismaticUnaligned(cross(turned.axis, x)),
-                        pin.JointModelRevoluteUnaligned(turned.axis)]
             case JointType.FREE:
                 return [pin.JointModelFreeFlyer()]
             case _:
-                return []
+                return [pin.JointModelPrismaticUnaligned(axis) if kind is JointType.PRISMATIC
+                        else pin.JointModelRevoluteUnaligned(axis)
+                        for kind, axis in elementary(joint.type, turned.axes, across)]
 
     def _add(self, joint: Joint, parent: str, suffix: str) -> int:
         """Add the joint models on ``parent``; the last one's index. Its frame sits at the joint's centre."""
@@ -334,8 +324,8 @@ class PinocchioModel:
                 case JointType.REVOLUTE | JointType.UNIVERSAL:
                     step[places] = turns_about(np.array(own.axes), R)
                 case JointType.PRISMATIC | JointType.CYLINDRICAL | JointType.PLANAR:
-                    x = across(own.axis)
-                    slides = [x, cross(own.axis, x)] if own.type is JointType.PLANAR else [own.axis]
+                    slides = [axis for kind, axis in elementary(own.type, own.axes, across)
+                              if kind is JointType.PRISMATIC]
                     turn = turns_about(own.axis[None], R)[: len(places) - len(slides)]
                     step[places] = [*(axis @ shift for axis in slides), *turn]
         return self.moved(self.q0, step)

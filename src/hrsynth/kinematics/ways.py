@@ -18,6 +18,7 @@ from ..geometry.lines import common_perpendicular, distance
 from ..geometry.vectors import Array, cross, dot, transform
 from ..mechanism import Joint, JointType
 from ..mechanism.legs import Leg, LegDecomposition
+from ..mechanism.screws import elementary
 from ..mechanism.wrist import Wrist
 from ..tolerances import SAME_GEOMETRY
 
@@ -114,20 +115,9 @@ def _parts(joint: Joint, near: str) -> list[Part]:
     seen = joint if joint.predecessor == near else joint.turned()
     point, name = np.asarray(seen.point), (joint.name,)
     one = (*name, "") if joint.type.freedoms > 1 else name
-    match joint.type:
-        case JointType.FIXED:
-            return []
-        case JointType.SPHERICAL:
-            return [Part(False, point, None, name, limit=seen.wrist)]
-        case JointType.REVOLUTE | JointType.UNIVERSAL:
-            return [Part(False, point, axis, one) for axis in seen.axes]
-        case JointType.PRISMATIC:
-            return [Part(True, point, seen.axis, name)]
-        case JointType.CYLINDRICAL:
-            return [Part(True, point, seen.axis, one), Part(False, point, seen.axis, one)]
-        case _:
-            x, y = np.linalg.svd(seen.axis[None, :])[2][1:]
-            return [Part(True, point, x, one), Part(True, point, y, one), Part(False, point, seen.axis, one)]
+    if joint.type is JointType.SPHERICAL:
+        return [Part(False, point, None, name, limit=seen.wrist)]
+    return [Part(kind is JointType.PRISMATIC, point, axis, one) for kind, axis in elementary(joint.type, seen.axes)]
 
 
 def gathered(parts: tuple[Part, ...], tolerance: float) -> tuple[Part, ...]:

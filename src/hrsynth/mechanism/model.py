@@ -25,7 +25,7 @@ from .sights import NamedCamera
 from .wrist import Wrist
 
 if TYPE_CHECKING:
-    import networkx as nx
+    pass
 
 
 class JointType(StrEnum):
@@ -270,17 +270,6 @@ class Mechanism(Result, shown_as="robot"):
         return (self.platform, *(link for link in self.links if told[link] and link != self.platform))
 
     @cached_property
-    def graph(self) -> nx.MultiGraph[str]:
-        """The joint graph: nodes are link names, edges are keyed by joint names; read-only."""
-        import networkx as nx
-
-        graph: nx.MultiGraph[str] = nx.MultiGraph()
-        graph.add_nodes_from(self.links)
-        for joint in self.joints.values():
-            graph.add_edge(joint.predecessor, joint.successor, key=joint.name, joint=joint)
-        return nx.freeze(graph)
-
-    @cached_property
     def adjacency(self) -> Adjacency:
         """The links in order, each with those that a joint joins it to."""
         return adjacency(self.links, (joint.links for joint in self.joints.values()))
@@ -326,10 +315,6 @@ class Mechanism(Result, shown_as="robot"):
     def joints_of(self, link: str) -> tuple[Joint, ...]:
         """The joints of a link, in the order of the mechanism."""
         return self._joints_of[link]
-
-    def between(self, a: str, b: str) -> tuple[Joint, ...]:
-        """The joints that join ``a`` and ``b`` directly."""
-        return tuple(joint for joint in self._joints_of[a] if joint.other(a) == b)
 
     def changed(self, *, remove_links: Iterable[str] = (), remove_joints: Iterable[str] = (),
                 links: Iterable[Link] = (), joints: Iterable[Joint] = (), **fields: object) -> Mechanism:

@@ -21,7 +21,8 @@ def between(mechanism: Mechanism, base: str, platform: str) -> Mechanism:
         raise BadRequest(f"{mechanism.name}: base and platform are one link", base, "two links")
     import networkx as nx
 
-    graph: nx.Graph[str] = nx.Graph(mechanism.graph)
+    graph: nx.Graph[str] = nx.Graph(joint.links for joint in mechanism.joints.values())
+    graph.add_nodes_from(mechanism.links)
     if not nx.has_path(graph, base, platform):
         raise BadRequest(f"{mechanism.name}: no chain of joints from {base!r} to", platform, "a link that is connected")
     graph.add_edge(base, platform)

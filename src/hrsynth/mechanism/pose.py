@@ -233,6 +233,13 @@ class Grid(Value):
         ranges = [f"{name}={values[0]:.6g}:{values[-1]:.6g}:{len(values)}" for name, values in self.axes]
         return ",".join([*ranges, *([str(self.fixed)] if self.fixed.given else [])])
 
+    def to_dict(self) -> dict[str, Any]:
+        """The record of what varies and what is held."""
+        fixed = {name: values[0] for name, values in self.fixed.given.items() if name in SCALARS}
+        rpy = {} if self.fixed.rpy is None else {"rpy": list(self.fixed.rpy)}
+        return {"axes": list(self.names), **{name: values.tolist() for name, values in self.axes},
+                "fixed": {**fixed, **rpy}}
+
     @property
     def shape(self) -> tuple[int, ...]:
         """Number of values on each axis."""

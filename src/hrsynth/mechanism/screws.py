@@ -1,5 +1,6 @@
-"""Screws of joints: the wrenches a joint transmits, the twists it allows, and the constraints of a mechanism on the
-twists of its links. Numbers may be floats or exact, as in :mod:`hrsynth.geometry.screws`.
+"""Screws of joints: the one-freedom joints that a joint is a chain of, the wrenches it transmits, the twists it allows,
+and the constraints of a mechanism on the twists of its links. Numbers may be floats or exact, as in
+:mod:`hrsynth.geometry.screws`.
 """
 
 from __future__ import annotations
@@ -9,11 +10,36 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from ..geometry.screws import couple, force, normals, rotation, translation
-from ..geometry.vectors import Numbers, cross
+from ..geometry.vectors import Array, Numbers, cross, perpendicular
 from .model import Joint, JointType
 
 Geometry = Callable[[Joint], tuple[Numbers, Sequence[Numbers]]]
 """The centre and the axes of a joint, in base axes, at the configuration in question."""
+
+
+def elementary(kind: JointType, axes: Sequence[Array], across: Callable[[Array], Array] = perpendicular
+               ) -> list[tuple[JointType, Array]]:
+    """The one-freedom joints, type and axis, that a joint is a chain of, one a freedom; ``across`` gives the direction
+    in which a planar joint slides first.
+
+    ``axes`` are those of the joint in the frame of the first link of the chain, and so are the axes found.
+    """
+    turn, slide = JointType.REVOLUTE, JointType.PRISMATIC
+    match kind:
+        case JointType.REVOLUTE | JointType.PRISMATIC:
+            return [(kind, axes[0])]
+        case JointType.UNIVERSAL:
+            return [(turn, axes[0]), (turn, axes[1])]
+        case JointType.SPHERICAL:
+            return [(turn, axis) for axis in np.eye(3)]
+        case JointType.FREE:
+            return [*((slide, axis) for axis in np.eye(3)), *((turn, axis) for axis in np.eye(3))]
+        case JointType.CYLINDRICAL:
+            return [(slide, axes[0]), (turn, axes[0])]
+        case JointType.PLANAR:
+            first = across(axes[0])
+            return [(slide, first), (slide, cross(axes[0], first)), (turn, axes[0])]
+    return []
 
 
 def transmitted(kind: JointType, point: Numbers, axes: Sequence[Numbers]) -> list[Numbers]:

@@ -185,7 +185,7 @@ def _robots(figure: Any, found: Servo, above: float, panels: int) -> Box:
     others = np.array([[getattr(mode.pose, name) for name in "xyz"] for mode in modes]).reshape(-1, 3)
     path = found.way
     every = np.vstack([ground, path, *(stroke for each, _ in drawn for stroke, _ in each)])
-    sketch = sketch_of(found, every)
+    sketch = Sketch.of(plane_normal(found.setting.motion), ground, [])
     entries = [entry("way of the platform", color=COLOURS[0]), entry("joints of the base", **BASE)]
     if any(np.ptp(stroke, axis=0).any() for each, _ in drawn for stroke, _ in each):
         entries[:0] = [entry("robot at the start", color=START[0]), entry("robot where it ended", color=END[0]),
@@ -221,8 +221,3 @@ def ground_of(found: Servo) -> Array:
     """The centres of the base's joints, (n, 3)."""
     mechanism = found.target.twin.mechanism
     return np.array([joint.point for joint in mechanism.joints_of(mechanism.base)])
-
-
-def sketch_of(found: Servo, every: Array) -> Sketch:
-    """How the run is seen."""
-    return Sketch.of(plane_normal(found.setting.motion), ground_of(found), [])

@@ -11,12 +11,13 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from xml.etree import ElementTree as Xml
 
-import networkx as nx
 import numpy as np
 
 from ..errors import BadMechanism
 from ..geometry.vectors import Array
-from ..mechanism import Joint, JointType, Mechanism
+from ..kinematics.pinocchio_model import across
+from ..mechanism import Joint, JointType, Mechanism, graphs
+from ..mechanism.screws import elementary
 
 GRAVITY = 9.81
 """m/s²."""
@@ -83,41 +84,25 @@ def mockup(mechanism: Mechanism) -> str:
 
 def _cut(mechanism: Mechanism) -> tuple[list[tuple[Joint, str]], list[Joint]]:
     """Joints of a spanning tree, each with the link it hangs on, and the others; motors are never cut."""
-    graph: nx.Graph[str] = nx.Graph()
-    graph.add_nodes_from(mechanism.links)
-    for joint in mechanism.joints.values():
+    joints = list(mechanism.joints.values())
+    for joint in joints:
         if joint.type is JointType.FREE:
             raise BadMechanism(f"{mechanism.name}: a joint with six freedoms has no mock-up", joint.name)
-        weight = _WEIGHTS[joint.type.value] - (DRIVEN if joint.actuated else 0.0)
-        old = graph.get_edge_data(*joint.links)
-        if old is None or weight < old["weight"]:
-            graph.add_edge(*joint.links, weight=weight, joint=joint)
-    tree = nx.minimum_spanning_tree(graph)
-    ordered = [(tree.edges[edge]["joint"], edge[0]) for edge in nx.bfs_edges(tree, mechanism.base)]
-    used = {joint.name for joint, _ in ordered}
-    return ordered, [joint for joint in mechanism.joints.values() if joint.name not in used]
+    weights = [_WEIGHTS[joint.type.value] - (DRIVEN if joint.actuated else 0.0) for joint in joints]
+    tree = graphs.spanning_forest(mechanism.links, joints, weights)
+    ordered = [(joint, near) for joint, near, _ in graphs.outward(mechanism.base, tree)]
+    return ordered, [joint for joint in joints if all(joint is not each for each in tree)]
 
 
 def coordinates(joint: Joint) -> Iterator[tuple[str, str, Array]]:
     """Name, type (hinge, slide or ball) and axis of the simulated joints that make up a joint."""
-    kind = joint.type
-    if kind is JointType.SPHERICAL:
+    if joint.type is JointType.SPHERICAL:
         yield joint.name, "ball", np.array([0.0, 0.0, 1.0])
-    elif kind is JointType.REVOLUTE:
-        yield joint.name, "hinge", joint.axis
-    elif kind is JointType.PRISMATIC:
-        yield joint.name, "slide", joint.axis
-    elif kind is JointType.UNIVERSAL:
-        for number, axis in enumerate(joint.axes):
-            yield f"{joint.name}__{number}", "hinge", axis
-    elif kind is JointType.CYLINDRICAL:
-        yield f"{joint.name}__0", "slide", joint.axis
-        yield f"{joint.name}__1", "hinge", joint.axis
-    elif kind is JointType.PLANAR:
-        x = np.linalg.svd(joint.axis[None])[2][1]
-        yield f"{joint.name}__0", "slide", x
-        yield f"{joint.name}__1", "slide", np.cross(joint.axis, x)
-        yield f"{joint.name}__2", "hinge", joint.axis
+        return
+    found = elementary(joint.type, joint.axes, across)
+    for number, (kind, axis) in enumerate(found):
+        yield (f"{joint.name}__{number}" if len(found) > 1 else joint.name,
+               "slide" if kind is JointType.PRISMATIC else "hinge", axis)
 
 
 def _joints(made: Mockup, body: Xml.Element, joint: Joint, extra: float = 0.0) -> None:

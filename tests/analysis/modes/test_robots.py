@@ -13,12 +13,15 @@ from analysis.modes.closings import asked, bodies_of, compared, distance, motor_
 from hrsynth.analysis.asked import observe as watched
 from hrsynth.analysis.controllability import legs
 from hrsynth.analysis.measured import MeasuredRobot
-from hrsynth.analysis.modes import ways
 from hrsynth.analysis.modes.branches import Model
+from hrsynth.analysis.modes.carried_modes import solve_carried
 from hrsynth.analysis.modes.drift import drift
 from hrsynth.analysis.modes.modes import AssemblyModes, modes
+from hrsynth.analysis.modes.planar_modes import solve_loops
+from hrsynth.analysis.modes.posed import solve_posed
+from hrsynth.analysis.modes.single_loop import solve_loop
 from hrsynth.analysis.modes.solve import SystemModes
-from hrsynth.analysis.modes.ways import uncoupled
+from hrsynth.analysis.modes.ways import solve_tips, uncoupled
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.budgets import EFFORT
 from hrsynth.description import load, shipped
@@ -402,9 +405,8 @@ def moved_since_zero(found: AssemblyModes, at: ClosedConfiguration, joint: Joint
     return float(np.arctan2(axis @ [across[2, 1], across[0, 2], across[1, 0]], np.trace(D[:3, :3]) - 1.0))
 
 
-WAYS = {"tips": partial(ways.of_tips, as_written=False, effort=EFFORT),
-        "conditions": partial(ways.of_conditions, effort=EFFORT),
-        "loops": ways.of_loops, "carrier": ways.of_carrier, "single": ways.of_single}
+WAYS = {"tips": partial(solve_tips, as_written=False, effort=EFFORT), "conditions": solve_posed,
+        "loops": solve_loops, "carrier": solve_carried, "single": solve_loop}
 
 
 @pytest.mark.some(1, 5)
@@ -423,7 +425,7 @@ def test_all_ways_list_the_same(name: str):
         exact, listed = drift(goal, None, setting.normal.moved), dict[str, tuple[Model, SystemModes]]()
         for way, solved in WAYS.items():
             with suppress(NotConfined, Unsolved, TooLarge, MissingExtra):
-                _, made, found = solved(measured, goal, exact)
+                made, found = solved(measured, goal, exact)
                 if found.complete:
                     listed[way] = made, found
         assert listed, observe

@@ -15,10 +15,10 @@ from ...batch.grids import poses_over
 from ...batch.reach import dependence, reach, sweep
 from ...budgets import LARGEST_GRID, POSES_FOR_NUMBA_ONCE
 from ...errors import BadRequest, Disagreement, HrsynthError, PlaneNotMet
-from ...geometry.vectors import Array
+from ...geometry.vectors import Array, nested
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.relation import Measurement
-from ...mechanism.pose import SCALARS, Grid, Pose
+from ...mechanism.pose import Grid, Pose
 from ...progress import tell
 from ...results import Value
 from ...tolerances import SAME_RELATION, USUAL_ERROR
@@ -109,24 +109,9 @@ class ErrorMap(Value):
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line: arrays nested in the order of ``axes``, null where not finite."""
-        return {**axes_of(self.grid), "reached": self.reached.tolist(),
+        return {**self.grid.to_dict(), "reached": self.reached.tolist(),
                 "position_mm": nested(1e3 * self.position), "orientation_deg": nested(np.degrees(self.orientation)),
                 "gap": self.gap, "checked": self.spots and self.spots.to_dict()}
-
-
-def axes_of(grid: Grid) -> dict[str, Any]:
-    """The record of what a grid varies and what it holds."""
-    fixed = {name: values[0] for name, values in grid.fixed.given.items() if name in SCALARS}
-    rpy = {} if grid.fixed.rpy is None else {"rpy": list(grid.fixed.rpy)}
-    return {"axes": list(grid.names), **{name: values.tolist() for name, values in grid.axes},
-            "fixed": {**fixed, **rpy}}
-
-
-def nested(values: Array) -> list[Any]:
-    """Nested lists of numbers, None where they are not finite."""
-    found = values.astype(object)
-    found[~np.isfinite(values)] = None
-    return list(found.tolist())
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -25,7 +25,7 @@ from ...mechanism.pose import Grid
 from ...progress import tell
 from ...results import Value, content
 from ...tolerances import LARGEST_FIRST_ORDER
-from .error_map import SPOTS, Mapper, Seen, Spots, axes_of
+from .error_map import SPOTS, Mapper, Seen, Spots
 from .ranges import ErrorRange, Tally
 
 ENDING, PART, JOURNAL = ".npy", ".part", ".journal"
@@ -46,7 +46,7 @@ class SweptErrors(Value):
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
-        return {**axes_of(self.grid), "gap": self.tally.gap, "checked": self.spots.to_dict(),
+        return {**self.grid.to_dict(), "gap": self.tally.gap, "checked": self.spots.to_dict(),
                 "swept": {"poses": self.grid.size, "reached": self.tally.reached, "before": self.before,
                           "position_mm": self.tally.position.to_dict(1e3),
                           "orientation_deg": self.tally.orientation.to_dict(180 / np.pi)}}

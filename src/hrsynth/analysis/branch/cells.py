@@ -232,7 +232,7 @@ def residual(trial: TubeTrial, equations: Sequence[LoopEquation]) -> AffineForms
     """G(q_c, x_c), (c, k)."""
     still = trial.kept(slice(None))
     still.half = 0.0 * still.half
-    return stacked([_constant(trial, 0.0) + each for each in
+    return stacked([_zero(trial) + each for each in
                     evaluated(trial.part, equations, still.forms(0.0 * trial.radius))[0]])
 
 
@@ -240,7 +240,7 @@ def derivatives(trial: TubeTrial, equations: Sequence[LoopEquation], own: Sequen
                 ) -> TubeDerivatives:
     """The derivatives of equations over tubes with radii (c, p)."""
     part = trial.part
-    zero = _constant(trial, 0.0)
+    zero = _zero(trial)
     values, slopes = evaluated(part, equations, trial.forms(radius))
     by_own = [stacked([zero + slope.get(part.unknowns[k], 0.0) for k in own]) for slope in slopes]
     others = [i for k, i in enumerate(part.unknowns) if k not in own]
@@ -261,17 +261,12 @@ def derivatives(trial: TubeTrial, equations: Sequence[LoopEquation], own: Sequen
         by_others.append(stacked(row))
         along.append(drift)
     made = stacked([zero + each for each in values])
-    return TubeDerivatives(made, _matrix(by_own), _matrix(by_others), _matrix(along))
+    return TubeDerivatives(made, stacked(by_own, axis=-2), stacked(by_others, axis=-2), stacked(along, axis=-2))
 
 
-def _constant(trial: TubeTrial, value: float) -> AffineForms:
-    """A number for all cells."""
-    return affine(np.full(len(trial.x), value), np.zeros((len(trial.x), trial.symbols[1])), np.zeros(len(trial.x)))
-
-
-def _matrix(rows: Sequence[AffineForms]) -> AffineForms:
-    """Rows (c, n) as matrices (c, k, n)."""
-    return AffineForms(np.stack([row.v for row in rows], axis=-2), np.stack([row.r for row in rows], axis=-2))
+def _zero(trial: TubeTrial) -> AffineForms:
+    """Zero for all cells."""
+    return affine(np.zeros(len(trial.x)), np.zeros((len(trial.x), trial.symbols[1])), np.zeros(len(trial.x)))
 
 
 def turning(trial: TubeTrial, block: LoopBlock) -> tuple[LoopEquation, ...]:

@@ -20,8 +20,9 @@ from ...errors import BadMechanism
 from ...geometry import lines
 from ...geometry.affine import crossed, dotted
 from ...geometry.so3 import turns_about
-from ...geometry.vectors import Array, cross, frozen, hat, inverse, perpendicular, transform
+from ...geometry.vectors import Array, cross, frozen, hat, inverse, plane_axes, transform
 from ...mechanism import Joint, JointType, Mechanism, graphs
+from ...mechanism.screws import elementary
 from ...results import Value
 from ...tolerances import ROUNDED_AXIS, SAME_POINT
 
@@ -291,70 +292,6 @@ def residuals(system: LoopSystem, loop: JointLoop, values: Any, rows: Sequence[L
     return found, slopes
 
 
-def curvatures(system: LoopSystem, loop: JointLoop, values: Any, rows: Sequence[LoopRow]
-               ) -> list[dict[tuple[int, int], Any]]:
-    """The second derivatives of the equations of :func:`residuals`, none of them a ``distance``, by pairs i ≤ j of
-    coordinates.
-
-    Behind coordinates i, j of one chain, i the first, a place a has ∂ᵢⱼ a = ωᵢ × ∂ⱼ a, a direction likewise.
-    """
-    one, two = (system.displacement(chain, values) for chain in loop.chains)
-    places = [[(place, i) for place, i in enumerate(chain) if values[i] is not None] for chain in loop.chains]
-    a, b = one.at(loop.point), two.at(loop.point)
-    ends = _CarriedVector.of(one, places[0], -a, one.rate, a, -1), _CarriedVector.of(two, places[1], b, two.rate, b, 1)
-    found = []
-    for row in rows:
-        if row.kind == "distance":
-            raise ValueError(row.kind)
-        slope: dict[tuple[int, int], Any] = {}
-        if row.kind == "direction":
-            u, v = mapped(one.R, row.one), mapped(two.R, row.other)
-            pairs = [(_CarriedVector.of(one, places[0], u, one.turned, u, 1),
-                      _CarriedVector.of(two, places[1], v, two.turned, v, 1))]
-        else:
-            assert row.one is not None
-            k = mapped(one.R, row.one) if row.carried else row.one
-            held = _CarriedVector.of(one, places[0] if row.carried else [], k, one.turned, k, 1)
-            pairs = [(end, held) for end in ends]
-        for first, second in pairs:
-            first.multiply(second, slope)
-        found.append(slope)
-    return found
-
-
-@dataclass(frozen=True, eq=False)
-class _CarriedVector:
-    """A vector (…, 3) with its first and second derivatives by coordinates, those that vanish left out."""
-
-    value: Any
-    once: Mapping[int, Any]
-    twice: Mapping[tuple[int, int], Any]
-
-    @classmethod
-    def of(cls, swept: Swept, places: Sequence[tuple[int, int]], value: Any, rate: Callable[[int, Any], Any], at: Any,
-           sign: int) -> _CarriedVector:
-        """Of what a chain carries: ``rate`` of ``at`` times a sign."""
-        once = {i: rate(place, at) for place, i in places}
-        once = {i: each * sign for i, each in once.items() if each is not None}
-        twice = {}
-        for n, (place, i) in enumerate(places):
-            for _, j in places[n:]:
-                turned = swept.turned(place, once[j]) if j in once else None
-                if turned is not None:
-                    twice[min(i, j), max(i, j)] = turned
-        return cls(value, once, twice)
-
-    def multiply(self, other: _CarriedVector, slope: dict[tuple[int, int], Any]) -> None:
-        """Add the second derivatives of the product of two vectors."""
-        terms = [(pair, each, far.value) for own, far in ((self, other), (other, self))
-                 for pair, each in own.twice.items()]
-        terms += [((min(i, j), max(i, j)), one, two) for i, one in self.once.items() for j, two in other.once.items()]
-        # ∂ᵢᵢ (v · w) has 2 ∂ᵢ v · ∂ᵢ w
-        terms += [((i, i), one, other.once[i]) for i, one in self.once.items() if i in other.once]
-        for pair, one, two in terms:
-            slope[pair] = slope[pair] + dotted(one, two) if pair in slope else dotted(one, two)
-
-
 def rod_ends(system: LoopSystem, loop: JointLoop, values: Any) -> tuple[Any, Any, Any]:
     """Of a loop with a joint that is left out: where its ends a and b are, and the centre A of that joint (…, 3)."""
     assert loop.swung is not None
@@ -450,25 +387,9 @@ def _weight(joint: Joint, mechanism: Mechanism, driven: Sequence[str], geared: s
 
 def parts(joint: Joint) -> list[tuple[str, bool, Array]]:
     """The coordinates of a joint in their order: name, whether it slides, axis."""
-    name = joint.name
-    match joint.type:
-        case JointType.REVOLUTE:
-            return [(name, False, joint.axis)]
-        case JointType.PRISMATIC:
-            return [(name, True, joint.axis)]
-        case JointType.UNIVERSAL:
-            return [(f"{name}.{k}", False, axis) for k, axis in enumerate(joint.axes, 1)]
-        case JointType.CYLINDRICAL:
-            return [(f"{name}.1", True, joint.axis), (f"{name}.2", False, joint.axis)]
-        case JointType.SPHERICAL:
-            return [(f"{name}.{k}", False, axis) for k, axis in enumerate(np.eye(3), 1)]
-        case JointType.PLANAR:
-            x = perpendicular(joint.axis)
-            return [(f"{name}.1", True, x), (f"{name}.2", True, cross(joint.axis, x)), (f"{name}.3", False, joint.axis)]
-        case JointType.FREE:
-            return [(f"{name}.{k}", k < 4, np.eye(3)[(k - 1) % 3]) for k in range(1, 7)]
-        case _:
-            return []
+    found = elementary(joint.type, joint.axes)
+    return [(f"{joint.name}.{k}" if len(found) > 1 else joint.name, kind is JointType.PRISMATIC, axis)
+            for k, (kind, axis) in enumerate(found, 1)]
 
 
 def _gears(mechanism: Mechanism, coordinates: Sequence[TreeCoordinate], length: float) -> tuple[GearEquation, ...]:
@@ -530,7 +451,7 @@ def equations(joint: Joint) -> list[LoopRow]:
     if joint.type is JointType.FIXED:
         return [LoopRow("point", e) for e in E] + [LoopRow("direction", E[k], E[(k + 1) % 3]) for k in range(3)]
     axis = joint.axis
-    across = perpendicular(axis), cross(axis, perpendicular(axis))
+    across = plane_axes(axis)
     aligned = [LoopRow("direction", e, axis) for e in across]
     match joint.type:
         case JointType.REVOLUTE:

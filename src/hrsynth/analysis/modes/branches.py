@@ -12,7 +12,7 @@ import numpy as np
 
 from ...budgets import BRANCH_CHOICES, EFFORT
 from ...errors import TooLarge
-from ...geometry.vectors import Array, inverse, perpendicular, pose, pose_difference, transform
+from ...geometry.vectors import Array, inverse, plane_axes, pose, pose_difference, transform
 from ...kinematics.configuration import ClosedConfiguration
 from ...results import Value
 from ...tolerances import RANK_GAP, SAME_POINT
@@ -36,6 +36,8 @@ class Model(Value):
     """Whether the system's pose is that of the base, as the platform sees it."""
     closing: Callable[[Array], ClosedConfiguration] | None = None
     """The whole robot at the system's coordinates, where these tell it."""
+    confined: TipLoci | None = None
+    """The curves of the tips, where these give the system."""
 
 
 def model(confined: TipLoci) -> Model:
@@ -43,7 +45,8 @@ def model(confined: TipLoci) -> Model:
     at = {body: confined.goal.pose(body) for body in confined.bodies}
     curves = tuple(tip.curve for tip in confined.tips)
     made = {"translations": _translating, "bodies": _articulated}.get(confined.motion, _rigid)(confined, at, curves)
-    return replace(made, system=replace(made.system, error=confined.error, as_written=confined.as_written))
+    return replace(made, confined=confined,
+                   system=replace(made.system, error=confined.error, as_written=confined.as_written))
 
 
 def _translating(confined: TipLoci, at: dict[str, Array], curves: tuple[Reach, ...]) -> Model:
@@ -59,8 +62,7 @@ def _rigid(confined: TipLoci, at: dict[str, Array], curves: tuple[Reach, ...]) -
     p, n = at[confined.bodies[0]][:3, 3], confined.plane if confined.motion == "planar" else None
     X_goal = pose(p)
     if n is not None:
-        first = perpendicular(n)
-        X_goal = pose(p, np.column_stack([first, np.cross(n, first), n]))
+        X_goal = pose(p, np.column_stack([*plane_axes(n), n]))
     back = inverse(X_goal)
     tips = np.array([_point(back @ at[tip.body], tip.place) for tip in confined.tips]).reshape(-1, 3)
     if n is None:

@@ -106,7 +106,7 @@ def _sphere(c: PoseCondition) -> bool:
 
 
 @dataclass(frozen=True, eq=False)
-class _Equation(Zero):
+class CarriedEquation(Zero):
     """A condition in all c, all s and slides t (0 and 1 besides), with numbers in balls."""
 
     freedoms: tuple[Turn, ...]
@@ -233,12 +233,12 @@ class CarriedPlatform(System):
                 if i != one and chosen[i].joints == chosen[one].joints:
                     table[i] = np.maximum(degrees[i], degrees[one])
                     table[i, slides] = np.minimum(table[i, slides], 1)
-        found = [_permanent(table) for table in tables]
+        found = [permanent(table) for table in tables]
         for (i, j), table in product(combinations(range(n), 2), tables):
             rest = [k for k in range(n) if k not in (i, j)]
             if self._meets(chosen[i], chosen[j]) and not table[rest, 0].any():
                 bent = np.where(degrees[[i, j], 1:].any(axis=0), 4, 0)
-                found.append(_permanent(np.vstack([bent, table[rest, 1:]])))
+                found.append(permanent(np.vstack([bent, table[rest, 1:]])))
         return min(found)
 
     def _meets(self, one: Told, other: Told) -> bool:
@@ -266,9 +266,9 @@ class CarriedPlatform(System):
                     best = most, chosen
         return () if best is None else best[1]
 
-    def equation(self, each: Told) -> _Equation:
+    def equation(self, each: Told) -> CarriedEquation:
         """A condition in balls."""
-        return _Equation(each.condition, Poses.spatial(), self.error / self.size, self.freedoms_, each.joints)
+        return CarriedEquation(each.condition, Poses.spatial(), self.error / self.size, self.freedoms_, each.joints)
 
     def unknowns(self, q: Array) -> Array:
         """All c, all s and slides t."""
@@ -277,6 +277,6 @@ class CarriedPlatform(System):
                                np.where(slides, q, 0.0)])
 
 
-def _permanent(degrees: Array) -> int:
+def permanent(degrees: Array) -> int:
     """Bézout's number in a product of lines."""
     return sum(prod(int(degrees[i, j]) for i, j in enumerate(order)) for order in permutations(range(len(degrees))))

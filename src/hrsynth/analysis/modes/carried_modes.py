@@ -15,12 +15,13 @@ from ...geometry.vectors import Array, cross, frozen, hat
 from ...kinematics.configuration import ClosedConfiguration
 from ..measured import MeasuredRobot
 from .branches import Model
-from .carried import CarriedPlatform, Told, Turn
+from .carried import CarriedEquation, CarriedPlatform, Told
 from .carrier import carried
 from .conditions import PoseCondition
 from .joint_forms import closings_bound, eigenvalues
 from .polynomials import Polynomial, krawczyk
 from .pose_boxes import FAR_FROM_REAL, PRECISION, PoseBox, UnitCircle, as_box, at_middle, told_far, zeros
+from .pose_forms import Poses
 from .solve import SystemMode, SystemModes
 
 FEW_JOINTS = 2
@@ -28,21 +29,18 @@ FEW_JOINTS = 2
 
 
 @dataclass(frozen=True, eq=False)
-class _Half:
+class _Half(CarriedEquation):
     """A condition in the tangents t of half the angles and in slides, numbers as they are: with an axis a the turn of
     the quaternion 1 + t a, whatever the length of a."""
 
-    freedoms: tuple[Turn, ...]
-    told: Told
+    idle: frozenset[int]
 
-    def _placed(self, x: Sequence[Any]) -> tuple[Any, Any, list[tuple[int, Any, Any]]]:
-        """The point and the arrow, and for each joint the rate of its turn and a point, or none and that of its slide.
-        """
-        R, p, at = _exact(np.eye(3)), _exact(np.zeros(3)), list[tuple[int, Any, Any]]()
-        for k, each in enumerate(self.freedoms[:self.told.joints]):
-            if k in self.told.idle:
+    def carried(self, x: Sequence[Any]) -> tuple[Any, Any, list[tuple[int, Any, Any]]]:
+        R, p, at = self.of(np.eye(3)), self.of(np.zeros(3)), list[tuple[int, Any, Any]]()
+        for k, each in enumerate(self.freedoms[:self.joints]):
+            if k in self.idle:
                 continue
-            a, o, t = _exact(each.axis), _exact(each.point), x[k]
+            a, o, t = self.of(each.axis), self.of(each.point), x[k]
             if each.slides:
                 at.append((k, None, R @ a))
                 p = p + R @ a * t
@@ -50,32 +48,11 @@ class _Half:
             w = 1 + t * t * (a @ a)
             at.append((k, R @ a * (2 / w), p + R @ o))
             turn = (np.eye(3, dtype=int) * (2 - w) + np.outer(a, a) * (2 * t * t)
-                    + _exact(hat(each.axis)) * (2 * t)) / w
+                    + self.of(hat(each.axis)) * (2 * t)) / w
             R, p = R @ turn, p + R @ (o - turn @ o)
-        return p + R @ _exact(self.told.condition.b), R @ _exact(self.told.condition.c), at
-
-    def value(self, x: Sequence[Any]) -> Any:
-        """The value at x."""
-        point, arrow, _ = self._placed(x)
-        return self.told.condition.value(point, arrow, _exact)
-
-    def slopes(self, x: Sequence[Any]) -> Any:
-        """The derivative by each unknown at x."""
-        point, arrow, at = self._placed(x)
-        along, turned = self.told.condition.slopes(point, arrow, _exact)
-        found = [0 * v for v in x]
-        for k, rate, place in at:
-            found[k] = along @ place if rate is None else along @ cross(rate, point - place) + turned @ cross(
-                rate, arrow)
-        return found
-
-
-def _exact(values: Array) -> Any:
-    """Numbers as balls without radii."""
-    from flint import arb
-
-    flat = np.array([arb(float(v)) for v in np.ravel(values)], dtype=object)
-    return flat.reshape(np.shape(values)) if np.shape(values) else flat[0]
+        point, arrow = p + R @ self.of(self.condition.b), R @ self.of(self.condition.c)
+        return point, arrow, [(k, place, 0 * arrow) if rate is None else
+                              (k, cross(rate, point - place), cross(rate, arrow)) for k, rate, place in at]
 
 
 @dataclass(frozen=True)
@@ -151,7 +128,9 @@ def _far(system: CarriedPlatform, proposed: Array, known: Sequence[PoseBox]) -> 
     """Boxes of the zeros, of the numbers as they are, at which a turn is far from real, apart from those known."""
     from flint import acb, ctx
 
-    equations: list[Polynomial] = [_Half(system.freedoms_, each) for each in system.square]
+    equations: list[Polynomial] = [
+        _Half(each.condition, Poses.spatial(), None, system.freedoms_, each.joints, each.idle)
+        for each in system.square]
     slides, found = np.array([each.slides for each in system.freedoms_]), list[PoseBox]()
     with ctx.workprec(PRECISION):
         for q in proposed:

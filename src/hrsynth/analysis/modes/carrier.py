@@ -10,7 +10,7 @@ import numpy as np
 
 from ...errors import NotConfined
 from ...geometry import lines
-from ...geometry.vectors import Array, perpendicular, unit
+from ...geometry.vectors import Array, perpendicular, plane_axes, unit
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.locked import carry_joint
 from ...kinematics.relation import Measurement
@@ -156,7 +156,6 @@ def _carrier(measured: MeasuredRobot, leg: Leg, rest: Measurement, goal: ClosedC
             raise NotConfined(mechanism.name, f"what is measured at leg {leg.label} is not a direction seen from "
                               "the base")
         d = goal.pose(each.link)[:3, :3] @ each.direction
-        first = perpendicular(d)
         told += [(AtAngle(leg.label, none, d, e, h), links[each.link])
-                 for e, h in ((first, 0.0), (np.cross(d, first), 0.0), (d, 1.0)) if links[each.link]]
+                 for e, h in zip((*plane_axes(d), d), (0.0, 0.0, 1.0), strict=True) if links[each.link]]
     return tuple(found), told

@@ -12,7 +12,7 @@ from ...constraints.pattern import attached
 from ...errors import NotConfined
 from ...geometry import lines
 from ...geometry.ranks import range_basis
-from ...geometry.vectors import Array, perpendicular
+from ...geometry.vectors import Array, plane_axes
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.locked import carry_joint, leg_twists
 from ...kinematics.relation import Measurement
@@ -171,8 +171,7 @@ def _of_tip(leg: str, found: Chain, count: int, tip: Array, middle: Middle, plan
             turns = [_angle(reach, *two_axes(found, known))]
         elif missing == 2:
             d, c = one_axis(found, known)
-            first = perpendicular(d)
-            turns = [(first, c, 0.0), (np.cross(d, first), c, 0.0), (d, c, 1.0)]
+            turns = [*((a, c, 0.0) for a in plane_axes(d)), (d, c, 1.0)]
         elif missing:
             raise Underived(f"{missing} conditions on how the platform turns")
         if not any(_alike(reach, other, found.length) and _same_turns(turns, others) for other, others in seen):

@@ -28,16 +28,19 @@ from ..singularity.agreement import weakest
 from .assembly_mode import AssemblyMode, ModeReader
 from .branches import Model
 from .carried import CarriedPlatform
+from .carried_modes import solve_carried
 from .drift import drift
 from .formed import formed
 from .motions import SelfMotion, self_motion
 from .planar_loops import PlanarLoops
-from .posed import PosedPlatform
+from .planar_modes import solve_loops
+from .posed import PosedPlatform, solve_posed
 from .search import FoundMode, leaves_free, search
 from .sighted import behind
+from .single_loop import solve_loop
 from .solve import SystemModes, continuum
 from .tips import TipLoci
-from .ways import better_ways, of_carrier, of_conditions, of_loops, of_single, of_tips, uncoupled
+from .ways import better_ways, solve_tips, uncoupled
 
 WITHIN = {"formation": "configurations up to trivial motions",
           "translations": "poses turned as this one", "bodies": "poses whose bodies are turned as at this one",
@@ -51,8 +54,7 @@ class AssemblyModes(Result, shown_as="modes"):
 
     ``complex``, ``complete``, ``proof``, ``degenerate`` and ``continuum`` are as for :class:`SystemModes`; ``kind`` is
     ``hidden`` or ``real``; ``motions`` are continua of modes, with what moves, as far as they were followed, and
-    ``modes`` those that lie on none; ``confined`` holds the curves of the tips (None if the measurements never decide
-    the pose, or if the modes were searched for because no such curves are known).
+    ``modes`` those that lie on none.
     """
 
     setting: ObservedRobot
@@ -62,13 +64,17 @@ class AssemblyModes(Result, shown_as="modes"):
     found: SystemModes
     modes: tuple[AssemblyMode, ...]
     near: tuple[AssemblyMode, ...]
-    confined: TipLoci | None = None
     model: Model | None = None
     motions: tuple[SelfMotion, ...] = ()
     antipodal: tuple[AssemblyMode, ...] = ()
     """Solutions of the same equations at which something is seen as the opposite value."""
     formation: Formation | None = None
     """Of several bodies: what is not seen of them at the goal."""
+
+    @property
+    def confined(self) -> TipLoci | None:
+        """The curves of the tips; None if the measurements never decide the pose, or if no such curves are known."""
+        return None if self.model is None else self.model.confined
 
     @property
     def within(self) -> str | None:
@@ -272,31 +278,30 @@ def _listed(setting: ObservedRobot, measured: MeasuredRobot, goal: ClosedConfigu
     """The modes as the solutions of the system that the tips' curves and surfaces give, or else of the conditions that
     the legs' joints give."""
     reasons, large = list[NotConfined | Unsolved | TooLarge | MissingExtra](), None
-    answers = list[tuple[TipLoci | None, Model, SystemModes]]()
+    answers = list[tuple[Model, SystemModes]]()
     exact, better = drift(goal, wanted, setting.normal.moved), None
     free = uncoupled(measured, goal)
-    tips, asked = partial(of_tips, as_written=as_written, effort=effort), partial(of_conditions, effort=effort)
-    ways = ((tips, asked, of_loops, of_carrier, of_single) if free is None else
-            (of_loops, tips, asked, of_carrier, of_single))
-    for listed in ways:
+    tips, asked = partial(solve_tips, as_written=as_written, effort=effort), partial(solve_posed, effort=effort)
+    first = (tips, asked, solve_loops) if free is None else (solve_loops, tips, asked)
+    for listed in (*first, solve_carried, solve_loop):
         if better is not None and listed not in better:
             continue
-        if listed is not of_loops and not setting.anatomy.decided:
+        if listed is not solve_loops and not setting.anatomy.decided:
             reasons.append(NotConfined(setting.robot.name, "joints inside its platform allow several poses of it"))
             continue
         try:
-            answers.append(listed(*((measured, goal) if free is None or listed is of_loops else free), exact))
+            answers.append(listed(*((measured, goal) if free is None or listed is solve_loops else free), exact))
         except (NotConfined, Unsolved, TooLarge, MissingExtra) as error:
             reasons.append(error)
-            large = error if listed is of_loops and isinstance(error, Unsolved) else large
+            large = error if listed is solve_loops and isinstance(error, Unsolved) else large
         else:
-            if answers[-1][2].complete:
-                better = () if better else better_ways(answers[-1][1])
+            if answers[-1][1].complete:
+                better = () if better else better_ways(answers[-1][0])
     if not answers:
         raise large or reasons[0]
     # what is measured leaves no freedom: a continuum is that of legs which tips alone do not show
-    confined, made, found = max(answers, key=lambda each: (each[2].complete, each[2].continuum is None,
-                                                           not better_ways(each[1])))
+    made, found = max(answers, key=lambda each: (each[1].complete, each[1].continuum is None,
+                                                 not better_ways(each[0])))
     if free is not None and made.closing is None:
         found = replace(found, proof=f"without couplings, which can only rule poses out: {found.proof}")
     reader = ModeReader(setting, measured.question if free is None else free[0].question, goal, made)
@@ -305,7 +310,7 @@ def _listed(setting: ObservedRobot, measured: MeasuredRobot, goal: ClosedConfigu
     read = [reader.read(mode, mode is at_goal) for mode in ordered]
     near = [reader.read(mode, False) for mode in found.near]
     return AssemblyModes(setting, kind, goal, pose, found, tuple(mode for mode in read if not mode.opposite),
-                         tuple(mode for mode in near if not mode.opposite), confined, made,
+                         tuple(mode for mode in near if not mode.opposite), made,
                          antipodal=tuple(mode for mode in read if mode.opposite))
 
 

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ...geometry.vectors import Array, cross, perpendicular, pose, rotation_about
+from ...geometry.vectors import Array, plane_axes, pose, rotation_about
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.tasks import solve as close
 from ...tolerances import NUMBER_ROUNDING, SOLVED
@@ -157,8 +157,7 @@ class PlanarLoops(System):
     @cached_property
     def frame(self) -> Array:  # type: ignore[override]
         """Two unit vectors of the plane; shape (2, 3)."""
-        first = perpendicular(self.normal)
-        return np.array([first, cross(self.normal, first)])
+        return plane_axes(self.normal)
 
     @cached_property
     def forms(self) -> list[dict[Exponents, complex]]:

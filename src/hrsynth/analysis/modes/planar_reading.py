@@ -13,7 +13,7 @@ import numpy as np
 from ...budgets import LARGEST_GEAR
 from ...constraints.pattern import placing_links
 from ...errors import NotConfined
-from ...geometry.vectors import Array, cross, perpendicular, transform
+from ...geometry.vectors import Array, cross, plane_axes, transform
 from ...kinematics.configuration import ClosedConfiguration
 from ...mechanism import Joint, JointType, Observation, graphs
 from ...mechanism.observations.direction import Direction
@@ -69,8 +69,7 @@ class _Reading:
             along = abs(float(self.axes.get(joint.name, np.zeros(3)) @ self.normal))
             if joint.type not in KINDS or abs(along - (not joint.type.slides)) > SAME_DIRECTION:
                 raise self._refused(f"joint {joint.name} is not one of a planar mechanism")
-        first = perpendicular(self.normal)
-        self.frame = np.array([first, cross(self.normal, first)]) / goal.twin.length
+        self.frame = plane_axes(self.normal) / goal.twin.length
         self.middle = np.mean([self._centre(joint) for joint in self.joints], axis=0)
         self.places = {link: i for i, link in enumerate(self.mechanism.links)}
         self.dropped = 0.0

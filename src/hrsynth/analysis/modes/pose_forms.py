@@ -21,7 +21,7 @@ from math import prod
 import numpy as np
 
 from ...geometry.ranks import decomposed
-from ...geometry.vectors import Array, cross, perpendicular
+from ...geometry.vectors import Array, cross, plane_axes
 from ...tolerances import INDEPENDENT_PLANES, INDEPENDENT_RATES, NO_POSE, RANK_OF_FORMS
 from .conditions import OnPlane, PoseCondition
 
@@ -61,8 +61,7 @@ class Poses:
     @classmethod
     def planar(cls, n: Array) -> Poses:
         """Those in a plane with a normal."""
-        first = perpendicular(n)
-        return cls(np.array([[1.0, 0.0], *([0.0, v] for v in n)]), np.column_stack([first, cross(n, first)]))
+        return cls(np.array([[1.0, 0.0], *([0.0, v] for v in n)]), np.column_stack([*plane_axes(n)]))
 
     @classmethod
     def translating(cls) -> Poses:

@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from ...geometry.vectors import Array, cross, perpendicular
+from ...geometry.vectors import Array, cross, plane_axes
 from ...tolerances import PARALLEL
 from .curves import Circle, Curve, Line, Plane, Point, Reach, Sphere, length
 from .polynomials import Quadric
@@ -70,8 +70,7 @@ def spatial_frame(curves: Sequence[Reach], size: float) -> WorkingFrame:
     directions += [curve.normal for curve in curves if isinstance(curve, Plane)]
     shared = [sum(_parallel(a, b) for b in directions) for a in directions]
     n = directions[int(np.argmax(shared))] if directions else np.array([0.0, 0.0, 1.0])
-    e = perpendicular(n)
-    return WorkingFrame(_middle(curves), np.array([e, cross(n, e), n]), _power(size), n)
+    return WorkingFrame(_middle(curves), np.array([*plane_axes(n), n]), _power(size), n)
 
 
 def planar_frame(curves: Sequence[Reach], X_plane: Array, size: float) -> WorkingFrame:
@@ -80,8 +79,8 @@ def planar_frame(curves: Sequence[Reach], X_plane: Array, size: float) -> Workin
     shared = [sum(_parallel(a, b) for b in lines) for a in lines]
     first = lines[int(np.argmax(shared))] if lines else X_plane[:3, 0]
     n = X_plane[:3, 2]
-    first = perpendicular(n, first)
-    return WorkingFrame(_middle(curves), np.array([first, cross(n, first)]), _power(size), first)
+    axes = plane_axes(n, first)
+    return WorkingFrame(_middle(curves), axes, _power(size), axes[0])
 
 
 class Rounded:
@@ -283,8 +282,7 @@ def conditions(tip: Conic, reach: Reach, frame: WorkingFrame, numbers: Numbers) 
 def normals(reach: Line | Circle | Plane) -> tuple[Array, ...]:
     """The normal of a plane or of a circle's, or of two planes that hold a line."""
     if isinstance(reach, Line):
-        first = perpendicular(reach.direction)
-        return first, cross(reach.direction, first)
+        return tuple(plane_axes(reach.direction))
     return (reach.axis if isinstance(reach, Circle) else reach.normal,)
 
 

@@ -79,7 +79,7 @@ class SingleLoop(CarriedPlatform):
         return found
 
 
-def _times(a: Any, b: Any) -> Any:
+def dual_product(a: Any, b: Any) -> Any:
     """The product of dual quaternions (8,)."""
     def product(p: Any, q: Any) -> Any:
         v, w = p[1:], q[1:]
@@ -157,9 +157,9 @@ class _Linear:
         h = [self.loop.axes()[k] for k in self.order]
         one = np.array([1, 0, 0, 0, 0, 0, 0, 0], dtype=object)
         two, rest = h[:2], h[2 + (len(h) == LARGEST_CHAIN):]
-        start = [one, -1 * two[0], -1 * two[1], _times(two[1], two[0])] if len(two) == 2 else [one, -1 * two[0]]
+        start = [one, -1 * two[0], -1 * two[1], dual_product(two[1], two[0])] if len(two) == 2 else [one, -1 * two[0]]
         end = ([one] if not rest else [one, rest[0]] if len(rest) == 1 else
-               [one, rest[0], rest[1], _times(rest[0], rest[1])])
+               [one, rest[0], rest[1], dual_product(rest[0], rest[1])])
         return start, end, h[2] if len(h) == LARGEST_CHAIN else None
 
     def matrix(self, t: Any) -> Any:
@@ -168,7 +168,7 @@ class _Linear:
         if h is not None:
             c, s = np.cos(TURN), np.sin(TURN)
             by = np.array([c - s * t if k == 0 else 0 for k in range(8)], dtype=object) + h * (s + c * t)
-            end = [_times(by, each) for each in end]
+            end = [dual_product(by, each) for each in end]
         return np.stack([*end, *(-1 * each for each in start)], axis=1)
 
 

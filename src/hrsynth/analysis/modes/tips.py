@@ -184,7 +184,7 @@ def _fitted(anatomy: LegDecomposition, own: Sequence[Observation], reference: st
             goal: ClosedConfiguration) -> Tip:
     """A tip's curve or surface as the pattern names it, to which the leg's moves keep."""
     B = _value(leg.tip, goal) * goal.twin.length
-    paths = _held_paths(anatomy, own, reference, leg, goal, tip.place)
+    paths = _held_paths(own, reference, leg, goal, tip.place)
     if not leg.fixed and not paths:
         raise NotConfined(anatomy.mechanism.name, f"leg {leg.label} cannot be moved to see where its tip goes")
     worst = np.inf
@@ -280,8 +280,8 @@ def _apart(pattern: ConstraintPattern, goal: ClosedConfiguration, q: Array) -> t
     return X[1, :3, 3] - X[0, :3, 3], V[1, :3] - V[0, :3]
 
 
-def _held_paths(anatomy: LegDecomposition, own: Sequence[Observation], reference: str, leg: LockedLeg,
-                goal: ClosedConfiguration, place: Array) -> list[Array]:
+def _held_paths(own: Sequence[Observation], reference: str, leg: LockedLeg, goal: ClosedConfiguration, place: Array
+                ) -> list[Array]:
     """Positions of a tip when its leg alone, with what is measured held, is moved along each of its freedoms, and along
     some random combinations of them."""
     rest = decompose(rezero(goal))

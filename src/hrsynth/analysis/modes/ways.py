@@ -23,9 +23,7 @@ from .conditions import AtAngle
 from .planar_modes import solve_loops
 from .posed import PosedPlatform, most_posed, solve_posed
 from .sighted import all_loci
-from .single_loop import solve_loop
 from .solve import SystemModes
-from .tips import TipLoci
 
 
 def uncoupled(measured: MeasuredRobot, goal: ClosedConfiguration) -> tuple[MeasuredRobot, ClosedConfiguration] | None:
@@ -66,35 +64,19 @@ def better_ways(made: Model) -> tuple[Any, ...]:
     if not isinstance(system, PosedPlatform) or not senses:
         return ()
     few = len(system.conditions) - senses <= system.poses.freedoms
-    return (of_loops, of_carrier) if few else (of_loops,)
+    return (solve_loops, solve_carried) if few else (solve_loops,)
 
 
-def of_tips(measured: MeasuredRobot, goal: ClosedConfiguration, exact: float, as_written: bool,
-             effort: float) -> tuple[TipLoci, Model, SystemModes]:
+def solve_tips(measured: MeasuredRobot, goal: ClosedConfiguration, exact: float, as_written: bool, effort: float
+               ) -> tuple[Model, SystemModes]:
+    """All modes by where the tips of the legs can be, with the goal known to ``exact`` (m)."""
     confined, seen = all_loci(measured, goal)
     # a curve that was fitted to a leg's moves is not known to hold its exact tip
     fitted = confined.doubt is not None or any(tip.doubt is not None for tip in confined.tips)
     confined = replace(confined, error=np.inf if fitted else max([exact, *(each.error(exact, goal) for each in seen)])
                        + max([*(tip.moved for tip in confined.tips), *(angle.moved for angle in confined.angles)]),
                        as_written=as_written)
-    return confined, *solve_all(confined, effort=effort)
-
-
-def of_conditions(measured: MeasuredRobot, goal: ClosedConfiguration, exact: float, effort: float
-                   ) -> tuple[None, Model, SystemModes]:
-    return None, *solve_posed(measured, goal, exact, effort)
-
-
-def of_carrier(measured: MeasuredRobot, goal: ClosedConfiguration, exact: float) -> tuple[None, Model, SystemModes]:
-    return None, *solve_carried(measured, goal, exact)
-
-
-def of_single(measured: MeasuredRobot, goal: ClosedConfiguration, exact: float) -> tuple[None, Model, SystemModes]:
-    return None, *solve_loop(measured, goal, exact)
-
-
-def of_loops(measured: MeasuredRobot, goal: ClosedConfiguration, exact: float) -> tuple[None, Model, SystemModes]:
-    return None, *solve_loops(measured, goal, exact)
+    return solve_all(confined, effort=effort)
 
 
 def expected(measured: MeasuredRobot, at: ClosedConfiguration) -> int:

@@ -15,14 +15,14 @@ from ...batch.reach import reach, sweep
 from ...budgets import CLOSER, COARSE_GRID, LOCUS_SIDES
 from ...errors import BadRequest, PlaneNotMet, PoseNotReached
 from ...geometry.so3 import turn_about
-from ...geometry.vectors import Array
+from ...geometry.vectors import Array, nested
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
 from ...kinematics.relation import Measurement
 from ...mechanism import Mechanism
 from ...mechanism.pose import Grid, Pose, as_pose
 from ...progress import tell
-from ...results import Value, finite
+from ...results import Value
 from ...tolerances import ON_PLANE, SAME_RELATION, SAME_SPOT
 from ..measured import MeasuredRobot
 from ..observed import CameraLike, ObservedRobot, SeeLike
@@ -72,14 +72,10 @@ class Locus(Value):
         robots = {"hidden": self.hidden, "real": self.real}
         return {"axes": {name: values.tolist() for name, values in self.grid.axes}, "fixed": self.grid.fixed.to_dict(),
                 "reached": self.reached,
-                **{name: field and {"expression": _table(field.value), "type2": _table(field.type2),
-                                    "type1": _table(field.type1), "poses": field.spots.tolist(),
+                **{name: field and {"expression": nested(field.value), "type2": nested(field.type2),
+                                    "type1": nested(field.type1), "poses": field.spots.tolist(),
                                     "curve": field.curve.tolist()}
                    for name, field in robots.items()}}
-
-
-def _table(values: Array) -> list[list[float | None]]:
-    return [[finite(value) for value in row] for row in values]
 
 
 def locus(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None = None, camera: CameraLike = None, *,

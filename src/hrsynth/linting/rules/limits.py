@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 
 from lxml import etree
 
@@ -10,7 +11,7 @@ from ...description import numerals, xml
 from ...description.formats.native.write import NO_LIMIT
 from ...mechanism.model import JointType
 from ..elements import LimitElement, joints, limits, number
-from ..findings import LintRule, Mend, Spot
+from ..findings import LintRule, Spot
 from ..subject import LintedFile
 
 
@@ -19,18 +20,15 @@ def _order(file: LintedFile) -> Iterator[Spot]:
         if each.bounds is not None and each.bounds[0] > each.bounds[1]:
             lower, upper = each.bounds
             yield Spot(xml.line(each.element), f"joint {each.joint!r}: lower limit {lower:g} above the upper one "
-                                               f"{upper:g}", _exchange(each))
+                                               f"{upper:g}", partial(_exchange, each))
 
 
-def _exchange(limit: LimitElement) -> Mend:
-    def mend() -> None:
-        assert limit.lower is not None
-        assert limit.upper is not None
-        lower, upper = limit.lower.text or "", limit.upper.text or ""
-        limit.lower.put(upper)
-        limit.upper.put(lower)
-
-    return mend
+def _exchange(limit: LimitElement) -> None:
+    assert limit.lower is not None
+    assert limit.upper is not None
+    lower, upper = limit.lower.text or "", limit.upper.text or ""
+    limit.lower.put(upper)
+    limit.upper.put(lower)
 
 
 def _empty(file: LintedFile) -> Iterator[Spot]:
@@ -55,18 +53,15 @@ def _demanded(file: LintedFile) -> Iterator[Spot]:
         kind = joint.get("type")
         if joint.tag == "joint" and kind in ("revolute", "prismatic") and joint.find("limit") is None:
             yield Spot(xml.line(joint), f"joint {joint.get('name')!r} of type {kind} has no <limit>",
-                       _without_range(joint, kind))
+                       partial(_without_range, joint, kind))
 
 
-def _without_range(joint: xml.Element, kind: str) -> Mend:
-    def mend() -> None:
-        if kind == "revolute":
-            joint.set("type", "continuous")
-        else:
-            values = {key: numerals.exact(value) for key, value in NO_LIMIT.items()}
-            etree.SubElement(joint, "limit", {**values, "free": " ".join(NO_LIMIT)})
-
-    return mend
+def _without_range(joint: xml.Element, kind: str) -> None:
+    if kind == "revolute":
+        joint.set("type", "continuous")
+    else:
+        values = {key: numerals.exact(value) for key, value in NO_LIMIT.items()}
+        etree.SubElement(joint, "limit", {**values, "free": " ".join(NO_LIMIT)})
 
 
 def _unlimited(file: LintedFile) -> Iterator[Spot]:

@@ -175,12 +175,7 @@ def _turned(file: LintedFile, joint: JointSpec) -> Mend | None:
     axis = None if element is None else element.find("child_axis")
     if axis is None:
         return None
-
-    def mend() -> None:
-        values = numerals.parse(axis.get("xyz", "1 0 0"), 3)
-        axis.set("xyz", numerals.exact_vector(-values))
-
-    return mend
+    return partial(axis.set, "xyz", numerals.exact_vector(-numerals.parse(axis.get("xyz", "1 0 0"), 3)))
 
 
 def nearby(file: LintedFile) -> NearbyFreedoms | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from ...mechanism import graphs
 from ...mechanism.model import JointType
 from ...tolerances import NO_BODY
 from ..elements import InertialElement, inertials
-from ..findings import LintRule, Mend, Spot
+from ..findings import LintRule, Spot
 from ..subject import LintedFile
 from .names import OWN
 
@@ -29,15 +30,13 @@ def moving(file: LintedFile) -> set[str]:
 def _negative(file: LintedFile) -> Iterator[Spot]:
     for each in inertials(file):
         if each.mass is not None and (value := each.mass.value) is not None and value < 0:
-            yield Spot(xml.line(each.element), f"link {each.link!r} has the mass {value:g}", _without_sign(each))
+            yield Spot(xml.line(each.element), f"link {each.link!r} has the mass {value:g}",
+                       partial(_without_sign, each))
 
 
-def _without_sign(inertial: InertialElement) -> Mend:
-    def mend() -> None:
-        assert inertial.mass is not None
-        inertial.mass.put((inertial.mass.text or "").lstrip("-"))
-
-    return mend
+def _without_sign(inertial: InertialElement) -> None:
+    assert inertial.mass is not None
+    inertial.mass.put((inertial.mass.text or "").lstrip("-"))
 
 
 def _zero(file: LintedFile) -> Iterator[Spot]:
@@ -62,21 +61,19 @@ def _impossible(file: LintedFile) -> Iterator[Spot]:
         if values[0] < -NO_BODY * float(np.max(np.abs(each.inertia))):
             moments = ", ".join(f"{value:.4g}" for value in np.linalg.eigvalsh(each.inertia))
             yield Spot(xml.line(each.element), f"link {each.link!r}: principal moments {moments}, of which one is "
-                                               "negative or larger than the two others together", _nearest(each))
+                                               "negative or larger than the two others together",
+                       partial(_nearest, each))
 
 
-def _nearest(inertial: InertialElement) -> Mend:
+def _nearest(inertial: InertialElement) -> None:
     """The inertia with the same second moments but for the negative ones, which are zero."""
-    def mend() -> None:
-        assert inertial.inertia is not None
-        values, vectors = second_moments(inertial.inertia)
-        kept = np.maximum(values, 0.0)
-        floor = 2 * NO_BODY * float(np.sum(kept))  # no rounding of the written digits is below zero again
-        moments = vectors @ np.diag(np.maximum(kept, floor)) @ vectors.T
-        matrix = np.trace(moments) * np.eye(3) - moments
-        inertial.write((matrix + matrix.T) / 2)
-
-    return mend
+    assert inertial.inertia is not None
+    values, vectors = second_moments(inertial.inertia)
+    kept = np.maximum(values, 0.0)
+    floor = 2 * NO_BODY * float(np.sum(kept))  # no rounding of the written digits is below zero again
+    moments = vectors @ np.diag(np.maximum(kept, floor)) @ vectors.T
+    matrix = np.trace(moments) * np.eye(3) - moments
+    inertial.write((matrix + matrix.T) / 2)
 
 
 def _missing(file: LintedFile) -> Iterator[Spot]:

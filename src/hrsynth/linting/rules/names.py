@@ -5,12 +5,13 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterator
+from functools import partial
 
 from ...description import xml
 from ...description.chains import CUT, END, TIP
 from ...mechanism import graphs
 from ..elements import joints
-from ..findings import LintRule, Mend, Spot
+from ..findings import LintRule, Spot
 from ..subject import LintedFile
 
 RESERVED = re.compile(r"__.*__|world|.*::.*")
@@ -71,14 +72,7 @@ def _unused(file: LintedFile) -> Iterator[Spot]:
             alone = len(part) == 1 and name not in (graph.base, graph.platform)
             element = file.element(graph.links[name].line, "link", name=name) if alone else None
             yield Spot(graph.links[name].line, f"link {name!r}: no joint connects it to the others",
-                       None if element is None else _removed(element))
-
-
-def _removed(element: xml.Element) -> Mend:
-    def mend() -> None:
-        remove(element)
-
-    return mend
+                       None if element is None else partial(remove, element))
 
 
 def remove(element: xml.Element) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 
@@ -88,7 +89,7 @@ def _axis(file: LintedFile) -> Iterator[Spot]:
             size = 1.0 if vector is None else float(np.linalg.norm(vector))
             if vector is not None and size > 0 and abs(size - 1) > UNIT_AXIS:
                 yield Spot(xml.line(axis), f"joint {joint.get('name')!r}: an axis of length {size:.6g}",
-                           _of_length_one(axis, vector))
+                           partial(axis.set, "xyz", numerals.axis(vector)))
 
 
 def _vector(text: str | None) -> Array | None:
@@ -96,13 +97,6 @@ def _vector(text: str | None) -> Array | None:
         return None if text is None else numerals.parse(text, 3)
     except ValueError:
         return None
-
-
-def _of_length_one(axis: xml.Element, vector: Array) -> Mend:
-    def mend() -> None:
-        axis.set("xyz", numerals.axis(vector))
-
-    return mend
 
 
 def _inertia(file: LintedFile) -> Iterator[Spot]:

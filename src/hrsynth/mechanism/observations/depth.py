@@ -12,7 +12,7 @@ import numpy as np
 
 from ...geometry.jets import Jet
 from ...geometry.screws import force
-from ...geometry.vectors import Array, Numbers, perpendicular
+from ...geometry.vectors import Array, Numbers, plane_axes
 from ..observation import Drawn
 from ..sights import HeldPlace, MetricPoint, Sighting, VirtualJoint, kept_in
 
@@ -57,9 +57,8 @@ class PointDepth(MetricPoint):
         return [force(at.z, at.B)]
 
     def chain(self, at: Sighting) -> tuple[VirtualJoint, ...]:
-        x = perpendicular(at.z)
-        return (VirtualJoint("P", at.B, (at.z,), actuated=True), VirtualJoint("P", at.B, (x,)),
-                VirtualJoint("P", at.B, (np.cross(at.z, x),)), VirtualJoint("S", at.B))
+        aside = (VirtualJoint("P", at.B, (axis,)) for axis in plane_axes(at.z))
+        return VirtualJoint("P", at.B, (at.z,), actuated=True), *aside, VirtualJoint("S", at.B)
 
     def loci(self, at: Sighting) -> tuple[HeldPlace, ...]:
         return (kept_in(at.B, at.B, at.z),)

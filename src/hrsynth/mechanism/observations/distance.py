@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...geometry.jets import Jet, inner
+from ...geometry import components
+from ...geometry.jets import Jet
 from ...geometry.screws import force, normals
 from ...geometry.vectors import Array, Numbers, unit
 from ..observation import Drawn
@@ -38,7 +39,7 @@ class PointDistance(MetricPoint):
 
     @staticmethod
     def fed(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
-        return [inner(p, p).sqrt() - float(wanted[0])]
+        return [components.dot(p, p).sqrt() - float(wanted[0])]
 
     @staticmethod
     def outline(p: Array, d: Array, r: float, size: float) -> Drawn:

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...errors import NotMeasured
-from ...geometry.jets import Jet, inner, moment
+from ...geometry import components
+from ...geometry.jets import Jet
 from ...geometry.vectors import Array, Numbers, cross, unit
 from ..images import SeenLine, line_fed
 from ..sights import Sighting, VirtualJoint, across, apart, normalised, on_plane
@@ -30,10 +31,10 @@ def tangent(p: Array, d: Array, r: Array) -> Array:
 
 def touching(p: Sequence[Jet], d: Sequence[Jet], r: Jet) -> list[Jet]:
     """The same of any length, with derivatives."""
-    along = inner(p, d)
+    along = components.dot(p, d)
     foot = [a - along * b for a, b in zip(p, d, strict=True)]
-    high = (inner(foot, foot) - r * r).sqrt()
-    return [r * f + high * m * -1.0 for f, m in zip(foot, moment(p, d), strict=True)]
+    high = (components.dot(foot, foot) - r * r).sqrt()
+    return [r * f + high * m * -1.0 for f, m in zip(foot, components.cross(p, d), strict=True)]
 
 
 def tangent_partials(p: Array, d: Array, r: Array) -> tuple[Array, Array]:

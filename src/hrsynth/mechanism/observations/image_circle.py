@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...errors import BadMechanism
-from ...geometry.jets import Jet, inner
+from ...geometry import components
+from ...geometry.jets import Jet
 from ...geometry.vectors import Array, Numbers, dot
 from ..images import ellipse_fed, ellipse_image, ellipse_slope, shifted_ellipse
 from ..observation import Drawn
@@ -89,7 +90,7 @@ class ImageCircle(CameraObservation):
 
     @staticmethod
     def fed(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
-        h, rest = inner(p, d), inner(p, p) - r * r
+        h, rest = components.dot(p, d), components.dot(p, p) - r * r
         Q = [[rest * d[i] * d[k] - h * (p[i] * d[k] + p[k] * d[i]) + (h * h if i == k else 0.0) for k in range(3)]
              for i in range(3)]
         return ellipse_fed(Q, _matrix(wanted))

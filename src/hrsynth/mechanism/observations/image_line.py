@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...geometry.jets import Jet, moment
+from ...geometry import components
+from ...geometry.jets import Jet
 from ...geometry.vectors import Array, Numbers, cross, hat, unit
 from ..images import SeenLine, line_fed
 from ..sights import Sighting, VirtualJoint, across, apart, normalised, on_plane
@@ -51,7 +52,7 @@ class ImageLine(SeenLine):
 
     @staticmethod
     def fed(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
-        return line_fed(moment(p, d), wanted)
+        return line_fed(components.cross(p, d), wanted)
 
     def chain(self, at: Sighting) -> tuple[VirtualJoint, ...]:
         apart(at, at.foot, 0.0, f"image_line {self.leg!r}", "a line that does not meet it")

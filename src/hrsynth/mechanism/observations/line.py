@@ -10,9 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...geometry.jets import Jet, moment
+from ...geometry import components
+from ...geometry.jets import Jet
 from ...geometry.screws import couple, force, normals
-from ...geometry.vectors import Array, Numbers, cross, frozen, hat, perpendicular, unit
+from ...geometry.vectors import Array, Numbers, cross, frozen, hat, plane_axes, unit
 from ...tolerances import LINE_AT_CENTRE
 from ..images import tilted
 from ..observation import Drawn
@@ -35,8 +36,7 @@ def line_chain(at: Sighting) -> tuple[VirtualJoint, ...]:
     away = at.foot - at.C
     if np.linalg.norm(away) > LINE_AT_CENTRE:
         return across(at, np.cross(unit(away), at.d), unit(away), 3)
-    x = perpendicular(at.d)
-    return (VirtualJoint("P", at.B, (x,), True), VirtualJoint("P", at.B, (np.cross(at.d, x),), True),
+    return (*(VirtualJoint("P", at.B, (axis,), True) for axis in plane_axes(at.d)),
             gimbal(at.B, at.d, None, actuated=True), VirtualJoint("C", at.B, (at.d,)))
 
 
@@ -69,7 +69,7 @@ class SpaceLine(CameraObservation):
 
     @staticmethod
     def fed(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
-        return [a - b for a, b in zip([*d, *moment(p, d)], wanted.tolist(), strict=True)]
+        return [a - b for a, b in zip([*d, *components.cross(p, d)], wanted.tolist(), strict=True)]
 
     def sensed(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
         """Its point nearest to C beside its place, its direction in a cone."""

@@ -22,8 +22,6 @@ from ...geometry.vectors import Array
 from ...tolerances import AFFINE_ROUNDING, CHAIN_ROUNDING, FOLLOWED, NARROWEST_RISING_CONE, SHORTEST_SLICE
 from .pose_error import Number, PoseError
 
-FIRST_STEP = 0.125
-"""Length of the first slice that is tried, in t: at 1 E is about the level that is wanted."""
 LONG_SLICE = 1 / 16
 """Length of a slice above which it is made shorter before its cone is cut."""
 LONGER = 1.5

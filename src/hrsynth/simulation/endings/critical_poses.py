@@ -14,6 +14,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from ...analysis.branch.carried_vectors import CarriedVector, SweptChains
 from ...analysis.observed import ObservedRobot
 from ...budgets import (
     POSE_BESIDE,
@@ -35,7 +36,6 @@ from ...mechanism.observations.direction import SeenAxis
 from ...progress import tell
 from ...results import Value
 from ...tolerances import COVER_REACH, FOLLOWED, SAME_ENDING
-from .carried import CarriedVector, SweptChains
 from .cover import bounds
 from .descent import CriticalPoint, descend
 from .error import RestSystem

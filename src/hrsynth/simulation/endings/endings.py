@@ -15,6 +15,7 @@ from ...analysis.aspects.leg_forms import LegPattern, pattern
 from ...analysis.aspects.path import CLEAR
 from ...analysis.aspects.path_segments import path_coordinates
 from ...analysis.aspects.vector_expressions import NoLegForm
+from ...analysis.branch.carried_vectors import SweptChains
 from ...analysis.measured import MeasuredRobot
 from ...analysis.modes.modes import AssemblyModes, modes
 from ...analysis.observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike
@@ -36,7 +37,6 @@ from ...tolerances import CRITICAL_FLAT, DAMPED, SAME_ENDING, SEEN_ABOVE, VANISH
 from ..ending import ANTIPODAL, BOUNDARY, GOAL, MODE, rest
 from ..law import FixedDirections, Law, Measures, measured, supposed_planes
 from ..servo import require_regular, require_seen, require_sight
-from .carried import SweptChains
 from .completeness import Covers
 from .critical_poses import Further, Lift, critical_poses
 from .descent import descend, walked

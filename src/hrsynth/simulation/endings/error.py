@@ -15,6 +15,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from ...analysis.branch.carried_vectors import Product, SweptChains, Total, add_bend, add_slope, outer, row_product
 from ...analysis.branch.loops import GearEquation, JointLoop, LoopRow, LoopSystem, loop_system
 from ...geometry.affine import crossed, stacked
 from ...geometry.jets import Jet, angle
@@ -28,7 +29,6 @@ from ...mechanism.observations.encoder import AngleEncoder, SlideEncoder
 from ...mechanism.sights import CameraObservation
 from ...results import Value
 from ...tolerances import RANK_CUTOFF
-from .carried import CarriedVector, Product, SweptChains, Total, add_bend, add_slope, outer
 
 Row = tuple[JointLoop, LoopRow]
 
@@ -361,18 +361,6 @@ def independent(rates: Array, rank: int | None = None) -> list[int]:
         rank = int(np.median((np.linalg.svd(rates, compute_uv=False) > RANK_CUTOFF).sum(axis=-1)))
     _, _, order = qr(np.concatenate(list(rates), axis=-1).T, mode="economic", pivoting=True)
     return sorted(order[:rank].tolist())
-
-
-def row_product(carrier: SweptChains, loop: JointLoop, row: LoopRow) -> Product:
-    """An equation of a loop as a product that vanishes."""
-    if row.kind == "direction":
-        assert row.one is not None
-        assert row.other is not None
-        return Product(carrier.direction(loop.chains[0], row.one), carrier.direction(loop.chains[1], row.other),
-                       float(row.one @ row.other))
-    assert row.one is not None
-    k = carrier.direction(loop.chains[0], row.one) if row.carried else CarriedVector(row.one)
-    return Product(k, carrier.point(loop.chains[1], loop.point) - carrier.point(loop.chains[0], loop.point))
 
 
 def term(system: LoopSystem, reference: str, seen: Observation, value: Array, plane: Array | None = None) -> ErrorTerm:

@@ -11,6 +11,7 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
+from ...analysis.branch.carried_vectors import SweptChains
 from ...analysis.observed import ObservedRobot, restricted
 from ...budgets import (
     ENDING_DESCENTS,
@@ -37,7 +38,6 @@ from ...progress import tell
 from ...results import Value
 from ...tolerances import CLOSURES_MEET, CRITICAL_FLAT, SAME_ENDING, SEEN_ABOVE
 from ..law import Law
-from .carried import SweptChains
 from .descent import CriticalPoint, are_closed, closed, descend, walked
 from .error import DirectionTerm, RestEquations, RestSystem
 

@@ -12,6 +12,7 @@ from ....budgets import LARGEST_NUMBER
 from ....errors import BadRequest
 from ....geometry.vectors import Array, inverse, pose, unit
 from ....mechanism.model import Joint, JointType, Limits, Mechanism, Motor
+from ....mechanism.screws import elementary
 from ....tolerances import AT_ORIGIN, SAME_DIRECTION
 from ... import chains, numerals, xml
 from ...annotations import IMAGE, camera_attributes
@@ -101,7 +102,7 @@ class _NativeWriter:
         X_J = X_P @ X_PJ if attributes else X_P
         parts: list[tuple[JointType, Array | None]] = [(joint.type, None)]
         if joint.type not in (JointType.FREE, JointType.FIXED):
-            parts = [*chains.parts(joint.type, _local_axes(joint, X_J))]
+            parts = [*elementary(joint.type, _local_axes(joint, X_J))]
         names = joint_names(joint)
         links = [joint.predecessor, *names[:-1], joint.name + chains.TIP if tip else joint.successor]
         elements = []

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ....geometry.vectors import Array, frozen, inverse, perpendicular, pose
+from ....geometry.vectors import Array, frozen, inverse, plane_axes, pose
 from ....mechanism.model import JointType
 from ... import xml
 from ...jointgraph import LOOP_TYPES, FrameSpec, JointGraph, Z, spanning_tree, zero_poses
@@ -106,8 +106,7 @@ def _constraint_end(reader: UrdfReader, element: xml.Element, side: str, kind: J
     X = reader.pose(origin)
     if kind.axes == 1:
         z = _constraint_axis(reader, element, side)
-        x = perpendicular(z)
-        X = X @ pose(rotation=np.column_stack((x, np.cross(z, x), z)))
+        X = X @ pose(rotation=np.column_stack((*plane_axes(z), z)))
     return FrameSpec(None if name is None else name.strip(), frozen(X), xml.line(element))
 
 

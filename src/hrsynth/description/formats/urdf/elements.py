@@ -11,8 +11,9 @@ from lxml import etree
 from ....errors import BadRequest
 from ....geometry.vectors import Array
 from ....mechanism.model import Coupling, JointType, Limits, Link, Motor
+from ....mechanism.screws import elementary
 from ....mechanism.sights import NamedCamera
-from ... import chains, xml
+from ... import xml
 from ...elements import XmlReader
 from ...jointgraph import LOOP_TYPES, ORIGIN, FrameSpec, JointSpec
 from ...sights import SightSpec, spec_of
@@ -142,7 +143,7 @@ class UrdfReader(XmlReader):
                 self.defect(joint.line, "a planar joint's own link takes the name of a link", name)
             self.links.setdefault(name, Link(name, line=joint.line))
         ends = [joint.ends[0], *(FrameSpec(name, ORIGIN, joint.line) for name in names[:2]), joint.ends[1]]
-        for number, (kind, axis) in enumerate(chains.parts(JointType.PLANAR, joint.axes)):
+        for number, (kind, axis) in enumerate(elementary(JointType.PLANAR, joint.axes)):
             name = names[number]
             if name in self.tree or name in self.loops:
                 self.defect(joint.line, "a planar joint's own joint takes the name of a joint", name)

@@ -11,13 +11,13 @@ import numpy as np
 
 from ....analysis.accuracy.accuracy import sees_all
 from ....analysis.accuracy.cones import Blur
-from ....analysis.accuracy.error_map import Mapper, nested
+from ....analysis.accuracy.error_map import Mapper
 from ....analysis.accuracy.pose_errors import attained
 from ....analysis.singularity.agreement import weakest
 from ....batch.reach import spread
 from ....budgets import FARTHEST_POSE, LARGEST_STUDIO_PLANE, LARGEST_STUDIO_SWEEP
 from ....errors import BadRequest
-from ....geometry.vectors import Array
+from ....geometry.vectors import Array, nested
 from ....kinematics.configuration import ClosedConfiguration
 from ....kinematics.coordinates import Coordinates
 from ....kinematics.steps import track

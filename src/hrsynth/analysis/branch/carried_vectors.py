@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...analysis.branch.loops import LoopSystem, Swept, mapped
 from ...geometry.affine import AffineForms, crossed, dotted, stacked
 from ...geometry.vectors import Array
+from .loops import JointLoop, LoopRow, LoopSystem, Swept, mapped
 
 Places = NDArray[np.intp]
 
@@ -97,6 +97,18 @@ class SweptChains:
 
 def _parts(chain: tuple[int, ...], columns: Callable[[], Any], axes: Any) -> tuple[ChainColumns, ...]:
     return (ChainColumns(np.array(chain, dtype=np.intp), columns(), axes),) if chain else ()
+
+
+def row_product(carrier: SweptChains, loop: JointLoop, row: LoopRow) -> Product:
+    """An equation of a loop as a product that vanishes."""
+    if row.kind == "direction":
+        assert row.one is not None
+        assert row.other is not None
+        return Product(carrier.direction(loop.chains[0], row.one), carrier.direction(loop.chains[1], row.other),
+                       float(row.one @ row.other))
+    assert row.one is not None
+    k = carrier.direction(loop.chains[0], row.one) if row.carried else CarriedVector(row.one)
+    return Product(k, carrier.point(loop.chains[1], loop.point) - carrier.point(loop.chains[0], loop.point))
 
 
 class Total:
