@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from adversary.robot import Robot, State
+from adversary.search import solve
 from analysis.singularity.found import found
 from hrsynth.analysis.check import check
 from hrsynth.analysis.singularity.locus import locus
@@ -16,6 +20,11 @@ from hrsynth.present.maps import _drawn_locus
 from hrsynth.present.text.poses import singularity
 from oracle import Oracle
 
+ROBOTS = Path(__file__).resolve().parents[2] / "robots"
+TURNED = {"guide_1": -0.32956881178506797, "guide_2": 0.22019586075863637, "guide_3": 0.009321378487941519,
+          "elbow_1__1": 0.3992829854782661, "elbow_2__1": 0.8042627383149855, "elbow_3__1": 0.6056722058486278,
+          "elbow_1__2": 0.007883001322778025, "elbow_2__2": -0.392619284127817, "elbow_3__2": 0.7947630011795785,
+          "wrist_1__1": -1.576940091041292, "wrist_1__2": -0.6610939500964069}
 LOST = "x=0.1799995866409783,y=0.3117684294034798,z=1.490904856940507"
 
 
@@ -43,6 +52,31 @@ def test_a_3_upu_loses_a_turn_where_its_two_watched_directions_are_not_parallel(
     assert any("constraint singularities" in each for each in answer.unexamined)
     assert "constraint singularities" in singularity(answer)
     assert len(posture.gained) == posture.dof - answer.verdict.dof == 1
+
+
+def test_a_3_puu_whose_platform_has_turned_loses_a_freedom_though_its_rails_are_not_parallel() -> None:
+    """In another operation mode, with loops of full rank: *never* does not speak of it, and the answer says so."""
+    answer = found("3puu", "1,2")
+    assert answer.condition is not None
+    assert answer.condition.never
+    file = Robot.read(ROBOTS / "3puu.urdf")
+    zero = file.zero()
+    turned = State(zero.theta.copy(), zero.quats)
+    for joint, value in TURNED.items():
+        turned.theta[0, file.coordinates[joint]] = value
+    turned = solve(file, file.loops, turned)[0]
+    R, p, _ = file.frames(turned)
+    robot = answer.setting.mechanism
+    oracle, state = Oracle(robot), np.tile(np.eye(4), (len(robot.links), 1, 1))
+    for k, link in enumerate(robot.links):
+        state[k, :3, :3], state[k, :3, 3] = R[0, file.number(link)], p[0, file.number(link)]
+    seen = tuple(o for o in answer.question.observations if isinstance(o, Direction))
+    assert oracle.error(state) < 1e-9
+    assert oracle.mobility(state) == oracle.mobility(oracle.zero()) == 3
+    assert np.trace(oracle.pose(state, robot.platform)[:3, :3]) < 1  # by more than a right angle
+    values = np.linalg.svd(rows(robot, oracle, state, seen), compute_uv=False)
+    assert values[-1] < 1e-6 < 1e-2 < values[-2]
+    assert any("and those at which it has turned" in each for each in answer.unexamined)
 
 
 @pytest.mark.parametrize(("robot", "legs"), [("3rrr_m1", None), ("rrrrr_m1", None), ("3rps", None)])
