@@ -133,7 +133,7 @@ def test_cures_that_are_none_at_zero_are_told(robot: str, observe: str, fewer: i
     answer, oracle = found(robot, observe), Independent(load(robot), observe, at_zero=True)
     dof = answer.now.dof
     shown = [dof - oracle.lost(frozenset(name_of(m.observation) for m in each.measurements)) for each in answer.sets]
-    assert [each.rank_at_zero for each in answer.sets] == [None if rank == dof else rank for rank in shown]
+    assert [each.verdict.rank_at_zero for each in answer.sets] == [None if rank == dof else rank for rank in shown]
     assert sum(rank < dof for rank in shown) == fewer
     assert [each.to_dict().get("rank_at_zero", dof) for each in answer.sets] == shown
     said = text.advice(answer)

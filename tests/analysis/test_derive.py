@@ -471,7 +471,7 @@ def test_a_second_attempt_keeps_to_the_form_that_was_asked_for(monkeypatch: pyte
 
 def test_a_zero_configuration_that_shows_fewer_freedoms_is_named():
     """How fast the watched rods of a 3-RRR turn, by hand: of the platform's three freedoms they show two there."""
-    assert derived("3rrr_m1").rank_at_zero is None
+    assert derived("3rrr_m1").verdict.rank_at_zero is None
     assert "rank_at_zero" not in derived("3rrr_m1").to_dict()
     checked = hrsynth.singular("3rrr_m1", points=5).checked
     assert checked is not None
@@ -495,5 +495,5 @@ def test_a_zero_configuration_that_shows_fewer_freedoms_is_named():
     assert values[2] < 1e-9 * values[0] < values[1]
     found = derive("3rrr_m1", at=at.pose("platform"))
     assert found.verdict.verdict == CONTROLLABLE
-    assert found.rank_at_zero == found.to_dict()["rank_at_zero"] == 2
+    assert found.verdict.rank_at_zero == found.to_dict()["rank_at_zero"] == 2
     assert "only 2 of 3 freedoms seen: the zero configuration is a Type 2 singularity" in hrsynth.text(found)

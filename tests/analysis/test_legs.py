@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import hrsynth
+from analysis.singularity.found import found as found_singular
 from hrsynth.analysis.controllability import Legs, legs
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.analysis.verdict import AT_REST, BLIND, CONTROLLABLE, PARTIAL, Verdict
@@ -29,8 +30,12 @@ def found(robot: str) -> Legs:
     return legs(load(robot))
 
 
+def table_of(answer: Legs) -> dict[tuple[str, ...], Verdict]:
+    return {each.legs: each for each in answer.sets}
+
+
 def table(robot: str) -> dict[tuple[str, ...], Verdict]:
-    return {each.legs: each for each in found(robot).sets}
+    return table_of(found(robot))
 
 
 @pytest.mark.some(1)
@@ -59,9 +64,9 @@ def test_all_sets_obey(robot: str) -> None:
     assert set(answer.minimal) == {each for each, verdict in sets.items() if verdict.rank == best and len(each) == size}
 
 
-def lost_by_oracle(robot: str, chosen: tuple[str, ...]) -> Array:
+def lost_by_oracle(setting: ObservedRobot, chosen: tuple[str, ...]) -> Array:
     """The platform twists (metres) that these legs do not see at the zero configuration, by the oracle."""
-    everything = setting_of(robot).everything
+    everything = setting.everything
     observations = [o for o in everything.question.observations if o.leg in chosen]
     oracle = Oracle(everything.twin.mechanism)
     basis = oracle.relation(state_of(everything.twin, everything.twin.q0), observations, unit_length=1.0)
@@ -78,11 +83,33 @@ def test_lost_freedoms_are_those_of_the_oracle(robot: str, size: int) -> None:
     for chosen, verdict in table(robot).items():
         if len(chosen) != size:
             continue
-        lost = lost_by_oracle(robot, chosen)
+        lost = lost_by_oracle(setting_of(robot), chosen)
         assert lost.shape[1] == len(verdict.lost)
         for freedom in verdict.lost:
             twist = freedom.twist / np.linalg.norm(freedom.twist)
             assert np.linalg.norm(twist - lost @ (lost.T @ twist)) < 1e-6, freedom.name
+
+
+@pytest.mark.some(1)
+@pytest.mark.parametrize(("robot", "singular"), [("3rps", "1,2,3"), ("gough_stewart", "1,2,3"), ("3rrr_m1", "1,2,3")])
+def test_sets_that_see_less_at_zero_are_told(robot: str, singular: str) -> None:
+    """At a pose that is singular with some legs watched, by the oracle there: of no other set less is told."""
+    checked = found_singular(robot, singular).checked
+    assert checked is not None
+    at = checked.on_locus[0]
+    answer = legs(robot, at=at.pose("platform"))
+    assert all(each.rank_at_zero is None for each in found(robot).sets)
+    for each in answer.sets:
+        shown = each.dof - lost_by_oracle(answer.setting, each.legs).shape[1]
+        assert each.rank_at_zero == (shown if shown < each.rank else None), each.legs
+        assert each.to_dict().get("rank_at_zero", each.rank) == shown
+    chosen = table_of(answer)[tuple(singular.split(","))]
+    assert chosen.verdict == CONTROLLABLE
+    assert chosen.rank_at_zero == chosen.dof - 1
+    said = " ".join(hrsynth.text(answer).split())
+    assert "a Type 2 singularity with these, fewer freedoms are seen" in said
+    assert f"{{{singular.replace(',', ', ')}}} ({chosen.dof - 1} of {chosen.dof})" in said
+    assert "fewer freedoms are seen" not in hrsynth.text(found(robot))
 
 
 def test_quattro() -> None:

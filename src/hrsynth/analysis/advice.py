@@ -15,7 +15,6 @@ from ..errors import BadRequest, HrsynthError, RankUndecided
 from ..geometry import lines
 from ..geometry.ranks import kernel_basis, largest_angle, range_basis, singular_values
 from ..geometry.vectors import Array
-from ..kinematics.relation import relation
 from ..kinematics.sampling import Samples
 from ..mechanism import Direction, Joint, JointType, Mechanism, Observation
 from ..mechanism.observations import kinds
@@ -23,9 +22,9 @@ from ..mechanism.sensors import encoders, observation_of, observed_line
 from ..progress import tell
 from ..results import Result, Value
 from ..tolerances import RANK_CUTOFF, SAME_PRICE, SAME_RELATION
-from .observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike, as_robot, as_texts, restricted, selected
+from .observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike, as_robot, as_texts, restricted
 from .question import question
-from .verdict import AT_REST, CONTROLLABLE, Verdict, fewer_at_zero, verdict_of
+from .verdict import AT_REST, CONTROLLABLE, Verdict, verdict_of
 
 AXES = {JointType.UNIVERSAL: ("first", "second"), JointType.CYLINDRICAL: ("slide", "turn")}
 """The names of the coordinates of joints that have two."""
@@ -143,14 +142,12 @@ class Cure(Value):
     verdict: Verdict
     price: float
     """Of all of them together; each is 1 where nothing else is said."""
-    rank_at_zero: int | None = None
-    """How many freedoms the zero configuration shows with it, where these are fewer than elsewhere (it is singular)."""
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
         return {"measurements": [each.to_dict() for each in self.measurements], "verdict": self.verdict.verdict,
                 "rank": self.verdict.rank, "gap": self.verdict.gap, "price": self.price,
-                **({} if self.rank_at_zero is None else {"rank_at_zero": self.rank_at_zero})}
+                **({} if self.verdict.rank_at_zero is None else {"rank_at_zero": self.verdict.rank_at_zero})}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -263,16 +260,13 @@ def _prices(text: str) -> dict[str, float]:
 
 def _verified(setting: ObservedRobot, samples: Samples,
               sets: Sequence[tuple[tuple[FurtherMeasurement, ...], float]]) -> list[Cure]:
-    """Each set with its price and its verdict at all samples, and what the zero configuration shows; those whose rank
-    has no clear gap are left out."""
-    found, start = list[Cure](), relation(samples.start, samples.question)
-    places = {each.key: place for place, each in enumerate(samples.question.observations)}
+    """Each set with its price and its verdict at all samples; those whose rank has no clear gap are left out."""
+    found = list[Cure]()
     for added, price in sets:
         watched = (*setting.observed, *(each.observation for each in added))
         try:
             verdict = verdict_of(setting, setting.labels, restricted(samples, watched, ways=False))
-            there = selected(start, [places[each.key] for each in watched])
-            found.append(Cure(added, verdict, price, fewer_at_zero(there, verdict)))
+            found.append(Cure(added, verdict, price))
         except RankUndecided:
             continue
     return found

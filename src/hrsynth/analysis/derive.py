@@ -13,7 +13,6 @@ from ..errors import BadRequest, NotCertified
 from ..geometry.ranks import range_basis
 from ..geometry.vectors import Array
 from ..kinematics.certificate import Certificate, certify
-from ..kinematics.relation import relation
 from ..kinematics.sampling import Samples
 from ..mechanism import Mechanism
 from ..mechanism.legs import LegDecomposition
@@ -30,7 +29,7 @@ from .exact import architecture as exact_architecture
 from .freedoms import Freedom, name_freedoms
 from .observed import CameraLike, LegsLike, Mobility, ObservedRobot, RobotLike, SeeLike
 from .question import question
-from .verdict import Verdict, fewer_at_zero, verdict_of
+from .verdict import Verdict, verdict_of
 
 if TYPE_CHECKING:
     from ..mechanism.pose import PoseLike
@@ -82,12 +81,6 @@ class Derivation(Result, shown_as="derive"):
         check = _check(self.setting.samples, STEP_SAMPLES)
         return tuple(step.measured(check) for step in self.taken)
 
-    @cached_property
-    def rank_at_zero(self) -> int | None:
-        """How many freedoms the zero configuration shows, where these are fewer than elsewhere (it is singular); None
-        where they are as many, or the number is not decided."""
-        return fewer_at_zero(relation(self.setting.samples.start, self.setting.samples.question), self.verdict)
-
     @property
     def dof(self) -> int:
         """The robot's dof."""
@@ -127,7 +120,7 @@ class Derivation(Result, shown_as="derive"):
             "verdict": self.verdict.verdict,
             "lost": [freedom.to_dict() for freedom in self.verdict.lost],
             "rank": self.verdict.rank, "margin": self.verdict.margin,
-            **({} if self.rank_at_zero is None else {"rank_at_zero": self.rank_at_zero}),
+            **({} if self.verdict.rank_at_zero is None else {"rank_at_zero": self.verdict.rank_at_zero}),
             **({} if self.verdict.formation is None else {"formation": self.verdict.formation.to_dict()}),
             "point_platform": self.setting.anatomy.point is not None,
             "has_interaction_matrix": self.verdict.has_interaction_matrix,

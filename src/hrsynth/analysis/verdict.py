@@ -49,6 +49,9 @@ class Verdict(Result, shown_as="verdict"):
     """The largest that does not, at the sample where it is least."""
     formation: Formation | None = None
     """Of a formation: what is not seen, trivial motions and flexes; ``dof`` are the freedoms of all bodies."""
+    rank_at_zero: int | None = None
+    """How many freedoms the zero configuration shows, where these are fewer than elsewhere (it is singular); None
+    where they are as many, the number is not decided, or several bodies are asked of."""
 
     @property
     def near(self) -> bool:
@@ -65,6 +68,7 @@ class Verdict(Result, shown_as="verdict"):
                 "lost": [freedom.to_dict() for freedom in self.lost], "gap": self.gap,
                 "has_interaction_matrix": self.has_interaction_matrix,
                 "interaction_matrix": self.has_interaction_matrix, "margin": self.margin,
+                **({} if self.rank_at_zero is None else {"rank_at_zero": self.rank_at_zero}),
                 **({} if self.formation is None else {"formation": self.formation.to_dict()})}
 
     @property
@@ -89,29 +93,24 @@ def verdict_of(setting: ObservedRobot, legs: Sequence[str], samples: Samples) ->
     gap = min(min(each.gap, each.RO.gap) for each in found)
     Rank(rank, gap).decided(what)
     dof = setting.dof
-    lost, formation = tuple[Freedom, ...](), None
+    lost, formation, at_zero = tuple[Freedom, ...](), None, None
+    start = relation(samples.start, samples.question)
     if setting.mechanism.formation:
-        formation = _formation(setting, samples, dof - rank)
-    elif rank < dof:
-        lost = _lost(setting, samples, tuple(legs), dof - rank)
+        formation = _formation(setting, samples, start, dof - rank)
+    else:
+        shown = max(dof - start.unobserved_twists.shape[1], 0)
+        at_zero = shown if shown < rank and start.gap >= RANK_GAP else None
+        lost = _lost(setting, samples, start, tuple(legs), dof - rank) if rank < dof else ()
     graph = not any(each.RI for each in found)
     said = word(rank, dof) if formation is None else formation.verdict
     return Verdict(tuple(legs), said, dof, rank, lost, gap, graph, max(each.seen.weakest for each in found),
-                   min(each.seen.dropped for each in found), formation)
+                   min(each.seen.dropped for each in found), formation, at_zero)
 
 
-def fewer_at_zero(start: Relation, found: Verdict) -> int | None:
-    """How many freedoms the zero configuration shows, where these are fewer than elsewhere (it is singular); None where
-    they are as many, the number is not decided, or several bodies are asked of. ``start`` is ρ there."""
-    if found.formation is not None:
-        return None
-    rank = found.dof - start.unobserved_twists.shape[1]
-    return max(rank, 0) if rank < found.rank and start.gap >= RANK_GAP else None
-
-
-def _formation(setting: ObservedRobot, samples: Samples, count: int) -> Formation:
-    """What is not seen of a formation, at the zero configuration where it is as at a sample, else there."""
-    member, start = samples.members[0], relation(samples.start, samples.question)
+def _formation(setting: ObservedRobot, samples: Samples, start: Relation, count: int) -> Formation:
+    """What is not seen of a formation, at the zero configuration (ρ there: ``start``) where it is as at a sample, else
+    there."""
+    member = samples.members[0]
     usual = formation_at(member.configuration, samples.question, member.relation, setting.anatomy)
     if start.unobserved_twists.shape[1] != count or start.gap < RANK_GAP:
         return usual
@@ -119,9 +118,9 @@ def _formation(setting: ObservedRobot, samples: Samples, count: int) -> Formatio
     return found if len(found.trivial) == len(usual.trivial) else usual
 
 
-def _lost(setting: ObservedRobot, samples: Samples, legs: tuple[str, ...], count: int) -> tuple[Freedom, ...]:
-    """The lost freedoms at the zero configuration where it is generic, else at a sample."""
-    start = relation(samples.start, samples.question)
+def _lost(setting: ObservedRobot, samples: Samples, start: Relation, legs: tuple[str, ...], count: int
+          ) -> tuple[Freedom, ...]:
+    """The lost freedoms at the zero configuration (ρ there: ``start``) where it is generic, else at a sample."""
     position = None
     found = start.unobserved_twists
     if found.shape[1] != count or start.gap < RANK_GAP:

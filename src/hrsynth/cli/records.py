@@ -244,6 +244,7 @@ class LegSet(TypedDict):
     has_interaction_matrix: bool
     interaction_matrix: bool
     margin: MarginRecord
+    rank_at_zero: NotRequired[Annotated[int, "at a zero configuration that shows fewer freedoms than others do"]]
     formation: NotRequired[FormationRecord]
     exact: bool
     architecture: ArchitectureRecord

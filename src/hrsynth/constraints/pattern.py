@@ -249,9 +249,11 @@ def _translating(anatomy: LegDecomposition, legs: tuple[LockedLeg, ...],
 
 def _two_bodies(anatomy: LegDecomposition, legs: tuple[LockedLeg, ...], motions: Array,
                 samples: Sequence[ClosedConfiguration]) -> ConstraintPattern | None:
-    """Two bodies that only translate, the second along one direction relative to the first."""
+    """Two bodies that only translate, the second along one direction relative to the first; with them the controlled
+    link must be at rest, which it need not where it hangs on them by loops that have dead points."""
     bodies = attached(anatomy)
-    if len(bodies) != 2 or motions.shape[2] != 4 or not vanishes(motions[:, [3, 4, 5, 9, 10, 11]]):
+    still = motions[:, [3, 4, 5, 9, 10, 11]]
+    if not anatomy.decided or len(bodies) != 2 or motions.shape[2] != 4 or not vanishes(still):
         return None
     relative = [range_basis(F[6:9] - F[:3], 1.0)[0] for F in motions]
     if any(each.shape[1] != 1 for each in relative):

@@ -1,10 +1,11 @@
 """What a named condition leaves out: poses at which the platform may move as it does nowhere else.
 
 At a constraint singularity the loops lose rank, and a platform that translates, or moves in a plane, may turn or leave
-that plane there. It then turns with rates that every leg's joints can give its end, and these are within one space for
-each leg, the span of what they can give over all samples. Where no direction is in the spaces of all legs of a body,
-where one leg alone keeps it in its plane, and where a leg with its measurements held leaves it no such motion, there is
-no such pose. A platform in space is held by what the condition names and by nothing else, at all poses.
+that plane there, and go on in another operation mode. It then turns with rates that every leg's joints can give its
+end, and these are within one space for each leg, the span of what they can give over all samples. Where no direction is
+in the spaces of all legs of a body, where one leg alone keeps it in its plane, and where a leg with its measurements
+held leaves it no such motion, there is no such pose. A platform in space is held by what the condition names and by
+nothing else, at all poses.
 """
 
 from __future__ import annotations
@@ -34,14 +35,14 @@ def unexamined(anatomy: LegDecomposition, pattern: ConstraintPattern, condition:
     folding = [leg.label for leg in anatomy.legs if leg.has_loops]
     if folding:
         found.append(f"poses at which a loop inside a leg ({', '.join(folding)}) lies flat are not examined")
-    more = ""
+    more: tuple[str, ...] = ()
     if pattern.motion in ("translations", "bodies") and may_turn(anatomy, pattern.legs, samples):
-        more = "turn"
+        more = ("turn", "turned")
     elif pattern.motion == "planar" and _may_leave_the_plane(anatomy, pattern, samples):
-        more = "leave its plane"
+        more = ("leave its plane", "left it")
     if more:
-        found.append(f"poses at which the loops lose rank, so that the platform may {more} (constraint singularities), "
-                     "are not examined")
+        found.append(f"poses at which the loops lose rank, so that the platform may {more[0]} (constraint "
+                     f"singularities), and those at which it has {more[1]} are not examined")
     return tuple(found)
 
 

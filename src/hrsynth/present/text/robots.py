@@ -71,7 +71,7 @@ def derivation(found: Derivation) -> str:
         *formation(found.verdict.formation),
         ("mode", _modes(observed)),
         ("architecture", exact_words(found.exact, found.verdict.rank)),
-        *lost(found.verdict), ("at zero", at_zero(found)),
+        *lost(found.verdict), ("at zero", at_zero(found.verdict)),
         ("", [] if found.verdict.has_interaction_matrix else NO_MATRIX),
         ("certificate", certificate(found.certificate)),
     ]
@@ -90,7 +90,7 @@ def lost(found: Verdict) -> Rows:
     return [("lost" if any(ELSEWHERE in name for name in names) else "lost at zero", names)]
 
 
-def at_zero(found: Derivation) -> list[str]:
+def at_zero(found: Verdict) -> list[str]:
     """That the zero configuration shows fewer freedoms than others, where it does."""
     rank = found.rank_at_zero
     if rank is None:
@@ -182,6 +182,11 @@ def legs(found: Legs) -> str:
     if chance:
         lines.append(f"exact except for a chance below {power_above(chance)}: identities tested at random instances")
     lines += [f"legs {', '.join(each.legs)}: {near(each)}" for each in found.sets if each.near]
+    fewer = [f"{{{', '.join(each.legs)}}} ({each.rank_at_zero} of {each.dof})" for each in found.sets
+             if each.rank_at_zero is not None]
+    if fewer:
+        lines += wrapped(f"at {found.where}, a Type 2 singularity with these, fewer freedoms are seen: "
+                         + "  ".join(fewer), more="  ")
     lines += _modes(found.setting)
     if not found.complete:
         lines.append("not all sets are listed, there are too many: " + (
@@ -257,7 +262,7 @@ def _missing(found: Advice) -> list[str]:
 
 def _singular(found: Advice) -> list[str]:
     """The sets with which the zero configuration shows fewer freedoms than others do."""
-    fewer = [[m.name for m in each.measurements] for each in found.sets if each.rank_at_zero is not None]
+    fewer = [[m.name for m in each.measurements] for each in found.sets if each.verdict.rank_at_zero is not None]
     if not fewer:
         return []
     which = "all of these" if len(fewer) == len(found.sets) else f"{len(fewer)} of these"
@@ -272,7 +277,7 @@ def _asked(found: Advice) -> list[str]:
     """The options of other commands that ask with the first set that has such, and cures at zero too where one does."""
     if not all(each.by_segment for each in found.setting.observed):
         return []
-    for each in sorted(found.sets, key=lambda each: each.rank_at_zero is not None):
+    for each in sorted(found.sets, key=lambda each: each.verdict.rank_at_zero is not None):
         see = [m.of if m.kind == "offered" else f"encoder:{m.of}" for m in each.measurements if m.kind != "leg"]
         if all(m.kind in ("leg", "offered") or (m.kind == "encoder" and m.of in found.setting.robot.joints
                                                 and m.axis is None) for m in each.measurements):
