@@ -166,13 +166,14 @@ class StructureUndecided(Unanswered):
 
 
 class NotSampled(Unanswered):
-    """Too few closed configurations could be reached from the zero configuration."""
+    """Too few closed configurations could be reached from the zero configuration, in how many ``tries``."""
 
-    def __init__(self, robot: str, reached: int, wanted: int) -> None:
-        self.robot, self.reached, self.wanted = robot, reached, wanted
-        super().__init__(f"{robot}: only {reached} closed configurations could be reached away from singularities, "
-                         f"needed: {wanted}; is the zero configuration singular, or do the loops move only where the "
-                         "file's numbers have more digits?")
+    def __init__(self, robot: str, reached: int, wanted: int, tries: int) -> None:
+        self.robot, self.reached, self.wanted, self.tries = robot, reached, wanted, tries
+        super().__init__(f"{robot}: of {tries} random walks from the zero configuration only {reached} led to a "
+                         f"configuration that counts, needed: {wanted}; the others came near a singularity or left the "
+                         "branch: start away from it (--at POSE, --keyframe NAME), or give the file's numbers more "
+                         "digits")
 
 
 class Shaky(Unanswered):
