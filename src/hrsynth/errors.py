@@ -217,8 +217,8 @@ class NothingProved(Unanswered):
 class PoseNotReached(Unanswered):
     """A pose that the robot does not reach from ``origin``: the leg that misses it most and by how much (mm, degrees),
     or None if each leg alone reaches it; how far the robot came (0 to 1), and to which pose; the ``wrist``, a joint
-    that stands for several R, that is near the end of its turns there; ``why`` all legs together do not get there, if that
-    is known; or another ``reason`` instead of these."""
+    that stands for several R, that is near the end of its turns there; ``why`` all legs together do not get there, if
+    that is known; or another ``reason`` instead of these."""
 
     def __init__(self, robot: str, pose: str, came: float, last: str, leg: str | None = None,
                  millimetres: float = 0.0, degrees: float = 0.0, origin: str = "its zero configuration",

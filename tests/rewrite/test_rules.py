@@ -343,7 +343,7 @@ def test_motors_are_counted_one_by_one() -> None:
     """A driven U has two motors; a robot may have none."""
     setting = setting_of("3upu")
     mechanism = setting.anatomy.mechanism
-    universal = [joint for joint in mechanism.joints.values() if joint.type == JointType.UNIVERSAL][0]
+    universal = next(joint for joint in mechanism.joints.values() if joint.type == JointType.UNIVERSAL)
     passive = [replace(joint, motor=None) for joint in mechanism.joints.values()]
     for joints, words in (([replace(universal, motor=Motor("m"))], "5 real motors become passive"),
                           (passive, "the robot has no motors"),
