@@ -74,7 +74,7 @@ def test_a_value_of_another_kind_is_told_with_what_is_allowed(ask: Any, allowed:
 def test_what_is_left_out_is_told_with_the_function():
     with pytest.raises(TypeError, match=r"^path: .*'goal'; it takes robot, .*goal"):
         hrsynth.path("3rrr_m1", start="x=0")  # type: ignore[call-arg]
-    with pytest.raises(BadRequest, match="how wrong the observations may be is not given, allowed: a cone"):
+    with pytest.raises(BadRequest, match="how wrong the observations may be is not given, allowed: a cone about"):
         hrsynth.accuracy("3rrr_m1")
 
 

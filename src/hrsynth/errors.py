@@ -166,13 +166,14 @@ class StructureUndecided(Unanswered):
 
 
 class NotSampled(Unanswered):
-    """Too few closed configurations could be reached from the zero configuration."""
+    """Too few closed configurations could be reached from the zero configuration, in how many ``tries``."""
 
-    def __init__(self, robot: str, reached: int, wanted: int) -> None:
-        self.robot, self.reached, self.wanted = robot, reached, wanted
-        super().__init__(f"{robot}: only {reached} closed configurations could be reached away from singularities, "
-                         f"needed: {wanted}; is the zero configuration singular, or do the loops move only where the "
-                         "file's numbers have more digits?")
+    def __init__(self, robot: str, reached: int, wanted: int, tries: int) -> None:
+        self.robot, self.reached, self.wanted, self.tries = robot, reached, wanted, tries
+        super().__init__(f"{robot}: of {tries} random walks from the zero configuration only {reached} led to a "
+                         f"configuration that counts, needed: {wanted}; the others came near a singularity or left the "
+                         "branch: start away from it (--at POSE, --keyframe NAME), or give the file's numbers more "
+                         "digits")
 
 
 class Shaky(Unanswered):
@@ -216,11 +217,12 @@ class NothingProved(Unanswered):
 class PoseNotReached(Unanswered):
     """A pose that the robot does not reach from ``origin``: the leg that misses it most and by how much (mm, degrees),
     or None if each leg alone reaches it; how far the robot came (0 to 1), and to which pose; the ``wrist``, a joint
-    that stands for several R, that is near the end of its turns there; or another ``reason`` instead of these."""
+    that stands for several R, that is near the end of its turns there; ``why`` all legs together do not get there, if
+    that is known; or another ``reason`` instead of these."""
 
     def __init__(self, robot: str, pose: str, came: float, last: str, leg: str | None = None,
                  millimetres: float = 0.0, degrees: float = 0.0, origin: str = "its zero configuration",
-                 wrist: str | None = None, reason: str | None = None) -> None:
+                 wrist: str | None = None, why: str | None = None, reason: str | None = None) -> None:
         self.robot, self.pose, self.came, self.last = robot, pose, came, last
         self.leg, self.millimetres, self.degrees = leg, millimetres, degrees
         self.wrist = wrist
@@ -229,12 +231,14 @@ class PoseNotReached(Unanswered):
             if wrist is not None:
                 reason = f"joint {wrist}, which stands for several R through one point, is near the end of its turns"
             elif leg is None:
-                reason = ("each leg alone can close there, but the straight path to it is blocked (a leg at its limit, "
-                          "another working mode)")
+                reason = "each leg alone can close there, but " + (why or (
+                    "the straight path to it is blocked (all legs together do not reach so far, a leg is at its limit, "
+                    "or it is another working mode)"))
             else:
                 turn = f" and {degrees:.3g} degrees" if degrees > 1e-6 else ""
                 reason = f"leg {leg} alone misses it by {millimetres:.4g} mm{turn}"
-            reason += f"; from {origin} the robot gets {100 * came:.3g} % of the way, to {last}"
+            part = "more than 99.9" if 0.999 < came < 1 else f"{100 * came:.3g}"
+            reason += f"; from {origin} the robot gets {part} % of the way, to {last}"
         self.reason = reason
         super().__init__(f"{robot}: the pose {pose} is not reached: {self.reason}")
 
@@ -250,9 +254,10 @@ class PoseNotReached(Unanswered):
 
 
 class PlaneNotMet(Unanswered):
-    """A plane or grid of poses none of which the robot reaches, and why."""
+    """A plane or grid of poses none of which the robot reaches, and why; that their parts depend on each other."""
 
-    def __init__(self, robot: str, plane: str, reason: str) -> None:
+    def __init__(self, robot: str, plane: str, reason: str, dependent: str | None = None) -> None:
+        reason += f"; {dependent}" if dependent else ""
         self.robot, self.plane, self.reason = robot, plane, reason
         super().__init__(f"{robot}: no pose of {plane} is reached: {reason}")
 

@@ -384,7 +384,7 @@ def test_parts_that_depend_on_each_other_are_said_to() -> None:
     1987); the nearest pose that is told is one of these, and can be asked for."""
     setting = setting_of("3rps")
     everything = setting.everything
-    words = "has 3 freedoms, and at the zero configuration parts of this pose depend on each other to first order"
+    words = "has 3 freedoms, and at zero and at a random configuration parts of this pose depend on each other"
     with pytest.raises(PoseNotReached, match=words) as refused:
         reach(everything.start, everything.question, Pose.parse("z=0.32,rpy=0.1/0.05/0"))
     assert "blocked" not in str(refused.value)
@@ -409,7 +409,34 @@ def test_a_grid_goes_on_where_the_nearest_pose_is_a_dead_end() -> None:
 
 
 def test_one_part_does_not_depend_on_itself() -> None:
+    """Huang: a 3-RPS does not turn about its normal at all."""
     everything = setting_of("3rps").everything
-    with pytest.raises(PoseNotReached, match="at the zero configuration none of them changes this part") as refused:
-        reach(everything.start, everything.question, Pose.parse("x=0.5"))
+    with pytest.raises(PoseNotReached, match="at a random configuration none of them changes this part") as refused:
+        reach(everything.start, everything.question, Pose.parse("phi=0.02"))
     assert "depend on each other" not in str(refused.value)
+
+
+@pytest.mark.parametrize(("robot", "pose"), [("3rps", "x=0.5"), ("3rps", "x=0.5,z=0.8"), ("3rrp", "x=2")])
+def test_what_is_too_far_does_not_depend(robot: str, pose: str) -> None:
+    """The point of the 3-RPS is never more than its radius aside (Huang), whatever depends to first order at zero."""
+    everything = setting_of(robot).everything
+    with pytest.raises(PoseNotReached, match="each leg alone can close there") as refused:
+        reach(everything.start, everything.question, Pose.parse(pose))
+    assert "depend" not in str(refused.value)
+    assert "changes this part" not in str(refused.value)
+
+
+def test_a_leg_without_a_way_to_a_pose_is_tried_all_the_same() -> None:
+    """Where a leg's Jacobian has no full rank and the damping has gone to nearly nothing."""
+    everything = setting_of("3rps").everything
+    with pytest.raises(PoseNotReached):
+        reach(everything.start, everything.question, Pose.parse("y=0.5,phi=0.05"))
+
+
+def test_a_constraint_singularity_on_the_way_is_told() -> None:
+    """The loops of the 3-UPU lose rank 0.36 m aside at this height; what is not reached is not 100 % of the way."""
+    everything = setting_of("3upu").everything
+    with pytest.raises(PoseNotReached, match="the loops lose rank") as refused:
+        reach(everything.start, everything.question, Pose.parse("x=0.18,y=0.31176914536239791,z=1.2"))
+    assert "more than 99.9 % of the way" in str(refused.value)
+    assert "100 %" not in str(refused.value)

@@ -186,8 +186,10 @@ def test_axes_that_are_parallel_but_for_rounding() -> None:
     found = export(robot, "numpy", box_of(robot, 0.05))
     assert found.bounds is not None
     assert found.bounds.others == 3
-    assert "Whether 3 more equations of the loops hold is checked at run time" in found.code
+    assert "Whether each of 3 more equations of the loops holds is checked at run time" in found.code
     assert "3 more equations" in exported(found)
+    alone = replace(found.bounds, others=1)
+    assert alone.more == "one more equation of the loops holds"
     program: Any = module_of(found.code)
     assert set(program.forward(np.linspace(*found.proof.proved, 50))[0]) <= {program.OK, program.UNDECIDED}
 

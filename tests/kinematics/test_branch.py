@@ -18,7 +18,7 @@ from hrsynth.analysis.verdict import verdict_of
 from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.words import parse
 from hrsynth.description import load
-from hrsynth.errors import BadMechanism, BranchPoint, Shaky
+from hrsynth.errors import BadMechanism, BranchPoint, NotSampled, Shaky
 from hrsynth.geometry.vectors import Array, rotation_about
 from hrsynth.kinematics.branch import CHANGED, TURNED, alike_after, turned_little
 from hrsynth.kinematics.configuration import ClosedConfiguration
@@ -309,3 +309,10 @@ def test_equal_parallel_rods_do_not_turn_their_plate(rods: int, seed: int) -> No
         closed = least_squares(misses, start, xtol=1e-15, ftol=1e-15, gtol=1e-15)
         assert np.abs(misses(closed.x)).max() < 1e-9
         assert np.linalg.norm(closed.x[3:]) < 0.002
+
+
+def test_walks_that_lead_nowhere_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    everything = setting_of("3rrr_m1").everything
+    monkeypatch.setattr(_Walks, "walk", lambda walks, roots: [])
+    with pytest.raises(NotSampled, match=r"of 20 random walks .* only 0 .* needed: 5; .*--at POSE"):
+        sample(everything.twin, everything.question, 5)

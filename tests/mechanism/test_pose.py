@@ -32,6 +32,7 @@ def test_what_may_be_written(text: str, wanted: Pose) -> None:
 
 
 @pytest.mark.parametrize(("text", "what"), [
+    ("x=0:1:3", "from:to:count is of a grid"),
     ("", "name=value"), ("x", "name=value"), ("x=", "not a number"), ("w=1", "unknown part"), ("x=1,x=1", "twice"),
     ("x=abc", "not a number"), ("x=nan", "not finite"), ("y=inf", "not finite"), ("z=-inf", "not finite"),
     ("x=1deg", "not a number"), ("phi=deg", "not a number"), ("phi=1e999", "not finite"), ("rpy=0/0", "rpy"),

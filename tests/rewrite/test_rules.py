@@ -11,7 +11,7 @@ import pytest
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.kinematics.certificate import certify
 from hrsynth.mechanism.builder import Builder
-from hrsynth.mechanism.model import JointType, Mechanism
+from hrsynth.mechanism.model import JointType, Mechanism, Motor
 from hrsynth.rewrite.evidence import Evidence, far_from, locus
 from hrsynth.rewrite.rule import Proposal, Refusal
 from hrsynth.rewrite.rules import end_change, leg_removal, lift, motors_off, pi_form, rules, takeover
@@ -337,3 +337,16 @@ def test_far_from() -> None:
         e = far_from(directions)
         assert np.linalg.norm(e) == pytest.approx(1)
         assert np.max(np.abs(directions @ e)) < 0.3
+
+
+def test_motors_are_counted_one_by_one() -> None:
+    """A driven U has two motors; a robot may have none."""
+    setting = setting_of("3upu")
+    mechanism = setting.anatomy.mechanism
+    universal = next(joint for joint in mechanism.joints.values() if joint.type == JointType.UNIVERSAL)
+    passive = [replace(joint, motor=None) for joint in mechanism.joints.values()]
+    for joints, words in (([replace(universal, motor=Motor("m"))], "5 real motors become passive"),
+                          (passive, "the robot has no motors"),
+                          ([*passive, replace(universal, motor=Motor("m"))], "2 real motors become passive")):
+        state = State(setting.anatomy, mechanism.changed(joints=joints))
+        assert [match.reason for match in motors_off.find(state, evidence_of(setting), "1")] == [words]

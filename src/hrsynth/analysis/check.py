@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..batch.reach import sweep
+from ..batch.reach import of_grid, sweep
 from ..errors import HrsynthError, PlaneNotMet, PoseNotReached
 from ..kinematics.configuration import ClosedConfiguration
 from ..mechanism.pose import Grid, PoseLike, asked_poses
@@ -32,6 +32,8 @@ class GridCheck(Value):
     postures: tuple[Posture | None, ...]
     free: tuple[str, ...]
     """The parts of the pose that are neither varied nor held."""
+    dependent: str | None = None
+    """That parts of its poses depend on each other, where some are not reached."""
 
     @property
     def states(self) -> tuple[str, ...]:
@@ -130,8 +132,9 @@ def check(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None,
     if cells is not None:
         require_platform(setting.robot, cells)
         places = sweep(start, question, cells, motion, setting.placer)
+        dependent = None if all(places) else of_grid(start, motion, cells)
         if not any(places):
-            raise PlaneNotMet(setting.robot.name, f"the grid {cells}", f"none of {len(places)} is")
+            raise PlaneNotMet(setting.robot.name, f"the grid {cells}", f"none of {len(places)} is", dependent)
         swept = GridCheck(cells, tuple(None if each is None else examiner.classify(each) for each in places),
-                          motion.free({*cells.names, *cells.fixed.given}))
+                          motion.free({*cells.names, *cells.fixed.given}), dependent)
     return Check(setting, postures, listed(examiner.redundant, generic=True), swept, unreached)

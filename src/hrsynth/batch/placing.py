@@ -91,7 +91,7 @@ class Placer(Value):
                     if given == count:
                         return
             if failed > 10 * (given + walks + 10):
-                raise NotSampled(self.twin.mechanism.name, given, count)
+                raise NotSampled(self.twin.mechanism.name, given, count, given + failed)
 
     def _walks(self, rng: np.random.Generator, walks: int, steps: int, limit: float) -> list[Array]:
         """The platform poses (k, 4, 4) of each walk."""

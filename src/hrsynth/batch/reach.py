@@ -22,13 +22,10 @@ from ..kinematics.tasks import Task, system
 from ..kinematics.walking import random_walk
 from ..mechanism.pose import Grid, Pose
 from ..progress import tell
-from ..tolerances import AS_PRINTED, NEAR_FOLD
+from ..tolerances import AS_PRINTED, EASY_RANK, NEAR_FOLD
 
 if TYPE_CHECKING:
     from .placing import Placer
-
-NEARER = 0.1
-"""Part of the way to a pose from which on it is worth telling where the way ends."""
 
 
 def generic_motion(start: ClosedConfiguration, question: Measurement) -> PlatformMotion:
@@ -53,28 +50,40 @@ def reach(start: ClosedConfiguration, question: Measurement, pose: Pose,
         leg, lengths, angles = worst_leg(start.twin, motion, goal)
         last = str(motion.pose(here.pose(motion.link)))
         wrist = at_end(here)
-        reason = None if leg or wrist else _dependent(start, motion, goal, came, last)
+        why = None if leg or wrist else (dependence(start, motion, goal, "this pose", came == 0)
+                                         or _lost_rank(start, here))
         raise PoseNotReached(robot, str(pose), came, last, leg, 1e3 * lengths, float(np.degrees(angles)), wrist=wrist,
-                             reason=reason)
+                             why=why)
     return found
 
 
-def dependence(start: ClosedConfiguration, motion: PlatformMotion, goal: Goal, what: str) -> str | None:
-    """That parts of wanted poses (``what``) depend on each other at the zero configuration; None where they do not. A
-    part alone depends on nothing: there the platform does not begin to change it."""
-    rows = goal.rows(start.twin, start.q)[1]
-    if not are_dependent(start, rows):
+def dependence(start: ClosedConfiguration, motion: PlatformMotion, goal: Goal, what: str, stuck: bool = False
+               ) -> str | None:
+    """That parts of wanted poses (``what``) depend on each other, at zero and elsewhere, or where the way is ``stuck``
+    at zero, there; None where they do not. A part alone depends on nothing: the platform does not change it."""
+    *_, elsewhere = random_walk(start, 3)
+    here, there = (are_dependent(at, goal.rows(at.twin, at.q)[1]) for at in (start, elsewhere))
+    if not here or not (there or stuck):
         return None
     freedoms = "1 freedom" if motion.dof == 1 else f"{motion.dof} freedoms"
-    why = "none of them changes this part" if len(rows) == 1 else f"parts of {what} depend on each other"
-    return f"the platform has {freedoms}, and at the zero configuration {why} to first order"
+    where = "at zero and at a random configuration" if there else "at zero, to first order,"
+    why = ("none of them changes this part" if len(goal.rows(start.twin, start.q)[0]) == 1 else
+           f"parts of {what} depend on each other" + ": give fewer" * there)
+    return f"the platform has {freedoms}, and {where} {why}"
 
 
-def _dependent(start: ClosedConfiguration, motion: PlatformMotion, goal: Goal, came: float, last: str) -> str | None:
-    """That parts of a wanted pose depend on each other, and the nearest pose found; None where they do not."""
-    words = dependence(start, motion, goal, "this pose")
-    nearest_one = f"; the nearest that small steps lead to is {last}" if came > NEARER else ""
-    return None if words is None else f"each leg alone can close there, but {words}{nearest_one}"
+def of_grid(start: ClosedConfiguration, motion: PlatformMotion, grid: Grid) -> str | None:
+    """The same of the poses of a grid."""
+    goal = motion.goal(next(iter(grid.poses_at([(0,) * grid.ndim]))), start.twin.mechanism.name)
+    return dependence(start, motion, goal, "these poses")
+
+
+def _lost_rank(start: ClosedConfiguration, here: ClosedConfiguration) -> str | None:
+    """That the way ended where the loops lose rank, if it did."""
+    kept, left = start.strengths, here.strengths
+    if len(left) == len(kept) and (not len(kept) or left[-1] > EASY_RANK * kept[-1]):
+        return None
+    return "on the straight path to it the loops lose rank (a constraint singularity), which small steps do not pass"
 
 
 def _arrived(at: ClosedConfiguration, goal: Goal) -> bool:

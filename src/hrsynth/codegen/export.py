@@ -165,4 +165,4 @@ def _bounds(source: Source) -> list[str]:
             f"{bounds.joints:.2g} (rad, or of that length) of the",
             f"closure (the joints that are solved for), the platform within {bounds.rotation:.2g} and "
             f"{bounds.position:.2g}:", "proved, rounding in double precision included."] + [
-        f"Whether {bounds.others} more equations of the loops hold is checked at run time."] * (bounds.others > 0)
+        f"Whether {bounds.more} is checked at run time."] * (bounds.others > 0)

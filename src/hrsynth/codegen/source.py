@@ -62,6 +62,12 @@ class ProvedBounds:
         """The largest of the three."""
         return max(self.joints, self.rotation, self.position)
 
+    @property
+    def more(self) -> str:
+        """What is tested, in words."""
+        return "one more equation of the loops holds" if self.others == 1 else (
+            f"each of {self.others} more equations of the loops holds")
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Source(Value):

@@ -83,8 +83,9 @@ def _approached(at: ClosedConfiguration, goal: Goal, manner: Goal, iterations: i
 
     def advance(here: tuple[ClosedConfiguration, Array], left: Residual, factor: float
                 ) -> tuple[ClosedConfiguration, Array] | None:
-        J = left.J
-        step = here[1] @ np.linalg.solve(J.T @ J + factor * np.eye(J.shape[1]), -(J.T @ left.error))
+        damped = np.vstack([left.J, np.sqrt(factor) * np.eye(left.J.shape[1])])
+        wanted = np.append(-left.error, np.zeros(left.J.shape[1]))
+        step = here[1] @ np.linalg.lstsq(damped, wanted, rcond=None)[0]
         q, residual = solve(twin, twin.moved(here[0].q, step), manner, tolerance=SOLVED)
         return tangent(ClosedConfiguration.of(twin, q)) if residual <= CLOSED else None
 

@@ -76,7 +76,7 @@ def ways_out(start: ClosedConfiguration, question: Measurement, rng: np.random.G
              if (beside := step_along(start, any_velocity(start, rng), leaving=singular)) is not None
              and (each := mode_at(beside, question)) is not None]
     if not found:
-        raise NotSampled(start.twin.mechanism.name, 0, 1)
+        raise NotSampled(start.twin.mechanism.name, 0, 1, LEAVING)
     if all(each.signature.dimension == 0 for each in found):
         _refuse_unmoved([each.at for each in found])
     groups = group_modes(found)

@@ -189,7 +189,7 @@ class _Walks:
         if len(members) == count:
             return members, discarded + len(lonely), True
         if len(members) + len(lonely) < count:
-            raise NotSampled(roots[0].twin.mechanism.name, len(members) + len(lonely), count)
+            raise NotSampled(roots[0].twin.mechanism.name, len(members) + len(lonely), count, draws)
         return [*members, *lonely][:count], discarded, False
 
     def _found_again(self, samples: Sequence[Sample]) -> Iterator[bool]:

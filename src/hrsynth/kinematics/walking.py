@@ -73,4 +73,4 @@ def random_walk(start: ClosedConfiguration, count: int, seed: int = 0, steps: in
             if given == count:
                 return
         if failed > 10 * (given + 10):
-            raise NotSampled(start.twin.mechanism.name, given, count)
+            raise NotSampled(start.twin.mechanism.name, given, count, given + failed)

@@ -43,8 +43,8 @@ class Noise:
             except ValueError:
                 raise BadRequest("noise: not a number", text, EXAMPLE) from None
             if not 0 < value < MOST[unit] or unit in found:
-                raise BadRequest("noise", text, "each unit once, more than zero; cones of less than 90deg, less than "
-                                                f"{WIDEST_NOISE:g}px")
+                raise BadRequest("noise", text, "each unit once, more than zero; angles below 90deg (a number alone is "
+                                                f"in radians), below {WIDEST_NOISE:g}px")
             found[unit] = value
         return cls(tuple(found.items()))
 

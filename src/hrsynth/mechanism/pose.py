@@ -335,6 +335,8 @@ def _number(value: str, name: str, text: str) -> float:
         number = float(digits)
     except ValueError:
         unit = "a number of radians, or of degrees with deg" if name in ("phi", "rpy") else "a number of metres"
+        if ":" in value:
+            unit += "; from:to:count is of a grid"
         raise BadRequest(f"pose {text!r}: {name} is not a number", value, unit) from None
     if not math.isfinite(number):
         raise BadRequest(f"pose {text!r}: {name} is not finite", value, "a finite number")

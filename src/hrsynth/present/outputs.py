@@ -79,7 +79,8 @@ class File:
                 function("paper:asked")(PNG, asked.get("width"), asked.get("font"))
         if path is None:
             if asked.get("plane") is not None and "plane" in self.takes:
-                raise BadRequest("--plane is of a figure: no file for it", asked["plane"], "--output FILE.png as well")
+                raise BadRequest("--plane says what a figure shows, and no figure is asked for", asked["plane"],
+                                 "-o FILE.png besides")
             return
         ending = Path(path).suffix.lower()
         if self.needs and all(asked[name] is None for name in self.needs):
@@ -172,7 +173,8 @@ class CodeFile(File):
         super().require(path, asked)
         endings = (".py",) if asked["lang"] == "numpy" else (".hpp", ".h")
         if path is not None and Path(path).suffix.lower() not in endings:
-            raise BadRequest(f"{self.refusal} of --lang {asked['lang']}: extension", path, endings)
+            raise BadRequest(f"{self.refusal} of --lang {asked['lang']}: extension", path,
+                             f"{', '.join(endings)} (or another --lang)")
 
 
 def figures(maker: str) -> dict[str, str]:

@@ -366,9 +366,11 @@ def test_what_an_ascent_attains_lies_between_the_two_bounds(name: str):
 
 
 def test_a_grid_says_that_parts_of_its_poses_depend_on_each_other() -> None:
-    """The point of a level 3-RPS moves along the vertical alone, to first order; that of a five-bar as it is told."""
-    with pytest.raises(PlaneNotMet, match="3 freedoms, and at the zero configuration parts of these poses depend on"):
-        accuracy(load("3rps"), cone=CONE, grid="x=5:6:3,y=5,z=0.9")
-    with pytest.raises(PlaneNotMet) as refused:
-        accuracy(load("rrrrr_m1"), cone=CONE, grid="x=50:60:3,y=50")
-    assert "depend" not in str(refused.value)
+    """Roll and pitch of a 3-RPS decide its yaw (Huang); three coordinates of its point that are too far do not depend,
+    nor do two of a five-bar's."""
+    with pytest.raises(PlaneNotMet, match="3 freedoms, and at zero and at a random configuration parts of these poses"):
+        accuracy(load("3rps"), cone=CONE, grid="z=0.3:0.4:3,rpy=0.1/0.05/0")
+    for robot, grid in (("3rps", "x=5:6:3,y=5,z=0.9"), ("rrrrr_m1", "x=50:60:3,y=50")):
+        with pytest.raises(PlaneNotMet) as refused:
+            accuracy(load(robot), cone=CONE, grid=grid)
+        assert "depend" not in str(refused.value)

@@ -223,9 +223,14 @@ def test_a_plane_that_is_not_reached() -> None:
     assert "\n" not in str(caught.value)
 
 
+def test_a_plane_whose_poses_depend_on_each_other_says_so() -> None:
+    with pytest.raises(PlaneNotMet, match="parts of this pose depend on each other"):
+        drawn(load("3rps"), plane="phi=0.1", steps=5)
+
+
 @pytest.mark.parametrize(("robot", "plane", "words"), [
-    ("delta", "phi=0.1", "cannot change phi"), ("delta", "x=0,y=0", "leaves two parts free"),
-    ("3rrr_m1", "x=0,y=0", "leaves two parts free"), ("delta", "z=abc", "z is not a number"),
+    ("delta", "phi=0.1", "cannot change phi"), ("delta", "x=0,y=0", "this one leaves z"),
+    ("3rrr_m1", "x=0,y=0", "this one leaves phi"), ("delta", "z=abc", "z is not a number"),
     ("hexaglide", None, "has no locus"), ("3prp", None, "has no locus"), ("3ppr_m1", None, "has no locus")])
 def test_planes_that_are_none(robot: str, plane: str | None, words: str) -> None:
     with pytest.raises(BadRequest, match=words):

@@ -376,6 +376,19 @@ def test_masses_shapes_and_colours_come_back(tmp_path: Path):
         assert pytest.approx(a.X, abs=1e-12) == b.X
 
 
+def test_the_colour_of_a_mesh_that_is_missing_comes_back(tmp_path: Path):
+    robot = load("3rps")
+    shape = ('<visual><geometry><mesh filename="gone.stl"/></geometry>'
+             '<material name=""><color rgba="1 0.5 0 0.25"/></material></visual>',)
+    full = replace(robot, links={**robot.links, robot.platform: replace(robot.links[robot.platform], xml=shape)})
+    assert "gone.stl" in str(save(full, tmp_path / "robot.usda"))
+    back = load(tmp_path / "robot.usda")
+    (solid,) = content_of(back.links[back.platform], back).solids
+    assert solid.file is not None
+    assert solid.file.endswith("gone.stl")
+    assert solid.colour == pytest.approx((1, 0.5, 0, 0.25), abs=1e-6)
+
+
 def test_every_type_has_its_place():
     from hrsynth.description.formats.usd.write import _FREE
 

@@ -118,7 +118,8 @@ class Blur(Value):
         others = [o for o in observed if not isinstance(o, SeenAxis)]
         if cone is None and amounts is None:
             raise BadRequest("how wrong the observations may be is not given", None,
-                             "a cone as 0.1deg, or noise as 0.1deg,0.3px,1mm: --cone, --noise")
+                             "a cone about each direction, as --cone 0.1deg, or errors of what else is observed, as "
+                             "--noise 0.1deg,0.3px,1mm")
         if cone is not None and not axes:
             raise BadRequest("cones apply to directions only", ", ".join(o.leg for o in observed), "--noise")
         if others and amounts is None:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ...batch.engine import Batch, Evaluation
 from ...batch.grids import poses_over
-from ...batch.reach import dependence, reach, sweep
+from ...batch.reach import of_grid, reach, sweep
 from ...budgets import LARGEST_GRID, POSES_FOR_NUMBA_ONCE
 from ...errors import BadRequest, Disagreement, HrsynthError, PlaneNotMet
 from ...geometry.vectors import Array, nested
@@ -157,10 +157,10 @@ class Mapper(Value):
             raise BadRequest(f"{name}: poses are found one by one; number of poses", grid.size,
                              f"at most {LARGEST_GRID}")
         seen = self._one_by_one(grid) if self.batch is None else self._together(grid)
-        dependent = None if seen.reached.all() else self._dependence(grid)
+        dependent = None if seen.reached.all() else (
+            of_grid(self.setting.everything.start, self.setting.motion, grid))
         if not seen.reached.any():
-            why = f"; {dependent}" if dependent else ""
-            raise PlaneNotMet(name, f"the grid {grid}", f"none of {grid.size} is{why}")
+            raise PlaneNotMet(name, f"the grid {grid}", f"none of {grid.size} is", dependent)
         spots = smallest_at = None
         if self.batch is not None:
             spots, smallest_at = self.spots(grid, seen, seed, checked), partial(self._smallest, grid)
@@ -168,12 +168,6 @@ class Mapper(Value):
         position, orientation = seen.position.reshape(shape), seen.orientation.reshape(shape)
         return ErrorMap(grid, seen.reached.reshape(shape), position, orientation, seen.gap, seen, spots, smallest_at,
                         dependent)
-
-    def _dependence(self, grid: Grid) -> str | None:
-        """That parts of a grid's poses depend on each other, if they do."""
-        start, motion, name = self.setting.everything.start, self.setting.motion, self.setting.robot.name
-        goal = motion.goal(next(iter(grid.poses_at([(0,) * grid.ndim]))), name)
-        return dependence(start, motion, goal, "these poses")
 
     def _together(self, grid: Grid) -> Seen:
         """Poses by the batch; of a part of them no more is kept than their errors."""

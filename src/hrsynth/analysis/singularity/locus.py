@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...batch.reach import reach, sweep
+from ...batch.reach import of_grid, reach, sweep
 from ...budgets import CLOSER, COARSE_GRID, LOCUS_SIDES
 from ...errors import BadRequest, PlaneNotMet, PoseNotReached
 from ...geometry.so3 import turn_about
@@ -111,7 +111,8 @@ def _locus(hidden: MeasuredRobot, real: MeasuredRobot | None, plane: Pose | None
     grid = framed(start, question, motion, plane, steps, met)
     configurations = sweep(start, question, grid, motion, placer)
     if not any(configurations):
-        raise PlaneNotMet(start.twin.mechanism.name, f"the plane {grid.fixed}", "none of its poses is reached")
+        raise PlaneNotMet(start.twin.mechanism.name, f"the plane {grid.fixed}", "none of its poses is reached",
+                          of_grid(start, motion, grid))
 
     def field(measured: MeasuredRobot) -> SingularityMap:
         tell("locus")
@@ -218,7 +219,10 @@ def _axes(start: ClosedConfiguration, motion: PlatformMotion, plane: Pose | None
         return plane, max(combinations(places, 2), key=lambda pair: _spread(motion, pair))
     if count == 1 and "phi" in parts and not turned and motion.dof > motion.translations.shape[1]:
         return plane, (places[0], "phi")
-    raise BadRequest(f"{name}: a plane of poses leaves two parts free", str(plane) or "none", parts)
+    left = [part for part in parts if part in places or (part == "phi" and motion.dof > motion.translations.shape[1])]
+    raise BadRequest(f"{name}: a plane leaves two parts of the pose to vary, this one leaves "
+                     f"{' and '.join(left) or 'none'}", str(plane) or "no part held",
+                     "fewer parts held; for a line of poses a grid, such as x=-0.1:0.1:9")
 
 
 def _spread(motion: PlatformMotion, pair: tuple[str, str]) -> float:

@@ -9,13 +9,16 @@ from .tables import Rows, listing
 if TYPE_CHECKING:
     from ...analysis.branch.answer import BranchPart, BranchProof, Toggle
 
+UNITS = "metres and radians"
+"""Of the intervals of motors."""
+
 
 def branch(found: BranchProof) -> str:
     """The robot, then each part: its box, how much of it is proved, and what ends that."""
     rows: Rows = [("robot", found.robot.name), ("motors", ", ".join(found.motors)),
                   ("passive", f"{len(found.passive)} coordinates"
                    + (f", {len(found.held)} idle ones held" if found.held else "")),
-                  ("box", found.box), *limits(found)]
+                  ("box", found.box), ("units", UNITS), *limits(found)]
     for part in found.parts:
         rows += _part(part)
     if not found.parts:
@@ -68,7 +71,8 @@ def _part(part: BranchPart) -> Rows:
     rows += [(f"turn of {name}", "comes back to itself" if same else "does not come back to itself")
              for name, same in part.turns]
     if part.redundant:
-        rows.append(("redundant", part.redundant + (f": closed to {part.closed_to:.2g}" if part.closed_to else "")))
+        rows.append(("redundant", part.redundant + (
+            f": each holds to {part.closed_to:.2g} (cosines, or characteristic lengths)" if part.closed_to else "")))
     return rows + ends(part)
 
 

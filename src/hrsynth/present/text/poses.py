@@ -57,6 +57,7 @@ def check(found: Check) -> str:
         beyond = sum(bool(each.beyond) for each in found.grid.postures if each is not None)
         rows.append(("grid", [
             f"{size}: " + ", ".join(f"{counts[state]} {state}" for state in sorted(counts)),
+            *([found.grid.dependent] if found.grid.dependent else []),
             *([f"{beyond} beyond limits of joints"] if beyond else []),
             *([f"held: {fixed}"] if fixed else []),
             f"free, at each pose nearest to the zero configuration: {free}" if free else "no part is free"]))

@@ -10,7 +10,7 @@ from ...analysis.exact import ExactVerdict, power_above
 from ...analysis.verdict import ELSEWHERE
 from ...errors import HrsynthError
 from ...tolerances import RANK_CUTOFF, RANK_GAP, SAME_RELATION, SURELY_SOMETHING
-from .branches import ends, limits
+from .branches import UNITS, ends, limits
 from .tables import LINE, Rows, camera, head, known, listing, sets, table, watched, wrapped
 
 if TYPE_CHECKING:
@@ -205,9 +205,9 @@ def exported(found: ExportedCode) -> str:
                   ("steps", [f"{bounds.steps} of Newton's method are enough, and an answer is within "
                              f"{bounds.error:.2g} of",
                              "the closure (rad, 1 or characteristic lengths), rounding included, proved",
-                             *[f"whether {bounds.others} more equations of the loops hold is checked at run time"
-                               for _ in range(bounds.others > 0)]]
+                             *([f"whether {bounds.more} is checked at run time"] if bounds.others else [])]
                    if bounds else "not bounded in all cells: what is not confirmed is undecided")]
+    rows.append(("units", UNITS))
     for part in proof.parts:
         rows.append(("answers for", [f"{name} {low:.6g} to {high:.6g}" for name, low, high in
                                      zip(part.motors, *part.proved, strict=True)]

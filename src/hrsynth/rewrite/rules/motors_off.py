@@ -17,8 +17,9 @@ from ..state import State
 def find(state: State, evidence: Evidence, leg: str) -> Iterator[Match[list[Joint]]]:
     """All motors of all legs at once."""
     driven = [joint for joint in state.mechanism.joints.values() if joint.actuated]
-    yield Match(driven, "1 real motor becomes passive" if len(driven) == 1 else
-                f"{len(driven)} real motors become passive")
+    count = sum(joint.type.freedoms for joint in driven)
+    yield Match(driven, "the robot has no motors" if not count else "1 real motor becomes passive" if count == 1 else
+                f"{count} real motors become passive")
 
 
 def apply(state: State, driven: list[Joint]) -> State:

@@ -84,13 +84,13 @@ def plain(value: Any) -> Any:
 
 
 def colour_of(prim: Any) -> Any:
-    """The colour of a shape: its display colour, else that of its bound preview surface."""
+    """The colour of a shape, or of what stands for a missing mesh: its display colour, else that of its bound preview
+    surface."""
     from pxr import UsdGeom, UsdShade
 
-    shape = UsdGeom.Gprim(prim)
-    own = shape.GetDisplayColorPrimvar().ComputeFlattened() if shape.GetDisplayColorPrimvar() else None
+    own, clear = (each.ComputeFlattened() if (each := UsdGeom.PrimvarsAPI(prim).GetPrimvar(name)) else None
+                  for name in ("displayColor", "displayOpacity"))
     if own:
-        clear = shape.GetDisplayOpacityPrimvar().ComputeFlattened() if shape.GetDisplayOpacityPrimvar() else None
         return [*map(float, own[0]), float(clear[0]) if clear else 1.0] if len(own) == 1 else None
     material = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()[0]
     shader = material.ComputeSurfaceSource()[0] if material else None
@@ -116,7 +116,7 @@ def told(stage: Any) -> dict[str, Any]:
                       "shape": shape, "joint": joint, "relations": relations,
                       "values": {str(each.GetName()): plain(each.Get()) for each in own},
                       "X": plain(cache.GetLocalToWorldTransform(prim)) if prim.IsA(UsdGeom.Xformable) else None,
-                      "colour": colour_of(prim) if shape else None,
+                      "colour": colour_of(prim) if shape or prim.HasAttribute("hrsynth:mesh") else None,
                       "guide": shape and UsdGeom.Imageable(prim).ComputePurpose() == "guide"})
     root = stage.GetDefaultPrim()
     return {"prims": found, "name": str(root.GetName()) if root else "",
