@@ -118,6 +118,7 @@ def test_a_flag_can_be_denied_and_words_that_repeat_are_all_taken():
     ("catalog site", "catalog site needs -o, --output DIR"),
     ("derive quattro --observ 1", "no such option, found '--observ', allowed: --observe"),
     ("derive quattro -x", "derive: no such option, found '-x'"),
+    ("derive quattro --nope", "no such option, found '--nope', allowed: --as-written, --at"),
     ("-x", "no such option, found '-x', allowed: -h, --help"),
     ("derive quattro --seed x", "--seed, found 'x', allowed: an integer, at least 0"),
     ("derive quattro --seed 1.5", "--seed, found '1.5'"), ("derive quattro --seed=-1", "--seed, found '-1'"),

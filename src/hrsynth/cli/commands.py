@@ -17,6 +17,8 @@ HELP = ("-h", "--help")
 HELP_ROW = (", ".join(HELP), "Show this message and exit.")
 POSES = ("--at", "--to", "--goal")
 """What the pose of a question is called: where the robot is, where runs should end, where one way leads."""
+LIKE_A_FLAG = 0.7
+"""How much alike a word and an option are of which it may be a misspelling."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +83,8 @@ class DeclaredCommand:
                 raise BadRequest(f"{self.name}: no such option", name, f"{usual} for the pose of this question")
             if takers := [each.name for each in beside if any(name in option.names for option in each.options)]:
                 raise BadRequest(f"{self.name} has no such option", name, f"it belongs to {', '.join(takers)}")
-            raise BadRequest(f"{self.name}: no such option", name, get_close_matches(name, flags) or sorted(flags))
+            raise BadRequest(f"{self.name}: no such option", name,
+                             get_close_matches(name, flags, cutoff=LIKE_A_FLAG) or sorted(flags))
         for name in (word.partition("=")[0] for word in joined):
             if name in flags and name in flags[name][0].old:
                 warn(f"{name} is now called {flags[name][0].names[0]}; the old name will be removed in 0.4")

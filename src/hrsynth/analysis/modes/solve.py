@@ -251,7 +251,7 @@ def _judged(system: System, square: Part, roots: Roots, others: Iterable[tuple[P
     near = () if others is None else _near(system, found, modes, others)
     near = tuple(_nearly(system, mode.q) for mode in found if mode not in left and mode.residual <= VANISHES) + near
     fitting = [mode.residual for mode in modes if mode is not at_goal]
-    proof = (f"from {len(square.legs)} of {len(system.curves)} legs: {proof}; of these "
+    proof = (f"from {len(square.legs)} of {len(system.curves)} tips: {proof}; of these "
              + words(at_goal is not None, lost, fitting, len(found) - len(left), len(open_)))
     kept = tuple(mode in left and mode not in open_ for mode in found)
     return SystemModes(len(modes), modes, enclosed and bound != "none", proof, near, _special(roots), None, bound,
