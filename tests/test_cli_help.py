@@ -114,7 +114,7 @@ def test_a_flag_can_be_denied_and_words_that_repeat_are_all_taken():
 
 
 @pytest.mark.parametrize(("words", "told"), [
-    ("derive", "derive needs ROBOT"), ("accuracy delta", "--cone, --noise"),
+    ("derive", "derive needs ROBOT"), ("accuracy delta", "as --cone 0.1deg, or"),
     ("catalog site", "catalog site needs -o, --output DIR"),
     ("derive quattro --observ 1", "no such option, found '--observ', allowed: --observe"),
     ("derive quattro -x", "derive: no such option, found '-x'"),
