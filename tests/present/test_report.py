@@ -144,6 +144,17 @@ def test_sets_that_show_all_alike_are_one_row():
     assert all(len(sets) == 1 for sets, each, _, _ in rows if each.lost)
 
 
+def test_sets_that_see_less_at_zero_are_told_in_their_row():
+    """As `legs` tells them, at a pose that is singular with the smallest sets watched."""
+    told = legs("rrrrr_m1", at="x=0,y=0.3332050807568877")
+    fewer = [each for each in told.sets if each.rank_at_zero is not None]
+    assert fewer
+    page = read(report(derive(told.setting)))
+    cells = [text_of(row[2]) for row in page.findall(".//table[@class='sets']/tbody/tr")]
+    assert sorted({cell for cell in cells if "at the zero" in cell}) == sorted(
+        {f"{each.rank} of {each.dof} ({each.rank_at_zero} at the zero configuration)" for each in fewer})
+
+
 def test_what_is_refused_is_one_sentence():
     page = read(made(*FAST)[1])
     told = [text_of(each) for each in page.xpath("//*[@class='refused']")]

@@ -102,7 +102,8 @@ def set_rows(found: Legs, most: int) -> Iterator[tuple[tuple[str, ...], Verdict,
     alike: dict[object, tuple[list[str], Verdict, str, bool]] = {}
     for each, exact in zip(found.sets[:most], found.exact, strict=False):
         cell, smallest = exact_cell(exact, each.rank), each.legs in found.minimal
-        key = each.legs if unseen(each) else (len(each.legs), each.verdict, each.rank, cell, smallest)
+        shown = (len(each.legs), each.verdict, each.rank, each.rank_at_zero, cell, smallest)
+        key = each.legs if unseen(each) else shown
         alike.setdefault(key, ([], each, cell, smallest))[0].append(", ".join(each.legs))
     for sets, each, cell, smallest in alike.values():
         yield tuple(sets), each, cell, smallest
