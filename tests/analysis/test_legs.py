@@ -13,6 +13,7 @@ import pytest
 import hrsynth
 from analysis.singularity.found import found as found_singular
 from hrsynth.analysis.controllability import Legs, legs
+from hrsynth.analysis.freedoms import name_freedoms
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.analysis.verdict import AT_REST, BLIND, CONTROLLABLE, PARTIAL, Verdict
 from hrsynth.description import load
@@ -88,6 +89,27 @@ def test_lost_freedoms_are_those_of_the_oracle(robot: str, size: int) -> None:
         for freedom in verdict.lost:
             twist = freedom.twist / np.linalg.norm(freedom.twist)
             assert np.linalg.norm(twist - lost @ (lost.T @ twist)) < 1e-6, freedom.name
+
+
+DRAWN = np.random.default_rng(7).normal(size=(6, 3))
+
+
+@pytest.mark.parametrize(("robot", "lost"), [
+    ("delta", np.eye(6)[:, :3]), ("delta", DRAWN[:, :2] * np.eye(6)[:, :3].sum(axis=1)[:, None]), ("delta", DRAWN),
+    ("gough_stewart", DRAWN[:, :2]), ("gough_stewart", np.eye(6)), ("3rps", np.column_stack([np.eye(6)[:, 2], DRAWN])),
+    ("gough_stewart", lost_by_oracle(setting_of("gough_stewart"), ("1",)))])
+def test_lost_freedoms_are_named_by_their_space_alone(robot: str, lost: np.ndarray) -> None:
+    """Whatever basis rounding gives of it: their twists span it, and are the same for any other basis."""
+    anatomy, length = setting_of(robot).anatomy, setting_of(robot).mechanism.length
+    twists = np.linalg.qr(lost / np.repeat([[length], [1.0]], 3, axis=0))[0]
+    named = name_freedoms(twists, anatomy)
+    assert len(named) == lost.shape[1]
+    assert np.linalg.matrix_rank(np.column_stack([lost, *(each.twist for each in named)]), tol=1e-8) == len(named)
+    for seed in range(5):
+        turn = np.linalg.qr(np.random.default_rng(seed).normal(size=(len(named), len(named))))[0]
+        again = name_freedoms(twists @ turn, anatomy)
+        assert [each.name for each in again] == [each.name for each in named]
+        assert all(np.allclose(a.twist, b.twist, atol=1e-9) for a, b in zip(again, named, strict=True))
 
 
 @pytest.mark.some(1)

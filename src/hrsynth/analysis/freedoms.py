@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..geometry.ranks import kernel_basis, range_basis
+from ..geometry.ranks import kernel_basis, range_basis, space_basis
 from ..geometry.vectors import Array, cross, oriented, unit
 from ..mechanism import JointType
 from ..mechanism.legs import LegDecomposition
@@ -92,10 +92,9 @@ def _spanned(twist: Array, found: list[Freedom]) -> bool:
 
 
 def directions_in(basis: Array, anatomy: LegDecomposition) -> list[Array]:
-    """Directions that span ``basis`` (3, k): base axes first, then P axes of the robot, then whatever is left."""
+    """Directions that span ``basis`` (3, k): base axes first, then P axes of the robot, then those normal to these."""
     candidates = [*np.eye(3)]
     candidates += [j.axis for j in anatomy.mechanism.joints.values() if j.type is JointType.PRISMATIC]
-    candidates += list(basis.T)
     chosen: list[Array] = []
     for candidate in candidates:
         inside = basis @ (basis.T @ candidate)
@@ -103,7 +102,9 @@ def directions_in(basis: Array, anatomy: LegDecomposition) -> list[Array]:
             stacked = np.column_stack([*chosen, candidate])
             if np.linalg.matrix_rank(stacked, tol=NAMED) == len(chosen) + 1:
                 chosen.append(oriented(unit(candidate)))
-    return chosen
+    onto = range_basis(np.column_stack(chosen), 1.0)[0] if chosen else np.zeros((3, 0))
+    rest = space_basis(basis - onto @ (onto.T @ basis), 1.0)
+    return [*chosen, *(oriented(unit(each)) for each in rest.T)]
 
 
 def direction_name(direction: Array, anatomy: LegDecomposition) -> str:
