@@ -692,7 +692,7 @@ def test_servo_text_names_the_mode_and_how_far_it_is(run):
 @pytest.mark.parametrize(("arguments", "words"), [
     (["--goal", "x=0.1", "--observe", "1"], ["do not see", "hrsynth legs"]),
     (["--goal", "x=0.1", "--observe", "7"], ["no leg or link", "'7'"]),
-    (["--goal", "x=0.1", "--noise", "90deg"], ["noise", "90deg", "less than 90deg"]),
+    (["--goal", "x=0.1", "--noise", "90deg"], ["noise", "90deg", "below 90deg"]),
     (["--goal", "x=0.1", "--noise", "1px"], ["'1px'", "allowed: 0.1deg"]),
     (["--goal", "x=0.1", "--sense", "edges", "--noise", "1deg"], ["1deg", "pixels"]),
     (["--goal", "x=0.1", "--sense", "touch"], ["touch", "exact, edges, pictures"]),

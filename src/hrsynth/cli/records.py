@@ -875,9 +875,9 @@ class LockedPlaceRecord(TypedDict):
 
 
 class BoxedRestRecord(TypedDict):
-    """A pose about which boxes prove exactly one rest that is not in the list, because the robot could not be closed
-    there or the command as computed does not vanish; `error` encloses ‖e‖; `pose` is that of the point alone from
-    which boxes count if the platform's turn follows from it."""
+    """A pose about which boxes prove exactly one critical point of ½‖e‖² that is not in the list, because the robot
+    could not be closed there or the command as computed does not vanish, as where joints lock; `error` encloses ‖e‖;
+    `pose` is that of the point alone from which boxes count if the platform's turn follows from it."""
 
     pose: PoseRecord
     stability: Literal["stable", "saddle", "unstable", "undecided"]

@@ -94,11 +94,11 @@ def _complete(found: Endings) -> list[str]:
 
 
 def _alone(cover: RestCover) -> list[str]:
-    """Rests that boxes alone prove, those that attract first."""
+    """Critical poses that boxes alone prove, those at which E is least around first."""
     some = sorted(cover.alone, key=lambda each: each.stability in ("saddle", "unstable"))
     left = len(some) - LISTED_SADDLES
-    return [*([f"{len(some)} of the rests that boxes prove are not listed above, as the robot could not be closed "
-               "there or the command as computed does not vanish:"] if some else []),
+    return [*([f"{len(some)} critical poses that boxes prove are not listed above, as the robot could not be closed "
+               "there or the command as computed does not vanish (so where joints lock):"] if some else []),
             *(f"  {each.stability} at {each.pose}, ‖e‖ = {each.error[0]:.3g}" for each in some[:LISTED_SADDLES]),
             *([f"  and {left} more (--json lists them)"] if left > 0 else [])]
 

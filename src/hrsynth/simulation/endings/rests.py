@@ -128,8 +128,9 @@ class SignedModes(Value):
 @dataclass(frozen=True, eq=False, repr=False)
 class BoxedRest(Value):
     """A pose about which boxes prove exactly one critical point of E, ‖e‖ in ``error``, that is no rest of the list:
-    the robot was not closed there, or the command as it is computed does not vanish, as where joints nearly lock.
-    ``pose`` is that of the point alone from which boxes count if the platform's turn follows from it."""
+    the robot was not closed there, or the command as it is computed does not vanish, as where joints lock or nearly
+    do; so whether the loop rests there is not said. ``pose`` is that of the point alone from which boxes count if the
+    platform's turn follows from it."""
 
     pose: Pose
     stability: str
