@@ -238,7 +238,7 @@ def test_the_rests_of_three_sliders_are_all_but_where_they_lock():
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize(("name", "at", "kinds"), [
     ("linear_delta", "x=0.061,y=-0.0337", [2, 14, 20, 8]), ("3puu", "x=0.02,y=-0.03", [2, 14, 18, 8]),
-    ("delta", "x=0.061,y=-0.0337,z=-0.63", [9, 71, 77, 15]),
+    ("delta", "x=0.061,y=-0.0337,z=-0.63", [9, 71, 77, 15]), ("delta", "x=0,y=0", [9, 62, 75, 16]),
     ("quattro_rigid", "x=-0.0652662,y=-0.031127,z=-0.534986", [22, 230, 244, 36])])
 def test_rests_of_platforms_that_translate_are_listed(name, at, kinds):
     """On inclined slides, and on cranks: nothing is left open but the places that lock, and no other rest is met. Half
