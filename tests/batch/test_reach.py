@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +14,7 @@ from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.batch.grids import beyond_rods
 from hrsynth.batch.reach import generic_motion, reach, sweep
 from hrsynth.description import load
-from hrsynth.errors import BadRequest, PoseNotReached
+from hrsynth.errors import BadRequest, NotSampled, PoseNotReached
 from hrsynth.geometry.so3 import logarithm, turn_about
 from hrsynth.geometry.vectors import Array
 from hrsynth.kinematics.configuration import ClosedConfiguration
@@ -440,3 +441,17 @@ def test_a_constraint_singularity_on_the_way_is_told() -> None:
         reach(everything.start, everything.question, Pose.parse("x=0.18,y=0.31176914536239791,z=1.2"))
     assert "more than 99.9 % of the way" in str(refused.value)
     assert "100 %" not in str(refused.value)
+
+
+def test_a_pose_is_not_reached_though_no_walk_leads_away(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whether parts depend on each other elsewhere is then not known, and not said."""
+    def none(start: ClosedConfiguration, count: int) -> Iterator[ClosedConfiguration]:
+        raise NotSampled("", 0, count, 10)
+        yield start
+
+    setting = setting_of("3rps")
+    everything, motion = setting.everything, motion_of(setting)
+    monkeypatch.setattr("hrsynth.batch.reach.random_walk", none)
+    with pytest.raises(PoseNotReached) as refused:
+        reach(everything.start, everything.question, Pose.parse("phi=0.02"), motion)
+    assert "random configuration" not in str(refused.value)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..budgets import FIRST_CELLS, SWEEP_HALVINGS
-from ..errors import PoseNotReached
+from ..errors import NotSampled, PoseNotReached
 from ..geometry.ranks import range_basis
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.leg_reach import worst_leg
@@ -61,13 +61,19 @@ def dependence(start: ClosedConfiguration, motion: PlatformMotion, goal: Goal, w
                ) -> str | None:
     """That parts of wanted poses (``what``) depend on each other, at zero and elsewhere, or where the way is ``stuck``
     at zero, there; None where they do not. A part alone depends on nothing: the platform does not change it."""
-    *_, elsewhere = random_walk(start, 3)
-    here, there = (are_dependent(at, goal.rows(at.twin, at.q)[1]) for at in (start, elsewhere))
-    if not here or not (there or stuck):
+    rows = goal.rows(start.twin, start.q)[1]
+    if not are_dependent(start, rows):
+        return None
+    try:
+        *_, elsewhere = random_walk(start, 3)
+        there = are_dependent(elsewhere, goal.rows(elsewhere.twin, elsewhere.q)[1])
+    except NotSampled:  # every step from zero comes near a singularity
+        there = False
+    if not (there or stuck):
         return None
     freedoms = "1 freedom" if motion.dof == 1 else f"{motion.dof} freedoms"
     where = "at zero and at a random configuration" if there else "at zero, to first order,"
-    why = ("none of them changes this part" if len(goal.rows(start.twin, start.q)[0]) == 1 else
+    why = ("none of them changes this part" if len(rows) == 1 else
            f"parts of {what} depend on each other" + ": give fewer" * there)
     return f"the platform has {freedoms}, and {where} {why}"
 
