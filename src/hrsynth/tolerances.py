@@ -41,6 +41,8 @@ NEAREST = 1e-10
 """Projected gradient (characteristic lengths, radians) at which a pose counts as the nearest one."""
 FOLLOWED = 1e-9
 """Residual below which a hidden robot has reached the pose and the directions of the real one."""
+NO_NEARER = 1e-9
+"""Part of what a leg misses a goal by that some steps must win for it to be led on."""
 STEADY_TANGENT = 1e-10
 """Turn (radians) of the tangent space that the residual of a sample may cause."""
 EASY_RANK = 1e-3

@@ -138,7 +138,8 @@ def test_nothing_is_left_out_where_the_legs_leave_no_other_motion(robot: str, le
     assert found(robot, legs).unexamined == ()
 
 
-@pytest.mark.parametrize(("robot", "legend"), [("3puu", "(never where examined)"), ("prrrp_m1", "(never)")])
+@pytest.mark.parametrize(("robot", "legend"), [("3puu", "(never where examined)"),
+                                               pytest.param("prrrp_m1", "(never)", marks=pytest.mark.slow)])
 def test_the_legend_of_a_locus_says_where_never_was_examined(robot: str, legend: str) -> None:
     field = locus(load(robot), steps=5).hidden
     assert _drawn_locus(None, None, field, "hidden robot").get_label().endswith(legend)

@@ -10,7 +10,7 @@ from ..geometry.ranks import kernel_basis
 from ..geometry.vectors import Array
 from ..mechanism import Mechanism
 from ..mechanism.legs import Leg, LegDecomposition, decompose
-from ..tolerances import CLOSED, FOLLOWED, RANK_CUTOFF, SOLVED
+from ..tolerances import CLOSED, FOLLOWED, NO_NEARER, RANK_CUTOFF, SOLVED
 from .configuration import ClosedConfiguration
 from .pinocchio_model import PinocchioModel
 from .platform_motion import Goal, PlatformMotion
@@ -20,6 +20,10 @@ WAY = 10
 """Points of the way at which a leg alone is led towards a pose, so that it keeps its working mode."""
 ASIDE = 8
 """Random starts from which a leg that seems to miss is led again: a stretched one does not bend by itself."""
+SETTLED = 3
+"""Steps over which an error that hardly falls any more is what is left."""
+HOPELESS = 100.0
+"""So many times what these steps win must lead below what is reached already, or the start is given up."""
 DAMPING = Damping(start=1e-3, eased=0.2, least=1e-12, most=1e7)
 
 
@@ -65,13 +69,15 @@ def _miss(twin: PinocchioModel, motion: PlatformMotion, goal: Goal) -> Array:
             break
         q, residual = solve(twin, twin.moved(at.q, rng.uniform(-1, 1, twin.nv)), manner, tolerance=SOLVED)
         if residual <= CLOSED:
-            found = _approached(ClosedConfiguration.of(twin, q), goal, manner, 200)
+            found = _approached(ClosedConfiguration.of(twin, q), goal, manner, 200, float(np.linalg.norm(least)))
             least = min(least, goal.rows(twin, found.q)[0], key=lambda error: float(np.linalg.norm(error)))
     return least
 
 
-def _approached(at: ClosedConfiguration, goal: Goal, manner: Goal, iterations: int) -> ClosedConfiguration:
-    """Minimise a goal's error with the loops closed and ``manner`` kept: damped Gauss-Newton in the tangent space."""
+def _approached(at: ClosedConfiguration, goal: Goal, manner: Goal, iterations: int, known: float = np.inf
+                ) -> ClosedConfiguration:
+    """Minimise a goal's error with the loops closed and ``manner`` kept: damped Gauss-Newton in the tangent space;
+    given up where the error will not fall below the one that is ``known``."""
     twin = at.twin
 
     def tangent(at: ClosedConfiguration) -> tuple[ClosedConfiguration, Array]:
@@ -89,7 +95,14 @@ def _approached(at: ClosedConfiguration, goal: Goal, manner: Goal, iterations: i
         q, residual = solve(twin, twin.moved(here[0].q, step), manner, tolerance=SOLVED)
         return tangent(ClosedConfiguration.of(twin, q)) if residual <= CLOSED else None
 
+    sizes: list[float] = []
+
     def content(left: Residual) -> bool:
-        return left.size <= SOLVED or bool(np.linalg.norm(left.J.T @ left.error) <= RANK_CUTOFF * left.size)
+        if not sizes or left.size < sizes[-1]:
+            sizes.append(left.size)
+        # far from a goal out of reach the steps become short, as J does not tell how its rows turn
+        won = sizes[-1 - SETTLED] - left.size if len(sizes) > SETTLED else np.inf
+        return won <= NO_NEARER * left.size or left.size - known > HOPELESS * won or left.size <= SOLVED or bool(
+            np.linalg.norm(left.J.T @ left.error) <= RANK_CUTOFF * left.size)
 
     return descend(tangent(at), evaluate, advance, DAMPING, iterations, content)[0][0]

@@ -392,6 +392,7 @@ def test_hollow_marks_are_in_the_legend_where_there_is_one(grid: str, hollow: bo
     assert ("hollow: at another" in drawn) == hollow
 
 
+@pytest.mark.slow
 def test_the_legend_has_the_marks_that_are_drawn_and_no_others():
     """A mark of an end beyond the map is not drawn; ends of one kind have colours of their own, however many."""
     found = hrsynth.basins("3rrr_m1", to="x=0,y=0,phi=0", grid="x=-0.02:0.02:2,y=-0.02:0.02:2,phi=0", jobs=1)
