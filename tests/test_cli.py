@@ -529,7 +529,7 @@ def test_singular_draws_the_locus(run, tmp_path: Path):
 @pytest.mark.some(3)
 @pytest.mark.parametrize(("robot", "arguments", "status", "words"), [
     ("delta", ["-o", "x.txt"], 2, ["unknown extension", "'x.txt'", ".png"]),
-    ("delta", ["--plane", "z=-0.6"], 2, ["--output"]),
+    ("delta", ["--plane", "z=-0.6"], 2, ["no figure is asked for", "-o FILE.png"]),
     ("delta", ["--plane", "phi=0", "-o", "x.png"], 2, ["cannot change phi", "x, y, z"]),
     ("delta", ["--plane", "z=5", "-o", "x.png"], 3, ["no pose of the plane z=5 is reached"]),
     ("hexaglide", ["-o", "x.png"], 2, ["has no locus"]), ("delta", ["--observe", "9"], 2, ["legs 1, 2, 3"]),
