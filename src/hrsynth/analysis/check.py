@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..batch.reach import of_grid, sweep
+from ..batch.reach import grid_dependence, sweep
 from ..errors import HrsynthError, PlaneNotMet, PoseNotReached
 from ..kinematics.configuration import ClosedConfiguration
 from ..mechanism.pose import Grid, PoseLike, asked_poses
@@ -132,7 +132,7 @@ def check(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None,
     if cells is not None:
         require_platform(setting.robot, cells)
         places = sweep(start, question, cells, motion, setting.placer)
-        dependent = None if all(places) else of_grid(start, motion, cells)
+        dependent = None if all(places) else grid_dependence(start, motion, cells)
         if not any(places):
             raise PlaneNotMet(setting.robot.name, f"the grid {cells}", f"none of {len(places)} is", dependent)
         swept = GridCheck(cells, tuple(None if each is None else examiner.classify(each) for each in places),

@@ -78,8 +78,8 @@ def dependence(start: ClosedConfiguration, motion: PlatformMotion, goal: Goal, w
     return f"the platform has {freedoms}, and {where} {why}"
 
 
-def of_grid(start: ClosedConfiguration, motion: PlatformMotion, grid: Grid) -> str | None:
-    """The same of the poses of a grid."""
+def grid_dependence(start: ClosedConfiguration, motion: PlatformMotion, grid: Grid) -> str | None:
+    """What :func:`dependence` says of the poses of a grid."""
     goal = motion.goal(next(iter(grid.poses_at([(0,) * grid.ndim]))), start.twin.mechanism.name)
     return dependence(start, motion, goal, "these poses")
 

@@ -312,14 +312,15 @@ def _curved(solved: Sequence[LoopEquation], trial: TubeTrial, radius: Array, Y: 
     """Bounds (c, p, p, p) of |Y D²_xG|, the last two dimensions the unknowns."""
     forms, unknowns = trial.forms(radius), np.array(trial.part.unknowns, dtype=np.intp)
     carrier, like, p = SweptChains(trial.part.system, forms), forms[unknowns[0]] * 0.0, len(unknowns)
-    pairs, rows = (np.repeat(unknowns, p), np.tile(unknowns, p)), list[Any]()
+    (i, j), rows = np.triu_indices(p), list[Any]()
     for each in solved:
         bend = Total(like, (len(forms), len(forms)))
         if each.row is not None and isinstance(each.of, JointLoop):  # gears are linear
             add_bend(bend, row_product(carrier, each.of, each.row))
-        rows.append(bend.sum[(..., *pairs)])
-    size = P @ combined(Y, stacked(rows, axis=-2)).size
-    return size.reshape(-1, p, p, p)
+        rows.append(bend.sum[..., unknowns[i], unknowns[j]])
+    found = np.empty((len(trial.x), p, p, p))
+    found[..., i, j] = found[..., j, i] = P @ combined(Y, stacked(rows, axis=-2)).size
+    return found
 
 
 def platform_error(branch: TubedBranch, ranges: Array, errors: Array, function: TracedFunction) -> tuple[float, float]:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
 from itertools import chain, count
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -23,9 +23,6 @@ from .graphs import Adjacency, adjacency
 from .observation import Observation
 from .sights import NamedCamera
 from .wrist import Wrist
-
-if TYPE_CHECKING:
-    pass
 
 
 class JointType(StrEnum):

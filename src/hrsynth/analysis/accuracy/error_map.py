@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ...batch.engine import Batch, Evaluation
 from ...batch.grids import poses_over
-from ...batch.reach import of_grid, reach, sweep
+from ...batch.reach import grid_dependence, reach, sweep
 from ...budgets import LARGEST_GRID, POSES_FOR_NUMBA_ONCE
 from ...errors import BadRequest, Disagreement, HrsynthError, PlaneNotMet
 from ...geometry.vectors import Array, nested
@@ -158,7 +158,7 @@ class Mapper(Value):
                              f"at most {LARGEST_GRID}")
         seen = self._one_by_one(grid) if self.batch is None else self._together(grid)
         dependent = None if seen.reached.all() else (
-            of_grid(self.setting.everything.start, self.setting.motion, grid))
+            grid_dependence(self.setting.everything.start, self.setting.motion, grid))
         if not seen.reached.any():
             raise PlaneNotMet(name, f"the grid {grid}", f"none of {grid.size} is", dependent)
         spots = smallest_at = None

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...batch.reach import of_grid, reach, sweep
+from ...batch.reach import grid_dependence, reach, sweep
 from ...budgets import CLOSER, COARSE_GRID, LOCUS_SIDES
 from ...errors import BadRequest, PlaneNotMet, PoseNotReached
 from ...geometry.so3 import turn_about
@@ -112,7 +112,7 @@ def _locus(hidden: MeasuredRobot, real: MeasuredRobot | None, plane: Pose | None
     configurations = sweep(start, question, grid, motion, placer)
     if not any(configurations):
         raise PlaneNotMet(start.twin.mechanism.name, f"the plane {grid.fixed}", "none of its poses is reached",
-                          of_grid(start, motion, grid))
+                          grid_dependence(start, motion, grid))
 
     def field(measured: MeasuredRobot) -> SingularityMap:
         tell("locus")

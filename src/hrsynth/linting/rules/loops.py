@@ -175,7 +175,12 @@ def _turned(file: LintedFile, joint: JointSpec) -> Mend | None:
     axis = None if element is None else element.find("child_axis")
     if axis is None:
         return None
-    return partial(axis.set, "xyz", numerals.exact_vector(-numerals.parse(axis.get("xyz", "1 0 0"), 3)))
+    return partial(_reverse, axis)
+
+
+def _reverse(axis: xml.Element) -> None:
+    """As it is then: another mend may have changed it."""
+    axis.set("xyz", numerals.exact_vector(-numerals.parse(axis.get("xyz", "1 0 0"), 3)))
 
 
 def nearby(file: LintedFile) -> NearbyFreedoms | None:
