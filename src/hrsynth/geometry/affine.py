@@ -126,6 +126,10 @@ class AffineForms:
         """The same with more symbols, on which it does not depend."""
         return AffineForms(np.concatenate([self.v, np.zeros((count - len(self.v), *self.r.shape))]), self.r)
 
+    def transposed(self) -> AffineForms:
+        """The same with the last two dimensions in turn."""
+        return AffineForms(np.swapaxes(self.v, -1, -2), np.swapaxes(self.r, -1, -2))
+
     def sum(self, axis: int = -1) -> AffineForms:
         """The sum along one of the last dimensions."""
         return _rounded(self.v.sum(axis=axis), self.r.sum(axis=axis), np.abs(self.v).sum(axis=0).sum(axis=axis))

@@ -149,16 +149,16 @@ def add_bend(total: Total, product: Product, weight: Any = 1.0) -> None:
         for part in vector.parts:
             f = other.value * (part.sign * _as_column(weight))
             pushed = crossed(f[..., None, :], part.axes)
-            later, earlier = outer(pushed, part.columns), outer(part.columns, pushed)
-            size = len(part.places)
-            total.add(np.ix_(part.places, part.places),
-                      later * np.triu(np.ones((size, size))) + earlier * np.tril(np.ones((size, size)), -1))
+            later, size = outer(pushed, part.columns), len(part.places)
+            total.add(np.ix_(part.places, part.places), later * np.triu(np.ones((size, size)))
+                      + _transposed(later) * np.tril(np.ones((size, size)), -1))
     for one in product.x.parts:
         for two in product.y.parts:
             both = one.sign * two.sign
             columns = two.columns * _as_column(_as_column(weight)) * both
-            total.add(np.ix_(one.places, two.places), outer(one.columns, columns))
-            total.add(np.ix_(two.places, one.places), outer(columns, one.columns))
+            across = outer(one.columns, columns)
+            total.add(np.ix_(one.places, two.places), across)
+            total.add(np.ix_(two.places, one.places), _transposed(across))
 
 
 def outer(a: Any, b: Any) -> Any:
@@ -166,6 +166,11 @@ def outer(a: Any, b: Any) -> Any:
     if isinstance(a, AffineForms) or isinstance(b, AffineForms):
         return (a[..., :, None, :] * b[..., None, :, :]).sum(-1)
     return a @ np.swapaxes(b, -1, -2)
+
+
+def _transposed(a: Any) -> Any:
+    """Matrices or forms (…, k, l) with the last two dimensions in turn."""
+    return a.transposed() if isinstance(a, AffineForms) else np.swapaxes(a, -1, -2)
 
 
 def _as_column(weight: Any) -> Any:

@@ -92,8 +92,8 @@ def _enclosed(system: RestSystem, q: Array, idle: int) -> list[EnclosedPoint | N
                                    (K, bend, (slice(size), slice(size))),
                                    (K, DG, (slice(size, None), slice(size)))):
             total.v[(..., *place)], total.r[(..., *place)] = part.v, part.r
-        K.v[..., :size, size:] = np.swapaxes(DG.v, -1, -2)
-        K.r[..., :size, size:] = np.swapaxes(DG.r, -1, -2)
+        back = DG.transposed()
+        K.v[..., :size, size:], K.r[..., :size, size:] = back.v, back.r
         both = mask[:, :, None] * mask[:, None, :]
         held_one = (1 - mask)[..., None] * np.eye(mask.shape[-1])
         K = AffineForms(K.v * both, K.r * both)

@@ -273,8 +273,7 @@ class Subdivision:
         turned = np.swapaxes(back, 1, 2)
         pull = combined(turned, entries(slope + (M * mu[:, :, None]).sum(-2), P))
         rates = entries(M, P)
-        off = (combined(turned, AffineForms(np.swapaxes(rates.v, -1, -2), np.swapaxes(rates.r, -1, -2)))
-               - np.eye(k)).size
+        off = (combined(turned, rates.transposed()) - np.eye(k)).size
         with np.errstate(all="ignore"):
             most = (pull.size.max(axis=1, initial=0.0) / (1 - off.sum(axis=-1).max(axis=1, initial=0.0)))[:, None]
             room = (pull.size + (off * most[:, None]).sum(axis=-1)) * (1 + BOX_ROUNDING)
@@ -305,7 +304,8 @@ class Subdivision:
         K.v[..., :n, :n], K.r[:, :n, :n] = out.v[..., : n * n].reshape(-1, c, n, n), out.r[:, : n * n].reshape(c, n, n)
         K.v[..., n:, :n] = out.v[..., n * n :].reshape(len(out.v), c, k, n)
         K.r[:, n:, :n] = out.r[:, n * n :].reshape(c, k, n)
-        K.v[..., :n, n:], K.r[:, :n, n:] = np.swapaxes(rates.v, -1, -2), np.swapaxes(rates.r, -1, -2)
+        along = rates.transposed()
+        K.v[..., :n, n:], K.r[:, :n, n:] = along.v, along.r
         return phi, K
 
     def zeros(self) -> list[CriticalBox]:
