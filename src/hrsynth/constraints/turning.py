@@ -34,7 +34,8 @@ def unexamined(anatomy: LegDecomposition, pattern: ConstraintPattern, condition:
     found = []
     folding = [leg.label for leg in anatomy.legs if leg.has_loops]
     if folding:
-        found.append(f"poses at which a loop inside a leg ({', '.join(folding)}) lies flat are not examined")
+        found.append(f"poses at which a loop inside a leg ({', '.join(folding)}) lies flat, and those behind them, at "
+                     "which it closes another way (crossed rods), are not examined")
     more: tuple[str, ...] = ()
     if pattern.motion in ("translations", "bodies") and may_turn(anatomy, pattern.legs, samples):
         more = ("turn", "turned")
