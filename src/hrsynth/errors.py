@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 
 class HrsynthError(Exception):
@@ -214,29 +215,41 @@ class NothingProved(Unanswered):
                          f"{', '.join(motors)}{': ' * bool(reason)}{reason}; try a smaller box (--box)")
 
 
-class PoseNotReached(Unanswered):
-    """A pose that the robot does not reach from ``origin``: the leg that misses it most and by how much (mm, degrees),
-    or None if each leg alone reaches it; how far the robot came (0 to 1), and to which pose; the ``wrist``, a joint
-    that stands for several R, that is near the end of its turns there; ``why`` all legs together do not get there, if
-    that is known; or another ``reason`` instead of these."""
+class LegMiss(NamedTuple):
+    """A leg that alone misses a goal by so much (m, rad), or at least by so much."""
 
-    def __init__(self, robot: str, pose: str, came: float, last: str, leg: str | None = None,
-                 millimetres: float = 0.0, degrees: float = 0.0, origin: str = "its zero configuration",
-                 wrist: str | None = None, why: str | None = None, reason: str | None = None) -> None:
+    leg: str
+    length: float
+    angle: float
+    at_least: bool = False
+
+
+class PoseNotReached(Unanswered):
+    """A pose that the robot does not reach from ``origin``: the leg that misses it most and by how much (mm, degrees;
+    at least, as rods tell it), or None if each leg alone reaches it; how far the robot came (0 to 1), and to which
+    pose; the ``wrist``, a joint that stands for several R, that is near the end of its turns there; ``why`` all legs
+    together do not get there, if that is known; or another ``reason`` instead of these."""
+
+    def __init__(self, robot: str, pose: str, came: float, last: str, miss: LegMiss | None = None,
+                 origin: str = "its zero configuration", wrist: str | None = None, why: str | None = None,
+                 reason: str | None = None) -> None:
         self.robot, self.pose, self.came, self.last = robot, pose, came, last
-        self.leg, self.millimetres, self.degrees = leg, millimetres, degrees
+        self.leg = None if miss is None else miss.leg
+        self.millimetres = 0.0 if miss is None else 1e3 * miss.length
+        self.degrees = 0.0 if miss is None else math.degrees(miss.angle)
         self.wrist = wrist
         self.others: tuple[PoseNotReached, ...] = ()
         if reason is None:
             if wrist is not None:
                 reason = f"joint {wrist}, which stands for several R through one point, is near the end of its turns"
-            elif leg is None:
+            elif miss is None:
                 reason = "each leg alone can close there, but " + (why or (
                     "the straight path to it is blocked (all legs together do not reach so far, a leg is at its limit, "
                     "or it is another working mode)"))
             else:
-                turn = f" and {degrees:.3g} degrees" if degrees > 1e-6 else ""
-                reason = f"leg {leg} alone misses it by {millimetres:.4g} mm{turn}"
+                turn = f" and {self.degrees:.3g} degrees" if self.degrees > 1e-6 else ""
+                least = "at least " * miss.at_least
+                reason = f"leg {miss.leg} alone misses it by {least}{self.millimetres:.4g} mm{turn}"
             part = "more than 99.9" if 0.999 < came < 1 else f"{100 * came:.3g}"
             reason += f"; from {origin} the robot gets {part} % of the way, to {last}"
         self.reason = reason

@@ -11,13 +11,13 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.batch.grids import beyond_rods
 from hrsynth.batch.reach import generic_motion, reach, sweep
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, NotSampled, PoseNotReached
 from hrsynth.geometry.so3 import logarithm, turn_about
 from hrsynth.geometry.vectors import Array
 from hrsynth.kinematics.configuration import ClosedConfiguration
+from hrsynth.kinematics.leg_reach import beyond_rods
 from hrsynth.kinematics.platform_motion import PlatformMotion
 from hrsynth.kinematics.tasks import solve
 from hrsynth.mechanism.pose import Grid, Pose
@@ -249,7 +249,8 @@ FEET, CRANK, ROD = (np.array([-0.1, 0.0]), np.array([0.1, 0.0])), 0.16, 0.2
 
 
 @pytest.mark.some(2)
-@pytest.mark.parametrize(("x", "y", "leg"), [(-0.2, 0.28, "2"), (0.2, 0.28, "1"), (0.02, 0.5, "1"), (-0.03, 0.6, "2")])
+@pytest.mark.parametrize(("x", "y", "leg"), [(-0.2, 0.28, "2"), (0.9, 0.1, "1"), (0.2, 0.28, "1"), (0.02, 0.5, "1"),
+                                              (-0.03, 0.6, "2")])
 def test_the_leg_that_misses_is_named(x: float, y: float, leg: str) -> None:
     everything = setting_of("rrrrr_m1").everything
     misses = {label: np.linalg.norm([x, y] - foot) - (CRANK + ROD) for label, foot in zip("12", FEET, strict=True)}
@@ -259,6 +260,8 @@ def test_the_leg_that_misses_is_named(x: float, y: float, leg: str) -> None:
     error = caught.value
     assert error.leg == leg
     assert error.millimetres == pytest.approx(1e3 * misses[leg], rel=1e-4)
+    # far away the lengths alone tell it
+    assert ("at least" in str(error)) == (misses[leg] > CRANK + ROD)
     assert error.degrees < 1e-6
     assert 0 < error.came < 1
     assert error.exit_status == 3

@@ -13,7 +13,7 @@ from ..budgets import FIRST_CELLS, SWEEP_HALVINGS
 from ..errors import NotSampled, PoseNotReached
 from ..geometry.ranks import range_basis
 from ..kinematics.configuration import ClosedConfiguration
-from ..kinematics.leg_reach import worst_leg
+from ..kinematics.leg_reach import beyond_rods, worst_leg
 from ..kinematics.limits import at_end, wrists_beyond
 from ..kinematics.platform_motion import Goal, PlatformMotion
 from ..kinematics.relation import Measurement
@@ -47,13 +47,12 @@ def reach(start: ClosedConfiguration, question: Measurement, pose: Pose,
     here, came = track(start, motion, goal)
     found = nearest(here, goal, motion.at_home()) if came == 1 else here
     if came < 1 or not _arrived(found, goal):
-        leg, lengths, angles = worst_leg(start.twin, motion, goal)
+        missed = worst_leg(start.twin, motion, goal)
         last = str(motion.pose(here.pose(motion.link)))
         wrist = at_end(here)
-        why = None if leg or wrist else (dependence(start, motion, goal, "this pose", came == 0)
+        why = None if missed or wrist else (dependence(start, motion, goal, "this pose", came == 0)
                                          or _lost_rank(start, here))
-        raise PoseNotReached(robot, str(pose), came, last, leg, 1e3 * lengths, float(np.degrees(angles)), wrist=wrist,
-                             why=why)
+        raise PoseNotReached(robot, str(pose), came, last, missed, wrist=wrist, why=why)
     return found
 
 
@@ -107,7 +106,7 @@ def sweep(start: ClosedConfiguration, question: Measurement, grid: Grid, motion:
     motion = motion or generic_motion(start, question)
     goals = [motion.goal(pose, start.twin.mechanism.name) for pose in grid.poses()]
     home = motion.at_home()
-    from .grids import beyond_rods, ready
+    from .grids import ready
 
     at_once, hopeless = ({}, beyond_rods(start.twin.mechanism, motion, goals)) if placer is None else (
         ready(placer, motion, goals))

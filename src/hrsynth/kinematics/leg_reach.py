@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+
 import numpy as np
 
-from ..errors import HrsynthError
+from ..errors import HrsynthError, LegMiss
 from ..geometry.gauss_newton import Damping, Residual, descend
 from ..geometry.ranks import kernel_basis
-from ..geometry.vectors import Array
-from ..mechanism import Mechanism
+from ..geometry.vectors import Array, inverse, transform
+from ..mechanism import JointType, Mechanism
+from ..mechanism.graphs import adjacency, shortest_path
 from ..mechanism.legs import Leg, LegDecomposition, decompose
-from ..tolerances import CLOSED, FOLLOWED, NO_NEARER, RANK_CUTOFF, SOLVED
+from ..tolerances import AS_PRINTED, CLOSED, FOLLOWED, NO_NEARER, RANK_CUTOFF, SOLVED
 from .configuration import ClosedConfiguration
 from .pinocchio_model import PinocchioModel
 from .platform_motion import Goal, PlatformMotion
@@ -27,23 +31,78 @@ HOPELESS = 100.0
 DAMPING = Damping(start=1e-3, eased=0.2, least=1e-12, most=1e7)
 
 
-def worst_leg(twin: PinocchioModel, motion: PlatformMotion, goal: Goal) -> tuple[str | None, float, float]:
-    """The leg that alone misses a goal most, with the miss in metres and in radians; None where each leg reaches it.
+def worst_leg(twin: PinocchioModel, motion: PlatformMotion, goal: Goal) -> LegMiss | None:
+    """The leg that alone misses a goal most, None where each leg reaches it: by its rods' lengths where that is more
+    than these together, else by what a descent leaves.
 
     Each leg is taken with base and platform alone; the platform keeps to what it generically does.
     """
     try:
         anatomy = decompose(twin.mechanism)
     except HrsynthError:
-        return None, 0.0, 0.0
+        return None
+    short = max(((float(each[0]), most, label) for label, most, each in rod_misses(anatomy, motion, [goal])),
+                default=(0.0, 0.0, ""))
+    if short[0] > short[1]:
+        return LegMiss(short[2], short[0], 0.0, True)
     misses = []
     for leg in anatomy.legs:
         error = _miss(PinocchioModel(alone(anatomy, leg), twin.length), motion, goal)
         lengths, angles = np.split(error, [goal.lengths])
-        misses.append((float(np.linalg.norm(error)), leg.label, twin.length * float(np.linalg.norm(lengths)),
-                       float(np.linalg.norm(angles))))
-    size, label, lengths_missed, angle = max(misses, key=lambda miss: miss[0])
-    return (label, lengths_missed, angle) if size > FOLLOWED else (None, 0.0, 0.0)
+        misses.append((float(np.linalg.norm(error)), LegMiss(leg.label, twin.length * float(np.linalg.norm(lengths)),
+                                                             float(np.linalg.norm(angles)))))
+    size, worst = max(misses, key=lambda miss: miss[0])
+    return worst if size > FOLLOWED else None
+
+
+def beyond_rods(mechanism: Mechanism, motion: PlatformMotion, goals: Sequence[Goal]) -> set[int]:
+    """The places of goals that some leg misses by its rods' lengths."""
+    try:
+        anatomy = decompose(mechanism)
+    except HrsynthError:
+        return set()
+    return {int(i) for *_, misses in rod_misses(anatomy, motion, goals) for i in np.flatnonzero(misses > 0)}
+
+
+def rod_misses(anatomy: LegDecomposition, motion: PlatformMotion, goals: Sequence[Goal]
+               ) -> Iterator[tuple[str, float, Array]]:
+    """Of each leg its label, the sum of its rods' lengths to the platform's point, and by how much (n,) it misses goals
+    at least, as these lengths tell (m); not positive where they do not.
+
+    Centres of R, U and S joints keep their distances on each link. So along a chain of them an end is at most the sum
+    of these away from the first one, and at least twice the longest less that sum: the platform's point, and where a
+    goal leaves no turn free the last centre. Of a point that may move it counts how far it is in wanted directions."""
+    point = motion.position(motion.home)
+    X = np.array([motion.posed(goal) for goal in goals]).reshape(-1, 4, 4)
+    placed, turned = (np.array([told(goal) for goal in goals], dtype=bool) for told in (
+        motion.is_placed, lambda goal: motion.turns_left(goal) == 0))
+    seen = np.array([np.eye(3) if known else goal.directions.T @ goal.directions
+                     for goal, known in zip(goals, placed, strict=True)]).reshape(-1, 3, 3)
+    for label, centres in _centres(anatomy, motion):
+        last = transform(inverse(motion.home), centres[-1])
+        found = np.full(len(goals), -np.inf)
+        for known, home, arm in ((np.ones_like(turned), point, motion.point), (turned, centres[-1], last)):
+            rods = np.linalg.norm(np.diff([*centres, home], axis=0), axis=1)
+            most, ends = rods.sum(), X[:, :3, 3] + X[:, :3, :3] @ arm
+            far = np.linalg.norm((seen @ (ends - centres[0])[..., None])[..., 0], axis=1)
+            missed = np.maximum(far - most, np.where(placed, 2 * rods.max() - most - far, -np.inf))
+            found = np.where(known, np.maximum(found, missed - AS_PRINTED * (1 + most)), found)
+        yield label, float(np.linalg.norm(np.diff([*centres, point], axis=0), axis=1).sum()), found
+
+
+def _centres(anatomy: LegDecomposition, motion: PlatformMotion) -> Iterator[tuple[str, Array]]:
+    """Of legs through which there are such chains the centres (n, 3) of the joints from the base to the platform."""
+    mechanism = anatomy.mechanism
+    centred = (JointType.REVOLUTE, JointType.UNIVERSAL, JointType.SPHERICAL)
+    for leg in anatomy.legs:
+        within = {mechanism.base, *anatomy.platform, motion.link, *leg.links}
+        bonds = {frozenset(joint.links): joint for joint in mechanism.joints.values()
+                 if joint.type in centred and within.issuperset(joint.links)}
+        try:
+            links = shortest_path(adjacency(within, bonds), mechanism.base, motion.link)
+        except KeyError:
+            continue
+        yield leg.label, np.array([bonds[frozenset(pair)].point for pair in pairwise(links)])
 
 
 def alone(anatomy: LegDecomposition, leg: Leg) -> Mechanism:

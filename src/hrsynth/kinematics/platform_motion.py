@@ -206,6 +206,28 @@ class PlatformMotion(Value):
         values = np.array([getattr(pose, "xyz"[i]) for i in placed], dtype=float)
         return Goal(self.link, self.point, self.home[:3, :3], np.eye(3)[placed], values, normal, phi, rotation)
 
+    def posed(self, goal: Goal) -> Array:
+        """The platform pose (4, 4) that a goal asks for, its free parts as near to home as they can be."""
+        X, home = self.home.copy(), self.position(self.home)
+        if goal.rotation is not None:
+            X[:3, :3] = goal.rotation
+        elif goal.phi is not None:
+            X[:3, :3] = exponential(goal.phi * goal.normal) @ self.home[:3, :3]
+        along = goal.directions @ self.translations
+        way = self.translations @ np.linalg.lstsq(along, goal.values - goal.directions @ home, rcond=RANK_CUTOFF)[0]
+        X[:3, 3] = home + way - X[:3, :3] @ self.point
+        return X
+
+    def is_placed(self, goal: Goal) -> bool:
+        """Whether a goal leaves the point no translation."""
+        k = self.translations.shape[1]
+        return not k or (len(goal.values) > 0 and bool(
+            np.linalg.matrix_rank(goal.directions @ self.translations, tol=RANK_CUTOFF) == k))
+
+    def turns_left(self, goal: Goal) -> int:
+        """How many of the platform's turns a goal leaves free."""
+        return 0 if goal.rotation is not None else self.rotations.shape[1] - (goal.phi is not None)
+
     def _as_at_home(self, pose: Pose, name: str) -> bool:
         """Whether a part that never changes is given as it is at the zero configuration, to the digits printed."""
         if name in "xyz":
