@@ -15,7 +15,7 @@ def listed(group: str) -> tuple[str, ...]:
     """The words of a group that the stored catalog does not refuse."""
     from hrsynth.catalog import load
 
-    stored = load(Path(__file__).resolve().parents[2] / "catalog").where(group=group)
+    stored = load(Path(__file__).resolve().parents[2] / "catalog", group=group)
     return tuple(record["word"] for record in stored if "refused" not in record)
 
 

@@ -173,7 +173,7 @@ def test_bad_input_is_one_line(run, folder: Path, tmp_path: Path, monkeypatch: p
     check_refused(run("show", "no pe", "--catalog", folder), "hrsynth catalog list --text 'no pe'")
     check_refused(run("show", "3(Qz*-Rz-Rz)"), "unknown joint")
     check_refused(run("show", "3(Rz*-Rz-Rz)", "-o", tmp_path / "robot.doc"), "robot.doc")
-    check_refused(run("show", "3()"), "unknown joint")
+    check_refused(run("show", "3()", "--catalog", folder), "unknown joint")
     (folder / "c.jsonl").write_text((folder / "c.jsonl").read_text().replace('"catalog":1', '"catalog":0'))
     check_refused(run("list", "--catalog", folder), "another version")
     assert sorted(file.name for file in tmp_path.iterdir()) == ["small"]

@@ -58,6 +58,7 @@ def test_a_common_translation_that_another_leg_forbids_is_not_lost() -> None:
     assert answer.condition.expressed(answer.pattern.values_at([there]))[0] > 0.01
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("legs", [["rod_1"], ["rod_2"]])
 def test_one_watched_leg_of_a_platform_on_a_table_has_a_condition(legs: list[str]) -> None:
     """Its tip moves on a circle that is not in the plane: one direction shows both freedoms."""
@@ -109,6 +110,7 @@ def as_printed(answer: Singularity, state: Array, oracle: Oracle) -> float:
     return float(np.linalg.det(terms(*(values[str(each)] for each in sorted(total.free_symbols, key=str)))))
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("turns", [(0.3, 2.5), (0.3, 2.5, -1.9)])
 def test_tips_that_leave_the_plane_of_motion_have_no_lines_in_it(turns: tuple[float, ...]) -> None:
     """The cranks' ends move in upright planes: what is printed vanishes with the rank of all screws, there alone."""

@@ -144,6 +144,7 @@ def test_sets_that_show_all_alike_are_one_row():
     assert all(len(sets) == 1 for sets, each, _, _ in rows if each.lost)
 
 
+@pytest.mark.slow
 def test_sets_that_see_less_at_zero_are_told_in_their_row():
     """As `legs` tells them, at a pose that is singular with the smallest sets watched."""
     told = legs("rrrrr_m1", at="x=0,y=0.3332050807568877")
