@@ -342,6 +342,21 @@ def test_a_way_that_touches_a_fold_does_not_pass_it() -> None:
         assert at is None or [np.sign(bend(at, leg)) for leg in "12"] == signs
 
 
+@pytest.mark.parametrize("side", [-1, 1])
+@pytest.mark.parametrize("length", [1.1, 1.25, 1.3, 1.45])
+def test_a_straight_way_that_touches_a_fold_does_not_pass_it(length: float, side: int) -> None:
+    """The way from zero touches the circle on which the first leg is folded and goes on: the elbow came to the other
+    side in a step that ended on the fold, beyond it by rounding."""
+    everything = setting_of("rrrrr_m1").everything
+    home, least = np.array([0.02, 0.24]), ROD - CRANK
+    far = np.linalg.norm(home - FEET[0])
+    turned = exponential(side * np.arcsin(least / far) * np.array([0.0, 0.0, 1.0]))[:2, :2]
+    x, y = home + length * np.sqrt(far**2 - least**2) / far * turned @ (FEET[0] - home)
+    with pytest.raises(PoseNotReached) as refused:
+        reach(everything.start, everything.question, Pose(float(x), float(y)))
+    assert refused.value.came == pytest.approx(1 / length, abs=1e-2)
+
+
 @pytest.mark.slow
 def test_nothing_is_reached_from_a_pose_on_a_fold() -> None:
     """At x=±0.06, y=0 a rod lies along its crank, 0.04 m from the base joint, to the last digit: the sweep came to it
