@@ -112,13 +112,14 @@ def _stepped(here: ClosedConfiguration, goal: GuidedTask, home: Goal, last: bool
 def _beyond(before: Array, after: Array, last: bool) -> bool:
     """Whether a fold lies between two configurations, given the Jacobians of loops and goal at both: the determinant of
     their rows, on the range of the first, has changed its sign. On the fold itself nothing lies beyond it, but only the
-    ``last`` step may end there: working modes meet, and the next would go on in any."""
+    ``last`` step may come there: working modes meet, and the next would go on in any."""
     span, _ = range_basis(before)
     turned = bool(np.linalg.slogdet(span.T @ before @ after.T @ span)[0] < 0)
     if turned != last:
         return turned
-    folded = np.min(np.linalg.svd(span.T @ after, compute_uv=False), initial=np.inf) <= NEAR_FOLD
-    return bool(folded) != last
+    was, is_folded = (bool(np.min(np.linalg.svd(span.T @ rows, compute_uv=False), initial=np.inf) <= NEAR_FOLD)
+                      for rows in (before, after))
+    return not is_folded if last else is_folded and not was
 
 
 def _corrected(here: ClosedConfiguration, step: Array, goal: GuidedTask | None) -> ClosedConfiguration | None:
