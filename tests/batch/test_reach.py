@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -344,6 +345,21 @@ def test_a_way_that_touches_a_fold_does_not_pass_it() -> None:
         assert at is None or [np.sign(bend(at, leg)) for leg in "12"] == signs
 
 
+@pytest.mark.parametrize("side", [-1, 1])
+@pytest.mark.parametrize("length", [1.1, 1.25, 1.3, 1.45])
+def test_a_straight_way_that_touches_a_fold_does_not_pass_it(length: float, side: int) -> None:
+    """The way from zero touches the circle on which the first leg is folded and goes on: the elbow came to the other
+    side in a step that ended on the fold, beyond it by rounding."""
+    everything = setting_of("rrrrr_m1").everything
+    home, least = np.array([0.02, 0.24]), ROD - CRANK
+    far = np.linalg.norm(home - FEET[0])
+    turned = exponential(side * np.arcsin(least / far) * np.array([0.0, 0.0, 1.0]))[:2, :2]
+    x, y = home + length * np.sqrt(far**2 - least**2) / far * turned @ (FEET[0] - home)
+    with pytest.raises(PoseNotReached) as refused:
+        reach(everything.start, everything.question, Pose(float(x), float(y)))
+    assert refused.value.came == pytest.approx(1 / length, abs=1e-2)
+
+
 @pytest.mark.slow
 def test_nothing_is_reached_from_a_pose_on_a_fold() -> None:
     """At x=±0.06, y=0 a rod lies along its crank, 0.04 m from the base joint, to the last digit: the sweep came to it
@@ -448,7 +464,7 @@ def test_a_constraint_singularity_on_the_way_is_told() -> None:
 
 def test_a_pose_is_not_reached_though_no_walk_leads_away(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whether parts depend on each other elsewhere is then not known, and not said."""
-    def none(start: ClosedConfiguration, count: int) -> Iterator[ClosedConfiguration]:
+    def none(start: ClosedConfiguration, count: int, *, steps: int) -> Iterator[ClosedConfiguration]:
         raise NotSampled("", 0, count, 10)
         yield start
 
@@ -458,3 +474,28 @@ def test_a_pose_is_not_reached_though_no_walk_leads_away(monkeypatch: pytest.Mon
     with pytest.raises(PoseNotReached) as refused:
         reach(everything.start, everything.question, Pose.parse("phi=0.02"), motion)
     assert "random configuration" not in str(refused.value)
+
+
+@pytest.mark.parametrize("angles", ["-0.3:0.3:4", "-0.3:0.3:7", "0.1:0.3:3"])
+def test_a_turn_that_two_others_make_together_is_reached(angles: str, tmp_path: Path) -> None:
+    """Turned by a about x and then by b about y, a stem has turned about z by φ, tan(φ/2) = tan(a/2) tan(b/2), and no
+    turn about x or y changes φ at zero; the least turns are equal or opposite."""
+    file = tmp_path / "stem.urdf"
+    hinges = "".join(f'<joint name="{name}" type="continuous"><parent link="{before}"/><child link="{after}"/>'
+                     f'<axis xyz="{axis}"/></joint>'
+                     for name, before, after, axis in (("a", "base", "cross", "1 0 0"),
+                                                       ("b", "cross", "stem", "0 1 0")))
+    file.write_text('<robot name="stem"><link name="base"/><link name="cross"/><link name="stem"/>' + hinges
+                    + '<hrsynth serial="true"><platform link="stem"/>'
+                      '<observe kind="direction" link="stem" axis="1 2 3"/></hrsynth></robot>')
+    everything = ObservedRobot.of(str(file)).everything
+    grid = Grid.parse(f"phi={angles}")
+    for pose, at in zip(grid.poses(), sweep(everything.start, everything.question, grid), strict=True):
+        assert at is not None
+        assert pose.phi is not None
+        assert turn_about(np.array([0.0, 0.0, 1.0]), at.pose("stem")[:3, :3])[0] == pytest.approx(pose.phi, abs=1e-9)
+        alone = reach(everything.start, everything.question, pose).pose("stem")[:3, :3]
+        least = 2 * np.arctan(np.sqrt(np.tan(abs(pose.phi) / 2)))
+        for R in (at.pose("stem")[:3, :3], alone):
+            np.testing.assert_allclose(np.abs([np.arctan2(R[2, 1], R[1, 1]), np.arctan2(R[0, 2], R[0, 0])]), least,
+                                       atol=1e-4)

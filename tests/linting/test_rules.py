@@ -109,6 +109,21 @@ def test_what_is_mended_hides_the_same_robot(rule: str, tmp_path: Path, shelf: P
     assert mended.certificate.passed
 
 
+@pytest.mark.parametrize("naming", ['<transmission name="m4"><joint name="wrist_2_again"/></transmission>',
+                                    '<observe kind="encoder" joint="wrist_2_again"/>'])
+def test_what_another_element_names_is_not_taken_out(naming: str, tmp_path: Path, shelf: Path):
+    """A dead closure with a motor or an encoder was removed, and the mended file was refused: they named nothing."""
+    case = next(each for each in CASES if each.rule == "constraint-dead")
+    _, two = files(case, tmp_path, shelf)
+    text = two.read_text()
+    two.write_text(text.replace("</hrsynth>", f"{naming}</hrsynth>") if "observe" in naming
+                   else text.replace("<hrsynth>", f"{naming}<hrsynth>"))
+    found = hrsynth.lint(two, fix=True, output=tmp_path / "mended.urdf")
+    assert "refused" not in {each.rule for each in found.findings}
+    assert "constraint-dead" in {each.rule for each in found.findings}
+    assert found.mended == ()
+
+
 def test_the_sound_limits_are_counted_from_the_new_zero(tmp_path: Path, shelf: Path):
     """A mend of an open loop moves the zero of joints: what the limits allow stays the same poses."""
     case = next(each for each in CASES if each.rule == "loop-open")

@@ -12,6 +12,7 @@ import numpy as np
 from ..budgets import FIRST_CELLS, SWEEP_HALVINGS
 from ..errors import NotSampled, PoseNotReached
 from ..geometry.ranks import range_basis
+from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.leg_reach import beyond_rods, worst_leg
 from ..kinematics.limits import at_end, wrists_beyond
@@ -44,7 +45,7 @@ def reach(start: ClosedConfiguration, question: Measurement, pose: Pose,
     motion = motion or generic_motion(start, question)
     robot = start.twin.mechanism.name
     goal = motion.goal(pose, robot)
-    here, came = track(start, motion, goal)
+    here, came = _led(start, _origins(start, motion, goal), motion, goal)
     found = nearest(here, goal, motion.at_home()) if came == 1 else here
     if came < 1 or not _arrived(found, goal):
         missed = worst_leg(start.twin, motion, goal)
@@ -63,11 +64,7 @@ def dependence(start: ClosedConfiguration, motion: PlatformMotion, goal: Goal, w
     rows = goal.rows(start.twin, start.q)[1]
     if not are_dependent(start, rows):
         return None
-    try:
-        *_, elsewhere = random_walk(start, 3)
-        there = are_dependent(elsewhere, goal.rows(elsewhere.twin, elsewhere.q)[1])
-    except NotSampled:  # every step from zero comes near a singularity
-        there = False
+    there = any(are_dependent(at, goal.rows(at.twin, at.q)[1]) for at in _aside(start)[-1:])
     if not (there or stuck):
         return None
     freedoms = "1 freedom" if motion.dof == 1 else f"{motion.dof} freedoms"
@@ -81,6 +78,39 @@ def grid_dependence(start: ClosedConfiguration, motion: PlatformMotion, grid: Gr
     """What :func:`dependence` says of the poses of a grid."""
     goal = motion.goal(next(iter(grid.poses_at([(0,) * grid.ndim]))), start.twin.mechanism.name)
     return dependence(start, motion, goal, "these poses")
+
+
+def _aside(start: ClosedConfiguration) -> list[ClosedConfiguration]:
+    """Random configurations beside ``start``; none where every step from it comes near a singularity."""
+    try:
+        return list(random_walk(start, 8, steps=2))
+    except NotSampled:
+        return []
+
+
+def _origins(start: ClosedConfiguration, motion: PlatformMotion, goal: Goal) -> list[ClosedConfiguration]:
+    """Where ways to goals with the parts of this one may begin besides ``start``: aside, if the platform changes fewer
+    of these parts at ``start`` than there, though it has all its freedoms (a turn that two others make together)."""
+    rows, whole = goal.rows(start.twin, start.q)[1], motion.at_home().rows(start.twin, start.q)[1]
+    if not are_dependent(start, rows) or _changed(start, whole) < motion.dof:
+        return []
+    return [at for at in _aside(start) if _changed(at, goal.rows(at.twin, at.q)[1]) > _changed(start, rows)]
+
+
+def _changed(at: ClosedConfiguration, rows: Array) -> int:
+    """How many of the parts with Jacobian ``rows`` (k, nv) change one by one, with closed loops."""
+    return range_basis(rows @ at.kernel()[0], 1.0)[1].value
+
+
+def _led(here: ClosedConfiguration, beside: Sequence[ClosedConfiguration], motion: PlatformMotion, goal: Goal,
+         halvings: int = HALVINGS) -> tuple[ClosedConfiguration, float]:
+    """Where small steps lead to a goal, as :func:`.steps.track`, from ``here`` or from the two ``beside`` that are
+    nearest to the goal."""
+    led = track(here, motion, goal, halvings)
+    for at in sorted(beside, key=lambda at: float(np.linalg.norm(goal.rows(at.twin, at.q)[0])))[:2]:
+        if led[1] < 1 and (other := track(at, motion, goal, halvings))[1] == 1:
+            return other
+    return led
 
 
 def _lost_rank(start: ClosedConfiguration, here: ClosedConfiguration) -> str | None:
@@ -111,10 +141,12 @@ def sweep(start: ClosedConfiguration, question: Measurement, grid: Grid, motion:
     at_once, hopeless = ({}, beyond_rods(start.twin.mechanism, motion, goals)) if placer is None else (
         ready(placer, motion, goals))
 
+    beside = _origins(start, motion, goals[0])
+
     def lead(cell: int, origin: ClosedConfiguration, halvings: int) -> ClosedConfiguration | None:
         if cell in hopeless:
             return None
-        there, came = (at_once[cell], 1.0) if cell in at_once else track(origin, motion, goals[cell], halvings)
+        there, came = (at_once[cell], 1.0) if cell in at_once else _led(origin, beside, motion, goals[cell], halvings)
         if came == 1:
             there = there if cell in at_once else nearest(there, goals[cell], home)
         return there if came == 1 and _arrived(there, goals[cell]) else None

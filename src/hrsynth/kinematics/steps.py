@@ -48,7 +48,7 @@ def track(here: ClosedConfiguration, motion: PlatformMotion, goal: GuidedTask,
     while came < 1:
         ahead = min(1.0, came + step)
         ahead = 1.0 if ahead > 1 - SOLVED else ahead
-        there = _stepped(here, goal.towards(X, ahead), home)
+        there = _stepped(here, goal.towards(X, ahead), home, last=ahead == 1)
         if there is not None:
             here, came, step = there, ahead, min(longest, 2 * step)
         elif step < longest * 0.5**halvings:
@@ -95,27 +95,31 @@ def _eased(here: ClosedConfiguration, goal: GuidedTask, X: Array, stride: float,
     return here
 
 
-def _stepped(here: ClosedConfiguration, goal: GuidedTask, home: Goal) -> ClosedConfiguration | None:
+def _stepped(here: ClosedConfiguration, goal: GuidedTask, home: Goal, last: bool = True) -> ClosedConfiguration | None:
     """The configuration at a goal nearby, moved towards ``home`` where parts are free; None where it jumps or lies
-    beyond a fold, in another working mode."""
+    beyond a fold, in another working mode, or on one and is not the ``last``."""
     twin = here.twin
     error, rows = system(twin, here.q, goal)
     step = np.asarray(np.linalg.lstsq(rows, -error, rcond=RANK_CUTOFF)[0])
     if np.max(np.abs(step), initial=0.0) > LONGEST_STEP:
         return None
     there = _corrected(here, step, goal)
-    if there is None or _beyond(rows, system(twin, there.q, goal)[1]):
+    if there is None or _beyond(rows, system(twin, there.q, goal)[1], last):
         return None
     return _drawn_home(there, goal, home, 1)
 
 
-def _beyond(before: Array, after: Array) -> bool:
+def _beyond(before: Array, after: Array, last: bool) -> bool:
     """Whether a fold lies between two configurations, given the Jacobians of loops and goal at both: the determinant of
-    their rows, on the range of the first, has changed its sign. On the fold itself nothing lies beyond it."""
+    their rows, on the range of the first, has changed its sign. On the fold itself nothing lies beyond it, but only the
+    ``last`` step may come there: working modes meet, and the next would go on in any."""
     span, _ = range_basis(before)
-    if np.linalg.slogdet(span.T @ before @ after.T @ span)[0] >= 0:
-        return False
-    return bool(np.linalg.svd(span.T @ after, compute_uv=False)[-1] > NEAR_FOLD)
+    turned = bool(np.linalg.slogdet(span.T @ before @ after.T @ span)[0] < 0)
+    if turned != last:
+        return turned
+    was, is_folded = (bool(np.min(np.linalg.svd(span.T @ rows, compute_uv=False), initial=np.inf) <= NEAR_FOLD)
+                      for rows in (before, after))
+    return not is_folded if last else is_folded and not was
 
 
 def _corrected(here: ClosedConfiguration, step: Array, goal: GuidedTask | None) -> ClosedConfiguration | None:

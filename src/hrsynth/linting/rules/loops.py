@@ -23,7 +23,7 @@ from ..elements import NumberAt
 from ..findings import LintRule, Mend, Spot
 from ..freedoms import NearbyFreedoms
 from ..subject import LintedFile
-from .names import OWN, remove
+from .names import OWN, removal
 
 CLOSING = ("loop", "constraint", "loop_joint", "joint", "connect", "weld", "coupling")
 """Elements that say how a loop closes, in any dialect."""
@@ -196,8 +196,7 @@ def _dead(file: LintedFile) -> Iterator[Spot]:
         line = _line(file, name)
         own = None if graph is None else graph.joints.get(name)
         element = None if own is not None and own.in_tree else file.element(line, *CLOSING, name=name)
-        yield Spot(line, f"without {name!r} the mechanism is as free as with it",
-                   None if element is None else partial(remove, element))
+        yield Spot(line, f"without {name!r} the mechanism is as free as with it", removal(element))
 
 
 def _line(file: LintedFile, name: str) -> int | None:

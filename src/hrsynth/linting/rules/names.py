@@ -11,7 +11,7 @@ from ...description import xml
 from ...description.chains import CUT, END, TIP
 from ...mechanism import graphs
 from ..elements import joints
-from ..findings import LintRule, Spot
+from ..findings import LintRule, Mend, Spot
 from ..subject import LintedFile
 
 RESERVED = re.compile(r"__.*__|world|.*::.*")
@@ -71,11 +71,21 @@ def _unused(file: LintedFile) -> Iterator[Spot]:
         for name in (each for each in graph.links if each in part):
             alone = len(part) == 1 and name not in (graph.base, graph.platform)
             element = file.element(graph.links[name].line, "link", name=name) if alone else None
-            yield Spot(graph.links[name].line, f"link {name!r}: no joint connects it to the others",
-                       None if element is None else partial(remove, element))
+            yield Spot(graph.links[name].line, f"link {name!r}: no joint connects it to the others", removal(element))
 
 
-def remove(element: xml.Element) -> None:
+def removal(element: xml.Element | None) -> Mend | None:
+    """A mend that takes an element out; None where another one names it, and would then name nothing."""
+    if element is None:
+        return None
+    name, own = element.get("name"), set(element.iter("*"))
+    elsewhere = set(element.getroottree().getroot().iter("*")) - own
+    if name is not None and any(name in (*each.attrib.values(), (each.text or "").strip()) for each in elsewhere):
+        return None
+    return partial(_remove, element)
+
+
+def _remove(element: xml.Element) -> None:
     """Take an element out of its document, and the white space before it."""
     parent, before = element.getparent(), element.getprevious()
     if parent is None:
