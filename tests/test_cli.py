@@ -543,6 +543,18 @@ def test_singular_refuses_in_one_line_and_writes_nothing(run, tmp_path: Path, mo
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize(("arguments", "status", "words"), [
+    (["--plane", "q=1"], 2, ["unknown part", "'q'"]),
+    (["--plane", "phi=0,x=0"], 2, ["this one leaves y", "fewer parts held", "--grid y=-0.1:0.1:9 of check, accuracy"]),
+    (["--plane", "x=9"], 3, ["no pose of the plane x=9 is reached"]),
+    (["--observe", "1"], 2, ["has no locus", "legs that make it controllable"])])
+def test_singular_refuses_a_plane_before_it_computes(run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+                                                     arguments: list[str], status: int, words: list[str]):
+    monkeypatch.setattr(hrsynth, "singular", lambda *_, **__: pytest.fail("computed before the plane was looked at"))
+    (line,) = run("singular", "3rrr_m1", *arguments, "-o", tmp_path / "x.png").refused(status)
+    assert all(word in line for word in words), line
+
+
 @pytest.mark.slow
 def test_singular_answers_3_where_condition_and_rank_disagree(run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr("hrsynth.analysis.singularity.agreement.RANK_CUTOFF", 1e-30)

@@ -79,7 +79,7 @@ class Question:
                 given |= each.given(path)
                 if path is not None:
                     require_other(path, source["robot"], mechanism.file)
-                each.require_drawable(path, mechanism, given)
+                each.require_drawable(path, mechanism, values | given)
             for option in ("at", "start", "goal"):
                 told_turns(option, values.get(option))
             found = function(mechanism, **given)
