@@ -51,8 +51,7 @@ class _MjcfReader(XmlReader):
         self.placed[WORLD] = ORIGIN
         for world in root.findall("worldbody"):
             self._children(world, WORLD, None, ORIGIN)
-        if len(graph.links) == 1:
-            self.defect(xml.line(root), "no bodies")
+        self.require_some(graph.links.keys() - {WORLD}, "bodies", root)
         self.require_sound()
         self._keyframes()
         for section in root.findall("equality"):

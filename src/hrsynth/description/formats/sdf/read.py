@@ -57,8 +57,7 @@ class _SdfReader(XmlReader):
         graph = self.result = JointGraph(model.get("name") or "robot", self.file, "SDF", digits=self.digits)
         self.frames[MODEL] = _FrameElement(model.find("pose"), WORLD, WORLD, "model")
         self._collect(model, "", 0)
-        if not graph.links:
-            self.defect(xml.line(model), "no links")
+        self.require_some(graph.links, "links", model)
         self.require_sound()
         for prefix, element in self.joints:
             self._joint(prefix, element)
