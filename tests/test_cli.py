@@ -135,6 +135,7 @@ def test_derive_text_has_the_hidden_robot_and_the_verdict(run):
     assert answer.status == 0
     assert re.search(r"^hidden robot +2-Π-\{2-U̲U\}$", answer.out, re.MULTILINE)
     assert re.search(r"^verdict +controllable$", answer.out, re.MULTILINE)
+    assert max(map(len, answer.out.splitlines())) <= 100
     assert answer.err == ""
 
 

@@ -241,7 +241,8 @@ def _axes(start: ClosedConfiguration, motion: PlatformMotion, plane: Pose | None
     allowed = ["fewer parts held"] if fixed else []
     allowed += [f"for a line of poses --grid {left[0]}=-0.1:0.1:9 of check, accuracy or basins"] if left else []
     raise BadRequest(f"{name}: a plane leaves two parts of the pose to vary, this one leaves "
-                     f"{' and '.join(left) or 'none'}", str(plane) or "no part held", "; ".join(allowed) or "single poses, or a platform that shifts")
+                     f"{' and '.join(left) or 'none'}", str(plane) or "no part held",
+                     "; ".join(allowed) or "single poses, or a platform that shifts")
 
 
 def _spread(motion: PlatformMotion, pair: tuple[str, str]) -> float:
