@@ -230,11 +230,10 @@ def _axes(start: ClosedConfiguration, motion: PlatformMotion, plane: Pose | None
     if not fixed and motion.planar:
         plane, turned = replace(plane, phi=0.0), True
     places = [part for part in parts if part in "xyz" and part not in fixed]
-    count, free = motion.translations.shape[1] - len(fixed & set("xyz")), motion.dof - len(fixed - {"rpy"})
+    count = motion.translations.shape[1] - len(fixed & set("xyz"))
     if count == 3:
-        plane = replace(plane, z=round(_coordinates(motion, start, ("z",))[0], 9))
-        places, count, free = places[:2], 2, free - 1
-    if count == 2 <= free:
+        plane, places, count = replace(plane, z=round(_coordinates(motion, start, ("z",))[0], 9)), places[:2], 2
+    if count == 2 <= motion.dof:
         return plane, max(combinations(places, 2), key=lambda pair: _spread(motion, pair))
     if count == 1 and "phi" in parts and not turned and motion.dof > motion.translations.shape[1]:
         return plane, (places[0], "phi")
