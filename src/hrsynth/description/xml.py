@@ -54,7 +54,8 @@ def content(path: str | Path) -> bytes:
     except FileNotFoundError:
         raise refusal(path, "no such file", "the path of a file that is there") from None
     except (OSError, ValueError) as error:
-        raise refusal(path, "cannot be read", "a file that can be read", value=getattr(error, "strerror", None) or str(error)) from None
+        raise refusal(path, "cannot be read", "a file that can be read",
+                      value=getattr(error, "strerror", None) or str(error)) from None
     if len(data) > LARGEST_FILE:
         raise refusal(path, "file too large", most, value=f"more than {LARGEST_FILE} bytes")
     return data
