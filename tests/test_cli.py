@@ -295,6 +295,7 @@ def test_a_hidden_robot_of_one_leg_is_a_robot_again(run, tmp_path: Path):
 @pytest.mark.parametrize(("arguments", "cure"), [
     (["nowhere.urdf"], "the path of a file"), (["empty.urdf"], "a robot file"), (["cut.urdf"], "a whole document"),
     (["/dev/null"], "a robot file"), (["delta", "-o", "nowhere/x.urdf"], "in a folder that is there"),
+    (["delta", "--camera", "arm_1", "--camera", "base"], "others as NAME=LINK@x,y,z"),
     (["delta", "--unit", ""], "m, mm, cm, in"), (["delta", "--platform", ""], "rod_1a"),
     (["delta", "more"], "what hrsynth derive -h lists"), (["spherical.urdf"], "--see direction:LINK/dx,dy,dz")])
 def test_a_refusal_says_what_to_do(run, robot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
