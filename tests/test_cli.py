@@ -135,6 +135,7 @@ def test_derive_text_has_the_hidden_robot_and_the_verdict(run):
     assert answer.status == 0
     assert re.search(r"^hidden robot +2-Π-\{2-U̲U\}$", answer.out, re.MULTILINE)
     assert re.search(r"^verdict +controllable$", answer.out, re.MULTILINE)
+    assert max(map(len, answer.out.splitlines())) <= 100
     assert answer.err == ""
 
 
@@ -267,6 +268,49 @@ def test_arguments_that_do_not_fit(run, arguments: list[str], words: list[str]):
     lines = run("derive", "delta", *arguments).refused()
     assert len(lines) == 1
     assert all(word in lines[0] for word in words), lines
+
+
+SPHERICAL = """<robot name="spherical">
+  <link name="base"/><link name="a"/><link name="b"/><link name="c"/>
+  <joint name="1" type="continuous"><parent link="base"/><child link="a"/><axis xyz="1 0 0"/></joint>
+  <joint name="2" type="continuous"><parent link="a"/><child link="b"/><axis xyz="0 1 0"/></joint>
+  <joint name="3" type="continuous"><parent link="base"/><child link="c"/><axis xyz="0 0 1"/></joint>
+  <loop name="4" type="revolute"><predecessor link="b"/><successor link="c"/><axis xyz="1 1 1"/></loop>
+  <hrsynth><platform link="b"/></hrsynth>
+</robot>"""
+
+
+def test_a_hidden_robot_of_one_leg_is_a_robot_again(run, tmp_path: Path):
+    """Its platform, which is watched, is in no leg then."""
+    hidden = tmp_path / "hidden.urdf"
+    data = run("derive", "rrrrr_m1", "--observe", "1", "-o", hidden, "--json").data
+    second = run("derive", hidden, "--json").data
+    assert second["notation"]["real_ascii"] == data["notation"]["hidden_ascii"] == "PiR*"
+    for told in ("dof", "verdict", "rank"):
+        assert second[told] == data[told]
+    (once,), (again,) = data["lost"], second["lost"]
+    assert again["twist"] == pytest.approx(once["twist"], abs=1e-9)
+
+
+@pytest.mark.parametrize(("arguments", "cure"), [
+    (["nowhere.urdf"], "the path of a file"), (["empty.urdf"], "a robot file"), (["cut.urdf"], "a whole document"),
+    (["/dev/null"], "a robot file"), (["delta", "-o", "nowhere/x.urdf"], "in a folder that is there"),
+    (["delta", "--camera", "arm_1", "--camera", "base"], "others as NAME=LINK@x,y,z"),
+    (["delta", "--unit", ""], "m, mm, cm, in"), (["delta", "--platform", ""], "rod_1a"),
+    (["delta", "more"], "what hrsynth derive -h lists"), (["spherical.urdf"], "--see direction:LINK/dx,dy,dz")])
+def test_a_refusal_says_what_to_do(run, robot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+                                   arguments: list[str], cure: str):
+    monkeypatch.chdir(tmp_path)
+    for name, text in (("empty.urdf", ""), ("cut.urdf", FOUR_BAR[:500]), ("spherical.urdf", SPHERICAL)):
+        robot(text, name)
+    (line,) = run("derive", *arguments).refused()
+    assert "allowed: " in line
+    assert cure in line.partition("allowed: ")[2]
+
+
+def test_a_spherical_robot_is_watched_by_directions_that_are_named(run, robot):
+    data = run("derive", robot(SPHERICAL), "--see", "direction:a/0,1,0", "--json").data
+    assert (data["dof"], data["verdict"]) == (1, "controllable")
 
 
 @pytest.mark.parametrize("arguments", [["nothing"], ["derive"], ["convert", "delta"], ["--nothing"], ["robots", "x"]])
@@ -541,6 +585,29 @@ def test_singular_refuses_in_one_line_and_writes_nothing(run, tmp_path: Path, mo
     (line,) = run("singular", robot, "--points", "5", *arguments).refused(status)
     assert all(word in line for word in words), line
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(("arguments", "status", "words"), [
+    (["--plane", "q=1"], 2, ["unknown part", "'q'"]),
+    (["--plane", "phi=0,x=0"], 2, ["this one leaves y", "fewer parts held", "--grid y=-0.1:0.1:9 of check, accuracy"]),
+    (["--plane", "x=9"], 3, ["no pose of the plane x=9 is reached"]),
+    (["--observe", "1"], 2, ["has no locus", "legs that make it controllable"])])
+def test_singular_refuses_a_plane_before_it_computes(run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+                                                     arguments: list[str], status: int, words: list[str]):
+    monkeypatch.setattr(hrsynth, "singular", lambda *_, **__: pytest.fail("computed before the plane was looked at"))
+    (line,) = run("singular", "3rrr_m1", *arguments, "-o", tmp_path / "x.png").refused(status)
+    assert all(word in line for word in words), line
+
+
+@pytest.mark.parametrize("words", [
+    ["singular", "-o", "x.png"], ["accuracy", "--cone", "1deg", "--plane", "y=0"]], ids=" ".join)
+def test_a_robot_of_one_freedom_has_no_plane(run, robot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+                                             words: list[str]):
+    """Though its platform moves along x and along z: on a curve."""
+    monkeypatch.chdir(tmp_path)
+    (line,) = run(words[0], robot(FOUR_BAR), *words[1:]).refused()
+    assert "this one leaves x and z, which depend on each other" in line
+    assert "--grid x=-0.1:0.1:9" in line
 
 
 @pytest.mark.slow

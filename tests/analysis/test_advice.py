@@ -398,6 +398,7 @@ def test_no_set_that_sees_as_much_is_cheaper(price: str) -> None:
 
 
 @pytest.mark.parametrize(("price", "said"), [("thing=2", "kind of measurement"), ("point=0", "a positive number"),
+                                             ("point=1,point=2", "given twice"),
                                              ("point", "a positive number"), ("leg=nan", "a positive number")])
 def test_prices_that_are_none_are_refused(price: str, said: str) -> None:
     with pytest.raises(BadRequest, match=said):

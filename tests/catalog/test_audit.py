@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from collections import Counter
 from pathlib import Path
 
@@ -329,6 +330,13 @@ def test_the_command_line(tables: Path, tmp_path: Path, capsys: pytest.CaptureFi
     assert (data["command"], data["rows"], data["agree"]) == ("catalog audit", 2, 1)
     assert execute(["catalog", "audit", str(tables), "--sample", "1"]) == 0
     assert "rows compared" in capsys.readouterr().out
+    broken = write(tmp_path / "broken")
+    with (broken / "robots" / "sym_2T1R_list.csv").open("a") as file:
+        file.write("\nP3XYZ;S3RRR1\n")
+    assert execute(["catalog", "audit", str(broken), "--only", "2T1R"]) == 0
+    out, err = capsys.readouterr()
+    assert re.search(r"^hrsynth: .*sym_2T1R_list.csv:\d+: not the name of a robot, found P3XYZ", err, re.MULTILINE)
+    assert out.splitlines()[-3].startswith("left out: 1 line of the tables, ")
     for arguments, said in (([str(tmp_path / "none")], "no folder of tables"), ([str(tmp_path)], "no table of robots"),
                             ([str(tables), "--only", "4T"], "no group of these tables"),
                             ([str(tables), "-o", "x.csv"], "one per line")):

@@ -5,13 +5,14 @@ from __future__ import annotations
 import contextlib
 import time
 from itertools import pairwise
+from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from description.samples import FOUR_BAR
-from hrsynth.description import native
+from hrsynth.description import load, native
 from hrsynth.errors import BadRobotFile, LoopsNotClosed
 
 UNIVERSAL = ('<loop name="d" type="revolute">', '<loop name="d" type="universal">')
@@ -177,6 +178,19 @@ def test_a_message_is_one_line_with_file_line_value_and_what_is_allowed():
 def test_what_is_no_robot_at_all(text: str | bytes, line: int | None, what: str):
     found = defects(text)
     assert (line, True) in [(number, message.startswith(what)) for number, message in found]
+
+
+@pytest.mark.parametrize(("name", "text"), [
+    ("a.urdf", '<robot name="x"/>'), ("a.xml", "<mujoco/>"), ("a.sdf", '<sdf version="1.9"><model name="x"/></sdf>'),
+    ("a.urdf", '<robot name="x"><hrsynth/></robot>'),
+    ("a.xacro", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:macro name="leg" params="i"/></robot>')])
+def test_a_file_without_links_is_told_what_to_name_instead(tmp_path: Path, name: str, text: str):
+    if name.endswith(".xacro"):
+        pytest.importorskip("xacro")
+    file = tmp_path / name
+    file.write_text(text)
+    with pytest.raises(BadRobotFile, match=r"no (links|bodies).*holds macros, the file that uses it"):
+        load(file)
 
 
 def test_an_entity_bomb_is_refused_at_once():

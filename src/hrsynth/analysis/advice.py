@@ -249,6 +249,8 @@ def _prices(text: str) -> dict[str, float]:
         kind, _, number = part.partition("=")
         if kind not in allowed:
             raise BadRequest("--price: kind of measurement", kind, ", ".join(allowed))
+        if kind in found:
+            raise BadRequest("--price: a kind given twice", text, f"one price of {kind}")
         try:
             found[kind] = float(number)
         except ValueError:

@@ -14,9 +14,11 @@ from ..geometry.ranks import range_basis
 from ..geometry.vectors import Array
 from ..kinematics.certificate import Certificate, certify
 from ..kinematics.sampling import Samples
-from ..mechanism import Mechanism
-from ..mechanism.legs import LegDecomposition
+from ..mechanism import Mechanism, Observation
+from ..mechanism.legs import LegDecomposition, decompose
+from ..mechanism.normal import normal_form
 from ..mechanism.notation import Architecture
+from ..mechanism.observations.direction import Direction
 from ..progress import tell
 from ..results import Result, Value
 from ..rewrite.evidence import Evidence
@@ -195,8 +197,19 @@ def finished(setting: ObservedRobot, state: State) -> Mechanism:
     mechanism = state.mechanism
     observations = tuple(o for o in setting.observed if {o.link, o.seen_from or o.link} <= mechanism.links.keys())
     cameras = tuple(camera for camera in mechanism.cameras if camera.link in mechanism.links)
-    return spanning(replace(mechanism, name=f"{setting.robot.name}_hidden", observations=observations, cameras=cameras,
-                            file=None, formation=False))
+    hidden = spanning(replace(mechanism, name=f"{setting.robot.name}_hidden", observations=observations,
+                              cameras=cameras, file=None, formation=False))
+    return replace(hidden, observations=_in_legs(hidden))
+
+
+def _in_legs(hidden: Mechanism) -> tuple[Observation, ...]:
+    """A mechanism's observations; a segment that is in none of its legs (of a single leg the platform) as a direction
+    of its link."""
+    told = tuple(replace(o, seen_from=hidden.reference) if isinstance(o, Direction) and o.by_segment else o
+                 for o in hidden.observations)
+    anatomy = decompose(normal_form(replace(hidden, observations=told)).mechanism)
+    return tuple(own if anatomy.leg_of(own.link) else other
+                 for own, other in zip(hidden.observations, told, strict=True))
 
 
 def _check(samples: Samples, count: int | None) -> Check:

@@ -327,7 +327,10 @@ def _seeing(robot: Mechanism, cameras: tuple[str, ...], see: tuple[str, ...], of
             ) -> tuple[Mechanism, set[str], set[str]]:
     """The robot with cameras and observations that are asked for and offered, and the labels of these."""
     named = [parse_camera(text) for text in cameras if "=" in text]
-    for link in [text for text in cameras if "=" not in text]:
+    links = [text for text in cameras if "=" not in text]
+    if len(links) > 1:
+        raise BadRequest("--camera: links that carry the camera", ", ".join(links), "one; others as NAME=LINK@x,y,z")
+    for link in links:
         if link not in robot.links:
             raise BadRequest(f"{robot.name} has no link for the camera", link, sorted(robot.links))
         robot = replace(robot, camera=link)

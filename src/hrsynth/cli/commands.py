@@ -101,7 +101,7 @@ class DeclaredCommand:
         read = {each: [each.read("--" if value == [] else value) for value in given[each.name]]
                 for each in self.options if each.name in given}
         if plain:
-            raise BadRequest(f"{self.name} takes no more arguments", " ".join(plain))
+            raise BadRequest(f"{self.name} takes no more arguments", " ".join(plain), f"what {self.path} -h lists")
         missing = [each.shown for each in self.options if each.default is NEEDED and each not in read]
         if missing:
             raise BadRequest(f"{self.name} needs {' and '.join(missing)}")

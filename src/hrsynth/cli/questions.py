@@ -79,7 +79,7 @@ class Question:
                 given |= each.given(path)
                 if path is not None:
                     require_other(path, source["robot"], mechanism.file)
-                each.require_drawable(path, mechanism, given)
+                each.require_drawable(path, mechanism, values | given)
             for option in ("at", "start", "goal"):
                 told_turns(option, values.get(option))
             found = function(mechanism, **given)
@@ -294,8 +294,8 @@ QUESTIONS = (
               Option("grid", "A line, plane or box of poses, such as x=-0.3:0.3:21,y=0,z=-0.7 (from:to:count).",
                      "GRID"),
               Option("steps", "Poses along each side of the plane.", None, int, low=5, high=300),
-              Option("nonlinear", "Try this many errors (four at least) at each pose; on a plane or grid, at its "
-                     "worst poses.", "COUNT", int, 0, low=0),
+              Option("nonlinear", "Try this many errors (at least the worst to first order) at each pose; on a "
+                     "plane or grid, at its worst poses.", "COUNT", int, 0, low=0),
               _file("accuracy")),
              ("delta --cone 0.1deg --at x=0.1", "delta --cone 0.1deg --plane z=-0.6 -o map.png")),
     Question("select", "Which legs to watch for a motion from start to goal: all sets, ranked by where else the loop "

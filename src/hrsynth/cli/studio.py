@@ -49,7 +49,7 @@ def add(app: Group) -> None:
                 "dropped in, with hidden robot, modes, accuracy and runs, live.",
                 (Option("robot", "A robot file in any dialect, a shipped robot's name, example:NAME, or a folder.",
                         "[ROBOT|FOLDER]", argument=True, words=shipped),
-                 Option("observe", "Legs to watch (1,4), links, or all (default: those of the file).", "LEGS",
+                 Option("observe", "Legs to watch (1,4), links, or all (default: all).", "LEGS",
                         group=WATCHING),
                  Option("camera", "The link that carries the camera.", "LINK", group=WATCHING), PORT,
                  Option("browser", "Open the page in the browser.", None, bool, True, ("--browser/--no-browser",))),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -38,6 +38,12 @@ class XmlReader:
         """Raise :class:`BadRobotFile` with all defects found so far, where there are any."""
         if self.defects:
             raise BadRobotFile(self.defects)
+
+    def require_some(self, found: Collection[object], what: str, element: xml.Element) -> None:
+        """Record that a file holds no links."""
+        if not found:
+            self.defect(xml.line(element), f"no {what}", None,
+                        f"{what} and joints; where this file is a part or holds macros, the file that uses it")
 
     def attribute(self, element: xml.Element, name: str) -> str | None:
         """An attribute that must be there and not be empty."""

@@ -70,7 +70,8 @@ def replaceable(path: str | Path) -> Path:
 
 
 def _unwritten(reason: str, path: str | Path) -> BadRequest:
-    return BadRequest(f"cannot write the file: {reason}", str(path))
+    return BadRequest(f"cannot write the file: {reason}", str(path),
+                      "a file, new or old, in a folder that is there and can be written to")
 
 
 def _reason(error: OSError | ValueError) -> str:

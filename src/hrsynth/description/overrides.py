@@ -62,8 +62,8 @@ class Overrides:
     @property
     def any(self) -> bool:
         """Whether anything is given that changes what the file says."""
-        return bool(self.platform or self.motors is not None or self.close or self.freeze or self.unit
-                    or self.keyframe is not None)
+        return bool(self.close or self.freeze) or any(
+            each is not None for each in (self.platform, self.motors, self.unit, self.keyframe))
 
     def apply(self, graph: JointGraph) -> None:
         """Unit, closures, frozen joints and motors, in the graph of a file."""

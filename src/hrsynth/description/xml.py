@@ -44,17 +44,18 @@ def content(path: str | Path) -> bytes:
     try:
         status = Path(path).stat()
         if stat.S_ISDIR(status.st_mode):
-            raise refusal(path, "a directory, not a robot file")
+            raise refusal(path, "a directory", "a robot file")
         if not stat.S_ISREG(status.st_mode):
-            raise refusal(path, "not a regular file")
+            raise refusal(path, "not a regular file", "a robot file")
         if status.st_size > LARGEST_FILE:
             raise refusal(path, "file too large", most, value=f"{status.st_size} bytes")
         with open(path, "rb") as stream:
             data = stream.read(LARGEST_FILE + 1)
     except FileNotFoundError:
-        raise refusal(path, "no such file") from None
+        raise refusal(path, "no such file", "the path of a file that is there") from None
     except (OSError, ValueError) as error:
-        raise refusal(path, "cannot be read", value=getattr(error, "strerror", None) or str(error)) from None
+        raise refusal(path, "cannot be read", "a file that can be read",
+                      value=getattr(error, "strerror", None) or str(error)) from None
     if len(data) > LARGEST_FILE:
         raise refusal(path, "file too large", most, value=f"more than {LARGEST_FILE} bytes")
     return data
@@ -68,7 +69,7 @@ def document(text: bytes | str, file: str, notes: list[Note] | None = None) -> E
     """
     data = text.encode() if isinstance(text, str) else text
     if not data.strip():
-        raise refusal(file, "an empty file", line=1)
+        raise refusal(file, "an empty file", "a robot file", line=1)
     try:
         data.decode("utf-8")
     except UnicodeDecodeError as error:
@@ -96,7 +97,7 @@ def document(text: bytes | str, file: str, notes: list[Note] | None = None) -> E
         data = mended
     # raised here, not above: libraries that send errors between processes take their context along, and the parser's
     # own error cannot be sent
-    raise refusal(file, "malformed XML", value=what, line=at)
+    raise refusal(file, "malformed XML", "a whole document of XML", value=what, line=at)
 
 
 def _mended(data: bytes, what: str, notes: list[Note]) -> bytes:

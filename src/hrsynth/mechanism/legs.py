@@ -315,7 +315,7 @@ def _labelled(anatomy: LegDecomposition) -> LegDecomposition:
         index = next((i for i, leg in enumerate(anatomy.legs) if anatomy.leg_of(observation.link) == leg), None)
         if index is None:
             defects.append(Defect(file, line, "observe of a link that is not in a leg", observation.link,
-                                  "links of the legs: " + links))
+                                  f"links of the legs: {links}; others as <observe kind=\"direction\">"))
         elif given.setdefault(index, observation.leg) != observation.leg:
             defects.append(Defect(file, line, f"link {observation.link!r} is in the leg labelled {given[index]!r}, "
                                   "but is labelled", observation.leg, given[index]))

@@ -64,7 +64,8 @@ class Noise:
         for unit, _ in self.amounts:
             if unit not in known:
                 raise BadRequest(f"noise: nothing that is observed has errors in {IN_WORDS[unit][0]}", str(self),
-                                 [IN_WORDS[each][1] for each in sorted(known)])
+                                 [IN_WORDS[each][1] for each in sorted(known)]
+                                 or "more to observe (--see): directions have cones")
         amounts = dict(self.amounts)
         for each in observations:
             if "px" in amounts and "px" in each.found_by and not (

@@ -22,6 +22,8 @@ from .observations.encoder import AngleEncoder, Encoder, SlideEncoder
 from .observations.line import SpaceLine
 
 Place = TypeVar("Place")
+INSTEAD = "another direction: --see direction:LINK/dx,dy,dz (in the link's frame), or <observe> in the file"
+"""What can be watched of a leg that has no segment of its own."""
 TURNING = (JointType.REVOLUTE, JointType.CYLINDRICAL)
 
 
@@ -35,7 +37,8 @@ def default_observation(anatomy: LegDecomposition, leg: Leg, last: bool = False)
 def _default(anatomy: LegDecomposition, leg: Leg, last: bool = False) -> tuple[Direction, str]:
     """The default segment of a leg, and why it is that one."""
     if anatomy.floats(leg):
-        raise NoSegment(f"leg {leg.label} has no segment to observe: nothing holds the platform", leg.joints[0])
+        raise NoSegment(f"leg {leg.label} has no segment to observe: nothing holds the platform", leg.joints[0],
+                        INSTEAD)
     segments = _Segments(anatomy, leg, NOISE)
     path, nodes, base = segments.path, segments.nodes, anatomy.mechanism.base
     for i, edge in enumerate(path):
@@ -48,7 +51,7 @@ def _default(anatomy: LegDecomposition, leg: Leg, last: bool = False) -> tuple[D
         rod = _first(segments.binary, path[-1].inside)
         return rod, "the first of the parallel rods before the platform"
     if len(nodes) < 3:
-        raise NoSegment(f"leg {leg.label} has no segment to observe: it is one joint", path[-1].joints[0])
+        raise NoSegment(f"leg {leg.label} has no segment to observe: it is one joint", path[-1].joints[0], INSTEAD)
     found = _first(segments.at, range(len(nodes) - 2, 0, -1)[: 1 if last else None])
     short = "" if found.link == nodes[-2] else " that has a length"
     return found, f"the last segment before the platform{short}"
@@ -173,7 +176,7 @@ class _Segments:
     def _direction(self, link: str, vector: Array) -> Direction:
         if np.linalg.norm(vector) <= self.least * self.mechanism.length:
             raise NoSegment(f"the observed segment {link!r} of leg {self.leg.label} has no length",
-                            float(np.linalg.norm(vector)), "two joint centres apart from each other")
+                            float(np.linalg.norm(vector)), f"two joint centres apart from each other; {INSTEAD}")
         return Direction(self.leg.label, link, self.mechanism.links[link].pose[:3, :3].T @ unit(vector))
 
 

@@ -70,7 +70,7 @@ def animation(found: Servo) -> bytes:
     return stream.getvalue()
 
 
-def require_legs(setting: ObservedRobot) -> None:
+def require_legs(setting: ObservedRobot, **_: Any) -> None:
     """Raise ``BadRequest`` where something else is observed than legs."""
     for each in setting.observed:
         if not each.by_segment:

@@ -172,6 +172,13 @@ def check_table(found: Check) -> bytes:
     return stream.getvalue().encode()
 
 
+def require_plane(setting: ObservedRobot, plane: Pose | str | None = None, **_: Any) -> None:
+    """Raise what is wrong with the plane, or why there is no locus."""
+    from ..analysis.singularity.locus import require_plane
+
+    require_plane(setting, plane)
+
+
 def locus(found: Singularity, plane: Pose | str | None, steps: int, seed: int) -> Locus:
     """Where a freedom is lost over a plane of poses."""
     from ..analysis.singularity.locus import locus

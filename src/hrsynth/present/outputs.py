@@ -60,8 +60,8 @@ class File:
     """Whether it is a figure, of which width and font can be asked for."""
     installed: tuple[str, str] | None = None
     """An ending, and what raises ``MissingExtra`` where a library for it is missing."""
-    limited: tuple[str, str] | None = None
-    """An ending, and what raises ``BadRequest`` for an observed robot that cannot be drawn so."""
+    limited: tuple[tuple[str, ...], str] | None = None
+    """Endings, and what raises ``BadRequest`` for an observed robot, with the options, that cannot be drawn so."""
     plotted: tuple[str, ...] = (".png", ".svg", ".pdf")
     """The endings that are drawn with matplotlib."""
     streamed: tuple[str, str] | None = None
@@ -96,12 +96,12 @@ class File:
         require_writable(path)
 
     def require_drawable(self, path: str | None, robot: Any, asked: Asked) -> None:
-        """Raise ``BadRequest`` where what is observed of a robot cannot be drawn so: before long work as well."""
-        if path is not None and self.limited is not None and Path(path).suffix.lower() == self.limited[0]:
+        """Raise ``BadRequest`` where what is asked for of a robot cannot be drawn so: before long work as well."""
+        if path is not None and self.limited is not None and Path(path).suffix.lower() in self.limited[0]:
             from ..analysis.observed import ObservedRobot
 
             watched = {name: asked[name] for name in ("observe", "camera", "see", "seed") if name in asked}
-            function(self.limited[1])(ObservedRobot.of(robot, **watched))
+            function(self.limited[1])(ObservedRobot.of(robot, **watched), **{name: asked[name] for name in self.takes})
 
     def given(self, path: str | None) -> dict[str, str]:
         """What the question is told of a file that it writes itself."""
@@ -243,10 +243,11 @@ OUTPUTS = {
              "The picture of the run", "Draw the run: curves (run.png, .pdf, .svg) or an animation (run.gif).",
              allowed=".png, .pdf, .svg (curves) or .gif (camera view)", drawn=True,
              installed=(".gif", ".simulation.pictures:drawing"),
-             limited=(".gif", "animations:require_legs"), plotted=(*FIGURES, ".gif")),)),
+             limited=((".gif",), "animations:require_legs"), plotted=(*FIGURES, ".gif")),)),
     "singular": Outputs("text.poses:singularity", (
         File("cannot draw the locus", figures("maps:locus_map"), "The locus", "Draw the locus: locus.png, .pdf, .svg.",
-             computed="maps:locus", takes=("plane", "steps"), record="locus", drawn=True),)),
+             computed="maps:locus", takes=("plane", "steps"), record="locus", drawn=True,
+             limited=(FIGURES, "maps:require_plane")),)),
     "verdict": Outputs("text.robots:verdict"),
     "view": Outputs("text.robots:view", (
         File("cannot write the view", dict.fromkeys(HTML, "view.page:static"), "The view",

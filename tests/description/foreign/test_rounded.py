@@ -292,3 +292,20 @@ def test_small_features_that_are_typed_stay(tmp_path: Path):
     assert robot.joints["q"].point.tolist() == [0.127, 0.375, 0.0]
     save(robot, tmp_path / "again.urdf")
     assert load(tmp_path / "again.urdf").differences(robot) == []
+
+
+def test_a_platform_on_balls_alone_has_no_axes_to_mend(tmp_path: Path):
+    """Five rods between balls, as a suspension of a wheel: no relation of axes holds, as there are none."""
+    feet = [(-0.4, 0.1, 0.02), (0.3, -0.35, -0.05), (0.45, 0.2, 0.01), (-0.1, 0.4, 0.03), (-0.25, -0.3, 0.04)]
+    tips = [(-0.2, 0.15, 0.6), (0.1, -0.25, 0.55), (0.25, 0.1, 0.62), (-0.05, 0.2, 0.58), (-0.15, -0.1, 0.64)]
+    text = '<sdf version="1.9"><model name="five rods"><link name="base"/><link name="hub"/>'
+    for i, (foot, tip) in enumerate(zip(feet, tips, strict=True)):
+        text += (f'<link name="rod{i}"><pose>{" ".join(map(str, foot))} 0 0 0</pose></link>'
+                 f'<joint name="a{i}" type="ball"><parent>base</parent><child>rod{i}</child></joint>'
+                 f'<joint name="b{i}" type="ball"><pose>{" ".join(map(str, tip))} 0 0 0</pose><parent>rod{i}</parent>'
+                 "<child>hub</child></joint>")
+    file = tmp_path / "rods.sdf"
+    file.write_text(text + "</model></sdf>")
+    found = ObservedRobot.of(load(file, platform="hub"))
+    assert str(found.anatomy.architecture()) == "5-SS"
+    assert (found.dof, found.mobility.total) == (1, 6)

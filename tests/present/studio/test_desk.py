@@ -319,6 +319,16 @@ def test_the_sliders_of_a_platform_of_five_freedoms_are_alive():
         assert moved["residual"] < CLOSED
 
 
+def test_a_smallest_set_that_sees_less_at_zero_is_told_as_by_legs(tmp_path: Path):
+    told = legs("rrrrr_m1", at="x=0,y=0.3332050807568877")
+    save(told.setting.robot, tmp_path / "singular.urdf")
+    found = Desk(folder=tmp_path).answer({"ask": "watch", "robot": {"source": "folder:singular.urdf"}})
+    assert [(each.legs, each.rank_at_zero) for each in told.sets if each.legs in told.minimal] == [(("1", "2"), 1)]
+    assert found["sets"] == [{"legs": ["1", "2"], "words": "controllable, but at the zero configuration only 1 of 2 "
+                                                            "freedoms are seen"}]
+    assert ask("watch", "rrrrr_m1")["sets"] == [{"legs": ["1", "2"], "words": "controllable"}]
+
+
 def test_what_was_guessed_of_a_foreign_file_is_told_and_can_be_changed(tmp_path: Path):
     save(load("rrrrr_m1"), tmp_path / "foreign.xml")
     desk, source = Desk(uploads=tmp_path), {"source": "file:foreign.xml"}

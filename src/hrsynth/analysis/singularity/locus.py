@@ -86,15 +86,27 @@ def locus(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None 
     (``BadRequest``). Raises ``PlaneNotMet`` where no pose of the plane is reached.
     """
     setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed)
-    hidden = MeasuredRobot.watched(setting)
-    if hidden.verdict.rank < setting.dof:
-        raise BadRequest(f"{setting.robot.name} has no locus: a freedom is lost at every pose", None,
-                         "legs that make it controllable")
+    hidden = _controllable(setting)
     real = None
     if any(joint.actuated for joint in setting.mechanism.joints.values()):
         driven = MeasuredRobot.driven(setting)
         real = driven if driven.rank == setting.dof else None
     return _locus(hidden, real, None if plane is None else as_pose(plane), steps)
+
+
+def require_plane(setting: ObservedRobot, plane: Pose | str | None) -> None:
+    """Raise what ``locus`` would raise of the robot or of the plane: before long work, not after it."""
+    hidden = _controllable(setting)
+    _begun(setting.everything.start, hidden.question, setting.motion, None if plane is None else as_pose(plane))
+
+
+def _controllable(setting: ObservedRobot) -> MeasuredRobot:
+    """The hidden robot; raises ``BadRequest`` where it has no locus."""
+    hidden = MeasuredRobot.watched(setting)
+    if hidden.verdict.rank < setting.dof:
+        raise BadRequest(f"{setting.robot.name} has no locus: a freedom is lost at every pose", None,
+                         "legs that make it controllable")
+    return hidden
 
 
 def _locus(hidden: MeasuredRobot, real: MeasuredRobot | None, plane: Pose | None, steps: int) -> Locus:
@@ -143,12 +155,7 @@ def framed(start: ClosedConfiguration, question: Measurement, motion: PlatformMo
     """The grid that just holds what is reached of a plane; ``met`` says which cells of a coarse one are, (n,).
 
     Raises ``PlaneNotMet`` where the plane's own parts are out of reach, ``BadRequest`` where not two parts are free."""
-    plane, names = _axes(start, motion, plane)
-    try:
-        first = reach(start, question, plane, motion) if plane.given else start
-    except PoseNotReached as error:
-        name = start.twin.mechanism.name
-        raise PlaneNotMet(name, f"the plane {plane}", str(error).removeprefix(f"{name}: ")) from None
+    plane, names, first = _begun(start, question, motion, plane)
     centre = _coordinates(motion, first, names)
     centre = [0.0 if name == "phi" else c for name, c in zip(names, centre, strict=True)]
     for wide in LOCUS_SIDES:
@@ -179,6 +186,17 @@ def framed(start: ClosedConfiguration, question: Measurement, motion: PlatformMo
     window = found + 0.75 * steps_apart[:, None] * [-1, 1]
     return Grid(tuple((name, np.linspace(low, high, steps))
                       for (name, _), (low, high) in zip(axes, window, strict=True)), plane)
+
+
+def _begun(start: ClosedConfiguration, question: Measurement, motion: PlatformMotion,
+           plane: Pose | None) -> tuple[Pose, tuple[str, ...], ClosedConfiguration]:
+    """The plane's fixed parts, the two that vary, and a configuration in it; raises as ``framed``."""
+    plane, names = _axes(start, motion, plane)
+    try:
+        return plane, names, reach(start, question, plane, motion) if plane.given else start
+    except PoseNotReached as error:
+        name = start.twin.mechanism.name
+        raise PlaneNotMet(name, f"the plane {plane}", str(error).removeprefix(f"{name}: ")) from None
 
 
 def _last(coarse: Grid, found: Array, axis: int, end: int, met: Callable[[Grid], NDArray[np.bool_]]) -> float:
@@ -215,14 +233,17 @@ def _axes(start: ClosedConfiguration, motion: PlatformMotion, plane: Pose | None
     count = motion.translations.shape[1] - len(fixed & set("xyz"))
     if count == 3:
         plane, places, count = replace(plane, z=round(_coordinates(motion, start, ("z",))[0], 9)), places[:2], 2
-    if count == 2:
+    if count == 2 <= motion.dof:
         return plane, max(combinations(places, 2), key=lambda pair: _spread(motion, pair))
     if count == 1 and "phi" in parts and not turned and motion.dof > motion.translations.shape[1]:
         return plane, (places[0], "phi")
     left = [part for part in parts if part in places or (part == "phi" and motion.dof > motion.translations.shape[1])]
+    told = " and ".join(left) + (", which depend on each other" if len(left) > 1 else "")
+    allowed = ["fewer parts held"] if fixed else []
+    allowed += [f"for a line of poses --grid {left[0]}=-0.1:0.1:9 of check, accuracy or basins"] if left else []
     raise BadRequest(f"{name}: a plane leaves two parts of the pose to vary, this one leaves "
-                     f"{' and '.join(left) or 'none'}", str(plane) or "no part held",
-                     "fewer parts held; for a line of poses a grid, such as x=-0.1:0.1:9")
+                     f"{told or 'none'}", str(plane) or "no part held",
+                     "; ".join(allowed) or "single poses, or a platform that shifts")
 
 
 def _spread(motion: PlatformMotion, pair: tuple[str, str]) -> float:

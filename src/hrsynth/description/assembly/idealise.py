@@ -187,8 +187,11 @@ def _names(relations: Sequence[GeometricRelation]) -> set[tuple[str, tuple[str, 
 
 
 def _project(at: JointCoordinates, relations: Sequence[GeometricRelation]) -> tuple[Array, float]:
-    """The nearest coordinates at which all relations hold, and the largest miss that is left."""
+    """The nearest coordinates at which all relations hold, and the largest miss that is left; of balls alone there may
+    be no relation."""
     start, weights = at.start, at.scale
+    if not relations:
+        return start, 0.0
 
     def evaluate(x: Array) -> tuple[Array, Array]:
         return (np.concatenate([each.value(x) for each in relations]),

@@ -28,7 +28,7 @@ def audited(record: Mapping[str, Any]) -> str:
                   listing([(name, words) for name, words in record["settlements"].items() if name in used]),
                   table(list(_first(record["disagreements"])), ("robot", "kind", "table", "computed", "settled"))]
     count = len(record["defects"])
-    parts += [f"{count} line{'s' * (count != 1)} of the tables cannot be read, {'the first: ' * (count != 1)}"
+    parts += [f"left out: {count} line{'s' * (count != 1)} of the tables, {'the first: ' * (count != 1)}"
               f"{record['defects'][0]}"] if count else []
     return "\n\n".join([*parts, f"{record['compared']} of {record['rows']} rows compared, {record['agree']} agree in "
                                 f"everything that is stated"])

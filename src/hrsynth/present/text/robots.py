@@ -29,6 +29,8 @@ NO_FREEDOM = "the platform has no freedom"
 NO_MATRIX = "there is no interaction matrix: observed links move while the platform rests"
 _KINDS = {"leg": "leg (direction of its default segment)", "direction": "direction of another link",
           "line": "position of an observed line", "encoder": "encoder on a joint", "offered": "--see"}
+NAMES = 14
+"""Columns before the values of a derivation."""
 _SHOWN = 6
 """Sets of measurements listed at most."""
 
@@ -70,10 +72,10 @@ def derivation(found: Derivation) -> str:
                      *([near(found.verdict)] if found.verdict.near else [])]),
         *formation(found.verdict.formation),
         ("mode", _modes(observed)),
-        ("architecture", exact_words(found.exact, found.verdict.rank)),
+        ("architecture", wrapped(exact_words(found.exact, found.verdict.rank), LINE - NAMES)),
         *lost(found.verdict), ("at zero", at_zero(found.verdict)),
         ("", [] if found.verdict.has_interaction_matrix else NO_MATRIX),
-        ("certificate", certificate(found.certificate)),
+        ("certificate", wrapped(certificate(found.certificate), LINE - NAMES)),
     ]
     if paper is not None:
         rows.append(("paper's form", [f"{paper.hidden}: {'equivalent' if paper.equivalent else 'NOT equivalent'}"

@@ -30,7 +30,7 @@ def settings_in(path: Path) -> dict[str, Any] | None:
                 raise xml.refusal(path, "YAML with aliases, too deep or too long", "lists of names")
         found = yaml.safe_load(data.decode("utf-8"))
     except (yaml.YAMLError, UnicodeDecodeError, RecursionError, ValueError) as error:
-        raise xml.refusal(path, f"not YAML: {' '.join(str(error).split())[:120]}", None) from None
+        raise xml.refusal(path, f"not YAML: {' '.join(str(error).split())[:120]}", "a whole file of YAML") from None
     if not isinstance(found, dict) or not set(KEYS) & set(found):
         return None
     return found

@@ -12,6 +12,7 @@ from ....errors import BadRobotFile
 from ....geometry.vectors import Array, pose, rotation_about
 from ... import xml
 from ...elements import XmlReader
+from ...jointgraph import comma_list
 
 
 class Defaults:
@@ -42,7 +43,7 @@ class Defaults:
         """The attributes of an element with those of its class, its own first."""
         name = element.get("class") or childclass or "main"
         if name not in self.classes:
-            self.reader.defect(xml.line(element), "unknown default class", name)
+            self.reader.defect(xml.line(element), "unknown default class", name, comma_list(self.classes, like=name))
             name = "main"
         return {**self.classes[name].get(tag or str(element.tag), {}), **_attributes(element)}
 

@@ -12,7 +12,7 @@ from ... import numerals, xml
 from ...annotations import PREFIX, drop_world, read_annotation
 from ...dialect import RobotFile
 from ...elements import XmlReader
-from ...jointgraph import ORIGIN, FrameSpec, GearSpec, JointGraph, JointSpec
+from ...jointgraph import ORIGIN, FrameSpec, GearSpec, JointGraph, JointSpec, comma_list
 from ...postures import from_keyframe
 from ..paired import onshape_pairs, other_pairs
 from .content import BodyContents
@@ -51,8 +51,7 @@ class _MjcfReader(XmlReader):
         self.placed[WORLD] = ORIGIN
         for world in root.findall("worldbody"):
             self._children(world, WORLD, None, ORIGIN)
-        if len(graph.links) == 1:
-            self.defect(xml.line(root), "no bodies")
+        self.require_some(graph.links.keys() - {WORLD}, "bodies", root)
         self.require_sound()
         self._keyframes()
         for section in root.findall("equality"):
@@ -185,13 +184,14 @@ class _MjcfReader(XmlReader):
             sites = [self.sites.get(given.get(key, "")) for key in ("site1", "site2")]
             if sites[0] is None or sites[1] is None:
                 self.defect(line, f"{element.tag} of unknown sites", " ".join(given.get(k, "?") for k in
-                                                                             ("site1", "site2")))
+                                                                             ("site1", "site2")),
+                            comma_list(self.sites) or "a <site> of each name")
                 return None
             return FrameSpec(*sites[0], line), FrameSpec(*sites[1], line)
         names = [given.get("body1"), given.get("body2", WORLD)]
         for body in names:
             if body not in self.placed:
-                self.defect(line, f"{element.tag} of an unknown body", body)
+                self.defect(line, f"{element.tag} of an unknown body", body, comma_list(self.placed, like=body))
         if any(body not in self.placed for body in names):
             return None
         one, two = (self.placed[str(body)] for body in names)
@@ -214,7 +214,8 @@ class _MjcfReader(XmlReader):
         coefficients = self._numbers(element, {"polycoef": " ".join((words + ["0"] * 5)[:5])}, "polycoef", (0,) * 5)
         for joint in (driven, driver):
             if joint is not None and joint not in graph.joints:
-                self.defect(line, f"joint equality {name!r}: unknown joint", joint)
+                self.defect(line, f"joint equality {name!r}: unknown joint", joint,
+                            comma_list(graph.joints, like=joint))
         if driven not in graph.joints or (driver is not None and driver not in graph.joints):
             return
         if driver is None:
@@ -249,6 +250,7 @@ class _MjcfReader(XmlReader):
         if joint is None:
             graph.note("ignored", f"the actuator {element.get('name')!r}, which drives no joint")
         elif joint not in graph.joints:
-            self.defect(xml.line(element), "actuator of an unknown joint", joint)
+            self.defect(xml.line(element), "actuator of an unknown joint", joint,
+                        comma_list(graph.joints, like=joint))
         elif graph.joints[joint].motor is None:
             graph.joints[joint] = replace(graph.joints[joint], motor=Motor(name))

@@ -180,7 +180,7 @@ class _NativeReader(UrdfReader):
         """The base; whatever keeps the tree joints from being one tree is a defect."""
         root_line = xml.line(self.root)
         if not self.links:
-            self.defect(root_line, "no links")
+            self.require_some(self.links, "links", self.root)
             return None
         self.check_ends()
         watched = self.cameras or self.root.findall("hrsynth/observe[@kind]")

@@ -15,7 +15,7 @@ from ... import xml
 from ...annotations import NAMESPACE, drop_world, read_annotation
 from ...dialect import RobotFile
 from ...elements import XmlReader
-from ...jointgraph import ORIGIN, FrameSpec, JointGraph
+from ...jointgraph import ORIGIN, FrameSpec, JointGraph, comma_list
 from ...postures import value_of
 from ..extensions import read_drake, read_plugins
 from ..paired import onshape_pairs, other_pairs
@@ -57,8 +57,7 @@ class _SdfReader(XmlReader):
         graph = self.result = JointGraph(model.get("name") or "robot", self.file, "SDF", digits=self.digits)
         self.frames[MODEL] = _FrameElement(model.find("pose"), WORLD, WORLD, "model")
         self._collect(model, "", 0)
-        if not graph.links:
-            self.defect(xml.line(model), "no links")
+        self.require_some(graph.links, "links", model)
         self.require_sound()
         for prefix, element in self.joints:
             self._joint(prefix, element)
@@ -178,8 +177,9 @@ class _SdfReader(XmlReader):
         chain: list[str] = []
         while name != WORLD and name not in self.poses:
             if name in chain or name not in self.frames:
-                what = "frames relative to each other in a cycle" if name in chain else "unknown frame"
-                self.defect(line, what, name)
+                cycle = ("frames relative to each other in a cycle", name, "a frame that is placed without it")
+                unknown = ("unknown frame", name, comma_list(self.frames, like=name))
+                self.defect(line, *(cycle if name in chain else unknown))
                 return ORIGIN
             chain.append(name)
             name = self.frames[name].relative_to
@@ -195,7 +195,7 @@ class _SdfReader(XmlReader):
         while name != WORLD and name not in links:
             frame = self.frames.get(name)
             if frame is None or name in passed:
-                self.defect(line, "unknown link or frame", name)
+                self.defect(line, "unknown link or frame", name, comma_list(self.frames, like=name))
                 return None
             passed.add(name)
             if frame.kind == "model":

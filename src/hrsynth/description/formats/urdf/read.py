@@ -97,8 +97,7 @@ class _TolerantReader(UrdfReader):
             self.links = {WORLD: Link(WORLD), **self.links}
             self.notes.append(("guess", f"no link {WORLD!r} is declared: it is read as the ground"))
         self.check_ends("joint")
-        if not self.links:
-            self.defect(xml.line(self.root), "no links")
+        self.require_some(self.links, "links", self.root)
         for ring in self.rings():
             names = comma_list(joint.name for joint in ring)
             self.defect(ring[0].line, "joints that form a cycle", names, "a tree with one root")

@@ -267,7 +267,7 @@ class _StageReader:
             return
         one, two = ends[0], ends[1]
         if one.link == two.link:
-            self.defect(prim.path, "a joint of a body to itself", one.link)
+            self.defect(prim.path, "a joint of a body to itself", one.link, "two bodies (physics:body0, physics:body1)")
             return
         name = fresh_name(prim.name, graph.joints)
         free = self._freedoms(prim)

@@ -161,7 +161,8 @@ def main(largest: str, most: str, task: str, name: str, *rest: str) -> None:
         sys.stdout.flush()
     except (Tf.ErrorException, RuntimeError, OSError, MemoryError, RecursionError) as error:
         text = " ".join(str(error).split())
-        refuse("OpenUSD refuses it: " + (text.partition(" : ")[2] or text or type(error).__name__))
+        what = text.partition(" : ")[2] or text or type(error).__name__
+        refuse(f"OpenUSD refuses it: {what[:300]}, allowed: a whole stage")
     os._exit(0)
 
 

@@ -39,7 +39,7 @@ def answer(request: Request) -> dict[str, Any]:
     """All that follows from which legs are watched, at ``here``."""
     setting = request.setting
     best = [each for each in smallest(all_legs(setting)) if each.rank]
-    sets = {"sets": [{"legs": list(each.legs), "words": each.verdict} for each in best[:MOST_SETS]],
+    sets = {"sets": [{"legs": list(each.legs), "words": words(each)} for each in best[:MOST_SETS]],
             "more_sets": max(0, len(best) - MOST_SETS)}
     if request.blind:
         return {"verdict": {"controllable": False, "words": "no leg is watched", "certainty": ""}, "rank": 0,
@@ -57,6 +57,13 @@ def answer(request: Request) -> dict[str, Any]:
         "hidden": hidden(request), "hidden_words": hidden_words(request), "condition": condition(setting),
         **sets, "ellipsoid": ellipsoid(setting, here.real), "error": error(setting, here.real),
         **lines(request, "derive")}
+
+
+def words(verdict: Verdict) -> str:
+    """What a set of legs sees, and that it sees less at the zero configuration, where it does."""
+    fewer = verdict.rank_at_zero
+    return verdict.verdict if fewer is None else (
+        f"{verdict.verdict}, but at the zero configuration only {fewer} of {verdict.dof} freedoms are seen")
 
 
 def lost(freedom: Freedom, point: list[float]) -> dict[str, Any]:
