@@ -23,7 +23,7 @@ from hrsynth.analysis.exact import architecture
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.catalog import load as load_catalog
 from hrsynth.catalog import store
-from hrsynth.catalog.build import unmoved
+from hrsynth.catalog.build import without_motors
 from hrsynth.catalog.entry import entry
 from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.groups import GROUPS
@@ -185,7 +185,7 @@ def questions(file: Path) -> Row:
     that are printed are there."""
     from catalog.stub import QUESTIONS
 
-    kept = store.shipped()
+    kept = store.shipped_folder()
     store._write_tables(file, {group: kept.lines([group], {}) for group in kept.groups()})
 
     def told(path: Path | None, asked: dict[str, Any]) -> str:
@@ -215,7 +215,7 @@ def verdicts(seed: int) -> float:
 def _chosen(seed: int) -> list[list[str]]:
     """Random words of each group, more than are needed."""
     rng = random.Random(seed)
-    return [rng.sample(sorted({unmoved(word) for word in make()}), 3 * EXACT) for make in GROUPS.values()]
+    return [rng.sample(sorted({without_motors(word) for word in make()}), 3 * EXACT) for make in GROUPS.values()]
 
 
 def _prepared(words: list[str]) -> Iterator[ObservedRobot]:

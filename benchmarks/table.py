@@ -17,7 +17,7 @@ from measure import Row
 from others import catalog, derivations, jacobians, modes, platforms
 from sweeps import exact_maxima, growth, matrices, other_twists
 
-from hrsynth.present.markdown import replaced, table
+from hrsynth.present.markdown import replace_between, table
 
 START = "<!-- generated: benchmarks -->"
 
@@ -28,7 +28,7 @@ def main(arguments: Sequence[str]) -> None:
         print(made)
         return
     file = Path(arguments[0])
-    made = replaced(file.read_text(encoding="utf-8"), made, START)
+    made = replace_between(file.read_text(encoding="utf-8"), made, START)
     file.write_text(made, encoding="utf-8", newline="\n")
 
 

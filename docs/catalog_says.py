@@ -14,7 +14,7 @@ from hrsynth.catalog.audit.tables import ROBOT
 from hrsynth.catalog.groups.spatial import translates
 from hrsynth.catalog.query import Catalog, load
 from hrsynth.catalog.words import LegWord, RobotWord, parse
-from hrsynth.present.markdown import replaced, table
+from hrsynth.present.markdown import replace_between, table
 
 PAGE = Path(__file__).resolve().parent / "pages" / "catalog_says.md"
 AUDIT = PAGE.with_name("audit.md")
@@ -218,7 +218,7 @@ def start(name: str) -> str:
 def written(text: str, catalog: Catalog, tables: Mapping[str, Callable[[Catalog], str]] = TABLES) -> str:
     """A page with its tables."""
     for name, made in tables.items():
-        text = replaced(text, made(catalog), start(name))
+        text = replace_between(text, made(catalog), start(name))
     return text
 
 

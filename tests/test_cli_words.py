@@ -12,7 +12,7 @@ import pytest
 import hrsynth
 from hrsynth.cli import execute
 from hrsynth.description import shipped
-from hrsynth.geometry.vectors import oriented
+from hrsynth.geometry.vectors import orient_axis
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.mechanism.normal import normal_form
 from hrsynth.mechanism.pose import Pose
@@ -101,10 +101,10 @@ def test_a_cut_is_called_by_a_loop_of_its_own_ring():
 def test_axes_have_one_sense():
     rng = np.random.default_rng(1)
     for axis in rng.normal(size=(200, 3)):
-        assert np.array_equal(oriented(axis), oriented(-axis))
-        assert oriented(axis)[np.argmax(np.abs(axis))] > 0
+        assert np.array_equal(orient_axis(axis), orient_axis(-axis))
+        assert orient_axis(axis)[np.argmax(np.abs(axis))] > 0
     for a, b in pairwise(rng.permuted(np.array([[1, -1, 1e-9]] * 20) / math.sqrt(2), axis=1)):
-        assert [oriented(v)[np.argmax(np.abs(v) > 0.5)] > 0 for v in (a, b, -a, -b)] == [True] * 4
+        assert [orient_axis(v)[np.argmax(np.abs(v) > 0.5)] > 0 for v in (a, b, -a, -b)] == [True] * 4
 
 
 @pytest.mark.some(1)

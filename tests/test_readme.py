@@ -15,7 +15,7 @@ from hrsynth.cli import execute
 from hrsynth.description import shipped
 from hrsynth.families.replays import REPLAYS, SIMULATED
 from hrsynth.present import observation_kinds, readme, replays
-from hrsynth.present.markdown import block, line, replaced
+from hrsynth.present.markdown import block, line, replace_between
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = ROOT / "docs" / "pages"
@@ -73,12 +73,12 @@ def test_the_table_of_the_catalog_is_fresh():
 
 
 def test_the_text_outside_the_marks_is_kept():
-    assert replaced(ROBOTS, block(ROBOTS, readme.START), readme.START) == ROBOTS
-    other = replaced(ROBOTS, "none at all\n", readme.START)
+    assert replace_between(ROBOTS, block(ROBOTS, readme.START), readme.START) == ROBOTS
+    other = replace_between(ROBOTS, "none at all\n", readme.START)
     assert block(other, readme.START) == "none at all\n"
-    assert replaced(other, block(ROBOTS, readme.START), readme.START) == ROBOTS
+    assert replace_between(other, block(ROBOTS, readme.START), readme.START) == ROBOTS
     with pytest.raises(ValueError, match="generated: robots"):
-        replaced("# without marks\n", "nothing\n", readme.START)
+        replace_between("# without marks\n", "nothing\n", readme.START)
 
 
 def test_the_readme_is_short():

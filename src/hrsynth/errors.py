@@ -67,7 +67,7 @@ class BadRobotFile(HrsynthError):
         return [str(defect) for defect in self.defects]
 
 
-def shortened(text: str, length: int = 200) -> str:
+def shorten_text(text: str, length: int = 200) -> str:
     """A text on one line, cut off at the end if it is too long."""
     line = " ".join(text.split())
     return line if len(line) <= length else line[: length - 1] + "…"
@@ -81,7 +81,7 @@ class BadRequest(HrsynthError):
         self.allowed = allowed if allowed is None or isinstance(allowed, str) else ", ".join(allowed)
         text = what
         if value is not None:
-            text += f", found {shortened(repr(value))}"
+            text += f", found {shorten_text(repr(value))}"
         if self.allowed:
             text += f", allowed: {self.allowed}"
         super().__init__(text)
@@ -132,7 +132,7 @@ class MotorsNotEnough(Unanswered):
     def __init__(self, robot: str, joints: Sequence[str]) -> None:
         self.robot, self.joints = robot, tuple(joints)
         super().__init__(f"{robot}: at the zero configuration the platform can move while all motors are held, through "
-                         f"{shortened(', '.join(joints))}: its pose is not a function of the motors; add motors, "
+                         f"{shorten_text(', '.join(joints))}: its pose is not a function of the motors; add motors, "
                          "or choose another zero configuration")
 
 

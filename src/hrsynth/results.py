@@ -10,7 +10,7 @@ from inspect import Parameter, signature
 from math import isfinite
 from typing import Any, ClassVar, ParamSpec, TypeVar
 
-from .errors import shortened
+from .errors import shorten_text
 
 LONGEST_LINE, LONGEST_PART = 160, 48
 """Characters of a value at a prompt, and of each of its fields there."""
@@ -33,7 +33,7 @@ class Value:
     def __repr__(self) -> str:
         own = [field for field in fields(self) if field.repr]  # type: ignore[arg-type]
         parts = (f"{field.name}={brief(getattr(self, field.name))}" for field in own)
-        return shortened(f"{type(self).__name__}({', '.join(parts)})", LONGEST_LINE)
+        return shorten_text(f"{type(self).__name__}({', '.join(parts)})", LONGEST_LINE)
 
     def __getstate__(self) -> dict[str, Any]:
         return {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore[arg-type]
@@ -53,7 +53,7 @@ def brief(value: Any) -> str:
         return f"<{len(value)} × {type(first).__name__}>"
     if hasattr(value, "shape") and value.shape:
         return f"<array {' × '.join(map(str, value.shape))}>"
-    return shortened(f"{value:.6g}" if isinstance(value, float) else repr(value), LONGEST_PART)
+    return shorten_text(f"{value:.6g}" if isinstance(value, float) else repr(value), LONGEST_PART)
 
 
 def content(value: Any) -> Any:
@@ -125,7 +125,7 @@ class Result(Compared):
         return hash(self.headline() if self.word is None else self.word)
 
     def __repr__(self) -> str:
-        return f"<{type(self).__name__}: {shortened(self.headline(), LONGEST_LINE)}>"
+        return f"<{type(self).__name__}: {shorten_text(self.headline(), LONGEST_LINE)}>"
 
     def __str__(self) -> str:
         return str(Result.public("text")(self))
@@ -145,7 +145,7 @@ def require_keywords(function: Callable[..., Any], given: Iterable[str], more: I
                             f"it takes {', '.join(known)}")
 
 
-def spelled(function: Callable[P, R]) -> Callable[P, R]:
+def with_spelling(function: Callable[P, R]) -> Callable[P, R]:
     """A function that tells of a wrong keyword which ones it has."""
     @wraps(function)
     def called(*args: P.args, **given: P.kwargs) -> R:

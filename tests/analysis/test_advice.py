@@ -19,7 +19,7 @@ from hrsynth.analysis.advice import Advice, advise, candidates
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.analysis.verdict import BLIND, CONTROLLABLE, PARTIAL
 from hrsynth.description import load
-from hrsynth.description.sights import listed
+from hrsynth.description.sights import split_offers
 from hrsynth.errors import BadRequest, HrsynthError
 from hrsynth.geometry.vectors import Array, unit
 from hrsynth.mechanism import Mechanism, Observation
@@ -406,6 +406,6 @@ def test_prices_that_are_none_are_refused(price: str, said: str) -> None:
 
 
 def test_offers_are_parted_at_kinds_alone() -> None:
-    assert listed("point:arm/plate@0.1,0,0,eye=line:plate@1,2,3/0,0,1,inclination,distance:base") == [
+    assert split_offers("point:arm/plate@0.1,0,0,eye=line:plate@1,2,3/0,0,1,inclination,distance:base") == [
         "point:arm/plate@0.1,0,0", "eye=line:plate@1,2,3/0,0,1", "inclination:plate", "distance:base"]
-    assert listed("encoder") == ["encoder"]
+    assert split_offers("encoder") == ["encoder"]

@@ -17,8 +17,8 @@ from hrsynth.analysis import instances
 from hrsynth.analysis.controllability import legs
 from hrsynth.analysis.derive import derive
 from hrsynth.analysis.exact import INSTANCES, TESTS, ExactArchitecture, ExactVerdict, architecture, architecture_of
-from hrsynth.analysis.instances import Geometry, Instance, NotRecognised, draw, kernel, rank, seen
-from hrsynth.analysis.observed import ObservedRobot, selected
+from hrsynth.analysis.instances import Geometry, Instance, NotRecognised, draw, kernel, observed_direction, rank
+from hrsynth.analysis.observed import ObservedRobot, select_relation
 from hrsynth.analysis.verdict import BLIND, CONTROLLABLE, PARTIAL
 from hrsynth.errors import HrsynthError
 from hrsynth.geometry.vectors import Array, frozen, unit
@@ -71,7 +71,7 @@ def test_exact_ranks_are_the_numerical_ones(robot: str) -> None:
         verdict = generic.verdict(observed)
         checked(verdict)
         assert verdict.exact, verdict.reason
-        assert verdict.rank == selected(setting.everything.members[0].relation, places).rank
+        assert verdict.rank == select_relation(setting.everything.members[0].relation, places).rank
 
 
 def placed(mechanism: Mechanism, relations: Relations, drawn: Geometry) -> Mechanism:
@@ -106,7 +106,8 @@ def test_an_instance_is_a_mechanism_of_the_same_kind(robot: str) -> None:
     drawn = draw(generic.relations, random.Random(0))
     exact = generic.instance(0)
     mechanism = placed(setting.mechanism, generic.relations, drawn)
-    observations = [Direction(o.leg, o.link, mechanism.links[o.link].pose[:3, :3].T @ doubles(seen(sight, drawn)))
+    observations = [Direction(o.leg, o.link,
+                              mechanism.links[o.link].pose[:3, :3].T @ doubles(observed_direction(sight, drawn)))
                     for o, sight in zip(generic.observations, generic.relations.sights, strict=True)]
     oracle = Oracle(mechanism)
     assert exact.mobility == oracle.mobility(oracle.zero())
@@ -142,12 +143,12 @@ def test_directions_that_follow_from_axes_and_centres() -> None:
                      np.array([instances.random_numbers(3, rng) for _ in range(2)]))
     a, b = drawn.directions
     between = drawn.centres[1] - drawn.centres[0]
-    foot = seen(DirectionSource("foot", (0, 1), (0,)), drawn)
+    foot = observed_direction(DirectionSource("foot", (0, 1), (0,)), drawn)
     assert foot @ a == 0
     assert rank(np.array([foot, between, a])) == rank(np.array([between, a])) == 2
-    normal = seen(DirectionSource("normal", (), (0, 1)), drawn)
+    normal = observed_direction(DirectionSource("normal", (), (0, 1)), drawn)
     assert normal @ a == normal @ b == 0
-    assert rank(np.array([seen(DirectionSource("between", (0, 1)), drawn), between])) == 1
+    assert rank(np.array([observed_direction(DirectionSource("between", (0, 1)), drawn), between])) == 1
 
 
 def test_a_mechanism_without_centres() -> None:
@@ -203,7 +204,7 @@ def check_agreement(mechanism: Mechanism) -> None:
         verdict = generic.verdict(observed)
         checked(verdict)
         assert verdict.exact, verdict.reason
-        assert verdict.rank == max(selected(m.relation, places).rank for m in setting.everything.members)
+        assert verdict.rank == max(select_relation(m.relation, places).rank for m in setting.everything.members)
 
 
 @given(parallel_robots(), st.integers(0, 2**32 - 1))
@@ -235,7 +236,7 @@ def test_directions_that_move_while_the_platform_rests() -> None:
     for places, observed in sets(setting):
         verdict = generic.verdict(observed)
         assert verdict.exact
-        assert verdict.rank == selected(setting.everything.members[0].relation, places).rank
+        assert verdict.rank == select_relation(setting.everything.members[0].relation, places).rank
 
 
 def test_what_some_legs_leave_free_must_be_the_robots_own() -> None:

@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from hrsynth.analysis import instances
 from hrsynth.analysis.exact import TESTS, ExactArchitecture, architecture, architecture_of
 from hrsynth.analysis.instances import Instance, draw, instance, ranks_at
-from hrsynth.analysis.kept import degree, kept
-from hrsynth.analysis.observed import ObservedRobot, selected
+from hrsynth.analysis.kept import are_kept, degree
+from hrsynth.analysis.observed import ObservedRobot, select_relation
 from hrsynth.analysis.verdict import CONTROLLABLE, PARTIAL
 from hrsynth.catalog.geometry import mechanism as built
 from hrsynth.catalog.words import parse
@@ -60,7 +60,7 @@ def test_what_is_kept_holds_far_away(robot: str) -> None:
     mechanism = observed(load(robot))
     relations = recognised(mechanism, walked(mechanism, 1, seed=1))
     every = ties(relations)
-    assert all(kept(every, relations, one_of(mechanism, relations)))
+    assert all(are_kept(every, relations, one_of(mechanism, relations)))
     state = walked(mechanism, 6, seed=2)[-1]
     assert max(miss(tie, mechanism, relations, state) for tie in every) < 1e-7
 
@@ -91,7 +91,7 @@ def test_what_holds_at_zero_by_accident_is_not_kept(robot: str) -> None:
     persistent = architecture(setting)
     assert len(ties(here.relations)) > len(ties(persistent.relations))
     every = ties(here.relations)
-    answers = kept(every, here.relations, instance(here.mechanism, here.relations, here.observations,
+    answers = are_kept(every, here.relations, instance(here.mechanism, here.relations, here.observations,
                                                    draw(here.relations, random.Random(0))))
     assert not all(answers)
     known = carried_by_joints(here.mechanism, here.relations, every)
@@ -111,7 +111,7 @@ def test_what_is_carried_is_kept(seed: int) -> None:
                   deltas(["P"] * 3, ["US", "2-SS", "SS"], rng, False)):
         relations = recognised(robot, walked(robot, 0, seed))
         every = ties(relations)
-        answers = kept(every, relations, one_of(robot, relations))
+        answers = are_kept(every, relations, one_of(robot, relations))
         known = carried_by_joints(robot, relations, every)
         assert all(keeps for keeps, holds in zip(answers, known, strict=True) if holds)
 
@@ -179,7 +179,7 @@ def test_robots_without_axes_or_without_centres() -> None:
         relations = recognised(robot, walked(robot, 2, seed=0))
         every = ties(relations)
         assert every
-        assert all(kept(every, relations, one_of(robot, relations)))
+        assert all(are_kept(every, relations, one_of(robot, relations)))
         assert all(carried_by_joints(robot, relations, every))
 
 
@@ -215,7 +215,7 @@ def pod(request: pytest.FixtureRequest) -> ObservedRobot:
 def test_a_mixture_of_operation_modes_proves_nothing(pod: ObservedRobot) -> None:
     generic = architecture(pod)
     verdict = generic.verdict(pod.segments[1:3])
-    ranks = {selected(m.relation, (1, 2)).rank for m in pod.everything.members}
+    ranks = {select_relation(m.relation, (1, 2)).rank for m in pod.everything.members}
     assert verdict.verdict in ((PARTIAL,) if ranks == {2} else (PARTIAL, None))
     if verdict.verdict is None:
         assert "operation modes" in verdict.reason

@@ -11,7 +11,7 @@ import pytest
 from hrsynth.analysis.controllability import legs
 from hrsynth.analysis.derive import Derivation, derive
 from hrsynth.analysis.exact import architecture
-from hrsynth.analysis.observed import ObservedRobot, restricted
+from hrsynth.analysis.observed import ObservedRobot, restrict_samples
 from hrsynth.analysis.verdict import verdict_of
 from hrsynth.description import load, native, shipped
 from hrsynth.errors import BadRequest, NotMeasured, RankUndecided
@@ -131,7 +131,7 @@ def test_exact_ranks_are_those_of_samples(robot: str, kind: str) -> None:
             continue
         assert found.exact, found.reason
         try:
-            samples = restricted(setting.everything, observed)
+            samples = restrict_samples(setting.everything, observed)
             assert found.rank == verdict_of(setting, [o.leg for o in observed], samples).rank
         except RankUndecided:  # a circle far away hardly shows how it is turned
             assert (kind, found.rank) == ("image_circle", min(5 * len(observed), found.dof))

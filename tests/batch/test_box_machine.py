@@ -12,8 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hrsynth.batch import box_machine
-from hrsynth.batch.enclosures import BoxFormula, traced
-from hrsynth.geometry.affine import AffineForms, affine, sines, stacked
+from hrsynth.batch.enclosures import BoxFormula, trace_formula
+from hrsynth.geometry.affine import AffineForms, affine, sines, stack
 from hrsynth.geometry.components import cosine, sine, sqrt
 
 flint = pytest.importorskip("flint")
@@ -54,23 +54,23 @@ def same(one: AffineForms, other: AffineForms) -> bool:
 @given(st.data(), st.integers(0, 1000), st.booleans(), st.sampled_from([2, 3, 16, 37]))
 def test_compiled_code_gives_the_numbers_of_arrays(data: st.DataObject, seed: int, bend: bool, count: int) -> None:
     pytest.importorskip("numba")
-    formula = traced(lambda y, number: leaves(data.draw, y, number), INPUTS)
+    formula = trace_formula(lambda y, number: leaves(data.draw, y, number), INPUTS)
     forms = boxes(np.random.default_rng(seed), count, bend)
-    one, other = stacked(formula._rows(forms)), formula.machine.run(forms)
+    one, other = stack(formula._rows(forms)), formula.machine.run(forms)
     assert same(one, other)
 
 
 def test_small_work_stays_in_numpy(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("numba")
     monkeypatch.setattr(box_machine.Work, "done", 0)
-    formula = traced(lambda y, number: [y[0] * y[1] + number(0.7), y[2]], INPUTS)
+    formula = trace_formula(lambda y, number: [y[0] * y[1] + number(0.7), y[2]], INPUTS)
     forms = boxes(np.random.default_rng(0), 50, bend=False)
     monkeypatch.setattr(box_machine.MachineCode, "run", lambda *_: pytest.fail("compiled"))
     plain = formula.together(forms)
     monkeypatch.undo()
     monkeypatch.setattr(box_machine.Work, "done", 1e12)
     monkeypatch.setattr(BoxFormula, "_rows", lambda *_: pytest.fail("not compiled"))
-    for each in (formula.together(forms), stacked(formula.at(forms))):
+    for each in (formula.together(forms), stack(formula.at(forms))):
         assert same(each, plain)
 
 
@@ -101,7 +101,7 @@ def test_forms_hold_what_balls_say(seed: int) -> None:
 
     rng = np.random.default_rng(seed)
     forms = boxes(rng, 20, bend=False)
-    found = traced(formula, INPUTS, off=0.0).together(forms)
+    found = trace_formula(formula, INPUTS, off=0.0).together(forms)
     noise = rng.uniform(-1, 1, (20, INPUTS))
     before, flint.ctx.prec = flint.ctx.prec, 200
     try:

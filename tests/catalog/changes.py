@@ -22,7 +22,7 @@ from typing import Any
 
 from catalog.witness import Witness
 from hrsynth.catalog.groups import GROUPS
-from hrsynth.present.markdown import replaced, table
+from hrsynth.present.markdown import replace_between, table
 
 START = "<!-- generated: changes -->"
 ROOT = Path(__file__).resolve().parents[2]
@@ -161,7 +161,7 @@ def main() -> None:
     before, now = catalog(asked.before), catalog(asked.now)
     if asked.page is not None:
         text = asked.page.read_text(encoding="utf-8")
-        asked.page.write_text(replaced(text, page(before, now), START), encoding="utf-8", newline="\n")
+        asked.page.write_text(replace_between(text, page(before, now), START), encoding="utf-8", newline="\n")
     sys.exit(bool(check(before, now, asked.check, asked.seed)))
 
 

@@ -15,11 +15,11 @@ import hrsynth
 from catalog.published import write
 from hrsynth.catalog.audit.closing import BatchState, batch, close, forward
 from hrsynth.catalog.audit.exact import by_legs, exact
-from hrsynth.catalog.audit.freedoms import freedoms, left
+from hrsynth.catalog.audit.freedoms import freedoms, freedoms_left
 from hrsynth.catalog.audit.motions import dimensions, factors
 from hrsynth.catalog.audit.prime_field import NotExact
 from hrsynth.catalog.audit.run import audit
-from hrsynth.catalog.audit.study import StudyCase, asked, study
+from hrsynth.catalog.audit.study import StudyCase, motor_choices, study
 from hrsynth.catalog.audit.tables import PublishedRobot, cell, read
 from hrsynth.cli import execute
 from hrsynth.errors import BadRequest
@@ -66,7 +66,7 @@ def test_freedoms_are_those_of_the_closed_loops_in_any_frame():
         assert [int(each.dof[0]) for each in found] == [dof_of(legs), dof_of(legs)]
         driven = np.zeros((1, *legs.shape[:2]), dtype=bool)
         driven[0, :, 0] = True
-        assert int(left(legs[None], driven, np.ones(3))[0][0]) == dof_of(legs * ~driven[0, ..., None])
+        assert int(freedoms_left(legs[None], driven, np.ones(3))[0][0]) == dof_of(legs * ~driven[0, ..., None])
 
 
 def test_screws_of_joints_and_dimensions_are_rates_of_the_ends(tables: Path):
@@ -128,7 +128,7 @@ def test_numbers_and_ranks_modulo_primes_agree(tables: Path):
     compared = 0
     for case, found in study([StudyCase(each, each.drives[0].angles) for each in read(tables).robots], 5):
         try:
-            first, second = exact(case.robot, found.letters, asked(case.robot), 1)
+            first, second = exact(case.robot, found.letters, motor_choices(case.robot), 1)
         except NotExact:
             continue
         compared += 1

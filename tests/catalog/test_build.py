@@ -22,7 +22,7 @@ from catalog.stub import REFUSED, broken, died, entry, source
 from hrsynth.catalog import load
 from hrsynth.catalog.build import architectures, build, check
 from hrsynth.catalog.journal import Journal
-from hrsynth.catalog.jsonl import decoded, encoded, line
+from hrsynth.catalog.jsonl import decode_lines, encode_lines, line
 from hrsynth.catalog.store import store
 from hrsynth.errors import BadRequest, BuildStopped, HrsynthError
 
@@ -303,13 +303,13 @@ def test_bad_requests_are_one_line_before_any_work(target: str, groups: list[str
 
 def test_files_round_trip_and_cut_off_ones_are_refused(whole: dict[str, bytes]):
     data = whole["c.jsonl"]
-    lines = decoded(data, "c")
-    assert encoded("c", random.Random(3).sample(lines, len(lines))) == data
+    lines = decode_lines(data, "c")
+    assert encode_lines("c", random.Random(3).sample(lines, len(lines))) == data
     for cut in range(0, len(data), 37):
         with pytest.raises(BadRequest):
-            decoded(data[:cut], "c")
+            decode_lines(data[:cut], "c")
     with pytest.raises(BadRequest, match=r"another version, found 'format 1, words 9', allowed: .*build it again"):
-        decoded(data.replace(b'"catalog":1', b'"catalog":9', 1), "c")
+        decode_lines(data.replace(b'"catalog":1', b'"catalog":9', 1), "c")
 
 
 def test_a_large_group_is_packed_and_holds_the_same(tmp_path: Path, whole: dict[str, bytes],
@@ -321,7 +321,7 @@ def test_a_large_group_is_packed_and_holds_the_same(tmp_path: Path, whole: dict[
     assert gzip.decompress((tmp_path / "c.jsonl.gz").read_bytes()) == whole["c.jsonl"]
     kept = store(tmp_path)
     assert kept.groups() == ["c", "d"]
-    assert kept.lines(["c"], {}) == decoded(whole["c.jsonl"], "c")
+    assert kept.lines(["c"], {}) == decode_lines(whole["c.jsonl"], "c")
     assert check(tmp_path, source=source()) == ()
     monkeypatch.setattr("hrsynth.catalog.store.PACKED_ABOVE", 1000)
     build(tmp_path, source=source())

@@ -11,7 +11,7 @@ import pytest
 from catalog.published import write
 from hrsynth.catalog.audit.study import StudyCase, study
 from hrsynth.catalog.audit.tables import read
-from hrsynth.catalog.published import _sets, published
+from hrsynth.catalog.published import _sets, published_words
 from hrsynth.cli import execute
 
 
@@ -22,7 +22,7 @@ def tables(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.slow
 def test_entries_say_what_the_screws_of_the_legs_say(tables: Path):
-    source = published(tables)
+    source = published_words(tables)
     for robot in read(tables).robots:
         entry = source.entry(robot.name)
         ((_, found),) = study([StudyCase(robot, robot.drives[0].angles)], 0)

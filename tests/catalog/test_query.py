@@ -22,7 +22,7 @@ from hrsynth.catalog.build import build, check
 from hrsynth.catalog.fits import FIELDS, TEXTS, fits, may_fit
 from hrsynth.catalog.jsonl import Record, record, word_of
 from hrsynth.catalog.query import count, groups_of, values
-from hrsynth.catalog.store import Database, Folder, _write_tables, shipped
+from hrsynth.catalog.store import Database, Folder, _write_tables, shipped_folder
 from hrsynth.catalog.words import SENSORS, VERSION
 from hrsynth.errors import BadRequest
 
@@ -115,7 +115,7 @@ def test_a_text_is_found_in_lines_as_in_records(text: str):
 @cache
 def _every_line() -> list[tuple[str, str, Record]]:
     """Some lines, how another program may write them, and their records."""
-    kept = shipped()
+    kept = shipped_folder()
     lines = [line for group in kept.groups() for line in kept.lines([group], {})][::97]
     return [(line, json.dumps(record(line)), record(line)) for line in lines]
 
@@ -239,7 +239,7 @@ def test_a_line_with_other_spaces_or_letters_is_read(tmp_path: Path):
 def test_sqlite_answers_as_the_lines_do(every: int, tmp_path: Path):
     """What may be asked about the shipped catalog, or every seventh record of it; how long it takes stands in
     ``benchmarks/others.py``."""
-    kept, folder, file = shipped(), Folder(tmp_path / "lines"), tmp_path / "all.sqlite"
+    kept, folder, file = shipped_folder(), Folder(tmp_path / "lines"), tmp_path / "all.sqlite"
     folder.path.mkdir()
     groups = {group: kept.lines([group], {})[::every] for group in kept.groups()}
     _write_tables(file, groups)

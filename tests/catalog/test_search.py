@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hrsynth.catalog import search
-from hrsynth.catalog.search import Texts, narrowed
+from hrsynth.catalog.search import Texts, narrow_type
 
 LETTERS = st.text(st.sampled_from("abR*?[-(\n\0\u00df\u20ac\udcff"), max_size=12)
 PLAIN = st.text(st.sampled_from("ab-R"), max_size=60)
@@ -51,6 +51,6 @@ def test_a_text_is_found_where_it_occurs(every: list[str], text: str, data: st.D
 
 @given(st.lists(st.integers(0, 2**32 - 1), max_size=5))
 def test_numbers_are_kept_in_as_few_bytes_as_hold_them(numbers: list[int]):
-    found = narrowed(np.array(numbers, np.int64))
+    found = narrow_type(np.array(numbers, np.int64))
     assert found.tolist() == numbers
     assert found.itemsize == max([1, *(1 if each < 2**8 else 2 if each < 2**16 else 4 for each in numbers)])

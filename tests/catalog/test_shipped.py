@@ -7,22 +7,22 @@ import pytest
 from hrsynth.catalog import load
 from hrsynth.catalog.build import check
 from hrsynth.catalog.groups import EVERY
-from hrsynth.catalog.store import shipped
+from hrsynth.catalog.store import shipped_folder
 from hrsynth.catalog.words import parse
 
-pytestmark = pytest.mark.skipif(not shipped().groups(), reason="no catalog is shipped yet")
+pytestmark = pytest.mark.skipif(not shipped_folder().groups(), reason="no catalog is shipped yet")
 LARGEST = 10_000_000
 """Bytes of all files."""
 
 
 def test_the_files_are_those_of_the_groups_and_small():
-    assert shipped().groups() == sorted(EVERY)
-    assert sum(file.stat().st_size for file in shipped().path.glob("*.jsonl*")) <= LARGEST
+    assert shipped_folder().groups() == sorted(EVERY)
+    assert sum(file.stat().st_size for file in shipped_folder().path.glob("*.jsonl*")) <= LARGEST
 
 
 @pytest.mark.slow
 def test_all_words_are_there_and_sorted():
-    assert check(shipped(), sample=0) == ()
+    assert check(shipped_folder(), sample=0) == ()
 
 
 @pytest.mark.slow
@@ -34,10 +34,10 @@ def test_words_are_canonical_and_in_one_group():
 
 @pytest.mark.slow
 def test_some_records_are_fresh():
-    assert check(shipped(), sample=3, seed=len(load())) == ()
+    assert check(shipped_folder(), sample=3, seed=len(load())) == ()
 
 
 @pytest.mark.long
 @pytest.mark.timeout(43_200)
 def test_all_records_are_fresh():
-    assert check(shipped(), workers=2) == ()
+    assert check(shipped_folder(), workers=2) == ()

@@ -21,9 +21,9 @@ from hrsynth.catalog.entry import entry
 from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.jsonl import line, record
 from hrsynth.catalog.site import Site, build, folder, site
-from hrsynth.catalog.site.index import LISTS, NUMBERS, TEXTS, columns, notation, rendered
-from hrsynth.catalog.site.pages import study, trace, written
-from hrsynth.catalog.site.structures import Structure, named, structures
+from hrsynth.catalog.site.index import LISTS, NUMBERS, TEXTS, columns, notation, render
+from hrsynth.catalog.site.pages import study, trace, write_pages
+from hrsynth.catalog.site.structures import Structure, address_name, structures
 from hrsynth.catalog.words import parse
 from hrsynth.cli import execute
 from hrsynth.errors import BadRequest, BuildStopped
@@ -94,9 +94,9 @@ def test_every_record_has_its_page_and_its_robot_file(made, catalog):
     for each in structures(catalog):
         page = (target / "p" / f"{each.name}.html").read_text(encoding="utf-8")
         for word in (known["word"] for known in each.records):
-            assert f'data-name="{named(word)}"' in page
+            assert f'data-name="{address_name(word)}"' in page
             assert word in page
-            assert (target / "r" / f"{named(word)}.urdf").is_file()
+            assert (target / "r" / f"{address_name(word)}.urdf").is_file()
     assert len(list((target / "r").iterdir())) == len(WORDS)
 
 
@@ -148,7 +148,7 @@ def test_a_page_says_what_the_record_says(made, catalog):
 @pytest.mark.parametrize("word", [word for word in WORDS if word != REFUSED])
 def test_the_robot_file_is_what_save_writes_and_derives_as_the_record(made, catalog, word, tmp_path):
     target, _ = made
-    file = target / "r" / f"{named(word)}.urdf"
+    file = target / "r" / f"{address_name(word)}.urdf"
     hrsynth.save(mechanism(parse(word)), tmp_path / "robot.urdf")
     assert file.read_bytes() == (tmp_path / "robot.urdf").read_bytes()
     derivation = hrsynth.derive(hrsynth.load(file))
@@ -166,7 +166,7 @@ def test_columns_hold_what_the_records_hold(catalog):
     for i, each in enumerate(records):
         assert held["word"][i] == each["word"]
         assert each in every[held["page"][i]].records
-        assert held["name"][i] == named(each["word"])
+        assert held["name"][i] == address_name(each["word"])
         for field in NUMBERS:
             assert held[field][i] == each.get(field)
         for field in TEXTS + LISTS:
@@ -206,8 +206,8 @@ def test_motors_that_change_what_is_known_part_a_structure():
 
 
 def test_names_are_stable_and_distinct():
-    assert named("3(Rz*-Rz-Rz)") == "338940699ed1"
-    assert len({named(word) for word in WORDS}) == len(WORDS)
+    assert address_name("3(Rz*-Rz-Rz)") == "338940699ed1"
+    assert len({address_name(word) for word in WORDS}) == len(WORDS)
 
 
 def test_steps_that_differ_by_their_leg_alone_are_one_row():
@@ -220,7 +220,7 @@ def test_steps_that_differ_by_their_leg_alone_are_one_row():
 
 def test_what_stands_in_a_page_is_made_safe():
     fact = {"word": "3(S-S)", "group": "none", "refused": "<b>1 < 2 & 'so'"}
-    shown = rendered("page.html", structure=Structure("3(S-S)", (fact,)), fact=fact,
+    shown = render("page.html", structure=Structure("3(S-S)", (fact,)), fact=fact,
                      facts=[("refused", fact["refused"])], differs="<i>", real=None, hidden=None, blind=False, steps=[],
                      variants=[{"name": "x", "word": "<u>", "notation": "", "motors": "", "joints": [], "file": False}])
     assert not [tag for tag in ("<b>", "<i>", "<u>") if tag in shown]
@@ -274,7 +274,7 @@ def test_a_site_replaces_an_older_one_and_nothing_else(few, tmp_path):
 def test_a_build_that_was_broken_off_goes_on_and_gives_the_same_bytes(few, tmp_path, monkeypatch):
     done = site(few, tmp_path / "whole")
     assert (done.now, done.pages) == (3, 3)
-    write, count = written, []
+    write, count = write_pages, []
 
     def breaks(folder, parts):
         count.append(1)
@@ -282,7 +282,7 @@ def test_a_build_that_was_broken_off_goes_on_and_gives_the_same_bytes(few, tmp_p
             raise KeyboardInterrupt
         return write(folder, parts)
 
-    monkeypatch.setattr(build, "written", breaks)
+    monkeypatch.setattr(build, "write_pages", breaks)
     with pytest.raises(KeyboardInterrupt):
         site(few, tmp_path / "site")
     assert not (tmp_path / "site").exists()

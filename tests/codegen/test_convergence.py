@@ -25,7 +25,7 @@ from hrsynth.codegen.source import Source
 from hrsynth.codegen.trace import TracedFunction
 from hrsynth.codegen.tubes import TubedBranch
 from hrsynth.geometry.vectors import Array
-from hrsynth.present.text.robots import exported
+from hrsynth.present.text.robots import describe_export
 
 WIDTHS = {**FORMS, **HALF}
 
@@ -187,7 +187,7 @@ def test_axes_that_are_parallel_but_for_rounding() -> None:
     assert found.bounds is not None
     assert found.bounds.others == 3
     assert "Whether each of 3 more equations of the loops holds is checked at run time" in found.code
-    assert "3 more equations" in exported(found)
+    assert "3 more equations" in describe_export(found)
     alone = replace(found.bounds, others=1)
     assert alone.more == "one more equation of the loops holds"
     program: Any = module_of(found.code)
@@ -218,5 +218,5 @@ def test_a_cell_without_a_bound_is_told(monkeypatch: pytest.MonkeyPatch) -> None
     assert found.bounds is None
     assert found.to_dict()["steps"] is found.to_dict()["error"] is None
     assert "is not proved in all cells" in found.code
-    assert "not bounded in all cells" in exported(found)
+    assert "not bounded in all cells" in describe_export(found)
     assert module_of(found.code).STEPS == NEWTON_STEPS_AT_RUN

@@ -11,12 +11,12 @@ from hrsynth.errors import BadMechanism, LoopsNotClosed, RankUndecided
 from hrsynth.geometry.ranks import (
     CLEAN,
     Rank,
-    decomposed,
     kernel_basis,
     largest_angle,
     range_bases,
     range_basis,
     rank_of,
+    singular_decomposition,
     space_basis,
     spectra,
     spectrum,
@@ -270,9 +270,9 @@ def test_a_matrix_that_lapack_gives_up_on_is_decomposed(full: bool, monkeypatch:
         raise np.linalg.LinAlgError("SVD did not converge")
 
     monkeypatch.setattr(np.linalg, "svd", gives_up)
-    U, s, Vt = decomposed(matrix, full)
+    U, s, Vt = singular_decomposition(matrix, full)
     assert Vt.shape == ((6, 6) if full else (4, 6))
     np.testing.assert_allclose(s, expected, atol=1e-14)
     np.testing.assert_allclose(U * s @ Vt[:4], matrix, atol=1e-14)
     with pytest.raises(np.linalg.LinAlgError):
-        decomposed(np.full((2, 2), np.nan))
+        singular_decomposition(np.full((2, 2), np.nan))

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from hrsynth.analysis.advice import advise
 from hrsynth.analysis.controllability import legs
 from hrsynth.analysis.derive import derive
-from hrsynth.analysis.observed import ObservedRobot, restricted
+from hrsynth.analysis.observed import ObservedRobot, restrict_samples
 from hrsynth.analysis.verdict import verdict_of
 from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.words import parse
@@ -157,7 +157,7 @@ def test_samples_of_a_pod_stay_in_its_operation_mode(dimensions: int, seed: int)
     for at in setting.configurations:
         R = at.pose("platform")[:3, :3]
         assert np.abs(R - setting.motion.home[:3, :3]).max() < 1e-7
-    verdict = verdict_of(setting, ("2", "3"), restricted(setting.everything, segments[1:3]))
+    verdict = verdict_of(setting, ("2", "3"), restrict_samples(setting.everything, segments[1:3]))
     assert (verdict.rank, verdict.dof) == (2, 3)
     assert [freedom.name for freedom in verdict.lost] == ["translation along z"]
 

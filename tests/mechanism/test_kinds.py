@@ -16,7 +16,7 @@ from hrsynth.mechanism.model import JointType
 from hrsynth.mechanism.observation import Observation
 from hrsynth.mechanism.observations import kinds
 from hrsynth.mechanism.observations.encoder import AngleEncoder, Encoder, SlideEncoder
-from hrsynth.mechanism.screws import allowed
+from hrsynth.mechanism.screws import allowed_twists
 from hrsynth.mechanism.sights import CameraObservation, NamedCamera, VirtualJoint
 from oracle import exponential
 from strategies import random_direction, random_rotation
@@ -63,7 +63,8 @@ def chain_of(seen: Observation, X_c: Array, X: Array) -> tuple[VirtualJoint, ...
 
 def twists(chain: tuple[VirtualJoint, ...], wanted: Callable[[VirtualJoint], bool] = lambda _: True) -> Array:
     """The twists (6, n) of some joints of a chain, about the base's origin."""
-    screws = [t for joint in chain if wanted(joint) for t in allowed(JointType(joint.letter), joint.at, joint.axes)]
+    screws = [t for joint in chain if wanted(joint)
+              for t in allowed_twists(JointType(joint.letter), joint.at, joint.axes)]
     return np.array(screws, dtype=float).reshape(-1, 6).T
 
 

@@ -15,7 +15,7 @@ import hrsynth
 from hrsynth.families.__main__ import main
 from hrsynth.present import paper as papers
 from hrsynth.present.outputs import OUTPUTS
-from hrsynth.present.paper import Paper, asked, scaled
+from hrsynth.present.paper import Paper, paper_for, scale_figure
 from hrsynth.present.plots import empty_figure
 from hrsynth.present.sketch import Sketch
 from hrsynth.results import Result
@@ -107,7 +107,7 @@ def test_text_is_legible_on_the_page_and_apart_at_any_width(name: str, folder: s
     for given in ASKED:
         figure, texts = drawn(found, given)
         width, height = figure.get_size_inches() * figure.dpi
-        paper = asked(".png", *given)
+        paper = paper_for(".png", *given)
         assert len(texts) >= 3
         smallest = min(texts, key=lambda each: each.get_fontsize())
         least = SMALLEST * (1.0 if paper.size is None else paper.size / papers.PRINTED)
@@ -158,7 +158,7 @@ def test_lines_break_at_spaces_into_like_parts_and_keep_numbers_with_their_units
 def test_names_of_axes_in_space_are_beside_their_scales(extent: tuple[float, float, float], scale: float):
     figure = empty_figure(6, 6)
     place = Sketch.of(None, np.zeros((1, 3)), []).place(figure, (0.1, 0.1, 0.8, 0.8), np.array([(0, 0, 0), extent]))
-    scaled(figure, list({id(each): each for each in figure.findobj()}.values()), scale)
+    scale_figure(figure, list({id(each): each for each in figure.findobj()}.values()), scale)
     figure.draw_without_rendering()
     for axis in (place.xaxis, place.yaxis, place.zaxis):
         name = axis.label.get_window_extent()

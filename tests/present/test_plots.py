@@ -114,7 +114,7 @@ def test_legends_stand_beside_the_axes():
         return b""
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(maps, "printed", kept)
+        patch.setattr(maps, "print_figure", kept)
         found = hrsynth.check(load("3rrr_m1"), grid="x=-0.2:0.2:9,y=-0.2:0.2:9,phi=0")
         maps.distance_map(found)
     (figure,) = drawn

@@ -23,7 +23,7 @@ from hrsynth.families.formations import formation
 from hrsynth.present.drawings import svg
 from hrsynth.present.report import figures, pages, parts
 from hrsynth.present.report.answer import set_rows
-from hrsynth.present.report.formulas import barred, collected, formula, indexed
+from hrsynth.present.report.formulas import collect_symbols, formula, lower_indices, underline_motors
 
 FAST = ("uranesx", None)
 SLOW = [("quattro", "1,4"), ("rrrrr_m1", None), ("3ppr_m1", None)]
@@ -168,9 +168,9 @@ def test_a_part_that_fails_leaves_its_reason():
     def fails() -> None:
         raise PlaneNotMet("r", "the plane z=1", "too high")
 
-    assert parts.asked("r", fails) == parts.Refused("no pose of the plane z=1 is reached: too high")
+    assert parts.ask("r", fails) == parts.Refused("no pose of the plane z=1 is reached: too high")
     with pytest.raises(ZeroDivisionError):
-        parts.asked("r", lambda: 1 // 0)
+        parts.ask("r", lambda: 1 // 0)
 
 
 @pytest.mark.some(1)
@@ -290,21 +290,21 @@ def test_products_keep_their_brackets():
 
 
 def test_names_are_set_as_in_print():
-    assert indexed("τ1, B2 and ui of rod_1a <x>") == ("τ<sub>1</sub>, B<sub>2</sub> and u<sub>i</sub> of rod_1a "
+    assert lower_indices("τ1, B2 and ui of rod_1a <x>") == ("τ<sub>1</sub>, B<sub>2</sub> and u<sub>i</sub> of rod_1a "
                                                        "&lt;x&gt;")
-    assert barred("2-Π-{2-U\u0332U}") == "2-Π-{2-<u>U</u>U}"
+    assert underline_motors("2-Π-{2-U\u0332U}") == "2-Π-{2-<u>U</u>U}"
 
 
 def test_symbols_that_differ_in_their_index_are_told_once():
     where = {"B1": "centre of wrist_1", "B2": "centre of wrist_2", "e": "tangent", "u3": "seen in leg 3"}
-    assert collected(where) == [("Bi", "centre of wrist_i (i = 1, 2)"), ("e", "tangent"), ("u3", "seen in leg 3")]
+    assert collect_symbols(where) == [("Bi", "centre of wrist_i (i = 1, 2)"), ("e", "tangent"), ("u3", "seen in leg 3")]
 
 
 def test_an_index_is_not_read_as_a_letter_of_a_name():
     """``tip1, tip2`` are not ``tipi``, nor are the symbols of a formula names."""
     where = {"B1": "centre of tip1", "B2": "centre of tip2", "N1": "I - u1 u1^T", "N2": "I - u2 u2^T",
              "u1": "direction watched in leg 1 (knee1a)", "u2": "direction watched in leg 2 (knee2a)"}
-    told = [(indexed(symbol), indexed(meaning)) for symbol, meaning in collected(where)]
+    told = [(lower_indices(symbol), lower_indices(meaning)) for symbol, meaning in collect_symbols(where)]
     assert told == [("B<sub>i</sub>", "centre of tip<sub>i</sub> (i = 1, 2)"),
                     ("N<sub>i</sub>", "I - u<sub>i</sub> u<sub>i</sub><sup>T</sup> (i = 1, 2)"),
                     ("u<sub>i</sub>", "direction watched in leg i (knee<sub>i</sub>a) (i = 1, 2)")]

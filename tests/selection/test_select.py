@@ -27,7 +27,7 @@ from hrsynth.mechanism.pose import Pose
 from hrsynth.progress import following, tell
 from hrsynth.selection.loop_ends import LoopEnds, fewer_are_better
 from hrsynth.selection.select import Candidate, Criteria, Selection, _Work, select
-from hrsynth.selection.sight import CameraView, camera_at, hidden
+from hrsynth.selection.sight import CameraView, are_hidden, camera_at
 from hrsynth.simulation.camera import Camera, cylinders
 from hrsynth.simulation.endings.basins import basins
 from hrsynth.simulation.endings.endings import RestSearch
@@ -232,7 +232,7 @@ def test_hidden_is_what_a_fine_search_finds() -> None:
         if abs(apart[nearest] - radius) < 0.02 or abs((1 - s[nearest]) * np.linalg.norm(point) - radius) < 0.03:
             continue
         expected = apart[nearest] < radius and (1 - s[nearest]) * np.linalg.norm(point) > radius
-        assert hidden(point[None], segment, radius)[0] == expected
+        assert are_hidden(point[None], segment, radius)[0] == expected
 
 
 def test_sight_sees_what_is_ahead_in_the_picture_and_not_hidden() -> None:

@@ -31,7 +31,7 @@ from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.locked import interaction
 from hrsynth.kinematics.relation import relation
 from hrsynth.mechanism.model import Mechanism
-from hrsynth.present.markdown import replaced, table
+from hrsynth.present.markdown import replace_between, table
 from hrsynth.simulation.ending import ANTIPODAL, BOUNDARY, ENDINGS, GOAL, MINIMUM, MODE
 from hrsynth.simulation.law import FixedDirections, Law, directions
 from hrsynth.simulation.result import Servo
@@ -218,7 +218,7 @@ def main() -> None:
     else:
         text = asked.page.read_text(encoding="utf-8")
         for mark, made in found.items():
-            text = replaced(text, made, mark)
+            text = replace_between(text, made, mark)
         asked.page.write_text(text, encoding="utf-8", newline="\n")
     sys.exit("\n".join(f"{record['robot']}, {record['watched'] or 'all legs'}, {record['start']} to {record['goal']}: "
                        f"{each}" for record in records for each in record["untrue"]) or None)

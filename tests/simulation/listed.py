@@ -15,11 +15,11 @@ import numpy as np
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.analysis.verdict import CONTROLLABLE, verdict_of
 from hrsynth.budgets import ENDING_STEPS, FARTHEST_ENDING
-from hrsynth.constraints.pattern import attached
+from hrsynth.constraints.pattern import leg_ends
 from hrsynth.geometry.vectors import Array
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.simulation.ending import ANTIPODAL, BOUNDARY, GOAL, MINIMUM, MODE
-from hrsynth.simulation.endings.descent import LONGEST_STEP, CriticalPoint, Expansion, are_closed, walked
+from hrsynth.simulation.endings.descent import LONGEST_STEP, CriticalPoint, Expansion, are_closed, walk_at_random
 from hrsynth.simulation.endings.endings import NEARBY, RestSearch
 from hrsynth.simulation.endings.error import DirectionTerm, RestSystem
 from hrsynth.simulation.endings.rests import CRITICAL, RestPoint
@@ -96,7 +96,7 @@ class Rests:
     def read(self, number: int) -> RestPoint | None:
         """A rest as a pose of the robot, in its operation mode."""
         system, found, q = self.search.system, self.search.setting, self.points[number].q[None]
-        nearby = walked(system, q, np.random.default_rng(0), 2, NEARBY)
+        nearby = walk_at_random(system, q, np.random.default_rng(0), 2, NEARBY)
         return self.search.read(Critical(self.points[number], 0)) if in_mode(system, found, nearby)[0] else None
 
 
@@ -144,7 +144,7 @@ class Lists:
         found, system = self.setting, self.every[0].search.system
         points = [CriticalPoint(each, each, 0.0, each, 0.0) for each in q]
         every, seen = found.everything.question.observations, {(o.leg, o.link) for o in found.observed}
-        told = marks(system, found, attached(found.anatomy), points)
+        told = marks(system, found, leg_ends(found.anatomy), points)
         if not len(points):
             return told
         bodies = told.shape[1] - 3 * len(every)

@@ -16,7 +16,7 @@ from hrsynth.geometry.vectors import Array, unit
 from hrsynth.mechanism.noise import Noise
 from hrsynth.mechanism.observations.direction import Direction
 from hrsynth.simulation import pictures
-from hrsynth.simulation.camera import Camera, Edges, cylinders, edges, placed, rebuilt, sensitivity
+from hrsynth.simulation.camera import Camera, Edges, cylinders, edges, place_camera, rebuilt, sensitivity
 from hrsynth.simulation.law import directions
 from hrsynth.simulation.noise import PERIOD, Sensors, Shocks
 from hrsynth.simulation.servo import servo
@@ -57,7 +57,7 @@ def test_the_camera_sees_all_rods_and_exact_edges_give_exact_directions(name: st
     scene = home(name)
     mechanism, question = scene.setting.mechanism, scene.law.question
     rods = cylinders(mechanism, question.observations)
-    camera = placed(rods, question.reference, (scene.start.pose,))
+    camera = place_camera(rods, question.reference, (scene.start.pose,))
     for rod in rods:
         pixels = camera.pixels(camera.seen(scene.start.pose(question.reference), scene.start.pose, rod))
         assert np.all((pixels > 0) & (pixels < [camera.width, camera.height]))
@@ -82,7 +82,7 @@ def test_the_noise_of_rebuilt_directions_grows_with_that_of_pixels_and_is_bounde
     scene = home("delta")
     question = scene.law.question
     rods = cylinders(scene.setting.mechanism, question.observations)
-    camera = placed(rods, question.reference, (scene.start.pose,))
+    camera = place_camera(rods, question.reference, (scene.start.pose,))
     u = directions(scene.start, question)[0]
 
     def wrong(pixels: float) -> Array:
@@ -147,7 +147,7 @@ def test_directions_from_rendered_pictures(name: str):
     scene = home(name)
     mechanism, question = scene.setting.mechanism, scene.law.question
     rods = cylinders(mechanism, question.observations)
-    camera = placed(rods, question.reference, (scene.start.pose,))
+    camera = place_camera(rods, question.reference, (scene.start.pose,))
     stage = pictures.LegRenderer(mechanism, camera, question.reference, rods)
     try:
         picture = stage.picture(scene.start.pose)

@@ -12,7 +12,7 @@ from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.locked import interaction
 from hrsynth.kinematics.relation import relation
 from hrsynth.kinematics.tasks import solve
-from hrsynth.simulation.law import Law, directions, inverted
+from hrsynth.simulation.law import Law, damped_inverses, directions
 from hrsynth.tolerances import DAMPED, SOLVED
 from simulation.scenes import CONTROLLABLE, few_first, home, regular, setting
 
@@ -81,10 +81,10 @@ def test_moving_desired_directions_are_fed_forward(name: str):
 
 
 def test_the_inverse_is_exact_where_nothing_is_weak_and_bounded_where_something_is():
-    assert inverted(np.array([2.0, 1.0, 2 * DAMPED])) == pytest.approx([0.5, 1.0, 0.5 / DAMPED])
+    assert damped_inverses(np.array([2.0, 1.0, 2 * DAMPED])) == pytest.approx([0.5, 1.0, 0.5 / DAMPED])
     weak = np.geomspace(DAMPED, 1e-12, 50)
-    assert np.all(inverted(weak) <= 1 / DAMPED + 1e-9)
-    assert inverted(np.array([0.0]))[0] == 0.0
+    assert np.all(damped_inverses(weak) <= 1 / DAMPED + 1e-9)
+    assert damped_inverses(np.array([0.0]))[0] == 0.0
 
 
 def test_a_goal_reached_commands_nothing():

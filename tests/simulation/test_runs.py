@@ -23,7 +23,7 @@ from hrsynth.mechanism.pose import asked_poses
 from hrsynth.simulation.ending import BOUNDARY, GOAL, MODE
 from hrsynth.simulation.run import LIMIT
 from hrsynth.simulation.servo import servo
-from hrsynth.simulation.track import tracked
+from hrsynth.simulation.track import track_run
 from hrsynth.tolerances import DAMPED
 from simulation.far import run_between, untold, untrue
 from simulation.listed import APART, OUTSIDE, Listed
@@ -92,7 +92,7 @@ def test_a_crossing_is_told_where_the_side_changes():
     found = setting("quattro", ("1", "4"))
     along = -0.1757 + np.array([-2e-2, -1e-2, -1e-3, -1e-4, -2e-5, 2e-5, 1e-4, 2e-4, 1e-3, 1e-2, 2e-2])
     at = configurations_at(found, asked_poses([f"x={x},y=-0.1931,z=-0.6481,phi=0.262" for x in along]))
-    track = tracked(at, found.samples.question, found.everything.question, found.dof)
+    track = track_run(at, found.samples.question, found.everything.question, found.dof)
     (crossing,) = track.crossings("type2")
     assert track.passages == (crossing,)
     assert abs(crossing.place - int(np.argmin(track.smallest))) <= 1
@@ -106,7 +106,7 @@ def test_a_crossing_is_told_where_a_configuration_lies_on_it(kind: str, bend: fl
     the configurations."""
     found = setting("rrrrr_m1")
     at = [five_bar(found, kind, bend, step) for step in np.linspace(-0.3, 0.3, 13)]
-    track = tracked(at, found.samples.question, found.everything.question, found.dof)
+    track = track_run(at, found.samples.question, found.everything.question, found.dof)
     assert [each.kind for each in track.passages] == [kind]
 
 

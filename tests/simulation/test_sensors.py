@@ -16,7 +16,7 @@ from hrsynth.kinematics.chart import TangentChart
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.present.runs import _picture
 from hrsynth.present.view.sights import eyes, half_picture
-from hrsynth.simulation.law import Law, measured, supposed_planes
+from hrsynth.simulation.law import Law, measure_all, supposed_planes
 from hrsynth.simulation.result import Servo
 from simulation.scenes import setting
 
@@ -95,7 +95,7 @@ def test_a_depth_that_is_only_supposed_bends_the_way_and_may_make_the_goal_repel
     for run, repels in ((exact, False), (found, False), (wrong, True)):
         question, goal = run.setting.samples.question, run.target
         law = Law(question, 6, 1.0, supposed_planes(run.depth, goal, question))
-        wanted, chart = measured(goal, question)[0], TangentChart.around(goal, question)
+        wanted, chart = measure_all(goal, question)[0], TangentChart.around(goal, question)
         flows = [law.at(chart.at(y, goal.q), (wanted, [0 * w for w in wanted])).velocity for y in 1e-5 * np.eye(6)]
         growth = float(np.linalg.eigvals(chart.basis.T @ np.array(flows).T / 1e-5).real.max())
         assert (growth > 0.1) is repels
@@ -118,7 +118,7 @@ def test_supposed_depths_make_other_rows_of_what_images_show_alone() -> None:
     assert planes is not None
     assert [plane is None for plane in planes] == [False] * 4 + [True]
     own = supposed_planes("desired", at, question)
-    wanted = measured(at, question)[0]
+    wanted = measure_all(at, question)[0]
     moved = [0 * w for w in wanted]
     off = robot.configurations[0]
     commands = [Law(question, 6, 1.0, each).at(off, (wanted, moved)) for each in (None, own, planes)]

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..description.sights import listed, offers
+from ..description.sights import offers, split_offers
 from ..errors import BadRequest, HrsynthError, RankUndecided
 from ..geometry import lines
 from ..geometry.ranks import kernel_basis, largest_angle, range_basis, singular_values
@@ -22,7 +22,7 @@ from ..mechanism.sensors import encoders, observation_of, observed_line
 from ..progress import tell
 from ..results import Result, Value
 from ..tolerances import RANK_CUTOFF, SAME_PRICE, SAME_RELATION
-from .observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike, as_robot, as_texts, restricted
+from .observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike, as_robot, as_texts, restrict_samples
 from .question import question
 from .verdict import AT_REST, CONTROLLABLE, Verdict, verdict_of
 
@@ -108,13 +108,13 @@ def _encoders(setting: ObservedRobot) -> Iterator[FurtherMeasurement]:
         leg = owner.get(joint.name)
         for number, encoder in enumerate(encoders(anatomy.mechanism, joint, leg or "")):
             axis = AXES[joint.type][number] if joint.type in AXES else None
-            if turned := _turned(setting, joint, number):
+            if turned := _joints_behind(setting, joint, number):
                 yield FurtherMeasurement("encoder", " and ".join(turned), encoder, leg, None, joint.actuated)
             else:
                 yield FurtherMeasurement("encoder", joint.name, encoder, leg, axis, joint.actuated)
 
 
-def _turned(setting: ObservedRobot, joint: Joint, number: int) -> list[str]:
+def _joints_behind(setting: ObservedRobot, joint: Joint, number: int) -> list[str]:
     """The joints of the file of which a joint of the normal form is made, those about its axis of this number; none
     where it is one of the file."""
     axis = joint.axes[min(number, len(joint.axes) - 1)]
@@ -216,7 +216,7 @@ def advise(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None
     """
     robot = as_robot(robot)
     length = (robot if isinstance(robot, Mechanism) else robot.robot).length
-    offered = [each for text in as_texts(offer) for one in listed(text) for each in offers(one, length)]
+    offered = [each for text in as_texts(offer) for one in split_offers(text) for each in offers(one, length)]
     setting = ObservedRobot.of(robot, observe, camera, see=see, offer=offered or None, seed=seed)
     prices = _prices(price)
     now = verdict_of(setting, setting.labels, setting.samples)
@@ -228,7 +228,7 @@ def advise(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None
     costs = [prices.get(_kind(each), 1.0) for each in search.useful]
     chosen, complete = search.cheapest(costs)
     tell("verification")
-    sets = _verified(setting, samples, [(tuple(search.useful[i] for i in places), sum(costs[i] for i in places))
+    sets = _verify(setting, samples, [(tuple(search.useful[i] for i in places), sum(costs[i] for i in places))
                                         for places in chosen[:most]])
     undecided = len(chosen[:most]) - len(sets)
     best = max((each.verdict.rank for each in sets), default=now.rank)
@@ -260,14 +260,14 @@ def _prices(text: str) -> dict[str, float]:
     return found
 
 
-def _verified(setting: ObservedRobot, samples: Samples,
+def _verify(setting: ObservedRobot, samples: Samples,
               sets: Sequence[tuple[tuple[FurtherMeasurement, ...], float]]) -> list[Cure]:
     """Each set with its price and its verdict at all samples; those whose rank has no clear gap are left out."""
     found = list[Cure]()
     for added, price in sets:
         watched = (*setting.observed, *(each.observation for each in added))
         try:
-            verdict = verdict_of(setting, setting.labels, restricted(samples, watched, ways=False))
+            verdict = verdict_of(setting, setting.labels, restrict_samples(samples, watched, ways=False))
             found.append(Cure(added, verdict, price))
         except RankUndecided:
             continue
@@ -297,7 +297,7 @@ class Search:
         kept = [i for i in kept if max(float(np.linalg.norm(blocks[i])) for blocks in unseen) > RANK_CUTOFF]
         kept = _without_twins(kept, everything, rates)
         self.useful = tuple(everything[i] for i in kept)
-        self._rows = [np.array([_padded(blocks[i]) for i in kept]).reshape(len(kept), LARGEST_VALUE, twist.shape[1])
+        self._rows = [np.array([_pad_rows(blocks[i]) for i in kept]).reshape(len(kept), LARGEST_VALUE, twist.shape[1])
                       for blocks, twist in zip(unseen, self._twists, strict=True)]
 
     def lost(self, sets: Sequence[Sequence[int]]) -> Array:
@@ -355,7 +355,7 @@ def _without_twins(kept: Sequence[int], everything: Sequence[FurtherMeasurement]
     return left
 
 
-def _padded(block: Array) -> Array:
+def _pad_rows(block: Array) -> Array:
     """The rows of a candidate, zero rows added up to those of the largest."""
     return np.vstack([block, np.zeros((LARGEST_VALUE - len(block), block.shape[1]))])
 

@@ -12,7 +12,7 @@ from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.locked import rezero
 from ..mechanism.model import Mechanism
 from ..mechanism.pose import ModeNumber, Pose, PoseLike, asked_pose
-from ..results import spelled
+from ..results import with_spelling
 from ..tolerances import AS_PRINTED
 from .observed import SAMPLES, CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike, as_robot
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from .modes.modes import AssemblyModes
 
 
-@spelled
+@with_spelling
 def observe(robot: RobotLike, legs: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
             at: PoseLike | None = None, samples: int = SAMPLES, seed: int = 0) -> ObservedRobot:
     """A robot with what is watched of it, its normal form and samples of its motion: the starting point of every
@@ -51,7 +51,7 @@ def observe(robot: RobotLike, legs: LegsLike = None, camera: CameraLike = None, 
     require_platform(robot, at)
     asked = asked_pose(at)
     if isinstance(asked, Pose):
-        start = _started(ObservedRobot.of(robot, seed=seed), asked)
+        start = _start_at(ObservedRobot.of(robot, seed=seed), asked)
     else:
         (start,) = configurations_at(ObservedRobot.of(robot, legs, camera, see=see, seed=seed), [asked])
     return ObservedRobot.of(replace(rezero(start), file=robot.file), legs, camera, see=see, samples=samples, seed=seed)
@@ -65,7 +65,7 @@ def require_platform(robot: Mechanism, where: object) -> None:
                          "the platform)")
 
 
-def _started(setting: ObservedRobot, wanted: Pose) -> ClosedConfiguration:
+def _start_at(setting: ObservedRobot, wanted: Pose) -> ClosedConfiguration:
     """The configuration at a pose, on the branch of the zero configuration or in another operation mode."""
     drawn = setting.everything
     refused: HrsynthError | None = None
@@ -125,13 +125,13 @@ def asked_at(setting: ObservedRobot, poses: Sequence[Pose | ModeNumber], by_mode
                 if isinstance(each, ModeNumber):
                     found[each] = at_mode(listed, each)
                 elif by_modes and each in unreached:
-                    found[each] = _met(listed, each, unreached[each])
+                    found[each] = _assembled_mode(listed, each, unreached[each])
             except PoseNotReached as error:
                 found[each] = error
     return [found[each] for each in poses]
 
 
-def _met(listed: AssemblyModes, pose: Pose, refused: PoseNotReached) -> ClosedConfiguration:
+def _assembled_mode(listed: AssemblyModes, pose: Pose, refused: PoseNotReached) -> ClosedConfiguration:
     """The robot at the one mode with this pose at which it was found assembled; raises ``refused`` where there is none.
     """
     from .modes.modes import at_mode

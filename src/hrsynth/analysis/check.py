@@ -15,7 +15,7 @@ from ..mechanism.pose import Grid, PoseLike, asked_poses
 from ..progress import tell
 from ..results import Result, Value
 from .asked import asked_at, require_platform
-from .classes import Redundancy, listed
+from .classes import Redundancy, list_redundant
 from .observed import CameraLike, LegsLike, Mobility, ObservedRobot, RobotLike, SeeLike
 from .posture import ConfigurationAnalysis, Posture
 from .question import question
@@ -137,4 +137,4 @@ def check(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None,
             raise PlaneNotMet(setting.robot.name, f"the grid {cells}", f"none of {len(places)} is", dependent)
         swept = GridCheck(cells, tuple(None if each is None else examiner.classify(each) for each in places),
                           motion.free({*cells.names, *cells.fixed.given}), dependent)
-    return Check(setting, postures, listed(examiner.redundant, generic=True), swept, unreached)
+    return Check(setting, postures, list_redundant(examiner.redundant, generic=True), swept, unreached)

@@ -141,6 +141,6 @@ def surplus(here: Rows, usual: Rows) -> Rows:
     return tuple((name, int(count)) for (name, _), count in zip(here, np.diff(lasting, prepend=0), strict=False))
 
 
-def listed(rows: Rows, *, generic: bool) -> tuple[Redundancy, ...]:
+def list_redundant(rows: Rows, *, generic: bool) -> tuple[Redundancy, ...]:
     """The loops with redundant rows."""
     return tuple(Redundancy(name, count, generic) for name, count in rows if count > 0)

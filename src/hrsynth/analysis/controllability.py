@@ -15,7 +15,7 @@ from ..progress import tell
 from ..results import Result
 from .asked import observe as observed
 from .exact import ExactVerdict, architecture
-from .observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike, restricted
+from .observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike, restrict_samples
 from .question import question
 from .verdict import Verdict, verdict_of
 
@@ -117,7 +117,7 @@ def legs(robot: RobotLike, camera: CameraLike = None, *, observe: LegsLike = Non
     few = 1 if formation else 3
 
     def samples_of(chosen: tuple[str, ...]) -> Samples:
-        return restricted(setting.everything, [each for each in segments if each.leg in chosen], ways=False)
+        return restrict_samples(setting.everything, [each for each in segments if each.leg in chosen], ways=False)
 
     def rank(chosen: tuple[str, ...]) -> int:
         return max(member.relation.rank for member in samples_of(chosen).members)

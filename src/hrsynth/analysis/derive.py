@@ -163,7 +163,7 @@ def derive(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None
 
     for unchecked in (OBSERVED_STAGES, ()):
         result = FORMS[form](Rewriting.of(evidence, _check(samples, STEP_SAMPLES), unchecked))
-        hidden, certificate = _certified(setting, result.state, samples)
+        hidden, certificate = _certify(setting, result.state, samples)
         if hidden is not None and certificate.passed and result.virtual_only:
             break
     architecture: Architecture | None = None
@@ -182,16 +182,16 @@ def derive(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None
                       result.steps, certificate, by_paper)
 
 
-def _certified(setting: ObservedRobot, state: State, samples: Samples) -> tuple[Mechanism | None, Certificate]:
+def _certify(setting: ObservedRobot, state: State, samples: Samples) -> tuple[Mechanism | None, Certificate]:
     """The hidden robot, None where every leg is blind, and its certificate at all samples."""
     if not state.actuators:
         return None, _blind(samples)
     tell("certificate")
-    hidden = finished(setting, state)
+    hidden = finish_robot(setting, state)
     return hidden, certify(samples, hidden)
 
 
-def finished(setting: ObservedRobot, state: State) -> Mechanism:
+def finish_robot(setting: ObservedRobot, state: State) -> Mechanism:
     """The hidden robot as a file writes it: a spanning tree, names of its own, its observations; of a formation, whose
     bodies are joined now, the first one is the platform."""
     mechanism = state.mechanism
@@ -223,7 +223,7 @@ def _fallback(setting: ObservedRobot, evidence: Evidence, samples: Samples, fail
     all samples, then of the general form."""
     for run in dict.fromkeys((asked, GENERAL)):
         again = run(Rewriting.of(evidence, _check(samples, None)))
-        hidden = finished(setting, again.state)
+        hidden = finish_robot(setting, again.state)
         certificate = certify(samples, hidden)
         if certificate.passed and again.virtual_only:
             return again, hidden, certificate
@@ -259,7 +259,7 @@ def _paper_form(setting: ObservedRobot, evidence: Evidence, samples: Samples, ce
             return PaperForm(architecture, True, found.largest_angle, reason="equivalent, but not the simplest form")
         tried.append((found, architecture))
     found, architecture = min(reversed(tried), key=lambda pair: pair[0].largest_angle)
-    gains, loses = _exchanged(setting.anatomy, found)
+    gains, loses = _exchanged_freedoms(setting.anatomy, found)
     return PaperForm(architecture, False, found.largest_angle, gains, loses, found.reason)
 
 
@@ -271,7 +271,8 @@ def _planar(samples: Samples) -> bool:
     return range_basis(twists[3:], 1.0)[1].value <= 1 and range_basis(twists[:3], 1.0)[1].value <= 2
 
 
-def _exchanged(anatomy: LegDecomposition, found: Certificate) -> tuple[tuple[Freedom, ...], tuple[Freedom, ...]]:
+def _exchanged_freedoms(anatomy: LegDecomposition, found: Certificate) -> tuple[tuple[Freedom, ...],
+                                                                                tuple[Freedom, ...]]:
     """The platform's freedoms that a wrong hidden robot gains and loses, at the configuration where they differ."""
     if found.mismatch is None or found.mismatch.real.twist_rows != 6:
         return (), ()

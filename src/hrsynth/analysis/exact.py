@@ -39,11 +39,11 @@ from ..mechanism.observations.direction import SeenAxis
 from ..mechanism.relations import Relations, recognise
 from ..results import Compared, finite
 from ..tolerances import CLOSED
-from .formation import PLACES, following, sensed
+from .formation import PLACES, following, sense_links
 from .formation import word as formation_word
 from .instances import Instance, NotRecognised, draw, instance, kernel, random_numbers, rank, ranks_at
-from .kept import degree, kept
-from .observed import ObservedRobot, selected
+from .kept import are_kept, degree
+from .observed import ObservedRobot, select_relation
 from .sensor_rows import DEGREE, SensorPlaces, has_exact_rates
 from .verdict import word
 
@@ -185,7 +185,7 @@ class ExactArchitecture:
         """How many independent similarities take along all that is sensed, at an instance, in motions not seen."""
         draws = [(random_numbers(3, self._random), random_numbers(3, self._random)) for _ in range(PLACES)]
         parts = [part for i in places if (at := found.sightings[i]) is not None
-                 for part in sensed(self.observations[i], self.mechanism.reference, at, draws)]
+                 for part in sense_links(self.observations[i], self.mechanism.reference, at, draws)]
         if not parts:
             return 0
         unseen = kernel(np.vstack([found.rates[i] for i in places]))
@@ -218,7 +218,7 @@ class ExactArchitecture:
 
     def _all_kept(self, every: Sequence[Tie]) -> bool:
         """Whether the motions of each of some instances keep all relations."""
-        return all(all(kept(every, self.relations, self.instance(i))) for i in range(TESTS))
+        return all(all(are_kept(every, self.relations, self.instance(i))) for i in range(TESTS))
 
     def _chance(self, observed: Sequence[Observation]) -> float:
         """A bound of the chance that an identity on which *proved* rests is none (0: there are none to test)."""
@@ -258,7 +258,7 @@ class ExactArchitecture:
                                 if has_exact_rates(odd) else
                                 f"what is measured by {odd.kind} {odd.leg} is not rational")
         places = [self._places[o.key] for o in observed]
-        dimension = selected(self.relation, places).dimension
+        dimension = select_relation(self.relation, places).dimension
         best = 0
         for number in range(INSTANCES):
             together, rates = self.instance(number).ranks(places)
@@ -285,7 +285,8 @@ def architecture_of(mechanism: Mechanism, question: Measurement, at: Sequence[Cl
     sensors = SensorPlaces.of(observed, mechanism)
     directions = [*(o for o in observed if isinstance(o, SeenAxis)), *sensors.watched()]
     relations = recognise(mechanism, frames_at(at), directions, question.point, sensors.points)
-    return ExactArchitecture(mechanism, relations, observed, selected(relation, places), at[0].kernel()[0].shape[1])
+    return ExactArchitecture(mechanism, relations, observed, select_relation(relation, places),
+                             at[0].kernel()[0].shape[1])
 
 
 def power_above(chance: float) -> str:

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..geometry.ranks import kernel_basis, range_basis
 from ..geometry.screws import rotation, translation
-from ..geometry.vectors import Array, Numbers, hat, oriented, rotation_about, unit
+from ..geometry.vectors import Array, Numbers, hat, orient_axis, rotation_about, unit
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.relation import Measurement, Relation
 from ..mechanism import Observation
@@ -52,7 +52,7 @@ class Sensed:
     rows: Numbers
 
 
-def sensed(seen: Observation, reference: str, at: Sighting, places: Sequence[tuple[Numbers, Numbers]]
+def sense_links(seen: Observation, reference: str, at: Sighting, places: Sequence[tuple[Numbers, Numbers]]
            ) -> Iterator[Sensed]:
     """What an observation senses of its two links; nothing beyond their relative motion where it has no wrenches (an
     encoder). ``places`` are points and directions where the other link might be."""
@@ -178,7 +178,7 @@ def formation_at(at: ClosedConfiguration, question: Measurement, found: Relation
     centre = points.mean(axis=0) if len(points) else np.zeros(3)
     random = np.random.default_rng(0)
     places = [(AWAY * length * unit(random.normal(size=3)), unit(random.normal(size=3))) for _ in range(PLACES)]
-    parts = [_scaled(part, length) for each, place in told for part in sensed(
+    parts = [_scale(part, length) for each, place in told for part in sense_links(
         each, question.reference, replace(place, B=place.B - centre, C=place.C - centre), places)]
     K = found.unobserved_twists
     twists = {}
@@ -210,7 +210,7 @@ def seen_at(at: ClosedConfiguration, question: Measurement) -> tuple[list[tuple[
     return found, np.array(points).reshape(-1, 3)
 
 
-def _scaled(part: Sensed, length: float) -> Sensed:
+def _scale(part: Sensed, length: float) -> Sensed:
     """The same in characteristic lengths, unit rows."""
     rows = part.rows * np.repeat([length, 1.0], 3)
     size = np.linalg.norm(rows, axis=1, keepdims=True)
@@ -278,5 +278,5 @@ def special_at(at: ClosedConfiguration, question: Measurement) -> str:
     if sizes[1] <= NAMED * sizes[0]:
         return "all points that are sensed lie on one line"
     if len(points) > 3 and sizes[2] <= NAMED * sizes[0]:
-        return f"all points that are sensed lie in one plane, with the normal {point_text(oriented(axes[2]))}"
+        return f"all points that are sensed lie in one plane, with the normal {point_text(orient_axis(axes[2]))}"
     return ""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..geometry.ranks import kernel_basis, range_basis, space_basis
-from ..geometry.vectors import Array, cross, oriented, unit
+from ..geometry.vectors import Array, cross, orient_axis, unit
 from ..mechanism import JointType
 from ..mechanism.legs import LegDecomposition
 from ..results import Value
@@ -49,14 +49,14 @@ def name_freedoms(twists: Array, anatomy: LegDecomposition, labels: tuple[str, .
         if len(found) == twists.shape[1]:
             break
         twist = _rotation(anatomy, point, direction)
-        if _inside(twist, twists) and not _spanned(twist, found):
+        if _inside(twist, twists) and not _is_spanned(twist, found):
             found.append(Freedom(twist, f"rotation about {name}"))
     for column in twists.T:
         if len(found) == twists.shape[1]:
             break
         rest = _without(column, found)
-        if np.linalg.norm(rest[3:]) > NAMED and not _spanned(rest, found):
-            twist = rest / (rest[3:] @ oriented(unit(rest[3:])))
+        if np.linalg.norm(rest[3:]) > NAMED and not _is_spanned(rest, found):
+            twist = rest / (rest[3:] @ orient_axis(unit(rest[3:])))
             origin = anatomy.mechanism.links[anatomy.mechanism.platform].pose[:3, 3] if position is None else position
             found.append(Freedom(twist, _screw(origin, twist)))
     return tuple(found)
@@ -87,7 +87,7 @@ def _without(twist: Array, found: list[Freedom]) -> Array:
     return twist - basis @ (basis.T @ twist)
 
 
-def _spanned(twist: Array, found: list[Freedom]) -> bool:
+def _is_spanned(twist: Array, found: list[Freedom]) -> bool:
     return bool(np.linalg.norm(_without(twist / np.linalg.norm(twist), found)) < NAMED)
 
 
@@ -101,10 +101,10 @@ def directions_in(basis: Array, anatomy: LegDecomposition) -> list[Array]:
         if len(chosen) < basis.shape[1] and np.linalg.norm(inside - candidate) < NAMED:
             stacked = np.column_stack([*chosen, candidate])
             if np.linalg.matrix_rank(stacked, tol=NAMED) == len(chosen) + 1:
-                chosen.append(oriented(unit(candidate)))
+                chosen.append(orient_axis(unit(candidate)))
     onto = range_basis(np.column_stack(chosen), 1.0)[0] if chosen else np.zeros((3, 0))
     rest = space_basis(basis - onto @ (onto.T @ basis), 1.0)
-    return [*chosen, *(oriented(unit(each)) for each in rest.T)]
+    return [*chosen, *(orient_axis(unit(each)) for each in rest.T)]
 
 
 def direction_name(direction: Array, anatomy: LegDecomposition) -> str:

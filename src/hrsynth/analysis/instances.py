@@ -20,11 +20,11 @@ from ..budgets import LARGEST_RANDOM
 from ..geometry.incidences import Incidence
 from ..geometry.ranks import rank_of
 from ..geometry.screws import normals
-from ..geometry.vectors import Numbers, cross, scaled
+from ..geometry.vectors import Numbers, cross, whole_multiple
 from ..mechanism import Joint, Mechanism, Observation, graphs
 from ..mechanism.observations.direction import SeenAxis
 from ..mechanism.relations import DirectionSource, Relations
-from ..mechanism.screws import allowed
+from ..mechanism.screws import allowed_twists
 from ..mechanism.sights import Sighting
 from ..tolerances import RANK_CUTOFF, RANK_GAP
 from .sensor_rows import SensorPlaces, rates, sighting
@@ -125,11 +125,11 @@ def instance(mechanism: Mechanism, relations: Relations, observations: Sequence[
     velocities, loops, columns = _velocities(mechanism, screws)
     places = SensorPlaces.of(observations, mechanism)
     sights = iter(relations.sights)
-    directions = {o.key: seen(next(sights), drawn) for o in observations if isinstance(o, SeenAxis)}
-    further = [seen(sight, drawn) for sight in sights]
+    directions = {o.key: observed_direction(next(sights), drawn) for o in observations if isinstance(o, SeenAxis)}
+    further = [observed_direction(sight, drawn) for sight in sights]
     t = np.vstack([velocities[body] for body in mechanism.bodies])
     if relations.point is not None:
-        point, scale = scaled(drawn.centres[relations.point])
+        point, scale = whole_multiple(drawn.centres[relations.point])
         t = scale * t[:3] + cross(t[3:], point[:, None], axis=-2)
     parts, sightings = [t], list[Sighting | None]()
     for observation in observations:
@@ -137,10 +137,10 @@ def instance(mechanism: Mechanism, relations: Relations, observations: Sequence[
                                   directions.get(observation.key)))
         if observation.key in directions:
             turn = velocities[observation.link] - velocities[observation.seen_from or mechanism.reference]
-            parts.append(cross(scaled(directions[observation.key])[0][:, None], turn[3:], axis=-2))
+            parts.append(cross(whole_multiple(directions[observation.key])[0][:, None], turn[3:], axis=-2))
         else:
             parts.append(rates(observation, sightings[-1], mechanism, velocities, columns))
-    free, _ = _reduced(loops)
+    free, _ = _reduce(loops)
     t, *moving = np.split(_times(np.vstack(parts), free), np.cumsum([len(part) for part in parts[:-1]]))
     return Instance(drawn, t, tuple(moving), velocities, free, loops, tuple(parts), tuple(sightings))
 
@@ -151,10 +151,10 @@ def _screws(joint: Joint, relations: Relations, drawn: Geometry) -> Numbers:
 
     number = relations.centres.get(joint.name)
     anywhere = np.array([fmpz(0)] * 3, dtype=object)
-    point, scale = (anywhere, 1) if number is None else scaled(drawn.centres[number])
-    axes = [scaled(drawn.directions[c])[0] for c in relations.axes[joint.name]]
+    point, scale = (anywhere, 1) if number is None else whole_multiple(drawn.centres[number])
+    axes = [whole_multiple(drawn.directions[c])[0] for c in relations.axes[joint.name]]
     found = [np.concatenate([screw[:3], scale * screw[3:]]) if screw[3:].any() else screw
-             for screw in allowed(joint.type, point, axes)]
+             for screw in allowed_twists(joint.type, point, axes)]
     return np.array(found, dtype=object).reshape(-1, 6).T
 
 
@@ -224,7 +224,7 @@ def _normals(incidence: Incidence, directions: Sequence[Numbers]) -> Sequence[It
             return [directions[incidence.classes[0]]]
 
 
-def seen(sight: DirectionSource, drawn: Geometry) -> Numbers:
+def observed_direction(sight: DirectionSource, drawn: Geometry) -> Numbers:
     """An observed direction, of any length."""
     axes = [drawn.directions[c] for c in sight.classes]
     match sight.kind:
@@ -247,7 +247,7 @@ def random_numbers(count: int, rng: random.Random) -> Numbers:
 
 def _whole(vector: Numbers) -> Numbers:
     """The shortest vector of whole numbers along a rational one."""
-    numbers, _ = scaled(vector)
+    numbers, _ = whole_multiple(vector)
     return numbers // gcd(*numbers)
 
 
@@ -255,11 +255,11 @@ def kernel(rows: Numbers) -> Numbers:
     """A basis of the exact kernel of whole rows, rational, shape (columns, nullity)."""
     from flint import fmpq
 
-    basis, divisor = _reduced(rows)
+    basis, divisor = _reduce(rows)
     return np.array([fmpq(x, divisor) for x in basis.ravel()], dtype=object).reshape(basis.shape)
 
 
-def _reduced(rows: Numbers) -> tuple[Numbers, Any]:
+def _reduce(rows: Numbers) -> tuple[Numbers, Any]:
     """A whole basis of the kernel, shape (columns, nullity), and the value of each vector in its own free column."""
     from flint import fmpz
 

@@ -20,13 +20,13 @@ from itertools import groupby
 
 import numpy as np
 
-from ..geometry.vectors import Numbers, cross, dot, scaled
+from ..geometry.vectors import Numbers, cross, dot, whole_multiple
 from ..mechanism.carried import Tie
 from ..mechanism.relations import Relations
 from .instances import Instance
 
 
-def kept(every: Sequence[Tie], relations: Relations, found: Instance) -> list[bool]:
+def are_kept(every: Sequence[Tie], relations: Relations, found: Instance) -> list[bool]:
     """Which of the relations all motions of an instance keep to first order."""
     moving = _Moving(relations, found)
     return [answer for _, group in groupby(every, key=_shape) for answer in moving.keeps(list(group))]
@@ -58,9 +58,9 @@ class _Moving:
 
     def __init__(self, relations: Relations, found: Instance) -> None:
         drawn = found.geometry
-        centres, factor = scaled(drawn.centres.ravel())
+        centres, factor = whole_multiple(drawn.centres.ravel())
         self.twists = found.twists()
-        self.D = np.array([scaled(direction)[0] for direction in drawn.directions]).reshape(-1, 3, 1)
+        self.D = np.array([whole_multiple(direction)[0] for direction in drawn.directions]).reshape(-1, 3, 1)
         turns = np.array([self.twists[links[0]][3:] for links in relations.fixed])
         self.dD = _cross(turns.reshape(len(self.D), 3, found.mobility), self.D)
         self.P = centres.reshape(-1, 3, 1)

@@ -8,7 +8,7 @@ from functools import cached_property, lru_cache
 from ..budgets import REMEMBERED
 from ..constraints.condition import Condition, condition
 from ..constraints.pattern import ConstraintPattern, moving, recognise
-from ..constraints.turning import unexamined
+from ..constraints.turning import unexamined_poses
 from ..geometry.vectors import Array
 from ..kinematics.relation import Measurement
 from ..kinematics.sampling import Samples
@@ -77,4 +77,4 @@ class MeasuredRobot(Value):
     @cached_property
     def unexamined(self) -> tuple[str, ...]:
         """Poses to which the condition does not apply, in words."""
-        return unexamined(self.setting.anatomy, self.pattern, self.condition, self.setting.configurations)
+        return unexamined_poses(self.setting.anatomy, self.pattern, self.condition, self.setting.configurations)

@@ -162,7 +162,7 @@ class ObservedRobot(Value):
     @cached_property
     def samples(self) -> Samples:
         """The samples, for the observed segments alone."""
-        return restricted(self.everything, self.observed)
+        return restrict_samples(self.everything, self.observed)
 
     def beside(self) -> tuple[str, ...]:
         """The other operation modes that were met: what the platform does in each, what legs see there, and where."""
@@ -196,7 +196,7 @@ class ObservedRobot(Value):
         """Mobility of the normal form, with its idle motions."""
         first, every = self.everything.members[0].relation, self.everything.question.observations
         places = [every.index(each) for each in self.telling_idle]
-        return Mobility(first.mobility, first.mobility - selected(first, places).dimension)
+        return Mobility(first.mobility, first.mobility - select_relation(first, places).dimension)
 
     @property
     def telling_idle(self) -> tuple[Observation, ...]:
@@ -310,7 +310,7 @@ def _observed_robot(robot: Mechanism, source: Hashable, observe: tuple[str, ...]
     own = tuple(o for o in anatomy.mechanism.observations if o.leg not in asked | possible)
     given = tuple(o for o in own if not o.by_segment)
     chosen = () if observe is None and asked else (
-        own if observe is None and given else _observed(anatomy, normal, defaults, observe, given))
+        own if observe is None and given else _observations(anatomy, normal, defaults, observe, given))
     observed = (*chosen, *(o for o in anatomy.mechanism.observations if o.leg in asked))
     offered = tuple(o for o in anatomy.mechanism.observations if o.leg in possible)
     known = {o.key for o in defaults.values()}
@@ -361,7 +361,7 @@ def _spec(option: str, text: str, eyes: Sequence[str]) -> SightSpec:
         raise BadRequest(error.what.replace("--see", option, 1), error.value, error.allowed) from None
 
 
-def _observed(anatomy: LegDecomposition, normal: NormalForm, defaults: dict[str, Observation],
+def _observations(anatomy: LegDecomposition, normal: NormalForm, defaults: dict[str, Observation],
               observe: Sequence[str] | None, given_too: Sequence[Observation]) -> tuple[Observation, ...]:
     if observe is not None and not observe:
         raise BadRequest("nothing is observed", "no leg", "leg labels, links, or all")
@@ -408,14 +408,14 @@ def motors(setting: ObservedRobot) -> Measurement:
     return replace(setting.everything.question, observations=found)
 
 
-def restricted(samples: Samples, observations: Iterable[Observation], *, ways: bool = True) -> Samples:
+def restrict_samples(samples: Samples, observations: Iterable[Observation], *, ways: bool = True) -> Samples:
     """The same samples for fewer observations (all of them among the samples' own), with their ``ways`` or without."""
     wanted = tuple(observations)
     all_of = samples.question.observations
     keys = [o.key for o in all_of]
     places = [keys.index(o.key) for o in wanted]
     question = replace(samples.question, observations=tuple(all_of[i] for i in places))
-    found = _selected([member.relation for member in samples.members], places)
+    found = _select_relations([member.relation for member in samples.members], places)
     members = tuple(
         Sample(m.configuration,
                tuple(replace(t, measured=tuple(t.measured[i] for i in places)) for t in m.way) if ways else (), each)
@@ -423,12 +423,12 @@ def restricted(samples: Samples, observations: Iterable[Observation], *, ways: b
     return replace(samples, question=question, members=members)
 
 
-def selected(relation: Relation, places: Sequence[int]) -> Relation:
+def select_relation(relation: Relation, places: Sequence[int]) -> Relation:
     """ρ for some of the observations: the projection of ρ for all."""
-    return _selected([relation], places)[0]
+    return _select_relations([relation], places)[0]
 
 
-def _selected(relations: Sequence[Relation], places: Sequence[int]) -> list[Relation]:
+def _select_relations(relations: Sequence[Relation], places: Sequence[int]) -> list[Relation]:
     rows = [np.vstack([each.twist_part, *(each.basis[each.rows_of(place)] for place in places)]) for each in relations]
     return [Relation(basis, each.twist_rows, tuple(each.sizes[i] for i in places), each.mobility,
                      min(each.gap, rank.gap))

@@ -24,7 +24,7 @@ from .classes import (
     gap_of,
     generic,
     interaction_matrix,
-    listed,
+    list_redundant,
     redundant_rows,
     surplus,
     usual_rows,
@@ -199,13 +199,14 @@ class ConfigurationAnalysis(Value):
             if (special := special_at(at, self.setting.samples.question)) and not self._usually_special:
                 here = replace(here, special=special)
             extra = surplus(redundant_rows(at), self.redundant)
-            return replace(posture, formation=here if hidden.classes else None, redundant=listed(extra, generic=False))
+            return replace(posture, formation=here if hidden.classes else None,
+                           redundant=list_redundant(extra, generic=False))
         hidden = replace(hidden, lost=self._named(at, found.unobserved_twists) if hidden.classes else ())
         if real is not None and real.classes:
             real = replace(real, lost=self._named(at, self._real(at).unobserved_twists))
         extra = surplus(redundant_rows(at), self.redundant)
         gained = self._named(at, self._gained(found)) if posture.constraint_singular else ()
-        return replace(posture, hidden=hidden, real=real, gained=gained, redundant=listed(extra, generic=False))
+        return replace(posture, hidden=hidden, real=real, gained=gained, redundant=list_redundant(extra, generic=False))
 
     @staticmethod
     def _kinds(found: Relation, usual: Counts) -> Kinds:

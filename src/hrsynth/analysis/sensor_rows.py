@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..geometry.vectors import Numbers, scaled
+from ..geometry.vectors import Numbers, whole_multiple
 from ..mechanism import Direction, Mechanism, Observation
 from ..mechanism.observations.direction import SeenAxis
 from ..mechanism.observations.encoder import AngleEncoder, Encoder
@@ -91,7 +91,7 @@ def rates(seen: Observation, at: Sighting | None, mechanism: Mechanism, velociti
 def _whole(wrench: Numbers) -> Numbers:
     from flint import fmpq
 
-    return scaled(np.array([fmpq(x) for x in wrench], dtype=object))[0]
+    return whole_multiple(np.array([fmpq(x) for x in wrench], dtype=object))[0]
 
 
 def _coordinate(seen: Encoder, mechanism: Mechanism) -> int:

@@ -59,7 +59,7 @@ def map(question: str | Callable[..., Any], robots: RobotLike | Iterable[RobotLi
     size = max(1, ceil(len(asked) / ceil(PARTS_EACH * workers / max(1, len(groups)))))
     parts = [[{**group, **at} for at in asked[k : k + size]] for group in groups for k in range(0, len(asked), size)]
     answers: list[Any] = []
-    with closing(_done(partial(_answered, function, errors), parts, min(workers, len(parts)))) as done:
+    with closing(_done(partial(_answer_part, function, errors), parts, min(workers, len(parts)))) as done:
         for found in done:
             answers += found
             tell("questions")
@@ -107,14 +107,14 @@ def _done(answered: Callable[[list[Given]], list[Any]], parts: list[list[Given]]
             done.close()
 
 
-def _answered(function: Callable[..., Any], errors: str, part: list[Given]) -> list[Any]:
+def _answer_part(function: Callable[..., Any], errors: str, part: list[Given]) -> list[Any]:
     """The answers of a part, to its first error where that ends all; the error is told what was asked."""
     found: list[Any] = []
     for given in part:
         try:
             found.append(function(**{**given, "robot": as_robot(given["robot"])}))
         except Exception as error:
-            error.add_note("asked: " + ", ".join(f"{name} {_told(value)}" for name, value in given.items()))
+            error.add_note("asked: " + ", ".join(f"{name} {_describe(value)}" for name, value in given.items()))
             if not isinstance(error, HrsynthError):
                 raise
             found.append(error)
@@ -123,7 +123,7 @@ def _answered(function: Callable[..., Any], errors: str, part: list[Given]) -> l
     return found
 
 
-def _told(value: Any) -> str:
+def _describe(value: Any) -> str:
     return str(value) if isinstance(value, Pose | ModeNumber | tuple) else brief(value)
 
 

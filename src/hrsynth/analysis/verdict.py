@@ -100,7 +100,7 @@ def verdict_of(setting: ObservedRobot, legs: Sequence[str], samples: Samples) ->
     else:
         shown = max(dof - start.unobserved_twists.shape[1], 0)
         at_zero = shown if shown < rank and start.gap >= RANK_GAP else None
-        lost = _lost(setting, samples, start, tuple(legs), dof - rank) if rank < dof else ()
+        lost = _lost_freedoms(setting, samples, start, tuple(legs), dof - rank) if rank < dof else ()
     graph = not any(each.RI for each in found)
     said = word(rank, dof) if formation is None else formation.verdict
     return Verdict(tuple(legs), said, dof, rank, lost, gap, graph, max(each.seen.weakest for each in found),
@@ -118,7 +118,7 @@ def _formation(setting: ObservedRobot, samples: Samples, start: Relation, count:
     return found if len(found.trivial) == len(usual.trivial) else usual
 
 
-def _lost(setting: ObservedRobot, samples: Samples, start: Relation, legs: tuple[str, ...], count: int
+def _lost_freedoms(setting: ObservedRobot, samples: Samples, start: Relation, legs: tuple[str, ...], count: int
           ) -> tuple[Freedom, ...]:
     """The lost freedoms at the zero configuration (ρ there: ``start``) where it is generic, else at a sample."""
     position = None

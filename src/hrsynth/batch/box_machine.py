@@ -27,7 +27,7 @@ from ..geometry.affine import (
     line_radius,
     product_radius,
     root_line,
-    rounded,
+    rounded_radius,
     scaled_radius,
     sine_line,
     spread,
@@ -45,7 +45,7 @@ CODES = "LOAD", "ADD", "SUBTRACT", "MULTIPLY", "SCALE", "COPY", "SHIFT", "NEGATE
 LOAD, ADD, SUBTRACT, MULTIPLY, SCALE, COPY, SHIFT, NEGATE, INVERT, ROOT, SINES, CONSTANT = range(12)
 _NAMES = {"+": ADD, "-": SUBTRACT, "*": MULTIPLY, "sqrt": ROOT}
 _NUMBERS = "AFFINE_ROUNDING", "HALF_PI", "FARTHEST_TURN", "SINE_SERIES", "COSINE_SERIES"
-_FUNCTIONS = (rounded, spread, product_radius, scaled_radius, inverse_line, root_line, line_radius, sine_line,
+_FUNCTIONS = (rounded_radius, spread, product_radius, scaled_radius, inverse_line, root_line, line_radius, sine_line,
               turned_sines)
 _TEXT = '''from __future__ import annotations
 
@@ -160,7 +160,7 @@ class MachineCode(Value):
             row[:S], row[S] = each.v, each.r
         bends = np.array([0 if each.bend is None else each.bend for each in inputs], dtype=np.int64)
         found = np.empty((S + 1, c, len(self.outputs)))
-        _compiled()(self.instructions, self.numbers, self.places, self.outputs, given, bends, found)
+        _compiled_machine()(self.instructions, self.numbers, self.places, self.outputs, given, bends, found)
         return AffineForms(found[:S], found[S])
 
 
@@ -189,7 +189,7 @@ def machine(code: Places, numbers: Array, places: int, outputs: Places, given: A
                         to[s, i] = a[s, i] + b[s, i]
                         total[i] += abs(to[s, i])
                 for i in range(LANES):
-                    to[rows, i] = rounded(a[rows, i] + b[rows, i], total[i])
+                    to[rows, i] = rounded_radius(a[rows, i] + b[rows, i], total[i])
             elif name == SUBTRACT:
                 for i in range(LANES):
                     total[i] = 0.0
@@ -198,7 +198,7 @@ def machine(code: Places, numbers: Array, places: int, outputs: Places, given: A
                         to[s, i] = a[s, i] - b[s, i]
                         total[i] += abs(to[s, i])
                 for i in range(LANES):
-                    to[rows, i] = rounded(a[rows, i] + b[rows, i], total[i])
+                    to[rows, i] = rounded_radius(a[rows, i] + b[rows, i], total[i])
             elif name == MULTIPLY:
                 for i in range(LANES):
                     slopes_a[i] = slopes_b[i] = both[i] = shared[i] = 0.0
@@ -229,7 +229,7 @@ def machine(code: Places, numbers: Array, places: int, outputs: Places, given: A
                 if name == SHIFT:
                     for i in range(LANES):
                         to[0, i] += numbers[number, 0]
-                        to[rows, i] = rounded(to[rows, i] + numbers[number, 1], abs(to[0, i]))
+                        to[rows, i] = rounded_radius(to[rows, i] + numbers[number, 1], abs(to[0, i]))
             elif name == NEGATE:
                 for s in range(rows):
                     for i in range(LANES):
@@ -272,7 +272,7 @@ def machine(code: Places, numbers: Array, places: int, outputs: Places, given: A
                 to[:] = 0.0
                 for i in range(LANES):
                     to[0, i] = numbers[number, 0]
-                    to[rows, i] = rounded(numbers[number, 1], abs(to[0, i]))
+                    to[rows, i] = rounded_radius(numbers[number, 1], abs(to[0, i]))
         for s in range(rows + 1):
             for i in range(count):
                 for k in range(outputs.shape[0]):
@@ -289,7 +289,7 @@ def sizes(form: Array, first: int, rows: int, total: Array) -> None:
 
 
 @lru_cache(maxsize=1)
-def _compiled() -> Callable[..., None]:
+def _compiled_machine() -> Callable[..., None]:
     """The machine, compiled once for all formulas and kept between runs."""
     return compiled_module(_TEXT.format(
         numbers="\n".join(f"{name} = {vars(affine)[name]!r}" for name in _NUMBERS), lanes=LANES,

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..geometry.components import Components, dot, normalised, plus, scaled, sqrt, tangents, times, where
+from ..geometry.components import Components, dot, normalise, plus, scale, sqrt, tangents, times, where
 from ..tolerances import CONES_MET, FLAT_CONE
 from .program import Program
 
@@ -108,7 +108,7 @@ def trace_two(program: Program, forms: list[str], go: str, name: str, *, direct:
     def begin(B: Components, C: Components, go: Components, *before: Components) -> dict[str, Components]:
         """w of the largest eigenvalue of B / √tr B + C / √tr C, or of B / a + C / b at the w before."""
         a, b = (error_along(B, before[0]), error_along(C, before[0])) if before else (trace_root(B), trace_root(C))
-        start = largest_eigenvalue(_weighted(B, C, positive(a), positive(b)))[1]
+        start = largest_eigenvalue(_weigh(B, C, positive(a), positive(b)))[1]
         if not before:
             return {w: start, value: [-1.0], open_: go}
         return {w: start, value: before[1], open_: [where(before[1][0] >= 0.0, 0.0, go[0])]}
@@ -129,11 +129,11 @@ def trace_two(program: Program, forms: list[str], go: str, name: str, *, direct:
             program.repeat(lambda *given: dict(zip(state, _newton(*given), strict=True)), NEWTON_STEPS, forms, state)
         program.apply(unproved, go, value)
         program.apply(lambda *given: dict(zip(dual, _bracket(*given), strict=False)), *forms, state=dual[:2])
-        program.repeat(lambda *given: dict(zip(dual, _halved(*given), strict=True)), HALVINGS, forms, dual)
+        program.repeat(lambda *given: dict(zip(dual, _halve(*given), strict=True)), HALVINGS, forms, dual)
         program.apply(chosen, value, least)
 
 
-def _weighted(B: Components, C: Components, a: Any, b: Any) -> list[Any]:
+def _weigh(B: Components, C: Components, a: Any, b: Any) -> list[Any]:
     """B / a + C / b."""
     return [x / a + y / b for x, y in zip(B, C, strict=True)]
 
@@ -149,7 +149,7 @@ def _newton(B: Components, C: Components, w: Components, value: Components, _: C
     aa, bb = dot(w, Bw), dot(w, Cw)
     sound = (aa > FLAT_CONE * (B[0] + B[1] + B[2])) & (bb > FLAT_CONE * (C[0] + C[1] + C[2]))
     a, b = sqrt(aa), sqrt(bb)
-    total, S, (e, f) = a + b, _weighted(B, C, a, b), tangents(w)
+    total, S, (e, f) = a + b, _weigh(B, C, a, b), tangents(w)
     be, bf, ce, cf = dot(Bw, e) / a, dot(Bw, f) / a, dot(Cw, e) / b, dot(Cw, f) / b
     Se = times(S, e)
     # S − (a + b) on the tangents, then the Hessian of the sum and its gradient
@@ -160,8 +160,8 @@ def _newton(B: Components, C: Components, w: Components, value: Components, _: C
     rising = sound & (det > 0.0) & (hee < 0.0)
     there = rising & (onto_e * ge + onto_f * gf <= CONES_MET * total)
     proved = there & (ee * ff >= ef * ef) & (ee <= 0.0)
-    step = plus(w, plus(scaled(onto_e, e), scaled(onto_f, f)))
-    ahead = normalised([where(rising, x, u / a + v / b) for x, u, v in zip(step, Bw, Cw, strict=True)])
+    step = plus(w, plus(scale(onto_e, e), scale(onto_f, f)))
+    ahead = normalise([where(rising, x, u / a + v / b) for x, u, v in zip(step, Bw, Cw, strict=True)])
     on = where(sound, where(there, 0.0, 1.0), 0.0)
     return ([where(on > 0.0, x, y) for x, y in zip(ahead, w, strict=True)], [where(proved, total, value[0])], [on])
 
@@ -172,14 +172,14 @@ def _bracket(B: Components, C: Components) -> tuple[Components, Components]:
     return [first / positive(first + second), 0.0, 1.0, first, -second, 0.0], [float("inf")]
 
 
-def _halved(B: Components, C: Components, bracket: Components, least: Components, _: Components
+def _halve(B: Components, C: Components, bracket: Components, least: Components, _: Components
             ) -> tuple[Components, ...]:
     """A step to the least bound (1) of two cones: at the weight t where a (1 − t) − b t changes its sign, by the rule
     of false position on a bracket; a and b are the two terms at the eigenvector. Where the largest eigenvalue is double
     there, the sign changes by a jump."""
     t, low, high, below, above, count = bracket
     t = where(t < 1e-12, 1e-12, where(t > 1 - 1e-12, 1 - 1e-12, t))
-    square, w = largest_eigenvalue(_weighted(B, C, t, 1.0 - t))
+    square, w = largest_eigenvalue(_weigh(B, C, t, 1.0 - t))
     a, b = error_along(B, w), error_along(C, w)
     total, off, bound = a + b, a * (1.0 - t) - b * t, root_of(square)
     rising = off > 0.0

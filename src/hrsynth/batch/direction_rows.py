@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..closed_forms.legs import ClosedFormLeg, FixedDirection, Number, OnCrank, OnRod, PlatformDirection
-from ..geometry.components import Components, cross, dot, minus, plus, scaled, sqrt, transformed
+from ..geometry.components import Components, cross, dot, minus, plus, scale, sqrt, transform_vector
 
 
 def direction_rows(leg: ClosedFormLeg, p: Components, R: Components, twists: Components, number: Number
@@ -22,25 +22,25 @@ def direction_rows(leg: ClosedFormLeg, p: Components, R: Components, twists: Com
     d = len(twists) // 6
     if isinstance(leg, FixedDirection):
         return 1.0, number(leg.axis), [0.0] * (3 * d)
-    arm = transformed(R, number(leg.tip.turned))
+    arm = transform_vector(R, number(leg.tip.turned))
     D = plus(plus(p, arm), number(leg.tip.constant - leg.centre))
     columns = [([twists[i * d + j] for i in range(3)], [twists[(3 + i) * d + j] for i in range(3)]) for j in range(d)]
     seen = replace(leg, centre=np.zeros(3))
     if isinstance(leg, PlatformDirection):
-        u: Components = transformed(R, number(leg.axis))
+        u: Components = transform_vector(R, number(leg.axis))
         margin = seen.at(D, number, leg.mode, *u)[0] if leg.radius else 1.0
         return margin, u, _by_rows([cross(w, u) for _, w in columns])
     margin, carried = seen.at(D, number, leg.mode)
     if isinstance(leg, OnRod):
         gain = leg.sense / number(leg.rod)
-        u = scaled(gain, minus(D, carried))
+        u = scale(gain, minus(D, carried))
         axis = number(leg.axis)
         tangent = cross(axis, carried) if isinstance(leg, OnCrank) else axis
-        slip = scaled(gain / dot(tangent, u), tangent)
+        slip = scale(gain / dot(tangent, u), tangent)
     else:
         u, gain = carried, leg.mode / sqrt(margin)
-        slip = scaled(gain, u)
-    return margin, u, _by_rows([minus(scaled(gain, y), scaled(dot(u, y), slip))
+        slip = scale(gain, u)
+    return margin, u, _by_rows([minus(scale(gain, y), scale(dot(u, y), slip))
                                 for y in (plus(v, cross(w, arm)) for v, w in columns)])
 
 

@@ -12,14 +12,14 @@ from typing import Any
 
 import numpy as np
 
-from ..geometry.affine import AffineForms, stacked
+from ..geometry.affine import AffineForms, stack
 from ..results import Value
 from ..tolerances import CHAIN_ROUNDING, FOLLOWED
 from .box_machine import MachineCode, Term, worth
 from .tape import Symbol, Tape
 
 
-def traced(formula: Callable[..., Sequence[Any]], inputs: int, off: float = FOLLOWED) -> BoxFormula:
+def trace_formula(formula: Callable[..., Sequence[Any]], inputs: int, off: float = FOLLOWED) -> BoxFormula:
     """A formula from ``inputs`` numbers and from what makes components of the robot's numbers, each of which may be
     ``off`` by so much, as code for boxes."""
     tape = Tape([])
@@ -82,7 +82,7 @@ class BoxFormula(Value):
     def together(self, inputs: Sequence[AffineForms]) -> AffineForms:
         """What is given out (boxes, outputs), for inputs of shape (boxes,); no number where a formula has a pole in a
         box."""
-        return self.machine.run(inputs) if worth(len(self.steps), len(inputs[0].r)) else stacked(self._rows(inputs))
+        return self.machine.run(inputs) if worth(len(self.steps), len(inputs[0].r)) else stack(self._rows(inputs))
 
     def at(self, inputs: Sequence[AffineForms]) -> list[AffineForms]:
         """The same, one after the other."""

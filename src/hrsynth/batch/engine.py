@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..budgets import LARGEST_BATCH, POSES_FOR_COMPILING, POSES_FOR_NUMBA
 from ..closed_forms.legs import ClosedFormLeg
 from ..errors import BadRequest
-from ..geometry.components import Components, cross, plus, scaled, tangents, transformed, where
+from ..geometry.components import Components, cross, plus, scale, tangents, transform_vector, where
 from ..geometry.vectors import Array, frozen
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.platform_motion import PlatformMotion
@@ -28,11 +28,11 @@ from ..results import Value
 from ..tolerances import RANK_CUTOFF
 from .direction_rows import direction_rows
 from .error_bounds import ErrorBound, bounds_compiled, bounds_of
-from .holds import Hold, freedoms, held
+from .holds import Hold, freedoms, holds_of_leg
 from .iterative_leg import IterativeLeg, IterativeLegStates
 from .platform_coordinates import PlatformCoordinates, SlidingLink, frames_at, sliding_links
 from .program import CHUNK, Compiled, Program
-from .recognition import recognised
+from .recognition import recognise_leg
 
 Flags = NDArray[np.bool_]
 EXTRAS = {"numba": "fast", "jax": "jax"}
@@ -118,7 +118,7 @@ class Batch(Value):
         legs: dict[str, ClosedFormLeg | IterativeLeg | None] = {}
         iterative: dict[str, IterativeLeg] = {}
         for leg in anatomy.legs:
-            found = recognised(anatomy, leg, seen[leg.label], coordinates, frames)
+            found = recognise_leg(anatomy, leg, seen[leg.label], coordinates, frames)
             placed = anatomy.point is not None or leg.attach in coordinates.links
             if placed and (found is None or not coordinates.constant):
                 iterative[leg.label] = IterativeLeg.of(mechanism, leg, seen[leg.label], anatomy.point)
@@ -135,7 +135,7 @@ class Batch(Value):
                     link, far = slid[leg.attach]
                     there = {**frames, mechanism.platform: link.moved(frames[mechanism.platform], far)}
                     placed_so = replace(coordinates, links={leg.attach: link.body})
-                    form = recognised(anatomy, leg, seen[leg.label], placed_so, there)
+                    form = recognise_leg(anatomy, leg, seen[leg.label], placed_so, there)
                     if form is not None:
                         sliding[leg.label] = link, form
         return cls(coordinates, frozen(motion.home), legs, iterative, holds, normals, mechanism.length, sliding)
@@ -277,21 +277,21 @@ class Batch(Value):
         def pose(X: Components, *slid_by: Components) -> dict[str, Components]:
             """p and R; a sum of numbers that are not all finite is not its own double's half."""
             R, whole = [X[i] for i in (0, 1, 2, 4, 5, 6, 8, 9, 10)], sum(X) + sum(each for (each,) in slid_by)
-            p = plus([X[3], X[7], X[11]], transformed(R, program.number(self.coordinates.point)))
+            p = plus([X[3], X[7], X[11]], transform_vector(R, program.number(self.coordinates.point)))
             return {"p": p, "R": R, "finite": [where(abs(whole - whole) <= 0.0, 1.0, 0.0)]}
 
         def leg_rows(p: Components, R: Components, *s: Components, name: str, leg: ClosedFormLeg,
                      link: SlidingLink | None = None) -> dict[str, Components]:
             moves = program.number(twists)
             if link is not None:  # its point is p + s R a: it moves by v + ω × s R a + ṡ R a
-                way = transformed(R, program.number(link.along)) if self.coordinates.rotations.size else (
+                way = transform_vector(R, program.number(link.along)) if self.coordinates.rotations.size else (
                     program.number(self.home[:3, :3] @ link.along))
-                shift = scaled(s[0][0], way)
+                shift = scale(s[0][0], way)
                 p = plus(p, shift)
                 for j in range(d - len(slides)):
                     for i, each in enumerate(cross([moves[3 + i][j] for i in range(3)], shift)):
                         moves[i][j] = moves[i][j] + each
-                for i, each in enumerate(scaled(program.number(self.length), way)):
+                for i, each in enumerate(scale(program.number(self.length), way)):
                     moves[i][d - len(slides) + slides.index(link.joint)] = each
             margin, u, M = direction_rows(leg, p, R, [each for row in moves for each in row], program.number)
             found: dict[str, Components] = {f"margin_{name}": [margin]}
@@ -399,7 +399,7 @@ def _holds(anatomy: LegDecomposition, coordinates: PlatformCoordinates, legs: Ma
         state = np.stack([frames[link] for link in chain.links], axis=1)
         state[:, :, :3, 3] /= chain.length
         states = IterativeLegStates(chain, coordinates, state, np.zeros(len(state)), R, span)
-        holds = held(anatomy.mechanism, leg, coordinates, states, p)
+        holds = holds_of_leg(anatomy.mechanism, leg, coordinates, states, p)
         if holds is None:
             return ()
         found += holds

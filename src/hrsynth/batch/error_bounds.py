@@ -117,7 +117,7 @@ def trace_bounds(program: Program, d: int, constants: Callable[..., tuple[Compon
             if only is not None:
                 rows = [[dot(program.number(only), column) for column in zip(*rows, strict=True)]]
             size = len(Q) // d
-            J = [[_product(P, Q[i::size]) for i in range(size)] for P in (_solved(row, R) for row in rows)]
+            J = [[_product(P, Q[i::size]) for i in range(size)] for P in (_solve_row(row, R) for row in rows)]
             blocks = [[row[i : i + 3] for row in J] for i in range(0, size, 3)]
             if only is not None:
                 total = _product(cones, [sqrt(dot(block[0], block[0])) for block in blocks])
@@ -153,7 +153,7 @@ def _product(a: Components, b: Components) -> Any:
     return sum(x * y for x, y in zip(a, b, strict=True))
 
 
-def _solved(row: Components, R: Components) -> list[Any]:
+def _solve_row(row: Components, R: Components) -> list[Any]:
     """row R⁻¹ (d)."""
     d, found = len(row), list(row)
     for j in range(d):

@@ -59,7 +59,7 @@ def _size(vectors: Array) -> Array:
     return np.sqrt(np.maximum(np.einsum("in,in->n", vectors, vectors), np.finfo(float).tiny))
 
 
-def held(mechanism: Mechanism, leg: Leg, coordinates: PlatformCoordinates, states: IterativeLegStates, p: Array
+def holds_of_leg(mechanism: Mechanism, leg: Leg, coordinates: PlatformCoordinates, states: IterativeLegStates, p: Array
          ) -> Sequence[Hold] | None:
     """The forces by which a leg holds the platform, at states of closed configurations; None where these are others."""
     ranks = range_bases([each.T for each in states.wrenches()], 1.0)

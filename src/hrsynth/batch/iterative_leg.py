@@ -173,7 +173,7 @@ class IterativeLeg(Value):
             A = J.transpose(0, 2, 1) @ J + damping[:, None, None] * np.eye(J.shape[2])
             step = -np.linalg.solve(A, J.transpose(0, 2, 1) @ residual[:, :, None])[..., 0]
             step *= np.minimum(1.0, CHAIN_STEP / np.maximum(np.abs(step).max(axis=1), 1e-300))[:, None]
-            X[live[:, None], self.free] = moved(X[live[:, None], self.free], step.reshape(len(live), -1, 6))
+            X[live[:, None], self.free] = move_poses(X[live[:, None], self.free], step.reshape(len(live), -1, 6))
         return X, np.where(self.ties.stand(X), size, np.inf)
 
     def answers(self, X: Array) -> tuple[Array, Array, Array]:
@@ -268,7 +268,7 @@ class IterativeLegStates(Value):
         return self._answers[2] @ self._motions
 
 
-def moved(X: Array, twists: Array) -> Array:
+def move_poses(X: Array, twists: Array) -> Array:
     """Poses (..., 4, 4) after twists (..., 6) of their origins for a unit of time."""
     found = X.copy()
     found[..., :3, 3] += twists[..., :3]

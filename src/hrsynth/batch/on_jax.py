@@ -26,7 +26,7 @@ def run(sections: tuple[Section, ...], numbers: Sequence[float], flat: Array, ou
     """Fill the rows of ``found`` (rows, n) for inputs ``flat`` (n, inputs), in double precision."""
     import jax
 
-    kernel, constants = _compiled(sections, tuple(outputs)), np.array([*numbers, 0.0])
+    kernel, constants = _compile(sections, tuple(outputs)), np.array([*numbers, 0.0])
     with jax.enable_x64(True):
         for start in range(0, len(flat), MOST):
             given = flat[start : start + MOST].T
@@ -36,7 +36,7 @@ def run(sections: tuple[Section, ...], numbers: Sequence[float], flat: Array, ou
 
 
 @cache
-def _compiled(sections: tuple[Section, ...], outputs: tuple[Any, ...]) -> Callable[[Array, Array], Any]:
+def _compile(sections: tuple[Section, ...], outputs: tuple[Any, ...]) -> Callable[[Array, Array], Any]:
     import jax
     import jax.numpy as jnp
 
@@ -47,9 +47,9 @@ def _compiled(sections: tuple[Section, ...], outputs: tuple[Any, ...]) -> Callab
             live: Any = None if section.flag is None else table[section.flag] > 0
             for step in section.steps:
                 if isinstance(step, Kernel):
-                    made = _stored(step, table, numbers)
+                    made = _store(step, table, numbers)
                 else:
-                    made = _repeated(step.step, step.state, step.open, step.limit, table, numbers, live)
+                    made = _repeat_step(step.step, step.state, step.open, step.limit, table, numbers, live)
                 table |= {place: value if live is None else jnp.where(live, value, table.get(place, nothing))
                           for place, value in made.items()}
         return jnp.stack([table.get(each, nothing) if isinstance(each, int) else jnp.full_like(nothing, each)
@@ -58,7 +58,7 @@ def _compiled(sections: tuple[Section, ...], outputs: tuple[Any, ...]) -> Callab
     return jax.jit(rows)
 
 
-def _repeated(step: Kernel, state: Sequence[int], flag: int, limit: int, table: Table, numbers: Any, live: Any
+def _repeat_step(step: Kernel, state: Sequence[int], flag: int, limit: int, table: Table, numbers: Any, live: Any
               ) -> Table:
     """The state after a step was repeated where its flag is positive."""
     import jax
@@ -68,7 +68,7 @@ def _repeated(step: Kernel, state: Sequence[int], flag: int, limit: int, table: 
         return (now[0] < limit) & jnp.any(now[1][flag] > 0)
 
     def again(now: tuple[Any, Table]) -> tuple[Any, Table]:
-        made, here = _stored(step, table | now[1], numbers), now[1][flag] > 0
+        made, here = _store(step, table | now[1], numbers), now[1][flag] > 0
         return now[0] + 1, {
             place: jnp.where(here, made[place], kept) if place in made else kept for place, kept in now[1].items()}
 
@@ -79,7 +79,7 @@ def _repeated(step: Kernel, state: Sequence[int], flag: int, limit: int, table: 
     return found
 
 
-def _stored(kernel: Kernel, table: Table, numbers: Any) -> Table:
+def _store(kernel: Kernel, table: Table, numbers: Any) -> Table:
     """What a kernel puts at its places."""
     import jax.numpy as jnp
 

@@ -200,7 +200,7 @@ def _hold(mechanism: Mechanism, leg: Leg, name: str, placed: Mapping[str, Array]
 
 def coordinates(twin: PinocchioModel, frames: Mapping[str, Array]) -> Array:
     """The twin's q (n, nq) for poses of all links (n, 4, 4), metres."""
-    moved = _moved(twin, frames)
+    moved = _displacements(twin, frames)
     n = len(next(iter(frames.values())))
     q = np.repeat(twin.q0[None], n, axis=0)
     for joint, parent, names in twin.parts():
@@ -218,7 +218,7 @@ def coordinates(twin: PinocchioModel, frames: Mapping[str, Array]) -> Array:
 def rates(twin: PinocchioModel, frames: Mapping[str, Array], link: str) -> tuple[Array, Array]:
     """What the twin's velocities do at closed poses of all links (n, 4, 4), metres: how fast the loops open
     (n, rows, nv), and the twists (n, 6, nv) of a link at the base's origin; characteristic lengths and radians."""
-    moved, (tree, cuts) = _moved(twin, frames), twin.spanned
+    moved, (tree, cuts) = _displacements(twin, frames), twin.spanned
     screws, rows = np.zeros((len(moved[link]), 6, twin.nv)), [np.zeros((len(moved[link]), 0, twin.nv))]
     moves = {twin.mechanism.base: np.zeros(twin.nv)}
 
@@ -263,7 +263,7 @@ def _centre(joint: Joint, A: Array) -> Array:
     return np.asarray(A[:, :3, :3] @ joint.point + A[:, :3, 3])
 
 
-def _moved(twin: PinocchioModel, frames: Mapping[str, Array]) -> dict[str, Array]:
+def _displacements(twin: PinocchioModel, frames: Mapping[str, Array]) -> dict[str, Array]:
     """What brought each link from the zero configuration to poses (n, 4, 4)."""
     return {name: X @ inverse(twin.mechanism.links[name].pose) for name, X in frames.items()}
 

@@ -25,7 +25,7 @@ import numpy as np
 
 from ..geometry.components import Components
 from ..geometry.vectors import Array
-from .sections import Indices, Kernel, KernelLoop, Section, put, taken
+from .sections import Indices, Kernel, KernelLoop, Section, put, take_places
 from .tape import LANES, Store, Symbol, Tape
 
 CHUNK = 4096
@@ -150,14 +150,14 @@ class Program:
                 live: Indices = np.flatnonzero(np.any(flags, axis=0)) if flags else np.zeros(0, dtype=np.int64)
                 if len(live):
                     index.append(start + live)
-                    parts.append(taken(table, passed, live))
+                    parts.append(take_places(table, passed, live))
             if not parts:
                 return
             rest, poses = np.concatenate(parts, axis=1), np.concatenate(index)
             for section in others:
                 live = np.flatnonzero(rest[section.flag] > 0)
                 if len(live):
-                    table = taken(rest, section.places & passed, live)
+                    table = take_places(rest, section.places & passed, live)
                     for step in section.steps:
                         step.run(table, self.numbers)
                     put(rest, section.places, live, table)

@@ -47,7 +47,7 @@ def reach(start: ClosedConfiguration, question: Measurement, pose: Pose,
     goal = motion.goal(pose, robot)
     here, came = _led(start, _origins(start, motion, goal), motion, goal)
     found = nearest(here, goal, motion.at_home()) if came == 1 else here
-    if came < 1 or not _arrived(found, goal):
+    if came < 1 or not _has_arrived(found, goal):
         missed = worst_leg(start.twin, motion, goal)
         last = str(motion.pose(here.pose(motion.link)))
         wrist = at_end(here)
@@ -121,7 +121,7 @@ def _lost_rank(start: ClosedConfiguration, here: ClosedConfiguration) -> str | N
     return "on the straight path to it the loops lose rank (a constraint singularity), which small steps do not pass"
 
 
-def _arrived(at: ClosedConfiguration, goal: Goal) -> bool:
+def _has_arrived(at: ClosedConfiguration, goal: Goal) -> bool:
     """Whether a configuration is at the wanted pose, by its matrix, and no wrist is beyond its interval."""
     return goal.met(at.pose(goal.link), AS_PRINTED * max(1.0, at.twin.length)) and not wrists_beyond(at.twin, at.q)
 
@@ -149,7 +149,7 @@ def sweep(start: ClosedConfiguration, question: Measurement, grid: Grid, motion:
         there, came = (at_once[cell], 1.0) if cell in at_once else _led(origin, beside, motion, goals[cell], halvings)
         if came == 1:
             there = there if cell in at_once else nearest(there, goals[cell], home)
-        return there if came == 1 and _arrived(there, goals[cell]) else None
+        return there if came == 1 and _has_arrived(there, goals[cell]) else None
 
     return spread(start, grid.shape, goals, lead, at_once)
 

@@ -28,7 +28,7 @@ from .platform_coordinates import Frames, PlatformCoordinates
 DRIVING = (JointType.REVOLUTE, JointType.PRISMATIC)
 
 
-def recognised(anatomy: LegDecomposition, leg: Leg, seen: Direction, coordinates: PlatformCoordinates,
+def recognise_leg(anatomy: LegDecomposition, leg: Leg, seen: Direction, coordinates: PlatformCoordinates,
                frames: Frames) -> ClosedFormLeg | None:
     """The closed form of the leg, or None; ``seen`` is the direction observed in it."""
     X = frames[anatomy.mechanism.platform]

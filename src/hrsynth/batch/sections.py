@@ -66,12 +66,12 @@ class KernelLoop(Value):
                 break
             if len(live) < here.shape[1]:
                 put(table, self.state, index, here)
-                index, here = index[live], taken(here, self.step.places, live)
+                index, here = index[live], take_places(here, self.step.places, live)
             self.step.run(here, numbers)
         put(table, self.state, index, here)
 
 
-def taken(table: Array, places: set[int], index: Indices) -> Array:
+def take_places(table: Array, places: set[int], index: Indices) -> Array:
     """Some places of a table at some poses; the others are left open."""
     found = np.empty((len(table), len(index)))
     for place in places:

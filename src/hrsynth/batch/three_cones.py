@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..geometry.components import Components, dot, scaled, sqrt, times, where
+from ..geometry.components import Components, dot, scale, sqrt, times, where
 from ..tolerances import CONES_TIGHT
 from .cones import error_along, larger, largest_eigenvalue, positive, trace_root
 from .program import Program
@@ -36,7 +36,7 @@ def trace_three(program: Program, forms: list[str], go: str, name: str) -> None:
 
     def start(*given: Components) -> dict[str, Components]:
         B, (on,) = given[:k], given[k:]
-        return {w: largest_eigenvalue(weighted(B, [1.0 / positive(trace_root(each)) for each in B]))[1],
+        return {w: largest_eigenvalue(weigh(B, [1.0 / positive(trace_root(each)) for each in B]))[1],
                 best: [1.0, 0.0, 0.0, -1.0], open_: on}
 
     def compare(*given: Components) -> dict[str, Components]:
@@ -71,7 +71,7 @@ def trace_three(program: Program, forms: list[str], go: str, name: str) -> None:
         program.apply(lambda upper, best: {name: [larger(upper[0], best[3]), best[3]]}, upper, best)
 
 
-def weighted(B: tuple[Components, ...], weights: Components) -> list[Any]:
+def weigh(B: tuple[Components, ...], weights: Components) -> list[Any]:
     """Σ weight_i B_i."""
     return [sum(weight * form[j] for weight, form in zip(weights, B, strict=True)) for j in range(6)]
 
@@ -82,7 +82,7 @@ def _ascent(B: tuple[Components, ...], w: Components) -> list[Any]:
     for form in B:
         gain = error_along(form, w)
         share = where(gain > 0.0, 1.0, 0.0) / positive(gain)
-        pull = [x + y for x, y in zip(pull, scaled(share, times(form, w)), strict=True)]
+        pull = [x + y for x, y in zip(pull, scale(share, times(form, w)), strict=True)]
     size = sqrt(dot(pull, pull))
     return [where(size > 0.0, x / positive(size), y) for x, y in zip(pull, w, strict=True)]
 
@@ -93,7 +93,7 @@ def _round(B: tuple[Components, ...], lower: Any, terms: Components, upper: Comp
     floor = 1e-12 * sum(terms) + 1e-300
     roots = [larger(term, floor) for term in terms]
     total = sum(roots)
-    square, w = largest_eigenvalue(weighted(B, [total / root for root in roots]))
+    square, w = largest_eigenvalue(weigh(B, [total / root for root in roots]))
     bound = sqrt(larger(square, 0.0))
     bound = where(bound < upper[0], bound, upper[0])
     here = [root * root for root in roots]

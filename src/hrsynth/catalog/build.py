@@ -19,7 +19,7 @@ from typing import Any
 from ..errors import BadRequest, BuildStopped, HrsynthError
 from .executors import Executor, Made, Stopped, executor
 from .journal import Journal
-from .jsonl import encoded, line, word_of
+from .jsonl import encode_lines, line, word_of
 from .store import Folder, Store, store
 
 CHUNK = 8
@@ -68,17 +68,17 @@ def architectures() -> WordSource:
     from .entry import entry
     from .groups import EVERY
 
-    return WordSource(EVERY, entry, unmoved)
+    return WordSource(EVERY, entry, without_motors)
 
 
-def unmoved(word: str) -> str:
+def without_motors(word: str) -> str:
     """The word without its motors: what a hidden robot is found from."""
     from .words import parse
 
     return str(parse(word).unmoved)
 
 
-def made(entry: Callable[[str], dict[str, Any]], group: str, words: Iterable[str]) -> Made:
+def make_records(entry: Callable[[str], dict[str, Any]], group: str, words: Iterable[str]) -> Made:
     """The records of words; a refused one says why, in one line. Raises ``Stopped`` for a defect of our own."""
     return [(word, line({**_record(entry, word), "word": word, "group": group})) for word in words]
 
@@ -167,7 +167,7 @@ def made_by(team: Executor, source: WordSource, group: str, words: Sequence[str]
             ) -> Iterator[Made]:
     """The records of words in parts, in any order; raises ``BuildStopped`` where they cannot be made."""
     try:
-        yield from team(partial(made, source.entry, group), source.chunks(words, CHUNK))
+        yield from team(partial(make_records, source.entry, group), source.chunks(words, CHUNK))
     except Stopped as stopped:
         raise BuildStopped(str(stopped), kept) from stopped
 
@@ -199,13 +199,13 @@ def _stale(kept: Store, group: str, source: WordSource, team: Executor, sample: 
         yield f"{group}: not in {kept.path}"
         return
     words = source.words(group)
-    if isinstance(kept, Folder) and kept.content(group) != encoded(group, lines):
+    if isinstance(kept, Folder) and kept.content(group) != encode_lines(group, lines):
         yield f"{group}: {kept.file(group)} is not sorted"
     yield from _some(group, "missing", [word for word in words if word not in stored])
     yield from _some(group, "no longer of the group", sorted(stored.keys() - set(words)))
-    both = _drawn([word for word in words if word in stored], sample, seed)
+    both = _draw_words([word for word in words if word in stored], sample, seed)
     differ: list[str] = []
-    for part in _counted(made_by(team, source, group, both), group, len(both), tell):
+    for part in _count_parts(made_by(team, source, group, both), group, len(both), tell):
         differ += [word for word, line in part if line != stored[word]]
     yield from _some(group, f"of {len(both)} compared with other records today", sorted(differ))
 
@@ -216,13 +216,13 @@ def _some(group: str, what: str, words: Sequence[str]) -> Iterator[str]:
         yield f"{group}: {len(words)} {what}, the first {words[0]}"
 
 
-def _drawn(words: list[str], count: int | None, seed: int) -> list[str]:
+def _draw_words(words: list[str], count: int | None, seed: int) -> list[str]:
     if count is None or count >= len(words):
         return words
     return random.Random(seed).sample(words, count)
 
 
-def _counted(parts: Iterator[list[tuple[str, str]]], group: str, total: int, tell: Tell
+def _count_parts(parts: Iterator[list[tuple[str, str]]], group: str, total: int, tell: Tell
              ) -> Iterator[list[tuple[str, str]]]:
     """The parts, told as they pass."""
     done = 0

@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import BadRequest
 from .fits import FIELDS, TEXTS, chains, texts
 from .jsonl import Record
-from .search import WIDTHS, Flags, Texts, Whole, narrowed
+from .search import WIDTHS, Flags, Texts, Whole, narrow_type
 
 NOTATION, CHAIN, WORD, BARE, FOLDED = "notation as written", "chain", "word", "bare word", "folded word"
 """Columns beside those of fields and texts: notations; the names of legs, each with the number of its notation; words,
@@ -143,6 +143,6 @@ def _value(record: Record, name: str) -> str:
 def _write(file: sqlite3.Connection, name: str, every: Iterable[str], numbers: Sequence[int]) -> None:
     """A column: texts, and the numbers of those of all rows."""
     found = Texts.of(every)
-    parts = (narrowed(each) for each in (found.letters, found.ends, np.array(numbers, np.int64)))
+    parts = (narrow_type(each) for each in (found.letters, found.ends, np.array(numbers, np.int64)))
     file.execute(f"INSERT INTO columns VALUES (?{', ?' * 2 * len(PARTS)})", (
         name, *(value for part in parts for value in (part.itemsize, part.tobytes()))))

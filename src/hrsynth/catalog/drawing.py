@@ -9,7 +9,7 @@ from ..mechanism.legs import decompose
 from ..mechanism.normal import normal_form
 from ..mechanism.sensors import default_observation
 from .geometry import mechanism
-from .words import COMPOSITE, LegWord, RobotWord, counted
+from .words import COMPOSITE, LegWord, RobotWord, count_equal
 
 ENDS = {"": ("platform",), "point": ("platform, a point",), "bar": ("plate 1", "plate 2"),
         "slide": ("plate", "platform")}
@@ -20,7 +20,7 @@ BETWEEN = {"bar": "plate 1 and plate 2 are joined by a bar, the platform, and it
 
 def drawing(word: RobotWord) -> str:
     """A line for all legs that are equal: ``*`` marks a motor, a double line the watched link."""
-    watched = _watched(word)
+    watched = _observed_places(word)
     groups: dict[tuple[int, LegWord], list[int]] = {}
     number = 0
     for body, legs in enumerate(word.bodies):
@@ -31,7 +31,7 @@ def drawing(word: RobotWord) -> str:
     width = max(map(len, heads))
     lines = [f"{head:<{width}}  {_chain(leg, watched.get(numbers[0]), ENDS[word.platform][body])}"
              for head, ((body, leg), numbers) in zip(heads, groups.items(), strict=True)]
-    seen = [f"seen of the platform: {counted(word.seen)}"] if word.seen else []
+    seen = [f"seen of the platform: {count_equal(word.seen)}"] if word.seen else []
     return "\n".join([*lines, *([BETWEEN[word.platform]] if word.platform in BETWEEN else []), *seen])
 
 
@@ -55,7 +55,7 @@ def _line(leg: LegWord, place: int, watched: int | None) -> str:
     return "══" if place == watched + 1 or (inside and place == watched) else "──"
 
 
-def _watched(word: RobotWord) -> dict[int, int]:
+def _observed_places(word: RobotWord) -> dict[int, int]:
     """The place of the observed link in each leg: the joint inside or after which it lies; nothing where the mechanism
     cannot be made, or something else is seen."""
     if word.seen:

@@ -15,9 +15,9 @@ from ..analysis.derive import derive
 from ..analysis.exact import ExactArchitecture, architecture
 from ..analysis.measured import MeasuredRobot
 from ..analysis.modes.solve import SystemModes
-from ..analysis.modes.ways import counted as counted_modes
-from ..analysis.modes.ways import expected
-from ..analysis.observed import ObservedRobot, restricted, selected
+from ..analysis.modes.ways import count_modes as counted_modes
+from ..analysis.modes.ways import expected_modes
+from ..analysis.observed import ObservedRobot, restrict_samples, select_relation
 from ..analysis.verdict import CONTROLLABLE, Verdict, verdict_of
 from ..errors import BadRequest, HrsynthError, MissingExtra, NotConfined, NotConfirmed, Unsolved
 from ..geometry.ranks import range_basis
@@ -33,7 +33,7 @@ from ..rewrite.strategy import Step
 from ..tolerances import PROVED_CHANCE
 from .geometry import mechanism
 from .groups import group
-from .words import RobotWord, counted, parse
+from .words import RobotWord, count_equal, parse
 
 SAMPLES = 10
 """Closed configurations at which an exact verdict is confirmed."""
@@ -55,8 +55,8 @@ def entry(text: str) -> dict[str, Any]:
     The same for the same word, whatever was asked before. Raises ``BadRequest`` for a text that is no word.
     """
     word = parse(text)
-    record: dict[str, Any] = {"word": str(word), "group": group(word), "see": counted(word.seen) or None}
-    found = _studied(str(model(word)))
+    record: dict[str, Any] = {"word": str(word), "group": group(word), "see": count_equal(word.seen) or None}
+    found = _study_first(str(model(word)))
     if isinstance(found, str):
         return {**record, "refused": found}
     drawn = mechanism(word, found.attempt)
@@ -94,7 +94,7 @@ class ArchitectureStudy:
 
     def driven(self, names: Sequence[str]) -> int:
         """What motors on these joints see of the platform."""
-        return selected(self.encoders, [i for i, name in enumerate(self.joints) if name in names]).rank
+        return select_relation(self.encoders, [i for i, name in enumerate(self.joints) if name in names]).rank
 
     def record(self, drawn: Mechanism, motors: Sequence[str]) -> dict[str, Any]:
         """The fields of a record, of a mechanism with motors on these joints."""
@@ -106,7 +106,7 @@ class ArchitectureStudy:
 
 
 @lru_cache(maxsize=128)
-def _studied(text: str) -> ArchitectureStudy | str:
+def _study_first(text: str) -> ArchitectureStudy | str:
     """The study of a model, or why there is none, with the first dimensions that can be studied."""
     word, reason = parse(text), ""
     for attempt in range(ATTEMPTS):
@@ -164,7 +164,7 @@ def _agree(exact: ExactArchitecture, samples: Samples, found: Verdict) -> None:
                                                  f"freedoms in exact arithmetic, {found.rank} at samples")
 
 
-def _watched(setting: ObservedRobot) -> tuple[Observation, ...]:
+def _watch(setting: ObservedRobot) -> tuple[Observation, ...]:
     """The segments of all legs, or what is seen instead."""
     return setting.segments if all(each.by_segment for each in setting.observed) else setting.observed
 
@@ -181,11 +181,11 @@ def _smallest(setting: ObservedRobot, exact: ExactArchitecture | None,
     confirmed, and exact where that is asked for."""
     if not best.rank:
         return []
-    for size in range(1, len(_watched(setting)) + 1):
+    for size in range(1, len(_watch(setting)) + 1):
         found = []
         for places in sets(size):
-            seen = [_watched(setting)[i] for i in places]
-            samples = restricted(setting.everything, seen, ways=False)
+            seen = [_watch(setting)[i] for i in places]
+            samples = restrict_samples(setting.everything, seen, ways=False)
             verdict = verdict_of(setting, [o.leg for o in seen], samples)
             if exact is not None:
                 _agree(exact, samples, verdict)
@@ -234,13 +234,13 @@ def _singular(setting: ObservedRobot) -> dict[str, Any]:
 def _modes(setting: ObservedRobot, fewest: Sequence[Sequence[str]]) -> dict[str, Any]:
     """Complex assembly modes of a smallest set of legs, by what there are no more if not by a resultant, and the most
     real ones of some configurations: of the first set, or else of that of which fewest can be expected."""
-    robots = [MeasuredRobot.watched(replace(setting, observed=tuple(o for o in _watched(setting) if o.leg in legs)))
+    robots = [MeasuredRobot.watched(replace(setting, observed=tuple(o for o in _watch(setting) if o.leg in legs)))
               for legs in fewest]
     at = setting.configurations[0]
 
     def tried() -> Iterator[int]:
         yield 0
-        yield from sorted(range(1, len(fewest)), key=lambda k: expected(robots[k], at))[:OTHERS]
+        yield from sorted(range(1, len(fewest)), key=lambda k: expected_modes(robots[k], at))[:OTHERS]
 
     for k in tried():
         found = [each for each in _lists(robots[k], setting.configurations) if each.complete and not each.continuum]

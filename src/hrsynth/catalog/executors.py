@@ -39,7 +39,7 @@ def executor(workers: int = 1, cluster: str | None = None) -> Executor:
         if workers > 1:
             raise BadRequest("workers and a cluster", workers, "one of the two")
         _require("distributed", "a cluster")
-        return lambda task, parts: _clustered(task, parts, cluster)
+        return lambda task, parts: _run_on_cluster(task, parts, cluster)
     if workers == 1:
         return _alone
     return lambda task, parts: _together(task, parts, workers)
@@ -90,7 +90,7 @@ def _end_with(parent: int) -> None:
     os._exit(1)
 
 
-def _clustered(task: Task, parts: Iterable[list[str]], address: str) -> Iterator[Made]:
+def _run_on_cluster(task: Task, parts: Iterable[list[str]], address: str) -> Iterator[Made]:
     from distributed import Client
 
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
@@ -101,12 +101,12 @@ def _clustered(task: Task, parts: Iterable[list[str]], address: str) -> Iterator
     except (OSError, ImportError):
         raise Stopped(f"no cluster answers at {address} within {PATIENCE:g} s") from None
     try:
-        yield from _served(client, task, iter(parts))
+        yield from _serve_parts(client, task, iter(parts))
     finally:
         client.close(timeout=1)
 
 
-def _served(client: Any, task: Task, parts: Iterator[list[str]]) -> Iterator[Made]:
+def _serve_parts(client: Any, task: Task, parts: Iterator[list[str]]) -> Iterator[Made]:
     """Keeps some parts waiting on the cluster; a worker that is lost leaves its parts to the others."""
     from asyncio import CancelledError
     from concurrent.futures import CancelledError as FutureCancelled
@@ -114,21 +114,21 @@ def _served(client: Any, task: Task, parts: Iterator[list[str]]) -> Iterator[Mad
     waiting: set[Any] = set()
     ahead = PARTS_AHEAD * max(2, sum(client.nthreads().values()))
     try:
-        while waiting := waiting | _submitted(client, task, islice(parts, ahead - len(waiting))):
-            done, waiting = _finished(client, waiting)
+        while waiting := waiting | _submit(client, task, islice(parts, ahead - len(waiting))):
+            done, waiting = _wait_for_parts(client, waiting)
             for future in done:
                 yield _result(future)
     except (OSError, CancelledError, FutureCancelled):
         raise Stopped("the cluster is gone") from None
 
 
-def _submitted(client: Any, task: Task, parts: Iterable[list[str]]) -> set[Any]:
+def _submit(client: Any, task: Task, parts: Iterable[list[str]]) -> set[Any]:
     if client.status != "running":
         raise Stopped("the cluster is gone")
-    return {client.submit(_versioned, task, part, pure=False) for part in parts}
+    return {client.submit(_with_version, task, part, pure=False) for part in parts}
 
 
-def _finished(client: Any, waiting: set[Any]) -> tuple[set[Any], set[Any]]:
+def _wait_for_parts(client: Any, waiting: set[Any]) -> tuple[set[Any], set[Any]]:
     """Parts that are done, at least one of them unless time has passed, and those that are not."""
     from distributed import wait
 
@@ -173,6 +173,6 @@ def _require_alive(client: Any) -> None:
         raise Stopped("the cluster has no workers left")
 
 
-def _versioned(task: Task, part: list[str]) -> tuple[str, Made]:
+def _with_version(task: Task, part: list[str]) -> tuple[str, Made]:
     """What a part gives, and the version that made it."""
     return __version__, task(part)

@@ -14,9 +14,9 @@ import numpy as np
 
 from ..errors import BadRequest
 from .jsonl import Record, is_written, leading_word, written_text
-from .known import called, is_called, kinds, known_as
+from .known import is_called, kinds, kinds_called, known_as
 from .search import Flags
-from .words import LONGEST_COUNT, counted, sights
+from .words import LONGEST_COUNT, count_equal, sights
 
 ASKED = ("group", "dof", "motion", "verdict", "base_motors", "fewest", "see", "modes", "legs", "text")
 """What can be asked for."""
@@ -94,10 +94,10 @@ def _any_of(every: Sequence[RecordCondition]) -> RecordCondition:
 
 def _condition(name: str, value: Any) -> RecordCondition:
     """That of one value; one of NumPy counts as Python's."""
-    return _told(name, value.item() if hasattr(value, "item") else value)
+    return _condition_on(name, value.item() if hasattr(value, "item") else value)
 
 
-def _told(name: str, value: Any) -> RecordCondition:
+def _condition_on(name: str, value: Any) -> RecordCondition:
     if name in ("legs", "see", "text") and not isinstance(value, str) and (name, type(value)) != ("legs", int):
         raise BadRequest(f"the catalog cannot be asked for {name}", value, "a text, or a number of legs")
     match name:
@@ -126,11 +126,11 @@ def _told(name: str, value: Any) -> RecordCondition:
                 lambda record: is_called(record, text) or any(text in str(each).casefold() for each in record.values()),
                 None if APART in text else lambda rows: rows.holding(text),
                 (lambda line: text in line.casefold() or (
-                    bool(called(text)) and kinds(leading_word(line)) in called(text))) if plain else None)
+                    bool(kinds_called(text)) and kinds(leading_word(line)) in kinds_called(text))) if plain else None)
         case "legs":
             value = int(value)
         case "see":
-            value = counted(sights(value))
+            value = count_equal(sights(value))
         case "modes":
             name = "modes_bound"
     # 1 is True and 3.0 is 3: these are not so written

@@ -38,10 +38,10 @@ def mechanism(word: RobotWord, attempt: int = 0) -> Mechanism:
     Raises ``BadRequest`` where the axes of a U cannot be at right angles.
     """
     drawn = _Draft(word.unseen, attempt).build()
-    return _seen(drawn, word, attempt) if word.seen else drawn
+    return _with_sights(drawn, word, attempt) if word.seen else drawn
 
 
-def _seen(drawn: Mechanism, word: RobotWord, attempt: int) -> Mechanism:
+def _with_sights(drawn: Mechanism, word: RobotWord, attempt: int) -> Mechanism:
     """The mechanism with what the word says to be seen of its platform: places, axes and cameras in general position.
 
     The cameras see upwards from below the platform.
@@ -100,7 +100,7 @@ class _Draft:
                 number += 1
                 angle = turn + 2 * np.pi * (number - 1 + self.rng.uniform(-0.2, 0.2)) / count
                 _Limb(self, leg, number, angle, end).add(watched)
-        return _observed(self.builder.build(platform="platform"), self.word, watched)
+        return _with_segments(self.builder.build(platform="platform"), self.word, watched)
 
     def _platform(self) -> tuple[str, ...]:
         """Adds the platform and says on which links legs end."""
@@ -131,7 +131,7 @@ class _Draft:
                 return ("platform",)
 
 
-def _observed(drawn: Mechanism, word: RobotWord, chords: Mapping[str, Direction]) -> Mechanism:
+def _with_segments(drawn: Mechanism, word: RobotWord, chords: Mapping[str, Direction]) -> Mechanism:
     """The mechanism with the segments that the word marks, and the chord of the last link (``chords``, by leg) where
     a leg has no segment by the rules, since its axes meet in a point."""
     anatomy = decompose(normal_form(drawn).mechanism)

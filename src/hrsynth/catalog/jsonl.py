@@ -74,7 +74,7 @@ def written_text(text: str, name: str) -> str:
     return text.partition(f'"{name}":"')[2].partition('"')[0]
 
 
-def encoded(group: str, lines: Iterable[str]) -> bytes:
+def encode_lines(group: str, lines: Iterable[str]) -> bytes:
     """The bytes of a group's file, sorted by word, whatever the order of the lines."""
     ordered = sorted(lines, key=leading_word)
     return "".join(f"{each}\n" for each in [head(group, len(ordered)), *ordered]).encode("ascii")
@@ -88,7 +88,7 @@ def head_count(first: str | bytes, file: str) -> int:
     return count
 
 
-def decoded(content: bytes, file: str) -> list[str]:
+def decode_lines(content: bytes, file: str) -> list[str]:
     """The lines of a group's file; raises ``BadRequest`` for another version, a file cut off or of something else."""
     try:
         first, *lines = content.decode("ascii").splitlines() or [""]

@@ -26,7 +26,7 @@ def alias(word: str) -> str | None:
 
 
 @cache
-def called(text: str) -> frozenset[frozenset[str]]:
+def kinds_called(text: str) -> frozenset[frozenset[str]]:
     """The kinds of legs, without motors and marks, of robots in whose names a text occurs."""
     return frozenset(kinds(word) for word, names in aliases().items() if text.casefold() in names.casefold())
 
@@ -43,14 +43,14 @@ def equal_legs(word: str) -> bool:
 
 def is_called(record: Record, text: str) -> bool:
     """Whether a text occurs in a name under which a record's robot is known; words with other legs are not read."""
-    found = called(text)
+    found = kinds_called(text)
     return bool(found) and kinds(record["word"]) in found and text.casefold() in known_as(record).casefold()
 
 
 def known_as(record: Record) -> str:
     """The names under which a record's robot is known; words with legs that no known robot has are not read."""
     word = record["word"]
-    return (alias(word) or "") if kinds(word) in called("") else ""
+    return (alias(word) or "") if kinds(word) in kinds_called("") else ""
 
 
 def bare(word: str) -> str:

@@ -23,7 +23,7 @@ from .build import WordSource
 from .entry import study
 
 
-def published(folder: str | Path) -> WordSource:
+def published_words(folder: str | Path) -> WordSource:
     """The robots of a folder of tables, by their names, in the groups of the tables. Raises ``BadRequest``."""
     groups: dict[str, list[str]] = {}
     for robot in _robots(str(folder)).values():

@@ -15,7 +15,7 @@ from ..results import Value
 from .fits import fits, require_askable
 from .jsonl import Record, leading_word, record
 from .known import alias, is_called, order
-from .store import DATABASES, Store, shipped, store
+from .store import DATABASES, Store, shipped_folder, store
 from .words import SENSORS, parse
 
 
@@ -118,7 +118,7 @@ def load(path: str | Path | None = None, **asked: Any) -> Catalog:
     return found if kept.decides(asked) else found.where(**asked)
 
 
-def named(text: str, path: str | Path | None = None) -> list[Record]:
+def find_named(text: str, path: str | Path | None = None) -> list[Record]:
     """The records of robots that are called so, or whose legs are, those first that a list shows first: names that
     begin with the text before others. ``path`` as for :func:`load`."""
     called = (each for each in load(path, text=text) if is_called(each, text))
@@ -157,7 +157,7 @@ def _tuple(value: object) -> tuple[object, ...]:
 
 def _there(path: str | Path | None) -> Store:
     """The store of a path, the shipped one where there is none; raises ``BadRequest`` where nothing is."""
-    kept = shipped() if path is None else store(path)
+    kept = shipped_folder() if path is None else store(path)
     if path is not None and not kept.path.exists():
         raise BadRequest("no such catalog", str(path), f"a folder, or a file that ends in {', '.join(DATABASES)}")
     if not kept.groups():

@@ -8,7 +8,7 @@ from ..analysis.verdict import BLIND, CONTROLLABLE, PARTIAL
 from ..present.markdown import rewrite
 from ..present.markdown import table as markdown
 from .query import Catalog, load
-from .store import shipped
+from .store import shipped_folder
 from .words import SENSORS
 
 START = "<!-- generated: catalog -->"
@@ -19,7 +19,7 @@ HEADS = ("group", "architectures", "controllable", "partially controllable", "un
 def table(catalog: Catalog | None = None) -> str:
     """The Markdown table of how many architectures of each group have which verdict (default: of what is shipped)."""
     if catalog is None:
-        catalog = Catalog((*load(), *load(group=SENSORS))) if shipped().groups() else Catalog(())
+        catalog = Catalog((*load(), *load(group=SENSORS))) if shipped_folder().groups() else Catalog(())
     rows = [_row(str(group), catalog.where(group=group)) for group, in catalog.count("group")]
     return markdown(HEADS, [*rows, _row("all", catalog)], 1)
 

@@ -33,7 +33,7 @@ class Texts:
     def of(cls, every: Iterable[str]) -> Texts:
         every = list(every)
         letters = np.frombuffer("".join(every).encode("utf-32-le", "surrogatepass"), "<u4")
-        return cls.ending(narrowed(letters), np.cumsum([len(each) for each in every], dtype=np.int64))
+        return cls.ending(narrow_type(letters), np.cumsum([len(each) for each in every], dtype=np.int64))
 
     @classmethod
     def ending(cls, letters: Whole, ends: Whole) -> Texts:
@@ -123,7 +123,7 @@ class Texts:
         return places
 
 
-def narrowed(numbers: Whole) -> Whole:
+def narrow_type(numbers: Whole) -> Whole:
     """The same numbers, none negative, in as few bytes each as hold all."""
     largest = int(numbers.max()) if len(numbers) else 0
     return numbers.astype(f"<u{next(width for width in WIDTHS if largest < 256 ** width)}")

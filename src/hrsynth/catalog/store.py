@@ -20,7 +20,7 @@ from ..errors import BadRequest, BuildStopped
 from .columns import Columns, ColumnWriter
 from .fits import ASKED, conditions, may_fit
 from .journal import ENDING, Journal
-from .jsonl import FORMAT, decoded, encoded, head_count, leading_word, record, require_version
+from .jsonl import FORMAT, decode_lines, encode_lines, head_count, leading_word, record, require_version
 from .search import Whole
 from .words import VERSION
 
@@ -82,7 +82,8 @@ class Folder:
 
     def lines(self, groups: Sequence[str], asked: Mapping[str, Any]) -> list[str]:
         fits = may_fit(asked)
-        return [line for group in groups for line in decoded(self.content(group), str(self.file(group))) if fits(line)]
+        return [line for group in groups for line in decode_lines(self.content(group), str(self.file(group)))
+                if fits(line)]
 
     def content(self, group: str) -> bytes:
         """The bytes of a group's lines; raises ``BadRequest`` where they cannot be read."""
@@ -108,7 +109,7 @@ class Folder:
         plain, packed = (self.path / f"{group}{ending}" for ending in (LINES, PACKED))
         large = len(lines) > PACKED_ABOVE
         file, other = (packed, plain) if large else (plain, packed)
-        content = encoded(group, lines)
+        content = encode_lines(group, lines)
         with writable(file), replacement(file, sync=True) as draft:
             draft.write_bytes(gzip.compress(content, mtime=0) if large else content)
         other.unlink(missing_ok=True)
@@ -116,7 +117,7 @@ class Folder:
     def journal(self, group: str, *, anew: bool = False) -> Journal:
         with writable(self.path):
             self.path.mkdir(exist_ok=True)
-        return _opened(self.path / f"{group}{LINES}", f"{group}{LINES}", group, anew)
+        return _open_journal(self.path / f"{group}{LINES}", f"{group}{LINES}", group, anew)
 
     def file(self, group: str) -> Path:
         packed = self.path / f"{group}{PACKED}"
@@ -136,7 +137,7 @@ class Database:
             return [name for name, in file.execute(f"SELECT {asked} ORDER BY 1")]
 
     def lines(self, groups: Sequence[str], asked: Mapping[str, Any]) -> Sequence[str]:
-        with _asked(self.path):
+        with _refusing_sqlite_errors(self.path):
             file = self._open()
             if not _is_new(file):
                 fits = may_fit(asked)
@@ -177,7 +178,7 @@ class Database:
     def journal(self, group: str, *, anew: bool = False) -> Journal:
         if self.path.exists():
             self.groups()
-        return _opened(self.path, f"{self.path.name}.{group}", group, anew)
+        return _open_journal(self.path, f"{self.path.name}.{group}", group, anew)
 
     def file(self, group: str) -> Path:
         return self.path
@@ -185,7 +186,7 @@ class Database:
     @contextlib.contextmanager
     def _read(self) -> Iterator[sqlite3.Connection]:
         """The file to read; raises ``BadRequest`` for something else, or another version."""
-        with _asked(self.path), contextlib.closing(self._open()) as file:
+        with _refusing_sqlite_errors(self.path), contextlib.closing(self._open()) as file:
             yield file
 
     def _open(self) -> sqlite3.Connection:
@@ -217,7 +218,7 @@ class StoredLines(Sequence[str]):
         part, offset = divmod(range(len(self))[place], READ_AT_ONCE)
         if part not in self._read:
             wanted = self._numbers[part * READ_AT_ONCE : (part + 1) * READ_AT_ONCE].tolist()
-            with _asked(self._path):
+            with _refusing_sqlite_errors(self._path):
                 found = dict(self._file.execute("SELECT record, line FROM lines WHERE record IN "
                                                 "(SELECT value FROM json_each(?))", (json.dumps(wanted),)))
             if not all(isinstance(found.get(number), str) for number in wanted):
@@ -248,17 +249,17 @@ def store(path: str | Path) -> Store:
     no such folder."""
     path = Path(path)
     if path == Path(PUBLISHED) and not path.exists():
-        return Folder(shipped().path / PUBLISHED)
+        return Folder(shipped_folder().path / PUBLISHED)
     return Database(path) if path.suffix in DATABASES else Folder(path)
 
 
-def shipped() -> Folder:
+def shipped_folder() -> Folder:
     """The catalog that comes with the package."""
     packaged = Path(str(resources.files("hrsynth").joinpath("catalog", "shipped")))
     return Folder(packaged if packaged.is_dir() else Path(__file__).parents[3] / "catalog")
 
 
-def _opened(file: Path, name: str, group: str, anew: bool) -> Journal:
+def _open_journal(file: Path, name: str, group: str, anew: bool) -> Journal:
     """The journal beside a file; drafts that a killed build left there go."""
     journal = Journal(file.with_name(name + ENDING), group, anew=anew)
     for draft in file.parent.glob(f".{file.name}.*.tmp"):
@@ -267,7 +268,7 @@ def _opened(file: Path, name: str, group: str, anew: bool) -> Journal:
 
 
 @contextlib.contextmanager
-def _asked(file: Path) -> Iterator[None]:
+def _refusing_sqlite_errors(file: Path) -> Iterator[None]:
     """What SQLite complains of is a bad request."""
     try:
         yield

@@ -226,12 +226,12 @@ class RobotWord:
         return replace(self, seen=())
 
     def __str__(self) -> str:
-        bodies = [counted(body) for body in self.bodies]
-        seen = f"@{counted(self.seen)}" if self.seen else ""
+        bodies = [count_equal(body) for body in self.bodies]
+        seen = f"@{count_equal(self.seen)}" if self.seen else ""
         return (f"{self.platform}:{'|'.join(bodies)}" if self.platform else bodies[0]) + seen
 
 
-def counted(symbols: Iterable[LegWord | SightWord]) -> str:
+def count_equal(symbols: Iterable[LegWord | SightWord]) -> str:
     """Equal ones once with their number, joined by +."""
     return "+".join(f"{count if count > 1 else ''}{each}" for each, count in Counter(map(str, symbols)).items())
 

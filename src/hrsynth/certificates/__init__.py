@@ -38,7 +38,7 @@ def certificate(found: AssemblyModes | Derivation | PathAnswer) -> dict[str, Any
     raise BadRequest("what has a certificate", type(found).__name__, "what modes, derive or path answer")
 
 
-def written(found: AssemblyModes | Derivation | PathAnswer) -> bytes:
+def write_certificate(found: AssemblyModes | Derivation | PathAnswer) -> bytes:
     """A certificate as the content of a file."""
     return (json.dumps(certificate(found), indent=1) + "\n").encode()
 
@@ -81,7 +81,7 @@ def verify(source: Mapping[str, Any] | str | Path, robot: Mechanism | str | Path
             raise CertificateRefused(name, f"it does not say which legs and pose it is for ({error!r})") from None
         if not _same(record, own):
             raise CertificateRefused(name, f"it is not for {robot.name}: other geometry, legs or pose")
-    return f"{proved}{ranks.seen(record)}" if record["claim"] == "ranks" else proved
+    return f"{proved}{ranks.describe_ranks(record)}" if record["claim"] == "ranks" else proved
 
 
 def _same(one: Any, other: Any) -> bool:

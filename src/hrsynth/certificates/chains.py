@@ -17,12 +17,12 @@ from typing import Any
 import numpy as np
 
 from ..analysis.modes.carried import CarriedPlatform, Told, Turn, permanent
-from ..analysis.modes.carried_modes import enclosed, proposals
+from ..analysis.modes.carried_modes import enclose_zeros, proposals
 from ..analysis.modes.conditions import AtAngle, OnPlane, OnRevolution
 from ..analysis.modes.quadrics import UNIT
 from ..analysis.modes.single_loop import SingleLoop, dual_product
 from ..geometry.vectors import Array
-from .closures import written
+from .closures import write_numbers
 from .refining import Polynomial
 from .verify_certificate import KINDS, NotAccepted, cross, dot, integral, rational, slope
 
@@ -65,7 +65,7 @@ class ToldChain:
 def chains(system: CarriedPlatform, found: Sequence[Array]) -> Iterator[ToldChain]:
     """The ways to write a system with modes at these coordinates."""
     if not isinstance(system, SingleLoop):
-        yield _carried(system, found)
+        yield _carried_chain(system, found)
         return
     joints, m = [_joint(each, np.eye(3), np.zeros(3)) for each in system.freedoms_], len(system.freedoms_)
     back = [[kind, [str(-Fraction(c)) for c in a], o] for kind, a, o in joints[::-1]]
@@ -73,7 +73,7 @@ def chains(system: CarriedPlatform, found: Sequence[Array]) -> Iterator[ToldChai
     for way, ends, q in ((joints, system.before, found), (back, m - system.before, [x[::-1] for x in found])):
         if 0 < ends <= n:
             record = _record(way, n, ends) | {"normals": _normals(way[n:])}
-            yield ToldChain.of(record, _solved(record), q, system.home)
+            yield ToldChain.of(record, _solve_loop(record), q, system.home)
 
 
 def _record(joints: list[Any], n: int, ends: int) -> dict[str, Any]:
@@ -81,7 +81,7 @@ def _record(joints: list[Any], n: int, ends: int) -> dict[str, Any]:
             "reaches": []}
 
 
-def _carried(system: CarriedPlatform, found: Sequence[Array]) -> ToldChain:
+def _carried_chain(system: CarriedPlatform, found: Sequence[Array]) -> ToldChain:
     """The conditions of the square part first. Angles are counted from where no joint is at the goal, so that a half
     turn from there, as directions that are watched allow, is no infinite tangent."""
     n, told, slides = len(system.freedoms_), [*system.square], np.array([each.slides for each in system.freedoms_])
@@ -90,12 +90,12 @@ def _carried(system: CarriedPlatform, found: Sequence[Array]) -> ToldChain:
     record = _record([_joint(each, *system.moved(off, k)) for k, each in enumerate(system.freedoms_)], n,
                      system.carrying)
     for each in told:
-        tip, reach, arrow = _told(each, *system.moved(off, each.joints))
+        tip, reach, arrow = _displaced_tip(each, *system.moved(off, each.joints))
         record["tips"].append(tip)
         record["reaches"].append(reach)
         record["ends"].append([min(_carriers(each)), max(_carriers(each)) + 1, arrow])
     turn, starts = np.exp(-1j * off), Starts()
-    for box in enclosed(system, proposals(system, system.most(system.square))):
+    for box in enclose_zeros(system, proposals(system, system.most(system.square))):
         c, s, t = box.middle[:n], box.middle[n:2 * n], box.middle[2 * n:]
         c, s = c * turn.real - s * turn.imag, s * turn.real + c * turn.imag
         starts.append((np.where(slides, t, s / (1.0 + c)).tolist(), box.real))
@@ -109,7 +109,7 @@ def _carriers(told: Told) -> list[int]:
 
 def _joint(turn: Turn, R: Array, p: Array) -> list[Any]:
     """A turn or a slide, displaced, its axis of length one, and a point."""
-    return ["P" if turn.slides else "R", written(_unit(R @ turn.axis)), written(_near(p + R @ turn.point))]
+    return ["P" if turn.slides else "R", write_numbers(_unit(R @ turn.axis)), write_numbers(_near(p + R @ turn.point))]
 
 
 def _near(v: Array) -> list[Fraction]:
@@ -127,16 +127,16 @@ def _unit(v: Array) -> list[Fraction]:
     return found
 
 
-def _told(each: Told, R: Array, p: Array) -> tuple[Any, Any, int]:
+def _displaced_tip(each: Told, R: Array, p: Array) -> tuple[Any, Any, int]:
     """A tip, or an arrow, displaced, and the plane or sphere on which it is."""
     c = each.condition
-    b = written(_near(p + R @ c.b))
+    b = write_numbers(_near(p + R @ c.b))
     if isinstance(c, OnPlane):
-        return b, {"plane": written([_near(c.h * c.n / (c.n @ c.n)), _near(c.n)])}, 0
+        return b, {"plane": write_numbers([_near(c.h * c.n / (c.n @ c.n)), _near(c.n)])}, 0
     if isinstance(c, AtAngle):
-        return written(_near(R @ c.c)), {"plane": written([_near(c.h * c.a), _near(c.a)])}, 1
+        return write_numbers(_near(R @ c.c)), {"plane": write_numbers([_near(c.h * c.a), _near(c.a)])}, 1
     if isinstance(c, OnRevolution) and float(c.f[2]) == -1.0 and float(c.f[1]) == 0.0:
-        return b, {"sphere": written([_near(c.o), _near(c.f[:1])])}, 0
+        return b, {"sphere": write_numbers([_near(c.o), _near(c.f[:1])])}, 0
     raise NotAccepted(f"legs have conditions that the checker does not know: {type(c).__name__}")
 
 
@@ -173,7 +173,7 @@ def _dual(joint: Any) -> Array:
     return np.array([Fraction(0), *first, Fraction(0), *second])
 
 
-def _solved(record: dict[str, Any]) -> Starts:
+def _solve_loop(record: dict[str, Any]) -> Starts:
     """About where all solutions of a loop's equations are, by Newton's method from random complex starts, as many as
     the degrees allow (a permanent)."""
     equations = [integral(p) for p in KINDS["chain"][0](record, rational(record["tips"]))[0]]

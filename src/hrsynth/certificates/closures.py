@@ -17,7 +17,7 @@ from ..analysis.measured import MeasuredRobot
 from ..analysis.modes.modes import AssemblyModes
 from ..analysis.modes.quadrics import UNIT, WorkingFrame
 from ..analysis.modes.solve import SystemMode
-from ..constraints.pattern import attached
+from ..constraints.pattern import leg_ends
 from ..geometry.vectors import Array, inverse
 from ..kinematics.configuration import ClosedConfiguration
 from ..mechanism import Joint, JointType, Mechanism
@@ -26,11 +26,11 @@ from ..mechanism.observations.encoder import Encoder
 from ..tolerances import CLOSED
 
 
-def written(values: Any) -> Any:
+def write_numbers(values: Any) -> Any:
     """Floats and fractions as the checker reads them."""
     if isinstance(values, Fraction | float | np.floating):
         return str(Fraction(values) if isinstance(values, Fraction) else Fraction(float(values)))
-    return [written(each) for each in values]
+    return [write_numbers(each) for each in values]
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,13 +44,13 @@ class ClosedRobot:
     def of(cls, found: AssemblyModes) -> ClosedRobot | None:
         """None where a joint or a measurement is of a kind that the checker does not know."""
         mechanism = found.setting.mechanism
-        held = list(_held(found))
+        held = list(_held_measurements(found))
         kinds = {joint.type for joint in mechanism.joints.values()}
         if mechanism.couplings or not held or None in held or JointType.FREE in kinds or found.model is None:
             return None
         length = found.goal.twin.length
         joints = [[joint.type.value, joint.predecessor, joint.successor,
-                   *written([[*joint.point / length, 1.0], *([*axis, 0.0] for axis in joint.axes)])]
+                   *write_numbers([[*joint.point / length, 1.0], *([*axis, 0.0] for axis in joint.axes)])]
                   for joint in mechanism.joints.values()]
         return cls(found, {"joints": joints, "held": held})
 
@@ -67,30 +67,30 @@ class ClosedRobot:
     def links(self, at: ClosedConfiguration) -> dict[str, Any]:
         """The displacements of all links."""
         mechanism = self.found.setting.mechanism
-        return {link: written(displaced(mechanism, at, link)) for link in mechanism.links}
+        return {link: write_numbers(displacement(mechanism, at, link)) for link in mechanism.links}
 
     def places(self, bodies: Sequence[int], frame: WorkingFrame, at: ClosedConfiguration, tips: Sequence[Any],
                arrows: int, hub: Sequence[Any]) -> dict[str, Any]:
         """A system's frame, and its tips as points or, the last, arrows of the robot's links, by where they are at a
         configuration in working coordinates."""
-        names = attached(self.found.setting.anatomy) if self.found.confined is None else self.found.confined.bodies
+        names = leg_ends(self.found.setting.anatomy) if self.found.confined is None else self.found.confined.bodies
         length, found = at.twin.length, []
         for k, (body, tip) in enumerate(zip(bodies, tips, strict=True)):
             link, point = names[body], float(k < len(tips) - arrows)
             there = np.array(tip, dtype=float) - (1.0 - point) * np.array(hub, dtype=float)[:len(tip)]
-            D = displaced(self.found.setting.mechanism, at, link)
+            D = displacement(self.found.setting.mechanism, at, link)
             v = (point * frame.origin + frame.size * there @ frame.R) / length - point * D[:, 3]
-            found.append([link, [*written(D[:, :3].T @ v), str(int(point))]])
-        return {"frame": written([frame.origin / length, *frame.R, [frame.size / length]]), "tips": found}
+            found.append([link, [*write_numbers(D[:, :3].T @ v), str(int(point))]])
+        return {"frame": write_numbers([frame.origin / length, *frame.R, [frame.size / length]]), "tips": found}
 
 
-def displaced(mechanism: Mechanism, at: ClosedConfiguration, link: str) -> Array:
+def displacement(mechanism: Mechanism, at: ClosedConfiguration, link: str) -> Array:
     """D of a link since the zero configuration of a mechanism, shape (3, 4)."""
     X = at.pose(link) @ inverse(mechanism.links[link].pose)
     return np.column_stack([X[:3, :3], X[:3, 3] / at.twin.length])
 
 
-def _held(found: AssemblyModes) -> Iterator[list[Any] | None]:
+def _held_measurements(found: AssemblyModes) -> Iterator[list[Any] | None]:
     """What is measured: a link's directions and points, the link from which they are seen, and how they are seen at the
     goal; None of another kind."""
     setting, at = found.setting, found.goal
@@ -99,29 +99,29 @@ def _held(found: AssemblyModes) -> Iterator[list[Any] | None]:
     for each in observations:
         if isinstance(each, Direction):
             d = mechanism.links[each.link].pose[:3, :3] @ each.direction
-            yield _seen(mechanism, at, each.link, each.seen_from or measured.question.reference, [*d, 0.0])
+            yield _seen_values(mechanism, at, each.link, each.seen_from or measured.question.reference, [*d, 0.0])
         elif isinstance(each, Encoder):
             joint = mechanism.joints[each.joint]
             if sum(isinstance(o, Encoder) and o.joint == each.joint for o in observations) < joint.type.freedoms:
                 yield None
             else:
-                yield from _locked(mechanism, at, joint)
+                yield from _locked_joints(mechanism, at, joint)
         else:
             yield None
 
 
-def _locked(mechanism: Mechanism, at: ClosedConfiguration, joint: Joint) -> Iterator[list[Any]]:
+def _locked_joints(mechanism: Mechanism, at: ClosedConfiguration, joint: Joint) -> Iterator[list[Any]]:
     for x in ([1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [*joint.point / at.twin.length, 1.0]):
-        yield _seen(mechanism, at, joint.successor, joint.predecessor, x)
+        yield _seen_values(mechanism, at, joint.successor, joint.predecessor, x)
 
 
-def _seen(mechanism: Mechanism, at: ClosedConfiguration, link: str, other: str, x: Sequence[float]) -> list[Any]:
-    D, E = displaced(mechanism, at, link), displaced(mechanism, at, other)
-    return [link, other, written(x), written(E[:, :3].T @ (D @ x - x[3] * E[:, 3]))]
+def _seen_values(mechanism: Mechanism, at: ClosedConfiguration, link: str, other: str, x: Sequence[float]) -> list[Any]:
+    D, E = displacement(mechanism, at, link), displacement(mechanism, at, other)
+    return [link, other, write_numbers(x), write_numbers(E[:, :3].T @ (D @ x - x[3] * E[:, 3]))]
 
 
-def rounded(x: Any) -> Any:
+def round_numbers(x: Any) -> Any:
     """Numbers to one part in 2⁻⁵², as fractions."""
     if np.ndim(x) == 0:
         return Fraction(round(float(x) * UNIT), UNIT)
-    return [rounded(each) for each in x]
+    return [round_numbers(each) for each in x]

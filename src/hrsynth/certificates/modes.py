@@ -34,7 +34,7 @@ from ..mechanism.pose import Pose
 from ..tolerances import NO_POSE_START
 from .bounds import bound
 from .chains import chains
-from .closures import ClosedRobot, written
+from .closures import ClosedRobot, write_numbers
 from .planar_records import closings
 from .proposed import ProposedRecord
 from .refining import Polynomial, Refining
@@ -85,7 +85,7 @@ def of_systems(found: SystemModes, about: Mapping[str, Any], robot: ClosedRobot 
     if not found.solved:
         raise NotAccepted("the list is complete by conditions of kinds that the checker does not know")
     proposed = [propose(each, robot) for each in found.solved]
-    return _sealed([_system(each, robot) for each in proposed], about, robot,
+    return _seal([_system(each, robot) for each in proposed], about, robot,
                    sum(each.roots.complex if each.part.whole else sum(each.kept) for each in found.solved))
 
 
@@ -93,9 +93,9 @@ def of_loops(found: AssemblyModes, about: Mapping[str, Any], robot: ClosedRobot 
     """The certificate of the modes of a planar mechanism from its joints; raises ``NotAccepted``, ``NotConfined``."""
     system = None if found.model is None else found.model.system
     if not isinstance(system, PlanarLoops):
-        system = planar_loops(_measured(found), found.goal)
+        system = planar_loops(_measured_robot(found), found.goal)
     proposed = closings(system, found.found.complex or 0)
-    return _sealed([_system(proposed, robot)], about, robot, found.found.complex or 0)
+    return _seal([_system(proposed, robot)], about, robot, found.found.complex or 0)
 
 
 def of_chain(system: CarriedPlatform, found: AssemblyModes, about: Mapping[str, Any], robot: ClosedRobot | None
@@ -114,7 +114,7 @@ def of_chain(system: CarriedPlatform, found: AssemblyModes, about: Mapping[str, 
             bodies = [None if k is None else found.model.bodies(modes_[k].q) for k in each.modes]
             try:
                 made = _system(ProposedRecord(each.record, each.starts, poses, kept, bodies, frame), robot)
-                return _sealed([made], about, robot, found.found.complex or 0)
+                return _seal([made], about, robot, found.found.complex or 0)
             except NotAccepted as reason:
                 why = str(reason)
         else:
@@ -130,19 +130,19 @@ def _as_chain(found: AssemblyModes, about: Mapping[str, Any], robot: ClosedRobot
     assert found.model is not None
     for way in ways:
         with suppress(NotConfined, Unsolved, NotAccepted):
-            model, listed = way(_measured(found), found.goal, found.model.system.error)
+            model, listed = way(_measured_robot(found), found.goal, found.model.system.error)
             system = model.system
             if listed.complete and listed.complex == found.found.complex and isinstance(system, CarriedPlatform):
                 return of_chain(system, replace(found, model=model, found=listed), about, robot)
     raise reason
 
 
-def _measured(found: AssemblyModes) -> MeasuredRobot:
+def _measured_robot(found: AssemblyModes) -> MeasuredRobot:
     """What the list holds."""
     return MeasuredRobot.driven(found.setting) if found.kind == "real" else MeasuredRobot.watched(found.setting)
 
 
-def _sealed(systems: list[dict[str, Any]], about: Mapping[str, Any], robot: ClosedRobot | None, count: int
+def _seal(systems: list[dict[str, Any]], about: Mapping[str, Any], robot: ClosedRobot | None, count: int
             ) -> dict[str, Any]:
     """A record of systems that have so many complex solutions, accepted."""
     record = {"format": "hrsynth-certificate-1", "claim": "modes", **about,
@@ -175,7 +175,7 @@ def _system(proposed: ProposedRecord, robot: ClosedRobot | None) -> dict[str, An
     record["boxes"], refining = [], Refining(equations)
     for start, is_real_ in [*proposed.starts, *((each, None) for each in _no_poses(equations, halves))]:
         middle, inverse = refining.box(start, bool(is_real_))
-        box = {"middle": written(middle), "radius": str(RADIUS), "inverse": written(inverse)}
+        box = {"middle": write_numbers(middle), "radius": str(RADIUS), "inverse": write_numbers(inverse)}
         pose, kept, bodies = next(real) if is_real_ else (np.empty(0), False, None)
         if kept:
             box |= _pose(record, box, points, pose)
@@ -188,13 +188,13 @@ def _system(proposed: ProposedRecord, robot: ClosedRobot | None) -> dict[str, An
                     record["places"] = robot.places(record.get("bodies", [0] * len(tips)), frame, at, tips,
                                                     record.get("arrows", 0), rational(record.get("hub", ["0"] * 3)))
         elif is_real_ or (legs and is_real_ is not None):
-            box["misses"] = _missed(legs, middle)
+            box["misses"] = _worst_leg(legs, middle)
         record["boxes"].append(box)
     record["bound"] = bound(record, equations, halves)
     return record
 
 
-def _missed(legs: Any, middle: Any) -> int:
+def _worst_leg(legs: Any, middle: Any) -> int:
     """The leg that misses most at a solution of the square part."""
     off = [max(sum(map(abs, value(p, middle))) for p in leg) for leg in legs]
     if not off or max(off) < RADIUS:
@@ -206,7 +206,7 @@ def _pose(record: dict[str, Any], box: dict[str, Any], points: Any, placed: Arra
     """A real pose, and how far it puts tips from where the box does at most (sizes)."""
     m, r, tips = rational(box["middle"]), rational(box["radius"]), rational(record["tips"])
     for within in WITHIN:
-        given = {"pose": written([[Fraction(float(x)) for x in row] for row in placed]), "within": str(within)}
+        given = {"pose": write_numbers([[Fraction(float(x)) for x in row] for row in placed]), "within": str(within)}
         try:
             told(record, given, points, tips, m, r)
         except NotAccepted:

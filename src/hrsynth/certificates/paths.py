@@ -21,7 +21,7 @@ from ..geometry.so3 import quaternions
 from ..geometry.vectors import Array
 from ..mechanism import Mechanism
 from ..mechanism.pose import Pose
-from .closures import written
+from .closures import write_numbers
 from .verify_path import PathNotAccepted, condition, digest, interval, pose, sign, verify
 
 PIECES = 4096
@@ -80,7 +80,7 @@ def _cut(record: dict[str, Any], ways: Sequence[StraightSegment], count: int) ->
         ends, low = [1.0], 0.0
         while ends:
             new = _node(way, ends[-1], found[-1])
-            if _proved(record, found[-1], new):
+            if _is_proved(record, found[-1], new):
                 found.append(new)
                 low = ends.pop()
             elif len(found) + len(ends) > PIECES or ends[-1] - low < 1.0 / PIECES:
@@ -90,7 +90,7 @@ def _cut(record: dict[str, Any], ways: Sequence[StraightSegment], count: int) ->
     return found
 
 
-def _proved(record: dict[str, Any], one: Node, other: Node) -> bool:
+def _is_proved(record: dict[str, Any], one: Node, other: Node) -> bool:
     try:
         p, q = ([interval(x, y) for x, y in zip(*parts, strict=True)]
                 for parts in zip(pose(one), pose(other), strict=True))
@@ -104,38 +104,38 @@ def _separate(aspects: Aspects, found: PathAnswer) -> list[Node]:
     """The two poses."""
     assert not isinstance(aspects.pattern, str)
     p, R = aspects.pattern.coordinates.of([found.start.configuration, found.goal.configuration])
-    return [_written(*each, None) for each in zip(p, R, strict=True)]
+    return [_write_node(*each, None) for each in zip(p, R, strict=True)]
 
 
 def _node(way: StraightSegment, fraction: float, before: Node | None) -> Node:
     """A pose on a way, its quaternion on the side of the one before."""
     p, R = way.at(np.array([fraction]))
-    return _written(p[0], R[0], before)
+    return _write_node(p[0], R[0], before)
 
 
-def _written(p: Array, R: Array, before: Node | None) -> Node:
+def _write_node(p: Array, R: Array, before: Node | None) -> Node:
     q = quaternions(R)
     if before is not None and sum(float(Fraction(x)) * float(y) for x, y in zip(before[1], q, strict=True)) < 0:
         q = -q
-    return [written(p), written(q)]
+    return [write_numbers(p), write_numbers(q)]
 
 
 def _leg(limb: ClosedFormLeg) -> dict[str, Any]:
     """A leg with its working mode."""
-    found = {"mode": int(limb.mode), "tip": _rule(limb.tip), "centre": written(limb.centre)}
+    found = {"mode": int(limb.mode), "tip": _rule(limb.tip), "centre": write_numbers(limb.centre)}
     if isinstance(limb, OnCrank):
-        return {"kind": "crank", "axis": written(limb.axis), "radius": written(float(limb.radius)),
-                "rod": written(float(limb.rod)), **found}
+        return {"kind": "crank", "axis": write_numbers(limb.axis), "radius": write_numbers(float(limb.radius)),
+                "rod": write_numbers(float(limb.rod)), **found}
     if isinstance(limb, OnRail):
-        return {"kind": "rail", "axis": written(limb.axis), "rod": written(float(limb.rod)), **found}
+        return {"kind": "rail", "axis": write_numbers(limb.axis), "rod": write_numbers(float(limb.rod)), **found}
     if isinstance(limb, SlidingRod):
-        return {"kind": "slide", "axis": None if limb.axis is None else written(limb.axis),
-                "aside": written(float(limb.aside)), **found}
+        return {"kind": "slide", "axis": None if limb.axis is None else write_numbers(limb.axis),
+                "aside": write_numbers(float(limb.aside)), **found}
     raise PathNotAccepted("a leg of a kind that the checker does not know")
 
 
 def _rule(point: PlatformPoint) -> list[Any]:
-    return [bool(point.follows), written(point.turned), written(point.constant)]
+    return [bool(point.follows), write_numbers(point.turned), write_numbers(point.constant)]
 
 
 def _vector(each: VectorExpression | None) -> list[Any]:
@@ -143,7 +143,7 @@ def _vector(each: VectorExpression | None) -> list[Any]:
     if isinstance(each, PlatformPoint):
         return ["point", *_rule(each)]
     if isinstance(each, LegVector):
-        return ["leg", each.limb, int(each.sense), written(each.offset)]
+        return ["leg", each.limb, int(each.sense), write_numbers(each.offset)]
     assert isinstance(each, DerivedVector)
     return ["unit", _vector(each.start), _vector(each.end), None if each.axis is None else _vector(each.axis)]
 

@@ -9,12 +9,12 @@ import numpy as np
 
 from ..analysis.modes.curves import Circle, Line, Point
 from ..analysis.modes.planar_loops import PlanarLoop, PlanarLoops
-from ..analysis.modes.planar_modes import enclosures, excluded
+from ..analysis.modes.planar_modes import enclosures, is_excluded
 from ..analysis.modes.quadrics import WorkingFrame
 from ..analysis.modes.solve import Solved
 from ..analysis.modes.squares import SquareSystem
 from ..geometry.vectors import Array, cross, rotation_about
-from .closures import rounded, written
+from .closures import round_numbers, write_numbers
 from .proposed import ProposedRecord, placed_in, starts_of
 from .reach_records import point_on, reach_record
 from .verify_certificate import NotAccepted
@@ -43,7 +43,7 @@ def closings(system: PlanarLoops, count: int) -> ProposedRecord:
 
     record = {"kind": "loops", "angles": n, "slides": system.slides, "loops": [*map(_vectors, system.loops)],
               "besides": [*map(_vectors, system.besides)], "reaches": [],
-              "tips": [[*written(rounded(end)), "0"] for _, end, _ in first_ends],
+              "tips": [[*write_numbers(round_numbers(end)), "0"] for _, end, _ in first_ends],
               "links": [[list(system.turns[first]), _vectors(PlanarLoop(shift, n, system.slides))]
                         for _, _, shift in first_ends],
               "others": [_vectors(PlanarLoop(shift, n, system.slides)) + _vectors(carried(body, end))
@@ -51,7 +51,7 @@ def closings(system: PlanarLoops, count: int) -> ProposedRecord:
     boxes = enclosures(system)
     real = [box for box in boxes if box.real]
     q = [np.array([*np.arctan2(x[n:2 * n], x[:n]), *x[2 * n:]]) for x in (box.middle.real for box in real)]
-    kept = [not excluded(system, box) for box in real]
+    kept = [not is_excluded(system, box) for box in real]
     if sum(kept) + (not system.besides) * (len(boxes) - len(real)) != count:
         raise NotAccepted("the closings of the loops are not those of the list")
     poses = [np.column_stack([rotation_about((0.0, 0.0, 1.0), float(np.array(system.turns[first]) @ x[:n])),
@@ -62,7 +62,7 @@ def closings(system: PlanarLoops, count: int) -> ProposedRecord:
 
 def _vectors(loop: PlanarLoop) -> list[Any]:
     """The vectors of a sum, each along a slide or none (-1), and by how much of each angle it turns."""
-    return [[written(rounded([a.real, a.imag])), k, list(e)] for (k, e), a in loop.terms.items()]
+    return [[write_numbers(round_numbers([a.real, a.imag])), k, list(e)] for (k, e), a in loop.terms.items()]
 
 
 def planar_system(solved: Solved) -> tuple[dict[str, Any], list[tuple[list[complex], bool | None]], list[Array]]:
@@ -77,7 +77,7 @@ def planar_system(solved: Solved) -> tuple[dict[str, Any], list[tuple[list[compl
     arms = [complex(*tips[k]) for k in part.legs]
 
     def vector(a: complex, slide: int = -1, angle: int = -1, sign: int = 1) -> list[Any]:
-        return [written(rounded([sign * a.real, sign * a.imag])), slide,
+        return [write_numbers(round_numbers([sign * a.real, sign * a.imag])), slide,
                 [int(k == angle) for k in range(1 + len(circles))]]
 
     def tip(k: int, sign: int = 1) -> list[Any]:
@@ -95,7 +95,7 @@ def planar_system(solved: Solved) -> tuple[dict[str, Any], list[tuple[list[compl
               "loops": [[*tip(k), *tip(start, -1), vector(arms[start] - arms[k], angle=0)] for k in range(len(reaches))
                         if k != start],
               "links": [[[1] + [0] * len(circles), [*tip(0), vector(-arms[0], angle=0)]]] * len(tips),
-              "tips": [[*written(rounded(tips[k])), "0"] for k in (*others, *part.legs)],
+              "tips": [[*write_numbers(round_numbers(tips[k])), "0"] for k in (*others, *part.legs)],
               "reaches": [{kind: [[*x, "0"] for x in vectors]} for k in others
                           for kind, vectors in reach_record(system.curves[k], frame, 0.0).items()]}
     values, real = starts_of(solved.roots)

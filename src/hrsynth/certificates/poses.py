@@ -22,7 +22,7 @@ from ..analysis.modes.rigid import Spatial
 from ..analysis.modes.wholes import by_homotopy
 from ..geometry.so3 import quaternions
 from ..geometry.vectors import Array
-from .closures import written
+from .closures import write_numbers
 from .refining import Polynomial, Refining
 from .verify_certificate import KINDS, NotAccepted, conditions, integral, poses, rational, reach_of
 
@@ -56,7 +56,7 @@ def regular(record: dict[str, Any], starts: Starts) -> tuple[dict[str, Any], Sta
         return record, found
     for seed in range(ATTEMPTS):
         moved = _Moved(_split(record), random.Random(seed))
-        ends = _followed(moved, E, most, most - len(found))
+        ends = _follow_infinity(moved, E, most, most - len(found))
         if ends is not None:
             return moved.at(EXACT[-1] ** 2), found + [(each, None) for each in ends]
     raise NotAccepted(f"{len(found)} solutions are enclosed, but those at infinity, of {most} together, are not")
@@ -95,9 +95,9 @@ class _Moved:
 
     def at(self, by: Fraction) -> dict[str, Any]:
         """The record, each number moved by so much at most."""
-        tips, reaches = (_added(self.record[key], each, by) for key, each in self.along.items())
-        return self.record | {"tips": written(tips), "reaches": [
-            {kind: written(vectors)} for each in reaches for kind, vectors in each.items()]}
+        tips, reaches = (_add(self.record[key], each, by) for key, each in self.along.items())
+        return self.record | {"tips": write_numbers(tips), "reaches": [
+            {kind: write_numbers(vectors)} for each in reaches for kind, vectors in each.items()]}
 
 
 def _alike(x: Any, rng: random.Random) -> Any:
@@ -106,13 +106,13 @@ def _alike(x: Any, rng: random.Random) -> Any:
     return [_alike(each, rng) for each in x] if isinstance(x, list) else Fraction(rng.randint(-GRAIN, GRAIN), GRAIN)
 
 
-def _added(x: Any, along: Any, by: Fraction) -> Any:
+def _add(x: Any, along: Any, by: Fraction) -> Any:
     if isinstance(x, dict):
-        return {key: _added(each, along[key], by) for key, each in x.items()}
-    return [_added(a, b, by) for a, b in zip(x, along, strict=True)] if isinstance(x, list) else x + by * along
+        return {key: _add(each, along[key], by) for key, each in x.items()}
+    return [_add(a, b, by) for a, b in zip(x, along, strict=True)] if isinstance(x, list) else x + by * along
 
 
-def _followed(moved: _Moved, E: Array, most: int, count: int) -> list[list[Any]] | None:
+def _follow_infinity(moved: _Moved, E: Array, most: int, count: int) -> list[list[Any]] | None:
     """About where the ``count`` solutions at infinity are (7,) after the least move; None where they are not found.
 
     They are power series in the root s of the move: each is predicted by the parabola through the last three. Complex
@@ -123,7 +123,7 @@ def _followed(moved: _Moved, E: Array, most: int, count: int) -> list[list[Any]]
     while gone < 1.0:
         next_ = min(1.0, gone + step)
         s = float(FIRST) ** (1 - next_) * float(ROUGH) ** next_ * np.exp(1j * np.sin(np.pi * next_))
-        start = _predicted(roots[-3:], found[-3:], s)
+        start = _predict(roots[-3:], found[-3:], s)
         x = floats.near(s * s, start)
         size = 1 + np.abs(x)
         apart = (np.abs(x[:, None] - x[None]) / size).max(axis=2) + np.diag([np.inf] * most)
@@ -139,12 +139,12 @@ def _followed(moved: _Moved, E: Array, most: int, count: int) -> list[list[Any]]
     for exact in EXACT:
         refining, s = Refining([integral(p) for p in _equations(moved.at(exact ** 2))]), complex(exact)
         for each in ends:
-            each.append(np.array(refining.near(_predicted(roots[-3:], each[-3:], s), STEPS), dtype=object))
+            each.append(np.array(refining.near(_predict(roots[-3:], each[-3:], s), STEPS), dtype=object))
         roots.append(s)
     return [list(each[-1]) for each in ends]
 
 
-def _predicted(at: Sequence[complex], values: Sequence[Any], s: complex) -> Any:
+def _predict(at: Sequence[complex], values: Sequence[Any], s: complex) -> Any:
     """The value at s of the polynomial through some."""
     return sum(math.prod((s - b) / (a - b) for b in at if b != a) * v for a, v in zip(at, values, strict=True))
 

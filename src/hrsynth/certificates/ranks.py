@@ -41,7 +41,7 @@ def certificate(found: Derivation) -> dict[str, Any]:
     return record
 
 
-def seen(record: dict[str, Any]) -> str:
+def describe_ranks(record: dict[str, Any]) -> str:
     """What ranks that were proved say of the legs; empty where they are not all there."""
     found = {"".join(sorted(each["of"])): int(each["rank"]) for each in record["stacks"]}
     needed = {"AX", "AXY", "AY"} | ({"A"} if record["matrices"].get("A") else set())

@@ -11,7 +11,7 @@ from ..analysis.modes.curves import Circle, Line, Point, Reach, Sphere
 from ..analysis.modes.quadrics import UNIT, Rounded, WorkingFrame, direction, spokes
 from ..geometry.so3 import quaternions
 from ..geometry.vectors import cross, unit
-from .closures import rounded, written
+from .closures import round_numbers, write_numbers
 from .verify_certificate import dot
 
 
@@ -23,15 +23,15 @@ def point_on(curve: Reach, frame: WorkingFrame, turn: float, t: complex) -> Any:
 
 def reach_record(reach: Reach, frame: WorkingFrame, turn: float) -> dict[str, Any]:
     """A curve or surface in rational working coordinates (sizes)."""
-    centre = rounded(frame.point(reach.centre))
+    centre = round_numbers(frame.point(reach.centre))
     if isinstance(reach, Sphere):
-        radius = rounded(reach.radius / frame.size)
-        return {"sphere": written([centre, [radius * radius]])}
+        radius = round_numbers(reach.radius / frame.size)
+        return {"sphere": write_numbers([centre, [radius * radius]])}
     if isinstance(reach, Circle):
-        return {"circle": written([centre, *_spokes(reach, frame, turn)])}
+        return {"circle": write_numbers([centre, *_spokes(reach, frame, turn)])}
     rest = [] if isinstance(reach, Point) else [reach.direction if isinstance(reach, Line) else reach.normal]
     exact = [[Fraction(int(x), UNIT) for x in direction(each, frame, Rounded)] for each in rest]
-    return {type(reach).__name__.lower(): written([centre, *exact])}
+    return {type(reach).__name__.lower(): write_numbers([centre, *exact])}
 
 
 def _spokes(circle: Circle, frame: WorkingFrame, turn: float) -> list[list[Fraction]]:
@@ -43,6 +43,6 @@ def _spokes(circle: Circle, frame: WorkingFrame, turn: float) -> list[list[Fract
     first, second = unit(given[0].astype(float)), unit(given[1].astype(float))
     w, x, y, z = (Fraction(round(float(c) * UNIT)) for c in quaternions(np.column_stack(
         [first, second, cross(first, second)])))
-    s = rounded(circle.radius / frame.size) / (w * w + x * x + y * y + z * z)
+    s = round_numbers(circle.radius / frame.size) / (w * w + x * x + y * y + z * z)
     return [[s * (w * w + x * x - y * y - z * z), 2 * s * (x * y + w * z), 2 * s * (x * z - w * y)],
             [2 * s * (x * y - w * z), s * (w * w - x * x + y * y - z * z), 2 * s * (y * z + w * x)]]

@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.modes.curves import Circle, Curve, Line, Plane, Point, Reach, Sphere, Surface, shifted
+from ..analysis.modes.curves import Circle, Curve, Line, Plane, Point, Reach, Sphere, Surface, shift_reach
 from ..analysis.modes.quadrics import PoseSystem, WorkingFrame
 from ..analysis.modes.rigid import Planar, Spatial
 from ..analysis.modes.solve import Solved
 from ..analysis.modes.squares import TURNS, SquareSystem
 from ..analysis.modes.translating import Articulated, Translating, coplanar, met_normal
 from ..geometry.vectors import Array
-from .closures import ClosedRobot, rounded, written
+from .closures import ClosedRobot, round_numbers, write_numbers
 from .planar_records import in_space, planar_system
 from .poses import regular
 from .proposed import ProposedRecord, placed_in, starts_of
@@ -26,14 +26,14 @@ from .verify_certificate import NotAccepted
 
 def propose(solved: Solved, robot: ClosedRobot | None) -> ProposedRecord:
     """The solutions of a square part of a system."""
-    record, starts, poses = _written(solved)
+    record, starts, poses = _write_system(solved)
     frame = solved.part.chart.frame if isinstance(solved.part, PoseSystem) else solved.part.frame
     assert frame is not None
     return ProposedRecord(record, starts, poses, solved.kept,
                      [None if robot is None else robot.bodies(mode) for mode in solved.modes], in_space(frame))
 
 
-def _written(solved: Solved) -> tuple[dict[str, Any], list[tuple[list[complex], bool | None]], list[Array]]:
+def _write_system(solved: Solved) -> tuple[dict[str, Any], list[tuple[list[complex], bool | None]], list[Array]]:
     """A system in rational numbers without boxes and bound; about where its solutions are, and whether they are real;
     the real ones' poses, as the checker is told them."""
     system, part, roots = solved.system, solved.part, solved.roots
@@ -52,31 +52,32 @@ def _written(solved: Solved) -> tuple[dict[str, Any], list[tuple[list[complex], 
         record = {"kind": "spatial",
                   "reaches": [reach_record(each, frame, 0.0 if isinstance(each, Point | Surface) else
                                                          next(origins, 0.0)) for each in curves],
-                  "tips": written(rounded(system.tips[legs] / frame.size)), "square": len(part.legs)}
+                  "tips": write_numbers(round_numbers(system.tips[legs] / frame.size)), "square": len(part.legs)}
         return record, list(zip(values, real, strict=True)), [placed_in(mode.pose, frame, 3) for mode in solved.modes]
     assert isinstance(system, Translating | Articulated)
     if isinstance(system, Translating):
         record, starts = _translating(system, part, frame, turns, values)
     else:
-        record, starts = _articulated(system, part, frame, turns, values)
+        record, starts = _write_articulated(system, part, frame, turns, values)
     origin = _middle(part, system) if isinstance(system, Articulated) else frame.origin
     record |= {"kind": "shifting", "square": len(record["reaches"])}
     if not part.whole:  # then all legs are told, and what is solved first
         bodies = [0] * len(system.paths) if isinstance(system, Translating) else system.bodies
-        paths = [shifted(each, frame.origin - origin) for each in system.paths]
+        paths = [shift_reach(each, frame.origin - origin) for each in system.paths]
         record["reaches"] = [*record["reaches"], *(reach_record(each, frame, 0.0) for each in paths)]
         record["bodies"] = [*record["bodies"], *bodies]
     record["tips"] = [["0"] * 3] * len(record["reaches"])
-    return record, list(zip(starts, real, strict=True)), [_shifted(mode.pose, frame, origin) for mode in solved.modes]
+    return record, list(zip(starts, real, strict=True)), [_shift_pose(mode.pose, frame, origin)
+                                                          for mode in solved.modes]
 
 
-def _shifted(X: Array, frame: WorkingFrame, origin: Array) -> Array:
+def _shift_pose(X: Array, frame: WorkingFrame, origin: Array) -> Array:
     """The pose of a body that does not turn, counted from an origin, in working coordinates (3, 4)."""
     return np.column_stack([np.eye(3), frame.vector(X[:3, 3] - origin)])
 
 
 def _pose_system(solved: Solved) -> tuple[dict[str, Any], list[tuple[list[complex], bool | None]], list[Array]]:
-    """As :func:`_written`, for tips on surfaces too, solved for in the pose's own coordinates."""
+    """As :func:`_write_system`, for tips on surfaces too, solved for in the pose's own coordinates."""
     system, part = solved.system, solved.part
     assert isinstance(part, PoseSystem)
     if not part.whole or sum(system.forbids[k] for k in part.legs) != system.freedoms:
@@ -84,9 +85,9 @@ def _pose_system(solved: Solved) -> tuple[dict[str, Any], list[tuple[list[comple
     frame, (values, real) = part.chart.frame, starts_of(solved.roots)
     if isinstance(system, Spatial) and part.chart.study is not None:
         record = {"kind": "pose", "reaches": [reach_record(system.curves[k], frame, 0.0) for k in part.legs],
-                  "tips": written(rounded(system.tips[list(part.legs)] / frame.size)),
+                  "tips": write_numbers(round_numbers(system.tips[list(part.legs)] / frame.size)),
                   "arrows": sum(k >= len(system.points) for k in part.legs),
-                  "hub": written(rounded(frame.point(system.hub))),
+                  "hub": write_numbers(round_numbers(frame.point(system.hub))),
                   "chart": [[str(round(x)) for x in row] for row in part.chart.study[:4, :4]]}
         poses = [placed_in(mode.pose, frame, 3) for mode in solved.modes]
         return *regular(record, list(zip(values, real, strict=True))), poses
@@ -101,7 +102,7 @@ def _pose_system(solved: Solved) -> tuple[dict[str, Any], list[tuple[list[comple
     starts = values if isinstance(system.slide, Line) else [
         [*x[:3], (x[4] * c - x[3] * s) / (1.0 + x[3] * c + x[4] * s)] for x in values]
     return (record, list(zip(starts, real, strict=True)),
-            [_shifted(mode.pose, frame, frame.origin) for mode in solved.modes])
+            [_shift_pose(mode.pose, frame, frame.origin) for mode in solved.modes])
 
 
 def _translating(system: Translating, part: SquareSystem, frame: WorkingFrame, turns: Sequence[float],
@@ -110,16 +111,16 @@ def _translating(system: Translating, part: SquareSystem, frame: WorkingFrame, t
     curve = part.unknowns[0]
     chosen: list[Reach] = [system.paths[k] for k in part.legs]
     if len(chosen) == 2:
-        chosen = [curve, _met(curve, next(each for each in chosen if each is not curve), system.size)]
+        chosen = [curve, _meeting_surface(curve, next(each for each in chosen if each is not curve), system.size)]
     starts = [list(frame.point(point_on(curve, frame, turns[0], t[0]))) for t in values]
     return {"reaches": [reach_record(each, frame, turns[0]) for each in chosen], "bodies": [0] * len(chosen)}, starts
 
 
-def _articulated(system: Articulated, part: SquareSystem, frame: WorkingFrame, turns: Sequence[float],
+def _write_articulated(system: Articulated, part: SquareSystem, frame: WorkingFrame, turns: Sequence[float],
                  values: Sequence[list[complex]]) -> tuple[dict[str, Any], list[list[complex]]]:
     """The first body's position, counted from the middle of the two paths, and the slide's half-angle tangent."""
     middle = _middle(part, system)
-    paths = [shifted(system.paths[k], -middle) for k in part.legs]
+    paths = [shift_reach(system.paths[k], -middle) for k in part.legs]
     bodies = [system.bodies[k] for k in part.legs]
     starts = []
     for t in values:
@@ -136,7 +137,7 @@ def _middle(part: SquareSystem, system: Articulated) -> Array:
     return np.asarray((one + other) / 2)
 
 
-def _met(curve: Curve, other: Reach, size: float) -> Reach:
+def _meeting_surface(curve: Curve, other: Reach, size: float) -> Reach:
     """The surface that a curve is met with: of a curve of its plane its sphere, or a plane through it."""
     if isinstance(other, Circle) and coplanar(curve, other, size):
         return Sphere(other.centre, other.radius)

@@ -68,13 +68,13 @@ def build(groups: list[str] | None, output: str | None, tables: str | None, work
             raise BadRequest(f"{option} {'with' if check else 'without'} --check", None)
     if tables is not None and output is None:
         raise BadRequest("--tables needs a catalog of its own", None, "-o FOLDER or -o FILE.sqlite")
-    source = None if tables is None else _published(tables)
+    source = None if tables is None else _published_words(tables)
     if check:
         from ..catalog.build import check as run
-        from ..catalog.store import shipped
+        from ..catalog.store import shipped_folder
 
         with Progress(counted=True) as progress:
-            stale = run(output or shipped(), groups or [], source=source, workers=workers, cluster=cluster,
+            stale = run(output or shipped_folder(), groups or [], source=source, workers=workers, cluster=cluster,
                         sample=sample, seed=seed, tell=progress.count)
         if json or not stale:
             _say("build", {"stale": stale}, "not stale", json)
@@ -82,13 +82,13 @@ def build(groups: list[str] | None, output: str | None, tables: str | None, work
             raise CatalogStale(stale)
         return
     from ..catalog.build import build as make
-    from ..present.text.catalog import built
+    from ..present.text.catalog import describe_built
 
     target = _target(output)
     with Progress(counted=True) as progress:
         done = [each.to_dict() for each in make(target, groups or [], source=source, workers=workers,
                                                 cluster=cluster, limit=limit, anew=anew, tell=progress.count)]
-    _say("build", {"groups": done}, built(done), json)
+    _say("build", {"groups": done}, describe_built(done), json)
 
 
 def entries(kept: str | None, json: bool, **asked: Any) -> None:
@@ -170,14 +170,14 @@ def _of_word(text: str, kept: str | None) -> _Shown:
         return _Shown(every[text], "", "", partial(_no_geometry, text))
     word, others = _word(text, kept)
     architecture = parse(word)
-    record, note = _known(str(architecture), kept)
+    record, note = _known_record(str(architecture), kept)
     return _Shown(record, drawing(architecture), "; ".join(each for each in (note, others) if each),
                   lambda: mechanism(architecture, record.get("attempt", 0)))
 
 
 def _of_tables(name: str, folder: str, kept: str | None) -> _Shown:
     from ..catalog import load
-    from ..catalog.build import made
+    from ..catalog.build import make_records
     from ..catalog.published import PublishedEntry, mechanism, published_robot
 
     robot = published_robot(folder, name)
@@ -185,7 +185,7 @@ def _of_tables(name: str, folder: str, kept: str | None) -> _Shown:
     if found is not None and name in found:
         record, note = found[name], ""
     else:
-        ((_, line),) = made(PublishedEntry(folder), robot.group, [name])
+        ((_, line),) = make_records(PublishedEntry(folder), robot.group, [name])
         record, note = javascript.loads(line), "studied now"
     return _Shown(record, "", note, lambda: mechanism(robot))
 
@@ -196,7 +196,7 @@ def site(output: str, workers: int, anew: bool, kept: str | None, json: bool, **
     from ..catalog.known import equal_legs
     from ..catalog.site import site as run
     from ..errors import BadRequest
-    from ..present.text.catalog import sited
+    from ..present.text.catalog import describe_site
 
     found = load(kept, **asked)
     if not found:
@@ -216,14 +216,14 @@ def site(output: str, workers: int, anew: bool, kept: str | None, json: bool, **
         word, derived = done.differ[0]
         warn(f"{len(done.differ)} derivations do not end in what the catalog says, the first: {word}, "
              f"derived {derived}")
-    _say("site", done.to_dict(), sited(done.to_dict()), json)
+    _say("site", done.to_dict(), describe_site(done.to_dict()), json)
 
 
 def audit(folder: str, output: str | None, only: str | None, sample: int | None, json: bool, seed: int) -> None:
     """Compare published tables of symmetric robots with what is computed."""
     from ..catalog.audit.run import audit as run
     from ..errors import BadRequest
-    from ..present.text.audit import audited
+    from ..present.text.audit import describe_audit
 
     if output is not None and Path(output).suffix != ".jsonl":
         raise BadRequest("records are kept one per line", output, "a file that ends in .jsonl")
@@ -232,20 +232,20 @@ def audit(folder: str, output: str | None, only: str | None, sample: int | None,
                     tell=lambda _, done, total: progress.count("robots", done, total)).to_dict()
     for defect in found["defects"]:
         warn(defect)
-    _say("audit", {**found, "file": output}, audited(found), json)
+    _say("audit", {**found, "file": output}, describe_audit(found), json)
 
 
 def _word(text: str, kept: str | None) -> tuple[str, str]:
     """The word of an architecture that is given by it, by a name or by its legs, and what else is called so."""
     from ..catalog.known import alias
-    from ..catalog.query import named
+    from ..catalog.query import find_named
     from ..catalog.words import parse
     from ..errors import BadRequest
 
     try:
         return str(parse(text)), ""
     except BadRequest:
-        found = named(text, kept) if text.strip() else []
+        found = find_named(text, kept) if text.strip() else []
         if not found and "(" in text:
             raise
         if not found:
@@ -257,28 +257,28 @@ def _word(text: str, kept: str | None) -> tuple[str, str]:
     return word, "; ".join([*filter(None, [alias(word)]), *more])
 
 
-def _known(word: str, kept: str | None) -> tuple[Any, str]:
+def _known_record(word: str, kept: str | None) -> tuple[Any, str]:
     """The record of a word, and where it comes from if not from the catalog."""
     from ..catalog import load
-    from ..catalog.build import architectures, made
+    from ..catalog.build import architectures, make_records
     from ..catalog.groups import group
     from ..catalog.query import groups_of
-    from ..catalog.store import shipped
+    from ..catalog.store import shipped_folder
     from ..catalog.words import parse
 
     own = group(parse(word))
-    if kept is not None or shipped().groups():
+    if kept is not None or shipped_folder().groups():
         found = load(kept, group=own if own in groups_of(kept) else None)
         if word in found:
             return found[word], ""
-    ((_, line),) = made(architectures().entry, own, [word])
+    ((_, line),) = make_records(architectures().entry, own, [word])
     return javascript.loads(line), "not in the catalog, studied now"
 
 
-def _published(folder: str) -> WordSource:
-    from ..catalog.published import published
+def _published_words(folder: str) -> WordSource:
+    from ..catalog.published import published_words
 
-    return published(folder)
+    return published_words(folder)
 
 
 def _target(output: str | None) -> Path:

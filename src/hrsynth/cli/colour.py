@@ -23,19 +23,19 @@ def say(text: str, *, err: bool = False) -> None:
     print(text, file=sys.stderr if err else sys.stdout, flush=True)
 
 
-def wanted() -> bool:
+def wants_colour() -> bool:
     """Whether standard output takes colours, and the user does too (https://no-color.org)."""
     return not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb" and sys.stdout.isatty()
 
 
 def heading(text: str) -> str:
     """The title of a part of the help."""
-    return f"\x1b[1m{text}\x1b[0m" if wanted() else text
+    return f"\x1b[1m{text}\x1b[0m" if wants_colour() else text
 
 
-def painted(text: str) -> str:
+def paint(text: str) -> str:
     """An answer with its rows' names dimmed and its verdicts in colour, where that is wanted."""
-    if not wanted():
+    if not wants_colour():
         return text
     for name, words in VERDICTS.items():
         shown = rf"(?:(?<=  )|(?<=: ))({'|'.join(words)})(?=[ ,]|$)"

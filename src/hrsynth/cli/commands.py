@@ -173,14 +173,14 @@ def _width() -> int:
     return max(min(shutil.get_terminal_size().columns, 100) - 2, 50)
 
 
-def _filled(text: str, width: int, first: str, more: str) -> str:
+def _fill_lines(text: str, width: int, first: str, more: str) -> str:
     return textwrap.fill(text, width, initial_indent=first, subsequent_indent=more, break_on_hyphens=False,
                          break_long_words=False)
 
 
 def _head(path: str, words: Sequence[str], help: str) -> tuple[str, str]:
     usage = f"Usage: {path} "
-    return _filled(" ".join(words), _width(), usage, " " * len(usage)), _filled(help, _width(), "  ", "  ")
+    return _fill_lines(" ".join(words), _width(), usage, " " * len(usage)), _fill_lines(help, _width(), "  ", "  ")
 
 
 def _section(title: str, rows: Sequence[tuple[str, str]]) -> list[str]:
@@ -194,5 +194,5 @@ def _section(title: str, rows: Sequence[tuple[str, str]]) -> list[str]:
         if len(name) > column - 2:
             lines.append(f"  {name}")
             first = apart
-        lines.append(_filled(told, _width(), first, apart).rstrip())
+        lines.append(_fill_lines(told, _width(), first, apart).rstrip())
     return ["\n".join(lines)]

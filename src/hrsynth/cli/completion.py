@@ -8,7 +8,7 @@ from typing import Any
 
 from .colour import say
 from .commands import Group, add_command
-from .options import NEEDED, Option, shipped
+from .options import NEEDED, Option, shipped_names
 
 EXAMPLE = "example:"
 WORDS = "words"
@@ -67,7 +67,7 @@ def _next(command: Any, before: Sequence[str], last: str) -> Iterable[str]:
 def _words(option: Option, last: str) -> Iterable[str]:
     """Its values; of robots also ``example:NAME``, once that is begun."""
     words = option.words() if callable(option.words) else option.words
-    if option.words is shipped and last and EXAMPLE.startswith(last[: len(EXAMPLE)]):
+    if option.words is shipped_names and last and EXAMPLE.startswith(last[: len(EXAMPLE)]):
         from ..description import examples
         from ..errors import MissingExtra
 

@@ -80,7 +80,8 @@ def add(app: Group) -> None:
     """Make them commands."""
     add_command(app, "verify", "Check a certificate of modes, derive or path, using only integers and fractions.",
                 (Option("certificate", "The certificate's file.", "FILE", default=NEEDED, argument=True),
-                 Option("robot", "Check that its geometry is that of this robot.", "ROBOT", words=options.shipped),
+                 Option("robot", "Check that its geometry is that of this robot.", "ROBOT",
+                        words=options.shipped_names),
                  JSON), verify,
                 ("c.json", "c.json --robot quattro"))
     add_command(app, "robots", "The shipped robots.",

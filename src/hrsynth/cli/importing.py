@@ -38,7 +38,7 @@ def importing(target: str, observe: str | None, yes: bool, view: bool, json: boo
     asking = not (yes or json) and sys.stdin.isatty() and sys.stdout.isatty()
     if asking:
         sys.stdin.reconfigure(errors="replace")  # type: ignore[union-attr]
-        source, observe = _answered(path, source, observe, target, view)
+        source, observe = _ask_all(path, source, observe, target, view)
     with Progress():
         mechanism = _read(source, observe, tell=not asking)
         lost = [str(warning) for warning in save(mechanism, target, "native")]
@@ -51,7 +51,7 @@ def importing(target: str, observe: str | None, yes: bool, view: bool, json: boo
             warn(notes[-1])
     for warning in lost:
         warn(warning)
-    again = repeated(source, observe, target)
+    again = repeat_command(source, observe, target)
     if json:
         fields = {"file": target, "repeat": again, "links": len(mechanism.links), "joints": len(mechanism.joints),
                   "base": mechanism.base, "platform": mechanism.platform, "motors": motors,
@@ -63,7 +63,7 @@ def importing(target: str, observe: str | None, yes: bool, view: bool, json: boo
                    f"to {target}.\nThe same without questions: {again}")
 
 
-def repeated(source: dict[str, Any], observe: str | None, target: str) -> str:
+def repeat_command(source: dict[str, Any], observe: str | None, target: str) -> str:
     """The command line that writes the same file without questions."""
     words = ["hrsynth", "import", source["robot"]]
     for option in SOURCE[1:]:
@@ -98,7 +98,7 @@ def _segments(mechanism: Mechanism) -> dict[str, Observation]:
         return {}
 
 
-def _answered(path: Path, source: dict[str, Any], observe: str | None, target: str, view: bool
+def _ask_all(path: Path, source: dict[str, Any], observe: str | None, target: str, view: bool
               ) -> tuple[dict[str, Any], str | None]:
     """The questions, until the answers are confirmed; ends the command where they are given up."""
     status = 0

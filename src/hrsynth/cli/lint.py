@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from .colour import painted, say
+from .colour import paint, say
 from .commands import Group, add_command
-from .options import JSON, NEEDED, OUTPUT, SOURCE, Option, flag, output, shipped
+from .options import JSON, NEEDED, OUTPUT, SOURCE, Option, flag, output, shipped_names
 from .progress import Progress
 
 FORMATS = ("text", "github", "sarif", "json")
@@ -48,7 +48,7 @@ def lint(files: list[str], format: str, fail_on: str, json: bool, reader: list[s
     if json or format == "json":
         say(record("lint", None, found.to_dict()))
     elif format == "text":
-        say(painted(hrsynth.text(found)))
+        say(paint(hrsynth.text(found)))
     else:
         say(shown.github(found) if format == "github" else shown.sarif(found))
     if found.unread:
@@ -63,7 +63,7 @@ def add(app: Group) -> None:
     """Make it a command."""
     add_command(app, "lint", "What is wrong, doubtful or lost in robot files, by named rules, and how to mend it.",
                 (Option("files", "Robot files in any dialect, or names of shipped robots.", "FILES", list[str], NEEDED,
-                        argument=True, words=shipped),
+                        argument=True, words=shipped_names),
                  flag("fix", "Mend what can be mended in one way only, and overwrite the file or write to --output."),
                  Option("compare", "Another file of the same robot: where the two differ.", "OTHER"),
                  Option("reader", "A program that should read the file (mujoco, gazebo …): a closure that it loses is "

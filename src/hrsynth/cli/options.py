@@ -100,7 +100,7 @@ def output(help: str, metavar: str = "FILE", default: Any = None) -> Option:
     return Option("output", help, metavar, default=default, flags=("-o", "--output"), group=OUTPUT)
 
 
-def shipped() -> Iterable[str]:
+def shipped_names() -> Iterable[str]:
     """The names of the shipped robots."""
     from ..description import shipped
 
@@ -126,7 +126,7 @@ OFFER = Option("offer", "What could be observed in addition, written as for --se
 SEED = Option("seed", "Seed of the random configurations.", "NUMBER", int, 0, low=0)
 SOURCE = (
     Option("robot", "A robot file in any dialect, a shipped robot's name, or example:NAME.", "ROBOT", default=NEEDED,
-           argument=True, words=shipped),
+           argument=True, words=shipped_names),
     Option("base", "Consider only what lies between this link and the platform.", "LINK", group=READING),
     Option("platform", "The platform, if the file names none.", "LINK", group=READING),
     Option("motors", "The driven joints, if the file names none.", "JOINTS", group=READING),
@@ -193,7 +193,7 @@ def told_turns(option: str, text: object) -> None:
                     told_radians(option, field)
 
 
-def listed(text: str) -> list[str]:
+def split_names(text: str) -> list[str]:
     """Names set apart by commas."""
     from ..errors import BadRequest
 

@@ -10,7 +10,7 @@ from typing import Any
 from ..budgets import BRANCH_CELLS, COVER_BOXES, EFFORT
 from ..present.outputs import OUTPUTS
 from ..progress import following
-from .colour import painted, say
+from .colour import paint, say
 from .commands import Group, add_command
 from .options import (
     JSON,
@@ -23,9 +23,9 @@ from .options import (
     WATCHED,
     Option,
     flag,
-    listed,
     output,
     robot_of,
+    split_names,
     told_radians,
     told_turns,
     warn,
@@ -104,7 +104,7 @@ class Question:
         elif self.shows is not None and not any(written.values()):
             self.shows(found, source=source, **values)
         else:
-            say(painted(text(found)))
+            say(paint(text(found)))
             for each, path in files.items():
                 if path is not None:
                     say(each.told(path))
@@ -116,13 +116,13 @@ class Question:
         known = inspect.signature(function).parameters
         given = {name: value for name, value in values.items() if name in known and value is not None}
         if "observe" in given:
-            given["observe"] = listed(given["observe"])
+            given["observe"] = split_names(given["observe"])
         if len(given.get("camera", ())) == 1:
             (given["camera"],) = given["camera"]
         return given
 
 
-def _decided(found: Any, at: list[str] | None, **_: Any) -> None:
+def _require_decided(found: Any, at: list[str] | None, **_: Any) -> None:
     """Raise ``RankUndecided`` and ``PoseNotReached`` at poses that were asked for."""
     from ..errors import PoseNotReached, RankUndecided
     from ..tolerances import RANK_GAP
@@ -134,7 +134,7 @@ def _decided(found: Any, at: list[str] | None, **_: Any) -> None:
         raise PoseNotReached.of_all(found.unreached)
 
 
-def _deprecated(_: Any, seconds: float | None, **__: Any) -> None:
+def _warn_deprecated(_: Any, seconds: float | None, **__: Any) -> None:
     if seconds is not None:
         warn("--seconds is deprecated, what it leaves out depends on the machine: try --examine")
 
@@ -146,7 +146,7 @@ def _servable() -> None:
     require_libraries()
 
 
-def _served(found: Any, source: dict[str, Any], port: int, open_: bool, **_: Any) -> None:
+def _serve_view(found: Any, source: dict[str, Any], port: int, open_: bool, **_: Any) -> None:
     """Serve a view until Ctrl-C, and open its page in the browser."""
     from ..present.show import text
     from ..present.studio.server import view_server
@@ -204,7 +204,7 @@ QUESTIONS = (
               _file("check")),
              ("quattro --at x=0.02,phi=30deg", "quattro --grid x=-0.3:0.3:21,y=-0.3:0.3:21,z=-0.7 -o map.png",
               f"gough_stewart {POINTS} --at x=0.02"),
-             after=_decided),
+             after=_require_decided),
     Question("singular", "Where a freedom of the platform is lost: the Type 2 condition in words, as an expression and "
              "drawn.",
              (*WATCHED, SEE, flag("real", "Ask about the real robot with its own motors instead of the hidden one."),
@@ -314,7 +314,7 @@ QUESTIONS = (
                      int, 20, low=1),
               Option("seconds", "Deprecated, because the answer then depends on the machine: time after which no "
                      "further set is examined.", None, float)),
-             ("quattro --start x=0.1 --goal x=-0.05,phi=20deg",), after=_deprecated),
+             ("quattro --start x=0.1 --goal x=-0.05,phi=20deg",), after=_warn_deprecated),
     Question("export", "Code for a controller: motors to passive joints and platform, Jacobians, and back, on the "
              "branch of the zero configuration.",
              (*WATCHED, Option("lang", "c++ (one header, C++17, Eigen) or numpy (one module).", default="c++",
@@ -329,6 +329,6 @@ QUESTIONS = (
               Option("open_", "Open the page in the browser.", None, bool, True, ("--open/--no-open",))),
              ("quattro --observe 1,4 --hidden", "quattro --observe 1,4 --static quattro.html",
               f"gough_stewart {POINTS} --static points.html"),
-             shows=_served, needs=_servable),
+             shows=_serve_view, needs=_servable),
 )
 """The commands in the order of the help."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from .colour import say
 from .commands import Group, add_command
-from .options import WATCHING, Option, listed, shipped
+from .options import WATCHING, Option, shipped_names, split_names
 
 if TYPE_CHECKING:
     from ..present.studio.server import StudioServer
@@ -20,7 +20,7 @@ def studio(robot: str | None, observe: str | None, camera: str | None, port: int
     """Serve the page until Ctrl-C."""
     from ..present.studio.server import studio as started
 
-    watched = None if observe is None else listed(observe)
+    watched = None if observe is None else split_names(observe)
     serve(started(robot, watched, camera, port=port, open_=browser), "The studio")
 
 
@@ -48,7 +48,7 @@ def add(app: Group) -> None:
     add_command(app, "studio", "An interactive page in the browser: a robot, a folder of robots or files that are "
                 "dropped in, with hidden robot, modes, accuracy and runs, live.",
                 (Option("robot", "A robot file in any dialect, a shipped robot's name, example:NAME, or a folder.",
-                        "[ROBOT|FOLDER]", argument=True, words=shipped),
+                        "[ROBOT|FOLDER]", argument=True, words=shipped_names),
                  Option("observe", "Legs to watch (1,4), links, or all (default: all).", "LEGS",
                         group=WATCHING),
                  Option("camera", "The link that carries the camera.", "LINK", group=WATCHING), PORT,

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..geometry.balls import Field, widened
-from ..geometry.components import Components, cross, dot, minus, plus, scaled, sqrt
+from ..geometry.balls import Field, widen
+from ..geometry.components import Components, cross, dot, minus, plus, scale, sqrt
 from ..geometry.vectors import Array
 from ..tolerances import FOLLOWED
 from .platform_points import ORIGIN, PlatformPoint
@@ -32,21 +32,21 @@ def rod_on_crank(D: Components, axis: Components, radius: Any, rod: Any, mode: A
 
     With D⊥ = D − (D·a) a: D⊥·B = (|D|² + radius² − rod²) / 2 = s, the other part of B is along a × D⊥ (circle and
     sphere; the margin is radius² |D⊥|² − s²)."""
-    flat = minus(D, scaled(dot(D, axis), axis))
+    flat = minus(D, scale(dot(D, axis), axis))
     far = dot(flat, flat)
     share = (dot(D, D) + radius * radius - rod * rod) * 0.5
     margin = radius * radius * far - share * share
     aside = mode * sqrt(margin)
-    spoke = plus(scaled(share, flat), scaled(aside, cross(axis, flat)))
+    spoke = plus(scale(share, flat), scale(aside, cross(axis, flat)))
     return margin, [x / far for x in spoke]
 
 
 def rod_on_rail(D: Components, axis: Components, rod: Any, mode: Any) -> tuple[Any, list[Any]]:
     """Reach margin and B, both points from the rail's start: B along the axis, |D − B| = rod (line and sphere)."""
     along = dot(D, axis)
-    across = minus(D, scaled(along, axis))
+    across = minus(D, scale(along, axis))
     margin = rod * rod - dot(across, across)
-    return margin, scaled(along + mode * sqrt(margin), axis)
+    return margin, scale(along + mode * sqrt(margin), axis)
 
 
 def sliding_rod(D: Components, axis: Components | None, aside: Any, mode: Any) -> tuple[Any, list[Any]]:
@@ -56,12 +56,12 @@ def sliding_rod(D: Components, axis: Components | None, aside: Any, mode: Any) -
     if axis is None:
         size = sqrt(square)
         return square, [mode * (x / size) for x in D]
-    flat = minus(D, scaled(dot(D, axis), axis))
+    flat = minus(D, scale(dot(D, axis), axis))
     far = dot(flat, flat)
     margin = far - aside * aside
     drawn = mode * sqrt(margin)
     turned = cross(axis, flat)
-    return margin, [x / far for x in minus(scaled(drawn, flat), scaled(aside, turned))]
+    return margin, [x / far for x in minus(scale(drawn, flat), scale(aside, turned))]
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +88,7 @@ class ClosedFormLeg:
 
     def solve(self, tip: Field, mode: Field | float) -> tuple[Field, Field]:
         """The reach margin (n,) and what the tip decides (n, 3), for tips (n, 3) of numbers or balls."""
-        margin, carried = self.at(list(np.moveaxis(tip, -1, 0)), lambda value: _known(value, tip), mode)
+        margin, carried = self.at(list(np.moveaxis(tip, -1, 0)), lambda value: _as_number(value, tip), mode)
         return margin, np.stack(np.broadcast_arrays(*carried), -1)
 
     def direction(self, p: Array, R: Array) -> tuple[Array, NDArray[np.bool_]]:
@@ -122,11 +122,11 @@ class OnRod(ClosedFormLeg):
         return self.solve(self.tip.value(p, R), self.mode)[1]
 
 
-def _known(value: Any, like: Field) -> Any:
+def _as_number(value: Any, like: Field) -> Any:
     """A number or vector of the geometry, for numbers; among balls, one that holds what it was rounded from."""
     if like.dtype != object:
         return value
-    found = widened(np.asarray(value, dtype=object), FOLLOWED)
+    found = widen(np.asarray(value, dtype=object), FOLLOWED)
     return found[()] if found.ndim == 0 else found
 
 
@@ -199,7 +199,7 @@ class PlatformDirection(ClosedFormLeg):
         D = minus(tip, centre)
         away = dot(D, u)
         margin = radius * radius - dot(D, D) + away * away
-        return margin, plus(tip, scaled(mode * sqrt(margin) - away, u))
+        return margin, plus(tip, scale(mode * sqrt(margin) - away, u))
 
     def direction(self, p: Array, R: Array) -> tuple[Array, NDArray[np.bool_]]:
         u, ends = R @ self.axis, self.ends(p, R)
@@ -234,4 +234,4 @@ class RailAndLine(ClosedFormLeg):
     def at(self, tip: Components, number: Number, mode: Any, *n: Any) -> tuple[Any, list[Any]]:
         centre, axis = number(self.centre), number(self.axis)
         crossing = dot(axis, n)
-        return crossing * crossing, plus(centre, scaled(dot(minus(tip, centre), n) / crossing, axis))
+        return crossing * crossing, plus(centre, scale(dot(minus(tip, centre), n) / crossing, axis))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..geometry.balls import Field, widened
+from ..geometry.balls import Field, widen
 from ..geometry.vectors import Array
 from ..tolerances import FOLLOWED, RANK_CUTOFF
 
@@ -24,7 +24,7 @@ class PlatformPoint:
     def value(self, p: Field, R: Field) -> Field:
         """The vectors (n, 3) at poses (n, 3), (n, 3, 3); of balls, with all that the rounded numbers stand for."""
         found = (p if self.follows else 0 * p) + self.constant
-        return widened(np.asarray(found + R @ self.turned if np.any(self.turned) else found), FOLLOWED)
+        return widen(np.asarray(found + R @ self.turned if np.any(self.turned) else found), FOLLOWED)
 
 
 ORIGIN = PlatformPoint(True, np.zeros(3), np.zeros(3))

@@ -38,7 +38,7 @@ from ..budgets import (
     MOST_PARTS,
     NEWTON_STEPS_AT_RUN,
 )
-from ..geometry.affine import AffineForms, combined, stacked
+from ..geometry.affine import AffineForms, combine, stack
 from ..geometry.vectors import Array
 from ..results import Value
 from ..tolerances import (
@@ -53,7 +53,7 @@ from ..tolerances import (
     PART_TUBE,
     UNIT_ROUNDOFF,
 )
-from .rounding import RoundedNumber, rounded
+from .rounding import RoundedNumber, round_function
 from .trace import TracedFunction
 from .tubes import TubeCell, TubedBranch, TubePart
 
@@ -222,7 +222,7 @@ class _Code:
         for k, i in enumerate(self.part.unknowns):
             x[self.branch.passive.index(i)] = RoundedNumber.between(trial.x[:, k] - reach[:, k],
                                                                     trial.x[:, k] + reach[:, k])
-        once, again = rounded(self.equations, q, x), rounded(self.closure, q, x)
+        once, again = round_function(self.equations, q, x), round_function(self.closure, q, x)
         solved, sums, doubt = np.zeros((c, p)), np.zeros((c, p)), np.zeros(c)
         for k, row in enumerate(self.rows):
             for each in (once.get(("G", (k,))), again.get(("E", (row,)))):
@@ -254,12 +254,12 @@ def _bounds(code: _Code, cells: Sequence[TubeCell], known: Sequence[bool], wider
         wide = wider * (largest if wider == FREEST_WIDER else trial.radius) + 4 * near
         J = derivatives(trial, solved, own, wide).by_own
         Y = inverses(J.v[0])
-        P, M = _levelled(combined(Y, J), trial.symbols[0])
-        size, Q = P @ np.abs(Y), _curved(solved, trial, wide, Y, P)
+        P, M = _level(combine(Y, J), trial.symbols[0])
+        size, Q = P @ np.abs(Y), _curvature_bounds(solved, trial, wide, Y, P)
         inside = derivatives(trial, solved, own, 0.0 * trial.radius)
-        g = combined(Y, residual(trial, solved)).size + drift(combined(Y, inside.along))
+        g = combine(Y, residual(trial, solved)).size + drift(combine(Y, inside.along))
         back = _inverse_bound(M)
-        a = _times(back @ P, np.fmin(g, combined(Y, inside.values).size))
+        a = _times(back @ P, np.fmin(g, combine(Y, inside.values).size))
         if code.part.exact:
             a = np.where(np.array(known)[:, None], np.fmin(trial.radius, a), a)
         errors, matrix, sizes = code.computed(trial, wide)
@@ -270,7 +270,7 @@ def _bounds(code: _Code, cells: Sequence[TubeCell], known: Sequence[bool], wider
 
         def step(e: Array, off: Array) -> Array:
             """What is left of e after a step; ``off``: how far the matrix's place is from those between."""
-            return _times(outer, _times(_weighed(Q, off) + F, e) + noise) + rounding
+            return _times(outer, _times(_weigh(Q, off) + F, e) + noise) + rounding
 
         # 2, 3. one step after another, each with a second one by the same matrix; whether equations that are not solved
         # hold is left to the program
@@ -287,7 +287,7 @@ def _bounds(code: _Code, cells: Sequence[TubeCell], known: Sequence[bool], wider
         # 4. what an answer is worth: the program's tube is wider by a step that is near
         s = np.broadcast_to(last, e.shape)
         off = _times(back, _times(one + M + F, s) + noise) + near
-        error = _times(back, _times(_weighed(Q, off) + F, s) + noise) + rounding
+        error = _times(back, _times(_weigh(Q, off) + F, s) + noise) + rounding
         tube = np.maximum(trial.radius, a) + near
         error[~(np.all(a <= wide, axis=-1) & _within(tube + off, wide - last))] = np.inf
         error[~np.isfinite(error)] = np.inf
@@ -296,7 +296,7 @@ def _bounds(code: _Code, cells: Sequence[TubeCell], known: Sequence[bool], wider
     return [BoundedCell(*each) for each in zip(cells, steps.tolist(), error, inner, alone.tolist(), strict=True)]
 
 
-def _levelled(B: AffineForms, motors: int) -> tuple[Array, Array]:
+def _level(B: AffineForms, motors: int) -> tuple[Array, Array]:
     """Of matrices B = 1 + Σ N_k ε_k + … (c, p, p), the first symbols those of the motors: P B with P = 1 − Σ N_k ε_k, a
     bound of |P|, and one of |1 − P B|."""
     p = B.r.shape[-1]
@@ -304,11 +304,11 @@ def _levelled(B: AffineForms, motors: int) -> tuple[Array, Array]:
     v[0] = np.eye(p)
     v[1 : 1 + motors] = -B.v[1 : 1 + motors]
     P = AffineForms(v, np.zeros_like(B.r))
-    made = stacked([(P[..., i, :, None] * B).sum(-2) for i in range(p)], axis=-2)
+    made = stack([(P[..., i, :, None] * B).sum(-2) for i in range(p)], axis=-2)
     return P.size, (np.eye(p) - made).size
 
 
-def _curved(solved: Sequence[LoopEquation], trial: TubeTrial, radius: Array, Y: Array, P: Array) -> Array:
+def _curvature_bounds(solved: Sequence[LoopEquation], trial: TubeTrial, radius: Array, Y: Array, P: Array) -> Array:
     """Bounds (c, p, p, p) of |Y D²_xG|, the last two dimensions the unknowns."""
     forms, unknowns = trial.forms(radius), np.array(trial.part.unknowns, dtype=np.intp)
     carrier, like, p = SweptChains(trial.part.system, forms), forms[unknowns[0]] * 0.0, len(unknowns)
@@ -319,7 +319,7 @@ def _curved(solved: Sequence[LoopEquation], trial: TubeTrial, radius: Array, Y: 
             add_bend(bend, row_product(carrier, each.of, each.row))
         rows.append(bend.sum[..., unknowns[i], unknowns[j]])
     found = np.empty((len(trial.x), p, p, p))
-    found[..., i, j] = found[..., j, i] = P @ combined(Y, stacked(rows, axis=-2)).size
+    found[..., i, j] = found[..., j, i] = P @ combine(Y, stack(rows, axis=-2)).size
     return found
 
 
@@ -328,7 +328,7 @@ def platform_error(branch: TubedBranch, ranges: Array, errors: Array, function: 
     (2, p) of the unknowns, ``errors`` (p,) of them."""
     q = [RoundedNumber.between(low, high) for low, high in zip(branch.lower, branch.upper, strict=True)]
     x = [RoundedNumber.between(low, high, off) for low, high, off in zip(*ranges, errors, strict=True)]
-    made = rounded(function, q, x)
+    made = round_function(function, q, x)
     rotation, position = (max(float(each.error) for (array, _), each in made.items() if array == name)
                           for name in ("R", "p"))
     return rotation, position
@@ -339,7 +339,7 @@ def _times(M: Array, v: Array) -> Array:
     return np.asarray((M @ v[..., None])[..., 0] * BOUND_ROUNDING)
 
 
-def _weighed(Q: Array, v: Array) -> Array:
+def _weigh(Q: Array, v: Array) -> Array:
     """Q(v), (c, p, p)."""
     return np.asarray((Q @ v[:, None, :, None])[..., 0])
 

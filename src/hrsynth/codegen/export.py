@@ -83,19 +83,19 @@ def export(robot: RobotLike, lang: str = "c++", box: BoxLike | None = None, *, o
     if lang not in TEMPLATES:
         raise BadRequest("language", lang, tuple(TEMPLATES))
     given = as_robot(robot)
-    watched = _watched(given, observe, camera)
+    watched = _watched_directions(given, observe, camera)
     proof = branch(given, box, effort=effort)
     if not proof.parts:
         raise BadRequest(f"{proof.robot.name}: loops that its motors move", 0, "one or more")
     tell("code")
     branch_ = TubedBranch.of(proof, parsed_box(box))
     source = Source.of(branch_, watched, closed_inverse(given, proof, branch_))
-    code = program(source, lang, _told(proof, source, lang, box, effort))
+    code = program(source, lang, _describe_program(proof, source, lang, box, effort))
     return ExportedCode(proof, lang, tuple(each.leg for each in watched), bool(source.legs), source.bounds,
                         sum(len(part.bounded) for part in source.parts), code, _free(proof, branch_))
 
 
-def _watched(robot: Any, observe: LegsLike, camera: CameraLike) -> tuple[Direction, ...]:
+def _watched_directions(robot: Any, observe: LegsLike, camera: CameraLike) -> tuple[Direction, ...]:
     """The watched directions that are seen from the base; by default none where a robot has no legs to watch. Raises
     ``BadRequest`` where something else is observed."""
     try:
@@ -121,7 +121,7 @@ def _free(proof: BranchProof, branch_: TubedBranch) -> tuple[tuple[str, float, f
                  zip(proof.motors, branch_.lower, branch_.upper, strict=True) if name not in moving)
 
 
-def _told(proof: BranchProof, source: Source, lang: str, box: BoxLike | None, effort: int) -> list[str]:
+def _describe_program(proof: BranchProof, source: Source, lang: str, box: BoxLike | None, effort: int) -> list[str]:
     """What the program says of itself."""
     from .. import __version__
 

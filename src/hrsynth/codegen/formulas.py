@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.branch.loops import JointLoop, LoopSystem, Swept, mapped, residuals
-from ..geometry.affine import dotted
+from ..analysis.branch.loops import JointLoop, LoopSystem, Swept, residuals, rotate
+from ..geometry.affine import dot_product
 from ..geometry.components import arctan2
 from ..geometry.vectors import plane_axes
 from ..mechanism import Joint, JointType
@@ -28,13 +28,13 @@ def rows(system: LoopSystem, values: Sequence[Any]) -> list[Row]:
     return found
 
 
-def placed(system: LoopSystem, values: Sequence[Any], link: str) -> tuple[Any, Any, dict[int, tuple[Any, Any]]]:
+def place_frame(system: LoopSystem, values: Sequence[Any], link: str) -> tuple[Any, Any, dict[int, tuple[Any, Any]]]:
     """Rotation and origin of a link's frame, and by each coordinate that moves it the velocity of its origin and its
     angular velocity, (..., 3) each."""
     way, X = system.way(system.body[link]), system.mechanism.links[link].pose
     swept = system.displacement(way, values)
     p = swept.at(X[:3, 3] / system.length)
-    R = np.stack([np.broadcast_to(mapped(swept.R, X[:3, k]), (1, 3)) for k in range(3)], axis=-1)
+    R = np.stack([np.broadcast_to(rotate(swept.R, X[:3, k]), (1, 3)) for k in range(3)], axis=-1)
     return R, p, {i: (swept.rate(place, p), _turn(swept, place)) for place, i in enumerate(way)
                   if values[i] is not None}
 
@@ -61,23 +61,24 @@ def cut_coordinate(system: LoopSystem, values: Sequence[Any], loop: JointLoop, w
     one, other = (system.displacement(chain, values) for chain in chains)
     sides = [(place, i, swept, sign) for chain, swept, sign in zip(chains, (one, other), (-1.0, 1.0), strict=True)
              for place, i in enumerate(chain) if values[i] is not None]
-    axis = mapped(one.R, joint.axis)
+    axis = rotate(one.R, joint.axis)
     if joint.type.slides and which == 0:
         # d/dq n·(B − A) = n·(v_B − v_A'), A' the point of the first body at B: n turns with that body
         A, B = one.at(loop.point), other.at(loop.point)
-        return dotted(axis, B - A), {i: dotted(axis, swept.rate(place, B)) * sign for place, i, swept, sign in sides}
+        return dot_product(axis, B - A), {i: dot_product(axis, swept.rate(place, B)) * sign for place, i, swept,
+                                          sign in sides}
     if joint.type is JointType.UNIVERSAL:
         first, second = joint.axes
         flat = np.cross(first, second)
         if which == 1:
             # seen from the second link, the first axis turns back about the second one
-            axis = mapped(other.R, second)
-            start, moved, across = mapped(other.R, first), mapped(one.R, first), mapped(other.R, flat)
+            axis = rotate(other.R, second)
+            start, moved, across = rotate(other.R, first), rotate(one.R, first), rotate(other.R, flat)
         else:
-            start, moved, across = mapped(one.R, second), mapped(other.R, second), mapped(one.R, flat)
+            start, moved, across = rotate(one.R, second), rotate(other.R, second), rotate(one.R, flat)
     else:
         normal, side = plane_axes(joint.axis)
-        start, moved, across = mapped(one.R, normal), mapped(other.R, normal), mapped(one.R, side)
+        start, moved, across = rotate(one.R, normal), rotate(other.R, normal), rotate(one.R, side)
     # d(turn) = axis·(ω_B − ω_A), the other axis of a U being normal to this one
-    return arctan2(*(np.ravel(dotted(each, moved))[0] for each in (across, start))), {
-        i: dotted(axis, _turn(swept, place)) * sign for place, i, swept, sign in sides}
+    return arctan2(*(np.ravel(dot_product(each, moved))[0] for each in (across, start))), {
+        i: dot_product(axis, _turn(swept, place)) * sign for place, i, swept, sign in sides}

@@ -17,7 +17,7 @@ from ..batch.tape import Tape
 from ..closed_forms.legs import ClosedFormLeg, OnCrank, OnRod, Pinned, PlatformDirection, RailAndLine, SlidingRod
 from ..closed_forms.platform_points import PlatformPoint
 from ..errors import HrsynthError
-from ..geometry.components import Components, arctan2, dot, minus, plus, scaled, transformed
+from ..geometry.components import Components, arctan2, dot, minus, plus, scale, transform_vector
 from ..geometry.components import cross as cross_
 from ..geometry.vectors import Array, cross, perpendicular
 from ..geometry.vectors import inverse as inverted
@@ -48,15 +48,15 @@ class LegMotor(Value):
 
     def read(self, position: Components, R: Components) -> tuple[Any, Any]:
         """Reach margin, and the vector or length that tells the coordinate, at a pose of the platform's frame."""
-        form, p = self.form, plus(position, transformed(R, self.point))
-        tip = plus(plus(p if form.tip.follows else [0.0] * 3, transformed(R, form.tip.turned)), form.tip.constant)
+        form, p = self.form, plus(position, transform_vector(R, self.point))
+        tip = plus(plus(p if form.tip.follows else [0.0] * 3, transform_vector(R, form.tip.turned)), form.tip.constant)
         margin: Any = 1.0
         if isinstance(form, PlatformDirection):
-            found = transformed(R, form.axis)
+            found = transform_vector(R, form.axis)
             if self.reads == "end":
                 margin, found = form.at(tip, _itself, form.mode, *found)
         elif isinstance(form, RailAndLine):
-            margin, found = form.at(tip, _itself, form.mode, *(transformed(R, form.normal) if form.turns
+            margin, found = form.at(tip, _itself, form.mode, *(transform_vector(R, form.normal) if form.turns
                                                                else form.normal))
         else:
             margin, found = form.at(tip, _itself, form.mode)
@@ -66,12 +66,12 @@ class LegMotor(Value):
             return margin, minus(found, self.coordinate.point)
         if not isinstance(form, OnRod | Pinned):
             return margin, found
-        rod = transformed(R, form.axis) if isinstance(form, Pinned) else minus(tip, found)
+        rod = transform_vector(R, form.axis) if isinstance(form, Pinned) else minus(tip, found)
         if self.reads == "direction":
             return margin, rod
         axis, spoke = self.coordinate.axis, minus(found, form.centre)
         across = perpendicular(axis)
-        return margin, plus(scaled(dot(spoke, rod), across), scaled(dot(cross_(spoke, rod), axis), cross(axis, across)))
+        return margin, plus(scale(dot(spoke, rod), across), scale(dot(cross_(spoke, rod), axis), cross(axis, across)))
 
     def at(self, position: Components, R: Components) -> tuple[Any, Any]:
         """Reach margin and coordinate at a pose of the platform's frame; turns between −π and π."""
@@ -85,7 +85,7 @@ class LegMotor(Value):
         return margin, arctan2(dot(cross(axis, arm), found), dot(arm, found))
 
 
-def traced(rules: Sequence[LegMotor]) -> TracedFunction:
+def trace_inverse(rules: Sequence[LegMotor]) -> TracedFunction:
     """S, the legs' reach margins, and Q, the motors, of rotation r (9,) and position p (3,)."""
     tape = Tape([])
     pose = [tape.load(k) for k in range(12)]

@@ -18,7 +18,7 @@ from ..tolerances import (
     GENERATED_REACHED,
     GENERATED_SINGULAR,
 )
-from .inverse import traced
+from .inverse import trace_inverse
 from .source import Source
 from .trace import TracedFunction
 
@@ -64,7 +64,7 @@ def _comment(text: str) -> str:
     return re.sub(r"coding(?=[:=])", "coding ", line)
 
 
-def _unused(arguments: str, function: TracedFunction) -> str:
+def _unused_arguments(arguments: str, function: TracedFunction) -> str:
     """The arguments of a function of C++ that it may not use, as they stand after ``(void)``."""
     stored = {array for array, _, _ in function.stores}
     names = re.findall(r"& (\w+)", arguments)
@@ -96,7 +96,7 @@ def program(source: Source, language: str, told: Sequence[str]) -> str:
         "direction_names": [observation.leg for observation in source.observed],
         "turning": [int(not branch.system.coordinates[i].slides) for i in branch.motors],
         "length": repr(float(mechanism.length)), "near": GENERATED_NEAR, "last_step": GENERATED_LAST_STEP,
-        "legs": source.legs and traced(source.legs), "far": repr(branch.far), "reached": GENERATED_REACHED,
+        "legs": source.legs and trace_inverse(source.legs), "far": repr(branch.far), "reached": GENERATED_REACHED,
         "turn": repr(2 * math.pi), "singular": GENERATED_SINGULAR}
     return _templates().get_template(TEMPLATES[language]).render(**values)
 
@@ -109,6 +109,6 @@ def _templates() -> Environment:
                        keep_trailing_newline=True)
     made.filters["quoted"] = lambda names: ", ".join(json.dumps(name, ensure_ascii=False) for name in names)
     made.filters["comment"] = _comment
-    made.filters["unused"] = _unused
+    made.filters["unused"] = _unused_arguments
     made.filters["name_of"] = lambda place, names: names[place]
     return made

@@ -80,7 +80,7 @@ class RoundedNumber:
         return self.between(np.maximum(middle - half, -1.0), np.minimum(middle + half, 1.0), self.error + SINE_ERROR)
 
 
-def rounded(function: TracedFunction, q: Sequence[RoundedNumber], x: Sequence[RoundedNumber]
+def round_function(function: TracedFunction, q: Sequence[RoundedNumber], x: Sequence[RoundedNumber]
             ) -> Mapping[tuple[str, Place], RoundedNumber]:
     """What a function of equations stores, at inputs between bounds."""
     names: dict[str, Any] = {"q": q, "x": x, "sin": RoundedNumber.sin, "cos": RoundedNumber.cos, "__builtins__": {}}

@@ -95,7 +95,7 @@ class Source(Value):
         names, values, slopes = tracer.cut()
         platform = tracer.platform()
         return cls(branch, parts, platform, tuple(names), values, slopes, tracer.rates(observed),
-                   tuple(observed), tuple(legs), _proved(branch, parts, platform))
+                   tuple(observed), tuple(legs), _proved_bounds(branch, parts, platform))
 
     def names(self, places: Sequence[int]) -> list[str]:
         """The names of coordinates."""
@@ -122,7 +122,7 @@ def _part(branch: TubedBranch, tracer: FormulaTracer, part: TubePart) -> SourceP
                       tuple(map(float, lower)), tuple(map(float, upper)), tuple(bounded))
 
 
-def _proved(branch: TubedBranch, parts: Sequence[SourcePart], platform: TracedFunction) -> ProvedBounds | None:
+def _proved_bounds(branch: TubedBranch, parts: Sequence[SourcePart], platform: TracedFunction) -> ProvedBounds | None:
     """The bounds of all parts together."""
     every = [each for part in parts for each in part.bounded]
     if not all(each.steps and np.all(np.isfinite(each.error)) for each in every):

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.branch.loops import LoopSystem, mapped
+from ..analysis.branch.loops import LoopSystem, rotate
 from ..batch.tape import Symbol, Tape
-from ..geometry.affine import crossed
+from ..geometry.affine import cross_product
 from ..mechanism.observations.direction import Direction
 from ..results import Value
-from .formulas import cut, cut_coordinate, placed, rows
+from .formulas import cut, cut_coordinate, place_frame, rows
 
 Place = tuple[int, ...]
 VALUES = ("R", "p", "u", "O")
@@ -85,7 +85,7 @@ class FormulaTracer(Value):
     def platform(self) -> TracedFunction:
         """Rotation R (3, 3) and position p (3,) of the platform's frame."""
         tape = Tape([])
-        R, p, _ = placed(self.system, self._values(tape), self.system.mechanism.platform)
+        R, p, _ = place_frame(self.system, self._values(tape), self.system.mechanism.platform)
         return TracedFunction.of(tape, self.names, [*(("R", divmod(i, 3), each) for i, each in enumerate(R.ravel())),
                                                     *_three("p", 0, p)])
 
@@ -105,15 +105,15 @@ class FormulaTracer(Value):
         the coordinates of q, then x."""
         tape, places, mechanism = Tape([]), self.places, self.system.mechanism
         values = self._values(tape)
-        twists = placed(self.system, values, mechanism.platform)[2]
+        twists = place_frame(self.system, values, mechanism.platform)[2]
         stores = [store for k, twist in twists.items() for i in (0, 1)
                   for store in _three("V", 3 * i, twist[i], places[k])]
         for number, observation in enumerate(observed):
-            R, _, twists = placed(self.system, values, observation.link)
-            u = mapped(R, observation.direction)
+            R, _, twists = place_frame(self.system, values, observation.link)
+            u = rotate(R, observation.direction)
             stores += _three("u", 3 * number, u)
             stores += [store for k, (_, w) in twists.items()
-                       for store in _three("W", 3 * number, crossed(w, u), places[k])]
+                       for store in _three("W", 3 * number, cross_product(w, u), places[k])]
         return TracedFunction.of(tape, self.names, stores)
 
 

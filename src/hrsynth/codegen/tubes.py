@@ -80,7 +80,7 @@ class TubedBranch(Value):
         motors = tuple(table[name] for name in proof.motors)
         lower, upper = np.full(len(motors), -np.inf), np.full(len(motors), np.inf)
         parts = []
-        solved = {tuple(own.unknowns): _solved(proof.system, own) for own in parts_of(proof.system)[0]}
+        solved = {tuple(own.unknowns): _solved_places(proof.system, own) for own in parts_of(proof.system)[0]}
         for part in proof.parts:
             if not part.cells:
                 raise NothingProved(proof.robot.name, part.motors, _reasons(part))
@@ -143,7 +143,7 @@ def _reasons(part: BranchPart) -> str:
     return "; ".join(f"{reason} (at {part.place(q)})" for reason, q in nearest.items())
 
 
-def _solved(system: LoopSystem, part: LoopPart) -> tuple[int, ...]:
+def _solved_places(system: LoopSystem, part: LoopPart) -> tuple[int, ...]:
     """The places among all equations of those that hold where a part is solved: of a loop that is closed by turning a
     rod all of them, if its length is among what was solved."""
     left = {(each.of.name, id(each.row)) for each in part.left_out}

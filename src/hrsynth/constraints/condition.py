@@ -128,7 +128,7 @@ def condition(pattern: ConstraintPattern, question: Measurement) -> Condition:
     if pattern.motion == "translations":
         return _translations(pattern, lines)
     if pattern.motion == "spatial" and (form := closed_form(pattern.legs)) is not None:
-        return _named(pattern, form.words, form.expression, True, parts=form.parts)
+        return _name_condition(pattern, form.words, form.expression, True, parts=form.parts)
     if pattern.motion in TURNING_MOTIONS and any(
             leg.virtual and (leg.turning is not None or pattern.motion == "planar") for leg in pattern.legs):
         return _gram(pattern)
@@ -152,12 +152,12 @@ def _translations(pattern: ConstraintPattern, lines: Sequence[LockedLeg]) -> Con
     dot, cross, det = products()
     symbols = [vector(_symbol(leg.line)) for leg in lines]
     normals = [vector(_symbol(leg.normal)) for leg in pattern.legs if leg.normal is not None]
-    names = _listed(leg.line for leg in lines)
+    names = _words_of(leg.line for leg in lines)
     constant = all(pattern.constant(leg.line) is not None for leg in lines)
     signed = False
     if not lines:
         expression = sum(det(*triple) ** 2 for triple in combinations(normals, 3))
-        words = f"{_listed(leg.normal for leg in pattern.legs)} are parallel to one plane"
+        words = f"{_words_of(leg.normal for leg in pattern.legs)} are parallel to one plane"
         if len(normals) == 3:
             expression, signed = det(*normals), True
     elif not normals and len(lines) == 2 and pattern.plane is not None:
@@ -177,10 +177,10 @@ def _translations(pattern: ConstraintPattern, lines: Sequence[LockedLeg]) -> Con
     if constant and not normals and len(lines) > 1:
         several = "all " if len(lines) > 2 else ""
         never = f"never: {names} are constant and not {several}parallel"
-        return _named(pattern, never, expression, False, never=True)
+        return _name_condition(pattern, never, expression, False, never=True)
     if reason := _apart(pattern):
-        return _named(pattern, f"never: {reason}", expression, False, never=True)
-    return _named(pattern, words, expression, signed)
+        return _name_condition(pattern, f"never: {reason}", expression, False, never=True)
+    return _name_condition(pattern, words, expression, signed)
 
 
 def _apart(pattern: ConstraintPattern) -> str | None:
@@ -211,7 +211,7 @@ def _planar(pattern: ConstraintPattern, lines: Sequence[LockedLeg]) -> Condition
     at = ", ".join(leg.tip.symbol for leg in lines)
     kinds = _kinds(lines, "normal to")
     words = f"the lines through {at}, {kinds}, meet in a point or are parallel"
-    return _named(pattern, words, expression, True)
+    return _name_condition(pattern, words, expression, True)
 
 
 def _pivot(pattern: ConstraintPattern, line: LockedLeg, fixed: LockedLeg) -> Condition:
@@ -219,7 +219,7 @@ def _pivot(pattern: ConstraintPattern, line: LockedLeg, fixed: LockedLeg) -> Con
     dot, _, _ = products()
     one, other, along = fixed.tip.symbol, line.tip.symbol, _symbol(line.line)
     words = f"the line {one}{other} is normal to {along}"
-    return _named(pattern, words, dot(vector(other) - vector(one), vector(along)), True)
+    return _name_condition(pattern, words, dot(vector(other) - vector(one), vector(along)), True)
 
 
 def _complex(pattern: ConstraintPattern, legs: Sequence[LockedLeg]) -> Condition:
@@ -230,16 +230,16 @@ def _complex(pattern: ConstraintPattern, legs: Sequence[LockedLeg]) -> Condition
     words = (f"the lines through {', '.join(leg.tip.symbol for leg in legs)} along "
              f"{', '.join(_symbol(leg.normal) for leg in legs)} belong to one linear complex")
     expression = sympy.Determinant(sympy.MatrixSymbol("L", 6, 6))
-    return _named(pattern, words, expression, True, matrices={"L": "rows " + ", ".join(lines)})
+    return _name_condition(pattern, words, expression, True, matrices={"L": "rows " + ", ".join(lines)})
 
 
 def _bodies(pattern: ConstraintPattern, lines: Sequence[LockedLeg]) -> Condition:
     _, _, det = products()
     slide = vector(_symbol(pattern.slide))
     expression = det(*(vector(_symbol(leg.line)) for leg in lines), slide)
-    words = (f"{_listed(leg.line for leg in lines)} and the direction {slide}, in which the platform's halves move on "
-             "each other, are parallel to one plane")
-    return _named(pattern, words, expression, True)
+    words = (f"{_words_of(leg.line for leg in lines)} and the direction {slide}, in which the platform's halves move "
+             "on each other, are parallel to one plane")
+    return _name_condition(pattern, words, expression, True)
 
 
 def _gram(pattern: ConstraintPattern) -> Condition:
@@ -275,10 +275,10 @@ def _gram(pattern: ConstraintPattern) -> Condition:
         words = f"{halves}, and {moves.replace('moves', 'move', 1)}"
     else:
         words = f"some motion of the platform {moves}{_cylinders(pattern.legs)}"
-    return _named(pattern, words, sympy.Determinant(total), False, matrices=dict(matrices))
+    return _name_condition(pattern, words, sympy.Determinant(total), False, matrices=dict(matrices))
 
 
-def _named(pattern: ConstraintPattern, words: str, expression: Any, signed: bool, *, never: bool = False,
+def _name_condition(pattern: ConstraintPattern, words: str, expression: Any, signed: bool, *, never: bool = False,
            matrices: Mapping[str, str] | None = None, parts: tuple[tuple[Any, str], ...] = ()) -> Named:
     """A condition with the meaning of its symbols and the factors that were split off."""
     import sympy
@@ -313,7 +313,7 @@ def always(pattern: ConstraintPattern, lost: Sequence[str]) -> str:
         vectors = [u for leg in lines if (u := pattern.constant(leg.line)) is not None]
         if len(vectors) == len(lines) > 1 and all(np.linalg.norm(np.cross(u, vectors[0])) < SAME_RELATION
                                                   for u in vectors):
-            return f"{text}, because {_listed(leg.line for leg in lines)} are parallel"
+            return f"{text}, because {_words_of(leg.line for leg in lines)} are parallel"
     return text
 
 
@@ -326,7 +326,7 @@ def _on_one_line(legs: Sequence[LockedLeg]) -> str:
     return ", ".join(leg.tip.symbol for leg in legs) if flat[1:].sum() <= SAME_RELATION * flat[0] else ""
 
 
-def _listed(features: Iterable[NamedVector | None]) -> str:
+def _words_of(features: Iterable[NamedVector | None]) -> str:
     """``the tangents tau1, tau2`` and the like, by what the vectors are."""
     groups: dict[str, list[str]] = {}
     for feature in features:
@@ -342,11 +342,11 @@ _KINDS = {"u": "watched directions", "p": "P axes", "t": "tangents", "a": "axes"
 def _moves(legs: Sequence[LockedLeg]) -> str:
     """What all tips do, and how the body turns: ``moves every tip Bi along ui (i = 1, 2, 3)`` where they are alike."""
     tips = [leg for leg in legs if not leg.free]
-    alike = {(leg.tip.symbol[0], _allowed(leg).replace(leg.tip.symbol[1:], "i")) for leg in tips}
+    alike = {(leg.tip.symbol[0], _allowed_words(leg).replace(leg.tip.symbol[1:], "i")) for leg in tips}
     parts = []
     if len(alike) > 1 or len(tips) == 1:
         still = [leg.tip.symbol for leg in tips if leg.fixed]
-        moved = [f"{leg.tip.symbol} {_allowed(leg)}" for leg in tips if not leg.fixed]
+        moved = [f"{leg.tip.symbol} {_allowed_words(leg)}" for leg in tips if not leg.fixed]
         parts = [*([f"leaves {_and(still)} at rest"] if still else []), *([f"moves {_and(moved)}"] if moved else [])]
     elif alike:
         tip, allowed = next(iter(alike))
@@ -365,7 +365,7 @@ def _cylinders(legs: Sequence[LockedLeg]) -> str:
     return f"; {eyes.pop()} is then on the danger cylinders of all threes of points that are not on one line"
 
 
-def _allowed(leg: LockedLeg) -> str:
+def _allowed_words(leg: LockedLeg) -> str:
     if leg.fixed:
         return "at rest"
     return f"along {_symbol(leg.line)}" if leg.line is not None else f"normal to {_symbol(leg.normal)}"

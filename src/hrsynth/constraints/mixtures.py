@@ -42,7 +42,7 @@ def closed_form(legs: Sequence[LockedLeg]) -> ClosedForm | None:
 def _three_rays(*rays: LockedLeg) -> ClosedForm:
     """The tips' speeds along their lines that keep |B_i B_j|: a 3 × 3 determinant."""
     dot, _, _ = products()
-    line, tips = [_named(leg.line) for leg in rays], [_named(leg.tip) for leg in rays]
+    line, tips = [_name_of(leg.line) for leg in rays], [_name_of(leg.tip) for leg in rays]
     sides = [tips[(i + 1) % 3] - tips[i] for i in range(3)]
     forth = dot(line[0], sides[0]) * dot(line[1], sides[1]) * dot(line[2], sides[2])
     back = dot(line[1], sides[0]) * dot(line[2], sides[1]) * dot(line[0], sides[2])
@@ -60,7 +60,7 @@ def _danger_cylinder(eye: str, rays: Sequence[LockedLeg], expression: Any) -> Cl
     radius of the circle through the points, ρ the distance of C from its axis."""
     dot, cross, det = products()
     one, two, three = (leg.tip.symbol for leg in rays)
-    tips = [_named(leg.tip) for leg in rays]
+    tips = [_name_of(leg.tip) for leg in rays]
     b, c, x = tips[1] - tips[0], tips[2] - tips[0], vector(eye) - tips[0]
     n = cross(b, c)
     square = dot(cross(n, x), cross(n, x)) + dot(b, b) * det(x, n, c) - dot(c, c) * det(x, n, b)
@@ -75,7 +75,7 @@ def _danger_cylinder(eye: str, rays: Sequence[LockedLeg], expression: Any) -> Cl
 def _three_planes(*planes: LockedLeg) -> ClosedForm:
     """Forces n_i at B_i and moments e_i: a block triangular matrix, so det(n₁, n₂, n₃) det(e₁, e₂, e₃)."""
     _, _, det = products()
-    normals, uprights = [_named(leg.normal) for leg in planes], [_named(leg.upright) for leg in planes]
+    normals, uprights = [_name_of(leg.normal) for leg in planes], [_name_of(leg.upright) for leg in planes]
     n, e = (", ".join(map(str, each)) for each in (normals, uprights))
     eye, lines = _one_eye(planes), ", ".join(leg.label for leg in planes)
     if eye is None:
@@ -94,8 +94,8 @@ def _two_rays_plane(one: LockedLeg, two: LockedLeg, plane: LockedLeg) -> ClosedF
     """Speeds (r₂·b, r₁·b) along the rays keep |B₁B₂|, b = B₂ − B₁; then ω = (b × δ)/b² + t b, δ the difference of
     velocities, with e·ω = 0 and n·v(B₃) = 0."""
     dot, cross, det = products()
-    r1, r2, n, e = _named(one.line), _named(two.line), _named(plane.normal), _named(plane.upright)
-    b, c = _named(two.tip) - _named(one.tip), _named(plane.tip) - _named(one.tip)
+    r1, r2, n, e = _name_of(one.line), _name_of(two.line), _name_of(plane.normal), _name_of(plane.upright)
+    b, c = _name_of(two.tip) - _name_of(one.tip), _name_of(plane.tip) - _name_of(one.tip)
     turn = dot(r1, b) * det(e, b, r2) - dot(r2, b) * det(e, b, r1)
     slip = (dot(b, b) * dot(r2, b) * dot(n, r1) + dot(r1, b) * dot(n, cross(cross(b, r2), c))
             - dot(r2, b) * dot(n, cross(cross(b, r1), c)))
@@ -108,12 +108,12 @@ def _two_rays_plane(one: LockedLeg, two: LockedLeg, plane: LockedLeg) -> ClosedF
 def _ray_two_planes(ray: LockedLeg, one: LockedLeg, two: LockedLeg) -> ClosedForm:
     """ω = s w, w = e₂ × e₃, and v(B₁) = μ r: two equations n_i·v(B_i) = 0 in (μ, s)."""
     dot, cross, det = products()
-    r, w = _named(ray.line), cross(_named(one.upright), _named(two.upright))
-    arms = [det(_named(leg.normal), w, _named(leg.tip) - _named(ray.tip)) for leg in (one, two)]
-    expression = dot(_named(one.normal), r) * arms[1] - dot(_named(two.normal), r) * arms[0]
+    r, w = _name_of(ray.line), cross(_name_of(one.upright), _name_of(two.upright))
+    arms = [det(_name_of(leg.normal), w, _name_of(leg.tip) - _name_of(ray.tip)) for leg in (one, two)]
+    expression = dot(_name_of(one.normal), r) * arms[1] - dot(_name_of(two.normal), r) * arms[0]
     words = (f"some motion of the platform moves {ray.tip.symbol} along {r}, {one.tip.symbol} normal to "
-             f"{_named(one.normal)}, {two.tip.symbol} normal to {_named(two.normal)}, and turns it about the normal of "
-             f"{_named(one.upright)}, {_named(two.upright)}")
+             f"{_name_of(one.normal)}, {two.tip.symbol} normal to {_name_of(two.normal)}, and turns it about the "
+             f"normal of {_name_of(one.upright)}, {_name_of(two.upright)}")
     return ClosedForm(words, expression)
 
 
@@ -121,20 +121,20 @@ def _two_rays_axis(one: LockedLeg, two: LockedLeg, axis: LockedLeg) -> ClosedFor
     """μ₂ r₂ − μ₁ r₁ = s u × b, b = B₂ − B₁; with one centre C of both, r₁ × r₂ is along CB₁ × b, and C is in a plane
     that depends on u and the points alone."""
     dot, cross, det = products()
-    r1, r2, u, b = _named(one.line), _named(two.line), _named(axis.about), _named(two.tip) - _named(one.tip)
+    r1, r2, u, b = _name_of(one.line), _name_of(two.line), _name_of(axis.about), _name_of(two.tip) - _name_of(one.tip)
     names, eye, expression = f"{one.tip.symbol}{two.tip.symbol}", _one_eye([one, two]), det(r1, r2, cross(u, b))
     if eye is None:
         return ClosedForm(f"{r1}, {r2} and {u} × {names} are parallel to one plane", expression)
     words = f"{eye} lies in the plane through {one.tip.symbol}, {two.tip.symbol} that is parallel to {u} × {names}"
     means = (f"that plane: |{eye}{one.tip.symbol}| |{eye}{two.tip.symbol}| times the expression up to sign, a "
              "proved identity")
-    return ClosedForm(words, expression, ((dot(cross(b, cross(u, b)), vector(eye) - _named(one.tip)), means),))
+    return ClosedForm(words, expression, ((dot(cross(b, cross(u, b)), vector(eye) - _name_of(one.tip)), means),))
 
 
 def _ray_plane_axis(ray: LockedLeg, plane: LockedLeg, axis: LockedLeg) -> ClosedForm:
     """ω = s u with s e·u = 0, and v = μ r with μ n·r = 0."""
     dot, _, _ = products()
-    r, n, e, u = _named(ray.line), _named(plane.normal), _named(plane.upright), _named(axis.about)
+    r, n, e, u = _name_of(ray.line), _name_of(plane.normal), _name_of(plane.upright), _name_of(axis.about)
     along, turn = f"{r} lies in the plane normal to {n}", f"{u} is normal to {e}"
     if _one_eye([ray, plane]) is not None:
         along = f"the image of {ray.label} lies on that of {plane.label} ({r} is normal to {n})"
@@ -148,6 +148,6 @@ def _one_eye(legs: Sequence[LockedLeg]) -> str | None:
     return eyes.pop() if len(eyes) == 1 else None
 
 
-def _named(feature: NamedVector | None) -> Any:
+def _name_of(feature: NamedVector | None) -> Any:
     assert feature is not None
     return vector(feature.symbol)

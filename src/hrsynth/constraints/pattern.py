@@ -113,7 +113,7 @@ class PatternValues(Value):
         return found
 
 
-def attached(anatomy: LegDecomposition) -> tuple[str, ...]:
+def leg_ends(anatomy: LegDecomposition) -> tuple[str, ...]:
     """The links of the platform on which legs end."""
     return tuple(dict.fromkeys(leg.attach for leg in anatomy.legs))
 
@@ -121,15 +121,15 @@ def attached(anatomy: LegDecomposition) -> tuple[str, ...]:
 def placing_links(anatomy: LegDecomposition) -> tuple[str, ...]:
     """The links of the platform that tell where it is: those on which legs end, and the controlled one where these
     leave it several poses."""
-    return attached(anatomy) if anatomy.decided else (*attached(anatomy), anatomy.mechanism.platform)
+    return leg_ends(anatomy) if anatomy.decided else (*leg_ends(anatomy), anatomy.mechanism.platform)
 
 
 def recognise(anatomy: LegDecomposition, question: Measurement, samples: Sequence[ClosedConfiguration], *,
               everywhere: bool = True) -> ConstraintPattern:
     """The pattern at the samples; ``motion`` is ``other`` where it is none of the known ones, or, unless it need not
     hold ``everywhere``, where a held leg may leave its end more at special poses."""
-    other = ConstraintPattern("other", anatomy.mechanism.base, attached(anatomy))
-    base, bodies = anatomy.mechanism.base, attached(anatomy)
+    other = ConstraintPattern("other", anatomy.mechanism.base, leg_ends(anatomy))
+    base, bodies = anatomy.mechanism.base, leg_ends(anatomy)
     motions = _motions(anatomy, question, samples)
     by_platform = sights(question, base, bodies)
     locks: dict[str, list[Observation]] = {leg.label: [] for leg in anatomy.legs}
@@ -140,7 +140,7 @@ def recognise(anatomy: LegDecomposition, question: Measurement, samples: Sequenc
                 return other
             locks[leg].append(each)
     translating = len(bodies) == 1 and vanishes(motions[:, 3:])
-    held = {leg.label: _held(anatomy, leg, tuple(locks[leg.label]), question.reference, tuple(samples),
+    held = {leg.label: _locked_leg(anatomy, leg, tuple(locks[leg.label]), question.reference, tuple(samples),
                              everywhere, translating) for leg in anatomy.legs}
     alone = motions.shape[1:] == (6, 6) and not any(locks.values())
     if anatomy.mechanism.couplings and not alone:
@@ -183,14 +183,14 @@ def _leg_of(seen: Observation, anatomy: LegDecomposition, question: Measurement)
     """The label of the leg of which an observation is: that it bears, or of the one in which it lies."""
     if seen.leg in anatomy.labels:
         return seen.leg
-    inside = {seen.link, seen.seen_from or question.reference} - {anatomy.mechanism.base, *attached(anatomy)}
+    inside = {seen.link, seen.seen_from or question.reference} - {anatomy.mechanism.base, *leg_ends(anatomy)}
     return next((leg.label for leg in anatomy.legs if inside and inside <= set(leg.links)), None)
 
 
 def _one_body(anatomy: LegDecomposition, every: tuple[LockedLeg, ...] | None, legs: tuple[LockedLeg, ...],
               motions: Array, samples: Sequence[ClosedConfiguration]) -> ConstraintPattern | None:
     """The pattern of one body: of the ``legs`` that are watched, or of ``every`` leg, None where one has none."""
-    base, bodies = anatomy.mechanism.base, attached(anatomy)
+    base, bodies = anatomy.mechanism.base, leg_ends(anatomy)
     own = [leg for leg in legs if not leg.virtual]
     if len(own) < len(anatomy.legs) and motions.shape[2] < (2 if own else 3):  # the other legs hold as well
         return None
@@ -241,7 +241,7 @@ def _translating(anatomy: LegDecomposition, legs: tuple[LockedLeg, ...],
         _, s, Vt = np.linalg.svd(np.concatenate([line.value(poses) for line in lines]))
         if s[1] > SAME_RELATION * s[0] > s[2]:
             plane = _normal(anatomy.mechanism, Vt[2], "direction normal to the lines along which the tips move")
-    found = ConstraintPattern("translations", anatomy.mechanism.base, attached(anatomy), legs, plane=plane)
+    found = ConstraintPattern("translations", anatomy.mechanism.base, leg_ends(anatomy), legs, plane=plane)
     turns = {link: X[:, :3, :3] for link, X in poses_at(samples, [link for each in found.features for link in each.links
                                                                   ]).items()}
     return replace(found, steady={link: frozen(R[0]) for link, R in turns.items() if vanishes(R - R[0])})
@@ -251,7 +251,7 @@ def _two_bodies(anatomy: LegDecomposition, legs: tuple[LockedLeg, ...], motions:
                 samples: Sequence[ClosedConfiguration]) -> ConstraintPattern | None:
     """Two bodies that only translate, the second along one direction relative to the first; with them the controlled
     link must be at rest, which it need not where it hangs on them by loops that have dead points."""
-    bodies = attached(anatomy)
+    bodies = leg_ends(anatomy)
     still = motions[:, [3, 4, 5, 9, 10, 11]]
     if not anatomy.decided or len(bodies) != 2 or motions.shape[2] != 4 or not vanishes(still):
         return None
@@ -265,13 +265,13 @@ def _two_bodies(anatomy: LegDecomposition, legs: tuple[LockedLeg, ...], motions:
     slide = next((f for f in named if _along(f, directions, samples)), None)
     if slide is None:
         return None
-    return ConstraintPattern("bodies", anatomy.mechanism.base, attached(anatomy), legs, slide=slide)
+    return ConstraintPattern("bodies", anatomy.mechanism.base, leg_ends(anatomy), legs, slide=slide)
 
 
 def _motions(anatomy: LegDecomposition, question: Measurement, samples: Sequence[ClosedConfiguration]) -> Array:
     """Bases (n, 6 bodies, d) of what the platform's bodies can do with nothing held; they differ in number where the
     samples are not alike, then the largest are kept."""
-    asked = replace(question, bodies=attached(anatomy), observations=())
+    asked = replace(question, bodies=leg_ends(anatomy), observations=())
     found = [relation(at, asked).basis[asked.twist_rows :] for at in samples]
     bases = [range_basis(each, 1.0)[0] for each in found]
     most = max(basis.shape[1] for basis in bases)
@@ -321,7 +321,7 @@ def _normal(mechanism: Mechanism, normal: Array, meaning: str = "normal of the p
 
 
 @lru_cache(maxsize=LEGS_HELD)
-def _held(anatomy: LegDecomposition, leg: Leg, locks: tuple[Observation, ...], reference: str,
+def _locked_leg(anatomy: LegDecomposition, leg: Leg, locks: tuple[Observation, ...], reference: str,
           samples: tuple[ClosedConfiguration, ...], everywhere: bool, translating: bool) -> LockedLeg | None:
     """The leg's pattern with these observations held, alike at all samples (``everywhere``: all poses), or None."""
     try:
@@ -338,10 +338,10 @@ def _held(anatomy: LegDecomposition, leg: Leg, locks: tuple[Observation, ...], r
             continue
         line = normal = None
         if shape[0] == 1:
-            line = _named(anatomy, leg, locks, symbol, np.array([p.translations[:, 0] for p in parts]), samples)
+            line = _name_vector(anatomy, leg, locks, symbol, np.array([p.translations[:, 0] for p in parts]), samples)
         elif shape[0] == 2:
             across = np.array([cross(p.translations[:, 0], p.translations[:, 1]) for p in parts])
-            normal = _named(anatomy, leg, locks, symbol, across, samples)
+            normal = _name_vector(anatomy, leg, locks, symbol, across, samples)
         if shape[0] in (1, 2) and line is None and normal is None:
             return None
         more = grows(leg, locks, reference, points, samples, translating) if everywhere else ""
@@ -366,7 +366,7 @@ def _tips(anatomy: LegDecomposition, leg: Leg, symbol: str, length: float) -> It
             yield centre_of(mechanism, joint, joint.predecessor, f"A{symbol}", length)
 
 
-def _named(anatomy: LegDecomposition, leg: Leg, locks: Sequence[Observation], symbol: str, values: Array,
+def _name_vector(anatomy: LegDecomposition, leg: Leg, locks: Sequence[Observation], symbol: str, values: Array,
            samples: Sequence[ClosedConfiguration]) -> NamedVector | None:
     """The first vector with a name that is parallel to ``values`` (n, 3) at all samples."""
     mechanism = anatomy.mechanism

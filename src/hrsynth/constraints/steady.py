@@ -160,11 +160,11 @@ def _way(mechanism: Mechanism, leg: Leg, one: str, other: str) -> _Way | None:
     if one not in graph or other not in component(graph, one):
         return None
     if leg.has_loops:
-        return _contracted(mechanism, leg, one, other)
+        return _contract(mechanism, leg, one, other)
     return _Way(tuple((bonds[frozenset(pair)], pair[0]) for pair in pairwise(shortest_path(graph, one, other))))
 
 
-def _contracted(mechanism: Mechanism, leg: Leg, one: str, other: str) -> _Way:
+def _contract(mechanism: Mechanism, leg: Leg, one: str, other: str) -> _Way:
     """The same in a leg with loops, not ``free`` where it goes through one that is no parallelogram or parallel rods.
     """
     tied = _Way((), free=False)

@@ -26,7 +26,7 @@ from .named_vectors import poses_at, vanishes
 from .pattern import ConstraintPattern
 
 
-def unexamined(anatomy: LegDecomposition, pattern: ConstraintPattern, condition: Condition | None,
+def unexamined_poses(anatomy: LegDecomposition, pattern: ConstraintPattern, condition: Condition | None,
                samples: Sequence[ClosedConfiguration]) -> tuple[str, ...]:
     """Poses to which a condition does not apply, in words; none of one that the screws of all joints give."""
     if not isinstance(condition, Named):

@@ -71,13 +71,13 @@ def vector(name: str) -> Any:
 
 def evaluate(expression: Any, values: Mapping[str, Array]) -> Array:
     """Values of an expression for vectors (n, 3), shape (n,)."""
-    names, run = _compiled(expression)
+    names, run = _compile(expression)
     size = max(map(len, values.values()), default=1)
     return np.broadcast_to(np.asarray(run(*(values[name] for name in names)), dtype=float), (size,))
 
 
 @lru_cache(maxsize=64)
-def _compiled(expression: Any) -> tuple[tuple[str, ...], Callable[..., Any]]:
+def _compile(expression: Any) -> tuple[tuple[str, ...], Callable[..., Any]]:
     """An expression as a function of arrays of its vectors, with their names in order."""
     import sympy
 

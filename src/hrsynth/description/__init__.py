@@ -11,13 +11,13 @@ from pathlib import Path
 
 from ..errors import BadRequest
 from ..mechanism.model import Mechanism, Note
-from ..results import spelled
+from ..results import with_spelling
 from . import formats
 from .dialect import Dialect
 from .example_data import PREFIX, examples
 from .files import require_same, require_writable, write_whole
 from .formats import native
-from .meshes import carried, taken_back, written
+from .meshes import carry_meshes, taken_back, write_meshes
 from .overrides import Overrides
 from .reading import read
 from .tree import spanning
@@ -36,7 +36,7 @@ def shipped() -> dict[str, Path]:
     return {path.stem: path for path in sorted(folder.glob("*.urdf"), key=lambda path: path.stem)}
 
 
-@spelled
+@with_spelling
 def load(robot: str | Path | Mechanism, *, base: str | None = None, platform: str | None = None,
          motors: Iterable[str] | str | None = None, observe: Iterable[str] | str | None = None,
          close: Iterable[str] | str = (), freeze: Iterable[str] | str = (), keyframe: str | None = None,
@@ -85,18 +85,19 @@ def file_of(robot: str | Path) -> Path:
         raise BadRequest("a robot's file", robot, "a path, the name of a shipped robot, example:NAME")
     path = Path(robot)
     if isinstance(robot, str) and robot.startswith(PREFIX) and not os.path.exists(robot):
-        return _named(robot.removeprefix(PREFIX), examples(), "not a robot of example-robot-data", "robots --examples")
+        return _file_by_name(robot.removeprefix(PREFIX), examples(), "not a robot of example-robot-data",
+                             "robots --examples")
     if isinstance(robot, str) and not path.suffix and len(path.parts) == 1:
         robots = shipped()
         with contextlib.suppress(OSError, ValueError):
             if path.is_file():
                 return path
         if robot in robots or not os.path.exists(robot):
-            return _named(robot, robots, "neither a file nor a shipped robot", "robots")
+            return _file_by_name(robot, robots, "neither a file nor a shipped robot", "robots")
     return path
 
 
-def _named(name: str, files: dict[str, Path], what: str, command: str) -> Path:
+def _file_by_name(name: str, files: dict[str, Path], what: str, command: str) -> Path:
     """The file of a robot by its name; raises ``BadRequest`` with the names closest to it."""
     if name in files:
         return files[name]
@@ -114,7 +115,7 @@ def targets(path: str | Path, dialect: str | None = None) -> tuple[Path, ...]:
     return files
 
 
-@spelled
+@with_spelling
 def save(mechanism: Mechanism | str | Path, path: str | Path, dialect: str | None = None, *, meshes: str = "keep"
          ) -> tuple[Note, ...]:
     """Write a robot file, completely or not at all, of a mechanism or of a robot given by its file or name; what the
@@ -139,8 +140,8 @@ def save(mechanism: Mechanism | str | Path, path: str | Path, dialect: str | Non
         raise BadRequest("meshes", meshes, ("keep", "copy"))
     target = Path(path)
     chosen, mechanism = _dialect(target, dialect), load(mechanism)
-    robot, copies, notes = carried(mechanism, target, chosen.meshes, copy=meshes == "copy")
-    new = written(copies)
+    robot, copies, notes = carry_meshes(mechanism, target, chosen.meshes, copy=meshes == "copy")
+    new = write_meshes(copies)
     try:
         found = formats.writer(chosen.name)(robot)
         texts = zip(chosen.files(target), found.texts, strict=True)

@@ -96,12 +96,12 @@ def annotations_of(robot: Mechanism, *, motors: bool = False) -> Iterable[tuple[
         if motors and joint.motor is not None:
             yield "motor", f"{quote(joint.motor.name)} {quote(joint.name)}"
     for camera in robot.cameras:
-        yield "eye", _said(camera_attributes(camera, numerals.ANGLE_DECIMALS))
+        yield "eye", _write_attributes(camera_attributes(camera, numerals.ANGLE_DECIMALS))
     for each in robot.observations:
         if isinstance(each, Direction) and each.by_segment:
             yield "observe", f"{quote(each.leg)} {quote(each.link)} {numerals.axis(each.direction)}"
         else:
-            yield "see", _said(attributes_of(each, robot, numerals.ANGLE_DECIMALS))
+            yield "see", _write_attributes(attributes_of(each, robot, numerals.ANGLE_DECIMALS))
 
 
 def camera_attributes(camera: NamedCamera, decimals: int) -> dict[str, str]:
@@ -110,5 +110,5 @@ def camera_attributes(camera: NamedCamera, decimals: int) -> dict[str, str]:
     return {"name": camera.name, "link": camera.link, **numerals.origin(camera.pose, decimals)[1], **image}
 
 
-def _said(attributes: dict[str, str]) -> str:
+def _write_attributes(attributes: dict[str, str]) -> str:
     return " ".join(f"{key}={quote(value)}" for key, value in attributes.items())

@@ -166,7 +166,7 @@ class JointGraph:
         self.unit *= factor
         slides = {name for name, joint in self.joints.items() if joint.type is JointType.PRISMATIC}
         for name, joint in self.joints.items():
-            one, two = (FrameSpec(end.link, scaled(end.X, factor), end.line) for end in joint.ends)
+            one, two = (FrameSpec(end.link, scale_pose(end.X, factor), end.line) for end in joint.ends)
             limits = joint.limits
             if limits is not None and name in slides:
                 lower, upper, velocity = (None if value is None else factor * value
@@ -175,7 +175,7 @@ class JointGraph:
             self.joints[name] = replace(joint, ends=(one, two), limits=limits)
         self.sights = [replace(each, at=each.at and (factor * each.at[0], factor * each.at[1], factor * each.at[2]),
                                radius=each.radius and factor * each.radius) for each in self.sights]
-        self.cameras = [replace(each, pose=scaled(each.pose, factor)) for each in self.cameras]
+        self.cameras = [replace(each, pose=scale_pose(each.pose, factor)) for each in self.cameras]
         units = {name: factor if name in slides else 1.0 for name in self.joints}
         self.gears = [replace(gear, ratio=gear.ratio * units[gear.driven] / units[gear.driver],
                               offset=gear.offset * units[gear.driven]) for gear in self.gears]
@@ -185,7 +185,7 @@ class JointGraph:
         if self.unit == 1:
             return posture
         slides = (JointType.PRISMATIC, JointType.FREE)
-        return {name: scaled(value, self.unit) if value.ndim == 2 else self.unit * value
+        return {name: scale_pose(value, self.unit) if value.ndim == 2 else self.unit * value
                 if name in self.joints and self.joints[name].type in slides else value
                 for name, value in posture.items()}
 
@@ -210,7 +210,7 @@ def comma_list(names: Iterable[str], most: int = 8, like: str | None = None) -> 
     return ", ".join(every[:most]) + (" …" if every[most:] else "")
 
 
-def scaled(X: Array, factor: float) -> Array:
+def scale_pose(X: Array, factor: float) -> Array:
     """A pose (4, 4) with its translation multiplied."""
     if X is ORIGIN:
         return X

@@ -26,7 +26,7 @@ KNOWN = (".stl", ".obj", ".dae", ".ply", ".off", ".msh", ".glb", ".gltf", ".3mf"
 """What meshes are called: no other file is ever copied."""
 
 
-def located(name: str, folder: Path) -> Path | None:
+def locate_mesh(name: str, folder: Path) -> Path | None:
     """The file that a mesh's address names: beside the robot file, or of a package in a folder above it; None where
     there is none on this machine."""
     scheme, _, rest = name.partition("://")
@@ -49,9 +49,9 @@ def triangles(name: str, robot: str | None, within: Path | None = None) -> tuple
     """The points (n, 3) and triangles (m, 3) of a mesh that the file of a robot names; None where it cannot be read.
     With ``within`` only files of that folder are read, also those that lie flat in it."""
     folder = Path(robot).parent if robot else Path()
-    path = located(name, folder)
+    path = locate_mesh(name, folder)
     if within is not None:
-        path = _fenced(path or within / Path(name).name, within)
+        path = _within_folder(path or within / Path(name).name, within)
     import trimesh
 
     try:
@@ -70,7 +70,7 @@ def triangles(name: str, robot: str | None, within: Path | None = None) -> tuple
     return (points, faces) if len(faces) and np.all(np.isfinite(points)) else None
 
 
-def _fenced(path: Path, within: Path) -> Path | None:
+def _within_folder(path: Path, within: Path) -> Path | None:
     """A file where it lies in a folder, links resolved, or else one of its name there."""
     for each in (path, within / path.name):
         if each.is_file() and each.resolve().is_relative_to(within.resolve()):
@@ -81,9 +81,9 @@ def _fenced(path: Path, within: Path) -> Path | None:
 def _inner(name: str, folder: Path, within: Path | None = None) -> bytes | None:
     """A mesh that lies in a USD file, as the text of an ``.obj`` file."""
     file, sign, prim = name.partition("#")
-    path = located(file, folder) if sign else None
+    path = locate_mesh(file, folder) if sign else None
     if path is not None and within is not None:
-        path = _fenced(path, within)
+        path = _within_folder(path, within)
     if path is None:
         return None
     from .formats.usd.stage import mesh
@@ -91,7 +91,7 @@ def _inner(name: str, folder: Path, within: Path | None = None) -> bytes | None:
     return mesh(path, prim)
 
 
-def carried(robot: Mechanism, target: Path, endings: tuple[str, ...] | None, *, copy: bool
+def carry_meshes(robot: Mechanism, target: Path, endings: tuple[str, ...] | None, *, copy: bool
             ) -> tuple[Mechanism, dict[Path, Callable[[], bytes]], list[Note]]:
     """A robot whose meshes are named from the folder of ``target``; what has to be written there for it (``copy``: all
     meshes, into ``meshes/``); and notes.
@@ -108,8 +108,8 @@ def carried(robot: Mechanism, target: Path, endings: tuple[str, ...] | None, *, 
 
     def place(name: str) -> str | None:
         """What the mesh is called in the new file; None where it has to be left out."""
-        path, (file, sign, prim) = located(name, source), name.partition("#")
-        inner = located(file, source) if path is None and sign else None
+        path, (file, sign, prim) = locate_mesh(name, source), name.partition("#")
+        inner = locate_mesh(file, source) if path is None and sign else None
         if path is None and inner is None:
             missing.append(name)
             return name if endings is None else None
@@ -129,8 +129,8 @@ def carried(robot: Mechanism, target: Path, endings: tuple[str, ...] | None, *, 
             files[new] = path.read_bytes if path is not None else lambda: _inner(name, source) or b""
             return f"meshes/{new.name}"
         there = path if path is not None else inner
-        if located(file, folder) is not None and there is not None and endings is None and os.path.samefile(
-                str(located(file, folder)), there):
+        if locate_mesh(file, folder) is not None and there is not None and endings is None and os.path.samefile(
+                str(locate_mesh(file, folder)), there):
             return name
         if inner is not None:
             inside.append(name)
@@ -171,7 +171,7 @@ def _is_text(path: Path | None) -> bool:
     return head.startswith(b"solid") and path.stat().st_size != 84 + 50 * int.from_bytes(head[80:84], "little")
 
 
-def written(files: dict[Path, Callable[[], bytes]]) -> list[Path]:
+def write_meshes(files: dict[Path, Callable[[], bytes]]) -> list[Path]:
     """Write them; those that are new. What is there with other content is not replaced; all or none are written."""
     from .files import require_same, write_whole
 
@@ -197,7 +197,7 @@ def written(files: dict[Path, Callable[[], bytes]]) -> list[Path]:
 
 
 def taken_back(new: list[Path]) -> None:
-    """Remove what :func:`written` wrote."""
+    """Remove what :func:`write_meshes` wrote."""
     for path in new:
         path.unlink(missing_ok=True)
     for folder in {path.parent for path in new}:

@@ -148,7 +148,7 @@ def parse_see(text: str, cameras: Sequence[str]) -> SightSpec:
     return found
 
 
-def listed(text: str) -> list[str]:
+def split_offers(text: str) -> list[str]:
     """The words of an ``--offer`` with commas between them, as point:platform,inclination: a kind alone is of the link
     before it; commas between numbers part nothing."""
     found: list[str] = []
@@ -254,13 +254,13 @@ def _with_sight(mechanism: Mechanism, spec: SightSpec) -> Mechanism:
     """With the observation, whose label is by default its kind and a number that is free."""
     taken = {o.leg for o in mechanism.observations}
     label = spec.leg or next(f"{spec.kind}_{n}" for n in count(1) if f"{spec.kind}_{n}" not in taken)
-    found = resolved(mechanism, replace(spec, leg=label))
+    found = resolve_sight(mechanism, replace(spec, leg=label))
     if {each.key for each in found} & {each.key for each in mechanism.observations}:
         raise BadRequest(f"observe {spec}: a second one with this label", label, "a label of its own")
     return replace(mechanism, observations=(*mechanism.observations, *found))
 
 
-def resolved(mechanism: Mechanism, spec: SightSpec) -> tuple[Observation, ...]:
+def resolve_sight(mechanism: Mechanism, spec: SightSpec) -> tuple[Observation, ...]:
     """The observations (of a joint with two coordinates, two) that a description says; raises ``BadRequest``."""
     label, kind = str(spec.leg), kinds()[spec.kind]
     if label == "all" or "," in label:

@@ -91,7 +91,7 @@ def document(text: bytes | str, file: str, notes: list[Note] | None = None) -> E
             what, at = (error.msg or "syntax error").split(", line ")[0], error.lineno or 1
         except (ValueError, LookupError) as error:
             what, at = str(error), 1
-        mended = data if notes is None else _mended(data, what, notes)
+        mended = data if notes is None else _mend(data, what, notes)
         if mended == data:
             break
         data = mended
@@ -100,7 +100,7 @@ def document(text: bytes | str, file: str, notes: list[Note] | None = None) -> E
     raise refusal(file, "malformed XML", "a whole document of XML", value=what, line=at)
 
 
-def _mended(data: bytes, what: str, notes: list[Note]) -> bytes:
+def _mend(data: bytes, what: str, notes: list[Note]) -> bytes:
     """A document without what stopped the parser, where that means nothing: its lines stay where they are."""
     prefix, root = _PREFIX.search(what), _ROOT.match(data)
     if prefix is not None and root is not None:
@@ -137,7 +137,7 @@ def beside(main: Path, file: str) -> str:
     return str(main.parent / own.relative_to(folder)) if own.is_relative_to(folder) else file
 
 
-def placed(root: Element, main: Path, places: Sequence[tuple[str, int] | None]) -> None:
+def give_places(root: Element, main: Path, places: Sequence[tuple[str, int] | None]) -> None:
     """Give the elements of a document, in its order, their places: file (None for ``main``) and line."""
     table: dict[tuple[str | None, int] | None, int] = {}
     names = {str(main.resolve()): None}

@@ -62,6 +62,6 @@ CLAIMS = (
 """All of them, in the order of the papers."""
 
 
-def printed() -> Iterator[tuple[PrintedClaim, PrintedMode]]:
+def printed_poses() -> Iterator[tuple[PrintedClaim, PrintedMode]]:
     """Each printed pose with its claim."""
     return ((claim, mode) for claim in CLAIMS for mode in claim.modes)

@@ -60,7 +60,7 @@ class AffineForms:
     def __add__(self, other: Any) -> AffineForms:
         other = self._like(other)
         v = self.v + other.v
-        return _rounded(v, self.r + other.r, np.abs(v).sum(axis=0))
+        return _add_rounding(v, self.r + other.r, np.abs(v).sum(axis=0))
 
     __radd__ = __add__
 
@@ -72,11 +72,11 @@ class AffineForms:
 
     def __mul__(self, other: Any) -> AffineForms:
         if isinstance(other, int | float):
-            return _rounded(self.v * other, self.r * abs(other), np.abs(self.v).sum(axis=0) * abs(other))
+            return _add_rounding(self.v * other, self.r * abs(other), np.abs(self.v).sum(axis=0) * abs(other))
         if not isinstance(other, AffineForms):
             k = np.asarray(other)
             size = np.abs(self.v).sum(axis=0)
-            return _rounded(self.v * k, self.r * np.abs(k) + _doubt(k) * (size + self.r), size * np.abs(k))
+            return _add_rounding(self.v * k, self.r * np.abs(k) + _doubt(k) * (size + self.r), size * np.abs(k))
         a, b = self.v, other.v
         v, both = a * b[0] + b * a[0], a[1:] * b[1:]
         # ε_k² is ½ ± ½, other products of two symbols are 0 ± 1
@@ -104,7 +104,7 @@ class AffineForms:
         """The values and a number that is known to ``doubt``."""
         v = self.v.copy()
         v[0] += term
-        return _rounded(v, self.r + doubt, np.abs(v[0]))
+        return _add_rounding(v, self.r + doubt, np.abs(v[0]))
 
     def inverse(self) -> AffineForms:
         """1 / value; not finite where the values may vanish."""
@@ -132,7 +132,7 @@ class AffineForms:
 
     def sum(self, axis: int = -1) -> AffineForms:
         """The sum along one of the last dimensions."""
-        return _rounded(self.v.sum(axis=axis), self.r.sum(axis=axis), np.abs(self.v).sum(axis=0).sum(axis=axis))
+        return _add_rounding(self.v.sum(axis=axis), self.r.sum(axis=axis), np.abs(self.v).sum(axis=0).sum(axis=axis))
 
     def sines(self) -> tuple[AffineForms, AffineForms]:
         """Sine and cosine."""
@@ -163,7 +163,7 @@ def affine(centre: Array, slopes: Array, radius: Array, bend: int | None = None)
     return AffineForms(np.ascontiguousarray(np.concatenate([centre[None], np.moveaxis(slopes, -1, 0)])), radius, bend)
 
 
-def stacked(parts: Sequence[Any], axis: int = -1) -> Any:
+def stack(parts: Sequence[Any], axis: int = -1) -> Any:
     """Numbers or forms put together along a new dimension, the last or (−2) the last but one."""
     like = next((each for each in parts if isinstance(each, AffineForms)), None)
     if like is None:
@@ -173,31 +173,31 @@ def stacked(parts: Sequence[Any], axis: int = -1) -> Any:
                        np.stack(np.broadcast_arrays(*(each.r for each in every)), axis=axis))
 
 
-def crossed(a: Any, b: Any) -> Any:
+def cross_product(a: Any, b: Any) -> Any:
     """a × b along the last dimension."""
     if not isinstance(a, AffineForms) and not isinstance(b, AffineForms):
         return cross(a, b)
     (a0, a1, a2), (b0, b1, b2) = ([x[..., k] for k in range(3)] for x in (a, b))
-    return stacked([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0])
+    return stack([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0])
 
 
-def dotted(a: Any, b: Any) -> Any:
+def dot_product(a: Any, b: Any) -> Any:
     """a · b along the last dimension."""
     return (a * b).sum(-1)
 
 
-def combined(Y: Array, forms: AffineForms) -> AffineForms:
+def combine(Y: Array, forms: AffineForms) -> AffineForms:
     """Y F for exact floats Y (c, p, k) and forms F (c, k) or (c, k, m)."""
     flat = forms.r.ndim == 2
     v, r = (forms.v[..., None], forms.r[..., None]) if flat else (forms.v, forms.r)
     size = np.abs(Y) @ np.abs(v).sum(axis=0)
-    found = _rounded(Y @ v, np.abs(Y) @ r, size * Y.shape[-1])
+    found = _add_rounding(Y @ v, np.abs(Y) @ r, size * Y.shape[-1])
     return AffineForms(found.v[..., 0], found.r[..., 0]) if flat else found
 
 
-def _rounded(v: Array, r: Array, size: Array) -> AffineForms:
+def _add_rounding(v: Array, r: Array, size: Array) -> AffineForms:
     """Forms with the rounding of numbers of a ``size`` added to their radius."""
-    return AffineForms(v, rounded(r, size))
+    return AffineForms(v, rounded_radius(r, size))
 
 
 def _doubt(k: Array) -> Array:
@@ -206,7 +206,7 @@ def _doubt(k: Array) -> Array:
     return np.where((size == 0) | (size == 1), 0.0, CHAIN_ROUNDING * (1 + size))
 
 
-def rounded(r: Numbers, size: Numbers) -> Numbers:
+def rounded_radius(r: Numbers, size: Numbers) -> Numbers:
     """A radius with the rounding of numbers of a ``size``."""
     return (r + AFFINE_ROUNDING * size) * (1 + AFFINE_ROUNDING)
 
@@ -221,13 +221,13 @@ def product_radius(a: Numbers, slopes_a: Numbers, r_a: Numbers, b: Numbers, slop
     """The radius of a product: of centres, sums of slopes' sizes, radii, and the sum of the sizes of products of slopes
     of the same symbol, half of which is in the centre."""
     size_a, size_b = abs(a) + slopes_a, abs(b) + slopes_b
-    return rounded(size_a * r_b + size_b * r_a + r_a * r_b + slopes_a * slopes_b - 0.5 * both, size_a * size_b)
+    return rounded_radius(size_a * r_b + size_b * r_a + r_a * r_b + slopes_a * slopes_b - 0.5 * both, size_a * size_b)
 
 
 def scaled_radius(size: Numbers, r: Numbers, factor: float, doubt: float) -> Numbers:
     """The radius of values, the sum of whose centre's and slopes' sizes is ``size``, times a number known to
     ``doubt``."""
-    return rounded(r * abs(factor) + doubt * (size + r), size * abs(factor))
+    return rounded_radius(r * abs(factor) + doubt * (size + r), size * abs(factor))
 
 
 def inverse_line(centre: Numbers, width: Numbers) -> tuple[Numbers, Numbers, Numbers, Numbers]:
@@ -252,7 +252,7 @@ def root_line(centre: Numbers, width: Numbers) -> tuple[Numbers, Numbers, Number
 
 def line_radius(r: Numbers, slope: Numbers, off: Numbers, size: Numbers, found: Numbers) -> Numbers:
     """The radius of slope · values + shift ± off, for results of a ``size``, and ``found`` of centre and slopes."""
-    return rounded(r * abs(slope) + off, 4 * (size + found))
+    return rounded_radius(r * abs(slope) + off, 4 * (size + found))
 
 
 def sine_line(value: Numbers, rate: Numbers, r: Numbers, w: Numbers, bent: bool) -> tuple[Numbers, Numbers, Numbers]:
@@ -261,7 +261,7 @@ def sine_line(value: Numbers, rate: Numbers, r: Numbers, w: Numbers, bent: bool)
     bend = w * w / 4
     along = value * bend
     r = abs(rate) * (r + w * w * w / 6)
-    return value * (1 - bend), along, rounded((r if bent else r + abs(along)) + AFFINE_ROUNDING, 1 + w)
+    return value * (1 - bend), along, rounded_radius((r if bent else r + abs(along)) + AFFINE_ROUNDING, 1 + w)
 
 
 def turned_sines(x: Numbers) -> tuple[Numbers, Numbers]:

@@ -17,7 +17,7 @@ Field = NDArray[Any]
 """Floats, or objects that are balls."""
 
 
-def normed(v: Field) -> Field:
+def unit_balls(v: Field) -> Field:
     """v / |v| along the last axis."""
     return np.asarray(v / np.sqrt(dot(v, v))[..., None])
 
@@ -47,13 +47,13 @@ def jets(boxes: Field) -> Field:
     return found
 
 
-def centred(middle: Field, jet: Field, reach: Field) -> Field:
+def mean_value_form(middle: Field, jet: Field, reach: Field) -> Field:
     """Mean value form: f(m) + f'(X) (X − m) encloses f on the balls X, for f at the middles m, jets of f, and X − m."""
     slopes = np.array([x[1] for x in jet.flat], dtype=object).reshape(jet.shape)
     return np.asarray(middle + (slopes.T * reach).T)
 
 
-def widened(v: Field, radius: float) -> Field:
+def widen(v: Field, radius: float) -> Field:
     """Balls with a larger radius; floats as they are."""
     if v.dtype != object:
         return v

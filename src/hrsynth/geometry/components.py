@@ -59,12 +59,12 @@ def minus(a: Components, b: Components) -> list[Any]:
     return [x - y for x, y in zip(a, b, strict=True)]
 
 
-def scaled(factor: Any, a: Components) -> list[Any]:
+def scale(factor: Any, a: Components) -> list[Any]:
     """The vector times a number."""
     return [factor * x for x in a]
 
 
-def normalised(a: Components) -> list[Any]:
+def normalise(a: Components) -> list[Any]:
     """a / |a|."""
     size = sqrt(dot(a, a))
     return [x / size for x in a]
@@ -74,12 +74,12 @@ def combination(x: Components, ways: NDArray[Any], number: Callable[[Any], Any])
     """Σ x_i w_i of the columns w_i of ``ways``, which ``number`` makes components."""
     found: Components = [0.0, 0.0, 0.0]
     for i, (each, way) in enumerate(zip(x, ways.T, strict=True)):
-        part = scaled(each, number(way))
+        part = scale(each, number(way))
         found = plus(found, part) if i else part
     return found
 
 
-def transformed(R: Components, b: Components) -> list[Any]:
+def transform_vector(R: Components, b: Components) -> list[Any]:
     """R b of a matrix given by its nine entries, row by row."""
     return [dot(R[3 * i : 3 * i + 3], b) for i in range(3)]
 
@@ -87,12 +87,12 @@ def transformed(R: Components, b: Components) -> list[Any]:
 def cayley(gamma: Components, v: Components) -> list[Any]:
     """v turned by tan(θ/2) = |γ| about γ: v + 2 (γ × v + γ × (γ × v)) / (1 + γ·γ)."""
     w = cross(gamma, v)
-    return plus(v, scaled(2.0 / (dot(gamma, gamma) + 1.0), plus(w, cross(gamma, w))))
+    return plus(v, scale(2.0 / (dot(gamma, gamma) + 1.0), plus(w, cross(gamma, w))))
 
 
 def spin(gamma: Components, rate: Components, one_axis: bool) -> list[Any]:
     """Angular velocity 2 (γ̇ + γ × γ̇) / (1 + γ·γ) of what γ turns (:func:`cayley`), γ × γ̇ = 0 about one axis."""
-    return scaled(2.0 / (dot(gamma, gamma) + 1.0), rate if one_axis else plus(rate, cross(gamma, rate)))
+    return scale(2.0 / (dot(gamma, gamma) + 1.0), rate if one_axis else plus(rate, cross(gamma, rate)))
 
 
 def times(B: Components, w: Components) -> list[Any]:
@@ -105,5 +105,5 @@ def tangents(v: Components) -> tuple[list[Any], list[Any]]:
     """Two unit vectors that make a right-handed triad with a unit vector."""
     x, y, z = v
     flat = abs(z) < 0.7
-    e = normalised([where(flat, -y, 0.0), where(flat, x, -z), where(flat, 0.0, y)])
+    e = normalise([where(flat, -y, 0.0), where(flat, x, -z), where(flat, 0.0, y)])
     return e, cross(v, e)

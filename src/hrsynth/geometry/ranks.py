@@ -54,7 +54,7 @@ def rank_of(singular_values: Array, scale: float | None = None, cutoff: float = 
     return Rank(kept, last / dropped, last / largest)
 
 
-def decomposed(matrix: Array, full_matrices: bool = False) -> tuple[Array, Array, Array]:
+def singular_decomposition(matrix: Array, full_matrices: bool = False) -> tuple[Array, Array, Array]:
     """U, s, Vᵀ of a matrix (rows, columns). LAPACK's divide and conquer gives up on some matrices with many equal
     singular values; QR iteration, which is slower, does these."""
     try:
@@ -69,13 +69,13 @@ def decomposed(matrix: Array, full_matrices: bool = False) -> tuple[Array, Array
 
 
 def decomposed_together(matrices: Sequence[Array], full_matrices: bool = False) -> list[tuple[Array, Array, Array]]:
-    """:func:`decomposed` of several matrices, those of one shape in one call: the same digits."""
+    """:func:`singular_decomposition` of several matrices, those of one shape in one call: the same digits."""
     if len({matrix.shape for matrix in matrices}) == 1:
         try:
             return list(zip(*np.linalg.svd(np.array(matrices), full_matrices=full_matrices), strict=True))
         except np.linalg.LinAlgError:
             pass
-    return [decomposed(matrix, full_matrices) for matrix in matrices]
+    return [singular_decomposition(matrix, full_matrices) for matrix in matrices]
 
 
 def range_basis(matrix: Array, scale: float | None = None) -> tuple[Array, Rank]:

@@ -24,7 +24,7 @@ def frozen(values: ArrayLike) -> Array:
     return array
 
 
-def scaled(vector: Numbers) -> tuple[Numbers, int]:
+def whole_multiple(vector: Numbers) -> tuple[Numbers, int]:
     """The first multiple of a rational vector that has whole entries, and how many times it is taken."""
     scale = lcm(*(int(x.q) for x in vector))
     return np.array([x.p * (scale // x.q) for x in vector], dtype=object), scale
@@ -39,7 +39,7 @@ def unit(vector: ArrayLike) -> Array:
     return array / length
 
 
-def oriented(axis: Array) -> Array:
+def orient_axis(axis: Array) -> Array:
     """An axis (3,) in the one sense in which axes are told: its largest component positive, of equal ones the first."""
     sizes = np.abs(axis)
     return axis if axis[np.argmax(sizes > (1 - NAMED) * sizes.max())] >= 0 else -axis
@@ -77,7 +77,7 @@ def times(M: Any, v: Any) -> Array:
     return np.asarray((M @ v[..., None])[..., 0])
 
 
-def solved(A: Array, B: Array) -> Array:
+def solve_definite(A: Array, B: Array) -> Array:
     """A⁻¹ B (n, d, k) of many small positive definite A (n, d, d): Gauss-Jordan elimination of all at once; LAPACK
     takes a call for each."""
     d = A.shape[1]
@@ -167,7 +167,7 @@ def plane_axes(normal: Array, near: ArrayLike | None = None) -> Array:
     return np.array([first, cross(normal, first)])
 
 
-def nested(values: Array) -> list[Any]:
+def nested_lists(values: Array) -> list[Any]:
     """Nested lists of numbers, None where they are not finite."""
     found = values.astype(object)
     found[~np.isfinite(values)] = None

@@ -142,7 +142,7 @@ class Signature:
     def of(cls, found: Relation) -> Signature:
         """The signature that ρ shows at one configuration."""
         turns, *turning = turns_of(found)
-        chosen = _chosen(found.sizes)
+        chosen = _choose_rows(found.sizes)
         rates = found.rates * chosen[:, :, None]
         twists = np.broadcast_to(found.twist_part, (len(chosen), *found.twist_part.shape))
         lost = [singular_values(each) for each in (np.concatenate([twists, rates], axis=1), rates)]
@@ -207,7 +207,7 @@ def sets_of(count: int) -> tuple[tuple[int, ...], ...]:
 
 
 @lru_cache(maxsize=64)
-def _chosen(sizes: tuple[int, ...]) -> Array:
+def _choose_rows(sizes: tuple[int, ...]) -> Array:
     """1 in the rows of the rates that belong to each set, (sets, rows)."""
     owner = np.repeat(np.arange(len(sizes)), sizes)
     sets = [np.isin(owner, places) for places in sets_of(len(sizes))]

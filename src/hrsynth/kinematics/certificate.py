@@ -94,16 +94,16 @@ def certify(samples: Samples, hidden: Mechanism, *, count: int | None = None, bo
         return verdict(f"not assembled at the zero configuration (loop {twin.worst_loop(twin.q0)[0]!r} misses)")
     ways = [[target if not blind else target.of(lambda o: o.link not in blind) for target in member.way]
             for member in members]
-    followed = _followed(twin, ways if complete else [way[::-2][::-1] for way in ways])
+    followed = _follow_ways(twin, ways if complete else [way[::-2][::-1] for way in ways])
     start_target = question.target(samples.start).of(lambda o: o.link not in blind)
     for denser in (1, CLOSER):
-        missed = [i for i, led in enumerate(followed) if not _arrived(led)]
+        missed = [i for i, led in enumerate(followed) if not _has_arrived(led)]
         again = [_between([start_target, *ways[i]], denser) for i in missed]
-        for i, led in zip(missed, _followed(twin, again), strict=True):
+        for i, led in zip(missed, _follow_ways(twin, again), strict=True):
             followed[i] = led
     arrived = list[Array]()
     for led in followed:
-        if isinstance(led, NotMeasured) or not _arrived(led):
+        if isinstance(led, NotMeasured) or not _has_arrived(led):
             break
         arrived.append(led[0])
     if kept:
@@ -144,7 +144,7 @@ Led = tuple[Array, float] | NotMeasured
 """Where a robot was led to, and by how much it misses; or what cannot be measured on the way."""
 
 
-def _followed(twin: PinocchioModel, ways: Sequence[Sequence[Target]]) -> list[Led]:
+def _follow_ways(twin: PinocchioModel, ways: Sequence[Sequence[Target]]) -> list[Led]:
     return list(track_paths(twin, ways)) if ways else []
 
 
@@ -153,7 +153,7 @@ def _between(way: Sequence[Target], parts: int) -> list[Target]:
     return [one.between(other, part / parts) for one, other in pairwise(way) for part in range(1, parts + 1)]
 
 
-def _arrived(led: Led) -> bool:
+def _has_arrived(led: Led) -> bool:
     return not isinstance(led, NotMeasured) and led[1] <= FOLLOWED
 
 

@@ -125,22 +125,22 @@ def _closures(way: Sequence[Part], end: LegEnd) -> Closures:
     far = [last.point] if last.axis is None else [last.point, last.point + end.length * last.axis]
     targets = [end.target(x) for x in far]
     if len(way) == 2 or moving is not None:
-        laws = [law for x, T in zip(far, targets, strict=True) for law in _kept(first, moving, last, x, T, end)]
-        return _solved(laws, first, moving, far[0], targets[0], end)
+        laws = [law for x, T in zip(far, targets, strict=True) for law in _kept_laws(first, moving, last, x, T, end)]
+        return _solve_laws(laws, first, moving, far[0], targets[0], end)
     B = way[1].point
     rods = [_square(end.ball(B) - x) for x in far]
     if first.axis is not None:
         words = f"the rod from {_name(way[1])} to {_name(last)} is {{sought}} long, {{span}} would do"
         laws = [_distance(first, end.ball(B), T, rod, words) for T, rod in zip(targets, rods, strict=True)]
         # seen from the first part, the rod's far end must be where the U between them can bring it
-        return _solved(laws, None, first, B, targets[0], end, lambda q: _tilted(
+        return _solve_laws(laws, None, first, B, targets[0], end, lambda q: _tilt_misses(
             way[1], end.ball(far[0]), first.moved(targets[0], -q)))
     if last.axis is not None:
         return UNDECIDED
     # two rods between three centres: |AB| − |BC| ≤ |AC| ≤ |AB| + |BC|
     reach, one, other = (_root(_square(v)) for v in (targets[0] - first.point, end.ball(B) - first.point,
                                                      end.ball(B) - far[0]))
-    return Closures(_missed(abs(one - other), one + other, reach, _far(first, last)))
+    return Closures(_miss_outside(abs(one - other), one + other, reach, _far(first, last)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,8 +168,8 @@ class _Law:
     def missed(self, low: Any, high: Any | None) -> Miss | None:
         """The proof that what is wanted lies outside of an interval of the left side (None: no upper bound)."""
         if self.squared:
-            return _missed(_root(low), None if high is None else _root(high), _root(self.wanted), self.words)
-        return _missed(low, high, self.wanted, self.words)
+            return _miss_outside(_root(low), None if high is None else _root(high), _root(self.wanted), self.words)
+        return _miss_outside(low, high, self.wanted, self.words)
 
     def miss(self) -> Miss | None:
         """The proof that no q does, where there is one."""
@@ -197,7 +197,7 @@ class _Law:
         return [half - self.alpha / 2, -half - self.alpha / 2]
 
 
-def _kept(first: Part, moving: Part | None, last: Part, x: Array, target: Field, end: LegEnd) -> list[_Law]:
+def _kept_laws(first: Part, moving: Part | None, last: Part, x: Array, target: Field, end: LegEnd) -> list[_Law]:
     """What the first part keeps of a point x of the last that ``moving`` moves to the target."""
     if first.axis is not None and first.slides:
         words = f"{_name(last)} would be at {{sought}} across the rail {_name(first)}, and reaches {{span}}"
@@ -234,7 +234,7 @@ def _height(moving: Part | None, x: Field, n: Array, target: Field, words: str, 
     return _Law(_dot(centre - A, n), _dot(v, n), _dot(w, n), wanted, True, False, words)
 
 
-def _solved(laws: Sequence[_Law], first: Part | None, moving: Part | None, x: Array, target: Field, end: LegEnd,
+def _solve_laws(laws: Sequence[_Law], first: Part | None, moving: Part | None, x: Array, target: Field, end: LegEnd,
             more: Callable[[Any], list[Miss]] = lambda q: []) -> Closures:
     """All values of the moving part by laws that hold together and by what ``more`` refuses, and of the first part's
     joint with each."""
@@ -246,18 +246,18 @@ def _solved(laws: Sequence[_Law], first: Part | None, moving: Part | None, x: Ar
         return UNDECIDED
     sharpest = min(lists, key=lambda roots: max(float(root.rad()) for root in roots))
     failed = [[miss for law in laws if (miss := law.missed(law.at(q), law.at(q))) is not None]
-              + _tilted(first, moving.moved(end.ball(x), q), target) + more(q) for q in sharpest]
+              + _tilt_misses(first, moving.moved(end.ball(x), q), target) + more(q) for q in sharpest]
     values = tuple(q for q, missed in zip(sharpest, failed, strict=True) if not missed)
     if not values:
         worst = [max(missed, key=lambda miss: miss.by) for missed in failed]
         return Closures(min(worst, key=lambda miss: miss.by))
     found = [] if moving.joint is None else [(moving.joint, values)]
     if first is not None and first.joint is not None:
-        found.append((first.joint, tuple(_carried(first, moving.moved(end.ball(x), q), target) for q in values)))
+        found.append((first.joint, tuple(_carrying_value(first, moving.moved(end.ball(x), q), target) for q in values)))
     return Closures(None, tuple(found))
 
 
-def _tilted(first: Part | None, x: Field, target: Field) -> list[Miss]:
+def _tilt_misses(first: Part | None, x: Field, target: Field) -> list[Miss]:
     """The proof that a U cannot bring x to the target: of what a turn about its second axis makes of x, the height
     along the first must be the target's."""
     if first is None or first.pair is None:
@@ -268,7 +268,7 @@ def _tilted(first: Part | None, x: Field, target: Field) -> list[Miss]:
     return [] if miss is None else [miss]
 
 
-def _carried(first: Part, x: Field, target: Field) -> Any:
+def _carrying_value(first: Part, x: Field, target: Field) -> Any:
     """The value with which a part brings x to the target."""
     from flint import arb
 
@@ -280,7 +280,7 @@ def _carried(first: Part, x: Field, target: Field) -> Any:
     return arb.atan2(sine, cosine) if cosine > 0 else arb.pi() + arb.atan2(-sine, -cosine)
 
 
-def _missed(low: Any, high: Any | None, wanted: Any, words: str) -> Miss | None:
+def _miss_outside(low: Any, high: Any | None, wanted: Any, words: str) -> Miss | None:
     """The proof that a ball lies outside of an interval between balls; ``words`` have places for both."""
     by = max(float((low - wanted).lower()), -1.0 if high is None else float((wanted - high).lower()))
     if not by > 0:

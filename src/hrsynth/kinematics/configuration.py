@@ -80,7 +80,7 @@ def measure(twin: PinocchioModel, q: Array, reference: str, observations: Sequen
     last = twin.measured
     if last is not None and last[1] is q and last[0] == asked:
         return last[2]
-    names, whole, groups = _grouped(*asked)
+    names, whole, groups = _group_links(*asked)
     X, V = twin.frames(q, names, whole)
     metric = V
     if not all(group.kind.turns_only for group in groups):
@@ -109,7 +109,7 @@ def measure_together(twin: PinocchioModel, places: Sequence[Array], reference: s
                      links: Sequence[str] = ()) -> tuple[Array, Array, Array, Array, Array, Array]:
     """At several configurations the loops' residuals (n, rows) and Jacobians (n, rows, nv), and what :func:`measure`
     gives there: (n, k, 4, 4), (n, k, 6, nv), all values (n, size) and rates (n, size, nv)."""
-    names, whole, groups = _grouped(reference, tuple(observations), tuple(links))
+    names, whole, groups = _group_links(reference, tuple(observations), tuple(links))
     errors, loops, X, V = twin.states(places, names, whole)
     metric = V
     if not all(group.kind.turns_only for group in groups):
@@ -143,7 +143,7 @@ class _AlikeObservations:
 
 
 @lru_cache(maxsize=512)
-def _grouped(reference: str, observations: tuple[Observation, ...], links: tuple[str, ...]
+def _group_links(reference: str, observations: tuple[Observation, ...], links: tuple[str, ...]
              ) -> tuple[tuple[str, ...], int, list[_AlikeObservations]]:
     """All links that matter, ``links`` first, how many of them whose points' velocities matter too, and the
     observations that are evaluated together."""

@@ -15,7 +15,7 @@ import numpy as np
 from ..budgets import SLIDER_PART
 from ..geometry.screws import point_velocity
 from ..geometry.so3 import logarithm, logarithm_rate, turn_about, wrap_angle
-from ..geometry.vectors import Array, oriented
+from ..geometry.vectors import Array, orient_axis
 from ..results import Value
 from ..tolerances import NO_SLIDER, SAME_DIRECTION
 from .configuration import ClosedConfiguration
@@ -135,4 +135,4 @@ class Coordinates(Value):
 
 def _axis(motion: PlatformMotion) -> Array:
     """The one axis about which a platform turns, (3,), with the sense of phi where that turns about it."""
-    return oriented(motion.rotations[:, 0])
+    return orient_axis(motion.rotations[:, 0])

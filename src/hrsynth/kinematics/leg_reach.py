@@ -120,7 +120,7 @@ def _miss(twin: PinocchioModel, motion: PlatformMotion, goal: Goal) -> Array:
     at = ClosedConfiguration.of(twin, twin.q0, FOLLOWED)
     X, manner = at.pose(motion.link), motion.manner()
     for number in range(1, WAY + 1):
-        at = _approached(at, goal.towards(X, number / WAY), manner, 200 if number == WAY else 10)
+        at = _approach(at, goal.towards(X, number / WAY), manner, 200 if number == WAY else 10)
     least = goal.rows(twin, at.q)[0]
     rng = np.random.default_rng(0)
     for _ in range(ASIDE):
@@ -128,12 +128,12 @@ def _miss(twin: PinocchioModel, motion: PlatformMotion, goal: Goal) -> Array:
             break
         q, residual = solve(twin, twin.moved(at.q, rng.uniform(-1, 1, twin.nv)), manner, tolerance=SOLVED)
         if residual <= CLOSED:
-            found = _approached(ClosedConfiguration.of(twin, q), goal, manner, 200, float(np.linalg.norm(least)))
+            found = _approach(ClosedConfiguration.of(twin, q), goal, manner, 200, float(np.linalg.norm(least)))
             least = min(least, goal.rows(twin, found.q)[0], key=lambda error: float(np.linalg.norm(error)))
     return least
 
 
-def _approached(at: ClosedConfiguration, goal: Goal, manner: Goal, iterations: int, known: float = np.inf
+def _approach(at: ClosedConfiguration, goal: Goal, manner: Goal, iterations: int, known: float = np.inf
                 ) -> ClosedConfiguration:
     """Minimise a goal's error with the loops closed and ``manner`` kept: damped Gauss-Newton in the tangent space;
     given up where the error will not fall below the one that is ``known``."""

@@ -89,10 +89,10 @@ def outside(twin: PinocchioModel, q: Array, joints: Sequence[str] | None = None)
     joints = [*twin.mechanism.joints] if joints is None else joints
     return ([name for name in wrists_beyond(twin, q) if name in joints]
             + [name for name in joints
-               if name in values and excluded(twin.mechanism, name, values[name], values[name])])
+               if name in values and is_excluded(twin.mechanism, name, values[name], values[name])])
 
 
-def excluded(mechanism: Mechanism, joint: str, low: float, high: float) -> bool:
+def is_excluded(mechanism: Mechanism, joint: str, low: float, high: float) -> bool:
     """Whether no coordinate from ``low`` to ``high`` is within a joint's limits, turns modulo 2π."""
     if joint not in mechanism.limited:
         return False
@@ -106,7 +106,7 @@ def excluded(mechanism: Mechanism, joint: str, low: float, high: float) -> bool:
 
 def all_excluded(mechanism: Mechanism, joint: str, values: Sequence[Any]) -> bool:
     """Whether all values of a list, as balls, are outside a joint's limits."""
-    return all(value.is_finite() and excluded(mechanism, joint, float(value.lower()), float(value.upper()))
+    return all(value.is_finite() and is_excluded(mechanism, joint, float(value.lower()), float(value.upper()))
                for value in values)
 
 

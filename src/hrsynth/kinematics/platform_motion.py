@@ -14,8 +14,8 @@ from ..errors import BadRequest
 from ..geometry.ranks import space_basis
 from ..geometry.screws import point_velocity
 from ..geometry.so3 import between, exponential, logarithm, turn_about, wrap_angle
-from ..geometry.vectors import Array, oriented, transform
-from ..mechanism.pose import RADIANS, Pose, PoseForm, positive_half_turn, written
+from ..geometry.vectors import Array, orient_axis, transform
+from ..mechanism.pose import RADIANS, Pose, PoseForm, positive_half_turn, write_parts
 from ..results import Value
 from ..tolerances import AS_PRINTED, RANK_CUTOFF
 from .configuration import ClosedConfiguration
@@ -140,7 +140,7 @@ class PlatformMotion(Value):
         normal = self.rotations[:, 0]
         if np.linalg.norm(normal @ self.translations) > RANK_CUTOFF:
             return np.array([0.0, 0.0, 1.0])
-        return oriented(normal)
+        return orient_axis(normal)
 
     @property
     def planar(self) -> bool:
@@ -186,7 +186,7 @@ class PlatformMotion(Value):
         if (self.form.phi or self.turns_once) and np.linalg.norm(turn @ self.normal - self.normal) <= AS_PRINTED:
             parts["phi"] = (positive_half_turn(turn_about(self.normal, turn)[0]),)
             del parts["rpy"]
-        return replace(found, shown=written(parts, self.form.degrees or "phi" in parts))
+        return replace(found, shown=write_parts(parts, self.form.degrees or "phi" in parts))
 
     def goal(self, pose: Pose, robot: str = "the robot") -> Goal:
         """The goal that a pose asks for; raises ``BadRequest`` for parts that the platform cannot change."""

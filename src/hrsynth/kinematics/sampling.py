@@ -46,7 +46,7 @@ from .sampled_mode import (
     ways_out,
     well_closed,
 )
-from .tasks import Places, Target, shortened, solve_together
+from .tasks import Places, Target, shorten_step, solve_together
 from .tracking import track_paths
 from .walking import HALVED, STEP, WEAKEST, any_velocity, lands_beside, step_along
 
@@ -159,7 +159,7 @@ class _Stride:
 
     def tangent(self) -> Array:
         """The next part of it, (nv,)."""
-        return self.part * shortened(STEP * self.velocity, 3 * STEP)
+        return self.part * shorten_step(STEP * self.velocity, 3 * STEP)
 
     def on(self, basis: Array) -> Array:
         """Its direction in a basis of (t, u̇)."""
@@ -213,13 +213,13 @@ class _Walks:
                                         if (there := step_along(walker.here, idly, part)) is not None), walker.here)
             walkers = self._step(walkers)
             passed = [(walker, at) for walker in walkers for at in walker.passed]
-            targets = _measured(question.targets, [at for _, at in passed])
+            targets = _measure_all(question.targets, [at for _, at in passed])
             for (walker, _), target in zip(passed, targets, strict=True):
                 walker.way.append(target)
             walkers = [walker for walker in walkers if None not in walker.way]
         steady = [(at, [each for each in walker.way if each is not None]) for walker in walkers
                   if (at := well_closed(walker.here)) is not None]
-        found = _measured(lambda at: relations(at, question, question.rows_together(at)), [at for at, _ in steady])
+        found = _measure_all(lambda at: relations(at, question, question.rows_together(at)), [at for at, _ in steady])
         return [Sample(at, tuple(way), each) for (at, way), each in zip(steady, found, strict=True)
                 if each is not None and each.gap >= RANK_GAP]
 
@@ -253,7 +253,7 @@ class _Walks:
                     ) -> list[tuple[Array, Array] | None]:
         """A joint velocity without idle motion at each configuration, whose (t, u̇) is a unit vector, and this vector:
         along what its aim makes of a basis; None where nothing moves so."""
-        rows = _measured(self.question.rows_together, here)
+        rows = _measure_all(self.question.rows_together, here)
         images = {i: moved @ here[i].kernel()[0] for i, moved in enumerate(rows) if moved is not None}
         found: list[tuple[Array, Array] | None] = [None] * len(here)
         for (i, image), (basis, rank) in zip(images.items(), range_bases(list(images.values()), 1.0), strict=True):
@@ -307,10 +307,10 @@ class _Walks:
         return found
 
 
-def _measured(ask: Callable[[list[ClosedConfiguration]], Iterable[X]], places: Sequence[ClosedConfiguration]
+def _measure_all(ask: Callable[[list[ClosedConfiguration]], Iterable[X]], places: Sequence[ClosedConfiguration]
               ) -> list[X | None]:
     """What is asked of several configurations together; None at those where it cannot be measured."""
     try:
         return list(ask(list(places))) if places else []
     except NotMeasured:
-        return [None] if len(places) == 1 else [each for place in places for each in _measured(ask, [place])]
+        return [None] if len(places) == 1 else [each for place in places for each in _measure_all(ask, [place])]

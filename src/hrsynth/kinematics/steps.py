@@ -16,7 +16,7 @@ from .configuration import ClosedConfiguration
 from .limits import wrists_beyond
 from .pinocchio_model import PinocchioModel
 from .platform_motion import Goal, PlatformMotion
-from .tasks import GuidedTask, Task, shortened, solve, system
+from .tasks import GuidedTask, Task, shorten_step, solve, system
 
 STRIDE = 0.1
 """Longest step along the way to a pose (characteristic lengths, radians)."""
@@ -37,8 +37,8 @@ def track(here: ClosedConfiguration, motion: PlatformMotion, goal: GuidedTask,
     error, rows = goal.rows(here.twin, here.q)
     longest = 1 / max(1, int(np.ceil(np.linalg.norm(error) / STRIDE)))
     if are_dependent(here, rows):
-        here = _eased(here, goal, X, longest)
-        there = _stepped(here, goal, home)
+        here = _ease_towards(here, goal, X, longest)
+        there = _step_to(here, goal, home)
         miss = float(np.linalg.norm(goal.rows(here.twin, here.q)[0]))
         if there is None and miss <= AS_PRINTED:
             there = here
@@ -48,7 +48,7 @@ def track(here: ClosedConfiguration, motion: PlatformMotion, goal: GuidedTask,
     while came < 1:
         ahead = min(1.0, came + step)
         ahead = 1.0 if ahead > 1 - SOLVED else ahead
-        there = _stepped(here, goal.towards(X, ahead), home, last=ahead == 1)
+        there = _step_to(here, goal.towards(X, ahead), home, last=ahead == 1)
         if there is not None:
             here, came, step = there, ahead, min(longest, 2 * step)
         elif step < longest * 0.5**halvings:
@@ -63,7 +63,7 @@ def are_dependent(here: ClosedConfiguration, rows: Array) -> bool:
     return range_basis(rows @ here.kernel()[0], 1.0)[1].value < len(rows)
 
 
-def led(here: ClosedConfiguration, motion: PlatformMotion, goal: Goal, last: bool
+def lead_to(here: ClosedConfiguration, motion: PlatformMotion, goal: Goal, last: bool
              ) -> tuple[ClosedConfiguration, bool]:
     """The configuration at a goal of the whole pose nearby, and whether it was reached: where parts of the pose depend
     on each other the nearest one, which is to be the goal's only at the ``last``."""
@@ -77,10 +77,10 @@ def led(here: ClosedConfiguration, motion: PlatformMotion, goal: Goal, last: boo
 def approach(here: ClosedConfiguration, goal: Goal, easing: int = EASING) -> ClosedConfiguration:
     """As near to a goal as small steps with closed loops come, whether the platform can be there or not."""
     error = float(np.linalg.norm(goal.rows(here.twin, here.q)[0]))
-    return _eased(here, goal, here.pose(goal.link), 1 / max(1, int(np.ceil(error / STRIDE))), easing)
+    return _ease_towards(here, goal, here.pose(goal.link), 1 / max(1, int(np.ceil(error / STRIDE))), easing)
 
 
-def _eased(here: ClosedConfiguration, goal: GuidedTask, X: Array, stride: float, easing: int = EASING
+def _ease_towards(here: ClosedConfiguration, goal: GuidedTask, X: Array, stride: float, easing: int = EASING
            ) -> ClosedConfiguration:
     """As near as steps with closed loops come to a goal of more parts than the platform has freedoms: the straight way
     from the pose X need not be one that it can go."""
@@ -95,7 +95,7 @@ def _eased(here: ClosedConfiguration, goal: GuidedTask, X: Array, stride: float,
     return here
 
 
-def _stepped(here: ClosedConfiguration, goal: GuidedTask, home: Goal, last: bool = True) -> ClosedConfiguration | None:
+def _step_to(here: ClosedConfiguration, goal: GuidedTask, home: Goal, last: bool = True) -> ClosedConfiguration | None:
     """The configuration at a goal nearby, moved towards ``home`` where parts are free; None where it jumps or lies
     beyond a fold, in another working mode, or on one and is not the ``last``."""
     twin = here.twin
@@ -103,7 +103,7 @@ def _stepped(here: ClosedConfiguration, goal: GuidedTask, home: Goal, last: bool
     step = np.asarray(np.linalg.lstsq(rows, -error, rcond=RANK_CUTOFF)[0])
     if np.max(np.abs(step), initial=0.0) > LONGEST_STEP:
         return None
-    there = _corrected(here, step, goal)
+    there = _correct_step(here, step, goal)
     if there is None or _beyond(rows, system(twin, there.q, goal)[1], last):
         return None
     return _drawn_home(there, goal, home, 1)
@@ -122,7 +122,7 @@ def _beyond(before: Array, after: Array, last: bool) -> bool:
     return not is_folded if last else is_folded and not was
 
 
-def _corrected(here: ClosedConfiguration, step: Array, goal: GuidedTask | None) -> ClosedConfiguration | None:
+def _correct_step(here: ClosedConfiguration, step: Array, goal: GuidedTask | None) -> ClosedConfiguration | None:
     """The closed configuration at the goal after a step; None where there is none, the correction is a jump, the step
     does not follow the branch, or a wrist cannot make the turn."""
     twin = here.twin
@@ -140,7 +140,7 @@ def nearest(here: ClosedConfiguration, goal: GuidedTask, home: Goal) -> ClosedCo
     loops are closed as well as floating point can; ``here`` itself where the goal is met but for its printed digits."""
     if np.linalg.norm(goal.rows(here.twin, here.q)[0]) > SOLVED:
         return here
-    return polished(_drawn_home(here, goal, home, 100), goal)
+    return polish(_drawn_home(here, goal, home, 100), goal)
 
 
 def _drawn_home(here: ClosedConfiguration, goal: GuidedTask, home: Goal, iterations: int) -> ClosedConfiguration:
@@ -166,14 +166,14 @@ def _nearer(here: ClosedConfiguration, task: Task, held: GuidedTask | None, cuto
     free = rows @ kernel
     if np.linalg.norm(error @ free) <= least:
         return
-    step = shortened(kernel @ np.linalg.lstsq(free, -error, rcond=cutoff)[0], longest)
+    step = shorten_step(kernel @ np.linalg.lstsq(free, -error, rcond=cutoff)[0], longest)
     for part in (1.0, 0.5, 0.25, 0.1, 0.02):
-        there = _corrected(here, part * step, held)
+        there = _correct_step(here, part * step, held)
         if there is not None:
             yield there
 
 
-def polished(here: ClosedConfiguration, goal: GuidedTask) -> ClosedConfiguration:
+def polish(here: ClosedConfiguration, goal: GuidedTask) -> ClosedConfiguration:
     """Newton steps of minimum norm until the residual no longer falls: on the edge of the workspace a configuration
     is only as exact as the square root of its residual."""
     twin, q = here.twin, here.q

@@ -145,7 +145,7 @@ def solve(twin: PinocchioModel, q: Array, task: Task | None = None, *, tolerance
     def advance(q: Array, at: Residual, factor: float) -> Array:
         normal = at.J.T @ at.J
         normal.reshape(-1)[:: twin.nv + 1] += max(factor * at.size**2, 1e-14)
-        return twin.moved(q, shortened(_damped(normal, -(at.J.T @ at.error)), 0.5))
+        return twin.moved(q, shorten_step(_damped_step(normal, -(at.J.T @ at.error)), 0.5))
 
     q, left = descend(q, lambda q: system(twin, q, task), advance, DAMPING, iterations,
                       lambda at: at.size <= tolerance)
@@ -170,16 +170,16 @@ def solve_together(places: Places, starts: Sequence[Array], targets: Sequence[Ta
         try:
             steps = np.linalg.solve(normal, wanted)[:, :, 0]
         except np.linalg.LinAlgError:
-            steps = np.array([_damped(*each) for each in zip(normal, wanted[:, :, 0], strict=True)])
+            steps = np.array([_damped_step(*each) for each in zip(normal, wanted[:, :, 0], strict=True)])
         longest = np.abs(steps).max(axis=1, initial=0.0).tolist()
-        return {i: twin.moved(q, step if size <= 0.5 else shortened(step, 0.5))
+        return {i: twin.moved(q, step if size <= 0.5 else shorten_step(step, 0.5))
                 for (i, (q, _, _)), step, size in zip(going.items(), steps, longest, strict=True)}
 
     return [(q, left.size) for q, left in descend_together(
         starts, evaluate, advance, DAMPING, iterations, lambda at: at.size <= tolerance)]
 
 
-def _damped(normal: Array, wanted: Array) -> Array:
+def _damped_step(normal: Array, wanted: Array) -> Array:
     """The step of damped normal equations."""
     try:
         return np.asarray(np.linalg.solve(normal, wanted), dtype=float)
@@ -234,7 +234,7 @@ class Places:
         return loops, np.concatenate([J, V, rates], axis=1), X, values
 
 
-def shortened(step: Array, longest: float) -> Array:
+def shorten_step(step: Array, longest: float) -> Array:
     """A step (nv,), shortened where a coordinate would change by more than ``longest``."""
     largest = float(np.abs(step).max(initial=0.0))
     return step * (longest / largest) if largest > longest else step

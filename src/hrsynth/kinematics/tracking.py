@@ -16,7 +16,7 @@ def track_paths(twin: PinocchioModel, ways: Sequence[Sequence[Target]], iteratio
     """The configurations a twin reaches when it is led from its zero configuration along ways, and the residuals, or
     what cannot be measured on a way; all ways in step, or each alone where that is so of one."""
     try:
-        yield from _tracked(twin, ways, iterations)
+        yield from _track_ways(twin, ways, iterations)
     except NotMeasured as error:
         for way in ways if len(ways) > 1 else ():
             yield from track_paths(twin, [way], iterations)
@@ -24,7 +24,7 @@ def track_paths(twin: PinocchioModel, ways: Sequence[Sequence[Target]], iteratio
             yield error
 
 
-def _tracked(twin: PinocchioModel, ways: Sequence[Sequence[Target]], iterations: int) -> list[tuple[Array, float]]:
+def _track_ways(twin: PinocchioModel, ways: Sequence[Sequence[Target]], iterations: int) -> list[tuple[Array, float]]:
     longest = max(map(len, ways))  # a shorter way ends with its last target, again and again
     found, stages = [(twin.q0, 0.0)] * len(ways), list(zip(*(
         [*way, *[way[-1]] * (longest - len(way))] for way in ways), strict=True))

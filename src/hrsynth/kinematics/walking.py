@@ -12,7 +12,7 @@ from ..geometry.vectors import Array
 from ..tolerances import CLOSED, SOLVED
 from .branch import CORRECTED, follows
 from .configuration import ClosedConfiguration
-from .tasks import shortened, solve
+from .tasks import shorten_step, solve
 
 STEP = 0.11
 """Length of a step: the norm of (t, u̇), in characteristic lengths and radians."""
@@ -26,7 +26,7 @@ def step_along(here: ClosedConfiguration, velocity: Array, part: float = 1.0, *,
            ) -> ClosedConfiguration | None:
     """The configuration a ``part`` of a step along ``velocity`` leads to; None where it does not close near its
     prediction, or does not follow the branch. ``leaving`` a singular configuration, any branch will do."""
-    step = part * shortened(STEP * velocity, 3 * STEP)
+    step = part * shorten_step(STEP * velocity, 3 * STEP)
     predicted = here.twin.moved(here.q, step)
     q, residual = solve(here.twin, predicted, tolerance=SOLVED)
     if not residual <= CLOSED:

@@ -107,7 +107,7 @@ def ways(anatomy: LegDecomposition, leg: Leg) -> Iterator[tuple[Part, ...]]:
                     yield from onward(beyond, (*been, beyond), (*parts, *_parts(joint, link)))
 
     for way in islice(onward(mechanism.base, (mechanism.base,), ()), WAYS):
-        yield gathered((*way, *last), SAME_GEOMETRY * mechanism.length)
+        yield gather_parts((*way, *last), SAME_GEOMETRY * mechanism.length)
 
 
 def _parts(joint: Joint, near: str) -> list[Part]:
@@ -120,12 +120,12 @@ def _parts(joint: Joint, near: str) -> list[Part]:
     return [Part(kind is JointType.PRISMATIC, point, axis, one) for kind, axis in elementary(joint.type, seen.axes)]
 
 
-def gathered(parts: tuple[Part, ...], tolerance: float) -> tuple[Part, ...]:
+def gather_parts(parts: tuple[Part, ...], tolerance: float) -> tuple[Part, ...]:
     """The parts with neighbours that turn about one point or one axis made one; ``tolerance`` in metres, by which
     axes may miss each other."""
     found: list[Part] = []
     for part in parts:
-        merged = _merged(found[-1], part, tolerance) if found else None
+        merged = _merge(found[-1], part, tolerance) if found else None
         if merged is None:
             found.append(part)
         else:
@@ -133,7 +133,7 @@ def gathered(parts: tuple[Part, ...], tolerance: float) -> tuple[Part, ...]:
     return tuple(found)
 
 
-def _merged(one: Part, other: Part, tolerance: float) -> Part | None:
+def _merge(one: Part, other: Part, tolerance: float) -> Part | None:
     joints = tuple(dict.fromkeys((*one.joints, *other.joints)))
     if one.slides or other.slides:
         return None

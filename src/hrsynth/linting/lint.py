@@ -98,7 +98,7 @@ def lint(files: str | Path | Iterable[str | Path], *, compare: str | Path | None
         raise BadRobotFile(defects)
     mended, written = list[Finding](), None
     if fix:
-        every = [(file, *_mended(file, skipped)) for file in opened]
+        every = [(file, *_mend_file(file, skipped)) for file in opened]
         new = [(Path(output or file.path), after.data) for file, after, gone in every if gone or output is not None]
         for target, _ in new:
             require_writable(target)
@@ -128,7 +128,7 @@ def findings(file: LintedFile, ignore: Sequence[str] = ()) -> list[tuple[Finding
     return sorted(found, key=lambda pair: (pair[0].line is None, pair[0].line or 0, -pair[0].rank))
 
 
-def _mended(file: LintedFile, ignore: Sequence[str]) -> tuple[LintedFile, list[Finding]]:
+def _mend_file(file: LintedFile, ignore: Sequence[str]) -> tuple[LintedFile, list[Finding]]:
     """The file with all mends, and what they mended: round by round, as one may uncover or undo the cause of
     another."""
     gone: list[Finding] = []

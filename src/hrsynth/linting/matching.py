@@ -111,7 +111,7 @@ class RobotMatch:
 
     def _fits(self, pairs: Sequence[tuple[_JointOn, _JointOn]], ways: Iterable[Sequence[float]]) -> list[LinkFit]:
         """Those with the other robot's axes in each of these senses."""
-        return [_fit(list(_turned(pairs, signs)), self.one.length, None) for signs in ways]
+        return [_fit(list(_turn_senses(pairs, signs)), self.one.length, None) for signs in ways]
 
     def apart(self, hinge: str) -> float:
         """By how much (characteristic lengths) the links of a hinge lie elsewhere along its axis in the other robot:
@@ -148,7 +148,7 @@ def _fit(pairs: Sequence[tuple[_JointOn, _JointOn]], length: float, upright: Arr
     for _ in range(SLIDES):
         points = [(mine.point, their.point + s * _slide(their)) for (mine, their), s in zip(pairs, shift, strict=True)]
         axes = [(mine, their) for pair in pairs for mine, their in zip(pair[0].axes, pair[1].axes, strict=True)]
-        X, only = _fitted(points, axes, length, upright)
+        X, only = _fit_motion(points, axes, length, upright)
         before = shift.copy()
         for number, (mine, their) in enumerate(pairs):
             if their.type in _LINES:
@@ -184,7 +184,7 @@ def _on(joint: Joint, link: str) -> _JointOn:
     return _JointOn(joint.name, joint.type, joint.point, (own,), abs(float(joint.axes[0] @ joint.axes[1])))
 
 
-def _turned(pairs: Sequence[tuple[_JointOn, _JointOn]], signs: Iterable[float]
+def _turn_senses(pairs: Sequence[tuple[_JointOn, _JointOn]], signs: Iterable[float]
             ) -> Iterator[tuple[_JointOn, _JointOn]]:
     """The pairs with the other robot's axes in these senses."""
     given = iter(signs)
@@ -216,7 +216,7 @@ def _slide(joint: _JointOn) -> Array:
     return np.asarray(joint.axis if joint.type in _LINES else np.zeros(3))
 
 
-def _fitted(points: Sequence[tuple[Array, Array]], axes: Sequence[tuple[Array, Array]], length: float,
+def _fit_motion(points: Sequence[tuple[Array, Array]], axes: Sequence[tuple[Array, Array]], length: float,
             upright: Array | None) -> tuple[Array, bool]:
     """The rigid motion that brings the second of each pair nearest to the first (Kabsch); whether no other does. Axes
     have the sense that they have after the turn ``upright``, or their own at first."""

@@ -105,7 +105,7 @@ def _ellipse(Q: Array) -> tuple[Array, Array, Array, Array]:
     return centre, np.asarray(k[..., None, None] * inverse / 4), inverse, k
 
 
-def tilted(u: Array, shock: Array, angle: float) -> Array:
+def tilt_vector(u: Array, shock: Array, angle: float) -> Array:
     """A unit vector (3,) inside a cone of half-angle ``angle`` about u; ``shock`` (3,) lies in the unit ball."""
     across = shock - (shock @ u) * u
     return unit(u + np.tan(angle) * across)

@@ -211,7 +211,7 @@ def decompose(mechanism: Mechanism) -> LegDecomposition:
     legs = _segment_platform(mechanism, platform, legs)
     joint_order = {name: i for i, name in enumerate(mechanism.joints)}
     legs.sort(key=lambda leg: (order[leg.links[0]] if leg.links else order[leg.attach], joint_order[leg.joints[0]]))
-    return _labelled(LegDecomposition(mechanism, tuple(sorted(platform, key=order.__getitem__)), tuple(legs)))
+    return _label_legs(LegDecomposition(mechanism, tuple(sorted(platform, key=order.__getitem__)), tuple(legs)))
 
 
 def _live(mechanism: Mechanism) -> list[Joint]:
@@ -302,7 +302,7 @@ def _freedoms(word: Word) -> int | None:
     return total
 
 
-def _labelled(anatomy: LegDecomposition) -> LegDecomposition:
+def _label_legs(anatomy: LegDecomposition) -> LegDecomposition:
     """Labels of the observations where there are any, numbers elsewhere."""
     given: dict[int, str] = {}
     watched: dict[str, Array] = {}

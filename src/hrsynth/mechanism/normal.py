@@ -22,7 +22,7 @@ from ..results import Value, with_value
 from ..tolerances import SAME_POINT
 from . import graphs
 from .model import Joint, JointType, Mechanism
-from .wrist import Interval, Wrist, chained
+from .wrist import Interval, Wrist, chain_arcs
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -45,13 +45,13 @@ def normal_form(mechanism: Mechanism) -> NormalForm:
     moved, made_of = 0.0, dict[str, tuple[str, ...]]()
     while (merge := _next_merge(current)) is not None:
         between, gone, joint = merge
-        moved += sum(_moved(each, joint, mechanism.length) for each in gone)
+        moved += sum(_moved_by(each, joint, mechanism.length) for each in gone)
         made_of[_first(current, gone)] = tuple(name for each in gone for name in made_of.pop(each.name, (each.name,)))
-        current = _replaced(current, between, gone, joint)
+        current = _replace_joint(current, between, gone, joint)
     return NormalForm(current, into, moved, made_of)
 
 
-def _moved(old: Joint, new: Joint, length: float) -> float:
+def _moved_by(old: Joint, new: Joint, length: float) -> float:
     """How far the axes of a joint are from those of the joint that takes its place, within a length (m)."""
     found = 0.0
     for axis in old.axes:
@@ -62,7 +62,7 @@ def _moved(old: Joint, new: Joint, length: float) -> float:
     return found
 
 
-def _protected(mechanism: Mechanism) -> set[str]:
+def _protected_names(mechanism: Mechanism) -> set[str]:
     return {mechanism.base, mechanism.platform, mechanism.reference, *_watching(mechanism)}
 
 
@@ -112,7 +112,7 @@ def _next_merge(mechanism: Mechanism) -> tuple[list[str], list[Joint], Joint] | 
     """The links between, the joints that go, and the joint that takes their place; a U of two R with centres apart only
     where nothing else merges, as axes of two balls on one rod may meet as well."""
     far: tuple[list[str], list[Joint], Joint] | None = None
-    held = _protected(mechanism) | {link for c in mechanism.couplings for link in (c.predecessor, c.successor)}
+    held = _protected_names(mechanism) | {link for c in mechanism.couplings for link in (c.predecessor, c.successor)}
     free = [name for name in mechanism.links if name not in held and len(mechanism.joints_of(name)) == 2]
     for x in free:
         first, second = mechanism.joints_of(x)
@@ -140,29 +140,29 @@ def _pair(mechanism: Mechanism, a: Joint, b: Joint) -> Joint | None:
     kinds = a.type.value + b.type.value
     if kinds == "RR":
         if lines.parallel(a.axis, b.axis):
-            return _joined(a, b) if lines.distance(b.point, a.point, a.axis) <= near else None
+            return _join(a, b) if lines.distance(b.point, a.point, a.axis) <= near else None
         centre = lines.meeting_point([(a.point, a.axis), (b.point, b.axis)], near)
         if centre is not None and lines.perpendicular(a.axis, b.axis):
-            return _joined(a, b, JointType.UNIVERSAL, centre, (a.axis, b.axis))
+            return _join(a, b, JointType.UNIVERSAL, centre, (a.axis, b.axis))
     elif kinds == "PP" and lines.parallel(a.axis, b.axis):
-        return _joined(a, b)
+        return _join(a, b)
     elif kinds in ("RU", "UR"):
         centre, arm = (a.point, b) if a.type is JointType.UNIVERSAL else (b.point, a)
         if lines.distance(centre, arm.point, arm.axis) <= near:
             axes = np.array([*a.axes, *b.axes])
             if abs(np.linalg.det(axes)) > 1e-3:
-                return _joined(a, b, JointType.SPHERICAL, centre, wrist=_wrist(a, b))
+                return _join(a, b, JointType.SPHERICAL, centre, wrist=_wrist(a, b))
             inner = a.axes[-1], b.axes[0]
             if lines.parallel(*inner):
-                return _joined(a, b, JointType.UNIVERSAL, centre, (a.axes[0], b.axes[-1]))
+                return _join(a, b, JointType.UNIVERSAL, centre, (a.axes[0], b.axes[-1]))
     elif kinds in ("RS", "SR"):
         ball, arm = (a, b) if a.type is JointType.SPHERICAL else (b, a)
         if lines.distance(ball.point, arm.point, arm.axis) <= near:
-            return _joined(a, b, JointType.SPHERICAL, ball.point, wrist=_wrist(a, b))
+            return _join(a, b, JointType.SPHERICAL, ball.point, wrist=_wrist(a, b))
     return None
 
 
-def _joined(a: Joint, b: Joint, type: JointType | None = None, point: Array | None = None,
+def _join(a: Joint, b: Joint, type: JointType | None = None, point: Array | None = None,
             axes: tuple[Array, ...] = (), wrist: Wrist | None = None) -> Joint:
     """One joint from a's predecessor to b's successor, without limits: of a's type and place where none is given."""
     if type is None or point is None:
@@ -183,7 +183,7 @@ def _wrist(*joints: Joint) -> Wrist | None:
             first, last, own = joint.wrist.first, joint.wrist.last, (joint.wrist.low, joint.wrist.high)
         else:
             return None
-        span = own if ends is None else chained(span, angle_between(ends[1], first), own)
+        span = own if ends is None else chain_arcs(span, angle_between(ends[1], first), own)
         ends = (first if ends is None else ends[0]), last
     return None if ends is None else Wrist.of(*ends, span)
 
@@ -195,7 +195,7 @@ def _triple(mechanism: Mechanism, a: Joint, b: Joint, c: Joint) -> Joint | None:
     centre = lines.meeting_point([(j.point, j.axis) for j in (a, b, c)], near)
     if centre is None or abs(np.linalg.det(np.array([a.axis, b.axis, c.axis]))) < 1e-3:
         return None
-    return _joined(a, c, JointType.SPHERICAL, centre, wrist=_wrist(a, b, c))
+    return _join(a, c, JointType.SPHERICAL, centre, wrist=_wrist(a, b, c))
 
 
 def _chains_of_three(mechanism: Mechanism, free: set[str]) -> Iterator[tuple[Joint, Joint, Joint]]:
@@ -218,7 +218,7 @@ def _first(mechanism: Mechanism, joints: list[Joint]) -> str:
     return min((each.name for each in joints), key=list(mechanism.joints).index)
 
 
-def _replaced(mechanism: Mechanism, between: list[str], gone: list[Joint], joint: Joint) -> Mechanism:
+def _replace_joint(mechanism: Mechanism, between: list[str], gone: list[Joint], joint: Joint) -> Mechanism:
     """``joint`` in the place (name and order) of the first of ``gone`` in the mechanism's order."""
     joint = replace(joint, name=_first(mechanism, gone), xml=())
     order = list(mechanism.joints)

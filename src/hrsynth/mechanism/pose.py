@@ -90,7 +90,7 @@ class Pose:
         return record if self.phi is None else {**record, "phi": self.phi}
 
     def __str__(self) -> str:
-        return self.shown or written(self.given)
+        return self.shown or write_parts(self.given)
 
 
 @dataclass(frozen=True)
@@ -300,14 +300,14 @@ def positive_half_turn(angle: float) -> float:
     return -angle if abs(angle + math.pi) < HALF_TURN else angle
 
 
-def written(parts: Mapping[str, tuple[float, ...]], degrees: bool = False) -> str:
+def write_parts(parts: Mapping[str, tuple[float, ...]], degrees: bool = False) -> str:
     """Parts of a pose in one line, angles in radians or ``degrees``."""
-    return ",".join(f"{name}={'/'.join(_written(round(math.degrees(v), 6)) + 'deg' for v in values)}"
-                    if degrees and name in ("phi", "rpy") else f"{name}={'/'.join(map(_written, values))}"
+    return ",".join(f"{name}={'/'.join(_write_number(round(math.degrees(v), 6)) + 'deg' for v in values)}"
+                    if degrees and name in ("phi", "rpy") else f"{name}={'/'.join(map(_write_number, values))}"
                     for name, values in parts.items())
 
 
-def _written(value: float) -> str:
+def _write_number(value: float) -> str:
     """Six digits, and six decimals, so that a pose is met again to ``AS_PRINTED`` when it is typed back."""
     return f"{round(value, 6) + 0.0:.15g}" if abs(value) >= 1 else f"{round(value, 9) + 0.0:.6g}"
 

@@ -42,7 +42,7 @@ def elementary(kind: JointType, axes: Sequence[Array], across: Callable[[Array],
     return []
 
 
-def transmitted(kind: JointType, point: Numbers, axes: Sequence[Numbers]) -> list[Numbers]:
+def transmitted_wrenches(kind: JointType, point: Numbers, axes: Sequence[Numbers]) -> list[Numbers]:
     """The wrenches that a joint transmits, 6 − freedoms of them: what it allows is reciprocal to all of them."""
     basis = np.eye(3, dtype=point.dtype)
     forces = [force(e, point) for e in basis]
@@ -66,7 +66,7 @@ def transmitted(kind: JointType, point: Numbers, axes: Sequence[Numbers]) -> lis
             return []
 
 
-def allowed(kind: JointType, point: Numbers, axes: Sequence[Numbers]) -> list[Numbers]:
+def allowed_twists(kind: JointType, point: Numbers, axes: Sequence[Numbers]) -> list[Numbers]:
     """The twists of the successor that a joint allows, one a freedom: reciprocal to all that it transmits."""
     basis = np.eye(3, dtype=point.dtype)
     match kind:
@@ -93,7 +93,7 @@ def constraints(joints: Sequence[Joint], place: Mapping[str, int], geometry: Geo
     """
     blocks = [np.zeros((0, 6 * len(place)))]
     for joint in joints:
-        wrenches = np.array(transmitted(joint.type, *geometry(joint))).reshape(-1, 6)
+        wrenches = np.array(transmitted_wrenches(joint.type, *geometry(joint))).reshape(-1, 6)
         block = np.zeros((len(wrenches), 6 * len(place)))
         for link, sign in ((joint.successor, 1), (joint.predecessor, -1)):
             if link in place:

@@ -43,10 +43,10 @@ class NamedCamera(Value):
 
     def carried_by(self, into: Mapping[str, str], poses: Mapping[str, Array]) -> NamedCamera:
         """The same camera where links became parts of others, as for observations."""
-        return replace(self, link=into[self.link], pose=moved(self.link, into, poses) @ self.pose)
+        return replace(self, link=into[self.link], pose=relative_pose(self.link, into, poses) @ self.pose)
 
 
-def moved(link: str, into: Mapping[str, str], poses: Mapping[str, Array]) -> Array:
+def relative_pose(link: str, into: Mapping[str, str], poses: Mapping[str, Array]) -> Array:
     """The pose of a link in the frame of the one that took it in."""
     return AT_CENTRE if into[link] == link else inverse(poses[into[link]]) @ poses[link]
 
@@ -340,7 +340,7 @@ class CameraObservation(Observation):
     def _together(cls, observations: Sequence[Observation], X_reference: Array, X_links: Array, V_reference: Array,
                   V_links: Array, planes: Array | None = None) -> tuple[Array, Array]:
         """The same, where ``planes`` (k, 3) are given of what is supposed to lie in them."""
-        at, axes, radii, views = _stacked(tuple(observations))
+        at, axes, radii, views = _stack_observations(tuple(observations))
         X = X_reference @ views
         seen = X[:, :3, :3].transpose(0, 2, 1)
         B = (X_links[:, :3, :3] @ at)[:, :, 0] + X_links[:, :3, 3]
@@ -360,7 +360,7 @@ class CameraObservation(Observation):
         return values.ravel(), rates.reshape(len(at) * cls.size, V_links.shape[2])
 
     def carried_by(self, into: Mapping[str, str], poses: Mapping[str, Array]) -> Self:
-        X = moved(self.link, into, poses)
+        X = relative_pose(self.link, into, poses)
         return replace(super().carried_by(into, poses), at=transform(X, self.at),
                        axis=None if self.axis is None else X[:3, :3] @ self.axis,
                        camera=self.camera and self.camera.carried_by(into, poses))
@@ -394,7 +394,7 @@ class MetricPoint(CameraObservation):
 
 
 @lru_cache(maxsize=512)
-def _stacked(observations: tuple[Observation, ...]) -> tuple[Array, Array, Array, Array]:
+def _stack_observations(observations: tuple[Observation, ...]) -> tuple[Array, Array, Array, Array]:
     """Points (k, 3, 1) and axes (k, 3, 1) of observations in their links, radii (k, 1), cameras (k, 4, 4)."""
     sights = [o for o in observations if isinstance(o, CameraObservation)]
     axes = [o.axis if o.axis is not None else np.zeros(3) for o in sights]
@@ -402,7 +402,7 @@ def _stacked(observations: tuple[Observation, ...]) -> tuple[Array, Array, Array
             frozen([[o.radius or 0.0] for o in sights]), frozen([o.view for o in sights]))
 
 
-def normalised(w: Array) -> tuple[Array, Array]:
+def normalise_rates(w: Array) -> tuple[Array, Array]:
     """w/‖w‖ (…, 3) of vectors w, and what its rate makes of ẇ: (I − n nᵀ)/‖w‖, (…, 3, 3). Raises ``NotMeasured`` where
     a w vanishes."""
     size = np.linalg.norm(w, axis=-1, keepdims=True)

@@ -60,7 +60,7 @@ class Wrist(Value):
                    np.inf if self.upper is None else self.upper - angle)
 
 
-def chained(one: Interval, gap: float, other: Interval) -> Interval:
+def chain_arcs(one: Interval, gap: float, other: Interval) -> Interval:
     """Distances of the ends of three arcs on the unit sphere, end to end: one of a length in ``one``, ``gap``, one of a
     length in ``other``; two sides leave |a − b| ≤ c ≤ π − |π − a − b| to the third."""
     return _third(_third(one, (gap, gap)), other)

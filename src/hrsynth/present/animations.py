@@ -14,13 +14,13 @@ from ..analysis.observed import ObservedRobot
 from ..errors import BadRequest
 from ..geometry.vectors import Array, inverse
 from ..progress import tell
-from ..simulation.camera import Camera, Cylinder, cylinders, facing, seen
+from ..simulation.camera import Camera, Cylinder, cylinders, facing, rods_in_frame
 from ..simulation.mockup import rods as rods_of
 from ..simulation.pictures import COLOURS, GREY, LegRenderer
 from ..simulation.result import Servo
 from ..simulation.track import TYPE_2
 from ..tolerances import REST_OF_RUN
-from .plots import empty_figure, pose_words, styled
+from .plots import empty_figure, in_style, pose_words
 from .runs import ENDS, LEAST_TURN, until
 
 FRAMES, PAUSE = 50, 12
@@ -43,7 +43,7 @@ LINE = 38
 """Letters of a line of words."""
 
 
-@styled
+@in_style
 def animation(found: Servo) -> bytes:
     """The run as GIF, at equal parts of its way; raises ``MissingExtra``, ``NotRendered``."""
     from PIL import Image
@@ -141,7 +141,7 @@ def _camera(found: Servo) -> Camera:
         X = inverse(mechanism.links[link].pose)
         links += [Cylinder(link, np.array(ends) @ X[:3, :3].T + X[:3, 3], 0.0) for ends in rods_of(mechanism, link)]
     configurations = (*found.run.configurations[:: max(1, len(found.run.configurations) // 5)], found.target)
-    points = np.array([seen(links, reference, at.pose) for at in configurations])
+    points = np.array([rods_in_frame(links, reference, at.pose) for at in configurations])
     ahead = np.array([np.cos(ELEVATION), 0.0, -np.sin(ELEVATION)])
     wide = WIDTH - SIDE
     blank = Camera(np.eye(4), FOCAL * wide, wide, HEIGHT)

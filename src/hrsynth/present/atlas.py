@@ -16,8 +16,8 @@ from ..errors import BadRequest
 from ..geometry.vectors import Array
 from . import plots
 from .modes import why_undrawn
-from .paper import PNG, Paper, printed
-from .plots import COLOURS, cell_edges, entry, panels, styled
+from .paper import PNG, Paper, print_figure
+from .plots import COLOURS, cell_edges, entry, in_style, panels
 
 CELLS = {SAME: ("#b9dcb1", "="), SEPARATED: ("#f2c0b0", "|"), UNDECIDED: ("#e3e3e3", "?")}
 CURVE, CUSP, NODE = "black", COLOURS[1], COLOURS[2]
@@ -52,7 +52,7 @@ def undrawn(found: Atlas) -> str | None:
     return why_undrawn(found.listed)
 
 
-@styled
+@in_style
 def picture(found: Atlas, drawn: DrawnSection, paper: Paper = PNG) -> bytes:
     """The picture (PNG); raises ``BadRequest`` where there are no modes."""
     why = why_undrawn(found.listed)
@@ -76,7 +76,7 @@ def picture(found: Atlas, drawn: DrawnSection, paper: Paper = PNG) -> bytes:
     told = ", cuspidal" if found.cuspidal else ""
     figure.suptitle(f"{found.listed.setting.robot.name}, legs {seen} watched\n{found.listed.count}, "
                     f"aspects: {found.aspects_met}{told}")
-    return printed(figure, paper)
+    return print_figure(figure, paper)
 
 
 def _colour(found: Atlas, number: int) -> str:

@@ -15,17 +15,17 @@ from ..simulation.endings.basins import LETTERS, NOT_REACHED, BasinEnd, Basins, 
 from ..simulation.endings.flow import Flags, Places
 from ..tolerances import IN_PLANE
 from . import plots
-from .paper import PNG, Paper, printed
+from .paper import PNG, Paper, print_figure
 from .plots import (
     COLOURS,
     MapPlane,
     cell_edges,
     entry,
     heading,
+    in_style,
     layer_title,
     missing_entry,
     panels,
-    styled,
     tick_values,
 )
 from .runs import ENDS
@@ -69,7 +69,7 @@ def _shades(kind: str, count: int) -> list[str]:
     return [to_hex(each) for each in zip(red, green, blue, strict=True)]
 
 
-@styled
+@in_style
 def picture(found: Basins, paper: Paper = PNG) -> bytes:
     """The starts in the colours of their ends: a strip for a line, a map for a plane, one for each value of the third
     part for a box; the ends where they lie, filled in the plane and hollow beside it."""
@@ -84,9 +84,9 @@ def picture(found: Basins, paper: Paper = PNG) -> bytes:
             drawn |= _ends_on_line(place, found)
         else:
             drawn |= _ends(place, plane, found, level)
-            larger |= _certified(place, plane, found, level)
+            larger |= _draw_certified(place, plane, found, level)
             plane.finish(place, plane.x, plane.y)
-    entries = [Patch(facecolor=shade, label=_told(letter, each))
+    entries = [Patch(facecolor=shade, label=_describe_end(letter, each))
                for letter, each, shade in zip(LETTERS, found.ends, shades, strict=False)]
     if found.region is not None and found.certified is not None and grid.ndim == 2:
         told = re.sub(" of ", "\nof ", found.certified.words.removeprefix("from anywhere "))
@@ -101,7 +101,7 @@ def picture(found: Basins, paper: Paper = PNG) -> bytes:
     entries += [entry(ENDS[kind], linestyle="", marker=MARKS[kind], color="black") for kind in kinds
                 if {(kind, True), (kind, False)} & drawn]
     if any(not inside for _, inside in drawn):
-        others = " or ".join("φ" if name == "phi" else name for name in _held(found, 0.0))
+        others = " or ".join("φ" if name == "phi" else name for name in _shared_parts(found, 0.0))
         entries.append(entry(f"hollow: at another {others}", linestyle="", marker="o", markerfacecolor="none",
                              color="black"))
     if grid.ndim > 1:
@@ -110,10 +110,10 @@ def picture(found: Basins, paper: Paper = PNG) -> bytes:
     word = "legs " if all(each.by_segment for each in found.setting.observed) else ""
     heading(figure, f"{found.setting.robot.name}, {word}{', '.join(found.setting.labels)} observed: where each start "
             f"ends\ngoal {plots.pose_words(found.goal)}", grid.fixed, "; starts: ")
-    return printed(figure, paper)
+    return print_figure(figure, paper)
 
 
-def _told(letter: str, end: BasinEnd) -> str:
+def _describe_end(letter: str, end: BasinEnd) -> str:
     matched = f" {end.ending.matched}" if end.ending.matched else ""
     return f"{letter}  {end.ending.name}{matched}: {100 * end.share:.3g} %"
 
@@ -138,7 +138,7 @@ def _ends_on_line(place: Any, found: Basins) -> set[tuple[str, bool]]:
             place.plot(here, 0.5, MARKS[each.ending.name], markeredgecolor="black", markersize=11, clip_on=False,
                        markerfacecolor="black" if inside else "none")
             place.annotate(letter, (here, 0.5), (0, 13), textcoords="offset points", ha="center",
-                           path_effects=outlined())
+                           path_effects=outline_strokes())
             drawn.add((each.ending.name, inside))
     return drawn
 
@@ -194,10 +194,10 @@ def _layer(place: Any, plane: MapPlane | None, cells: Places, damped: Flags, sha
             i, j = np.unravel_index(np.argmax(room), room.shape)
             u, v = plane.at(plane.x[i], plane.y[j])
             place.text(u, v, letter, ha="center", va="center", weight="bold",
-                       path_effects=outlined())
+                       path_effects=outline_strokes())
 
 
-def _certified(place: Any, plane: MapPlane, found: Basins, level: float | None) -> bool:
+def _draw_certified(place: Any, plane: MapPlane, found: Basins, level: float | None) -> bool:
     """The border of what is certified, in a plane; a ring about it where it is too small to be seen: whether that is
     so."""
     if found.region is None or level is not None:
@@ -218,18 +218,18 @@ def _certified(place: Any, plane: MapPlane, found: Basins, level: float | None) 
 def _inside(found: Basins, end: BasinEnd, level: float | None) -> bool:
     """Whether an end is one of the poses of a plane or line; ``level`` is the third part's value of one of a box."""
     assert end.X is not None
-    held = _held(found, level)
+    held = _shared_parts(found, level)
     away = np.abs(place_of(found.setting.motion, end.X, tuple(held)) - np.array(list(held.values())))
     return bool(np.all(away <= IN_PLANE * found.target.twin.length))
 
 
-def _held(found: Basins, level: float | None) -> dict[str, float]:
+def _shared_parts(found: Basins, level: float | None) -> dict[str, float]:
     """The parts of a pose that all poses of a plane or line share, with their values."""
     held = {name: values[0] for name, values in found.grid.fixed.given.items() if name != "rpy"}
     return held if level is None else {**held, **dict.fromkeys(found.grid.names[2:], level)}
 
 
-def outlined() -> list[Any]:
+def outline_strokes() -> list[Any]:
     """Strokes of letters that are read on any colour."""
     from matplotlib.patheffects import Normal, Stroke
 
@@ -256,7 +256,7 @@ def _ends(place: Any, plane: MapPlane, found: Basins, level: float | None) -> se
     for k, (x, y, letter) in enumerate(spots):
         turn = 2 * np.pi * (k + 0.5) / len(spots)
         place.annotate(letter, (x, y), (13 * np.cos(turn), 13 * np.sin(turn)), textcoords="offset points", fontsize=9,
-                       ha="center", va="center", zorder=6, path_effects=outlined())
+                       ha="center", va="center", zorder=6, path_effects=outline_strokes())
     return drawn
 
 

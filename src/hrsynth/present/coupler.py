@@ -34,7 +34,7 @@ def chains(one: Curve, other: Curve, length: float, samples: int) -> list[Chain]
         return [(first, second) for second, first in chains(other, one, length, samples)]
     found = []
     for low, high, whole in _stretches(one, other, length):
-        s = np.linspace(low, high, samples) if whole else low + (high - low) * _eased(samples)
+        s = np.linspace(low, high, samples) if whole else low + (high - low) * _ease(samples)
         middle, half = _partners(other, points(one, s), length)
         half = np.where(np.isfinite(half), half, 0.0)
         ways = [(points(one, s), points(other, middle + sign * half)) for sign in (1, -1)]
@@ -46,7 +46,7 @@ def chains(one: Curve, other: Curve, length: float, samples: int) -> list[Chain]
     return found
 
 
-def traced(chain: Chain, triangle: Array, normal: Array) -> Array:
+def trace_coupler(chain: Chain, triangle: Array, normal: Array) -> Array:
     """The curve (n, 3) of a platform's third point in the plane with this ``normal``; ``triangle`` (3, 3) are the three
     points at one pose of the platform."""
     one, other = chain
@@ -94,7 +94,7 @@ def _stretches(one: Curve, other: Curve, length: float) -> Iterator[tuple[float,
     there is to follow: a full turn, or a line without end."""
     low, high = _range(one, other, length)
     s = np.linspace(low, high, STEPS, endpoint=not isinstance(one, Circle))
-    reached = _reached(one, other, length, s)
+    reached = _reach_point(one, other, length, s)
     if reached.all():
         yield low, high, True
         return
@@ -107,16 +107,16 @@ def _stretches(one: Curve, other: Curve, length: float) -> Iterator[tuple[float,
         yield start, end, False
 
 
-def _reached(one: Curve, other: Curve, length: float, s: Array) -> Array:
+def _reach_point(one: Curve, other: Curve, length: float, s: Array) -> Array:
     return np.asarray(np.isfinite(_partners(other, points(one, s), length)[1]))
 
 
 def _border(one: Curve, other: Curve, length: float, low: float, high: float) -> float:
     """Where the bar ceases to reach, between two parameters of which one is reached: the reached side."""
-    inside = bool(_reached(one, other, length, np.array([low]))[0])
+    inside = bool(_reach_point(one, other, length, np.array([low]))[0])
     for _ in range(50):
         middle = (low + high) / 2
-        if bool(_reached(one, other, length, np.array([middle]))[0]) == inside:
+        if bool(_reach_point(one, other, length, np.array([middle]))[0]) == inside:
             low = middle
         else:
             high = middle
@@ -141,6 +141,6 @@ def _range(one: Curve, other: Curve, length: float) -> tuple[float, float]:
     return middle - 1.01 * length / sine, middle + 1.01 * length / sine
 
 
-def _eased(samples: int) -> Array:
+def _ease(samples: int) -> Array:
     """From 0 to 1, close together at both ends, where a branch turns round."""
     return np.asarray((1 - np.cos(np.linspace(0, np.pi, samples))) / 2)

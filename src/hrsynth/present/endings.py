@@ -8,8 +8,8 @@ import numpy as np
 
 from ..kinematics.configuration import ClosedConfiguration
 from ..simulation.endings.rests import CRITICAL, STABLE, Endings, RestPoint
-from .paper import PNG, Paper, legend_within, printed, settled
-from .plots import COLOURS, empty_figure, entry, pose_words, styled
+from .paper import PNG, Paper, legend_within, print_figure, settle_title
+from .plots import COLOURS, empty_figure, entry, in_style, pose_words
 from .skeleton import legs_of, outline
 from .sketch import Sketch
 from .view.view import plane_normal
@@ -29,7 +29,7 @@ WORDS = {"goal": "the goal", "mode": "another mode", "antipodal": "antipodal pos
          "critical": "pose with an error that attracts", "other": "rest that does not attract"}
 
 
-@styled
+@in_style
 def picture(found: Endings, paper: Paper = PNG) -> bytes:
     """The endings as a figure on ``paper``."""
     goal, platform = found.goal, found.setting.anatomy.platform
@@ -50,7 +50,7 @@ def picture(found: Endings, paper: Paper = PNG) -> bytes:
     title = figure.suptitle(f"{found.setting.robot.name}, {word}{', '.join(found.setting.labels)} observed, goal "
                             f"{pose_words(found.pose)}\n{len(found.attracting)} of {len(found.rests)} rests attract"
                             f"{beyond}", va="top")
-    above = settled(figure, title)
+    above = settle_title(figure, title)
     kinds = [kind for kind in WORDS if any(look(each) == kind for each, _ in near)]
     entries = [entry("robot at the goal", color="0.72"), entry("joints of the base", linestyle="", **BASE),
                *(entry(WORDS[k], linestyle="", **LOOKS[k]) for k in kinds)]
@@ -70,7 +70,7 @@ def picture(found: Endings, paper: Paper = PNG) -> bytes:
         points = np.array([p for each, p in near if look(each) == kind])
         sketch.stroke(place, points, linestyle="", zorder=8 if kind != "other" else 4, **LOOKS[kind])
     sketch.stroke(place, ground, linestyle="", zorder=6, **BASE)
-    return printed(figure, paper)
+    return print_figure(figure, paper)
 
 
 def look(each: RestPoint) -> str:

@@ -19,17 +19,17 @@ from ..geometry.vectors import Array
 from ..mechanism.pose import PARTS
 from ..tolerances import DARKEST_DISTANCE, DISTANCE_FLOOR
 from . import plots
-from .paper import PNG, Paper, printed
+from .paper import PNG, Paper, print_figure
 from .plots import (
     MapPlane,
     along,
     cell_edges,
     entry,
     heading,
+    in_style,
     missing_entry,
     panels,
     round_ticks,
-    styled,
     tick_values,
     tick_words,
 )
@@ -61,7 +61,7 @@ HIGHEST = 30.0
 """Multiple of the median error at which the scale ends."""
 
 
-@styled
+@in_style
 def distance_map(found: Check, paper: Paper = PNG) -> bytes:
     """The distance to Type 2 singularities over a grid: a curve for a line of poses, a colour map for a plane, one map
     for each value of the third part for a box. Raises ``BadRequest`` where Mᵀ exists nowhere."""
@@ -81,7 +81,7 @@ def distance_map(found: Check, paper: Paper = PNG) -> bytes:
     plots.legend(figure, entries, paper)
     heading(figure, f"{found.setting.robot.name}: distance to Type 2 singularities, legs "
             f"{', '.join(found.setting.labels)} observed", grid.grid.fixed)
-    return printed(figure, paper)
+    return print_figure(figure, paper)
 
 
 def _robot(figure: Any, grid: Grid, setting: ObservedRobot) -> list[Any]:
@@ -186,7 +186,7 @@ def locus(found: Singularity, plane: Pose | str | None, steps: int, seed: int) -
     return locus(found.setting, plane=plane, steps=steps, seed=seed)
 
 
-@styled
+@in_style
 def locus_map(found: Singularity, drawn: Locus, paper: Paper = PNG) -> bytes:
     """Type 2 loci of the hidden and the real robot over a plane, the Type 1 boundary and what is not reached (PNG)."""
     from matplotlib.patches import Patch
@@ -209,7 +209,7 @@ def locus_map(found: Singularity, drawn: Locus, paper: Paper = PNG) -> bytes:
     plots.legend(figure, entries, paper)
     heading(figure, f"{found.setting.robot.name}: Type 2 singularities, legs {', '.join(found.setting.labels)} "
             "observed", drawn.grid.fixed)
-    return printed(figure, paper)
+    return print_figure(figure, paper)
 
 
 def _drawn_locus(place: Any, plane: MapPlane, field: SingularityMap, name: str) -> Any:
@@ -250,7 +250,7 @@ def _boundary(place: Any, plane: MapPlane, drawn: Locus) -> list[Any]:
     return entries
 
 
-@styled
+@in_style
 def error_map(found: Accuracy, paper: Paper = PNG) -> bytes:
     """Position and orientation errors (the latter where there are any): maps with the singular locus and the border of
     what is reached drawn over for a plane, a row of maps for a box, curves for a line (PNG)."""
@@ -267,7 +267,7 @@ def error_map(found: Accuracy, paper: Paper = PNG) -> bytes:
     legs = ", ".join(f"{o.leg} {found.blur.words(i, o)}" for i, o in enumerate(found.setting.observed))
     what = "observed legs" if all(o.by_segment for o in found.setting.observed) else "observed"
     heading(figure, f"{found.setting.robot.name}: largest errors\n{what}: {legs}", field.grid.fixed, "; ")
-    return printed(figure, paper)
+    return print_figure(figure, paper)
 
 
 def _error_maps(field: ErrorField, shown: list[tuple[Array, str]], motion: PlatformMotion,
@@ -301,7 +301,7 @@ def _error_maps(field: ErrorField, shown: list[tuple[Array, str]], motion: Platf
             if missing.any() and not missing.all():
                 plane.contour(place, missing.astype(float), 0.5, "black", 1.6)
             if not flat and field.determinant is not None:
-                locus |= _lost(place, plane, field.determinant[..., k])
+                locus |= _draw_loss(place, plane, field.determinant[..., k])
             plane.finish(place, cell_edges(plane.x), cell_edges(plane.y))
             plots.outer(place, k, columns, len(ps))
             if pname:
@@ -326,7 +326,7 @@ def _locus(field: ErrorField, places: Any, plane: MapPlane) -> bool:
     from ..analysis.accuracy.singular_search import singular_poses
 
     if field.determinant is not None:
-        return all([_lost(place, plane, field.determinant) for place in places])
+        return all([_draw_loss(place, plane, field.determinant) for place in places])
     if field.curve is not None:
         for place, (colour, width) in product(places, STROKES):
             _pieces(place, plane, field.curve, colors=colour, linewidths=width)
@@ -338,7 +338,7 @@ def _locus(field: ErrorField, places: Any, plane: MapPlane) -> bool:
     return len(spots) > 0
 
 
-def _lost(place: Any, plane: MapPlane, determinant: Array) -> bool:
+def _draw_loss(place: Any, plane: MapPlane, determinant: Array) -> bool:
     """Draw where a determinant changes its sign, white on black; whether it does."""
     return all([plane.sign_change(place, determinant, colour, width) for colour, width in STROKES])
 

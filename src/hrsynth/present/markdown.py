@@ -28,7 +28,7 @@ def block(text: str, start: str) -> str:
     return match[2]
 
 
-def replaced(text: str, made: str, start: str) -> str:
+def replace_between(text: str, made: str, start: str) -> str:
     """The text with ``made`` between the marks."""
     block(text, start)
     return _between(start).sub(lambda match: match[1] + made + match[3], text)
@@ -38,7 +38,7 @@ def rewrite(file: str | Path, tables: Mapping[str, Callable[[], str]]) -> None:
     """Make those of the tables, by the marks before them, that a page has."""
     text = Path(file).read_text(encoding="utf-8")
     for start, make in tables.items():
-        text = replaced(text, make(), start) if start in text else text
+        text = replace_between(text, make(), start) if start in text else text
     Path(file).write_text(text, encoding="utf-8", newline="\n")
 
 

@@ -12,8 +12,8 @@ import numpy as np
 from ..analysis.modes.modes import AssemblyModes
 from ..errors import BadRequest
 from ..geometry.vectors import Array
-from .paper import PNG, Paper, legend_within, printed, settled, wrap
-from .plots import empty_figure, entry, styled
+from .paper import PNG, Paper, legend_within, print_figure, settle_title, wrap
+from .plots import empty_figure, entry, in_style
 from .scenes import CLOSES, GOAL, NEAR, OPEN, UNKNOWN, ModesScene, Placed, scene
 from .sketch import Box, Sketch
 
@@ -42,7 +42,7 @@ def picture(found: AssemblyModes, paper: Paper = PNG) -> bytes:
     drawn = drawable(found)
     whole = figure(found, drawn, paper)
     if paper.ending != ".png":
-        return printed(whole, paper)
+        return print_figure(whole, paper)
     paper.fit(whole)
     canvas = whole.canvas
     canvas.draw()
@@ -76,7 +76,7 @@ def description(found: AssemblyModes, drawn: ModesScene) -> dict[str, Any]:
             "at": str(found.pose), "complex": found.found.complex, **drawn.to_dict()}
 
 
-@styled
+@in_style
 def figure(found: AssemblyModes, drawn: ModesScene, paper: Paper = PNG) -> Any:
     """The picture as a matplotlib figure: the robots beside the curves, or below where the paper is narrow."""
     placed = drawn.placed[:MOST]
@@ -185,7 +185,7 @@ def _heading(whole: Any, found: AssemblyModes, drawn: ModesScene) -> float:
         many += ", ".join(drawn.rest) + " as well"
     title = (f"{setting.robot.name}   {setting.anatomy.architecture()}\nassembly modes with the same {held} as at "
              f"{found.pose}: {many}")
-    return settled(whole, whole.suptitle(title, fontsize=12, va="top"))
+    return settle_title(whole, whole.suptitle(title, fontsize=12, va="top"))
 
 
 def _colours(drawn: ModesScene) -> Iterator[str]:

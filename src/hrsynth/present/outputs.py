@@ -76,7 +76,7 @@ class File:
             if asked.get(name) is not None and (path is None or Path(path).suffix.lower() not in FIGURES):
                 raise BadRequest(f"--{name} is of a figure", asked[name], f"--output with {', '.join(FIGURES)}")
             if asked.get(name) is not None:
-                function("paper:asked")(PNG, asked.get("width"), asked.get("font"))
+                function("paper:paper_for")(PNG, asked.get("width"), asked.get("font"))
         if path is None:
             if asked.get("plane") is not None and "plane" in self.takes:
                 raise BadRequest("--plane says what a figure shows, and no figure is asked for", asked["plane"],
@@ -122,7 +122,7 @@ class File:
         """The file's content and what the JSON says more; raises ``BadRequest`` where there is nothing to draw."""
         maker = function(self.makers[ending])
         if ending in FIGURES and self.drawn:
-            maker = partial(maker, paper=function("paper:asked")(ending, asked.get("width"), asked.get("font")))
+            maker = partial(maker, paper=function("paper:paper_for")(ending, asked.get("width"), asked.get("font")))
         if self.computed is None:
             return maker(found), {}
         value = function(self.computed)(found, **{name: asked[name] for name in (*self.takes, "seed")})
@@ -192,7 +192,7 @@ class Outputs:
     inline: str | None = None
 
 
-CERTIFICATE = File("cannot write the certificate", {".json": ".certificates:written"}, "The certificate",
+CERTIFICATE = File("cannot write the certificate", {".json": ".certificates:write_certificate"}, "The certificate",
                    "Write a certificate (.json), which the command verify, or a single file of plain Python, can "
                    "check.",
                    "certificate", "certificate_file")
@@ -226,7 +226,7 @@ OUTPUTS = {
     "endings": Outputs("text.endings:endings", (
         File("cannot draw the endings", figures("endings:picture"), "The picture of the endings",
              "Draw the endings: endings.png, .pdf, .svg.", drawn=True),)),
-    "export": Outputs("text.robots:exported", (
+    "export": Outputs("text.robots:describe_export", (
         CodeFile("cannot write the code", dict.fromkeys((".hpp", ".h", ".py"), "text.robots:code"), "The code",
              "Write the code: robot.hpp (C++), robot.py (NumPy).", plotted=()),)),
     "legs": Outputs("text.robots:legs"),

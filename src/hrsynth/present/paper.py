@@ -72,13 +72,13 @@ class Paper:
             if self.font is not None:
                 axis.set_tick_params(labelfontfamily=self.font)
         if scale != 1.0:
-            scaled(figure, every, scale)
+            scale_figure(figure, every, scale)
 
 
 PNG = Paper()
 
 
-def asked(ending: str, width: str | None, font: str | None) -> Paper:
+def paper_for(ending: str, width: str | None, font: str | None) -> Paper:
     """What a figure is printed on: ``width`` as 88mm, 8.8cm or 3.5in, ``font`` as a name, a size (8pt) or both
     (Times 8pt). Raises ``BadRequest``."""
     inches = size = None
@@ -113,7 +113,7 @@ def require_font(name: str) -> str | None:
     return name or None
 
 
-def printed(figure: Any, paper: Paper) -> bytes:
+def print_figure(figure: Any, paper: Paper) -> bytes:
     """The bytes of a matplotlib figure; of a PNG without ``savefig``, which would draw it twice."""
     import matplotlib
 
@@ -135,7 +135,7 @@ def settle(figure: Any) -> None:
     if figure.get_layout_engine() is None:
         return
     if figure.get_suptitle():
-        settled(figure, figure._suptitle)
+        settle_title(figure, figure._suptitle)
     figure.draw_without_rendering()
     for place in figure.axes:
         box = place.get_window_extent()
@@ -144,7 +144,7 @@ def settle(figure: Any) -> None:
     figure.draw_without_rendering()
 
 
-def settled(figure: Any, title: Any) -> float:
+def settle_title(figure: Any, title: Any) -> float:
     """Break a title where it is wider than its figure; its height (inches)."""
     wrap(title, figure.get_figwidth() - 2 * BORDER)
     return float(title.get_window_extent().height / figure.dpi)
@@ -166,13 +166,13 @@ def wrap(text: Any, width: float) -> None:
         if whole > width:
             least = -(-whole // width)
             shares = (whole / least * (1 + step / 10) for step in range(10))
-            tries = [filled(words, length, share) for share in (*(each for each in shares if each < width), width)]
+            tries = [fill_lines(words, length, share) for share in (*(each for each in shares if each < width), width)]
             broken = min(tries, key=lambda each: (len(each), max(map(length, each))))
         lines += broken
     text.set_text("\n".join(lines))
 
 
-def filled(words: list[str], length: Callable[[str], float], width: float) -> list[str]:
+def fill_lines(words: list[str], length: Callable[[str], float], width: float) -> list[str]:
     """Words in lines, each as long as ``width`` allows."""
     lines = words[:1]
     for word in words[1:]:
@@ -200,7 +200,7 @@ def axes_of(figure: Any) -> list[Any]:
     return [axis for place in figure.axes for axis in place._axis_map.values()]
 
 
-def scaled(figure: Any, every: list[Any], scale: float) -> None:
+def scale_figure(figure: Any, every: list[Any], scale: float) -> None:
     """Scale a figure with all texts, strokes and marks."""
     for each in every:
         for name, power in (("fontsize", 1), ("linewidth", 1), ("markersize", 1), ("sizes", 2)):

@@ -44,7 +44,7 @@ def library() -> None:
         raise MissingExtra("drawing", "plots")
 
 
-def styled(draw: Callable[Asked, Given]) -> Callable[Asked, Given]:
+def in_style(draw: Callable[Asked, Given]) -> Callable[Asked, Given]:
     """A function that draws, in the style of all plots."""
     @wraps(draw)
     def drawn(*given: Asked.args, **named: Asked.kwargs) -> Given:
@@ -244,10 +244,10 @@ def heading(figure: Any, text: str, fixed: Pose, before: str = "\n") -> None:
 def pose_words(pose: Pose) -> str:
     """A pose with its units, angles in degrees."""
     told = Pose.parse(pose.shown) if pose.shown else pose
-    return ", ".join(_held(name, values) for name, values in told.given.items())
+    return ", ".join(_held_parts(name, values) for name, values in told.given.items())
 
 
-def _held(name: str, values: Sequence[float]) -> str:
+def _held_parts(name: str, values: Sequence[float]) -> str:
     if name in "xyz":
         return f"{name} = {round(values[0], PLACES) + 0.0:.4g} m"
     turned = "/".join(f"{value:.4g}" for value in np.round(np.degrees(values), PLACES) + 0.0)

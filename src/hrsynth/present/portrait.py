@@ -98,7 +98,7 @@ class Portrait:
         parts = []
         for i in order:
             at = (seen[i][:, :2] - middle) * [scale, -scale] + [width / 2, height / 2]
-            parts.append(_drawn(self.marks[i], [(float(x), float(y)) for x, y in at], thin))
+            parts.append(_draw_mark(self.marks[i], [(float(x), float(y)) for x, y in at], thin))
         return svg.picture(width, height, title or f"Drawing of {self.name}", self.words(), *parts)
 
     def words(self) -> str:
@@ -118,7 +118,7 @@ class Portrait:
             for mark in self.marks]}
 
 
-def _drawn(mark: Mark, at: list[svg.Place], thin: float) -> str:
+def _draw_mark(mark: Mark, at: list[svg.Place], thin: float) -> str:
     """A mark on the page, a pale line about strokes so that what is nearer stands out."""
     if mark.kind == "area":
         colour, wide = STROKES[mark.role]

@@ -17,7 +17,7 @@ HEADS = ("source", "robot", "legs", "printed x, y, z (φ = 0)", "computed x, y, 
 
 
 @cache
-def computed(claim: PrintedClaim) -> AssemblyModes:
+def compute_modes(claim: PrintedClaim) -> AssemblyModes:
     """All modes with the directions that the claim's legs have at its desired pose."""
     return modes(load(shipped()[claim.robot]), claim.legs, at=claim.at)
 
@@ -33,18 +33,18 @@ def table() -> str:
 
 
 def _rows(claim: PrintedClaim) -> Iterator[tuple[str, ...]]:
-    found = computed(claim)
+    found = compute_modes(claim)
     head = (claim.source, f"`{claim.robot}`", ", ".join(claim.legs))
     met = []
     for each in claim.modes:
         mode = nearest(each.place, found)
         met.append(mode)
         apart = 1e3 * math.dist(each.place, _place(mode))
-        yield (*head, ", ".join(f"{v:g}" for v in each.place), _written(mode), f"{apart:.0f} mm", each.remark)
+        yield (*head, ", ".join(f"{v:g}" for v in each.place), _write_place(mode), f"{apart:.0f} mm", each.remark)
     for mode in found.modes:
         if mode not in met:
             reached = f"; legs {', '.join(mode.open)} do not reach it" if mode.reachable is False else ""
-            yield (*head, "–", _written(mode), "–", f"not printed{reached}")
+            yield (*head, "–", _write_place(mode), "–", f"not printed{reached}")
 
 
 def _place(mode: AssemblyMode) -> Place:
@@ -55,7 +55,7 @@ def _place(mode: AssemblyMode) -> Place:
     return pose.x, pose.y, pose.z
 
 
-def _written(mode: AssemblyMode) -> str:
+def _write_place(mode: AssemblyMode) -> str:
     """A place to a tenth of a millimetre and the turn about z to a degree."""
     assert mode.pose.rpy is not None
     turn = round(math.degrees(mode.pose.rpy[2])) % 360

@@ -26,7 +26,7 @@ ALIKE = 1.5
 
 
 @cache
-def computed(replay: Replay, seed: int = 0) -> Servo:
+def compute_run(replay: Replay, seed: int = 0) -> Servo:
     """The run with one draw of the noise."""
     return servo(load(shipped()[replay.robot]), replay.legs, start=replay.way[0], goal=replay.way[1], gain=replay.gain,
                  noise=replay.noise, physics=replay.physics,
@@ -40,7 +40,7 @@ def table(replays: Sequence[Replay] = REPLAYS) -> str:
 
 def row(replay: Replay) -> tuple[str, ...]:
     """One run's row."""
-    found = computed(replay)
+    found = compute_run(replay)
     here = found.ended
     if found.spread is not None:
         s = found.spread
@@ -78,7 +78,7 @@ def _agrees(replay: Replay, found: Servo) -> str:
 def _error(replay: Replay) -> tuple[float, float]:
     """The root mean square error of all draws together (m, rad)."""
     draws = DRAWS if replay.order and not replay.physics else 1
-    spreads = [computed(replay, seed).spread for seed in range(draws)]
+    spreads = [compute_run(replay, seed).spread for seed in range(draws)]
     squares = [(each.rms_metres ** 2, each.rms_radians ** 2) for each in spreads if each is not None]
     metres, radians = np.sqrt(np.mean(squares, axis=0))
     return float(metres), float(radians)

@@ -14,8 +14,8 @@ from ..mechanism.sights import CameraObservation, NamedCamera
 from ..simulation.result import Servo
 from ..simulation.track import TYPE_2
 from ..tolerances import REST_OF_RUN, UNMOVED
-from .paper import PNG, Paper, legend_within, printed, settled, wrap
-from .plots import COLOURS, empty_figure, entry, pose_words, styled
+from .paper import PNG, Paper, legend_within, print_figure, settle_title, wrap
+from .plots import COLOURS, empty_figure, entry, in_style, pose_words
 from .skeleton import legs_of, outline
 from .sketch import Box, Sketch
 from .view.sights import REACH, eyes, half_picture
@@ -44,7 +44,7 @@ ENDS = {"goal": "the goal", "mode": "another assembly mode", "antipodal": "an an
 """Endings in words."""
 
 
-@styled
+@in_style
 def picture(found: Servo, paper: Paper = PNG) -> bytes:
     """The run as a figure on ``paper``."""
     panels = list(_panels(found))
@@ -53,7 +53,7 @@ def picture(found: Servo, paper: Paper = PNG) -> bytes:
     word = "legs " if all(each.by_segment for each in found.setting.observed) else ""
     title = figure.suptitle(f"{found.setting.robot.name}, {word}{legs} observed: ended at {ENDS[found.ended]}\n"
                             f"from {pose_words(found.start)} to {pose_words(found.goal)}", va="top")
-    x, y, wide, tall = _robots(figure, found, settled(figure, title), len(panels))
+    x, y, wide, tall = _robots(figure, found, settle_title(figure, title), len(panels))
     title.set_y(1 - GAP / 2 / figure.get_figheight())
     pictures = _pictures(found)
     high = PICTURE * len(panels) / (len(panels) + PICTURE * len(pictures)) if pictures else 0.0
@@ -78,7 +78,7 @@ def picture(found: Servo, paper: Paper = PNG) -> bytes:
         side = figure.add_axes((x, y + number * part, wide, part - BELOW * 1.3 / figure.get_figheight()))
         _picture(side, found, eye, half)
     figure.align_ylabels()
-    return printed(figure, paper)
+    return print_figure(figure, paper)
 
 
 def _pictures(found: Servo) -> list[tuple[NamedCamera, Array]]:

@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 
 from ..analysis.modes.assembly_mode import AssemblyMode
-from ..analysis.modes.curves import Circle, Curve, Line, Point, Reach, Sphere, shifted
+from ..analysis.modes.curves import Circle, Curve, Line, Point, Reach, Sphere, shift_reach
 from ..analysis.modes.modes import AssemblyModes
 from ..analysis.modes.tips import Tip, TipLoci
 from ..geometry.vectors import Array, inverse, transform
-from .coupler import chains, points, swept, traced
+from .coupler import chains, points, swept, trace_coupler
 from .skeleton import legs_of, outline
 
 GOAL, CLOSES, OPEN, UNKNOWN, NEAR = "goal", "reachable", "unreachable", "unknown", "near"
@@ -92,16 +92,16 @@ def scene(found: AssemblyModes) -> ModesScene:
     plot = _platform(found) if confined is None or confined.back else _PLOTS[confined.motion](found, confined)
     listed = [(str(k), mode) for k, mode in enumerate(found.modes, 1)]
     listed += [(f"near {k}", mode) for k, mode in enumerate(found.near, 1)]
-    placed = tuple(_placed(found, plot, label, mode) for label, mode in listed)
+    placed = tuple(_place(found, plot, label, mode) for label, mode in listed)
     about = np.vstack([*(trace.points.reshape(-1, 3) for trace in plot.traces), *(each.at[None] for each in placed)])
-    drawn = tuple(Trace(_drawn(reach, about, found.goal.twin.length), words) for reach, words in plot.reaches)
+    drawn = tuple(Trace(_reach_points(reach, about, found.goal.twin.length), words) for reach, words in plot.reaches)
     mechanism = found.goal.twin.mechanism
     ground = np.array([joint.point for joint in mechanism.joints_of(mechanism.base)])
     rest = tuple(leg for leg in found.labels if plot.legs and leg not in plot.legs)
     return ModesScene(_normal(found), (*plot.traces, *drawn), placed, ground, rest)
 
 
-def _placed(found: AssemblyModes, plot: _Plot, label: str, mode: AssemblyMode) -> Placed:
+def _place(found: AssemblyModes, plot: _Plot, label: str, mode: AssemblyMode) -> Placed:
     assert mode.bodies is not None
     goal = found.goal
     bodies = tuple(outline(goal.twin.mechanism, body, X) for body, X in mode.bodies.items())
@@ -148,7 +148,7 @@ def _translating(found: AssemblyModes, confined: TipLoci) -> _Plot:
     X = found.goal.pose(plot.body)
     p = transform(X, plot.place)
     curves = [(tip, curve) for tip in confined.tips for curve in (tip.curve, *(each for each, _ in tip.others))]
-    reaches = tuple((shifted(curve, p - _at_goal(found, tip)), f"platform on leg {tip.leg}")
+    reaches = tuple((shift_reach(curve, p - _at_goal(found, tip)), f"platform on leg {tip.leg}")
                     for tip, curve in curves if not isinstance(curve, Point))
     return _Plot(plot.body, plot.place, (), reaches)
 
@@ -162,7 +162,7 @@ def _planar(found: AssemblyModes, confined: TipLoci) -> _Plot:
     tips = [confined.tips[k] for k in legs]
     at = np.array([_at_goal(found, tip) for tip in tips])
     level = at - np.outer(at @ n, n)
-    flat = [shifted(_curve(tip), -n * float(n @ tip.curve.centre)) for tip in tips]
+    flat = [shift_reach(_curve(tip), -n * float(n @ tip.curve.centre)) for tip in tips]
     last = tips[-1]
     reach, words, names = (flat[-1], _on(last, (last,))), _on(last, tips[:-1]), tuple(tip.leg for tip in tips)
     if len(tips) == 2:
@@ -170,7 +170,7 @@ def _planar(found: AssemblyModes, confined: TipLoci) -> _Plot:
         return _Plot(last.body, last.place, (), ((circle, words), reach), names)
     bar = float(np.linalg.norm(level[1] - level[0]))
     branches = chains(flat[0], flat[1], bar, FINE)
-    traces = tuple(Trace(traced(each, level, n), words, True) for each in branches)
+    traces = tuple(Trace(trace_coupler(each, level, n), words, True) for each in branches)
     return _Plot(last.body, last.place, traces, (reach,), names)
 
 
@@ -197,7 +197,7 @@ def _bodies(found: AssemblyModes, confined: TipLoci) -> _Plot:
     first, last = (confined.tips[k] for k in legs)
     sign = 1.0 if first.body == confined.bodies[0] else -1.0
     arms = [_at_goal(found, tip) - found.goal.pose(tip.body)[:3, 3] for tip in (first, last)]
-    start = _drawn(first.curve, _at_goal(found, first)[None], 2 * confined.slide.radius, COARSE)
+    start = _reach_points(first.curve, _at_goal(found, first)[None], 2 * confined.slide.radius, COARSE)
     around = points(confined.slide, np.linspace(0, 2 * np.pi, TURN))
     dome = (start - arms[0] + arms[1])[:, None] + sign * around
     return _Plot(last.body, last.place, (Trace(dome, _on(last, (first,)), True),), ((last.curve, _on(last, (last,))),),
@@ -236,7 +236,7 @@ def _curve(tip: Tip) -> Curve:
     return tip.curve
 
 
-def _drawn(reach: Reach, about: Array, least: float, samples: int = FINE) -> Array:
+def _reach_points(reach: Reach, about: Array, least: float, samples: int = FINE) -> Array:
     """Points to draw a reach with: a circle or sphere whole, a line or plane as far as what lies ``about`` it (n, 3),
     at least over ``least`` each way."""
     if isinstance(reach, Point):

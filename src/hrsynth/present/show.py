@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from .. import __version__
 from ..errors import BadRequest, MissingExtra
-from ..results import Result, spelled
+from ..results import Result, with_spelling
 from .outputs import FIGURES, OUTPUTS, File, function
 
 if TYPE_CHECKING:
@@ -87,7 +87,7 @@ def html(result: Result) -> str:
     return f'<pre style="white-space: pre; overflow-x: auto">{shown}</pre>'
 
 
-@spelled
+@with_spelling
 def draw(result: Result, file: str | Path | None = None, *, plane: Pose | str | None = None, steps: int = 51,
          width: str | None = None, font: str | None = None) -> Picture:
     """A picture of a result, written to ``file`` (.png, .pdf or .svg; for a servo run also .gif) if one is given: the

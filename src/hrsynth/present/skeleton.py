@@ -16,7 +16,7 @@ def outline(mechanism: Mechanism, link: str, X: Array) -> Array:
     """The closed polygon (n, 3) through the centres of a link's joints, the link at the pose X (4, 4)."""
     moved = X @ inverse(mechanism.links[link].pose)
     centres = _apart([joint.point for joint in mechanism.joints_of(link)], SAME_POINT * mechanism.length)
-    ring = _ordered(np.array(centres))
+    ring = _sort_by_angle(np.array(centres))
     return np.asarray(np.vstack([ring, ring[:1]]) @ moved[:3, :3].T + moved[:3, 3])
 
 
@@ -46,7 +46,7 @@ def _apart(points: list[Array], tolerance: float) -> list[Array]:
     return found
 
 
-def _ordered(points: Array) -> Array:
+def _sort_by_angle(points: Array) -> Array:
     """Points in the order of their angles about their middle, in the plane that fits them best."""
     v = points - points.mean(axis=0)
     axes = np.linalg.svd(v)[2]

@@ -201,11 +201,11 @@ class Evidence:
             for path in graphs.paths(self.mechanism.adjacency, self.reference, before, {*leg.links} - {link}):
                 nodes.update(path)
         joints = tuple(j for j in self.mechanism.joints.values() if set(j.links) <= nodes)
-        rotations, anchors = _moved(self.mechanism, self.reference, nodes, joints, before, anchor)
+        rotations, anchors = _move_at_random(self.mechanism, self.reference, nodes, joints, before, anchor)
         return ProximalChain(joints, before, K, anchor, rotations, anchors, self.mechanism.length)
 
 
-def _moved(mechanism: Mechanism, reference: str, nodes: set[str], joints: Sequence[Joint], before: str,
+def _move_at_random(mechanism: Mechanism, reference: str, nodes: set[str], joints: Sequence[Joint], before: str,
            anchor: Array) -> tuple[Array, Array]:
     """Orientations of ``before`` and positions of the anchor over random motions of the part alone."""
     if before == reference:

@@ -115,10 +115,10 @@ class State(Value):
                 if link in leg.links:
                     own = {mechanism.base, leg.attach, *leg.links}
                     legs[number] = replace(leg, links=(*leg.links, *chain.links), joints=(*leg.joints, *chain.joints))
-                    return _relinked(mechanism, chain, own)
+                    return _relink(mechanism, chain, own)
         attach = chain.reference if chain.link == mechanism.base else chain.link
         legs.append(Leg(chain.leg, chain.links, chain.joints, attach))
-        return _relinked(mechanism, chain, {mechanism.base, attach})
+        return _relink(mechanism, chain, {mechanism.base, attach})
 
     def _joints(self, leg: Leg, links: set[str]) -> list[str]:
         mechanism = self.mechanism
@@ -141,7 +141,7 @@ class State(Value):
         return self.anatomy().architecture()
 
 
-def _relinked(mechanism: Mechanism, chain: SensorChain, known: set[str]) -> Mechanism:
+def _relink(mechanism: Mechanism, chain: SensorChain, known: set[str]) -> Mechanism:
     """With the ends of a chain that lie on no known link moved to the base."""
     ends = [(chain.joints[0], chain.reference), (chain.joints[-1], chain.link)]
     joints = {name: mechanism.joints[name].relinked(link, mechanism.base) for name, link in ends if link not in known}

@@ -181,12 +181,12 @@ def _taken_back(step: Step) -> Step:
     return replace(step, accepted=False, reason=step.reason + " (taken back: legs remain)", state=None)
 
 
-def observed(at: Rewriting) -> tuple[str, ...]:
+def observed_legs(at: Rewriting) -> tuple[str, ...]:
     """The legs that are observed."""
     return labels_of(at.evidence.samples.question.observations)
 
 
-def unobserved(at: Rewriting) -> tuple[str, ...]:
+def unobserved_legs(at: Rewriting) -> tuple[str, ...]:
     """The legs that have no virtual chain and have not gone."""
     known = {*at.state.observed(), *at.state.removed}
     return tuple(label for label in at.state.real.labels if label not in known)
@@ -195,7 +195,7 @@ def unobserved(at: Rewriting) -> tuple[str, ...]:
 def keep_unobserved(at: Rewriting) -> Rewriting:
     """Say of the legs that are left why they are."""
     reason = "nothing else restores the relation: the leg stays, passive"
-    return replace(at, steps=at.steps + tuple(Step("keep", leg, True, reason, None) for leg in unobserved(at)))
+    return replace(at, steps=at.steps + tuple(Step("keep", leg, True, reason, None) for leg in unobserved_legs(at)))
 
 
 def unless_blind(strategy: Strategy) -> Strategy:
@@ -206,19 +206,19 @@ def unless_blind(strategy: Strategy) -> Strategy:
 OBSERVED_STAGES = frozenset(Stage) - {Stage.LEG, Stage.ENDS}
 """The stages of the observed legs: where all hidden robot is, the relation of all steps together decides."""
 
-LIFTED = chain(whole_robot(Stage.MOTORS), each_leg(observed, Stage.LIFT))
+LIFTED = chain(whole_robot(Stage.MOTORS), each_leg(observed_legs, Stage.LIFT))
 """The exact lift, of which the relation is that of the real robot for every robot."""
 
-GENERAL = chain(LIFTED, each_leg(observed, Stage.DIRECTION, Stage.ANCHOR, Stage.JOINT, Stage.BESIDE))
+GENERAL = chain(LIFTED, each_leg(observed_legs, Stage.DIRECTION, Stage.ANCHOR, Stage.JOINT, Stage.BESIDE))
 """The general form: sliders under every virtual actuator, all legs kept."""
 
-DROPPED = each_leg(unobserved, Stage.LEG)
+DROPPED = each_leg(unobserved_legs, Stage.LEG)
 """All unobserved legs tried, whether they can go."""
 
 SIMPLIFIED = chain(
     GENERAL,
-    each_leg(observed, Stage.FORM),
-    unless_blind(chain(DROPPED, best(Stage.ENDS, DROPPED, unobserved), keep_unobserved)))
+    each_leg(observed_legs, Stage.FORM),
+    unless_blind(chain(DROPPED, best(Stage.ENDS, DROPPED, unobserved_legs), keep_unobserved)))
 """The form of the paper, as far as the certificate goes along with it: where unobserved legs hold the platform, the
 ends of the observed legs are changed; what still does not go is kept."""
 
@@ -230,7 +230,7 @@ FORMS = {"simplified": SIMPLIFIED, "general": GENERAL}
 def trusting(evidence: Evidence, *, change_ends: bool) -> list[Rewriting]:
     """The form that the paper's rules alone give, nothing checked; with ``change_ends`` one for each choice of outer
     axes besides."""
-    start = chain(GENERAL, each_leg(observed, Stage.FORM))(Rewriting.of(evidence))
+    start = chain(GENERAL, each_leg(observed_legs, Stage.FORM))(Rewriting.of(evidence))
     starts = [start]
     for rule in rules(Stage.ENDS) if change_ends else ():
         starts += [start.judged(rule, None, each) for each in rule.proposals(start.state, evidence, waive=True)

@@ -34,7 +34,7 @@ from ..mechanism.observations.direction import SeenAxis
 from ..mechanism.pose import Pose, PoseLike, asked_pose
 from ..progress import part, tell
 from ..results import Compared, Result, Value, by_name
-from ..simulation.camera import cylinders, placed
+from ..simulation.camera import cylinders, place_camera
 from ..simulation.ending import GOAL
 from ..simulation.endings.endings import RestSearch
 from ..simulation.endings.search import starts
@@ -268,7 +268,8 @@ def _sight(setting: ObservedRobot, ends: Sequence[ClosedConfiguration], criteria
         return None
     rods = cylinders(setting.mechanism, setting.observed)
     reference = setting.mechanism.reference
-    camera = (placed(rods, reference, [at.pose for at in ends], of_focal(criteria.focal)) if criteria.sight == AUTO
+    camera = (place_camera(rods, reference, [at.pose for at in ends], of_focal(criteria.focal))
+              if criteria.sight == AUTO
               else camera_at(criteria.sight, criteria.focal))
     return CameraView(camera, reference, {o.leg: rod for o, rod in zip(setting.observed, rods, strict=True)})
 

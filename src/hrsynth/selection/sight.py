@@ -38,7 +38,7 @@ class CameraView(Value):
             clear = self._pictured(points)
             for other, segment in ends.items():
                 if other != leg:
-                    clear &= ~hidden(points, segment, self.rods[other].radius)
+                    clear &= ~are_hidden(points, segment, self.rods[other].radius)
             found[leg] = float(clear.mean())
         return found
 
@@ -55,7 +55,7 @@ class CameraView(Value):
         return np.asarray(ahead & inside, dtype=bool)
 
 
-def hidden(points: Array, segment: Array, radius: float) -> Flags:
+def are_hidden(points: Array, segment: Array, radius: float) -> Flags:
     """Which points (n, 3) a cylinder about a segment (2, 3) hides from the origin: the ray to the point comes nearer to
     the segment than ``radius``, before the point."""
     a, d = segment[0], segment[1] - segment[0]

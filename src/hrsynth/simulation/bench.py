@@ -88,7 +88,7 @@ class Bench:
         states: list[tuple[ClosedConfiguration, Command]] = []
         while time < horizon:
             tell(f"run of the mock-up, {time:.1f} s of {horizon:.3g} s at most")
-            at_now = encoded(self.start, at, driven, data.qpos[places] / scale)
+            at_now = read_encoders(self.start, at, driven, data.qpos[places] / scale)
             if at_now is None:
                 stopped = OPEN
                 break
@@ -133,7 +133,7 @@ class Bench:
         return replace(command, error=true, true=tuple(seen))
 
 
-def encoded(start: ClosedConfiguration, at: ClosedConfiguration, places: list[int], moved: Array
+def read_encoders(start: ClosedConfiguration, at: ClosedConfiguration, places: list[int], moved: Array
             ) -> ClosedConfiguration | None:
     """The configuration next to ``at`` to which these motors have moved since the start; None where there is none. What
     more motors say than how they can move together is left out."""

@@ -118,13 +118,13 @@ class Edges(Value):
         found = []
         for number, rod in enumerate(self.rods):
             ends = self.camera.seen(poses(self.reference), poses, rod)
-            normals = [_moved(normal, ends, shock[2 * number + side])
+            normals = [_move_edge(normal, ends, shock[2 * number + side])
                        for side, normal in enumerate(edges(ends, rod.radius))]
             found.append(self.camera.place[:3, :3] @ rebuilt(*normals))
         return np.array(found)
 
 
-def _moved(normal: Array, ends: Array, shift: Array) -> Array:
+def _move_edge(normal: Array, ends: Array, shift: Array) -> Array:
     """The normal of an edge whose image is moved across itself by ``shift`` (two numbers) at the rod's ends."""
     across = unit(np.array([normal[0], normal[1], 0.0]))
     points = []
@@ -136,10 +136,11 @@ def _moved(normal: Array, ends: Array, shift: Array) -> Array:
     return found if found @ normal > 0 else -found
 
 
-def placed(rods: Sequence[Cylinder], reference: str, poses: Sequence[Poses], blank: Camera | None = None) -> Camera:
+def place_camera(rods: Sequence[Cylinder], reference: str, poses: Sequence[Poses],
+                 blank: Camera | None = None) -> Camera:
     """A camera on the reference link from which all rods lie in the picture at all given poses, where the rebuilt
     directions suffer least from errors of pixels: among places on a sphere of directions around them."""
-    ends = np.array([seen(rods, reference, X) for X in poses])
+    ends = np.array([rods_in_frame(rods, reference, X) for X in poses])
     best, found = np.inf, Camera(np.eye(4))
     for ahead in _sphere(VIEWS):
         camera = facing(ends, ahead, perpendicular(ahead), blank)
@@ -150,7 +151,7 @@ def placed(rods: Sequence[Cylinder], reference: str, poses: Sequence[Poses], bla
     return found
 
 
-def seen(rods: Sequence[Cylinder], reference: str, poses: Poses) -> Array:
+def rods_in_frame(rods: Sequence[Cylinder], reference: str, poses: Poses) -> Array:
     """The ends of rods (rods, 2, 3) in the frame of the reference link."""
     frames = [inverse(poses(reference)) @ poses(rod.link) for rod in rods]
     return np.array([rod.ends @ X[:3, :3].T + X[:3, 3] for rod, X in zip(rods, frames, strict=True)])
@@ -177,7 +178,7 @@ def sensitivity(ends: Array, radius: float) -> float:
     u, total = rebuilt(*normals), 0.0
     for side, end in product(range(2), repeat=2):
         wrong = list(normals)
-        wrong[side] = _moved(normals[side], ends, NUDGE * np.eye(2)[end])
+        wrong[side] = _move_edge(normals[side], ends, NUDGE * np.eye(2)[end])
         total += float(np.linalg.norm(rebuilt(*wrong) - u)) / NUDGE
     return total
 

@@ -24,7 +24,7 @@ from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration, measure
 from ..kinematics.platform_motion import Goal, PlatformMotion
 from ..kinematics.relation import Measurement
-from ..kinematics.steps import led
+from ..kinematics.steps import lead_to
 from ..mechanism.observations.direction import SeenAxis
 from ..mechanism.sights import CameraObservation, depth_plane
 from ..results import Value
@@ -87,7 +87,7 @@ class Law(Value):
            time: float = 0.0) -> Command:
         """The command at a configuration (of the joint velocities of its twin)."""
         every = self.question.observations
-        y, exact = measured(configuration, self.question)
+        y, exact = measure_all(configuration, self.question)
         wanted, moving = desired
         true = tuple(o.error(value, w) for o, value, w in zip(every, y, wanted, strict=True))
         seen = y if sensed is None else tuple(sensed(time, configuration.pose, y))
@@ -102,7 +102,7 @@ class Law(Value):
                  for o, s, w, m, e in zip(every, seen, wanted, moving, error, strict=True)]
         e = np.concatenate(error)
         asked = self.gain * e - np.concatenate(drift)
-        velocity = -kernel @ (right.T @ (inverted(values) * (left.T @ asked)))
+        velocity = -kernel @ (right.T @ (damped_inverses(values) * (left.T @ asked)))
         pull = float(np.linalg.norm(rows.T @ e))
         return Command(velocity, true, y, seen, values, kernel @ right[-1], pull)
 
@@ -151,14 +151,14 @@ def supposed_planes(text: str, goal: ClosedConfiguration, question: Measurement)
     return tuple(found)
 
 
-def inverted(values: Array) -> Array:
+def damped_inverses(values: Array) -> Array:
     """The singular values (descending) of a damped pseudo-inverse: exact but where a value is below ``DAMPED``, then
     σ / (σ² + μ²), μ² growing from 0 to ``DAMPED``² as σ vanishes."""
     damping = np.maximum(DAMPED**2 - values**2, 0.0)
     return np.asarray(values / (values**2 + damping))
 
 
-def measured(configuration: ClosedConfiguration, question: Measurement) -> tuple[tuple[Array, ...], list[Array]]:
+def measure_all(configuration: ClosedConfiguration, question: Measurement) -> tuple[tuple[Array, ...], list[Array]]:
     """Of each observation the value (size,) and the rates (size, nv)."""
     _, _, values, rates = measure(configuration.twin, configuration.q, question.reference, question.observations)
     return tuple(values), rates
@@ -166,7 +166,7 @@ def measured(configuration: ClosedConfiguration, question: Measurement) -> tuple
 
 def directions(configuration: ClosedConfiguration, question: Measurement) -> tuple[Array, list[Array]]:
     """The same where all are directions, (k, 3) and (3, nv)."""
-    values, rates = measured(configuration, question)
+    values, rates = measure_all(configuration, question)
     return np.array(values), rates
 
 
@@ -223,15 +223,15 @@ def straight(start: ClosedConfiguration, motion: PlatformMotion, goal: Goal, que
     ``PoseNotReached`` where the way is blocked."""
     X = start.pose(motion.link)
     every = question.observations
-    here, marks = start, [measured(start, question)[0]]
+    here, marks = start, [measure_all(start, question)[0]]
     for fraction in np.linspace(0, 1, POSES + 1)[1:]:
-        here, came = led(here, motion, goal.towards(X, float(fraction)), last=fraction == 1)
+        here, came = lead_to(here, motion, goal.towards(X, float(fraction)), last=fraction == 1)
         if not came:
             at = motion.pose(here.pose(motion.link))
             raise PoseNotReached(start.twin.mechanism.name, str(motion.pose(goal_pose(goal))), float(fraction), str(at),
                                  origin="the start")
         # an angle goes on where it passes half a turn
-        now = measured(here, question)[0]
+        now = measure_all(here, question)[0]
         marks.append(tuple(last + o.apart(value, last) for o, value, last in zip(every, now, marks[-1], strict=True)))
     units = tuple(isinstance(o, SeenAxis) for o in every)
     return Trajectory(np.array([np.concatenate(each) for each in marks]), duration, question.sizes, units), here

@@ -181,7 +181,7 @@ def outlines(cover: Array, light: Array, camera: Camera) -> tuple[Array, Array] 
     normals = []
     for side in (1.0, -1.0):
         points = border[(np.abs(border @ along) < longest) & (side * (border @ across) > 0)] + middle
-        points = _placed(cover, light, points, side * across)
+        points = _place_edge(cover, light, points, side * across)
         if len(points) < 20:
             return None
         vx, vy, x, y = cv2.fitLine(points.astype(np.float32), cv2.DIST_HUBER, 0, 0.001, 0.001).ravel()
@@ -191,7 +191,7 @@ def outlines(cover: Array, light: Array, camera: Camera) -> tuple[Array, Array] 
     return normals[0], normals[1]
 
 
-def _placed(cover: Array, light: Array, points: Array, outwards: Array) -> Array:
+def _place_edge(cover: Array, light: Array, points: Array, outwards: Array) -> Array:
     """Edge points (n, 2) moved along the outward normal to where half of a pixel is covered; those without such a
     place, or with something else beside it, are left out."""
     cv2 = vision()

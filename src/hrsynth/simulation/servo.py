@@ -29,14 +29,14 @@ from ..progress import tell
 from ..results import by_name
 from ..tolerances import RANK_GAP, SEEN_ABOVE
 from .bench import Bench
-from .camera import Camera, Edges, cylinders, placed
+from .camera import Camera, Edges, cylinders, place_camera
 from .ending import EndingClassifier
-from .law import FixedDirections, Law, Sense, Trajectory, measured, straight, supposed_planes
+from .law import FixedDirections, Law, Sense, Trajectory, measure_all, straight, supposed_planes
 from .noise import Sensors, Shocks
 from .pictures import LegRenderer, Pictures, drawing, vision
 from .result import Scatter, Servo
 from .run import AWAY, EFFORT, LIMIT, UNMEASURED, UNSEEN, Loop, Run
-from .track import tracked
+from .track import track_run
 
 GAIN = 0.8
 """λ of MMT 5.1.1."""
@@ -178,21 +178,21 @@ class ServoTask:
         motion, ends = setting.motion, [start, goal]
         question = setting.samples.question
         law = Law(question, setting.dof, conditions.gain, supposed_planes(conditions.depth, goal, question))
-        for name, at in _named(ends):
+        for name, at in _name_ends(ends):
             require_sight(setting, law, name, at)
-        desired: FixedDirections | Trajectory = FixedDirections(measured(ends[1], question)[0])
+        desired: FixedDirections | Trajectory = FixedDirections(measure_all(ends[1], question)[0])
         if conditions.duration is not None:
             goal_pose = motion.whole(ends[1].pose(motion.link))
             desired, ends[1] = straight(ends[0], motion, goal_pose, question, conditions.duration)
         analysis = ConfigurationAnalysis.of(setting)
-        for name, at in _named(ends):
+        for name, at in _name_ends(ends):
             require_regular(analysis, name, at)
         return cls(setting, ends[0], ends[1], law, desired, conditions, seed)
 
     @property
     def wanted(self) -> tuple[Array, ...]:
         """The values of the goal."""
-        return measured(self.goal, self.law.question)[0]
+        return measure_all(self.goal, self.law.question)[0]
 
     @property
     def directions(self) -> Array:
@@ -221,7 +221,7 @@ class ServoTask:
             return Sensors.of(question.observations, noise, given.horizon, self.seed, self.goal.twin.length)
         mechanism = self.setting.mechanism
         rods = cylinders(mechanism, question.observations)
-        eye = given.lens or placed(rods, question.reference, (self.start.pose, self.goal.pose))
+        eye = given.lens or place_camera(rods, question.reference, (self.start.pose, self.goal.pose))
         if given.sense == EDGES:
             edge = noise or Noise(())
             shocks = Shocks.drawn(2 * len(rods), given.horizon, self.seed, edge.bias)
@@ -240,8 +240,8 @@ class ServoTask:
             still = Loop(self.law, setting.everything.question, FixedDirections(self.wanted)).simulate(
                 run.last, LASTS / self.law.gain)
         classifier = EndingClassifier(setting, self.goal, self.wanted)
-        ending = classifier.classify(still, measured(still.last, self.law.question)[0])
-        track = tracked(run.configurations, self.law.question, setting.everything.question, setting.dof)
+        ending = classifier.classify(still, measure_all(still.last, self.law.question)[0])
+        track = track_run(run.configurations, self.law.question, setting.everything.question, setting.dof)
         return Servo(setting, motion.pose(self.start.pose(motion.link)), motion.pose(self.goal.pose(motion.link)),
                      self.wanted, self.law.gain, given.sense, given.amount, run, track, ending, given.depth,
                      still.last, self.goal, self._scatter(run, still.last) if given.noisy and not over else None,
@@ -326,7 +326,7 @@ def _off(kind: tuple[str, str], seen: Observation, value: Array, true: Array) ->
     return {ANGLES: math.degrees(off), LENGTHS: 1e3 * off}.get(kind, off)
 
 
-def _named(ends: Sequence[ClosedConfiguration]) -> list[tuple[str, ClosedConfiguration]]:
+def _name_ends(ends: Sequence[ClosedConfiguration]) -> list[tuple[str, ClosedConfiguration]]:
     """The start and the goal with their names; the goal alone where both are one."""
     return list(zip(("start", "goal"), ends, strict=True))[ends[0] is ends[1]:]
 

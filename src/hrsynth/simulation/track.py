@@ -91,7 +91,7 @@ class _Mark:
         return float(np.linalg.svd(self.rates @ inverse, compute_uv=False)[dof - 1])
 
 
-def tracked(configurations: Sequence[ClosedConfiguration], question: Measurement, moving: Measurement,
+def track_run(configurations: Sequence[ClosedConfiguration], question: Measurement, moving: Measurement,
             dof: int) -> Track:
     """The track of a run; ``question`` holds what is observed, ``moving`` everything that counts as motion."""
     marks = [_mark(at, question, moving) for at in configurations]
@@ -106,7 +106,7 @@ def tracked(configurations: Sequence[ClosedConfiguration], question: Measurement
     for place in range(1, len(marks)):
         since = since * _sign(marks[place].basis.T @ marks[place - 1].basis)
         for i in np.flatnonzero(marks[place].least > INVERTED):
-            turned = _turned(marks[known[i]], marks[place])[i] * (1.0 if i == LOOPS else since[i])
+            turned = _turned_maps(marks[known[i]], marks[place])[i] * (1.0 if i == LOOPS else since[i])
             here[i], last[i] = here[i] * turned, place if turned < 0 else last[i]
             known[i], since[i] = place, 1.0
         if marks[place].clear and np.any(here != before):
@@ -128,7 +128,7 @@ def _mark(at: ClosedConfiguration, question: Measurement, moving: Measurement) -
                  at.kernel()[1].weakest)
 
 
-def _turned(a: _Mark, b: _Mark) -> Array:
+def _turned_maps(a: _Mark, b: _Mark) -> Array:
     """−1 for each of the three maps whose orientation changes between two configurations, else 1: of rates and twists
     up to the turn of the tangent space."""
     return np.array([_sign(a.rates.T @ b.rates), _sign(a.twists.T @ b.twists),

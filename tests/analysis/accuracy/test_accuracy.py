@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 from hrsynth.analysis.accuracy.accuracy import Accuracy, accuracy, errors_at, sees_all
 from hrsynth.analysis.accuracy.cones import Blur, half_angles
 from hrsynth.analysis.accuracy.error_map import Mapper
-from hrsynth.analysis.accuracy.pose_errors import _descended, _width, attained, error_axes, reading
-from hrsynth.analysis.accuracy.sampled import sampled
+from hrsynth.analysis.accuracy.pose_errors import _descend, _width, error_axes, largest_by_ascent, reading
+from hrsynth.analysis.accuracy.sampled import true_errors
 from hrsynth.analysis.accuracy.singular_search import singular_poses
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.description import load
@@ -174,7 +174,7 @@ def test_samples_approach_the_linear_maxima_as_cones_shrink(robot: str) -> None:
     for cone in (2e-3, 1e-3):
         cones = np.full(len(setting.observed), cone)
         errors = errors_at(setting, Blur(cones), start)
-        true = sampled(start, question, setting.motion, Blur(cones), errors, 8)
+        true = true_errors(start, question, setting.motion, Blur(cones), errors, 8)
         assert true.missed == 0
         away.append(abs(true.position - errors.position.largest) / errors.position.largest)
     assert away[1] < 0.02
@@ -343,7 +343,7 @@ def test_the_least_error_is_the_least_of_many_directions() -> None:
         blocks = U * s[:, None] @ Vt
         views = rng.normal(size=(d, 20_000))
         views /= np.linalg.norm(views, axis=0)
-        assert _width(blocks, _descended(blocks)[:, None])[0] <= _width(blocks, views).min() * (1 + 1e-6)
+        assert _width(blocks, _descend(blocks)[:, None])[0] <= _width(blocks, views).min() * (1 + 1e-6)
 
 
 @pytest.mark.some(1)
@@ -352,7 +352,8 @@ def test_what_an_ascent_attains_lies_between_the_two_bounds(name: str):
     setting = ObservedRobot.of(name)
     cones = np.full(len(setting.observed), 1e-3)
     for at in (setting.everything.start, *setting.configurations[:4]):
-        found, bounds = attained(at, setting.samples.question, Blur(cones)), errors_at(setting, Blur(cones), at)
+        found, bounds = largest_by_ascent(at, setting.samples.question, Blur(cones)), errors_at(setting, Blur(cones),
+                                                                                                at)
         for bound, met in zip((bounds.position, bounds.orientation), found, strict=True):
             assert np.isinf(met) == np.isinf(bound.largest)
             if np.isfinite(met):

@@ -12,8 +12,8 @@ from hypothesis import HealthCheck, assume, given, settings
 from scipy.optimize import minimize
 
 from hrsynth.analysis.accuracy.accuracy import Accuracy, accuracy
-from hrsynth.analysis.accuracy.best_fit import ENDS, FIT, Fit, best_fits, seen, weakest
-from hrsynth.analysis.accuracy.cones import tilted
+from hrsynth.analysis.accuracy.best_fit import ENDS, FIT, Fit, best_fits, observed_values, weakest
+from hrsynth.analysis.accuracy.cones import tilt
 from hrsynth.analysis.accuracy.sampled import _tangents
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.batch.reach import reach
@@ -55,7 +55,7 @@ def rested(P: Array, legs: list[int], way: Array, parts: int) -> tuple[Array, bo
     """The position of the best fit led there in equal parts by a general minimiser, and whether it never jumped."""
     u, smooth = directions(P, legs), True
     for part in np.linspace(0, 1, parts + 1)[1:]:
-        wanted = tilted(u, part * way)
+        wanted = tilt(u, part * way)
         found = minimize(lambda x, w=wanted: 1e3 * np.sum(across(directions(x, legs), w) ** 2), P, tol=1e-12)
         smooth &= bool(np.linalg.norm(found.x - P) < 0.05)
         P = found.x
@@ -87,7 +87,7 @@ def test_what_ends_is_no_singularity() -> None:
 
 def ways(setting: ObservedRobot, at: ClosedConfiguration, cone: float, count: int, seed: int) -> list[Array]:
     rng = np.random.default_rng(seed)
-    u = np.array(seen(at, setting.samples.question)[0])
+    u = np.array(observed_values(at, setting.samples.question)[0])
     return [cone * _tangents(rng, u) for _ in range(count)]
 
 
@@ -101,11 +101,11 @@ def test_best_fits_are_those_of_the_closed_form(legs: str, at: str, chosen: list
     here = reach(setting.everything.start, setting.everything.question, Pose.parse(at), setting.motion)
     numbers = [int(leg) - 1 for leg in legs.split(",")]
     P = setting.motion.position(here.pose(setting.motion.link))
-    u = np.array(seen(here, setting.samples.question)[0])
+    u = np.array(observed_values(here, setting.samples.question)[0])
     assert np.allclose(u, directions(P, numbers), atol=1e-9)
     drawn = ways(setting, here, math.radians(2), 30, 0)
     for way in (drawn[i] for i in chosen):
-        fit = best_fits(here, setting.samples.question, lambda part, way=way: tilted(u, part * way))
+        fit = best_fits(here, setting.samples.question, lambda part, way=way: tilt(u, part * way))
         found, smooth = rested(P, numbers, way, 40)
         assert fit.outcome == (FIT if smooth else ENDS)
         if smooth:
@@ -116,16 +116,16 @@ def check_fit(setting: ObservedRobot, at: ClosedConfiguration, way: Array) -> Fi
     """A fit is where the loop rests whose desired directions are the wrong ones, and nothing next to it fits better;
     where there is none, that is no claim about the robot."""
     question, link = setting.samples.question, setting.motion.link
-    u = np.array(seen(at, question)[0])
-    fit = best_fits(at, question, lambda part: tilted(u, part * way))
+    u = np.array(observed_values(at, question)[0])
+    fit = best_fits(at, question, lambda part: tilt(u, part * way))
     assert fit.weakest <= weakest(at, question) * (1 + 1e-9)
     if fit.outcome != FIT:
         return fit
     assert fit.reached == 1.0
-    wanted, there = tilted(u, way), fit.way[-1]
+    wanted, there = tilt(u, way), fit.way[-1]
 
     def size(here: ClosedConfiguration) -> float:
-        return float(np.sum(np.cross(np.array(seen(here, question)[0]), wanted) ** 2))
+        return float(np.sum(np.cross(np.array(observed_values(here, question)[0]), wanted) ** 2))
 
     rng = np.random.default_rng(0)
     for _ in range(10):

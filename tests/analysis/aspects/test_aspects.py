@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from analysis.aspects.certified import check_certified
-from hrsynth.analysis.aspects.condition_enclosure import ConditionEnclosure, enclosed, prove
+from hrsynth.analysis.aspects.condition_enclosure import ConditionEnclosure, enclose_value, prove
 from hrsynth.analysis.aspects.leg_forms import LegPattern
 from hrsynth.analysis.aspects.path import BUDGET, Aspects, path
 from hrsynth.analysis.aspects.path_segments import StraightSegment, mode_change
@@ -24,7 +24,7 @@ from hrsynth.analysis.singularity.agreement import smallest_of
 from hrsynth.closed_forms.legs import OnCrank
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, PoseNotReached
-from hrsynth.geometry.balls import balls, below, centred, jets
+from hrsynth.geometry.balls import balls, below, jets, mean_value_form
 from hrsynth.geometry.vectors import Array, cross, dot, triple
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.walking import random_walk
@@ -308,7 +308,7 @@ def test_the_mean_value_form_holds_all_values_and_is_sharper_on_short_intervals(
 
     box = balls([middle - half], [middle + half])
     point = balls([middle], [middle])
-    form = centred(value(point), value(jets(box)), box - middle)[0]
+    form = mean_value_form(value(point), value(jets(box)), box - middle)[0]
     for number in value(np.linspace(middle - half, middle + half, 30)):
         assert float(form.lower()) - 1e-12 <= number <= float(form.upper()) + 1e-12
     assert half > 0.01 or form.rad() < value(box)[0].rad()
@@ -348,7 +348,7 @@ def test_a_pose_on_the_locus_is_undecided():
     way = StraightSegment.between((p[0], R[0]), (p[1], R[1]))
     root = brentq(lambda x: float(reading.at(*way.at(np.array([x])))[1][0]), 0, 1, xtol=1e-14)
     place = way.at(np.array([root]))
-    assert enclosed(reading, place[0][0], place[1][0]) == (True, 0.0)
+    assert enclose_value(reading, place[0][0], place[1][0]) == (True, 0.0)
     on = str(aspects.motion.pose(aspects.pattern.coordinates.frame(place[0][0], place[1][0]))).replace("z=0,", "")
     answer = path(load("3rrr_m1"), start="x=0,y=0", goal=on)
     assert answer.verdict == UNDECIDED

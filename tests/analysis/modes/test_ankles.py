@@ -12,8 +12,8 @@ from analysis.modes.ankles import LEGS, ankle, carried, counted
 from analysis.modes.test_robots import check_completeness, check_modes, same_modes
 from analysis.modes.test_surfaces import needs_msolve
 from hrsynth.analysis.measured import MeasuredRobot
-from hrsynth.analysis.modes.carried_modes import polished, proposals
-from hrsynth.analysis.modes.carrier import carried as carried_platform
+from hrsynth.analysis.modes.carried_modes import polish_zeros, proposals
+from hrsynth.analysis.modes.carrier import carried_platform as carried_platform
 from hrsynth.analysis.modes.joint_forms import closings_bound, eigenvalues
 from hrsynth.errors import NotConfined
 from hrsynth.geometry.vectors import pose, rotation_about
@@ -119,7 +119,7 @@ def test_ranks_and_degrees_leave_the_same_number(word: str):
         counted = closings_bound(system, system.square)
         assert counted is not None
         assert counted.most == system.most(system.square)
-        found = polished(system, eigenvalues(system, system.square, counted))
+        found = polish_zeros(system, eigenvalues(system, system.square, counted))
         others = proposals(system, counted.most)
         assert len(found) == len(others) == counted.most
         for q in others:

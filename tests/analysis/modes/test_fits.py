@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from analysis.modes.draws import Draw, Rng, on_two_bodies, planar, spatial, translating
-from hrsynth.analysis.modes.curves import Circle, shifted
+from hrsynth.analysis.modes.curves import Circle, shift_reach
 from hrsynth.analysis.modes.modes import modes
 from hrsynth.analysis.modes.rigid import Planar, Spatial
 from hrsynth.analysis.modes.solve import SystemModes, solve
@@ -58,10 +58,10 @@ def test_what_may_be_the_goal_within_the_error_is_not_excluded(name: str):
         moves = [unit(rng.normal(size=3)) for _ in system.curves]
         if isinstance(system, Planar):
             moves = [unit(v - system.X_plane[:3, 2] * float(system.X_plane[:3, 2] @ v)) for v in moves]
-        curves = tuple(shifted(curve, 0.9 * error * v) for curve, v in zip(system.curves, moves, strict=True))
+        curves = tuple(shift_reach(curve, 0.9 * error * v) for curve, v in zip(system.curves, moves, strict=True))
         near = solve(replace(system, curves=curves, error=error), near=False)
         assert not near.complete or listed(near, goal, 1e-5), near.proof
-        curves = tuple(shifted(curve, 1e-4 * v) for curve, v in zip(system.curves, moves, strict=True))
+        curves = tuple(shift_reach(curve, 1e-4 * v) for curve, v in zip(system.curves, moves, strict=True))
         far = solve(replace(system, curves=curves), near=False)
         assert far.complete, far.proof
         assert far.modes == ()
@@ -70,7 +70,7 @@ def test_what_may_be_the_goal_within_the_error_is_not_excluded(name: str):
 def test_a_match_below_the_tolerance_that_is_none_is_excluded():
     """A leg off by 1e-10 sizes: formerly a mode, proved."""
     system, _ = planar(np.random.default_rng(2), "CCCC")
-    curves = (*system.curves[:3], shifted(system.curves[3], 1e-10 * system.X_plane[:3, 0]))
+    curves = (*system.curves[:3], shift_reach(system.curves[3], 1e-10 * system.X_plane[:3, 0]))
     found = solve(Planar(curves, system.tips, system.X_plane))
     assert found.complete
     assert found.modes == ()
@@ -82,7 +82,7 @@ def test_a_goal_whose_solution_is_known_too_roughly_is_a_mode_all_the_same(name:
     """A leg off by 1e-8 sizes, with no error told that would make it one: the goal was dropped."""
     system, X = MORE[name](np.random.default_rng(0))
     goal = solve(system, near=False).modes[0].q
-    curves = (*system.curves[:-1], shifted(system.curves[-1], 1e-8 * system.size * np.ones(3)))
+    curves = (*system.curves[:-1], shift_reach(system.curves[-1], 1e-8 * system.size * np.ones(3)))
     rough = replace(system, curves=curves, error=np.inf)
     found = solve(rough, near=False, goal=goal)
     assert not found.complete
@@ -115,7 +115,7 @@ def test_a_second_mode_by_symmetry_is_neither_proved_nor_excluded(seed: int):
 
 def test_tips_at_rest_that_are_torn_apart_leave_no_mode():
     system, _ = spatial(np.random.default_rng(0), "PPP")
-    curves = (*system.curves[:2], shifted(system.curves[2], np.array([1e-6, 2e-6, -1e-6])))
+    curves = (*system.curves[:2], shift_reach(system.curves[2], np.array([1e-6, 2e-6, -1e-6])))
     found = solve(Spatial(curves, system.tips), near=False)
     assert found.complete
     assert found.modes == ()

@@ -9,7 +9,7 @@ import sympy
 from analysis.modes.draws import FAMILIES, articulated, planar, spatial, translating
 from analysis.modes.laws import among, check_member, draw
 from analysis.modes.newton import pose_of, real_ones, solutions
-from hrsynth.analysis.modes.curves import Circle, Curve, Line, shifted
+from hrsynth.analysis.modes.curves import Circle, Curve, Line, shift_reach
 from hrsynth.analysis.modes.rigid import Planar, Spatial
 from hrsynth.analysis.modes.solve import SystemModes, solve
 from hrsynth.analysis.modes.systems import System
@@ -191,7 +191,7 @@ def test_circles_with_centres_at_equal_height_meet_twice():
 
 def test_what_matches_almost_is_near_and_stationary():
     system, goal = planar(np.random.default_rng(2), "CCCC")
-    curves = (system.curves[0], shifted(system.curves[1], 1e-3 * system.X_plane[:3, 0]), *system.curves[2:])
+    curves = (system.curves[0], shift_reach(system.curves[1], 1e-3 * system.X_plane[:3, 0]), *system.curves[2:])
     modes = solve(Planar(curves, system.tips, system.X_plane))
     assert modes.modes == ()
     assert modes.complex == 0

@@ -7,7 +7,7 @@ import pytest
 
 import hrsynth
 from analysis.modes.laws import needs_msolve
-from hrsynth.analysis.modes.multiples import combined, most_zeros
+from hrsynth.analysis.modes.multiples import combine_quadrics, most_zeros
 from hrsynth.analysis.modes.polynomials import Quadric
 from hrsynth.description import load, shipped
 from strategies import random_rotation, transformed
@@ -56,7 +56,7 @@ def test_combinations_have_the_same_zeros():
     x = [3, -2, 5]
     centres = ([1, 1, 0], [4, 0, 2], [0, 7, 9])
     quadrics = [sphere(c, sum((a - b) ** 2 for a, b in zip(c, x, strict=True))) for c in centres]
-    found = combined(quadrics)
+    found = combine_quadrics(quadrics)
     assert [each.value(x) for each in found] == [0, 0, 0]
     assert sum(not np.any(each.A[1:, 1:]) for each in found) == 2
     assert any(each.value([1, 2, 3]) for each in found)

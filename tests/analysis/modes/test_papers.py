@@ -16,7 +16,7 @@ from scipy.optimize import least_squares
 
 from hrsynth.analysis.modes.modes import AssemblyModes, modes
 from hrsynth.description import load, shipped
-from hrsynth.families.printed import CLAIMS, GOAL, PrintedClaim, PrintedMode, printed
+from hrsynth.families.printed import CLAIMS, GOAL, PrintedClaim, PrintedMode, printed_poses
 from hrsynth.geometry.vectors import Array
 from hrsynth.present import printed as table
 from hrsynth.present.markdown import block
@@ -89,7 +89,7 @@ def coordinates(found: AssemblyModes, size: int) -> Array:
     return np.array(sorted(rows, key=lambda row: -row[2]))[:, :size]
 
 
-listed = table.computed
+listed = table.compute_modes
 
 
 def goal_of(claim: PrintedClaim) -> Array:
@@ -112,7 +112,7 @@ def test_the_closed_form_has_the_modes_that_are_listed(claim: PrintedClaim):
 
 
 @pytest.mark.some(5)
-@pytest.mark.parametrize(("claim", "mode"), list(printed()), ids=lambda each: (
+@pytest.mark.parametrize(("claim", "mode"), list(printed_poses()), ids=lambda each: (
     spoken(each) if isinstance(each, PrintedClaim) else "/".join(map(str, each.place))))
 def test_only_the_desired_poses_are_printed_as_they_are(claim: PrintedClaim, mode: PrintedMode):
     nearest = table.nearest(mode.place, listed(claim))

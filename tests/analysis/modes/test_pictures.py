@@ -22,7 +22,7 @@ from hrsynth.cli import execute
 from hrsynth.description import load, shipped
 from hrsynth.errors import BadRequest
 from hrsynth.geometry.vectors import rotation_about
-from hrsynth.present.coupler import chains, points, swept, traced
+from hrsynth.present.coupler import chains, points, swept, trace_coupler
 from hrsynth.present.modes import MARKS, description, drawable, figure, picture
 from hrsynth.present.scenes import CLOSES, GOAL, NEAR, OPEN, ModesScene, scene
 from hrsynth.present.sketch import Sketch
@@ -174,7 +174,7 @@ def test_a_traced_point_keeps_its_triangle():
     n = np.array([0.0, 0.0, 1.0])
     turn = rotation_about(n, 0.7)
     pair = tuple((turn @ triangle[k] + [0.2, 0.1, 0.0])[None] for k in (0, 1))
-    assert np.allclose(traced(pair, triangle, n), turn @ triangle[2] + [0.2, 0.1, 0.0])
+    assert np.allclose(trace_coupler(pair, triangle, n), turn @ triangle[2] + [0.2, 0.1, 0.0])
     surface = swept(pair, triangle, 40)
     for k in (0, 1):
         sides = np.linalg.norm(surface - pair[k], axis=2)

@@ -21,7 +21,7 @@ from hrsynth.analysis.modes.planar_reading import planar_loops, whole_kernel
 from hrsynth.analysis.modes.search import search
 from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.words import parse
-from hrsynth.constraints.pattern import attached, placing_links
+from hrsynth.constraints.pattern import leg_ends, placing_links
 from hrsynth.description import load, shipped
 from hrsynth.errors import NotConfined, Unsolved
 from hrsynth.geometry.vectors import pose_difference
@@ -104,7 +104,7 @@ def test_geared_five_bars(ratio: str, seed: int):
 @pytest.mark.parametrize("ratio", [2.0, -1.0])
 def test_a_search_finds_only_closings_that_are_listed(ratio: float):
     listed = hrsynth.modes(five_bar(ratio, 3)[0], "1")
-    found = search(listed.goal, measured(listed).question, attached(listed.setting.anatomy))
+    found = search(listed.goal, measured(listed).question, leg_ends(listed.setting.anatomy))
     assert len(found.modes) > 1
     for mode in found.modes:
         assert min(max(np.abs(X - each.bodies[body]).max() for body, X in mode.bodies.items())
@@ -145,7 +145,7 @@ def test_loops_are_told_so_that_their_degrees_are_low(word: str, count: int):
     """A tip on a line of the platform, two on circles: 6, as a coupler curve meets a circle; lines alone leave 4."""
     found = hrsynth.modes(mechanism(parse(word)), real=True)
     assert (found.found.complete, found.found.complex) == (True, count)
-    others = search(found.goal, measured(found).question, attached(found.setting.anatomy))
+    others = search(found.goal, measured(found).question, leg_ends(found.setting.anatomy))
     for mode in others.modes:
         assert min(max(np.abs(X - each.bodies[body]).max() for body, X in mode.bodies.items())
                    for each in found.modes if each.bodies) < 1e-6

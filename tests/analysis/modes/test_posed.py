@@ -23,12 +23,12 @@ from hrsynth.analysis.modes.conditions import (
 from hrsynth.analysis.modes.modes import modes
 from hrsynth.analysis.modes.pose_bound import _Quotient, bound, dimensions
 from hrsynth.analysis.modes.pose_forms import Poses, SquareForms
-from hrsynth.analysis.modes.posed import posed, solve_posed
+from hrsynth.analysis.modes.posed import pose_platform, solve_posed
 from hrsynth.analysis.modes.search import search
 from hrsynth.analysis.modes.tips import tip_loci
 from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.words import parse
-from hrsynth.constraints.pattern import attached
+from hrsynth.constraints.pattern import leg_ends
 from hrsynth.geometry.vectors import pose_difference
 from strategies import spherical
 
@@ -79,7 +79,7 @@ def test_what_random_starts_find_is_listed(word, legs, count):
     at = robot.setting.configurations[1]
     made, found = solve_posed(robot, at)
     assert (found.complex, found.complete) == (count, True)
-    (body,) = attached(robot.setting.anatomy)
+    (body,) = leg_ends(robot.setting.anatomy)
     listed = [made.bodies(mode.q)[body] for mode in found.modes]
     met = [mode.bodies[body] for mode in search(at, robot.question, (body,)).modes]
     assert distance(met, listed, at.twin.length) < SAME
@@ -108,9 +108,9 @@ def test_the_known_ways_list_the_same(word, legs, seed):
 def test_each_pose_is_within_its_radius_of_one_that_fits_all_legs():
     robot = measured(*KINDS[0][:2])
     at = robot.setting.configurations[1]
-    (system,) = posed(robot, at)
+    (system,) = pose_platform(robot, at)
     made, found = solve_posed(robot, at)
-    (body,) = attached(robot.setting.anatomy)
+    (body,) = leg_ends(robot.setting.anatomy)
     home = np.linalg.inv(at.pose(body))
     for mode in found.modes:
         moved = made.bodies(mode.q)[body] @ home
@@ -226,7 +226,7 @@ def test_a_body_that_turns_about_a_point_has_eight_modes(seed: int):
     elbow's axis, three quadrics of the quaternion."""
     found = modes(spherical(np.random.default_rng(seed)), real=True)
     assert (found.found.complete, found.found.complex) == (True, 8)
-    others = search(found.goal, MeasuredRobot.driven(found.setting).question, attached(found.setting.anatomy))
+    others = search(found.goal, MeasuredRobot.driven(found.setting).question, leg_ends(found.setting.anatomy))
     for mode in others.modes:
         assert min(max(np.abs(X - each.bodies[body]).max() for body, X in mode.bodies.items())
                    for each in found.modes if each.bodies) < 1e-6
@@ -239,5 +239,5 @@ def test_a_body_that_turns_about_a_point_has_one_mode_where_its_rods_are_watched
     for seed in range(3):
         found = modes(spherical(np.random.default_rng(seed)), legs)
         assert (found.found.complete, found.found.complex, len(found.modes)) == (True, 1, 1)
-    others = search(found.goal, MeasuredRobot.watched(found.setting).question, attached(found.setting.anatomy))
+    others = search(found.goal, MeasuredRobot.watched(found.setting).question, leg_ends(found.setting.anatomy))
     assert len(others.modes) == 1

@@ -21,7 +21,7 @@ from hrsynth.analysis.modes.planar_modes import solve_loops
 from hrsynth.analysis.modes.posed import solve_posed
 from hrsynth.analysis.modes.single_loop import solve_loop
 from hrsynth.analysis.modes.solve import SystemModes
-from hrsynth.analysis.modes.ways import solve_tips, uncoupled
+from hrsynth.analysis.modes.ways import solve_tips, without_couplings
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.budgets import EFFORT
 from hrsynth.description import load, shipped
@@ -389,8 +389,8 @@ def test_a_joint_that_a_coupling_holds_apart_from_another_is_no_joint_without_it
                             couplings=(Coupling("belt", stage, slide.successor, 1.0),))
     setting = watched(coupled)
     assert stage in setting.mechanism.links
-    assert uncoupled(MeasuredRobot.driven(setting), setting.everything.start) is None
-    assert uncoupled(MeasuredRobot.watched(setting), setting.everything.start) is not None
+    assert without_couplings(MeasuredRobot.driven(setting), setting.everything.start) is None
+    assert without_couplings(MeasuredRobot.watched(setting), setting.everything.start) is not None
 
 
 def moved_since_zero(found: AssemblyModes, at: ClosedConfiguration, joint: Joint) -> float:

@@ -17,7 +17,7 @@ from hrsynth.analysis.modes.msolve import PACKAGE
 from hrsynth.analysis.modes.search import search
 from hrsynth.catalog.entry import mechanism
 from hrsynth.catalog.words import parse
-from hrsynth.constraints.pattern import attached
+from hrsynth.constraints.pattern import leg_ends
 from hrsynth.description import load, shipped
 from hrsynth.mechanism import Mechanism
 
@@ -37,7 +37,7 @@ def check_agreement(listed: AssemblyModes) -> None:
     of a platform that only translates)."""
     assert listed.found.complete
     measured = (MeasuredRobot.driven if listed.kind == "real" else MeasuredRobot.watched)(listed.setting)
-    found = search(listed.goal, measured.question, attached(listed.setting.anatomy))
+    found = search(listed.goal, measured.question, leg_ends(listed.setting.anatomy))
     assert found.loose == 0
     for mode in found.modes:
         if not other_branch(listed, mode.configuration):
@@ -80,7 +80,7 @@ def test_a_platform_that_is_a_point_has_modes_at_points():
     mechanism, real = robot_of("planar, a point", 6)
     listed = hrsynth.modes(mechanism, real=real)
     measured = (MeasuredRobot.driven if real else MeasuredRobot.watched)(listed.setting)
-    bodies = attached(listed.setting.anatomy)
+    bodies = leg_ends(listed.setting.anatomy)
     found = search(listed.goal, measured.question, bodies)
     assert listed.found.complete
     assert len(found.modes) == len(listed.modes) == 2

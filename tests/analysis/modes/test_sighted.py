@@ -24,7 +24,7 @@ from hrsynth.analysis.modes.modes import AssemblyModes, modes
 from hrsynth.analysis.modes.search import search
 from hrsynth.analysis.modes.sighted import Sight, conditions
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.constraints.pattern import attached
+from hrsynth.constraints.pattern import leg_ends
 from hrsynth.errors import BadRequest, NoCertificate
 from hrsynth.geometry.vectors import Array
 from hrsynth.mechanism.observations import kinds
@@ -183,7 +183,7 @@ def test_what_random_starts_of_the_whole_robot_find_is_listed(name: str) -> None
     setting: ObservedRobot = ROBOTS[name]()
     found = modes(setting, at=setting.configurations[0])
     assert found.found.complete
-    bodies = attached(setting.anatomy)
+    bodies = leg_ends(setting.anatomy)
     met = [mode.bodies[bodies[0]] for mode in search(found.goal, setting.samples.question, bodies).modes]
     if found.within == "poses turned as this one":  # others are not looked for, and a search meets them
         met = [X for X in met if np.abs(X[:3, :3] - found.goal.pose(bodies[0])[:3, :3]).max() < SAME]
@@ -273,7 +273,7 @@ def test_encoders_of_legs_are_held_with_the_legs() -> None:
     assert (found.found.complex, found.found.complete) == (4, True)  # circles about one centre: two shapes, two turns
     other = modes("rrrrr_m1", camera="eye=base@0.3,0.1,0.5", see="point:dist_1@0.1,0,0")
     assert (other.found.complete, len(other.modes)) == (True, 2)
-    found = search(other.goal, MeasuredRobot.watched(other.setting).question, attached(other.setting.anatomy))
+    found = search(other.goal, MeasuredRobot.watched(other.setting).question, leg_ends(other.setting.anatomy))
     assert len(found.modes) == 2
 
 

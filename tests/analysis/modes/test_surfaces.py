@@ -14,7 +14,7 @@ import pytest
 from analysis.modes.draws import FAMILIES, MEETING, SURFACES, on_two_bodies, spatial, translating
 from analysis.modes.laws import among, check_agreement, check_member, draw, needs_msolve
 from hrsynth.analysis.modes.curves import Circle, Plane, Reach, Sphere
-from hrsynth.analysis.modes.msolve import parametrised, read, written
+from hrsynth.analysis.modes.msolve import parametrise, read, write_system
 from hrsynth.analysis.modes.polynomials import Quadric
 from hrsynth.analysis.modes.quadrics import Balls
 from hrsynth.analysis.modes.rigid import Planar
@@ -177,8 +177,8 @@ def coordinates(system: System, chart, goal: np.ndarray) -> list[float]:
 def test_msolve_is_asked_and_read_in_its_own_words():
     circle = Quadric(np.array([[-2, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=object))
     line = Quadric(np.array([[0, 3, -3], [0, 0, 0], [0, 0, 0]], dtype=object))
-    assert written([circle, line]) == "a,b\n0\n-2+1*a^2+1*b^2,\n1*a-1*b\n"
-    assert written([line], circle).splitlines()[-1] == "-2*z+1*z*a^2+1*z*b^2-1"
+    assert write_system([circle, line]) == "a,b\n0\n-2+1*a^2+1*b^2,\n1*a-1*b\n"
+    assert write_system([line], circle).splitlines()[-1] == "-2*z+1*z*a^2+1*z*b^2-1"
     assert read("[1, 2, -1, []]:", 2) is None
     answer = read("[-1]:", 2)
     assert answer is not None
@@ -192,7 +192,7 @@ def test_msolve_is_asked_and_read_in_its_own_words():
 def test_msolve_stops_in_time():
     part = next(wholes(spatial(np.random.default_rng(0), "SSSSSS").system))
     with pytest.raises(Unsolved, match="no answer within"):
-        parametrised(part.equations(), timeout=0.05)
+        parametrise(part.equations(), timeout=0.05)
 
 
 def test_without_msolve_the_extra_is_named(monkeypatch):

@@ -15,7 +15,7 @@ from analysis.singularity.found import found
 from analysis.singularity.test_figures import centre
 from hrsynth.analysis.measured import MeasuredRobot
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.analysis.singularity.locus import Locus, framed
+from hrsynth.analysis.singularity.locus import Locus, frame_plane
 from hrsynth.analysis.singularity.locus import locus as drawn
 from hrsynth.analysis.singularity.rank_curve import PlaneOfPoses
 from hrsynth.batch.reach import reach, sweep
@@ -197,7 +197,7 @@ def test_thin_tips_are_within_the_window(degrees: int) -> None:
         needle = (along >= 0) & (along <= 1.9 * length) & (np.abs(across) <= along * np.tan(np.radians(10)))
         return needle | (np.linalg.norm(places - centre, axis=1) <= radius)
 
-    grid = framed(setting.everything.start, setting.everything.question, motion, Pose(phi=0.0), 5,
+    grid = frame_plane(setting.everything.start, setting.everything.question, motion, Pose(phi=0.0), 5,
                   lambda _, cells: inside(cells.places()))
     step = 2 * LOCUS_SIDES[0] * length / (COARSE_GRID - 1)
     corners = np.stack([end, centre + radius, centre - radius])

@@ -12,7 +12,7 @@ import pytest
 from hrsynth.cli import execute
 from hrsynth.description import load, save
 from hrsynth.description.contents import Content, content_of
-from hrsynth.description.meshes import located
+from hrsynth.description.meshes import locate_mesh
 from hrsynth.errors import BadRequest
 from hrsynth.geometry.vectors import rotation_from_rpy
 from hrsynth.mechanism import Mechanism
@@ -65,7 +65,7 @@ def same(mine: Content, theirs: Content, folders: tuple[Path, Path]) -> None:
         assert pytest.approx(a.X, abs=1e-9) == b.X
         assert b.scale == pytest.approx(a.scale, rel=1e-9)
         if a.file is not None:
-            one, two = (located(s.file, folder) for s, folder in zip((a, b), folders, strict=True))
+            one, two = (locate_mesh(s.file, folder) for s, folder in zip((a, b), folders, strict=True))
             assert one is not None
             assert two is not None
             assert one.read_bytes() == two.read_bytes()

@@ -18,7 +18,7 @@ from hrsynth.cli import main
 from hrsynth.errors import BadRequest, HrsynthError
 from hrsynth.mechanism.observations.direction import Direction
 from hrsynth.present.studio.desk import Desk
-from hrsynth.present.studio.scale import CONE_TEXT, LOST, error, rounded
+from hrsynth.present.studio.scale import CONE_TEXT, LOST, error, round_digits
 from hrsynth.present.text.tables import NOT_BOUNDED
 
 DESK = Desk()
@@ -374,7 +374,7 @@ def test_the_error_of_orientation_is_told_where_the_platform_turns(robot: str):
     assert ("turned by about" in wrong["words"]) == (turns and wrong["words"] != LOST)
     if turns:
         found = hrsynth.accuracy(robot, cone=CONE_TEXT).to_dict()["poses"][0]["orientation_deg"]["largest"]
-        assert f"turned by about {rounded(found)}°" in wrong["words"]
+        assert f"turned by about {round_digits(found)}°" in wrong["words"]
 
 
 @pytest.mark.slow

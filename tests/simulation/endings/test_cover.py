@@ -22,7 +22,7 @@ from hrsynth.simulation.endings.cover import _places, bounds, cover
 from hrsynth.simulation.endings.flow import Places
 from hrsynth.simulation.endings.joint_error import JointError
 from hrsynth.simulation.endings.pose_error import PoseError
-from hrsynth.simulation.endings.reached import narrowed, reached
+from hrsynth.simulation.endings.reached import narrow_joint, narrow_joints
 from hrsynth.simulation.endings.subdivision import Subdivision
 from hrsynth.tolerances import LOCKED_PLACE, SMALLEST_BOX
 from simulation import scenes
@@ -125,7 +125,7 @@ def test_joints_are_narrowed_to_where_the_legs_close(name):
             a[n - k :], b[n - k :] = np.sort(rng.uniform(a, b, (2, n)), axis=0)[:, n - k :]
         forms = [affine(x[None], each[None], np.zeros(1))
                  for x, each in zip((a + b) / 2, np.diag((b - a) / 2), strict=True)]
-        inner, outer = narrowed(error, forms, a[None], b[None])
+        inner, outer = narrow_joints(error, forms, a[None], b[None])
         for i in range(n - k, n):
             for _ in range(3):
                 y = np.tile(pose + room * rng.uniform(-1, 1, n - k), (len(places), 1))
@@ -168,7 +168,7 @@ def test_no_place_of_a_joint_is_lost(seed):
             roots = np.roots(told)
             places, whole = [float(np.angle(w)) for w in roots if abs(abs(w) - 1) < 1e-12], np.pi
         own = np.sort(rng.uniform(-whole, whole, 2)) if rng.integers(2) else np.array([-whole, whole])
-        inner, outer = reached(limb, along, one, two, (own[[0]], own[[1]]))
+        inner, outer = narrow_joint(limb, along, one, two, (own[[0]], own[[1]]))
         for place in places:
             if own[0] + 1e-9 < place < own[1] - 1e-9:
                 assert inner[0] - 1e-9 <= place <= outer[0] + 1e-9

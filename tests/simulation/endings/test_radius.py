@@ -8,7 +8,7 @@ import pytest
 
 from hrsynth import load
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.batch.enclosures import traced
+from hrsynth.batch.enclosures import trace_formula
 from hrsynth.geometry.affine import affine
 from hrsynth.geometry.so3 import exponential, logarithm
 from hrsynth.mechanism.model import Limits
@@ -16,7 +16,7 @@ from hrsynth.simulation.endings.cones import ConeProver, RisingCones
 from hrsynth.simulation.endings.inward import InwardProver, inward_radius
 from hrsynth.simulation.endings.pose_error import PoseError
 from hrsynth.simulation.endings.radius import CERTIFIED, UNDECIDED, certified_radius
-from hrsynth.simulation.law import inverted
+from hrsynth.simulation.law import damped_inverses
 from strategies import random_rotation, transformed
 
 
@@ -71,7 +71,7 @@ def ends(setting, found, poses, steps=120, step=0.25):
         rows = np.cross(M, wanted[..., None], axis=2).reshape(len(X), 3 * len(legs), -1)
         left, values, right = np.linalg.svd(np.nan_to_num(rows), full_matrices=False)
         e = np.nan_to_num(np.cross(u, wanted)).reshape(len(X), -1)
-        shares = np.einsum("nij,ni->nj", left, e) * np.array([inverted(v) for v in values])
+        shares = np.einsum("nij,ni->nj", left, e) * np.array([damped_inverses(v) for v in values])
         return -np.einsum("ij,nkj,nk->ni", at.twists, right, shares)
 
     def moved(X, v, h):
@@ -166,7 +166,7 @@ def test_a_ball_ends_before_the_law_leads_away():
 
 def test_roots_and_inverses_of_forms_hold_those_of_numbers():
     rng = np.random.default_rng(1)
-    formula = traced(lambda x, number: [1.0 / (x[0] * number(0.3) - x[1]), (x[0] * x[1]).sqrt()], 2)
+    formula = trace_formula(lambda x, number: [1.0 / (x[0] * number(0.3) - x[1]), (x[0] * x[1]).sqrt()], 2)
     middle, half = rng.uniform(0.3, 2, (500, 2)), rng.uniform(0, 0.3, (500, 2))
     found = formula.at([affine(middle[:, i], half[:, i, None] * np.eye(2)[i], np.zeros(500)) for i in range(2)])
     for _ in range(50):

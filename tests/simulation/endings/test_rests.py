@@ -28,9 +28,9 @@ from hrsynth.mechanism.model import Limits
 from hrsynth.present.text.endings import endings as text
 from hrsynth.simulation.endings.completeness import Covers
 from hrsynth.simulation.endings.cover import bounds
-from hrsynth.simulation.endings.critical_poses import CriticalPoses, Lift, _held, critical_poses
-from hrsynth.simulation.endings.descent import CriticalPoint, Tangents, descend, walked
-from hrsynth.simulation.endings.enclosure import _rates, enclosed
+from hrsynth.simulation.endings.critical_poses import CriticalPoses, Lift, _held_sets, critical_poses
+from hrsynth.simulation.endings.descent import CriticalPoint, Tangents, descend, walk_at_random
+from hrsynth.simulation.endings.enclosure import _rates, enclose_points
 from hrsynth.simulation.endings.endings import RestSearch, _ways, endings
 from hrsynth.simulation.endings.error import RestEquations
 from hrsynth.simulation.endings.pose_error import PoseError
@@ -169,7 +169,7 @@ def test_rates_are_those_of_the_law() -> None:
     idle = seen.mobility - seen.dimension
     (q,) = islice(starts(search.system, np.array([search.system.system.read(goal.pose)])), 1)
     ends = [each for each in descend(search.system, q[:60], np.ones(60, dtype=np.intp), idle) if each.value > 1e-3]
-    own = [(box.rates, at) for box, each in zip(enclosed(search.system, ends, idle), ends, strict=True)
+    own = [(box.rates, at) for box, each in zip(enclose_points(search.system, ends, idle), ends, strict=True)
            if box is not None and box.rates and (at := search._placed(each.q)) is not None][:4]
     assert own
     for rates, at in own:
@@ -249,7 +249,7 @@ def test_nothing_is_enclosed_beside_a_rest() -> None:
     for each in found.rests[:4]:
         q = search.system.system.read(each.configuration.pose)
         moved = CriticalPoint(q + 1e-4, np.zeros(search.system.size[1]), 0.0, np.zeros(2), 0.0)
-        (box,) = enclosed(search.system, [moved], 0)
+        (box,) = enclose_points(search.system, [moved], 0)
         assert box is None or np.all(np.abs(box.q - q) <= box.radius)
 
 
@@ -322,7 +322,7 @@ def test_no_loop_is_open_for_the_oracle(name: str, legs: Legs | None) -> None:
     assert len(closings) > 20
     assert left(closings).max() < 1e-9
     home = search.system.system.read(search.goal.pose)[None]
-    walks = walked(search.system, np.repeat(home, 20, axis=0), rng, 12)
+    walks = walk_at_random(search.system, np.repeat(home, 20, axis=0), rng, 12)
     assert np.abs(walks - home).max(axis=1).min() > 0.1
     assert left(walks).max() < 1e-9
     error = PoseError.of(found, search.goal)
@@ -352,7 +352,7 @@ def test_equations_over_the_pose_are_what_their_derivatives_say(name: str, legs:
     setting = ObservedRobot.of(name, legs)
     error, rng = PoseError.of(setting, setting.configurations[3]), np.random.default_rng(0)
     low, high, _ = bounds(error, 3.0)
-    for held in _held(error):
+    for held in _held_sets(error):
         system = LegSystem.of(error, held)
         n, k = system.quaternion.stop, error.shifts.shape[1]
         x = np.concatenate([rng.uniform(low[:k], high[:k], (2000, k)), rng.normal(size=(2000, n - k))], axis=1)

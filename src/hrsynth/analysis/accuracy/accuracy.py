@@ -24,9 +24,9 @@ from ..question import question
 from ..verdict import verdict_of
 from .cones import IN_SIGHT, Blur, Cones, unseen
 from .error_map import ErrorMap, Mapper
-from .pose_errors import PoseErrors, measured
-from .sampled import Sampled, sampled
-from .swept import SweptErrors, required, sweep_to
+from .pose_errors import PoseErrors, error_maxima
+from .sampled import Sampled, true_errors
+from .swept import SweptErrors, require_file, sweep_to
 
 WORST = 3
 """Poses of a grid, those of the largest errors, at which the linear law is checked by samples."""
@@ -104,7 +104,7 @@ def accuracy(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = No
     if nonlinear < 0:
         raise BadRequest("number of samples", nonlinear, "none or more")
     if into is not None:
-        required(into)
+        require_file(into)
         if plane is None and grid is None:
             raise BadRequest("only a plane or a grid is written", str(into), "a plane or a grid as well")
         if nonlinear and not wanted:
@@ -130,7 +130,7 @@ def accuracy(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = No
         configurations = [start]
     tell("errors")
     poses = tuple(errors_at(setting, blur, each) for each in configurations)
-    true = tuple(sampled(each, mapper.question, motion, blur, errors, nonlinear, seed)
+    true = tuple(true_errors(each, mapper.question, motion, blur, errors, nonlinear, seed)
                  if nonlinear else None for each, errors in zip(configurations, poses, strict=True))
     return Accuracy(setting, blur, poses, true, field, swept)
 
@@ -142,7 +142,7 @@ def errors_at(setting: ObservedRobot, blur: Blur, at: ClosedConfiguration) -> Po
     if lost is not None:
         raise BadRequest(f"{setting.robot.name}: {lost.kind} {lost.leg} is not in front of its camera", str(pose),
                          IN_SIGHT)
-    return measured(at, question, blur, pose)
+    return error_maxima(at, question, blur, pose)
 
 
 def sees_all(setting: ObservedRobot, otherwise: str = "the error is infinite at every pose, ") -> None:

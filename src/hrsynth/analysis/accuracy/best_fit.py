@@ -61,7 +61,7 @@ class _Bowl:
 
     def errors(self, at: ClosedConfiguration, wanted: Values) -> tuple[Array, Array]:
         """All errors e at a configuration, and their rates J (rows, n) in y."""
-        u, rates = seen(at, self.question)
+        u, rates = observed_values(at, self.question)
         every = list(zip(self.question.observations, u, wanted, strict=True))
         kernel, _ = at.kernel()
         forth = kernel @ np.linalg.pinv(self.chart.slope(at.q) @ kernel, rcond=INVERTED)
@@ -101,7 +101,7 @@ class _Bowl:
         return None
 
 
-def seen(at: ClosedConfiguration, question: Measurement) -> tuple[list[Array], list[Array]]:
+def observed_values(at: ClosedConfiguration, question: Measurement) -> tuple[list[Array], list[Array]]:
     """The value (size,) of each observation and its rates (size, nv)."""
     return measure(at.twin, at.q, question.reference, question.observations)[2:]
 
@@ -123,7 +123,7 @@ def best_fits(at: ClosedConfiguration, question: Measurement, wanted: Wanted) ->
         if done == 1.0 or step < BEST_FIT_SHORTEST_STEP:
             break
         ahead = min(1.0, done + step)
-        found = _stepped(bowl, H, wanted, ahead)
+        found = _newton_step(bowl, H, wanted, ahead)
         change = np.inf if found is None else _change(bowl, H, *found)
         if found is not None and change <= HESSIAN_CHANGE:
             (bowl, H), done = found, ahead
@@ -133,7 +133,7 @@ def best_fits(at: ClosedConfiguration, question: Measurement, wanted: Wanted) ->
     return Fit(tuple(way), done, min(weakest(each, question) for each in way), outcome)
 
 
-def _stepped(bowl: _Bowl, H: Array, wanted: Wanted, ahead: float) -> tuple[_Bowl, Array] | None:
+def _newton_step(bowl: _Bowl, H: Array, wanted: Wanted, ahead: float) -> tuple[_Bowl, Array] | None:
     """The bowl around the best fit a step further, and its Hessian; None where Newton steps do not contract near the
     prediction."""
     try:

@@ -33,9 +33,9 @@ Cones = float | str | Mapping[str, float | str] | Mapping[int, float | str]
 def half_angles(cones: Cones, observed: Sequence[Observation]) -> Array:
     """The half-angle (rad) of each observation's cone, (k,); raises ``BadRequest`` where one is missing, is of nothing
     that is observed, or is not between 0 and 90 degrees."""
-    given = _parsed(cones) if isinstance(cones, str) else cones
+    given = _parse(cones) if isinstance(cones, str) else cones
     if not isinstance(given, Mapping):
-        return np.full(len(observed), _checked(float(given), given))
+        return np.full(len(observed), _require_angle(float(given), given))
     given = {str(name): _angle(value) if isinstance(value, str) else value for name, value in given.items()}
     names = {name for o in observed for name in (o.leg, o.link)}
     unknown = [name for name in given if name not in names]
@@ -47,11 +47,11 @@ def half_angles(cones: Cones, observed: Sequence[Observation]) -> Array:
         value = given.get(o.link, given.get(o.leg))
         if value is None:
             raise BadRequest(f"leg {o.leg} has no cone", str(cones), EXAMPLE)
-        found.append(_checked(value, value))
+        found.append(_require_angle(value, value))
     return np.array(found)
 
 
-def _parsed(text: str) -> float | dict[str, float]:
+def _parse(text: str) -> float | dict[str, float]:
     fields = [field.strip() for field in text.split(",")]
     if len(fields) == 1 and "=" not in fields[0]:
         return _angle(fields[0])
@@ -72,10 +72,10 @@ def _angle(text: str) -> float:
         value = float(digits)
     except ValueError:
         raise BadRequest("cone: not a number", text, EXAMPLE) from None
-    return _checked(value if digits == text else math.radians(value), text)
+    return _require_angle(value if digits == text else math.radians(value), text)
 
 
-def _checked(value: float, shown: object) -> float:
+def _require_angle(value: float, shown: object) -> float:
     if not 0 < value < math.pi / 2:
         raise BadRequest("half-angle of a cone", shown, ALLOWED)
     if value < NARROWEST_CONE:
@@ -208,14 +208,14 @@ class Blur(Value):
             shocks[i, number] = part * each
         for i, (o, value) in enumerate(zip(observed, values, strict=True)):
             if isinstance(o, SeenAxis):
-                found[i] = tilted(value[None], shocks[i, :1])[0]
+                found[i] = tilt(value[None], shocks[i, :1])[0]
             elif own := self.own(i, o):
                 unit = length ** np.broadcast_to(o.dimension, o.size)
                 found[i] = o.sensed(value * unit, shocks[i], own) / unit
         return found
 
 
-def tilted(u: Sequence[Array] | Array, way: Array) -> Array:
+def tilt(u: Sequence[Array] | Array, way: Array) -> Array:
     """u (k, 3), each turned by the angle ‖way‖ towards its way (k, 3), which is normal to it."""
     return np.array([rotation_about(np.cross(a, b), float(np.linalg.norm(b))) @ a if np.any(b) else a
                      for a, b in zip(u, way, strict=True)])

@@ -15,7 +15,7 @@ from ...batch.grids import poses_over
 from ...batch.reach import grid_dependence, reach, sweep
 from ...budgets import LARGEST_GRID, POSES_FOR_NUMBA_ONCE
 from ...errors import BadRequest, Disagreement, HrsynthError, PlaneNotMet
-from ...geometry.vectors import Array, nested
+from ...geometry.vectors import Array, nested_lists
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.relation import Measurement
 from ...mechanism.pose import Grid, Pose
@@ -23,7 +23,7 @@ from ...progress import tell
 from ...results import Value
 from ...tolerances import SAME_RELATION, USUAL_ERROR
 from ..observed import ObservedRobot
-from ..singularity.locus import framed
+from ..singularity.locus import frame_plane
 from ..singularity.rank_curve import PlaneOfPoses
 from .cones import Blur, unseen
 from .pose_errors import maxima, reading
@@ -110,7 +110,8 @@ class ErrorMap(Value):
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line: arrays nested in the order of ``axes``, null where not finite."""
         return {**self.grid.to_dict(), "reached": self.reached.tolist(),
-                "position_mm": nested(1e3 * self.position), "orientation_deg": nested(np.degrees(self.orientation)),
+                "position_mm": nested_lists(1e3 * self.position),
+                "orientation_deg": nested_lists(np.degrees(self.orientation)),
                 "gap": self.gap, "checked": self.spots and self.spots.to_dict()}
 
 
@@ -147,7 +148,7 @@ class Mapper(Value):
             return np.array([at is not None for at in sweep(first, everything.question, coarse, motion)])
 
         count = steps or (FINE if self.batch is not None else COARSE)
-        return framed(everything.start, everything.question, motion, plane, count, met)
+        return frame_plane(everything.start, everything.question, motion, plane, count, met)
 
     def over(self, grid: Grid, seed: int, checked: int = SPOTS) -> ErrorMap:
         """The error maxima over a grid, by the batch ``checked`` at so many poses; raises ``PlaneNotMet`` where no pose

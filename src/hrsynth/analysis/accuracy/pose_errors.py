@@ -13,7 +13,7 @@ import numpy as np
 
 from ...batch.error_bounds import bounds_of_maps, freedom
 from ...geometry.ranks import kernel_basis
-from ...geometry.vectors import Array, oriented
+from ...geometry.vectors import Array, orient_axis
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.limits import outside
 from ...kinematics.relation import Measurement, relation
@@ -94,7 +94,7 @@ def maxima(at: ClosedConfiguration, question: Measurement, blur: Blur) -> tuple[
     return found[0], found[1]
 
 
-def attained(at: ClosedConfiguration, question: Measurement, blur: Blur) -> tuple[float, float]:
+def largest_by_ascent(at: ClosedConfiguration, question: Measurement, blur: Blur) -> tuple[float, float]:
     """The largest position (m) and orientation error (rad) that an ascent from many views finds: as :func:`maxima`, but
     a lower bound of it, where six legs are watched in a sixth of the time."""
     position, orientation = (_axes(part, 1) for part in _parts(at, question, blur))
@@ -147,7 +147,7 @@ def _axes(part: ErrorMaps | None, count: int) -> Array | None:
         return None
     (span, blocks), found = part.seen, np.zeros((count, 3))
     for row in found[: span.shape[1]]:
-        w = span @ _ascended(blocks @ span)
+        w = span @ _ascend(blocks @ span)
         row[:] = float(_width(blocks, w[:, None])[0]) * w
         span = span @ kernel_basis((w @ span)[None], 1.0)[0]
     return found
@@ -157,7 +157,7 @@ def _longest(axes: Array | None) -> float:
     return np.inf if axes is None else float(np.linalg.norm(axes[0]))
 
 
-def measured(at: ClosedConfiguration, question: Measurement, blur: Blur, pose: Pose) -> PoseErrors:
+def error_maxima(at: ClosedConfiguration, question: Measurement, blur: Blur, pose: Pose) -> PoseErrors:
     """The error maxima at a configuration with their directions."""
     position, orientation = map(_extent, _parts(at, question, blur))
     return PoseErrors(pose, position, orientation, tuple(outside(at.twin, at.q)))
@@ -172,8 +172,8 @@ def _extent(part: ErrorMaps | None) -> ErrorEllipsoid:
         return ErrorEllipsoid(0.0, None, 0.0, None, None)
     largest, lower = (float(bound[0]) for bound in bounds_of_maps(part.J[None], part.only))
     inside = blocks @ span
-    w = oriented(span @ _ascended(inside))
-    low = oriented(span @ _descended(inside))
+    w = orient_axis(span @ _ascend(inside))
+    low = orient_axis(span @ _descend(inside))
     pulls = blocks @ w
     sizes = np.linalg.norm(pulls, axis=1)
     errors = part.radii[:, None] * pulls / np.where(sizes > 0, sizes, 1.0)[:, None]
@@ -200,7 +200,7 @@ def _views(dimension: int) -> Array:
     return np.stack([level * np.cos(turn), level * np.sin(turn), height])
 
 
-def _ascended(blocks: Array) -> Array:
+def _ascend(blocks: Array) -> Array:
     """The direction (d,) of the largest error: ascent from the best view and from some spread evenly (a convex function
     on the sphere, which may have several maxima)."""
     views = _views(blocks.shape[2])
@@ -215,7 +215,7 @@ def _ascended(blocks: Array) -> Array:
     return np.asarray(w[:, 0 if reached[0] >= (1 - FOLLOWED) * reached.max() else np.argmax(reached)])
 
 
-def _descended(blocks: Array) -> Array:
+def _descend(blocks: Array) -> Array:
     """The direction (d,) of the least error that was found: from views spread evenly and from the axes of each block,
     w ← the least eigenvector of Σ A_iᵀ A_i / ‖A_i w‖, which never makes Σ ‖A_i w‖ larger (Weiszfeld)."""
     d = blocks.shape[2]

@@ -18,7 +18,7 @@ from ...kinematics.platform_motion import PlatformMotion
 from ...kinematics.relation import Measurement
 from ...progress import tell
 from ...results import Value, finite
-from .best_fit import ENDS, NOT_FOUND, best_fits, seen, weakest
+from .best_fit import ENDS, NOT_FOUND, best_fits, observed_values, weakest
 from .cones import Blur
 from .pose_errors import PoseErrors
 
@@ -52,10 +52,10 @@ class Sampled(Value):
                 "singular_value_at_pose": finite(self.usual)}
 
 
-def sampled(at: ClosedConfiguration, question: Measurement, motion: PlatformMotion, blur: Blur, linear: PoseErrors,
+def true_errors(at: ClosedConfiguration, question: Measurement, motion: PlatformMotion, blur: Blur, linear: PoseErrors,
             count: int, seed: int = 0) -> Sampled:
     """The true errors at a configuration for ``count`` samples, seeded."""
-    values, length = seen(at, question)[0], at.twin.length
+    values, length = observed_values(at, question)[0], at.twin.length
     balls = blur.at(at, question)
     ways = _extremes(linear)
     rng = np.random.default_rng(seed)

@@ -66,7 +66,7 @@ def sweep_to(path: str | Path, mapper: Mapper, grid: Grid, seed: int) -> SweptEr
     PlaneNotMet
         Where no pose of the grid is reached.
     """
-    name, target = mapper.setting.robot.name, required(path)
+    name, target = mapper.setting.robot.name, require_file(path)
     if mapper.batch is None:
         raise BadRequest(f"{name}: poses are found one by one, not in parts", str(path),
                          "another file, as map.csv")
@@ -109,7 +109,7 @@ def _spots(mapper: Mapper, grid: Grid, draft: _SweepDraft, tally: Tally, seed: i
     return mapper.spots(grid, seen, seed, cells=cells)
 
 
-def required(path: str | Path) -> Path:
+def require_file(path: str | Path) -> Path:
     """Where the file will be; raises ``BadRequest``."""
     if Path(path).suffix.lower() != ENDING:
         raise BadRequest("errors are written part by part to an array", str(path), f"a file that ends in {ENDING}")

@@ -157,7 +157,7 @@ def atlas(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None,
     places = tuple(_place(listed, number) for number in range(1, len(listed.modes) + 1))
     answers: dict[tuple[int, int], PathAnswer] = {}
     spent = 0
-    for one, other in _ordered(aspects, places):
+    for one, other in _sort_pairs(aspects, places):
         if spent >= ATLAS_INTERVALS or _chain(answers, one, other) is not None:
             continue
         start, goal = places[one - 1], places[other - 1]
@@ -177,7 +177,7 @@ def _place(listed: AssemblyModes, number: int) -> ClosedConfiguration | None:
         return None
 
 
-def _ordered(aspects: Aspects, places: Sequence[ClosedConfiguration | None]) -> list[tuple[int, int]]:
+def _sort_pairs(aspects: Aspects, places: Sequence[ClosedConfiguration | None]) -> list[tuple[int, int]]:
     """The pairs of assembled modes, those first that differ in the fewest working modes of legs."""
     working: dict[int, tuple[float, ...]] = {}
     for number, at in enumerate(places, 1):

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ...budgets import FINEST_INTERVAL, FIRST_INTERVALS
 from ...constraints.condition import Named, rows
-from ...geometry.balls import Field, above_zero, balls, below, centred, finite, jets
+from ...geometry.balls import Field, above_zero, balls, below, finite, jets, mean_value_form
 from ...geometry.vectors import Array, cross, dot, triple
 from .leg_forms import LegForms
 from .path_segments import StraightSegment, WorkingModeChange
@@ -42,7 +42,7 @@ class ConditionEnclosure:
     def raw(self, p: Field, R: Field, leading: Leading = None) -> tuple[Field, Field]:
         """Reserves (n, limbs) and the expression (n,) of a condition with a sign, for numbers, balls or jets."""
         found = self.forms.at(p, R, leading)
-        names, run = _compiled(self.condition.expression)
+        names, run = _compile(self.condition.expression)
         return found.reach_margins, run(*(found.values[name] for name in names))
 
     def at(self, p: Field, R: Field, leading: Leading = None) -> tuple[NDArray[np.bool_], Field]:
@@ -72,12 +72,12 @@ class ConditionEnclosure:
             return found
         middle = (low[weak] + high[weak]) / 2
         middles, moving = self.raw(*way.at(balls(middle, middle))), self.raw(*way.at(jets(boxes[weak])))
-        found[weak] = below(centred(middles[1], moving[1], boxes[weak] - middle))
+        found[weak] = below(mean_value_form(middles[1], moving[1], boxes[weak] - middle))
         return found
 
 
 @lru_cache(maxsize=64)
-def _compiled(expression: Any) -> tuple[list[str], Callable[..., Any]]:
+def _compile(expression: Any) -> tuple[list[str], Callable[..., Any]]:
     """The symbols of an expression in vectors, and the function of them, for numbers, balls and jets."""
     import sympy
 
@@ -128,7 +128,7 @@ def prove(enclosure: ConditionEnclosure, way: PathSegment, budget: int) -> Proof
     return Proof(True, margin, boxes)
 
 
-def enclosed(enclosure: ConditionEnclosure, p: Array, R: Array) -> tuple[bool, float]:
+def enclose_value(enclosure: ConditionEnclosure, p: Array, R: Array) -> tuple[bool, float]:
     """Whether all poses within ``tolerances.FOLLOWED`` of one reach, and a bound of the value with its sign: the point
     of their values that is nearest to zero (0 where zero is among them)."""
     here = StraightSegment(p, R, np.zeros(3), np.zeros(3))

@@ -234,12 +234,12 @@ def _traces(leg: HeldLeg) -> Iterator[_Trace]:
             start = _newton(leg.curve, seed, FOLLOWED)
             if start is None or (len(known) and np.min(np.linalg.norm(known - start, axis=1)) < SECTION_APART):
                 continue
-            unknowns = _followed(leg, start)
+            unknowns = _follow_curve(leg, start)
             known = np.vstack([known, unknowns])
             yield _Trace(unknowns, np.column_stack(_angles(leg, unknowns.T)))
 
 
-def _followed(leg: HeldLeg, start: Array) -> Array:
+def _follow_curve(leg: HeldLeg, start: Array) -> Array:
     """Places (n, 8) of a piece of the curve, step by step until it closes; in both directions where it ends."""
     ways = []
     for sense in (1.0, -1.0):

@@ -46,7 +46,7 @@ class TurnLimit:
 
     def reach_margin(self, of: Value) -> Field:
         """size (cos(angle − middle) − cos half), (n,)."""
-        cosine, sine = _turned(self.one.value(of), self.two.value(of), of(self.axis))
+        cosine, sine = _turn_between(self.one.value(of), self.two.value(of), of(self.axis))
         along = cosine * float(np.cos(self.middle)) + sine * float(np.sin(self.middle))
         return np.asarray(along - self.size * (float(np.cos(self.half)) + FOLLOWED))
 
@@ -103,7 +103,7 @@ def _bound(sight: SampledMechanism, source: Callable[..., VectorExpression], joi
                 return SlideLimit(joint.name, axis, LinkVector(end, start), shift, half / length)
     elif joint.type is JointType.REVOLUTE and half < np.pi:
         for (one, first), (two, second) in product(known.arms(joint.predecessor), known.arms(joint.successor)):
-            cosine, sine = _turned(one, two, along)
+            cosine, sine = _turn_between(one, two, along)
             offsets = [wrap_angle(float(x)) for x in np.arctan2(sine, cosine) - coordinates]
             size = np.hypot(cosine, sine)
             apart = [wrap_angle(x - offsets[0]) for x in offsets]
@@ -140,6 +140,6 @@ class _Known:
                     yield self.sight.values(axis), LinkVector(found)
 
 
-def _turned(one: Field, two: Field, axis: Field) -> tuple[Field, Field]:
+def _turn_between(one: Field, two: Field, axis: Field) -> tuple[Field, Field]:
     """Cosine and sine of the turn from a vector to another about a unit axis, times their parts normal to it."""
     return (np.asarray(dot(one, two) - dot(one, axis) * dot(two, axis)), dot(axis, cross(one, two)))

@@ -14,7 +14,7 @@ from ...constraints.pattern import ConstraintPattern
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
-from ...kinematics.steps import led, track
+from ...kinematics.steps import lead_to, track
 from ...mechanism.pose import Pose, PoseLike, asked_pose
 from ...progress import tell
 from ...results import Result, Value
@@ -25,7 +25,7 @@ from ..measured import MeasuredRobot
 from ..observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike
 from ..question import question
 from ..singularity.agreement import smallest_of, weakest
-from .condition_enclosure import ConditionEnclosure, PathSegment, enclosed, sign_of
+from .condition_enclosure import ConditionEnclosure, PathSegment, enclose_value, sign_of
 from .leg_forms import LegPattern, pattern
 from .path_segments import PathCoordinates, Place, WorkingModeChange, path_coordinates
 from .road_map import PlannedPath, PoseRegion, plan
@@ -149,7 +149,7 @@ def between(answer: PathAnswer, coordinates: PathCoordinates, ways: Sequence[Pat
         if coordinates.turning:
             found.append(motion.pose(coordinates.frame(p, R)))
             continue
-        here = _led(here, coordinates, p)
+        here = _lead_to(here, coordinates, p)
         found.append(motion.pose(here.pose(motion.link)))
     return found
 
@@ -161,7 +161,7 @@ def _marks(way: PathSegment) -> list[tuple[Array, Array]]:
     return [(p[0], R[0]), way.end]
 
 
-def _led(here: ClosedConfiguration, coordinates: PathCoordinates, p: Array) -> ClosedConfiguration:
+def _lead_to(here: ClosedConfiguration, coordinates: PathCoordinates, p: Array) -> ClosedConfiguration:
     """The configuration with the coordinates's point at ``p``."""
     motion = coordinates.motion
     directions = motion.translations.T
@@ -259,7 +259,7 @@ class Aspects(Value):
         way = [start]
         fractions = np.linspace(0, 1, SAMPLES)
         for fraction in fractions[1:]:
-            there, came = led(way[-1], motion, target.towards(X, float(fraction)), last=fraction == 1)
+            there, came = lead_to(way[-1], motion, target.towards(X, float(fraction)), last=fraction == 1)
             if not came:
                 break
             way.append(there)
@@ -277,7 +277,7 @@ class Aspects(Value):
         assert isinstance(self.pattern, LegPattern)
         coordinates = self.pattern.coordinates
         p, R = coordinates.of([answer.start.configuration, answer.goal.configuration, *self.members])
-        sure, values = zip(*(enclosed(enclosures[i].unlimited, p[i], R[i]) for i in range(2)), strict=True)
+        sure, values = zip(*(enclose_value(enclosures[i].unlimited, p[i], R[i]) for i in range(2)), strict=True)
         margin = min(map(abs, values))
         fitted = self.pattern.fitted
         forms = f", for forms that are fitted to samples: {', '.join(fitted)}" if fitted else ""
@@ -297,7 +297,7 @@ class Aspects(Value):
         found = plan((enclosures[0], enclosures[1]), region, (p[0], R[0]), (p[1], R[1]), seed=seed, budget=budget)
         answer = self._shown(answer, found, self.pattern)
         if not found.proved:
-            return replace(answer, reason=_unproved(found, enclosures, budget))
+            return replace(answer, reason=_why_undecided(found, enclosures, budget))
         if not leads(found.ways, (p[0], R[0]), (p[1], R[1]), enclosures):
             return replace(answer, reason="no path was proved: what was found does not lead from pose to pose")
         if self.pattern.loose:
@@ -362,7 +362,7 @@ def _gap(one: Place, other: Place) -> float:
     return max(float(np.max(np.abs(a - b))) for a, b in zip(one, other, strict=True))
 
 
-def _unproved(found: PlannedPath, enclosures: Sequence[ConditionEnclosure], budget: int) -> str:
+def _why_undecided(found: PlannedPath, enclosures: Sequence[ConditionEnclosure], budget: int) -> str:
     """Why a plan decides nothing."""
     used = "the number of intervals is used up" if found.boxes >= budget else "the road map does not join the poses"
     if found.ways:

@@ -15,7 +15,7 @@ import numpy as np
 
 from ...closed_forms.legs import ClosedFormLeg, OnCrank, OnRail
 from ...closed_forms.platform_points import PlatformPoint
-from ...geometry.balls import Field, widened
+from ...geometry.balls import Field, widen
 from ...geometry.so3 import exponential, logarithm
 from ...geometry.vectors import Array, cross, hat, inverse
 from ...kinematics.configuration import ClosedConfiguration
@@ -94,7 +94,7 @@ class StraightSegment(Value):
             R = self.R + sines[:, None, None] * (K @ self.R) + (1 - cosines)[:, None, None] * (K @ K @ self.R)
         if p.dtype == object:
             R = R.astype(object)
-        return widened(p, FOLLOWED), widened(R, FOLLOWED)
+        return widen(p, FOLLOWED), widen(R, FOLLOWED)
 
     @property
     def end(self) -> tuple[Array, Array]:
@@ -168,10 +168,10 @@ class WorkingModeChange(Value):
             carried = self.centre + self.foot.at(fractions)
         else:
             carried = self.foot[0] + fractions[:, None] * (self.foot[1] - self.foot[0])
-        carried = widened(carried, FOLLOWED)
+        carried = widen(carried, FOLLOWED)
         p = carried + self.rod.at(fractions) - (self.tip.constant + self.R @ self.tip.turned)
         R: Field = np.broadcast_to(self.R, (len(fractions), 3, 3))
-        return widened(p, FOLLOWED), widened(R.astype(p.dtype), FOLLOWED), (self.limb, carried)
+        return widen(p, FOLLOWED), widen(R.astype(p.dtype), FOLLOWED), (self.limb, carried)
 
 
 def mode_change(coordinates: PathCoordinates, limb: ClosedFormLeg, number: int, place: Place

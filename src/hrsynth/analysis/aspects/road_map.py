@@ -314,7 +314,7 @@ def plan(enclosures: tuple[ConditionEnclosure, ConditionEnclosure], region: Pose
     roads = RoadMap.between(enclosures, region, start, goal, budget)
     straight = roads.modes_of[1] == 0 and roads.proof(0, 1).proved
     if straight:
-        return _planned(roads, [0, 1])
+        return _plan(roads, [0, 1])
     rng = np.random.default_rng(seed)
     limbs = enclosures[0].forms.limbs
     crossed = [number for number, (limb, other) in enumerate(zip(limbs, enclosures[1].forms.limbs, strict=True))
@@ -331,11 +331,11 @@ def plan(enclosures: tuple[ConditionEnclosure, ConditionEnclosure], region: Pose
         roads.add(region.wider(factor), rng, int(np.ceil(size / np.sqrt(len(roads.enclosures)))))
         found = roads.way()
         if found is not None:
-            return _planned(roads, roads.shortened(found))
+            return _plan(roads, roads.shortened(found))
         crossed = [int(i) for i in rng.permutation(crossed)] + [i for i in able if i not in crossed]
-    return _planned(roads, roads.nearest())
+    return _plan(roads, roads.nearest())
 
 
-def _planned(roads: RoadMap, way: list[int]) -> PlannedPath:
+def _plan(roads: RoadMap, way: list[int]) -> PlannedPath:
     proofs = tuple(roads.proof(*road) for road in pairwise(way))
     return PlannedPath(tuple(roads.road(*road) for road in pairwise(way)), proofs, roads.spent)

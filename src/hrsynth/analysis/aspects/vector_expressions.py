@@ -14,7 +14,7 @@ import numpy as np
 
 from ...closed_forms.platform_points import ORIGIN, PlatformPoint
 from ...constraints.named_vectors import BodyPoint, BodyVector, NamedVector
-from ...geometry.balls import Field, normed
+from ...geometry.balls import Field, unit_balls
 from ...geometry.lines import distance
 from ...geometry.vectors import Array, cross, dot
 from ...kinematics.configuration import ClosedConfiguration
@@ -73,7 +73,7 @@ class SightVector:
         """Of those of its parts."""
         if self.radius is None:
             one, other = parts
-            return normed(cross(one, other))
+            return unit_balls(cross(one, other))
         start, on, d = parts
         out = on - start
         foot = out - dot(out, d)[..., None] * d
@@ -93,7 +93,7 @@ def value_of(each: VectorExpression, p: Field, R: Field, carried: Sequence[Field
     if isinstance(each, SightVector):
         return each.value(*(value_of(part, p, R, carried) for part in each.parts))
     along = value_of(each.end, p, R, carried) - value_of(each.start, p, R, carried)
-    return normed(along if each.axis is None else cross(value_of(each.axis, p, R, carried), along))
+    return unit_balls(along if each.axis is None else cross(value_of(each.axis, p, R, carried), along))
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,12 +23,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...budgets import BACK_CELLS, BACK_SIDES, BACK_SIZES, BACK_TRIALS
-from ...geometry.affine import AffineForms, affine, combined, stacked
+from ...geometry.affine import AffineForms, affine, combine, stack
 from ...geometry.vectors import Array
 from ...tolerances import AFFINE_ROUNDING
 from .cells import BranchTube, TubeTrial, derivatives, middles, prove_all, trial_of, turning
 from .growth import AT_ONCE, Growth, largest_box
-from .loops import LoopSystem, mapped
+from .loops import LoopSystem, rotate
 from .part import LoopPart
 
 Places = NDArray[np.int64]
@@ -61,7 +61,7 @@ class PosedCells:
             return False
         Z = np.linalg.pinv((low.min(axis=0) + high.max(axis=0)) / 2)
         one = np.eye(len(Z))
-        N = np.asarray((one - combined(Z[None], part)).size.max(axis=0))
+        N = np.asarray((one - combine(Z[None], part)).size.max(axis=0))
         if not np.all(np.isfinite(N)) or np.abs(np.linalg.eigvals(N)).max() >= 1:
             return False
         v = np.linalg.solve(one - N, np.ones(len(one)))
@@ -143,7 +143,7 @@ def way_back(system: LoopSystem, grown: Sequence[Growth]) -> tuple[tuple[Array, 
     home, free = np.concatenate([growth.q0 for growth in grown]), False
     cells: PosedCells | None = None
     while _count(parts) <= BACK_CELLS:
-        cells = _posed(system, way, parts)
+        cells = _pose_cells(system, way, parts)
         free = free or all(cells.regular(np.array([k])) for k in range(len(cells.low)))
         if free and InjectiveTrial(cells).one_to_one(low, high):
             return (low[place], high[place]), True
@@ -155,7 +155,7 @@ def way_back(system: LoopSystem, grown: Sequence[Growth]) -> tuple[tuple[Array, 
         a, b = home + size * (low - home), home + size * (high - home)
         parts = [each.within(a[own], b[own]) for each, own in zip(parts, sides, strict=True)]
         while box is None and _count(parts) <= BACK_CELLS:
-            cells = _posed(system, way, parts)
+            cells = _pose_cells(system, way, parts)
             box = (a, b) if InjectiveTrial(cells).one_to_one(a, b) else None
             if _count(parts) * 2 ** len(home) > BACK_CELLS:
                 break
@@ -235,7 +235,7 @@ class TubedCells:
             for one, tube, c, h, at in zip(new, old, centre, half, x, strict=True)])
 
 
-def _posed(system: LoopSystem, way: Sequence[int], cells: Sequence[TubedCells]) -> PosedCells:
+def _pose_cells(system: LoopSystem, way: Sequence[int], cells: Sequence[TubedCells]) -> PosedCells:
     """Cells of all motors together."""
     parts = [SlopedPart.of(each.part, each.tubes) for each in cells]
     places = np.indices([len(each.tubes) for each in cells]).reshape(len(parts), -1)
@@ -266,7 +266,7 @@ class SlopedPart:
         drift = AffineForms(at.along.v / trial.half[:, None, :], (at.along.r + AFFINE_ROUNDING * at.along.size)
                             / trial.half[:, None, :])
         Y = np.linalg.pinv(at.by_own.v[0])
-        M, w = (np.eye(Y.shape[-1]) - combined(Y, at.by_own)).size, combined(Y, drift).size
+        M, w = (np.eye(Y.shape[-1]) - combine(Y, at.by_own)).size, combine(Y, drift).size
         # A E = −(B + A S): |E| ≤ M |E| + w, so |E| ≤ v for each v > M v + w
         v = 1.01 * np.linalg.pinv(np.eye(Y.shape[-1]) - M) @ (w + AFFINE_ROUNDING)
         good = np.all((v > 0) & ((M @ v + w) * (1 + AFFINE_ROUNDING) < v), axis=(1, 2), keepdims=True)
@@ -291,18 +291,18 @@ def _over(system: LoopSystem, way: Sequence[int], parts: Sequence[SlopedPart], p
             forms[i] = padded(form, k) if form is not None else forms[i]
     swept = system.displacement(way, forms)
     centre = np.mean([joint.point for joint in system.mechanism.joints_of(system.mechanism.platform)], axis=0)
-    p, columns = swept.at(centre / system.length), [mapped(swept.R, e) for e in np.eye(3)]
+    p, columns = swept.at(centre / system.length), [rotate(swept.R, e) for e in np.eye(3)]
     zero = affine(np.zeros(count), np.zeros((count, firsts[-1])), np.zeros(count))
 
     def pose(vectors: Sequence[Any]) -> AffineForms:
-        made: AffineForms = stacked([zero + v[..., k] for v in vectors for k in range(3)])
+        made: AffineForms = stack([zero + v[..., k] for v in vectors for k in range(3)])
         return made
 
     rates = {}
     for place, i in enumerate(way):
         turned = [swept.turned(place, column) for column in columns]
         rates[i] = pose([swept.rate(place, p), *(np.zeros(3) if each is None else each for each in turned)])
-    still = stacked([zero] * 12)
+    still = stack([zero] * 12)
     found = []
     for k, each in enumerate(parts):
         part, S = each.trial.part, each.trial.slopes[places[k]]
@@ -313,9 +313,9 @@ def _over(system: LoopSystem, way: Sequence[int], parts: Sequence[SlopedPart], p
         # F' = y_q + y_x (S + E) − K (A (S + E) + B) for any K: with y_x A⁻¹ at the middle E counts in second order
         A = padded(each.A, k)
         K = y_x.v[0] @ np.linalg.pinv(A.v[0])
-        rate = along - combined(K, padded(each.drift, k))
+        rate = along - combine(K, padded(each.drift, k))
         with np.errstate(invalid="ignore"):
-            rest = (y_x - combined(K, A)).size @ each.off[places[k]]
+            rest = (y_x - combine(K, A)).size @ each.off[places[k]]
         found.append(AffineForms(rate.v, (rate.r + rest) * (1 + AFFINE_ROUNDING)))
     return pose([p, *columns]), AffineForms(np.concatenate([each.v for each in found], axis=-1),
                                             np.concatenate([each.r for each in found], axis=-1))
@@ -323,5 +323,5 @@ def _over(system: LoopSystem, way: Sequence[int], parts: Sequence[SlopedPart], p
 
 def _columns(vectors: Sequence[AffineForms]) -> AffineForms:
     """Vectors (c, 12) side by side, (c, 12, k)."""
-    made: AffineForms = stacked(vectors)
+    made: AffineForms = stack(vectors)
     return made

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...geometry.affine import AffineForms, crossed, dotted, stacked
+from ...geometry.affine import AffineForms, cross_product, dot_product, stack
 from ...geometry.vectors import Array
-from .loops import JointLoop, LoopRow, LoopSystem, Swept, mapped
+from .loops import JointLoop, LoopRow, LoopSystem, Swept, rotate
 
 Places = NDArray[np.intp]
 
@@ -55,7 +55,7 @@ class Product:
     @property
     def value(self) -> Any:
         """x · y − constant, (…)."""
-        return dotted(self.x.value, self.y.value) - self.constant
+        return dot_product(self.x.value, self.y.value) - self.constant
 
 
 class SweptChains:
@@ -74,7 +74,7 @@ class SweptChains:
             rows = [[none if slide else axis for slide, axis in zip(slides, swept.axes, strict=True)],
                     [none if point is None else point for point in swept.points],
                     [axis if slide else none for slide, axis in zip(slides, swept.axes, strict=True)]]
-            axes, points, along = (stacked(each, -2) if chain else np.zeros((0, 3)) for each in rows)
+            axes, points, along = (stack(each, -2) if chain else np.zeros((0, 3)) for each in rows)
             self._swept[chain] = swept, axes, points, along
         return self._swept[chain]
 
@@ -85,14 +85,14 @@ class SweptChains:
             swept, axes, points, slides = self._chain(chain)
             at = swept.at(p)
             self._known[key] = CarriedVector(at, _parts(
-                chain, lambda: crossed(axes, at[..., None, :] - points) + slides, axes))
+                chain, lambda: cross_product(axes, at[..., None, :] - points) + slides, axes))
         return self._known[key]
 
     def direction(self, chain: tuple[int, ...], d: Array) -> CarriedVector:
         """A direction (3,), as it is at zero, behind a chain."""
         swept, axes, *_ = self._chain(chain)
-        v = mapped(swept.R, d)
-        return CarriedVector(v, _parts(chain, lambda: crossed(axes, v[..., None, :]), axes))
+        v = rotate(swept.R, d)
+        return CarriedVector(v, _parts(chain, lambda: cross_product(axes, v[..., None, :]), axes))
 
 
 def _parts(chain: tuple[int, ...], columns: Callable[[], Any], axes: Any) -> tuple[ChainColumns, ...]:
@@ -148,17 +148,17 @@ def add_bend(total: Total, product: Product, weight: Any = 1.0) -> None:
     for vector, other in ((product.x, product.y), (product.y, product.x)):
         for part in vector.parts:
             f = other.value * (part.sign * _as_column(weight))
-            pushed = crossed(f[..., None, :], part.axes)
+            pushed = cross_product(f[..., None, :], part.axes)
             later, size = outer(pushed, part.columns), len(part.places)
             total.add(np.ix_(part.places, part.places), later * np.triu(np.ones((size, size)))
-                      + _transposed(later) * np.tril(np.ones((size, size)), -1))
+                      + _transpose(later) * np.tril(np.ones((size, size)), -1))
     for one in product.x.parts:
         for two in product.y.parts:
             both = one.sign * two.sign
             columns = two.columns * _as_column(_as_column(weight)) * both
             across = outer(one.columns, columns)
             total.add(np.ix_(one.places, two.places), across)
-            total.add(np.ix_(two.places, one.places), _transposed(across))
+            total.add(np.ix_(two.places, one.places), _transpose(across))
 
 
 def outer(a: Any, b: Any) -> Any:
@@ -168,7 +168,7 @@ def outer(a: Any, b: Any) -> Any:
     return a @ np.swapaxes(b, -1, -2)
 
 
-def _transposed(a: Any) -> Any:
+def _transpose(a: Any) -> Any:
     """Matrices or forms (…, k, l) with the last two dimensions in turn."""
     return a.transposed() if isinstance(a, AffineForms) else np.swapaxes(a, -1, -2)
 

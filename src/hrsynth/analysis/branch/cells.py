@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...budgets import TUBE_RADII, TUBE_WIDER
-from ...geometry.affine import AffineForms, affine, combined, dotted, stacked
+from ...geometry.affine import AffineForms, affine, combine, dot_product, stack
 from ...geometry.vectors import Array, times
 from ...tolerances import AFFINE_ROUNDING, THINNEST_CELL, THINNEST_TUBE
 from .loops import GearEquation, JointLoop, LoopRow, residuals, rod_ends
@@ -136,9 +136,9 @@ def _prove_block(trial: TubeTrial, block: LoopBlock) -> None:
     A = at.by_own
     Y = inverses(A.v[0])
     # Y G along x̃, as a whole and in mean value form: both hold, the sharper one counts
-    e = (combined(Y, residual(trial, equations)).size + drift(combined(Y, at.along))
-         + times(combined(Y, at.by_others).size, trial.radius))
-    e = np.fmin(e, combined(Y, at.values).size)
+    e = (combine(Y, residual(trial, equations)).size + drift(combine(Y, at.along))
+         + times(combine(Y, at.by_others).size, trial.radius))
+    e = np.fmin(e, combine(Y, at.values).size)
     one = np.eye(len(own))
     done = np.zeros(len(e), dtype=bool)
     radius = trial.radius.copy()
@@ -146,7 +146,7 @@ def _prove_block(trial: TubeTrial, block: LoopBlock) -> None:
     for attempt in range(TUBE_RADII):
         if attempt:
             at = derivatives(trial, equations, own, radius)
-        M = (one - combined(Y, at.by_own)).size
+        M = (one - combine(Y, at.by_own)).size
         r = radius[:, own]
         Mr = times(M, r)
         fits = np.all((e + Mr) * (1 + AFFINE_ROUNDING) < r, axis=-1) & ~done
@@ -204,7 +204,7 @@ class TubeDerivatives:
     along: AffineForms
 
 
-def evaluated(part: LoopPart, equations: Sequence[LoopEquation], forms: Sequence[AffineForms | None]
+def evaluate_equations(part: LoopPart, equations: Sequence[LoopEquation], forms: Sequence[AffineForms | None]
               ) -> tuple[list[Any], list[dict[int, Any]]]:
     """The values of equations, and their derivatives by the coordinates that are not held."""
     values: list[Any] = [0.0] * len(equations)
@@ -232,8 +232,8 @@ def residual(trial: TubeTrial, equations: Sequence[LoopEquation]) -> AffineForms
     """G(q_c, x_c), (c, k)."""
     still = trial.kept(slice(None))
     still.half = 0.0 * still.half
-    return stacked([_zero(trial) + each for each in
-                    evaluated(trial.part, equations, still.forms(0.0 * trial.radius))[0]])
+    return stack([_zero(trial) + each for each in
+                    evaluate_equations(trial.part, equations, still.forms(0.0 * trial.radius))[0]])
 
 
 def derivatives(trial: TubeTrial, equations: Sequence[LoopEquation], own: Sequence[int], radius: Array
@@ -241,14 +241,14 @@ def derivatives(trial: TubeTrial, equations: Sequence[LoopEquation], own: Sequen
     """The derivatives of equations over tubes with radii (c, p)."""
     part = trial.part
     zero = _zero(trial)
-    values, slopes = evaluated(part, equations, trial.forms(radius))
-    by_own = [stacked([zero + slope.get(part.unknowns[k], 0.0) for k in own]) for slope in slopes]
+    values, slopes = evaluate_equations(part, equations, trial.forms(radius))
+    by_own = [stack([zero + slope.get(part.unknowns[k], 0.0) for k in own]) for slope in slopes]
     others = [i for k, i in enumerate(part.unknowns) if k not in own]
     by_others, along = [], []
     spread = trial.slopes * trial.half[:, None, :]
     for slope in slopes:
         row = [zero] * len(part.unknowns)
-        drift = stacked([zero] * trial.half.shape[1])
+        drift = stack([zero] * trial.half.shape[1])
         for i, rate in slope.items():
             if i in part.place:
                 # along the tube x_i moves by S_i h ε
@@ -258,10 +258,10 @@ def derivatives(trial: TubeTrial, equations: Sequence[LoopEquation], own: Sequen
             elif i in part.driven:
                 k = part.driven.index(i)
                 drift = drift + (zero + rate)[..., None] * (np.eye(trial.half.shape[1])[k] * trial.half[:, k : k + 1])
-        by_others.append(stacked(row))
+        by_others.append(stack(row))
         along.append(drift)
-    made = stacked([zero + each for each in values])
-    return TubeDerivatives(made, stacked(by_own, axis=-2), stacked(by_others, axis=-2), stacked(along, axis=-2))
+    made = stack([zero + each for each in values])
+    return TubeDerivatives(made, stack(by_own, axis=-2), stack(by_others, axis=-2), stack(along, axis=-2))
 
 
 def _zero(trial: TubeTrial) -> AffineForms:
@@ -292,6 +292,6 @@ def _same_side(trial: TubeTrial, block: LoopBlock) -> NDArray[np.bool_]:
     ends = rod_ends(system, block.loop, trial.forms(trial.radius))
     found = np.ones(len(trial.x), dtype=bool)
     for end in ends[:2]:
-        along = dotted(end - ends[2], direction)
+        along = dot_product(end - ends[2], direction)
         found &= along.v[0] - along.spread > 0
     return found

@@ -39,7 +39,7 @@ def _toggles(growth: Growth, ends: Sequence[BranchEnd]) -> Iterator[Toggle]:
     middle = np.array([(growth.grid.point(end.leaf.low) + growth.grid.point(end.leaf.high)) / 2 for end in ends])
     goal = np.clip(start + BEYOND * (middle - start), growth.grid.low, growth.grid.high)
     home = np.linalg.svd(part.closure(growth.q0, growth.x0)[1], compute_uv=False)[-1]
-    for end, q, x, last in zip(ends, *_followed(part, start, x0, goal), strict=True):
+    for end, q, x, last in zip(ends, *_follow_ways(part, start, x0, goal), strict=True):
         _, strengths, rows = np.linalg.svd(part.closure(q, x)[1])
         if last == 1.0 or strengths[-1] / max(home, 1e-300) > TOGGLE:
             why = ("not tried: the effort was used up (a smaller --box needs less)" if not end.leaf.failed else
@@ -53,7 +53,7 @@ def _toggles(growth: Growth, ends: Sequence[BranchEnd]) -> Iterator[Toggle]:
         yield Toggle(q * unit, joints, loops, "a determinant vanishes: these joints can move while all motors rest")
 
 
-def _followed(part: LoopPart, q: Array, x: Array, goal: Array) -> tuple[Array, Array, Array]:
+def _follow_ways(part: LoopPart, q: Array, x: Array, goal: Array) -> tuple[Array, Array, Array]:
     """The last closed configurations (c, n), (c, p) on the straight ways to ``goal`` that short steps reach, and their
     parts (c,) of the ways."""
     x, done, step = x.copy(), np.zeros(len(q)), np.full(len(q), 0.25)
@@ -114,6 +114,6 @@ def _meets(growth: Growth, k: int, one: BranchTube, other: BranchTube, face: Arr
     return False if np.any((off - doubt > other.radius) & alone) else None
 
 
-def told(ends: Sequence[Toggle]) -> list[str]:
+def describe_ends(ends: Sequence[Toggle]) -> list[str]:
     """The ends of a proof in words."""
     return [f"{each.reason}: {', '.join(each.joints)}" if each.joints else each.reason for each in ends]

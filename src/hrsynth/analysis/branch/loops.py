@@ -18,7 +18,7 @@ import numpy as np
 
 from ...errors import BadMechanism
 from ...geometry import lines
-from ...geometry.affine import crossed, dotted
+from ...geometry.affine import cross_product, dot_product
 from ...geometry.so3 import turns_about
 from ...geometry.vectors import Array, cross, frozen, hat, inverse, plane_axes, transform
 from ...mechanism import Joint, JointType, Mechanism, graphs
@@ -119,16 +119,16 @@ class LoopSystem(Value):
     def metric(self) -> LoopSystem:
         """The same in metres; what is zero but for rounding is zero."""
         def point(p: Array) -> Array:
-            return frozen(_sharpened(p * self.length))
+            return frozen(_drop_rounding(p * self.length))
 
         def row(each: LoopRow) -> LoopRow:
-            return replace(each, one=None if each.one is None else _sharpened(each.one),
-                           other=None if each.other is None else _sharpened(each.other))
+            return replace(each, one=None if each.one is None else _drop_rounding(each.one),
+                           other=None if each.other is None else _drop_rounding(each.other))
 
         units = self.units
         return replace(
             self, length=1.0,
-            coordinates=tuple(replace(each, axis=frozen(_sharpened(each.axis)), point=point(each.point))
+            coordinates=tuple(replace(each, axis=frozen(_drop_rounding(each.axis)), point=point(each.point))
                               for each in self.coordinates),
             loops=tuple(replace(each, point=point(each.point), rows=tuple(map(row, each.rows)))
                         for each in self.loops),
@@ -195,9 +195,9 @@ class Swept:
         before, about, angle = R, None, None
         for each, value in zip(chain, values, strict=True):
             if np.any(each.point != c):
-                o = o + mapped(R, each.point - c)
+                o = o + rotate(R, each.point - c)
                 c = each.point
-            axes.append(mapped(R, each.axis))
+            axes.append(rotate(R, each.axis))
             points.append(None if each.slides else o)
             if value is None:
                 continue
@@ -209,36 +209,36 @@ class Swept:
                 angle = angle + value if along > 0 else angle - value
             else:
                 before, about, angle = R, each.axis, value
-            R = _turned(before, about, angle)
+            R = _turn_frame(before, about, angle)
         return cls(R, o, c, axes, points)
 
     def at(self, p: Array) -> Any:
         """Where a point (3,) of the end, as it lies at zero, is."""
-        return self.o + mapped(self.R, p - self.c)
+        return self.o + rotate(self.R, p - self.c)
 
     def rate(self, k: int, p: Any) -> Any:
         """The velocity (…, 3) of a place p with the k-th coordinate."""
         at = self.points[k]
-        return self.axes[k] if at is None else crossed(self.axes[k], p - at)
+        return self.axes[k] if at is None else cross_product(self.axes[k], p - at)
 
     def turned(self, k: int, v: Any) -> Any:
         """The rate (…, 3) of a direction v with the k-th coordinate, None where it is zero."""
-        return None if self.points[k] is None else crossed(self.axes[k], v)
+        return None if self.points[k] is None else cross_product(self.axes[k], v)
 
 
-def _sharpened(directions: Array) -> Array:
+def _drop_rounding(directions: Array) -> Array:
     """Directions or points whose components that are zero but for rounding are zero."""
     return np.where(np.abs(directions) < ROUNDED_AXIS, 0.0, directions)
 
 
-def mapped(R: Any, p: Any) -> Any:
+def rotate(R: Any, p: Any) -> Any:
     """R p (…, 3)."""
     if _floats(R) and _floats(p):
         return np.matmul(R, p[..., None])[..., 0]
     return (R * p[..., None, :]).sum(-1)
 
 
-def _turned(R: Any, axis: Array, angle: Any) -> Any:
+def _turn_frame(R: Any, axis: Array, angle: Any) -> Any:
     """R exp([a]ₓ θ) = R + R [a]ₓ sin θ + R [a]ₓ² (1 − cos θ)."""
     sine, cosine = angle.sines() if hasattr(angle, "sines") else (np.sin(angle), np.cos(angle))
     K = hat(axis)
@@ -270,22 +270,22 @@ def residuals(system: LoopSystem, loop: JointLoop, values: Any, rows: Sequence[L
         slope: dict[int, Any] = {}
         if row.kind == "point":
             assert row.one is not None
-            k = mapped(one.R, row.one) if row.carried else row.one
-            found.append(dotted(b - a, k))
+            k = rotate(one.R, row.one) if row.carried else row.one
+            found.append(dot_product(b - a, k))
             for place, i in moving[0]:
-                slope[i] = -dotted(one.rate(place, a), k)
+                slope[i] = -dot_product(one.rate(place, a), k)
                 turned = one.turned(place, k) if row.carried else None
                 if turned is not None:
-                    slope[i] = slope[i] + dotted(turned, b - a)
+                    slope[i] = slope[i] + dot_product(turned, b - a)
             for place, i in moving[1]:
-                slope[i] = dotted(two.rate(place, b), k)
+                slope[i] = dot_product(two.rate(place, b), k)
         elif row.kind == "direction":
-            u, v = mapped(one.R, row.one), mapped(two.R, row.other)
-            found.append(dotted(u, v) - np.asarray(row.one @ row.other))  # type: ignore[operator]
+            u, v = rotate(one.R, row.one), rotate(two.R, row.other)
+            found.append(dot_product(u, v) - np.asarray(row.one @ row.other))  # type: ignore[operator]
             for chain, swept, own, far in ((moving[0], one, u, v), (moving[1], two, v, u)):
                 for place, i in chain:
                     turned = swept.turned(place, own)
-                    slope[i] = dotted(turned, far) if turned is not None else 0.0
+                    slope[i] = dot_product(turned, far) if turned is not None else 0.0
         else:
             found.append(_distance(system, loop, values, one, a, slope))
         slopes.append(slope)
@@ -312,8 +312,8 @@ def _distance(system: LoopSystem, loop: JointLoop, values: Any, one: Swept, a: A
                                      (after, far, rod, b, -1)):
         for place, i in enumerate(chain):
             if values[i] is not None:
-                slope[i] = dotted(swept.rate(place, p), v) * sign
-    return (dotted(reach, reach) - dotted(rod, rod)) * 0.5
+                slope[i] = dot_product(swept.rate(place, p), v) * sign
+    return (dot_product(reach, reach) - dot_product(rod, rod)) * 0.5
 
 
 def loop_system(mechanism: Mechanism, driven: Sequence[str], free: bool = False) -> LoopSystem:
@@ -350,7 +350,7 @@ def loop_system(mechanism: Mechanism, driven: Sequence[str], free: bool = False)
     system = LoopSystem(mechanism, length, tuple(coordinates), body, (), _gears(mechanism, coordinates, length))
     loops = [_loop(system, joint, normal) for joint in joints
              if joint.name not in kept and joint.type is not JointType.FREE]
-    return replace(system, loops=tuple(_shortened(system, loops, loop) for loop in loops))
+    return replace(system, loops=tuple(_shorten_loop(system, loops, loop) for loop in loops))
 
 
 def plane_of(joints: Sequence[Joint]) -> Array | None:
@@ -418,7 +418,7 @@ def _loop(system: LoopSystem, joint: Joint, normal: Array | None) -> JointLoop:
                      tuple(equations(joint)), planar=normal is not None)
 
 
-def _shortened(system: LoopSystem, loops: Sequence[JointLoop], loop: JointLoop) -> JointLoop:
+def _shorten_loop(system: LoopSystem, loops: Sequence[JointLoop], loop: JointLoop) -> JointLoop:
     """The loop without a joint that only it has, where it is closed in a point: that the distance of the ball that is
     cut from this joint's centre is right is all that the others have to do with it (a rod)."""
     joints = system.mechanism.joints

@@ -100,7 +100,7 @@ class LoopPart(Value):
             far = np.linalg.norm(errors, axis=-1) >= SOLVED
             if not far.any() or not np.all(np.isfinite(x)):
                 break
-            step = _solved(A[far], errors[far][..., None])[..., 0]
+            step = _least_squares(A[far], errors[far][..., None])[..., 0]
             x[far] -= step * np.minimum(1.0, 0.5 / np.maximum(np.abs(step).max(axis=-1, initial=0.0), 0.5))[..., None]
         done = np.linalg.norm(self.closure(q, x)[0], axis=-1) < 100 * SOLVED
         return x, done & np.all(np.isfinite(x), axis=-1)
@@ -108,7 +108,7 @@ class LoopPart(Value):
     def slopes(self, q: Array, x: Array) -> Array:
         """dx/dq (…, p, n) at closed configurations."""
         _, A, B = self.closure(q, x)
-        return -_solved(A, B)
+        return -_least_squares(A, B)
 
     def followed(self, q: Array, x: Array, goal: Array, step: float = 0.1) -> tuple[Array, Array]:
         """The unknowns (c, p) at ``goal`` (c, n), reached by short steps from closed configurations, and which (c,) are
@@ -125,7 +125,7 @@ class LoopPart(Value):
         return x, good
 
 
-def _solved(A: Array, B: Array) -> Array:
+def _least_squares(A: Array, B: Array) -> Array:
     """The least squares solutions (…, p, k) of A X = B, (…, m, p) and (…, m, k)."""
     return np.asarray(np.linalg.pinv(A, rcond=RANK_CUTOFF) @ B)
 

@@ -22,7 +22,7 @@ from .growth import CellGrid, GrownCell, Growth, largest_box, lattice, whole_box
 from .limits import branch_limits
 from .loops import LoopSystem, loop_system
 from .part import LoopPart, parts_of, whole
-from .redundant import closed_to, unexplained
+from .redundant import closed_to, unexplained_equations
 
 GROUPS = "the loops' links move in groups of fewer dimensions"
 BOUNDED = "bounded over the tubes"
@@ -51,7 +51,7 @@ def branch(robot: RobotLike, box: BoxLike | None = None, *, effort: int = BRANCH
     motors = [name for name, joint in mechanism.joints.items() if joint.actuated]
     if not motors:
         raise BadRequest(f"{mechanism.name} has no motor", None, "one or more: --motors names them")
-    system, parts, held = _shaped(mechanism, motors, box)
+    system, parts, held = _choose_shape(mechanism, motors, box)
     intervals, source = _box(system, box)
     found, grown = [], []
     for part in parts:
@@ -73,7 +73,7 @@ def branch(robot: RobotLike, box: BoxLike | None = None, *, effort: int = BRANCH
 Shaped = tuple[LoopSystem, tuple[LoopPart, ...], tuple[int, ...]]
 
 
-def _shaped(mechanism: Mechanism, motors: Sequence[str], box: BoxLike | None) -> Shaped:
+def _choose_shape(mechanism: Mechanism, motors: Sequence[str], box: BoxLike | None) -> Shaped:
     """The loops in the coordinates in which the larger cell about zero is proved: those of the joints alone, or with
     the pose of the platform, seen from which all legs are alike."""
     system = loop_system(mechanism, motors)
@@ -190,7 +190,7 @@ def _answer(part: LoopPart, growth: Growth) -> BranchPart:
         corners = largest_box(growth)
         box = growth.grid.point(corners[0]), growth.grid.point(corners[1])
     names = system.names
-    loose = unexplained(part)
+    loose = unexplained_equations(part)
     tubes = [leaf.tube for leaf in growth.proved if leaf.tube is not None]
     redundant = "" if not part.left_out else GROUPS if not loose else BOUNDED
     return BranchPart(

@@ -9,12 +9,12 @@ import numpy as np
 from ...geometry.ranks import range_basis
 from ...geometry.vectors import Array
 from ...mechanism import JointType
-from .cells import BranchTube, evaluated, trial_of
+from .cells import BranchTube, evaluate_equations, trial_of
 from .loops import JointLoop, LoopSystem, parts
 from .part import LoopEquation, LoopPart
 
 
-def unexplained(part: LoopPart) -> tuple[LoopEquation, ...]:
+def unexplained_equations(part: LoopPart) -> tuple[LoopEquation, ...]:
     """The equations that were left out and do not follow from the others.
 
     All displacements about a loop lie in the group that its joints generate, of dimension d; with the f freedoms of the
@@ -64,7 +64,7 @@ def closed_to(part: LoopPart, tubes: Sequence[BranchTube], equations: Sequence[L
     if not equations or not tubes:
         return 0.0
     trial = trial_of(part, tubes)
-    values, _ = evaluated(part, equations, trial.forms(trial.radius))
+    values, _ = evaluate_equations(part, equations, trial.forms(trial.radius))
     bound = 0.0
     for each, value in zip(equations, values, strict=True):
         size = float(np.max(value.size))

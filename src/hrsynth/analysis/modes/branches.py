@@ -44,7 +44,8 @@ def model(confined: TipLoci) -> Model:
     """The system for the way in which the platform moves."""
     at = {body: confined.goal.pose(body) for body in confined.bodies}
     curves = tuple(tip.curve for tip in confined.tips)
-    made = {"translations": _translating, "bodies": _articulated}.get(confined.motion, _rigid)(confined, at, curves)
+    made = {"translations": _translating, "bodies": _articulated_model}.get(confined.motion, _rigid)(confined, at,
+                                                                                                     curves)
     return replace(made, confined=confined,
                    system=replace(made.system, error=confined.error, as_written=confined.as_written))
 
@@ -53,7 +54,7 @@ def _translating(confined: TipLoci, at: dict[str, Array], curves: tuple[Reach, .
     """q is the position of the first body's origin; tips are counted from there."""
     p = at[confined.bodies[0]][:3, 3]
     tips = np.array([_point(at[tip.body], tip.place) - p for tip in confined.tips])
-    return Model(Translating(curves, tips), partial(_shifted, at, p), p)
+    return Model(Translating(curves, tips), partial(_shift_bodies, at, p), p)
 
 
 def _rigid(confined: TipLoci, at: dict[str, Array], curves: tuple[Reach, ...]) -> Model:
@@ -75,11 +76,11 @@ def _rigid(confined: TipLoci, at: dict[str, Array], curves: tuple[Reach, ...]) -
         system = Planar(curves, tips[:, :2], X_goal)
     home = np.array([*p, 0.0, 0.0, 0.0]) if n is None else np.zeros(3)
     carry = partial(_carried_back, system, X_goal, at) if confined.back else partial(
-        _carried, system, {body: back @ X for body, X in at.items()})
+        _carried_bodies, system, {body: back @ X for body, X in at.items()})
     return Model(system, carry, home, confined.back)
 
 
-def _articulated(confined: TipLoci, at: dict[str, Array], curves: tuple[Reach, ...]) -> Model:
+def _articulated_model(confined: TipLoci, at: dict[str, Array], curves: tuple[Reach, ...]) -> Model:
     """q is the first body's origin and the second's place on its circle about it."""
     assert confined.slide is not None
     one, other = confined.bodies
@@ -90,12 +91,12 @@ def _articulated(confined: TipLoci, at: dict[str, Array], curves: tuple[Reach, .
                  partial(_on_circle, at[one], at[other], one, other, confined.slide), np.array([*p, 0.0]))
 
 
-def _shifted(at: dict[str, Array], p: Array, q: Array) -> dict[str, Array]:
+def _shift_bodies(at: dict[str, Array], p: Array, q: Array) -> dict[str, Array]:
     """Bodies that move with one point from ``p`` to ``q``."""
-    return {body: _moved(X, q - p) for body, X in at.items()}
+    return {body: _translate(X, q - p) for body, X in at.items()}
 
 
-def _carried(system: Spatial | Planar, at: dict[str, Array], q: Array) -> dict[str, Array]:
+def _carried_bodies(system: Spatial | Planar, at: dict[str, Array], q: Array) -> dict[str, Array]:
     """Bodies in the frame that the system's coordinates place."""
     return {body: system.pose(q) @ X for body, X in at.items()}
 
@@ -110,7 +111,7 @@ def _on_circle(X_one: Array, X_other: Array, one: str, other: str, slide: Circle
     """Two bodies, the second at a place of its curve about the first."""
     first = q[:3] - X_one[:3, 3]
     second = q[:3] + slide.at(float(q[3])) - X_other[:3, 3]
-    return {one: _moved(X_one, first), other: _moved(X_other, second)}
+    return {one: _translate(X_one, first), other: _translate(X_other, second)}
 
 
 def _point(X: Array, place: Array) -> Array:
@@ -118,7 +119,7 @@ def _point(X: Array, place: Array) -> Array:
     return transform(X, place)
 
 
-def _moved(X: Array, by: Array) -> Array:
+def _translate(X: Array, by: Array) -> Array:
     """A pose moved by a translation (3,)."""
     return pose(X[:3, 3] + by, X[:3, :3])
 
@@ -141,7 +142,7 @@ def solve_all(confined: TipLoci, *, near: bool = True, effort: float = EFFORT) -
     most = int(min(BRANCH_CHOICES, effort / first.seconds))
     made = [model(each) for each in islice(choices(confined), most)]
     size = made[0].system.size
-    found = [_scaled(solve(each.system, near=near, goal=None if k else each.home), each.system.size / size)
+    found = [_rescale(solve(each.system, near=near, goal=None if k else each.home), each.system.size / size)
              for k, each in enumerate(made)]
     total = int(np.prod([1 + len(tip.others) for tip in confined.tips]))
     modes = together(found, {tip.leg: 1 + len(tip.others) for tip in confined.tips}, size)
@@ -156,7 +157,7 @@ def solve_all(confined: TipLoci, *, near: bool = True, effort: float = EFFORT) -
     return made[0], modes
 
 
-def _scaled(modes: SystemModes, factor: float) -> SystemModes:
+def _rescale(modes: SystemModes, factor: float) -> SystemModes:
     """Radii and residuals in sizes of another system."""
 
     def scaled(each: Sequence[SystemMode]) -> tuple[SystemMode, ...]:

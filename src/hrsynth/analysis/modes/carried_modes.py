@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from ...budgets import LARGEST_LOOPS, PLANAR_STARTS
-from ...constraints.pattern import attached
+from ...constraints.pattern import leg_ends
 from ...errors import NotConfined, Unsolved
 from ...geometry.vectors import Array, cross, frozen, hat
 from ...kinematics.configuration import ClosedConfiguration
 from ..measured import MeasuredRobot
 from .branches import Model
 from .carried import CarriedEquation, CarriedPlatform, Told
-from .carrier import carried
+from .carrier import carried_platform
 from .conditions import PoseCondition
 from .joint_forms import closings_bound, eigenvalues
 from .polynomials import Polynomial, krawczyk
@@ -76,13 +76,13 @@ def proposals(system: CarriedPlatform, most: int) -> Array:
     rng, n, found = np.random.default_rng(0), len(system.freedoms_), np.zeros((0, len(system.freedoms_)))
     for _ in range(PLANAR_STARTS):
         start = rng.uniform(-np.pi, np.pi, (64, n)) + 3j * rng.normal(size=(64, n))
-        found = polished(system, start, found)
+        found = polish_zeros(system, start, found)
         if len(found) >= most:
             break
     return found
 
 
-def polished(system: CarriedPlatform, q: Array, known: Iterable[Array] = ()) -> Array:
+def polish_zeros(system: CarriedPlatform, q: Array, known: Iterable[Array] = ()) -> Array:
     """The common zeros (k, n) to which Newton's method leads, each with its conjugate, after those that are known."""
     slides, found = np.array([each.slides for each in system.freedoms_]), list(known)
     with np.errstate(all="ignore"):
@@ -110,12 +110,12 @@ def solve_carried(measured: MeasuredRobot, goal: ClosedConfiguration, error: flo
     enclosed that there may be."""
     if not np.isfinite(error):
         raise NotConfined(measured.setting.robot.name, "no distance bounds how far it is from where its loops close")
-    system = carried(measured, goal, error)
-    (body,) = attached(measured.setting.anatomy)
-    return Model(system, lambda q: {body: system.placed(q)}, system.home), _judged(system)
+    system = carried_platform(measured, goal, error)
+    (body,) = leg_ends(measured.setting.anatomy)
+    return Model(system, lambda q: {body: system.placed(q)}, system.home), _judge(system)
 
 
-def enclosed(system: CarriedPlatform, proposed: Array) -> list[PoseBox]:
+def enclose_zeros(system: CarriedPlatform, proposed: Array) -> list[PoseBox]:
     """Boxes of common zeros in c, s and t, apart from each other."""
     n = len(system.freedoms_)
     equations: list[Polynomial] = [system.equation(each) for each in system.square]
@@ -150,7 +150,7 @@ def _far(system: CarriedPlatform, proposed: Array, known: Sequence[PoseBox]) -> 
     return found
 
 
-def _judged(system: CarriedPlatform) -> SystemModes:
+def _judge(system: CarriedPlatform) -> SystemModes:
     """The modes: as many zeros as the degrees allow."""
     from flint import ctx
 
@@ -159,11 +159,11 @@ def _judged(system: CarriedPlatform) -> SystemModes:
     if most > LARGEST_LOOPS:
         raise Unsolved("the leg", f"{size}: up to {most} closings, too many (at most {LARGEST_LOOPS})")
     why, bound = "degrees in each (Bézout)", "class"
-    boxes = enclosed(system, proposals(system, most)) if n <= FEW_JOINTS else []
+    boxes = enclose_zeros(system, proposals(system, most)) if n <= FEW_JOINTS else []
     if len(boxes) < most and (counted := closings_bound(system, system.square)) is not None:
         most, why, bound = counted.most, "ranks modulo a prime of 62 bits", "rank"
-        proposed = polished(system, eigenvalues(system, system.square, counted))
-        boxes = enclosed(system, proposed)
+        proposed = polish_zeros(system, eigenvalues(system, system.square, counted))
+        boxes = enclose_zeros(system, proposed)
         boxes += _far(system, proposed, boxes)
     at_goal = [box for box in boxes if box.real and box.holds(system.unknowns(system.home))]
     if len(boxes) != most or len(at_goal) != 1:

@@ -25,7 +25,7 @@ from .leg_conditions import Middle, leg_conditions, rigid_platform
 from .sighted import conditions, sights
 
 
-def carried(measured: MeasuredRobot, goal: ClosedConfiguration, error: float) -> CarriedPlatform:
+def carried_platform(measured: MeasuredRobot, goal: ClosedConfiguration, error: float) -> CarriedPlatform:
     """The platform on that leg which leaves fewest zeros. Raises ``NotConfined`` where none carries it, or what the
     others ask is not known."""
     anatomy, name = measured.setting.anatomy, measured.setting.robot.name

@@ -87,7 +87,7 @@ class Chain:
     @property
     def moved(self) -> float:
         """How far axes and centres were moved so that they meet, coincide or are parallel, all together (m)."""
-        return self.off + self.extent * _tilted(self.bodies)
+        return self.off + self.extent * _parallel_angles(self.bodies)
 
 
 def chain(anatomy: LegDecomposition, leg: Leg, held: Sequence[Observation], goal: ClosedConfiguration, tip: Array,
@@ -105,7 +105,7 @@ def chain(anatomy: LegDecomposition, leg: Leg, held: Sequence[Observation], goal
     return Chain(bodies, end != "free" if isinstance(end, str) else True, goal.twin.length, off)
 
 
-def _tilted(bodies: Sequence[ChainBody]) -> float:
+def _parallel_angles(bodies: Sequence[ChainBody]) -> float:
     """The angles (rad) of all pairs of directions of a chain that count as parallel, and are not but for rounding."""
     found = [d for body in bodies for d in (*([] if body.axis is None else [body.axis]), *body.slides, *body.watched,
                                             *(d for crank in body.cranks for d in (crank.axis, *crank.watched)))]
@@ -151,7 +151,7 @@ class _Walk:
             at = there
         for what in (*self.watched, *self.coordinates):
             raise Underived(f"what is measured at {what} is not on the way from the base to the leg's end")
-        return _shifted(found, tip, SAME_POINT * self.goal.twin.length)
+        return _shift_bodies(found, tip, SAME_POINT * self.goal.twin.length)
 
     def _seen(self, link: str) -> tuple[Array, ...]:
         return tuple(self.watched.pop(link, ()))
@@ -249,7 +249,7 @@ _TURNS = {JointType.REVOLUTE: True, JointType.UNIVERSAL: True, JointType.CYLINDR
 """Joints that are read axis by axis, and whether those are axes of turns."""
 
 
-def _shifted(bodies: Sequence[ChainBody], tip: Array, small: float) -> tuple[tuple[ChainBody, ...], float]:
+def _shift_bodies(bodies: Sequence[ChainBody], tip: Array, small: float) -> tuple[tuple[ChainBody, ...], float]:
     """Bodies with their shifts, counted from points of their axes that neighbours share where axes meet; and how far
     they are from meeting (m)."""
     points, moved = [bodies[0].point], 0.0

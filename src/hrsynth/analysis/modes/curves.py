@@ -181,10 +181,10 @@ def curves_of(reaches: Iterable[Reach]) -> list[int]:
 
 
 @overload
-def shifted(reach: Curve, by: ArrayLike) -> Curve: ...
+def shift_reach(reach: Curve, by: ArrayLike) -> Curve: ...
 @overload
-def shifted(reach: Reach, by: ArrayLike) -> Reach: ...
-def shifted(reach: Reach, by: ArrayLike) -> Reach:
+def shift_reach(reach: Reach, by: ArrayLike) -> Reach: ...
+def shift_reach(reach: Reach, by: ArrayLike) -> Reach:
     """The same moved by ``by`` (3,), with the same parameter at each point of a curve."""
     return replace(reach, centre=reach.centre + np.asarray(by, dtype=float))
 

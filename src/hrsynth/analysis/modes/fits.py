@@ -23,23 +23,23 @@ from .roots import PRECISION
 from .systems import System
 
 
-def rounded(system: System, at: Array) -> float:
+def tip_rounding(system: System, at: Array) -> float:
     """How far a tip that floats put at ``at`` (3,) can be from that of the exact input at the same pose (m)."""
     return system.error + TIP_ROUNDING * (system.size + length(at))
 
 
 def off(system: System, k: int, at: Array, shift: float, turn: float) -> float:
     """How far the exact tip of a leg is from ``at`` (3,) at most (m), at a pose enclosed to ``shift`` and ``turn``."""
-    return shift + turn * length(system.tips[k]) + rounded(system, at)
+    return shift + turn * length(system.tips[k]) + tip_rounding(system, at)
 
 
 def meets(system: System, q: Array, goal: Array, shift: float, turn: float) -> bool:
     """Whether the exact pose about ``q`` can be that about ``goal``: all its tips can."""
-    return all(length(one - other) <= off(system, k, one, shift, turn) + rounded(system, other)
+    return all(length(one - other) <= off(system, k, one, shift, turn) + tip_rounding(system, other)
                for k, (one, other) in enumerate(zip(system.reached(q), system.reached(goal), strict=True)))
 
 
-def excluded(system: System, q: Array, shift: float, turn: float) -> bool:
+def is_excluded(system: System, q: Array, shift: float, turn: float) -> bool:
     """Whether no pose within ``shift`` and ``turn`` of q, one of which is exact, fits all legs: a condition on a tip is
     not zero anywhere in the ball that holds it. The worst legs are tried first."""
     from flint import ctx
@@ -67,7 +67,7 @@ def torn(system: System, places: Mapping[int, tuple[Array, float]]) -> bool:
     frame = system.frame
     numbers = system.balls(frame)
     with ctx.workprec(PRECISION):
-        tips = {k: (numbers.vector(frame.point(at), (miss + rounded(system, at)) / frame.size * UNIT),
+        tips = {k: (numbers.vector(frame.point(at), (miss + tip_rounding(system, at)) / frame.size * UNIT),
                     numbers.vector(system.tips[k] / frame.size)) for k, (at, miss) in places.items()}
         arms = [(at - to, b - c) for (at, b), (to, c) in combinations(tips.values(), 2)]
         return any(not (arm @ arm - own @ own).contains(0) for arm, own in arms)
@@ -102,7 +102,7 @@ def stationary(system: System, starts: Sequence[Array], known: Sequence[Array]) 
     for start in starts:
         if residual(system, start) > NO_NEAR_MODE:
             continue
-        q = _minimised(system, start)
+        q = _least_misses(system, start)
         miss = residual(system, q)
         if VANISHES < miss <= NEAR_MODE and all(_apart(system, q, other) > SAME_NEAR_MODE for other in seen):
             found.append((miss, q))
@@ -115,14 +115,14 @@ def dimension(system: System) -> int | None:
     rng = np.random.default_rng(0)
     found = []
     for _ in range(STARTS):
-        q = _minimised(system, system.somewhere(rng))
+        q = _least_misses(system, system.somewhere(rng))
         if residual(system, q) <= VANISHES:
             values = np.linalg.svd(_slopes(system, q), compute_uv=False)
             found.append(int(len(q) - np.sum(values > np.sqrt(LOCUS) * values[0])))
     return max(found, default=None)
 
 
-def _minimised(system: System, start: Array) -> Array:
+def _least_misses(system: System, start: Array) -> Array:
     """The pose of least squared misses next to a start."""
     from scipy.optimize import least_squares
 

@@ -57,7 +57,7 @@ class FormedModes:
     continuum: int | None = None
 
 
-def formed(setting: ObservedRobot) -> FormedModes:
+def formation_modes(setting: ObservedRobot) -> FormedModes:
     """The modes of a formation with the measurements of its zero configuration."""
     at, question = setting.everything.start, setting.samples.question
     formation = formation_at(at, question, relation(at, question), setting.anatomy)
@@ -76,7 +76,7 @@ def formed(setting: ObservedRobot) -> FormedModes:
         return FormedModes(formation, (goal,), "others are not searched for: a trivial motion ties a turn or a scale "
                            "to another")
     listed = None if sliding is None else sliding.modes(formation, goal)
-    return listed or _found(question, formation, formation.group, goal)
+    return listed or _search(question, formation, formation.group, goal)
 
 
 def _slides(at: ClosedConfiguration) -> bool:
@@ -187,7 +187,7 @@ def _nearest(at: ClosedConfiguration, goal: ClosedConfiguration, question: Measu
     return found, off
 
 
-def _found(question: Measurement, formation: Formation, group: Similarities, goal: FormedMode) -> FormedModes:
+def _search(question: Measurement, formation: Formation, group: Similarities, goal: FormedMode) -> FormedModes:
     """The modes that random starts lead to."""
     at = goal.configuration
     twin, rng, rank = at.twin, np.random.default_rng(0), relation(at, question).rank

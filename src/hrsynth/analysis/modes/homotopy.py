@@ -82,8 +82,8 @@ def ends(quadrics: Sequence[Quadric], study: Array, resting: Sequence[int] = (),
     found = _Sorted()
     for number in range(HOMOTOPY_ROUNDS):
         with np.errstate(all="ignore"):
-            at = _normed(_followed(start * np.exp(1j * (1.2 + 2.0 * number)), to, x) @ lift.T)
-            found = _sorted(wanted, at, found.sharp)
+            at = _normalise(_follow_paths(start * np.exp(1j * (1.2 + 2.0 * number)), to, x) @ lift.T)
+            found = _sort_ends(wanted, at, found.sharp)
         if not found.lost or len(found.sharp) >= (enough or len(x)):
             break
     at = np.array([*found.sharp, *found.singular]).reshape(-1, 8) @ back.T
@@ -96,7 +96,7 @@ def _corners() -> tuple[Array, Array]:
     """Three quadrics of e, shape (3, 4, 4), and their eight solutions (8, 4): eₖ² = cₖ² e₀²."""
     c, one = np.exp(1j * np.arange(4)), np.eye(4)
     start = np.array([np.diag(one[k] - c[k] ** 2 * one[0]) for k in range(1, 4)])
-    return start, _normed(np.array([c * signs for signs in product((1.0,), *[(1.0, -1.0)] * 3)]))
+    return start, _normalise(np.array([c * signs for signs in product((1.0,), *[(1.0, -1.0)] * 3)]))
 
 
 def _turning(quadrics: Array) -> Array:
@@ -106,7 +106,7 @@ def _turning(quadrics: Array) -> Array:
     return np.asarray(np.linalg.lstsq(table, -quadrics[:, :4, :4].ravel(), rcond=None)[0].reshape(4, 4))
 
 
-def _followed(start: Array, wanted: Array, x: Array) -> Array:
+def _follow_paths(start: Array, wanted: Array, x: Array) -> Array:
     """The ends of the paths from x (m, d), or how far they were followed: Runge and Kutta's steps, each corrected by
     Newton's method, all paths at once and each with steps of its own."""
     both = np.moveaxis(np.concatenate([start, wanted]), 0, 1).reshape(x.shape[1], -1)
@@ -136,13 +136,13 @@ def _followed(start: Array, wanted: Array, x: Array) -> Array:
         k2 = tangent(at + s / 2.0 * k1, half)
         k3 = tangent(at + s / 2.0 * k2, half)
         k4 = tangent(at + s * k3, then)
-        at = _normed(at + s / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4))
+        at = _normalise(at + s / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4))
         first = correction(at, then)
         at = at + first
         second = correction(at, then)
         first, second = np.linalg.norm(first, axis=1), np.linalg.norm(second, axis=1)
         good = (first < NEAR_PATH) & (second < ON_PATH)
-        x[active[good]], t[active[good]] = _normed(at)[good], then[good]
+        x[active[good]], t[active[good]] = _normalise(at)[good], then[good]
         h[active] = np.where(good, np.where(first < EASY * NEAR_PATH, 2.0 * step, step), step / 2.0)
         active = active[(t[active] < 1.0) & (h[active] > SHORTEST_STEP)]
     return x
@@ -160,7 +160,7 @@ class _Sorted:
     loose: int = 0
 
 
-def _sorted(wanted: Array, x: Array, known: Sequence[Array]) -> _Sorted:
+def _sort_ends(wanted: Array, x: Array, known: Sequence[Array]) -> _Sorted:
     """What the ends (m, 8) of paths are, with solutions that are ``known`` already."""
     left, (x, steps) = x, _newton(wanted, x, POLISHES)
     infinite = _distance(x) > FARTHEST
@@ -177,20 +177,20 @@ def _sorted(wanted: Array, x: Array, known: Sequence[Array]) -> _Sorted:
     multiple = tuple(len(group) for group in several)
     far = left[infinite]
     lost = len(left) - len(far) - len(poses) - sum(multiple)
-    singular = [_turned(group[0], SAME_SINGULAR_END) for group in several]
+    singular = [_turn_real(group[0], SAME_SINGULAR_END) for group in several]
     return _Sorted(poses, singular, multiple, tuple(far), max(0, lost), len(groups) - len(several))
 
 
 def _conjugates(x: Sequence[Array]) -> list[Array]:
     """Distinct vectors up to factors, each with its conjugate; real ones without imaginary parts."""
     found: list[Array] = []
-    for each in map(_turned, x):
+    for each in map(_turn_real, x):
         if all(_apart(each, other) > SAME_END for other in found):
             found += [each] if np.isrealobj(each) else [each, each.conj()]
     return found
 
 
-def _turned(x: Array, flat: float = SAME_END) -> Array:
+def _turn_real(x: Array, flat: float = SAME_END) -> Array:
     """A vector with its largest entry made real; real if all others are then, but for ``flat``."""
     largest = x[np.argmax(np.abs(x))]
     x = x * (abs(largest) / largest)
@@ -215,7 +215,7 @@ def _newton(quadrics: Array, x: Array, rounds: int) -> tuple[Array, Array]:
         J = 2.0 * np.einsum("kij,nj->nki", quadrics, x)
         step = _step(J, x, np.einsum("nki,ni->nk", J, x) / 2.0)
         steps = np.linalg.norm(step, axis=1)
-        x = np.where(steps[:, None] < 1.0, _normed(x + step), x)
+        x = np.where(steps[:, None] < 1.0, _normalise(x + step), x)
     return x, steps
 
 
@@ -223,12 +223,12 @@ def _gauss_newton(quadrics: Array, x: Array) -> tuple[Array, Array, Array]:
     """Unit vectors (m, 8) after steps that leave out what is nearly singular, what is left of the quadrics there, and
     the smallest singular values."""
     for _ in range(ROUNDS):
-        J = _bordered(2.0 * np.einsum("kij,nj->nki", quadrics, x), x)
+        J = _border(2.0 * np.einsum("kij,nj->nki", quadrics, x), x)
         F = np.einsum("nki,ni->nk", J, x) / 2.0
         F[:, -1] = 0.0
         step = np.linalg.pinv(J, rcond=SINGULAR_END / 10.0) @ F[:, :, None]
-        x = _normed(x - step[:, :, 0])
-    J = _bordered(2.0 * np.einsum("kij,nj->nki", quadrics, x), x)
+        x = _normalise(x - step[:, :, 0])
+    J = _border(2.0 * np.einsum("kij,nj->nki", quadrics, x), x)
     misses: Array = np.abs(np.einsum("nki,ni->nk", J[:, :-1], x)).max(axis=1, initial=0.0)
     return x, misses, np.linalg.svd(J, compute_uv=False)[:, -1].astype(float)
 
@@ -237,17 +237,17 @@ def _step(J: Array, x: Array, F: Array) -> Array:
     """The solution of J d = −F, normal to x; not finite where there is none."""
     right = np.concatenate([-F, np.zeros((len(x), 1))], axis=1)[:, :, None]
     try:
-        return np.asarray(np.linalg.solve(_bordered(J, x), right)[:, :, 0])
+        return np.asarray(np.linalg.solve(_border(J, x), right)[:, :, 0])
     except np.linalg.LinAlgError:  # NumPy does not say of which
         if len(x) == 1:
             return np.full(x.shape, np.inf, dtype=complex)
         return np.concatenate([_step(J[k:k + 1], x[k:k + 1], F[k:k + 1]) for k in range(len(x))])
 
 
-def _bordered(J: Array, x: Array) -> Array:
+def _border(J: Array, x: Array) -> Array:
     """J (m, n, n + 1) with the conjugate of x below."""
     return np.concatenate([J, x.conj()[:, None]], axis=1)
 
 
-def _normed(x: Array) -> Array:
+def _normalise(x: Array) -> Array:
     return np.asarray(x / np.linalg.norm(x, axis=1, keepdims=True))

@@ -79,13 +79,13 @@ def beyond(part: PoseSystem, balls: Within, far: Array, wanted: int) -> int:
     the ends ``far`` (m, 8) of paths, as (e, g). Other coordinates are tried until as many as ``wanted`` are."""
     most = 0
     for number in range(1, MARKS + 1):
-        most = max(most, _enclosed(part, balls, far, np.exp(1j * number * np.arange(1, 5) ** 2)))
+        most = max(most, _enclose_infinity(part, balls, far, np.exp(1j * number * np.arange(1, 5) ** 2)))
         if most >= wanted:
             break
     return most
 
 
-def _enclosed(part: PoseSystem, balls: Within, far: Array, mark: Array) -> int:
+def _enclose_infinity(part: PoseSystem, balls: Within, far: Array, mark: Array) -> int:
     """As :func:`beyond`, with e and g' fixed by mark·e = 1 and mark·g' = 0; ``mark`` (4,) has entries of length one."""
     from flint import acb
 
@@ -98,7 +98,7 @@ def _enclosed(part: PoseSystem, balls: Within, far: Array, mark: Array) -> int:
     thick = _equations(part.equations(balls), own.A, [np.array([acb(v) for v in row], dtype=object) for row in rows])
     boxes: list[list[Any]] = []
     known: list[Array] = []
-    for z in (_polished(rounded, start) for start in _starts(np.vstack([far, far.conj()]), mark, study)):
+    for z in (_polish(rounded, start) for start in _starts(np.vstack([far, far.conj()]), mark, study)):
         if not np.all(np.isfinite(z)) or any(np.abs(z - other).max() < SAME_END for other in known):
             continue
         known.append(z)
@@ -128,7 +128,7 @@ def _starts(far: Array, mark: Array, study: Array) -> Array:
     return np.column_stack([np.hstack([e, moved]) @ np.linalg.inv(study).T, kappa])
 
 
-def _polished(equations: Sequence[Polynomial], z: Array) -> Array:
+def _polish(equations: Sequence[Polynomial], z: Array) -> Array:
     """z after Newton's steps; not finite where it cannot go on."""
     for _ in range(ROUNDS):
         J: Array = np.array([equation.slopes(list(z)) for equation in equations], dtype=complex)

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...budgets import LARGEST_JOINT_FORMS, MOST_INFINITE
-from ...geometry.ranks import decomposed
+from ...geometry.ranks import singular_decomposition
 from ...geometry.vectors import Array, hat
 from ...tolerances import RANK_OF_FORMS
 from .pose_bound import PRIME, residues
@@ -82,7 +82,7 @@ def eigenvalues(system: CarriedPlatform, chosen: Sequence[Told], counted: Counte
     pivots = np.abs(np.diag(upper))
     kernel = Q[:, int(np.sum(pivots > RANK_OF_FORMS * pivots[0])):]
     lower = _within(sizes, steps, counted.k, np.zeros(len(t), dtype=int))
-    space = decomposed(kernel[lower])[0][:, :counted.most]
+    space = singular_decomposition(kernel[lower])[0][:, :counted.most]
     place = {index: i for i, index in enumerate(lower)}
     home = [place[i] for i in _within(sizes, steps, counted.k + 1, np.zeros(len(t), dtype=int))]
     moved = [[place[i] for i in _within(sizes, steps, counted.k + 1, shift)] for shift in np.eye(len(t), dtype=int)]

@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from ...constraints.pattern import attached
+from ...constraints.pattern import leg_ends
 from ...errors import NotConfined
 from ...geometry import lines
 from ...geometry.ranks import range_basis
@@ -60,7 +60,7 @@ class Middle:
 def rigid_platform(measured: MeasuredRobot, goal: ClosedConfiguration) -> tuple[str, Middle]:
     """The one body on which all legs end, and lengths from where it is at the goal. Raises ``NotConfined``."""
     anatomy = measured.setting.anatomy
-    bodies = attached(anatomy)
+    bodies = leg_ends(anatomy)
     if len(bodies) != 1 or anatomy.point is not None or anatomy.mechanism.couplings:
         raise NotConfined(measured.setting.robot.name, "its platform is not one rigid body whose pose the legs decide")
     return bodies[0], Middle(goal.pose(bodies[0])[:3, 3], goal.twin.length)
@@ -177,7 +177,7 @@ def _of_tip(leg: str, found: Chain, count: int, tip: Array, middle: Middle, plan
         if not any(_alike(reach, other, found.length) and _same_turns(turns, others) for other, others in seen):
             seen.append((reach, turns))
     b = middle.point(tip)
-    return [[*_reached(leg, reach, tip, middle, plane), *(AtAngle(leg, b, c, a, h) for a, c, h in turns)]
+    return [[*_reach_conditions(leg, reach, tip, middle, plane), *(AtAngle(leg, b, c, a, h) for a, c, h in turns)]
             for reach, turns in seen], moved
 
 
@@ -198,7 +198,7 @@ def _same_turns(one: list[tuple[Array, Array, float]], other: list[tuple[Array, 
                for (a, c, h), (b, d, k) in zip(one, other, strict=True))
 
 
-def _reached(leg: str, reach: Reach | Quadrics, tip: Array, middle: Middle, plane: Array | None
+def _reach_conditions(leg: str, reach: Reach | Quadrics, tip: Array, middle: Middle, plane: Array | None
              ) -> list[PoseCondition]:
     """The conditions that a tip is within its reach."""
     b, none, o = middle.point(tip), np.zeros(3), middle.point(reach.centre)

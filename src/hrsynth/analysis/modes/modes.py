@@ -30,7 +30,7 @@ from .branches import Model
 from .carried import CarriedPlatform
 from .carried_modes import solve_carried
 from .drift import drift
-from .formed import formed
+from .formed import formation_modes
 from .motions import SelfMotion, self_motion
 from .planar_loops import PlanarLoops
 from .planar_modes import solve_loops
@@ -40,7 +40,7 @@ from .sighted import behind
 from .single_loop import solve_loop
 from .solve import SystemModes, continuum
 from .tips import TipLoci
-from .ways import better_ways, solve_tips, uncoupled
+from .ways import better_ways, solve_tips, without_couplings
 
 WITHIN = {"formation": "configurations up to trivial motions",
           "translations": "poses turned as this one", "bodies": "poses whose bodies are turned as at this one",
@@ -167,7 +167,7 @@ def modes(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None,
                          "one of the two")
     setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed)
     if setting.robot.formation:
-        return _formed(setting, at, real)
+        return _modes_of_formation(setting, at, real)
     asked = None if at is None or isinstance(at, ClosedConfiguration) else asked_pose(at)
     if isinstance(asked, ModeNumber):
         at, asked = at_mode(modes(setting), asked), None
@@ -189,10 +189,10 @@ def modes(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None,
     tell("modes")
     try:
         if not as_written and _moves(setting, measured.question, goal):
-            return _searched(setting, measured.question, goal, pose, kind, "the pose lies on a self-motion")
-        listed = _listed(setting, measured, goal, wanted, pose, kind, as_written, effort)
+            return _modes_by_search(setting, measured.question, goal, pose, kind, "the pose lies on a self-motion")
+        listed = _modes_by_system(setting, measured, goal, wanted, pose, kind, as_written, effort)
     except (NotConfined, Unsolved, TooLarge, MissingExtra) as error:
-        return _searched(setting, measured.question, goal, pose, kind, error.reason)
+        return _modes_by_search(setting, measured.question, goal, pose, kind, error.reason)
     moving = not listed.found.complete and not as_written and any(
         mode.configuration is not None and _moves(setting, measured.question, mode.configuration)
         for mode in listed.modes)
@@ -200,18 +200,18 @@ def modes(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None,
         return listed
     why = ("some of the solutions lie on a self-motion" if moving else "the equations depend on each other"
            if listed.found.continuum is not None else str(listed.found.degenerate))
-    found = _searched(setting, measured.question, goal, pose, kind, why)
+    found = _modes_by_search(setting, measured.question, goal, pose, kind, why)
     return found if moving or not any(mode.proved for mode in listed.modes) else replace(listed, motions=found.motions)
 
 
-def _formed(setting: ObservedRobot, where: object, real: bool) -> AssemblyModes:
+def _modes_of_formation(setting: ObservedRobot, where: object, real: bool) -> AssemblyModes:
     """The modes of a formation; refuses poses and motors, which are those of one platform."""
     if where is not None or real:
         raise BadRequest(f"{setting.robot.name}: poses and motors belong to one platform, and this is a formation",
                          "real" if real else str(where),
                          "nothing: what is measured at the file's configuration is held")
     tell("modes")
-    found, goal = formed(setting), setting.everything.start
+    found, goal = formation_modes(setting), setting.everything.start
     system = SystemModes(found.complex, (), found.complete, found.proof, degenerate=found.degenerate,
                          continuum=found.continuum, bound=found.bound)
     first = setting.samples.question.platform
@@ -251,7 +251,7 @@ def _moves(setting: ObservedRobot, question: Measurement, at: ClosedConfiguratio
     return leaves_free(at, question) and self_motion(at, question, placing_links(setting.anatomy)) is not None
 
 
-def _searched(setting: ObservedRobot, question: Measurement, goal: ClosedConfiguration, pose: Pose, kind: str,
+def _modes_by_search(setting: ObservedRobot, question: Measurement, goal: ClosedConfiguration, pose: Pose, kind: str,
               reason: str) -> AssemblyModes:
     """The modes that a search finds, and why there is no list that could be complete."""
     done = search(goal, question, placing_links(setting.anatomy))
@@ -259,11 +259,12 @@ def _searched(setting: ObservedRobot, question: Measurement, goal: ClosedConfigu
     found = SystemModes(None, (), False, f"{done.words}; not counted: {reason}", degenerate=done.degenerate,
                         continuum=size)
     return AssemblyModes(setting, kind, goal, pose, found,
-                         tuple(_closed(setting, question, mode, mode.configuration is goal) for mode in done.modes),
+                         tuple(_unproved_mode(setting, question, mode, mode.configuration is goal)
+                               for mode in done.modes),
                          (), motions=done.motions)
 
 
-def _closed(setting: ObservedRobot, question: Measurement, mode: FoundMode, goal: bool) -> AssemblyMode:
+def _unproved_mode(setting: ObservedRobot, question: Measurement, mode: FoundMode, goal: bool) -> AssemblyMode:
     """A closing that was found, as a mode of which nothing is proved."""
     at, motion = mode.configuration, setting.motion
     beyond = tuple(outside(at.twin, at.q))
@@ -273,14 +274,14 @@ def _closed(setting: ObservedRobot, question: Measurement, mode: FoundMode, goal
                         bodies=mode.bodies, behind=behind(question.observations, at.pose))
 
 
-def _listed(setting: ObservedRobot, measured: MeasuredRobot, goal: ClosedConfiguration, wanted: Task | None,
+def _modes_by_system(setting: ObservedRobot, measured: MeasuredRobot, goal: ClosedConfiguration, wanted: Task | None,
             pose: Pose, kind: str, as_written: bool, effort: float) -> AssemblyModes:
     """The modes as the solutions of the system that the tips' curves and surfaces give, or else of the conditions that
     the legs' joints give."""
     reasons, large = list[NotConfined | Unsolved | TooLarge | MissingExtra](), None
     answers = list[tuple[Model, SystemModes]]()
     exact, better = drift(goal, wanted, setting.normal.moved), None
-    free = uncoupled(measured, goal)
+    free = without_couplings(measured, goal)
     tips, asked = partial(solve_tips, as_written=as_written, effort=effort), partial(solve_posed, effort=effort)
     first = (tips, asked, solve_loops) if free is None else (solve_loops, tips, asked)
     for listed in (*first, solve_carried, solve_loop):

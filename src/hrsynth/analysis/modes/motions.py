@@ -25,7 +25,7 @@ from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.limits import outside
 from ...kinematics.pinocchio_model import PinocchioModel
 from ...kinematics.relation import Measurement
-from ...kinematics.tasks import Held, shortened, solve, system
+from ...kinematics.tasks import Held, shorten_step, solve, system
 from ...tolerances import (
     CLOSED,
     INVERTED,
@@ -125,7 +125,7 @@ def self_motion(at: ClosedConfiguration, question: Measurement, bodies: Sequence
                       inside=(longest.inside[0] * twin.length, longest.inside[1]))
 
 
-def followed(at: ClosedConfiguration, question: Measurement, twist: Array, count: int
+def follow_motion(at: ClosedConfiguration, question: Measurement, twist: Array, count: int
              ) -> tuple[tuple[ClosedConfiguration, ...], ...]:
     """The motion with the measurements held that begins with a twist (rows of t; m, rad) of the platform, and with its
     opposite: up to ``count`` closed configurations each way, none where the twist is one to first order only."""
@@ -259,7 +259,7 @@ class _Follower:
             if size < 1.0 - MOTION_BEND:
                 return
             w = basis @ ahead / size
-            step = shortened(MOTION_STEP * (joints @ ahead) / size, MOTION_STEP)
+            step = shorten_step(MOTION_STEP * (joints @ ahead) / size, MOTION_STEP)
             there = self._closed(q, step)
             if there is None:
                 return

@@ -41,7 +41,7 @@ class Parametrisation:
     others: Callable[[Any], list[Any]]
 
 
-def parametrised(quadrics: Sequence[Quadric], nonzero: Quadric | None = None, timeout: float = TIMEOUT
+def parametrise(quadrics: Sequence[Quadric], nonzero: Quadric | None = None, timeout: float = TIMEOUT
                  ) -> Parametrisation | None:
     """All solutions of quadrics with integer coefficients; None where they are infinitely many.
 
@@ -51,7 +51,7 @@ def parametrised(quadrics: Sequence[Quadric], nonzero: Quadric | None = None, ti
     program = executable()
     with tempfile.TemporaryDirectory() as folder:
         source = Path(folder) / "system.ms"
-        source.write_text(written(quadrics, nonzero), encoding="ascii")
+        source.write_text(write_system(quadrics, nonzero), encoding="ascii")
         target = Path(folder) / "solutions.ms"
         command = [str(program), "-P", "2", "-f", str(source), "-o", str(target)]
         try:
@@ -78,7 +78,7 @@ def executable() -> Path:
     return found
 
 
-def written(quadrics: Sequence[Quadric], nonzero: Quadric | None = None) -> str:
+def write_system(quadrics: Sequence[Quadric], nonzero: Quadric | None = None) -> str:
     """The system in msolve's own format."""
     count = len(quadrics[0].A) - 1
     names, lines = NAMES[:count], [_sum(_terms(each)) for each in quadrics]

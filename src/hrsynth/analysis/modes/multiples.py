@@ -36,7 +36,7 @@ def most_zeros(quadrics: Sequence[Quadric], enough: int) -> int | None:
     """The least bound that is found, the first that is ``enough``; None where none is."""
     forms, n = [_form(each) for each in quadrics], len(quadrics[0].A) - 1
     left = list(range(n))
-    while (line := _line(forms := _reduced(forms))) is not None:
+    while (line := _line(forms := _reduce_forms(forms))) is not None:
         k = max((k for k in left if _at(line, k)), key=lambda k: abs(_at(line, k)), default=None)
         if k is None:
             return 0
@@ -53,7 +53,7 @@ def _least(forms: Sequence[Form], groupings: Iterable[Sequence[Sequence[int]]], 
     """The least bound by ranks of multiples, the first that is ``enough``, of some ways to group the unknowns."""
     best: int | None = None
     for groups in groupings:
-        best = min((each for each in (best, _ranked(forms, groups, enough)) if each is not None), default=None)
+        best = min((each for each in (best, _least_bound(forms, groups, enough)) if each is not None), default=None)
         if best is not None and best <= enough:
             break
     return best
@@ -112,10 +112,10 @@ def bezout(forms: Sequence[Form], groups: Sequence[Sequence[int]]) -> int:
     return sum(ways.values())
 
 
-def combined(quadrics: Sequence[Quadric]) -> list[Quadric]:
+def combine_quadrics(quadrics: Sequence[Quadric]) -> list[Quadric]:
     """The same span of quadrics, as many as can be without their quadratic parts."""
     n, found = len(quadrics[0].A) - 1, []
-    for form in _reduced([_form(each) for each in quadrics]):
+    for form in _reduce_forms([_form(each) for each in quadrics]):
         A, common = np.zeros((n + 1, n + 1), dtype=object), math.lcm(*(c.denominator for c in form.values()))
         for e, c in form.items():
             i, j = sorted([0, 0, *(k + 1 for k in range(n) for _ in range(e[k]))])[-2:]
@@ -139,7 +139,7 @@ def _at(line: Form, k: int) -> Any:
     return next((c for e, c in line.items() if e[k] and sum(e) == 1), 0)
 
 
-def _reduced(forms: Sequence[Form]) -> list[Form]:
+def _reduce_forms(forms: Sequence[Form]) -> list[Form]:
     """The same span, quadratic monomials eliminated first."""
     rows, found = [dict(form) for form in forms], list[Form]()
     columns = sorted({e for form in forms for e in form}, key=lambda e: (-sum(e), [-k for k in e]))
@@ -192,7 +192,7 @@ def partitions(left: list[int]) -> Iterator[list[list[int]]]:
             yield [*rest[:k], [left[0], *rest[k]], *rest[k + 1:]]
 
 
-def _ranked(forms: Sequence[Form], groups: Sequence[Sequence[int]], enough: int) -> int | None:
+def _least_bound(forms: Sequence[Form], groups: Sequence[Sequence[int]], enough: int) -> int | None:
     """The least bound with some groups."""
     from flint import nmod_mat
 

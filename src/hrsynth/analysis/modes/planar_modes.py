@@ -64,7 +64,7 @@ def solve_loops(measured: MeasuredRobot, goal: ClosedConfiguration, error: float
     for system in islice(systems(measured, goal), LOOP_SYSTEMS):
         system = replace(system, error=system.error + error)
         try:
-            found = _judged(system)
+            found = _judge(system)
         except Unsolved as unsolved:
             refused.append(unsolved)
         else:
@@ -74,7 +74,7 @@ def solve_loops(measured: MeasuredRobot, goal: ClosedConfiguration, error: float
     raise refused[0]
 
 
-def _judged(system: PlanarLoops) -> SystemModes:
+def _judge(system: PlanarLoops) -> SystemModes:
     """The modes: as many closings as the degrees in groups of unknowns allow, or else the ranks of multiples."""
     loops, angles, slides = (f"{n} {word}{'s' * (n != 1)}" for n, word in (
         (len(system.loops), "loop"), (system.angles, "angle"), (system.slides, "slide")))
@@ -82,7 +82,7 @@ def _judged(system: PlanarLoops) -> SystemModes:
     most, why, bound = system.most, "degrees in groups of unknowns (Bézout)", "class"
     if most > LARGEST_LOOPS:
         raise Unsolved("the loops", f"{size}: up to {most} closings, too many (at most {LARGEST_LOOPS})")
-    boxes, lost = _enclosed(system, proposals(system.forms, system.angles, most))
+    boxes, lost = _enclose(system, proposals(system.forms, system.angles, most))
     if len(boxes) < most and (fewer := system.residues.most_by_ranks(len(boxes))) is not None and fewer < most:
         most, why, bound = fewer, "ranks modulo a prime of 62 bits", "rank"
     start = np.array([1.0] * system.angles + [0.0] * (system.angles + system.slides))
@@ -99,17 +99,17 @@ def _judged(system: PlanarLoops) -> SystemModes:
     if not system.besides:
         modes = tuple(_mode(system, box, True) for box in real)
         return SystemModes(len(boxes), modes, True, proof, bound=bound, enclosed=True)
-    kept = [box for box in real if box is at_goal[0] or not excluded(system, box)]
+    kept = [box for box in real if box is at_goal[0] or not is_excluded(system, box)]
     modes = tuple(_mode(system, box, box is at_goal[0]) for box in kept)
     return SystemModes.of_more(modes, len(real) - len(kept), proof, bound)
 
 
 def enclosures(system: PlanarLoops) -> list[PoseBox]:
     """Boxes of closings, complex ones too, apart from each other."""
-    return _enclosed(system, proposals(system.forms, system.angles, system.most))[0]
+    return _enclose(system, proposals(system.forms, system.angles, system.most))[0]
 
 
-def excluded(system: PlanarLoops, box: PoseBox) -> bool:
+def is_excluded(system: PlanarLoops, box: PoseBox) -> bool:
     """Whether something that is measured besides is another at each closing in a real box."""
     return any(not SumPart(each, part, system.slack).value(_balls(box)).contains(0) for each in system.besides
                for part in (False, True))
@@ -123,7 +123,7 @@ def _balls(box: PoseBox) -> list[Any]:
             for m, r in zip(box.middle, box.radii, strict=True)]
 
 
-def _enclosed(system: PlanarLoops, proposed: Array) -> tuple[list[PoseBox], int]:
+def _enclose(system: PlanarLoops, proposed: Array) -> tuple[list[PoseBox], int]:
     """Boxes of closings, apart from each other, and how many proposals have none."""
     a, slack = system.angles, system.slack
     equations: list[Polynomial] = [*(SumPart(loop, part, slack) for loop in system.loops for part in (False, True)),

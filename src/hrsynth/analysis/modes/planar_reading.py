@@ -124,7 +124,7 @@ class _Reading:
             return {(slides.index(k) if k in slides else -1, kept(e)): a for (k, e), a in terms.items()}
 
         whole = [tuple(PlanarLoop(of(loop), len(angles), len(slides)) for loop in part)
-                 for part in (map(_turned, loops), loops, more)]
+                 for part in (map(_turn_loop, loops), loops, more)]
         found = PlanarLoops((), np.zeros((0, 3)), self.goal, self.normal, {k: kept(e) for k, e in turns.items()},
                            {body: of(shifts[body]) for body in self.bodies},
                            {name: (slides.index(k) if k in slides else -1, by) for name, (k, by) in moves.items()},
@@ -254,7 +254,7 @@ class _Reading:
         return {key: a for key, a in total.items() if abs(a) >= SAME_POINT}
 
 
-def _turned(loop: Sum) -> Sum:
+def _turn_loop(loop: Sum) -> Sum:
     """A loop, turned with what most of its slides are on."""
     on = Counter(e for k, e in loop if k >= 0)
     if not on:

@@ -150,7 +150,7 @@ def pair(f: Table, g: Table) -> Eliminant:
     top, low, mixed = a[2] * b[1] - a[1] * b[2], a[2] * b[0] - a[0] * b[2], a[1] * b[0] - a[0] * b[1]
 
     def others(x: Any) -> tuple[Any, ...]:
-        return (_divided(-low(x), top(x)),)
+        return (_divide(-low(x), top(x)),)
 
     def several(x: Any) -> list[tuple[Any, ...]] | None:
         ys = _two([p(x) for p in a])
@@ -172,15 +172,15 @@ def cycle(f: Table, g: Table, h: Table) -> Eliminant:
     # 1: Res_y(f, g), of degree four in z, by the formula above
     quartic = _resultant_in_third(a, b)
     # 2: modulo h = c₂ z² + c₁ z + c₀ that is (R₁ z + R₀) / c₂³
-    R0, R1, leading = _reduced(quartic, (c0, c1, c2))
+    R0, R1, leading = _reduce_quartic(quartic, (c0, c1, c2))
     # 3: c₂ (R₁ z₁ + R₀) (R₁ z₂ + R₀) at the roots of h, by z₁ + z₂ = −c₁/c₂ and z₁ z₂ = c₀/c₂; c₂³ is a factor
     norm = R1 * R1 * c0 - R1 * R0 * c1 + R0 * R0 * c2
     polynomial = norm if not norm else _exact(norm, leading)
 
     def others(x: Any) -> tuple[Any, ...]:
-        z = _divided(-R0(x), R1(x))
+        z = _divide(-R0(x), R1(x))
         ax, bz = [p(x) for p in a], [p(z) for p in b]
-        y = _divided(ax[0] * bz[2] - ax[2] * bz[0], ax[2] * bz[1] - ax[1] * bz[2])
+        y = _divide(ax[0] * bz[2] - ax[2] * bz[0], ax[2] * bz[1] - ax[1] * bz[2])
         return y, z
 
     def several(x: Any) -> list[tuple[Any, ...]] | None:
@@ -233,7 +233,7 @@ def _resultant_in_third(a: Sequence[fmpz_poly], b: Sequence[fmpz_poly]) -> list[
     return [sum((p * q[k] for p, q in terms), fmpz_poly()) for k in range(5)]
 
 
-def _reduced(quartic: Sequence[fmpz_poly], c: Sequence[fmpz_poly]) -> tuple[fmpz_poly, fmpz_poly, fmpz_poly]:
+def _reduce_quartic(quartic: Sequence[fmpz_poly], c: Sequence[fmpz_poly]) -> tuple[fmpz_poly, fmpz_poly, fmpz_poly]:
     """R₀, R₁ with c₂³ Σ hₖ zᵏ ≡ R₁ z + R₀ modulo c₂ z² + c₁ z + c₀, and what the norm of that is too large by: c₂³."""
     from flint import fmpz_poly
 
@@ -263,6 +263,6 @@ def _two(c: Sequence[Any]) -> list[Any] | None:
     return [(-c[1] + sign * root) / (2 * c[2]) for sign in (1, -1)]
 
 
-def _divided(numerator: Any, denominator: Any) -> Any:
+def _divide(numerator: Any, denominator: Any) -> Any:
     """The quotient of two balls; not finite where the denominator may be zero."""
     return numerator / (denominator if not denominator.contains(0) else denominator * 0)

@@ -142,7 +142,7 @@ class PoseBox:
         return bool(np.all(np.any(far, axis=2)))
 
 
-def refined(forms: SquareForms, y: Array, p: Array) -> Array:
+def refine_poses(forms: SquareForms, y: Array, p: Array) -> Array:
     """Newton's method on proposals (n, a) and (n, 3), all at once; (n, a + k)."""
     conditions, poses = (*forms.planes, *forms.others), forms.poses
     E, moves = poses.turns, poses.moves
@@ -165,7 +165,7 @@ def refined(forms: SquareForms, y: Array, p: Array) -> Array:
     return x
 
 
-def enclosed(forms: SquareForms, slack: float, proposed: tuple[Array, Array], needed: int = 0
+def enclose_poses(forms: SquareForms, slack: float, proposed: tuple[Array, Array], needed: int = 0
              ) -> tuple[list[PoseBox], int]:
     """Boxes of poses, each with one for all input within the slack (sizes), no two with the same; and how many
     proposals had none. Poses far from real ones may have a box for the numbers as they are alone. Where no ``needed``
@@ -179,7 +179,7 @@ def enclosed(forms: SquareForms, slack: float, proposed: tuple[Array, Array], ne
     found: list[PoseBox] = []
     lost = 0
     with ctx.workprec(PRECISION):
-        for number, x in enumerate(refined(forms, *proposed)):
+        for number, x in enumerate(refine_poses(forms, *proposed)):
             if lost and len(found) + len(proposed[0]) - number < needed:
                 break
             real = bool(np.abs(x.imag).max() < NEARLY_REAL_POSE)

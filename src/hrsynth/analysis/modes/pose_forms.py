@@ -20,7 +20,7 @@ from math import prod
 
 import numpy as np
 
-from ...geometry.ranks import decomposed
+from ...geometry.ranks import singular_decomposition
 from ...geometry.vectors import Array, cross, plane_axes
 from ...tolerances import INDEPENDENT_PLANES, INDEPENDENT_RATES, NO_POSE, RANK_OF_FORMS
 from .conditions import OnPlane, PoseCondition
@@ -227,7 +227,7 @@ def proposals(forms: SquareForms, t: int, number: int, k: int) -> tuple[Array, A
     if space.shape[1] < number or (not k and space.shape[1] > number):
         return None
     if k:
-        space = decomposed(space)[0][:, :number]
+        space = singular_decomposition(space)[0][:, :number]
     t -= 2 * k
     by_w, by_s = (_times(shape, t, count, what) @ space for what in "ws")
     shifted = _times(shape, t, count, "y") @ space if shape[0] > 1 else np.concatenate([by_w, by_s])

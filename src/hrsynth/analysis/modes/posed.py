@@ -13,7 +13,7 @@ from math import prod
 import numpy as np
 
 from ...budgets import BRANCH_CHOICES, EFFORT, FEW_FORMS_SECONDS, FORMS_SECONDS, LARGEST_FORMS
-from ...constraints.pattern import attached
+from ...constraints.pattern import leg_ends
 from ...errors import NotConfined, Unsolved
 from ...geometry.so3 import exponential, logarithm, rotation_of
 from ...geometry.vectors import Array, frozen, inverse, pose
@@ -25,7 +25,7 @@ from .conditions import OnPlane, PoseCondition
 from .fits import words
 from .leg_conditions import Branches, Middle, leg_conditions, rigid_platform
 from .pose_bound import bound
-from .pose_boxes import PoseBox, enclosed, excluded_by, told_far
+from .pose_boxes import PoseBox, enclose_poses, excluded_by, told_far
 from .pose_forms import Poses, SquareForms, proposals
 from .sighted import Sight, conditions, sights
 from .solve import SystemMode, SystemModes
@@ -78,7 +78,7 @@ class PosedPlatform(System):
         return max(found)
 
 
-def posed(measured: MeasuredRobot, goal: ClosedConfiguration) -> list[PosedPlatform]:
+def pose_platform(measured: MeasuredRobot, goal: ClosedConfiguration) -> list[PosedPlatform]:
     """The platform with the measurements at a configuration, one for each choice of the legs' branches, the goal's own
     first. Raises ``NotConfined`` where a leg's conditions are not known."""
     anatomy, name = measured.setting.anatomy, measured.setting.robot.name
@@ -122,7 +122,7 @@ def _once(conditions: Sequence[PoseCondition]) -> tuple[tuple[PoseCondition, ...
 
 def most_posed(measured: MeasuredRobot, goal: ClosedConfiguration) -> int:
     """How many modes there are at most, complex ones too. Raises ``NotConfined``."""
-    return sum(_forms(measured, each).most for each in posed(measured, goal))
+    return sum(_forms(measured, each).most for each in pose_platform(measured, goal))
 
 
 def solve_posed(measured: MeasuredRobot, goal: ClosedConfiguration, error: float = 0.0, effort: float = EFFORT
@@ -130,10 +130,10 @@ def solve_posed(measured: MeasuredRobot, goal: ClosedConfiguration, error: float
     """All modes of all choices of branches together, with the goal known to ``error`` (m). Raises ``NotConfined``, and
     ``Unsolved`` where not all poses are enclosed that there may be, or the choices need more than ``effort`` (s)."""
     systems = [replace(each, error=each.error + max([error, *(sight.error(error, goal) for sight in each.seen)]))
-               for each in posed(measured, goal)]
+               for each in pose_platform(measured, goal)]
     if not np.isfinite(error):
         raise NotConfined(measured.setting.robot.name, "no distance bounds how far it is from where its loops close")
-    (body,) = attached(measured.setting.anatomy)
+    (body,) = leg_ends(measured.setting.anatomy)
     first = systems[0]
     X, back = goal.pose(body), inverse(pose(first.middle.origin))
     made = Model(first, lambda q: {body: (inverse if first.back else np.asarray)(first.pose(q) @ back) @ X},
@@ -144,7 +144,7 @@ def solve_posed(measured: MeasuredRobot, goal: ClosedConfiguration, error: float
         raise Unsolved("conditions on the pose", f"{len(systems)} choices of branches, {forms.size} forms each, need "
                                                  f"about {needed:.2g} s: too many (the effort is {effort:g} s)")
     for system in systems:
-        found.append(_judged(system, _forms(measured, system), system is first))
+        found.append(_judge(system, _forms(measured, system), system is first))
         if not found[-1].complete:
             raise Unsolved("the conditions on the pose", found[-1].proof)
     return made, together(found, first.branches, first.size)
@@ -161,7 +161,7 @@ def _forms(measured: MeasuredRobot, system: PosedPlatform) -> SquareForms:
     return forms
 
 
-def _judged(system: PosedPlatform, forms: SquareForms, own: bool) -> SystemModes:
+def _judge(system: PosedPlatform, forms: SquareForms, own: bool) -> SystemModes:
     """The modes: as many as the degrees allow, or else as the ranks of all multiples of the conditions do; ``own``:
     whether the goal is one."""
     slack = system.error / system.size
@@ -170,7 +170,7 @@ def _judged(system: PosedPlatform, forms: SquareForms, own: bool) -> SystemModes
                 else "conditions that are all linear")
     most, why, named = forms.most, product_, "class"
     proposed = proposals(forms, forms.degree, forms.most, 0)
-    boxes, lost = ([], 1) if proposed is None else enclosed(forms, slack, proposed, most)
+    boxes, lost = ([], 1) if proposed is None else enclose_poses(forms, slack, proposed, most)
     if len(boxes) < most:
         found = bound(forms)
         if found is not None:
@@ -178,7 +178,7 @@ def _judged(system: PosedPlatform, forms: SquareForms, own: bool) -> SystemModes
             if lost or len(boxes) < most:
                 proposed, lost = proposals(forms, found[1], most, found[2]), 1
         if lost:
-            boxes = [] if proposed is None else enclosed(forms, slack, proposed)[0]
+            boxes = [] if proposed is None else enclose_poses(forms, slack, proposed)[0]
     at_goal = [box for box in boxes if own and box.real and box.holds(np.eye(len(box.middle))[0])]
     goal = at_goal[0] if len(at_goal) == 1 else None
     complete = len(boxes) == most and (goal is not None) == own

@@ -256,7 +256,7 @@ class PoseSystem:
         groups = [conditions(tips[k], chart.reaches[k], chart.frame, numbers) for k in self.legs]
         needed = chart.count - len(chart.own) - sum(map(len, groups[:-1]))
         return [Quadric(A) for A in (*chart.own, *(A for group in groups[:-1] for A in group),
-                                     *_combined(groups[-1], needed))]
+                                     *_combine(groups[-1], needed))]
 
 
 def conditions(tip: Conic, reach: Reach, frame: WorkingFrame, numbers: Numbers) -> list[Any]:
@@ -296,7 +296,7 @@ def _at_distance(tip: Conic, radius: float, centre: Any, frame: WorkingFrame, nu
     return on_sphere(tip, centre, rho * rho)
 
 
-def _combined(forms: Sequence[Any], needed: int) -> list[Any]:
+def _combine(forms: Sequence[Any], needed: int) -> list[Any]:
     """All forms where so many are needed, else that many combinations with small odd coefficients."""
     if needed == len(forms):
         return list(forms)

@@ -34,7 +34,7 @@ from .quadrics import (
 )
 from .squares import SquareSystem, resting, single
 from .study import study
-from .systems import System, registered
+from .systems import System, register
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -80,7 +80,7 @@ class Planar(System):
 
     def spread(self, q: Array, apart: Mapping[int, float]) -> tuple[float, float]:
         """How far the platform's frame (m) and turn (rad) can be from those at q; see ``registered``."""
-        return registered(self.tips, apart)
+        return register(self.tips, apart)
 
     @cached_property
     def frame(self) -> WorkingFrame:
@@ -140,7 +140,7 @@ class Planar(System):
             two = np.array([curve.centre if isinstance(curve, Point) else curve.at(next(free)) for curve in curves[:2]])
             flat = self.position(two)
             turn = complex(*(flat[1] - flat[0])) / complex(*(b[1] - b[0]))
-            at = flat[0] - _turned(turn / abs(turn), b[0])
+            at = flat[0] - _turn_vector(turn / abs(turn), b[0])
             return np.array([*at, cmath.phase(turn)])
 
         unknowns = tuple(curve for curve in curves[:2] if not isinstance(curve, Point))
@@ -170,7 +170,7 @@ def _third(conics: Sequence[Conic], tips: Sequence[Any], curve: Curve, frame: Wo
             + scale * (centre @ centre - rho * rho) * np.outer(one.w, other.w))
 
 
-def _turned(turn: complex, v: Array) -> tuple[float, float]:
+def _turn_vector(turn: complex, v: Array) -> tuple[float, float]:
     """A vector of the plane multiplied by a complex number."""
     product = turn * complex(*v)
     return product.real, product.imag
@@ -211,7 +211,7 @@ class Spatial(System):
 
     def spread(self, q: Array, apart: Mapping[int, float]) -> tuple[float, float]:
         """How far the platform's frame (m) and turn (rad) can be from those at q; see ``registered``."""
-        return registered(self.tips, apart, self.arrows)
+        return register(self.tips, apart, self.arrows)
 
     def chart(self, number: int) -> PoseParametrization:
         """Study's coordinates, with a linear form of the quaternion that depends on the number made 1."""

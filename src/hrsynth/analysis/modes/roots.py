@@ -107,7 +107,7 @@ def solve_square(square: SquareSystem, balls: Within = Balls, farthest: float = 
         with ctx.workprec(PRECISION):
             conics = square.conics(turn, balls)
             thick = square.build(conics, balls)
-        noisy = _perturbed(equations, thick)
+        noisy = _perturb(equations, thick)
         zeros = 0
         for (order, eliminant), (_, other) in zip(_eliminants(equations), _eliminants(noisy), strict=True):
             if _vanishes(eliminant.polynomial, other.polynomial):
@@ -138,7 +138,7 @@ def _eliminants(equations: Sequence[Equation]) -> Iterator[tuple[tuple[int, ...]
         yield (2, 0, 1), cycle(h, f, g)
 
 
-def _perturbed(equations: Sequence[Equation], thick: Sequence[Equation]) -> list[Equation]:
+def _perturb(equations: Sequence[Equation], thick: Sequence[Equation]) -> list[Equation]:
     """The equations with each coefficient changed at random by what the rounding of the input allows."""
     rng = random.Random(0)
     found = []
@@ -186,7 +186,7 @@ def all_solutions(polynomial: fmpz_poly, over: Callable[[Any, int], list[Solutio
     precision = PRECISION
     for _ in range(PRECISIONS):
         with ctx.workprec(precision):
-            resolved = [each for x, m in _isolated(polynomial) for each in over(x, m)]
+            resolved = [each for x, m in _isolate(polynomial) for each in over(x, m)]
             if sum(m for _, m in resolved) == polynomial.degree():
                 break
         precision *= 2
@@ -197,22 +197,22 @@ def _over(x: Any, multiplicity: int, order: tuple[int, ...], eliminant: Eliminan
           ) -> list[Solution]:
     """The solutions over a root, each with its multiplicity; none where they cannot be told from infinity or from each
     other."""
-    one = _restored(order, (x, *eliminant.others(x)))
+    one = _restore_order(order, (x, *eliminant.others(x)))
     if _finite(one, half_angles):
         return [(one, multiplicity)]
-    found = [_restored(order, (x, *others)) for others in eliminant.several(x) or ()]
+    found = [_restore_order(order, (x, *others)) for others in eliminant.several(x) or ()]
     if len(found) != multiplicity or not all(_finite(values, half_angles) for values in found):
         return []
     return [(values, 1) for values in found]
 
 
-def _isolated(polynomial: fmpz_poly) -> list[tuple[Any, int]]:
+def _isolate(polynomial: fmpz_poly) -> list[tuple[Any, int]]:
     """Balls about the roots of an integer polynomial, each with one root alone, and multiplicities."""
     roots: Any = polynomial.complex_roots() if polynomial.degree() > 0 else []
     return [(x, int(m)) for x, m in roots]
 
 
-def _restored(order: tuple[int, ...], values: Sequence[Any]) -> list[Any]:
+def _restore_order(order: tuple[int, ...], values: Sequence[Any]) -> list[Any]:
     """Values in the order of the unknowns."""
     found: list[Any] = [None] * len(order)
     for place, value in zip(order, values, strict=True):

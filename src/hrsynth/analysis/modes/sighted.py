@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...constraints.pattern import attached, recognise
+from ...constraints.pattern import leg_ends, recognise
 from ...errors import NotConfined, NotMeasured
 from ...geometry.vectors import Array, inverse, transform
 from ...kinematics.configuration import ClosedConfiguration
@@ -59,7 +59,7 @@ def sights(anatomy: LegDecomposition, question: Measurement, goal: ClosedConfigu
            ) -> tuple[Measurement, tuple[Sight, ...]]:
     """What is measured of legs, by their labels, and the sights. Raises ``NotConfined`` where what an observation
     leaves is not known, or what is observed is neither a leg's nor between base and platform."""
-    base, bodies = anatomy.mechanism.base, attached(anatomy)
+    base, bodies = anatomy.mechanism.base, leg_ends(anatomy)
     found, rest = list[Sight](), list[Observation]()
     for each in question.observations:
         reference = each.seen_from or question.reference
@@ -136,7 +136,7 @@ def all_loci(measured: MeasuredRobot, goal: ClosedConfiguration) -> tuple[TipLoc
 def _unheld(measured: MeasuredRobot, goal: ClosedConfiguration) -> TipLoci:
     """A platform that no leg holds. Raises ``NotConfined`` where legs restrict how it moves."""
     anatomy, dof = measured.setting.anatomy, measured.setting.dof
-    bodies, (motion, normal) = attached(anatomy), measured.moving
+    bodies, (motion, normal) = leg_ends(anatomy), measured.moving
     if len(bodies) > 1 or dof != {"translations": dof, "planar": 3, "spatial": 6}[motion]:
         raise NotConfined(anatomy.mechanism.name, "its legs restrict how the platform moves")
     return TipLoci(goal, motion, (), bodies, normal)

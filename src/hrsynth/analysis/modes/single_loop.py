@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ...constraints.pattern import attached
+from ...constraints.pattern import leg_ends
 from ...errors import NotConfined, Unsolved
 from ...geometry.vectors import Array, pose_difference
 from ...kinematics.configuration import ClosedConfiguration
@@ -97,7 +97,7 @@ def single_loop(measured: MeasuredRobot, goal: ClosedConfiguration, error: float
     """The mechanism as one loop, what is measured held. Raises ``NotConfined`` where it is none, or what is measured
     does not hold joints one by one."""
     mechanism, seen = goal.twin.mechanism, measured.question.observations
-    bodies = attached(measured.setting.anatomy)
+    bodies = leg_ends(measured.setting.anatomy)
     ends = [link for joint in mechanism.joints.values() for link in joint.links]
     if (mechanism.couplings or len(bodies) != 1 or measured.setting.anatomy.point is not None
             or any(ends.count(link) != 2 for link in mechanism.links)):
@@ -251,7 +251,7 @@ def solve_loop(measured: MeasuredRobot, goal: ClosedConfiguration, error: float 
 
     if not np.isfinite(error):
         raise NotConfined(measured.setting.robot.name, "no distance bounds how far it is from where its loops close")
-    loop, (body,) = single_loop(measured, goal, error), attached(measured.setting.anatomy)
+    loop, (body,) = single_loop(measured, goal, error), leg_ends(measured.setting.anatomy)
     with ctx.workprec(PRECISION):
         found = _five(loop) if len(loop.freedoms_) == LARGEST_CHAIN else _few(loop)
     return Model(loop, lambda q: {body: loop.placed(q)}, loop.home, closing=lambda q: loop.closed(q)[0]), found
@@ -298,7 +298,7 @@ def _zeros(linear: _Linear) -> SystemModes | None:
     sure = zeros([_Polynomial(f)], np.roots([float(c) for c in f[::-1]])[:, None])[0]
     if len(sure) < len(f) - 1:
         return None
-    found = [_told(linear, box.box[0]) for box in sure if box.real]
+    found = [_box_of_joints(linear, box.box[0]) for box in sure if box.real]
     home = linear.loop.unknowns(linear.loop.home)
     told = [each for each in found if each is not None]
     at_goal = [each for each in told if each[0].holds(home)]
@@ -311,7 +311,7 @@ def _zeros(linear: _Linear) -> SystemModes | None:
     return SystemModes.of_more(modes, len(told) - len(kept), proof, "class")
 
 
-def _told(linear: _Linear, t: Any) -> tuple[PoseBox, bool] | None:
+def _box_of_joints(linear: _Linear, t: Any) -> tuple[PoseBox, bool] | None:
     """The box of all joints at a real zero, and whether its unknowns are no products; None where they are not told."""
     x = _products(linear, t)
     if x is None:

@@ -14,14 +14,14 @@ from ...results import Value
 from ...tolerances import FARTHEST, NEARLY_DOUBLE, SAME_RELATION, TIP_ROUNDING, VANISHES
 from .bounds import Bound, least_bound
 from .curves import Point
-from .fits import Meant, as_meant, dimension, excluded, meets, residual, stationary, torn, words
+from .fits import Meant, as_meant, dimension, is_excluded, meets, residual, stationary, torn, words
 from .multiples import most_zeros
 from .quadrics import PoseSystem
 from .roots import Root, Roots, nearly_double, solve_square
 from .squares import SquareSystem
 from .systems import System
 from .translating import Translating
-from .wholes import Proposed, by_msolve, enclosed, proposed, wholes
+from .wholes import Proposed, by_msolve, enclose_roots, propose_roots, wholes
 
 CHOICES = 5
 """Choices of legs that are given to a solver until one has finitely many solutions, and, besides the first, whose
@@ -143,10 +143,10 @@ def solve(system: System, *, near: bool = True, goal: Array | None = None) -> Sy
     a rigid body, else msolve (``MissingExtra`` where that is not installed).
     """
     system, told = as_meant(system)
-    return replace(_solved(system, near, goal), meant=told)
+    return replace(_solve(system, near, goal), meant=told)
 
 
-def _solved(system: System, near: bool, goal: Array | None) -> SystemModes:
+def _solve(system: System, near: bool, goal: Array | None) -> SystemModes:
     if system.missing:
         return _too_few(system)
     square = None
@@ -154,13 +154,13 @@ def _solved(system: System, near: bool, goal: Array | None) -> SystemModes:
         roots = solve_square(square, system.balls(square.frame), system.farthest)
         if not roots.continuum:
             if not near:
-                return _judged(system, square, roots, None, goal)
+                return _judge(system, square, roots, None, goal)
             others = (each for each in system.squares() if each.legs != square.legs)
-            return _judged(system, square, roots,
+            return _judge(system, square, roots,
                            ((each, solve_square(each)) for each in islice(others, CHOICES)), goal)
     if system.surfaces and not isinstance(system, Translating):
-        return _proposed(system, near, goal, proposed)
-    return _undecided(system, square is not None, goal, near)
+        return _propose(system, near, goal, propose_roots)
+    return _undecided_modes(system, square is not None, goal, near)
 
 
 def solve_by_msolve(system: System, *, near: bool = True, goal: Array | None = None) -> SystemModes:
@@ -170,10 +170,10 @@ def solve_by_msolve(system: System, *, near: bool = True, goal: Array | None = N
     one choice of legs alone. Raises ``MissingExtra``, ``Unsolved``.
     """
     system, told = as_meant(system)
-    return replace(_proposed(system, near, goal, lambda part, enough: by_msolve(part)), meant=told)
+    return replace(_propose(system, near, goal, lambda part, enough: by_msolve(part)), meant=told)
 
 
-def _proposed(system: System, near: bool, goal: Array | None,
+def _propose(system: System, near: bool, goal: Array | None,
               proposer: Callable[[PoseSystem, int | None], Proposed | None]) -> SystemModes:
     if system.missing:
         return _too_few(system)
@@ -186,22 +186,22 @@ def _proposed(system: System, near: bool, goal: Array | None,
             found = proposer(part, None if most is None else most.most)
             if found is None:
                 break
-            roots = enclosed(part, found, most, system.balls(part.chart.frame), system.farthest)
+            roots = enclose_roots(part, found, most, system.balls(part.chart.frame), system.farthest)
             if found.loose and roots.complex != (most and most.most) and dimension(system):
                 roots = None
                 break
             if roots.apart or not roots.complete or part.chart.study is None:
                 break
         if roots is not None:
-            return _judged(system, part, roots, () if near else None, goal, most)
-    return _undecided(system, part is not None, goal, near)
+            return _judge(system, part, roots, () if near else None, goal, most)
+    return _undecided_modes(system, part is not None, goal, near)
 
 
 def _too_few(system: System) -> SystemModes:
     return continuum(f"too few legs: a continuum of dimension {system.missing}", system.missing)
 
 
-def _undecided(system: System, tried: bool, goal: Array | None, near: bool) -> SystemModes:
+def _undecided_modes(system: System, tried: bool, goal: Array | None, near: bool) -> SystemModes:
     """What is said where no choice of legs has finitely many solutions: the goal, where it is given, is one. Poses of a
     continuum are looked for where ``near`` ones are."""
     known = () if goal is None else (_by_construction(system, goal, ()),)
@@ -224,21 +224,21 @@ def continuum(text: str, size: int) -> SystemModes:
     return SystemModes(0, (), False, "a continuum is not counted", degenerate=text, continuum=size)
 
 
-def _judged(system: System, square: Part, roots: Roots, others: Iterable[tuple[Part, Roots]] | None,
+def _judge(system: System, square: Part, roots: Roots, others: Iterable[tuple[Part, Roots]] | None,
             goal: Array | None, most: Bound | None = None) -> SystemModes:
     """The modes among the solutions of a square part, ``most`` at most; near ones are looked for from those of others
     too (not at all where these are None)."""
     found = [_mode(system, square, root) for root in roots.real]
     enclosed = roots.complete and all(mode.proved for mode in found)
     bound, proof = (("resultant", _proof(system, roots)) if isinstance(square, SquareSystem)
-                    else _bounded(system, square, most, roots))
+                    else _bound(system, square, most, roots))
     if square.whole:
         return SystemModes(roots.complex, tuple(found), enclosed and bound != "none", proof, (), _special(roots), None,
                            bound, enclosed, solved=(Solved(system, square, roots, tuple(found), (True,) * len(found)),))
     whole = [mode for mode, root in zip(found, roots.real, strict=True) if not _torn(system, square, root)]
     at_goal = _goal(system, roots, whole, goal)
     left = [mode for mode in whole if mode is at_goal
-            or not (mode.proved and excluded(system, mode.q, mode.shift, mode.turn))]
+            or not (mode.proved and is_excluded(system, mode.q, mode.shift, mode.turn))]
     modes = tuple(mode if mode is at_goal else replace(mode, proved=False, fits=mode.proved)
                   for mode in left if mode is at_goal or mode.residual <= VANISHES)
     enclosed = roots.complete and len(modes) == len(left) and all(mode.proved or mode.fits for mode in modes)
@@ -277,7 +277,7 @@ def _same(system: System, q: Array, goal: Array) -> bool:
     return float(np.abs(system.reached(q) - system.reached(goal)).max()) <= SAME_RELATION * system.size
 
 
-def _bounded(system: System, part: PoseSystem, most: Bound | None, roots: Roots) -> tuple[str, str]:
+def _bound(system: System, part: PoseSystem, most: Bound | None, roots: Roots) -> tuple[str, str]:
     """By what there are no more solutions than a solver proposes, and the proof in words (theory.md 8)."""
     proof = _proof(system, roots)
     known = f", {roots.beyond} enclosed at infinity" if roots.beyond else ""

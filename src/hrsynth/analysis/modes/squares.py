@@ -67,7 +67,7 @@ def resting(legs: tuple[int, ...], q: Array, whole: bool) -> SquareSystem:
 def three_surfaces(legs: Sequence[tuple[int, Surface]], whole: bool) -> tuple[float, SquareSystem]:
     """The points on the surfaces of three legs, and the sine of the angle between the two planes: where that vanishes
     the surfaces have no point in common, or a continuum of them."""
-    first, second, last = _ordered([surface for _, surface in legs])
+    first, second, last = _sort_surfaces([surface for _, surface in legs])
     all_three = (first, second, last)
     frame = spatial_frame(all_three, extent(all_three, np.zeros((1, 3))))
     one, two = (_normal(surface, last) for surface in (first, second))
@@ -97,7 +97,7 @@ def three_surfaces(legs: Sequence[tuple[int, Surface]], whole: bool) -> tuple[fl
                         lambda numbers: [point(numbers)])
 
 
-def _ordered(surfaces: Sequence[Surface]) -> list[Surface]:
+def _sort_surfaces(surfaces: Sequence[Surface]) -> list[Surface]:
     """A sphere last where there is one; of several candidates the one that leaves the others most apart."""
     def apart(last: int) -> tuple[bool, float]:
         one, two = (_normal(surface, surfaces[last]) for k, surface in enumerate(surfaces) if k != last)

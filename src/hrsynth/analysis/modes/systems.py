@@ -20,7 +20,7 @@ from ...errors import BadRequest
 from ...geometry.vectors import Array, frozen, pose
 from ...results import Value
 from ...tolerances import FARTHEST, TIP_ROUNDING
-from .curves import Point, Reach, curves_of, extent, length, shifted
+from .curves import Point, Reach, curves_of, extent, length, shift_reach
 from .quadrics import SLACK, UNIT, Balls, PoseParametrization, Within, WorkingFrame, spatial_frame
 from .squares import SquareSystem
 
@@ -155,7 +155,7 @@ class System(Value):
         raise NotImplementedError
 
 
-def registered(tips: Array, apart: Mapping[int, float], arrows: int = 0) -> tuple[float, float]:
+def register(tips: Array, apart: Mapping[int, float], arrows: int = 0) -> tuple[float, float]:
     """How far the origin of a rigid body (m) can be moved and how far the body turned (rad), at most, where its points
     ``tips`` (n, d) are moved by at most the distances ``apart`` (m); the last ``arrows`` only turn with it.
 
@@ -194,7 +194,7 @@ class Shifting(System):
     @cached_property
     def paths(self) -> tuple[Reach, ...]:
         """Where each leg lets its own body's origin be."""
-        return tuple(shifted(curve, -tip) for curve, tip in zip(self.curves, self.tips, strict=True))
+        return tuple(shift_reach(curve, -tip) for curve, tip in zip(self.curves, self.tips, strict=True))
 
     def pose(self, q: Array) -> Array:
         """The first body's frame in the base frame; shape (4, 4)."""

@@ -123,7 +123,7 @@ def tip_loci(anatomy: LegDecomposition, question: Measurement, pattern: Constrai
     return TipLoci(goal, pattern.motion, tips, pattern.bodies, plane, slide, angles, doubt=doubt)
 
 
-def _held(anatomy: LegDecomposition, question: Measurement, leg: LockedLeg, at: ClosedConfiguration,
+def _held_chain(anatomy: LegDecomposition, question: Measurement, leg: LockedLeg, at: ClosedConfiguration,
           end: Array | str) -> Chain:
     """The chain to a leg's tip, its observations held; raises ``Underived``."""
     own = [o for o in question.observations if o.leg == leg.label]
@@ -136,7 +136,7 @@ def _turned_once(anatomy: LegDecomposition, question: Measurement, leg: LockedLe
     if leg.virtual or leg.turns:
         return False
     try:
-        known = [bodies for bodies, _ in orientations(_held(anatomy, question, leg, goal, "free"))]
+        known = [bodies for bodies, _ in orientations(_held_chain(anatomy, question, leg, goal, "free"))]
     except Underived:
         return False
     return len(known) == 1 and known[0][-1] is not None
@@ -145,7 +145,7 @@ def _turned_once(anatomy: LegDecomposition, question: Measurement, leg: LockedLe
 def _angle(anatomy: LegDecomposition, question: Measurement, leg: LockedLeg, goal: ClosedConfiguration) -> KeptAngle:
     """The angle that a leg keeps; raises ``NotConfined`` where its joints do not show one."""
     try:
-        found = _held(anatomy, question, leg, goal, "free")
+        found = _held_chain(anatomy, question, leg, goal, "free")
         axis, direction = kept_angle(found)
     except Underived as error:
         raise NotConfined(anatomy.mechanism.name, f"how leg {leg.label} turns the platform is not known: {error}"
@@ -161,12 +161,12 @@ def _tip(anatomy: LegDecomposition, question: Measurement, leg: LockedLeg, goal:
     own = [o for o in question.observations if o.leg == leg.label]
 
     def branches(at: ClosedConfiguration) -> tuple[list[tuple[Reach, float]], float]:
-        return reaches(_held(anatomy, question, leg, at, end))
+        return reaches(_held_chain(anatomy, question, leg, at, end))
 
     try:
         found, moved = branches(goal)
     except Underived as error:
-        return _fitted(anatomy, own, question.reference, Tip(leg.label, leg.body, place, Point(B), doubt=str(error)),
+        return _fit_tip(anatomy, own, question.reference, Tip(leg.label, leg.body, place, Point(B), doubt=str(error)),
                        leg, goal)
     if moved:  # at the zero configuration, unless that is special, the file's own decimals show it
         with suppress(Underived):
@@ -177,10 +177,10 @@ def _tip(anatomy: LegDecomposition, question: Measurement, leg: LockedLeg, goal:
         return Tip(leg.label, leg.body, place, here, tuple(found[1:]), moved=moved)
     doubt = (f"its joints taken one by one leave {here.freedoms} freedoms, together {freedoms}"
              if here.freedoms != freedoms else "its joints put its end elsewhere")
-    return _fitted(anatomy, own, question.reference, Tip(leg.label, leg.body, place, Point(B), doubt=doubt), leg, goal)
+    return _fit_tip(anatomy, own, question.reference, Tip(leg.label, leg.body, place, Point(B), doubt=doubt), leg, goal)
 
 
-def _fitted(anatomy: LegDecomposition, own: Sequence[Observation], reference: str, tip: Tip, leg: LockedLeg,
+def _fit_tip(anatomy: LegDecomposition, own: Sequence[Observation], reference: str, tip: Tip, leg: LockedLeg,
             goal: ClosedConfiguration) -> Tip:
     """A tip's curve or surface as the pattern names it, to which the leg's moves keep."""
     B = _value(leg.tip, goal) * goal.twin.length

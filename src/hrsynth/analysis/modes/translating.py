@@ -13,7 +13,7 @@ import numpy as np
 from ...errors import BadRequest
 from ...geometry.vectors import Array, cross
 from ...tolerances import PARALLEL, TIP_ROUNDING, VANISHES
-from .curves import Circle, Curve, Line, Plane, Point, Reach, Sphere, Surface, extent, length, shifted
+from .curves import Circle, Curve, Line, Plane, Point, Reach, Sphere, Surface, extent, length, shift_reach
 from .polynomials import Equation
 from .quadrics import (
     Conic,
@@ -220,7 +220,7 @@ class Articulated(Shifting):
         sign = 1 if self.bodies[legs[0]] == 0 else -1
         size = max(extent((first, onto), np.zeros((1, 3))), self._radius, length(self.slide.centre))
         middle = (first.centre + onto.centre) / 2
-        start, end = shifted(first, -middle), shifted(onto, -middle)
+        start, end = shift_reach(first, -middle), shift_reach(onto, -middle)
         frame = replace(spatial_frame((start, end, self.slide), size), origin=np.zeros(3))
         resting = isinstance(first, Point)
 

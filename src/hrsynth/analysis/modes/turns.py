@@ -35,15 +35,15 @@ def orientations(chain: Chain) -> list[tuple[Known, float]]:
     known[0] = np.eye(3)
     if chain.kept:
         known[-1] = np.eye(3)
-    return _settled(chain, tuple(known), 1.0)
+    return _settle(chain, tuple(known), 1.0)
 
 
-def _settled(chain: Chain, known: Known, gain: float) -> list[tuple[Known, float]]:
-    for step in (_driven, _watched_once, _between_two, _watched_twice, _between_three):
+def _settle(chain: Chain, known: Known, gain: float) -> list[tuple[Known, float]]:
+    for step in (_driven_bodies, _watched_once, _between_two, _watched_twice, _between_three):
         for found in step(chain, known):
             if any(known[k] is None for k in found.places) or not found.turns:
                 return [each for turns, own in found.turns
-                        for each in _settled(chain, _with(known, found.places, turns), gain * own)]
+                        for each in _settle(chain, _with(known, found.places, turns), gain * own)]
     return [(known, gain)]
 
 
@@ -90,7 +90,7 @@ def groups(way: Way) -> list[Way]:
     return found
 
 
-def _held(chain: Chain, known: Known) -> Iterator[tuple[Array, list[Way], Array]]:
+def _held_directions(chain: Chain, known: Known) -> Iterator[tuple[Array, list[Way], Array]]:
     """For each direction that is held in a body that may turn, or in a crank on one: ways to it, and the direction."""
     for k, body in enumerate(chain.bodies):
         for Q, way in ways(chain, known, k):
@@ -146,7 +146,7 @@ def _turning(chain: Chain, known: Known) -> tuple[Array, list[Way]]:
     return base, groups([(0, axis) for axis in axes[::-1]])
 
 
-def _driven(chain: Chain, known: Known) -> Iterator[_Found]:
+def _driven_bodies(chain: Chain, known: Known) -> Iterator[_Found]:
     """A body that a drive turns, on one of known orientation: as many solutions as the drive leaves angles."""
     for k, body in enumerate(chain.bodies):
         Q, axis = known[k - 1], body.axis
@@ -156,7 +156,7 @@ def _driven(chain: Chain, known: Known) -> Iterator[_Found]:
 
 def _watched_once(chain: Chain, known: Known) -> Iterator[_Found]:
     """A direction held behind one axis keeps all bodies up to it from turning, where it is not along that axis."""
-    for Q, parts, d in _held(chain, known):
+    for Q, parts, d in _held_directions(chain, known):
         if len(parts) == 1 and not lines.parallel(parts[0][0][1], d):
             turn = _about(parts[0][0][1], d, Q.T @ d)
             place = parts[0][-1][0]
@@ -168,7 +168,7 @@ def _watched_once(chain: Chain, known: Known) -> Iterator[_Found]:
 
 def _watched_twice(chain: Chain, known: Known) -> Iterator[_Found]:
     """A direction held behind two axes: two solutions."""
-    for Q, parts, d in _held(chain, known):
+    for Q, parts, d in _held_directions(chain, known):
         if len(parts) == 2:
             both = _cones(parts[0][0][1], parts[1][0][1], d, Q.T @ d)
             places = [part[-1][0] for part in parts]

@@ -26,7 +26,8 @@ from .sighted import all_loci
 from .solve import SystemModes
 
 
-def uncoupled(measured: MeasuredRobot, goal: ClosedConfiguration) -> tuple[MeasuredRobot, ClosedConfiguration] | None:
+def without_couplings(measured: MeasuredRobot, goal: ClosedConfiguration) -> tuple[MeasuredRobot,
+                                                                                   ClosedConfiguration] | None:
     """The robot without its couplings, at the same place, and with what is measured held: so are joints that couplings
     tie to motors that are held. It has all modes of the robot, and those at which couplings cannot be closed besides.
     None where it has no couplings, sees less than all freedoms without them, or what is measured is of joints that are
@@ -79,7 +80,7 @@ def solve_tips(measured: MeasuredRobot, goal: ClosedConfiguration, exact: float,
     return solve_all(confined, effort=effort)
 
 
-def expected(measured: MeasuredRobot, at: ClosedConfiguration) -> int:
+def expected_modes(measured: MeasuredRobot, at: ClosedConfiguration) -> int:
     """How many modes, complex ones too, the degrees of the legs' conditions allow; the largest number where these are
     not known."""
     try:
@@ -88,7 +89,7 @@ def expected(measured: MeasuredRobot, at: ClosedConfiguration) -> int:
         return sys.maxsize
 
 
-def counted(measured: MeasuredRobot, at: ClosedConfiguration) -> SystemModes:
+def count_modes(measured: MeasuredRobot, at: ClosedConfiguration) -> SystemModes:
     """The modes with the measurements at a configuration, without near ones, and not read as poses of the robot's legs:
     as :func:`modes`, for many configurations of one robot that sees all its freedoms."""
     found = None

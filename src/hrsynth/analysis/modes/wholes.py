@@ -21,8 +21,8 @@ from .bounds import Bound
 from .curves import Point
 from .homotopy import ends
 from .infinity import beyond
-from .msolve import Parametrisation, parametrised
-from .multiples import combined
+from .msolve import Parametrisation, parametrise
+from .multiples import combine_quadrics
 from .polynomials import Quadric, krawczyk
 from .quadrics import UNIT, Balls, Moving, PoseParametrization, PoseSystem, Rounded, Within
 from .roots import PRECISION, PRECISIONS, Enclosing, Roots, Solution, all_solutions, is_real, sharp
@@ -57,7 +57,7 @@ def wholes(system: System, number: int = 0) -> Iterator[PoseSystem]:
                 yield PoseSystem(legs, chart, False)
 
 
-def proposed(part: PoseSystem, enough: int | None) -> Proposed | None:
+def propose_roots(part: PoseSystem, enough: int | None) -> Proposed | None:
     """All solutions, up to rounding, ``enough`` at most; None where there seem to be infinitely many.
 
     Raises ``MissingExtra``, ``Unsolved`` where msolve is needed."""
@@ -90,9 +90,9 @@ def by_msolve(part: PoseSystem) -> Proposed | None:
 
     Raises ``MissingExtra``, ``Unsolved``."""
     equations, nonzero = part.equations(), part.chart.nonzero
-    answer = parametrised(equations)
+    answer = parametrise(equations)
     if answer is None and nonzero is not None:
-        answer, nonzero = parametrised(equations, nonzero), None
+        answer, nonzero = parametrise(equations, nonzero), None
     if answer is None:
         return None
     solutions = all_solutions(answer.polynomial, lambda t, m: _over(answer, nonzero, t, m))
@@ -101,7 +101,7 @@ def by_msolve(part: PoseSystem) -> Proposed | None:
     return Proposed(poses, "msolve's parametrisation", len(solutions) - len(poses), lost)
 
 
-def enclosed(part: PoseSystem, proposed: Proposed, most: Bound | None = None, balls: Within = Balls,
+def enclose_roots(part: PoseSystem, proposed: Proposed, most: Bound | None = None, balls: Within = Balls,
              farthest: float = FARTHEST) -> Roots:
     """What is proposed for a choice of legs, as :func:`solve_square` gives it; where a degree bounds their number,
     solutions at infinity are counted too."""
@@ -163,7 +163,7 @@ def _far_apart(part: PoseSystem, far: Sequence[Sequence[Any]]) -> bool:
     in one box."""
     from flint import ctx
 
-    boxes, quadrics = list[list[Any]](), combined(part.equations())
+    boxes, quadrics = list[list[Any]](), combine_quadrics(part.equations())
     with ctx.workprec(PRECISION << PRECISIONS):
         for values in far:
             sizes = [2 ** max(0, math.frexp(float(abs(v).upper()))[1]) for v in values]

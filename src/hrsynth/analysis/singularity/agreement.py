@@ -27,7 +27,7 @@ from ...progress import tell
 from ...results import Value
 from ...tolerances import CLOSED, FOLLOWED, INVERTED, NUDGE, RANK_CUTOFF, RANK_GAP, SAME_RELATION, SAME_SPOT
 from .batch_spectrum import SPOTS, Quick
-from .rank_descent import lose, rates_of_twists, stepped
+from .rank_descent import lose, rates_of_twists, step_from
 
 CHUNK = 250
 ON_LOCUS = 10
@@ -119,7 +119,7 @@ def agreement(start: ClosedConfiguration, question: Measurement, pattern: Constr
                     _descents(others, question, pattern, condition)]):
         for at in starts:
             searches += 1
-            if at is None or _beside(at, question, loops, freedoms) or _known(at, on_locus, question):
+            if at is None or _beside(at, question, loops, freedoms) or _is_known(at, on_locus, question):
                 continue
             sigma = float(_weakest(pattern.values_at([at]), question, condition)[0][0])
             if sigma > RANK_CUTOFF:
@@ -257,7 +257,7 @@ def _crossings(walk: Sequence[ClosedConfiguration], signs: Sequence[float], patt
             continue
 
         def there(fraction: float, one: ClosedConfiguration = one, step: Array = step) -> ClosedConfiguration:
-            return stepped(one, fraction * step)
+            return step_from(one, fraction * step)
 
         def value(fraction: float, there: Callable[[float], ClosedConfiguration] = there) -> float:
             return float(condition.expressed(pattern.values_at([there(fraction)]))[0])
@@ -267,11 +267,11 @@ def _crossings(walk: Sequence[ClosedConfiguration], signs: Sequence[float], patt
             continue
         root = there(float(brentq(value, 0.0, 1.0, xtol=1e-15, rtol=1e-14)))
         if root.residual <= CLOSED:
-            found = _sharpened(ClosedConfiguration.of(twin, root.q), step, pattern, condition)
+            found = _sharpen(ClosedConfiguration.of(twin, root.q), step, pattern, condition)
             yield found if abs(float(condition.expressed(pattern.values_at([found]))[0])) <= FOLLOWED else None
 
 
-def _sharpened(at: ClosedConfiguration, step: Array, pattern: ConstraintPattern, condition: Condition
+def _sharpen(at: ClosedConfiguration, step: Array, pattern: ConstraintPattern, condition: Condition
                ) -> ClosedConfiguration:
     """A last Newton step along the mechanism's own motion, too short to need closing again."""
     kernel, _ = at.kernel()
@@ -299,7 +299,7 @@ def _size(pair: tuple[float, ClosedConfiguration]) -> float:
     return pair[0]
 
 
-def _known(at: ClosedConfiguration, others: Sequence[ClosedConfiguration], question: Measurement) -> bool:
+def _is_known(at: ClosedConfiguration, others: Sequence[ClosedConfiguration], question: Measurement) -> bool:
     """Whether a configuration's platform pose is one of others'."""
     X = at.pose(question.platform)
     return any(np.linalg.norm(X - other.pose(question.platform)) <= SAME_SPOT for other in others)
@@ -319,7 +319,7 @@ def descend(start: ClosedConfiguration, question: Measurement, pattern: Constrai
         shape, x0 = start_rows.shape, np.linalg.svd(start_rows)[2][-1]
 
         def reached(s: Array, here: ClosedConfiguration = here, motion: Array = motion) -> ClosedConfiguration:
-            return stepped(here, motion @ s)
+            return step_from(here, motion @ s)
 
         def residuals(z: Array, count: int = count, shape: tuple[int, ...] = shape,
                       reached: Callable[[Array], ClosedConfiguration] = reached) -> Array:

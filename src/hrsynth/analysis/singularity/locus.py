@@ -15,7 +15,7 @@ from ...batch.reach import grid_dependence, reach, sweep
 from ...budgets import CLOSER, COARSE_GRID, LOCUS_SIDES
 from ...errors import BadRequest, PlaneNotMet, PoseNotReached
 from ...geometry.so3 import turn_about
-from ...geometry.vectors import Array, nested
+from ...geometry.vectors import Array, nested_lists
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
 from ...kinematics.relation import Measurement
@@ -72,8 +72,8 @@ class Locus(Value):
         robots = {"hidden": self.hidden, "real": self.real}
         return {"axes": {name: values.tolist() for name, values in self.grid.axes}, "fixed": self.grid.fixed.to_dict(),
                 "reached": self.reached,
-                **{name: field and {"expression": nested(field.value), "type2": nested(field.type2),
-                                    "type1": nested(field.type1), "poses": field.spots.tolist(),
+                **{name: field and {"expression": nested_lists(field.value), "type2": nested_lists(field.type2),
+                                    "type1": nested_lists(field.type1), "poses": field.spots.tolist(),
                                     "curve": field.curve.tolist()}
                    for name, field in robots.items()}}
 
@@ -120,7 +120,7 @@ def _locus(hidden: MeasuredRobot, real: MeasuredRobot | None, plane: Pose | None
     def met(first: ClosedConfiguration, coarse: Grid) -> NDArray[np.bool_]:
         return np.array([at is not None for at in sweep(first, question, coarse, motion, placer)])
 
-    grid = framed(start, question, motion, plane, steps, met)
+    grid = frame_plane(start, question, motion, plane, steps, met)
     configurations = sweep(start, question, grid, motion, placer)
     if not any(configurations):
         raise PlaneNotMet(start.twin.mechanism.name, f"the plane {grid.fixed}", "none of its poses is reached",
@@ -150,7 +150,8 @@ def _locus(hidden: MeasuredRobot, real: MeasuredRobot | None, plane: Pose | None
     return Locus(grid, field(hidden), None if real is None else field(real))
 
 
-def framed(start: ClosedConfiguration, question: Measurement, motion: PlatformMotion, plane: Pose | None, steps: int,
+def frame_plane(start: ClosedConfiguration, question: Measurement, motion: PlatformMotion, plane: Pose | None,
+                steps: int,
            met: Callable[[ClosedConfiguration, Grid], NDArray[np.bool_]]) -> Grid:
     """The grid that just holds what is reached of a plane; ``met`` says which cells of a coarse one are, (n,).
 

@@ -27,7 +27,7 @@ def lose(start: ClosedConfiguration, question: Measurement) -> ClosedConfigurati
         rows = twists_seen(at, question)
         x = np.linalg.svd(rows)[2][-1]
         error = rows @ x
-        aside = [stepped(at, NUDGE * motion) for motion in platform_motions(at, question).T]
+        aside = [step_from(at, NUDGE * motion) for motion in platform_motions(at, question).T]
         return error, np.column_stack([(twists_seen(each, question) @ x - error) / NUDGE for each in aside])
 
     def advance(at: ClosedConfiguration, found: Residual, factor: float) -> ClosedConfiguration | None:
@@ -63,7 +63,7 @@ def rates_of_twists(found: Relation) -> tuple[Array, Array]:
     return M, U[:, :kept]
 
 
-def stepped(here: ClosedConfiguration, step: Array) -> ClosedConfiguration:
+def step_from(here: ClosedConfiguration, step: Array) -> ClosedConfiguration:
     """Where a step (nv,) leads, closed as sharply as it can be; that it is closed its residual tells."""
     q, residual = solve(here.twin, here.twin.moved(here.q, step), tolerance=SHARP)
     return ClosedConfiguration(here.twin, q, residual)

@@ -9,7 +9,7 @@ from typing import Any
 from ...budgets import NEIGHBOUR_STEP
 from ...constraints.condition import Condition, always
 from ...constraints.pattern import ConstraintPattern
-from ...constraints.turning import unexamined
+from ...constraints.turning import unexamined_poses
 from ...errors import BadRequest
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.relation import Measurement, platform_motions, relation
@@ -71,7 +71,7 @@ class Singularity(Result, shown_as="singular"):
     @cached_property
     def unexamined(self) -> tuple[str, ...]:
         """Poses to which the condition does not apply, in words; none where it is computed at each pose anew."""
-        return unexamined(self.setting.anatomy, self.pattern, self.condition, self.setting.configurations)
+        return unexamined_poses(self.setting.anatomy, self.pattern, self.condition, self.setting.configurations)
 
     def headline(self) -> str:
         """The robot and the condition in words."""

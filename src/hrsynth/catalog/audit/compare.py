@@ -12,7 +12,7 @@ from typing import Any
 
 from .exact import ModularRanks, by_legs, exact
 from .prime_field import NotExact
-from .study import Studied, asked
+from .study import Studied, motor_choices
 from .tables import Held, MotorChoice, PublishedRobot
 
 MORE, SHAKY, UNMOVED = "more freedoms", "more freedoms to first order", "not found to move so"
@@ -59,7 +59,7 @@ class TableDisagreement:
         return dict(vars(self))
 
 
-def compared(robot: PublishedRobot, studies: Sequence[tuple[str, Studied]], seed: int) -> dict[str, Any]:
+def compare_robot(robot: PublishedRobot, studies: Sequence[tuple[str, Studied]], seed: int) -> dict[str, Any]:
     """The record of a robot whose free angles were studied as its choices of motors say."""
     by = dict(studies)
     moving = next((each for _, each in studies if each.moves), studies[0][1])
@@ -128,7 +128,7 @@ class _Judge:
         """The ranks modulo the primes, or why there are none."""
         if study.letters not in self._known:
             try:
-                self._known[study.letters] = exact(self.robot, study.letters, asked(self.robot), self.seed)
+                self._known[study.letters] = exact(self.robot, study.letters, motor_choices(self.robot), self.seed)
             except NotExact as reason:
                 self._known[study.letters] = str(reason)
         return self._known[study.letters]

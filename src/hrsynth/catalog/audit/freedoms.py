@@ -33,7 +33,7 @@ class PlatformFreedoms:
         return np.asarray(self.dof - self.translations)
 
 
-def counted(values: Array, scale: Array | float = 1.0) -> tuple[Array, Array]:
+def count_ranks(values: Array, scale: Array | float = 1.0) -> tuple[Array, Array]:
     """How many descending singular values (..., k) are above the cutoff, and the gap that says so."""
     size = np.maximum(values[..., :1], scale)
     relative = np.maximum(values / np.where(size > 0, size, 1.0), np.finfo(float).eps)
@@ -48,16 +48,16 @@ def counted(values: Array, scale: Array | float = 1.0) -> tuple[Array, Array]:
 def common(legs: Array) -> tuple[Array, Array, Array, Array]:
     """The twists that all legs (B, n, m, 6) can make: the right singular vectors (B, 6, 6), those of zero first, how
     many they are (B,), the ranks of the legs (B, n), the smallest gap (B,)."""
-    refused, gaps, rank = denied(legs)
+    refused, gaps, rank = denied_freedoms(legs)
     _, values, Vt = np.linalg.svd(refused.reshape(len(legs), -1, 6), full_matrices=False)
-    held, gap = counted(values)
+    held, gap = count_ranks(values)
     return np.swapaxes(Vt, -1, -2)[..., ::-1], 6 - held, rank, np.minimum(gap, gaps.min(axis=1))
 
 
-def denied(legs: Array) -> tuple[Array, Array, Array]:
+def denied_freedoms(legs: Array) -> tuple[Array, Array, Array]:
     """Of legs (..., m, 6) the projectors (..., 6, 6) onto what they do not leave, the gaps and the ranks (...)."""
     U, s, _ = np.linalg.svd(np.swapaxes(legs, -1, -2), full_matrices=False)
-    rank, gaps = counted(s)
+    rank, gaps = count_ranks(s)
     Q = U * (np.arange(s.shape[-1]) < rank[..., None])[..., None, :]
     return np.eye(6) - Q @ np.swapaxes(Q, -1, -2), gaps, rank
 
@@ -66,12 +66,12 @@ def freedoms(legs: Array) -> PlatformFreedoms:
     """The freedoms that legs (B, n, m, 6) leave."""
     twists, dof, ranks, gap = common(legs)
     turns = twists[:, 3:] * (np.arange(6) < dof[:, None])[:, None, :]
-    turned, clear = counted(np.asarray(np.linalg.svd(turns, compute_uv=False)))
+    turned, clear = count_ranks(np.asarray(np.linalg.svd(turns, compute_uv=False)))
     idle = np.sum(legs.shape[2] - ranks, axis=1)
     return PlatformFreedoms(twists, dof, dof - turned, idle, np.minimum(gap, clear))
 
 
-def left(legs: Array, driven: NDArray[np.bool_], axes: Array) -> tuple[Array, Array, Array]:
+def freedoms_left(legs: Array, driven: NDArray[np.bool_], axes: Array) -> tuple[Array, Array, Array]:
     """The platform's freedoms with motors held, ``driven`` (B, n, m), those of them that turn about no other than the
     stated ``axes`` (3,), and the gap, (B,) each."""
     twists, dof, _, gap = common(legs * ~driven[..., None])
@@ -82,5 +82,5 @@ def within(twists: Array, dof: Array, axes: Array, gap: Array) -> tuple[Array, A
     """How many of the first ``dof`` twists (B, 6, 6), combined, turn about no other than the stated axes of the base
     (3,), and the smallest gap, (B,) each."""
     turns = twists[:, 3:] * (np.arange(6) < dof[:, None])[:, None, :] * (1 - axes)[:, None]
-    turned, clear = counted(np.asarray(np.linalg.svd(turns, compute_uv=False)))
+    turned, clear = count_ranks(np.asarray(np.linalg.svd(turns, compute_uv=False)))
     return dof - turned, np.minimum(gap, clear)

@@ -12,7 +12,7 @@ from typing import Any
 
 from ...budgets import AUDIT_BATCH
 from ...errors import BadRequest, Defect
-from .compare import CLASSES, SETTLED, compared
+from .compare import CLASSES, SETTLED, compare_robot
 from .study import Studied, StudyCase, study
 from .tables import PublishedRobot, PublishedTables, read
 
@@ -97,7 +97,7 @@ def audit(folder: str | Path, *, only: str | None = None, sample: int | None = N
     groups = sorted({robot.group for robot in tables.robots} | {group for group, *_ in tables.no_chain})
     if only is not None and only not in groups:
         raise BadRequest("no group of these tables", only, groups)
-    robots = list(_drawn(tables, [only] if only else groups, sample, seed))
+    robots = list(_draw_robots(tables, [only] if only else groups, sample, seed))
     lost = [each for each in tables.no_chain if only in (None, each[0])]
     head = {"audit": str(folder), "only": only, "sample": sample, "seed": seed, "robots": len(robots)}
     with _Kept(kept, head) as done:
@@ -112,7 +112,8 @@ def audit(folder: str | Path, *, only: str | None = None, sample: int | None = N
     return TableAudit(str(folder), rows, records, tuple(tables.defects), tuple(lost))
 
 
-def _drawn(tables: PublishedTables, groups: Sequence[str], sample: int | None, seed: int) -> Iterator[PublishedRobot]:
+def _draw_robots(tables: PublishedTables, groups: Sequence[str], sample: int | None,
+                 seed: int) -> Iterator[PublishedRobot]:
     for group in groups:
         robots = [robot for robot in tables.robots if robot.group == group]
         if sample is not None and sample < len(robots):
@@ -127,7 +128,7 @@ def _chunk(robots: Sequence[PublishedRobot], seed: int) -> Iterator[tuple[str, d
     for case, found in study(cases, seed):
         studied.setdefault(_key(case.robot), []).append((case.letters, found))
     for robot in robots:
-        yield _key(robot), compared(robot, studied[_key(robot)], seed)
+        yield _key(robot), compare_robot(robot, studied[_key(robot)], seed)
 
 
 def _key(robot: PublishedRobot) -> str:

@@ -21,7 +21,7 @@ from ...geometry.so3 import exponential, logarithm
 from ...geometry.vectors import Array
 from ...tolerances import AUDIT_CHANGED, AUDIT_SLIGHT, AUDIT_TURNED, RANK_GAP
 from .closing import BatchState, RobotBatch, batch, close, legs_at
-from .freedoms import PlatformFreedoms, freedoms, left, within
+from .freedoms import PlatformFreedoms, freedoms, freedoms_left, within
 from .motions import LegFactor, dimensions, factors
 from .tables import ANGLES, Held, PublishedRobot
 from .watching import WatchedLegs, watching
@@ -89,7 +89,7 @@ def axes_of(robot: PublishedRobot) -> Array:
     return np.array({0: (0.0, 0.0, 0.0), 1: (0.0, 0.0, 1.0)}.get(robot.motion[1], (1.0, 1.0, 1.0)))
 
 
-def asked(robot: PublishedRobot) -> list[Held]:
+def motor_choices(robot: PublishedRobot) -> list[Held]:
     """The choices of motors of a robot: those listed, and those of the same joint in each leg."""
     same = [((joint,),) * robot.legs for joint in range(len(robot.chain.joints))]
     return list(dict.fromkeys([*same, *(drive.driven for drive in robot.drives)]))
@@ -133,9 +133,9 @@ def _trial(robots: Sequence[PublishedRobot], letters: Sequence[str], random: np.
     parts = [factors(robot, each) for robot, each in zip(robots, letters, strict=True)]
     of, axes, wanted = batch(parts, len(robots[0].chain.joints)), axes_of(robots[0]), sum(robots[0].motion)
     poses = AUDIT_POSES if related else 1
-    state, closed = _closed(of, len(robots), robots[0].legs, axes, poses, random)
+    state, closed = _close_at_random(of, len(robots), robots[0].legs, axes, poses, random)
     closed &= _plain(parts, state)
-    again, persists = _changed(of, state, robots[0].legs, axes, random, keep=related)
+    again, persists = _close_elsewhere(of, state, robots[0].legs, axes, random, keep=related)
     legs, later = legs_at(of, _first(state, robots[0].legs)), legs_at(of, again)
     one, two = freedoms(legs), freedoms(later)
     kept, clear = within(one.twists, one.dof, axes, one.gap)
@@ -144,11 +144,11 @@ def _trial(robots: Sequence[PublishedRobot], letters: Sequence[str], random: np.
     shifts = two.translations - robots[0].motion[0]
     kind = (shifts == 0) | ((shifts > 0) & (two.dof > wanted))
     good = same & (kept == wanted) & (one.idle == two.idle) & kind
-    finite = _followed(of, again, two, axes, wanted, random)
-    held = {driven: _held(legs, later, robots, driven, axes) for driven in _every(robots)}
+    finite = _can_leave(of, again, two, axes, wanted, random)
+    held = {driven: _freedoms_with_motors(legs, later, robots, driven, axes) for driven in _every(robots)}
     found: list[Studied | None] = []
     for b, robot in enumerate(robots):
-        motors = {driven: held[driven] for driven in asked(robot)}
+        motors = {driven: held[driven] for driven in motor_choices(robot)}
         gap = min(float(clear[b]), float(clear_later[b]), *(float(each[2][b]) for each in motors.values()))
         steady = all(each[3][b] for each in motors.values()) and gap >= RANK_GAP
         if not (good[b] and steady):
@@ -164,7 +164,7 @@ def _trial(robots: Sequence[PublishedRobot], letters: Sequence[str], random: np.
     return found, instead
 
 
-def _closed(of: RobotBatch, B: int, n: int, axes: Array, poses: int, random: np.random.Generator
+def _close_at_random(of: RobotBatch, B: int, n: int, axes: Array, poses: int, random: np.random.Generator
             ) -> tuple[BatchState, NDArray[np.bool_]]:
     """Random dimensions closed at one random pose of the stated motion, or at several that are held."""
     lengths = random.uniform(0.3, 1.2, (B, of.count + 1))
@@ -195,7 +195,7 @@ def _plain(parts: Sequence[Sequence[LegFactor]], state: BatchState) -> NDArray[n
     return good
 
 
-def _changed(of: RobotBatch, state: BatchState, n: int, axes: Array, random: np.random.Generator, *, keep: bool
+def _close_elsewhere(of: RobotBatch, state: BatchState, n: int, axes: Array, random: np.random.Generator, *, keep: bool
              ) -> tuple[BatchState, NDArray[np.bool_]]:
     """Closed again in the stated motion, elsewhere, and (unless ``keep``) with other dimensions."""
     at = _first(state, n)
@@ -206,7 +206,7 @@ def _changed(of: RobotBatch, state: BatchState, n: int, axes: Array, random: np.
     return close(of, start, np.broadcast_to(axes, (B, 1, 3)), np.ones((B, 1, 3)), sized=False)
 
 
-def _followed(of: RobotBatch, at: BatchState, now: PlatformFreedoms, axes: Array, wanted: int,
+def _can_leave(of: RobotBatch, at: BatchState, now: PlatformFreedoms, axes: Array, wanted: int,
               random: np.random.Generator) -> Array:
     """Whether platforms with more freedoms than stated can leave the stated motion for good: moved along a random twist
     and closed with all freedoms, the turn is off the stated axes, and the freedoms are as many."""
@@ -226,15 +226,15 @@ def _followed(of: RobotBatch, at: BatchState, now: PlatformFreedoms, axes: Array
 
 
 def _every(robots: Sequence[PublishedRobot]) -> list[Held]:
-    return list(dict.fromkeys(driven for robot in robots for driven in asked(robot)))
+    return list(dict.fromkeys(driven for robot in robots for driven in motor_choices(robot)))
 
 
-def _held(legs: Array, later: Array, robots: Sequence[PublishedRobot], driven: Held, axes: Array
+def _freedoms_with_motors(legs: Array, later: Array, robots: Sequence[PublishedRobot], driven: Held, axes: Array
           ) -> tuple[Array, Array, Array, Array]:
     """PlatformFreedoms left with these motors held, of them stated ones, the gap, and whether both configurations
     agree."""
     mask = np.zeros(legs.shape[:3], dtype=bool)
     for i, joints in enumerate(driven):
         mask[:, i, list(joints)] = True
-    one, two = left(legs, mask, axes), left(later, mask, axes)
+    one, two = freedoms_left(legs, mask, axes), freedoms_left(later, mask, axes)
     return two[0], two[1], np.minimum(one[2], two[2]), (one[0] == two[0]) & (one[1] == two[1])

@@ -15,7 +15,7 @@ from functools import cached_property
 from pathlib import Path
 
 from ...budgets import LARGEST_CELL
-from ...errors import BadRequest, Defect, shortened
+from ...errors import BadRequest, Defect, shorten_text
 
 CHAIN = re.compile(r"S(\d)([PR]+)(\d{1,9}(?:V\d{1,9})?)$", re.ASCII)
 ROBOT = re.compile(r"P([1-9])([PR]+)(\d{1,9}(?:V\d{1,9})?)G(\d{1,9})P(\d{1,9})$", re.ASCII)
@@ -162,7 +162,7 @@ class _Once:
     def new(self, path: Path, line: int, name: str, *key: object) -> bool:
         """Whether what a row says was not said before."""
         if key in self._where:
-            self.defects.append(Defect(str(path), line, f"told before, in {self._where[key]}", shown(name)))
+            self.defects.append(Defect(str(path), line, f"told before, in {self._where[key]}", cell_text(name)))
             return False
         self._where[key] = f"{path.name}:{line}"
         return True
@@ -172,9 +172,9 @@ class _Once:
         self._where[(group,)] = group
 
 
-def shown(text: str) -> str:
+def cell_text(text: str) -> str:
     """A cell as a message shows it: on one line, not too long."""
-    return shortened(text if text.isprintable() else ascii(text), 60)
+    return shorten_text(text if text.isprintable() else ascii(text), 60)
 
 
 def _rows(path: Path, heads: int, defects: list[Defect], named: re.Pattern[str] | None = None, *,
@@ -196,11 +196,11 @@ def _rows(path: Path, heads: int, defects: list[Defect], named: re.Pattern[str] 
             cells = [each.strip().strip('"') for each in line.decode("utf-8").split(";")]
         except UnicodeDecodeError:
             filled = True
-            defects.append(Defect(str(path), number, "not UTF-8", shown(line.decode("utf-8", "backslashreplace"))))
+            defects.append(Defect(str(path), number, "not UTF-8", cell_text(line.decode("utf-8", "backslashreplace"))))
             continue
         if number <= heads:
             if named is not None and named.match(cells[0]):
-                defects.append(Defect(str(path), number, "a row where a head line should be", shown(cells[0])))
+                defects.append(Defect(str(path), number, "a row where a head line should be", cell_text(cells[0])))
         elif any(cells):
             filled = True
             yield number, cells
@@ -212,13 +212,13 @@ def _chains(path: Path, once: _Once) -> Iterator[LegChain]:
     for line, row in _rows(path, 2, once.defects, CHAIN):
         match = CHAIN.match(row[0])
         if match is None or int(match[1]) != len(match[2]):
-            once.defects.append(Defect(str(path), line, "not the name of a chain", shown(row[0]),
+            once.defects.append(Defect(str(path), line, "not the name of a chain", cell_text(row[0]),
                                        "S4PRRR1, S6RRPRRR12V2"))
             continue
         try:
             found = _chain(row, match[2])
         except ValueError as error:
-            once.defects.append(Defect(str(path), line, str(error), shown(row[0])))
+            once.defects.append(Defect(str(path), line, str(error), cell_text(row[0])))
             continue
         if once.new(path, line, row[0], "chain", row[0]):
             yield found
@@ -256,9 +256,10 @@ def cell(text: str) -> Cell:
     else:
         value = float(text) if NUMBER.match(text) else math.nan
     if math.isnan(value):
-        raise ValueError(f"a cell is neither a number, a multiple of pi nor a name: {shown(text) or 'empty'}")
+        raise ValueError(f"a cell is neither a number, a multiple of pi nor a name: {cell_text(text) or 'empty'}")
     if abs(value) > LARGEST_CELL or 0 < abs(value) < 1 / LARGEST_CELL:
-        raise ValueError(f"a cell is larger than {LARGEST_CELL:g}, or nearer to zero than its inverse: {shown(text)}")
+        raise ValueError(f"a cell is larger than {LARGEST_CELL:g}, or nearer to zero than its inverse: "
+                         f"{cell_text(text)}")
     return value
 
 
@@ -278,19 +279,19 @@ def _drives(path: Path, once: _Once) -> dict[tuple[str, str], list[MotorChoice]]
         group, name = GROUP.search(row[0]), DRIVEN.match(row[1] if len(row) > 1 else "")
         robot = ROBOT.match(name[1]) if name else None
         if group is None or name is None or robot is None:
-            once.defects.append(Defect(str(path), line, "no choice of motors", shown(";".join(row[:2])),
+            once.defects.append(Defect(str(path), line, "no choice of motors", cell_text(";".join(row[:2])),
                                        "sym_3T0R;P3PRRR1G1P1A1"))
             continue
         legs, joints = int(robot[1]), len(robot[2])
         cells, rest = row[2: 2 + legs * joints], row[2 + legs * joints:]
         if len(cells) < legs * joints or any(each not in ("0", "1") for each in cells):
             what = f"not {legs} × {joints} joints that are driven (1) or not (0)"
-            once.defects.append(Defect(str(path), line, what, shown(row[1])))
+            once.defects.append(Defect(str(path), line, what, cell_text(row[1])))
             continue
         try:
             loss = _whole(rest[0]) if rest else None
         except ValueError:
-            once.defects.append(Defect(str(path), line, "the loss of rank is not a whole number", shown(rest[0])))
+            once.defects.append(Defect(str(path), line, "the loss of rank is not a whole number", cell_text(rest[0])))
             continue
         driven = tuple(tuple(j for j in range(joints) if cells[i * joints + j] == "1") for i in range(legs))
         if once.new(path, line, row[1], "choice", group[0], name[1], int(name[2])):
@@ -307,17 +308,17 @@ def _synthesis(path: Path, once: _Once) -> Iterator[tuple[Combination, tuple[int
     """Each combination that was tried, with its status and number of working choices."""
     group = GROUP.match(path.name)
     if group is None:
-        once.defects.append(Defect(str(path), None, "the name gives no group", shown(path.name), "3T0R.csv"))
+        once.defects.append(Defect(str(path), None, "the name gives no group", cell_text(path.name), "3T0R.csv"))
         return
     for line, row in _rows(path, 1, once.defects, CHAIN, bare=True):
         try:
             legs, base, platform, status, count = map(_whole, [*row[1:6], *[""] * 5][:5])
         except ValueError as error:
-            once.defects.append(Defect(str(path), line, "not a whole number", shown(str(error))))
+            once.defects.append(Defect(str(path), line, "not a whole number", cell_text(str(error))))
             continue
         if not CHAIN.match(row[0]) or legs is None or base is None or platform is None:
             once.defects.append(Defect(str(path), line, "not a combination of a chain, legs, G and P",
-                                       shown(";".join(row[:4]))))
+                                       cell_text(";".join(row[:4]))))
             continue
         key = group[0], row[0], legs, base, platform
         if once.new(path, line, ";".join(row[:4]), "tried", *key):
@@ -329,20 +330,21 @@ def _robots(path: Path, chains: dict[str, LegChain], drives: dict[tuple[str, str
             ) -> Iterator[PublishedRobot]:
     group = GROUP.search(path.name)
     if group is None:
-        found.defects.append(Defect(str(path), None, "the name gives no group", shown(path.name), "sym_3T0R_list.csv"))
+        found.defects.append(Defect(str(path), None, "the name gives no group", cell_text(path.name),
+                                    "sym_3T0R_list.csv"))
         return
     before = len(found.defects)
     for line, row in _rows(path, 1, found.defects, ROBOT):
         match = ROBOT.match(row[0])
         if match is None:
-            found.defects.append(Defect(str(path), line, "not the name of a robot", shown(row[0]), "P3PRRR1G2P2"))
+            found.defects.append(Defect(str(path), line, "not the name of a robot", cell_text(row[0]), "P3PRRR1G2P2"))
             continue
         if not once.new(path, line, row[0], group[0], row[0]):
             continue
         name = f"S{len(match[2])}{match[2]}{match[3]}"
         if any(row[1:2]) and row[1] != name:
             found.defects.append(Defect(str(path), line, f"the chain of {row[0]} is not that of its name",
-                                        shown(row[1]), name))
+                                        cell_text(row[1]), name))
             continue
         if name not in chains:
             found.no_chain.append((group[0], row[0], name))

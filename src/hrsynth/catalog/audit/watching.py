@@ -14,7 +14,7 @@ import numpy as np
 
 from ...geometry.vectors import Array, cross, hat
 from ...tolerances import RANK_GAP, SAME_DIRECTION
-from .freedoms import counted, denied
+from .freedoms import count_ranks, denied_freedoms
 
 
 @dataclass(frozen=True)
@@ -38,12 +38,12 @@ def watching(screws: Array, kinds: str, dof: int) -> WatchedLegs | None:
         rates = np.zeros((3, m))
         rates[:, :last + 1] = -hat(u) @ leg[:last + 1, 3:].T  # u̇ = ω × u, slides do not turn
         _, s, Vt = np.linalg.svd(rates)
-        rank, gap = counted(s)
+        rank, gap = count_ranks(s)
         if gap < RANK_GAP:
             return None
         kept.append(np.pad(Vt[rank:] @ leg, ((0, int(rank)), (0, 0))))
-    free, gaps, _ = denied(screws)
-    held, more, _ = denied(np.stack(kept))
+    free, gaps, _ = denied_freedoms(screws)
+    held, more, _ = denied_freedoms(np.stack(kept))
     if min(gaps.min(), more.min()) < RANK_GAP:
         return None
     best: int | None = None
@@ -51,7 +51,7 @@ def watching(screws: Array, kinds: str, dof: int) -> WatchedLegs | None:
         sets = list(combinations(range(n), size))
         chosen = np.array([[leg in each for leg in range(n)] for each in sets])[..., None, None]
         stacked = np.where(chosen, held, free).reshape(len(sets), 6 * n, 6)
-        ranks, clear = counted(np.asarray(np.linalg.svd(stacked, compute_uv=False)))
+        ranks, clear = count_ranks(np.asarray(np.linalg.svd(stacked, compute_uv=False)))
         if clear.min() < RANK_GAP:
             return None
         if best is None:

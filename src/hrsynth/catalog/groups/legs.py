@@ -14,7 +14,7 @@ def leg(text: str) -> LegWord:
     return parse(f"2({text})").legs[0]
 
 
-def driven(chain: LegWord, places: Iterable[int]) -> Iterator[LegWord]:
+def drive_each_joint(chain: LegWord, places: Iterable[int]) -> Iterator[LegWord]:
     """The leg with one motor, on each of these joints in turn that can have one."""
     for place in places:
         if chain.joints[place].letter in MOVED:
@@ -23,10 +23,10 @@ def driven(chain: LegWord, places: Iterable[int]) -> Iterator[LegWord]:
 
 def base_driven(chain: LegWord) -> LegWord:
     """The leg with a motor on the first joint that can have one."""
-    return next(driven(chain, range(len(chain.joints))))
+    return next(drive_each_joint(chain, range(len(chain.joints))))
 
 
-def watched(chain: LegWord) -> Iterator[LegWord]:
+def watch_each_segment(chain: LegWord) -> Iterator[LegWord]:
     """The leg with each segment observed in turn, one of those that always turn alike."""
     last = len(chain.joints) - (1 if chain.joints[-1].letter in COMPOSITE else 2)
     seen = (LegWord(tuple(replace(joint, watched=i == place) for i, joint in enumerate(chain.joints))).canonical

@@ -12,7 +12,7 @@ from itertools import product
 
 from ..geometry import planar as belongs
 from ..words import LegWord, RobotWord
-from .legs import base_driven, driven, leg, robots, watched
+from .legs import base_driven, drive_each_joint, leg, robots, watch_each_segment
 
 __all__ = ["belongs", "chains", "words"]
 
@@ -43,7 +43,7 @@ def _kinds(rail: str, motors: int, tip: str = "RP") -> list[LegWord]:
     begin with a P."""
     return [moved for chain in chains(rail) if chain.joints[-1].letter in tip
             and (rail == "h" or chain.joints[0].letter == "P")
-            for seen in watched(chain) for moved in driven(seen, range(motors))]
+            for seen in watch_each_segment(chain) for moved in drive_each_joint(seen, range(motors))]
 
 
 def words() -> Iterator[RobotWord]:
@@ -53,12 +53,12 @@ def words() -> Iterator[RobotWord]:
         yield from robots(_kinds(rail, 3), 3)
         yield from robots(_kinds(rail, 2, tip="R"), 2, "point")
     for chain in with_parallelograms():
-        for seen in watched(chain):
-            for moved in driven(seen, range(3)):
+        for seen in watch_each_segment(chain):
+            for moved in drive_each_joint(seen, range(3)):
                 yield RobotWord.of([moved] * 3)
                 if chain.joints[-1].letter == "R":
                     yield RobotWord.of([moved] * 2, platform="point")
-    simple, mixed = ([base_driven(seen) for chain in kinds for seen in watched(chain)]
+    simple, mixed = ([base_driven(seen) for chain in kinds for seen in watch_each_segment(chain)]
                      for kinds in (chains(), [*chains(), *with_parallelograms()]))
     yield from robots(simple, 4)
     yield from robots(mixed, 3)

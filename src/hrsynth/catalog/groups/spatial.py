@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from itertools import product
 
 from ..words import LegWord, RobotWord
-from .legs import driven, leg, watched
+from .legs import drive_each_joint, leg, watch_each_segment
 
 _SLIDES = "hjk"
 """Names of a leg's P axes, one after another; more are not needed for three freedoms."""
@@ -64,7 +64,7 @@ def words() -> Iterator[RobotWord]:
     """Three equal legs of each family, each segment observed, each of the first two joints driven; the Clavel leg with
     a Π."""
     for chain in (*translational(), *spherical(), *zero_torsion()):
-        for seen in watched(chain):
-            yield from (RobotWord.of([each] * 3) for each in driven(seen, range(2)))
+        for seen in watch_each_segment(chain):
+            yield from (RobotWord.of([each] * 3) for each in drive_each_joint(seen, range(2)))
     for text in (CLAVEL, "Pk*-Rt-Pin-Rt", "Pz*-Rt-Pin-Rt"):
-        yield from (RobotWord.of([seen] * 3) for seen in watched(leg(text)))
+        yield from (RobotWord.of([seen] * 3) for seen in watch_each_segment(leg(text)))

@@ -18,7 +18,7 @@ from ..jsonl import line
 from ..query import Catalog
 from . import index
 from .folder import FOLDERS, draft
-from .pages import written
+from .pages import write_pages
 from .structures import Structure, structures
 
 CHUNK = 4
@@ -65,7 +65,7 @@ def site(catalog: Catalog, target: str | Path, *, workers: int = 1, anew: bool =
         wanted = [each for each in every if not (folder / FOLDERS[0] / f"{each.name}.html").exists()]
         done = len(every) - len(wanted)
         tell("pages", done, len(every))
-        for made in _made(team, folder, wanted):
+        for made in _make_pages(team, folder, wanted):
             done += len(made)
             tell("pages", done, len(every))
             differ += [(word, found) for word, found in made if found]
@@ -73,10 +73,11 @@ def site(catalog: Catalog, target: str | Path, *, workers: int = 1, anew: bool =
     return Site(Path(target) / "index.html", len(catalog), len(every), len(wanted), tuple(sorted(differ)))
 
 
-def _made(team: Executor, folder: Path, wanted: Sequence[Structure]) -> Iterator[Made]:
+def _make_pages(team: Executor, folder: Path, wanted: Sequence[Structure]) -> Iterator[Made]:
     packed = [each.packed() for each in wanted]
     try:
-        yield from team(partial(written, str(folder)), (packed[i : i + CHUNK] for i in range(0, len(packed), CHUNK)))
+        yield from team(partial(write_pages, str(folder)),
+                        (packed[i : i + CHUNK] for i in range(0, len(packed), CHUNK)))
     except Stopped as stopped:
         raise BuildStopped(str(stopped), str(folder)) from stopped
 

@@ -32,7 +32,7 @@ def draft(target: str | Path, stamp: dict[str, str], *, anew: bool = False) -> I
     site = Path(os.path.realpath(target))
     require_replaceable(site, str(target))
     folder = site.with_name(f".{site.name}.part")
-    with writable(folder, "site"), _locked(folder):
+    with writable(folder, "site"), _lock(folder):
         _prepare(folder, stamp, anew)
         yield folder
         require_replaceable(site, str(target))
@@ -55,7 +55,7 @@ def require_replaceable(site: Path, said: str) -> None:
 
 
 @contextlib.contextmanager
-def _locked(folder: Path) -> Iterator[None]:
+def _lock(folder: Path) -> Iterator[None]:
     folder.mkdir(exist_ok=True)
     handle = os.open(folder, os.O_RDONLY | os.O_CLOEXEC)
     try:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from ... import __version__
 from ..known import alias, order
 from .folder import FOLDERS
-from .structures import Structure, named
+from .structures import Structure, address_name
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -53,7 +53,7 @@ def write(folder: Path, structures: Iterable[Structure]) -> None:
     drawn = [int((folder / FOLDERS[2] / f"{each.name}.svg").exists()) for each in every]
     held = {**columns(every), "drawn": drawn}
     (folder / "data.js").write_text(f"const CATALOG = {_compact(held)};\n", encoding="utf-8")
-    (folder / "index.html").write_text(rendered("index.html", version=__version__), encoding="utf-8")
+    (folder / "index.html").write_text(render("index.html", version=__version__), encoding="utf-8")
 
 
 def columns(structures: Iterable[Structure]) -> dict[str, Any]:
@@ -63,7 +63,7 @@ def columns(structures: Iterable[Structure]) -> dict[str, Any]:
     found: dict[str, Any] = {"pages": [each.name for each in structures], "page": [place for place, _ in rows]}
     records = [record for _, record in rows]
     found["word"] = [record["word"] for record in records]
-    found["name"] = [named(record["word"]) for record in records]
+    found["name"] = [address_name(record["word"]) for record in records]
     found["order"] = _ranks([(*order(record), record["word"]) for record in records])
     found["alias"] = _places([alias(record["word"]) for record in records])
     for field in NUMBERS:
@@ -95,7 +95,7 @@ def _compact(data: object) -> str:
     return json.dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
 
 
-def rendered(template: str, **values: Any) -> str:
+def render(template: str, **values: Any) -> str:
     """The text of a template with these values."""
     return _environment().get_template(template).render(values)
 
@@ -113,6 +113,6 @@ def _environment() -> Environment:
 
     made = Environment(loader=PackageLoader("hrsynth.catalog.site"), autoescape=True, trim_blocks=True,
                        lstrip_blocks=True, undefined=StrictUndefined)
-    made.filters.update(notation=notation, named=named)
+    made.filters.update(notation=notation, named=address_name)
     made.globals.update(explained=EXPLAINED)
     return made

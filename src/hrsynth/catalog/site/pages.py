@@ -26,9 +26,9 @@ from ..jsonl import Record
 from ..known import alias
 from ..words import parse
 from .folder import FOLDERS
-from .index import rendered
+from .index import render
 from .sentences import cure, rules
-from .structures import Structure, named
+from .structures import Structure, address_name
 
 PAGES, ROBOTS, DRAWINGS = FOLDERS
 """Folders of the pages, of the robot files and of the small drawings."""
@@ -36,7 +36,7 @@ SMALL = (104.0, 78.0)
 """Width and height of a small drawing (pixels)."""
 
 
-def written(folder: str, parts: Iterable[str]) -> Made:
+def write_pages(folder: str, parts: Iterable[str]) -> Made:
     """Write the pages of packed structures, each after its robot files and whole; gives for each its word, and how its
     derivation differs from the record (empty: it does not). Raises ``Stopped`` where the disk takes no more."""
     found: Made = []
@@ -59,7 +59,7 @@ def _write(folder: Path, structure: Structure, studied: Study) -> None:
             content = native.write(robot).encode()
         except HrsynthError:
             continue
-        (folder / ROBOTS / f"{named(record['word'])}.urdf").write_bytes(content)
+        (folder / ROBOTS / f"{address_name(record['word'])}.urdf").write_bytes(content)
         robots[record["word"]] = robot
     shown = robots.get(structure.fact["word"])
     drawn = None if shown is None else _portrait(shown, studied)
@@ -75,7 +75,7 @@ def _portrait(robot: Mechanism, studied: Study) -> Portrait:
         return Portrait.drawn(robot, [robot.platform], (), None)
     setting = studied.derivation.setting
     return Portrait.drawn(robot, [link for link in setting.anatomy.platform if link in robot.links] or [robot.platform],
-                          _known(studied.observed, robot) or (), plane_normal(setting.motion))
+                          _known_links(studied.observed, robot) or (), plane_normal(setting.motion))
 
 
 def page(structure: Structure, studied: Study, robots: dict[str, Mechanism], drawn: Portrait | None) -> str:
@@ -83,24 +83,25 @@ def page(structure: Structure, studied: Study, robots: dict[str, Mechanism], dra
     derivation = studied.derivation
     hidden = None if derivation is None else derivation.hidden
     shown = robots.get(structure.fact["word"])
-    real = None if shown is None else robot_svg(shown, observed=_known(studied.observed, shown), title="Real robot")
-    return rendered(
+    real = None if shown is None else robot_svg(shown, observed=_known_links(studied.observed, shown),
+                                                title="Real robot")
+    return render(
         "page.html", structure=structure, fact=structure.fact, facts=list(facts(structure.fact)),
         turned=None if drawn is None else drawn.scene(), alias=alias(structure.fact["word"]),
         cure=cure(structure.fact), rules=list(rules(structure.fact)),
         differs=studied.differs, real=real,
-        hidden=None if hidden is None else robot_svg(hidden, virtual=_driven(hidden), title="Hidden robot"),
+        hidden=None if hidden is None else robot_svg(hidden, virtual=_driven_joints(hidden), title="Hidden robot"),
         blind=derivation is not None and hidden is None,
         steps=[] if derivation is None else trace(derivation.steps),
         variants=[_variant(record, robots.get(record["word"])) for record in structure.records])
 
 
-def _known(links: Iterable[str] | None, robot: Mechanism) -> list[str] | None:
+def _known_links(links: Iterable[str] | None, robot: Mechanism) -> list[str] | None:
     """The observed links that the robot has by name."""
     return None if links is None else [link for link in links if link in robot.links]
 
 
-def _driven(robot: Mechanism) -> list[str]:
+def _driven_joints(robot: Mechanism) -> list[str]:
     return [joint.name for joint in robot.joints.values() if joint.actuated]
 
 
@@ -117,9 +118,9 @@ def trace(steps: Iterable[Step]) -> list[dict[str, Any]]:
 
 def _variant(record: Record, robot: Mechanism | None) -> dict[str, Any]:
     """What a page says of one architecture: its name, its motors, its file."""
-    return {"name": named(record["word"]), "word": record["word"], "notation": record.get("notation", ""),
+    return {"name": address_name(record["word"]), "word": record["word"], "notation": record.get("notation", ""),
             "motors": motors(record) if "motors" in record else "",
-            "joints": [] if robot is None else _driven(robot), "file": robot is not None}
+            "joints": [] if robot is None else _driven_joints(robot), "file": robot is not None}
 
 
 @dataclass(frozen=True, eq=False)

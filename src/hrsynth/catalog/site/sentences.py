@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from ...present.text.tables import listed, named
+from ...present.text.tables import list_words, name_all
 from ..jsonl import Record
 
 RULES = {
@@ -48,14 +48,14 @@ def cure(record: Record) -> str | None:
     if said.startswith("none of"):
         return "Of the measurements that were tried, up to four at a time, none shows all freedoms."
     parts = [_KINDS[each["kind"]].format(_where(each["name"])) for each in _PART.finditer(said)]
-    measured = listed(parts)
+    measured = list_words(parts)
     if said.startswith("not all by"):
         return f"Measure {measured} as well: that shows more, but not all freedoms."
     return f"Measure {measured} as well: then all {record['dof']} freedoms are seen."
 
 
 def _legs(labels: str | None) -> str:
-    return "all legs" if labels is None else named("leg", labels.split(","))
+    return "all legs" if labels is None else name_all("leg", labels.split(","))
 
 
 def _where(name: str) -> str:

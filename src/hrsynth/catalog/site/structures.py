@@ -15,7 +15,7 @@ LENGTH = 12
 """Digits of a name: two of a million words are alike with a probability of 2e-3."""
 
 
-def named(word: str) -> str:
+def address_name(word: str) -> str:
     """The name of a word in addresses: the same for ever, and for any spelling of files."""
     return sha256(word.encode()).hexdigest()[:LENGTH]
 
@@ -36,7 +36,7 @@ class Structure:
     @property
     def name(self) -> str:
         """Its name in addresses."""
-        return named(self.word)
+        return address_name(self.word)
 
     @property
     def fact(self) -> Record:

@@ -46,7 +46,7 @@ def closure_candidates(graph: JointGraph, base: str) -> tuple[ClosureCandidate, 
     bonds = graphs.adjacency(links, (j.links for j in joints if j.type is JointType.FIXED and j.links[0] in at_zero))
     body = {link: number for number, group in enumerate(graphs.components(bonds)) for link in group}
     joined = {frozenset(body[x] for x in j.links) for j in graph.joints.values() if set(j.links) <= set(at_zero)}
-    points, moved = (_points(assembly, links, values) for values in (assembly.zero(), _moved(assembly)))
+    points, moved = (_points(assembly, links, values) for values in (assembly.zero(), _move_joints(assembly)))
     apart = np.linalg.norm(points[:, None] - points, axis=2) / assembly.length
     apart_moved = np.linalg.norm(moved[:, None] - moved, axis=2) / assembly.length
     # near at zero, and farther apart elsewhere: joints that turn about the place itself do not separate frames there
@@ -84,7 +84,7 @@ def _points(assembly: LoopAssembly, links: list[str], values: dict[str, Array]) 
     return np.array([poses[link][:3, 3] for link in links])
 
 
-def _moved(assembly: LoopAssembly, seed: int = 0) -> dict[str, Array]:
+def _move_joints(assembly: LoopAssembly, seed: int = 0) -> dict[str, Array]:
     """All joints somewhere else."""
     rng = np.random.default_rng(seed)
     return {joint.name: step_along(joint, zero(joint), rng.uniform(0.4, 1.0, joint.kind.freedoms), np.eye(3))

@@ -18,7 +18,7 @@ import numpy as np
 from ...budgets import FINER_TRIES, LARGEST_RELATED
 from ...errors import HeldByRounding, RankUndecided, StructureUndecided
 from ...geometry.gauss_newton import Damping, Residual, descend
-from ...geometry.ranks import decomposed
+from ...geometry.ranks import singular_decomposition
 from ...geometry.vectors import Array, unit
 from ...mechanism.model import JointType, Mechanism, Note
 from ...mechanism.normal import normal_form
@@ -110,10 +110,10 @@ def as_meant(mechanism: Mechanism, residual: float, tolerance: float, possible: 
             "merged", f"the loops are open by up to {residual:.2g} (characteristic lengths, radians; a gap of "
                       f"{1e3 * residual * mechanism.length:.2g} mm) at zero, within the tolerance of {tolerance:.1g}: "
                       "the joints that close them are put in the middle")]
-    return _watched(replace(found, notes=(*mechanism.notes, *notes)) if notes else found, tolerance)
+    return _idealise_directions(replace(found, notes=(*mechanism.notes, *notes)) if notes else found, tolerance)
 
 
-def _watched(mechanism: Mechanism, tolerance: float) -> Mechanism:
+def _idealise_directions(mechanism: Mechanism, tolerance: float) -> Mechanism:
     """With the watched directions along segments and axes of their links, or square to axes, that are nearly so."""
     found, told = list(mechanism.observations), []
     if not found or tolerance <= EXACT:
@@ -146,7 +146,7 @@ def _direction(bodies: Bodies, link: str, d: Array, length: float, tolerance: fl
         line, _ = lines[int(np.argmin(misses))]
         return np.asarray(np.copysign(1.0, d @ line) * line)
     square = [axis for axis in axes if abs(float(d @ axis)) <= tolerance]
-    _, s, Vt = decomposed(np.array(square).reshape(-1, 3))
+    _, s, Vt = singular_decomposition(np.array(square).reshape(-1, 3))
     across = Vt[s > OBLIQUE]
     return unit(d - across.T @ (across @ d))
 
@@ -199,7 +199,7 @@ def _project(at: JointCoordinates, relations: Sequence[GeometricRelation]) -> tu
 
     def advance(x: Array, here: Residual, factor: float) -> Array:
         # rows that depend on each other at the solution differ by the miss before it: they are not followed
-        U, s, Vt = decomposed(here.J / weights)
+        U, s, Vt = singular_decomposition(here.J / weights)
         kept = s > max(30 * float(np.max(np.abs(here.error))), 1e-9) * s[0]
         V = Vt[kept].T
         back = weights * (start - x)

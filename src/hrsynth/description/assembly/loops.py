@@ -13,11 +13,21 @@ import numpy as np
 
 from ...budgets import FIRMER_BY, LOOP_EFFORT, LOOP_STRIDE, LOOP_TRIES
 from ...geometry.gauss_newton import Damping, Residual, descend
-from ...geometry.ranks import Rank, decomposed, rank_of
+from ...geometry.ranks import Rank, rank_of, singular_decomposition
 from ...geometry.vectors import Array, inverse, pose
 from ...mechanism.model import JointType, Mechanism
 from ...tolerances import FAINT, FIRM, NEARLY_SINGULAR, NEWTON_REACH, NOISE, RANK_CUTOFF, RANK_GAP, SOLVED
-from ..jointgraph import ORIGIN, FrameSpec, GearSpec, JointSpec, Posture, TreeJoint, scaled, spanning_tree, zero_poses
+from ..jointgraph import (
+    ORIGIN,
+    FrameSpec,
+    GearSpec,
+    JointSpec,
+    Posture,
+    TreeJoint,
+    scale_pose,
+    spanning_tree,
+    zero_poses,
+)
 from ..jointmotion import displacement, opening, screws, step_along, zero
 
 DAMPING = Damping(start=1.0, eased=0.1, least=1e-3, most=1e6)
@@ -85,7 +95,7 @@ class LoopAssembly:
         value = self._start.get(joint.name, at_zero)
         if value.shape != at_zero.shape:
             return at_zero
-        return scaled(value, 1 / self.length) if value.ndim == 2 else value / self.unit(joint)
+        return scale_pose(value, 1 / self.length) if value.ndim == 2 else value / self.unit(joint)
 
     def unit(self, joint: JointSpec) -> float:
         """Metres or radians in one unit of a joint's coordinate."""
@@ -104,7 +114,7 @@ class LoopAssembly:
 
     def poses(self, values: Values) -> dict[str, Array]:
         """The pose (4, 4) of every link in the base frame, in metres."""
-        return {link: scaled(X, self.length) for link, X in self.scaled_poses(values).items()}
+        return {link: scale_pose(X, self.length) for link, X in self.scaled_poses(values).items()}
 
     def system(self, values: Values) -> tuple[Array, Array]:
         """What is open in all loops and gears (rows,), and its derivative by the active coordinates (rows, size)."""
@@ -192,7 +202,7 @@ class LoopAssembly:
 
     def _damped(self, at: Residual, factor: float) -> Array:
         """The damped step, no longer than ``LOOP_STRIDE``; near the solution the plain one without faint directions."""
-        U, s, Vt = decomposed(at.J)
+        U, s, Vt = singular_decomposition(at.J)
         if at.size < self.noise and factor <= 1.0:
             kept = s > FAINT * s[0]
             step = -(Vt[kept].T @ ((U.T @ at.error)[kept] / s[kept]))
@@ -211,7 +221,7 @@ class LoopAssembly:
 
     def kernel(self, values: Values) -> Array:
         """A basis (size, freedoms) of the velocities that keep the loops closed."""
-        _, s, Vt = decomposed(self.system(values)[1], full_matrices=True)
+        _, s, Vt = singular_decomposition(self.system(values)[1], full_matrices=True)
         return np.asarray(Vt[int(np.sum(s > RANK_CUTOFF * max(s, default=1.0))):].T)
 
     def worst(self, values: Values) -> tuple[str, float]:
@@ -300,7 +310,7 @@ def _slip(gear: GearSpec, values: Values) -> Array:
 
 
 def _scale(joint: JointSpec, length: float) -> JointSpec:
-    one, two = (FrameSpec(end.link, scaled(end.X, 1 / length), end.line) for end in joint.ends)
+    one, two = (FrameSpec(end.link, scale_pose(end.X, 1 / length), end.line) for end in joint.ends)
     return replace(joint, ends=(one, two))
 
 

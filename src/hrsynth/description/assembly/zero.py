@@ -50,7 +50,7 @@ def with_limits(joints: Mapping[str, Joint], assembly: LoopAssembly, values: Val
             if limits is not None:
                 lower, upper = (None if bound is None else bound - q for bound in (limits.lower, limits.upper))
                 limits = replace(limits, lower=lower, upper=upper)
-            found[joint.name] = replace(joint, limits=limits, xml=tuple(_counted(each, q) for each in joint.xml))
+            found[joint.name] = replace(joint, limits=limits, xml=tuple(_recount(each, q) for each in joint.xml))
     return found
 
 
@@ -75,7 +75,7 @@ def closing(assembly: LoopAssembly, values: Values) -> dict[str, float]:
     return {name: q for name, q in found.items() if abs(q) > EXACT}
 
 
-def _counted(fragment: str, q: float) -> str:
+def _recount(fragment: str, q: float) -> str:
     """A kept element of a joint with what it counts from zero counted from q."""
     if not fragment.startswith(tuple(f"<{tag}" for tag in COUNTED_FROM_ZERO)):
         return fragment

@@ -41,7 +41,7 @@ def is_drake(element: xml.Element) -> bool:
     return "drake" in space or str(element.tag).startswith("drake:")
 
 
-def _said(element: xml.Element, tag: str) -> str | None:
+def _value_of(element: xml.Element, tag: str) -> str | None:
     """What a child element says: ``value`` or ``name`` of it in URDF, its text in SDFormat."""
     child = next((each for each in xml.children(element) if local(each) == tag), None)
     if child is None:
@@ -54,7 +54,7 @@ def _ends(reader: XmlReader, element: xml.Element, tags: tuple[str, str], frame_
     """The two frames that child elements name; a name that is none, or one link twice, is a defect."""
     line, found = xml.line(element), []
     for tag in tags:
-        name = _said(element, tag)
+        name = _value_of(element, tag)
         frame = None if name is None else frame_of(name)
         if frame is None:
             reader.defect(line, f"<{local(element)}>: <{tag}> is not a link or frame", name)
@@ -113,7 +113,7 @@ def _bushing(reader: XmlReader, graph: JointGraph, element: xml.Element, frame_o
 
 
 def _vector(reader: XmlReader, element: xml.Element, tag: str) -> Array:
-    return reader.values(_said(element, tag), (0, 0, 0), xml.line(element), f"<{tag}>")
+    return reader.values(_value_of(element, tag), (0, 0, 0), xml.line(element), f"<{tag}>")
 
 
 def read_plugins(graph: JointGraph, plugins: list[xml.Element], poses: Mapping[str, Array], models: tuple[str, ...]

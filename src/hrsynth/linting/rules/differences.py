@@ -43,7 +43,7 @@ def _pairs(file: LintedFile) -> Iterator[tuple[Joint, Joint]]:
             yield match.one.joints[mine], match.other.joints[theirs]
 
 
-def _named(mine: Joint, theirs: Joint) -> str:
+def _names_of(mine: Joint, theirs: Joint) -> str:
     return repr(mine.name) if mine.name == theirs.name else f"{mine.name!r} ({theirs.name!r} in the other file)"
 
 
@@ -67,7 +67,7 @@ def _what(joint: Joint) -> str:
 def _types(file: LintedFile) -> Iterator[Spot]:
     for mine, theirs in _pairs(file):
         if mine.type is not theirs.type:
-            yield Spot(mine.line, f"joint {_named(mine, theirs)} is of type {mine.type} here, {theirs.type} there")
+            yield Spot(mine.line, f"joint {_names_of(mine, theirs)} is of type {mine.type} here, {theirs.type} there")
 
 
 def _ends(file: LintedFile) -> Iterator[Spot]:
@@ -76,7 +76,7 @@ def _ends(file: LintedFile) -> Iterator[Spot]:
         assert match is not None
         here = {match.links.get(link) for link in mine.links}
         if here != set(theirs.links):
-            yield Spot(mine.line, f"joint {_named(mine, theirs)} joins {' and '.join(mine.links)} here, "
+            yield Spot(mine.line, f"joint {_names_of(mine, theirs)} joins {' and '.join(mine.links)} here, "
                                   f"{' and '.join(theirs.links)} there")
     if match is None:
         return
@@ -140,7 +140,7 @@ def _senses(file: LintedFile) -> Iterator[Spot]:
         turned = mine.predecessor != _partner(match, theirs)
         cosine = float(mine.axis @ fit.X[:3, :3] @ theirs.axis) * (-1 if turned else 1)
         if mine.in_tree and theirs.in_tree and cosine < -1 + SAME_ROBOT:
-            yield Spot(mine.line, f"joint {_named(mine, theirs)} counts in the opposite sense in the other file")
+            yield Spot(mine.line, f"joint {_names_of(mine, theirs)} counts in the opposite sense in the other file")
 
 
 def _partner(match: RobotMatch, theirs: Joint) -> str | None:
@@ -151,7 +151,8 @@ def _partner(match: RobotMatch, theirs: Joint) -> str | None:
 def _motors(file: LintedFile) -> Iterator[Spot]:
     for mine, theirs in _pairs(file):
         if mine.actuated != theirs.actuated:
-            yield Spot(mine.line, f"joint {_named(mine, theirs)} is {'driven' if mine.actuated else 'passive'} here, "
+            yield Spot(mine.line,
+                       f"joint {_names_of(mine, theirs)} is {'driven' if mine.actuated else 'passive'} here, "
                                   f"{'driven' if theirs.actuated else 'passive'} there")
 
 
@@ -161,7 +162,7 @@ def _limits(file: LintedFile) -> Iterator[Spot]:
                        for each in (mine, theirs))
         if any((a is None) != (b is None) or (a is not None and abs(a - (b or 0.0)) > SAME_ROBOT * max(1.0, abs(a)))
                for a, b in zip(here, there, strict=True)):
-            yield Spot(mine.line, f"joint {_named(mine, theirs)}: limits {_range(here)} here, {_range(there)} there")
+            yield Spot(mine.line, f"joint {_names_of(mine, theirs)}: limits {_range(here)} here, {_range(there)} there")
 
 
 def _range(limits: tuple[float | None, float | None]) -> str:

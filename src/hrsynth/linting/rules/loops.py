@@ -71,7 +71,7 @@ def _open(file: LintedFile) -> Iterator[Spot]:
                    "correct the dimensions, or the frames in which the closures are given")
         return
     text += f"; they close with {moves(assembly, closed.values)}"
-    yield Spot(graph.joints[worst].line, text, _closed(file, graph, assembly, closed),
+    yield Spot(graph.joints[worst].line, text, _mend_zero(file, graph, assembly, closed),
                severity="warning" if file.refusal is None else None)
 
 
@@ -88,7 +88,7 @@ def _miss(joint: JointSpec, poses: dict[str, np.ndarray], length: float) -> floa
     return float(np.linalg.norm([*(error[:gap] / length), *error[gap:]]))
 
 
-def _closed(file: LintedFile, graph: JointGraph, assembly: LoopAssembly, closed: LoopSolution) -> Mend | None:
+def _mend_zero(file: LintedFile, graph: JointGraph, assembly: LoopAssembly, closed: LoopSolution) -> Mend | None:
     """Let every joint that moved count from where it is closed: its origin takes the displacement, its limits and the
     offset of its mimic lose it."""
     if file.dialect != "urdf" or file.expanded:
@@ -119,11 +119,11 @@ def _rezero(moved: list[tuple[JointSpec, xml.Element]], values: Values, graph: J
             element.insert(0, origin)
         origin.set("xyz", numerals.exact_vector(X[:3, 3]))
         origin.set("rpy", numerals.exact_vector(numerals.rpy(X[:3, :3])))
-        _shifted(element, q)
+        _shift_limits(element, q)
     shifts = closing(assembly, values)
     for element in moved[0][1].getroottree().iter("loop"):
         if q := shifts.get(str(element.get("name")), 0.0):
-            _shifted(element, q)
+            _shift_limits(element, q)
     for element in moved[0][1].getroottree().iter("joint"):
         for mimic in element.iterfind("mimic"):
             ratio = NumberAt(mimic, "multiplier").value
@@ -133,7 +133,7 @@ def _rezero(moved: list[tuple[JointSpec, xml.Element]], values: Values, graph: J
                 mimic.set("offset", numerals.exact(offset if abs(offset) > EXACT else 0.0))
 
 
-def _shifted(element: xml.Element, q: float) -> None:
+def _shift_limits(element: xml.Element, q: float) -> None:
     """Count the limits of a joint's element from q, and what else of it is counted from zero."""
     for limit in element.iterfind("limit"):
         free = (limit.get("free") or "").split()
@@ -166,10 +166,11 @@ def _mirrored(file: LintedFile) -> Iterator[Spot]:
     for loop in assembly.loops:
         joint = graph.joints[loop.name]
         if _opposite(joint, poses):
-            yield Spot(joint.line, f"the two axes of {joint.name!r} point opposite ways at zero", _turned(file, joint))
+            yield Spot(joint.line, f"the two axes of {joint.name!r} point opposite ways at zero",
+                       _turn_axis(file, joint))
 
 
-def _turned(file: LintedFile, joint: JointSpec) -> Mend | None:
+def _turn_axis(file: LintedFile, joint: JointSpec) -> Mend | None:
     """Turn the child's axis of a ``<constraint>`` round."""
     element = file.element(joint.line, "constraint", name=joint.name)
     axis = None if element is None else element.find("child_axis")
@@ -225,21 +226,21 @@ def _redundant(file: LintedFile) -> Iterator[Spot]:
                                           "loops before it")
 
 
-def unclosed(robot: Mechanism) -> bool:
+def is_unclosed(robot: Mechanism) -> bool:
     """Whether nothing closes a loop."""
     return not robot.couplings and all(joint.in_tree for joint in robot.joints.values())
 
 
-def watched(robot: Mechanism) -> bool:
+def is_watched(robot: Mechanism) -> bool:
     """Whether a robot is open on purpose, and what counts is what is seen of it: formations, a body that nothing holds,
     arms with a camera."""
     seen = robot.formation or robot.observations or robot.cameras
-    return unclosed(robot) and (bool(seen) or all(joint.type is JointType.FREE for joint in robot.joints.values()))
+    return is_unclosed(robot) and (bool(seen) or all(joint.type is JointType.FREE for joint in robot.joints.values()))
 
 
 def _none(file: LintedFile) -> Iterator[Spot]:
     robot = file.mechanism
-    if robot is not None and unclosed(robot) and not watched(robot):
+    if robot is not None and is_unclosed(robot) and not is_watched(robot):
         yield Spot(None, "the file closes no loop")
 
 

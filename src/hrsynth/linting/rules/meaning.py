@@ -45,7 +45,7 @@ def _unknown(file: LintedFile) -> Iterator[Spot]:
             continue
         tag = str(element.tag)
         for child in xml.children(element) if tag in WITHIN else ():
-            if (spot := _spot(child, WITHIN[tag], _named(element))) is not None:
+            if (spot := _spot(child, WITHIN[tag], _name_of(element))) is not None:
                 yield spot
             yield from _attributes(child, element)
             for origin in child.findall("origin") if child.tag in _ENDS else ():
@@ -67,7 +67,7 @@ def _attributes(element: xml.Element, owner: xml.Element) -> Iterator[Spot]:
     for name in () if known is None else map(str, element.attrib):
         if known is not None and name not in known and "}" not in name and ":" not in name:
             near = _near(name, known)
-            yield Spot(xml.line(element), f"attribute {name!r} of <{element.tag}> in {_named(owner)}"
+            yield Spot(xml.line(element), f"attribute {name!r} of <{element.tag}> in {_name_of(owner)}"
                        f"{f', nearly {near!r}' if near else ''}", advice=f"write {near}" if near else None,
                        severity="warning" if near else None)
 
@@ -79,7 +79,7 @@ def _near(name: str, known: Iterable[str]) -> str | None:
     return whole[found[0]] if found else None
 
 
-def _named(element: xml.Element) -> str:
+def _name_of(element: xml.Element) -> str:
     return str(element.tag) if element.get("name") is None else f"{element.tag} {element.get('name')!r}"
 
 

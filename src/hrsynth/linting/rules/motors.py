@@ -8,7 +8,7 @@ from ...mechanism.model import Mechanism
 from ..findings import LintRule, Spot
 from ..freedoms import Pair
 from ..subject import LintedFile
-from .loops import nearby, watched
+from .loops import is_watched, nearby
 
 
 def _held(robot: Mechanism) -> list[Pair]:
@@ -17,7 +17,7 @@ def _held(robot: Mechanism) -> list[Pair]:
 
 def _none(file: LintedFile) -> Iterator[Spot]:
     robot = file.mechanism
-    if robot is not None and not _held(robot) and not watched(robot):
+    if robot is not None and not _held(robot) and not is_watched(robot):
         yield Spot(None, "no joint has a motor")
 
 

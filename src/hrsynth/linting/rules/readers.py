@@ -85,10 +85,10 @@ def _dropped(file: LintedFile) -> Iterator[Spot]:
             told.setdefault(construct, []).append((name, line))
     for construct, every in told.items():
         names = comma_list((repr(name) for name, _ in every), 4)
-        yield Spot(every[0][1], f"{names} ({construct}): {_listed(CONSTRUCTS[construct])}")
+        yield Spot(every[0][1], f"{names} ({construct}): {_list_deeds(CONSTRUCTS[construct])}")
 
 
-def _listed(known: dict[str, str]) -> str:
+def _list_deeds(known: dict[str, str]) -> str:
     """What programs do, each deed once."""
     parts = []
     for what in (SILENT, ASKED, TOLD, REFUSED):

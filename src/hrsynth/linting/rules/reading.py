@@ -27,7 +27,7 @@ def _asks(file: LintedFile) -> Iterator[Spot]:
         yield Spot(None, " ".join(str(file.refusal).removeprefix(f"{file.file}: ").split()))
 
 
-def noted(*kinds: str, text: str = "") -> Callable[[LintedFile], Iterator[Spot]]:
+def find_notes(*kinds: str, text: str = "") -> Callable[[LintedFile], Iterator[Spot]]:
     """What finds the reader's notes of some kinds whose text begins with a pattern."""
     def find(file: LintedFile) -> Iterator[Spot]:
         robot = file.mechanism
@@ -38,8 +38,8 @@ def noted(*kinds: str, text: str = "") -> Callable[[LintedFile], Iterator[Spot]]
     return find
 
 
-_unread = noted("open", text=r"(?!\d+ coordinates are driven|the robot's char|nothing in the file closes)")
-_left_out = noted("ignored", text=r"(?!\d+ links that no joint)")  # those have a rule of their own
+_unread = find_notes("open", text=r"(?!\d+ coordinates are driven|the robot's char|nothing in the file closes)")
+_left_out = find_notes("ignored", text=r"(?!\d+ links that no joint)")  # those have a rule of their own
 
 
 RULES = (
@@ -49,7 +49,7 @@ RULES = (
              "Commands need it as an option.", "give the option named in the message", _asks),
     LintRule("guessed", "note", "what the file does not say, guessed from its structure",
              "A guess is made only where the structure leaves one choice; the answer still depends on it.",
-             "say it in the file, or with the option named in the message", noted("guess")),
+             "say it in the file, or with the option named in the message", find_notes("guess")),
     LintRule("ignored", "warning", "what the reader leaves out",
              "No answer takes it into account.", "remove it, or correct the name that it gives", _left_out),
     LintRule("closure-unread", "warning", "what may close a loop and is not read",
@@ -58,10 +58,10 @@ RULES = (
     LintRule("merged", "note", "what is read as something else",
              "Closures and joints that stand for one joint are read as that joint, and relations that hold up to "
              "printed digits are corrected.",
-             "nothing, if that is intended", noted("merged", text=rf"(?!{ROUNDED.pattern})")),
+             "nothing, if that is intended", find_notes("merged", text=rf"(?!{ROUNDED.pattern})")),
     LintRule("zero-singular", "warning", "a singular zero configuration",
              "Ranks at that pose differ from those nearby: motors are at a dead point, or the loops gain a freedom. "
              "This program uses a nearby pose as zero.",
              "choose another zero configuration (hrsynth convert writes the one that is used)",
-             noted("solved", text="the zero pose")),
+             find_notes("solved", text="the zero pose")),
 )

@@ -28,7 +28,7 @@ def _in_radians(value: float | None) -> bool:
         abs(value - steps * numerals.SIMPLE_ANGLE) < NEARLY_ONE
 
 
-def _converted(numbers: list[NumberAt]) -> Mend | None:
+def _convert(numbers: list[NumberAt]) -> Mend | None:
     """All of them in radians; None where some are in these, so that nobody knows what the others are."""
     if any(_in_radians(each.value) for each in numbers):
         return None
@@ -47,7 +47,7 @@ def _limits(file: LintedFile) -> Iterator[Spot]:
         ends = [end for end in (each.lower, each.upper) if end is not None]
         if each.turns and any(in_degrees(end.value) for end in ends):
             values = " to ".join(str(end.text) for end in ends)
-            yield Spot(xml.line(each.element), f"joint {each.joint!r}: limits {values} rad", _converted(ends))
+            yield Spot(xml.line(each.element), f"joint {each.joint!r}: limits {values} rad", _convert(ends))
 
 
 def _angles(file: LintedFile) -> Iterator[Spot]:
@@ -55,7 +55,7 @@ def _angles(file: LintedFile) -> Iterator[Spot]:
         sure = any(in_degrees(end.value) for end in ends)
         if sure or any(TURN_IN_RADIANS < abs(end.value or 0.0) <= 360 for end in ends):
             yield Spot(xml.line(element), f"rpy {' '.join(str(end.text) for end in ends)}, of {what}",
-                       _converted(ends) if sure else None)
+                       _convert(ends) if sure else None)
 
 
 def _turns(file: LintedFile) -> Iterator[tuple[str, xml.Element, list[NumberAt]]]:

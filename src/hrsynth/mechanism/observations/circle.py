@@ -13,7 +13,7 @@ import numpy as np
 from ...geometry.jets import Jet
 from ...geometry.screws import couple, force, normals
 from ...geometry.vectors import Array, Numbers, frozen
-from ..images import tilted
+from ..images import tilt_vector
 from ..observation import Drawn
 from ..sights import (
     CameraObservation,
@@ -23,7 +23,7 @@ from ..sights import (
     apart,
     gimbal,
     kept_in,
-    normalised,
+    normalise_rates,
     ring,
     turned_across,
 )
@@ -74,7 +74,7 @@ class SpaceCircle(CameraObservation):
     def sensed(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
         """The centre beside its place, the normal in a cone."""
         return np.concatenate([value[:3] + noise.get("m", 0.0) * shocks[0],
-                               tilted(value[3:], shocks[1], noise.get("rad", 0.0))])
+                               tilt_vector(value[3:], shocks[1], noise.get("rad", 0.0))])
 
     @staticmethod
     def outline(p: Array, d: Array, r: float, size: float) -> Drawn:
@@ -95,7 +95,7 @@ class SpaceCircle(CameraObservation):
         return (kept_in(at.B, at.B, *np.eye(3)), turned_across(at.d, *normals(at.d)))
 
     def pointing(self, values: Array) -> Array | None:
-        return normalised(values[:, :3])[0]
+        return normalise_rates(values[:, :3])[0]
 
 
 KIND = SpaceCircle

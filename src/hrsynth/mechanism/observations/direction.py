@@ -15,9 +15,9 @@ import numpy as np
 from ...errors import BadMechanism
 from ...geometry.screws import couple, normals
 from ...geometry.vectors import Array, Numbers, cross, frozen, hat, unit
-from ..images import tilted
+from ..images import tilt_vector
 from ..observation import Observation
-from ..sights import HeldPlace, Sighting, VirtualJoint, gimbal, moved, turned_across
+from ..sights import HeldPlace, Sighting, VirtualJoint, gimbal, relative_pose, turned_across
 
 
 def axis_chain(at: Sighting) -> tuple[VirtualJoint, ...]:
@@ -71,7 +71,7 @@ class SeenAxis(Observation):
 
     def sensed(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
         """In a cone about u."""
-        return tilted(value, shocks[0], noise["rad"])
+        return tilt_vector(value, shocks[0], noise["rad"])
 
     @classmethod
     def together(cls, observations: Sequence[Observation], X_reference: Array, X_links: Array, V_reference: Array,
@@ -114,7 +114,7 @@ class SeenAxis(Observation):
     def carried_by(self, into: Mapping[str, str], poses: Mapping[str, Array]) -> Self:
         if into[self.link] == self.link:
             return super().carried_by(into, poses)
-        turned = moved(self.link, into, poses)[:3, :3] @ self.direction
+        turned = relative_pose(self.link, into, poses)[:3, :3] @ self.direction
         return replace(super().carried_by(into, poses), direction=turned)
 
     def to_dict(self) -> dict[str, Any]:

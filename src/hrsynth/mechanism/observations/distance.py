@@ -15,7 +15,7 @@ from ...geometry.jets import Jet
 from ...geometry.screws import force, normals
 from ...geometry.vectors import Array, Numbers, unit
 from ..observation import Drawn
-from ..sights import HeldPlace, MetricPoint, Sighting, VirtualJoint, apart, gimbal, normalised, ring
+from ..sights import HeldPlace, MetricPoint, Sighting, VirtualJoint, apart, gimbal, normalise_rates, ring
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -35,7 +35,7 @@ class PointDistance(MetricPoint):
 
     @staticmethod
     def partials(p: Array, d: Array, r: Array) -> tuple[Array | None, Array | None]:
-        return normalised(p)[0][..., None, :], None
+        return normalise_rates(p)[0][..., None, :], None
 
     @staticmethod
     def fed(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:

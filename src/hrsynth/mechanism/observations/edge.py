@@ -15,7 +15,7 @@ from ...geometry import components
 from ...geometry.jets import Jet
 from ...geometry.vectors import Array, Numbers, cross, unit
 from ..images import SeenLine, line_fed
-from ..sights import Sighting, VirtualJoint, across, apart, normalised, on_plane
+from ..sights import Sighting, VirtualJoint, across, apart, normalise_rates, on_plane
 
 
 def tangent(p: Array, d: Array, r: Array) -> Array:
@@ -77,7 +77,7 @@ class CylinderEdge(SeenLine):
         """The axis of the cylinder that is touched where the plane of the edge meets that of g."""
         n = tangent(p, d, r)
         foot = on_plane(n, g)
-        return foot + r * n, normalised(cross(foot, n))[0]
+        return foot + r * n, normalise_rates(cross(foot, n))[0]
 
     @staticmethod
     def fed(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:

@@ -14,7 +14,7 @@ from ...geometry.jets import Jet
 from ...geometry.vectors import Array, Numbers
 from ..images import line_apart, line_fed, line_slope, shifted_line
 from ..observation import Drawn
-from ..sights import CameraObservation, HeldPlace, Sighting, VirtualJoint, apart, normalised
+from ..sights import CameraObservation, HeldPlace, Sighting, VirtualJoint, apart, normalise_rates
 from .edge import CylinderEdge, tangent, tangent_partials, touching
 from .line import SpaceLine, line_chain, line_loci, line_wrenches
 
@@ -84,7 +84,7 @@ class CylinderEdges(CameraObservation):
         return line_loci(at)
 
     def pointing(self, values: Array) -> Array | None:
-        return normalised(values[:, :3] + values[:, 3:])[0]
+        return normalise_rates(values[:, :3] + values[:, 3:])[0]
 
 
 KIND = CylinderEdges

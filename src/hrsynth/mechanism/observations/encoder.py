@@ -12,7 +12,7 @@ from ...geometry.screws import point_velocity
 from ...geometry.so3 import wrap_angle
 from ...geometry.vectors import Array, cross, transform, unit
 from ..observation import Drawn, Observation
-from ..sights import moved
+from ..sights import relative_pose
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -55,7 +55,7 @@ class AngleEncoder(Encoder):
     start: Array
 
     def carried_by(self, into: Mapping[str, str], poses: Mapping[str, Array]) -> Self:
-        R, R_c = (moved(link, into, poses)[:3, :3] for link in (self.link, str(self.seen_from)))
+        R, R_c = (relative_pose(link, into, poses)[:3, :3] for link in (self.link, str(self.seen_from)))
         axis, start = R_c @ self.axis, R_c @ self.start
         return replace(super().carried_by(into, poses), axis=axis, mark=R @ self.mark, start=start)
 
@@ -100,7 +100,7 @@ class SlideEncoder(Encoder):
     start: Array
 
     def carried_by(self, into: Mapping[str, str], poses: Mapping[str, Array]) -> Self:
-        X, X_c = (moved(link, into, poses) for link in (self.link, str(self.seen_from)))
+        X, X_c = (relative_pose(link, into, poses) for link in (self.link, str(self.seen_from)))
         axis, start = X_c[:3, :3] @ self.axis, transform(X_c, self.start)
         return replace(super().carried_by(into, poses), axis=axis, point=transform(X, self.point), start=start)
 

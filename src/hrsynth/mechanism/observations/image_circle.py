@@ -36,7 +36,7 @@ def _both(a: Array, b: Array) -> Array:
     return np.asarray(product + np.swapaxes(product, -1, -2))
 
 
-def _listed(Q: Array) -> Array:
+def _entries_of(Q: Array) -> Array:
     """The six entries of symmetric matrices, their norm that of the matrix."""
     return np.asarray(Q[..., ROWS, COLUMNS] * WEIGHTS)
 
@@ -67,12 +67,13 @@ class ImageCircle(CameraObservation):
 
     @staticmethod
     def measured(p: Array, d: Array, r: Array) -> Array:
-        entries = _listed(cone(p, d, r))
+        entries = _entries_of(cone(p, d, r))
         return np.asarray(entries / np.linalg.norm(entries, axis=-1, keepdims=True))
 
     @staticmethod
     def partials(p: Array, d: Array, r: Array) -> tuple[Array | None, Array | None]:
-        h, size, entries = dot(p, d)[..., None, None], (dot(p, p)[..., None] - r**2)[..., None], _listed(cone(p, d, r))
+        h, size, entries = dot(p, d)[..., None, None], (dot(p, p)[..., None] - r**2)[...,
+                                                                                     None], _entries_of(cone(p, d, r))
         norm = np.linalg.norm(entries, axis=-1)[..., None, None]
         q = entries[..., None] / norm
 
@@ -81,7 +82,7 @@ class ImageCircle(CameraObservation):
             columns = []
             for k, e in enumerate(np.eye(3)):
                 turned = other[..., k, None, None]
-                columns.append(_listed(2 * h * turned * np.eye(3) - turned * _both(p, d) - h * _both(e, other)
+                columns.append(_entries_of(2 * h * turned * np.eye(3) - turned * _both(p, d) - h * _both(e, other)
                                        + (own[..., k, None, None] * rest if own is p else size * _both(e, d))))
             J = np.stack(columns, axis=-1)
             return np.asarray((J - q @ (np.swapaxes(q, -1, -2) @ J)) / norm)
@@ -110,7 +111,7 @@ class ImageCircle(CameraObservation):
 
     def sensed(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
         """Through five image points beside the ellipse."""
-        entries = _listed(shifted_ellipse(_matrix(value), shocks, self.pixels(noise)))
+        entries = _entries_of(shifted_ellipse(_matrix(value), shocks, self.pixels(noise)))
         return np.asarray(entries / np.linalg.norm(entries))
 
     @staticmethod

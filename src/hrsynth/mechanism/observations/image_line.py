@@ -14,7 +14,7 @@ from ...geometry import components
 from ...geometry.jets import Jet
 from ...geometry.vectors import Array, Numbers, cross, hat, unit
 from ..images import SeenLine, line_fed
-from ..sights import Sighting, VirtualJoint, across, apart, normalised, on_plane
+from ..sights import Sighting, VirtualJoint, across, apart, normalise_rates, on_plane
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -29,11 +29,11 @@ class ImageLine(SeenLine):
 
     @staticmethod
     def measured(p: Array, d: Array, r: Array) -> Array:
-        return normalised(cross(p, d))[0]
+        return normalise_rates(cross(p, d))[0]
 
     @staticmethod
     def partials(p: Array, d: Array, r: Array) -> tuple[Array | None, Array | None]:
-        turned = normalised(cross(p, d))[1]
+        turned = normalise_rates(cross(p, d))[1]
         return -turned @ hat(d), turned @ hat(p)
 
     def normal(self, at: Sighting) -> Numbers:
@@ -46,9 +46,9 @@ class ImageLine(SeenLine):
     @staticmethod
     def supposed(p: Array, d: Array, r: Array, g: Array) -> tuple[Array, Array]:
         """Where the plane of C and the line meets that of g."""
-        n = normalised(cross(p, d))[0]
+        n = normalise_rates(cross(p, d))[0]
         foot = on_plane(n, g)
-        return foot, normalised(cross(n, foot))[0]
+        return foot, normalise_rates(cross(n, foot))[0]
 
     @staticmethod
     def fed(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:

@@ -15,7 +15,7 @@ from ...geometry.jets import Jet
 from ...geometry.screws import couple, force, normals
 from ...geometry.vectors import Array, Numbers, cross, frozen, hat, plane_axes, unit
 from ...tolerances import LINE_AT_CENTRE
-from ..images import tilted
+from ..images import tilt_vector
 from ..observation import Drawn
 from ..sights import (
     CameraObservation,
@@ -25,7 +25,7 @@ from ..sights import (
     across,
     gimbal,
     kept_in,
-    normalised,
+    normalise_rates,
     stretch,
     turned_across,
 )
@@ -74,7 +74,7 @@ class SpaceLine(CameraObservation):
     def sensed(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
         """Its point nearest to C beside its place, its direction in a cone."""
         d, h = value[:3], value[3:]
-        turned = tilted(d, shocks[1], noise.get("rad", 0.0))
+        turned = tilt_vector(d, shocks[1], noise.get("rad", 0.0))
         return np.concatenate([turned, cross(cross(d, h) + noise.get("m", 0.0) * shocks[0], turned)])
 
     @staticmethod
@@ -97,7 +97,7 @@ class SpaceLine(CameraObservation):
 
     def pointing(self, values: Array) -> Array | None:
         sizes = np.linalg.norm(values[:, 3:], axis=1)
-        return normalised(values[:, 3:])[0] if sizes.min() > LINE_AT_CENTRE else None
+        return normalise_rates(values[:, 3:])[0] if sizes.min() > LINE_AT_CENTRE else None
 
 
 def line_loci(at: Sighting) -> tuple[HeldPlace, ...]:

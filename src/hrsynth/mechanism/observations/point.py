@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from ...geometry.jets import Jet
 from ...geometry.screws import force, normals
 from ...geometry.vectors import Array, Numbers, dot
-from ..images import point_image, point_slope, shifted_point, tilted
+from ..images import point_image, point_slope, shifted_point, tilt_vector
 from ..sights import (
     CameraObservation,
     HeldPlace,
@@ -21,7 +21,7 @@ from ..sights import (
     depth_plane,
     gimbal,
     kept_in,
-    normalised,
+    normalise_rates,
 )
 
 
@@ -41,11 +41,11 @@ class ImagePoint(CameraObservation):
 
     @staticmethod
     def measured(p: Array, d: Array, r: Array) -> Array:
-        return normalised(p)[0]
+        return normalise_rates(p)[0]
 
     @staticmethod
     def partials(p: Array, d: Array, r: Array) -> tuple[Array | None, Array | None]:
-        return normalised(p)[1], None
+        return normalise_rates(p)[1], None
 
     @staticmethod
     def plane(p: Array, d: Array, r: Array) -> Array | None:
@@ -75,7 +75,7 @@ class ImagePoint(CameraObservation):
         """The image point beside its place, or the ray in a cone."""
         if "px" in noise:
             return shifted_point(value, shocks[0], self.pixels(noise))
-        return tilted(value, shocks[0], noise["rad"])
+        return tilt_vector(value, shocks[0], noise["rad"])
 
     def wrenches(self, at: Sighting) -> list[Numbers]:
         return [force(n, at.B) for n in normals(at.B - at.C)]

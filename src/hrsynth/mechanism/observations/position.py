@@ -14,7 +14,7 @@ from ...geometry.jets import Jet
 from ...geometry.screws import force
 from ...geometry.vectors import Array, Numbers
 from ..observation import Drawn
-from ..sights import HeldPlace, MetricPoint, Sighting, VirtualJoint, apart, gimbal, kept_in, normalised, stretch
+from ..sights import HeldPlace, MetricPoint, Sighting, VirtualJoint, apart, gimbal, kept_in, normalise_rates, stretch
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -59,7 +59,7 @@ class PointPosition(MetricPoint):
         return (kept_in(at.B, at.B, *np.eye(3)),)
 
     def pointing(self, values: Array) -> Array | None:
-        return normalised(values)[0]
+        return normalise_rates(values)[0]
 
 
 KIND = PointPosition

@@ -101,7 +101,7 @@ def plan(mechanism: Mechanism | LegDecomposition, *, observed: Collection[str] |
         groups, platform = [_LegBoxes(leg, tuple(ears(own, (whole.base, chosen.attach))))], (chosen.attach,)
     columns = _columns(groups, whole.base)
     ends = {group.ears[0].links[-1] for group in groups if group.ears}
-    spots, ways, rows = _placed(groups, columns)
+    spots, ways, rows = _place_groups(groups, columns)
     return Layout(whole, tuple(spots), tuple(_nets(whole, ends, ways, columns)), tuple(rows), links, platform)
 
 
@@ -157,11 +157,12 @@ _Way = tuple[str, tuple[Point, ...], int]
 """A link, the points of its line within a lane, the group."""
 
 
-def _placed(groups: Sequence[_LegBoxes], columns: dict[str, int]) -> tuple[list[PlacedBox], list[_Way], list[Row]]:
+def _place_groups(groups: Sequence[_LegBoxes], columns: dict[str, int]) -> tuple[list[PlacedBox], list[_Way],
+                                                                                 list[Row]]:
     spots: list[PlacedBox] = []
     ways: list[_Way] = []
     rows: list[Row] = []
-    shared = _shared(ear for group in groups for ear in group.ears)
+    shared = _shared_links(ear for group in groups for ear in group.ears)
     top = 0
     for number, group in enumerate(groups):
         lanes: list[list[tuple[int, int]]] = []
@@ -177,7 +178,7 @@ def _placed(groups: Sequence[_LegBoxes], columns: dict[str, int]) -> tuple[list[
     return spots, ways, rows
 
 
-def _shared(found: Iterable[Ear]) -> set[str]:
+def _shared_links(found: Iterable[Ear]) -> set[str]:
     """The links that have a place of their own: ends of ears."""
     return {link for ear in found for link in ((ear.links[0],) if ear.open else (ear.links[0], ear.links[-1]))}
 

@@ -162,10 +162,10 @@ def _scheme(drawn: Layout, name: str) -> str:
 def _picture(drawn: Layout, scale: Scale, name: str, right: float, below: float, bands: list[str],
              content: list[str]) -> str:
     bottom = scale.band(drawn.rows[-1])[1]
-    return svg.picture(scale.x(drawn.columns) + right, bottom + below, name, _described(drawn), *bands, *content)
+    return svg.picture(scale.x(drawn.columns) + right, bottom + below, name, _describe(drawn), *bands, *content)
 
 
-def _described(drawn: Layout) -> str:
+def _describe(drawn: Layout) -> str:
     """The drawing in words: each group's boxes in order, what is driven, what is observed."""
     sentences = []
     for number, row in enumerate(drawn.rows):

@@ -19,7 +19,7 @@ from .parts import CONE, Parts, Refused
 
 def answer(found: Derivation, told: Parts) -> Iterator[str]:
     """A sentence for each question that has an answer."""
-    yield seen(found)
+    yield describe_seen(found)
     if not isinstance(told.legs, Refused):
         yield enough(found, told.legs)
     if not isinstance(told.singularity, Refused):
@@ -27,14 +27,14 @@ def answer(found: Derivation, told: Parts) -> Iterator[str]:
     modes = told.modes
     if not isinstance(modes, Refused) and modes.found.continuum is None and modes.modes:
         count = len(modes.modes)
-        yield (f"At home {count} pose{'s have' if count > 1 else ' has'} the same {held(found.setting)} "
+        yield (f"At home {count} pose{'s have' if count > 1 else ' has'} the same {describe_held(found.setting)} "
                f"({all_of(modes)})"
                + ("; a run that starts far away may end at another than its goal." if count > 1 else "."))
     if not isinstance(told.accuracy, Refused):
         yield from errors(told.accuracy)
 
 
-def seen(found: Derivation) -> str:
+def describe_seen(found: Derivation) -> str:
     """How many freedoms are seen, and what is not."""
     verdict, watched = found.verdict, _legs(found.setting.labels, found.setting)
     if (bodies := verdict.formation) is not None:
@@ -81,7 +81,7 @@ def things(setting: ObservedRobot) -> str:
     return "legs" if all(o.by_segment for o in setting.observed) else "observations"
 
 
-def held(setting: ObservedRobot) -> str:
+def describe_held(setting: ObservedRobot) -> str:
     """What assembly modes have in common."""
     return "observed directions" if things(setting) == "legs" else "measurements"
 

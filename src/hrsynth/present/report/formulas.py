@@ -67,13 +67,13 @@ def formula(expression: Any, said: str, zero: bool = True) -> str:
             f"<mrow>{found}{equals}</mrow></math>")
 
 
-def indexed(text: str) -> str:
+def lower_indices(text: str) -> str:
     """Words with the indices of points and directions set low, as HTML."""
     found = _INDEXED.sub(lambda m: f"{'τ' if m[1] == 'tau' else m[1]}<sub>{m[2]}</sub>", escape(text))
     return found.replace(_LOW, "<sub>i</sub>").replace("]x", "]<sub>×</sub>").replace("^T", "<sup>T</sup>")
 
 
-def collected(where: Mapping[str, str]) -> list[tuple[str, str]]:
+def collect_symbols(where: Mapping[str, str]) -> list[tuple[str, str]]:
     """What symbols mean, those that differ in their index alone as one: ``Bi``, with i = 1, 2, 3."""
     kinds: dict[tuple[str, str], list[str]] = {}
     for symbol, meaning in where.items():
@@ -93,6 +93,6 @@ def _indices(meaning: str, number: str, symbols: Collection[str]) -> str:
                   lambda m: "i" if formula or meaning[m.start() - 1] in " _" else _LOW, meaning)
 
 
-def barred(text: str) -> str:
+def underline_motors(text: str) -> str:
     """An architecture with its driven joints underlined, as HTML."""
     return _BARRED.sub(r"<u>\1</u>", escape(text))

@@ -13,14 +13,14 @@ from ..drawings.schematic import graph_svg
 from ..maps import error_map
 from ..modes import picture, why_undrawn
 from ..portrait import Portrait
-from ..text.poses import all_of, at_mode, proved
-from ..text.robots import at_zero, exact_words, lost, unseen
+from ..text.poses import all_of, at_mode, proof_words
+from ..text.robots import at_zero, exact_words, lost_rows, unseen
 from ..text.runs import field_rows
-from ..text.tables import labelled
-from .answer import answer, good, held, set_rows, things, wrong
+from ..text.tables import label_of
+from .answer import answer, describe_held, good, set_rows, things, wrong
 from .figures import SOURCES, actuators, pairs, step_figures
-from .formulas import barred, collected, formula, indexed
-from .parts import Parts, Refused, asked
+from .formulas import collect_symbols, formula, lower_indices, underline_motors
+from .parts import Parts, Refused, ask
 
 LARGEST_LIST = 63
 """Sets of legs in the table at most: all of six legs; of more, the smallest sets."""
@@ -43,11 +43,11 @@ def page(found: Derivation, told: Parts) -> bytes:
         hidden=found.hidden_architecture and str(found.hidden_architecture), pairs=pairs(found),
         errors=None if isinstance(errors, Refused) else (
             f"{errors.blur.inside} of {wrong(errors)}" if errors.blur.noise is None else
-            f"{errors.blur.inside}, {wrong(errors)}"), things=things(found.setting), held=held(found.setting),
-        watched=["leg " * o.by_segment + labelled(o) for o in found.setting.observed],
+            f"{errors.blur.inside}, {wrong(errors)}"), things=things(found.setting), held=describe_held(found.setting),
+        watched=["leg " * o.by_segment + label_of(o) for o in found.setting.observed],
         scenes=step_figures(found), modes_picture=None if isinstance(modes, Refused) or why_undrawn(modes) is not None
         else _png(picture(modes)),
-        map=errors if isinstance(errors, Refused) else asked(name, lambda: _png(error_map(errors))))).encode()
+        map=errors if isinstance(errors, Refused) else ask(name, lambda: _png(error_map(errors))))).encode()
 
 
 @cache
@@ -58,14 +58,15 @@ def _template() -> Any:
     environment = Environment(loader=PackageLoader("hrsynth.present.report", "."), autoescape=True,
                               undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     environment.filters |= {
-        "barred": lambda text: Markup(barred(text)), "indexed": lambda text: Markup(indexed(text)),
+        "barred": lambda text: Markup(underline_motors(text)), "indexed": lambda text: Markup(lower_indices(text)),
         "sentence": lambda text: text[:1].upper() + text[1:].rstrip(".") + ".",
         "pose": lambda pose: str(pose).replace(",", ", "),
         "angle": lambda value: "" if value is None else f"{value:.1e}"}
     environment.tests["refused"] = lambda part: isinstance(part, Refused)
     environment.globals.update(
-        all_of=all_of, at_mode=at_mode, collected=collected, exact_words=exact_words, lost=lost, at_zero=at_zero,
-        field_rows=field_rows, formula=formula, good=good, most=LARGEST_LIST, proved=proved, rank_gap=RANK_GAP,
+        all_of=all_of, at_mode=at_mode, collected=collect_symbols, exact_words=exact_words, lost=lost_rows,
+                               at_zero=at_zero,
+        field_rows=field_rows, formula=formula, good=good, most=LARGEST_LIST, proved=proof_words, rank_gap=RANK_GAP,
         same_relation=SAME_RELATION, sources=SOURCES, version=__version__, set_rows=set_rows, unseen=unseen)
     return environment.get_template("page.html.j2")
 

@@ -122,7 +122,7 @@ class WorkerProcess:
                 finally:
                     self.current = None
                     task.cancel()
-                await self.send(cancelled(number) if task.cancelled() else task.result())
+                await self.send(cancel_message(number) if task.cancelled() else task.result())
         finally:
             self._end()
 
@@ -131,7 +131,7 @@ class WorkerProcess:
         whole = False
         try:
             reader, writer = await self._started()
-            writer.write(framed(text))
+            writer.write(frame_message(text))
             async with asyncio.timeout(self.seconds):
                 await writer.drain()
                 answer = await _frame(reader)
@@ -152,7 +152,7 @@ class WorkerProcess:
         if self.streams is None:
             channel = await asyncio.to_thread(self.forks.channel)
             self.streams = reader, writer = await asyncio.open_unix_connection(sock=channel)
-            writer.write(framed(self.setup))
+            writer.write(frame_message(self.setup))
             try:
                 async with asyncio.timeout(WORKER_START_SECONDS):
                     await _frame(reader)
@@ -167,7 +167,7 @@ class WorkerProcess:
             self.streams = None
 
 
-def framed(text: bytes) -> bytes:
+def frame_message(text: bytes) -> bytes:
     """A frame, as the other side reads it."""
     return len(text).to_bytes(HEAD, "big") + text
 
@@ -179,7 +179,7 @@ async def _frame(reader: asyncio.StreamReader) -> bytes:
     return await reader.readexactly(size)
 
 
-def cancelled(number: int) -> str:
+def cancel_message(number: int) -> str:
     """The message of an ask that was cancelled."""
     return gone(number, "given up", "Cancelled")
 

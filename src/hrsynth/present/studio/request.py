@@ -42,11 +42,11 @@ class RobotSource:
 
     def load(self) -> Mechanism:
         """The mechanism; one that was read is not read again while its file stays as it is."""
-        return _loaded(self)
+        return _load(self)
 
 
 @lru_cache(maxsize=REMEMBERED)
-def _loaded(source: RobotSource) -> Mechanism:
+def _load(source: RobotSource) -> Mechanism:
     return load(source.robot, **dict(source.options))
 
 

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from ...analysis.accuracy.cones import Blur
-from ...analysis.accuracy.pose_errors import attained
+from ...analysis.accuracy.pose_errors import largest_by_ascent
 from ...analysis.observed import ObservedRobot
 from ...kinematics.configuration import ClosedConfiguration
 from ...mechanism.observations.direction import Direction
 from ...results import finite
-from ..text.tables import NOT_BOUNDED, bounded
+from ..text.tables import NOT_BOUNDED, is_bounded
 
 CONE = math.radians(0.1)
 """Half-angle of the errors of each watched direction (rad)."""
@@ -37,25 +37,26 @@ def step_of(value: float | None, unit: str) -> int:
 
 
 def error(setting: ObservedRobot, at: ClosedConfiguration) -> dict[str, Any]:
-    """What the platform can be wrong by at a configuration, found by an ascent (:func:`.attained`); None where there is
-    no bound, or none to first order."""
+    """What the platform can be wrong by at a configuration, found by an ascent (:func:`.largest_by_ascent`); None where
+    there is no bound, or none to first order."""
     unit = unit_of(setting)
     if not all(isinstance(each, Direction) for each in setting.observed):
         return {**nothing(unit, "not given: what is watched is not a direction"), "step": None}
-    metres, radians = attained(at, setting.samples.question, Blur(np.full(len(setting.observed), CONE)))
-    if np.isfinite([metres, radians]).all() and not (bounded(metres, at.twin.length) and bounded(radians)):
+    metres, radians = largest_by_ascent(at, setting.samples.question, Blur(np.full(len(setting.observed), CONE)))
+    if np.isfinite([metres, radians]).all() and not (is_bounded(metres, at.twin.length) and is_bounded(radians)):
         return nothing(unit, NOT_BOUNDED)
-    return told(finite(1e3 * metres), finite(math.degrees(radians)), unit, bool(setting.motion.rotations.shape[1]))
+    return describe_error(finite(1e3 * metres), finite(math.degrees(radians)), unit,
+                          bool(setting.motion.rotations.shape[1]))
 
 
-def told(mm: float | None, deg: float | None, unit: str, turns: bool) -> dict[str, Any]:
+def describe_error(mm: float | None, deg: float | None, unit: str, turns: bool) -> dict[str, Any]:
     """The record of an error of position and of orientation; the step's name is that of ``unit``, the error of
     orientation is told beside it where the platform ``turns``."""
     value = {"mm": mm, "deg": deg}[unit]
     if mm is None or deg is None:
         return {"mm": mm, "deg": deg, "unit": unit, "step": len(NAMES) - 1, "words": LOST}
-    step, size = step_of(value, unit), f"{rounded(value)}{SIGNS[unit]}"
-    turned = f"{rounded(deg)}°" if turns and unit == "mm" else ""
+    step, size = step_of(value, unit), f"{round_digits(value)}{SIGNS[unit]}"
+    turned = f"{round_digits(deg)}°" if turns and unit == "mm" else ""
     return {"mm": mm, "deg": deg, "unit": unit, "step": step, "size": f"{size} and {turned}" if turned else size,
             "words": f"about {size} off per 0.1°: {NAMES[step]}{f'; turned by about {turned}' if turned else ''}"}
 
@@ -70,6 +71,6 @@ def scale(unit: str) -> dict[str, Any]:
     return {"unit": unit, "edges": list(STEPS[unit]), "names": list(NAMES)}
 
 
-def rounded(value: float | None) -> str:
+def round_digits(value: float | None) -> str:
     """A number as one says it: two digits."""
     return "?" if value is None else f"{float(f'{value:.2g}'):g}"

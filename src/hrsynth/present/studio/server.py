@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...budgets import FAREWELL_SECONDS, LARGEST_ASK, MOST_CONNECTIONS, SENDER_SECONDS
 from ...errors import BadRequest, FileTooLarge, HrsynthError, MissingExtra
-from ...results import spelled
+from ...results import with_spelling
 from .guard import HOST, Guard
 from .processes import DESK, ForkServer
 from .tabs import Opening, Tabs
@@ -39,7 +39,7 @@ TYPES = {".html": "text/html; charset=utf-8", ".js": "text/javascript; charset=u
 MAIN = "studio.html"
 
 
-@spelled
+@with_spelling
 def studio(robot: str | Path | Mechanism | None = None, observe: Iterable[str | int] | str | None = None,
            camera: str | None = None, *, port: int = 0, open_: bool = True) -> StudioServer:
     """Serve the studio on this machine, with a robot, a folder of robots or nothing, and open it in the browser:
@@ -155,7 +155,7 @@ class StudioServer:
         listener = bound(port)
         self.forks = ForkServer(desk)  # while modules are loaded there, the server's are loaded here
         try:
-            self.server, self.guard, self.folder = made(opening, listener.getsockname()[1], self.forks)
+            self.server, self.guard, self.folder = make_server(opening, listener.getsockname()[1], self.forks)
         except BaseException:
             listener.close()
             self.forks.close()
@@ -197,7 +197,8 @@ def require_libraries() -> None:
         raise MissingExtra("serving a page", "studio")
 
 
-def made(opening: Opening, port: int, forks: ForkServer) -> tuple[Server, Guard, tempfile.TemporaryDirectory[str]]:
+def make_server(opening: Opening, port: int, forks: ForkServer) -> tuple[Server, Guard,
+                                                                         tempfile.TemporaryDirectory[str]]:
     """The server, not started, who guards it, and the folder of what is dropped into its pages."""
     require_libraries()
     import h11

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...budgets import ASK_SECONDS, MOST_TABS, MOVE_SECONDS
-from .processes import ForkServer, WorkerProcess, cancelled, gone
+from .processes import ForkServer, WorkerProcess, cancel_message, gone
 from .uploads import UploadFolder
 
 if TYPE_CHECKING:
@@ -97,7 +97,7 @@ class BrowserTab:
         except (ValueError, KeyError, TypeError, RecursionError):
             return gone(None, "no message: an object with a whole number n and the name of an ask", "Unknown")
         if kind == CANCEL:
-            return cancelled(number) if self.mover.cancel(number) or self.desk.cancel(number) else None
+            return cancel_message(number) if self.mover.cancel(number) or self.desk.cancel(number) else None
         there = self.mover if kind == MOVE else self.desk
         return None if there.ask(number, (text or "").encode()) else gone(number, "too many questions wait", "TooMany")
 

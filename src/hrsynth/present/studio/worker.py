@@ -132,10 +132,10 @@ def answer_all(channel: socket.socket, desk: Callable[..., Any]) -> None:
         place = b"" if uploads is None else f"{uploads.resolve()}/".encode()  # what was dropped in is named alone
         _write(stream, READY)
         while asked := _read(stream):
-            _write(stream, answered(found, json.loads(asked)).replace(place, b""))
+            _write(stream, answer_message(found, json.loads(asked)).replace(place, b""))
 
 
-def answered(desk: Any, asked: dict[str, Any]) -> bytes:
+def answer_message(desk: Any, asked: dict[str, Any]) -> bytes:
     """The message to the page: the answer, or what went wrong, as the command line says it."""
     reply: dict[str, Any] = {"n": asked["n"]}
     try:

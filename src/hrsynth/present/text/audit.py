@@ -12,7 +12,7 @@ SHOWN = 5
 """Disagreements of each kind that are shown; JSON has all."""
 
 
-def audited(record: Mapping[str, Any]) -> str:
+def describe_audit(record: Mapping[str, Any]) -> str:
     """The groups, what each column means, the kinds of disagreement with what settles them, the first of each kind."""
     parts = [table([_group(each) for each in record["groups"]], HEADS), _legend(record)]
     sights = [(group["group"], each["verdict"], str(each["fewest"]), f"{each['number']:,}")

@@ -32,14 +32,14 @@ def entry(record: Record, drawn: str, note: str = "") -> str:
     return "\n\n".join([head, *legs, listing(_all(record)), *filter(None, [note])])
 
 
-def built(groups: Iterable[Mapping[str, Any]]) -> str:
+def describe_built(groups: Iterable[Mapping[str, Any]]) -> str:
     """A line a group that was built."""
     rows = [(*(str(each[name]) for name in ("group", "words", "now", "before")), each["file"] or "not complete")
             for each in groups]
     return table(rows, ("group", "words", "made now", "before", "file"))
 
 
-def sited(done: Mapping[str, Any]) -> str:
+def describe_site(done: Mapping[str, Any]) -> str:
     """What a site holds, and where it starts."""
     pages = f"{done['pages']:,} pages, {done['now']:,} made now"
     return f"{done['architectures']:,} architectures on {pages}: {done['index']}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from .tables import GAP, Rows, camera, head, listing, named, table
+from .tables import GAP, Rows, camera, head, listing, name_all, table
 
 if TYPE_CHECKING:
     from ...simulation.endings.rests import Endings, RestCover, RestPoint, SignedModes
@@ -30,17 +30,17 @@ def endings(found: Endings) -> str:
         told = table([_line(each) for each in others[:LISTED_SADDLES]], HEADS).splitlines()
         left = len(others) - LISTED_SADDLES
         rows += [("do not", [*told, *([f"and {left} more (--json lists them)"] if left > 0 else [])]), *GAP]
-    rows += [("enclosed", _enclosed(found, boxed)), *GAP]
+    rows += [("enclosed", _describe_enclosed(found, boxed)), *GAP]
     rows += [("continua", [f"‖e‖ = {each.error:.3g}, {each.stability}{_why(each)}" for each in found.continua])]
-    rows += [("all", [*(_signs(each, found) for each in found.lists if _met(each)),
-                      *_others([each for each in found.lists if not _met(each)]), *_complete(found)])]
+    rows += [("all", [*(_signs(each, found) for each in found.lists if _are_met(each)),
+                      *_others([each for each in found.lists if not _are_met(each)]), *_complete(found)])]
     return listing(rows)
 
 
 HEADS = ("kind", "‖e‖", "", "pose", "")
 
 
-def _met(each: SignedModes) -> bool:
+def _are_met(each: SignedModes) -> bool:
     """Whether there are poses with these legs reversed."""
     return each.listed is not None or bool(each.boxes)
 
@@ -50,7 +50,7 @@ def _others(unmet: list[SignedModes]) -> list[str]:
     proved = sum(each.empty for each in unmet)
     if not unmet:
         return []
-    what = (f"{named('leg', unmet[0].reversed)} reversed" if len(unmet) == 1 else
+    what = (f"{name_all('leg', unmet[0].reversed)} reversed" if len(unmet) == 1 else
             f"{len(unmet)} other choices of reversed legs")
     return [f"poses with {what}: none, proved by boxes of poses" if proved == len(unmet) else
             f"poses with {what}: none found, not proved"]
@@ -72,7 +72,7 @@ def _complete(found: Endings) -> list[str]:
     elif told.turned:
         where += ", with the platform turned as at the goal"
     where += "" if told.shorter is None else f", no rod shorter than {1e3 * told.shorter:.3g} mm"
-    apart = [f"the joints of {named('leg', told.cover.unread)} lock"] if told.cover.unread else []
+    apart = [f"the joints of {name_all('leg', told.cover.unread)} lock"] if told.cover.unread else []
     if told.unstretched is not None:
         apart += [f"leg {' or '.join(told.unstretched)} is stretched"] if told.unstretched else []
         apart += ["a watched direction is at right angles to the desired one" if told.across == 1 else
@@ -103,7 +103,7 @@ def _alone(cover: RestCover) -> list[str]:
             *([f"  and {left} more (--json lists them)"] if left > 0 else [])]
 
 
-def _enclosed(found: Endings, boxed: list[RestPoint]) -> list[str]:
+def _describe_enclosed(found: Endings, boxed: list[RestPoint]) -> list[str]:
     """How many are enclosed, and what that says."""
     if not boxed:
         return []
@@ -118,15 +118,15 @@ def _line(each: RestPoint) -> list[str]:
     if each.singular is not None and not each.across:
         notes.append(each.singular.split(": " if each.boundary else "vanishes ")[-1])
     if each.reversed:
-        notes.append(f"{named('leg', each.reversed)} reversed")
+        notes.append(f"{name_all('leg', each.reversed)} reversed")
     if each.across:
-        notes.append(f"{named('leg', each.across)} at right angles")
+        notes.append(f"{name_all('leg', each.across)} at right angles")
     if each.ways > 1:
         notes.append(f"in {each.ways} working modes")
     if each.side == "other":
         notes.append("in another aspect")
     if each.other_legs:
-        notes.append(f"{named('leg', each.other_legs)} in another working mode")
+        notes.append(f"{name_all('leg', each.other_legs)} in another working mode")
     if each.beyond:
         notes.append(f"beyond the limits of {', '.join(each.beyond)}")
     if each.rates and each.kind == "critical":
@@ -137,7 +137,7 @@ def _line(each: RestPoint) -> list[str]:
 
 def _signs(each: SignedModes, found: Endings) -> str:
     what = "directions" if all(o.by_segment for o in found.setting.observed) else "measurements"
-    which = f"with {named('leg', each.reversed)} reversed" if each.reversed else f"with the desired {what}"
+    which = f"with {name_all('leg', each.reversed)} reversed" if each.reversed else f"with the desired {what}"
     if each.listed is None:
         return f"poses {which}: found, not listed"
     known = "proved to be all" if each.complete else "found, not proved to be all"
@@ -148,4 +148,4 @@ def _signs(each: SignedModes, found: Endings) -> str:
 
 
 def _why(each: RestPoint) -> str:
-    return f", {named('leg', each.across)} at right angles to the desired directions" if each.across else ""
+    return f", {name_all('leg', each.across)} at right angles to the desired directions" if each.across else ""

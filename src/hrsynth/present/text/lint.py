@@ -44,13 +44,13 @@ def github(found: Lint) -> str:
 
 def _command(finding: Finding) -> str:
     place: dict[str, object] = {"file": finding.file, "line": finding.line, "title": finding.rule}
-    properties = ",".join(f"{key}={_escaped(str(value), {':': '%3A', ',': '%2C'})}" for key, value in place.items()
+    properties = ",".join(f"{key}={_escape(str(value), {':': '%3A', ',': '%2C'})}" for key, value in place.items()
                           if value is not None)
     text = finding.message if finding.advice is None else f"{finding.message} → {finding.advice}"
-    return f"::{LEVELS[finding.severity]} {properties}::{_escaped(text)}"
+    return f"::{LEVELS[finding.severity]} {properties}::{_escape(text)}"
 
 
-def _escaped(text: str, more: Mapping[str, str] | None = None) -> str:
+def _escape(text: str, more: Mapping[str, str] | None = None) -> str:
     for character, code in {"%": "%25", "\r": "%0D", "\n": "%0A", **(more or {})}.items():
         text = text.replace(character, code)
     return text

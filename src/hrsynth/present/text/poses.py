@@ -17,7 +17,18 @@ from ...constraints.condition import General
 from ...mechanism.pose import Pose
 from ...tolerances import NOISE, RANK_GAP
 from .robots import NO_MATRIX, formation
-from .tables import GAP, NOT_BOUNDED, Rows, beyond_limits, bounded, camera, head, known, listing, watched
+from .tables import (
+    GAP,
+    NOT_BOUNDED,
+    Rows,
+    beyond_limits,
+    camera,
+    describe_watched,
+    head,
+    is_bounded,
+    known_row,
+    listing,
+)
 
 if TYPE_CHECKING:
     from ...analysis.aspects.atlas import Atlas, ModePair
@@ -37,10 +48,10 @@ _SINCE = {"hidden": "the observed directions", "real": "the motors' coordinates"
 
 def check(found: Check) -> str:
     """What is observed, a block for each pose, then redundant constraints and the grid in numbers."""
-    seen = [f"{leg} ({', '.join(each)})" for leg, each in watched(found.setting).items()]
+    seen = [f"{leg} ({', '.join(each)})" for leg, each in describe_watched(found.setting).items()]
     generic, written = found.setting.mobility, found.as_written
     rows = [head(found.setting)[0], ("observed", seen), *camera(found.setting),
-            *known("mobility", None if written in (None, generic) else
+            *known_row("mobility", None if written in (None, generic) else
                    f"{written.total} as the file is written, {generic.total} in normal form"),
             ("lengths in", f"{found.length:.4g} m (the characteristic length), angles in radians")]
     for posture in found.postures:
@@ -86,7 +97,7 @@ def _posture(posture: Posture, length: float, setting: ObservedRobot) -> Rows:
             *formation(posture.formation)]
     if far.condition is not None and far.type2 is not None and far.type1 is not None:
         rows += [("", f"singular values of Mᵀ {far.type2:.3g} to {1 / far.type1:.3g}, condition {far.condition:.3g}"),
-                 *([("", f"one degree of error in the {shown}{_moved(far, length)}")]
+                 *([("", f"one degree of error in the {shown}{_describe_moved(far, length)}")]
                    if all(each.angular for each in setting.observed) else [])]
         if far.condition > 1 / NOISE:
             rows.append(("", f"nearly singular: dimensions known to {NOISE:g} cannot tell it from a singularity"))
@@ -114,10 +125,10 @@ def _kinds(name: str, what: str, kinds: Kinds, lost: str, *, whole: bool = True)
     return [(name, [title, f"over the generic values: {counts}"]), *((lost, freedom.name) for freedom in kinds.lost)]
 
 
-def _moved(far: Distances, length: float) -> str:
+def _describe_moved(far: Distances, length: float) -> str:
     """How far one degree of error moves the platform, where that is a small motion."""
     if far.millimetres is None or far.degrees is None or not (
-            bounded(far.millimetres / 1e3, length) and bounded(math.radians(far.degrees))):
+            is_bounded(far.millimetres / 1e3, length) and is_bounded(math.radians(far.degrees))):
         return f": {NOT_BOUNDED}"
     return (f", to first order: {_small(far.millimetres)} mm and {_small(far.degrees)} degrees along the weakest "
             "freedom that they show")
@@ -165,8 +176,8 @@ def modes(found: AssemblyModes) -> str:
     count = found.found
     name, seen = head(found.setting)
     if found.formation is not None:
-        return _formed(found, [name, seen, *formation(found.formation)])
-    rows = [name, *([seen] if found.kind == "hidden" else []), ("held", f"{_held(found)} at {found.pose}")]
+        return _describe_formation(found, [name, seen, *formation(found.formation)])
+    rows = [name, *([seen] if found.kind == "hidden" else []), ("held", f"{_describe_held(found)} at {found.pose}")]
     if count.continuum is None or count.complex is None:
         rows += [("modes", f"{found.count}, {all_of(found)}"),
                  ("proof", count.proof)]
@@ -174,7 +185,7 @@ def modes(found: AssemblyModes) -> str:
         legs = ", ".join(found.labels[k] for k in each.legs)
         rows.append(("meant", f"legs {legs} share a joint centre of the {each.where} (to {each.defect:.1e} m; "
                               "--as-written takes the numbers as they are)"))
-    rows += known("special", count.degenerate)
+    rows += known_row("special", count.degenerate)
     for number, motion in enumerate(found.motions, 1):
         place = "the pose itself" if motion.goal else str(found.pose_of(motion))
         starts = f"{motion.met} start{'s' * (motion.met > 1)}"
@@ -182,22 +193,22 @@ def modes(found: AssemblyModes) -> str:
         rows += [*GAP, (f"motion {number}", [f"through {place}, found, not proved: a self-motion {motion.words}{met}"])]
     for number, mode in enumerate(found.modes, 1):
         rows += [*GAP, (f"mode {number}", [f"{mode.pose}" + ("   (the pose itself)" if mode.goal else ""),
-                 proved(mode) if mode.fits is not None else f"{proved(mode)}, residual {mode.residual:.1e}",
+                 proof_words(mode) if mode.fits is not None else f"{proof_words(mode)}, residual {mode.residual:.1e}",
                  *ahead(mode), *at_mode(mode, found.kind)])]
     for number, mode in enumerate(found.antipodal, 1):
         rows += [*GAP, (f"antipodal {number}", [f"{mode.pose}   not a mode: the opposite value of "
-                                                f"{', '.join(mode.opposite)}", proved(mode), *ahead(mode)])]
+                                                f"{', '.join(mode.opposite)}", proof_words(mode), *ahead(mode)])]
     for number, mode in enumerate(found.near, 1):
         rows += [*GAP, (f"near {number}", [f"{mode.pose}   residual {mode.residual:.2e}: almost a mode"
                  + (", and none" if count.complete else ""), *at_mode(mode, found.kind)])]
     return listing(rows)
 
 
-def _formed(found: AssemblyModes, rows: Rows) -> str:
+def _describe_formation(found: AssemblyModes, rows: Rows) -> str:
     """The count with its proof, a block with the places of all bodies for each mode of a formation."""
     if found.found.continuum is None:
         rows += [("modes", f"{found.count}, {all_of(found)}"), ("proof", found.found.proof)]
-    rows += known("special", found.found.degenerate)
+    rows += known_row("special", found.found.degenerate)
     for word, listed in (("mode", found.modes), ("antipodal", found.antipodal)):
         for number, mode in enumerate(listed, 1):
             told = [f"{body}: {Pose.of(X)}" for body, X in (mode.bodies or {}).items()]
@@ -209,7 +220,7 @@ def _formed(found: AssemblyModes, rows: Rows) -> str:
     return listing(rows)
 
 
-def _held(found: AssemblyModes) -> str:
+def _describe_held(found: AssemblyModes) -> str:
     if found.kind == "hidden" and not all(o.by_segment for o in found.setting.observed):
         return "what is observed"
     return _SINCE[found.kind]
@@ -231,7 +242,7 @@ def all_of(found: AssemblyModes) -> str:
     return "found, not proved to be all"
 
 
-def proved(mode: AssemblyMode) -> str:
+def proof_words(mode: AssemblyMode) -> str:
     """What is proved of a mode's place."""
     within = "" if not np.isfinite(mode.radius) else f"to {mode.shift:.1e} m" + (f", {mode.turn:.1e} rad" if mode.turn
                                                                                  else "")
@@ -281,7 +292,7 @@ def path(found: PathAnswer) -> str:
     value = "expression" if found.signed else "smallest singular value"
     rows = [*head(found.setting), ("from", f"{found.start.pose}   ({value} {found.start.value:.4g})"),
             ("to", f"{found.goal.pose}   ({value} {found.goal.value:.4g})"),
-            *known("", "start and goal are the same pose: there is no path to find" if found.stays else None),
+            *known_row("", "start and goal are the same pose: there is no path to find" if found.stays else None),
             ("verdict", [f"{found.verdict} ({'certified' if found.certified else 'not certified'})", found.reason])]
     if found.margin is not None:
         where = "all along the path" if found.certified and found.ways else "at both poses"
@@ -292,7 +303,7 @@ def path(found: PathAnswer) -> str:
                                for leg, place in found.crossings]))
     if found.road is not None:
         rows.append(("sampled", road(found.road, value)))
-    return listing([*rows, *known("not proved", found.not_proved if found.certified else None)])
+    return listing([*rows, *known_row("not proved", found.not_proved if found.certified else None)])
 
 
 def road(found: SampledRoad, value: str) -> list[str]:
@@ -311,9 +322,9 @@ _SIGNS = {SAME: "=", SEPARATED: "|", UNDECIDED_PAIR: "?"}
 def atlas(found: Atlas) -> str:
     """The modes, how many aspects hold them, the table mode by mode, and what was asked of which pairs."""
     listed = found.listed
-    rows = [*head(listed.setting), ("held", f"{_held(listed)} at {listed.pose}")]
+    rows = [*head(listed.setting), ("held", f"{_describe_held(listed)} at {listed.pose}")]
     if listed.found.continuum is not None:
-        return listing([*rows, *known("special", listed.found.degenerate)])
+        return listing([*rows, *known_row("special", listed.found.degenerate)])
     rows += [("modes", f"{listed.count}, {all_of(listed)}"),
              ("aspects", f"{found.aspects_met} of the hidden robot: {aspect_groups(found)}"),
              ("cuspidal", _cuspidal(found)), *GAP]

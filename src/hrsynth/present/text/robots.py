@@ -11,7 +11,7 @@ from ...analysis.verdict import ELSEWHERE
 from ...errors import HrsynthError
 from ...tolerances import RANK_CUTOFF, RANK_GAP, SAME_RELATION, SURELY_SOMETHING
 from .branches import UNITS, ends, limits
-from .tables import LINE, Rows, camera, head, known, listing, sets, table, watched, wrapped
+from .tables import LINE, Rows, camera, describe_watched, head, known_row, listing, sets, table, wrap_lines
 
 if TYPE_CHECKING:
     from ...analysis.advice import Advice, FurtherMeasurement
@@ -44,7 +44,7 @@ def robot(found: Mechanism) -> str:
     rows: Rows = [("links, joints", f"{len(found.links)}, {len(found.joints)}"), ("base", found.base),
                   ("bodies", ", ".join(found.bodies)) if found.formation else ("platform", found.platform),
                   ("motors", ", ".join(joint.name for joint in found.joints.values() if joint.actuated) or "none"),
-                  *known("camera on", found.reference if found.reference != found.base else None)]
+                  *known_row("camera on", found.reference if found.reference != found.base else None)]
     try:
         anatomy = decompose(normal_form(found).mechanism)
         rows.insert(0, ("robot", f"{found.name}   {anatomy.architecture()}"))
@@ -72,10 +72,10 @@ def derivation(found: Derivation) -> str:
                      *([near(found.verdict)] if found.verdict.near else [])]),
         *formation(found.verdict.formation),
         ("mode", _modes(observed)),
-        ("architecture", wrapped(exact_words(found.exact, found.verdict.rank), LINE - NAMES)),
-        *lost(found.verdict), ("at zero", at_zero(found.verdict)),
+        ("architecture", wrap_lines(exact_words(found.exact, found.verdict.rank), LINE - NAMES)),
+        *lost_rows(found.verdict), ("at zero", at_zero(found.verdict)),
         ("", [] if found.verdict.has_interaction_matrix else NO_MATRIX),
-        ("certificate", wrapped(certificate(found.certificate), LINE - NAMES)),
+        ("certificate", wrap_lines(certificate(found.certificate), LINE - NAMES)),
     ]
     if paper is not None:
         rows.append(("paper's form", [f"{paper.hidden}: {'equivalent' if paper.equivalent else 'NOT equivalent'}"
@@ -86,7 +86,7 @@ def derivation(found: Derivation) -> str:
     return "\n".join([listing(rows), "", table(steps, ("rule", "leg", "taken", "angle", "why"))])
 
 
-def lost(found: Verdict) -> Rows:
+def lost_rows(found: Verdict) -> Rows:
     """The freedoms that are not seen; at zero, where their names do not say where the platform is."""
     names = [freedom.name for freedom in found.lost]
     return [("lost" if any(ELSEWHERE in name for name in names) else "lost at zero", names)]
@@ -106,7 +106,7 @@ def formation(found: Formation | None) -> Rows:
     if found is None:
         return []
     return [("trivial", list(found.trivial) or "no motion: all are seen, or flexes"),
-            ("flexes", [each.name for each in found.flexes] or "none"), *known("special", found.special or None)]
+            ("flexes", [each.name for each in found.flexes] or "none"), *known_row("special", found.special or None)]
 
 
 def _modes(observed: ObservedRobot) -> list[str]:
@@ -174,10 +174,11 @@ def legs(found: Legs) -> str:
     if found.setting.mechanism.formation:
         lost = f"not seen (at {found.where})"
     lines = [f"{found.robot}   {found.architecture}   {found.dof} dof", "",
-             *wrapped(f"smallest sets of the best rank: {found.smallest}" if found.dof else NO_FREEDOM, more="  "), "",
+             *wrap_lines(f"smallest sets of the best rank: {found.smallest}" if found.dof else NO_FREEDOM, more="  "),
+             "",
              table(rows, ("legs", "verdict", "rank", "exact", lost)), "",
-             *(line for leg, seen in watched(found.setting).items()
-               for line in wrapped(f"leg {leg}: {', '.join(seen)}", more="  "))]
+             *(line for leg, seen in describe_watched(found.setting).items()
+               for line in wrap_lines(f"leg {leg}: {', '.join(seen)}", more="  "))]
     lines += [f"not decided in exact arithmetic: {reason}"
               for reason in dict.fromkeys(each.reason for each in found.exact if not each.exact)]
     chance = max(each.chance for each in found.exact)
@@ -187,7 +188,7 @@ def legs(found: Legs) -> str:
     fewer = [f"{{{', '.join(each.legs)}}} ({each.rank_at_zero} of {each.dof})" for each in found.sets
              if each.rank_at_zero is not None]
     if fewer:
-        lines += wrapped(f"at {found.where}, a Type 2 singularity with these, fewer freedoms are seen: "
+        lines += wrap_lines(f"at {found.where}, a Type 2 singularity with these, fewer freedoms are seen: "
                          + "  ".join(fewer), more="  ")
     lines += _modes(found.setting)
     if not found.complete:
@@ -197,7 +198,7 @@ def legs(found: Legs) -> str:
     return "\n".join(lines)
 
 
-def exported(found: ExportedCode) -> str:
+def describe_export(found: ExportedCode) -> str:
     """What the code is of, and where it answers."""
     proof, bounds = found.proof, found.bounds
     rows: Rows = [("robot", proof.robot.name), ("language", found.lang), ("motors", ", ".join(proof.motors)),
@@ -233,7 +234,7 @@ def advice(found: Advice) -> str:
     """What is seen now, then the smallest sets of measurements that cure it, by kind."""
     now = found.now
     rows = [*head(found.setting), *camera(found.setting), ("verdict", f"{now.verdict} (rank {now.rank} of {now.dof})"),
-            *lost(now)]
+            *lost_rows(now)]
     return "\n".join([listing(rows), "", *_missing(found)])
 
 
@@ -257,9 +258,10 @@ def _missing(found: Advice) -> list[str]:
     lines = [f"{best.verdict.capitalize()} (rank {best.rank} of {best.dof}) with {what}, {ways}, smallest rank gap "
              f"{gap:.1e} (needed {RANK_GAP:.0e}):",
              *(f"  {line}" for group in groups.items() for way in _ways(*group)
-               for line in wrapped(way, LINE - 2, more="    "))]
+               for line in wrap_lines(way, LINE - 2, more="    "))]
     starred = any(m.actuated for each in found.sets for m in each.measurements)
-    return [*lines, *(["* a joint with a motor"] if starred else []), *_singular(found), *_asked(found), *limits]
+    return [*lines, *(["* a joint with a motor"] if starred else []), *_singular(found), *_options_that_ask(found),
+            *limits]
 
 
 def _singular(found: Advice) -> list[str]:
@@ -272,10 +274,10 @@ def _singular(found: Advice) -> list[str]:
     see = "sees fewer freedoms" if len(fewer) == 1 else "see fewer freedoms"
     title = f"{which} {see} at the zero configuration, a Type 2 singularity with them:"
     return [title] if len(fewer) == len(found.sets) else [
-        title, *(f"  {line}" for line in wrapped("  ".join(sets(fewer[:_SHOWN])) + more, LINE - 2, more="  "))]
+        title, *(f"  {line}" for line in wrap_lines("  ".join(sets(fewer[:_SHOWN])) + more, LINE - 2, more="  "))]
 
 
-def _asked(found: Advice) -> list[str]:
+def _options_that_ask(found: Advice) -> list[str]:
     """The options of other commands that ask with the first set that has such, and cures at zero too where one does."""
     if not all(each.by_segment for each in found.setting.observed):
         return []

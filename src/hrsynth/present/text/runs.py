@@ -18,11 +18,11 @@ from .tables import (
     NOT_BOUNDED,
     Rows,
     beyond_limits,
-    bounded,
     camera,
     head,
-    known,
-    labelled,
+    is_bounded,
+    known_row,
+    label_of,
     listing,
     table,
 )
@@ -94,7 +94,7 @@ def basins(found: Basins) -> str:
     size = " × ".join(f"{count} {name}" for count, name in zip(found.grid.shape, found.grid.names, strict=True))
     rows = [*head(found.setting), *camera(found.setting), ("to", str(found.goal)),
             ("starts", f"{found.starts:,} of {size}: {replace(found.grid, fixed=Pose())}"),
-            *known("held", held(found.grid, found.setting, found.abreast)), *GAP]
+            *known_row("held", describe_held(found.grid, found.setting, found.abreast)), *GAP]
     lines = [[letter, each.ending.name, f"{each.count:,}", f"{100 * each.share:.3g} %",
               "" if each.pose is None else str(each.pose), str(each.example)]
              for letter, each in zip(LETTERS, found.ends, strict=False)]
@@ -128,7 +128,7 @@ def _degrees(angle: float) -> str:
 def accuracy(found: Accuracy) -> str:
     """The cones, the range of errors over a grid, a block for each single pose."""
     name, _ = head(found.setting)
-    rows = [name, ("observed", ", ".join(f"{labelled(o)} {found.blur.words(i, o)}"
+    rows = [name, ("observed", ", ".join(f"{label_of(o)} {found.blur.words(i, o)}"
                                          for i, o in enumerate(found.setting.observed))),
             *camera(found.setting), ("errors", f"largest over all errors {found.blur.inside}, to first order")]
     length = found.setting.everything.twin.length
@@ -172,7 +172,7 @@ def _swept_rows(found: Accuracy, swept: SweptErrors) -> Rows:
                       _range(tally.orientation, None, 180 / np.pi, "degrees"), swept.spots, tally.gap)
 
 
-def held(grid: Grid, setting: ObservedRobot, as_at_home: bool) -> str | None:
+def describe_held(grid: Grid, setting: ObservedRobot, as_at_home: bool) -> str | None:
     """What a grid holds: the whole pose but for what varies, where free parts stay as they are at the zero
     configuration (``as_at_home``), else what was given and which parts are free."""
     motion, typed = setting.motion, str(grid.fixed)
@@ -194,7 +194,7 @@ def _grid_rows(found: Accuracy, grid: Grid, reached: str, position: str, orienta
     size = " × ".join(f"{count} {name}" for count, name in zip(grid.shape, grid.names, strict=True))
     ranges = ", ".join(f"{name} {values[0]:.4g} to {values[-1]:.4g} {'rad' if name == 'phi' else 'm'}"
                        for name, values in grid.axes)
-    rows = [("poses", f"{size}: {ranges}"), *known("held", held(grid, found.setting, spots is not None)),
+    rows = [("poses", f"{size}: {ranges}"), *known_row("held", describe_held(grid, found.setting, spots is not None)),
             ("reached", reached), ("position", position), ("orientation", orientation)]
     if spots is not None and spots.count:
         rows.append(("checked", f"against Pinocchio at {spots.count} random poses, largest difference "
@@ -241,7 +241,7 @@ def _samples(errors: PoseErrors, true: Sampled) -> Rows:
 def _extent(name: str, extent: ErrorEllipsoid, unit: float, word: str, length: float = 1.0) -> Rows:
     if not np.isfinite(extent.largest):
         return [(name, "infinite: a freedom is lost here")]
-    if not bounded(extent.largest, length):
+    if not is_bounded(extent.largest, length):
         return [(name, f"{NOT_BOUNDED}: the cones are too large for that here, or a singularity is near")]
     if extent.direction is None:
         return [(name, "no error: the platform does not move so")]
@@ -317,8 +317,8 @@ def _row(each: Candidate, sight: bool, length: float) -> list[str]:
     seen = [] if not sight else ["–" if each.seen is None else f"{100 * min(each.seen.values()):.0f} %"]
     position, orientation = errors.position.largest, errors.orientation.largest
     return [", ".join(each.legs), *_ends(each.ends),
-            f"{1e3 * position:.4g}" if bounded(position, length) else "not bounded",
-            f"{np.degrees(orientation):.4g}" if bounded(orientation) else "not bounded",
+            f"{1e3 * position:.4g}" if is_bounded(position, length) else "not bounded",
+            f"{np.degrees(orientation):.4g}" if is_bounded(orientation) else "not bounded",
             f"{_modes(each.start_modes)} / {_modes(each.goal_modes)}",
             "–" if each.aspect is None else each.aspect.verdict, *seen,
             "–" if each.run is None else each.run.verdict]

@@ -33,7 +33,7 @@ def table(rows: Sequence[Sequence[str]], heads: Sequence[str]) -> str:
     before = sum(max(width(row[i]) for row in (heads, *rows)) + 2 for i in range(len(heads) - 1))
     everything = [list(heads)]
     for *cells, last in rows:
-        first, *more = wrapped(last, max(LINE - before, LEAST))
+        first, *more = wrap_lines(last, max(LINE - before, LEAST))
         everything += [[*cells, first], *([*[""] * len(cells), line] for line in more)]
     columns = [max(width(row[i]) for row in everything) for i in range(len(heads))]
 
@@ -44,7 +44,7 @@ def table(rows: Sequence[Sequence[str]], heads: Sequence[str]) -> str:
     return "\n".join([line(heads), "  ".join("-" * size for size in columns), *map(line, everything[1:])])
 
 
-def wrapped(text: str, columns: int = LINE, more: str = "") -> list[str]:
+def wrap_lines(text: str, columns: int = LINE, more: str = "") -> list[str]:
     """The lines of a text, no word, vector or set of it parted; further ones begin with ``more``."""
     whole = re.sub(r"\([-+.e\d ]+\)|\{[^}]*\}", lambda found: found[0].replace(" ", "\u00a0"), text)
     lines = textwrap.wrap(whole, columns, subsequent_indent=more, break_long_words=False, break_on_hyphens=False)
@@ -59,44 +59,44 @@ def listing(rows: Iterable[tuple[str, str | Sequence[str]]]) -> str:
     return "\n".join(f"{name:<{head}}  {value}".rstrip() for name, value in lines)
 
 
-def listed(words: Sequence[str]) -> str:
+def list_words(words: Sequence[str]) -> str:
     """Words as a sentence lists them: one, two and three."""
     return ", ".join(words[:-1]) + " and " * (len(words) > 1) + words[-1]
 
 
-def named(noun: str, words: Sequence[str]) -> str:
+def name_all(noun: str, words: Sequence[str]) -> str:
     """Things of a kind by their names: leg 1; legs 1, 2 and 4."""
-    return f"{noun}{'s' * (len(words) > 1)} {listed(words)}"
+    return f"{noun}{'s' * (len(words) > 1)} {list_words(words)}"
 
 
-def bounded(error: Any, length: float = 1.0) -> Any:
+def is_bounded(error: Any, length: float = 1.0) -> Any:
     """Whether a displacement (m, with a characteristic ``length``) or a turn (rad) is one of which the first order
     tells anything."""
     return error <= LARGEST_FIRST_ORDER * length
 
 
-def known(name: str, value: str | None) -> Rows:
+def known_row(name: str, value: str | None) -> Rows:
     """A row where there is a value."""
     return [] if value is None else [(name, value)]
 
 
 def beyond_limits(joints: Sequence[str]) -> Rows:
     """The joints that are beyond their limits at a pose."""
-    return known("limits", f"beyond those of {', '.join(joints)}" if joints else None)
+    return known_row("limits", f"beyond those of {', '.join(joints)}" if joints else None)
 
 
 def head(found: ObservedRobot) -> Rows:
     """The robot and what is observed of it."""
     return [("robot", f"{found.robot.name}   {found.anatomy.architecture()}"),
-            ("observed", ", ".join(map(labelled, found.observed)))]
+            ("observed", ", ".join(map(label_of, found.observed)))]
 
 
-def labelled(observation: Observation) -> str:
+def label_of(observation: Observation) -> str:
     """An observation's label, with what it is."""
-    return f"{observation.leg} ({observation.link if observation.by_segment else seen(observation)})"
+    return f"{observation.leg} ({observation.link if observation.by_segment else describe_observation(observation)})"
 
 
-def seen(observation: Observation) -> str:
+def describe_observation(observation: Observation) -> str:
     """What is observed, and by what: ``point of plate by hand``."""
     told = observation.to_dict()
     if "joint" in told:
@@ -106,7 +106,7 @@ def seen(observation: Observation) -> str:
         f" by {by}" if by else "")
 
 
-def watched(found: ObservedRobot) -> dict[str, list[str]]:
+def describe_watched(found: ObservedRobot) -> dict[str, list[str]]:
     """What is watched of each leg: the link, the axis in its frame, and why it is that."""
     from ...analysis.freedoms import point_text
 
@@ -115,7 +115,7 @@ def watched(found: ObservedRobot) -> dict[str, list[str]]:
         said = o.to_dict()
         where = "".join(f" {word} {point_text(said[key])}" for word, key in (("at", "at"), ("along", "axis"))
                         if said[key] is not None)
-        what = o.link if o.by_segment else seen(o)
+        what = o.link if o.by_segment else describe_observation(o)
         told.setdefault(o.leg, []).append(f"{what}{where}{' of its frame' * bool(where)}, {why}")
     return told
 
@@ -123,7 +123,7 @@ def watched(found: ObservedRobot) -> dict[str, list[str]]:
 def camera(found: ObservedRobot) -> Rows:
     """What carries the camera, where it is not the base."""
     reference = found.mechanism.reference
-    return known("camera on", reference if reference != found.mechanism.base else None)
+    return known_row("camera on", reference if reference != found.mechanism.base else None)
 
 
 def sets(found: Iterable[Iterable[str]]) -> list[str]:

@@ -12,7 +12,7 @@ import numpy as np
 from ...analysis.derive import Derivation, derive
 from ...analysis.observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike
 from ...analysis.question import question
-from ...geometry.vectors import Array, oriented
+from ...geometry.vectors import Array, orient_axis
 from ...kinematics.coordinates import Coordinates
 from ...kinematics.platform_motion import PlatformMotion
 from ...mechanism import Mechanism
@@ -238,4 +238,4 @@ def plane_normal(motion: PlatformMotion) -> Array | None:
     normal = np.cross(*motion.translations.T)
     if motion.rotations.shape[1] > 1 or (motion.rotations.shape[1] and abs(normal @ motion.rotations[:, 0]) < 1 - 1e-6):
         return None
-    return oriented(normal)
+    return orient_axis(normal)

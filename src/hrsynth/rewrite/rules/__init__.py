@@ -14,10 +14,10 @@ from ..rule import Rule, Stage
 @cache
 def rules(*stages: Stage) -> tuple[Rule[Any, Any], ...]:
     """The rules of some stages (default: of all), stage by stage, by their files' names in each."""
-    found = list(_found())
+    found = list(_find_rules())
     return tuple(rule for stage in stages or Stage for rule in found if rule.stage is stage)
 
 
-def _found() -> Iterator[Rule[Any, Any]]:
+def _find_rules() -> Iterator[Rule[Any, Any]]:
     for module in sorted(iter_modules(__path__), key=lambda module: module.name):
         yield import_module(f"{__name__}.{module.name}").RULE

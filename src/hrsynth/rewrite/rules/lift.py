@@ -81,11 +81,11 @@ def _sensor(state: State, evidence: Evidence, seen: Observation, index: int, tag
 def apply(state: State, found: list[Lifting | Encoder]) -> State:
     """The robot with these chains, and these joints actuated."""
     for each in found:
-        state = _encoded(state, each) if isinstance(each, Encoder) else _lifted(state, each)
+        state = _encode(state, each) if isinstance(each, Encoder) else _lift(state, each)
     return state
 
 
-def _lifted(state: State, lifting: Lifting) -> State:
+def _lift(state: State, lifting: Lifting) -> State:
     mechanism, tag = state.mechanism, lifting.tag
     count = len(lifting.joints)
     names, between = SEGMENT if lifting.segment else (
@@ -111,7 +111,7 @@ def _lifted(state: State, lifting: Lifting) -> State:
                    owners={**state.owners, **{link: lifting.leg for link in link_names}})
 
 
-def _encoded(state: State, seen: Encoder) -> State:
+def _encode(state: State, seen: Encoder) -> State:
     """The real joint with a motor; of two coordinates of one joint the second changes nothing."""
     joint = state.mechanism.joints[seen.joint]
     if joint.actuated:

@@ -171,12 +171,12 @@ class Abreast:
         done = live[good]
         self.X[done], self.times[done] = Y[good], self.times[done] + self.steps[done]
         self.steps[live] = np.minimum(self.steps[live] * factor, LONGEST_STEP)
-        here = _merged(here, there, good)
+        here = _merge(here, there, good)
         changed = self._stretched(live, here, met) | self._released(live, here, good) | self._weakened(live, here, good)
         uneven = changed | (here.weakest < FLOW_WEAK * DAMPED) | (~good & (self.old[live] > 0))
         self.old[live] = np.where(uneven, FLOW_KEPT, self.old[live] + good)
         if changed.any():
-            here = _merged(here, self._at(live), changed)
+            here = _merge(here, self._at(live), changed)
             self.stopped[live[changed & ~here.reached]] = LOST
         return here
 
@@ -290,7 +290,7 @@ def _part(here: Commanded, kept: Flags) -> Commanded:
     return Commanded(*(getattr(here, name)[kept] for name in Commanded.__dataclass_fields__))
 
 
-def _merged(here: Commanded, there: Commanded, good: Flags) -> Commanded:
+def _merge(here: Commanded, there: Commanded, good: Flags) -> Commanded:
     """What is commanded there where ``good``, else here."""
     found = []
     for name in Commanded.__dataclass_fields__:

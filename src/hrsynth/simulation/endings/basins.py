@@ -42,7 +42,7 @@ from ...progress import tell
 from ...results import Result, Value
 from ...tolerances import RUNS_ALIKE, SEEN_ABOVE
 from ..ending import ENDINGS, GOAL, SIGHT, TIME, UNDECIDED, Ending, EndingClassifier
-from ..law import measured
+from ..law import measure_all
 from ..run import AWAY, EFFORT, LOST, POISED, REST, SERVED_AT
 from ..run import TIME as OVER
 from ..servo import Conditions, ServoTask
@@ -275,7 +275,7 @@ class BasinSearch:
         shares = [starts[k::count] for k in range(count)]
         starts = np.concatenate(shares)
         # a step of few runs takes as long as one of a thousand: the last of all parts go on together
-        first, *others = self._done([partial(_followed, flow.bare(), horizon, RUN_AWAY * length, X[share],
+        first, *others = self._done([partial(_follow_flow, flow.bare(), horizon, RUN_AWAY * length, X[share],
                                              FLOW_FEW // count) for share in shares])
         checked = np.random.default_rng(seed).choice(len(starts), min(FLOW_CHECKED, len(starts)), replace=False)
         runs, certified, *alone = self._done([partial(first.together(others).run, horizon),
@@ -325,7 +325,7 @@ class BasinSearch:
 
     def _single(self, starts: Sequence[ClosedConfiguration | None]) -> list[Callable[[], list[Outcome]]]:
         """Pieces of work that give the outcomes of single runs, undecided where there is no start."""
-        return [partial(_simulated, self.task, starts[k : k + FLOW_SINGLE]) for k in range(0, len(starts), FLOW_SINGLE)]
+        return [partial(_simulate, self.task, starts[k : k + FLOW_SINGLE]) for k in range(0, len(starts), FLOW_SINGLE)]
 
     def _done(self, works: Sequence[Callable[[], Any]]) -> list[Any]:
         """What pieces of work give, in their order."""
@@ -365,13 +365,13 @@ def _at(outcome: Outcome, X: Array, length: float) -> Outcome:
     return Outcome(Ending(UNDECIDED, "a single run does not stay where these end"))
 
 
-def _followed(flow: Flow, horizon: float, farthest: float, X: Array, few: int) -> Abreast:
+def _follow_flow(flow: Flow, horizon: float, farthest: float, X: Array, few: int) -> Abreast:
     found = Abreast(flow, X, farthest).follow(horizon, few)
     found.flow = flow.bare()
     return found
 
 
-def _simulated(task: ServoTask, starts: Sequence[ClosedConfiguration | None]) -> list[Outcome]:
+def _simulate(task: ServoTask, starts: Sequence[ClosedConfiguration | None]) -> list[Outcome]:
     classifier = EndingClassifier(task.setting, task.goal, task.wanted)
     loop, found = task.loop(), []
     for start in starts:
@@ -382,7 +382,7 @@ def _simulated(task: ServoTask, starts: Sequence[ClosedConfiguration | None]) ->
             found.append(Outcome(Ending(SIGHT, "a camera does not see at the start what it is to see")))
             continue
         run = loop.simulate(start, task.conditions.horizon)
-        ending = classifier.classify(run, measured(run.last, task.law.question)[0])
+        ending = classifier.classify(run, measure_all(run.last, task.law.question)[0])
         rests = run.stopped in (SERVED_AT, REST, POISED)
         found.append(Outcome(ending, run.last.pose(task.setting.motion.link), run.commands[-1].size) if rests
                      else Outcome(ending))

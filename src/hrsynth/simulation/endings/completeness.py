@@ -21,7 +21,7 @@ from ...tolerances import COVER_REACH, SHORTEST_ROD
 from ..law import directions
 from .cover import Cover, cover
 from .critical_poses import CriticalPoses, Lift
-from .descent import descend, sharpened
+from .descent import descend, sharpen_points
 from .error import RestSystem
 from .rests import SADDLE, STABLE, UNDECIDED, UNSTABLE, BoxedRest, RestCover, RestPoint, SignedModes
 from .search import Critical
@@ -76,7 +76,7 @@ class Covers(Value):
                                       np.array([box.directions for box in left]), falling, 0 * falling)
                 start, done = Lift(self.system, self.question.observations, each.error)(poses, q)
                 points = descend(self.system, start[done], falling[done], idle, np.inf)
-                found += [Critical(point, 0) for point in sharpened(self.system, points, idle)]
+                found += [Critical(point, 0) for point in sharpen_points(self.system, points, idle)]
         return found
 
     def signed(self, lists: Sequence[SignedModes], desired: Array) -> list[SignedModes]:

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...batch.enclosures import BoxFormula, traced
+from ...batch.enclosures import BoxFormula, trace_formula
 from ...budgets import CONE_BOXES, CONES_AT_ONCE
-from ...geometry.affine import affine, stacked
+from ...geometry.affine import affine, stack
 from ...geometry.vectors import Array
 from ...tolerances import AFFINE_ROUNDING, CHAIN_ROUNDING, FOLLOWED, NARROWEST_RISING_CONE, SHORTEST_SLICE
 from .pose_error import Number, PoseError
@@ -126,9 +126,10 @@ class ConeProver:
             found = error.at(x, [number(column) for column in W.T], number)
             return [*found.margins, *(x for each in found.seen for rate in zip(*each.rates, strict=True) for x in rate)]
 
-        made = traced(jacobian, n)
+        made = trace_formula(jacobian, n)
         found = made.at([affine(np.zeros(1), np.zeros((1, n)), np.zeros(1))] * n)[len(error.limbs):]
-        return cls(error, W, np.array([each.v[0, 0] for each in found]).reshape(-1, n), traced(along, 2 * n), made)
+        return cls(error, W, np.array([each.v[0, 0] for each in found]).reshape(-1, n), trace_formula(along, 2 * n),
+                   made)
 
     def core(self) -> tuple[float, float]:
         """The radius ρ of a ball |w| ≤ ρ in which the goal is the only critical point and E rises along rays, and a
@@ -192,7 +193,7 @@ class ConeProver:
             reached &= each.low > 0
         times = affine(t, (off * np.concatenate([face, np.zeros_like(face)], axis=1))[:, None], AFFINE_ROUNDING * t)
         inverse = times.inverse()
-        e, rate = (stacked(part) for part in (found[k : k + len(self.Q)], found[k + len(self.Q) :]))
+        e, rate = (stack(part) for part in (found[k : k + len(self.Q)], found[k + len(self.Q) :]))
         Qy, Qw = (affine(middle @ self.Q.T, np.einsum("cks,rk->crs", part, self.Q), off * np.abs(self.Q).sum(axis=1))
                   for middle, part, off in ((centre, slopes, rounding),
                                             (cones.middle, around, np.full_like(t, AFFINE_ROUNDING))))

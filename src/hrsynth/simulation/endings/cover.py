@@ -147,7 +147,7 @@ def cover(setting: ObservedRobot, goal: ClosedConfiguration, *, vanishing: bool 
     left, lost = (
         [corners for part in every for corners in _corners(part.error, boxes(part), error.size)]
         for boxes in (lambda part: part.left, lambda part: part.lost))
-    locked, left = _places(joined(lost), left, (high - low)[: error.size])
+    locked, left = _places(join_boxes(lost), left, (high - low)[: error.size])
     meeting = [each for each in found if each.error[0] > 0 and sum(
         isinstance(family, PlaneError) and family.holds(each.R) for family in families) > 1]
     near = SINGULAR_BOX * (high - low)[: error.size]
@@ -237,7 +237,7 @@ def _places(places: Sequence[tuple[Array, Array]], left: Sequence[tuple[Array, A
     return locked, [each for each, is_taken in zip(left, taken, strict=True) if not is_taken] + long
 
 
-def joined(boxes: Iterable[Sequence[Array]]) -> list[tuple[Array, Array]]:
+def join_boxes(boxes: Iterable[Sequence[Array]]) -> list[tuple[Array, Array]]:
     """The corners of a box about each group of boxes (lower, upper corner) that are nearly together."""
     groups: list[tuple[Array, Array]] = []
     for low, high in boxes:

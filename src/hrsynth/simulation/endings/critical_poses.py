@@ -92,7 +92,7 @@ def critical_poses(setting: ObservedRobot, goal: ClosedConfiguration, seed: int 
         error = PoseError.of(setting, goal)
     except NotEnclosed:
         return None
-    rng, systems = np.random.default_rng([seed, 2]), [LegSystem.of(error, held) for held in _held(error)]
+    rng, systems = np.random.default_rng([seed, 2]), [LegSystem.of(error, held) for held in _held_sets(error)]
     found, continua = _none(systems[0]), dict[tuple[int, ...], CriticalPoses]()
     for system in systems:
         fresh: list[int] = []
@@ -103,12 +103,12 @@ def critical_poses(setting: ObservedRobot, goal: ClosedConfiguration, seed: int 
             drawn, flat = _round(system, found, rng)
             found, continua = _apart(found, drawn), flat | continua
             fresh.append(len(found) - before)
-    return error, _mirrored(error, found), _joined([_none(systems[0]), *continua.values()]), found.unmet
+    return error, _mirror(error, found), _join([_none(systems[0]), *continua.values()]), found.unmet
 
 
 def _apart(found: CriticalPoses, drawn: CriticalPoses) -> CriticalPoses:
     """Both, each pose once."""
-    every = _joined([found, drawn])
+    every = _join([found, drawn])
     marks, met, kept = every.marks, every.met.copy(), list(range(len(found)))
     for k in range(len(found), len(marks)):
         alike = np.flatnonzero(np.abs(marks[kept] - marks[k]).max(axis=1) < SAME_ENDING)
@@ -119,7 +119,7 @@ def _apart(found: CriticalPoses, drawn: CriticalPoses) -> CriticalPoses:
     return replace(every, met=met).some(np.array(kept, dtype=np.intp))
 
 
-def _held(error: PoseError) -> list[tuple[int, ...]]:
+def _held_sets(error: PoseError) -> list[tuple[int, ...]]:
     """The sets of limbs that are held, none first: at their limits those that are not watched, as E does not know how
     far they are from it; of watched rods that slide one that is free, as it may be short."""
     watched = {each.limb for each in error.seen}
@@ -156,13 +156,13 @@ def _round(system: LegSystem, old: CriticalPoses, rng: np.random.Generator) -> t
     y = np.concatenate([own, system.drawn(x, rng)])[:count]
     if len(old):
         near = system.drawn(_beside(system, old, 4 * round(POSE_BESIDE * count), rng), rng)[:round(POSE_BESIDE * count)]
-        beside, families = _led(system, near, rng)
-        some, more = _led(system, rng.permutation(y)[: len(y) - len(near)], rng)
-        return _joined([some, replace(beside, met=0 * beside.met)]), families | more
-    return _led(system, y, rng)
+        beside, families = _lead_starts(system, near, rng)
+        some, more = _lead_starts(system, rng.permutation(y)[: len(y) - len(near)], rng)
+        return _join([some, replace(beside, met=0 * beside.met)]), families | more
+    return _lead_starts(system, y, rng)
 
 
-def _led(system: LegSystem, y: Array, rng: np.random.Generator) -> tuple[
+def _lead_starts(system: LegSystem, y: Array, rng: np.random.Generator) -> tuple[
         CriticalPoses, dict[tuple[int, ...], CriticalPoses]]:
     """What starts (c, N) lead to."""
     error = system.error
@@ -189,16 +189,16 @@ def _none(system: LegSystem) -> CriticalPoses:
                          *np.zeros((2, 0), dtype=np.intp))
 
 
-def _joined(parts: list[CriticalPoses]) -> CriticalPoses:
+def _join(parts: list[CriticalPoses]) -> CriticalPoses:
     return CriticalPoses(*(np.concatenate(each) for each in zip(*(vars(part).values() for part in parts), strict=True)))
 
 
-def _mirrored(error: PoseError, found: CriticalPoses) -> CriticalPoses:
+def _mirror(error: PoseError, found: CriticalPoses) -> CriticalPoses:
     """With all choices of directions under which E is the same, where these are few."""
     signs = error.mirrors
     if not 1 < len(signs) <= 2**POSE_MIRRORS:
         return found
-    others = _joined([replace(found, directions=found.directions * each) for each in signs[1:]])
+    others = _join([replace(found, directions=found.directions * each) for each in signs[1:]])
     return _apart(found, replace(others, met=0 * others.met))
 
 
@@ -318,5 +318,5 @@ class Further:
     fit: Fit
 
     def __call__(self, pool: Array) -> list[CriticalPoint]:
-        q, done = self.lift(_joined([self.poses, self.continua]), pool, self.fit)
+        q, done = self.lift(_join([self.poses, self.continua]), pool, self.fit)
         return descend(self.lift.system, q[done], np.full(int(done.sum()), -1), self.idle)

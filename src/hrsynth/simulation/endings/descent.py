@@ -146,13 +146,13 @@ class Expansion:
                    np.maximum(np.linalg.norm(at.G, axis=-1), np.linalg.norm(flat, axis=-1)), idle)
 
 
-def _shortened(step: Array, longest: float) -> Array:
+def _shorten_steps(step: Array, longest: float) -> Array:
     """Steps (c, N), none of whose changes is longer."""
     size = np.abs(step).max(axis=-1, keepdims=True)
     return np.asarray(step * np.minimum(1.0, longest / np.maximum(size, longest)))
 
 
-def closed(system: RestSystem, q: Array, steps: int = 12) -> Array:
+def close_loops(system: RestSystem, q: Array, steps: int = 12) -> Array:
     """Configurations (c, N) moved to the nearest closed ones, as far as Gauss and Newton's method does it."""
     for _ in range(steps):
         G, DG = system.closures(q)
@@ -162,7 +162,7 @@ def closed(system: RestSystem, q: Array, steps: int = 12) -> Array:
         # all equations, of which some may depend on others: the shortest step
         gram = DG @ back
         gram += DEPENDENT * np.maximum(1.0, np.trace(gram, axis1=-2, axis2=-1))[:, None, None] * np.eye(G.shape[-1])
-        q = q + _shortened(times(back, -np.linalg.solve(gram, G[..., None])[..., 0]), LONGEST_STEP)
+        q = q + _shorten_steps(times(back, -np.linalg.solve(gram, G[..., None])[..., 0]), LONGEST_STEP)
     return q
 
 
@@ -171,12 +171,13 @@ def are_closed(system: RestSystem, q: Array, within: float = CRITICAL) -> NDArra
     return np.asarray(np.linalg.norm(system.closures(q)[0], axis=-1) < within)
 
 
-def walked(system: RestSystem, q: Array, rng: np.random.Generator, steps: int, longest: float = WALK_STEP) -> Array:
+def walk_at_random(system: RestSystem, q: Array, rng: np.random.Generator, steps: int,
+                   longest: float = WALK_STEP) -> Array:
     """Closed configurations (c, N), each led so many random steps along the loops; those that do not close stay."""
     for _ in range(steps):
         tangents = Tangents.of(RestEquations(system, list(q.T)).DG)
         way = times(tangents.Z, rng.normal(size=(len(q), tangents.Z.shape[-1])))
-        there = closed(system, q + longest * rng.uniform(0.2, 1.0, (len(q), 1)) * way / np.abs(way).max(
+        there = close_loops(system, q + longest * rng.uniform(0.2, 1.0, (len(q), 1)) * way / np.abs(way).max(
             axis=-1, keepdims=True), 6)
         good = are_closed(system, there)
         good &= np.abs(there - q).max(axis=-1) < 2 * longest
@@ -205,14 +206,14 @@ def descend(system: Critically, q: Array, index: NDArray[np.intp], idle: int, fa
         near |= index < 0
         sign = np.where(near[:, None], -np.sign(at.curvatures), np.where(up, 1.0, -1.0))
         sign[:, at.freedoms :] *= np.abs(at.curvatures[:, at.freedoms :]) > CRITICAL_FLAT
-        step = _shortened(times(at.directions, sign * at.slope / size), LONGEST_STEP)
-        q = q + step + _shortened(at.closing, LONGEST_STEP)
+        step = _shorten_steps(times(at.directions, sign * at.slope / size), LONGEST_STEP)
+        q = q + step + _shorten_steps(at.closing, LONGEST_STEP)
         going = ~done & np.isfinite(q).all(axis=-1) & (np.abs(q).max(axis=-1) < farthest)
         q, index = q[going], index[going]
     return found
 
 
-def sharpened(system: Critically, points: Sequence[CriticalPoint], idle: int) -> list[CriticalPoint]:
+def sharpen_points(system: Critically, points: Sequence[CriticalPoint], idle: int) -> list[CriticalPoint]:
     """Critical points after a few more of Newton's steps: where E is nearly flat, as far away, it is known where they
     are to fewer digits than ∇E."""
     if not points:
@@ -257,7 +258,7 @@ def settle(system: RestSystem, q: Array, index: NDArray[np.intp], idle: int) -> 
         # steps of half a unit of time where the loop is fast, longer ones where it slows down
         slow = np.where(flows, 2 * np.minimum(1.0, np.linalg.norm(times(inverse, v), axis=-1)), 0.0)
         step = -times(np.linalg.pinv(slow[:, None, None] * M + A, rcond=COMMAND_CUTOFF), v)
-        q = q + _shortened(times(Z, step), LONGEST_STEP) + _shortened(p, LONGEST_STEP)
+        q = q + _shorten_steps(times(Z, step), LONGEST_STEP) + _shorten_steps(p, LONGEST_STEP)
         going = ~done & ~lost & np.isfinite(q).all(axis=-1) & (np.abs(q).max(axis=-1) < FARTHEST_ENDING)
         q, flows = q[going], flows[going]
     return found

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...batch.enclosures import BoxFormula, traced
-from ...geometry.affine import AffineForms, combined
+from ...batch.enclosures import BoxFormula, trace_formula
+from ...geometry.affine import AffineForms, combine
 from ...geometry.vectors import Array
 from ...tolerances import AFFINE_ROUNDING
 
@@ -51,15 +51,15 @@ def reduced_gradient(M: AffineForms, slope: AffineForms, P: Places, N: Places) -
     minors of what is left of g and E before the last step, which vanish with it and need no last pivot."""
     k, order = P.shape[1], np.concatenate([P, N], axis=1)
     A, rest = entries(M, order), entries(slope, order)
-    A = combined(inverse(A.v[0, ..., :k]), A) if k else A
+    A = combine(inverse(A.v[0, ..., :k]), A) if k else A
     n = order.shape[1]
-    found = _eliminated(k, n).together([*(A[..., i, j] for i in range(k) for j in range(n)),
+    found = _eliminate(k, n).together([*(A[..., i, j] for i in range(k) for j in range(n)),
                                         *(rest[..., j] for j in range(n))])
     return found[..., : N.shape[1]], found[..., N.shape[1] :]
 
 
 @lru_cache(maxsize=64)
-def _eliminated(k: int, n: int) -> BoxFormula:
+def _eliminate(k: int, n: int) -> BoxFormula:
     """What Gauss's elimination leaves of k rows of n numbers and one more, and the minors before its last step."""
     def formula(y: Sequence[Any], number: Any) -> list[Any]:
         rows, rest = [list(y[n * i : n * i + n]) for i in range(k)], list(y[n * k :])
@@ -74,7 +74,7 @@ def _eliminated(k: int, n: int) -> BoxFormula:
                 later[:] = [each - part * head for each, part in zip(later, tail, strict=True)]
         return [*rest, *minors]
 
-    return traced(formula, n * (k + 1))
+    return trace_formula(formula, n * (k + 1))
 
 
 def away(F: AffineForms) -> Flags:
@@ -82,8 +82,8 @@ def away(F: AffineForms) -> Flags:
     coordinates in which it is nearest to the box's own."""
     with np.errstate(all="ignore"):
         found = np.any(np.abs(F.v[0]) > F.spread * (1 + AFFINE_ROUNDING), axis=1)
-        found |= combined(np.nan_to_num(F.v[0])[:, None, :], F).low[:, 0] > 0
-        near = combined(pseudo_inverse(np.moveaxis(F.v[1:], 0, -1)), F)
+        found |= combine(np.nan_to_num(F.v[0])[:, None, :], F).low[:, 0] > 0
+        near = combine(pseudo_inverse(np.moveaxis(F.v[1:], 0, -1)), F)
         found |= np.any(np.abs(near.v[0]) > near.spread * (1 + AFFINE_ROUNDING), axis=1)
     return np.asarray(found)
 

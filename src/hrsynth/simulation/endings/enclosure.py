@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from ...analysis.branch.redundant import dependent_rows
 from ...budgets import TUBE_RADII, TUBE_WIDER
-from ...geometry.affine import AffineForms, affine, combined
+from ...geometry.affine import AffineForms, affine, combine
 from ...geometry.vectors import Array, times
 from ...results import Value
 from ...tolerances import AFFINE_ROUNDING, THINNEST_TUBE
@@ -55,22 +55,22 @@ class EnclosedPoint(Value):
         return np.where(np.arange(count) < (self.index or 0), -1.0, 1.0)
 
 
-def enclosed(system: RestSystem, points: Sequence[CriticalPoint], idle: int) -> list[EnclosedPoint | None]:
+def enclose_points(system: RestSystem, points: Sequence[CriticalPoint], idle: int) -> list[EnclosedPoint | None]:
     """Boxes around critical points, None where nothing was proved; where the equations of the loops that were chosen
     are nearly dependent, with others."""
     q = np.array([each.q for each in points])
-    found = _enclosed(system, q, idle) if points else []
+    found = _enclose(system, q, idle) if points else []
     left = [k for k, each in enumerate(found) if each is None or each.index is None]
     while left:
         # equations that are independent at one are so at others
-        again = _enclosed(system.chosen_at(q[left[:1]]), q[left], idle)
+        again = _enclose(system.chosen_at(q[left[:1]]), q[left], idle)
         for k, each in zip(left, again, strict=True):
             found[k] = each or found[k]
         left = [k for k in left[1:] if (each := found[k]) is None or each.index is None]
     return found
 
 
-def _enclosed(system: RestSystem, q: Array, idle: int) -> list[EnclosedPoint | None]:
+def _enclose(system: RestSystem, q: Array, idle: int) -> list[EnclosedPoint | None]:
     """The same with given equations, for configurations (c, N)."""
     size, count = system.size
     at = RestEquations(system, list(q.T))
@@ -103,14 +103,14 @@ def _enclosed(system: RestSystem, q: Array, idle: int) -> list[EnclosedPoint | N
     still = np.zeros(known.shape)
     with np.errstate(all="ignore"):
         F, K, _ = evaluated(still)
-        Y = np.linalg.inv(K.v[0] + _lost(K.v[0]))
-        e = combined(Y, F).size
+        Y = np.linalg.inv(K.v[0] + _lost_rank(K.v[0]))
+        e = combine(Y, F).size
         radius = TUBE_WIDER * e + THINNEST_TUBE
         done, found = np.zeros(len(q), dtype=bool), still.copy()
         inertia, left = np.full(len(q), -1), np.arange(len(q))
         for _ in range(TUBE_RADII):
             _, K, _ = evaluated(radius, left)
-            M = (np.eye(known.shape[-1]) - combined(Y[left], K)).size
+            M = (np.eye(known.shape[-1]) - combine(Y[left], K)).size
             wanted = e[left] + times(M, radius)
             fits = np.all(wanted * (1 + AFFINE_ROUNDING) < radius, axis=-1)
             found[left[fits]], done[left[fits]] = radius[fits], True
@@ -128,7 +128,7 @@ def _enclosed(system: RestSystem, q: Array, idle: int) -> list[EnclosedPoint | N
 
 def _rates(K: AffineForms, gram: AffineForms, free: Array, count: int) -> list[tuple[tuple[float, float], ...]]:
     """Enclosures of the eigenvalues of JᵀJ (c, N, N) and H along the motions of the loops; ``free`` coordinates (c, N),
-    ``count`` equations of the loops and K as :func:`_enclosed` has them."""
+    ``count`` equations of the loops and K as :func:`_enclose` has them."""
     size, freedoms = gram.r.shape[-1], int(free[0].sum()) - count
     M = AffineForms(np.zeros((len(gram.v), *K.r.shape)), np.zeros(K.r.shape))
     M.v[..., :size, :size], M.r[:, :size, :size] = gram.v, gram.r
@@ -171,7 +171,7 @@ def _eigenvalues(H: Array, gram: Array, DG: Array, free: NDArray[np.intp], count
     return np.asarray(values) if len(values) == count else np.full(count, np.nan)
 
 
-def _lost(K: Array) -> Array:
+def _lost_rank(K: Array) -> Array:
     """What is added to singular matrices (c, n, n) so that they can be inverted: nothing is proved of them."""
     known = np.where(np.isfinite(K), K, 0.0)
     values = np.linalg.svd(known, compute_uv=False)

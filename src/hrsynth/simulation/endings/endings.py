@@ -35,12 +35,12 @@ from ...mechanism.pose import PoseLike, asked_pose
 from ...progress import tell
 from ...tolerances import CRITICAL_FLAT, DAMPED, SAME_ENDING, SEEN_ABOVE, VANISHED
 from ..ending import ANTIPODAL, BOUNDARY, GOAL, MODE, rest
-from ..law import FixedDirections, Law, Measures, measured, supposed_planes
+from ..law import FixedDirections, Law, Measures, measure_all, supposed_planes
 from ..servo import require_regular, require_seen, require_sight
 from .completeness import Covers
 from .critical_poses import Further, Lift, critical_poses
-from .descent import descend, walked
-from .enclosure import EnclosedPoint, enclosed
+from .descent import descend, walk_at_random
+from .enclosure import EnclosedPoint, enclose_points
 from .error import RestSystem
 from .rests import CRITICAL, Endings, RestPoint, SignedModes, stability
 from .search import Critical, critical_points, in_mode
@@ -104,7 +104,7 @@ class RestSearch:
         question = setting.samples.question
         planes = supposed_planes(depth, goal, question)
         system = RestSystem.of(goal, question, setting.configurations, planes)
-        values = measured(goal, question)[0]
+        values = measure_all(goal, question)[0]
         by_directions = all(isinstance(each, SeenAxis) for each in question.observations)
         return cls(setting, goal, system, Law(question, setting.dof, 1.0, planes),
                    np.array(values) if by_directions else values, depth)
@@ -135,7 +135,7 @@ class RestSearch:
         if not minima and not self.system.supposes:
             # with idle coordinates held, curvatures of motions that are idle elsewhere are not enclosed
             whole = [k for k, each in enumerate(isolated) if len(each.point.curvatures) <= self._freedoms]
-            proved = enclosed(self.system, [isolated[k].point for k in whole], found.idle)
+            proved = enclose_points(self.system, [isolated[k].point for k in whole], found.idle)
             for k, box in zip(whole, proved, strict=True):
                 boxes[k] = box
         rests = _ways([each for one, box in zip(isolated, boxes, strict=True)
@@ -207,7 +207,7 @@ class RestSearch:
 
     def _reversed(self, at: ClosedConfiguration) -> tuple[str, ...]:
         """The legs whose direction is opposite to the desired one, as far as it is along it."""
-        return tuple(leg for leg, c in self._cosines(measured(at, self.law.question)[0]) if c < VANISHED - 1)
+        return tuple(leg for leg, c in self._cosines(measure_all(at, self.law.question)[0]) if c < VANISHED - 1)
 
     def _cosines(self, values: Measures) -> list[tuple[str, float]]:
         """The legs whose directions are observed, each with the cosine of its angle with the desired one."""
@@ -318,7 +318,7 @@ class RestSearch:
         # what lies nearby may be nearly singular as well: then a little farther away
         for number in range(MODE_TRIES):
             if not good.all():
-                near = walked(self.system, q[~good], rng, 2, NEARBY * 2**number)
+                near = walk_at_random(self.system, q[~good], rng, 2, NEARBY * 2**number)
                 good[~good] = in_mode(self.system, self.setting, near)
         return good
 
@@ -328,9 +328,10 @@ def _ways(rests: Sequence[RestPoint], search: RestSearch) -> list[RestPoint]:
     working modes nearest to the goal's (where loops are singular, coordinates are known to half their digits), with how
     many there are."""
     setting = search.setting
-    segments, (home,) = ([np.concatenate([*measured(at, setting.everything.question)[0]]) for at in every] for every in
+    segments, (home,
+               ) = ([np.concatenate([*measure_all(at, setting.everything.question)[0]]) for at in every] for every in
                          ([each.configuration for each in rests], [search.goal]))
-    told = np.array([_told(each.configuration, search) for each in rests])
+    told = np.array([_telling_values(each.configuration, search) for each in rests])
     groups: list[list[int]] = []
     for k in range(len(rests)):
         first = np.array([group[0] for group in groups], dtype=np.intp)
@@ -345,8 +346,8 @@ def _ways(rests: Sequence[RestPoint], search: RestSearch) -> list[RestPoint]:
             for k, group in zip(best, groups, strict=True)]
 
 
-def _told(at: ClosedConfiguration, search: RestSearch) -> Array:
+def _telling_values(at: ClosedConfiguration, search: RestSearch) -> Array:
     """Where the platform's bodies are (characteristic lengths), how they are turned, and all that is measured."""
     poses = [at.pose(body) for body in placing_links(search.setting.anatomy)]
     return np.concatenate([*(X[:3, 3] / search.goal.twin.length for X in poses), *(X[:3, :3].ravel() for X in poses),
-                           *measured(at, search.law.question)[0]])
+                           *measure_all(at, search.law.question)[0]])

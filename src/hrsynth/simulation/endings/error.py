@@ -17,7 +17,7 @@ import numpy as np
 
 from ...analysis.branch.carried_vectors import Product, SweptChains, Total, add_bend, add_slope, outer, row_product
 from ...analysis.branch.loops import GearEquation, JointLoop, LoopRow, LoopSystem, loop_system
-from ...geometry.affine import crossed, stacked
+from ...geometry.affine import cross_product, stack
 from ...geometry.jets import Jet, angle
 from ...geometry.so3 import exponential
 from ...geometry.vectors import Array, cross, transform
@@ -168,7 +168,7 @@ class SightTerm(Value):
         """As of :class:`ErrorTerm`: with X the rates of the coordinates, ∇e = X ∂e and ∇²e = X ∂²e Xᵀ + Σ ∂ₐe ∇²xₐ."""
         products = self.coordinates(carrier)
         e = self.errors([each.value for each in products])
-        X = stacked([gradient(each, sums) for each in products])
+        X = stack([gradient(each, sums) for each in products])
         along = sum(each.slope * each.value[..., None] for each in e)
         sums.value = sums.value + sum(each.value * each.value for each in e) * 0.5
         sums.slope.add((slice(None),), (X * along[..., None, :]).sum(-1))
@@ -226,7 +226,7 @@ def seen_rates(product: Product, sums: ErrorSums) -> Any:
     for part in product.x.parts:
         total.add((part.places, slice(None)), part.columns * part.sign)
     for part in product.y.parts:
-        total.add((part.places, slice(None)), crossed(part.axes, x[..., None, :]) * -part.sign)
+        total.add((part.places, slice(None)), cross_product(part.axes, x[..., None, :]) * -part.sign)
     return total.sum
 
 

@@ -20,7 +20,7 @@ from ...batch.engine import Batch
 from ...batch.placing import Placer, rates
 from ...closed_forms.legs import ClosedFormLeg, SlidingRod
 from ...geometry.so3 import exponential
-from ...geometry.vectors import Array, cross, hat, solved, times
+from ...geometry.vectors import Array, cross, hat, solve_definite, times
 from ...kinematics.configuration import ClosedConfiguration
 from ...results import Value
 from ...tolerances import DAMPED, FLOW_SLOPE, FLOW_WEAK, SOLVED
@@ -101,7 +101,7 @@ class Flow(Value):
         scaled = L @ root
         back = np.ascontiguousarray(scaled.transpose(0, 2, 1))
         A, g = back @ scaled, back @ error
-        velocity, weakest = damped(A, g[..., 0])
+        velocity, weakest = damped_inverse(A, g[..., 0])
         held = np.zeros_like(active)
         slid = np.flatnonzero(active.any(axis=1) & reached)
         if len(slid):
@@ -191,12 +191,12 @@ class Flow(Value):
         return self.batch.coordinates.rotations
 
 
-def damped(A: Array, g: Array) -> tuple[Array, Array]:
-    """−V max(Σ², DAMPED²)⁻¹ Vᵀ g (n, d) for A = V Σ² Vᵀ (n, d, d), as ``law.inverted``; the smallest of Σ (n,), of
-    which only a lower bound is told from ``FLOW_WEAK`` times ``DAMPED`` on."""
+def damped_inverse(A: Array, g: Array) -> tuple[Array, Array]:
+    """−V max(Σ², DAMPED²)⁻¹ Vᵀ g (n, d) for A = V Σ² Vᵀ (n, d, d), as ``law.damped_inverses``; the smallest of Σ (n,),
+    of which only a lower bound is told from ``FLOW_WEAK`` times ``DAMPED`` on."""
     d = A.shape[1]
     with np.errstate(all="ignore"):
-        found = solved(A, np.concatenate([g[..., None], np.broadcast_to(np.eye(d), A.shape)], axis=2))
+        found = solve_definite(A, np.concatenate([g[..., None], np.broadcast_to(np.eye(d), A.shape)], axis=2))
         # the norm of A⁻¹ is at least 1 / λ for the least eigenvalue λ of A
         least = 1 / np.sqrt(np.square(found[..., 1:]).sum(axis=(1, 2)))
     weak = ~(least >= (FLOW_WEAK * DAMPED) ** 2)
@@ -216,7 +216,7 @@ def _along(normals: Array, A: Array, g: Array) -> tuple[Array, Array, Array]:
     for rank in np.unique(ranks[ranks < g.shape[1]]):
         some = np.flatnonzero(ranks == rank)
         K = right[some, rank:].transpose(0, 2, 1)
-        inside, weakest[some] = damped(K.transpose(0, 2, 1) @ A[some] @ K, (g[some, None] @ K)[:, 0])
+        inside, weakest[some] = damped_inverse(K.transpose(0, 2, 1) @ A[some] @ K, (g[some, None] @ K)[:, 0])
         found[some] = times(K, inside)
     rest = times(A, found) + g
     push = np.linalg.pinv(normals.transpose(0, 2, 1), rcond=DAMPED) @ rest[..., None]

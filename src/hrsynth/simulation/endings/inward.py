@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...batch.enclosures import BoxFormula, traced
+from ...batch.enclosures import BoxFormula, trace_formula
 from ...budgets import INWARD_BOXES, RADIUS_AT_ONCE, RAYS
-from ...geometry.affine import affine, stacked
+from ...geometry.affine import affine, stack
 from ...geometry.vectors import Array
 from ...tolerances import FOLLOWED, INWARD_SHARES
 from .cones import ConeProver, proved_all_over
@@ -32,7 +32,7 @@ class InwardProver:
     @classmethod
     def of(cls, error: PoseError) -> InwardProver:
         """The formulas of an error, traced."""
-        return cls(error, ConeProver.of(error, np.eye(error.size)), traced(
+        return cls(error, ConeProver.of(error, np.eye(error.size)), trace_formula(
             lambda x, number: [part for each in error.at(x, [], number).seen for part in each.error], error.size))
 
     def core(self, radius: float) -> float:
@@ -54,8 +54,8 @@ class InwardProver:
         reached = np.ones(count, dtype=bool)
         for each in found[:limbs]:
             reached &= each.low > 0
-        rows, X = [stacked(found[k : k + n]) for k in range(limbs, len(found), n)], stacked(x)
-        d = stacked([(row * X).sum() - e for row, e in zip(rows, self.errors.at(x), strict=True)])
+        rows, X = [stack(found[k : k + n]) for k in range(limbs, len(found), n)], stack(x)
+        d = stack([(row * X).sum() - e for row, e in zip(rows, self.errors.at(x), strict=True)])
         J, off = (np.stack(parts, axis=1) for parts in ([row.v[0] for row in rows], [row.spread for row in rows]))
         reached &= np.isfinite(J).all(axis=(1, 2)) & np.isfinite(off).all(axis=(1, 2)) & np.isfinite(d.size).all(axis=1)
         J, off = np.where(reached[:, None, None], J, 0.0), np.where(reached[:, None, None], off, 0.0)
@@ -87,10 +87,10 @@ class InwardProver:
 def inward_radius(error: PoseError, seed: int = 0) -> tuple[float, int]:
     """The radius of a ball |x| ≤ ρ that is proved, as large a part of the one that rays show as boxes allow, and the
     boxes for it; 0 if none is."""
-    prover, seen, boxes = InwardProver.of(error), _seen(error, seed), 0
+    prover, seen, boxes = InwardProver.of(error), _seen_radius(error, seed), 0
     found = prover.core(seen)
     for radius in (share * seen for share in INWARD_SHARES if found > 0 and share * seen > found):
-        held, used = _held(prover, radius, prover.core(radius))
+        held, used = _hold_inwards(prover, radius, prover.core(radius))
         boxes += used
         if not held:
             break
@@ -98,7 +98,7 @@ def inward_radius(error: PoseError, seed: int = 0) -> tuple[float, int]:
     return found, boxes
 
 
-def _held(prover: InwardProver, radius: float, core: float) -> tuple[bool, int]:
+def _hold_inwards(prover: InwardProver, radius: float, core: float) -> tuple[bool, int]:
     """Whether runs lead inwards all over the ball outside its core, by boxes that are cut where that is not proved."""
     def inside(middle: Array, half: Array) -> NDArray[np.bool_]:
         near, far = np.maximum(np.abs(middle) - half, 0.0), np.abs(middle) + half
@@ -112,7 +112,7 @@ def _held(prover: InwardProver, radius: float, core: float) -> tuple[bool, int]:
     return proved_all_over(np.full(prover.error.size, radius), inside, judge, INWARD_BOXES)
 
 
-def _seen(error: PoseError, seed: int) -> float:
+def _seen_radius(error: PoseError, seed: int) -> float:
     """How far rays from the goal show that runs lead inwards: seen, not proved."""
     n = error.size
     w = np.random.default_rng(seed).normal(size=(RAYS, n))

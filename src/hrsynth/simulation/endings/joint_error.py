@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from ...batch.enclosures import BoxFormula, traced
+from ...batch.enclosures import BoxFormula, trace_formula
 from ...closed_forms.legs import ClosedFormLeg, OnCrank, OnRail, SlidingRod
 from ...geometry.components import (
     Components,
@@ -32,10 +32,10 @@ from ...geometry.components import (
     dot,
     minus,
     plus,
-    scaled,
+    scale,
     sine,
     sqrt,
-    transformed,
+    transform_vector,
 )
 from ...geometry.duals import Dual
 from ...geometry.so3 import exponential
@@ -44,7 +44,7 @@ from ...results import Value
 from ...tolerances import FOLLOWED, KNOWN_NUMBER, SHORTEST_ROD
 from .pose_error import Number, PoseError
 
-of_robot = partial(traced, off=KNOWN_NUMBER)
+of_robot = partial(trace_formula, off=KNOWN_NUMBER)
 
 
 def rodless(error: PoseError) -> Array:
@@ -208,11 +208,11 @@ class JointError(Value):
             if self.short is not None and i == self.short[0]:
                 told.append(u)
                 continue
-            tip = plus(point, scaled(w, number(error.p + limb.tip.constant)))
+            tip = plus(point, scale(w, number(error.p + limb.tip.constant)))
             if np.any(limb.tip.turned):
-                tip = plus(tip, transformed(turned, number(limb.tip.turned)))
+                tip = plus(tip, transform_vector(turned, number(limb.tip.turned)))
             if i not in self.joints:
-                tip = plus(tip, scaled(number(1.0) - w, number(limb.centre)))
+                tip = plus(tip, scale(number(1.0) - w, number(limb.centre)))
                 margin, carried = limb.at(tip, number, limb.mode)
                 margins.append(margin - w * w * number(least**2))
                 told.append(carried)
@@ -222,21 +222,21 @@ class JointError(Value):
             at, (one, two) = self.freedoms + self.joints.index(i), map(number, across(limb))
             (z,) = self.unknowns(y, [at])
             c, s = cosine(z), sine(z)
-            way, ring = minus(tip, scaled(w, number(limb.centre))), plus(scaled(c, one), scaled(s, two))
+            way, ring = minus(tip, scale(w, number(limb.centre))), plus(scale(c, one), scale(s, two))
             if isinstance(limb, SlidingRod):
-                g.append(dot(way, minus(scaled(c, two), scaled(s, one))) - w * number(limb.aside))
+                g.append(dot(way, minus(scale(c, two), scale(s, one))) - w * number(limb.aside))
                 told.append(ring)
                 continue
-            carried = scaled(number(limb.radius), ring) if isinstance(limb, OnCrank) else scaled(z, number(limb.axis))
+            carried = scale(number(limb.radius), ring) if isinstance(limb, OnCrank) else scale(z, number(limb.axis))
             rod = minus(way, carried)
             g.append((dot(rod, rod) - number(limb.rod**2)) * 0.5)
-            told.append(scaled(number(1 / limb.rod), rod))
+            told.append(scale(number(1 / limb.rod), rod))
         seen = list[Sequence[Dual]]()
         for each in error.seen:
             if each.limb is not None:
-                seen.append(scaled(each.sense, told[each.limb]))
+                seen.append(scale(each.sense, told[each.limb]))
             elif each.rule is not None:
-                seen.append(plus(transformed(turned, number(each.rule.turned)), number(each.rule.constant)))
+                seen.append(plus(transform_vector(turned, number(each.rule.turned)), number(each.rule.constant)))
         return g, seen, margins
 
     def _placed(self, y: Sequence[Any], known: Number, number: Number
@@ -251,8 +251,8 @@ class JointError(Value):
         if self.short is not None:
             v = [x[1], x[2]]
             v.insert(self.short[1], w)
-            u = scaled(number(1.0) / sqrt(dot(v, v)), v)
-            point = plus(number(self.ends[self.short[0]]), scaled(x[0], u))
+            u = scale(number(1.0) / sqrt(dot(v, v)), v)
+            point = plus(number(self.ends[self.short[0]]), scale(x[0], u))
         return w, point, self._turned(y, w, known), u
 
     def _turned(self, y: Sequence[Any], w: Dual, known: Number) -> list[Dual]:
@@ -296,7 +296,7 @@ class JointError(Value):
                 assert limb.axis is not None
                 way = plus(point, number(error.p + limb.tip.constant - limb.centre))
                 if np.any(limb.tip.turned):
-                    way = plus(way, transformed(turned, number(limb.tip.turned)))
+                    way = plus(way, transform_vector(turned, number(limb.tip.turned)))
                 found += [dot(way, number(each)) for each in (limb.axis, *across(limb))]
             return found
 

@@ -21,14 +21,14 @@ import numpy as np
 
 from ...batch.enclosures import BoxFormula
 from ...closed_forms.legs import ClosedFormLeg, OnCrank, OnRail, SlidingRod
-from ...geometry.affine import AffineForms, stacked
-from ...geometry.components import Components, cosine, cross, dot, minus, plus, scaled, sine
+from ...geometry.affine import AffineForms, stack
+from ...geometry.components import Components, cosine, cross, dot, minus, plus, scale, sine
 from ...geometry.vectors import Array
 from ...tolerances import EXACT, FOLLOWED, MET_AGAIN, SINGULAR_BOX, SMALLEST_BOX
 from .elimination import Flags, Places, away, pivots
 from .joint_error import JointError, across, of_robot
 from .pose_error import NotEnclosed, Number, PoseError
-from .reached import reached as joint_bounds
+from .reached import narrow_joint as joint_bounds
 from .subdivision import CriticalBox, Subdivision, forms_of
 
 NARROWINGS = 16
@@ -47,10 +47,10 @@ class Term:
     def at(self, z: Any, number: Number) -> tuple[Components, Components]:
         """f and the unit vector along its rate."""
         if self.one is None:
-            return scaled(z, number(self.size * self.axis)), number(self.axis)
+            return scale(z, number(self.size * self.axis)), number(self.axis)
         one, two, c, s = self.one, np.cross(self.axis, self.one), cosine(z), sine(z)
-        return (plus(scaled(c, number(self.size * one)), scaled(s, number(self.size * two))),
-                minus(scaled(c, number(two)), scaled(s, number(one))))
+        return (plus(scale(c, number(self.size * one)), scale(s, number(self.size * two))),
+                minus(scale(c, number(two)), scale(s, number(one))))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -152,14 +152,14 @@ class LoopError(JointError):
         u, m = self.desired[0], self.freedoms
         first = np.linalg.svd(u[None])[2][1] if m == 3 else np.cross(np.cross(*self.error.shifts.T), u)
         w = number(first) if m == 2 else plus(
-            scaled(cosine(y[0]), number(first)), scaled(sine(y[0]), number(np.cross(u, first))))
-        n, rod = (plus(scaled(cosine(z), number(u)), scaled(sine(z), w)) for z in y[m - 2 : m])
-        tip, g = plus(scaled(number(one.rod), rod), number(self._still)), list[Any]()
+            scale(cosine(y[0]), number(first)), scale(sine(y[0]), number(np.cross(u, first))))
+        n, rod = (plus(scale(cosine(z), number(u)), scale(sine(z), w)) for z in y[m - 2 : m])
+        tip, g = plus(scale(number(one.rod), rod), number(self._still)), list[Any]()
         for z, term in zip(y[m:], self.terms, strict=True):
             f, rate = term.at(z, number)
             tip = plus(tip, f)
             g.append(dot(n, rate))
-        return [n, rod, scaled(number(1 / two.rod), tip)], g
+        return [n, rod, scale(number(1 / two.rod), tip)], g
 
     def rest(self, y: Sequence[Any], number: Number) -> list[Any]:
         """What is left beside g: the length of u₂; the force, across u₂; in space the plane of u₂."""
@@ -169,8 +169,8 @@ class LoopError(JointError):
         (n, _, u), _ = self.vectors(y, number)
         t, theta = y[self.freedoms - 2 : self.freedoms]
         wanted, across_u = number(self.desired[1]), cross(n, u)
-        force = minus(scaled(number(one.rod) * sine(t - theta) * dot(u, wanted), cross(wanted, u)),
-                      scaled(number(two.rod) * cosine(theta) * sine(theta), across_u))
+        force = minus(scale(number(one.rod) * sine(t - theta) * dot(u, wanted), cross(wanted, u)),
+                      scale(number(two.rod) * cosine(theta) * sine(theta), across_u))
         length = (dot(u, u) - 1.0) * 0.5
         if self.freedoms == 2:
             return [length, dot(force, number(np.cross(*self.error.shifts.T)))]
@@ -222,12 +222,12 @@ class LoopError(JointError):
             assert isinstance(limb, OnCrank | OnRail)
             rod = self.vectors(y, number)[0][1]
             point = plus(number(limb.centre - limb.tip.constant - error.p),
-                         plus(scaled(number(limb.rod), rod), self.terms[0].at(y[m], number)[0]))
+                         plus(scale(number(limb.rod), rod), self.terms[0].at(y[m], number)[0]))
             arm = error.R @ limb.tip.turned
             for axis, z in zip(error.turns.T, y[m + 2 :], strict=True):
                 c, s = cosine(z), sine(z)
-                point = minus(point, plus(scaled(s, number(np.cross(axis, arm))),
-                                          scaled(c, number(arm - axis * (axis @ arm)))))
+                point = minus(point, plus(scale(s, number(np.cross(axis, arm))),
+                                          scale(c, number(arm - axis * (axis @ arm)))))
                 arm = axis * (axis @ arm)
             point = minus(point, number(arm))
             return [*(dot(point, number(way)) for way in error.shifts.T), *y[m + 2 :], *y[m : m + 2]]
@@ -269,7 +269,7 @@ class LoopSubdivision(Subdivision):
 
     def _equations(self, at: Array, about: Array) -> tuple[AffineForms, AffineForms]:
         forms = forms_of(at, 0 * at)
-        F = stacked([*self.error.closing.at(forms), *self.error.left.at(forms)])
+        F = stack([*self.error.closing.at(forms), *self.error.left.at(forms)])
         K = self.error.bends.together(forms_of(at, about))
         shape = (*F.r.shape, at.shape[1])
         return F, AffineForms(K.v.reshape(-1, *shape), K.r.reshape(shape))
@@ -302,7 +302,7 @@ class LoopSubdivision(Subdivision):
         zeros = part.zeros()
         if zeros:
             forms = forms_of(*(np.array([getattr(each, name) for each in zeros]) for name in ("x", "radius")))
-            margins = stacked([*part._values(forms)[3], 0.0 * forms[0] + 1.0])
+            margins = stack([*part._values(forms)[3], 0.0 * forms[0] + 1.0])
             reached, beyond = np.all(margins.low > 0, axis=1), np.any(margins.high < 0, axis=1)
             for zero in (each for each, known in zip(zeros, reached | beyond, strict=True) if not known):
                 settled[np.abs(y - zero.x).max(axis=1).argmin()] = False

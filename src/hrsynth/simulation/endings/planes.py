@@ -23,10 +23,10 @@ import numpy as np
 from ...analysis.aspects.path_segments import PathCoordinates
 from ...analysis.aspects.vector_expressions import NoLegForm
 from ...analysis.observed import ObservedRobot
-from ...batch.enclosures import BoxFormula, traced
+from ...batch.enclosures import BoxFormula, trace_formula
 from ...closed_forms.legs import SlidingRod
-from ...geometry.affine import affine, stacked
-from ...geometry.components import Components, combination, cross, plus, scaled
+from ...geometry.affine import affine, stack
+from ...geometry.components import Components, combination, cross, plus, scale
 from ...geometry.duals import Dual
 from ...geometry.so3 import quaternions
 from ...geometry.vectors import Array
@@ -143,7 +143,7 @@ class PlaneError(JointError):
         if self.far is not None:
             w, place[self.far] = x[self.far], w
         turned = [self._times(w, each) for each in self._rotation(x[k:], number)]
-        point = plus(scaled(w, number(self.offset)), combination(turned, self.follow, number))
+        point = plus(scale(w, number(self.offset)), combination(turned, self.follow, number))
         return w, plus(point, combination(place, self.along, number)) if k else point, turned, []
 
     def _times(self, w: Dual, turned: Dual) -> Dual:
@@ -193,10 +193,10 @@ class PlaneError(JointError):
             k = self.along.shape[1]
             R = self._rotation([Dual(each, [0.0] * self.size[0]) for each in y[k : self.freedoms]], number)
             turn = [cross(number(self.error.R[:, j]), [R[3 * i + j] for i in range(3)]) for j in range(3)]
-            axis = scaled(0.5, plus(plus(turn[0], turn[1]), turn[2]))
+            axis = scale(0.5, plus(plus(turn[0], turn[1]), turn[2]))
             return [each.value for each in (w, *point, *axis)]
 
-        return traced(formula, self.freedoms)
+        return trace_formula(formula, self.freedoms)
 
     def spanned(self, middle: Array, half: Array) -> tuple[Array, Array]:
         """What boxes (c, n) hold: shifts from the goal, axes of the turn times its sine, joints."""
@@ -204,7 +204,7 @@ class PlaneError(JointError):
         forms = [affine(middle[:, i], half[:, i, None] * eye[i], AFFINE_ROUNDING * (1 + np.abs(middle[:, i])))
                  for i in range(f)]
         w, *rest = self.told.at(forms)
-        found = stacked(rest)
+        found = stack(rest)
         low, high = found.low.copy(), found.high.copy()
         if self.far is not None:
             with np.errstate(all="ignore"):

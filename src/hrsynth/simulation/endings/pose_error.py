@@ -32,10 +32,10 @@ from ...geometry.components import (
     dot,
     minus,
     plus,
-    scaled,
+    scale,
     spin,
     sqrt,
-    transformed,
+    transform_vector,
 )
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
@@ -97,7 +97,7 @@ class Turning:
     @property
     def rates(self) -> list[Components]:
         """ė along each direction."""
-        return [cross(minus(plain, scaled(normal / self.along, self.slip)), self.wanted)
+        return [cross(minus(plain, scale(normal / self.along, self.slip)), self.wanted)
                 for plain, normal in zip(self.plain, self.normal, strict=True)]
 
 
@@ -155,7 +155,7 @@ class PoseError(Value):
         configurations, mechanism = [setting.everything.start, *setting.configurations], setting.mechanism
         known = pattern(setting.anatomy, [], coordinates, configurations)
         limbs = known.forms(goal).limbs
-        seen = tuple(_seen(o, known, limbs, [goal, *configurations]) for o in setting.observed)
+        seen = tuple(_seen_direction(o, known, limbs, [goal, *configurations]) for o in setting.observed)
         (p, R), motion = coordinates.of([goal]), coordinates.motion
         rules = tuple(f"direction of leg {o.leg}" for o in seen if o.rule is not None)
         return cls(coordinates.length, motion, p[0], R[0], motion.translations,
@@ -223,7 +223,7 @@ class PoseError(Value):
 
     def _tip(self, limb: ClosedFormLeg, p: Components, R: Components, number: Number) -> tuple[Components, Components]:
         """A limb's tip, and the tip from the point."""
-        arm: Components = transformed(R, number(limb.tip.turned)) if np.any(limb.tip.turned) else [0.0, 0.0, 0.0]
+        arm: Components = transform_vector(R, number(limb.tip.turned)) if np.any(limb.tip.turned) else [0.0, 0.0, 0.0]
         return plus(plus(p, number(limb.tip.constant)), arm), arm
 
     def _turning(self, seen: SeenDirection, here: Place, goal: Place, twists: Sequence[Twist], number: Number
@@ -244,17 +244,17 @@ class PoseError(Value):
             along = (-limb.mode) * (gain * sqrt(margin))
         else:
             gain, slip, along = (seen.sense * limb.mode) / sqrt(margin), u, 1.0
-        return Turning(u, wanted, [scaled(gain, y) for y in tips], [gain * dot(u, y) for y in tips], slip, along)
+        return Turning(u, wanted, [scale(gain, y) for y in tips], [gain * dot(u, y) for y in tips], slip, along)
 
     def _direction(self, seen: SeenDirection, p: Components, R: Components, number: Number) -> Components:
         """An observed direction at a pose, in its limb's working mode."""
         if seen.rule is not None:
-            return plus(transformed(R, number(seen.rule.turned)), number(seen.rule.constant))
+            return plus(transform_vector(R, number(seen.rule.turned)), number(seen.rule.constant))
         assert seen.limb is not None
         limb = self.limbs[seen.limb]
         tip = self._tip(limb, p, R, number)[0]
         carried = limb.at(tip, number, limb.mode)[1]
-        return scaled(seen.sense / number(limb.rod), minus(tip, carried)) if isinstance(limb, OnRod) else scaled(
+        return scale(seen.sense / number(limb.rod), minus(tip, carried)) if isinstance(limb, OnRod) else scale(
             seen.sense, carried)
 
 
@@ -270,7 +270,7 @@ def require_directions(setting: ObservedRobot) -> None:
         raise NotEnclosed("joints are coupled")
 
 
-def _seen(observation: Observation, known: LegPattern, limbs: Sequence[ClosedFormLeg],
+def _seen_direction(observation: Observation, known: LegPattern, limbs: Sequence[ClosedFormLeg],
           configurations: Sequence[ClosedConfiguration]) -> SeenDirection:
     """Which limb's rod an observed direction is, at all configurations; raises ``NotEnclosed``."""
     assert isinstance(observation, Direction)

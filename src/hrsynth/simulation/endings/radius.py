@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...analysis.observed import ObservedRobot
-from ...batch.enclosures import BoxFormula, traced
+from ...batch.enclosures import BoxFormula, trace_formula
 from ...budgets import RADIUS_BOXES, RAYS
-from ...geometry.affine import AffineForms, affine, stacked
+from ...geometry.affine import AffineForms, affine, stack
 from ...geometry.so3 import angle_of
 from ...geometry.vectors import Array, transform
 from ...kinematics.configuration import ClosedConfiguration
@@ -102,7 +102,7 @@ def certified_radius(setting: ObservedRobot, goal: ClosedConfiguration) -> Certi
             raise NotEnclosed(f"forms are fitted to samples: {', '.join(error.fitted)}")
         if error.limits:
             raise NotEnclosed(f"a run may stop at the limits of joints: {', '.join(error.limits)}")
-        proved = _proved(error)
+        proved = _proved_cones(error)
     except NotEnclosed as why:
         return CertifiedRadius(goal, setting.motion, 0.0, None, 0.0, 0.0, 0, str(why))
     reach, boxes = _reach(proved)
@@ -125,7 +125,7 @@ def _product(radius: float) -> float:
     return float(low)
 
 
-def _proved(error: PoseError) -> ProvedCones:
+def _proved_cones(error: PoseError) -> ProvedCones:
     """Cones proved up to nearly where E is seen to stop rising on some ray; raises ``NotEnclosed``."""
     n = error.size
     _, rates = error.numbers(np.zeros((1, n)), np.eye(n))
@@ -174,7 +174,7 @@ def _reach(proved: ProvedCones) -> tuple[float, int]:
         inside = reached & (c > E)
         low, high = np.where(inside, middle, low), np.where(inside, high, middle)
     seen = float(np.min(_gauge(error, low[:, None] * x)))
-    errors = traced(lambda inputs, number: [x for each in error.at(inputs, [], number).seen for x in each.error],
+    errors = trace_formula(lambda inputs, number: [x for each in error.at(inputs, [], number).seen for x in each.error],
                     error.size)
     Q, boxes = proved.prover.Q @ np.linalg.inv(W), 0
     for share in RADIUS_SHARES:
@@ -196,7 +196,7 @@ def _highest_on(errors: BoxFormula, Q: Array, middle: Array, half: Array) -> Aff
     """E over boxes (c, n) of coordinates x: with e = Q x + a it is ½ (xᵀ Qᵀ Q x + 2 Q x · a + |a|²)."""
     n, H = middle.shape[1], Q.T @ Q
     off = half[:, :, None] * np.eye(n)
-    e = stacked(errors.at([affine(middle[:, i], off[:, i], np.zeros(len(middle))) for i in range(n)]))
+    e = stack(errors.at([affine(middle[:, i], off[:, i], np.zeros(len(middle))) for i in range(n)]))
     extent = np.abs(middle) + half
     Qx = affine(middle @ Q.T, np.einsum("cks,rk->crs", off, Q), AFFINE_ROUNDING * extent @ np.abs(Q).T)
     a = e - Qx

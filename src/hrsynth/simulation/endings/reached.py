@@ -19,7 +19,7 @@ Bounds = tuple[Array, Array]
 """Lower and upper bounds (c,)."""
 
 
-def narrowed(error: JointError, forms: list[AffineForms], low: Array, high: Array) -> Bounds:
+def narrow_joints(error: JointError, forms: list[AffineForms], low: Array, high: Array) -> Bounds:
     """The corners (c, n) of boxes, whose coordinates are ``forms``, with the joints where the legs can have them; the
     lower above the upper one where a leg has them nowhere. Charts of their own are as they were."""
     if error.far is not None or error.short is not None:
@@ -29,11 +29,11 @@ def narrowed(error: JointError, forms: list[AffineForms], low: Array, high: Arra
     for place, i in enumerate(error.joints):
         along, one, two = ((each.low, each.high) for each in ways[3 * place : 3 * place + 3])
         at = pose + place
-        low[:, at], high[:, at] = reached(error.error.limbs[i], along, one, two, (low[:, at], high[:, at]))
+        low[:, at], high[:, at] = narrow_joint(error.error.limbs[i], along, one, two, (low[:, at], high[:, at]))
     return low, high
 
 
-def reached(limb: ClosedFormLeg, along: Bounds, one: Bounds, two: Bounds, own: Bounds) -> Bounds:
+def narrow_joint(limb: ClosedFormLeg, along: Bounds, one: Bounds, two: Bounds, own: Bounds) -> Bounds:
     """The bounds ``own`` of a joint, narrowed to where it can be while the tip is between bounds, from the centre along
     the axis and in the two directions across."""
     shifts = [0.0] if isinstance(limb, OnRail) else list(2 * np.pi * np.arange(-2, 3))

@@ -17,7 +17,7 @@ from ...mechanism.pose import Pose
 from ...results import Result, Value
 from ...tolerances import SAME_ENDING
 from ..law import Measures
-from .cover import Cover, joined
+from .cover import Cover, join_boxes
 from .search import CriticalPoints
 
 CRITICAL = "critical"
@@ -212,7 +212,7 @@ class RestCover(Value):
         corners = np.array(cover.open)[:, :, :k]
         if not np.isfinite(corners).all():
             return ", some however far away"
-        places = [np.array(each) for each in joined(corners)] if len(corners) <= MOST_JOINED else []
+        places = [np.array(each) for each in join_boxes(corners)] if len(corners) <= MOST_JOINED else []
         if not 0 < len(places) <= PLACES_TOLD:
             places = [np.stack([corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)])]
         told = [(f"{cover.error.length * float(np.ptp(each, axis=0).max()):.3g} m about "

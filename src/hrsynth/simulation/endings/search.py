@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...analysis.branch.carried_vectors import SweptChains
-from ...analysis.observed import ObservedRobot, restricted
+from ...analysis.observed import ObservedRobot, restrict_samples
 from ...budgets import (
     ENDING_DESCENTS,
     ENDING_EFFORT,
@@ -38,7 +38,7 @@ from ...progress import tell
 from ...results import Value
 from ...tolerances import CLOSURES_MEET, CRITICAL_FLAT, SAME_ENDING, SEEN_ABOVE
 from ..law import Law
-from .descent import CriticalPoint, are_closed, closed, descend, walked
+from .descent import CriticalPoint, are_closed, close_loops, descend, walk_at_random
 from .error import DirectionTerm, RestEquations, RestSystem
 
 BESIDE = 0.5
@@ -93,7 +93,7 @@ def starts(system: RestSystem, homes: Array, seed: int = 0, setting: ObservedRob
         homes, strict = np.concatenate([homes[kept], drawn[good]]), not (good.all() and kept.all())
     q = homes[np.arange(ENDING_STARTS) % len(homes)]
     while True:
-        q = walked(system, q, rng, ENDING_WALK)
+        q = walk_at_random(system, q, rng, ENDING_WALK)
         if strict and setting is not None:
             astray = ~in_mode(system, setting, q)
             q[astray] = homes[rng.integers(len(homes), size=int(astray.sum()))]
@@ -125,7 +125,7 @@ def critical_points(system: RestSystem, setting: ObservedRobot, goal: ClosedConf
             # rests lie near each other
             own = np.array([each.point.q for each in known.isolated])
             some = own[rng.integers(len(own), size=round(BESIDE * len(q)))]
-            q = np.concatenate([q, walked(system, some, rng, 1 + len(fresh) % 3)])
+            q = np.concatenate([q, walk_at_random(system, some, rng, 1 + len(fresh) % 3)])
         # what attracts matters most: two of five starts go down all along
         index = rng.integers(freedoms + 1, size=len(q)) * (rng.random(len(q)) < (0.0 if minima else 0.6))
         points += descend(system, q, index, idle)
@@ -231,7 +231,7 @@ def anywhere(system: RestSystem, rng: np.random.Generator, count: int) -> Array:
     """Closed configurations (c, N) to which random coordinates lead, as many as close."""
     slides = np.array([each.slides for each in system.system.coordinates])
     q = rng.uniform(-1.0, 1.0, (count, len(slides))) * np.where(slides, WIDEST_SLIDE, np.pi)
-    q = closed(system, q, 40)
+    q = close_loops(system, q, 40)
     return q[are_closed(system, q)]
 
 
@@ -290,4 +290,4 @@ def told_by(setting: ObservedRobot) -> tuple[Observation, ...]:
     if every.members[0].relation.dimension == held:
         return every.question.observations
     return tuple(o for o in every.question.observations if o.key in own or
-                 restricted(every, [*setting.observed, o], ways=False).members[0].relation.dimension == held)
+                 restrict_samples(every, [*setting.observed, o], ways=False).members[0].relation.dimension == held)

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...budgets import BOXES_AT_ONCE
-from ...geometry.affine import AffineForms, affine, combined
+from ...geometry.affine import AffineForms, affine, combine
 from ...geometry.vectors import Array
 from ...progress import tell
 from ...results import Value
@@ -37,7 +37,7 @@ from .elimination import (
 )
 from .enclosure import negative
 from .joint_error import JointError
-from .reached import narrowed
+from .reached import narrow_joints
 
 WIDER = (1.25, 4.0)
 """By how much boxes are larger in which exactly one zero is to be proved, one after the other."""
@@ -134,16 +134,16 @@ class Subdivision:
         forms = forms_of(middle, half)
         g = self.error.closing.together(forms) if self.error.size[1] else AffineForms(
             np.zeros((middle.shape[1] + 1, len(middle), 0)), np.zeros((len(middle), 0)))
-        low, high = _narrowed(g)
+        low, high = _narrow_symbols(g)
         if self.vanishing:
             low, high = (pick(one, other) for pick, one, other in zip(
-                (np.maximum, np.minimum), (low, high), _narrowed(self.error.asked.together(forms)), strict=True))
+                (np.maximum, np.minimum), (low, high), _narrow_symbols(self.error.asked.together(forms)), strict=True))
         gone = np.any(low > high, axis=1)
         with np.errstate(all="ignore"):
             J = np.where(half[:, None] > 0, np.moveaxis(g.v[1:], 0, -1) / half[:, None], 0.0)
         P, N = pivots(J)
-        follow = combined(inverse(columns(np.moveaxis(g.v[1:], 0, -1), P)), g)
-        inner = _narrowed(follow, P)
+        follow = combine(inverse(columns(np.moveaxis(g.v[1:], 0, -1), P)), g)
+        inner = _narrow_symbols(follow, P)
         low, high = np.maximum(low, inner[0]), np.minimum(high, inner[1])
         gone |= np.any(low > high, axis=1)
         own, size = middle + half * (low + high) / 2, half * np.maximum((high - low) / 2, 0.0) * (1 + BOX_ROUNDING)
@@ -172,7 +172,7 @@ class Subdivision:
 
     def _narrow(self, middle: Array, half: Array) -> tuple[Array, Array]:
         """The corners of boxes (c, n) with the joints where closed forms say that they can be."""
-        return narrowed(self.error, forms_of(middle, half), middle - half, middle + half)
+        return narrow_joints(self.error, forms_of(middle, half), middle - half, middle + half)
 
     def _settled(self, tube: list[AffineForms], P: Places, N: Places) -> tuple[Flags, AffineForms]:
         """Whether nothing is asked for on a tube, and F there."""
@@ -271,9 +271,9 @@ class Subdivision:
         # over the box μ is μ₀ + δ, with (∇E + μ₀ ∇g)_P + δ ∇g_P = 0
         _, M, slope, _ = self._values(forms_of(middle, wide))
         turned = np.swapaxes(back, 1, 2)
-        pull = combined(turned, entries(slope + (M * mu[:, :, None]).sum(-2), P))
+        pull = combine(turned, entries(slope + (M * mu[:, :, None]).sum(-2), P))
         rates = entries(M, P)
-        off = (combined(turned, rates.transposed()) - np.eye(k)).size
+        off = (combine(turned, rates.transposed()) - np.eye(k)).size
         with np.errstate(all="ignore"):
             most = (pull.size.max(axis=1, initial=0.0) / (1 - off.sum(axis=-1).max(axis=1, initial=0.0)))[:, None]
             room = (pull.size + (off * most[:, None]).sum(axis=-1)) * (1 + BOX_ROUNDING)
@@ -286,8 +286,8 @@ class Subdivision:
         pull, K = self._equations(at, about)
         Y = pseudo_inverse(K.v[0])
         with np.errstate(all="ignore"):
-            shift = combined(Y, pull)
-            off = ((np.eye(at.shape[1]) - combined(Y, K)).size @ about[..., None])[..., 0]
+            shift = combine(Y, pull)
+            off = ((np.eye(at.shape[1]) - combine(Y, K)).size @ about[..., None])[..., 0]
             return shift.v[0], (shift.size + off) * (1 + AFFINE_ROUNDING)
 
     def _equations(self, at: Array, about: Array) -> tuple[AffineForms, AffineForms]:
@@ -363,7 +363,7 @@ def forms_of(middle: Array, half: Array) -> list[AffineForms]:
     return [affine(middle[:, i], half[:, i, None] * eye[i], off[:, i]) for i in range(len(eye))]
 
 
-def _narrowed(g: AffineForms, P: Places | None = None) -> tuple[Array, Array]:
+def _narrow_symbols(g: AffineForms, P: Places | None = None) -> tuple[Array, Array]:
     """Where in [−1, 1] the symbols (c, n) are, as far as equations g (c, k) = 0 tell; those ``P`` alone of one equation
     each, which it has the coefficient 1 in."""
     J = np.moveaxis(g.v[1:], 0, -1)

@@ -46,10 +46,10 @@ def write(mechanism: Mechanism) -> Written:
                 "equality": [*loops, *_gears(robot)], "actuator": motors}
     root = xml.new("mujoco", xml.new("compiler", angle="radian", boundmass="0.001", boundinertia="0.000001"),
                    *(xml.new(tag, *elements) for tag, elements in sections.items() if elements), model=robot.name)
-    return Written((xml.text_of(root),), (*lost, *_lost(robot), *odd, *unsaid(robot, SIZES, dialect="MJCF")))
+    return Written((xml.text_of(root),), (*lost, *_notes_on_losses(robot), *odd, *unsaid(robot, SIZES, dialect="MJCF")))
 
 
-def _lost(robot: Mechanism) -> list[Note]:
+def _notes_on_losses(robot: Mechanism) -> list[Note]:
     """What MJCF has no words for: one-sided limits, limits of loops, of velocity and effort; names of fixed joints."""
     found = []
     bounded = [(joint, joint.limits) for joint in robot.joints.values() if joint.limits is not None]

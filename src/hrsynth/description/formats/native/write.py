@@ -140,7 +140,7 @@ class _NativeWriter:
         for tag, axis in zip(("axis", "axis2"), axes, strict=False):
             etree.SubElement(element, tag, xyz=numerals.axis(axis))
         if joint.limits is not None:
-            etree.SubElement(element, "limit", {k: numerals.exact(v) for k, v in _known(joint.limits).items()})
+            etree.SubElement(element, "limit", {k: numerals.exact(v) for k, v in _known_limits(joint.limits).items()})
         xml.restore(element, joint.xml)
         return element
 
@@ -206,7 +206,7 @@ def _tree_type(kind: JointType, limits: Limits | None) -> str:
 
 def _limit(element: xml.Element, kind: JointType, limits: Limits | None) -> None:
     """Append a ``<limit>`` with all that URDF demands; ``free`` names the values that stand for no limit."""
-    known = {} if limits is None else _known(limits)
+    known = {} if limits is None else _known_limits(limits)
     if kind is JointType.PRISMATIC or (kind is JointType.REVOLUTE and {"lower", "upper"} & set(known)):
         needed = list(NO_LIMIT)
     elif known:
@@ -221,7 +221,7 @@ def _limit(element: xml.Element, kind: JointType, limits: Limits | None) -> None
     etree.SubElement(element, "limit", attributes)
 
 
-def _known(limits: Limits) -> dict[str, float]:
+def _known_limits(limits: Limits) -> dict[str, float]:
     return {key: value for key in NO_LIMIT if (value := getattr(limits, key)) is not None}
 
 

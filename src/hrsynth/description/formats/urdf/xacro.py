@@ -35,16 +35,16 @@ def expand(path: Path) -> xml.Element:
     except subprocess.TimeoutExpired:
         raise xml.refusal(path, "xacro did not finish", f"{XACRO_SECONDS} seconds") from None
     if run.returncode:
-        file, line, said = _said(run.stderr)
+        file, line, said = _last_message(run.stderr)
         raise xml.refusal(path if file is None else xml.beside(path, file),
                           f"xacro refuses it: {said[:300]}", "a file that xacro expands", line=line)
     places, _, text = run.stdout.partition("\n")
     root = xml.document(text, str(path))
-    xml.placed(root, path, json.loads(places))
+    xml.give_places(root, path, json.loads(places))
     return root
 
 
-def _said(errors: str) -> tuple[str | None, int | None, str]:
+def _last_message(errors: str) -> tuple[str | None, int | None, str]:
     """File, line and text of what the process says last."""
     last = "".join([line for line in errors.splitlines() if line.strip()][-1:])
     try:

@@ -9,7 +9,7 @@ from ...dialect import Dialect
 _TEXT, _BINARY = (b"#usda", b"#sdf"), (b"PXR-USDC", b"PK\x03\x04")
 
 
-def _packed(text: str, path: Path) -> bytes:
+def _pack(text: str, path: Path) -> bytes:
     """A text as its file holds it: ``.usdc`` is binary."""
     if path.suffix.lower() != ".usdc":
         return text.encode()
@@ -19,4 +19,4 @@ def _packed(text: str, path: Path) -> bytes:
 
 
 DIALECT = Dialect("usd", lambda file: file.start.startswith((*_TEXT, *_BINARY)), (".usda", ".usd", ".usdc"), rank=-2,
-                  begins=(*_TEXT, *_BINARY), packed=_packed, meshes=None)
+                  begins=(*_TEXT, *_BINARY), packed=_pack, meshes=None)

@@ -305,7 +305,7 @@ class _StageReader:
         if kind is not None and axis not in AXES:
             self.defect(prim.path, "physics:axis", axis, "X, Y, Z")
             axis = "X"
-        locked = [each for each in FREEDOMS if _locked(prim.values, each)]
+        locked = [each for each in FREEDOMS if _is_locked(prim.values, each)]
         match kind:
             case JointType.REVOLUTE:
                 return (f"rot{axis}",)
@@ -492,7 +492,7 @@ class _StageReader:
             self.result.note("guess", what)
 
 
-def _locked(values: Mapping[str, Any], freedom: str) -> bool:
+def _is_locked(values: Mapping[str, Any], freedom: str) -> bool:
     low, high = (values.get(f"limit:{freedom}:physics:{key}") for key in ("low", "high"))
     return low is not None and high is not None and bool(low >= high)
 

@@ -78,7 +78,7 @@ class _UsdWriter:
         return Written((text,), tuple(self.lost))
 
     def _body(self, name: str, X: Array, content: Content, unread: list[str]) -> list[str]:
-        apis, lines = ["PhysicsRigidBodyAPI"], [*_label(name, self.names[name]), *_placed(X)]
+        apis, lines = ["PhysicsRigidBodyAPI"], [*_label(name, self.names[name]), *_transform_of(X)]
         inertial = content.inertial
         if inertial is not None and inertial.mass > 0:
             apis.append("PhysicsMassAPI")
@@ -116,7 +116,7 @@ class _UsdWriter:
                       f"custom double3 {PREFIX}:scale = {_tuple(solid.scale)}"]
             if found is None:
                 unread.append(f"{link} ({solid.file})")
-                return _prim("Xform", title, [*lines, *_placed(solid.X)], apis)
+                return _prim("Xform", title, [*lines, *_transform_of(solid.X)], apis)
             points, faces = found
             points = points * solid.scale
             rows = ", ".join(_tuple(np.round(point, 9) + 0.0) for point in points)
@@ -130,7 +130,7 @@ class _UsdWriter:
             lines += [f"double {'height' if key == 'length' else key} = {_number(value)}"
                       for key, value in zip(SIZES[solid.kind], solid.sizes, strict=True)]
             lines += ['uniform token axis = "Z"'] * (kind != "Sphere")
-        return _prim(kind, title, [*lines, *_placed(solid.X, scale)], apis)
+        return _prim(kind, title, [*lines, *_transform_of(solid.X, scale)], apis)
 
     def _joint(self, joint: Joint) -> list[str]:
         """A joint between two bodies; what is no type of its own is a D6 whose other directions are locked."""
@@ -228,7 +228,7 @@ def _prim(kind: str, name: str, lines: Iterable[str], apis: Iterable[str] = ()) 
     return [*head, "{", *(f"    {line}" for line in lines), "}"]
 
 
-def _placed(X: Array, scale: tuple[float, ...] = (1.0, 1.0, 1.0)) -> list[str]:
+def _transform_of(X: Array, scale: tuple[float, ...] = (1.0, 1.0, 1.0)) -> list[str]:
     """The transform of a prim in its parent's frame."""
     found, order = [], []
     if np.any(X[:3, 3]):

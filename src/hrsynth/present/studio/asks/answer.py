@@ -17,7 +17,7 @@ from ....geometry.vectors import Array
 from ....kinematics.platform_motion import PlatformMotion
 from ....tolerances import SAME_RELATION
 from ...text.poses import all_of
-from ...text.tables import listed, named
+from ...text.tables import list_words, name_all
 from ..commands import lines
 from ..request import Request
 from ..scale import LOST, error
@@ -48,7 +48,7 @@ def _size(wrong: dict[str, Any]) -> float:
 
 def which(verdict: Verdict) -> str:
     """The sentence that says which legs to watch."""
-    legs = named("leg", verdict.legs)
+    legs = name_all("leg", verdict.legs)
     if verdict == CONTROLLABLE:
         return f"Watch {legs}."
     if not verdict.dof:
@@ -56,7 +56,7 @@ def which(verdict: Verdict) -> str:
     if not verdict.rank:
         return ("Watching the legs does not help: their directions do not change with the platform wherever it was "
                 "tried.")
-    return (f"Watching legs is not enough: even with all of them {listed([each.name for each in verdict.lost])} "
+    return (f"Watching legs is not enough: even with all of them {list_words([each.name for each in verdict.lost])} "
             f"stay{'s' * (len(verdict.lost) == 1)} unseen wherever it was tried ({verdict.dof - verdict.rank} of "
             f"{verdict.dof} freedoms).")
 
@@ -65,7 +65,7 @@ def blind(verdict: Verdict) -> list[str]:
     """What follows where a freedom is not seen."""
     if not verdict.dof:
         return []
-    legs = named("leg", verdict.legs)
+    legs = name_all("leg", verdict.legs)
     seen = f"{legs[0].upper()}{legs[1:]} see{'s' * (len(verdict.legs) == 1)} as much as all of them together."
     return [seen if verdict.rank else "However well the directions are measured, they say nothing about the platform.",
             "Something else must be measured as well: the command advise lists what would do."]

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ....description import formats
-from ....description.meshes import carried
+from ....description.meshes import carry_meshes
 from ....errors import BadRequest
 from ...outputs import OUTPUTS
 from ...show import draw
@@ -57,7 +57,7 @@ def _robot(request: Request) -> tuple[str, bytes, dict[str, str]]:
     dialect = next(each for each in formats.writable() if each.name == NATIVE)
     name = re.sub(r"[^\w.-]", "_", mechanism.name)
     target = Path(mechanism.file or name).with_name(f"{name}.urdf")
-    robot, _, _ = carried(mechanism, target, dialect.meshes, copy=False)
+    robot, _, _ = carry_meshes(mechanism, target, dialect.meshes, copy=False)
     (text,) = formats.writer(NATIVE)(robot).texts
     same = lines(request, "import", "--yes", "-o", target.name, watching=False)
     loaded = lines(request, "load", watching=False)["python"]

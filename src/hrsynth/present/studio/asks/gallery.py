@@ -9,7 +9,7 @@ import numpy as np
 
 from ....description import load, shipped
 from ....families.table import ROBOTS
-from ....geometry.vectors import Array, oriented
+from ....geometry.vectors import Array, orient_axis
 from ....mechanism import JointType, Mechanism
 from ....mechanism.legs import decompose
 from ....mechanism.normal import normal_form
@@ -52,7 +52,7 @@ def flat(robot: Mechanism) -> Array | None:
     if not turns or len(turns) + len(slides) < len(robot.joints):
         return None
     away = max([np.linalg.norm(np.cross(turns[0], axis)) for axis in turns] + [abs(turns[0] @ axis) for axis in slides])
-    return oriented(turns[0]) if away < SAME_DIRECTION else None
+    return orient_axis(turns[0]) if away < SAME_DIRECTION else None
 
 
 def files(request: Request) -> list[str]:

@@ -32,13 +32,13 @@ def answer(request: Request) -> dict[str, Any]:
         if mover.far(values):
             raise BadRequest("values", values.tolist(), "what the robot's sliders can mean")
         here, reached = mover.sent(here, values)
-        return told(request, mover, here, bool(np.max(np.abs(reached - values), initial=0.0) > SLIDER_ARRIVED))
+        return describe_pose(request, mover, here, bool(np.max(np.abs(reached - values), initial=0.0) > SLIDER_ARRIVED))
     if place is not None:
-        return _drawn(request, mover, here, place)
-    return told(request, mover, here)
+        return _draw_pose(request, mover, here, place)
+    return describe_pose(request, mover, here)
 
 
-def _drawn(request: Request, mover: Mover, here: Posed, place: Any) -> dict[str, Any]:
+def _draw_pose(request: Request, mover: Mover, here: Posed, place: Any) -> dict[str, Any]:
     size = float(np.linalg.norm(place[3:]))
     if not 0.5 < size < 2.0:
         raise BadRequest("platform", place.tolist(), "a position and a unit quaternion")
@@ -48,10 +48,10 @@ def _drawn(request: Request, mover: Mover, here: Posed, place: Any) -> dict[str,
         raise BadRequest("platform", place.tolist(), f"within {BEYOND_SLIDERS:g} sizes of the robot")
     found = mover.drawn_to(here, wanted)
     apart = np.abs(found.real.pose(link) - wanted).max()
-    return told(request, mover, found, bool(apart > SLIDER_ARRIVED))
+    return describe_pose(request, mover, found, bool(apart > SLIDER_ARRIVED))
 
 
-def told(request: Request, mover: Mover, posed: Posed, stopped: bool = False) -> dict[str, Any]:
+def describe_pose(request: Request, mover: Mover, posed: Posed, stopped: bool = False) -> dict[str, Any]:
     """A configuration with all that is shown of it; ``stopped``: it is not where it was sent."""
     return {"state": state(request, mover, posed), "here": request.told(posed),
             "values": mover.read(posed).tolist(), "stopped": stopped, "residual": posed.real.residual}

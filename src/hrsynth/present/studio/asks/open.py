@@ -19,7 +19,7 @@ from ...view.view import arrows_of, machine_of, stage
 from ..commands import lines
 from ..request import Request
 from ..scale import scale, unit_of
-from .move import told
+from .move import describe_pose
 
 MOST_OFFERED = 30
 """Candidates of a guess that are offered."""
@@ -28,7 +28,7 @@ MOST_OFFERED = 30
 def answer(request: Request) -> dict[str, Any]:
     """The scene of a robot. Where its file can be read but no robot be made of it: why (``failed``), and what was
     guessed."""
-    found = guessed(request)
+    found = guess_choices(request)
     guesses = [] if found is None else list(offers(request, found))
     dialect = "hrsynth" if found is None else found.dialect
     try:
@@ -54,7 +54,8 @@ def scene(request: Request) -> dict[str, Any]:
         **stage(setting, [machine], arrows_of(setting, known.values())),
         "words": f"{words}, {setting.dof} freedom{'s' * (setting.dof != 1)}",
         "legs": [_leg(request, setting, leg) for leg in setting.anatomy.legs],
-        "sliders": sliders(mover, request.ends), "scale": scale(unit_of(setting)), **told(request, mover, here),
+        "sliders": sliders(mover, request.ends), "scale": scale(unit_of(setting)),
+            **describe_pose(request, mover, here),
         "notes": [*map(str, setting.robot.notes), *setting.beside(), *missing], **lines(request, "derive")}
 
 
@@ -88,7 +89,7 @@ def _leg(request: Request, setting: ObservedRobot, leg: Leg) -> dict[str, Any]:
             "ask": seen.link if seen and not (default and seen.link == default.link) else leg.label}
 
 
-def guessed(request: Request) -> ImportChoices | None:
+def guess_choices(request: Request) -> ImportChoices | None:
     """What the file leaves open, None where it says all, or cannot be read."""
     said = dict(request.source.options)
     try:

@@ -12,23 +12,23 @@ import numpy as np
 from ....analysis.accuracy.accuracy import sees_all
 from ....analysis.accuracy.cones import Blur
 from ....analysis.accuracy.error_map import Mapper
-from ....analysis.accuracy.pose_errors import attained
+from ....analysis.accuracy.pose_errors import largest_by_ascent
 from ....analysis.singularity.agreement import weakest
 from ....batch.reach import spread
 from ....budgets import FARTHEST_POSE, LARGEST_STUDIO_PLANE, LARGEST_STUDIO_SWEEP
 from ....errors import BadRequest
-from ....geometry.vectors import Array, nested
+from ....geometry.vectors import Array, nested_lists
 from ....kinematics.configuration import ClosedConfiguration
 from ....kinematics.coordinates import Coordinates
 from ....kinematics.steps import track
 from ....mechanism.pose import SCALARS, Grid, Pose
 from ....results import Value
 from ....tolerances import ON_LOCUS, SAME_RELATION, SLIDER_ARRIVED
-from ...text.tables import NOT_BOUNDED, bounded
+from ...text.tables import NOT_BOUNDED, is_bounded
 from ...view.states import Mover
 from ..commands import NONE, digits, lines, same_at
 from ..request import Request
-from ..scale import CONE, CONE_TEXT, SIGNS, STEPS, rounded, unit_of
+from ..scale import CONE, CONE_TEXT, SIGNS, STEPS, round_digits, unit_of
 
 ACCURACY, DISTANCE = "accuracy", "distance"
 DISTANCES = (0.01, 0.03, 0.1, 0.3)
@@ -82,7 +82,7 @@ def answer(request: Request) -> dict[str, Any]:
     (a, b), (c, d) = (map(float, ends) for ends in ranges)
     across = mover.coordinates.places[third[0]] if third else None
     return {"corners": [place(x, y).tolist() for x, y in ((a, c), (b, c), (b, d), (a, d))], "n": cells,
-            "values": nested(found.values.T), "unit": unit if kind == ACCURACY else "",
+            "values": nested_lists(found.values.T), "unit": unit if kind == ACCURACY else "",
             "steps": list(STEPS[unit] if kind == ACCURACY else DISTANCES), "falling": kind == DISTANCE,
             "at": float(values[third[0]]) if third else None,
             "normal": np.eye(3)[across].tolist() if across is not None and across < 3 else None,
@@ -145,7 +145,7 @@ def grid_text(grid: Grid) -> str:
 def by_batch(mapper: Mapper, grid: Grid, kind: str, unit: str) -> PoseField:
     """The plane by closed forms, held against Pinocchio at some of its poses."""
     found = mapper.over(grid, 0, CHECKED)
-    table = found.smallest if kind == DISTANCE else _shown(found.position, found.orientation, unit)
+    table = found.smallest if kind == DISTANCE else _in_unit(found.position, found.orientation, unit)
     signs, (x, y) = found.determinant, (values for _, values in grid.axes)
     if signs is None or found.smallest_at is None:
         return PoseField(table, np.zeros((0, 2, 2)))
@@ -175,12 +175,12 @@ def one_by_one(mover: Mover, here: ClosedConfiguration, pair: tuple[int, int], v
     found = np.full((2, len(aims)), np.nan)
     for i, at in enumerate(spread(here, (size, size), aims, lead)):
         if at is not None:
-            found[:, i] = (weakest(at, question), np.nan) if kind == DISTANCE else attained(at, question, blur)
-    table = found[0] if kind == DISTANCE else _shown(found[0], found[1], unit)
+            found[:, i] = (weakest(at, question), np.nan) if kind == DISTANCE else largest_by_ascent(at, question, blur)
+    table = found[0] if kind == DISTANCE else _in_unit(found[0], found[1], unit)
     return PoseField(table.reshape(size, size), np.zeros((0, 2, 2)))
 
 
-def _shown(position: Array, orientation: Array, unit: str) -> Array:
+def _in_unit(position: Array, orientation: Array, unit: str) -> Array:
     """Errors in the unit in which they are shown; where they have no bound, more than any step."""
     found = 1e3 * position if unit == "mm" else np.degrees(orientation)
     return np.where(np.isinf(position) | np.isinf(orientation), FARTHEST_POSE, found)
@@ -229,6 +229,6 @@ def _words(kind: str, unit: str, found: PoseField, length: float) -> str:
     if kind == DISTANCE:
         return f"{part}; there the smallest singular value of Mᵀ lies between {here.min():.2g} and {here.max():.2g}."
     most = float(here.max())
-    near = bounded(most / 1e3, length) if unit == "mm" else bounded(np.radians(most))
-    worst = f"{rounded(most)}{SIGNS[unit]}" if near else f"more, {NOT_BOUNDED}"
-    return f"{part}; there the platform is off, per 0.1°, by {rounded(float(here.min()))}{SIGNS[unit]} to {worst}."
+    near = is_bounded(most / 1e3, length) if unit == "mm" else is_bounded(np.radians(most))
+    worst = f"{round_digits(most)}{SIGNS[unit]}" if near else f"more, {NOT_BOUNDED}"
+    return f"{part}; there the platform is off, per 0.1°, by {round_digits(float(here.min()))}{SIGNS[unit]} to {worst}."

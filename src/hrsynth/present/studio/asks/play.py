@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ....analysis.modes.motions import followed
+from ....analysis.modes.motions import follow_motion
 from ....analysis.posture import ConfigurationAnalysis
 from ....budgets import LARGEST_STUDIO_LIST
 from ....errors import BadRequest
@@ -31,7 +31,7 @@ def answer(request: Request) -> dict[str, Any]:
         raise BadRequest("number of a lost freedom", number, f"0 to {len(lost) - 1}" if lost else "none is lost here")
     question = setting.samples.question
     ways = [mover.followed(here, way) for way in
-            followed(here.real, question, lost[number].twist[: question.twist_rows], STEPS)]
+            follow_motion(here.real, question, lost[number].twist[: question.twist_rows], STEPS)]
     frames = {id(each): {**state(request, mover, each), "here": request.told(each)}
               for each in (here, *ways[0], *ways[1])}
     cycle = [here, *_there_and_back(ways[0]), here, *_there_and_back(ways[1])]

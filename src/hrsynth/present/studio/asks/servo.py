@@ -9,7 +9,7 @@ import numpy as np
 
 from ....errors import BadRequest
 from ....geometry.vectors import Array
-from ....simulation.camera import Camera, Cylinder, cylinders, placed
+from ....simulation.camera import Camera, Cylinder, cylinders, place_camera
 from ....simulation.servo import ServoTask
 from ....tolerances import SLIDER_ARRIVED
 from ...view.states import Mover, Posed
@@ -27,11 +27,11 @@ def answer(request: Request) -> dict[str, Any]:
     """The run from ``here`` to ``end``, a configuration told as ``here`` is, or to the coordinates ``goal``."""
     setting, mover = request.seeing(), request.mover(request.flag("hidden"))
     start = request.here(mover)
-    end = _sent(request, mover, start) if request.fields.get("end") is None else request.here(mover, "end")
+    end = _send_to(request, mover, start) if request.fields.get("end") is None else request.here(mover, "end")
     task = ServoTask.between(setting, start.real, end.real)
     found = task.run()
     reference, rods = setting.mechanism.reference, cylinders(setting.mechanism, setting.observed)
-    eye = placed(rods, reference, (start.real.pose, end.real.pose))
+    eye = place_camera(rods, reference, (start.real.pose, end.real.pose))
     last = len(found.run.times) - 1
     chosen = sorted({round(last * part) for part in np.linspace(0, 1, FRAMES)})
     way = mover.followed(start, [found.run.configurations[i] for i in chosen])
@@ -46,7 +46,7 @@ def answer(request: Request) -> dict[str, Any]:
             **(same if same_at(setting, start.real, end.real) else NONE)}
 
 
-def _sent(request: Request, mover: Mover, start: Posed) -> Posed:
+def _send_to(request: Request, mover: Mover, start: Posed) -> Posed:
     """The configuration with the coordinates ``goal`` to which small steps lead."""
     goal = request.vector("goal", len(mover.coordinates.places))
     if goal is None or mover.far(goal):

@@ -13,7 +13,7 @@ from ....analysis.accuracy.cones import Blur
 from ....analysis.accuracy.pose_errors import error_axes
 from ....analysis.freedoms import Freedom
 from ....analysis.measured import MeasuredRobot
-from ....analysis.observed import ObservedRobot, restricted
+from ....analysis.observed import ObservedRobot, restrict_samples
 from ....analysis.posture import ConfigurationAnalysis
 from ....analysis.verdict import CONTROLLABLE, Verdict, verdict_of
 from ....budgets import REMEMBERED
@@ -53,8 +53,8 @@ def answer(request: Request) -> dict[str, Any]:
         "verdict": {"controllable": verdict == CONTROLLABLE, "words": verdict.verdict,
                     "certainty": exact_words(derivation.exact, verdict.rank)},
         "rank": posture.hidden.rank, "dof": verdict.dof, "here": STATES[posture.hidden.state],
-        "lost": [lost(each, point.tolist()) for each in posture.hidden.lost],
-        "hidden": hidden(request), "hidden_words": hidden_words(request), "condition": condition(setting),
+        "lost": [describe_lost(each, point.tolist()) for each in posture.hidden.lost],
+        "hidden": hidden_machine(request), "hidden_words": hidden_words(request), "condition": condition(setting),
         **sets, "ellipsoid": ellipsoid(setting, here.real), "error": error(setting, here.real),
         **lines(request, "derive")}
 
@@ -66,14 +66,14 @@ def words(verdict: Verdict) -> str:
         f"{verdict.verdict}, but at the zero configuration only {fewer} of {verdict.dof} freedoms are seen")
 
 
-def lost(freedom: Freedom, point: list[float]) -> dict[str, Any]:
+def describe_lost(freedom: Freedom, point: list[float]) -> dict[str, Any]:
     """A lost freedom; its ``kind`` is translation or rotation (a screw is one too)."""
     turns = bool(np.linalg.norm(freedom.twist[3:]) > NAMED)
     return {"words": freedom.name, "twist": freedom.to_dict()["twist"], "point": point,
             "kind": "rotation" if turns else "translation"}
 
 
-def hidden(request: Request) -> dict[str, Any] | None:
+def hidden_machine(request: Request) -> dict[str, Any] | None:
     """The hidden robot as a machine to be drawn, None where every leg is blind."""
     found = request.derivation
     if found.hidden is None:
@@ -117,7 +117,7 @@ def smallest(setting: ObservedRobot) -> tuple[Verdict, ...]:
     for size in range(1, len(labels) + 1):
         found = []
         for chosen in combinations(labels, size):
-            samples = restricted(setting.everything, [each for each in setting.observed if each.leg in chosen],
+            samples = restrict_samples(setting.everything, [each for each in setting.observed if each.leg in chosen],
                                  ways=False)
             if max(member.relation.rank for member in samples.members) == best:
                 with suppress(RankUndecided):
