@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from fractions import Fraction
@@ -388,7 +389,8 @@ def test_a_robot_may_see_less_than_its_architecture() -> None:
     assert record["verdict"] == PARTIAL
     assert record["architecture"]["verdict"] == CONTROLLABLE
     assert record["architecture"]["exact"] is True
-    (line,) = [line for line in text.derivation(found).splitlines() if line.startswith("architecture")]
+    (row,) = [row for row in re.split(r"\n(?=\S)", text.derivation(found)) if row.startswith("architecture")]
+    line = " ".join(row.split())
     assert "generic geometry sees 6 of 6" in line
     assert "this robot 5" in line
 
@@ -409,7 +411,8 @@ def test_the_architecture_in_a_derivation(robot: str, observe: None, verdict: st
     assert basis["observed"] == []
     assert record == {"verdict": verdict, "exact": True, "rank": found.verdict.rank, "proved": verdict == CONTROLLABLE,
                       "instances": 1 if verdict == CONTROLLABLE else 5, "reason": words.split(", ", 1)[1]}
-    (line,) = [line for line in text.derivation(found).splitlines() if line.startswith("architecture")]
+    (row,) = [row for row in re.split(r"\n(?=\S)", text.derivation(found)) if row.startswith("architecture")]
+    line = " ".join(row.split())
     assert line.split(maxsplit=1)[1] == words
 
 

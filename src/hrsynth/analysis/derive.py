@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..description.tree import spanning
-from ..errors import BadRequest, NotCertified
+from ..errors import BadMechanism, BadRequest, NotCertified
 from ..geometry.ranks import range_basis
 from ..geometry.vectors import Array
 from ..kinematics.certificate import Certificate, certify
@@ -204,10 +204,13 @@ def finish_robot(setting: ObservedRobot, state: State) -> Mechanism:
 
 def _in_legs(hidden: Mechanism) -> tuple[Observation, ...]:
     """A mechanism's observations; a segment that is in none of its legs (of a single leg the platform) as a direction
-    of its link."""
+    of its link. Where no leg ends on the base, as of a formation, they stay as they are."""
     told = tuple(replace(o, seen_from=hidden.reference) if isinstance(o, Direction) and o.by_segment else o
                  for o in hidden.observations)
-    anatomy = decompose(normal_form(replace(hidden, observations=told)).mechanism)
+    try:
+        anatomy = decompose(normal_form(replace(hidden, observations=told)).mechanism)
+    except BadMechanism:
+        return hidden.observations
     return tuple(own if anatomy.leg_of(own.link) else other
                  for own, other in zip(hidden.observations, told, strict=True))
 
@@ -271,8 +274,8 @@ def _planar(samples: Samples) -> bool:
     return range_basis(twists[3:], 1.0)[1].value <= 1 and range_basis(twists[:3], 1.0)[1].value <= 2
 
 
-def _exchanged_freedoms(anatomy: LegDecomposition, found: Certificate) -> tuple[tuple[Freedom, ...],
-                                                                                tuple[Freedom, ...]]:
+def _exchanged_freedoms(anatomy: LegDecomposition, found: Certificate
+                        ) -> tuple[tuple[Freedom, ...], tuple[Freedom, ...]]:
     """The platform's freedoms that a wrong hidden robot gains and loses, at the configuration where they differ."""
     if found.mismatch is None or found.mismatch.real.twist_rows != 6:
         return (), ()

@@ -67,8 +67,8 @@ def _write_system(solved: Solved) -> tuple[dict[str, Any], list[tuple[list[compl
         record["reaches"] = [*record["reaches"], *(reach_record(each, frame, 0.0) for each in paths)]
         record["bodies"] = [*record["bodies"], *bodies]
     record["tips"] = [["0"] * 3] * len(record["reaches"])
-    return record, list(zip(starts, real, strict=True)), [_shift_pose(mode.pose, frame, origin)
-                                                          for mode in solved.modes]
+    poses = [_shift_pose(mode.pose, frame, origin) for mode in solved.modes]
+    return record, list(zip(starts, real, strict=True)), poses
 
 
 def _shift_pose(X: Array, frame: WorkingFrame, origin: Array) -> Array:

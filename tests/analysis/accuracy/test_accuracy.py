@@ -352,8 +352,8 @@ def test_what_an_ascent_attains_lies_between_the_two_bounds(name: str):
     setting = ObservedRobot.of(name)
     cones = np.full(len(setting.observed), 1e-3)
     for at in (setting.everything.start, *setting.configurations[:4]):
-        found, bounds = largest_by_ascent(at, setting.samples.question, Blur(cones)), errors_at(setting, Blur(cones),
-                                                                                                at)
+        found = largest_by_ascent(at, setting.samples.question, Blur(cones))
+        bounds = errors_at(setting, Blur(cones), at)
         for bound, met in zip((bounds.position, bounds.orientation), found, strict=True):
             assert np.isinf(met) == np.isinf(bound.largest)
             if np.isfinite(met):

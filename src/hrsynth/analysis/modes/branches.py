@@ -44,8 +44,8 @@ def model(confined: TipLoci) -> Model:
     """The system for the way in which the platform moves."""
     at = {body: confined.goal.pose(body) for body in confined.bodies}
     curves = tuple(tip.curve for tip in confined.tips)
-    made = {"translations": _translating, "bodies": _articulated_model}.get(confined.motion, _rigid)(confined, at,
-                                                                                                     curves)
+    model = {"translations": _translating, "bodies": _articulated_model}.get(confined.motion, _rigid)
+    made = model(confined, at, curves)
     return replace(made, confined=confined,
                    system=replace(made.system, error=confined.error, as_written=confined.as_written))
 

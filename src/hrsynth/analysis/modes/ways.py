@@ -26,8 +26,8 @@ from .sighted import all_loci
 from .solve import SystemModes
 
 
-def without_couplings(measured: MeasuredRobot, goal: ClosedConfiguration) -> tuple[MeasuredRobot,
-                                                                                   ClosedConfiguration] | None:
+def without_couplings(measured: MeasuredRobot, goal: ClosedConfiguration
+                      ) -> tuple[MeasuredRobot, ClosedConfiguration] | None:
     """The robot without its couplings, at the same place, and with what is measured held: so are joints that couplings
     tie to motors that are held. It has all modes of the robot, and those at which couplings cannot be closed besides.
     None where it has no couplings, sees less than all freedoms without them, or what is measured is of joints that are

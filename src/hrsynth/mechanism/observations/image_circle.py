@@ -72,8 +72,8 @@ class ImageCircle(CameraObservation):
 
     @staticmethod
     def partials(p: Array, d: Array, r: Array) -> tuple[Array | None, Array | None]:
-        h, size, entries = dot(p, d)[..., None, None], (dot(p, p)[..., None] - r**2)[...,
-                                                                                     None], _entries_of(cone(p, d, r))
+        h, size = dot(p, d)[..., None, None], (dot(p, p)[..., None] - r**2)[..., None]
+        entries = _entries_of(cone(p, d, r))
         norm = np.linalg.norm(entries, axis=-1)[..., None, None]
         q = entries[..., None] / norm
 

@@ -157,8 +157,8 @@ _Way = tuple[str, tuple[Point, ...], int]
 """A link, the points of its line within a lane, the group."""
 
 
-def _place_groups(groups: Sequence[_LegBoxes], columns: dict[str, int]) -> tuple[list[PlacedBox], list[_Way],
-                                                                                 list[Row]]:
+def _place_groups(groups: Sequence[_LegBoxes], columns: dict[str, int]
+                  ) -> tuple[list[PlacedBox], list[_Way], list[Row]]:
     spots: list[PlacedBox] = []
     ways: list[_Way] = []
     rows: list[Row] = []

@@ -197,8 +197,8 @@ def require_libraries() -> None:
         raise MissingExtra("serving a page", "studio")
 
 
-def make_server(opening: Opening, port: int, forks: ForkServer) -> tuple[Server, Guard,
-                                                                         tempfile.TemporaryDirectory[str]]:
+def make_server(opening: Opening, port: int, forks: ForkServer
+                ) -> tuple[Server, Guard, tempfile.TemporaryDirectory[str]]:
     """The server, not started, who guards it, and the folder of what is dropped into its pages."""
     require_libraries()
     import h11
