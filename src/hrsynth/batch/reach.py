@@ -45,7 +45,7 @@ def reach(start: ClosedConfiguration, question: Measurement, pose: Pose,
     motion = motion or generic_motion(start, question)
     robot = start.twin.mechanism.name
     goal = motion.goal(pose, robot)
-    here, came = _led(start, _origins(start, motion, goal), motion, goal)
+    here, came = _lead_from(start, _origins(start, motion, goal), motion, goal)
     found = nearest(here, goal, motion.at_home()) if came == 1 else here
     if came < 1 or not _has_arrived(found, goal):
         missed = worst_leg(start.twin, motion, goal)
@@ -92,25 +92,25 @@ def _origins(start: ClosedConfiguration, motion: PlatformMotion, goal: Goal) -> 
     """Where ways to goals with the parts of this one may begin besides ``start``: aside, if the platform changes fewer
     of these parts at ``start`` than there, though it has all its freedoms (a turn that two others make together)."""
     rows, whole = goal.rows(start.twin, start.q)[1], motion.at_home().rows(start.twin, start.q)[1]
-    if not are_dependent(start, rows) or _changed(start, whole) < motion.dof:
+    if not are_dependent(start, rows) or _parts_changed(start, whole) < motion.dof:
         return []
-    return [at for at in _aside(start) if _changed(at, goal.rows(at.twin, at.q)[1]) > _changed(start, rows)]
+    return [at for at in _aside(start) if _parts_changed(at, goal.rows(at.twin, at.q)[1]) > _parts_changed(start, rows)]
 
 
-def _changed(at: ClosedConfiguration, rows: Array) -> int:
+def _parts_changed(at: ClosedConfiguration, rows: Array) -> int:
     """How many of the parts with Jacobian ``rows`` (k, nv) change one by one, with closed loops."""
     return range_basis(rows @ at.kernel()[0], 1.0)[1].value
 
 
-def _led(here: ClosedConfiguration, beside: Sequence[ClosedConfiguration], motion: PlatformMotion, goal: Goal,
+def _lead_from(here: ClosedConfiguration, beside: Sequence[ClosedConfiguration], motion: PlatformMotion, goal: Goal,
          halvings: int = HALVINGS) -> tuple[ClosedConfiguration, float]:
     """Where small steps lead to a goal, as :func:`.steps.track`, from ``here`` or from the two ``beside`` that are
     nearest to the goal."""
-    led = track(here, motion, goal, halvings)
+    best = track(here, motion, goal, halvings)
     for at in sorted(beside, key=lambda at: float(np.linalg.norm(goal.rows(at.twin, at.q)[0])))[:2]:
-        if led[1] < 1 and (other := track(at, motion, goal, halvings))[1] == 1:
+        if best[1] < 1 and (other := track(at, motion, goal, halvings))[1] == 1:
             return other
-    return led
+    return best
 
 
 def _lost_rank(start: ClosedConfiguration, here: ClosedConfiguration) -> str | None:
@@ -146,9 +146,11 @@ def sweep(start: ClosedConfiguration, question: Measurement, grid: Grid, motion:
     def lead(cell: int, origin: ClosedConfiguration, halvings: int) -> ClosedConfiguration | None:
         if cell in hopeless:
             return None
-        there, came = (at_once[cell], 1.0) if cell in at_once else _led(origin, beside, motion, goals[cell], halvings)
-        if came == 1:
-            there = there if cell in at_once else nearest(there, goals[cell], home)
+        if cell in at_once:
+            there, came = at_once[cell], 1.0
+        else:
+            there, came = _lead_from(origin, beside, motion, goals[cell], halvings)
+            there = nearest(there, goals[cell], home) if came == 1 else there
         return there if came == 1 and _has_arrived(there, goals[cell]) else None
 
     return spread(start, grid.shape, goals, lead, at_once)

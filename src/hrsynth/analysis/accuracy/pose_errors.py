@@ -61,8 +61,8 @@ class ErrorEllipsoid(Value):
 
     def to_dict(self, unit: float) -> dict[str, Any]:
         """The record of the command line, lengths or angles in another unit; null where infinite."""
-        return {"largest": finite(unit * self.largest), "direction": _listed(self.direction),
-                "least": finite(unit * self.least), "least_direction": _listed(self.least_direction),
+        return {"largest": finite(unit * self.largest), "direction": _nested(self.direction),
+                "least": finite(unit * self.least), "least_direction": _nested(self.least_direction),
                 "anisotropy": self.anisotropy, "gap": self.gap}
 
 
@@ -231,5 +231,5 @@ def _descend(blocks: Array) -> Array:
     return np.asarray(w[np.argmin(_width(blocks, w.T))])
 
 
-def _listed(vector: Array | None) -> list[float] | None:
+def _nested(vector: Array | None) -> list[float] | None:
     return None if vector is None else vector.tolist()

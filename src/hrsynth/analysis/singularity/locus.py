@@ -97,7 +97,7 @@ def locus(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None 
 def require_plane(setting: ObservedRobot, plane: Pose | str | None) -> None:
     """Raise what ``locus`` would raise of the robot or of the plane: before long work, not after it."""
     hidden = _controllable(setting)
-    _begun(setting.everything.start, hidden.question, setting.motion, None if plane is None else as_pose(plane))
+    _begin_plane(setting.everything.start, hidden.question, setting.motion, None if plane is None else as_pose(plane))
 
 
 def _controllable(setting: ObservedRobot) -> MeasuredRobot:
@@ -156,7 +156,7 @@ def frame_plane(start: ClosedConfiguration, question: Measurement, motion: Platf
     """The grid that just holds what is reached of a plane; ``met`` says which cells of a coarse one are, (n,).
 
     Raises ``PlaneNotMet`` where the plane's own parts are out of reach, ``BadRequest`` where not two parts are free."""
-    plane, names, first = _begun(start, question, motion, plane)
+    plane, names, first = _begin_plane(start, question, motion, plane)
     centre = _coordinates(motion, first, names)
     centre = [0.0 if name == "phi" else c for name, c in zip(names, centre, strict=True)]
     for wide in LOCUS_SIDES:
@@ -189,7 +189,7 @@ def frame_plane(start: ClosedConfiguration, question: Measurement, motion: Platf
                       for (name, _), (low, high) in zip(axes, window, strict=True)), plane)
 
 
-def _begun(start: ClosedConfiguration, question: Measurement, motion: PlatformMotion,
+def _begin_plane(start: ClosedConfiguration, question: Measurement, motion: PlatformMotion,
            plane: Pose | None) -> tuple[Pose, tuple[str, ...], ClosedConfiguration]:
     """The plane's fixed parts, the two that vary, and a configuration in it; raises as ``framed``."""
     plane, names = _axes(start, motion, plane)

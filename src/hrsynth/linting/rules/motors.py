@@ -11,31 +11,31 @@ from ..subject import LintedFile
 from .loops import is_watched, nearby
 
 
-def _held(robot: Mechanism) -> list[Pair]:
+def _held_joints(robot: Mechanism) -> list[Pair]:
     return [joint.links for joint in robot.joints.values() if joint.actuated]
 
 
 def _none(file: LintedFile) -> Iterator[Spot]:
     robot = file.mechanism
-    if robot is not None and not _held(robot) and not is_watched(robot):
+    if robot is not None and not _held_joints(robot) and not is_watched(robot):
         yield Spot(None, "no joint has a motor")
 
 
 def _few(file: LintedFile) -> Iterator[Spot]:
     robot, found = file.mechanism, nearby(file)
-    if robot is None or found is None or not _held(robot):
+    if robot is None or found is None or not _held_joints(robot):
         return
-    whole, rest = found.platform(), found.platform(_held(robot))
+    whole, rest = found.platform(), found.platform(_held_joints(robot))
     if whole and rest:
         yield Spot(None, f"with all motors held, the platform {robot.platform!r} keeps {rest} of its {whole} freedoms")
 
 
 def _many(file: LintedFile) -> Iterator[Spot]:
     robot, found = file.mechanism, nearby(file)
-    if robot is None or found is None or not _held(robot):
+    if robot is None or found is None or not _held_joints(robot):
         return
     driven = sum(joint.type.freedoms for joint in robot.joints.values() if joint.actuated)
-    whole, rest = found.count(), found.count(held=_held(robot))
+    whole, rest = found.count(), found.count(held=_held_joints(robot))
     if whole is not None and rest is not None and driven > whole - rest:
         yield Spot(None, f"{driven} coordinates are driven, and {whole - rest} of them are independent")
 
