@@ -171,6 +171,7 @@ def inside(value: object, depth: int, seen: set[int]) -> Iterator[object]:
             yield from inside(getattr(value, field.name), depth - 1, seen)
 
 
+@pytest.mark.slow
 @pytest.mark.some(8)
 @pytest.mark.parametrize("name", ASKED)
 def test_whatever_an_answer_holds_is_one_line_at_a_prompt(name):

@@ -476,6 +476,7 @@ def test_a_pose_is_not_reached_though_no_walk_leads_away(monkeypatch: pytest.Mon
     assert "random configuration" not in str(refused.value)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("angles", ["-0.3:0.3:4", "-0.3:0.3:7", "0.1:0.3:3"])
 def test_a_turn_that_two_others_make_together_is_reached(angles: str, tmp_path: Path) -> None:
     """Turned by a about x and then by b about y, a stem has turned about z by φ, tan(φ/2) = tan(a/2) tan(b/2), and no

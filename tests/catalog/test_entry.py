@@ -133,6 +133,7 @@ def test_what_does_not_move_has_no_verdict():
         entry("3(Rz*-Q-Rz)")
 
 
+@pytest.mark.slow
 @pytest.mark.some(1)
 @pytest.mark.parametrize("name", TWO_FIRST)
 def test_screws_without_pinocchio_see_the_same(name):

@@ -31,6 +31,7 @@ SMALL_FIRST = [pytest.param(name, marks=pytest.mark.slow) if name in ("planar", 
 ANY = st.deferred(lambda: st.sampled_from([word for name in GROUPS for word in listed()[name]]))
 
 
+@pytest.mark.slow
 @pytest.mark.some(1)
 @pytest.mark.parametrize("name", SMALL_FIRST)
 def test_what_is_listed_is_canonical_and_belongs_there(name):

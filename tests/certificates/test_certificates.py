@@ -237,6 +237,7 @@ def test_robots_with_motors_held(name, count, far):
     assert (f"({far} solutions are farther)" in told) == (far > 0)
 
 
+@pytest.mark.slow
 @pytest.mark.some(1)
 @pytest.mark.parametrize("name", ["3prp", "3rrp"])
 def test_lines_of_a_platform_that_keep_to_points_of_the_base(name):
@@ -397,6 +398,7 @@ def test_a_chain_of_joints_is_that_of_rotations_and_shifts():
         assert sum(x * x for x in N) == Q * w
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_the_degrees_of_a_checker_are_those_of_the_list(seed):
     """Its Bézout number is that of an expansion by sympy."""
@@ -438,6 +440,7 @@ def test_ten_thousand_false_certificates():
     assert sum(told.values()) == 14_000
 
 
+@pytest.mark.slow
 def test_false_ranks_are_refused():
     rng = random.Random(4)
     record = json.loads(ranks("1,2"))

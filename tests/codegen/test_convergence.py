@@ -104,6 +104,7 @@ def check(name: str, count: int, exact: int) -> None:
             assert off / robot.length <= bounds.position
 
 
+@pytest.mark.slow
 @pytest.mark.some(1)
 @pytest.mark.parametrize("name", ["four_bar", "3rps"])
 def test_steps_and_errors_are_as_proved(name: str) -> None:

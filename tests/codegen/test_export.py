@@ -182,6 +182,7 @@ def test_a_robot_in_large_numbers_is_answered_as_the_same_in_small_ones(size: fl
     np.testing.assert_allclose(back[:, 0], q, atol=1e-11)
 
 
+@pytest.mark.slow
 def test_motors_of_a_pose_in_a_box_of_more_than_a_turn() -> None:
     """The crank's angle is that of its end, but for whole turns: the one nearest to the middle of the box."""
     found = export(four_bar(), "numpy", {"motor": (-2.5, 5.0)})
@@ -206,6 +207,7 @@ def test_code_tells_where_motors_are_the_only_ones() -> None:
     assert found.to_dict()["back"] == [[low], [high]]
 
 
+@pytest.mark.slow
 @pytest.mark.some(2)
 @pytest.mark.parametrize(("lower", "upper", "verdict"), [
     (-0.05, 0.1, "passed"), (-3.0, 3.0, "kept"), (-3.0, None, "kept"), (None, 0.1, "passed")])
@@ -241,6 +243,7 @@ def test_motors_that_the_box_takes_beyond_their_limits_are_told() -> None:
     assert "passed" not in f"{hrsynth.branch(limited, within)}{hrsynth.branch(limited)}{hrsynth.branch(robot, wide)}"
 
 
+@pytest.mark.slow
 def test_limits_are_undecided_within_the_tube_alone() -> None:
     """A limit at the largest angle: beyond what a tube bounds it is kept, below passed, between not decided."""
     robot = four_bar()
@@ -402,6 +405,7 @@ def test_files_of_other_dialects(tmp_path: Path, ending: str) -> None:
     np.testing.assert_allclose(p_again, p, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_compiler_that_drops_checks_is_refused(tmp_path: Path) -> None:
     """With -ffast-math what is no number may pass the comparisons that refuse it."""
     header = tmp_path / "robot.hpp"
@@ -457,6 +461,7 @@ def test_names_are_no_code_in_cpp(name: str, tmp_path: Path) -> None:
     assert found.stdout == 'motor "*/ ???/ q\n\\\n'
 
 
+@pytest.mark.slow
 def test_no_name_of_the_c_library_is_a_namespace(tmp_path: Path) -> None:
     """None of its names, types and macros is what a robot's namespace is called."""
     names = set(" ".join(path.read_text(encoding="utf-8", errors="replace") for path in (

@@ -44,6 +44,7 @@ def tangent(robot: Mechanism, state: Array, oracle: Oracle, k: int) -> Array:
     return unit(np.cross(robot.joints[f"crank_{k}"].axis, knee - robot.joints[f"crank_{k}"].point))
 
 
+@pytest.mark.slow
 def test_a_common_translation_that_another_leg_forbids_is_not_lost() -> None:
     """Both tangents are vertical at this pose, and the platform moves in a level plane."""
     robot = on_a_table()
@@ -127,6 +128,7 @@ def test_tips_that_leave_the_plane_of_motion_have_no_lines_in_it(turns: tuple[fl
         assert (left < 1e-6) == (found < 1e-10), (left, found)
 
 
+@pytest.mark.slow
 def test_a_held_leg_that_stops_the_turn_in_the_plane_is_no_line_of_it() -> None:
     """An arm, a ball and a slide on the platform: with the slide held, in direction and length, the platform may turn
     about it, and not in its plane."""

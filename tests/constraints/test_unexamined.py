@@ -42,6 +42,7 @@ def rows(robot: Mechanism, oracle: Oracle, state: Array, seen: tuple[Direction, 
     return np.vstack(found)
 
 
+@pytest.mark.slow
 def test_a_3_upu_loses_a_turn_where_its_two_watched_directions_are_not_parallel() -> None:
     answer = found("3upu", "1,2")
     assert answer.words == "the watched directions u1, u2 are parallel"

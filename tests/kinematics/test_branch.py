@@ -280,6 +280,7 @@ def test_a_triangle_does_not_move() -> None:
         ObservedRobot.of(b.build("plate"), samples=2)
 
 
+@pytest.mark.slow
 @pytest.mark.some(1)
 @pytest.mark.parametrize(("rods", "seed"), [(5, 1), (6, 1)])
 def test_equal_parallel_rods_do_not_turn_their_plate(rods: int, seed: int) -> None:

@@ -111,6 +111,7 @@ def test_every_joint_is_drawn_once_and_every_rod_ends_in_joint_centres(name: str
             assert len(centres) == 1 or len(ends) >= len(centres), link
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ROBOTS)
 def test_virtual_actuators_are_marked_and_motors_are_not_in_the_hidden_robot(name: str):
     found = seen(name)

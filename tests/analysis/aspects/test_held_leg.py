@@ -104,6 +104,7 @@ def test_two_modes_meet_twice_at_a_node(drawn: HeldLegSection):
             assert abs(second) > 1e-6
 
 
+@pytest.mark.slow
 def test_the_curve_is_where_two_modes_meet(drawn: HeldLegSection):
     """All along the curve the distance to the third circle has a double zero, and pieces are closed."""
     for piece in drawn.curve:
@@ -152,6 +153,7 @@ def test_other_robots_have_no_such_section(name: str, observe: str | None, reaso
     assert three_cranks(found.aspects, at) == made
 
 
+@pytest.mark.slow
 @pytest.mark.some(1)
 @pytest.mark.parametrize("seed", [1, 6, 9, 10])
 def test_cusps_of_random_cranks_come_in_pairs_and_are_cusps(seed: int):

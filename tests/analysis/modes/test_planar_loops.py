@@ -319,6 +319,7 @@ def two_segments() -> Mechanism:
     return b.build(platform="plate")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("observe", [None, "1,2", "one,two,rod"])
 def test_two_segments_of_a_leg_are_both_watched(observe: str | None):
     """With each one of them there are two modes, of which the other one's direction excludes the second."""

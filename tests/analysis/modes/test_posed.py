@@ -232,6 +232,7 @@ def test_a_body_that_turns_about_a_point_has_eight_modes(seed: int):
                    for each in found.modes if each.bodies) < 1e-6
 
 
+@pytest.mark.slow
 @pytest.mark.some(1)
 @pytest.mark.parametrize("legs", [None, "1,3"])
 def test_a_body_that_turns_about_a_point_has_one_mode_where_its_rods_are_watched(legs: str | None):

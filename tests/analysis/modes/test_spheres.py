@@ -73,6 +73,7 @@ def test_named_classes_are_proved_at_twenty_instances(name: str):
     assert len(real) > 1
 
 
+@pytest.mark.slow
 @pytest.mark.some(1)
 @pytest.mark.parametrize("name", ["CCSS", "AABCDE on ABCCDE"])
 def test_as_many_are_counted_modulo_a_prime(name: str):

@@ -172,6 +172,7 @@ def test_a_condition_without_named_wrenches_defines_its_symbols_and_tells_no_ang
         assert set(re.findall(r"\b[A-Z]\b", meaning)) <= general.condition.where.keys(), meaning
 
 
+@pytest.mark.slow
 def test_a_line_and_a_plane_are_told_by_their_vectors():
     """A translating platform slides along a seen vertical line; its seen distance stays where it is at the camera's
     height."""

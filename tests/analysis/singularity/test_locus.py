@@ -181,6 +181,7 @@ def test_where_the_smallest_value_passes_through_zero_the_expression_does(
     assert len(missed) <= 0.1 * len(changes)
 
 
+@pytest.mark.slow
 @pytest.mark.some(4)
 @pytest.mark.parametrize("degrees", range(5, 360, 50))
 def test_thin_tips_are_within_the_window(degrees: int) -> None:

@@ -79,6 +79,7 @@ def test_a_rail_normal_to_the_axis_can_be_parallel(seed: int):
     assert not answer.words.startswith("never")
 
 
+@pytest.mark.slow
 def test_near_misses_are_not_called_never():
     """A cosine of 1e-9 is rounding, one of 1e-3 is geometry."""
     answers = [told(mixed(0, off)).condition for off in (1e-9, 1e-3)]

@@ -159,6 +159,7 @@ def slider_crank() -> Mechanism:
     return b.build(platform="platform")
 
 
+@pytest.mark.slow
 @pytest.mark.some(1)
 @pytest.mark.parametrize(("see", "camera"), [
     ("distance:platform@0,0,0", "eye=base@-0.1,0.2,0"), ("encoder:slide", None), ("direction:rod/1,0,0", None),

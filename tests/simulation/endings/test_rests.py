@@ -304,6 +304,7 @@ def test_critical_poses_are_rests_and_joints_go_there() -> None:
     assert np.abs(RestEquations(search.system, list(q[done].T)).G).max() < 1e-8
 
 
+@pytest.mark.slow
 @pytest.mark.some(1)
 @pytest.mark.parametrize(("name", "legs"), [("quattro", ("1", "4")), ("quattro_rigid", None), ("delta", None)])
 def test_no_loop_is_open_for_the_oracle(name: str, legs: Legs | None) -> None:
