@@ -23,7 +23,7 @@ def ready(placer: Placer, motion: PlatformMotion, goals: Sequence[Goal]
           ) -> tuple[dict[int, ClosedConfiguration], set[int]]:
     """The configurations at goals whose free parts are as at home, by their place; and the places of goals that no pose
     of the platform reaches in the working mode of the zero configuration."""
-    X = np.array([motion.posed(goal) for goal in goals])
+    X = np.array([motion.pose_of(goal) for goal in goals])
     found = {i: at for i, at in enumerate(placer.configurations(X))
              if at is not None and np.linalg.norm(goals[i].rows(placer.twin, at.q)[0]) <= RANK_CUTOFF}
     missed = [i for i in range(len(goals)) if i not in found]
@@ -39,7 +39,7 @@ def poses_over(motion: PlatformMotion, grid: Grid, robot: str, places: Array) ->
     change."""
     first = motion.goal(grid.poses_at([(0,) * grid.ndim])[0], robot)
     columns = dict(zip(grid.names, places.T, strict=True))
-    X = np.tile(motion.posed(first), (len(places), 1, 1))
+    X = np.tile(motion.pose_of(first), (len(places), 1, 1))
     if "phi" in columns:
         X[:, :3, :3] = exponential(columns["phi"][:, None] * motion.normal) @ motion.home[:3, :3]
     values = np.tile(first.values, (len(places), 1))

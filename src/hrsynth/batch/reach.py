@@ -45,14 +45,14 @@ def reach(start: ClosedConfiguration, question: Measurement, pose: Pose,
     motion = motion or generic_motion(start, question)
     robot = start.twin.mechanism.name
     goal = motion.goal(pose, robot)
-    here, came = _lead_from(start, _origins(start, motion, goal), motion, goal)
+    here, came = _lead_from(start, lambda: _origins(start, motion, goal), motion, goal)
     found = nearest(here, goal, motion.at_home()) if came == 1 else here
     if came < 1 or not _has_arrived(found, goal):
         missed = worst_leg(start.twin, motion, goal)
         last = str(motion.pose(here.pose(motion.link)))
         wrist = at_end(here)
         why = None if missed or wrist else (dependence(start, motion, goal, "this pose", came == 0)
-                                         or _lost_rank(start, here))
+                                            or _lost_rank(start, here))
         raise PoseNotReached(robot, str(pose), came, last, missed, wrist=wrist, why=why)
     return found
 
@@ -91,8 +91,10 @@ def _aside(start: ClosedConfiguration) -> list[ClosedConfiguration]:
 def _origins(start: ClosedConfiguration, motion: PlatformMotion, goal: Goal) -> list[ClosedConfiguration]:
     """Where ways to goals with the parts of this one may begin besides ``start``: aside, if the platform changes fewer
     of these parts at ``start`` than there, though it has all its freedoms (a turn that two others make together)."""
-    rows, whole = goal.rows(start.twin, start.q)[1], motion.at_home().rows(start.twin, start.q)[1]
-    if not are_dependent(start, rows) or _parts_changed(start, whole) < motion.dof:
+    rows = goal.rows(start.twin, start.q)[1]
+    if not are_dependent(start, rows):
+        return []
+    if _parts_changed(start, motion.at_home().rows(start.twin, start.q)[1]) < motion.dof:
         return []
     return [at for at in _aside(start) if _parts_changed(at, goal.rows(at.twin, at.q)[1]) > _parts_changed(start, rows)]
 
@@ -102,15 +104,17 @@ def _parts_changed(at: ClosedConfiguration, rows: Array) -> int:
     return range_basis(rows @ at.kernel()[0], 1.0)[1].value
 
 
-def _lead_from(here: ClosedConfiguration, beside: Sequence[ClosedConfiguration], motion: PlatformMotion, goal: Goal,
-         halvings: int = HALVINGS) -> tuple[ClosedConfiguration, float]:
-    """Where small steps lead to a goal, as :func:`.steps.track`, from ``here`` or from the two ``beside`` that are
-    nearest to the goal."""
-    best = track(here, motion, goal, halvings)
-    for at in sorted(beside, key=lambda at: float(np.linalg.norm(goal.rows(at.twin, at.q)[0])))[:2]:
-        if best[1] < 1 and (other := track(at, motion, goal, halvings))[1] == 1:
+def _lead_from(here: ClosedConfiguration, beside: Callable[[], Sequence[ClosedConfiguration]], motion: PlatformMotion,
+               goal: Goal, halvings: int = HALVINGS) -> tuple[ClosedConfiguration, float]:
+    """Where small steps lead to a goal, as :func:`.steps.track`: from ``here``, or else from the two ``beside`` that
+    are nearest to the goal."""
+    led = track(here, motion, goal, halvings)
+    if led[1] == 1:
+        return led
+    for at in sorted(beside(), key=lambda at: float(np.linalg.norm(goal.rows(at.twin, at.q)[0])))[:2]:
+        if (other := track(at, motion, goal, halvings))[1] == 1:
             return other
-    return best
+    return led
 
 
 def _lost_rank(start: ClosedConfiguration, here: ClosedConfiguration) -> str | None:
@@ -141,7 +145,7 @@ def sweep(start: ClosedConfiguration, question: Measurement, grid: Grid, motion:
     at_once, hopeless = ({}, beyond_rods(start.twin.mechanism, motion, goals)) if placer is None else (
         ready(placer, motion, goals))
 
-    beside = _origins(start, motion, goals[0])
+    beside = cache(lambda: _origins(start, motion, goals[0]))
 
     def lead(cell: int, origin: ClosedConfiguration, halvings: int) -> ClosedConfiguration | None:
         if cell in hopeless:

@@ -73,21 +73,22 @@ def rod_misses(anatomy: LegDecomposition, motion: PlatformMotion, goals: Sequenc
     of these away from the first one, and at least twice the longest less that sum: the platform's point, and where a
     goal leaves no turn free the last centre. Of a point that may move it counts how far it is in wanted directions."""
     point = motion.position(motion.home)
-    X = np.array([motion.posed(goal) for goal in goals]).reshape(-1, 4, 4)
+    X = np.array([motion.pose_of(goal) for goal in goals]).reshape(-1, 4, 4)
     placed, turned = (np.array([told(goal) for goal in goals], dtype=bool) for told in (
         motion.is_placed, lambda goal: motion.turns_left(goal) == 0))
     seen = np.array([np.eye(3) if known else goal.directions.T @ goal.directions
                      for goal, known in zip(goals, placed, strict=True)]).reshape(-1, 3, 3)
     for label, centres in _centres(anatomy, motion):
         last = transform(inverse(motion.home), centres[-1])
-        found = np.full(len(goals), -np.inf)
+        found, lengths = np.full(len(goals), -np.inf), list[float]()
         for known, home, arm in ((np.ones_like(turned), point, motion.point), (turned, centres[-1], last)):
             rods = np.linalg.norm(np.diff([*centres, home], axis=0), axis=1)
-            most, ends = rods.sum(), X[:, :3, 3] + X[:, :3, :3] @ arm
+            most, ends = float(rods.sum()), X[:, :3, 3] + X[:, :3, :3] @ arm
+            lengths.append(most)
             far = np.linalg.norm((seen @ (ends - centres[0])[..., None])[..., 0], axis=1)
             missed = np.maximum(far - most, np.where(placed, 2 * rods.max() - most - far, -np.inf))
             found = np.where(known, np.maximum(found, missed - AS_PRINTED * (1 + most)), found)
-        yield label, float(np.linalg.norm(np.diff([*centres, point], axis=0), axis=1).sum()), found
+        yield label, lengths[0], found
 
 
 def _centres(anatomy: LegDecomposition, motion: PlatformMotion) -> Iterator[tuple[str, Array]]:

@@ -206,7 +206,7 @@ class PlatformMotion(Value):
         values = np.array([getattr(pose, "xyz"[i]) for i in placed], dtype=float)
         return Goal(self.link, self.point, self.home[:3, :3], np.eye(3)[placed], values, normal, phi, rotation)
 
-    def posed(self, goal: Goal) -> Array:
+    def pose_of(self, goal: Goal) -> Array:
         """The platform pose (4, 4) that a goal asks for, its free parts as near to home as they can be."""
         X, home = self.home.copy(), self.position(self.home)
         if goal.rotation is not None:

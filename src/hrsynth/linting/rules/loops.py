@@ -197,7 +197,7 @@ def _dead(file: LintedFile) -> Iterator[Spot]:
         line = _line(file, name)
         own = None if graph is None else graph.joints.get(name)
         element = None if own is not None and own.in_tree else file.element(line, *CLOSING, name=name)
-        yield Spot(line, f"without {name!r} the mechanism is as free as with it", removal(element))
+        yield Spot(line, f"without {name!r} the mechanism is as free as with it", removal(file, element))
 
 
 def _line(file: LintedFile, name: str) -> int | None:

@@ -71,18 +71,24 @@ def _unused(file: LintedFile) -> Iterator[Spot]:
         for name in (each for each in graph.links if each in part):
             alone = len(part) == 1 and name not in (graph.base, graph.platform)
             element = file.element(graph.links[name].line, "link", name=name) if alone else None
-            yield Spot(graph.links[name].line, f"link {name!r}: no joint connects it to the others", removal(element))
+            yield Spot(graph.links[name].line, f"link {name!r}: no joint connects it to the others",
+                       removal(file, element))
 
 
-def removal(element: xml.Element | None) -> Mend | None:
+def removal(file: LintedFile, element: xml.Element | None) -> Mend | None:
     """A mend that takes an element out; None where another one names it, and would then name nothing."""
     if element is None:
         return None
-    name, own = element.get("name"), set(element.iter("*"))
-    elsewhere = set(element.getroottree().getroot().iter("*")) - own
-    if name is not None and any(name in (*each.attrib.values(), (each.text or "").strip()) for each in elsewhere):
+    name, everywhere = element.get("name"), file.remembered("words", lambda: Counter(_words(file.root)))
+    if name is not None and everywhere[name] > sum(word == name for word in _words(element)):
         return None
     return partial(_remove, element)
+
+
+def _words(element: xml.Element | None) -> Iterator[str]:
+    """The values of all attributes of an element and of those in it, and their texts."""
+    for each in () if element is None else element.iter("*"):
+        yield from (*each.attrib.values(), (each.text or "").strip())
 
 
 def _remove(element: xml.Element) -> None:
