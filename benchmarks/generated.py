@@ -162,12 +162,12 @@ def _pinocchio(twin: PinocchioModel, motors: list[str], values: Array) -> Array:
     passive = [i for i in range(twin.nv) if i not in driven]
     step = np.zeros(twin.nv)
     step[driven] = values
-    q = twin.moved(twin.q0, step)
+    q = twin.integrate(twin.q0, step)
     for _ in range(30):
         x = np.linalg.lstsq(twin.jacobian(q)[:, passive], -twin.residual(q), rcond=1e-9)[0]
         step = np.zeros(twin.nv)
         step[passive] = x
-        q = twin.moved(q, step)
+        q = twin.integrate(q, step)
         if np.abs(x).max() <= 1e-12:
             break
     return np.asarray(twin.pose(q, twin.mechanism.platform)[:3, 3])

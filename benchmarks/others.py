@@ -134,7 +134,7 @@ def jacobians() -> Iterator[Row]:
         if not angle < 1e-5:
             raise SystemExit(f"{robot}: the platform's twists differ by {angle:.2g} rad")
         rng = np.random.default_rng(0)
-        places = [twin.moved(twin.q0, AROUND * rng.normal(size=twin.nv)) for _ in range(EVALUATIONS)]
+        places = [twin.integrate(twin.q0, AROUND * rng.normal(size=twin.nv)) for _ in range(EVALUATIONS)]
         others = [model.qpos0.copy() for _ in places]
         for q in others:
             mujoco.mj_integratePos(model, q, rng.normal(size=model.nv), AROUND)

@@ -45,7 +45,7 @@ twists, start = linkage.twists, linkage.regular(np.random.default_rng(0))
 constant = np.sin((twists[0] + twists[1]) / 2) / np.sin((twists[1] - twists[0]) / 2)
 closed = []
 for angle in np.linspace(start[1], start[1] + 2.0, 9):
-    start = linkage.closed(start, angle)
+    start = linkage.close(start, angle)
     closed.append(start)
 products = np.tan(np.array(closed)[:, 0] / 2) * np.tan(np.array(closed)[:, 1] / 2)
 print("tan θ₁/2 · tan θ₂/2 from", products.min().round(9), "to", products.max().round(9))

@@ -261,12 +261,12 @@ def test_a_link_that_has_turned_over_does_not_close_its_leg() -> None:
     one, two = (joint.point / chain.length for joint in setting.mechanism.joints_of(seen.link))
     state = chain.start(1)
     ends = state[:, 1].copy()
-    assert chain.closed(state, ends, 1)[1] == pytest.approx([0], abs=1e-12)
+    assert chain.close(state, ends, 1)[1] == pytest.approx([0], abs=1e-12)
     turn = half_turn((two - one) / np.linalg.norm(two - one))
     state[0, place, :3, 3] = one + turn @ (state[0, place, :3, 3] - one)
     state[0, place, :3, :3] = turn @ state[0, place, :3, :3]
     assert np.linalg.norm(chain.ties.residual(state)) < 1e-12
-    assert chain.closed(state, ends, 1)[1] == [np.inf]
+    assert chain.close(state, ends, 1)[1] == [np.inf]
 
 
 @pytest.fixture(autouse=True)

@@ -231,10 +231,10 @@ def test_gained_freedoms_are_those_beyond_the_usual_ones() -> None:
         return Relation(np.eye(6)[:, columns], 6, (), len(columns), CLEAN)
 
     examiner = ConfigurationAnalysis(setting_of("delta"))
-    gained = examiner._gained(having([0, 1, 2, 5]))
+    gained = examiner._gained_twists(having([0, 1, 2, 5]))
     np.testing.assert_allclose(np.abs(gained[:, 0]), [0, 0, 0, 0, 0, 1], atol=1e-9)
     assert gained.shape[1] == 1
-    assert examiner._gained(having([0, 1, 2])).shape[1] == 0
+    assert examiner._gained_twists(having([0, 1, 2])).shape[1] == 0
 
 
 @given(parallel_robots())
@@ -325,7 +325,7 @@ def test_the_singular_pose_really_moves() -> None:
     rows = answer.setting.samples.question.rows(at) @ kernel
     lost = kernel @ np.linalg.svd(rows[6:])[2][-1]
     h = 1e-5
-    ahead, behind = (ClosedConfiguration(at.twin, at.twin.moved(at.q, s * h * lost), 0.0) for s in (1, -1))
+    ahead, behind = (ClosedConfiguration(at.twin, at.twin.integrate(at.q, s * h * lost), 0.0) for s in (1, -1))
     moved = inverse(behind.pose("dist_1")) @ ahead.pose("dist_1")
     assert np.linalg.norm(moved[:3, 3]) > 1e-6
     target = answer.setting.samples.question.target

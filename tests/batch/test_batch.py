@@ -108,7 +108,7 @@ def test_what_legs_forbid_in_closed_form_is_what_their_joints_forbid(robot: str)
     seen = dict(zip(anatomy.labels, setting.segments, strict=True))
     X = np.array([at.pose(mechanism.platform) for at in random_walk(setting.everything.start, 12, seed=5, steps=4)])
     chains = [IterativeLeg.of(mechanism, leg, seen[leg.label], None) for leg in anatomy.legs]  # type: ignore[arg-type]
-    rows = np.concatenate([each.followed_from_zero(batch.coordinates, batch.home, X, batch.span).wrenches()
+    rows = np.concatenate([each.follow_from_zero(batch.coordinates, batch.home, X, batch.span).wrenches()
                            for each in chains], axis=1)
     basis = np.linalg.pinv(batch.span) @ batch.evaluate(X).twists
     assert np.max(np.abs(basis.swapaxes(1, 2) @ basis - np.eye(batch.coordinates.dof))) < 1e-12

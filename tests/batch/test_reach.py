@@ -145,7 +145,7 @@ def test_free_parts_are_nearest_to_zero(robot: str, text: str) -> None:
     least, compared = distance(at.q), 0
     for _ in range(20):
         kernel, _ = at.kernel()
-        q, residual = solve(twin, twin.moved(at.q, 1e-2 * kernel @ rng.normal(size=kernel.shape[1])), goal)
+        q, residual = solve(twin, twin.integrate(at.q, 1e-2 * kernel @ rng.normal(size=kernel.shape[1])), goal)
         if residual <= CLOSED:
             compared += 1
             assert distance(q) >= least - 1e-9

@@ -188,7 +188,7 @@ def test_structures_part_the_records_and_kin_differ_by_what_is_watched(catalog):
     words = {each.word: each for each in every}
     assert len(words) == len(every)
     for each in every:
-        assert Structure.unpacked(each.packed()) == each
+        assert Structure.unpack(each.pack()) == each
         assert {str(parse(record["word"]).unmoved) for record in each.records} == {str(parse(each.word).unmoved)}
         for other, verdict in each.kin:
             assert unmarked(other) == unmarked(each.word)

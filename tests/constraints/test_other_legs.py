@@ -56,7 +56,7 @@ def test_a_common_translation_that_another_leg_forbids_is_not_lost() -> None:
     assert np.linalg.svd(basis[6:], compute_uv=False)[-1] > 0.01  # both freedoms are seen
     answer = singular(robot, ["rod_1", "rod_2"], points=60)
     assert answer.condition is not None
-    assert answer.condition.expressed(answer.pattern.values_at([there]))[0] > 0.01
+    assert answer.condition.evaluate(answer.pattern.values_at([there]))[0] > 0.01
 
 
 @pytest.mark.some(1)

@@ -28,7 +28,7 @@ def drawn(name: str, seed: int) -> tuple[Linkage, Array, Array]:
 
 def closings(linkage: Linkage, seed: int, starts: int, second: float) -> list[Array]:
     """Closed angles (n,) with the second angle held, one for each random start that ends there."""
-    found = (linkage.closed(start, second)
+    found = (linkage.close(start, second)
              for start in np.random.default_rng(seed).uniform(-np.pi, np.pi, (starts, len(linkage.lengths))))
     return [angles for angles in found if angles is not None]
 

@@ -151,7 +151,7 @@ def test_planes_that_share_a_line() -> None:
 def test_an_open_loop_is_no_configuration(robot: str) -> None:
     twin = setting_of(robot).everything.twin
     step = np.random.default_rng(0).normal(scale=0.05, size=twin.nv)
-    q = twin.moved(twin.q0, step)
+    q = twin.integrate(twin.q0, step)
     with pytest.raises(LoopsNotClosed) as caught:
         ClosedConfiguration.of(twin, q)
     worst, miss = twin.worst_loop(q)
@@ -170,9 +170,9 @@ def test_the_loop_that_misses_is_named() -> None:
     for name in arms:
         step[list(twin.coordinates[name])] = 0.1
     with pytest.raises(LoopsNotClosed) as caught:
-        ClosedConfiguration.of(twin, twin.moved(twin.q0, step))
+        ClosedConfiguration.of(twin, twin.integrate(twin.q0, step))
     assert arms
-    assert caught.value.loop == twin.worst_loop(twin.moved(twin.q0, step))[0]
+    assert caught.value.loop == twin.worst_loop(twin.integrate(twin.q0, step))[0]
 
 
 def test_not_a_number_is_no_configuration() -> None:
@@ -190,7 +190,7 @@ def test_configurations_are_read_only() -> None:
 @pytest.mark.parametrize("robot", ["delta", "quattro", "hexa", "3puu"])
 def test_open_loops_nearby_are_closed(robot: str) -> None:
     twin = setting_of(robot).everything.twin
-    q, residual = solve(twin, twin.moved(twin.q0, np.random.default_rng(3).normal(scale=0.02, size=twin.nv)))
+    q, residual = solve(twin, twin.integrate(twin.q0, np.random.default_rng(3).normal(scale=0.02, size=twin.nv)))
     assert residual < CLOSED
     assert ClosedConfiguration.of(twin, q).residual < CLOSED
     assert np.max(np.abs(q - twin.q0)) > 1e-3

@@ -47,7 +47,7 @@ def walked(twin: PinocchioModel, seed: int = 0, steps: int = 4, size: float = 0.
     at = ClosedConfiguration.of(twin, twin.q0)
     for _ in range(steps):
         kernel, _ = at.kernel()
-        q, _ = solve(twin, twin.moved(at.q, size * kernel @ rng.normal(size=kernel.shape[1])), tolerance=1e-13)
+        q, _ = solve(twin, twin.integrate(at.q, size * kernel @ rng.normal(size=kernel.shape[1])), tolerance=1e-13)
         at = ClosedConfiguration.of(twin, q)
     return at
 

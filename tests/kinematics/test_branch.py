@@ -61,7 +61,7 @@ def test_bounds_never_say_what_singular_values_deny(robot: str) -> None:
     for size in np.geomspace(0.01, 3.0, 60):
         step = rng.normal(size=here.twin.nv)
         step *= size / np.linalg.norm(step)
-        values = np.linalg.svd(here.twin.jacobian(here.twin.moved(here.q, step)), compute_uv=False)[: len(kept)]
+        values = np.linalg.svd(here.twin.jacobian(here.twin.integrate(here.q, step)), compute_uv=False)[: len(kept)]
         alike = bool(np.all(values <= CHANGED * kept) and np.all(kept <= CHANGED * values))
         assert alike_after(here, step) == alike
         tangent = here.kernel()[0]

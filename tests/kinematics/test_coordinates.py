@@ -95,7 +95,8 @@ def test_the_jacobian_is_that_of_the_error(name: str):
     for at in setting.configurations[:3]:
         rows = coordinates.rows(at.twin, at.q)[1]
         for k, direction in enumerate(np.eye(at.twin.nv)):
-            ahead, behind = (coordinates.rows(at.twin, at.twin.moved(at.q, s * direction))[0] for s in (step, -step))
+            ahead, behind = (coordinates.rows(at.twin, at.twin.integrate(at.q, s * direction))[0]
+                             for s in (step, -step))
             assert rows[:, k] == pytest.approx((ahead - behind) / (2 * step), abs=1e-7)
 
 

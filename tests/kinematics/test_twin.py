@@ -129,7 +129,7 @@ def test_loops_are_the_constraints_of_pinocchio(letter: str) -> None:
              else PinocchioModel(cycle(CYCLES[letter], rng, welded=letter == "F")) for _ in range(2)]
     twins[1] = PinocchioModel(twins[1].mechanism, 0.3)
     for size in (0.0, 0.01, 0.3, 1.0):
-        places = [twin.moved(twin.q0, size * rng.normal(size=twin.nv)) for twin in twins]
+        places = [twin.integrate(twin.q0, size * rng.normal(size=twin.nv)) for twin in twins]
         for twin, q in zip(twins, places, strict=True):
             twin.at(q)
         for twin, q in zip(twins, places, strict=True):
@@ -186,7 +186,7 @@ def test_derivatives_of_residual_pose_and_target(robot: str) -> None:
     for column in range(twin.nv):
         step = np.zeros(twin.nv)
         step[column] = h
-        up, down = twin.moved(at.q, step), twin.moved(at.q, -step)
+        up, down = twin.integrate(at.q, step), twin.integrate(at.q, -step)
         np.testing.assert_allclose(central(twin.residual(up), twin.residual(down), h), J[:, column], atol=1e-8)
         np.testing.assert_allclose(central(target.rows(twin, up)[0], target.rows(twin, down)[0], h), rows[:, column],
                                    atol=1e-8)
@@ -212,5 +212,5 @@ def test_actuated_coordinates_are_those_of_the_motors() -> None:
     twin = setting_of("quattro").everything.twin
     names = [joint.name for joint in twin.mechanism.joints.values() if joint.actuated]
     assert len(names) == 4
-    assert twin.actuated() == [i for name in names for i in twin.coordinates[name]]
-    assert len(set(twin.actuated())) == 4
+    assert twin.actuated_indices() == [i for name in names for i in twin.coordinates[name]]
+    assert len(set(twin.actuated_indices())) == 4

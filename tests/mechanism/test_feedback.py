@@ -81,13 +81,14 @@ def test_the_plane_in_which_it_lies_gives_its_rate(kind: type[CameraObservation]
     assert isinstance(seen, CameraObservation)
     plane, V_c, V = seen.plane_at(X_c, X), *rng.uniform(-1, 1, size=(2, 6, 3))
     assert plane is not None
-    np.testing.assert_allclose(seen.supposed_rate(plane, X_c, X, V_c, V), seen.rate(X_c, X, V_c, V), atol=1e-9)
+    np.testing.assert_allclose(seen.suppose_plane_rate(plane, X_c, X, V_c, V), seen.rate(X_c, X, V_c, V), atol=1e-9)
     p, d = camera_frame(seen, X_c, X)
     other, r = plane + 0.3 * random_direction(rng) * np.linalg.norm(plane), np.array([seen.radius or 0.0])
-    np.testing.assert_allclose(seen.measured(*seen.supposed(p, d, r, other), r), seen.measured(p, d, r), atol=1e-9)
+    np.testing.assert_allclose(
+        seen.measurement(*seen.suppose_plane(p, d, r, other), r), seen.measurement(p, d, r), atol=1e-9)
     turns = camera_twists(seen, X_c)[:, 3:]
     still = np.zeros((6, 3))
-    np.testing.assert_allclose(seen.supposed_rate(other, X_c, X, turns, still), seen.rate(X_c, X, turns, still),
+    np.testing.assert_allclose(seen.suppose_plane_rate(other, X_c, X, turns, still), seen.rate(X_c, X, turns, still),
                                atol=1e-9 * (1 + 1 / np.linalg.norm(other)))
 
 
@@ -99,7 +100,7 @@ def test_a_point_has_the_matrix_of_the_textbook(rng: Rng) -> None:
     assert isinstance(seen, ImagePoint)
     (x, y), Z = seen.error(seen.value(X_c, X), np.array([0.0, 0, 1])), rng.uniform(0.3, 2)
     V_c = camera_twists(seen, X_c)
-    rows = seen.error_slope(seen.value(X_c, X), seen.value(X_c, X)) @ seen.supposed_rate(
+    rows = seen.error_slope(seen.value(X_c, X), seen.value(X_c, X)) @ seen.suppose_plane_rate(
         np.array([0, 0, 1 / Z]), X_c, X, V_c, np.zeros((6, 6)))
     expected = [[-1 / Z, 0, x / Z, x * y, -(1 + x * x), y], [0, -1 / Z, y / Z, 1 + y * y, -x * y, -x]]
     np.testing.assert_allclose(rows, expected, atol=1e-9 * (1 + np.abs(expected).max()))
@@ -114,8 +115,8 @@ def test_a_line_has_the_matrix_of_the_textbook(rng: Rng) -> None:
     value = seen.value(X_c, X)
     rho, theta = seen.error(value, np.array([1.0, 0, 0]))
     (a, b, c), d = rng.normal(size=3), -1.0
-    rows = seen.error_slope(value, value) @ seen.supposed_rate(np.array([a, b, c]), X_c, X, camera_twists(seen, X_c),
-                                                               np.zeros((6, 6)))
+    rows = seen.error_slope(value, value) @ seen.suppose_plane_rate(
+        np.array([a, b, c]), X_c, X, camera_twists(seen, X_c), np.zeros((6, 6)))
     cos, sin = np.cos(theta), np.sin(theta)
     by_rho, by_theta = (a * rho * cos + b * rho * sin + c) / d, (a * sin - b * cos) / d
     expected = [[by_rho * cos, by_rho * sin, -by_rho * rho, (1 + rho**2) * sin, -(1 + rho**2) * cos, 0],
@@ -135,7 +136,7 @@ def test_what_is_fed_back_is_what_a_picture_shows(rng: Rng) -> None:
         assert x * np.cos(theta) + y * np.sin(theta) == pytest.approx(rho * z, abs=1e-9)
     circle, X_c, X = in_sight(rng, ImageCircle)
     assert isinstance(circle, ImageCircle)
-    found = circle.error(circle.value(X_c, X), ImageCircle.measured(np.array([0, 0, 1.0]), np.array([0, 0, 1.0]),
+    found = circle.error(circle.value(X_c, X), ImageCircle.measurement(np.array([0, 0, 1.0]), np.array([0, 0, 1.0]),
                                                                    np.array([0.5])))
     found = found + [0, 0, 0.0625, 0, 0.0625]
     p, d = camera_frame(circle, X_c, X)
@@ -180,8 +181,8 @@ def test_sensors_are_wrong_by_no_more_than_is_said(kind: type[Observation], rng:
     for unit_, amount in (("px", 0.05), ("rad", 1e-4), ("m", 1e-4)):
         if unit_ not in kind.found_by:
             continue
-        np.testing.assert_allclose(seen.sensed(value, 0 * shocks, {unit_: amount}), value, atol=1e-9)
-        off = [seen.sensed(value, shocks, {unit_: part * amount}) - value for part in (1.0, 0.5)]
+        np.testing.assert_allclose(seen.sense(value, 0 * shocks, {unit_: amount}), value, atol=1e-9)
+        off = [seen.sense(value, shocks, {unit_: part * amount}) - value for part in (1.0, 0.5)]
         assert off[0].any()
         assert np.linalg.norm(off[0] - 2 * off[1]) < 0.05 * np.linalg.norm(off[0]) + 1e-9
         if kind is ImagePoint and unit_ == "px":
@@ -214,9 +215,9 @@ def test_each_kind_draws_itself_where_it_is(kind: type[Observation]) -> None:
             X_c, X = random_pose(rng), random_pose(rng)
         else:
             seen, X_c, X = in_sight(rng, kind)
-        found, D = seen.drawn(X_c, X, 0.2), random_pose(rng)
+        found, D = seen.draw(X_c, X, 0.2), random_pose(rng)
         assert bool(found.lines) is (kind.kind != "direction")
-        other = seen.drawn(D @ X_c, D @ X, 0.2)
+        other = seen.draw(D @ X_c, D @ X, 0.2)
         for one, two in zip(found.lines + found.areas, other.lines + other.areas, strict=True):
             np.testing.assert_allclose(two, one @ D[:3, :3].T + D[:3, 3], atol=1e-9)
         if not isinstance(seen, CameraObservation):

@@ -117,7 +117,7 @@ def test_encoders_of_each_type_in_a_tilted_chain(type: str) -> None:
     mechanism = builder.build(platform="b")
     for each in (mechanism, mechanism.changed(joints=[mechanism.joints["j"].turned()])):
         twin = PinocchioModel(each)
-        q = twin.moved(twin.q0, rng.uniform(-1, 1, size=twin.nv))
+        q = twin.integrate(twin.q0, rng.uniform(-1, 1, size=twin.nv))
         found = encoders(each, each.joints["j"])
         _, _, values, rates = measure(twin, q, "base", found)
         travelled = pin.difference(twin.model, twin.q0, q)
@@ -143,8 +143,8 @@ def test_rates_and_values_of_candidates_have_the_same_units(robot: str) -> None:
         slides = [i for j in mechanism.joints.values() if j.type.slides for i in twin.coordinates[j.name][:1]]
         step = q_step.copy()
         step[slides] /= length
-        q = twin.moved(twin.q0, 0.1 * step)
-        ahead, behind = (measure(twin, twin.moved(q, s * step), mechanism.reference, observations)[2]
+        q = twin.integrate(twin.q0, 0.1 * step)
+        ahead, behind = (measure(twin, twin.integrate(q, s * step), mechanism.reference, observations)[2]
                          for s in (STEP, -STEP))
         _, _, values, rates = measure(twin, q, mechanism.reference, observations)
         for a, b, rate in zip(ahead, behind, rates, strict=True):

@@ -76,7 +76,7 @@ def test_verdicts_are_those_of_legs() -> None:
 @pytest.mark.parametrize("watched", ["1,4", pytest.param("2,3", marks=pytest.mark.slow)])
 def test_answers_are_those_of_the_single_commands(watched: str) -> None:
     robot = load("quattro")
-    mine = work().decided(first(watched))
+    mine = work().decide(first(watched))
     theirs = accuracy(robot, watched, cone="0.1deg", at=[GOAL]).poses[0]
     assert mine.errors is not None
     assert mine.errors.position.largest == pytest.approx(theirs.position.largest, rel=1e-7)
@@ -241,13 +241,13 @@ def test_sight_sees_what_is_ahead_in_the_picture_and_not_hidden() -> None:
     rods = dict(zip(setting.labels, cylinders(setting.mechanism, setting.observed), strict=True))
     below = rotation_from_rpy(0.0, 0.0, 0.0)
     sight = CameraView(Camera(pose([0, 0, -3.0], below)), "base", rods)
-    assert all(part == 1.0 for part in sight.seen(at).values())
+    assert all(part == 1.0 for part in sight.visible_parts(at).values())
     away = CameraView(Camera(pose([0, 0, -3.0], rotation_from_rpy(math.pi, 0, 0))), "base", rods)
-    assert all(part == 0.0 for part in away.seen(at).values())
+    assert all(part == 0.0 for part in away.visible_parts(at).values())
     level = Camera(pose([-3.0, -3.0, -0.35], rotation_from_rpy(-math.pi / 2, 0, -math.pi / 4)))
-    assert all(part == 1.0 for part in CameraView(level, "base", rods).seen(at).values())
+    assert all(part == 1.0 for part in CameraView(level, "base", rods).visible_parts(at).values())
     fat = CameraView(level, "base", {leg: replace(rod, radius=0.12) for leg, rod in rods.items()})
-    seen = fat.seen(at)
+    seen = fat.visible_parts(at)
     assert seen["1"] > 0.9
     assert seen["3"] < 0.2
     assert fat.least([at, at]) == seen

@@ -59,9 +59,9 @@ def test_the_camera_sees_all_rods_and_exact_edges_give_exact_directions(name: st
     rods = cylinders(mechanism, question.observations)
     camera = place_camera(rods, question.reference, (scene.start.pose,))
     for rod in rods:
-        pixels = camera.pixels(camera.seen(scene.start.pose(question.reference), scene.start.pose, rod))
+        pixels = camera.pixels(camera.project(scene.start.pose(question.reference), scene.start.pose, rod))
         assert np.all((pixels > 0) & (pixels < [camera.width, camera.height]))
-    sense = Edges(camera, question.reference, rods, 0.0, Shocks.drawn(2 * len(rods), 1, 0))
+    sense = Edges(camera, question.reference, rods, 0.0, Shocks.draw(2 * len(rods), 1, 0))
     u = directions(scene.start, question)[0]
     assert sense(0.0, scene.start.pose, u) == pytest.approx(u, abs=1e-9)
 
@@ -86,12 +86,12 @@ def test_the_noise_of_rebuilt_directions_grows_with_that_of_pixels_and_is_bounde
     u = directions(scene.start, question)[0]
 
     def wrong(pixels: float) -> Array:
-        sense = Edges(camera, question.reference, rods, pixels, Shocks.drawn(2 * len(rods), 4, 0))
+        sense = Edges(camera, question.reference, rods, pixels, Shocks.draw(2 * len(rods), 4, 0))
         return np.array([np.linalg.norm(sense(t, scene.start.pose, u) - u, axis=1) for t in np.arange(0, 4, 0.04)])
 
     assert wrong(0.02).max() == pytest.approx(2 * wrong(0.01).max(), rel=0.05)
     for number, rod in enumerate(rods):
-        ends = camera.seen(scene.start.pose(question.reference), scene.start.pose, rod)
+        ends = camera.project(scene.start.pose(question.reference), scene.start.pose, rod)
         assert wrong(0.01)[:, number].max() <= 1.1 * sensitivity(ends, rod.radius) * 0.01 / camera.focal
 
 
@@ -160,6 +160,6 @@ def test_directions_from_rendered_pictures(name: str):
     assert np.all((wrong > 0) & (wrong < 1.0))
     drawn = [pictures.shade(picture, colour) > 127 for colour in pictures.COLOURS[: len(rods)]]
     for rod, seen_there in zip(rods, drawn, strict=True):
-        ends = camera.pixels(camera.seen(scene.start.pose(question.reference), scene.start.pose, rod))
+        ends = camera.pixels(camera.project(scene.start.pose(question.reference), scene.start.pose, rod))
         middle = np.round(ends.mean(axis=0) - 0.5).astype(int)
         assert seen_there[middle[1], middle[0]]

@@ -56,7 +56,7 @@ def test_the_error_falls_as_its_projection_says(name: str):
     command = law.at(start, (desired, 0 * desired))
 
     def error(sign: float) -> Array:
-        q, _ = solve(twin, twin.moved(start.q, sign * step * command.velocity), tolerance=SOLVED)
+        q, _ = solve(twin, twin.integrate(start.q, sign * step * command.velocity), tolerance=SOLVED)
         return np.cross(seen(ClosedConfiguration.of(twin, q), law), desired).ravel()
 
     rate = (error(1.0) - error(-1.0)) / (2 * step)

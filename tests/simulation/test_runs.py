@@ -40,7 +40,7 @@ def near(name: str) -> tuple[ClosedConfiguration, ClosedConfiguration]:
     kernel, _ = goal.kernel()
     moves = range_basis((found.everything.question.rows(goal) @ kernel).T, 1.0)[0]
     step = kernel @ moves @ np.full(moves.shape[1], 0.05 / np.sqrt(moves.shape[1]))
-    q, _ = solve(goal.twin, goal.twin.moved(goal.q, step), tolerance=1e-12)
+    q, _ = solve(goal.twin, goal.twin.integrate(goal.q, step), tolerance=1e-12)
     return ClosedConfiguration.of(goal.twin, q), goal
 
 

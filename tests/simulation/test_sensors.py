@@ -58,7 +58,7 @@ def true(found: Servo, corners: Array = CORNERS) -> bool:
     if found.ended == "local minimum":
         twin, q = found.settled.twin, found.settled.q
         steps = 1e-5 * np.eye(twin.nv)
-        errors = [np.sum((picture(ClosedConfiguration.of(twin, twin.moved(q, s * step)), corners) - wanted)[:, :2]
+        errors = [np.sum((picture(ClosedConfiguration.of(twin, twin.integrate(q, s * step)), corners) - wanted)[:, :2]
                          ** 2) for step in steps for s in (1, -1)]
         rising = np.array(errors).reshape(-1, 2)
         return apart > 1e-6 and bool(np.abs(rising[:, 0] - rising[:, 1]).max() < 1e-8)

@@ -300,7 +300,7 @@ class Search:
         self._rows = [np.array([_pad_rows(blocks[i]) for i in kept]).reshape(len(kept), LARGEST_VALUE, twist.shape[1])
                       for blocks, twist in zip(unseen, self._twists, strict=True)]
 
-    def lost(self, sets: Sequence[Sequence[int]]) -> Array:
+    def count_lost(self, sets: Sequence[Sequence[int]]) -> Array:
         """How many freedoms stay lost with each set, generically: the least over the probes; shape (sets,)."""
         places = np.array(sets, dtype=int)
         found = []
@@ -316,7 +316,7 @@ class Search:
         count, prices = len(self.useful), np.array(costs)
         if not count:
             return [], True
-        least, now = (int(self.lost([places])[0]) for places in (range(count), ()))
+        least, now = (int(self.count_lost([places])[0]) for places in (range(count), ()))
         if least == now:
             return [], True
         best, lowest, chosen, complete = np.inf, np.inf, list[tuple[int, ...]](), True
@@ -330,7 +330,8 @@ class Search:
             while batch := list(islice(sets, BATCH)):
                 tell(f"sets of {size}")
                 self.tried += len(batch)
-                for each, rest, cost in zip(batch, self.lost(batch), prices[np.array(batch)].sum(axis=1), strict=True):
+                costs = prices[np.array(batch)].sum(axis=1)
+                for each, rest, cost in zip(batch, self.count_lost(batch), costs, strict=True):
                     same = rest == best and abs(cost - lowest) <= SAME_PRICE * lowest
                     if not same and (rest, cost) < (best, lowest):
                         best, lowest, chosen = int(rest), float(cost), []

@@ -140,7 +140,7 @@ def _assembled_mode(listed: AssemblyModes, pose: Pose, refused: PoseNotReached) 
     wanted = motion.goal(pose, listed.setting.robot.name)
     met = [number for number, mode in enumerate(listed.modes, 1)
            if mode.configuration is not None and mode.reachable
-           and wanted.met(mode.configuration.pose(motion.link), AS_PRINTED * max(1.0, twin.length))]
+           and wanted.is_met(mode.configuration.pose(motion.link), AS_PRINTED * max(1.0, twin.length))]
     if len(met) != 1:
         raise refused
     return at_mode(listed, ModeNumber(met[0]))

@@ -179,9 +179,10 @@ class ExactArchitecture:
 
     def _trivial(self, observed: Sequence[Observation]) -> int:
         """How many independent trivial motions there are: the least of several instances."""
-        return min(self._followed(self.instance(i), [self._places[o.key] for o in observed]) for i in range(INSTANCES))
+        places = [self._places[o.key] for o in observed]
+        return min(self._count_similarities(self.instance(i), places) for i in range(INSTANCES))
 
-    def _followed(self, found: Instance, places: Sequence[int]) -> int:
+    def _count_similarities(self, found: Instance, places: Sequence[int]) -> int:
         """How many independent similarities take along all that is sensed, at an instance, in motions not seen."""
         draws = [(random_numbers(3, self._random), random_numbers(3, self._random)) for _ in range(PLACES)]
         parts = [part for i in places if (at := found.sightings[i]) is not None
@@ -283,7 +284,7 @@ def architecture_of(mechanism: Mechanism, question: Measurement, at: Sequence[Cl
     places = [i for i, o in enumerate(question.observations) if has_exact_rates(o)]
     observed = [question.observations[i] for i in places]
     sensors = SensorPlaces.of(observed, mechanism)
-    directions = [*(o for o in observed if isinstance(o, SeenAxis)), *sensors.watched()]
+    directions = [*(o for o in observed if isinstance(o, SeenAxis)), *sensors.as_observed()]
     relations = recognise(mechanism, frames_at(at), directions, question.point, sensors.points)
     return ExactArchitecture(mechanism, relations, observed, select_relation(relation, places),
                              at[0].kernel()[0].shape[1])

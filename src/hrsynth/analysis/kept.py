@@ -85,7 +85,7 @@ class _Moving:
             case "plane":
                 return _rate(_dot, _cross(D[0], D[1]), _rate(_cross, D[0], dD[0], D[1], dD[1]), D[2], dD[2])
             case "seen":
-                return self._seen(alike, D, dD)
+                return self._directions(alike, D, dD)
         numbers = np.array([[number for number, _ in tie.terms] for tie in alike])
         signs = np.array([[sign for _, sign in tie.terms] for tie in alike])[..., None, None]
         S, dS = (signs * self.P[numbers]).sum(axis=1), (signs * self.dP[numbers]).sum(axis=1)
@@ -97,7 +97,7 @@ class _Moving:
             case _:
                 return _rate(_dot, S, dS, D[0], dD[0])
 
-    def _seen(self, alike: list[Tie], D: list[Numbers], dD: list[Numbers]) -> Numbers:
+    def _directions(self, alike: list[Tie], D: list[Numbers], dD: list[Numbers]) -> Numbers:
         """(ẇ − ω × w) × w of observed directions w."""
         sights = [tie.sight for tie in alike if tie.sight is not None]
         if sights[0].kind == "normal":

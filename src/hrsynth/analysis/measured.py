@@ -27,13 +27,13 @@ class MeasuredRobot(Value):
 
     @classmethod
     @lru_cache(maxsize=REMEMBERED)
-    def watched(cls, setting: ObservedRobot) -> MeasuredRobot:
+    def of_directions(cls, setting: ObservedRobot) -> MeasuredRobot:
         """The observed directions: the hidden robot."""
         return cls(setting, setting.samples)
 
     @classmethod
     @lru_cache(maxsize=REMEMBERED)
-    def driven(cls, setting: ObservedRobot) -> MeasuredRobot:
+    def of_motors(cls, setting: ObservedRobot) -> MeasuredRobot:
         """The motors' coordinates: the real robot. Raises ``BadRequest`` where it has no motor."""
         return cls(setting, setting.measuring(motors(setting).observations))
 

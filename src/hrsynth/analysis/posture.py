@@ -177,14 +177,14 @@ class ConfigurationAnalysis(Value):
         return all(special_at(at, self.setting.samples.question) for at in self.setting.configurations)
 
     def _real(self, at: ClosedConfiguration) -> Relation:
-        return relation_of(at, self.setting.samples.question, np.eye(at.twin.nv)[at.twin.actuated()])
+        return relation_of(at, self.setting.samples.question, np.eye(at.twin.nv)[at.twin.actuated_indices()])
 
     def classify(self, at: ClosedConfiguration) -> Posture:
         """What can be said without names: no freedoms, no redundant constraints."""
         setting = self.setting
         found = relation(at, setting.samples.question)
         told = relation(at, replace(setting.everything.question, observations=setting.telling_idle))
-        real = self._kinds(self._real(at), self.usual_real) if at.twin.actuated() else None
+        real = self._kinds(self._real(at), self.usual_real) if at.twin.actuated_indices() else None
         mobility = Mobility(found.mobility, found.mobility - told.dimension)
         return Posture(at, setting.motion.pose(at.pose(setting.motion.link)), mobility, found.dof.value,
                        self._kinds(found, self.usual), real, self._distances(at, found))
@@ -201,11 +201,11 @@ class ConfigurationAnalysis(Value):
             extra = surplus(redundant_rows(at), self.redundant)
             return replace(posture, formation=here if hidden.classes else None,
                            redundant=list_redundant(extra, generic=False))
-        hidden = replace(hidden, lost=self._named(at, found.unobserved_twists) if hidden.classes else ())
+        hidden = replace(hidden, lost=self._name_freedoms(at, found.unobserved_twists) if hidden.classes else ())
         if real is not None and real.classes:
-            real = replace(real, lost=self._named(at, self._real(at).unobserved_twists))
+            real = replace(real, lost=self._name_freedoms(at, self._real(at).unobserved_twists))
         extra = surplus(redundant_rows(at), self.redundant)
-        gained = self._named(at, self._gained(found)) if posture.constraint_singular else ()
+        gained = self._name_freedoms(at, self._gained_twists(found)) if posture.constraint_singular else ()
         return replace(posture, hidden=hidden, real=real, gained=gained, redundant=list_redundant(extra, generic=False))
 
     @staticmethod
@@ -232,7 +232,7 @@ class ConfigurationAnalysis(Value):
                          1e3 * at.twin.length * float(np.linalg.norm(moved[:3])) * float(np.radians(1)),
                          float(np.linalg.norm(moved[3:])))
 
-    def _gained(self, found: Relation) -> Array:
+    def _gained_twists(self, found: Relation) -> Array:
         """The platform's twists that it has only here; all of them where the general ones change from pose to pose."""
         if found.dof.value <= self.usual.dof:
             return np.zeros((found.twist_rows, 0))
@@ -242,7 +242,7 @@ class ConfigurationAnalysis(Value):
         beside = np.linalg.svd(found.twists - usual @ (usual.T @ found.twists), full_matrices=False)[0]
         return np.asarray(beside[:, : found.dof.value - self.usual.dof])
 
-    def _named(self, at: ClosedConfiguration, twists: Array) -> tuple[Freedom, ...]:
+    def _name_freedoms(self, at: ClosedConfiguration, twists: Array) -> tuple[Freedom, ...]:
         """Twists (3 or 6, k) in characteristic lengths as named freedoms."""
         setting = self.setting
         start = setting.everything.start

@@ -45,7 +45,7 @@ class SensorPlaces:
                 directions[direction] = None
         return cls(tuple(points), tuple(directions))
 
-    def watched(self) -> list[Direction]:
+    def as_observed(self) -> list[Direction]:
         """The directions as if each was observed: that is how relations find what they are parallel to."""
         return [Direction("", link, np.array(axis)) for link, axis in self.directions]
 

@@ -46,9 +46,9 @@ class BoxFormula(Value):
         """The code of some of a tape's symbols; the robot's numbers may be ``off`` by so much."""
         from flint import arb
 
-        used = tape.needed(list(enumerate(outputs)))
+        used = tape.needed_operations(list(enumerate(outputs)))
         known: dict[int, Any] = {}
-        fixed = tape.fixed()
+        fixed = tape.are_constant()
         steps: list[tuple[int, str, Sequence[int | Term]]] = []
 
         def term(each: Any) -> int | Term:

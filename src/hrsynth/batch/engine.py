@@ -181,7 +181,7 @@ class Batch(Value):
             raise BadRequest("the result of a batch takes too much memory (bytes)", need,
                              f"at most {LARGEST_BATCH}; sweep goes through any number of poses in parts")
         k, n = len(watched), len(X)
-        quick = self.compiled(n, watched, half, slid=slid) if compiled is None else compiled
+        quick = self.uses_numba(n, watched, half, slid=slid) if compiled is None else compiled
         if compiled:
             self._require_compilable("jax" if compiled == "jax" else "numba")
         given = X if s is None else np.hstack([X[:, :3].reshape(n, 12), s])
@@ -189,7 +189,7 @@ class Batch(Value):
         reached, u = rows[0] > 0, rows[1 : 1 + 3 * k].reshape(k, 3, n)
         M = rows[1 + 3 * k :].reshape(3 * k, twists.shape[1], n)
         if not self.closed:
-            M, twists = self._iterated(X, watched, reached, u, M)
+            M, twists = self._iterate(X, watched, reached, u, M)
         position, orientation = (None, None) if half is None else bounds_of(M, twists, half, reached, compiled=quick)
         if not reached.all():
             u[..., ~reached], M[..., ~reached] = np.nan, np.nan
@@ -206,7 +206,7 @@ class Batch(Value):
         k, d = len(watched), self.span.shape[1]
         return margins.T, u.T.reshape(n, k, 3), M.T.reshape(n, k, 3, d)
 
-    def reached(self, X: Array) -> Flags:
+    def reaches(self, X: Array) -> Flags:
         """Where closed forms alone reach the poses X (n, 4, 4), without the rest of ``evaluate``."""
         return np.asarray(self._program(()).run(X, ROWS[:1])[0] > 0)
 
@@ -245,13 +245,13 @@ class Batch(Value):
         """The coordinates' twists (m, rad), (6, D)."""
         return _span(self.coordinates, self.length)
 
-    def compiled(self, n: int, legs: Sequence[str], cones: Array | None, enough: int = POSES_FOR_NUMBA, *,
-                 slid: bool = False) -> bool:
+    def uses_numba(self, n: int, legs: Sequence[str], cones: Array | None, enough: int = POSES_FOR_NUMBA, *,
+                   slid: bool = False) -> bool:
         """Whether numba is to do n poses by default: its kernels are there already, and they are ``enough``, or they
         are so many that compiling pays."""
         if not self.closed or n < enough or find_spec("numba") is None:
             return False
-        return n >= POSES_FOR_COMPILING or (self._program(legs, slid).compiled(ROWS) and (
+        return n >= POSES_FOR_COMPILING or (self._program(legs, slid).is_compiled(ROWS) and (
             cones is None or bounds_compiled(len(legs), self._twists(slid), cones)))
 
     def _require_compilable(self, by: str) -> None:
@@ -267,10 +267,10 @@ class Batch(Value):
         the directions ``u`` and rows ``M`` of the watched legs; zero for those that are solved by iteration."""
         key = tuple(watched), slid
         if key not in self.programs:
-            self.programs[key] = self._traced(*key)
+            self.programs[key] = self._trace(*key)
         return self.programs[key]
 
-    def _traced(self, watched: tuple[str, ...], slid: bool) -> Program:
+    def _trace(self, watched: tuple[str, ...], slid: bool) -> Program:
         twists, slides = self._twists(slid), self.slides if slid else ()
         program, d = Program.of(X=12, **{f"slide_{name}": 1 for name in slides}), twists.shape[1]
 
@@ -319,7 +319,7 @@ class Batch(Value):
                                     for place in program.places.get(f"{name}_{leg}", [0.0] * size)]
         return program
 
-    def _iterated(self, X: Array, watched: Sequence[str], reached: Flags, u: Array, M: Array) -> tuple[Array, Array]:
+    def _iterate(self, X: Array, watched: Sequence[str], reached: Flags, u: Array, M: Array) -> tuple[Array, Array]:
         """Fill in the rows of legs that are solved by iteration, and ``reached``; Mᵀ (3 k, d, n) and its twists, which
         the legs decide where they are not the same at all poses."""
         n, constant = len(X), self.coordinates.constant
@@ -327,7 +327,7 @@ class Batch(Value):
         X = np.where(reached[:, None, None], X, self.home)
         for start in range(0, n, CHUNK):
             here = slice(start, start + CHUNK)
-            states = {name: self._followed(leg, X[here]) for name, leg in self.iterative.items()}
+            states = {name: self._follow(leg, X[here]) for name, leg in self.iterative.items()}
             for name in states:
                 if self.legs[name] is self.iterative[name]:
                     found, rows, there = states[name].rows()
@@ -336,7 +336,7 @@ class Batch(Value):
                         place = list(watched).index(name)
                         u[place, :, here], M[3 * place : 3 * place + 3, :, here] = found, rows
             if self.holds:
-                across, there = self._held(X[here])
+                across, there = self._held_basis(X[here])
                 basis[here], found = across.transpose(2, 0, 1), M[:, :, here].copy()
                 M[:, : self.coordinates.dof, here] = sum(
                     row[:, None] * column for row, column in zip(found.swapaxes(0, 1), across, strict=True))
@@ -350,15 +350,15 @@ class Batch(Value):
             return M[:, : self.coordinates.dof], self.span @ basis
         return np.einsum("rcn,ncd->rdn", M, basis), self.span @ basis
 
-    def _held(self, X: Array) -> tuple[Array, Flags]:
+    def _held_basis(self, X: Array) -> tuple[Array, Flags]:
         """An orthonormal basis (D, d, n) of the coordinates of the twists that the legs' forces allow, and where these
         are independent."""
         p, R = self.coordinates.place(X)
         basis, least = freedoms(np.array([hold.rows(p, R, self.span) for hold in self.holds]))
         return basis, least > RANK_CUTOFF
 
-    def _followed(self, leg: IterativeLeg, X: Array) -> IterativeLegStates:
-        return leg.followed_from_zero(self.coordinates, self.home, X, self.span)
+    def _follow(self, leg: IterativeLeg, X: Array) -> IterativeLegStates:
+        return leg.follow_from_zero(self.coordinates, self.home, X, self.span)
 
     def _feasible(self, states: Sequence[IterativeLegStates]) -> tuple[Array, Flags]:
         """An orthonormal basis (n, D, d) of the coordinates of the twists that all legs allow, and where it has the
@@ -377,7 +377,7 @@ class Batch(Value):
     @cached_property
     def _reference(self) -> Array:
         """The twists at home: which way round every other basis is."""
-        states = [self._followed(leg, self.home[None]) for leg in self.iterative.values()]
+        states = [self._follow(leg, self.home[None]) for leg in self.iterative.values()]
         rows = np.concatenate([each.wrenches() for each in states], axis=1)[0]
         return np.linalg.svd(rows)[2][rows.shape[1] - self.coordinates.dof :].T
 

@@ -73,7 +73,7 @@ def _constant_program(k: int, d: int, twists: bytes, cones: bytes) -> Program:
 
 def bounds_compiled(k: int, twists: Array, cones: Array) -> bool:
     """Whether numba has compiled them already."""
-    return _constant_program(k, twists.shape[1], twists.tobytes(), cones.tobytes()).compiled(OUTPUTS)
+    return _constant_program(k, twists.shape[1], twists.tobytes(), cones.tobytes()).is_compiled(OUTPUTS)
 
 
 def freedom(rows: Array) -> Array | None:

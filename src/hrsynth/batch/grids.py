@@ -29,7 +29,7 @@ def ready(placer: Placer, motion: PlatformMotion, goals: Sequence[Goal]
     missed = [i for i in range(len(goals)) if i not in found]
     closed, turning = ([i for i in missed if motion.is_placed(goals[i]) and motion.turns_left(goals[i]) == left]
                        for left in (0, 1))
-    some = np.concatenate([placer.batch.reached(X[closed]), _some_turn(placer, motion, X[turning])])
+    some = np.concatenate([placer.batch.reaches(X[closed]), _some_turn(placer, motion, X[turning])])
     return found, {i for i, reached in zip([*closed, *turning], some, strict=True) if not reached}
 
 
@@ -62,5 +62,5 @@ def _some_turn(placer: Placer, motion: PlatformMotion, X: Array) -> Flags:
     poses = np.tile(np.eye(4), (len(X), TURNS, 1, 1))
     poses[..., :3, :3] = turns @ X[:, None, :3, :3]
     poses[..., :3, 3] = p[:, None] - poses[..., :3, :3] @ motion.point
-    reached = placer.batch.reached(poses.reshape(-1, 4, 4)).reshape(len(X), TURNS)
+    reached = placer.batch.reaches(poses.reshape(-1, 4, 4)).reshape(len(X), TURNS)
     return np.asarray(reached.any(axis=1))

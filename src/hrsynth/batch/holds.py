@@ -47,7 +47,7 @@ class Hold(Value):
         found = span.T @ np.concatenate([force, cross(arm, force, axis=-2)])
         return np.asarray(found / _size(found))
 
-    def kept(self, p: Array, R: Array) -> Array:
+    def level(self, p: Array, R: Array) -> Array:
         """What stays (n,), m: the tip's height or distance, or the place's height above the reference point."""
         force, arm = self.force(p, R)
         height = arm if self.turns else arm + p.T - (0.0 if self.normal is not None else self.place[:, None])
@@ -70,7 +70,7 @@ def holds_of_leg(mechanism: Mechanism, leg: Leg, coordinates: PlatformCoordinate
         return None
     wanted = np.array([basis[:, 0] for basis, _ in ranks])
     for hold in _candidates(mechanism, leg, coordinates):
-        levels = hold.kept(p, states.R)
+        levels = hold.level(p, states.R)
         rows = hold.rows(p, states.R, states.span).T
         aside = wanted - dot(rows, wanted)[:, None] * rows
         if max(np.ptp(levels) / mechanism.length, np.max(np.abs(aside))) <= 10 * SAME_GEOMETRY:

@@ -154,7 +154,7 @@ class IterativeLeg(Value):
         """The zero configuration, n times."""
         return np.repeat(self.zero[None], n, axis=0)
 
-    def closed(self, X: Array, ends: Array, iterations: int) -> tuple[Array, Array]:
+    def close(self, X: Array, ends: Array, iterations: int) -> tuple[Array, Array]:
         """States nearest to X (n, links, 4, 4) with the end at ``ends`` (n, 4, 4), characteristic lengths, and the
         residuals left (n,), infinite where a joint's axis has turned over."""
         X = X.copy()
@@ -195,8 +195,8 @@ class IterativeLeg(Value):
         _, s, right = np.linalg.svd(np.concatenate([wrenches, np.zeros((len(X), 6, 6))], axis=1), full_matrices=False)
         return u, minus @ twists[:, number, 3:], right * (s > RANK_CUTOFF)[:, :, None]
 
-    def followed_from_zero(self, coordinates: PlatformCoordinates, home: Array, X: Array, span: Array
-                           ) -> IterativeLegStates:
+    def follow_from_zero(self, coordinates: PlatformCoordinates, home: Array, X: Array, span: Array
+                         ) -> IterativeLegStates:
         """The chain at platform poses X (n, 4, 4), followed from ``home`` in small steps, all poses abreast."""
         p, R = coordinates.place(X)
         (p0,), (R0,) = coordinates.place(home[None])
@@ -207,7 +207,7 @@ class IterativeLeg(Value):
         for step in range(1, steps + 1):
             part = step / steps
             there = self.end(coordinates, p0 + part * (p - p0), exponential(part * turn) @ R0 if step < steps else R)
-            state, residual = self.closed(state, there, ITERATIONS if step == steps else CHAIN_STEPS)
+            state, residual = self.close(state, there, ITERATIONS if step == steps else CHAIN_STEPS)
         return IterativeLegStates(self, coordinates, state, residual, R, span)
 
     def turns(self, coordinates: PlatformCoordinates) -> bool:

@@ -84,7 +84,7 @@ def _store(kernel: Kernel, table: Table, numbers: Any) -> Table:
     import jax.numpy as jnp
 
     values: dict[int, Any] = {}
-    for number in sorted(kernel.tape.needed(kernel.stores)):
+    for number in sorted(kernel.tape.needed_operations(kernel.stores)):
         name, *given = kernel.tape.code[number]
         if name == "load":
             values[number] = table[given[0]]

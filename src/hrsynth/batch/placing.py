@@ -130,7 +130,7 @@ class Placer(Value):
             state[:, :, :3, 3] /= batch.length
             state[~there] = chain.zero
             end = state[:, 1].copy()
-            state, residual = chain.closed(state, end, CLOSING)
+            state, residual = chain.close(state, end, CLOSING)
             reached &= there & (residual <= CLOSED)
             state[:, :, :3, 3] *= batch.length
             frames.update({name: state[:, i] for i, name in enumerate(chain.links) if name in leg.links})

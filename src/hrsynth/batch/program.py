@@ -68,13 +68,13 @@ class Program:
 
     def apply(self, formula: Formula, *reads: str, state: Sequence[str] = ()) -> None:
         """Trace a formula: what it makes can be read from then on; ``state`` can be overwritten later."""
-        kernel = self._traced(formula, reads, state)
+        kernel = self._trace(formula, reads, state)
         if kernel.stores:
             self.section.steps.append(kernel)
 
     def repeat(self, formula: Formula, limit: int, reads: Sequence[str], state: Sequence[str]) -> None:
         """Trace a formula that makes the next state from what it reads and the state."""
-        step = self._traced(formula, (*reads, *state), state)
+        step = self._trace(formula, (*reads, *state), state)
         places = [place for name in state for place in self.places[name]]
         self.section.steps.append(KernelLoop(step, places, self.places[state[-1]][0], limit))
 
@@ -87,7 +87,7 @@ class Program:
         yield
         self.section = section
 
-    def _traced(self, formula: Formula, reads: Sequence[str], state: Sequence[str]) -> Kernel:
+    def _trace(self, formula: Formula, reads: Sequence[str], state: Sequence[str]) -> Kernel:
         self.tape = tape = Tape(self.numbers)
         self.texts.clear()
         made = formula(*([tape.load(each) if isinstance(each, int) else each for each in self.places[name]]
@@ -122,7 +122,7 @@ class Program:
             (self._run_lanes if compiled else self._run_rows)(flat, outputs, found)
         return found
 
-    def compiled(self, names: Sequence[str]) -> bool:
+    def is_compiled(self, names: Sequence[str]) -> bool:
         """Whether numba has compiled what makes these names, in this run or in an earlier one."""
         file = _file_of(self.text(self._outputs(names)))
         return any(file.parent.glob(f"__pycache__/{file.stem}.sweep*.nbi"))
@@ -178,10 +178,10 @@ class Program:
         """The module that numba compiles: the same for all robots of one structure, whose numbers it is given."""
         key = tuple(outputs)
         if key not in self.texts:
-            self.texts[key] = self._written(outputs)
+            self.texts[key] = self._source(outputs)
         return self.texts[key]
 
-    def _written(self, outputs: Sequence[Any]) -> str:
+    def _source(self, outputs: Sequence[Any]) -> str:
         kernels: list[str] = []
         body: list[str] = []
         for section in self.sections:

@@ -127,7 +127,7 @@ def _lost_rank(start: ClosedConfiguration, here: ClosedConfiguration) -> str | N
 
 def _has_arrived(at: ClosedConfiguration, goal: Goal) -> bool:
     """Whether a configuration is at the wanted pose, by its matrix, and no wrist is beyond its interval."""
-    return goal.met(at.pose(goal.link), AS_PRINTED * max(1.0, at.twin.length)) and not wrists_beyond(at.twin, at.q)
+    return goal.is_met(at.pose(goal.link), AS_PRINTED * max(1.0, at.twin.length)) and not wrists_beyond(at.twin, at.q)
 
 
 def sweep(start: ClosedConfiguration, question: Measurement, grid: Grid, motion: PlatformMotion | None = None,

@@ -110,11 +110,11 @@ class Tape:
     def make(self, name: str, *arguments: Any) -> Symbol:
         """An operation on symbols and constants, found again where it is there already."""
         operation = (name, *(each.number if isinstance(each, Symbol) else float(each) for each in arguments))
-        return self._found(operation)
+        return self._find(operation)
 
     def load(self, place: int) -> Symbol:
         """What stands at a place."""
-        return self._found(("load", place))
+        return self._find(("load", place))
 
     def place(self, value: Any) -> int | None:
         """The place of which a symbol is the load."""
@@ -126,9 +126,9 @@ class Tape:
         if value in (0.0, 1.0):
             return float(value)
         self.numbers.append(float(value))
-        return self._found(("number", len(self.numbers) - 1))
+        return self._find(("number", len(self.numbers) - 1))
 
-    def _found(self, operation: tuple[Any, ...]) -> Symbol:
+    def _find(self, operation: tuple[Any, ...]) -> Symbol:
         key = tuple(map(repr, operation))
         if key not in self.known:
             self.known[key] = Symbol(self, len(self.code))
@@ -141,14 +141,14 @@ class Tape:
             return []
         return [each for each in operation[1:] if isinstance(each, int)]
 
-    def fixed(self) -> list[bool]:
+    def are_constant(self) -> list[bool]:
         """Which operations are on the robot's numbers alone: the same at all poses."""
         found: list[bool] = []
         for operation in self.code:
             found.append(operation[0] != "load" and all(found[each] for each in self.arguments(operation)))
         return found
 
-    def needed(self, stores: Sequence[Store]) -> set[int]:
+    def needed_operations(self, stores: Sequence[Store]) -> set[int]:
         """The operations that the stored symbols need."""
         found: set[int] = set()
         queue = [each.number for _, each in stores if isinstance(each, Symbol)]
@@ -161,13 +161,13 @@ class Tape:
 
     def rows(self, stores: Sequence[Store]) -> tuple[list[str], int]:
         """Lines on rows of ``m`` (places, n), with intermediate results in rows of ``r``; how many these are."""
-        used = self.needed(stores)
+        used = self.needed_operations(stores)
         last = {each: number for number in sorted(used) for each in self.arguments(self.code[number])}
         last |= {each.number: len(self.code) for _, each in stores if isinstance(each, Symbol)}
         names: list[str] = []
         free: list[str] = []
         lines, count = [], 0
-        for number, (operation, fixed) in enumerate(zip(self.code, self.fixed(), strict=True)):
+        for number, (operation, fixed) in enumerate(zip(self.code, self.are_constant(), strict=True)):
             name, earlier = operation[0], self.arguments(operation)
             inputs = [names[each] if isinstance(each, int) else repr(each) for each in operation[1:]] if earlier else []
             if number not in used:
@@ -195,7 +195,7 @@ class Tape:
         """Names and what they are set to, in the order of the operations, then of what is stored: for one pose, in any
         language that writes sums and products as C does. ``places`` names what is loaded."""
         found = []
-        for number in sorted(self.needed(stores)):
+        for number in sorted(self.needed_operations(stores)):
             operation = self.code[number]
             inputs = [f"t{each}" if isinstance(each, int) else repr(each) for each in operation[1:]]
             text = places[operation[1]] if operation[0] == "load" else _scalar(operation, inputs)
@@ -207,8 +207,8 @@ class Tape:
         ``live`` is not positive keeps what it has."""
         before: list[str] = []
         inside = [] if live is None else [f"live = m[i + {LANES * live}] > 0.0"]
-        fixed = self.fixed()
-        for number in sorted(self.needed(stores)):
+        fixed = self.are_constant()
+        for number in sorted(self.needed_operations(stores)):
             operation = self.code[number]
             inputs = [f"t{each}" if isinstance(each, int) else repr(each) for each in operation[1:]]
             text = f"m[i + {LANES * operation[1]}]" if operation[0] == "load" else _scalar(operation, inputs)

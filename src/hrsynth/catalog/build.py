@@ -40,7 +40,7 @@ class WordSource:
     entry: Callable[[str], dict[str, Any]]
     sharing_key: Callable[[str], str] = str
 
-    def chosen(self, names: Sequence[str]) -> list[str]:
+    def choose(self, names: Sequence[str]) -> list[str]:
         """The groups of these names, all if there are none; raises ``BadRequest``."""
         for name in names:
             if name not in self.groups:
@@ -129,7 +129,7 @@ def build(target: str | Path, groups: Sequence[str] = (), *, source: WordSource 
     source, tell = source or architectures(), tell or (lambda *_: None)
     kept, team, done = store(target), executor(workers, cluster), list[Built]()
     with ExitStack() as stack:
-        journals = {group: stack.enter_context(kept.journal(group, anew=anew)) for group in source.chosen(groups)}
+        journals = {group: stack.enter_context(kept.journal(group, anew=anew)) for group in source.choose(groups)}
         words = {group: source.words(group) for group in journals}
         for group, journal in journals.items():
             tell(group, sum(word in journal for word in words[group]), len(words[group]))
@@ -182,7 +182,7 @@ def check(target: str | Path | Store, groups: Sequence[str] = (), *, source: Wor
     """
     source = source or architectures()
     kept = store(target) if isinstance(target, str | Path) else target
-    team, chosen = executor(workers, cluster), source.chosen(groups)
+    team, chosen = executor(workers, cluster), source.choose(groups)
     return tuple(complaint for group in chosen
                  for complaint in _stale(kept, group, source, team, sample, seed, tell or (lambda *_: None)))
 

@@ -32,7 +32,7 @@ class Columns:
 
     def having(self, name: str, test: Callable[[Any], bool]) -> Flags:
         """The rows of records that have a field whose value meets a test."""
-        every = self._listed(name)
+        every = self._as_list(name)
         return np.array([any(map(test, each)) for each in every], bool)[self._numbers(name, len(every))]
 
     def holding(self, text: str) -> Flags:
@@ -45,7 +45,7 @@ class Columns:
                 found |= fit[self._numbers(name, len(fit))]
         return self._or_words(found, FOLDED, lambda words: words.holding(text))
 
-    def called(self, pattern: str) -> Flags:
+    def match(self, pattern: str) -> Flags:
         """The rows of records whose word, notation, or chain of some leg fits a pattern."""
         fit = np.zeros(len(self._texts(NOTATION)), bool)
         chain = self._texts(CHAIN).matching(pattern)
@@ -56,9 +56,9 @@ class Columns:
 
     def values(self, name: str) -> list[Any]:
         """The values of a field that records have, each once, sorted."""
-        return sorted(value for each in self._listed(name) for value in each if value is not None)
+        return sorted(value for each in self._as_list(name) for value in each if value is not None)
 
-    def _listed(self, name: str) -> list[list[Any]]:
+    def _as_list(self, name: str) -> list[list[Any]]:
         """Each value that a field has, in a list; an empty one for records without the field."""
         try:
             return [list(json.loads(each)) for each in self._texts(name)]

@@ -92,13 +92,13 @@ class ArchitectureStudy:
     joints: tuple[str, ...]
     """The joint of each observation of ``encoders``."""
 
-    def driven(self, names: Sequence[str]) -> int:
+    def motor_rank(self, names: Sequence[str]) -> int:
         """What motors on these joints see of the platform."""
         return select_relation(self.encoders, [i for i, name in enumerate(self.joints) if name in names]).rank
 
     def record(self, drawn: Mechanism, motors: Sequence[str]) -> dict[str, Any]:
         """The fields of a record, of a mechanism with motors on these joints."""
-        rank = self.driven(motors)
+        rank = self.motor_rank(motors)
         return {"notation": decompose(normal_form(drawn).mechanism).architecture().ascii, **self.facts,
                 "attempt": self.attempt or None, "motors": len(motors), "motor_rank": rank,
                 "driven": rank == self.facts["dof"],
@@ -228,13 +228,13 @@ def _general(name: str) -> str:
 
 def _singular(setting: ObservedRobot) -> dict[str, Any]:
     """When the hidden robot loses a freedom, in words; None where that is not known in words."""
-    return {"condition": MeasuredRobot.watched(setting).condition.words}
+    return {"condition": MeasuredRobot.of_directions(setting).condition.words}
 
 
 def _modes(setting: ObservedRobot, fewest: Sequence[Sequence[str]]) -> dict[str, Any]:
     """Complex assembly modes of a smallest set of legs, by what there are no more if not by a resultant, and the most
     real ones of some configurations: of the first set, or else of that of which fewest can be expected."""
-    robots = [MeasuredRobot.watched(replace(setting, observed=tuple(o for o in _watch(setting) if o.leg in legs)))
+    robots = [MeasuredRobot.of_directions(replace(setting, observed=tuple(o for o in _watch(setting) if o.leg in legs)))
               for legs in fewest]
     at = setting.configurations[0]
 

@@ -40,7 +40,7 @@ class Rows(Protocol):
     def holding(self, text: str) -> Flags:
         """Those of records in which a casefolded text occurs in some field, or in a name."""
 
-    def called(self, pattern: str) -> Flags:
+    def match(self, pattern: str) -> Flags:
         """Those of records whose word, notation, or chain of some leg fits a pattern."""
 
 
@@ -116,7 +116,7 @@ def _condition_on(name: str, value: Any) -> RecordCondition:
 
             return RecordCondition(
                 lambda record: has_legs(record["word"], str(record.get("notation", ""))),
-                lambda rows: rows.called(value),
+                lambda rows: rows.match(value),
                 lambda line: "\\" in line or has_legs(leading_word(line), written_text(line, "notation")))
         case "text":
             text = value.casefold()

@@ -214,7 +214,7 @@ class _Limb:
             if joint.letter in COMPOSITE:
                 place += 1
                 if joint.letter == "Pi" and joint.axes != "n" and place < len(places) - 1:
-                    normal = self._named(joint.axes, start)
+                    normal = self._vector(joint.axes, start)
                     places[place] = places[place] - (places[place] - start) @ normal * normal
             ends.append(places[min(place, len(places) - 1)])
             place += 1
@@ -235,9 +235,9 @@ class _Limb:
     def _axes(self, joint: JointSymbol, at: Array, line: Array) -> list[Array]:
         """The axes of a joint, unit vectors."""
         if joint.letter != "U":
-            return [unit(line) if name in "ln" else self._named(name, at) for name in joint.axes]
+            return [unit(line) if name in "ln" else self._vector(name, at) for name in joint.axes]
         names = joint.axes
-        known = {name: unit(line) if name == "l" else self._named(name, at) for name in names if name not in "nq"}
+        known = {name: unit(line) if name == "l" else self._vector(name, at) for name in names if name not in "nq"}
         if not known:
             raise BadRequest(f"word {str(self.draft.word)!r}: axes of a U", names, "one that is named by itself")
         found = []
@@ -253,7 +253,7 @@ class _Limb:
                              round(float(found[0] @ found[1]), 6), "n or q for one of them")
         return found
 
-    def _named(self, name: str, at: Array) -> Array:
+    def _vector(self, name: str, at: Array) -> Array:
         """The direction of a name, a unit vector."""
         match name:
             case "x" | "y" | "z":

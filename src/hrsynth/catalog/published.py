@@ -46,7 +46,7 @@ class PublishedEntry:
         drawn = mechanism(robot)
         found = study(drawn, partial(_sets, robot), proved=False)
         driven = _choices(robot)
-        ranks = [found.driven(_names(each)) for each in driven]
+        ranks = [found.motor_rank(_names(each)) for each in driven]
         best = ranks.index(found.facts["dof"]) if found.facts["dof"] in ranks else 0
         choices = [{"joints": [[j + 1 for j in leg] for leg in each], "rank": rank}
                    for each, rank in zip(driven, ranks, strict=True)]

@@ -87,10 +87,10 @@ def _carried_chain(system: CarriedPlatform, found: Sequence[Array]) -> ToldChain
     n, told, slides = len(system.freedoms_), [*system.square], np.array([each.slides for each in system.freedoms_])
     told += [each for each in system.told if each not in told and _carriers(each)]
     off = np.where(slides, 0.0, FROM * np.arange(1, n + 1))
-    record = _record([_joint(each, *system.moved(off, k)) for k, each in enumerate(system.freedoms_)], n,
+    record = _record([_joint(each, *system.transform(off, k)) for k, each in enumerate(system.freedoms_)], n,
                      system.carrying)
     for each in told:
-        tip, reach, arrow = _displaced_tip(each, *system.moved(off, each.joints))
+        tip, reach, arrow = _displaced_tip(each, *system.transform(off, each.joints))
         record["tips"].append(tip)
         record["reaches"].append(reach)
         record["ends"].append([min(_carriers(each)), max(_carriers(each)) + 1, arrow])

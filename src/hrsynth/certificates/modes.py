@@ -107,8 +107,8 @@ def of_chain(system: CarriedPlatform, found: AssemblyModes, about: Mapping[str, 
     for each in chains(system, [mode.q for mode in modes_]):
         kept = [mode is not None for mode in each.modes]
         if sum(kept) == len(modes_):
-            R, p = system.moved(each.home, system.carrying)
-            there = [None if k is None else system.moved(modes_[k].q, system.carrying) for k in each.modes]
+            R, p = system.transform(each.home, system.carrying)
+            there = [None if k is None else system.transform(modes_[k].q, system.carrying) for k in each.modes]
             poses = [np.empty(0) if to is None else np.column_stack([to[0] @ R.T, to[1] - to[0] @ R.T @ p])
                      for to in there]
             bodies = [None if k is None else found.model.bodies(modes_[k].q) for k in each.modes]
@@ -139,7 +139,8 @@ def _as_chain(found: AssemblyModes, about: Mapping[str, Any], robot: ClosedRobot
 
 def _measured_robot(found: AssemblyModes) -> MeasuredRobot:
     """What the list holds."""
-    return MeasuredRobot.driven(found.setting) if found.kind == "real" else MeasuredRobot.watched(found.setting)
+    make = MeasuredRobot.of_motors if found.kind == "real" else MeasuredRobot.of_directions
+    return make(found.setting)
 
 
 def _seal(systems: list[dict[str, Any]], about: Mapping[str, Any], robot: ClosedRobot | None, count: int

@@ -57,7 +57,7 @@ def closings(system: PlanarLoops, count: int) -> ProposedRecord:
     poses = [np.column_stack([rotation_about((0.0, 0.0, 1.0), float(np.array(system.turns[first]) @ x[:n])),
                               frame.point(system.pose_of(first, x)[:3, 3])]) for x in q]
     return ProposedRecord(record, [([*map(complex, box.middle)], box.real) for box in boxes], poses, kept,
-                          [system.placed(x) for x in q], frame)
+                          [system.body_poses(x) for x in q], frame)
 
 
 def _vectors(loop: PlanarLoop) -> list[Any]:

@@ -41,7 +41,7 @@ class DeclaredCommand:
         """Run the command on the words after its name, or show its help; ``beside`` are other commands."""
         values = self.values(words, beside)
         if values is None:
-            say(self.shown())
+            say(self.help_text())
         else:
             self.run(**values)
 
@@ -108,7 +108,7 @@ class DeclaredCommand:
         return {each.name: each.default if each not in read else read[each] if each.several else read[each][-1]
                 for each in self.options}
 
-    def shown(self) -> str:
+    def help_text(self) -> str:
         """Usage, what it does, arguments, groups of options, examples."""
         arguments = [each for each in self.options if each.argument]
         needed = [each.shown.split(", ")[-1] for each in self.options if each.default is NEEDED and not each.argument]
@@ -134,7 +134,7 @@ class Group:
         """Run the command that the first word names on those after it; without one show the help."""
         name, *rest = words or HELP
         if name in HELP:
-            say(self.shown())
+            say(self.help_text())
         elif name == "--version" and self.version is not None:
             say(f"{self.path} {self.version()}")
         elif name.startswith("-"):
@@ -148,7 +148,7 @@ class Group:
             else:
                 found.main(rest, [each for each in self.commands.values() if isinstance(each, DeclaredCommand)])
 
-    def shown(self) -> str:
+    def help_text(self) -> str:
         """A row a command."""
         version = [] if self.version is None else [("--version", "Print the version.")]
         return "\n\n".join([*_head(self.path, ["[OPTIONS]", "COMMAND", "[ARGS]..."], self.help),

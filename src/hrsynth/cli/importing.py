@@ -126,18 +126,18 @@ class _Dialog:
 
     def ask(self, view: bool) -> bool | None:
         """Whether to write: None to be asked all again."""
-        found = self._found()
+        found = self._choices()
         self._show_file(found)
         if view:
             self._view()
         if not self.source["close"]:
             self._ask_closures(found)
         if self.source["base"] is None:
-            self._ask_base(self._found())
+            self._ask_base(self._choices())
         if self.source["platform"] is None:
-            self._ask_platform(self._found())
+            self._ask_platform(self._choices())
         if self.source["motors"] is None:
-            self._ask_motors(self._found())
+            self._ask_motors(self._choices())
         mechanism = self._mechanism()
         if mechanism is None:
             return None
@@ -146,9 +146,9 @@ class _Dialog:
         self._show_robot(mechanism)
         if self.observe is None and (seen := self._ask_segments(mechanism)) is not None:
             self.observe = seen
-        return self._confirmed()
+        return self._confirm()
 
-    def _found(self) -> ImportChoices:
+    def _choices(self) -> ImportChoices:
         """What the file leaves open after the answers up to now."""
         from ..description.assembly.choices import choices
         from ..description.overrides import Overrides, names
@@ -203,7 +203,7 @@ class _Dialog:
                 else:
                     wishes.append(word)
             self.source["close"] = wishes
-            self._found()
+            self._choices()
             return wishes
 
         self.source["close"] = _answer(
@@ -281,7 +281,7 @@ class _Dialog:
 
         return _answer("Watch these, or other links? Names, with commas between", "so", chosen)
 
-    def _confirmed(self) -> bool | None:
+    def _confirm(self) -> bool | None:
         there = " (it already exists and will be replaced)" if Path(self.target).exists() else ""
 
         def meant(text: str) -> bool | None:

@@ -24,7 +24,7 @@ class Progress:
         self._began = time.monotonic()
         self._start = self._began + wait
         self._counted = counted
-        self._timer = self._armed(max(0.0, wait), self._begin) if sys.stderr.isatty() else self._armed(
+        self._timer = self._arm(max(0.0, wait), self._begin) if sys.stderr.isatty() else self._arm(
             SILENT, self._line)
         self._lock = threading.Lock()
         self._what = "working"
@@ -67,13 +67,13 @@ class Progress:
         """Show the bar, once its time has come."""
         with self._lock:
             if self._bar is None and time.monotonic() >= self._start and sys.stderr.isatty():
-                bar = self._made()
+                bar = self._make_bar()
                 bar.add_task(self._what, total=None, completed=self._steps)
                 bar.start()
                 self._bar = bar
 
     @staticmethod
-    def _armed(seconds: float, then: Callable[[], None]) -> threading.Timer:
+    def _arm(seconds: float, then: Callable[[], None]) -> threading.Timer:
         timer = threading.Timer(seconds, then)
         timer.daemon = True
         return timer
@@ -85,10 +85,10 @@ class Progress:
                 return
             passed = time.monotonic() - self._began
             print(f"hrsynth: {self._what}, step {self._steps}, {passed:.0f} s", file=sys.stderr, flush=True)
-            self._timer = self._armed(passed, self._line)
+            self._timer = self._arm(passed, self._line)
             self._timer.start()
 
-    def _made(self) -> Any:
+    def _make_bar(self) -> Any:
         """A bar of rich, which is imported here."""
         from rich import progress
         from rich.console import Console

@@ -74,9 +74,9 @@ class Question:
         with Progress() as progress, following(progress.tell):
             mechanism = robot_of(values)
             function = getattr(hrsynth, self.name)
-            given = self._given(function, values)
+            given = self._given_options(function, values)
             for each, path in files.items():
-                given |= each.given(path)
+                given |= each.question_fields(path)
                 if path is not None:
                     require_other(path, source["robot"], mechanism.file)
                 each.require_drawable(path, mechanism, values | given)
@@ -107,11 +107,11 @@ class Question:
             say(paint(text(found)))
             for each, path in files.items():
                 if path is not None:
-                    say(each.told(path))
+                    say(each.sentence(path))
         if self.after is not None:
             self.after(found, **values)
 
-    def _given(self, function: Callable[..., Any], values: dict[str, Any]) -> dict[str, Any]:
+    def _given_options(self, function: Callable[..., Any], values: dict[str, Any]) -> dict[str, Any]:
         """The options that a function takes and that are given."""
         known = inspect.signature(function).parameters
         given = {name: value for name, value in values.items() if name in known and value is not None}

@@ -82,7 +82,7 @@ class BoundedCell(Value):
         inside = np.all(off < whole.radius * (1 - AFFINE_ROUNDING))
         return bool(parent.alone and np.all(self.inner <= cell.radius) and inside)
 
-    def tried(self, units: Array) -> TubeCell:
+    def trial_cell(self, units: Array) -> TubeCell:
         """The cell as a program has it: where its steps are bounded, an answer in its tube counts though it is off."""
         widened = np.maximum(self.cell.radius, self.inner) + GENERATED_NEAR * units
         return replace(self.cell, radius=widened) if self.steps else self.cell
@@ -102,7 +102,7 @@ class BoundedCell(Value):
         x = cell.middle + (centres - cell.centre) @ cell.slopes.T
         slopes = np.broadcast_to(cell.slopes, (len(centres), *cell.slopes.shape))
         if not known:
-            x = loops.closed(centres, x)[0]
+            x = loops.close(centres, x)[0]
             slopes = loops.slopes(centres, x)
         radius = (cell.radius + AFFINE_ROUNDING * np.abs(x).max(axis=0)) if known else PART_TUBE * cell.radius
         return _Parts(self, [TubeCell(low, high, middle, rates, radius)
@@ -127,7 +127,7 @@ def bounded_cells(branch: TubedBranch, part: TubePart, solved: Sequence[int], ro
     among += [LoopEquation(gear) for gear in system.gears]
     block = LoopBlock(part.unknowns, tuple(among[i] for i in solved))
     loops = LoopPart(system, part.driven, part.unknowns, (block,), system.loops, system.gears)
-    code = _Code(branch, part, loops, equations, closure, list(rows), branch.closed(solved))
+    code = _Code(branch, part, loops, equations, closure, list(rows), branch.closing_tolerance(solved))
     found: list[BoundedCell] = []
     most = min(MOST_BOUNDED, MOST_BOUNDED_NUMBERS // (len(part.driven) * len(part.unknowns)))
     nothing = np.full(len(rows), np.inf)
@@ -136,7 +136,7 @@ def bounded_cells(branch: TubedBranch, part: TubePart, solved: Sequence[int], ro
         again: list[_Parts] = []
         smaller: list[_Parts] = []
         for some in (left, again):
-            for parts, made in zip(some, code.bounded(some), strict=True):
+            for parts, made in zip(some, code.bound_parts(some), strict=True):
                 if not parts.known and not all(each.is_of(parts.whole) for each in made):
                     again.append(parts.whole.split(loops, True))
                     continue
@@ -173,7 +173,7 @@ class _Code:
         """What counts as 1 of each unknown (p,)."""
         return np.array([self.branch.unit(i) for i in self.part.unknowns])
 
-    def bounded(self, every: Sequence[_Parts]) -> Iterator[list[BoundedCell]]:
+    def bound_parts(self, every: Sequence[_Parts]) -> Iterator[list[BoundedCell]]:
         """All parts with their bounds."""
         pairs = [(cell, each.known) for each in every for cell in each.cells]
         made = iter([each for k in range(0, len(pairs), CELLS_TOGETHER)
@@ -209,7 +209,7 @@ class _Code:
             left.discard(candidates[0])
         return 4 * p**3 * 2.0 ** max(times) * UNIT_ROUNDOFF
 
-    def computed(self, trial: TubeTrial, radius: Array) -> tuple[Array, Array, Array]:
+    def compute(self, trial: TubeTrial, radius: Array) -> tuple[Array, Array, Array]:
         """Errors of the solved equations (c, p), of each entry of a matrix (c,) with what its factors add, and the
         largest sizes of the unknowns (c, p): by running errors over tubes."""
         c, p = trial.x.shape
@@ -262,7 +262,7 @@ def _bounds(code: _Code, cells: Sequence[TubeCell], known: Sequence[bool], wider
         a = _times(back @ P, np.fmin(g, combine(Y, inside.values).size))
         if code.part.exact:
             a = np.where(np.array(known)[:, None], np.fmin(trial.radius, a), a)
-        errors, matrix, sizes = code.computed(trial, wide)
+        errors, matrix, sizes = code.compute(trial, wide)
         F = size.sum(axis=-1, keepdims=True) * matrix[:, None, None] * np.ones(p)
         noise, rates = _times(size, errors), J.size
         rounding = (4 + len(trial.part.driven)) * UNIT_ROUNDOFF * sizes

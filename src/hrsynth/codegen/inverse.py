@@ -135,8 +135,8 @@ def _samples(proof: BranchProof, branch: TubedBranch) -> tuple[Array, Array]:
     for part, loops in zip(proof.parts, parts_of(system)[0], strict=True):
         near = [cell.at(row) for row in values[:, loops.driven] if (cell := part.find(row)) is not None]
         units = system.units[list(loops.unknowns)]
-        values[:, loops.unknowns] = units * loops.closed(values[:, loops.driven] / system.units[list(loops.driven)],
-                                                         np.array(near) / units)[0]
+        values[:, loops.unknowns] = units * loops.close(values[:, loops.driven] / system.units[list(loops.driven)],
+                                                        np.array(near) / units)[0]
     values /= system.units
     return q, np.array([system.pose(system.mechanism.platform, row.tolist()) for row in values])
 

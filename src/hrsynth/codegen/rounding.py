@@ -47,7 +47,7 @@ class RoundedNumber:
 
     def __add__(self, other: RoundedNumber | float) -> RoundedNumber:
         far = self.of(other)
-        return self._made(self.low + far.low, self.high + far.high, self.error + far.error)
+        return self._make(self.low + far.low, self.high + far.high, self.error + far.error)
 
     def __sub__(self, other: RoundedNumber | float) -> RoundedNumber:
         return self + (-self.of(other))
@@ -58,24 +58,24 @@ class RoundedNumber:
     def __mul__(self, other: RoundedNumber | float) -> RoundedNumber:
         far = self.of(other)
         ends = np.array(np.broadcast_arrays(*(a * b for a in (self.low, self.high) for b in (far.low, far.high))))
-        return self._made(ends.min(axis=0), ends.max(axis=0), self.size * far.error + far.size * self.error)
+        return self._make(ends.min(axis=0), ends.max(axis=0), self.size * far.error + far.size * self.error)
 
     __radd__, __rmul__ = __add__, __mul__
 
-    def _made(self, low: Array, high: Array, error: Array) -> RoundedNumber:
+    def _make(self, low: Array, high: Array, error: Array) -> RoundedNumber:
         """The result of an operation whose arguments make for an error."""
         found = self.between(low, high, error)
         return self.between(low, high, error + 2 * UNIT_ROUNDOFF * found.size)
 
     def sin(self) -> RoundedNumber:
         """Their sines: as far from that of the middle as the ends are, at most."""
-        return self._turned(np.sin)
+        return self._apply(np.sin)
 
     def cos(self) -> RoundedNumber:
         """Their cosines."""
-        return self._turned(np.cos)
+        return self._apply(np.cos)
 
-    def _turned(self, function: Any) -> RoundedNumber:
+    def _apply(self, function: Any) -> RoundedNumber:
         middle, half = function((self.low + self.high) / 2), (self.high - self.low) / 2 + SINE_ERROR
         return self.between(np.maximum(middle - half, -1.0), np.minimum(middle + half, 1.0), self.error + SINE_ERROR)
 

@@ -112,13 +112,13 @@ def _part(branch: TubedBranch, tracer: FormulaTracer, part: TubePart) -> SourceP
     closure, own = tracer.closure(every), [every.index(i) for i in rows]
     bounded = bounded_cells(branch, part, rows, own, equations, closure)
     units = np.array([branch.unit(i) for i in part.unknowns])
-    tried = [each.tried(units) for each in bounded]
+    tried = [each.trial_cell(units) for each in bounded]
     root, nodes = cell_tree(lower, upper, [(cell.lower, cell.upper) for cell in tried])
     cells = tuple((tuple(cell.centre), tuple(cell.middle), tuple(cell.slopes.ravel()), tuple(cell.radius))
                   for cell in tried)
     return SourcePart(tuple(driven), tuple(unknowns), equations, slopes, closure, tuple(own), len(every),
-                      _floats(tuple(branch.closed(every))), root, tuple(nodes), tree_depth(root, nodes), _floats(cells),
-                      _floats(tuple(units)),
+                      _floats(tuple(branch.closing_tolerance(every))), root, tuple(nodes), tree_depth(root, nodes),
+                      _floats(cells), _floats(tuple(units)),
                       tuple(map(float, lower)), tuple(map(float, upper)), tuple(bounded))
 
 

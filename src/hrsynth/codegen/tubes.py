@@ -122,7 +122,7 @@ class TubedBranch(Value):
         is more, so that rounding of large numbers is no error."""
         return max(1.0, float(self.system.mechanism.length))
 
-    def closed(self, rows: Sequence[int]) -> Array:
+    def closing_tolerance(self, rows: Sequence[int]) -> Array:
         """What equations, by their places among all, may be off where their loops count as closed."""
         units = [self.far if row.kind == "point" else 1.0 for loop in self.system.loops for row in loop.rows]
         units += [self.far if self.system.coordinates[gear.second].slides else 1.0 for gear in self.system.gears]

@@ -49,7 +49,7 @@ class Condition(Value):
         """The rows (n, rows, d) that have a kernel exactly where a freedom is lost."""
         raise NotImplementedError
 
-    def expressed(self, here: PatternValues) -> Array:
+    def evaluate(self, here: PatternValues) -> Array:
         """The expression's value, (n,), as a first power of the distance to the locus (the root of a sum of squares).
 
         Here that of the determinant of a Gram matrix of the rows."""
@@ -66,11 +66,11 @@ class Named(Condition):
     def rows(self, here: PatternValues) -> Array:
         return rows(self.pattern, here.values)
 
-    def expressed(self, here: PatternValues) -> Array:
+    def evaluate(self, here: PatternValues) -> Array:
         import sympy
 
         if isinstance(self.expression, sympy.Determinant):
-            return np.linalg.det(plucker(self.pattern, here.values)) if self.signed else super().expressed(here)
+            return np.linalg.det(plucker(self.pattern, here.values)) if self.signed else super().evaluate(here)
         found = evaluate(self.expression, here.values)
         return found if self.signed else np.sqrt(np.abs(found))
 

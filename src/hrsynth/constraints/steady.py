@@ -65,7 +65,7 @@ class _Held:
         """What an observation, with these joints at rest, may leave more at special poses; joints that it holds at all
         poses are added."""
         if isinstance(lock, Encoder):
-            return self._encoded(self.mechanism.joints[lock.joint])
+            return self._code_of(self.mechanism.joints[lock.joint])
         near, far = lock.seen_from or self.reference, lock.link
         if near in self.leg.links and far not in self.leg.links:
             near, far = far, near
@@ -83,7 +83,7 @@ class _Held:
             self.joints |= {turning[0].name, *left.together}
         return found
 
-    def _encoded(self, joint: Joint) -> str:
+    def _code_of(self, joint: Joint) -> str:
         names: tuple[str, ...] = (joint.name,)
         if self.leg.has_loops and joint.name in self.leg.joints:
             words = _contraction(self.mechanism, self.leg)

@@ -51,7 +51,7 @@ class Linkage:
         frames = self.frames(angles)[:-1]
         return np.array([[*at[:3, 2], *np.cross(at[:3, 3], at[:3, 2])] for at in frames]).T
 
-    def closed(self, start: Array, second: float | None = None) -> Array | None:
+    def close(self, start: Array, second: float | None = None) -> Array | None:
         """The angles (n,) at which it is closed to which the least squares of the closure lead from a start (n,), with
         the ``second`` angle held where it is given; None where they lead to none."""
         from scipy.optimize import least_squares
@@ -74,7 +74,7 @@ class Linkage:
         spans = np.hypot(self.lengths, self.offsets)
         for _ in range(LINKAGE_STARTS if 2 * spans.max() <= spans.sum() else 0):  # no link is longer than the others
             start = rng.uniform(-math.pi, math.pi, count)
-            found = self.closed(start, start[1])  # the second angle held: the same closure on every machine
+            found = self.close(start, start[1])  # the second angle held: the same closure on every machine
             if found is None:
                 continue
             found = np.remainder(found + math.pi, 2 * math.pi) - math.pi

@@ -40,7 +40,7 @@ class Sieve:
         self.mixed: tuple[int, int] | None = None
         """Of a relation that holds at the first configuration and at some of the others: at how many, of how many."""
 
-    def held(self, candidates: Indices, value: Callable[[Indices, slice], Array], tolerance: float) -> Indices:
+    def keep(self, candidates: Indices, value: Callable[[Indices, slice], Array], tolerance: float) -> Indices:
         """The candidates (m, k) whose ``value`` (m, configurations, …) vanishes at all configurations."""
         near = candidates[self._sizes(candidates, value, slice(1)).max(axis=1, initial=0.0) < RANK_GAP * tolerance]
         sizes = self._sizes(near, value, slice(None))
@@ -91,13 +91,13 @@ def incidences(sieve: Sieve, classes: Array, points: Array, together: NDArray[np
 
     count = range(len(classes))
     pairs = choices(len(points), 2)
-    same = sieve.held(pairs, between, SAME_POINT).tolist()
+    same = sieve.keep(pairs, between, SAME_POINT).tolist()
     apart = [(j, k) for j, k in pairs.tolist() if [j, k] not in same]
     candidates = rows(((j, k, c) for j, k in apart for c in count if together[j, k] or c in owns[j] | owns[k]), 3)
-    parallel = sieve.held(candidates, along, SAME_POINT).tolist()
+    parallel = sieve.keep(candidates, along, SAME_POINT).tolist()
     lined = {(j, k) for j, k, _ in parallel}
     rest = [(j, k) for j, k in apart if together[j, k] and (j, k) not in lined]
-    normal = sieve.held(rows(((j, k, c) for j, k in rest for c in count), 3), across, SAME_POINT).tolist()
+    normal = sieve.keep(rows(((j, k, c) for j, k in rest for c in count), 3), across, SAME_POINT).tolist()
     return [*(Incidence(((k, 1), (j, -1)), "zero") for j, k in same),
             *(Incidence(((k, 1), (j, -1)), "parallel", (c,)) for j, k, c in parallel),
             *(Incidence(((k, 1), (j, -1)), "normal", (c,)) for j, k, c in normal),
@@ -116,9 +116,9 @@ def _parallelograms(sieve: Sieve, classes: Array, points: Array, together: NDArr
     beside = [set(np.flatnonzero(each).tolist()) - {i} for i, each in enumerate(together)]
     quads = [(i, j, k, m) for i, near in enumerate(beside) for j, k in combinations(sorted(near), 2)
              for m in beside[j] & beside[k] if i < min(j, m) and not (together[i, m] and together[j, k])]
-    closed = sieve.held(rows(quads, 4), gap, SAME_POINT).tolist()
+    closed = sieve.keep(rows(quads, 4), gap, SAME_POINT).tolist()
     shared = ((*quad, c) for quad in quads for c in set.intersection(*(slides[i] for i in quad)))
-    slid = [each for each in sieve.held(rows(shared, 5), gap_across, SAME_POINT).tolist() if each[:4] not in closed]
+    slid = [each for each in sieve.keep(rows(shared, 5), gap_across, SAME_POINT).tolist() if each[:4] not in closed]
 
     def terms(quad: list[int]) -> tuple[tuple[int, int], ...]:
         return tuple(zip(quad[:4], (1, -1, -1, 1), strict=True))

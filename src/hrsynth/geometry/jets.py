@@ -57,15 +57,15 @@ class Jet:
         b = other.value
         f = b.inverse() if isinstance(b, AffineForms) else 1 / b
         square = f * f
-        return self * other._mapped(f, -1.0 * square, f * square * 2.0)
+        return self * other._map(f, -1.0 * square, f * square * 2.0)
 
     def sqrt(self) -> Jet:
         """Its square root."""
         root = self.value.sqrt() if isinstance(self.value, AffineForms) else np.sqrt(self.value)
         slope = (root * 2.0).inverse() if isinstance(root, AffineForms) else 1 / (2 * root)
-        return self._mapped(root, slope, slope * slope * slope * -2.0)
+        return self._map(root, slope, slope * slope * slope * -2.0)
 
-    def _mapped(self, value: Any, first: Any, second: Any) -> Jet:
+    def _map(self, value: Any, first: Any, second: Any) -> Jet:
         """f of it, where f, f' and f'' are given."""
         return Jet(value, self.slope * first[..., None],
                    self.bend * first[..., None, None]

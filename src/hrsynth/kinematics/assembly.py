@@ -146,7 +146,7 @@ class Assembler:
         """One leg with its end at X: within its joints' limits where it was found there."""
         twin = self._twins[leg.label]
         target = Target(leg.attach, X, self.anatomy.point, self.reference, tuple(measured))
-        first = self._closed(twin, twin.q0, target)
+        first = self._close(twin, twin.q0, target)
         if first is not None and not limits.outside(twin, first, leg.joints):
             return _Closing((twin, first))
         zero = self.anatomy.mechanism.links[leg.attach].pose
@@ -158,13 +158,13 @@ class Assembler:
                 or any(limits.never(way, dict(known.values), end.D, within, len(self._ways[leg.label]) == 1)
                        for way in self._ways[leg.label]))
         for start in () if held and first is not None else _starts(twin, known):
-            q = self._closed(twin, start, target)
+            q = self._close(twin, start, target)
             if q is not None and (held or not limits.outside(twin, q, leg.joints)):
                 return _Closing((twin, q), None, held)
             first = q if first is None else first
         return _Closing(None if first is None else (twin, first), None, held)
 
-    def _closed(self, twin: PinocchioModel, start: Array, target: Target) -> Array | None:
+    def _close(self, twin: PinocchioModel, start: Array, target: Target) -> Array | None:
         """The closed configuration that a start leads to."""
         q, residual = solve(twin, start, target, tolerance=SOLVED, iterations=LEG_ITERATIONS)
         turned = target.point is not None or _turned_as(twin.pose(q, target.link), target.pose)
@@ -208,4 +208,4 @@ def _starts(twin: PinocchioModel, known: Closures = UNDECIDED) -> Iterator[Array
             if combination is not None:
                 for (place,), value in zip(joints, combination, strict=True):
                     step[place] = value
-            yield twin.moved(twin.q0, step)
+            yield twin.integrate(twin.q0, step)

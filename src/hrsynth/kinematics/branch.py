@@ -63,7 +63,7 @@ def alike_after(here: ClosedConfiguration, step: Array) -> bool:
     exceeds it by no more than ‖J' − U Uᵀ J'‖². Only where these bounds do not decide are they taken apart.
     """
     kept, U = here.strengths, here.loops.left
-    J = here.twin.jacobian(here.twin.moved(here.q, step))
+    J = here.twin.jacobian(here.twin.integrate(here.q, step))
     within = U.T @ J
     A = within / kept[:, None]
     product = A @ A.T
@@ -86,7 +86,7 @@ def nears(here: ClosedConfiguration, step: Array, there: ClosedConfiguration) ->
     if np.linalg.norm(T - tangent @ (tangent.T @ T), 2) > np.sin(TURNED):
         return False
     w, n = here.loops.left[:, others], here.loops.right[:, others]
-    middle, end = (float(w @ here.twin.jacobian(here.twin.moved(here.q, part * step)) @ n) / kept[others]
+    middle, end = (float(w @ here.twin.jacobian(here.twin.integrate(here.q, part * step)) @ n) / kept[others]
                    for part in (0.5, 1.0))
     if not (-NUDGE <= end < 1 and abs(middle - (1 + end) / 2) < EVENLY):
         return False
@@ -104,7 +104,7 @@ def _same_side(here: ClosedConfiguration, there: ClosedConfiguration) -> bool:
 
 def _values(here: ClosedConfiguration, step: Array, count: int) -> Array:
     """The largest singular values of the loops after a step."""
-    return np.asarray(np.linalg.svd(here.twin.jacobian(here.twin.moved(here.q, step)), compute_uv=False)[:count])
+    return np.asarray(np.linalg.svd(here.twin.jacobian(here.twin.integrate(here.q, step)), compute_uv=False)[:count])
 
 
 def _alike(one: Array, other: Array) -> bool:

@@ -84,7 +84,7 @@ def certify(samples: Samples, hidden: Mechanism, *, count: int | None = None, bo
     except BadMechanism as error:
         angle = np.pi / 2
         return verdict(str(error))
-    active = twin.actuated()
+    active = twin.actuated_indices()
     usual = [max(ranks) for ranks in zip(*(member.shown for member in members), strict=True)]
     kept = () if all(o.by_segment for o in question.observations) else _as_they_were(samples, hidden)
     start = float(np.linalg.norm(twin.residual(twin.q0)))

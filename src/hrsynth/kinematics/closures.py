@@ -165,7 +165,7 @@ class _Law:
         """By how much a turn changes the left side at most."""
         return _root(self.alpha * self.alpha + self.beta * self.beta)
 
-    def missed(self, low: Any, high: Any | None) -> Miss | None:
+    def prove_miss(self, low: Any, high: Any | None) -> Miss | None:
         """The proof that what is wanted lies outside of an interval of the left side (None: no upper bound)."""
         if self.squared:
             return _miss_outside(_root(low), None if high is None else _root(high), _root(self.wanted), self.words)
@@ -174,11 +174,11 @@ class _Law:
     def miss(self) -> Miss | None:
         """The proof that no q does, where there is one."""
         if self.turns:
-            return self.missed(self.K - self.swing, self.K + self.swing)
+            return self.prove_miss(self.K - self.swing, self.K + self.swing)
         if self.squared:
             least = self.K - self.alpha * self.alpha / 4
-            return self.missed(least, None if self.beta > 0 else least)
-        return self.missed(self.K, self.K) if self.alpha.contains(0) else None
+            return self.prove_miss(least, None if self.beta > 0 else least)
+        return self.prove_miss(self.K, self.K) if self.alpha.contains(0) else None
 
     def roots(self) -> list[Any]:
         """Balls that hold all q; none where every q may do."""
@@ -245,7 +245,7 @@ def _solve_laws(laws: Sequence[_Law], first: Part | None, moving: Part | None, x
     if moving is None or not lists:
         return UNDECIDED
     sharpest = min(lists, key=lambda roots: max(float(root.rad()) for root in roots))
-    failed = [[miss for law in laws if (miss := law.missed(law.at(q), law.at(q))) is not None]
+    failed = [[miss for law in laws if (miss := law.prove_miss(law.at(q), law.at(q))) is not None]
               + _tilt_misses(first, moving.moved(end.ball(x), q), target) + more(q) for q in sharpest]
     values = tuple(q for q, missed in zip(sharpest, failed, strict=True) if not missed)
     if not values:

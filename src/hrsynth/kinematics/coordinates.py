@@ -109,25 +109,25 @@ class Coordinates(Value):
     def ends(self, start: ClosedConfiguration, index: int, spans: tuple[float, float]
              ) -> tuple[ClosedConfiguration, ClosedConfiguration]:
         """Where the robot comes to as one coordinate alone goes down and up from ``start``, within ``spans``."""
-        down, up = (track(start, self.motion, self._changed(index, self.values[index] + span))[0]
+        down, up = (track(start, self.motion, self._change(index, self.values[index] + span))[0]
                     for span in (-spans[0], spans[1]))
         return down, up
 
     def _out(self, start: ClosedConfiguration, index: int, span: float, count: int
              ) -> Iterator[tuple[float, ClosedConfiguration]]:
-        end = self._changed(index, self.values[index] + span)
+        end = self._change(index, self.values[index] + span)
         came = track(start, self.motion, end)[1] if span else 0.0
         if came < 1:
             came *= SLIDER_PART
         here = start
         for step in range(1, count + 1) if came > NO_SLIDER else ():
-            aim = self._changed(index, self.values[index] + came * span * step / count)
+            aim = self._change(index, self.values[index] + came * span * step / count)
             here, arrived = track(here, self.motion, aim)
             if arrived < 1:
                 return
             yield float(aim.values[index]), here
 
-    def _changed(self, index: int, value: float) -> Coordinates:
+    def _change(self, index: int, value: float) -> Coordinates:
         values = self.values.copy()
         values[index] = value
         return replace(self, values=values)

@@ -127,7 +127,7 @@ def _miss(twin: PinocchioModel, motion: PlatformMotion, goal: Goal) -> Array:
     for _ in range(ASIDE):
         if np.linalg.norm(least) <= FOLLOWED:
             break
-        q, residual = solve(twin, twin.moved(at.q, rng.uniform(-1, 1, twin.nv)), manner, tolerance=SOLVED)
+        q, residual = solve(twin, twin.integrate(at.q, rng.uniform(-1, 1, twin.nv)), manner, tolerance=SOLVED)
         if residual <= CLOSED:
             found = _approach(ClosedConfiguration.of(twin, q), goal, manner, 200, float(np.linalg.norm(least)))
             least = min(least, goal.rows(twin, found.q)[0], key=lambda error: float(np.linalg.norm(error)))
@@ -152,7 +152,7 @@ def _approach(at: ClosedConfiguration, goal: Goal, manner: Goal, iterations: int
         damped = np.vstack([left.J, np.sqrt(factor) * np.eye(left.J.shape[1])])
         wanted = np.append(-left.error, np.zeros(left.J.shape[1]))
         step = here[1] @ np.linalg.lstsq(damped, wanted, rcond=None)[0]
-        q, residual = solve(twin, twin.moved(here[0].q, step), manner, tolerance=SOLVED)
+        q, residual = solve(twin, twin.integrate(here[0].q, step), manner, tolerance=SOLVED)
         return tangent(ClosedConfiguration.of(twin, q)) if residual <= CLOSED else None
 
     sizes: list[float] = []

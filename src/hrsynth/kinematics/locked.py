@@ -34,9 +34,9 @@ class _Bodies:
         pose = cache(at.pose)
         self.A = constraints(joints, self.place, lambda joint: joint_at(at, joint, pose))
         gears = [each for each in at.twin.mechanism.couplings if {each.predecessor, each.successor} <= {*links}]
-        self.A = np.vstack([self.A, *(self._coupled(each, pose) for each in gears)])
+        self.A = np.vstack([self.A, *(self._coupling_row(each, pose) for each in gears)])
 
-    def _coupled(self, coupling: Coupling, pose: Callable[[str], Array]) -> Array:
+    def _coupling_row(self, coupling: Coupling, pose: Callable[[str], Array]) -> Array:
         """A coupling's row: the successor's rate less ratio × the predecessor's (metres, radians)."""
         row, mechanism = np.zeros((1, 6 * len(self.place))), self.at.twin.mechanism
         for link, factor in ((coupling.successor, 1.0), (coupling.predecessor, -coupling.ratio)):

@@ -70,7 +70,7 @@ class LoopRows:
         self.jacobian = _product(self.numbers.take, forces, data.J.reshape(6, model.nv), signs)
         """The derivatives of the errors at closure, at the placements and screws that are there, (rows, nv)."""
 
-    def missed(self) -> Array:
+    def errors(self) -> Array:
         """The errors of the welds at the placements that are there."""
         if not self._welds:
             return _NOTHING

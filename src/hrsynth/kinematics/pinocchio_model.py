@@ -53,7 +53,7 @@ class PinocchioModel:
         self.data = self.model.createData()
         self.nv: int = self.model.nv
         self.q0: Array = pin.neutral(self.model)
-        self._links = {name: (self._body[name], self._seen_from_body(name)) for name in mechanism.links}
+        self._links = {name: (self._body[name], self._pose_from_body(name)) for name in mechanism.links}
         self._placements, self._screws = numbers(self.data.oMi), self.data.J.reshape(6, self.nv)
         self._several: dict[tuple[str, ...], tuple[Places, Array, Array]] = {}
         self._masks = {0: np.zeros(self.nv)}
@@ -95,7 +95,7 @@ class PinocchioModel:
         names = {name: loop for loop, name in called.items()}
         return tuple(names.get(joint.name, joint.name) for joint in cuts)
 
-    def _seen_from_body(self, link: str) -> Array:
+    def _pose_from_body(self, link: str) -> Array:
         X = self.mechanism.links[link].pose.copy()
         X[:3, 3] -= self._centre[self._body[link]] * self.length
         return X
@@ -191,16 +191,16 @@ class PinocchioModel:
     def residual(self, q: Array) -> Array:
         """Loop residuals, stacked in the order of ``loops`` (characteristic lengths, radians)."""
         self.at(q)
-        errors = self._rows.residual(self._rows.numbers, self._rows.missed())
-        return np.concatenate([errors, self._turned(q)]) if self._geared else errors
+        errors = self._rows.residual(self._rows.numbers, self._rows.errors())
+        return np.concatenate([errors, self._gear_errors(q)]) if self._geared else errors
 
-    def _turned(self, q: Array) -> Array:
+    def _gear_errors(self, q: Array) -> Array:
         """What the gears leave over."""
         return np.asarray(self._gears @ pin.difference(self.model, self.q0, q))
 
-    def turned(self, q: Array) -> dict[str, float]:
+    def gear_errors(self, q: Array) -> dict[str, float]:
         """What each coupling leaves over (m, rad)."""
-        return dict(zip((each.name for each in self.mechanism.couplings), self._turned(q).tolist(), strict=True))
+        return dict(zip((each.name for each in self.mechanism.couplings), self._gear_errors(q).tolist(), strict=True))
 
     def jacobian(self, q: Array) -> Array:
         """The derivative of :meth:`residual` at closure, shape (rows, nv)."""
@@ -270,13 +270,13 @@ class PinocchioModel:
         for q in places:
             loops.append(self.jacobian(q))
             numbers.append(rows.numbers.copy())
-            missed.append(rows.missed())
+            missed.append(rows.errors())
             if links:
                 J.append(self._screws.copy())
                 X.append(self._placements.take(bodies, 0))
         n, errors = len(places), rows.residual(np.array(numbers), np.array(missed))
         if self._geared:
-            errors = np.hstack([errors, [self._turned(q) for q in places]])
+            errors = np.hstack([errors, [self._gear_errors(q) for q in places]])
         if not links:
             return errors, np.array(loops), np.zeros((n, 0, 4, 4)), np.zeros((n, 0, 6, self.nv))
         poses = self._homogeneous(np.array(X)) @ self._several[links][1]
@@ -328,9 +328,9 @@ class PinocchioModel:
                               if kind is JointType.PRISMATIC]
                     turn = turns_about(own.axis[None], R)[: len(places) - len(slides)]
                     step[places] = [*(axis @ shift for axis in slides), *turn]
-        return self.moved(self.q0, step)
+        return self.integrate(self.q0, step)
 
-    def moved(self, q: Array, step: Array) -> Array:
+    def integrate(self, q: Array, step: Array) -> Array:
         """The configuration that ``step`` (nv) leads to from ``q``."""
         return pin.integrate(self.model, q, step)
 
@@ -342,7 +342,7 @@ class PinocchioModel:
         """The step (nv) that leads from ``q`` to ``other``."""
         return pin.difference(self.model, q, other)
 
-    def actuated(self) -> list[int]:
+    def actuated_indices(self) -> list[int]:
         """Velocity indices of the actuated joints' coordinates."""
         return [i for joint in self.mechanism.joints.values() if joint.actuated for i in self.coordinates[joint.name]]
 

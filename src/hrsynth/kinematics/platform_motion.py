@@ -60,7 +60,7 @@ class Goal(Value):
             blocks.append(across @ V[3:])
         return np.concatenate(errors), np.vstack(blocks)
 
-    def met(self, X: Array, tolerance: float) -> bool:
+    def is_met(self, X: Array, tolerance: float) -> bool:
         """Whether the pose X (4, 4) of the link is one that is wanted, to a difference of positions (m) and of rotation
         matrices: no error vanishes at another pose unseen."""
         R = X[:3, :3]

@@ -115,7 +115,7 @@ def ways_on(at: ClosedConfiguration) -> int | None:
     twin, (kernel, rank) = at.twin, at.kernel()
     if rank.value == len(twin.residual(at.q)):
         return kernel.shape[1]
-    predicted = [twin.moved(at.q, CONTINUED_STEP * each) for each in kernel.T]
+    predicted = [twin.integrate(at.q, CONTINUED_STEP * each) for each in kernel.T]
     closed = solve_together(Places(twin, None), predicted, [None] * len(predicted), tolerance=SOLVED)
     if any(residual > CLOSED for _, residual in closed):
         return None
@@ -153,7 +153,7 @@ def well_closed(here: ClosedConfiguration) -> ClosedConfiguration | None:
         return here
     twin = here.twin
     here = ClosedConfiguration.of(twin, solve(twin, here.q, tolerance=SHARP, iterations=5)[0])
-    aside, _ = kernel_basis(twin.jacobian(twin.moved(here.q, NUDGE * here.loops.right[:, -1])))
+    aside, _ = kernel_basis(twin.jacobian(twin.integrate(here.q, NUDGE * here.loops.right[:, -1])))
     turn = largest_angle(here.kernel()[0], aside) / NUDGE  # radians for each unit of the weakest direction
     return here if turn * max(here.residual, SHARP) / here.strengths[-1] <= STEADY_TANGENT else None
 

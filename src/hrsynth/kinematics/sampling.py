@@ -184,7 +184,7 @@ class _Walks:
             last, draws = draws, min(draws + count - len(members), most)
             drawn = self.walk([roots[number % len(roots)] for number in range(last, draws)])
             discarded += draws - last - len(drawn)
-            for sample, again in zip(drawn, self._found_again(drawn), strict=True):
+            for sample, again in zip(drawn, self._finds_again(drawn), strict=True):
                 (members if again else lonely).append(sample)
         if len(members) == count:
             return members, discarded + len(lonely), True
@@ -192,7 +192,7 @@ class _Walks:
             raise NotSampled(roots[0].twin.mechanism.name, len(members) + len(lonely), count, draws)
         return [*members, *lonely][:count], discarded, False
 
-    def _found_again(self, samples: Sequence[Sample]) -> Iterator[bool]:
+    def _finds_again(self, samples: Sequence[Sample]) -> Iterator[bool]:
         """Whether the robot, led along the way of each sample, arrives."""
         ways = [[target.of(lambda o: o.key in self.leading) for target in sample.way] for sample in samples]
         for led in track_paths(samples[0].configuration.twin, ways, EASY_ITERATIONS) if ways else ():
@@ -295,7 +295,7 @@ class _Walks:
     def _parts(self, strides: Sequence[_Stride]) -> list[ClosedConfiguration | None]:
         """As :func:`.walking.step_along`, of the next part of several steps."""
         twin, tangents = strides[0].here.twin, [stride.tangent() for stride in strides]
-        predicted = [twin.moved(stride.here.q, tangent) for stride, tangent in zip(strides, tangents, strict=True)]
+        predicted = [twin.integrate(stride.here.q, tangent) for stride, tangent in zip(strides, tangents, strict=True)]
         solved = solve_together(Places(twin, None), predicted, [None] * len(strides), tolerance=SOLVED)
         closed = [k for k, (_, residual) in enumerate(solved) if residual <= CLOSED]
         found: list[ClosedConfiguration | None] = [None] * len(strides)

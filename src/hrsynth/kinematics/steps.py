@@ -126,7 +126,7 @@ def _correct_step(here: ClosedConfiguration, step: Array, goal: GuidedTask | Non
     """The closed configuration at the goal after a step; None where there is none, the correction is a jump, the step
     does not follow the branch, or a wrist cannot make the turn."""
     twin = here.twin
-    predicted = twin.moved(here.q, step)
+    predicted = twin.integrate(here.q, step)
     q, residual = solve(twin, predicted, goal, tolerance=SOLVED, iterations=15)
     allowed = max(0.5 * float(np.linalg.norm(step)), JUMP)
     if not residual <= CLOSED or np.linalg.norm(q - predicted) > allowed or wrists_beyond(twin, q):
@@ -180,7 +180,7 @@ def polish(here: ClosedConfiguration, goal: GuidedTask) -> ClosedConfiguration:
     error, rows = system(twin, q, goal)
     for _ in range(20):
         step = np.linalg.lstsq(rows, -error, rcond=FOLLOWED)[0]
-        trial = twin.moved(q, np.asarray(step, dtype=float))
+        trial = twin.integrate(q, np.asarray(step, dtype=float))
         trial_error, trial_rows = system(twin, trial, goal)
         if not np.linalg.norm(trial_error) < 0.9 * np.linalg.norm(error):
             break
@@ -197,9 +197,9 @@ def _on_fold(twin: PinocchioModel, q: Array, goal: GuidedTask) -> Array:
     if len(weak) != 1:
         return q
     across, along, size = left[:, weak[0]], right[weak[0]], float(values[weak[0]])
-    ahead = system(twin, twin.moved(q, PASSED_BY * along), goal)[1]
+    ahead = system(twin, twin.integrate(q, PASSED_BY * along), goal)[1]
     slope = (float(across @ ahead @ along) - size) / PASSED_BY
     if abs(slope) * PASSED_BY < size:
         return q
-    there = twin.moved(q, -size / slope * along)
+    there = twin.integrate(q, -size / slope * along)
     return there if np.linalg.norm(system(twin, there, goal)[0]) <= SOLVED else q

@@ -145,7 +145,7 @@ def solve(twin: PinocchioModel, q: Array, task: Task | None = None, *, tolerance
     def advance(q: Array, at: Residual, factor: float) -> Array:
         normal = at.J.T @ at.J
         normal.reshape(-1)[:: twin.nv + 1] += max(factor * at.size**2, 1e-14)
-        return twin.moved(q, shorten_step(_damped_step(normal, -(at.J.T @ at.error)), 0.5))
+        return twin.integrate(q, shorten_step(_damped_step(normal, -(at.J.T @ at.error)), 0.5))
 
     q, left = descend(q, lambda q: system(twin, q, task), advance, DAMPING, iterations,
                       lambda at: at.size <= tolerance)
@@ -172,7 +172,7 @@ def solve_together(places: Places, starts: Sequence[Array], targets: Sequence[Ta
         except np.linalg.LinAlgError:
             steps = np.array([_damped_step(*each) for each in zip(normal, wanted[:, :, 0], strict=True)])
         longest = np.abs(steps).max(axis=1, initial=0.0).tolist()
-        return {i: twin.moved(q, step if size <= 0.5 else shorten_step(step, 0.5))
+        return {i: twin.integrate(q, step if size <= 0.5 else shorten_step(step, 0.5))
                 for (i, (q, _, _)), step, size in zip(going.items(), steps, longest, strict=True)}
 
     return [(q, left.size) for q, left in descend_together(
@@ -205,7 +205,7 @@ class Places:
             loops, J, X, values = (np.array([stack[part][i] for _, stack, i in known]) for part in range(4))
             self.known = {id(each[0]): each for each in known}
         else:
-            stack = loops, J, X, values = self._measured(places)
+            stack = loops, J, X, values = self._measure(places)
             self.known |= {id(q): (q, stack, i) for i, q in enumerate(places)}
         goals = [target for target in targets if target is not None]
         if not goals:
@@ -221,7 +221,7 @@ class Places:
                 for rows in zip(values, wanted, strict=True)])
         return zip(np.concatenate([loops, missed, apart], axis=1), J, strict=True)
 
-    def _measured(self, places: Sequence[Array]) -> tuple[Array, Array, Array, Array]:
+    def _measure(self, places: Sequence[Array]) -> tuple[Array, Array, Array, Array]:
         """The loops' residuals (n, rows), all Jacobians (n, rows, nv), poses X_BP (n, 4, 4), and values (n, size)."""
         twin, like = self.twin, self.like
         reference = twin.mechanism.base if like is None else like.reference

@@ -27,7 +27,7 @@ def step_along(here: ClosedConfiguration, velocity: Array, part: float = 1.0, *,
     """The configuration a ``part`` of a step along ``velocity`` leads to; None where it does not close near its
     prediction, or does not follow the branch. ``leaving`` a singular configuration, any branch will do."""
     step = part * shorten_step(STEP * velocity, 3 * STEP)
-    predicted = here.twin.moved(here.q, step)
+    predicted = here.twin.integrate(here.q, step)
     q, residual = solve(here.twin, predicted, tolerance=SOLVED)
     if not residual <= CLOSED:
         return None

@@ -42,17 +42,17 @@ class RobotMatch:
         """Joint of one: joint of the other. Equal names first; then one of the same type in the same place; then the
         only ones of their kind by structure."""
         found = {name: name for name in self.one.joints if name in self.other.joints}
-        found |= self._placed(found)
-        found |= self._structured(found)
+        found |= self._match_by_place(found)
+        found |= self._match_by_structure(found)
         return found
 
-    def _left(self, found: Mapping[str, str]) -> tuple[list[Joint], list[Joint]]:
+    def _remaining(self, found: Mapping[str, str]) -> tuple[list[Joint], list[Joint]]:
         taken = set(found.values())
         return ([joint for name, joint in self.one.joints.items() if name not in found],
                 [joint for name, joint in self.other.joints.items() if name not in taken])
 
-    def _placed(self, found: Mapping[str, str]) -> dict[str, str]:
-        mine, theirs = self._left(found)
+    def _match_by_place(self, found: Mapping[str, str]) -> dict[str, str]:
+        mine, theirs = self._remaining(found)
         near = {}
         for joint in mine:
             same = [each.name for each in theirs if each.type is joint.type
@@ -62,8 +62,8 @@ class RobotMatch:
         often = Counter(near.values())
         return {mine: yours for mine, yours in near.items() if often[yours] == 1}
 
-    def _structured(self, found: Mapping[str, str]) -> dict[str, str]:
-        mine, theirs = self._left(found)
+    def _match_by_structure(self, found: Mapping[str, str]) -> dict[str, str]:
+        mine, theirs = self._remaining(found)
         pairs = {name: number for number, pair in enumerate(found.items()) for name in [pair]}
         a = _colours(self.one, {pair[0]: number for pair, number in pairs.items()})
         b = _colours(self.other, {pair[1]: number for pair, number in pairs.items()})

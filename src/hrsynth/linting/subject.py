@@ -51,13 +51,13 @@ class LintedFile:
         self._remembered: dict[str, Any] = {}
         self.dialect = None if self.root is None else DIALECTS.get(str(self.root.tag))
 
-    def opened(self, *, strict: bool = False) -> RobotFile:
+    def open(self, *, strict: bool = False) -> RobotFile:
         """The file as readers get it, which may change its document."""
         return replace(self._opened, root=copy.deepcopy(self.root), strict=strict and not self.given.any)
 
     def graph(self) -> JointGraph:
         """What the file says before anything is put together; raises ``BadRobotFile``."""
-        found = formats.read(self.opened())
+        found = formats.read(self.open())
         assert isinstance(found, JointGraph)
         return found
 
@@ -72,7 +72,7 @@ class LintedFile:
     @cached_property
     def _read(self) -> Mechanism | HrsynthError:
         try:
-            return understood(self.opened(strict=True), self.given)
+            return understood(self.open(strict=True), self.given)
         except HrsynthError as error:
             return error
 
@@ -88,11 +88,11 @@ class LintedFile:
         if isinstance(self._read, Mechanism):
             return self._read
         try:
-            return understood(self.opened(), self.given)
+            return understood(self.open(), self.given)
         except HrsynthError:
             return None
 
-    def remembered(self, name: str, make: Callable[[], Found]) -> Found:
+    def remember(self, name: str, make: Callable[[], Found]) -> Found:
         """What is computed once for several rules."""
         if name not in self._remembered:
             self._remembered[name] = make()

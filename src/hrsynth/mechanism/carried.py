@@ -86,9 +86,9 @@ class _Carried:
         self.square = {frozenset((number, *by)) for number, conditions in enumerate(relations.tower)
                        for by in conditions if len(by) == 1}
         number = len(relations.tower)
-        self.groups = [self._joined(self._carriers(c)) for c in range(number)]
+        self.groups = [self._joined_links(self._carriers(c)) for c in range(number)]
         """For each class the groups of links in which one direction of it is fixed or would be."""
-        self.at_axis = [self._reached(groups, set(links))
+        self.at_axis = [self._reach(groups, set(links))
                         for groups, links in zip(self.groups, relations.fixed, strict=True)]
         """For each class where its directions are fixed."""
         self.whole = [all(link in groups.get(links[0], links[:1]) for link in links)
@@ -96,8 +96,8 @@ class _Carried:
         """Whether all directions of a class are parallel by the file: else what holds for one may not for another."""
         slides = [[joint.links for joint in self.joints if joint.type is JointType.FIXED
                    or (joint.type is JointType.PRISMATIC and self.axes[joint.name] == (c,))] for c in range(number)]
-        self.slides = [self._joined(pairs) for pairs in slides]
-        self.levels = [self._joined([j.links for j in self.joints if self._level(j, c)]) for c in range(number)]
+        self.slides = [self._joined_links(pairs) for pairs in slides]
+        self.levels = [self._joined_links([j.links for j in self.joints if self._level(j, c)]) for c in range(number)]
         self.at = [{host} for host in relations.hosts]
         """Where each centre is fixed."""
         for joint in self.joints:
@@ -106,7 +106,7 @@ class _Carried:
         self._spread(relations)
 
     @staticmethod
-    def _joined(pairs: Iterable[tuple[str, str]]) -> dict[str, frozenset[str]]:
+    def _joined_links(pairs: Iterable[tuple[str, str]]) -> dict[str, frozenset[str]]:
         """For each link that is joined to others, all that it is joined to."""
         parts = (frozenset(part) for part in graphs.components(graphs.adjacency((), pairs)))
         return {link: part for part in parts for link in part}
@@ -123,7 +123,7 @@ class _Carried:
         return pairs
 
     @staticmethod
-    def _reached(groups: dict[str, frozenset[str]], links: set[str]) -> set[str]:
+    def _reach(groups: dict[str, frozenset[str]], links: set[str]) -> set[str]:
         return links.union(*(groups.get(link, ()) for link in links))
 
     def _level(self, joint: Joint, c: int) -> bool:
@@ -165,7 +165,7 @@ class _Carried:
                 return bool(together) or any(all(self._is_square(n, c) for c in tie.classes)
                                              for n in range(len(self.at_axis)) if n not in tie.classes)
             case "seen":
-                return self._seen(tie)
+                return self._is_seen(tie)
         if len(tie.terms) != 2:
             return False
         one, two = (self.at[number] for number, _ in tie.terms)
@@ -176,7 +176,7 @@ class _Carried:
         return any((a == b or b in passing.get(a, ())) and not self.at_axis[c].isdisjoint({a, *passing.get(a, ())})
                    for a in one for b in two)
 
-    def _seen(self, tie: Tie) -> bool:
+    def _is_seen(self, tie: Tie) -> bool:
         """Whether all that makes an observed direction is fixed in its link."""
         assert tie.sight is not None
         (link,) = tie.links

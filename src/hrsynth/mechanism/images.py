@@ -155,19 +155,19 @@ class SeenLine(CameraObservation):
         raise NotImplementedError
 
     @staticmethod
-    def met(p: Array, d: Array, r: Array) -> Array:
+    def meet_plane(p: Array, d: Array, r: Array) -> Array:
         """A point of the line of direction d in which the plane meets what is seen."""
         raise NotImplementedError
 
     @classmethod
     def plane(cls, p: Array, d: Array, r: Array) -> Array | None:
         """Through that line, normal to the plane of C and it."""
-        return line_plane(cls.met(p, d, r), d)
+        return line_plane(cls.meet_plane(p, d, r), d)
 
     @classmethod
     def outline(cls, p: Array, d: Array, r: float, size: float) -> Drawn:
         """A piece of that line, and its plane with C."""
-        piece = stretch(cls.met(p, d, np.array([r])), d, size)
+        piece = stretch(cls.meet_plane(p, d, np.array([r])), d, size)
         return Drawn((piece,), (np.vstack([0 * p, piece]),))
 
     def wrenches(self, at: Sighting) -> list[Numbers]:
@@ -183,10 +183,10 @@ class SeenLine(CameraObservation):
     def error_slope(self, value: Array, wanted: Array) -> Array:
         return line_slope(value)
 
-    def sensed(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
+    def sense(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
         """Through two image points beside the line."""
         return shifted_line(value, shocks[0], self.pixels(noise))
 
     @classmethod
-    def shown(cls, p: Array, d: Array, r: float, size: float) -> tuple[Array, ...]:
+    def polylines(cls, p: Array, d: Array, r: float, size: float) -> tuple[Array, ...]:
         return cls.outline(p, d, r, size).lines

@@ -44,7 +44,7 @@ class Leg:
         """Whether it is no chain of joints: loops lie inside it."""
         return len(self.joints) > len(self.links) + 1
 
-    def looped(self, mechanism: Mechanism) -> tuple[str, ...]:
+    def loop_joints(self, mechanism: Mechanism) -> tuple[str, ...]:
         """Its joints that lie in loops inside it, all links beside its own taken as two: the base and the platform."""
         if not self.has_loops:
             return ()

@@ -57,7 +57,7 @@ class Noise:
         every = [words[unit][0].format(words[unit][1] * value) for unit, value in self.amounts]
         return ", ".join(every) + (", constant over time" if self.bias else "")
 
-    def required(self, observations: Sequence[Observation]) -> dict[str, float]:
+    def amounts_for(self, observations: Sequence[Observation]) -> dict[str, float]:
         """The amounts; raises ``BadRequest`` for noise that none of the observations has, and for pixels of a camera
         without a focal length."""
         known = frozenset().union(*(each.found_by for each in observations))
@@ -81,7 +81,7 @@ def vectors(seen: Observation) -> int:
 
 
 def blurs(seen: Observation, value: Array, amounts: Mapping[str, float]) -> list[Array]:
-    """The rates (size, 3) of :meth:`.Observation.sensed` by each random vector where there is none, by central
+    """The rates (size, 3) of :meth:`.Observation.sense` by each random vector where there is none, by central
     differences: to first order the errors are the sums of images of unit balls. ``value`` (size,) in metres."""
     own = {unit: amount for unit, amount in amounts.items() if unit in seen.found_by}
     if not own:
@@ -91,5 +91,5 @@ def blurs(seen: Observation, value: Array, amounts: Mapping[str, float]) -> list
     scale = NOISE_STEP / largest
     small = {unit: scale * amount for unit, amount in own.items()}
     ways = np.eye(6).reshape(6, 2, 3)
-    columns = [(seen.sensed(value, way, small) - seen.sensed(value, -way, small)) / (2 * scale) for way in ways]
+    columns = [(seen.sense(value, way, small) - seen.sense(value, -way, small)) / (2 * scale) for way in ways]
     return list(np.stack(columns, axis=1).reshape(seen.size, 2, 3).transpose(1, 0, 2)[: vectors(seen)])

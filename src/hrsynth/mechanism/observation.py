@@ -94,7 +94,7 @@ class Observation(Value):
         known): the sine of an angle, negative behind it; infinite where nothing can be lost from sight."""
         return np.inf
 
-    def drawn(self, X_reference: Array, X_link: Array, size: float) -> Drawn:
+    def draw(self, X_reference: Array, X_link: Array, size: float) -> Drawn:
         """How it is drawn in space, in the base frame; ``size`` (m) of what has none of its own."""
         return Drawn()
 
@@ -102,7 +102,7 @@ class Observation(Value):
         """What a camera shows of it: polylines (n, 2) in the plane z = 1 of its frame, a point alone (1, 2)."""
         return []
 
-    def sensed(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
+    def sense(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
         """The value (size,) that a simulated sensor gives: ``noise`` by its unit (m, rad, px), ``shocks`` (2, 3) in the
         unit ball."""
         return value

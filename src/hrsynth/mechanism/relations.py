@@ -244,7 +244,7 @@ class _Drawing:
 
 def _parallels(sieve: Sieve, D: Array) -> tuple[Array, list[int]]:
     """One direction of each class of parallels (classes, configurations, 3), and the class of each direction."""
-    pairs = sieve.held(choices(len(D), 2), lambda c, s: cross(D[c[:, 0], s], D[c[:, 1], s]), SAME_DIRECTION)
+    pairs = sieve.keep(choices(len(D), 2), lambda c, s: cross(D[c[:, 0], s], D[c[:, 1], s]), SAME_DIRECTION)
     first = list(range(len(D)))
     for a, b in pairs.tolist():
         first[b] = min(first[b], first[a])
@@ -258,9 +258,9 @@ def _tower(sieve: Sieve, classes: Array) -> tuple[tuple[tuple[tuple[int, ...], .
     The last is the one that lies in the fewest different planes, and so on with the rest.
     """
     n = len(classes)
-    normal = sieve.held(choices(n, 2), lambda c, s: dot(classes[c[:, 0], s], classes[c[:, 1], s]),
+    normal = sieve.keep(choices(n, 2), lambda c, s: dot(classes[c[:, 0], s], classes[c[:, 1], s]),
                         SAME_DIRECTION)
-    planar = sieve.held(choices(n, 3), lambda c, s: triple(*(classes[c[:, i], s] for i in range(3))),
+    planar = sieve.keep(choices(n, 3), lambda c, s: triple(*(classes[c[:, i], s] for i in range(3))),
                         SAME_DIRECTION)
     obeyed: list[list[tuple[frozenset[int], int]]] = [[] for _ in range(n)]
     planes: list[list[Array]] = [[] for _ in range(n)]

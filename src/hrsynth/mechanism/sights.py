@@ -219,7 +219,7 @@ class CameraObservation(Observation):
         return AT_CENTRE if self.camera is None else self.camera.pose
 
     @staticmethod
-    def measured(p: Array, d: Array, r: Array) -> Array:
+    def measurement(p: Array, d: Array, r: Array) -> Array:
         """The value (…, size) for points p (…, 3) and axes d (…, 3) in the camera's frame, radii r (…, 1)."""
         raise NotImplementedError
 
@@ -235,12 +235,12 @@ class CameraObservation(Observation):
         return None
 
     @staticmethod
-    def supposed(p: Array, d: Array, r: Array, g: Array) -> tuple[Array, Array]:
+    def suppose_plane(p: Array, d: Array, r: Array, g: Array) -> tuple[Array, Array]:
         """The p and d of the same value that a controller takes for true which supposes the plane g."""
         return p, d
 
     @staticmethod
-    def fed(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
+    def error_jets(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
         """:meth:`error` by formula, with its derivatives, of the coordinates of p and d in the camera's frame."""
         raise NotImplementedError
 
@@ -270,21 +270,21 @@ class CameraObservation(Observation):
         return Drawn((np.array([0 * p, p]),))
 
     @staticmethod
-    def shown(p: Array, d: Array, r: float, size: float) -> tuple[Array, ...]:
+    def polylines(p: Array, d: Array, r: float, size: float) -> tuple[Array, ...]:
         """What a picture shows, as polylines (n, 3) in the camera's frame: by default the point."""
         return (p[None],)
 
-    def drawn(self, X_reference: Array, X_link: Array, size: float) -> Drawn:
+    def draw(self, X_reference: Array, X_link: Array, size: float) -> Drawn:
         X = X_reference @ self.view
-        found = self.outline(*self._placed(X, X_link), size)
+        found = self.outline(*self._place(X, X_link), size)
         lines, areas = ([each @ X[:3, :3].T + X[:3, 3] for each in every] for every in (found.lines, found.areas))
         return Drawn(tuple(lines), tuple(areas))
 
     def image(self, X_reference: Array, X_link: Array, size: float) -> list[Array]:
-        every = self.shown(*self._placed(X_reference @ self.view, X_link), size)
+        every = self.polylines(*self._place(X_reference @ self.view, X_link), size)
         return [each[:, :2] / each[:, 2:] for each in map(before_camera, every) if len(each)]
 
-    def _placed(self, X_camera: Array, X_link: Array) -> tuple[Array, Array, float]:
+    def _place(self, X_camera: Array, X_link: Array) -> tuple[Array, Array, float]:
         """p and d in the camera's frame, and r."""
         X = inverse(X_camera) @ X_link
         axis = np.zeros(3) if self.axis is None else X[:3, :3] @ self.axis
@@ -312,8 +312,8 @@ class CameraObservation(Observation):
         assert focal is not None
         return noise["px"] / focal
 
-    def supposed_rate(self, plane: Array, X_reference: Array, X_link: Array, V_reference: Array, V_link: Array
-                      ) -> Array:
+    def suppose_plane_rate(self, plane: Array, X_reference: Array, X_link: Array, V_reference: Array, V_link: Array
+                           ) -> Array:
         """The rate (size, n) of the value if what is seen lay in the ``plane`` (3,), and moved as the link does."""
         return self._together((self,), X_reference, X_link[None], V_reference, V_link[None], plane[None])[1]
 
@@ -346,9 +346,9 @@ class CameraObservation(Observation):
         B = (X_links[:, :3, :3] @ at)[:, :, 0] + X_links[:, :3, 3]
         p, d = ((seen @ each[:, :, None])[:, :, 0] for each in (B - X[:, :3, 3], (X_links[:, :3, :3] @ axes)[:, :, 0]))
         if planes is not None:
-            p, d = cls.supposed(p, d, radii, planes)
+            p, d = cls.suppose_plane(p, d, radii, planes)
             B = (X[:, :3, :3] @ p[:, :, None])[:, :, 0] + X[:, :3, 3]
-        values, (by_p, by_d) = cls.measured(p, d, radii), cls.partials(p, d, radii)
+        values, (by_p, by_d) = cls.measurement(p, d, radii), cls.partials(p, d, radii)
         turn = V_links[:, 3:] - V_reference[3:]
         rates = np.zeros((len(at), cls.size, V_links.shape[2]))
         if by_p is not None:
@@ -389,7 +389,7 @@ class MetricPoint(CameraObservation):
     dimension = 1
     found_by = frozenset({"m"})
 
-    def sensed(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
+    def sense(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
         return value + noise["m"] * shocks[0, : self.size]
 
 

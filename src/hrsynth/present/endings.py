@@ -86,4 +86,4 @@ def _sights(found: Endings, at: ClosedConfiguration) -> list[Any]:
     """What is observed that is no segment, as lines in space."""
     reference, size = found.setting.mechanism.reference, at.twin.length / 2
     return [line for each in found.setting.observed if not each.by_segment
-            for line in each.drawn(at.pose(each.seen_from or reference), at.pose(each.link), size).lines]
+            for line in each.draw(at.pose(each.seen_from or reference), at.pose(each.link), size).lines]

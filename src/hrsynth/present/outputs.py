@@ -103,13 +103,13 @@ class File:
             watched = {name: asked[name] for name in ("observe", "camera", "see", "seed") if name in asked}
             function(self.limited[1])(ObservedRobot.of(robot, **watched), **{name: asked[name] for name in self.takes})
 
-    def given(self, path: str | None) -> dict[str, str]:
+    def question_fields(self, path: str | None) -> dict[str, str]:
         """What the question is told of a file that it writes itself."""
         if path is None or self.streamed is None or Path(path).suffix.lower() != self.streamed[0]:
             return {}
         return {self.streamed[1]: path}
 
-    def told(self, path: str) -> str:
+    def sentence(self, path: str) -> str:
         """The sentence that tells where it was written."""
         return f"{self.holds} is written to {path}."
 
@@ -132,7 +132,7 @@ class File:
         """What writes the file, whole or not at all, once all else is done, and what the JSON says more."""
         from ..description.files import write_whole
 
-        if self.given(path):
+        if self.question_fields(path):
             return (lambda: None), {}
         content, more = self.content(found, Path(path).suffix.lower(), asked)
         return partial(write_whole, path, content), more
@@ -148,11 +148,11 @@ class HiddenFile(File):
         if path is not None:
             targets(path)
 
-    def told(self, path: str) -> str:
+    def sentence(self, path: str) -> str:
         """The sentence that names all files of a dialect."""
         from ..description import targets
 
-        return super().told(" and ".join(map(str, targets(path))))
+        return super().sentence(" and ".join(map(str, targets(path))))
 
     def unwritten(self, found: Any, path: str) -> str | None:
         """What is to be said where there is no hidden robot."""

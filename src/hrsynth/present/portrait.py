@@ -50,12 +50,12 @@ class Portrait:
     @classmethod
     def of(cls, setting: ObservedRobot) -> Portrait:
         """An observed robot."""
-        return cls.drawn(setting.mechanism, setting.anatomy.platform, {each.link for each in setting.observed},
-                         plane_normal(setting.motion))
+        return cls.draw(setting.mechanism, setting.anatomy.platform, {each.link for each in setting.observed},
+                        plane_normal(setting.motion))
 
     @classmethod
-    def drawn(cls, mechanism: Mechanism, platform: Collection[str], observed: Collection[str],
-              normal: Array | None) -> Portrait:
+    def draw(cls, mechanism: Mechanism, platform: Collection[str], observed: Collection[str],
+             normal: Array | None) -> Portrait:
         """A mechanism at its zero configuration."""
         drawer = Drawer(mechanism, mechanism, platform, RADIUS * mechanism.length)
         way = TRAVEL * mechanism.length

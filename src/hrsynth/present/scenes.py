@@ -80,7 +80,7 @@ class _Plot:
     reaches: tuple[tuple[Reach, str], ...] = ()
     legs: tuple[str, ...] = ()
 
-    def marked(self, mode: AssemblyMode) -> Array:
+    def mark(self, mode: AssemblyMode) -> Array:
         assert mode.bodies is not None
         X = mode.bodies[self.body]
         return transform(X, self.place)
@@ -115,7 +115,7 @@ def _place(found: AssemblyModes, plot: _Plot, label: str, mode: AssemblyMode) ->
                                         for noun, names in mode.left_open)
     else:
         words = f"{said}: beyond limits" if mode.beyond else "assembled"
-    return Placed(label, state, words, plot.marked(mode), bodies, strokes)
+    return Placed(label, state, words, plot.mark(mode), bodies, strokes)
 
 
 def _normal(found: AssemblyModes) -> Array | None:
@@ -223,7 +223,7 @@ def _deciding(found: AssemblyModes, confined: TipLoci, count: int) -> tuple[int,
 
     def apart(k: int) -> tuple[bool, float, int]:
         tip = confined.tips[k]
-        places = [_Plot(tip.body, tip.place).marked(mode) for mode in found.modes]
+        places = [_Plot(tip.body, tip.place).mark(mode) for mode in found.modes]
         least = min((float(np.linalg.norm(a - b)) for a, b in combinations(places, 2)), default=0.0)
         return not isinstance(tip.curve, Point), round(least / found.goal.twin.length, 6), k
 

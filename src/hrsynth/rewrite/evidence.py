@@ -159,7 +159,7 @@ class Evidence:
         near = graphs.component(mechanism.adjacency, self.reference, {*leg.links} - {link})
         return [j for j in mechanism.joints_of(link) if j.other(link) in near and j.type is not JointType.FREE]
 
-    def carried(self, link: str) -> str:
+    def carrier(self, link: str) -> str:
         """The link that turns as this one does, moved towards the reference link over P joints."""
         passed = {link}
         while True:
@@ -220,11 +220,11 @@ def _move_at_random(mechanism: Mechanism, reference: str, nodes: set[str], joint
     for _ in range(12):
         q = twin.q0
         if not twin.loops:
-            q = twin.moved(q, rng.uniform(-0.6, 0.6, twin.nv))
+            q = twin.integrate(q, rng.uniform(-0.6, 0.6, twin.nv))
         else:
             for _ in range(4):
                 kernel, _ = ClosedConfiguration.of(twin, q).kernel()
-                q, _ = solve(twin, twin.moved(q, 0.12 * random_in(kernel, rng)), tolerance=SOLVED)
+                q, _ = solve(twin, twin.integrate(q, 0.12 * random_in(kernel, rng)), tolerance=SOLVED)
         X = twin.pose(q, before)
         rotations.append(X[:3, :3] @ home[:3, :3].T)
         anchors.append(transform(X, local))

@@ -87,7 +87,7 @@ class State(Value):
         return replace(self, mechanism=mechanism, chains=chains,
                        owners={k: v for k, v in table.items() if k in mechanism.links})
 
-    def observed(self) -> tuple[str, ...]:
+    def observed_labels(self) -> tuple[str, ...]:
         """Labels of the legs that still have a virtual chain, and of what else is observed, in order."""
         return tuple(dict.fromkeys([*(chain.leg for chain in self.chains), *(each.leg for each in self.sensors)]))
 

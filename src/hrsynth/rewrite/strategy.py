@@ -188,7 +188,7 @@ def observed_legs(at: Rewriting) -> tuple[str, ...]:
 
 def unobserved_legs(at: Rewriting) -> tuple[str, ...]:
     """The legs that have no virtual chain and have not gone."""
-    known = {*at.state.observed(), *at.state.removed}
+    known = {*at.state.observed_labels(), *at.state.removed}
     return tuple(label for label in at.state.real.labels if label not in known)
 
 

@@ -256,7 +256,7 @@ def select(robot: RobotLike, camera: CameraLike = None, *, observe: LegsLike = N
     for number, legs in enumerate(sets, 1):
         with part(f"set {number} of {len(sets)}"):
             looked.append(work.first(legs))
-    found, left = work.examined(sorted(looked, key=lambda each: each.order))
+    found, left = work.examine(sorted(looked, key=lambda each: each.order))
     found.sort(key=lambda each: (each.discarded is not None, not each.examined,
                                  () if each.discarded is not None else each.rank))
     poses = [setting.motion.pose(at.pose(setting.motion.link)) for at in ends]
@@ -311,11 +311,11 @@ class _Work:
             reasons += [reason for name, at in ends if (reason := _singular_at(name, analysis.classify(at)))]
         except HrsynthError as error:
             return Candidate(legs, "undecided", str(error))
-        blur = self.blur.chosen([i for i, o in enumerate(self.setting.observed) if o.leg in legs])
+        blur = self.blur.select([i for i, o in enumerate(self.setting.observed) if o.leg in legs])
         found = Candidate(legs, verdict.verdict, next(iter(reasons), None), errors_at(setting, blur, self.goal))
-        return self.looked(found, (self.start, self.goal))
+        return self.look(found, (self.start, self.goal))
 
-    def looked(self, candidate: Candidate, configurations: Sequence[ClosedConfiguration]) -> Candidate:
+    def look(self, candidate: Candidate, configurations: Sequence[ClosedConfiguration]) -> Candidate:
         """The candidate with what the camera sees of its legs."""
         if self.sight is None or candidate.discarded:
             return candidate
@@ -325,7 +325,7 @@ class _Work:
         why = None if seen[worst] >= AXIS_SEEN else f"the camera sees {100 * seen[worst]:.0f} % of leg {worst}"
         return replace(candidate, seen=seen, discarded=why)
 
-    def decided(self, candidate: Candidate) -> Candidate:
+    def decide(self, candidate: Candidate) -> Candidate:
         """The candidate with its modes and whether start and goal lie in one aspect."""
         if candidate.discarded:
             return candidate
@@ -348,7 +348,7 @@ class _Work:
         except HrsynthError as error:
             return ModeCount(None, None, False, str(error))
 
-    def examined(self, candidates: Sequence[Candidate]) -> tuple[list[Candidate], str | None]:
+    def examine(self, candidates: Sequence[Candidate]) -> tuple[list[Candidate], str | None]:
         """The candidates, of which as many as are to be examined, best first, have modes, aspects and endings, and from
         the best of these on simulated runs until enough ended at the goal; why the others were left, None where there
         are none."""
@@ -368,7 +368,7 @@ class _Work:
                 continue
             begun += 1
             with part(f"examined set {begun} of {every}"):
-                found.append(self.ended(self.decided(candidate), begun))
+                found.append(self.find_endings(self.decide(candidate), begun))
         for place in sorted(range(len(found)), key=lambda i: found[i].rank):
             candidate = found[place]
             if candidate.examined and not candidate.discarded and arrived < runs:
@@ -377,7 +377,7 @@ class _Work:
                 arrived += found[place].discarded is None
         return found, left
 
-    def ended(self, candidate: Candidate, number: int) -> Candidate:
+    def find_endings(self, candidate: Candidate, number: int) -> Candidate:
         """The candidate, the ``number``-th that is examined, with where its loop may end."""
         if candidate.discarded or number > self.criteria.endings:
             return candidate
@@ -411,7 +411,7 @@ class _Work:
         run = Decision(found.ended, found.ending.reason)
         if found.ended != GOAL:
             return replace(candidate, run=run, discarded=f"the simulated run ends in: {found.ended} ({run.reason})")
-        return self.looked(replace(candidate, run=run), found.run.configurations)
+        return self.look(replace(candidate, run=run), found.run.configurations)
 
 
 def _singular_at(name: str, posture: Posture) -> str | None:

@@ -28,14 +28,14 @@ class CameraView(Value):
     reference: str
     rods: Mapping[str, Cylinder]
 
-    def seen(self, at: ClosedConfiguration) -> dict[str, float]:
+    def visible_parts(self, at: ClosedConfiguration) -> dict[str, float]:
         """The part (0 to 1) of each rod's axis that lies in the picture and is not hidden by another rod."""
         X = at.pose(self.reference)
-        ends = {leg: self.camera.seen(X, at.pose, rod) for leg, rod in self.rods.items()}
+        ends = {leg: self.camera.project(X, at.pose, rod) for leg, rod in self.rods.items()}
         found = {}
         for leg, (first, last) in ends.items():
             points = first + np.linspace(0.0, 1.0, PLACES)[:, None] * (last - first)
-            clear = self._pictured(points)
+            clear = self._in_picture(points)
             for other, segment in ends.items():
                 if other != leg:
                     clear &= ~are_hidden(points, segment, self.rods[other].radius)
@@ -44,10 +44,10 @@ class CameraView(Value):
 
     def least(self, configurations: Sequence[ClosedConfiguration]) -> dict[str, float]:
         """The least part of each rod that is seen at some configurations."""
-        found = [self.seen(at) for at in configurations]
+        found = [self.visible_parts(at) for at in configurations]
         return {leg: min(each[leg] for each in found) for leg in self.rods}
 
-    def _pictured(self, points: Array) -> Flags:
+    def _in_picture(self, points: Array) -> Flags:
         """Which points (n, 3) of the camera's frame lie in the picture."""
         ahead = points[:, 2] > 0
         pixels = self.camera.pixels(np.where(ahead[:, None], points, 1.0))

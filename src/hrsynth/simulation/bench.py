@@ -80,7 +80,7 @@ class Bench:
         places = [int(model.joint(name).qposadr[0]) for name in self._names]
         mujoco.mj_kinematics(model, data)
         twin = self.start.twin
-        driven = twin.actuated()
+        driven = twin.actuated_indices()
         scale = np.array([twin.length if model.joint(name).type[0] == mujoco.mjtJoint.mjJNT_SLIDE else 1.0
                           for name in self._names])
         at, time, stopped = self.start, 0.0, TIME
@@ -96,7 +96,7 @@ class Bench:
             command = self._command(loop, time, at, data)
             times.append(time)
             states.append((at, command))
-            if loop.sensed is None and time >= loop.steady and self._settled(loop, [c for _, c in states]):
+            if loop.sensed is None and time >= loop.steady and self._is_settled(loop, [c for _, c in states]):
                 stopped = SERVED_AT
                 break
             data.ctrl[motors] = command.velocity[driven] * scale
@@ -106,7 +106,7 @@ class Bench:
         run = Run(np.array(times), tuple(c for c, _ in states), tuple(c for _, c in states), stopped)
         return run, displacement(data, self.setting.motion.link)
 
-    def _settled(self, loop: Loop, commands: list[Command]) -> bool:
+    def _is_settled(self, loop: Loop, commands: list[Command]) -> bool:
         """Whether the error vanishes, or has stayed as it is for a time constant 1 / λ."""
         now, back = commands[-1].size, round(1 / (loop.law.gain * SAMPLE))
         if now < BENCH_SETTLED:

@@ -50,7 +50,7 @@ class Camera(Value):
     width: int = 640
     height: int = 480
 
-    def seen(self, X_reference: Array, poses: Poses, rod: Cylinder) -> Array:
+    def project(self, X_reference: Array, poses: Poses, rod: Cylinder) -> Array:
         """The ends of a rod in the camera's frame, (2, 3)."""
         X = inverse(X_reference @ self.place) @ poses(rod.link)
         return np.asarray(rod.ends @ X[:3, :3].T + X[:3, 3])
@@ -117,7 +117,7 @@ class Edges(Value):
         shock = self.shocks.at(time) * self.pixels / self.camera.focal
         found = []
         for number, rod in enumerate(self.rods):
-            ends = self.camera.seen(poses(self.reference), poses, rod)
+            ends = self.camera.project(poses(self.reference), poses, rod)
             normals = [_move_edge(normal, ends, shock[2 * number + side])
                        for side, normal in enumerate(edges(ends, rod.radius))]
             found.append(self.camera.place[:3, :3] @ rebuilt(*normals))

@@ -48,7 +48,7 @@ class EndingClassifier(Value):
         """The ending of a run at whose end these values are measured."""
         last = run.commands[-1]
         if run.stopped == SERVED_AT:
-            return self._served(run.last, values)
+            return self._serve(run.last, values)
         if run.stopped in (REST, POISED):
             ending = rest(self.setting, run.last, last)
             loose = "" if run.stopped == REST else "; this rest was not found to attract"
@@ -83,7 +83,7 @@ class EndingClassifier(Value):
         first = min(self.setting.observed, key=lambda o: o.in_front(at.pose(o.seen_from or reference), at.pose(o.link)))
         return f"{first.kind} {first.leg} leaves the camera's sight"
 
-    def _served(self, at: ClosedConfiguration, values: Measures) -> Ending:
+    def _serve(self, at: ClosedConfiguration, values: Measures) -> Ending:
         opposite = [float(value @ wanted) < 0 for o, value, wanted in
                     zip(self.setting.observed, values, self.wanted, strict=True) if isinstance(o, SeenAxis)]
         word = "directions" if len(opposite) == len(self.setting.observed) else "measurements"

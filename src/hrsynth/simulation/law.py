@@ -93,7 +93,7 @@ class Law(Value):
         seen = y if sensed is None else tuple(sensed(time, configuration.pose, y))
         error = true if sensed is None else tuple(o.error(s, w) for o, s, w in zip(every, seen, wanted, strict=True))
         kernel, _ = configuration.kernel()
-        rates = self._supposed(configuration, exact)
+        rates = self._suppose(configuration, exact)
         rows = np.vstack([o.error_slope(s, w) @ r for o, s, w, r in zip(every, seen, wanted, rates, strict=True)])
         rows = rows @ kernel
         left, values, right = np.linalg.svd(rows, full_matrices=False)
@@ -106,7 +106,7 @@ class Law(Value):
         pull = float(np.linalg.norm(rows.T @ e))
         return Command(velocity, true, y, seen, values, kernel @ right[-1], pull)
 
-    def _supposed(self, at: ClosedConfiguration, rates: Sequence[Array]) -> Sequence[Array]:
+    def _suppose(self, at: ClosedConfiguration, rates: Sequence[Array]) -> Sequence[Array]:
         """The rates with those that hold for the ``planes``."""
         if self.planes is None:
             return rates
@@ -117,7 +117,7 @@ class Law(Value):
             if plane is not None and isinstance(seen, CameraObservation):
                 links = (seen.seen_from or self.question.reference, seen.link)
                 poses, moves = ([each(link) for link in links] for each in (at.pose, at.velocity))
-                found[i] = seen.supposed_rate(plane, *poses, *(metric * V for V in moves))
+                found[i] = seen.suppose_plane_rate(plane, *poses, *(metric * V for V in moves))
                 found[i] = found[i] / (length ** np.broadcast_to(seen.dimension, seen.size))[:, None]
         return found
 

@@ -26,7 +26,7 @@ class Shocks(Value):
     table: Array
 
     @classmethod
-    def drawn(cls, count: int, horizon: float, seed: int, bias: bool = False) -> Shocks:
+    def draw(cls, count: int, horizon: float, seed: int, bias: bool = False) -> Shocks:
         """Shocks of ``count`` quantities until ``horizon`` (s), uniform in the ball; of a bias only one for each."""
         rng = np.random.default_rng(seed)
         shape = (1 if bias else math.ceil(horizon / PERIOD) + 2, count)
@@ -55,9 +55,9 @@ class Sensors(Value):
     def of(cls, observations: Sequence[Observation], noise: Noise, horizon: float, seed: int, length: float) -> Sensors:
         """Of a seed, until ``horizon`` (s); raises ``BadRequest`` for noise that none of them has, and for pixels of a
         camera without a focal length."""
-        amounts = noise.required(observations)
+        amounts = noise.amounts_for(observations)
         count = sum(vectors(each) for each in observations)
-        return cls(tuple(observations), amounts, Shocks.drawn(count, horizon, seed, noise.bias), length)
+        return cls(tuple(observations), amounts, Shocks.draw(count, horizon, seed, noise.bias), length)
 
     def __call__(self, time: float, poses: Callable[[str], Array], values: Sequence[Array] | Array) -> list[Array]:
         """What is measured where the true values are these."""
@@ -67,5 +67,5 @@ class Sensors(Value):
             first += len(own)
             unit = self.length ** np.broadcast_to(each.dimension, each.size)
             noisy = each.found_by & self.amounts.keys()
-            found.append(each.sensed(value * unit, own, self.amounts) / unit if noisy else value)
+            found.append(each.sense(value * unit, own, self.amounts) / unit if noisy else value)
         return found

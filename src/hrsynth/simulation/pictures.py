@@ -138,11 +138,11 @@ class Pictures:
         directions = np.array(values)
         sample = int(time / PERIOD + 1e-9)
         if sample not in self._held:
-            self._held[sample] = self._measured(poses, directions) - directions
+            self._held[sample] = self._measure(poses, directions) - directions
         moved = directions + self._held[sample]
         return np.asarray(moved / np.linalg.norm(moved, axis=1, keepdims=True))
 
-    def _measured(self, poses: Poses, directions: Array) -> Array:
+    def _measure(self, poses: Poses, directions: Array) -> Array:
         picture = self.stage.finer.picture(poses)
         found = directions.copy()
         for number in range(len(self.stage.rods)):

@@ -195,7 +195,7 @@ class _Stretch:
                 if solver.status == "failed":
                     return times, states, LOST
                 time, state = float(solver.t), self.state(float(solver.t), solver.y)
-                met = self._met(state[0])
+                met = self._stop_reason(state[0])
                 if met:
                     time, state = self._at_limit(solver)
                 times.append(time)
@@ -232,7 +232,7 @@ class _Stretch:
             return None
         return self.state(time, found.y)
 
-    def _met(self, at: ClosedConfiguration) -> str | None:
+    def _stop_reason(self, at: ClosedConfiguration) -> str | None:
         """What ends a run at a configuration: a joint beyond its limit, something that no camera sees."""
         past = {name: margin - self.least[name] for name, margin in self.stops.margins(at.twin, at.q).items()}
         first = min(past, key=past.__getitem__, default=None)
@@ -246,7 +246,7 @@ class _Stretch:
         inside, outside, curve = float(solver.t_old), float(solver.t), solver.dense_output()
         for _ in range(HALVINGS):
             middle = (inside + outside) / 2
-            met = self._met(self.state(middle, curve(middle))[0]) is not None
+            met = self._stop_reason(self.state(middle, curve(middle))[0]) is not None
             inside, outside = (inside, middle) if met else (middle, outside)
         return inside, self.state(inside, curve(inside))
 

@@ -224,7 +224,7 @@ class ServoTask:
         eye = given.lens or place_camera(rods, question.reference, (self.start.pose, self.goal.pose))
         if given.sense == EDGES:
             edge = noise or Noise(())
-            shocks = Shocks.drawn(2 * len(rods), given.horizon, self.seed, edge.bias)
+            shocks = Shocks.draw(2 * len(rods), given.horizon, self.seed, edge.bias)
             return Edges(eye, question.reference, rods, edge.of("px"), shocks)
         drawing()
         vision()
@@ -253,7 +253,7 @@ class ServoTask:
         for name, at in (("start", self.start), ("goal", self.goal)):
             if beyond := outside(twin, at.q):
                 yield f"the {name} is beyond the limits of {', '.join(beyond)}"
-        if self.setting.segments and (motors := len(twin.actuated())) < self.setting.dof:
+        if self.setting.segments and (motors := len(twin.actuated_indices())) < self.setting.dof:
             yield (f"motors for {motors} of the platform's {self.setting.dof} freedoms: "
                    "fewer than the motion that is commanded needs")
         if run.stopped == EFFORT:

@@ -130,7 +130,7 @@ def check_fit(setting: ObservedRobot, at: ClosedConfiguration, way: Array) -> Fi
     rng = np.random.default_rng(0)
     for _ in range(10):
         kernel, _ = there.kernel()
-        q, residual = solve(there.twin, there.twin.moved(there.q, 1e-3 * kernel @ rng.normal(size=kernel.shape[1])))
+        q, residual = solve(there.twin, there.twin.integrate(there.q, 1e-3 * kernel @ rng.normal(size=kernel.shape[1])))
         if residual < 1e-10:
             assert size(ClosedConfiguration.of(there.twin, q)) >= size(there) - 1e-12
     loop = Loop(Law(question, setting.dof, 0.8), setting.everything.question, FixedDirections(wanted))

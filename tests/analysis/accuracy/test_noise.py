@@ -107,7 +107,7 @@ def sensed(setting: ObservedRobot, blur: Blur, at: ClosedConfiguration, given: A
     """What the simulated sensors give for random vectors."""
     true = values(at, setting.observed, setting.mechanism.reference)
     every = enumerate(zip(setting.observed, true, given, strict=True))
-    return [o.sensed(value, shock, blur.own(i, o)) for i, (o, value, shock) in every]
+    return [o.sense(value, shock, blur.own(i, o)) for i, (o, value, shock) in every]
 
 
 SLOW = pytest.mark.slow
@@ -214,7 +214,7 @@ def test_what_a_sensor_makes_of_noise_to_first_order(kind: str, tmp_path: Path) 
     for _ in range(20):
         given = rng.normal(size=(2, 3))
         given /= np.linalg.norm(given, axis=1, keepdims=True)
-        off = [np.linalg.norm(seen.sensed(value, part * given, own) - value
+        off = [np.linalg.norm(seen.sense(value, part * given, own) - value
                               - sum(A @ (part * s) for A, s in zip(blurs(seen, value, own), given, strict=False)))
                for part in (1.0, 0.1)]
         assert off[0] < 1e-4

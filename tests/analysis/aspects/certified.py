@@ -58,7 +58,7 @@ def check_certified(aspects: Aspects, answer: PathAnswer, points: int) -> None:
     assert np.max(np.abs(end)) < 1e-7
     scene = aspects.structure.values_at(way)
     condition: Condition = aspects.condition
-    values = condition.expressed(scene) if answer.signed else smallest_of(condition.rows(scene))
+    values = condition.evaluate(scene) if answer.signed else smallest_of(condition.rows(scene))
     assert np.all(np.sign(values) == np.sign(answer.start.value))
     assert np.min(np.abs(values)) >= answer.margin - 1e-9
     ranks = [weakest(at, aspects.setting.samples.question) for at in way[:: max(1, len(way) // 20)]]

@@ -51,7 +51,7 @@ class SixModes:
         step = np.zeros(twin.nv)
         for joint in robot.joints.values():
             step[list(twin.coordinates[joint.name])] = turns[joint.successor] - turns[joint.predecessor]
-        return ClosedConfiguration.of(twin, twin.moved(twin.q0, step))
+        return ClosedConfiguration.of(twin, twin.integrate(twin.q0, step))
 
 
 def normal(robot: Mechanism) -> Array:

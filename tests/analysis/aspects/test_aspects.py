@@ -59,7 +59,7 @@ def pairs(robot: str, observe: str | None, count: int, seed: int = 0) -> list[tu
 
 
 def signs(aspects: Aspects, *configurations: ClosedConfiguration) -> np.ndarray:
-    return np.sign(aspects.condition.expressed(aspects.structure.values_at(configurations)))
+    return np.sign(aspects.condition.evaluate(aspects.structure.values_at(configurations)))
 
 
 # ---- the certificate is never wrong
@@ -118,7 +118,7 @@ def test_poses_decide_the_values_that_configurations_have(robot: str, observe: s
     for at in walk(robot, observe)[:6]:
         reached, value = aspects.enclosure(at).at(*aspects.pattern.coordinates.of([at]))
         scene = aspects.structure.values_at([at])
-        exact = aspects.condition.expressed(scene) if aspects.condition.signed else smallest_of(
+        exact = aspects.condition.evaluate(scene) if aspects.condition.signed else smallest_of(
             aspects.condition.rows(scene))
         assert reached.all()
         assert value == pytest.approx(exact, abs=1e-8)

@@ -66,7 +66,7 @@ def test_signs_of_the_determinant_agree_with_the_table(name: str, observe: str |
     if not found.aspects.condition.signed:
         assert not any(SEPARATED in row for row in found.table)
         return
-    signs = np.sign(found.aspects.condition.expressed(found.aspects.structure.values_at(
+    signs = np.sign(found.aspects.condition.evaluate(found.aspects.structure.values_at(
         [found.places[k - 1] for k in numbers])))
     for (i, one), (j, other) in combinations(zip(numbers, signs, strict=True), 2):
         assert (found.verdict(i, j) == SEPARATED) == (one != other)

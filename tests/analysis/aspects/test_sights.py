@@ -56,7 +56,7 @@ def test_what_is_enclosed_is_the_condition_of_the_configurations(name: str, robo
     assert not aspects.pattern.fitted
     at = aspects.members
     scene = aspects.structure.values_at(at)
-    expected = aspects.condition.expressed(scene) if aspects.condition.signed else smallest_of(
+    expected = aspects.condition.evaluate(scene) if aspects.condition.signed else smallest_of(
         aspects.condition.rows(scene))
     p, R = aspects.pattern.coordinates.of(at)
     for i, each in enumerate(at):

@@ -53,7 +53,7 @@ def closings(listed: AssemblyModes, starts: int, seed: int = 0) -> list[ClosedCo
     found = []
     for number in range(starts):
         spread = SPREADS[number % len(SPREADS)]
-        start = goal.twin.moved(goal.q, rng.uniform(-spread, spread, goal.twin.nv))
+        start = goal.twin.integrate(goal.q, rng.uniform(-spread, spread, goal.twin.nv))
         q, residual = solve(goal.twin, start, held, tolerance=1e-13, iterations=40)
         if residual < 1e-11:
             found.append(ClosedConfiguration.of(goal.twin, q))

@@ -114,7 +114,7 @@ def test_three_joints_and_three_balls_have_their_number_of_modes(word: str, on: 
 @pytest.mark.parametrize("word", ["RR", "PR", "RP"])
 def test_ranks_and_degrees_leave_the_same_number(word: str):
     for seed in range(2, 4):
-        measured = MeasuredRobot.driven(hrsynth.observe(carried(word, seed)))
+        measured = MeasuredRobot.of_motors(hrsynth.observe(carried(word, seed)))
         system = carried_platform(measured, measured.setting.everything.start, 1e-12)
         counted = closings_bound(system, system.square)
         assert counted is not None
@@ -132,20 +132,20 @@ def test_how_a_robot_stands_does_not_change_what_its_leg_leaves(seed: int):
     rng, robot, axis = np.random.default_rng(seed), carried("RR", 2), np.array([0.0, 0.0, 1.0])
     robot = robot.changed(joints=[replace(robot.joints[f"joint_{k}"], axes=(axis,)) for k in range(2)])
     R = random_rotation(rng)
-    measured = MeasuredRobot.driven(hrsynth.observe(transformed(robot, R, rng.normal(size=3)), samples=4))
+    measured = MeasuredRobot.of_motors(hrsynth.observe(transformed(robot, R, rng.normal(size=3)), samples=4))
     system = carried_platform(measured, measured.setting.everything.start, 1e-12)
     counted = closings_bound(system, system.square)
     assert counted is not None
     assert counted.most == 6
     q = rng.normal(size=2)
-    moved = system.placed(q) @ np.linalg.inv(system.placed(0 * q))
+    moved = system.pose(q) @ np.linalg.inv(system.pose(0 * q))
     assert min(np.abs(moved[:3, :3] - rotation_about(R @ axis, sign * q.sum())).max() for sign in (1, -1)) < 1e-12
 
 
 def test_motors_on_all_joints_of_a_leg_leave_it_no_way():
     robot = carried("RR", 2)
     driven = robot.changed(joints=[replace(robot.joints[f"joint_{k}"], motor=Motor(f"motor_{k}")) for k in range(2)])
-    measured = MeasuredRobot.driven(hrsynth.observe(driven, samples=4))
+    measured = MeasuredRobot.of_motors(hrsynth.observe(driven, samples=4))
     with pytest.raises(NotConfined):
         carried_platform(measured, measured.setting.everything.start, 1e-12)
 

@@ -130,6 +130,6 @@ def test_a_goal_that_is_not_closed_drifts_by_what_it_misses():
     """The residual that is allowed counts, and near a fold nothing is known."""
     setting = ObservedRobot.of(load(shipped()["gough_stewart"]), ("1", "4", "6"))
     goal = setting.everything.start
-    off = ClosedConfiguration.of(goal.twin, goal.twin.moved(goal.q, np.full(goal.twin.nv, 1e-12)))
+    off = ClosedConfiguration.of(goal.twin, goal.twin.integrate(goal.q, np.full(goal.twin.nv, 1e-12)))
     assert drift(off) > drift(goal) + 0.3 * off.residual * goal.twin.length
     assert drift(goal) < 1e-12

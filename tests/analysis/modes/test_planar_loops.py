@@ -45,7 +45,7 @@ def planar() -> list[str]:
 
 
 def measured(found: AssemblyModes) -> MeasuredRobot:
-    return (MeasuredRobot.driven if found.kind == "real" else MeasuredRobot.watched)(found.setting)
+    return (MeasuredRobot.of_motors if found.kind == "real" else MeasuredRobot.of_directions)(found.setting)
 
 
 @pytest.mark.some(2)
@@ -131,7 +131,7 @@ def test_a_six_bar_of_two_loops(motor: str, platform: str, count: int, loops: in
     one, coupler curve and circle meet in six; the last bar has two places for each of the four-bar's."""
     mechanism = linkage(STEPHENSON, LINKS, platform, motor)
     observed = hrsynth.observe(mechanism)
-    driven = MeasuredRobot.driven(observed)
+    driven = MeasuredRobot.of_motors(observed)
     system = planar_loops(driven, observed.everything.start)
     assert len(system.loops) == loops
     _, found = solve_loops(driven, observed.everything.start)
@@ -166,11 +166,11 @@ def test_what_has_no_loops_says_why():
     for ratio, reason in ((np.sqrt(2.0), "is not a quotient of whole"), (7.0, "is not a quotient of whole")):
         observed = hrsynth.observe(five_bar(ratio)[0], "1")
         with pytest.raises(NotConfined, match=reason):
-            planar_loops(MeasuredRobot.watched(observed), observed.everything.start)
+            planar_loops(MeasuredRobot.of_directions(observed), observed.everything.start)
         assert not hrsynth.modes(observed).found.complete
     observed = hrsynth.observe("delta")
     with pytest.raises(NotConfined, match="not one of a planar mechanism"):
-        planar_loops(MeasuredRobot.watched(observed), observed.everything.start)
+        planar_loops(MeasuredRobot.of_directions(observed), observed.everything.start)
 
 
 def test_what_is_too_large_says_its_size():

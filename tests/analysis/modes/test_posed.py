@@ -40,9 +40,9 @@ def measured(word, legs, seed=0):
     """Some legs of a word watched, or its motors (no legs)."""
     setting = observe(mechanism(parse(word), seed), samples=4)
     if not legs:
-        return MeasuredRobot.driven(setting)
+        return MeasuredRobot.of_motors(setting)
     seen = tuple(o for o in setting.segments if o.leg in legs)
-    return MeasuredRobot.watched(replace(setting, observed=seen))
+    return MeasuredRobot.of_directions(replace(setting, observed=seen))
 
 
 def distance(one, other, length):
@@ -226,7 +226,7 @@ def test_a_body_that_turns_about_a_point_has_eight_modes(seed: int):
     elbow's axis, three quadrics of the quaternion."""
     found = modes(spherical(np.random.default_rng(seed)), real=True)
     assert (found.found.complete, found.found.complex) == (True, 8)
-    others = search(found.goal, MeasuredRobot.driven(found.setting).question, leg_ends(found.setting.anatomy))
+    others = search(found.goal, MeasuredRobot.of_motors(found.setting).question, leg_ends(found.setting.anatomy))
     for mode in others.modes:
         assert min(max(np.abs(X - each.bodies[body]).max() for body, X in mode.bodies.items())
                    for each in found.modes if each.bodies) < 1e-6
@@ -240,5 +240,5 @@ def test_a_body_that_turns_about_a_point_has_one_mode_where_its_rods_are_watched
     for seed in range(3):
         found = modes(spherical(np.random.default_rng(seed)), legs)
         assert (found.found.complete, found.found.complex, len(found.modes)) == (True, 1, 1)
-    others = search(found.goal, MeasuredRobot.watched(found.setting).question, leg_ends(found.setting.anatomy))
+    others = search(found.goal, MeasuredRobot.of_directions(found.setting).question, leg_ends(found.setting.anatomy))
     assert len(others.modes) == 1

@@ -389,8 +389,8 @@ def test_a_joint_that_a_coupling_holds_apart_from_another_is_no_joint_without_it
                             couplings=(Coupling("belt", stage, slide.successor, 1.0),))
     setting = watched(coupled)
     assert stage in setting.mechanism.links
-    assert without_couplings(MeasuredRobot.driven(setting), setting.everything.start) is None
-    assert without_couplings(MeasuredRobot.watched(setting), setting.everything.start) is not None
+    assert without_couplings(MeasuredRobot.of_motors(setting), setting.everything.start) is None
+    assert without_couplings(MeasuredRobot.of_directions(setting), setting.everything.start) is not None
 
 
 def moved_since_zero(found: AssemblyModes, at: ClosedConfiguration, joint: Joint) -> float:
@@ -418,7 +418,7 @@ def test_all_ways_list_the_same(name: str):
     sets = [*dict.fromkeys([None, *legs(robot).minimal[:2]]), "motors"]
     for observe in sets:
         setting = ObservedRobot.of(robot, None if observe == "motors" else observe)
-        measured = MeasuredRobot.driven(setting) if observe == "motors" else MeasuredRobot.watched(setting)
+        measured = MeasuredRobot.of_motors(setting) if observe == "motors" else MeasuredRobot.of_directions(setting)
         if measured.rank < setting.dof:
             continue
         goal = setting.everything.start

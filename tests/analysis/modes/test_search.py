@@ -36,7 +36,7 @@ def check_agreement(listed: AssemblyModes) -> None:
     """What is searched for is in the complete list, but for closings on another branch (crossed parallelograms, turns
     of a platform that only translates)."""
     assert listed.found.complete
-    measured = (MeasuredRobot.driven if listed.kind == "real" else MeasuredRobot.watched)(listed.setting)
+    measured = (MeasuredRobot.of_motors if listed.kind == "real" else MeasuredRobot.of_directions)(listed.setting)
     found = search(listed.goal, measured.question, leg_ends(listed.setting.anatomy))
     assert found.loose == 0
     for mode in found.modes:
@@ -79,7 +79,7 @@ def test_a_platform_that_is_a_point_has_modes_at_points():
     """However its body, of which only the point counts, is turned."""
     mechanism, real = robot_of("planar, a point", 6)
     listed = hrsynth.modes(mechanism, real=real)
-    measured = (MeasuredRobot.driven if real else MeasuredRobot.watched)(listed.setting)
+    measured = (MeasuredRobot.of_motors if real else MeasuredRobot.of_directions)(listed.setting)
     bodies = leg_ends(listed.setting.anatomy)
     found = search(listed.goal, measured.question, bodies)
     assert listed.found.complete

@@ -273,7 +273,7 @@ def test_encoders_of_legs_are_held_with_the_legs() -> None:
     assert (found.found.complex, found.found.complete) == (4, True)  # circles about one centre: two shapes, two turns
     other = modes("rrrrr_m1", camera="eye=base@0.3,0.1,0.5", see="point:dist_1@0.1,0,0")
     assert (other.found.complete, len(other.modes)) == (True, 2)
-    found = search(other.goal, MeasuredRobot.watched(other.setting).question, leg_ends(other.setting.anatomy))
+    found = search(other.goal, MeasuredRobot.of_directions(other.setting).question, leg_ends(other.setting.anatomy))
     assert len(found.modes) == 2
 
 

@@ -209,7 +209,7 @@ def test_where_the_rank_is_led_to_zero_the_expression_vanishes(robot: str, legs:
     assert len(ends) > 4
     for at in ends:
         assert weakest(at, answer.question) < RANK_CUTOFF
-        assert abs(answer.condition.expressed(answer.pattern.values_at([at]))[0]) < 1e-6
+        assert abs(answer.condition.evaluate(answer.pattern.values_at([at]))[0]) < 1e-6
 
 
 @pytest.mark.slow

@@ -203,7 +203,7 @@ def test_six_lines_of_a_complex_are_dependent_wrenches() -> None:
     members = [member.configuration for member in answer.setting.samples.members]
     scene = answer.pattern.values_at(members)
     values = scene.values
-    for k, value in enumerate(answer.condition.expressed(scene)):
+    for k, value in enumerate(answer.condition.evaluate(scene)):
         wrenches = [force(values[f"p{i}"][k], values[f"B{i}"][k]) for i in range(1, 7)]
         assert value == pytest.approx(np.linalg.det(wrenches), rel=1e-9)
         assert abs(value) > 1e-6

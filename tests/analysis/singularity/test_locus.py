@@ -155,7 +155,7 @@ def test_where_the_smallest_value_passes_through_zero_the_expression_does(
     """The curve knows the relation alone: its crossings of edges are the expression's, and in nine of ten
     cells in which that changes its sign, or beside them, there is one."""
     setting = ObservedRobot.of(robot, legs)
-    measured = MeasuredRobot.driven(setting) if real else MeasuredRobot.watched(setting)
+    measured = MeasuredRobot.of_motors(setting) if real else MeasuredRobot.of_directions(setting)
     located = drawn(setting, plane=plane, steps=STEPS)
     start, motion, question = setting.everything.start, setting.motion, measured.question
     configurations = sweep(start, setting.samples.question, located.grid, motion, setting.placer)
@@ -170,7 +170,7 @@ def test_where_the_smallest_value_passes_through_zero_the_expression_does(
         for end in piece:
             near = min(reached, key=lambda place: np.linalg.norm(np.subtract(place, end)))
             at = reach(reached[near], setting.samples.question, located.grid.pose(end.tolist()), motion)
-            assert abs(measured.condition.expressed(measured.pattern.values_at([at]))[0]) < 0.03 * size
+            assert abs(measured.condition.evaluate(measured.pattern.values_at([at]))[0]) < 0.03 * size
     cell = np.array([x[1] - x[0], y[1] - y[0]])
     changes = [(i, j) for i, j in np.ndindex(STEPS - 1, STEPS - 1)
                if np.isfinite(values[i : i + 2, j : j + 2]).all()

@@ -82,7 +82,7 @@ def test_four_points_are_on_all_danger_cylinders() -> None:
 def test_a_platform_that_translates_has_a_condition_of_all_kinds(see: list[str], words: str) -> None:
     """Three vectors have rank two just there; each is named by what it is."""
     setting = ObservedRobot.of("delta", camera=EYE, see=see)
-    assert MeasuredRobot.watched(setting).condition.words == words
+    assert MeasuredRobot.of_directions(setting).condition.words == words
 
 
 def test_points_on_one_line() -> None:

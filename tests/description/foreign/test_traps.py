@@ -354,7 +354,7 @@ def test_loops_that_rounding_may_hold_are_refused_as_such(tmp_path: Path):
     from hrsynth.families.linkages import LINKAGES
 
     linkage = LINKAGES["line_symmetric_bricard"]()
-    angles = linkage.closed(np.linspace(0.5, 1.5, 6), 0.9)
+    angles = linkage.close(np.linspace(0.5, 1.5, 6), 0.9)
     assert angles is not None
     screws = linkage.axes(angles)
     exact = np.linalg.svd(screws, compute_uv=False)

@@ -44,15 +44,15 @@ class Inside:
     def within(self, count: int, radius: float) -> np.ndarray:
         """Poses whose shift (characteristic lengths) and turn are at most a radius, evenly."""
         y = np.concatenate([self.ball(count, self.shifts, radius), self.ball(count, self.turns, radius)], axis=1)
-        return self.flow.moved(np.repeat(self.flow.batch.home[None], count, axis=0), y)
+        return self.flow.move(np.repeat(self.flow.batch.home[None], count, axis=0), y)
 
     def reached(self, count: int) -> tuple[np.ndarray, float]:
         """Poses evenly in what the legs reach, and its volume (characteristic lengths, radians)."""
         wide, met, tried = self.span(), [], 0
         while sum(map(len, met)) < count:
             y = self.rng.uniform(wide[0], wide[1], (20_000, len(wide[0])))
-            X = self.flow.moved(np.repeat(self.flow.batch.home[None], len(y), axis=0), y)
-            there = self.flow.batch.reached(X)
+            X = self.flow.move(np.repeat(self.flow.batch.home[None], len(y), axis=0), y)
+            there = self.flow.batch.reaches(X)
             met.append(X[there])
             tried += len(y)
             if tried > 4_000_000:
@@ -69,7 +69,7 @@ class Inside:
         for _ in range(3):
             y = self.rng.uniform(low, high, (200_000, d))
             home = np.repeat(self.flow.batch.home[None], len(y), axis=0)
-            there = y[self.flow.batch.reached(self.flow.moved(home, y))]
+            there = y[self.flow.batch.reaches(self.flow.move(home, y))]
             gap = 0.1 * (there.max(axis=0) - there.min(axis=0))
             low, high = np.maximum(low, there.min(axis=0) - gap), np.minimum(high, there.max(axis=0) + gap)
         return low, high

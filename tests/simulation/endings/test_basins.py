@@ -46,8 +46,8 @@ def task(name: str, legs: str | None = None, to: str | None = None) -> tuple[Ser
 def poses(flow: Flow, count: int, seed: int, wide: float) -> np.ndarray:
     """Random poses that are reached, about home."""
     y = np.random.default_rng(seed).uniform(-wide, wide, (20 * count, flow.batch.span.shape[1]))
-    X = flow.moved(np.repeat(flow.batch.home[None], len(y), axis=0), y)
-    return X[flow.batch.reached(X)][:count]
+    X = flow.move(np.repeat(flow.batch.home[None], len(y), axis=0), y)
+    return X[flow.batch.reaches(X)][:count]
 
 
 def runs(flow: Flow, X: np.ndarray) -> Runs:
@@ -283,8 +283,8 @@ def test_every_start_within_the_certified_radius_ends_at_the_goal():
         found.target, found.setting.samples.question)[0])
     rng = np.random.default_rng(0)
     y = rng.uniform(-1, 1, (200, 3)) * [found.certified.length / flow.batch.length] * 2 + [0]
-    X = flow.moved(np.repeat(goal[None], 200, axis=0), y * [1, 1, 0] + rng.uniform(-1, 1, (200, 1))
-                   * [0, 0, found.certified.angle])
+    X = flow.move(np.repeat(goal[None], 200, axis=0), y * [1, 1, 0] + rng.uniform(-1, 1, (200, 1))
+                  * [0, 0, found.certified.angle])
     X = X[[found.certified.holds(each) for each in X]]
     assert len(X) > 20
     np.testing.assert_allclose(runs(flow, X).X, np.broadcast_to(goal, X.shape), atol=1e-8)

@@ -122,7 +122,7 @@ def test_boxes_hold_the_poses_that_are_told():
     goal = families()[0].error
     for error in (chart for family in families() for chart in family.charts):
         y, half = drawn(error, rng), rng.uniform(0, 0.05, (4, error.size[0]))
-        low, high = error.spanned(y, half)
+        low, high = error.enclose_chart(y, half)
         for _ in range(20):
             p, R = error.pose(y + rng.uniform(-1, 1, y.shape) * half)
             turn = R @ goal.R.T

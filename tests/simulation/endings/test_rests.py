@@ -170,7 +170,7 @@ def test_rates_are_those_of_the_law() -> None:
     (q,) = islice(starts(search.system, np.array([search.system.system.read(goal.pose)])), 1)
     ends = [each for each in descend(search.system, q[:60], np.ones(60, dtype=np.intp), idle) if each.value > 1e-3]
     own = [(box.rates, at) for box, each in zip(enclose_points(search.system, ends, idle), ends, strict=True)
-           if box is not None and box.rates and (at := search._placed(each.q)) is not None][:4]
+           if box is not None and box.rates and (at := search._place(each.q)) is not None][:4]
     assert own
     for rates, at in own:
         chart = TangentChart.around(at, setting.everything.question)
@@ -202,15 +202,15 @@ def test_what_is_said_to_be_all_is_what_boxes_prove(name: str) -> None:
     assert found.cover.alone == ()
     counted_from = found.cover.cover.error.coordinates
     for k, each in enumerate(found.rests):
-        short = covers.judged([*found.rests[:k], *found.rests[k + 1:]])
+        short = covers.judge([*found.rests[:k], *found.rests[k + 1:]])
         assert short is not None
         assert short.complete
         (missing,) = short.alone
-        assert counted_from.motion.goal(missing.pose).met(each.configuration.pose(counted_from.motion.link), 1e-6)
+        assert counted_from.motion.goal(missing.pose).is_met(each.configuration.pose(counted_from.motion.link), 1e-6)
         assert missing.stability == each.stability
         assert missing.error[0] - 1e-9 <= each.error <= missing.error[1] + 1e-9
         assert f"{missing.stability} at {missing.pose}" in text(replace(found, cover=short))
-    twice = covers.judged([*found.rests, replace(found.rests[0], configuration=nearby(found, found.rests[0]))])
+    twice = covers.judge([*found.rests, replace(found.rests[0], configuration=nearby(found, found.rests[0]))])
     assert twice is not None
     assert (twice.strangers, twice.complete) == (1, False)
 
@@ -300,7 +300,7 @@ def test_critical_poses_are_rests_and_joints_go_there() -> None:
     lift = Lift(search.system, search.law.question.observations, error)
     q, done = lift(poses, search.system.system.read(found.goal.pose)[None])
     assert done.sum() > len(poses) / 2
-    assert np.abs(lift.told(q[done]) - lift.wanted(poses.some(done))).max() < 1e-8
+    assert np.abs(lift.values_at(q[done]) - lift.desired_values(poses.some(done))).max() < 1e-8
     assert np.abs(RestEquations(search.system, list(q[done].T)).G).max() < 1e-8
 
 
@@ -328,8 +328,8 @@ def test_no_loop_is_open_for_the_oracle(name: str, legs: Legs | None) -> None:
     assert left(walks).max() < 1e-9
     error = PoseError.of(found, search.goal)
     assert error.coordinates is not None
-    p, R = error.coordinates.of([at for q in walks if (at := search._placed(q)) is not None])
-    u = np.array([directions(at, found.samples.question)[0] for q in walks if (at := search._placed(q)) is not None])
+    p, R = error.coordinates.of([at for q in walks if (at := search._place(q)) is not None])
+    u = np.array([directions(at, found.samples.question)[0] for q in walks if (at := search._place(q)) is not None])
     places = CriticalPoses(error.length * p, R, u, *np.zeros((2, len(p)), dtype=np.intp))
     q, done = Lift(search.system, search.law.question.observations, error)(places, home)
     assert done.sum() > len(p) / 2
@@ -357,7 +357,7 @@ def test_equations_over_the_pose_are_what_their_derivatives_say(name: str, legs:
         system = LegSystem.of(error, held)
         n, k = system.quaternion.stop, error.shifts.shape[1]
         x = np.concatenate([rng.uniform(low[:k], high[:k], (2000, k)), rng.normal(size=(2000, n - k))], axis=1)
-        y = system.drawn(x, rng)[:20]
+        y = system.draw(x, rng)[:20]
         assert len(y) == 20
         at = system.at(list(y.T))
         if not held:

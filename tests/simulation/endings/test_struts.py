@@ -121,7 +121,7 @@ def test_on_the_lines_on_which_a_rod_lies_along_its_axis_all_are_found(turn):
     setting, goal, wanted = asked()
     struts = Struts.of(setting, goal, PoseError.of(setting, goal))
     assert np.abs(np.cross(struts.axes, AXES)).max() < 1e-12
-    family = struts.locked()[0 if turn > 0 else 3 :][:3]
+    family = struts.locked_errors()[0 if turn > 0 else 3 :][:3]
     s = sympy.Symbol("s")
     for i, error in enumerate(family):
         found = []

@@ -126,7 +126,7 @@ class Blur(Value):
             raise BadRequest(f"cones apply to directions only, not to {others[0].kind} {others[0].leg}", str(cone),
                              "noise besides, as 0.3px or 1mm: --noise")
         if amounts is not None:
-            amounts.required(others if cone is not None else observed)
+            amounts.amounts_for(others if cone is not None else observed)
         angle = 0.0 if amounts is None else amounts.of("rad")
         half = half_angles(cone, axes) if cone is not None else np.full(len(axes), angle)
         found = np.zeros(len(observed))
@@ -162,7 +162,7 @@ class Blur(Value):
         own = self.own(place, seen)
         return f"within {' and '.join(str(Noise(((unit, own[unit]),))) for unit in own)}" if own else "exact"
 
-    def chosen(self, places: Sequence[int]) -> Blur:
+    def select(self, places: Sequence[int]) -> Blur:
         """That of some of the observations."""
         return Blur(self.cones[list(places)], self.noise)
 
@@ -211,7 +211,7 @@ class Blur(Value):
                 found[i] = tilt(value[None], shocks[i, :1])[0]
             elif own := self.own(i, o):
                 unit = length ** np.broadcast_to(o.dimension, o.size)
-                found[i] = o.sensed(value * unit, shocks[i], own) / unit
+                found[i] = o.sense(value * unit, shocks[i], own) / unit
         return found
 
 

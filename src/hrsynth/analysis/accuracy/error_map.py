@@ -204,16 +204,16 @@ class Mapper(Value):
         batch says of them; in NumPy where they do not make up for numba's start."""
         count = grid.size if places is None else len(places)
         size = -(-count // max(1, count // PART))
-        compiled = self.compiled(count, cones)
+        compiled = self.uses_numba(count, cones)
         for start in range(0, count, size):
             tell("poses")
             here = grid.places(start, start + size) if places is None else places[start : start + size]
             yield self.part(grid, here, cones, compiled)
 
-    def compiled(self, count: int, cones: Array | None) -> bool:
+    def uses_numba(self, count: int, cones: Array | None) -> bool:
         """Whether so many poses are done by numba."""
         assert self.batch is not None
-        return self.batch.compiled(count, self.setting.labels, cones, POSES_FOR_NUMBA_ONCE)
+        return self.batch.uses_numba(count, self.setting.labels, cones, POSES_FOR_NUMBA_ONCE)
 
     def part(self, grid: Grid, places: Array, cones: Array | None, compiled: bool) -> tuple[Flags, Evaluation]:
         """Which poses at some places of a grid the platform can have at all, and what the batch says of them."""

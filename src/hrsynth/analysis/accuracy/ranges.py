@@ -64,12 +64,12 @@ class Tally(Value):
                      max(self.fullest, (reached, self.done), key=lambda each: each[0]))
 
     @classmethod
-    def read(cls, line: str) -> Tally:
+    def parse(cls, line: str) -> Tally:
         """What a line of the journal says."""
         told = json.loads(line)
         ranges = {name: ErrorRange(**told[name]) for name in ("position", "orientation")}
         return cls(**{**told, **ranges, "fullest": tuple(told["fullest"])})
 
-    def written(self) -> str:
+    def to_line(self) -> str:
         """The line of the journal."""
         return json.dumps({**vars(self), "position": vars(self.position), "orientation": vars(self.orientation)})

@@ -73,7 +73,7 @@ def sweep_to(path: str | Path, mapper: Mapper, grid: Grid, seed: int) -> SweptEr
     cones = mapper.blur.cones
     asked = hashlib.sha256(repr(content((mapper.setting.mechanism, mapper.setting.observed, mapper.blur, grid,
                                          SWEEP_PART, __version__))).encode()).hexdigest()
-    with _SweepDraft(target, grid, asked, mapper.compiled(grid.size, cones)) as draft:
+    with _SweepDraft(target, grid, asked, mapper.uses_numba(grid.size, cones)) as draft:
         tally = draft.tally
         limits = [LARGEST_FIRST_ORDER * mapper.setting.everything.twin.length, LARGEST_FIRST_ORDER]
         for start in range(tally.done, grid.size, SWEEP_PART):
@@ -131,7 +131,7 @@ class _SweepDraft:
         with _stopping(self.journal), ExitStack() as files:
             self._lines = files.enter_context(open(os.open(self.journal, os.O_RDWR | os.O_CREAT, 0o666), "r+b"))
             require_alone(self._lines.fileno(), "another sweep writes this file", self.journal, "one sweep at a time")
-            self.compiled, self.tally = self._read(asked, compiled)
+            self.compiled, self.tally = self._resume(asked, compiled)
             self._rows = files.enter_context(open(os.open(self.part, os.O_RDWR | os.O_CREAT, 0o666), "r+b"))
             self._begin(asked)
             self._files = files.pop_all()
@@ -142,7 +142,7 @@ class _SweepDraft:
     def __exit__(self, *_: object) -> None:
         self._files.close()
 
-    def _read(self, asked: str, compiled: bool) -> tuple[bool, Tally]:
+    def _resume(self, asked: str, compiled: bool) -> tuple[bool, Tally]:
         """Whether it is done by numba, and how far it came; raises ``BadRequest`` for another question's journal."""
         content = self._lines.read()
         lines = content[: content.rfind(b"\n") + 1].decode("ascii", "replace").splitlines()
@@ -153,7 +153,7 @@ class _SweepDraft:
             if told["asked"] != asked:
                 raise BadRequest("another sweep to this file was interrupted", str(self.journal),
                                  "the same question, another file, or that journal removed")
-            done = Tally.read(lines[-1]) if lines[1:] else Tally()
+            done = Tally.parse(lines[-1]) if lines[1:] else Tally()
             there = self.part.stat().st_size if self.part.exists() else 0
         except (ValueError, KeyError, TypeError):
             raise BadRequest("no journal of a sweep", str(self.journal), "another file, or that one removed") from None
@@ -191,7 +191,7 @@ class _SweepDraft:
             self._rows.write(rows.tobytes())
             self._rows.flush()
             os.fsync(self._rows.fileno())
-            self._line(tally.written())
+            self._line(tally.to_line())
 
     def rows(self, cells: NDArray[np.int64]) -> Array:
         """The rows (n, 2) of some cells."""

@@ -193,7 +193,7 @@ class Aspects(Value):
            *, see: SeeLike = None, seed: int = 0) -> Aspects:
         """The condition of a robot from random samples of its motion."""
         setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed)
-        seen = MeasuredRobot.watched(setting)
+        seen = MeasuredRobot.of_directions(setting)
         return cls(setting, setting.motion, seen.pattern, seen.condition,
                    tuple(freedom.name for freedom in seen.verdict.lost))
 
@@ -232,7 +232,7 @@ class Aspects(Value):
              ) -> PathAnswer:
         """Whether a path without Type 2 singularity joins two configurations."""
         found, scene = self.condition, self.structure.values_at([start, goal])
-        values = found.expressed(scene) if found.signed else smallest_of(found.rows(scene))
+        values = found.evaluate(scene) if found.signed else smallest_of(found.rows(scene))
         ends = [PathEnd(self.motion.pose(at.pose(self.motion.link)), at, float(value))
                 for at, value in zip((start, goal), values, strict=True)]
         answer = PathAnswer(self.setting, UNDECIDED, False, tuple(end.pose for end in ends), None, 0, ends[0], ends[1],
@@ -250,7 +250,7 @@ class Aspects(Value):
         except NoLegForm as why:
             answer = _pointwise(answer, str(why))
             return answer if answer.verdict == SEPARATED else replace(answer, road=self.road(start, goal))
-        return self._decided(answer, enclosures, seed, budget)
+        return self._decide(answer, enclosures, seed, budget)
 
     def road(self, start: ClosedConfiguration, goal: ClosedConfiguration) -> SampledRoad:
         """The straight way of the platform from a configuration to the pose of another, sampled."""
@@ -264,15 +264,15 @@ class Aspects(Value):
                 break
             way.append(there)
         scene = self.structure.values_at(way)
-        values = self.condition.expressed(scene) if self.condition.signed else smallest_of(self.condition.rows(scene))
+        values = self.condition.evaluate(scene) if self.condition.signed else smallest_of(self.condition.rows(scene))
         worst = int(np.argmin(np.abs(values)))
         changes = int(np.sum(values[1:] * values[:-1] < 0)) if self.condition.signed else None
         lost = next((f"{o.kind} {o.leg}" for at in way if (o := unseen(at, question)) is not None), None)
         return SampledRoad(len(way), float(abs(values[worst])), motion.pose(way[worst].pose(motion.link)), changes,
                            float(fractions[len(way) - 1]), lost)
 
-    def _decided(self, answer: PathAnswer, enclosures: Sequence[ConditionEnclosure], seed: int, budget: int
-                 ) -> PathAnswer:
+    def _decide(self, answer: PathAnswer, enclosures: Sequence[ConditionEnclosure], seed: int, budget: int
+                ) -> PathAnswer:
         """The verdict where poses decide what the legs do."""
         assert isinstance(self.pattern, LegPattern)
         coordinates = self.pattern.coordinates
@@ -295,7 +295,7 @@ class Aspects(Value):
                 return replace(answer, reason=f"at the {end} beyond its limits: joint {', '.join(beyond)}")
         region = PoseRegion.around(coordinates, p, R)
         found = plan((enclosures[0], enclosures[1]), region, (p[0], R[0]), (p[1], R[1]), seed=seed, budget=budget)
-        answer = self._shown(answer, found, self.pattern)
+        answer = self._add_ways(answer, found, self.pattern)
         if not found.proved:
             return replace(answer, reason=_why_undecided(found, enclosures, budget))
         if not leads(found.ways, (p[0], R[0]), (p[1], R[1]), enclosures):
@@ -308,7 +308,7 @@ class Aspects(Value):
         return replace(answer, verdict=SAME, certified=not fitted, margin=found.margin, reason=(
             f"the condition and the reach of all legs are enclosed away from zero along the path{forms}"))
 
-    def _shown(self, answer: PathAnswer, found: PlannedPath, known: LegPattern) -> PathAnswer:
+    def _add_ways(self, answer: PathAnswer, found: PlannedPath, known: LegPattern) -> PathAnswer:
         """The answer with a plan's ways, and the joints whose limits these keep."""
         kept = tuple(bound.joint for bound in known.bounds)
         answer = replace(answer, boxes=found.boxes, limits=kept,

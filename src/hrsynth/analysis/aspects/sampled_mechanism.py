@@ -158,11 +158,11 @@ class SampledMechanism:
                         direction = axis_of(self.mechanism, slide, "p")
                         found = sliding(leg.label, tip, tips, centre, axis, self.values(direction))
                         if found is not None:
-                            fitted = tip.fitted or not self.drawn(foot, slide, spot, found)
+                            fitted = tip.fitted or not self.slide_makes_form(foot, slide, spot, found)
                             yield replace(found, fitted=fitted), direction
                             return
 
-    def drawn(self, foot: Joint, slide: Joint, tip: BodyPoint, limb: SlidingRod) -> bool:
+    def slide_makes_form(self, foot: Joint, slide: Joint, tip: BodyPoint, limb: SlidingRod) -> bool:
         """Whether a P joint between a link that holds the foot's centre and one that holds the tip makes the form: its
         axis passes through both, or stays normal to the foot's axis."""
         centre = self.centre(foot, self.mechanism.base)
@@ -177,7 +177,7 @@ class SampledMechanism:
     def closes(self, leg: Leg, carried: Sequence[NamedVector]) -> bool:
         """Whether the loops inside a leg close where its rods do: pose and limbs decide all joint centres in them. Of
         other loops (a crank that a rocker drives) the forms say nothing, and they may not reach."""
-        for name in leg.looped(self.mechanism):
+        for name in leg.loop_joints(self.mechanism):
             joint = self.mechanism.joints[name]
             known = (any(self.sources(self.centre(joint, link), carried)) for link in joint.links)
             if joint.type is JointType.PRISMATIC or not any(known):

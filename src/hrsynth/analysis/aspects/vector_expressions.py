@@ -149,7 +149,7 @@ class JointRules:
             if False in turns:
                 return PlatformPoint(False, np.zeros(3), d)
             if True in turns:
-                return PlatformPoint(False, self._turned(d), np.zeros(3))
+                return PlatformPoint(False, self._rotate(d), np.zeros(3))
         return None
 
     def point(self, link: str, x: Array) -> PlatformPoint | None:
@@ -160,7 +160,7 @@ class JointRules:
             return body.rule
         if body.turns is None:
             return None
-        turned, constant = (self._turned(arm), np.zeros(3)) if body.turns else (np.zeros(3), arm)
+        turned, constant = (self._rotate(arm), np.zeros(3)) if body.turns else (np.zeros(3), arm)
         return PlatformPoint(body.rule.follows, body.rule.turned + turned, body.rule.constant + constant)
 
     def zero(self, feature: BodyPoint | BodyVector) -> Array:
@@ -198,7 +198,7 @@ class JointRules:
             return distance(x, joint.point / self.length, joint.axis) <= EXACT
         return _points(joint) and bool(np.linalg.norm(x - joint.point / self.length) <= EXACT)
 
-    def _turned(self, vector: Array) -> Array:
+    def _rotate(self, vector: Array) -> Array:
         """A vector at zero in the platform's frame."""
         link = next(name for name, body in self.bodies.items() if body.rule.follows)
         return np.asarray(self.mechanism.links[link].pose[:3, :3].T @ vector)

@@ -228,7 +228,7 @@ class TubedCells:
         old = [tube for tube in self.tubes for _ in sides]
         centre, half = middles(low, high)
         x = np.array([tube.at(q) for tube, q in zip(old, centre, strict=True)])
-        new = prove_all(self.part, centre, half, self.part.closed(centre, x)[0])
+        new = prove_all(self.part, centre, half, self.part.close(centre, x)[0])
         return TubedCells(self.part, low, high, [
             one if one is not None and one.lies_in(tube) else BranchTube(
                 c, h, at, tube.slopes, tube.radius + AFFINE_ROUNDING * (1 + np.abs(at)), tube.weakest)

@@ -63,9 +63,9 @@ def _follow_ways(part: LoopPart, q: Array, x: Array, goal: Array) -> tuple[Array
             break
         ahead = np.minimum(1.0, done[on] + step[on])
         here, next_ = (q[on] + (goal - q)[on] * part_of[:, None] for part_of in (done[on], ahead))
-        there, good = part.followed(here, x[on], next_)
+        there, good = part.follow(here, x[on], next_)
         # the closure that follows must be the near one: back again must be where it came from
-        back, same = part.followed(next_, there, here)
+        back, same = part.follow(next_, there, here)
         near = np.abs(back - x[on]).max(axis=-1, initial=0.0) < AFFINE_ROUNDING**0.5
         reached = np.logical_and.reduce((good, same, near))
         done[on[reached]], x[on[reached]] = ahead[reached], there[reached]
@@ -95,7 +95,7 @@ def _meets(growth: Growth, k: int, one: BranchTube, other: BranchTube, face: Arr
     """Whether the closure of one tube at a point of the last face lies in another tube, a whole turn before; None where
     it is proved neither to lie in it nor out of it."""
     part = growth.part
-    x, good = part.closed(face[None], one.at(face)[None])
+    x, good = part.close(face[None], one.at(face)[None])
     (point,) = prove_all(part, face[None], np.zeros((1, len(face))), x) if good[0] else (None,)
     if point is None or np.any(np.abs(point.x - one.at(face)) + point.radius >= one.radius):
         return None

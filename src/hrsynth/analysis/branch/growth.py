@@ -144,7 +144,7 @@ class Growth:
             self.tried += len(batch)
             tell("batches of cells")
             tubes = self._tubes(batch)
-            joined = self._joined(batch, tubes)
+            joined = self._join(batch, tubes)
             for (leaf, q, x), tube in zip(batch, tubes, strict=True):
                 if tube is not None and leaf in joined:
                     waiting += self._around(leaf)
@@ -171,11 +171,11 @@ class Growth:
         high = np.array([self.grid.point(leaf.high) for leaf, *_ in batch])
         centre, half = middles(low, high)
         q = np.array([q for _, q, _ in batch])
-        x, closed = self.part.closed(q, np.array([x for *_, x in batch]))
-        starts, good = self.part.followed(q, x, centre)
-        return self._proved(centre, half, starts, np.logical_and(good, closed))
+        x, closed = self.part.close(q, np.array([x for *_, x in batch]))
+        starts, good = self.part.follow(q, x, centre)
+        return self._prove(centre, half, starts, np.logical_and(good, closed))
 
-    def _proved(self, centre: Array, half: Array, x: Array, which: Array) -> list[BranchTube | None]:
+    def _prove(self, centre: Array, half: Array, x: Array, which: Array) -> list[BranchTube | None]:
         """The tubes over those cells (c, n) for which there is a closed configuration (c, p)."""
         found: list[BranchTube | None] = [None] * len(centre)
         there = np.flatnonzero(which)
@@ -184,8 +184,8 @@ class Growth:
                 found[k] = tube
         return found
 
-    def _joined(self, batch: Sequence[tuple[GrownCell, Array, Array]], tubes: Sequence[BranchTube | None]
-                ) -> set[GrownCell]:
+    def _join(self, batch: Sequence[tuple[GrownCell, Array, Array]], tubes: Sequence[BranchTube | None]
+              ) -> set[GrownCell]:
         """Number those cells whose tubes hold the closure at their starts, and agree with every numbered cell beside
         them; these cells."""
         own = [(leaf, q, x, tube) for (leaf, q, x), tube in zip(batch, tubes, strict=True) if tube is not None]
@@ -232,8 +232,8 @@ class Growth:
         if not asked:
             return []
         q = np.array([each[0] for each in asked])
-        x, good = self.part.closed(q, np.array([each[1] for each in asked]))
-        points = self._proved(q, np.zeros(q.shape), x, good)
+        x, good = self.part.close(q, np.array([each[1] for each in asked]))
+        points = self._prove(q, np.zeros(q.shape), x, good)
         return [point is not None and all(
             each is None or bool(np.all(np.abs(point.x - each.at(point.centre)) + point.radius
                                         < each.radius * (1 - AFFINE_ROUNDING))) for each in tubes)

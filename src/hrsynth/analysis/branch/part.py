@@ -92,7 +92,7 @@ class LoopPart(Value):
         errors, rates = whole(self.system, self.loops, self.gears, self.values(q, x), q.shape[:-1])
         return errors, rates[..., list(self.unknowns)], rates[..., list(self.driven)]
 
-    def closed(self, q: Array, x: Array) -> tuple[Array, Array]:
+    def close(self, q: Array, x: Array) -> tuple[Array, Array]:
         """The unknowns (c, p) near ``x`` at which the loops are closed, by Newton's method, and which (c,) are."""
         x = x.copy()
         for _ in range(NEWTON_STEPS):
@@ -110,7 +110,7 @@ class LoopPart(Value):
         _, A, B = self.closure(q, x)
         return -_least_squares(A, B)
 
-    def followed(self, q: Array, x: Array, goal: Array, step: float = 0.1) -> tuple[Array, Array]:
+    def follow(self, q: Array, x: Array, goal: Array, step: float = 0.1) -> tuple[Array, Array]:
         """The unknowns (c, p) at ``goal`` (c, n), reached by short steps from closed configurations, and which (c,) are
         reached without a correction that is longer than the step."""
         count = max(1, int(np.ceil(np.abs(goal - q).max(initial=0.0) / step)))
@@ -118,7 +118,7 @@ class LoopPart(Value):
         for k in range(count):
             here, there = q + (goal - q) * (k / count), q + (goal - q) * ((k + 1) / count)
             ahead = times(self.slopes(here, x), there - here)
-            found, done = self.closed(there, x + ahead)
+            found, done = self.close(there, x + ahead)
             off = np.abs(found - x - ahead).max(axis=-1, initial=0.0)
             good &= done & (off <= step + np.abs(ahead).max(axis=-1, initial=0.0))
             x = np.where(good[:, None], found, x)

@@ -131,7 +131,7 @@ class ModeReader:
             at = self.made.closing(mode.q)
             found = Assembly(at, (), tuple(outside(at.twin, at.q)), held=True)
         elif not at_goal or near or outside(self.goal.twin, self.goal.q):
-            found = self.assembler.at(bodies, held, 0.0 if near else self.known(mode))
+            found = self.assembler.at(bodies, held, 0.0 if near else self.doubt(mode))
         if found.configuration is not None and self.made.closing is None and (gears := self.open(found.configuration)):
             found = Assembly(None, platform=self.assembler.platform(bodies), gears=gears)
         X = (found.platform[self.motion.link] if found.platform is not None else self.goal.pose(self.motion.link)
@@ -162,10 +162,10 @@ class ModeReader:
             if all(pose_difference(whole.pose(link), at.pose(link), at.twin.length) <= SAME_RELATION
                    for link in at.twin.mechanism.links):
                 return ()
-        left = twin.turned(twin.read({link: at.pose(link) for link in twin.mechanism.links}.__getitem__))
+        left = twin.gear_errors(twin.read({link: at.pose(link) for link in twin.mechanism.links}.__getitem__))
         return tuple(name for name, miss in left.items() if abs(miss) > CLOSED) or tuple(left)
 
-    def known(self, mode: SystemMode) -> float:
+    def doubt(self, mode: SystemMode) -> float:
         """How far the bodies' exact poses can be from the system's (characteristic lengths, radians); 0 where nothing
         was proved of them: the told poses are meant."""
         length = self.goal.twin.length

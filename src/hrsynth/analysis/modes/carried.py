@@ -116,7 +116,7 @@ class CarriedEquation(Zero):
     def _maps(self) -> list[tuple[Any, ...]]:
         return [(*each.maps(self.of), self.of(each.point), self.of(each.axis)) for each in self.freedoms]
 
-    def carried(self, x: Sequence[Any]) -> tuple[Any, Any, list[tuple[int, Any, Any]]]:
+    def point_and_arrow(self, x: Sequence[Any]) -> tuple[Any, Any, list[tuple[int, Any, Any]]]:
         """The point and the arrow, and their derivatives by the unknowns, by number."""
         n = len(self.freedoms)
         p, d = self.of(self.condition.b) + 0 * x[0], self.of(self.condition.c) + 0 * x[0]
@@ -135,12 +135,12 @@ class CarriedEquation(Zero):
 
     def value(self, x: Sequence[Any]) -> Any:
         """The value at x."""
-        point, arrow, _ = self.carried(x)
+        point, arrow, _ = self.point_and_arrow(x)
         return self.condition.value(point, arrow, self._of)
 
     def slopes(self, x: Sequence[Any]) -> Any:
         """The derivative by each unknown at x."""
-        point, arrow, by = self.carried(x)
+        point, arrow, by = self.point_and_arrow(x)
         along, turned = self.condition.slopes(point, arrow, self._of)
         found = [0 * v for v in x]
         for j, dp, dd in by:
@@ -177,7 +177,7 @@ class CarriedPlatform(System):
         """The goal."""
         return np.zeros(len(self.freedoms_))
 
-    def moved(self, q: Array, joints: int | None = None) -> tuple[Array, Array]:
+    def transform(self, q: Array, joints: int | None = None) -> tuple[Array, Array]:
         """R and p (..., 3) (sizes) of what the first joints carry, at complex coordinates (..., n) too."""
         q = np.asarray(q)
         R = np.broadcast_to(np.eye(3), (*q.shape[:-1], 3, 3))
@@ -193,9 +193,9 @@ class CarriedPlatform(System):
             R = turn @ R
         return R, p
 
-    def placed(self, q: Array) -> Array:
+    def pose(self, q: Array) -> Array:
         """The platform's pose (4, 4), m."""
-        R, p = self.moved(q, self.carrying)
+        R, p = self.transform(q, self.carrying)
         R, p, o = self.rows.T @ R @ self.rows, self.rows.T @ p, self.middle.origin
         return np.asarray(pose(o + self.size * p - R @ o, R) @ self.start)
 
@@ -204,7 +204,7 @@ class CarriedPlatform(System):
         values, slopes = [], []
         for each in chosen:
             c, columns = each.condition, []
-            R, p = self.moved(q, each.joints)
+            R, p = self.transform(q, each.joints)
             x, d = p + R @ c.b, R @ c.c
             values.append(c.value(x, d, np.asarray))
             along, turned = c.slopes(x, d, np.asarray)
@@ -212,7 +212,7 @@ class CarriedPlatform(System):
                 if k >= each.joints:
                     columns.append(0 * values[-1])
                     continue
-                Q, o = self.moved(q, k)
+                Q, o = self.transform(q, k)
                 axis, point = Q @ freedom.axis, o + Q @ freedom.point
                 by_x = axis + 0 * x if freedom.slides else cross(axis, x - point)
                 by_d = 0 * d if freedom.slides else cross(axis, d)

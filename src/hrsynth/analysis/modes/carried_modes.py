@@ -35,7 +35,7 @@ class _Half(CarriedEquation):
 
     idle: frozenset[int]
 
-    def carried(self, x: Sequence[Any]) -> tuple[Any, Any, list[tuple[int, Any, Any]]]:
+    def point_and_arrow(self, x: Sequence[Any]) -> tuple[Any, Any, list[tuple[int, Any, Any]]]:
         R, p, at = self.of(np.eye(3)), self.of(np.zeros(3)), list[tuple[int, Any, Any]]()
         for k, each in enumerate(self.freedoms[:self.joints]):
             if k in self.idle:
@@ -112,7 +112,7 @@ def solve_carried(measured: MeasuredRobot, goal: ClosedConfiguration, error: flo
         raise NotConfined(measured.setting.robot.name, "no distance bounds how far it is from where its loops close")
     system = carried_platform(measured, goal, error)
     (body,) = leg_ends(measured.setting.anatomy)
-    return Model(system, lambda q: {body: system.placed(q)}, system.home), _judge(system)
+    return Model(system, lambda q: {body: system.pose(q)}, system.home), _judge(system)
 
 
 def enclose_zeros(system: CarriedPlatform, proposed: Array) -> list[PoseBox]:
@@ -194,7 +194,7 @@ def _body(system: CarriedPlatform, box: PoseBox) -> list[Any]:
     with ctx.workprec(PRECISION):
         for c in np.vstack([np.zeros(3), np.eye(3)]):
             told = Told(PoseCondition("", np.zeros(3), c), system.carrying)
-            at, arrow, _ = system.equation(told).carried(box.box)
+            at, arrow, _ = system.equation(told).point_and_arrow(box.box)
             found += [*(arrow if c.any() else at)]
     return found
 
@@ -209,5 +209,5 @@ def as_mode(system: CarriedPlatform, box: PoseBox, proved: bool, miss: float | N
     if miss is None:
         values, slopes = system.values(q, system.told)
         miss = float(np.max(np.abs(values) / np.maximum(1.0, np.linalg.norm(slopes, axis=-1))))
-    return SystemMode((), max(shift / system.size, turn), shift, turn, miss, frozen(system.placed(q)), frozen(q),
+    return SystemMode((), max(shift / system.size, turn), shift, turn, miss, frozen(system.pose(q)), frozen(q),
                       proved=proved, fits=not proved)

@@ -136,7 +136,7 @@ class _Walk:
         """The bodies, shifts included, and how far their points were moved to meet (m); every measurement must be met
         on the way."""
         at = self.anatomy.mechanism.base
-        found = [ChainBody(None, np.zeros(3), watched=self._seen(at))]
+        found = [ChainBody(None, np.zeros(3), watched=self._sight(at))]
         path = self.anatomy.path(self.leg)
         self.beside = set(self.leg.joints).difference(*(edge.joints for edge in path))
         for edge in path:
@@ -147,13 +147,13 @@ class _Walk:
                 self._rods(found, edge, at)
             else:
                 self._parallelogram(found, edge, at)
-            found[-1] = replace(found[-1], watched=found[-1].watched + self._seen(there))
+            found[-1] = replace(found[-1], watched=found[-1].watched + self._sight(there))
             at = there
         for what in (*self.watched, *self.coordinates):
             raise Underived(f"what is measured at {what} is not on the way from the base to the leg's end")
         return _shift_bodies(found, tip, SAME_POINT * self.goal.twin.length)
 
-    def _seen(self, link: str) -> tuple[Array, ...]:
+    def _sight(self, link: str) -> tuple[Array, ...]:
         return tuple(self.watched.pop(link, ()))
 
     def _geometry(self, joint: Joint, at: str) -> tuple[Array, list[Array]]:
@@ -177,16 +177,16 @@ class _Walk:
         found[-1] = replace(found[-1], slides=(*found[-1].slides, *(unit(s) for s in slides)))
         found.extend(ChainBody(axis, point) for axis in axes if _TURNS[joint.type])
         if joint.type is JointType.REVOLUTE and self.beside:
-            found[-1] = replace(found[-1], angles=self._driven(joint, at))
+            found[-1] = replace(found[-1], angles=self._rod_angles(joint, at))
 
-    def _driven(self, joint: Joint, at: str) -> tuple[tuple[float, float], ...]:
+    def _rod_angles(self, joint: Joint, at: str) -> tuple[tuple[float, float], ...]:
         """The two angles of an R that a rod leaves, between points C and D of bodies that are fixed to its links: D is
         where it is, or its mirror image in the plane of C and the axis (a four-bar with its crank held, a strut of held
         length)."""
-        near, far = self._fixed_to(at), self._fixed_to(joint.other(at))
+        near, far = self._links_fixed_to(at), self._links_fixed_to(joint.other(at))
         o, (a, *_) = self._geometry(joint, at)
         for link in self.leg.links:
-            rod = self._fixed_to(link)
+            rod = self._links_fixed_to(link)
             ends = [self._centre(rod, end) for end in (near, far)]
             if rod & (near | far) or ends[0] is None or ends[1] is None:
                 continue
@@ -209,7 +209,7 @@ class _Walk:
                 return self._geometry(joint, a)[0]
         return None
 
-    def _fixed_to(self, link: str) -> set[str]:
+    def _links_fixed_to(self, link: str) -> set[str]:
         """A link with those that held joints beside the way fix to it."""
         mechanism, found, new = self.anatomy.mechanism, {link}, [link]
         while new:
@@ -228,7 +228,7 @@ class _Walk:
         (start, axes), (end, _) = self._geometry(near, at), self._geometry(far, at)
         held = any([self.coordinates.pop(joint.name, 0) for joint in joints])
         axis, way = axes[0], end - start
-        watched = tuple(d for link in edge.inside for d in self._seen(link))
+        watched = tuple(d for link in edge.inside for d in self._sight(link))
         crank = Crank(axis, way - axis * float(axis @ way), watched, held)
         found[-1] = replace(found[-1], cranks=(*found[-1].cranks, crank))
 
@@ -239,7 +239,7 @@ class _Walk:
         number = next((k for k, link in enumerate(edge.inside) if link in self.watched), 0)
         joints = [self.anatomy.mechanism.joints[name] for name in edge.joints[2 * number : 2 * number + 2]]
         near, far = joints if edge.tail == at else joints[::-1]
-        watched = tuple(d for link in edge.inside for d in self._seen(link))
+        watched = tuple(d for link in edge.inside for d in self._sight(link))
         found.append(ChainBody(None, self._geometry(near, at)[0], watched=watched))
         found.append(ChainBody(None, self._geometry(far, at)[0]))
 

@@ -36,7 +36,7 @@ def off(system: System, k: int, at: Array, shift: float, turn: float) -> float:
 def meets(system: System, q: Array, goal: Array, shift: float, turn: float) -> bool:
     """Whether the exact pose about ``q`` can be that about ``goal``: all its tips can."""
     return all(length(one - other) <= off(system, k, one, shift, turn) + tip_rounding(system, other)
-               for k, (one, other) in enumerate(zip(system.reached(q), system.reached(goal), strict=True)))
+               for k, (one, other) in enumerate(zip(system.tips_at(q), system.tips_at(goal), strict=True)))
 
 
 def is_excluded(system: System, q: Array, shift: float, turn: float) -> bool:
@@ -44,7 +44,7 @@ def is_excluded(system: System, q: Array, shift: float, turn: float) -> bool:
     not zero anywhere in the ball that holds it. The worst legs are tried first."""
     from flint import ctx
 
-    at, frame = system.reached(q), system.frame
+    at, frame = system.tips_at(q), system.frame
     numbers = system.balls(frame)
     misses = np.linalg.norm(system.off(at), axis=1)
     with ctx.workprec(PRECISION):
@@ -92,7 +92,7 @@ STARTS = 40
 
 def residual(system: System, q: Array) -> float:
     """The largest distance of a tip from its curve, in sizes of the mechanism."""
-    return system.residual(system.reached(q))
+    return system.residual(system.tips_at(q))
 
 
 def stationary(system: System, starts: Sequence[Array], known: Sequence[Array]) -> list[Array]:

@@ -93,7 +93,7 @@ class _Sliding:
     def __init__(self, setting: ObservedRobot) -> None:
         self.at, self.question = setting.everything.start, setting.samples.question
         twin = self.at.twin
-        steps = [ClosedConfiguration.of(twin, twin.moved(self.at.q, each)) for each in np.eye(twin.nv)]
+        steps = [ClosedConfiguration.of(twin, twin.integrate(self.at.q, each)) for each in np.eye(twin.nv)]
         seen, points = seen_at(self.at, self.question)
         known = drift(self.at, None, setting.normal.moved) + CHAIN_ROUNDING * float(np.abs(points).max(initial=0.0))
         planes, nearest = list[Array](), np.inf
@@ -149,7 +149,7 @@ class _Sliding:
             return []
         if spread > VANISHES or abs(cuts[0]) <= NAMED:
             return None
-        at = ClosedConfiguration.of(self.at.twin, self.at.twin.moved(self.at.q, cuts[0] * line))
+        at = ClosedConfiguration.of(self.at.twin, self.at.twin.integrate(self.at.q, cuts[0] * line))
         bodies, _ = _nearest(at, self.at, self.question, group, tuple(goal.bodies))
         reversed_ = opposite(self.question.observations, self.at, self.question.reference, at.pose)
         return [FormedMode(at, bodies, at.residual, reversed_)]
@@ -198,7 +198,7 @@ def _search(question: Measurement, formation: Formation, group: Similarities, go
         tell("starts")
         far = np.pi if starts % 2 else rng.uniform(0.0, np.pi)
         try:
-            q, residual = solve(twin, twin.moved(twin.q0, rng.uniform(-far, far, twin.nv)), held, tolerance=SOLVED,
+            q, residual = solve(twin, twin.integrate(twin.q0, rng.uniform(-far, far, twin.nv)), held, tolerance=SOLVED,
                                 iterations=SEARCH_ITERATIONS)
         except NotMeasured:  # on the way a point came to a camera's centre
             continue

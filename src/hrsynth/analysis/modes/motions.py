@@ -109,7 +109,7 @@ def self_motion(at: ClosedConfiguration, question: Measurement, bodies: Sequence
     ways, near = walker.around(at.q)
     if not ways.shape[1]:
         return None
-    alike = next((each for each in known if each.like(ways.shape[1], walker.moved(at.q, near))), None)
+    alike = next((each for each in known if each.like(ways.shape[1], walker.links_moved(at.q, near))), None)
     if alike is not None:
         return alike
     walks = [walk for w in ways.T if (walk := walker.walk(at.q, w)).far >= MOTION_LEAST]
@@ -119,8 +119,8 @@ def self_motion(at: ClosedConfiguration, question: Measurement, bodies: Sequence
     places = [q for walk in walks for q in walk.places]
     middle = [walk.places[len(walk.places) // 2] for walk in walks]
     size = min(each for each in [ways.shape[1], *(walker.around(q)[0].shape[1] for q in middle)] if each)
-    return SelfMotion(at, size, walker.moved(at.q, places), longest.shift * twin.length, longest.turn, longest.returns,
-                      goal, way=tuple(map(walker.bodies, places)),
+    return SelfMotion(at, size, walker.links_moved(at.q, places), longest.shift * twin.length, longest.turn,
+                      longest.returns, goal, way=tuple(map(walker.bodies, places)),
                       beyond=tuple(dict.fromkeys(name for walk in walks for name in walk.beyond)),
                       inside=(longest.inside[0] * twin.length, longest.inside[1]))
 
@@ -195,7 +195,7 @@ class _Follower:
         for c in np.vstack([np.eye(size), rng.normal(size=(size, size))]):
             step = joints @ (c / np.linalg.norm(c))
             part = MOTION_NEAR / max(1.0, float(np.abs(step).max()))  # of a unit twist of the bodies
-            there, residual = solve(self.twin, self.twin.moved(q, part * step), self.held, tolerance=SOLVED,
+            there, residual = solve(self.twin, self.twin.integrate(q, part * step), self.held, tolerance=SOLVED,
                                     iterations=SEARCH_ITERATIONS)
             if residual <= CLOSED:
                 found.append(there)
@@ -210,7 +210,7 @@ class _Follower:
             return ((transform(X, self.question.point) - transform(home, self.question.point)) / self.twin.length,)
         return (X[:3, 3] - home[:3, 3]) / self.twin.length, logarithm(X[:3, :3] @ home[:3, :3].T)
 
-    def moved(self, q: Array, places: Sequence[Array]) -> tuple[str, ...]:
+    def links_moved(self, q: Array, places: Sequence[Array]) -> tuple[str, ...]:
         """The links that are elsewhere, or turned, at one of some configurations."""
         links = tuple(link for link in self.twin.mechanism.links if link != self.twin.mechanism.base)
         home = self.twin.poses(q, links)
@@ -260,16 +260,16 @@ class _Follower:
                 return
             w = basis @ ahead / size
             step = shorten_step(MOTION_STEP * (joints @ ahead) / size, MOTION_STEP)
-            there = self._closed(q, step)
+            there = self._close(q, step)
             if there is None:
                 return
             q = there
             yield q
 
-    def _closed(self, q: Array, step: Array) -> Array | None:
+    def _close(self, q: Array, step: Array) -> Array | None:
         """The closed configuration beside the end of a step, or of a part of it; None where there is none."""
         for part in 0.5 ** np.arange(MOTION_HALVINGS):
-            predicted = self.twin.moved(q, part * step)
+            predicted = self.twin.integrate(q, part * step)
             there, residual = solve(self.twin, predicted, self.held, tolerance=SOLVED, iterations=15)
             if residual <= CLOSED and (np.linalg.norm(self.twin.difference(predicted, there))
                                        <= MOTION_BEND * part * np.linalg.norm(step)):

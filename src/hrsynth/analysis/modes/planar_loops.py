@@ -37,7 +37,7 @@ class PlanarLoop:
     angles: int
     slides: int
 
-    def used(self) -> frozenset[int]:
+    def used_coordinates(self) -> frozenset[int]:
         """Its angles, and its slides after all angles."""
         return unknowns(self.terms, self.angles)
 
@@ -175,7 +175,7 @@ class PlanarLoops(System):
     @cached_property
     def most(self) -> int:
         """How many isolated closings the degrees allow, with unknowns eliminated or not."""
-        groups = groupings(self.angles, self.slides, [loop.used() for loop in self.loops])
+        groups = groupings(self.angles, self.slides, [loop.used_coordinates() for loop in self.loops])
         return min(self.residues.most_by_degrees(), *(bezout(self.forms, each) for each in groups))
 
     def pose_of(self, link: str, q: Array) -> Array:
@@ -187,7 +187,7 @@ class PlanarLoops(System):
         moved = self.size * (np.real(shift) * self.frame[0] + np.imag(shift) * self.frame[1])
         return pose(start[:3, 3] + moved, rotation_about(self.normal, angle) @ start[:3, :3])
 
-    def placed(self, q: Array) -> dict[str, Array]:
+    def body_poses(self, q: Array) -> dict[str, Array]:
         """The poses (4, 4) of the bodies that tell where the platform is."""
         return {body: self.pose_of(body, q) for body in self.bodies}
 
@@ -204,9 +204,9 @@ class PlanarLoops(System):
                 axis = self.goal.pose(joint.predecessor)[:3, :3] @ twin.mechanism.links[joint.predecessor].inverse[
                     :3, :3] @ joint.axis
                 step[place] = float(E @ q[:self.angles]) * np.sign(axis @ self.normal)
-        return ClosedConfiguration.of(twin, close(twin, twin.moved(self.goal.q, step), tolerance=SOLVED)[0])
+        return ClosedConfiguration.of(twin, close(twin, twin.integrate(self.goal.q, step), tolerance=SOLVED)[0])
 
-    def seen(self, x: Sequence[Any]) -> list[Any]:
+    def pose_terms(self, x: Sequence[Any]) -> list[Any]:
         """What tells the pose of the bodies, each with its conjugate, at balls (cos ψ, sin ψ, t)."""
         found: list[Any] = []
         for body in self.bodies:

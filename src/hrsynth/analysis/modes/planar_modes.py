@@ -70,7 +70,7 @@ def solve_loops(measured: MeasuredRobot, goal: ClosedConfiguration, error: float
         else:
             # without couplings not all loops need be among those
             closing = system.closing if goal.twin.mechanism.couplings else None
-            return Model(system, system.placed, system.home, closing=closing), found
+            return Model(system, system.body_poses, system.home, closing=closing), found
     raise refused[0]
 
 
@@ -89,7 +89,7 @@ def _judge(system: PlanarLoops) -> SystemModes:
     at_goal = [box for box in boxes if box.real and box.holds(start)]
     if len(boxes) < most or lost or len(at_goal) != 1:
         raise Unsolved("the loops", f"{size}: of {most} closings at most ({why}) {len(boxes)} have boxes")
-    seen = [system.seen(_balls(box)) for box in boxes]
+    seen = [system.pose_terms(_balls(box)) for box in boxes]
     if any(all((a - b).contains(0) for a, b in zip(one, other, strict=True))
            for k, one in enumerate(seen) for other in seen[:k]):
         raise Unsolved("the loops", f"{size}: several of {most} closings have one pose of the platform")
@@ -136,7 +136,7 @@ def _mode(system: PlanarLoops, box: PoseBox, proved: bool) -> SystemMode:
     """A real box as a mode, or as one that fits."""
     a, x = system.angles, box.middle.real
     q = np.array([*np.arctan2(x[a:2 * a], x[:a]), *x[2 * a:]])
-    spread = [float(each.real.rad()) + float(each.imag.rad()) for each in system.seen(_balls(box))]
+    spread = [float(each.real.rad()) + float(each.imag.rad()) for each in system.pose_terms(_balls(box))]
     shift = 2.0 * system.size * max(spread)
     turn = 0.0 if system.point is not None else 4.0 * max(spread)
     at = np.array([*np.exp(1j * q[:a]), *np.exp(-1j * q[:a]), *q[a:]])

@@ -62,13 +62,13 @@ class _Reading:
         self.reference = measured.question.reference
         self.bodies, self.point = placing_links(anatomy), anatomy.point
         self.joints = list(self.mechanism.joints.values())
-        self.axes = {joint.name: self._moved(joint.predecessor)[:3, :3] @ joint.axis for joint in self.joints
+        self.axes = {joint.name: self._displacement(joint.predecessor)[:3, :3] @ joint.axis for joint in self.joints
                      if joint.type in KINDS}
         self.normal = next((self.axes[joint.name] for joint in self.joints if joint.type is KINDS[0]), np.zeros(3))
         for joint in self.joints:
             along = abs(float(self.axes.get(joint.name, np.zeros(3)) @ self.normal))
             if joint.type not in KINDS or abs(along - (not joint.type.slides)) > SAME_DIRECTION:
-                raise self._refused(f"joint {joint.name} is not one of a planar mechanism")
+                raise self._refuse(f"joint {joint.name} is not one of a planar mechanism")
         self.frame = plane_axes(self.normal) / goal.twin.length
         self.middle = np.mean([self._centre(joint) for joint in self.joints], axis=0)
         self.places = {link: i for i, link in enumerate(self.mechanism.links)}
@@ -76,15 +76,15 @@ class _Reading:
         self.more = False
         """Whether the loops that are left out ask more than their own unknowns can meet."""
 
-    def _refused(self, reason: str) -> NotConfined:
+    def _refuse(self, reason: str) -> NotConfined:
         return NotConfined(self.mechanism.name, reason)
 
-    def _moved(self, link: str) -> Array:
+    def _displacement(self, link: str) -> Array:
         """How a link is displaced at the goal since zero (4, 4)."""
         return self.goal.pose(link) @ self.mechanism.links[link].inverse
 
     def _centre(self, joint: Joint) -> Array:
-        return transform(self._moved(joint.predecessor), joint.point)
+        return transform(self._displacement(joint.predecessor), joint.point)
 
     def _flat(self, point: Array) -> complex:
         """A point (m) in the plane (sizes)."""
@@ -97,7 +97,7 @@ class _Reading:
         shifts, loops = self._loops(turns, moves)
         told = [each for body in self.bodies for each in shifts[body]]
         told += [] if self.point is not None else [(-1, turns[body]) for body in self.bodies]
-        more = [*({(-1, turns[a]): 1 + 0j, (-1, turns[b]): -1 + 0j} for a, b in self._held(besides)),
+        more = [*({(-1, turns[a]): 1 + 0j, (-1, turns[b]): -1 + 0j} for a, b in self._held_pairs(besides)),
                 *({(moves[each.joint][0], turns[self.mechanism.base]): 1 + 0j} for each in besides
                   if isinstance(each, Encoder) and moves.get(each.joint, (-1, 0.0))[0] >= 0)]
         needed = _unknowns([*told, *(each for loop in more for each in loop)])
@@ -138,37 +138,38 @@ class _Reading:
         geared = [joint for _, _, *both in self._gears() for joint in both if not joint.type.slides]
         for name, ratio, one, other in self._gears():
             if one.type.slides is not other.type.slides:
-                raise self._refused(f"coupling {name} is of a turn and a slide")
+                raise self._refuse(f"coupling {name} is of a turn and a slide")
             if not one.type.slides:
                 q = Fraction(ratio).limit_denominator(LARGEST_GEAR)
                 if abs(float(q) - ratio) > SAME_GEOMETRY or abs(q) > LARGEST_GEAR:
-                    raise self._refused(f"coupling {name}: {ratio:g} is not a quotient of whole numbers up to "
-                                        f"{LARGEST_GEAR}")
+                    raise self._refuse(f"coupling {name}: {ratio:g} is not a quotient of whole numbers up to "
+                                       f"{LARGEST_GEAR}")
                 row = Counter[str]()
                 for joint, factor in ((one, -q.numerator), (other, q.denominator)):
                     sense = factor * (1 if self.axes[joint.name] @ self.normal > 0 else -1)
                     row.update({joint.successor: sense})
                     row.update({joint.predecessor: -sense})
                 rows.append(self._row(row))
-        rows += [self._row({one: 1, other: -1}) for one, other in self._held(self.seen, [j.name for j in geared])]
+        rows += [self._row({one: 1, other: -1}) for one, other in self._held_pairs(self.seen, [j.name for j in geared])]
         if len(graphs.spanning_forest(self.mechanism.links, list({j.name: j for j in geared}.values()),
                                       [0.0] * len(geared))) < len({joint.name for joint in geared}):
-            raise self._refused("its gears form a cycle")
+            raise self._refuse("its gears form a cycle")
         tied = whole_kernel(rows)
         assert tied is not None
-        equal = [*(joint.links for joint in self.joints if joint.type.slides), *self._held(self.seen)]
+        equal = [*(joint.links for joint in self.joints if joint.type.slides), *self._held_pairs(self.seen)]
         places = [[each[i] for each in tied] for i in range(len(self.places))]
         rest = whole_kernel([[a - b for a, b in zip(*(places[self.places[link]] for link in links), strict=True)]
                              for links in equal] or [[0] * len(tied)], whole=True)
         if rest is None:
-            raise self._refused("its gears have several positions for what is measured")
+            raise self._refuse("its gears have several positions for what is measured")
         return {link: tuple(sum(a * b for a, b in zip(places[i], each, strict=True)) for each in rest)
                 for link, i in self.places.items()}
 
     def _row(self, entries: dict[str, int]) -> list[int]:
         return [entries.get(link, 0) for link in self.places]
 
-    def _held(self, seen: Sequence[Observation], joints: Sequence[str] | None = None) -> Iterator[tuple[str, str]]:
+    def _held_pairs(self, seen: Sequence[Observation], joints: Sequence[str] | None = None
+                    ) -> Iterator[tuple[str, str]]:
         """Pairs of links that do not turn against each other, of ``joints`` alone where these are given."""
         for each in seen:
             if isinstance(each, Direction):
@@ -176,7 +177,7 @@ class _Reading:
                 if joints is None and float(np.linalg.norm(cross(direction, self.normal))) > SAME_DIRECTION:
                     yield each.link, each.seen_from or self.reference
             elif not isinstance(each, Encoder) or each.joint not in self.mechanism.joints:
-                raise self._refused(f"{each.kind} {each.leg} is neither a direction nor a joint's coordinate")
+                raise self._refuse(f"{each.kind} {each.leg} is neither a direction nor a joint's coordinate")
             elif not self.mechanism.joints[each.joint].type.slides and (joints is None or each.joint in joints):
                 yield self.mechanism.joints[each.joint].links
 
@@ -194,7 +195,7 @@ class _Reading:
             if one.type.slides:
                 (a, f), (b, g) = roots[one.name], roots[other.name]  # g b = ratio f a
                 if a == b:
-                    raise self._refused(f"coupling {name} ties what is tied")
+                    raise self._refuse(f"coupling {name} ties what is tied")
                 for each, (root, factor) in list(roots.items()):
                     if root == b:
                         roots[each] = a, factor * ratio * f / g

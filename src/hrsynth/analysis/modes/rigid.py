@@ -69,7 +69,7 @@ class Planar(System):
         c, s = math.cos(q[2]), math.sin(q[2])
         return np.asarray(self.X_plane @ np.array([[c, -s, 0, q[0]], [s, c, 0, q[1]], [0, 0, 1, 0], [0, 0, 0, 1]]))
 
-    def reached(self, q: Array) -> Array:
+    def tips_at(self, q: Array) -> Array:
         """Where the tips are at a pose, each in the plane of its own curve; shape (legs, 3), metres."""
         X, n = self.pose(q), self.X_plane[:3, 2]
         found = []
@@ -203,7 +203,7 @@ class Spatial(System):
         """The platform's frame in the base frame; shape (4, 4)."""
         return pose(q[:3], exponential(q[3:]))
 
-    def reached(self, q: Array) -> Array:
+    def tips_at(self, q: Array) -> Array:
         """Where the tips are at a pose; shape (legs, 3), metres."""
         X = self.pose(q)
         at = self.tips @ X[:3, :3].T

@@ -275,7 +275,7 @@ class Enclosing(ABC):
 
         resolved, far, undecided = _nearer(solutions, self.distance, farthest)
         with ctx.workprec(PRECISION):
-            real = tuple(self._enclosed([v.real for v in values], m) for values, m in resolved if is_real(values))
+            real = tuple(self._enclose([v.real for v in values], m) for values, m in resolved if is_real(values))
             real += tuple(self._middle(values) for values, _ in resolved if _almost_real(values))
         count, values = sum(m for _, m in resolved), tuple(values for values, _ in resolved)
         near = set(map(id, values))
@@ -285,7 +285,7 @@ class Enclosing(ABC):
                      closest=_closest(values), method=self.method, far=far, undecided=undecided, values=values,
                      distant=distant)
 
-    def _enclosed(self, start: Sequence[Any], multiplicity: int) -> Root:
+    def _enclose(self, start: Sequence[Any], multiplicity: int) -> Root:
         """The box of a real solution: for the exact input where that can be proved, else for the rounded one."""
         for each in (self.thick, self.equations):
             box = krawczyk(each, start)

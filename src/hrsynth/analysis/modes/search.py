@@ -78,7 +78,7 @@ def search(goal: ClosedConfiguration, question: Measurement, bodies: Sequence[st
         number, starts = starts, starts + 1
         tell("starts")
         far = np.pi if number % 2 else rng.uniform(0.0, np.pi)
-        start = twin.moved(twin.q0, rng.uniform(-far, far, twin.nv))
+        start = twin.integrate(twin.q0, rng.uniform(-far, far, twin.nv))
         try:
             q, residual = solve(twin, start, held, tolerance=SOLVED, iterations=SEARCH_ITERATIONS)
         except NotMeasured:  # on the way a point came to a camera's centre

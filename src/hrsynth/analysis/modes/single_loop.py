@@ -56,13 +56,13 @@ class SingleLoop(CarriedPlatform):
         """How many of the joints carry the platform."""
         return self.before
 
-    def closed(self, q: Array) -> tuple[ClosedConfiguration, float]:
+    def close(self, q: Array) -> tuple[ClosedConfiguration, float]:
         """The robot closed from there on with what is measured held, and what is left of that."""
         twin, step = self.goal.twin, np.zeros(self.goal.twin.nv)
         for (place, sense), value in zip(self.places, q, strict=True):
             step[place] = sense * float(value)  # slides are in characteristic lengths there too
         held = Held.at(twin, self.goal.q, self.question.reference, self.question.observations)
-        found, residual = close(twin, twin.moved(self.goal.q, step), held, tolerance=SOLVED)
+        found, residual = close(twin, twin.integrate(self.goal.q, step), held, tolerance=SOLVED)
         return ClosedConfiguration.of(twin, found), residual
 
     def axes(self) -> list[Any]:
@@ -254,7 +254,7 @@ def solve_loop(measured: MeasuredRobot, goal: ClosedConfiguration, error: float 
     loop, (body,) = single_loop(measured, goal, error), leg_ends(measured.setting.anatomy)
     with ctx.workprec(PRECISION):
         found = _five(loop) if len(loop.freedoms_) == LARGEST_CHAIN else _few(loop)
-    return Model(loop, lambda q: {body: loop.placed(q)}, loop.home, closing=lambda q: loop.closed(q)[0]), found
+    return Model(loop, lambda q: {body: loop.pose(q)}, loop.home, closing=lambda q: loop.close(q)[0]), found
 
 
 def _box(loop: SingleLoop, halves: Sequence[tuple[Any, Any]]) -> PoseBox | None:
@@ -331,6 +331,6 @@ def _mode(loop: SingleLoop, box: PoseBox, goal: bool) -> SystemMode:
     if goal:
         return as_mode(loop, box, True, 0.0)
     mode = as_mode(loop, box, False, np.inf)
-    at, residual = loop.closed(mode.q)
-    inside = pose_difference(at.pose(loop.body), loop.placed(mode.q), loop.size) <= mode.radius
+    at, residual = loop.close(mode.q)
+    inside = pose_difference(at.pose(loop.body), loop.pose(mode.q), loop.size) <= mode.radius
     return as_mode(loop, box, False, residual) if inside else mode

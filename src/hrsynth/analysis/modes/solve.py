@@ -260,7 +260,7 @@ def _judge(system: System, square: Part, roots: Roots, others: Iterable[tuple[Pa
 
 def _by_construction(system: System, goal: Array, legs: tuple[int, ...]) -> SystemMode:
     """The goal as a mode whose place no solution proves."""
-    return SystemMode((), np.inf, np.inf, np.pi, system.residual(system.reached(goal)), frozen(system.pose(goal)),
+    return SystemMode((), np.inf, np.inf, np.pi, system.residual(system.tips_at(goal)), frozen(system.pose(goal)),
                       frozen(goal), legs)
 
 
@@ -274,7 +274,7 @@ def _goal(system: System, roots: Roots, found: Sequence[SystemMode], goal: Array
 
 def _same(system: System, q: Array, goal: Array) -> bool:
     """Whether a pose is the goal, but for what poses of one relation may differ."""
-    return float(np.abs(system.reached(q) - system.reached(goal)).max()) <= SAME_RELATION * system.size
+    return float(np.abs(system.tips_at(q) - system.tips_at(goal)).max()) <= SAME_RELATION * system.size
 
 
 def _bound(system: System, part: PoseSystem, most: Bound | None, roots: Roots) -> tuple[str, str]:
@@ -305,7 +305,7 @@ def _near(system: System, found: Sequence[SystemMode], modes: Sequence[SystemMod
 def _mode(system: System, square: Part, root: Root) -> SystemMode:
     parameters = tuple(float(each.mid()) for each in root.parameters)
     q = square.place(parameters)
-    at = system.reached(q)
+    at = system.tips_at(q)
     if isinstance(square, SquareSystem):
         own = parameters
         apart = system.apart(q, at, square.legs, _points(square, root))
@@ -328,7 +328,7 @@ def _torn(system: System, square: Part, root: Root) -> bool:
     equations are that they are not."""
     return (isinstance(square, SquareSystem) and system.rigid and _sure(system, root)
             and any(isinstance(system.curves[k], Point) for k in square.legs)
-            and torn(system, system.known(square.legs, _points(square, root))))
+            and torn(system, system.known_tips(square.legs, _points(square, root))))
 
 
 def _sure(system: System, root: Root) -> bool:

@@ -70,9 +70,9 @@ class System(Value):
     @property
     def missing(self) -> int:
         """Freedoms that too few legs leave: the dimension of the continuum, 0 where there are legs enough."""
-        return self.left(range(len(self.curves)))
+        return self.freedoms_left(range(len(self.curves)))
 
-    def left(self, legs: Sequence[int]) -> int:
+    def freedoms_left(self, legs: Sequence[int]) -> int:
         """Freedoms that some legs leave."""
         return max(0, self.freedoms - sum(self.forbids[k] for k in legs))
 
@@ -102,9 +102,9 @@ class System(Value):
         """How far the tips of some legs can be from those at q (m), which are ``at`` (legs, 3), with the point on each
         leg's curve and how far the exact one is from it (m); a tip at rest has no such point."""
         error = self.error + TIP_ROUNDING * self.size
-        return {k: miss + length(point - at[k]) + error for k, (point, miss) in self.known(legs, points).items()}
+        return {k: miss + length(point - at[k]) + error for k, (point, miss) in self.known_tips(legs, points).items()}
 
-    def known(self, legs: Sequence[int], points: Sequence[tuple[Array, float]]) -> dict[int, tuple[Array, float]]:
+    def known_tips(self, legs: Sequence[int], points: Sequence[tuple[Array, float]]) -> dict[int, tuple[Array, float]]:
         """The ``points`` of those of some legs that are not at rest, in their order, and the places of those that
         are."""
         resting = [k for k in legs if isinstance(self.curves[k], Point)]
@@ -118,7 +118,7 @@ class System(Value):
 
     def misses(self, q: Array) -> Array:
         """What separates each tip from what it can reach at a pose; shape (legs, 3), metres."""
-        return self.off(self.reached(q))
+        return self.off(self.tips_at(q))
 
     def off(self, at: Array) -> Array:
         """What separates tips ``at`` (legs, 3) from what they can reach; shape (legs, 3), metres."""
@@ -138,7 +138,7 @@ class System(Value):
         """The coordinates (d,) of a platform whose origin is at a point (3,)."""
         return origin
 
-    def reached(self, q: Array) -> Array:
+    def tips_at(self, q: Array) -> Array:
         """Where the tips are at a pose; shape (legs, 3), metres."""
         raise NotImplementedError
 

@@ -268,7 +268,7 @@ def _slide(anatomy: LegDecomposition, pattern: ConstraintPattern, goal: ClosedCo
     second = _opposite(first, at)
     kernel, _ = goal.kernel()
     step = kernel @ np.linalg.svd(moving @ kernel)[2][0]
-    nearby, _ = solve(goal.twin, goal.twin.moved(goal.q, MOVES[-1] * step), tolerance=SOLVED)
+    nearby, _ = solve(goal.twin, goal.twin.integrate(goal.q, MOVES[-1] * step), tolerance=SOLVED)
     there, _ = _apart(pattern, goal, nearby)
     circle = min((first, second), key=lambda circle: float(np.linalg.norm(circle.miss(there))))
     return circle, f"no parallelogram joins {one} and {other}"
@@ -296,7 +296,7 @@ def _held_paths(own: Sequence[Observation], reference: str, leg: LockedLeg, goal
         directions = np.vstack([directions, mixed / np.linalg.norm(mixed, axis=1, keepdims=True)])
     for direction in directions:
         for size in MOVES:
-            q, residual = solve(twin, twin.moved(start.q, size * direction), held, tolerance=SOLVED)
+            q, residual = solve(twin, twin.integrate(start.q, size * direction), held, tolerance=SOLVED)
             X = twin.pose(q, leg.body)
             if residual <= CLOSED:
                 found.append(transform(X, place))

@@ -46,7 +46,7 @@ class Translating(Shifting):
 
     freedoms = 3
 
-    def reached(self, q: Array) -> Array:
+    def tips_at(self, q: Array) -> Array:
         """Where the tips are at a pose; shape (legs, 3), metres."""
         return np.asarray(q + self.tips)
 
@@ -160,12 +160,12 @@ class Articulated(Shifting):
     def _radius(self) -> float:
         return self.slide.radius if isinstance(self.slide, Circle) else 0.0
 
-    def left(self, legs: Sequence[int]) -> int:
+    def freedoms_left(self, legs: Sequence[int]) -> int:
         """Freedoms that some legs leave: of each body's three, and one at least where a body has no leg."""
         sides = [sum(self.forbids[k] for k in legs if self.bodies[k] == body) for body in (0, 1)]
         return max(4 - sum(min(3, side) for side in sides), *(int(side == 0) for side in sides), 0)
 
-    def reached(self, q: Array) -> Array:
+    def tips_at(self, q: Array) -> Array:
         """Where the tips are at a pose; shape (legs, 3), metres."""
         origins = np.array([q[:3], q[:3] + self.slide.at(float(q[3]))])
         return np.asarray(origins[list(self.bodies)] + self.tips)

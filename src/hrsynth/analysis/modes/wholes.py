@@ -48,12 +48,12 @@ def wholes(system: System, number: int = 0) -> Iterator[PoseSystem]:
     chart = system.chart(number)
     for size in range(1, len(system.curves) + 1):
         for legs in combinations(range(len(system.curves)), size):
-            if sum(system.forbids[k] for k in legs) == system.freedoms and not system.left(legs):
+            if sum(system.forbids[k] for k in legs) == system.freedoms and not system.freedoms_left(legs):
                 yield PoseSystem(legs, chart, size == len(system.curves))
     for size in range(1, len(system.curves) + 1):
         for legs in combinations(sorted(range(len(system.curves)), key=lambda k: -system.forbids[k]), size):
             given = [system.forbids[k] for k in legs]
-            if sum(given) > system.freedoms > sum(given[:-1]) and not system.left(legs):
+            if sum(given) > system.freedoms > sum(given[:-1]) and not system.freedoms_left(legs):
                 yield PoseSystem(legs, chart, False)
 
 

@@ -91,7 +91,7 @@ def agreement(start: ClosedConfiguration, question: Measurement, pattern: Constr
             ranks, _ = quick.spectrum(chunk, spectrum, seed + number)
             apart = _weakest(pattern.values_at(chunk[:: CHUNK // SPOTS]), question, condition)[1]
         matrices = condition.rows(here)
-        spectra, values = np.linalg.svd(matrices, compute_uv=False), condition.expressed(here)
+        spectra, values = np.linalg.svd(matrices, compute_uv=False), condition.evaluate(here)
         rows, others = spectra[:, -1].astype(float), spectra[:, :-1].prod(axis=1)
         angle = max(angle, apart)
         smallest = min(smallest, float(ranks.min()))
@@ -260,7 +260,7 @@ def _crossings(walk: Sequence[ClosedConfiguration], signs: Sequence[float], patt
             return step_from(one, fraction * step)
 
         def value(fraction: float, there: Callable[[float], ClosedConfiguration] = there) -> float:
-            return float(condition.expressed(pattern.values_at([there(fraction)]))[0])
+            return float(condition.evaluate(pattern.values_at([there(fraction)]))[0])
 
         if value(0.0) * value(1.0) >= 0:
             yield None
@@ -268,7 +268,7 @@ def _crossings(walk: Sequence[ClosedConfiguration], signs: Sequence[float], patt
         root = there(float(brentq(value, 0.0, 1.0, xtol=1e-15, rtol=1e-14)))
         if root.residual <= CLOSED:
             found = _sharpen(ClosedConfiguration.of(twin, root.q), step, pattern, condition)
-            yield found if abs(float(condition.expressed(pattern.values_at([found]))[0])) <= FOLLOWED else None
+            yield found if abs(float(condition.evaluate(pattern.values_at([found]))[0])) <= FOLLOWED else None
 
 
 def _sharpen(at: ClosedConfiguration, step: Array, pattern: ConstraintPattern, condition: Condition
@@ -279,13 +279,13 @@ def _sharpen(at: ClosedConfiguration, step: Array, pattern: ConstraintPattern, c
     motion /= np.linalg.norm(motion)
 
     def value(size: float) -> float:
-        q = at.twin.moved(at.q, size * motion)
-        return float(condition.expressed(pattern.values_at([ClosedConfiguration(at.twin, q, at.residual)]))[0])
+        q = at.twin.integrate(at.q, size * motion)
+        return float(condition.evaluate(pattern.values_at([ClosedConfiguration(at.twin, q, at.residual)]))[0])
 
     here, slope = value(0.0), (value(NUDGE) - value(-NUDGE)) / (2 * NUDGE)
     if slope == 0.0 or abs(here / slope) > NUDGE:
         return at
-    return ClosedConfiguration.of(at.twin, at.twin.moved(at.q, -here / slope * motion))
+    return ClosedConfiguration.of(at.twin, at.twin.integrate(at.q, -here / slope * motion))
 
 
 def _descents(low: Sequence[tuple[float, ClosedConfiguration]], question: Measurement, pattern: ConstraintPattern,

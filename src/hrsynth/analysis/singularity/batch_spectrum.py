@@ -54,14 +54,14 @@ class Quick:
         values[:, : found.singular_values.shape[1]] = found.singular_values
         here = np.flatnonzero(same)
         for i in np.random.default_rng(seed).choice(here, min(SPOTS, len(here)), replace=False):
-            self._checked(configurations[int(i)], values[i])
+            self._check(configurations[int(i)], values[i])
         smallest, largest = values[:, -1].copy(), values[:, 0].copy()
         if not same.all():
             elsewhere = [configurations[int(i)] for i in np.flatnonzero(~same)]
             smallest[~same], largest[~same] = others(elsewhere, self.question)
         return smallest, largest
 
-    def _checked(self, at: ClosedConfiguration, values: Array) -> None:
+    def _check(self, at: ClosedConfiguration, values: Array) -> None:
         theirs = relation(at, self.question)
         M = interaction_matrix(theirs)
         if M is None or theirs.dof.value != len(values):

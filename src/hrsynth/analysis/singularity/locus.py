@@ -89,7 +89,7 @@ def locus(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None 
     hidden = _controllable(setting)
     real = None
     if any(joint.actuated for joint in setting.mechanism.joints.values()):
-        driven = MeasuredRobot.driven(setting)
+        driven = MeasuredRobot.of_motors(setting)
         real = driven if driven.rank == setting.dof else None
     return _locus(hidden, real, None if plane is None else as_pose(plane), steps)
 
@@ -102,7 +102,7 @@ def require_plane(setting: ObservedRobot, plane: Pose | str | None) -> None:
 
 def _controllable(setting: ObservedRobot) -> MeasuredRobot:
     """The hidden robot; raises ``BadRequest`` where it has no locus."""
-    hidden = MeasuredRobot.watched(setting)
+    hidden = MeasuredRobot.of_directions(setting)
     if hidden.verdict.rank < setting.dof:
         raise BadRequest(f"{setting.robot.name} has no locus: a freedom is lost at every pose", None,
                          "legs that make it controllable")
@@ -133,7 +133,7 @@ def _locus(hidden: MeasuredRobot, real: MeasuredRobot | None, plane: Pose | None
         places, here = [i for i, _ in reached], [at for _, at in reached]
         quick = Quick.of(placer, measured.question)
         smallest, largest = (spectrum(here, measured.question) if quick is None else quick.spectrum(here, spectrum))
-        value = condition.expressed(measured.pattern.values_at(here))
+        value = condition.evaluate(measured.pattern.values_at(here))
         tables = []
         for column in (value, smallest, 1 / np.where(largest > 0, largest, np.nan)):
             table = np.full(len(configurations), np.nan)

@@ -65,5 +65,5 @@ def rates_of_twists(found: Relation) -> tuple[Array, Array]:
 
 def step_from(here: ClosedConfiguration, step: Array) -> ClosedConfiguration:
     """Where a step (nv,) leads, closed as sharply as it can be; that it is closed its residual tells."""
-    q, residual = solve(here.twin, here.twin.moved(here.q, step), tolerance=SHARP)
+    q, residual = solve(here.twin, here.twin.integrate(here.q, step), tolerance=SHARP)
     return ClosedConfiguration(here.twin, q, residual)

@@ -113,7 +113,7 @@ def singular(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = No
     <Singularity: rrrrr_m1, watching 1, 2: the tangents τ1, τ2 are parallel>
     """
     setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed)
-    measured = MeasuredRobot.driven(setting) if real else MeasuredRobot.watched(setting)
+    measured = MeasuredRobot.of_motors(setting) if real else MeasuredRobot.of_directions(setting)
     question, verdict = measured.question, measured.verdict
     if not verdict.dof:
         raise BadRequest(f"{setting.robot.name}: the platform has no freedom to lose", setting.mechanism.platform,
@@ -144,7 +144,7 @@ def neighbours(at: ClosedConfiguration, question: Measurement, distance: float) 
     motion = platform_motions(at, question)
     found = []
     for column in (*motion.T, *-motion.T):
-        q, residual = solve(at.twin, at.twin.moved(at.q, column * distance / at.twin.length), tolerance=SOLVED)
+        q, residual = solve(at.twin, at.twin.integrate(at.q, column * distance / at.twin.length), tolerance=SOLVED)
         if residual <= 10 * SOLVED:
             found.append(ClosedConfiguration.of(at.twin, q))
     return found

@@ -85,7 +85,7 @@ def compare_robot(robot: PublishedRobot, studies: Sequence[tuple[str, Studied]],
     if counts["theirs"] is not None and counts["stated"] is not None and counts["theirs"] != counts["stated"]:
         kind = FEWER if counts["stated"] < counts["theirs"] else FURTHER
         found.append(TableDisagreement(robot.name, robot.group, where, kind, str(counts["theirs"]),
-                                       str(counts["stated"]), judge.counted(moving, kind)))
+                                       str(counts["stated"]), judge.reason_of_count(moving, kind)))
     return {
         "robot": robot.name, "group": robot.group, "at": where, "moves": moving.moves,
         "motion": "{}T{}R".format(*moving.motion) if moving.motion else None, "finite": moving.finite,
@@ -161,7 +161,7 @@ class _Judge:
             return NUMBERS
         return MODULAR if not ranks[0].orbit else SYMMETRIC
 
-    def counted(self, study: Studied, kind: str) -> str:
+    def reason_of_count(self, study: Studied, kind: str) -> str:
         """By what a number of working choices is settled."""
         settled = {self.loss(study, ((joint,),) * self.robot.legs, kind) for joint in self.robot.tried}
         return next(each for each in (NUMBERS, SYMMETRIC, MODULAR) if each in settled)

@@ -90,13 +90,13 @@ class _Instance(PrimeField):
     def by_legs(self, robot: PublishedRobot, letters: str) -> tuple[int, int]:
         """Translations and rotations that the legs leave one by one."""
         parts, axes = factors(robot, letters), axes_of(robot)
-        shared = self._shared(parts)
+        shared = self._shared_turns(parts)
         target = self._target(robot, axes, 0)
         if target is None:
             raise NotExact("the stated motion turns about more than one axis")
         turns: list[list[list[int]]] = []
         for leg in range(robot.legs):
-            joints, _ = self._oriented(parts, leg, shared, target)
+            joints, _ = self._orient(parts, leg, shared, target)
             columns = self._columns(parts, leg, shared, joints)
             lengths = {name: self.random.randrange(1, self.p) for name in dimensions(parts) if name not in shared}
             slides = {j: self.random.randrange(1, self.p) for j in range(len(robot.chain.joints))}
@@ -107,26 +107,26 @@ class _Instance(PrimeField):
         rows = self._loops(turns, 3)
         return 3, len(rows[0]) - self.rank(rows) - sum(len(each) - self.rank(each) for each in turns)
 
-    def _shared(self, parts: Sequence[LegFactor]) -> dict[str, Turn]:
+    def _shared_turns(self, parts: Sequence[LegFactor]) -> dict[str, Turn]:
         """Random turns of the dimensions that are angles."""
         return {name: self.any_turn() for name in dimensions(parts)
                 if any(part.dimension == name and part.kind < TX for part in parts)}
 
     def _ranks(self, robot: PublishedRobot, parts: Sequence[LegFactor], axes: Any, asked: Sequence[Held],
                orbit: int) -> ModularRanks:
-        shared = self._shared(parts)
+        shared = self._shared_turns(parts)
         target = self._target(robot, axes, orbit)
         legs, turned = [], list[dict[int, Turn]]()
         for leg in range(robot.legs):
             if orbit and leg >= orbit:
                 joints, end = turned[leg - orbit], target
             else:
-                joints, end = self._oriented(parts, leg, shared, target)
+                joints, end = self._orient(parts, leg, shared, target)
             target = target or end
             turned.append(joints)
             legs.append(self._columns(parts, leg, shared, joints))
         names = [name for name in dimensions(parts) if name not in shared]
-        lengths, slides, p = self._placed(parts, legs, names, robot.legs, orbit)
+        lengths, slides, p = self._place(parts, legs, names, robot.legs, orbit)
         screws = [self._screws(parts, leg, legs[leg], lengths, slides[leg], p) for leg in range(robot.legs)]
         idle = sum(len(each) - self.rank(each) for each in screws)
         dof, translations, stated = self._freedoms(screws, axes, idle)
@@ -170,8 +170,8 @@ class _Instance(PrimeField):
             found[-1] = self.times(found[-1], R)  # type: ignore[arg-type]
         return found
 
-    def _oriented(self, parts: Sequence[LegFactor], leg: int, shared: dict[str, Turn], target: Matrix | None
-                  ) -> tuple[dict[int, Turn], Matrix]:
+    def _orient(self, parts: Sequence[LegFactor], leg: int, shared: dict[str, Turn], target: Matrix | None
+                ) -> tuple[dict[int, Turn], Matrix]:
         """Turns of a leg's joints with which it has the platform's orientation (any where there is none yet)."""
         whole = self._turns(parts, leg, shared)
         numbers: list[int] = whole[1::2]  # type: ignore[assignment]
@@ -179,7 +179,7 @@ class _Instance(PrimeField):
         for _ in range(AUDIT_DRAWS):
             joints = {j: self.any_turn() for j in numbers}
             if target is not None:
-                chosen = self._chosen(numbers, between)
+                chosen = self._choose(numbers, between)
                 blocks = [between[0]]
                 for j, after in zip(numbers, between[1:], strict=True):
                     if j in chosen:
@@ -187,7 +187,7 @@ class _Instance(PrimeField):
                     else:
                         blocks[-1] = self.times(self.times(blocks[-1], self.matrix(RZ, joints[j])), after)
                 try:
-                    joints.update(zip(chosen, self._solved(blocks, target), strict=True))
+                    joints.update(zip(chosen, self._solve(blocks, target), strict=True))
                 except NotExact:
                     continue
             R = between[0]
@@ -197,7 +197,7 @@ class _Instance(PrimeField):
                 return joints, R
         raise NotExact("no turns with which a leg has the orientation")
 
-    def _chosen(self, numbers: list[int], between: list[Matrix]) -> list[int]:
+    def _choose(self, numbers: list[int], between: list[Matrix]) -> list[int]:
         """Up to three joints that close the orientation: at random, of different runs of parallel axes if there are."""
         runs: list[list[int]] = []
         for k, j in enumerate(numbers):
@@ -209,7 +209,7 @@ class _Instance(PrimeField):
         rest = [j for j in numbers if j not in chosen]
         return sorted([*chosen, *self.random.sample(rest, min(3 - len(chosen), len(rest)))])
 
-    def _solved(self, blocks: list[Matrix], target: Matrix) -> list[Turn]:
+    def _solve(self, blocks: list[Matrix], target: Matrix) -> list[Turn]:
         """Turns θ of A Rz(θ₁) [M Rz(θ₂) [N Rz(θ₃)]] B = C."""
         A, B = blocks[0], blocks[-1]
         D = self.times(self.times(self.transposed(A), target), self.transposed(B))
@@ -240,8 +240,8 @@ class _Instance(PrimeField):
                 R = self.times(R, self.matrix(part.kind, turn))
         return found
 
-    def _placed(self, parts: Sequence[LegFactor], legs: list[list[Any]], names: list[str], n: int, orbit: int
-                ) -> tuple[dict[str, int], list[dict[int, int]], list[int]]:
+    def _place(self, parts: Sequence[LegFactor], legs: list[list[Any]], names: list[str], n: int, orbit: int
+               ) -> tuple[dict[str, int], list[dict[int, int]], list[int]]:
         """Lengths, slides and position that close all legs: a random solution of linear equations."""
         from flint import nmod_mat
 

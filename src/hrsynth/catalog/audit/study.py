@@ -42,7 +42,7 @@ class StudyCase:
     robot: PublishedRobot
     letters: str
 
-    def tried(self, trial: int) -> str:
+    def letters_of(self, trial: int) -> str:
         """The letters of a trial: those stated, or all in turn."""
         free = len(self.robot.chain.angles)
         if self.letters or not free:
@@ -116,7 +116,7 @@ def _batch(cases: Sequence[StudyCase], random: np.random.Generator) -> list[Stud
                 if each is None or (each.finite is not None and trial < AUDIT_TRIALS // 2)]
         if not todo:
             break
-        letters = [cases[i].tried(trial) for i in todo]
+        letters = [cases[i].letters_of(trial) for i in todo]
         for i, each, other in zip(todo, *_trial([cases[i].robot for i in todo], letters, random, related),
                                   strict=True):
             if each is not None and (found[i] is None or each.finite is None):

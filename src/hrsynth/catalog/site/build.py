@@ -74,7 +74,7 @@ def site(catalog: Catalog, target: str | Path, *, workers: int = 1, anew: bool =
 
 
 def _make_pages(team: Executor, folder: Path, wanted: Sequence[Structure]) -> Iterator[Made]:
-    packed = [each.packed() for each in wanted]
+    packed = [each.pack() for each in wanted]
     try:
         yield from team(partial(write_pages, str(folder)),
                         (packed[i : i + CHUNK] for i in range(0, len(packed), CHUNK)))

@@ -41,7 +41,7 @@ def write_pages(folder: str, parts: Iterable[str]) -> Made:
     derivation differs from the record (empty: it does not). Raises ``Stopped`` where the disk takes no more."""
     found: Made = []
     for part in parts:
-        structure = Structure.unpacked(part)
+        structure = Structure.unpack(part)
         studied = study(structure.fact)
         try:
             _write(Path(folder), structure, studied)
@@ -72,10 +72,10 @@ def _write(folder: Path, structure: Structure, studied: Study) -> None:
 def _portrait(robot: Mechanism, studied: Study) -> Portrait:
     """The robot in space, its watched links and the plane in which it moves marked where they are known."""
     if studied.derivation is None:
-        return Portrait.drawn(robot, [robot.platform], (), None)
+        return Portrait.draw(robot, [robot.platform], (), None)
     setting = studied.derivation.setting
-    return Portrait.drawn(robot, [link for link in setting.anatomy.platform if link in robot.links] or [robot.platform],
-                          _known_links(studied.observed, robot) or (), plane_normal(setting.motion))
+    return Portrait.draw(robot, [link for link in setting.anatomy.platform if link in robot.links] or [robot.platform],
+                         _known_links(studied.observed, robot) or (), plane_normal(setting.motion))
 
 
 def page(structure: Structure, studied: Study, robots: dict[str, Mechanism], drawn: Portrait | None) -> str:

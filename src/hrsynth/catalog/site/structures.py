@@ -43,13 +43,13 @@ class Structure:
         """The record of what all its architectures have in common."""
         return self.records[0]
 
-    def packed(self) -> str:
+    def pack(self) -> str:
         """As text that can be sent to another process."""
         return json.dumps({"word": self.word, "kin": self.kin, "records": [line(each) for each in self.records]})
 
     @classmethod
-    def unpacked(cls, text: str) -> Structure:
-        """What ``packed`` wrote."""
+    def unpack(cls, text: str) -> Structure:
+        """What ``pack`` wrote."""
         found: dict[str, Any] = json.loads(text)
         return cls(found["word"], tuple(json.loads(each) for each in found["records"]),
                    tuple((word, verdict) for word, verdict in found["kin"]))

@@ -90,7 +90,7 @@ def platform(graph: JointGraph, base: str) -> str:
         raise BadRequest(f"{graph.file}: no link moves relative to the base", base, "a joint that is not fixed")
     body, why, rivals = bodies.platform()
     if body is None:
-        names = bodies.offered(rivals)
+        names = bodies.platform_candidates(rivals)
         chain = "".join(f"; {note.text}" for note in graph.notes if note.kind == "open")
         raise BadRequest(f"{graph.file}: the file does not say which link is the platform, and several could be{chain}",
                          None, "--platform LINK, such as " + ", ".join(names[:12]) + (" …" if names[12:] else ""))
@@ -103,7 +103,7 @@ def platforms(graph: JointGraph, base: str) -> tuple[list[str], str]:
     """The link that is guessed and why, or the links among which nothing decides, and no reason."""
     bodies = _RigidBodies(graph, base)
     body, why, rivals = bodies.platform()
-    return bodies.offered(rivals) if body is None else [bodies.title(body)], why
+    return bodies.platform_candidates(rivals) if body is None else [bodies.title(body)], why
 
 
 class _RigidBodies:
@@ -146,7 +146,7 @@ class _RigidBodies:
         ends = [body for body in others if distance[body] == max(distance.values())]
         return (ends[0], "the farthest from the base", ()) if len(ends) == 1 else (None, "", ends)
 
-    def offered(self, rivals: Sequence[str]) -> list[str]:
+    def platform_candidates(self, rivals: Sequence[str]) -> list[str]:
         """The links that may be the platform where nothing decides: open ends and what ends in a loop beside the
         ``rivals``; those first whose names are those of feet and tools."""
         import networkx as nx

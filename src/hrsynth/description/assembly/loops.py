@@ -182,7 +182,7 @@ class LoopAssembly:
             return at.size <= SOLVED or stalled or not self.size or self._spent > LOOP_EFFORT
 
         def propose(values: Values, at: Residual, factor: float) -> Values:
-            return self.step(values, self._damped(at, factor))
+            return self.step(values, self._damped_step(at, factor))
 
         values, left = descend(values, self.system, propose, DAMPING, iterations, content)
         return self._polish(values, left) if SOLVED < left.size < self.noise else (values, left.size)
@@ -200,7 +200,7 @@ class LoopAssembly:
                 return values, at.size
         return start
 
-    def _damped(self, at: Residual, factor: float) -> Array:
+    def _damped_step(self, at: Residual, factor: float) -> Array:
         """The damped step, no longer than ``LOOP_STRIDE``; near the solution the plain one without faint directions."""
         U, s, Vt = singular_decomposition(at.J)
         if at.size < self.noise and factor <= 1.0:

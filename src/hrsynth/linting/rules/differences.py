@@ -22,7 +22,7 @@ def _match(file: LintedFile) -> RobotMatch | None:
     one, other = file.mechanism, None if file.other is None else file.other.mechanism
     if one is None or other is None:
         return None
-    return file.remembered("match", lambda: RobotMatch(_normal(one), _normal(other)))
+    return file.remember("match", lambda: RobotMatch(_normal(one), _normal(other)))
 
 
 def _normal(robot: Mechanism) -> Mechanism:
@@ -33,7 +33,7 @@ def _normal(robot: Mechanism) -> Mechanism:
 
 
 def _fits(file: LintedFile, match: RobotMatch) -> dict[str, LinkFit]:
-    return file.remembered("fits", lambda: {link: fit for link in match.one.links if (fit := match.fit(link))})
+    return file.remember("fits", lambda: {link: fit for link in match.one.links if (fit := match.fit(link))})
 
 
 def _pairs(file: LintedFile) -> Iterator[tuple[Joint, Joint]]:

@@ -33,7 +33,7 @@ LEAST_BETWEEN = 3
 
 def as_written(file: LintedFile) -> tuple[JointGraph, LoopAssembly] | None:
     """The loops of a file before anything is solved, merged or made exact; nothing may change them."""
-    return file.remembered("as written", lambda: _as_written(file))
+    return file.remember("as written", lambda: _as_written(file))
 
 
 def _as_written(file: LintedFile) -> tuple[JointGraph, LoopAssembly] | None:
@@ -187,7 +187,7 @@ def _reverse(axis: xml.Element) -> None:
 def nearby(file: LintedFile) -> NearbyFreedoms | None:
     """The freedoms of the file's mechanism, where it has loops and was read."""
     robot = file.mechanism
-    return None if robot is None else file.remembered("freedoms", lambda: NearbyFreedoms(robot))
+    return None if robot is None else file.remember("freedoms", lambda: NearbyFreedoms(robot))
 
 
 def _dead(file: LintedFile) -> Iterator[Spot]:

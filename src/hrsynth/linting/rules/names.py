@@ -79,7 +79,7 @@ def removal(file: LintedFile, element: xml.Element | None) -> Mend | None:
     """A mend that takes an element out; None where another one names it, and would then name nothing."""
     if element is None:
         return None
-    name, everywhere = element.get("name"), file.remembered("words", lambda: Counter(_words(file.root)))
+    name, everywhere = element.get("name"), file.remember("words", lambda: Counter(_words(file.root)))
     if name is not None and everywhere[name] > sum(word == name for word in _words(element)):
         return None
     return partial(_remove, element)

@@ -56,7 +56,7 @@ class SpaceCircle(CameraObservation):
     found_by = frozenset({"m", "rad"})
 
     @staticmethod
-    def measured(p: Array, d: Array, r: Array) -> Array:
+    def measurement(p: Array, d: Array, r: Array) -> Array:
         return np.concatenate([p, d], axis=-1)
 
     @staticmethod
@@ -68,10 +68,10 @@ class SpaceCircle(CameraObservation):
         return np.inf if self.camera is None else self.ahead(X_reference, X_link)
 
     @staticmethod
-    def fed(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
+    def error_jets(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
         return [a - b for a, b in zip([*p, *d], wanted.tolist(), strict=True)]
 
-    def sensed(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
+    def sense(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
         """The centre beside its place, the normal in a cone."""
         return np.concatenate([value[:3] + noise.get("m", 0.0) * shocks[0],
                                tilt_vector(value[3:], shocks[1], noise.get("rad", 0.0))])
@@ -82,7 +82,7 @@ class SpaceCircle(CameraObservation):
         return Drawn((np.array([0 * p, p]), ring(p, d, size / 2), np.array([p, p + size / 2 * d])))
 
     @staticmethod
-    def shown(p: Array, d: Array, r: float, size: float) -> tuple[Array, ...]:
+    def polylines(p: Array, d: Array, r: float, size: float) -> tuple[Array, ...]:
         return (ring(p, d, size / 2),)
 
     def wrenches(self, at: Sighting) -> list[Numbers]:

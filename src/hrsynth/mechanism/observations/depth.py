@@ -29,7 +29,7 @@ class PointDepth(MetricPoint):
     along_z = True
 
     @staticmethod
-    def measured(p: Array, d: Array, r: Array) -> Array:
+    def measurement(p: Array, d: Array, r: Array) -> Array:
         return p[..., 2:]
 
     @staticmethod
@@ -40,7 +40,7 @@ class PointDepth(MetricPoint):
         return np.inf if self.camera is None else self.ahead(X_reference, X_link)
 
     @staticmethod
-    def fed(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
+    def error_jets(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
         return [p[2] - float(wanted[0])]
 
     @staticmethod
@@ -50,7 +50,7 @@ class PointDepth(MetricPoint):
         return Drawn((np.array([0 * p, foot, p]),))
 
     @staticmethod
-    def shown(p: Array, d: Array, r: float, size: float) -> tuple[Array, ...]:
+    def polylines(p: Array, d: Array, r: float, size: float) -> tuple[Array, ...]:
         return ()
 
     def wrenches(self, at: Sighting) -> list[Numbers]:

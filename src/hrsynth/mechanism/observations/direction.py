@@ -69,7 +69,7 @@ class SeenAxis(Observation):
         """−[u*]ₓ."""
         return -hat(wanted)
 
-    def sensed(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
+    def sense(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
         """In a cone about u."""
         return tilt_vector(value, shocks[0], noise["rad"])
 

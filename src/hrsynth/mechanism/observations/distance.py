@@ -30,7 +30,7 @@ class PointDistance(MetricPoint):
     spot = False
 
     @staticmethod
-    def measured(p: Array, d: Array, r: Array) -> Array:
+    def measurement(p: Array, d: Array, r: Array) -> Array:
         return np.linalg.norm(p, axis=-1, keepdims=True)
 
     @staticmethod
@@ -38,7 +38,7 @@ class PointDistance(MetricPoint):
         return normalise_rates(p)[0][..., None, :], None
 
     @staticmethod
-    def fed(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
+    def error_jets(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
         return [components.dot(p, p).sqrt() - float(wanted[0])]
 
     @staticmethod
@@ -49,7 +49,7 @@ class PointDistance(MetricPoint):
         return Drawn((np.array([0 * p, p]), *(np.array(sorted(arc, key=tuple)) for arc in near if len(arc) > 1)))
 
     @staticmethod
-    def shown(p: Array, d: Array, r: float, size: float) -> tuple[Array, ...]:
+    def polylines(p: Array, d: Array, r: float, size: float) -> tuple[Array, ...]:
         return ()
 
     def wrenches(self, at: Sighting) -> list[Numbers]:

@@ -58,7 +58,7 @@ class CylinderEdge(SeenLine):
     signed = True
 
     @staticmethod
-    def measured(p: Array, d: Array, r: Array) -> Array:
+    def measurement(p: Array, d: Array, r: Array) -> Array:
         return tangent(p, d, r)
 
     @staticmethod
@@ -69,18 +69,18 @@ class CylinderEdge(SeenLine):
         return tangent(at.B - at.C, at.d, np.array([self.radius]))
 
     @staticmethod
-    def met(p: Array, d: Array, r: Array) -> Array:
+    def meet_plane(p: Array, d: Array, r: Array) -> Array:
         return p - r * tangent(p, d, r)
 
     @staticmethod
-    def supposed(p: Array, d: Array, r: Array, g: Array) -> tuple[Array, Array]:
+    def suppose_plane(p: Array, d: Array, r: Array, g: Array) -> tuple[Array, Array]:
         """The axis of the cylinder that is touched where the plane of the edge meets that of g."""
         n = tangent(p, d, r)
         foot = on_plane(n, g)
         return foot + r * n, normalise_rates(cross(foot, n))[0]
 
     @staticmethod
-    def fed(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
+    def error_jets(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
         return line_fed(touching(p, d, r), wanted)
 
     def chain(self, at: Sighting) -> tuple[VirtualJoint, ...]:

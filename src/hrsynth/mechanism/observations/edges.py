@@ -35,7 +35,7 @@ class CylinderEdges(CameraObservation):
     spot = False
 
     @staticmethod
-    def measured(p: Array, d: Array, r: Array) -> Array:
+    def measurement(p: Array, d: Array, r: Array) -> Array:
         return np.concatenate([tangent(p, d, r), tangent(p, d, -r)], axis=-1)
 
     @staticmethod
@@ -44,7 +44,7 @@ class CylinderEdges(CameraObservation):
         return np.concatenate([one[0], other[0]], axis=-2), np.concatenate([one[1], other[1]], axis=-2)
 
     @staticmethod
-    def fed(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
+    def error_jets(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
         return [*line_fed(touching(p, d, r), wanted[:3]), *line_fed(touching(p, d, r * -1.0), wanted[3:])]
 
     def error(self, value: Array, wanted: Array) -> Array:
@@ -56,7 +56,7 @@ class CylinderEdges(CameraObservation):
         slope[..., :2, :3], slope[..., 2:, 3:] = line_slope(value[..., :3]), line_slope(value[..., 3:])
         return slope
 
-    def sensed(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
+    def sense(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
         """Each edge through two image points beside it."""
         by = self.pixels(noise)
         return np.concatenate([shifted_line(n, shock, by) for n, shock in zip((value[:3], value[3:]), shocks,
@@ -69,7 +69,7 @@ class CylinderEdges(CameraObservation):
         return Drawn(both[0].lines + both[1].lines, both[0].areas + both[1].areas)
 
     @staticmethod
-    def shown(p: Array, d: Array, r: float, size: float) -> tuple[Array, ...]:
+    def polylines(p: Array, d: Array, r: float, size: float) -> tuple[Array, ...]:
         return CylinderEdges.outline(p, d, r, size).lines
 
     def wrenches(self, at: Sighting) -> list[Numbers]:

@@ -69,10 +69,10 @@ class AngleEncoder(Encoder):
         """The difference without whole turns: at half a turn the angle is π as well as −π."""
         return np.array([wrap_angle(float(value[0] - wanted[0]))])
 
-    def sensed(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
+    def sense(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
         return value + noise["rad"] * shocks[0, :1]
 
-    def drawn(self, X_reference: Array, X_link: Array, size: float) -> Drawn:
+    def draw(self, X_reference: Array, X_link: Array, size: float) -> Drawn:
         """An arc about the axis, at the link's frame, from where its mark was at zero to where it is."""
         turn, R = float(self.value(X_reference, X_link)[0]), X_reference[:3, :3]
         spoke = unit(self.start - (self.axis @ self.start) * self.axis)
@@ -109,10 +109,10 @@ class SlideEncoder(Encoder):
         arm = transform(X_link, self.point) - X_reference[:3, 3]
         return np.array([self.axis @ (X_reference[:3, :3].T @ arm - self.start)])
 
-    def sensed(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
+    def sense(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
         return value + noise["m"] * shocks[0, :1]
 
-    def drawn(self, X_reference: Array, X_link: Array, size: float) -> Drawn:
+    def draw(self, X_reference: Array, X_link: Array, size: float) -> Drawn:
         """The way since zero."""
         return Drawn((np.array([transform(X_reference, self.start), transform(X_link, self.point)]),))
 

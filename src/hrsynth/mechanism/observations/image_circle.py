@@ -66,7 +66,7 @@ class ImageCircle(CameraObservation):
     found_by = frozenset({"px"})
 
     @staticmethod
-    def measured(p: Array, d: Array, r: Array) -> Array:
+    def measurement(p: Array, d: Array, r: Array) -> Array:
         entries = _entries_of(cone(p, d, r))
         return np.asarray(entries / np.linalg.norm(entries, axis=-1, keepdims=True))
 
@@ -90,7 +90,7 @@ class ImageCircle(CameraObservation):
         return rates(d, p, _both(d, d)), rates(p, d, _both(d, d))
 
     @staticmethod
-    def fed(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
+    def error_jets(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
         h, rest = components.dot(p, d), components.dot(p, p) - r * r
         Q = [[rest * d[i] * d[k] - h * (p[i] * d[k] + p[k] * d[i]) + (h * h if i == k else 0.0) for k in range(3)]
              for i in range(3)]
@@ -109,7 +109,7 @@ class ImageCircle(CameraObservation):
         reach = abs(self.radius or 0.0) * np.sqrt(max(0.0, 1 - float(at.z @ at.d) ** 2))
         return self.ahead(X_reference, X_link) - float(reach / np.linalg.norm(at.B - at.C))
 
-    def sensed(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
+    def sense(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
         """Through five image points beside the ellipse."""
         entries = _entries_of(shifted_ellipse(_matrix(value), shocks, self.pixels(noise)))
         return np.asarray(entries / np.linalg.norm(entries))
@@ -121,7 +121,7 @@ class ImageCircle(CameraObservation):
         return Drawn((around, *(np.array([0 * p, each]) for each in around[:-1:RING // 8])))
 
     @staticmethod
-    def shown(p: Array, d: Array, r: float, size: float) -> tuple[Array, ...]:
+    def polylines(p: Array, d: Array, r: float, size: float) -> tuple[Array, ...]:
         return (ring(p, d, r),)
 
     def wrenches(self, at: Sighting) -> list[Numbers]:

@@ -28,7 +28,7 @@ class ImageLine(SeenLine):
     fed_back = "ρ − ρ*, θ − θ*; x cos θ + y sin θ = ρ"
 
     @staticmethod
-    def measured(p: Array, d: Array, r: Array) -> Array:
+    def measurement(p: Array, d: Array, r: Array) -> Array:
         return normalise_rates(cross(p, d))[0]
 
     @staticmethod
@@ -40,18 +40,18 @@ class ImageLine(SeenLine):
         return cross(at.B - at.C, at.d)
 
     @staticmethod
-    def met(p: Array, d: Array, r: Array) -> Array:
+    def meet_plane(p: Array, d: Array, r: Array) -> Array:
         return p
 
     @staticmethod
-    def supposed(p: Array, d: Array, r: Array, g: Array) -> tuple[Array, Array]:
+    def suppose_plane(p: Array, d: Array, r: Array, g: Array) -> tuple[Array, Array]:
         """Where the plane of C and the line meets that of g."""
         n = normalise_rates(cross(p, d))[0]
         foot = on_plane(n, g)
         return foot, normalise_rates(cross(n, foot))[0]
 
     @staticmethod
-    def fed(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
+    def error_jets(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
         return line_fed(components.cross(p, d), wanted)
 
     def chain(self, at: Sighting) -> tuple[VirtualJoint, ...]:

@@ -26,7 +26,7 @@ class Inclination(SeenAxis):
     def key(self) -> tuple[str, ...]:
         return (self.leg, str(self.seen_from), self.kind)
 
-    def drawn(self, X_reference: Array, X_link: Array, size: float) -> Drawn:
+    def draw(self, X_reference: Array, X_link: Array, size: float) -> Drawn:
         """The vertical, from the frame of the link with the IMU."""
         start = X_reference[:3, 3]
         return Drawn((np.array([start, start + size * X_link[:3, :3] @ self.direction]),))

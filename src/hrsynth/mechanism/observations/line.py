@@ -59,7 +59,7 @@ class SpaceLine(CameraObservation):
     found_by = frozenset({"m", "rad"})
 
     @staticmethod
-    def measured(p: Array, d: Array, r: Array) -> Array:
+    def measurement(p: Array, d: Array, r: Array) -> Array:
         return np.concatenate([d, cross(p, d)], axis=-1)
 
     @staticmethod
@@ -68,10 +68,10 @@ class SpaceLine(CameraObservation):
         return np.concatenate([0 * one, -hat(d)], axis=-2), np.concatenate([one, hat(p)], axis=-2)
 
     @staticmethod
-    def fed(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
+    def error_jets(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
         return [a - b for a, b in zip([*d, *components.cross(p, d)], wanted.tolist(), strict=True)]
 
-    def sensed(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
+    def sense(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
         """Its point nearest to C beside its place, its direction in a cone."""
         d, h = value[:3], value[3:]
         turned = tilt_vector(d, shocks[1], noise.get("rad", 0.0))
@@ -83,7 +83,7 @@ class SpaceLine(CameraObservation):
         return Drawn((stretch(p, d, size), np.array([0 * p, p - (p @ d) * d])))
 
     @staticmethod
-    def shown(p: Array, d: Array, r: float, size: float) -> tuple[Array, ...]:
+    def polylines(p: Array, d: Array, r: float, size: float) -> tuple[Array, ...]:
         return (stretch(p, d, size),)
 
     def wrenches(self, at: Sighting) -> list[Numbers]:

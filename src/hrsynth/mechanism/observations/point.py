@@ -40,7 +40,7 @@ class ImagePoint(CameraObservation):
     found_by = frozenset({"px", "rad"})
 
     @staticmethod
-    def measured(p: Array, d: Array, r: Array) -> Array:
+    def measurement(p: Array, d: Array, r: Array) -> Array:
         return normalise_rates(p)[0]
 
     @staticmethod
@@ -53,12 +53,12 @@ class ImagePoint(CameraObservation):
         return depth_plane(p[..., 2:])
 
     @staticmethod
-    def supposed(p: Array, d: Array, r: Array, g: Array) -> tuple[Array, Array]:
+    def suppose_plane(p: Array, d: Array, r: Array, g: Array) -> tuple[Array, Array]:
         """Where the ray meets the plane."""
         return p / dot(g, p)[..., None], d
 
     @staticmethod
-    def fed(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
+    def error_jets(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
         x, y = point_image(wanted).tolist()
         return [p[0] / p[2] - x, p[1] / p[2] - y]
 
@@ -71,7 +71,7 @@ class ImagePoint(CameraObservation):
     def in_front(self, X_reference: Array, X_link: Array) -> float:
         return self.ahead(X_reference, X_link)
 
-    def sensed(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
+    def sense(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
         """The image point beside its place, or the ray in a cone."""
         if "px" in noise:
             return shifted_point(value, shocks[0], self.pixels(noise))

@@ -28,7 +28,7 @@ class PointPosition(MetricPoint):
     rank = 3
 
     @staticmethod
-    def measured(p: Array, d: Array, r: Array) -> Array:
+    def measurement(p: Array, d: Array, r: Array) -> Array:
         return p
 
     @staticmethod
@@ -39,7 +39,7 @@ class PointPosition(MetricPoint):
         return np.inf if self.camera is None else self.ahead(X_reference, X_link)
 
     @staticmethod
-    def fed(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
+    def error_jets(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
         return [a - b for a, b in zip(p, wanted.tolist(), strict=True)]
 
     @staticmethod

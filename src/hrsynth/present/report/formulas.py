@@ -26,10 +26,10 @@ def _printer() -> Any:
 
     class Printer(MathMLPresentationPrinter):
         def _print_dot(self, expression: Any) -> Any:
-            return self._joined(expression, "·")
+            return self._join(expression, "·")
 
         def _print_cross(self, expression: Any) -> Any:
-            return self._joined(expression, "×")
+            return self._join(expression, "×")
 
         def _print_Transpose(self, expression: Any) -> Any:
             base, mark = self._print(expression.arg), self.dom.createElement("mi")
@@ -40,7 +40,7 @@ def _printer() -> Any:
                 found.appendChild(part)
             return found
 
-        def _joined(self, expression: Any, sign: str) -> Any:
+        def _join(self, expression: Any, sign: str) -> Any:
             row = self.dom.createElement("mrow")
             for number, each in enumerate(expression.args):
                 if number:

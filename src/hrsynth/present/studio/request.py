@@ -199,9 +199,9 @@ class Request(Value):
             return posed
         if other is not None and not isinstance(other, dict):
             raise BadRequest(f"{field}: hidden", other, "what an answer has there, or null")
-        return mover.joined(at)
+        return mover.with_hidden(at)
 
-    def told(self, posed: Posed) -> dict[str, Any]:
+    def describe_here(self, posed: Posed) -> dict[str, Any]:
         """The field ``here`` of an answer."""
         hidden = None if posed.hidden is None else {"legs": list(self.setting.labels), "q": posed.hidden.tolist()}
         return {"q": posed.real.q.tolist(), "hidden": hidden}

@@ -226,7 +226,7 @@ def make_server(opening: Opening, port: int, forks: ForkServer
             super().connection_lost(exc)
 
     folder = tempfile.TemporaryDirectory(prefix="hrsynth-", ignore_cleanup_errors=True)
-    tabs = Tabs(forks, opening.written(Path(folder.name)), Path(folder.name))
+    tabs = Tabs(forks, opening.write(Path(folder.name)), Path(folder.name))
     guard = Guard(application(tabs), port)
     config = uvicorn.Config(
         guard, http=PatientProtocol, ws=WebSocketsSansIOProtocol, lifespan="off", loop="asyncio", log_config=None,

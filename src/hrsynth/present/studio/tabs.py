@@ -39,7 +39,7 @@ class Opening:
     first: dict[str, Any] = field(default_factory=dict)
     panels: bool = True
 
-    def written(self, folder: Path) -> Opening:
+    def write(self, folder: Path) -> Opening:
         """The same with the mechanism as a file in a folder, for processes that read it."""
         if self.mechanism is None:
             return self
@@ -82,11 +82,11 @@ class BrowserTab:
             message = await self.socket.receive()
             if message["type"] != "websocket.receive":
                 return
-            refused = self._routed(message.get("text"))
+            refused = self._route(message.get("text"))
             if refused is not None:
                 await self.socket.send_text(refused)
 
-    def _routed(self, text: str | None) -> str | None:
+    def _route(self, text: str | None) -> str | None:
         """Put an ask where it is answered, or cancel one; what is said where that cannot be."""
         try:
             asked = json.loads(text or "", parse_constant=_no_number)

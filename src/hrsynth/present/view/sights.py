@@ -81,7 +81,7 @@ def shown_sights(setting: ObservedRobot, at: ClosedConfiguration) -> tuple[Shown
         if isinstance(seen, CameraObservation):
             name = seen.camera.name if seen.camera else setting.mechanism.reference
             eye = next(i for i, each in enumerate(every) if each.name == name)
-        found.append(ShownSight(seen.leg, seen.drawn(*poses, REACH * length), eye,
+        found.append(ShownSight(seen.leg, seen.draw(*poses, REACH * length), eye,
                                 tuple(seen.image(*poses, REACH * length))))
     return *found, *(ShownSight(eye.name, _case(at.pose(eye.link) @ eye.pose, half_picture(eye), CASE * length))
                      for eye in every)

@@ -122,25 +122,25 @@ class Mover(Value):
             places[HIDDEN] = displacements(self.hidden.mechanism, lambda link: self.hidden.pose(q, link))
         return places
 
-    def shown(self, at: Posed) -> ViewState:
+    def with_error(self, at: Posed) -> ViewState:
         """The same with the error there."""
         return replace(self.state(at), error=error(self.setting, at.real))
 
-    def sent(self, here: Posed, values: Array) -> tuple[Posed, Array]:
+    def send(self, here: Posed, values: Array) -> tuple[Posed, Array]:
         """Where the robot comes to from ``here`` when the platform is sent to coordinates (n,), and those there."""
         aim = Coordinates(self.setting.motion, self.coordinates.places, values)
         there, _ = track(here.real, self.setting.motion, aim)
-        followed = self.followed(here, [there])
+        followed = self.follow_hidden(here, [there])
         found = followed[-1] if followed else here
         return found, values + aim.apart(found.real.pose(self.setting.motion.link))
 
-    def drawn_to(self, here: Posed, X: Array) -> Posed:
+    def draw_to(self, here: Posed, X: Array) -> Posed:
         """Where the robot comes to from ``here`` when its platform is drawn to the pose X (4, 4): as near as it goes,
         lengths in characteristic lengths, turns in radians."""
         motion = self.setting.motion
         whole = Goal(motion.link, motion.point, motion.home[:3, :3], np.eye(3), motion.position(X), motion.normal,
                      rotation=X[:3, :3] if motion.body and motion.rotations.shape[1] else None)
-        followed = self.followed(here, [approach(here.real, whole, APPROACH)])
+        followed = self.follow_hidden(here, [approach(here.real, whole, APPROACH)])
         return followed[-1] if followed else here
 
     def read(self, posed: Posed) -> Array:
@@ -153,16 +153,16 @@ class Mover(Value):
         assert self.hidden is not None
         return Posed(at, q) if np.linalg.norm(self._misses(at, q)) <= FOLLOWED else None
 
-    def joined(self, at: ClosedConfiguration) -> Posed:
+    def with_hidden(self, at: ClosedConfiguration) -> Posed:
         """The real robot with the hidden one beside it, which comes there from its zero configuration; without it where
         it does not arrive."""
-        found = self.followed(self.home, [at])
+        found = self.follow_hidden(self.home, [at])
         if not found:
             goal = Coordinates(self.setting.motion, self.coordinates.places, self.coordinates.read(
                 at.pose(self.setting.motion.link)))
             halfway = goal.towards(self.home.real.pose(self.setting.motion.link), 0.5)
             way = [track(self.home.real, self.setting.motion, each)[0] for each in (halfway, goal)]
-            found = self.followed(self.home, [*way, at])
+            found = self.follow_hidden(self.home, [*way, at])
         return found[-1] if found and found[-1].real is at else Posed(at)
 
     @cached_property
@@ -189,14 +189,14 @@ class Mover(Value):
         span = TURN if turns else WAY * home.real.twin.length
         ways = self.coordinates.along(home.real, index, (span, span), STEPS)
         start = next(i for i, (_, at) in enumerate(ways) if at is home.real)
-        down = self.followed(home, [at for _, at in reversed(ways[:start])])
-        up = self.followed(home, [at for _, at in ways[start + 1 :]])
+        down = self.follow_hidden(home, [at for _, at in reversed(ways[:start])])
+        up = self.follow_hidden(home, [at for _, at in ways[start + 1 :]])
         posed = [*reversed(down), home, *up]
         values = [value for value, _ in ways[start - len(down) : start + len(up) + 1]]
         return Slider(self.coordinates.names[index], "rad" if turns else "m", tuple(values),
-                      tuple(map(self.shown, posed)), len(down))
+                      tuple(map(self.with_error, posed)), len(down))
 
-    def followed(self, start: Posed, way: Iterable[ClosedConfiguration]) -> list[Posed]:
+    def follow_hidden(self, start: Posed, way: Iterable[ClosedConfiguration]) -> list[Posed]:
         """The way with the hidden robot beside the real one, as far as it can follow."""
         found: list[Posed] = []
         q = start.hidden

@@ -147,7 +147,7 @@ def view(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, 
     tell("modes")
     found, notes = mode_outlines(setting)
     shapes, missing = meshes(setting)
-    home = mover.shown(mover.home)
+    home = mover.with_error(mover.home)
     states = (home, *(state for slider in sliders for state in slider.states))
     machines = [machine_of(REAL, setting, setting.mechanism, str(setting.anatomy.architecture()),
                            [state.places[REAL] for state in states], shapes)]

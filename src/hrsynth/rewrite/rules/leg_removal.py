@@ -28,7 +28,7 @@ def find(state: State, evidence: Evidence, leg: str) -> Iterator[Match[str] | Re
     if state.watched & set(own.links) or state.actuators & set(own.joints):
         yield Refusal("the leg carries what is observed or sees")
         return
-    observed = state.observed()
+    observed = state.observed_labels()
     ends = dict.fromkeys(each.attach for each in state.real.legs if each.label in observed)
     bodies = dict.fromkeys((*ends, *sorted(state.watched)))
     yield Match(leg, "platform and observed legs move as before without it",

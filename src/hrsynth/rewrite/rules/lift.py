@@ -63,7 +63,7 @@ def _segment(state: State, evidence: Evidence, seen: Observation, index: int, ta
     """The chain of a direction, its anchor A where the leg's joint K is."""
     assert isinstance(seen, SeenAxis)
     links, reference = state.mechanism.links, state.mechanism.reference
-    link = evidence.carried(seen.link)
+    link = evidence.carrier(seen.link)
     proximal, before = evidence.proximal(link), evidence.joints_before(link)
     anchor = proximal.anchor if proximal else before[0].point if before else links[link].pose[:3, 3]
     at = seen.sighting(links[reference].pose, links[seen.link].pose, evidence.far(index))

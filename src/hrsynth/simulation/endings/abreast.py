@@ -134,7 +134,7 @@ class Abreast:
         def rate(y: Array, runs: slice | Places = slice(None)) -> tuple[Array, Flags]:
             """ẏ at one or several coordinates of each run's chart, (m n, d)."""
             X, *rest = (np.tile(each[runs], (len(y) // len(each[runs]), *[1] * (each.ndim - 1))) for each in chart)
-            there = flow.at(flow.moved(X, y), *rest)
+            there = flow.at(flow.move(X, y), *rest)
             return flow.rate(y, there.moves), there.reached
 
         # any slopes give order 2: those of a run are kept for some steps while the law changes evenly
@@ -154,7 +154,7 @@ class Abreast:
         f1, met = rate(h * k1 / 2)
         k2 = solved(f1 - k1) + k1
         y = h * k2
-        Y = flow.moved(X, y)
+        Y = flow.move(X, y)
         slid = np.flatnonzero(active.any(axis=1))
         if len(slid):
             Y[slid] = self._on_wall(Y[slid], flipped[slid], active[slid])
@@ -172,7 +172,8 @@ class Abreast:
         self.X[done], self.times[done] = Y[good], self.times[done] + self.steps[done]
         self.steps[live] = np.minimum(self.steps[live] * factor, LONGEST_STEP)
         here = _merge(here, there, good)
-        changed = self._stretched(live, here, met) | self._released(live, here, good) | self._weakened(live, here, good)
+        changed = self._cross_stretched(live, here, met)
+        changed = changed | self._release(live, here, good) | self._weaken(live, here, good)
         uneven = changed | (here.weakest < FLOW_WEAK * DAMPED) | (~good & (self.old[live] > 0))
         self.old[live] = np.where(uneven, FLOW_KEPT, self.old[live] + good)
         if changed.any():
@@ -180,7 +181,7 @@ class Abreast:
             self.stopped[live[changed & ~here.reached]] = LOST
         return here
 
-    def _stretched(self, live: Places, here: Commanded, met: Flags) -> Flags:
+    def _cross_stretched(self, live: Places, here: Commanded, met: Flags) -> Flags:
         """Change the working mode, or what holds the platform, of runs that come no farther; which they are."""
         flow = self.flow
         margins = np.where(self.active[live], np.inf, here.margins)
@@ -191,7 +192,7 @@ class Abreast:
         lost = stuck & (least > FLOW_STRETCHED)
         through = np.flatnonzero((stuck & seen & ~lost) | (short & turning & (least < FLOW_TURNED)))
         if len(through):
-            came = self._crossed(live[through], leg[through], least[through], here.velocity[through])
+            came = self._cross(live[through], leg[through], least[through], here.velocity[through])
             lost[through] = stuck[through] & ~came
             through = through[came]
         walled = np.flatnonzero(stuck & ~seen & ~lost)
@@ -205,7 +206,7 @@ class Abreast:
         changed[walled] = changed[through] = True
         return changed
 
-    def _crossed(self, runs: Places, leg: Places, margin: Array, velocity: Array) -> Flags:
+    def _cross(self, runs: Places, leg: Places, margin: Array, velocity: Array) -> Flags:
         """Give runs the other working mode of a leg, and move them on to where it is stretched as little again: √margin
         goes through zero at a steady pace. Runs that are on their way from there keep their mode, and are moved on to
         twice the margin, from where a step is felt. Which of them move at all."""
@@ -217,7 +218,7 @@ class Abreast:
         self.flipped[runs[through], leg[through]] ^= True
         after = np.where((flow.points[leg] | ~through)[:, None], velocity, self._at(runs).moves)
         time = np.where(through, -2 * time, time)
-        self.X[runs] = flow.moved(self.X[runs], time[:, None] * (velocity + after) / np.where(through, 1, 2)[:, None])
+        self.X[runs] = flow.move(self.X[runs], time[:, None] * (velocity + after) / np.where(through, 1, 2)[:, None])
         self.steps[runs] = np.where(flow.points[leg], self.steps[runs], 2 * FLOW_SHORTEST_STEP)
         stretched = np.arange(len(flow.legs)) == leg[:, None]
         short = np.any(stretched & (flow.margins(self.X[runs], self.flipped[runs]) <= 0), axis=1) & ~flow.points[leg]
@@ -225,7 +226,7 @@ class Abreast:
         self.X[runs] = self._on_wall(self.X[runs], self.flipped[runs], stretched, least[:, None])
         return came
 
-    def _weakened(self, live: Places, here: Commanded, good: Flags) -> Flags:
+    def _weaken(self, live: Places, here: Commanded, good: Flags) -> Flags:
         """Take S anew where it counts; which runs these are."""
         near = good & (here.weakest < FLOW_WEAK * DAMPED) & (self.stopped[live] == "")
         self.weak[live[near & (here.weakest < DAMPED)]] = True
@@ -238,7 +239,7 @@ class Abreast:
             self.roots[runs[closed]], self.taken[runs] = found[closed], self.X[runs]
         return near
 
-    def _released(self, live: Places, here: Commanded, good: Flags) -> Flags:
+    def _release(self, live: Places, here: Commanded, good: Flags) -> Flags:
         """Let go of legs that no longer hold the platform; which runs they are of."""
         free = self.active[live] & ~here.held & good[:, None]
         some = free.any(axis=1)
@@ -251,7 +252,7 @@ class Abreast:
         for _ in range(2):
             miss = np.where(active, margin - self.flow.margins(X, flipped), 0.0)
             N = np.where(active[:, :, None], self.flow.slopes(X, flipped), 0.0)
-            X = self.flow.moved(X, times(np.linalg.pinv(N, rcond=1e-6), miss))
+            X = self.flow.move(X, times(np.linalg.pinv(N, rcond=1e-6), miss))
         return X
 
     def _arrive(self, live: Places, here: Commanded) -> None:
@@ -264,12 +265,12 @@ class Abreast:
         if not len(some):
             return
         runs, X, speed = live[some], self.X[live[some]], np.linalg.norm(here.velocity[some], axis=1)
-        self.X[runs] = self.flow.moved(X, here.velocity[some])
+        self.X[runs] = self.flow.move(X, here.velocity[some])
         there = self._at(runs)
         slow = ~(np.linalg.norm(there.velocity, axis=1) <= FLOW_CONTRACTED * speed)
         for _ in range(POLISHED - 1):
             slow |= ~np.all(there.margins > FLOW_CLEAR, axis=1)
-            self.X[runs] = self.flow.moved(self.X[runs], there.moves)
+            self.X[runs] = self.flow.move(self.X[runs], there.moves)
             there = self._at(runs)
         back = (slow | ~(there.size <= SERVED)) & (here.size[some] > FLOW_SERVED)
         self.X[runs[back]] = X[back]

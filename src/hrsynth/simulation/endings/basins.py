@@ -265,7 +265,7 @@ class BasinSearch:
         """The outcomes of starts X (n, 4, 4) that the batch follows, all abreast."""
         flow, length = self.flow, self.goal.twin.length
         assert flow is not None
-        starts = np.flatnonzero(possible & flow.batch.reached(X))
+        starts = np.flatnonzero(possible & flow.batch.reaches(X))
         cells, damped = np.full(len(X), NOT_REACHED), np.zeros(len(X), dtype=bool)
         if not len(starts):
             return Found([], cells, damped, X)
@@ -275,19 +275,19 @@ class BasinSearch:
         shares = [starts[k::count] for k in range(count)]
         starts = np.concatenate(shares)
         # a step of few runs takes as long as one of a thousand: the last of all parts go on together
-        first, *others = self._done([partial(_follow_flow, flow.bare(), horizon, RUN_AWAY * length, X[share],
-                                             FLOW_FEW // count) for share in shares])
+        first, *others = self._run_all([partial(_follow_flow, flow.bare(), horizon, RUN_AWAY * length, X[share],
+                                                FLOW_FEW // count) for share in shares])
         checked = np.random.default_rng(seed).choice(len(starts), min(FLOW_CHECKED, len(starts)), replace=False)
-        runs, certified, *alone = self._done([partial(first.together(others).run, horizon),
-                                              partial(certified_radius, self.setting, self.goal),
-                                              *self._single(self._started(X[starts[checked]]))])
+        runs, certified, *alone = self._run_all([partial(first.together(others).run, horizon),
+                                                 partial(certified_radius, self.setting, self.goal),
+                                                 *self._single(self._start(X[starts[checked]]))])
         damped[starts] = runs.weak
         groups = runs.groups(length, flow.seen)
         shown = groups[:FLOW_NAMED]
         away, open_ = (np.flatnonzero(np.isin(runs.stopped, words)) for words in ((AWAY,), (LOST, EFFORT)))
         followed = open_[np.unique(np.linspace(0, len(open_) - 1, FLOW_FOLLOWED).astype(int))] if len(open_) else open_
         at = flow.configurations(runs.X[[group[0] for group in shown]], runs.flipped[[group[0] for group in shown]])
-        told = list(chain(*self._done(self._single(at + self._started(X[starts[[*away[:1], *followed]]])))))
+        told = list(chain(*self._run_all(self._single(at + self._start(X[starts[[*away[:1], *followed]]])))))
         numbers, outcomes = np.full(len(starts), -1), Outcomes(length)
         for group, outcome in zip(shown, told, strict=False):
             numbers[group] = outcomes.number(_at(outcome, runs.X[group[0]], length))
@@ -310,15 +310,15 @@ class BasinSearch:
         at = sweep(everything.start, everything.question, grid, self.setting.motion, self.setting.placer)
         starts = np.array([i for i, each in enumerate(at) if each is not None], dtype=int)
         cells, outcomes = np.full(len(at), NOT_REACHED), Outcomes(self.goal.twin.length)
-        certified, *told = self._done([partial(certified_radius, self.setting, self.goal),
-                                       *self._single([at[i] for i in starts])])
+        certified, *told = self._run_all([partial(certified_radius, self.setting, self.goal),
+                                          *self._single([at[i] for i in starts])])
         for i, outcome in zip(starts, chain(*told), strict=True):
             cells[i] = outcomes.number(outcome)
         reached = np.array([there if each is None else each.pose(self.setting.motion.link)
                             for each, there in zip(at, X, strict=True)])
         return Found(outcomes.all, cells, np.zeros(len(at), dtype=bool), reached, len(starts), certified=certified)
 
-    def _started(self, X: Array) -> list[ClosedConfiguration | None]:
+    def _start(self, X: Array) -> list[ClosedConfiguration | None]:
         """The configurations at starts X (n, 4, 4)."""
         assert self.flow is not None
         return self.flow.configurations(X, np.zeros((len(X), len(self.flow.legs)), dtype=bool))
@@ -327,7 +327,7 @@ class BasinSearch:
         """Pieces of work that give the outcomes of single runs, undecided where there is no start."""
         return [partial(_simulate, self.task, starts[k : k + FLOW_SINGLE]) for k in range(0, len(starts), FLOW_SINGLE)]
 
-    def _done(self, works: Sequence[Callable[[], Any]]) -> list[Any]:
+    def _run_all(self, works: Sequence[Callable[[], Any]]) -> list[Any]:
         """What pieces of work give, in their order."""
         if self.jobs == 1 or len(works) == 1:
             return [work() for work in works]

@@ -56,8 +56,8 @@ class Covers(Value):
         with part("all rests"):
             return cls(system, setting, found, cover(setting, goal, budget=boxes))
 
-    def missed(self, known: Sequence[ClosedConfiguration], q: Array, idle: int, turn: int = 0
-               ) -> list[Critical]:
+    def find_missed(self, known: Sequence[ClosedConfiguration], q: Array, idle: int, turn: int = 0
+                    ) -> list[Critical]:
         """The proved critical points that none of the configurations (with coordinates q (c, N)) is at, as far as the
         robot is closed there, from these and (of each ``turn`` but the first) from coordinates scattered about them."""
         found: list[Critical] = []
@@ -79,7 +79,7 @@ class Covers(Value):
                 found += [Critical(point, 0) for point in sharpen_points(self.system, points, idle)]
         return found
 
-    def signed(self, lists: Sequence[SignedModes], desired: Array) -> list[SignedModes]:
+    def complete_signs(self, lists: Sequence[SignedModes], desired: Array) -> list[SignedModes]:
         """The lists of modes with what boxes prove, and those of all other choices of signs."""
         labels = [each.leg for each in self.question.observations]
         if 2 ** len(labels) > SIGN_CHOICES:
@@ -100,7 +100,7 @@ class Covers(Value):
         told, u = self.every, directions(rest.configuration, self.question)[0]
         return told is not None and told.place(rest.configuration, u) is not None
 
-    def judged(self, rests: Sequence[RestPoint]) -> RestCover | None:
+    def judge(self, rests: Sequence[RestPoint]) -> RestCover | None:
         """Whether the rests are all."""
         if self.every is None:
             return None
@@ -112,7 +112,7 @@ class Covers(Value):
         shorter = SHORTEST_ROD * told.error.length if told.short and told.error is not None else None
         alone = tuple(self._alone(told, each) for k, each in enumerate(told.found) if k not in places)
         return RestCover(told, alone, sum(held), within, shorter,
-                         sum(told.turned(each.configuration) for each in rests), len(held) - sum(held))
+                         sum(told.is_turned(each.configuration) for each in rests), len(held) - sum(held))
 
     def _alone(self, told: Cover, box: CriticalBox) -> BoxedRest:
         """A critical point that is no rest of the list."""

@@ -74,7 +74,7 @@ class Cover(Value):
     def holds(self, at: ClosedConfiguration) -> bool:
         """Whether a configuration's pose was looked at: not where a platform that only translates is turned as at none
         of the ``turns``, as it can be in another assembly."""
-        if self.error is None or self.error.coordinates is None or self.turned(at):
+        if self.error is None or self.error.coordinates is None or self.is_turned(at):
             return False
         (p, R), k = (each[0] for each in self.error.coordinates.of([at])), self.error.shifts.shape[1]
         if any(limb.solve(limb.tip.value(p[None], R[None]), limb.mode)[0] < SHORTEST_ROD**2 for limb in self.short):
@@ -96,7 +96,7 @@ class Cover(Value):
         """Rotations from the goal's at which a platform that only translates was looked at."""
         return (np.eye(3),) if self.struts is None else self.struts.turns
 
-    def turned(self, at: ClosedConfiguration) -> bool:
+    def is_turned(self, at: ClosedConfiguration) -> bool:
         """Whether a platform that only translates is turned otherwise than it was looked at."""
         error = self.error
         if error is None or error.coordinates is None or error.motion.rotations.shape[1]:
@@ -107,7 +107,7 @@ class Cover(Value):
     def place(self, at: ClosedConfiguration, u: Array) -> int | None:
         """Which of the critical points a configuration with observed directions u (legs, 3) is at: far away as near as
         directions tell."""
-        if self.error is None or self.error.coordinates is None or not self.found or self.turned(at):
+        if self.error is None or self.error.coordinates is None or not self.found or self.is_turned(at):
             return None
         p, R = (each[0] for each in self.error.coordinates.of([at]))
         far = max(1.0, float(np.abs(p).max()))
@@ -127,7 +127,7 @@ def cover(setting: ObservedRobot, goal: ClosedConfiguration, *, vanishing: bool 
     except NotEnclosed as why:
         return Cover((), (), 1.0, 0, False, str(why))
     low, high, bounded = bounds(error, reach)
-    charts, endless = [each.looked(bounded) for each in families], families[0].endless
+    charts, endless = [each.list_charts(bounded) for each in families], families[0].endless
     loop = next((each for each in families if isinstance(each, LoopError)), None)
     parts = [[_boxes(each, low, high, reach, vanishing or loop not in (None, each)) for each in some]
              for some in charts]
@@ -179,7 +179,7 @@ def _families(setting: ObservedRobot, goal: ClosedConfiguration, vanishing: bool
         raise NotEnclosed("the platform turns about more than one axis")
     struts = Struts.of(setting, goal, error)
     if struts is not None:
-        return error, [*struts.whole(), *([] if vanishing else struts.locked())], struts
+        return error, [*struts.whole(), *([] if vanishing else struts.locked_errors())], struts
     families: list[JointError] = [JointError.of(error)]
     # in a plane what is at right angles to the desired directions does not fill curves
     if not vanishing and error.size > 2:
@@ -210,7 +210,7 @@ def _corners(error: JointError, boxes: Sequence[tuple[Array, Array]], size: int)
     """The corners of boxes, in coordinates of the pose about the goal; boundless in a chart of fewer."""
     if not boxes:
         return
-    low, high = error.spanned(*map(np.array, zip(*boxes, strict=True)))
+    low, high = error.enclose_chart(*map(np.array, zip(*boxes, strict=True)))
     if error.error.size < size:
         low, high = np.full((len(boxes), size), -np.inf), np.full((len(boxes), size), np.inf)
     yield from zip(low[:, :size], high[:, :size], strict=True)

@@ -152,10 +152,10 @@ def _round(system: LegSystem, old: CriticalPoses, rng: np.random.Generator) -> t
     count = POSE_STARTS
     x = np.concatenate([rng.uniform(low[:k], high[:k], (POSE_THINNED * count, k)),
                         rng.normal(size=(POSE_THINNED * count, n - k))], axis=1)
-    own = system.drawn(system.about_legs(x[: len(x) // 4], FARTHER, rng), rng)[: count // 2]
-    y = np.concatenate([own, system.drawn(x, rng)])[:count]
+    own = system.draw(system.about_legs(x[: len(x) // 4], FARTHER, rng), rng)[: count // 2]
+    y = np.concatenate([own, system.draw(x, rng)])[:count]
     if len(old):
-        near = system.drawn(_beside(system, old, 4 * round(POSE_BESIDE * count), rng), rng)[:round(POSE_BESIDE * count)]
+        near = system.draw(_beside(system, old, 4 * round(POSE_BESIDE * count), rng), rng)[:round(POSE_BESIDE * count)]
         beside, families = _lead_starts(system, near, rng)
         some, more = _lead_starts(system, rng.permutation(y)[: len(y) - len(near)], rng)
         return _join([some, replace(beside, met=0 * beside.met)]), families | more
@@ -173,9 +173,9 @@ def _lead_starts(system: LegSystem, y: Array, rng: np.random.Generator) -> tuple
         y = np.array([each.q for each in kept]).reshape(len(kept), system.size[0])
         falling = np.array([np.sum(each.curvatures < -SAME_ENDING) for each in kept], dtype=np.intp)
         flat = np.array([np.sum(np.abs(each.curvatures) <= SAME_ENDING) for each in kept], dtype=np.intp)
-        found = CriticalPoses(error.length * system.point(y), system.turned(y), system.directions(y), falling,
+        found = CriticalPoses(error.length * system.point(y), system.rotation(y), system.directions(y), falling,
                               np.ones(len(y), dtype=np.intp))
-        reached = system.reached(y)
+        reached = system.is_reached(y)
         across = np.abs(np.einsum("cla,la->cl", found.directions, system.wanted)) < SAME_ENDING
     families: dict[tuple[int, ...], CriticalPoses] = {}
     for k in np.flatnonzero(reached & (flat > 0)):
@@ -220,12 +220,12 @@ class Lift:
         turns = [carrier.direction(self.body, axis) for axis in self.axes] if self.turning else []
         return [carrier.point(self.body, self.point), *turns, *(carrier.direction(*each) for each in self.seen)]
 
-    def told(self, q: Array) -> Array:
+    def values_at(self, q: Array) -> Array:
         """The same at coordinates (c, N), (c, k)."""
         vectors = self.vectors(SweptChains(self.system.system, list(q.T)))
         return np.concatenate([np.broadcast_to(each.value, (len(q), 3)) for each in vectors], axis=1)
 
-    def wanted(self, poses: CriticalPoses) -> Array:
+    def desired_values(self, poses: CriticalPoses) -> Array:
         """What they are to be, (c, k)."""
         turns = [poses.R[:, :, i] for i in range(3)] if self.turning else []
         return np.concatenate([poses.p / self.system.system.length, *turns,
@@ -242,7 +242,7 @@ class Lift:
         return q, done
 
     def _from(self, poses: CriticalPoses, pool: Array, fit: Fit | None) -> tuple[Array, NDArray[np.bool_]]:
-        wanted, told = self.wanted(poses), self.told(pool)
+        wanted, told = self.desired_values(poses), self.values_at(pool)
         found, done = np.zeros((len(poses), pool.shape[1])), np.zeros(len(poses), dtype=bool)
         if not len(poses):
             return found, done
@@ -255,7 +255,7 @@ class Lift:
             start = np.zeros((len(left), pool.shape[1]))
             for group, nearest in near:
                 start[:, group] = pool[nearest[left, k]][:, group]
-            q, good = self._led(start, wanted[left])
+            q, good = self._lead(start, wanted[left])
             if fit is not None and good.any():
                 good[good] = fit(q[good])
             found[left[good]], done[left[good]] = q[good], True
@@ -274,7 +274,7 @@ class Lift:
         return [(sorted(each), pose + [len(pose) + 3 * k + i for k, (way, _) in enumerate(self.seen)
                                        if each & set(way) for i in range(3)]) for each in own if each]
 
-    def _led(self, q: Array, wanted: Array, steps: int = 40) -> tuple[Array, NDArray[np.bool_]]:
+    def _lead(self, q: Array, wanted: Array, steps: int = 40) -> tuple[Array, NDArray[np.bool_]]:
         size, q = q.shape[1], q.copy()
         good, going = np.zeros(len(q), dtype=bool), np.arange(len(q))
         # poses far away are to be reached as well

@@ -115,7 +115,7 @@ class Expansion:
         """d without idle motions."""
         return self.curvatures.shape[-1] - self.idle
 
-    def told(self, k: int) -> Array:
+    def curvatures_of(self, k: int) -> Array:
         """The curvatures of the k-th configuration, ascending: of idle motions none but those that are not idle there,
         as where an arm with a joint more than freedoms is stretched."""
         values, d = self.curvatures[k], self.freedoms
@@ -197,8 +197,8 @@ def descend(system: Critically, q: Array, index: NDArray[np.intp], idle: int, fa
             break
         at = Expansion.of(system, q, idle)
         done = at.residual < CRITICAL
-        found += [CriticalPoint(q[k], at.multipliers[k], float(at.residual[k]), at.told(int(k)), float(at.E[k]))
-                  for k in np.flatnonzero(done)]
+        found += [CriticalPoint(q[k], at.multipliers[k], float(at.residual[k]), at.curvatures_of(k), float(at.E[k]))
+                  for k in map(int, np.flatnonzero(done))]
         up = np.arange(at.curvatures.shape[-1]) < np.minimum(index, at.freedoms)[:, None]
         size = np.maximum(np.abs(at.curvatures), CRITICAL_FLAT)
         # near a critical point: Newton's method, whatever it is
@@ -224,7 +224,7 @@ def sharpen_points(system: Critically, points: Sequence[CriticalPoint], idle: in
         size = np.where(np.abs(at.curvatures) > CRITICAL, at.curvatures, np.inf)
         q = q + times(at.directions, -at.slope / size) + at.closing
     at = Expansion.of(system, q, idle)
-    return [CriticalPoint(q[k], at.multipliers[k], float(at.residual[k]), at.told(k), float(at.E[k]))
+    return [CriticalPoint(q[k], at.multipliers[k], float(at.residual[k]), at.curvatures_of(k), float(at.E[k]))
             for k in range(len(q)) if at.residual[k] < CRITICAL]
 
 
@@ -241,12 +241,12 @@ def settle(system: RestSystem, q: Array, index: NDArray[np.intp], idle: int) -> 
             at = RestEquations(system, list(q.T))
             tangents = Tangents.of(at.DG)
             Z, back = tangents.Z, np.swapaxes(tangents.Z, -1, -2)
-            E, pull, gram = at.commanded()
+            E, pull, gram = at.command_terms()
             lost = np.asarray(~np.isfinite(gram).all(axis=(-1, -2)) | ~np.isfinite(pull).all(axis=-1))
             pull, gram = np.where(lost[:, None], 0.0, pull), np.where(lost[:, None, None], 0.0, gram)
             mu, p, v, M = tangents.multipliers(pull), tangents.closing(at.G), times(back, pull), back @ gram @ Z
             there = (q[:, None] + COMMAND_STEP * back).reshape(-1, q.shape[1])
-            turned = RestEquations(system, list(there.T)).commanded()[1].reshape(*back.shape) - pull[:, None]
+            turned = RestEquations(system, list(there.T)).command_terms()[1].reshape(*back.shape) - pull[:, None]
             A = back @ (np.swapaxes(np.nan_to_num(turned), -1, -2) / COMMAND_STEP + at.bend(mu, error=False) @ Z)
         residual = np.maximum(np.linalg.norm(at.G, axis=-1), np.linalg.norm(v, axis=-1))
         done = (residual < CRITICAL) & ~lost

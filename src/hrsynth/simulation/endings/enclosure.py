@@ -63,7 +63,7 @@ def enclose_points(system: RestSystem, points: Sequence[CriticalPoint], idle: in
     left = [k for k, each in enumerate(found) if each is None or each.index is None]
     while left:
         # equations that are independent at one are so at others
-        again = _enclose(system.chosen_at(q[left[:1]]), q[left], idle)
+        again = _enclose(system.select_rows_at(q[left[:1]]), q[left], idle)
         for k, each in zip(left, again, strict=True):
             found[k] = each or found[k]
         left = [k for k in left[1:] if (each := found[k]) is None or each.index is None]

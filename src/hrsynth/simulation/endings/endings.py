@@ -126,10 +126,10 @@ class RestSearch:
         for turn in range(MISSED_ROUNDS):
             if covers is None:
                 break
-            places = [(at, each.point.q) for each in isolated if (at := self._placed(each.point.q)) is not None]
-            isolated += covers.missed([at for at, _ in places], np.array([q for _, q in places]), found.idle, turn)
+            places = [(at, each.point.q) for each in isolated if (at := self._place(each.point.q)) is not None]
+            isolated += covers.find_missed([at for at, _ in places], np.array([q for _, q in places]), found.idle, turn)
         lists = [] if minima else self._lists(isolated)
-        isolated += [each for one in lists for each in self._listed(one, isolated, found.idle)]
+        isolated += [each for one in lists for each in self._new_modes(one, isolated, found.idle)]
         tell("enclosures")
         boxes: list[EnclosedPoint | None] = [None] * len(isolated)
         if not minima and not self.system.supposes:
@@ -146,10 +146,10 @@ class RestSearch:
         order = {GOAL: 0, MODE: 1, ANTIPODAL: 2, CRITICAL: 3}
         rests.sort(key=lambda each: (order[each.kind], not each.stable, each.error))
         if covers is not None:
-            lists = covers.signed(lists, np.array(self.desired))
+            lists = covers.complete_signs(lists, np.array(self.desired))
         return Endings(setting, self.goal, motion.pose(self.goal.pose(motion.link)), self.desired, tuple(rests),
                        tuple(continua), tuple(lists), measured, found,
-                       None if covers is None else covers.judged(rests), self.depth)
+                       None if covers is None else covers.judge(rests), self.depth)
 
     @property
     def _freedoms(self) -> int:
@@ -169,28 +169,28 @@ class RestSearch:
         """The lists of modes of those combinations of signs at which the error was found to vanish, that of the goal
         first."""
         known: dict[tuple[str, ...], AssemblyModes | None] = {}
-        for at in (self.goal, *(self._placed(each.point.q) for each in found if each.point.vanishes)):
-            if at is not None and (reversed_ := self._reversed(at)) not in known:
+        for at in (self.goal, *(self._place(each.point.q) for each in found if each.point.vanishes)):
+            if at is not None and (reversed_ := self._reversed_legs(at)) not in known:
                 try:
                     known[reversed_] = modes(self.setting, at=at)
                 except HrsynthError:
                     known[reversed_] = None
         return [SignedModes(*each) for each in known.items()]
 
-    def _listed(self, given: SignedModes, found: Sequence[Critical], idle: int) -> list[Critical]:
+    def _new_modes(self, given: SignedModes, found: Sequence[Critical], idle: int) -> list[Critical]:
         """The modes of a list that are none of those that were found."""
         if given.listed is None:
             return []
         places = [each.configuration for each in given.listed.modes if each.configuration is not None]
-        old = [at for each in found if each.point.vanishes and (at := self._placed(each.point.q))]
-        new = [at for at in places if not any(self.alike(at, each) and self._reversed(each) == given.reversed
+        old = [at for each in found if each.point.vanishes and (at := self._place(each.point.q))]
+        new = [at for at in places if not any(self.alike(at, each) and self._reversed_legs(each) == given.reversed
                                               for each in old)]
         if not new:
             return []
         q = np.array([self.system.system.read(at.pose) for at in new])
         return [Critical(each, 0) for each in descend(self.system, q, np.zeros(len(q), dtype=np.intp), idle)]
 
-    def _placed(self, q: Array) -> ClosedConfiguration | None:
+    def _place(self, q: Array) -> ClosedConfiguration | None:
         """The robot at coordinates (N,); None where its loops do not close."""
         key = q.tobytes()
         if key not in self._known:
@@ -202,10 +202,10 @@ class RestSearch:
 
     @cached_property
     def _known(self) -> dict[bytes, ClosedConfiguration | None]:
-        """What was asked of :meth:`_placed`."""
+        """What was asked of :meth:`_place`."""
         return {}
 
-    def _reversed(self, at: ClosedConfiguration) -> tuple[str, ...]:
+    def _reversed_legs(self, at: ClosedConfiguration) -> tuple[str, ...]:
         """The legs whose direction is opposite to the desired one, as far as it is along it."""
         return tuple(leg for leg, c in self._cosines(measure_all(at, self.law.question)[0]) if c < VANISHED - 1)
 
@@ -223,14 +223,14 @@ class RestSearch:
         """A critical point as a pose of the robot; None where its loops do not close, or a camera does not see what it
         is to see."""
         motion, point = self.setting.motion, found.point
-        at = self._placed(point.q)
+        at = self._place(point.q)
         if at is None or self.law.in_front(at) < SEEN_ABOVE:
             return None
         command = self.law.at(at, FixedDirections(self.desired)(0.0))
         if command.pull > SAME_ENDING:
             return None
         error = command.size
-        reversed_ = self._reversed(at)
+        reversed_ = self._reversed_legs(at)
         across = tuple(leg for leg, c in self._cosines(command.true) if abs(c) < VANISHED)
         kind, singular, boundary = CRITICAL, None, False
         if error < VANISHED:
@@ -265,7 +265,7 @@ class RestSearch:
     @cached_property
     def _condition(self) -> tuple[ConstraintPattern, Condition] | None:
         """The pattern of the held legs and the Type 2 condition, where that has a sign."""
-        seen = MeasuredRobot.watched(self.setting)
+        seen = MeasuredRobot.of_directions(self.setting)
         try:
             return (seen.pattern, seen.condition) if seen.condition.signed else None
         except HrsynthError:
@@ -276,7 +276,7 @@ class RestSearch:
         if self._condition is None:
             return None
         found, condition = self._condition
-        here, home = condition.expressed(found.values_at([at, self.goal]))
+        here, home = condition.evaluate(found.values_at([at, self.goal]))
         if not min(abs(here), abs(home)) > CLEAR:
             return None
         return "goal" if here * home > 0 else "other"

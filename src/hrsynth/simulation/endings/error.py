@@ -162,7 +162,7 @@ class SightTerm(Value):
         """e and its derivatives by these coordinates, no numbers where nothing is measured."""
         x = [Jet.variable(value, place, len(values)) for place, value in enumerate(values)]
         with np.errstate(all="ignore"):
-            return self.seen.fed(x[:3], x[3:], x[0] * 0.0 + self.radius, self.wanted)
+            return self.seen.error_jets(x[:3], x[3:], x[0] * 0.0 + self.radius, self.wanted)
 
     def add(self, carrier: SweptChains, sums: ErrorSums) -> None:
         """As of :class:`ErrorTerm`: with X the rates of the coordinates, ∇e = X ∂e and ∇²e = X ∂²e Xᵀ + Σ ∂ₐe ∇²xₐ."""
@@ -182,7 +182,7 @@ class SightTerm(Value):
                 add_bend(sums.bend, product, along[..., place])
 
 
-    def supposed(self, carrier: SweptChains, sums: ErrorSums) -> None:
+    def add_supposed(self, carrier: SweptChains, sums: ErrorSums) -> None:
         """Add to ``slope`` and ``gram`` J̃ᵀe and J̃ᵀJ̃, J̃ the rates of e that hold if what is seen lies in the plane: for
         floats. It moves as the link does, x̃' = x' + ω × (x̃ − x)."""
         products = self.coordinates(carrier)
@@ -191,7 +191,7 @@ class SightTerm(Value):
         if self.plane is not None:
             r = np.full((x.shape[1], 1), self.radius)
             p, d = x[:3].T, x[3:].T if len(x) > 3 else np.zeros((x.shape[1], 3))
-            there = np.concatenate([each.T for each in self.seen.supposed(p, d, r, self.plane)])[: len(x)]
+            there = np.concatenate([each.T for each in self.seen.suppose_plane(p, d, r, self.plane)])[: len(x)]
         e = self.errors(list(there))
         X = np.array([gradient(each, sums) for each in products])
         turn = np.array([spun(each, sums) for each in products[:3]])
@@ -252,9 +252,9 @@ class RestSystem(Value):
         terms = tuple(term(system, question.reference, each, value, None if plane is None else plane * system.length)
                       for each, value, plane in zip(question.observations, values,
                                                     planes or [None] * len(values), strict=True))
-        return cls(system, (), (), terms).chosen_at(np.array([system.read(each.pose) for each in generic]))
+        return cls(system, (), (), terms).select_rows_at(np.array([system.read(each.pose) for each in generic]))
 
-    def chosen_at(self, q: Array) -> RestSystem:
+    def select_rows_at(self, q: Array) -> RestSystem:
         """The same with equations that are independent at configurations (c, N)."""
         system = self.system
         every = [(loop, row) for loop in system.loops for row in loop.rows]
@@ -321,12 +321,12 @@ class RestEquations:
             each.add(self.carrier, sums)
         return sums
 
-    def commanded(self) -> tuple[Array, Array, Array]:
+    def command_terms(self) -> tuple[Array, Array, Array]:
         """E (c,), J̃ᵀe (c, N) and J̃ᵀJ̃ (c, N, N), J̃ the rates of e with the depths that the law supposes."""
         size = self.system.size[0]
         sums = ErrorSums(self.like, Total(self.like, (size,)), gram=Total(self.like, (size, size)))
         for each in self.system.terms:
-            (each.supposed if isinstance(each, SightTerm) else each.add)(self.carrier, sums)
+            (each.add_supposed if isinstance(each, SightTerm) else each.add)(self.carrier, sums)
         assert sums.gram is not None
         return sums.value, sums.slope.sum, sums.gram.sum
 

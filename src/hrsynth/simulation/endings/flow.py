@@ -91,7 +91,7 @@ class Flow(Value):
         n, d, k = len(X), root.shape[1], len(self.watched)
         margins, u, M = np.empty((n, len(self.legs))), np.empty((n, k, 3)), np.empty((n, k, 3, d))
         for bits, some in _groups(flipped):
-            margins[some], u[some], M[some] = self.placed(bits).batch.rows_at(X[some], self.watched)
+            margins[some], u[some], M[some] = self.mode_placer(bits).batch.rows_at(X[some], self.watched)
         margins /= self._home
         reached = np.all((margins > 0) | active, axis=1) & np.isfinite(M).all(axis=(1, 2, 3))
         u[~reached], M[~reached] = self.desired, 0.0
@@ -117,18 +117,18 @@ class Flow(Value):
         """The legs' reach margins (n, legs), parts of those at home."""
         found = np.empty((len(X), len(self.legs)))
         for bits, some in _groups(flipped):
-            found[some] = self.placed(bits).batch.rows_at(X[some], ())[0]
+            found[some] = self.mode_placer(bits).batch.rows_at(X[some], ())[0]
         return found / self._home
 
     def slopes(self, X: Array, flipped: Flags) -> Array:
         """The rates of the margins (n, legs, d)."""
         n, d = len(X), self.batch.span.shape[1]
         steps = FLOW_SLOPE * np.concatenate([np.eye(d), -np.eye(d)])
-        around = self.margins(self.moved(np.tile(X, (2 * d, 1, 1)), np.repeat(steps, n, axis=0)),
+        around = self.margins(self.move(np.tile(X, (2 * d, 1, 1)), np.repeat(steps, n, axis=0)),
                               np.tile(flipped, (2 * d, 1))).reshape(2, d, n, len(self.legs))
         return np.asarray((around[0] - around[1]).transpose(1, 2, 0) / (2 * FLOW_SLOPE))
 
-    def moved(self, X: Array, y: Array) -> Array:
+    def move(self, X: Array, y: Array) -> Array:
         """The poses (n, 4, 4) with coordinates y (n, d) in the chart about X: the point moved, the frame turned."""
         platform, span = self.batch.coordinates, self.batch.span
         p, R = platform.place(X)
@@ -152,7 +152,7 @@ class Flow(Value):
         twin, coordinates, inverse = self.placer.twin, self.batch.coordinates, np.linalg.pinv(self.batch.span)
         square, closed = np.empty((len(X), len(inverse), len(inverse))), np.zeros(len(X), dtype=bool)
         for bits, some in _groups(flipped):
-            frames, closed[some] = self.placed(bits).frames(X[some])
+            frames, closed[some] = self.mode_placer(bits).frames(X[some])
             J, V = rates(twin, frames, coordinates.link)
             arms = hat(coordinates.place(X[some])[0] / twin.length)
             V = inverse @ np.concatenate([(V[:, :3] - arms @ V[:, 3:]) * twin.length, V[:, 3:]], axis=1)
@@ -166,7 +166,7 @@ class Flow(Value):
         """The closed configurations at poses."""
         found: list[ClosedConfiguration | None] = [None] * len(X)
         for bits, some in _groups(flipped):
-            for i, at in zip(some, self.placed(bits).configurations(X[some]), strict=True):
+            for i, at in zip(some, self.mode_placer(bits).configurations(X[some]), strict=True):
                 found[i] = at
         return found
 
@@ -174,7 +174,7 @@ class Flow(Value):
         """The same, with nothing traced yet: to be sent to another process."""
         return replace(self, placer=replace(self.placer, batch=replace(self.batch, programs={})), modes={})
 
-    def placed(self, bits: int) -> Placer:
+    def mode_placer(self, bits: int) -> Placer:
         """The robot in a working mode."""
         if bits not in self.modes:
             legs = {name: replace(leg, mode=-leg.mode) if bits >> place & 1 else leg

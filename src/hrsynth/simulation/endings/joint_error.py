@@ -93,7 +93,7 @@ class JointError(Value):
         """Whether these hold all poses however far away."""
         return len(self.charts) > 1
 
-    def looked(self, bounded: bool) -> tuple[JointError, ...]:
+    def list_charts(self, bounded: bool) -> tuple[JointError, ...]:
         """Those that are to be looked at, of poses that are ``bounded`` by the legs' reach or not."""
         return (self,) if bounded else self.charts
 
@@ -164,7 +164,7 @@ class JointError(Value):
                 y[..., :k] /= w[..., None]
         return y
 
-    def spanned(self, middle: Array, half: Array) -> tuple[Array, Array]:
+    def enclose_chart(self, middle: Array, half: Array) -> tuple[Array, Array]:
         """What boxes (c, n) hold in the chart about the goal, boundless where w may vanish."""
         if self.short is not None:
             # |∂u/∂v| ≤ 1
@@ -188,7 +188,7 @@ class JointError(Value):
         """Some of the coordinates with their rates."""
         return [Dual(y[i], [float(i == j) for j in range(self.size[0])]) for i in places]
 
-    def fixed(self, known: Number) -> Number:
+    def make_constant(self, known: Number) -> Number:
         """What makes numbers with rates, which vanish, of the robot's numbers and lists of them."""
         none = [0.0] * self.size[0]
 
@@ -200,8 +200,8 @@ class JointError(Value):
     def parts(self, y: Sequence[Any], known: Number) -> tuple[list[Dual], list[Sequence[Dual]], list[Dual]]:
         """g, the observed directions, and of limbs without a joint the reach margins less what a rod is to be long (of
         those far away times w²), with their rates by the coordinates (n,), of which ``known`` makes numbers as well."""
-        error, number = self.error, self.fixed(known)
-        w, point, turned, u = self._placed(y, known, number)
+        error, number = self.error, self.make_constant(known)
+        w, point, turned, u = self._place_platform(y, known, number)
         g, margins, told = list[Dual](), list[Dual](), list[Sequence[Dual]]()
         least = self.shortest if self.short is None else 0.0
         for i, limb in enumerate(error.limbs):
@@ -239,8 +239,8 @@ class JointError(Value):
                 seen.append(plus(transform_vector(turned, number(each.rule.turned)), number(each.rule.constant)))
         return g, seen, margins
 
-    def _placed(self, y: Sequence[Any], known: Number, number: Number
-                ) -> tuple[Dual, Components, list[Dual], list[Dual]]:
+    def _place_platform(self, y: Sequence[Any], known: Number, number: Number
+                        ) -> tuple[Dual, Components, list[Dual], list[Dual]]:
         """w, the shift of the platform's point and the platform's rotation by rows, both times w, and u of a chart
         about a short rod."""
         k, x = self.error.shifts.shape[1], self.unknowns(y, range(self.freedoms))
@@ -253,9 +253,9 @@ class JointError(Value):
             v.insert(self.short[1], w)
             u = scale(number(1.0) / sqrt(dot(v, v)), v)
             point = plus(number(self.ends[self.short[0]]), scale(x[0], u))
-        return w, point, self._turned(y, w, known), u
+        return w, point, self._rotate(y, w, known), u
 
-    def _turned(self, y: Sequence[Any], w: Dual, known: Number) -> list[Dual]:
+    def _rotate(self, y: Sequence[Any], w: Dual, known: Number) -> list[Dual]:
         """w R by rows: R₀ + sin ψ K R₀ + (1 − cos ψ) K² R₀."""
         R, k, n = self.error.R, self.error.shifts.shape[1], self.size[0]
         if not self.error.turns.shape[1]:
@@ -288,7 +288,7 @@ class JointError(Value):
 
         def formula(y: Sequence[Any], number: Number) -> list[Any]:
             found = list[Any]()
-            _, place, rotation, _ = self._placed(y, number, self.fixed(number))
+            _, place, rotation, _ = self._place_platform(y, number, self.make_constant(number))
             point, turned = ([each.value for each in some] for some in (place, rotation))
             for i in self.joints:
                 limb = error.limbs[i]
@@ -305,22 +305,22 @@ class JointError(Value):
     @cached_property
     def errors(self) -> BoxFormula:
         """u × u* of all that is observed."""
-        return of_robot(lambda y, number: [e.value for u, wanted in self._seen(y, number) for e in cross(u, wanted)],
-                        self.size[0])
+        return of_robot(lambda y, number: [
+            e.value for u, wanted in self._directions(y, number) for e in cross(u, wanted)], self.size[0])
 
     @cached_property
     def asked(self) -> BoxFormula:
         """What vanishes where only such poses are asked for."""
         return of_robot(lambda y, number: [
-            each.value for k, (u, wanted) in enumerate(self._seen(y, number))
+            each.value for k, (u, wanted) in enumerate(self._directions(y, number))
             for each in ([dot(u, wanted)] if k == self.square else cross(u, wanted))], self.size[0])
 
     @cached_property
     def directions(self) -> BoxFormula:
         """u of all that is observed."""
-        return of_robot(lambda y, number: [each.value for u, _ in self._seen(y, number) for each in u], self.size[0])
+        return of_robot(lambda y, number: [e.value for u, _ in self._directions(y, number) for e in u], self.size[0])
 
-    def _seen(self, y: Sequence[Any], number: Number) -> list[tuple[Sequence[Dual], list[Dual]]]:
+    def _directions(self, y: Sequence[Any], number: Number) -> list[tuple[Sequence[Dual], list[Dual]]]:
         """The observed directions and the desired ones."""
         none = [0.0] * self.size[0]
         return [(u, [Dual(number(each), none) for each in wanted])
@@ -340,7 +340,7 @@ class JointError(Value):
         return of_robot(formula, n)
 
     def _cosines(self, y: Sequence[Any], number: Number) -> list[Dual]:
-        return [dot(u, wanted) for u, wanted in self._seen(y, number)]
+        return [dot(u, wanted) for u, wanted in self._directions(y, number)]
 
     @cached_property
     def bends(self) -> BoxFormula:
@@ -349,7 +349,7 @@ class JointError(Value):
         none = [0.0] * n
 
         def formula(y: Sequence[Any], number: Number) -> list[Any]:
-            x, known = self.unknowns(y, range(n)), self.fixed(number)
+            x, known = self.unknowns(y, range(n)), self.make_constant(number)
             mu = [Dual(each, none) for each in y[n:]]
             g, cosines = self.parts(x, known)[0], self._cosines(x, known)
             rows = [total([*(c.value * c.rates[j] * -1.0 for c in cosines),

@@ -198,7 +198,7 @@ class LoopError(JointError):
     def bends(self) -> BoxFormula:
         """The rates of all equations, one after the other."""
         def formula(y: Sequence[Any], known: Number) -> list[Any]:
-            x, number = self.unknowns(y, range(self.size[0])), self.fixed(known)
+            x, number = self.unknowns(y, range(self.size[0])), self.make_constant(known)
             return [rate for each in (*self.vectors(x, number)[1], *self.rest(x, number)) for rate in each.rates]
 
         return of_robot(formula, self.size[0])
@@ -234,7 +234,7 @@ class LoopError(JointError):
 
         return of_robot(formula, self.size[0])
 
-    def spanned(self, middle: Array, half: Array) -> tuple[Array, Array]:
+    def enclose_chart(self, middle: Array, half: Array) -> tuple[Array, Array]:
         found = self.told.together(forms_of(middle, half))
         return found.low, found.high
 
@@ -255,7 +255,7 @@ class LoopSubdivision(Subdivision):
             low[:, i], high[:, i] = joint_bounds(rod, along, one, two, (low[:, i], high[:, i]))
         return low, high
 
-    def _settled(self, tube: list[AffineForms], P: Places, N: Places) -> tuple[Flags, AffineForms]:
+    def _settle(self, tube: list[AffineForms], P: Places, N: Places) -> tuple[Flags, AffineForms]:
         F = self.error.left.together(tube)
         settled = away(F)
         # where n may lie along both rods |λ| may have no bound: the closure itself may be singular
@@ -274,7 +274,7 @@ class LoopSubdivision(Subdivision):
         shape = (*F.r.shape, at.shape[1])
         return F, AffineForms(K.v.reshape(-1, *shape), K.r.reshape(shape))
 
-    def _told(self, x: Array, reach: Array) -> list[CriticalBox]:
+    def _report(self, x: Array, reach: Array) -> list[CriticalBox]:
         """The rests at zeros, each once: over the pose exactly one is proved in a box that holds all that lie in that
         of the zero. Those are left out which a leg that is not watched does not reach; what is not decided is left
         open."""
@@ -284,7 +284,7 @@ class LoopSubdivision(Subdivision):
         reach = room + np.abs(x - at)
         for _ in range(NARROWINGS):
             reach = np.fmin(reach, self._krawczyk(x, reach)[1])
-        y, (low, high) = np.mean(self.error.spanned(x, 0 * x), axis=0), self.error.spanned(x, reach)
+        y, (low, high) = np.mean(self.error.enclose_chart(x, 0 * x), axis=0), self.error.enclose_chart(x, reach)
         room = np.maximum(high - y, y - low)
         for k in range(len(x)):
             apart = np.abs(y[kept] - y[k])

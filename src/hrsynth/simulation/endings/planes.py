@@ -101,7 +101,7 @@ class PlaneError(JointError):
         near = [replace(self, one=k) for k in range(self.span.shape[1])]
         return (*near, *(replace(each, far=k) for each in near for k in range(self.along.shape[1])))
 
-    def looked(self, bounded: bool) -> tuple[JointError, ...]:
+    def list_charts(self, bounded: bool) -> tuple[JointError, ...]:
         return self.charts
 
     def holds(self, R: Array) -> bool:
@@ -136,8 +136,8 @@ class PlaneError(JointError):
         turns = np.ones(self.freedoms - k)
         return (np.concatenate([middle - room, -turns, inner[6:]]), np.concatenate([middle + room, turns, outer[6:]]))
 
-    def _placed(self, y: Sequence[Any], known: Number, number: Number
-                ) -> tuple[Dual, Components, list[Dual], list[Dual]]:
+    def _place_platform(self, y: Sequence[Any], known: Number, number: Number
+                        ) -> tuple[Dual, Components, list[Dual], list[Dual]]:
         k, x = self.along.shape[1], self.unknowns(y, range(self.freedoms))
         w, place = number(1.0), list(x[:k])
         if self.far is not None:
@@ -170,7 +170,7 @@ class PlaneError(JointError):
         """As for a pose that is free; and the forms that vanish."""
         g, seen, margins = super().parts(y, known)
         if len(self.forms):
-            q, number = self.unknowns(y, range(self.along.shape[1], self.freedoms)), self.fixed(known)
+            q, number = self.unknowns(y, range(self.along.shape[1], self.freedoms)), self.make_constant(known)
             q.insert(self.one, number(1.0))
             for form in self.forms:
                 own, r = self.span.T @ form @ self.span, len(q)
@@ -180,7 +180,7 @@ class PlaneError(JointError):
 
     @property
     def periods(self) -> Array:
-        """Of what :meth:`spanned` tells."""
+        """Of what :meth:`enclose_chart` tells."""
         return np.append(np.full(6, np.inf), super().periods[6:])
 
     @cached_property
@@ -188,8 +188,8 @@ class PlaneError(JointError):
         """w, the platform's point from the goal's, times w, and the axis of its turn from the goal's, times the sine of
         its angle."""
         def formula(y: Sequence[Any], known: Number) -> list[Any]:
-            number = self.fixed(known)
-            w, point, _, _ = self._placed(y, known, number)
+            number = self.make_constant(known)
+            w, point, _, _ = self._place_platform(y, known, number)
             k = self.along.shape[1]
             R = self._rotation([Dual(each, [0.0] * self.size[0]) for each in y[k : self.freedoms]], number)
             turn = [cross(number(self.error.R[:, j]), [R[3 * i + j] for i in range(3)]) for j in range(3)]
@@ -198,7 +198,7 @@ class PlaneError(JointError):
 
         return trace_formula(formula, self.freedoms)
 
-    def spanned(self, middle: Array, half: Array) -> tuple[Array, Array]:
+    def enclose_chart(self, middle: Array, half: Array) -> tuple[Array, Array]:
         """What boxes (c, n) hold: shifts from the goal, axes of the turn times its sine, joints."""
         f, eye = self.freedoms, np.eye(self.freedoms)
         forms = [affine(middle[:, i], half[:, i, None] * eye[i], AFFINE_ROUNDING * (1 + np.abs(middle[:, i])))

@@ -236,7 +236,7 @@ class LegSystem(Value):
         arm = np.einsum("kij,ci,cj->ck", piece.bends, q, q) if q.shape[1] else piece.bends[:, 0, 0]
         return np.asarray((self.point(y) if piece.follows else 0.0) + piece.constant + arm + np.zeros((len(y), 3)))
 
-    def turned(self, y: Array) -> Array:
+    def rotation(self, y: Array) -> Array:
         """The platform's rotation (c, 3, 3)."""
         q = y[:, self.quaternion]
         if not q.shape[1]:
@@ -249,14 +249,14 @@ class LegSystem(Value):
         return np.stack([piece.direction(self.tip(piece, y), piece.own(y)) for piece in self.pieces
                          if piece.seen is not None], axis=1)
 
-    def reached(self, y: Array) -> NDArray[np.bool_]:
+    def is_reached(self, y: Array) -> NDArray[np.bool_]:
         """Whether all other limbs reach, and no held leg's crank can stand anywhere as its tip is on its axis, (c,)."""
         error, good = self.error, np.ones(len(y), dtype=bool)
         for piece in self.pieces:
             if piece.held and not piece.free:
                 good &= np.abs(piece.equations(self.tip(piece, y), piece.own(y))[1].o) > SAME_ENDING
         own = {id(each.limb) for each in self.pieces if each.place is not None}
-        p, R = self.point(y), self.turned(y)
+        p, R = self.point(y), self.rotation(y)
         for limb in error.limbs:
             if id(limb) not in own:
                 tip = limb.tip.constant + p + R @ limb.tip.turned
@@ -283,7 +283,7 @@ class LegSystem(Value):
             x[some, :k] += (tip - self.tip(piece, x[some])) @ self.error.shifts
         return x
 
-    def drawn(self, x: Array, rng: np.random.Generator) -> Array:
+    def draw(self, x: Array, rng: np.random.Generator) -> Array:
         """Coordinates (c, N) about those of poses (n, k), in random working modes: those in reach, held legs along the
         way from their centre to the tip."""
         count, q = len(x), x[:, self.quaternion]
@@ -313,7 +313,7 @@ class LegSystem(Value):
             else:
                 assert isinstance(limb, OnRod)
                 y[:, piece.place.start] = way @ limb.axis
-        return y[good & self.reached(y)]
+        return y[good & self.is_reached(y)]
 
 
 class PoseEquations:

@@ -83,7 +83,7 @@ class Struts(Value):
             found.append(JointError.of(error, self.error, max(SHORT_SHARE * gap, SHORTEST_ROD)))
         return found
 
-    def locked(self) -> list[JointError]:
+    def locked_errors(self) -> list[JointError]:
         """The error on the lines on which a rod lies along its leg's outer axes, at all turns."""
         found = []
         for error, i in product(map(self.turned, self.turns), range(len(self.axes))):

@@ -153,7 +153,7 @@ class Subdivision:
         if len(look):
             tube, loose = _tube(own[look], size[look], middle[look], half[look], P[look], N[look],
                                 AffineForms(follow.v[:, look], follow.r[look]))
-            settled, F = self._settled(tube, P[look], N[look])
+            settled, F = self._settle(tube, P[look], N[look])
             step = solution(np.moveaxis(F.v[1:], 0, -1), F.v[0])
             finite = np.isfinite(F.r).all(axis=1)
             likely = ~settled & finite & (tiny[look] | np.all(np.abs(step) < 3.0, axis=1))
@@ -174,7 +174,7 @@ class Subdivision:
         """The corners of boxes (c, n) with the joints where closed forms say that they can be."""
         return narrow_joints(self.error, forms_of(middle, half), middle - half, middle + half)
 
-    def _settled(self, tube: list[AffineForms], P: Places, N: Places) -> tuple[Flags, AffineForms]:
+    def _settle(self, tube: list[AffineForms], P: Places, N: Places) -> tuple[Flags, AffineForms]:
         """Whether nothing is asked for on a tube, and F there."""
         _, M, slope, margins = self._values(tube)
         F, minors = reduced_gradient(M, slope, P, N)
@@ -335,9 +335,9 @@ class Subdivision:
             endless = np.abs(x[:, far]) <= reach[:, far]
             self.left += [(at[i, :n], room[i, :n]) for i in np.flatnonzero(endless)]
             x, reach = x[~endless], reach[~endless]
-        return self._told(x, reach) if len(x) else []
+        return self._report(x, reach) if len(x) else []
 
-    def _told(self, x: Array, reach: Array) -> list[CriticalBox]:
+    def _report(self, x: Array, reach: Array) -> list[CriticalBox]:
         """What boxes with one zero each hold."""
         (n, k), error, far = self.error.size, self.error.error, self.error.far
         K, forms = self._equations(x, reach)[1], forms_of(x[:, :n], reach[:, :n])
@@ -350,7 +350,7 @@ class Subdivision:
         e, u = self.error.errors.together(forms), self.error.directions.together(forms_of(x[:, :n], 0 * x[:, :n]))
         least, most = np.maximum(np.maximum(e.low, -e.high), 0.0), e.size
         p, R = self.error.pose(x[:, :n])
-        low, high = self.error.spanned(x[:, :n], reach[:, :n])
+        low, high = self.error.enclose_chart(x[:, :n], reach[:, :n])
         return [CriticalBox(error.length * p[i], R[i], (low[i] + high[i]) / 2, (high[i] - low[i]) / 2,
                             (float(np.linalg.norm(least[i])), float(np.linalg.norm(most[i]))),
                             int(falling[i]) if falling[i] >= 0 else None, u.v[0, i].reshape(-1, 3))

@@ -110,7 +110,7 @@ class _NativeReader(UrdfReader):
             if target is None:
                 continue
             planar = self.planar_parts(target)
-            if not planar and not self.known(target, xml.line(joint), "transmission of an unknown joint", joints):
+            if not planar and not self.check_link(target, xml.line(joint), "transmission of an unknown joint", joints):
                 continue
             for each in planar or [target]:
                 if joints[each].type is JointType.FIXED:
@@ -141,7 +141,7 @@ class _NativeReader(UrdfReader):
             if found:
                 child = found[0]
                 link = self.attribute(child, "link")
-                if self.known(link, xml.line(child), f"{role}: unknown link"):
+                if self.check_link(link, xml.line(child), f"{role}: unknown link"):
                     setattr(self, role, link)
             elif role == "platform":
                 self.formation = bool(self.seen)
@@ -166,7 +166,7 @@ class _NativeReader(UrdfReader):
         if is_sight(element):
             return
         leg, link = self.attribute(element, "leg"), self.attribute(element, "link")
-        self.known(link, xml.line(element), "observe: unknown link")
+        self.check_link(link, xml.line(element), "observe: unknown link")
         if leg is not None and (leg == "all" or "," in leg):
             self.defect(xml.line(element), "observe: a leg label that does not fit into a list of legs", leg,
                         "a label without commas, other than all")
@@ -244,7 +244,7 @@ class _NativeReader(UrdfReader):
         links = {key: replace(link, pose=poses[key]) for key, link in self.links.items()}
         mechanism = Mechanism(name, links, joints, base, platform, tuple(self.observations), tuple(self.couplings),
                               self.camera, tuple(self.rest), self.file, formation=self.formation)
-        found = None if self.as_written or not loops else self.rounded(mechanism, loops, poses)
+        found = None if self.as_written or not loops else self.repair_rounding(mechanism, loops, poses)
         if found is not None:
             return found
         for joint, X_P, X_S in loops:
@@ -256,14 +256,14 @@ class _NativeReader(UrdfReader):
                                 f"{cosine:.3g}", "0")
         self.require_sound()
         require_closed(self.file, loops, mechanism.length)
-        return self.watched(chains.merge(mechanism))
+        return self.with_sensors(chains.merge(mechanism))
 
-    def watched(self, mechanism: Mechanism) -> Mechanism:
+    def with_sensors(self, mechanism: Mechanism) -> Mechanism:
         """With its cameras and observations of all kinds."""
         return as_written(mechanism, self.seen, self.cameras, self.file)
 
-    def rounded(self, mechanism: Mechanism, loops: Sequence[tuple[JointSpec, Array, Array]], poses: Mapping[str, Array]
-                ) -> Mechanism | None:
+    def repair_rounding(self, mechanism: Mechanism, loops: Sequence[tuple[JointSpec, Array, Array]],
+                        poses: Mapping[str, Array]) -> Mechanism | None:
         """The mechanism as it is meant, where its numbers are rounded; None where they are not, or not to blame."""
         if not (self.tolerance or self.digits.last_place):
             return None
@@ -276,4 +276,4 @@ class _NativeReader(UrdfReader):
             return None
         self.require_sound()
         between = [replace(joint_at(joint, poses, False), motor=self.motors.get(joint.name)) for joint, _, _ in loops]
-        return as_meant(self.watched(chains.merge(mechanism.changed(joints=between))), opening, tolerance)
+        return as_meant(self.with_sensors(chains.merge(mechanism.changed(joints=between))), opening, tolerance)

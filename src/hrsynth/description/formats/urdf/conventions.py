@@ -34,7 +34,7 @@ class Convention:
 
 def _joins(reader: UrdfReader, what: str, element: xml.Element, ends: Ends) -> bool:
     """Whether the ends of a closure are two links that there are; what is wrong is a defect."""
-    if not all(reader.known(end.link, end.line, f"{what}: unknown link") for end in ends):
+    if not all(reader.check_link(end.link, end.line, f"{what}: unknown link") for end in ends):
         return False
     if ends[0].link == ends[1].link:
         reader.defect(xml.line(element), f"{what} joins a link to itself", ends[0].link)
@@ -56,7 +56,7 @@ def gazebo(reader: UrdfReader, graph: JointGraph) -> None:
             reader.defect(xml.line(element), "joint of <gazebo> without two links", element.get("name"))
             continue
         what = "joint of <gazebo>: unknown link"
-        if not all(reader.known(link, xml.line(element), what) for link in (parent, child)):
+        if not all(reader.check_link(link, xml.line(element), what) for link in (parent, child)):
             continue
         if parent not in poses or child not in poses:
             reader.defect(xml.line(element), "joint of <gazebo>: a link attached to nothing", element.get("name"))

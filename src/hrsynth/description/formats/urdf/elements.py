@@ -58,7 +58,8 @@ class UrdfReader(XmlReader):
         for element in self.root.findall("coupling"):
             self.coupling(element, names)
 
-    def known(self, link: str | None, line: int | None, what: str, names: Mapping[str, object] | None = None) -> bool:
+    def check_link(self, link: str | None, line: int | None, what: str, names: Mapping[str, object] | None = None
+                   ) -> bool:
         """Whether a link (or another of ``names``) exists; None was reported before."""
         table = self.links if names is None else names
         if link is None:
@@ -164,7 +165,7 @@ class UrdfReader(XmlReader):
         tags = ("predecessor", "successor")
         one, two = self.ends(element, tags, (ORIGIN, ORIGIN))
         for end, tag in zip((one, two), tags, strict=True):
-            self.known(end.link, end.line, f"{tag} of a coupling: unknown link")
+            self.check_link(end.link, end.line, f"{tag} of a coupling: unknown link")
         ratio = self.only(element, "ratio")
         if ratio is None:
             self.defect(xml.line(element), "coupling without <ratio>", name)
@@ -209,7 +210,7 @@ class UrdfReader(XmlReader):
         """A defect for every end on no link and every joint from a link to itself; loops are called ``loop``."""
         for name, joint in self.joints.items():
             for end in joint.ends:
-                self.known(end.link, end.line, f"{'joint' if joint.in_tree else loop} {name!r}: unknown link")
+                self.check_link(end.link, end.line, f"{'joint' if joint.in_tree else loop} {name!r}: unknown link")
             if joint.ends[0].link is not None and joint.ends[0].link == joint.ends[1].link:
                 self.defect(joint.line, f"{name!r} joins a link to itself", joint.ends[0].link)
 

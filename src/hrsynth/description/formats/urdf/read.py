@@ -124,15 +124,16 @@ class _TolerantReader(UrdfReader):
         for own in self.root.findall("hrsynth")[:1]:
             for tag in ("platform", "camera"):
                 element = next((each for each in own.findall(tag) if each.get("name") is None), None)
-                if element is not None and self.known(element.get("link"), xml.line(element), f"{tag}: unknown link"):
-                    setattr(graph, tag, element.get("link"))
+                link = None if element is None else element.get("link")
+                if element is not None and self.check_link(link, xml.line(element), f"{tag}: unknown link"):
+                    setattr(graph, tag, link)
             graph.sights, graph.cameras = self.sights(own)
             graph.formation = graph.platform is None and bool(graph.sights)
             for element in own.findall("observe"):
                 if is_sight(element):
                     continue
                 link, leg = element.get("link"), element.get("leg")
-                if self.known(link, xml.line(element), "observe: unknown link") and leg and link:
+                if self.check_link(link, xml.line(element), "observe: unknown link") and leg and link:
                     axis = self.direction(element, "axis", (0, 0, 1))
                     graph.observations.append(Direction(leg, link, np.asarray(axis), line=xml.line(element)))
 

@@ -108,7 +108,7 @@ class _StageReader:
         self._contents()
         for prim in joints:
             self._joint(prim)
-        self._held()
+        self._hold_kinematic()
         graph.note_assumed()
         self.require_sound()
         self._mimics(joints)
@@ -392,7 +392,7 @@ class _StageReader:
             values["effort"] = forces[0] if forces and math.isfinite(forces[0]) else None
         return Limits(**values) if any(value is not None for value in values.values()) else None
 
-    def _held(self) -> None:
+    def _hold_kinematic(self) -> None:
         """Kinematic bodies stand still in the world."""
         for path, link in self.bodies.items():
             if self.prims[path].values.get("physics:kinematicEnabled") is True:

@@ -37,7 +37,7 @@ _FREE = {JointType.REVOLUTE: ("rotX",), JointType.PRISMATIC: ("transX",), JointT
 def write(mechanism: Mechanism) -> Written:
     """The USD text of a mechanism, and warnings of what it has no place for."""
     robot = spanning(mechanism)
-    return _UsdWriter(robot).written()
+    return _UsdWriter(robot).write()
 
 
 class _UsdWriter:
@@ -50,7 +50,7 @@ class _UsdWriter:
         self.joints = {joint: _identifier(joint, taken) for joint in robot.joints}
         self.lost: list[Note] = []
 
-    def written(self) -> Written:
+    def write(self) -> Written:
         robot, body = self.robot, list[str]()
         says = [f"{key} {text}" for key, text in annotations_of(robot, motors=True)]
         body += [f"custom string {PREFIX}:name = {_text(robot.name)}",

@@ -41,7 +41,7 @@ def robots() -> list[dict[str, Any]]:
 def picture(robot: Mechanism) -> str:
     """A small drawing of a robot."""
     anatomy = decompose(normal_form(robot).mechanism)
-    portrait = Portrait.drawn(anatomy.mechanism, anatomy.platform, (), flat(anatomy.mechanism))
+    portrait = Portrait.draw(anatomy.mechanism, anatomy.platform, (), flat(anatomy.mechanism))
     return portrait.svg(WIDTH, HEIGHT, robot.name)
 
 

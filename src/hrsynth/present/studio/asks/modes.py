@@ -40,4 +40,4 @@ def _mode(request: Request, found: AssemblyModes, number: int, mode: AssemblyMod
         there = None
     return {**drawn.scene(), "words": f"{drawn.words}: {'the pose itself' if mode.goal else assembly(mode)[0]}",
             "pose": mode.pose.to_dict(), "goal": mode.goal,
-            "here": None if there is None else request.told(Posed(there))}
+            "here": None if there is None else request.describe_here(Posed(there))}

@@ -31,7 +31,7 @@ def answer(request: Request) -> dict[str, Any]:
     if values is not None:
         if mover.far(values):
             raise BadRequest("values", values.tolist(), "what the robot's sliders can mean")
-        here, reached = mover.sent(here, values)
+        here, reached = mover.send(here, values)
         return describe_pose(request, mover, here, bool(np.max(np.abs(reached - values), initial=0.0) > SLIDER_ARRIVED))
     if place is not None:
         return _draw_pose(request, mover, here, place)
@@ -46,14 +46,14 @@ def _draw_pose(request: Request, mover: Mover, here: Posed, place: Any) -> dict[
     wanted = pose(place[:3], rotation_of(place[[6, 3, 4, 5]] / size)) @ mover.setting.mechanism.links[link].pose
     if float(np.linalg.norm(place[:3])) > BEYOND_SLIDERS * mover.home.real.twin.length:
         raise BadRequest("platform", place.tolist(), f"within {BEYOND_SLIDERS:g} sizes of the robot")
-    found = mover.drawn_to(here, wanted)
+    found = mover.draw_to(here, wanted)
     apart = np.abs(found.real.pose(link) - wanted).max()
     return describe_pose(request, mover, found, bool(apart > SLIDER_ARRIVED))
 
 
 def describe_pose(request: Request, mover: Mover, posed: Posed, stopped: bool = False) -> dict[str, Any]:
     """A configuration with all that is shown of it; ``stopped``: it is not where it was sent."""
-    return {"state": state(request, mover, posed), "here": request.told(posed),
+    return {"state": state(request, mover, posed), "here": request.describe_here(posed),
             "values": mover.read(posed).tolist(), "stopped": stopped, "residual": posed.real.residual}
 
 

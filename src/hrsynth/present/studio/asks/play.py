@@ -30,9 +30,9 @@ def answer(request: Request) -> dict[str, Any]:
     if number is None or number >= len(lost):
         raise BadRequest("number of a lost freedom", number, f"0 to {len(lost) - 1}" if lost else "none is lost here")
     question = setting.samples.question
-    ways = [mover.followed(here, way) for way in
+    ways = [mover.follow_hidden(here, way) for way in
             follow_motion(here.real, question, lost[number].twist[: question.twist_rows], STEPS)]
-    frames = {id(each): {**state(request, mover, each), "here": request.told(each)}
+    frames = {id(each): {**state(request, mover, each), "here": request.describe_here(each)}
               for each in (here, *ways[0], *ways[1])}
     cycle = [here, *_there_and_back(ways[0]), here, *_there_and_back(ways[1])]
     return {"frames": [frames[id(each)] for each in cycle],

@@ -34,8 +34,8 @@ def answer(request: Request) -> dict[str, Any]:
     eye = place_camera(rods, reference, (start.real.pose, end.real.pose))
     last = len(found.run.times) - 1
     chosen = sorted({round(last * part) for part in np.linspace(0, 1, FRAMES)})
-    way = mover.followed(start, [found.run.configurations[i] for i in chosen])
-    frames = [{**state(request, mover, posed), "here": request.told(posed), "t": float(found.run.times[i]),
+    way = mover.follow_hidden(start, [found.run.configurations[i] for i in chosen])
+    frames = [{**state(request, mover, posed), "here": request.describe_here(posed), "t": float(found.run.times[i]),
                "e": found.run.commands[i].size, "image": image(eye, reference, rods, posed.real.pose)}
               for i, posed in zip(chosen, way, strict=False)]
     poses = [at_pose(setting, each.real) for each in (start, end)]
@@ -51,7 +51,7 @@ def _send_to(request: Request, mover: Mover, start: Posed) -> Posed:
     goal = request.vector("goal", len(mover.coordinates.places))
     if goal is None or mover.far(goal):
         raise BadRequest("goal", None if goal is None else goal.tolist(), "values of the robot's sliders")
-    end, reached = mover.sent(start, goal)
+    end, reached = mover.send(start, goal)
     if np.max(np.abs(reached - goal), initial=0.0) > SLIDER_ARRIVED:
         raise BadRequest("the goal is not reached from the start", goal.tolist(), "values that the robot comes to")
     return end
@@ -61,6 +61,6 @@ def image(eye: Camera, reference: str, rods: tuple[Cylinder, ...], poses: Poses)
     """The two ends of each watched leg in the picture (pixels); None of one that is not ahead of the camera."""
     found: list[list[list[float]] | None] = []
     for rod in rods:
-        ends = eye.seen(poses(reference), poses, rod)
+        ends = eye.project(poses(reference), poses, rod)
         found.append(np.round(eye.pixels(ends), 2).tolist() if np.all(ends[:, 2] > 0) else None)
     return found

@@ -79,7 +79,7 @@ def hidden_machine(request: Request) -> dict[str, Any] | None:
     if found.hidden is None:
         return None
     mover = request.mover(hidden=True)
-    posed = [mover.home, *(mover.joined(end.real) for pair in request.ends for end in pair)]
+    posed = [mover.home, *(mover.with_hidden(end.real) for pair in request.ends for end in pair)]
     places = [mover.places(each)[HIDDEN] for each in posed if each.hidden is not None]
     return machine_of(HIDDEN, request.setting, found.hidden, str(found.hidden_architecture), places, ()).scene()
 
@@ -94,7 +94,7 @@ def hidden_words(request: Request) -> str:
 
 def condition(setting: ObservedRobot) -> str:
     """When a freedom is lost that is seen generically (Type 2)."""
-    robot = MeasuredRobot.watched(setting)
+    robot = MeasuredRobot.of_directions(setting)
     try:
         if robot.verdict.lost:
             return always(robot.pattern, [each.name for each in robot.verdict.lost])
