@@ -13,8 +13,8 @@ PICTURES = (".png", ".svg", ".gif")
 def long_description() -> str:
     """The README; pages lead to the repository at this version's tag, pictures to their raw files."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    package = (ROOT / "src" / "hrsynth" / "__init__.py").read_text(encoding="utf-8")
-    version = re.search(r'^__version__ = "(.*)"', package, re.MULTILINE)[1]
+    module = (ROOT / "src" / "hrsynth" / "version.py").read_text(encoding="utf-8")
+    version = re.search(r'^__version__ = "(.*)"', module, re.MULTILINE)[1]
 
     def absolute(link: re.Match[str]) -> str:
         kind = "raw" if link[1].endswith(PICTURES) else "blob"

@@ -14,6 +14,7 @@ An answer is one line at a prompt; ``print`` shows it in full, ``to_dict()`` is 
 from typing import TYPE_CHECKING
 
 from .results import Result
+from .version import __version__
 
 if TYPE_CHECKING:
     from . import catalog
@@ -43,7 +44,6 @@ if TYPE_CHECKING:
     from .simulation.endings.endings import endings
     from .simulation.servo import servo
 
-__version__ = "0.2.0"
 __all__ = ["__version__", "accuracy", "advise", "atlas", "basins", "branch", "catalog", "certificate", "check",
            "derive", "draw", "endings", "examples", "export", "following", "forget", "html", "legs", "lint", "load",
            "map", "modes", "observe",

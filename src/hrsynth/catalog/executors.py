@@ -10,9 +10,9 @@ from functools import cache
 from itertools import islice
 from typing import Any
 
-from .. import __version__
 from ..budgets import PARTS_AHEAD
 from ..errors import BadRequest, MissingExtra
+from ..version import __version__
 
 Made = list[tuple[str, str]]
 """Words with the lines of their records."""

@@ -16,7 +16,7 @@ from .questions import QUESTIONS
 
 
 def _version() -> str:
-    from .. import __version__
+    from ..version import __version__
 
     return __version__
 

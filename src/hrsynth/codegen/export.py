@@ -123,7 +123,7 @@ def _free(proof: BranchProof, branch_: TubedBranch) -> tuple[tuple[str, float, f
 
 def _describe_program(proof: BranchProof, source: Source, lang: str, box: BoxLike | None, effort: int) -> list[str]:
     """What the program says of itself."""
-    from .. import __version__
+    from ..version import __version__
 
     robot, branch_ = proof.robot, source.branch
     pairs = {} if box is None or isinstance(box, str) else box

@@ -11,9 +11,9 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .. import __version__
 from ..errors import BadRequest, MissingExtra
 from ..results import Result, with_spelling
+from ..version import __version__
 from .outputs import FIGURES, OUTPUTS, File, function
 
 if TYPE_CHECKING:

@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ... import __version__
 from ...budgets import SWEEP_DRAWN, SWEEP_PART
 from ...description.files import require_alone, require_writable
 from ...errors import BadRequest, BuildStopped, PlaneNotMet
@@ -25,6 +24,7 @@ from ...mechanism.pose import Grid
 from ...progress import tell
 from ...results import Value, content
 from ...tolerances import LARGEST_FIRST_ORDER
+from ...version import __version__
 from .error_map import SPOTS, Mapper, Seen, Spots
 from .ranges import ErrorRange, Tally
 

@@ -10,8 +10,8 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from ... import __version__
 from ...errors import BadRequest, BuildStopped
+from ...version import __version__
 from ..build import Tell
 from ..executors import Executor, Made, Stopped, executor
 from ..jsonl import line

@@ -11,7 +11,7 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ... import __version__
+from ...version import __version__
 from ..known import alias, order
 from .folder import FOLDERS
 from .structures import Structure, address_name

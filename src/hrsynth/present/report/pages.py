@@ -6,9 +6,9 @@ import base64
 from functools import cache
 from typing import Any
 
-from ... import __version__
 from ...analysis.derive import Derivation
 from ...tolerances import RANK_GAP, SAME_RELATION
+from ...version import __version__
 from ..drawings.schematic import graph_svg
 from ..maps import error_map
 from ..modes import picture, why_undrawn

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
-from ... import __version__
 from ...linting.findings import Finding
+from ...version import __version__
 
 if TYPE_CHECKING:
     from ...errors import Defect
