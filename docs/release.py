@@ -63,7 +63,7 @@ def main(version: str) -> None:
 
 def release_texts(version: str) -> dict[Path, str]:
     """The files that name the version, with the new one; raises ``Refused``."""
-    package, changes, citation = ROOT / "src" / "hrsynth" / "__init__.py", ROOT / "CHANGELOG.md", ROOT / "CITATION.cff"
+    package, changes, citation = ROOT / "src" / "hrsynth" / "version.py", ROOT / "CHANGELOG.md", ROOT / "CITATION.cff"
     code, log, cite = (path.read_text(encoding="utf-8") for path in (package, changes, citation))
     present = re.search(r'^__version__ = "(.*)"$', code, re.MULTILINE)[1]
     if not re.fullmatch(r"\d+\.\d+\.\d+", version) or numbers(version) <= numbers(present):
