@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -149,9 +150,8 @@ def add_bend(total: Total, product: Product, weight: Any = 1.0) -> None:
         for part in vector.parts:
             f = other.value * (part.sign * _as_column(weight))
             pushed = cross_product(f[..., None, :], part.axes)
-            later, size = outer(pushed, part.columns), len(part.places)
-            total.add(np.ix_(part.places, part.places), later * np.triu(np.ones((size, size)))
-                      + _transpose(later) * np.tril(np.ones((size, size)), -1))
+            later, (upper, lower) = outer(pushed, part.columns), _triangles(len(part.places))
+            total.add(np.ix_(part.places, part.places), later * upper + _transpose(later) * lower)
     for one in product.x.parts:
         for two in product.y.parts:
             both = one.sign * two.sign
@@ -159,6 +159,13 @@ def add_bend(total: Total, product: Product, weight: Any = 1.0) -> None:
             across = outer(one.columns, columns)
             total.add(np.ix_(one.places, two.places), across)
             total.add(np.ix_(two.places, one.places), _transpose(across))
+
+
+@cache
+def _triangles(size: int) -> tuple[Array, Array]:
+    """Ones on and above the diagonal of a matrix, and below it."""
+    upper = np.triu(np.ones((size, size)))
+    return upper, 1.0 - upper
 
 
 def outer(a: Any, b: Any) -> Any:
