@@ -280,16 +280,20 @@ SPHERICAL = """<robot name="spherical">
 </robot>"""
 
 
-def test_a_hidden_robot_of_one_leg_is_a_robot_again(run, tmp_path: Path):
-    """Its platform, which is watched, is in no leg then."""
+@pytest.mark.parametrize(("robot", "word"), [("rrrrr_m1", "PiR*"), ("gough_stewart", "U*PS"),
+                                              ("prrrp_parallel_point", "PR*R")])
+def test_a_hidden_robot_of_one_leg_is_a_robot_again(run, tmp_path: Path, robot: str, word: str):
+    """Its platform, which is watched, is in no leg then; it turns on one ball; it is a point on one R."""
     hidden = tmp_path / "hidden.urdf"
-    data = run("derive", "rrrrr_m1", "--observe", "1", "-o", hidden, "--json").data
-    second = run("derive", hidden, "--json").data
-    assert second["notation"]["real_ascii"] == data["notation"]["hidden_ascii"] == "PiR*"
-    for told in ("dof", "verdict", "rank"):
-        assert second[told] == data[told]
-    (once,), (again,) = data["lost"], second["lost"]
-    assert again["twist"] == pytest.approx(once["twist"], abs=1e-9)
+    data = run("derive", robot, "--observe", "1", "-o", hidden, "--json").data
+    second = run("derive", hidden, "-o", tmp_path / "its_own.urdf", "--json").data
+    third = run("derive", tmp_path / "its_own.urdf", "--json").data
+    assert second["notation"]["real_ascii"] == data["notation"]["hidden_ascii"] == word
+    for later in (second, third):
+        for told in ("dof", "verdict", "rank", "point_platform"):
+            assert later[told] == data[told]
+        for once, again in zip(data["lost"], later["lost"], strict=True):
+            assert again["twist"] == pytest.approx(once["twist"], abs=1e-9)
 
 
 @pytest.mark.parametrize(("arguments", "cure"), [
