@@ -281,9 +281,10 @@ SPHERICAL = """<robot name="spherical">
 
 
 @pytest.mark.parametrize(("robot", "word"), [("rrrrr_m1", "PiR*"), ("gough_stewart", "U*PS"),
-                                              ("prrrp_parallel_point", "PR*R")])
+                                              ("3rps", "R*PS+2-RPS"), ("prrrp_parallel_point", "PR*R")])
 def test_a_hidden_robot_of_one_leg_is_a_robot_again(run, tmp_path: Path, robot: str, word: str):
-    """Its platform, which is watched, is in no leg then; it turns on one ball; it is a point on one R."""
+    """Its platform, which is watched, is in no leg then; it turns on one ball; it is a point on one R. What
+    was watched is what its file watches."""
     hidden = tmp_path / "hidden.urdf"
     data = run("derive", robot, "--observe", "1", "-o", hidden, "--json").data
     second = run("derive", hidden, "-o", tmp_path / "its_own.urdf", "--json").data

@@ -280,7 +280,7 @@ def as_names(given: LegsLike) -> tuple[str, ...] | None:
 def legs_asked(robot: Mechanism | ObservedRobot, observe: LegsLike, see: SeeLike = None) -> tuple[str, ...] | None:
     """:func:`as_names`, None also for all legs where nothing but segments is watched: one question, told in one way."""
     names = as_names(observe)
-    other = see is not None or (isinstance(robot, Mechanism) and not all(o.by_segment for o in robot.observations))
+    other = see is not None or (isinstance(robot, Mechanism) and bool(robot.observations))
     return None if names == ("all",) and not other else names
 
 
@@ -310,7 +310,7 @@ def _observed_robot(robot: Mechanism, source: Hashable, observe: tuple[str, ...]
     own = tuple(o for o in anatomy.mechanism.observations if o.leg not in asked | possible)
     given = tuple(o for o in own if not o.by_segment)
     chosen = () if observe is None and asked else (
-        own if observe is None and given else _observations(anatomy, normal, defaults, observe, given))
+        own if observe is None and own else _observations(anatomy, normal, defaults, observe, given))
     observed = (*chosen, *(o for o in anatomy.mechanism.observations if o.leg in asked))
     offered = tuple(o for o in anatomy.mechanism.observations if o.leg in possible)
     known = {o.key for o in defaults.values()}

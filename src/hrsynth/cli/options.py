@@ -108,8 +108,8 @@ def shipped_names() -> Iterable[str]:
 
 
 JSON = flag("json", "Print the result as one JSON object; its schema: hrsynth schema COMMAND.", OUTPUT)
-OBSERVE = Option("observe", "Legs to watch (1,4), links, or all (default: all, or what the file observes that is no "
-                 "leg's direction; none with --see).",
+OBSERVE = Option("observe", "Legs to watch (1,4), links, or all (default: what the file observes, else all; none "
+                 "with --see).",
                  "LEGS", group=WATCHING)
 CAMERA = Option("camera", "The link that carries the camera; or a further camera with a name and its place on a link "
                 "(metres; radians or deg; focal length, width and height in pixels); repeat for more.",

@@ -105,7 +105,7 @@ def condition(setting: ObservedRobot) -> str:
 
 def all_legs(setting: ObservedRobot) -> ObservedRobot:
     """The same robot with all legs watched."""
-    return ObservedRobot.of(setting.robot)
+    return ObservedRobot.of(setting.robot, "all")
 
 
 @lru_cache(maxsize=REMEMBERED)
