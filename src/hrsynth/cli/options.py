@@ -76,12 +76,13 @@ class Option:
     def read(self, text: str) -> Any:
         """A value as it is written on the command line; raises ``BadRequest``."""
         from ..errors import BadRequest
+        from ..results import plain_number
 
         if self.kind not in (int, float):
             return text
         ends = [f"at {end} {value:g}" for end, value in (("least", self.low), ("most", self.high)) if value is not None]
         try:
-            number = self.kind(text)
+            number = plain_number(text, self.kind)
             if (self.low is None or number >= self.low) and (self.high is None or number <= self.high):
                 return number
         except ValueError:
