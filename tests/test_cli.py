@@ -274,7 +274,8 @@ def test_arguments_that_do_not_fit(run, arguments: list[str], words: list[str]):
     "derive delta --seed ٣", "derive delta --seed 1_0", "accuracy delta --cone ١deg", "accuracy delta --cone 1=０.5deg",
     "advise delta --price leg=٢", "check delta --at mode:٢", "check delta --grid x=0:1:٣",
     "servo delta --start z=-0.7 --goal z=-0.75 --noise ١deg",
-    "servo delta --start z=-0.7 --goal z=-0.75 --depth constant:٢", "derive delta --close arm_1@٠,0,0:arm_2@0,0,0", "accuracy delta --plane z=-0.7 -o map.svg --width ٨cm"])
+    "servo delta --start z=-0.7 --goal z=-0.75 --depth constant:٢",
+    "derive delta --close arm_1@٠,0,0:arm_2@0,0,0", "accuracy delta --plane z=-0.7 -o map.svg --width ٨cm"])
 def test_numbers_are_in_ascii_digits(run, words: str):
     assert len(run(*words.split()).refused()) == 1
 
