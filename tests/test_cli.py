@@ -270,6 +270,16 @@ def test_arguments_that_do_not_fit(run, arguments: list[str], words: list[str]):
     assert all(word in lines[0] for word in words), lines
 
 
+@pytest.mark.parametrize("words", [
+    "derive delta --seed ٣", "derive delta --seed 1_0", "accuracy delta --cone ١deg", "accuracy delta --cone 1=０.5deg",
+    "advise delta --price leg=٢", "check delta --at mode:٢", "check delta --grid x=0:1:٣",
+    "servo delta --start z=-0.7 --goal z=-0.75 --noise ١deg",
+    "servo delta --start z=-0.7 --goal z=-0.75 --depth constant:٢",
+    "derive delta --close arm_1@٠,0,0:arm_2@0,0,0", "accuracy delta --plane z=-0.7 -o map.svg --width ٨cm"])
+def test_numbers_are_in_ascii_digits(run, words: str):
+    assert len(run(*words.split()).refused()) == 1
+
+
 SPHERICAL = """<robot name="spherical">
   <link name="base"/><link name="a"/><link name="b"/><link name="c"/>
   <joint name="1" type="continuous"><parent link="base"/><child link="a"/><axis xyz="1 0 0"/></joint>
@@ -280,16 +290,21 @@ SPHERICAL = """<robot name="spherical">
 </robot>"""
 
 
-def test_a_hidden_robot_of_one_leg_is_a_robot_again(run, tmp_path: Path):
-    """Its platform, which is watched, is in no leg then."""
+@pytest.mark.parametrize(("robot", "word"), [("rrrrr_m1", "PiR*"), ("gough_stewart", "U*PS"),
+                                              ("3rps", "R*PS+2-RPS"), ("prrrp_parallel_point", "PR*R")])
+def test_a_hidden_robot_of_one_leg_is_a_robot_again(run, tmp_path: Path, robot: str, word: str):
+    """Its platform, which is watched, is in no leg then; it turns on one ball; it is a point on one R. What
+    was watched is what its file watches."""
     hidden = tmp_path / "hidden.urdf"
-    data = run("derive", "rrrrr_m1", "--observe", "1", "-o", hidden, "--json").data
-    second = run("derive", hidden, "--json").data
-    assert second["notation"]["real_ascii"] == data["notation"]["hidden_ascii"] == "PiR*"
-    for told in ("dof", "verdict", "rank"):
-        assert second[told] == data[told]
-    (once,), (again,) = data["lost"], second["lost"]
-    assert again["twist"] == pytest.approx(once["twist"], abs=1e-9)
+    data = run("derive", robot, "--observe", "1", "-o", hidden, "--json").data
+    second = run("derive", hidden, "-o", tmp_path / "its_own.urdf", "--json").data
+    third = run("derive", tmp_path / "its_own.urdf", "--json").data
+    assert second["notation"]["real_ascii"] == data["notation"]["hidden_ascii"] == word
+    for later in (second, third):
+        for told in ("dof", "verdict", "rank", "point_platform"):
+            assert later[told] == data[told]
+        for once, again in zip(data["lost"], later["lost"], strict=True):
+            assert again["twist"] == pytest.approx(once["twist"], abs=1e-9)
 
 
 @pytest.mark.parametrize(("arguments", "cure"), [

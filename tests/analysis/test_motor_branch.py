@@ -12,12 +12,13 @@ from hypothesis import strategies as st
 
 from hrsynth import branch, load, modes
 from hrsynth.analysis.branch.answer import BranchProof
+from hrsynth.analysis.branch.cells import _weakest
 from hrsynth.analysis.branch.growth import CellGrid, lattice
 from hrsynth.errors import BadRequest, MotorsNotEnough
 from hrsynth.geometry.affine import AffineForms, affine
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.model import Limits, Mechanism
-from strategies import random_rotation
+from strategies import random_rotation, spherical
 
 Z = np.array([0.0, 0.0, 1.0])
 
@@ -390,3 +391,24 @@ def test_a_robot_without_motors_is_refused_as_everywhere() -> None:
             ask()
         said.append(str(refused.value))
     assert said[0] == said[1]
+
+
+def test_the_smallest_singular_value_is_bounded_whatever_the_tubes_widths():
+    """Of matrices A with |1 − Y A| ≤ M, where M r < r for radii r of very different sizes."""
+    rng = np.random.default_rng(0)
+    Y, r = rng.normal(size=(200, 4, 4)), 10.0 ** rng.uniform(-9, 0, (200, 4))
+    M = rng.uniform(0, 0.2, (200, 4, 4)) * np.minimum(1.0, r[:, :, None] / r[:, None, :])
+    E = M * rng.uniform(-1, 1, M.shape)
+    exact = np.linalg.svd(np.linalg.solve(Y, np.eye(4) - E), compute_uv=False)[:, -1]
+    bound = _weakest(Y, M, r, (M @ r[..., None])[..., 0])
+    assert np.all(bound <= exact)
+    assert np.median(bound / exact) > 0.3
+
+
+def test_a_thin_box_has_the_bound_of_the_loops_at_its_middle():
+    robot = spherical(np.random.default_rng(0))
+    least = [min(cell.weakest for part in branch(robot, box={
+        f"joint_{k}_1": (-w, w) for k, w in enumerate((0.01, *widths), 1)}).parts for cell in part.cells)
+        for widths in ((0.01, 0.01), (1e-9, 1e-9))]
+    assert least[0] > 0.1
+    assert least[1] >= 0.9 * least[0]

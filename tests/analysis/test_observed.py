@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 
 import hrsynth
@@ -16,7 +18,8 @@ from hrsynth.analysis.modes.modes import modes
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.analysis.singularity.singular import singular
 from hrsynth.description import load
-from hrsynth.errors import BadRequest
+from hrsynth.errors import BadRequest, NoSegment
+from strategies import spherical
 
 QUESTIONS: dict[str, Callable[..., Any]] = {
     "derive": derive, "check": check, "advise": advise, "modes": modes,
@@ -54,3 +57,16 @@ def test_what_is_watched_is_asked_once(more: dict[str, str]) -> None:
     assert ObservedRobot.of(observed) is observed
     with pytest.raises(BadRequest, match="given twice"):
         derive(observed, **more)
+
+
+def test_a_question_about_motors_needs_no_segments() -> None:
+    """The links of a spherical robot have no length."""
+    watched = spherical(np.random.default_rng(0))
+    robot = replace(watched, observations=())
+    with pytest.raises(NoSegment):
+        modes(robot)
+    found, other = (modes(each, real=True) for each in (robot, watched))
+    assert len(found.modes) == len(other.modes) > 1
+    for one, two in zip(found.modes, other.modes, strict=True):
+        assert one.pose.rpy == pytest.approx(two.pose.rpy, abs=1e-9)
+    assert singular(robot, real=True, points=20).verdict.rank == 3

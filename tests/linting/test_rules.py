@@ -182,6 +182,19 @@ def test_degrees_beside_radians_are_told_and_left(tmp_path: Path, shelf: Path):
         assert all(text in path.read_text() for text in values.values())
 
 
+@pytest.mark.parametrize(("other", "mended"), [("0", True), ("1.5", False)])
+def test_small_limits_beside_degrees_are_degrees_where_all_are_whole(tmp_path: Path, other: str, mended: bool):
+    path = tmp_path / "robot.urdf"
+    joints = "".join(f"""<link name="l{k}"/><joint name="j{k}" type="revolute"><parent link="base"/><child link="l{k}"/>
+        <limit lower="{low}" upper="{high}" effort="1" velocity="1"/></joint>"""
+                     for k, (low, high) in enumerate([("-5", "5"), ("-90", "45"), (other, "30")]))
+    path.write_text(f"""<robot name="r"><link name="base"/>{joints}</robot>""")
+    hrsynth.lint(path, fix=True)
+    lower, upper = ([float(each.get(end)) for each in etree.parse(path).iter("limit")] for end in ("lower", "upper"))
+    assert (lower[0], upper[0]) == pytest.approx(np.radians([-5, 5]) if mended else [-5, 5])
+    assert (lower[1], upper[1]) == pytest.approx(np.radians([-90, 45]))
+
+
 def load_tolerantly(path: Path):
     found = LintedFile(path).mechanism
     assert found is not None

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import strategies
-from hrsynth.description import load, shipped
+from hrsynth.description import load, save, shipped
 from hrsynth.errors import BadMechanism, BadRequest, BadRobotFile
 from hrsynth.mechanism import Direction, Mechanism
 from hrsynth.mechanism.builder import Builder
@@ -69,9 +72,28 @@ def test_only_the_end_joint_makes_a_point_of_a_platform() -> None:
     assert anatomy("3rrr_m1").point is None
 
 
-def test_a_point_platform_with_its_frame_elsewhere_is_the_same_point() -> None:
-    from dataclasses import replace
+@pytest.mark.parametrize("motor", [False, True])
+def test_a_ball_without_a_motor_makes_a_point_of_a_platform(motor: bool) -> None:
+    b = Builder("wrist")
+    b.link("base")
+    b.link("slide")
+    b.link("hand", at=(0, 0, 1))
+    b.joint("guide", "P", "base", "slide", at=(0, 0, 0), axis=(0, 0, 1), motor=True)
+    b.joint("ball", "S", "slide", "hand", at=(0.2, 0, 1), motor=motor)
+    robot = b.build(platform="hand")
+    assert (decompose(robot).point is None) == motor
+    assert decompose(replace(robot, turns=True)).point is None
 
+
+@pytest.mark.parametrize("ending", ["urdf", "sdf", "xml", "usda"])
+def test_that_a_platform_turns_is_written_and_read(tmp_path: Path, ending: str) -> None:
+    robot, path = load("prrrp_parallel_point"), tmp_path / f"robot.{ending}"
+    for turns in (None, True, False):
+        save(replace(robot, turns=turns), path)
+        assert load(path).turns is turns
+
+
+def test_a_point_platform_with_its_frame_elsewhere_is_the_same_point() -> None:
     robot = normal_form(load("prrrp_parallel_point")).mechanism
     frame = robot.links["platform"].pose.copy()
     frame[:3, 3] += (0.1, 0.05, 0.02)
@@ -87,8 +109,6 @@ def test_names_do_not_matter(name: str) -> None:
 
 
 def watched(*observations: tuple[str, str]) -> Mechanism:
-    from dataclasses import replace
-
     robot = load("3rrr_m1")
     return replace(robot, observations=tuple(Direction(leg, link, np.array([1.0, 0, 0])) for leg, link in observations))
 

@@ -20,7 +20,7 @@ from ..mechanism import Direction, Joint, JointType, Mechanism, Observation
 from ..mechanism.observations import kinds
 from ..mechanism.sensors import encoders, observation_of, observed_line
 from ..progress import tell
-from ..results import Result, Value
+from ..results import Result, Value, plain_number
 from ..tolerances import RANK_CUTOFF, SAME_PRICE, SAME_RELATION
 from .observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike, as_robot, as_texts, restrict_samples
 from .question import question
@@ -252,7 +252,7 @@ def _prices(text: str) -> dict[str, float]:
         if kind in found:
             raise BadRequest("--price: a kind given twice", text, f"one price of {kind}")
         try:
-            found[kind] = float(number)
+            found[kind] = plain_number(number)
         except ValueError:
             found[kind] = np.nan
         if not 0 < found[kind] < np.inf:

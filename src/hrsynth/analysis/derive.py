@@ -14,7 +14,7 @@ from ..geometry.ranks import range_basis
 from ..geometry.vectors import Array
 from ..kinematics.certificate import Certificate, certify
 from ..kinematics.sampling import Samples
-from ..mechanism import Mechanism, Observation
+from ..mechanism import Mechanism
 from ..mechanism.legs import LegDecomposition, decompose
 from ..mechanism.normal import normal_form
 from ..mechanism.notation import Architecture
@@ -192,27 +192,29 @@ def _certify(setting: ObservedRobot, state: State, samples: Samples) -> tuple[Me
 
 
 def finish_robot(setting: ObservedRobot, state: State) -> Mechanism:
-    """The hidden robot as a file writes it: a spanning tree, names of its own, its observations; of a formation, whose
-    bodies are joined now, the first one is the platform."""
+    """The hidden robot as a file writes it: a spanning tree, names of its own, its observations; its platform turns
+    where the real one does. Of a formation, whose bodies are joined now, the first one is the platform."""
     mechanism = state.mechanism
     observations = tuple(o for o in setting.observed if {o.link, o.seen_from or o.link} <= mechanism.links.keys())
     cameras = tuple(camera for camera in mechanism.cameras if camera.link in mechanism.links)
     hidden = spanning(replace(mechanism, name=f"{setting.robot.name}_hidden", observations=observations,
                               cameras=cameras, file=None, formation=False))
-    return replace(hidden, observations=_in_legs(hidden))
+    return _as_legs(hidden, turns=setting.samples.question.point is None)
 
 
-def _in_legs(hidden: Mechanism) -> tuple[Observation, ...]:
-    """A mechanism's observations; a segment that is in none of its legs (of a single leg the platform) as a direction
-    of its link. Where no leg ends on the base, as of a formation, they stay as they are."""
+def _as_legs(hidden: Mechanism, turns: bool) -> Mechanism:
+    """A mechanism that says whether its platform ``turns`` where its joints do not, with its observations; a segment
+    that is in none of its legs (of a single leg the platform) as a direction of its link. Where no leg ends on the
+    base, as of a formation, it stays as it is."""
     told = tuple(replace(o, seen_from=hidden.reference) if isinstance(o, Direction) and o.by_segment else o
                  for o in hidden.observations)
     try:
-        anatomy = decompose(normal_form(replace(hidden, observations=told)).mechanism)
+        anatomy = decompose(normal_form(replace(hidden, observations=told, turns=None)).mechanism)
     except BadMechanism:
-        return hidden.observations
-    return tuple(own if anatomy.leg_of(own.link) else other
-                 for own, other in zip(hidden.observations, told, strict=True))
+        return hidden
+    observations = tuple(own if anatomy.leg_of(own.link) else other
+                         for own, other in zip(hidden.observations, told, strict=True))
+    return replace(hidden, observations=observations, turns=None if turns == (anatomy.point is None) else turns)
 
 
 def _check(samples: Samples, count: int | None) -> Check:

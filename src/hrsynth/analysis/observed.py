@@ -71,9 +71,10 @@ class ObservedRobot(Value):
 
     @classmethod
     def of(cls, robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
-           offer: SeeLike = None, samples: int = SAMPLES, seed: int = 0) -> ObservedRobot:
+           offer: SeeLike = None, samples: int = SAMPLES, seed: int = 0, driven: bool = False) -> ObservedRobot:
         """What a question is asked of: an observed robot itself, or a robot with what is watched of it, as
-        :func:`.asked.observe`, and in the manner of ``see`` what is ``offer``-ed besides."""
+        :func:`.asked.observe`, and in the manner of ``see`` what is ``offer``-ed besides. A question about ``driven``
+        motors needs no segments: where there are none, the motors' coordinates are observed."""
         robot = as_robot(robot)
         names = legs_asked(robot, observe, see)
         if isinstance(robot, ObservedRobot):
@@ -84,7 +85,7 @@ class ObservedRobot(Value):
         tell("sampling")
         try:
             return _observed_robot(robot, (robot.file, robot.notes), names, as_texts(camera), as_texts(see),
-                                   as_texts(offer), samples, seed)
+                                   as_texts(offer), samples, seed, driven)
         except (BadMechanism, NotSampled) as error:
             error.file = robot.file
             raise
@@ -280,7 +281,7 @@ def as_names(given: LegsLike) -> tuple[str, ...] | None:
 def legs_asked(robot: Mechanism | ObservedRobot, observe: LegsLike, see: SeeLike = None) -> tuple[str, ...] | None:
     """:func:`as_names`, None also for all legs where nothing but segments is watched: one question, told in one way."""
     names = as_names(observe)
-    other = see is not None or (isinstance(robot, Mechanism) and not all(o.by_segment for o in robot.observations))
+    other = see is not None or (isinstance(robot, Mechanism) and bool(robot.observations))
     return None if names == ("all",) and not other else names
 
 
@@ -300,7 +301,8 @@ def forget_robots() -> None:
 
 @lru_cache(maxsize=REMEMBERED)
 def _observed_robot(robot: Mechanism, source: Hashable, observe: tuple[str, ...] | None, cameras: tuple[str, ...],
-                    see: tuple[str, ...], offer: tuple[str, ...], samples: int, seed: int) -> ObservedRobot:
+                    see: tuple[str, ...], offer: tuple[str, ...], samples: int, seed: int,
+                    driven: bool) -> ObservedRobot:
     """The answer to the same words for the same value of a robot, of one ``source``, is the same value: it is drawn
     once."""
     robot, asked, possible = _seeing(robot, cameras, see, offer)
@@ -309,8 +311,8 @@ def _observed_robot(robot: Mechanism, source: Hashable, observe: tuple[str, ...]
     defaults = defaults_of(anatomy)
     own = tuple(o for o in anatomy.mechanism.observations if o.leg not in asked | possible)
     given = tuple(o for o in own if not o.by_segment)
-    chosen = () if observe is None and asked else (
-        own if observe is None and given else _observations(anatomy, normal, defaults, observe, given))
+    chosen = () if observe is None and asked else own if observe is None and own else (
+        _encoders_of(anatomy) if driven and not defaults else _observations(anatomy, normal, defaults, observe, given))
     observed = (*chosen, *(o for o in anatomy.mechanism.observations if o.leg in asked))
     offered = tuple(o for o in anatomy.mechanism.observations if o.leg in possible)
     known = {o.key for o in defaults.values()}
@@ -399,13 +401,16 @@ def _observations(anatomy: LegDecomposition, normal: NormalForm, defaults: dict[
 
 def motors(setting: ObservedRobot) -> Measurement:
     """The question that a robot's own motors answer: their coordinates, as encoders would give them."""
-    mechanism, anatomy = setting.mechanism, setting.anatomy
+    return replace(setting.everything.question, observations=_encoders_of(setting.anatomy))
+
+
+def _encoders_of(anatomy: LegDecomposition) -> tuple[Observation, ...]:
+    mechanism = anatomy.mechanism
     of = {name: leg.label for leg in anatomy.legs for name in leg.joints}
     driven = [joint for joint in mechanism.joints.values() if joint.actuated]
     if not driven:
         raise BadRequest(f"{mechanism.name} has no motor", None, "one or more: --motors names them")
-    found = tuple(each for joint in driven for each in encoders(mechanism, joint, of.get(joint.name, "")))
-    return replace(setting.everything.question, observations=found)
+    return tuple(each for joint in driven for each in encoders(mechanism, joint, of.get(joint.name, "")))
 
 
 def restrict_samples(samples: Samples, observations: Iterable[Observation], *, ways: bool = True) -> Samples:

@@ -145,7 +145,11 @@ def _with_segments(drawn: Mechanism, word: RobotWord, chords: Mapping[str, Direc
             continue
         if leg.observed is not None:
             found.append(replace(segment, leg=label))
-    return replace(drawn, observations=tuple(found)) if found else drawn
+    if not found:
+        return drawn
+    told = {each.leg: each for each in found}
+    return replace(drawn, observations=tuple(told.get(leg.label) or default_observation(anatomy, leg)
+                                             for leg in anatomy.legs))
 
 
 class _Limb:

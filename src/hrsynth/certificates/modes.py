@@ -160,7 +160,7 @@ def again(record: dict[str, Any], robot: Mechanism) -> dict[str, Any]:
                              for part, value in record["at"].items() if value is not None}
     at = Pose(**parts)
     real = record["kind"] == "real"
-    setting = ObservedRobot.of(robot, None if real else [link for _, link in record["observed"]])
+    setting = ObservedRobot.of(robot, None if real else [link for _, link in record["observed"]], driven=real)
     start = setting.motion.pose(setting.everything.start.pose(setting.motion.link))
     return certificate(modes(setting, at=None if start == at else at, real=real))
 

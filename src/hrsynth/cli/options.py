@@ -76,12 +76,13 @@ class Option:
     def read(self, text: str) -> Any:
         """A value as it is written on the command line; raises ``BadRequest``."""
         from ..errors import BadRequest
+        from ..results import plain_number
 
         if self.kind not in (int, float):
             return text
         ends = [f"at {end} {value:g}" for end, value in (("least", self.low), ("most", self.high)) if value is not None]
         try:
-            number = self.kind(text)
+            number = plain_number(text, self.kind)
             if (self.low is None or number >= self.low) and (self.high is None or number <= self.high):
                 return number
         except ValueError:
@@ -108,8 +109,8 @@ def shipped_names() -> Iterable[str]:
 
 
 JSON = flag("json", "Print the result as one JSON object; its schema: hrsynth schema COMMAND.", OUTPUT)
-OBSERVE = Option("observe", "Legs to watch (1,4), links, or all (default: all, or what the file observes that is no "
-                 "leg's direction; none with --see).",
+OBSERVE = Option("observe", "Legs to watch (1,4), links, or all (default: what the file observes, else all; none "
+                 "with --see).",
                  "LEGS", group=WATCHING)
 CAMERA = Option("camera", "The link that carries the camera; or a further camera with a name and its place on a link "
                 "(metres; radians or deg; focal length, width and height in pixels); repeat for more.",

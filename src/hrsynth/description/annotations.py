@@ -15,6 +15,7 @@ from ..mechanism.observations.direction import Direction
 from ..mechanism.sights import NamedCamera
 from ..tolerances import WITHOUT_DIRECTION
 from . import numerals
+from .elements import TURNS
 from .jointgraph import FrameSpec, JointGraph
 from .sights import attributes_of, spec_of
 
@@ -52,6 +53,8 @@ def read_annotation(graph: JointGraph, key: str, text: str) -> str | None:
             return f"{key}: unknown link"
         setattr(graph, "platform" if key == "formation" else key, words[0])
         graph.formation = graph.formation or key == "formation"
+    elif key == "turns" and words in (["true"], ["false"]):
+        graph.turns = TURNS[words[0]]
     elif key == "motor" and len(words) == 2:
         if words[1] not in graph.joints:
             return "motor of an unknown joint"
@@ -90,6 +93,8 @@ def _camera(said: dict[str, str]) -> NamedCamera:
 def annotations_of(robot: Mechanism, *, motors: bool = False) -> Iterable[tuple[str, str]]:
     """Key and text of all that is added for a robot, in order."""
     yield "formation" if robot.formation else "platform", quote(robot.platform)
+    if robot.turns is not None:
+        yield "turns", str(robot.turns).lower()
     if robot.camera is not None:
         yield "camera", quote(robot.camera)
     for joint in robot.joints.values():

@@ -16,6 +16,8 @@ from . import numerals, xml
 from .jointgraph import ORIGIN, Z
 
 LIMITS = ("lower", "upper", "velocity", "effort")
+TURNS: dict[str, bool | None] = {"true": True, "false": False}
+"""What a platform's ``turns`` may say."""
 
 
 @dataclass

@@ -125,6 +125,8 @@ class JointGraph:
     platform: str | None = None
     formation: bool = False
     """Whether the platform is only the first of the bodies that are controlled."""
+    turns: bool | None = None
+    """Whether the platform's turn counts; None: by the joints."""
     camera: str | None = None
     observations: list[Direction] = field(default_factory=list)
     sights: list[SightSpec] = field(default_factory=list)

@@ -24,7 +24,7 @@ UNITS = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "in": 0.0254}
 """Units of length (m)."""
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _END = rf"(?:[^:,@]|::)+(?:@{_NUMBER},{_NUMBER},{_NUMBER})?"
-_CLOSURE = re.compile(rf"(?P<one>{_END}):(?P<two>{_END})(?::(?P<kind>\w+))?")
+_CLOSURE = re.compile(rf"(?P<one>{_END}):(?P<two>{_END})(?::(?P<kind>\w+))?", re.ASCII)
 
 
 @dataclass(frozen=True)

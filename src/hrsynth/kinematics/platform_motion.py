@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import BadRequest
-from ..geometry.ranks import space_basis
+from ..geometry.ranks import range_basis, space_basis
 from ..geometry.screws import point_velocity
 from ..geometry.so3 import between, exponential, logarithm, turn_about, wrap_angle
 from ..geometry.vectors import Array, orient_axis, transform
@@ -113,6 +113,8 @@ class PlatformMotion(Value):
     twists: Array
     dof: int
     """Freedoms at a generic configuration; ``twists`` spans more where they change from pose to pose."""
+    shifts: int
+    """Those of the point there: 1 on a curve, 2 on a surface; ``translations`` spans all."""
     form: PoseForm = RADIANS
     """How poses are told."""
 
@@ -130,7 +132,8 @@ class PlatformMotion(Value):
         together = np.hstack(columns)
         translations, rotations, twists = (space_basis(part, 1.0) for part in (together[:3], together[3:], together))
         home, dof = twin.pose(twin.q0, question.platform), max(column.shape[1] for column in columns)
-        return cls(question.platform, point, question.point is None, home, translations, rotations, twists, dof)
+        shifts = max(range_basis(column[:3], 1.0)[1].value for column in columns)
+        return cls(question.platform, point, question.point is None, home, translations, rotations, twists, dof, shifts)
 
     @property
     def normal(self) -> Array:

@@ -83,17 +83,19 @@ class LegDecomposition(Value):
 
     @cached_property
     def point(self) -> Array | None:
-        """Where the platform is a point body (two or more joints, all coaxial R, or one S): that point, in the
+        """Where the platform is a point body (two or more joints, all coaxial R, or one passive S): that point, in the
         platform's frame, (3,); on a common axis the foot of the frame's origin. None for any other platform: what
-        hangs on a single R is a tool, and its turn counts."""
+        hangs on a single R is a tool, and its turn counts, unless the robot says that it does not."""
         joints = self.mechanism.joints_of(self.mechanism.platform)
         frame = self.mechanism.links[self.mechanism.platform].pose
         first = joints[0]
-        tolerance = SAME_POINT * self.mechanism.length
+        tolerance, turns = SAME_POINT * self.mechanism.length, self.mechanism.turns
+        if turns or (turns is None and len(joints) == 1 and (first.type is JointType.REVOLUTE or first.actuated)):
+            return None
         if len(joints) == 1 and first.type is JointType.SPHERICAL:
             centre = first.point
-        elif len(joints) > 1 and all(j.type is JointType.REVOLUTE and lines.parallel(j.axis, first.axis)
-                                     and lines.distance(j.point, first.point, first.axis) <= tolerance for j in joints):
+        elif all(j.type is JointType.REVOLUTE and lines.parallel(j.axis, first.axis)
+                 and lines.distance(j.point, first.point, first.axis) <= tolerance for j in joints):
             centre = lines.foot(frame[:3, 3], first.point, first.axis)
         else:
             return None

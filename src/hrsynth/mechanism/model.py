@@ -208,6 +208,8 @@ class Mechanism(Result, shown_as="robot"):
     formation: bool = False
     """Whether no platform is named: all bodies of :attr:`bodies` are what is controlled, up to the motions that no
     observation could tell; ``platform`` is then only the first of them."""
+    turns: bool | None = None
+    """Whether the platform's turn counts, as it does in the real robot of a hidden one; None: by the joints."""
 
     def headline(self) -> str:
         """The name, and the number of its parts."""
@@ -345,7 +347,7 @@ class Mechanism(Result, shown_as="robot"):
             if not gap <= tolerance:
                 found.append(f"{what}: differs by {gap:.3g}")
 
-        for role in ("base", "platform", "formation", "reference", "couplings"):
+        for role in ("base", "platform", "formation", "turns", "reference", "couplings"):
             compare(role, getattr(self, role), getattr(other, role))
         compare("links", set(self.links), set(other.links))
         compare("joints", set(self.joints), set(other.joints))

@@ -11,6 +11,7 @@ import numpy as np
 from ..budgets import WIDEST_NOISE
 from ..errors import BadRequest
 from ..geometry.vectors import Array
+from ..results import plain_number
 from ..tolerances import NOISE_STEP
 from .observation import Observation
 from .sights import CameraObservation
@@ -39,7 +40,7 @@ class Noise:
             ending = next(each for each in UNITS if word.endswith(each))
             unit, one = UNITS[ending]
             try:
-                value = float(word.removesuffix(ending)) * one
+                value = plain_number(word.removesuffix(ending)) * one
             except ValueError:
                 raise BadRequest("noise: not a number", text, EXAMPLE) from None
             if not 0 < value < MOST[unit] or unit in found:

@@ -38,5 +38,5 @@ def between(mechanism: Mechanism, base: str, platform: str) -> Mechanism:
         notes = (*notes, Note("ignored", f"{len(gone)} links that are not between {base!r} and {platform!r}: "
                                          + ", ".join(gone[:5]) + (" …" if gone[5:] else "")))
     kept = replace(mechanism, base=base, platform=platform, camera=camera, observations=observations, notes=notes,
-                   cameras=cameras)
+                   cameras=cameras, turns=mechanism.turns if platform == mechanism.platform else None)
     return kept.changed(remove_links=gone)

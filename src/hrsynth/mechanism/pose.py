@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..budgets import FARTHEST_POSE, LARGEST_GRID
 from ..errors import BadRequest
 from ..geometry.vectors import Array, rotation_from_rpy
-from ..results import Value
+from ..results import Value, plain_number
 from ..tolerances import AS_PRINTED, HALF_TURN
 
 SCALARS = ("x", "y", "z", "phi")
@@ -194,7 +194,7 @@ def asked_pose(given: PoseLike) -> Pose | ModeNumber:
     name, colon, number = given.strip().partition(":")
     if not colon or name != "mode":
         return Pose.parse(given)
-    if not number.isdecimal() or int(number) < 1:
+    if not (number.isascii() and number.isdecimal()) or int(number) < 1:
         raise BadRequest("number of a mode", given, "mode:1, mode:2, … as modes lists them")
     return ModeNumber(int(number))
 
@@ -330,9 +330,7 @@ def _fields(text: str, what: str) -> list[tuple[str, str]]:
 def _number(value: str, name: str, text: str) -> float:
     digits = value.removesuffix("deg").strip() if name in ("phi", "rpy") else value
     try:
-        if not digits.isascii() or "_" in digits:
-            raise ValueError
-        number = float(digits)
+        number: float = plain_number(digits)
     except ValueError:
         unit = "a number of radians, or of degrees with deg" if name in ("phi", "rpy") else "a number of metres"
         if ":" in value:
@@ -352,7 +350,7 @@ def _triple(value: str, text: str) -> Sequence[float]:
 
 def _range(value: str, name: str, text: str, largest: int) -> Array:
     entries = [entry.strip() for entry in value.split(":")]
-    if len(entries) != 3 or not entries[2].isdecimal() or not 2 <= int(entries[2]) <= largest:
+    if len(entries) != 3 or not (value.isascii() and entries[2].isdecimal()) or not 2 <= int(entries[2]) <= largest:
         raise BadRequest(f"grid {text!r}: range of {name}", value, f"from:to:count with a count of 2 to {largest}")
     low, high = (_number(entry, name, text) for entry in entries[:2])
     if low == high:

@@ -83,12 +83,12 @@ def paper_for(ending: str, width: str | None, font: str | None) -> Paper:
     (Times 8pt). Raises ``BadRequest``."""
     inches = size = None
     if width is not None:
-        found = re.fullmatch(r"(\d+\.?\d*) *(mm|cm|in)", width.strip())
+        found = re.fullmatch(r"(\d+\.?\d*) *(mm|cm|in)", width.strip(), re.ASCII)
         inches = 0.0 if found is None else float(found[1]) * MILLIMETRES[found[2]] / MILLIMETRES["in"]
         if not WIDTHS[0] <= inches <= WIDTHS[1]:
             raise BadRequest("width of a figure", width, f"{WIDTHS[0]:g}in to {WIDTHS[1]:g}in, as 88mm, 8.8cm or 3.5in")
     if font is not None:
-        name, points = re.fullmatch(r"(.*?)(?:(?:^| +)(\d+\.?\d*) *pt)?", font.strip()).groups()  # type: ignore[union-attr]
+        name, points = re.fullmatch(r"(.*?)(?:(?:^| +)(\d+\.?\d*) *pt)?", font.strip(), re.ASCII).groups()  # type: ignore[union-attr]
         size = None if points is None else float(points)
         if size is not None and not TEXTS[0] <= size <= TEXTS[1]:
             raise BadRequest("font of a figure", font, f"a name, a size of {TEXTS[0]:g}pt to {TEXTS[1]:g}pt, or both")

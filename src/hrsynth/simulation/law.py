@@ -27,7 +27,7 @@ from ..kinematics.relation import Measurement
 from ..kinematics.steps import lead_to
 from ..mechanism.observations.direction import SeenAxis
 from ..mechanism.sights import CameraObservation, depth_plane
-from ..results import Value
+from ..results import Value, plain_number
 from ..tolerances import DAMPED
 
 Measures = Sequence[Array] | Array
@@ -134,7 +134,7 @@ def supposed_planes(text: str, goal: ClosedConfiguration, question: Measurement)
     if text == "exact":
         return None
     try:
-        depth = None if text == "desired" else float(number)
+        depth = None if text == "desired" else plain_number(number)
     except ValueError:
         depth = np.nan
     if depth is not None and not (word == "constant" and 0 < depth <= FARTHEST_POSE):

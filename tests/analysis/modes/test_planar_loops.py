@@ -113,7 +113,7 @@ def test_a_search_finds_only_closings_that_are_listed(ratio: float):
 
 def test_more_than_needed_is_measured():
     """The floating bar is seen too: all other closings are excluded."""
-    found = hrsynth.modes(five_bar(-1.0)[0])
+    found = hrsynth.modes(five_bar(-1.0)[0], "all")
     assert found.found.complete
     assert (len(found.modes), found.found.complex, found.modes[0].goal) == (1, 1, True)
     assert "3 excluded by the legs in interval arithmetic" in found.found.proof

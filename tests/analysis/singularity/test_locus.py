@@ -224,6 +224,20 @@ def test_a_plane_that_is_not_reached() -> None:
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.slow
+def test_a_point_on_a_circle_and_the_turn_are_a_plane() -> None:
+    """The frame of a five-bar's distal link at the elbow: x and y depend on each other."""
+    robot = load("rrrrr_m1")
+    elbow, frame = robot.joints["elbow_1"].point, robot.links["dist_1"].pose.copy()
+    frame[:3, 3] = elbow
+    moved = robot.changed(links=[replace(robot.links["dist_1"], pose=frame)])
+    motion = ObservedRobot.of(moved).motion
+    assert (motion.translations.shape[1], motion.shifts, motion.dof) == (2, 1, 2)
+    locus = drawn(moved, steps=9)
+    assert locus.grid.names == ("x", "phi")
+    assert np.isfinite(locus.hidden.type2).mean() > 0.3
+
+
 def test_a_plane_whose_poses_depend_on_each_other_says_so() -> None:
     with pytest.raises(PlaneNotMet, match="parts of this pose depend on each other"):
         drawn(load("3rps"), plane="phi=0.1", steps=5)

@@ -86,6 +86,17 @@ def read(folder: Path, text: str, **given: object):
 
 
 @pytest.mark.some(1, 10)
+@pytest.mark.parametrize("size", [1500, 4000])
+def test_a_cut_stage_is_refused_with_the_line(tmp_path: Path, size: int):
+    path = tmp_path / "robot.usda"
+    save(load("delta"), path)
+    path.write_text(text := path.read_text()[:size])
+    with pytest.raises(BadRobotFile) as refused:
+        load(path)
+    assert refused.value.lines() == [f"{path}: OpenUSD cannot read robot.usda from line {len(text.splitlines())} on, "
+                                     "allowed: a whole stage"]
+
+
 @pytest.mark.parametrize("ending", [".usda", pytest.param(".usd", marks=pytest.mark.slow),
                                     pytest.param(".usdc", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", ROBOTS)

@@ -20,7 +20,7 @@ from ...kinematics.relation import Measurement
 from ...mechanism import Observation
 from ...mechanism.noise import Noise, blurs
 from ...mechanism.observations.direction import SeenAxis
-from ...results import Value
+from ...results import Value, plain_number
 from ...tolerances import NARROWEST_CONE, SEEN_ABOVE
 
 EXAMPLE = "0.1deg, 0.002 (radians), or one for each leg such as 1=0.1deg,2=0.2deg"
@@ -69,7 +69,7 @@ def _parse(text: str) -> float | dict[str, float]:
 def _angle(text: str) -> float:
     digits = text.removesuffix("deg").strip()
     try:
-        value = float(digits)
+        value = plain_number(digits)
     except ValueError:
         raise BadRequest("cone: not a number", text, EXAMPLE) from None
     return _require_angle(value if digits == text else math.radians(value), text)

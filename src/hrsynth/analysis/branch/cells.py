@@ -151,12 +151,9 @@ def _prove_block(trial: TubeTrial, block: LoopBlock) -> None:
         Mr = times(M, r)
         fits = np.all((e + Mr) * (1 + AFFINE_ROUNDING) < r, axis=-1) & ~done
         if fits.any():
-            beta = (Mr / r).max(axis=-1)
-            norm = (np.abs(Y).sum(axis=-1) / r).max(axis=-1) * r.max(axis=-1) * np.sqrt(len(own))
-            bound = (1 - beta) / norm * (1 - AFFINE_ROUNDING)
             trial.radius[np.ix_(fits, own)] = r[fits]
             if block.loop is None:
-                trial.weakest[fits] = np.minimum(trial.weakest[fits], bound[fits])
+                trial.weakest[fits] = np.minimum(trial.weakest[fits], _weakest(Y[fits], M[fits], r[fits], Mr[fits]))
             done |= fits
         good = np.all(np.isfinite(M), axis=(-1, -2)) & np.all(np.isfinite(e), axis=-1) & ~done
         possible = good & (np.abs(np.linalg.eigvals(np.where(good[:, None, None], M, one))).max(axis=-1) < 1)
@@ -167,6 +164,20 @@ def _prove_block(trial: TubeTrial, block: LoopBlock) -> None:
     trial.alive &= done
     if block.loop is not None:
         trial.alive &= _same_side(trial, block)
+
+
+def _weakest(Y: Array, M: Array, r: Array, Mr: Array) -> Array:
+    """A lower bound (c,) of the smallest singular value of all A (c, k, k) with |1 − Y A| ≤ M, where M r < r.
+
+    |A⁻¹| ≤ (1 − M)⁻¹ |Y| = Z + (1 − M)⁻¹ R, entry by entry, for any Z and R = |Y| − (1 − M) Z. Columns of |R| are at
+    most ρ r, and (1 − M)⁻¹ r ≤ r / (1 − max M r / r).
+    """
+    size, r = np.abs(Y), r[..., None]
+    Z = np.abs(np.linalg.solve(np.eye(Y.shape[-1]) - M, size))
+    R = np.abs(size - Z + M @ Z) + AFFINE_ROUNDING * (size + Z + M @ Z)
+    found = Z + r * (R / r).max(axis=-2, keepdims=True) / (1 - (Mr[..., None] / r).max(axis=-2, keepdims=True))
+    norm = np.sqrt(found.sum(axis=-1).max(axis=-1) * found.sum(axis=-2).max(axis=-1))
+    return np.asarray((1 - AFFINE_ROUNDING) / norm)
 
 
 def inverses(A: Array) -> Array:

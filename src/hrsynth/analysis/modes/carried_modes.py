@@ -20,7 +20,7 @@ from .carrier import carried_platform
 from .conditions import PoseCondition
 from .joint_forms import closings_bound, eigenvalues
 from .polynomials import Polynomial, krawczyk
-from .pose_boxes import FAR_FROM_REAL, PRECISION, PoseBox, UnitCircle, as_box, at_middle, told_far, zeros
+from .pose_boxes import FAR_FROM_REAL, PRECISION, PoseBox, UnitLength, as_box, at_middle, told_far, zeros
 from .pose_forms import Poses
 from .solve import SystemMode, SystemModes
 
@@ -120,7 +120,7 @@ def enclose_zeros(system: CarriedPlatform, proposed: Array) -> list[PoseBox]:
     n = len(system.freedoms_)
     equations: list[Polynomial] = [system.equation(each) for each in system.square]
     for k, each in enumerate(system.freedoms_):
-        equations += [_Fixed(k, 1), _Fixed(n + k, 0)] if each.slides else [UnitCircle(k, n + k), _Fixed(2 * n + k, 0)]
+        equations += [_Fixed(k, 1), _Fixed(n + k, 0)] if each.slides else [UnitLength((k, n + k)), _Fixed(2 * n + k, 0)]
     return zeros(equations, map(system.unknowns, proposed))[0]
 
 

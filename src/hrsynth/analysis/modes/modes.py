@@ -165,7 +165,7 @@ def modes(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None,
     if real and (observe not in (None, "all", ["all"]) or see is not None):
         raise BadRequest("the motors are held instead of what is observed", f"real with {observe or see}",
                          "one of the two")
-    setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed)
+    setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed, driven=real)
     if setting.robot.formation:
         return _modes_of_formation(setting, at, real)
     asked = None if at is None or isinstance(at, ClosedConfiguration) else asked_pose(at)

@@ -18,7 +18,7 @@ from .branches import Model
 from .planar_loops import Exponents, PlanarLoops, SumPart
 from .planar_reading import systems
 from .polynomials import Polynomial
-from .pose_boxes import PoseBox, UnitCircle, zeros
+from .pose_boxes import PoseBox, UnitLength, zeros
 from .solve import SystemMode, SystemModes
 
 
@@ -127,7 +127,7 @@ def _enclose(system: PlanarLoops, proposed: Array) -> tuple[list[PoseBox], int]:
     """Boxes of closings, apart from each other, and how many proposals have none."""
     a, slack = system.angles, system.slack
     equations: list[Polynomial] = [*(SumPart(loop, part, slack) for loop in system.loops for part in (False, True)),
-                                   *(UnitCircle(k, a + k) for k in range(a))]
+                                   *(UnitLength((k, a + k)) for k in range(a))]
     u, v, t = proposed[:, :a], proposed[:, a:2 * a], proposed[:, 2 * a:]
     return zeros(equations, np.hstack([(u + v) / 2, (u - v) / 2j, t]))
 

@@ -91,20 +91,19 @@ class Zero:
         return self.of(values)
 
 
-@dataclass(frozen=True, eq=False)
-class _Unit:
-    """q · q = 1."""
+@dataclass(frozen=True)
+class UnitLength:
+    """The squares of some unknowns, by their numbers, add up to 1: of a quaternion, of a cosine and a sine."""
 
-    turned: int
-    """How many coordinates the quaternion has."""
+    places: Sequence[int]
 
     def value(self, x: Sequence[Any]) -> Any:
         """The value at x."""
-        return sum(v * v for v in x[:self.turned]) - 1
+        return sum(x[k] * x[k] for k in self.places) - 1
 
     def slopes(self, x: Sequence[Any]) -> Any:
         """The derivative by each unknown at x."""
-        return [*(2 * v for v in x[:self.turned]), *(0 for _ in x[self.turned:])]
+        return [2 * v if k in self.places else 0 * v for k, v in enumerate(x)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,7 +173,7 @@ def enclose_poses(forms: SquareForms, slack: float, proposed: tuple[Array, Array
 
     turned = forms.poses.turns.shape[1]
     conditions = (*forms.planes, *forms.others)
-    equations, exact = (list[Polynomial]([_Unit(turned), *(Zero(c, forms.poses, each) for c in conditions)])
+    equations, exact = (list[Polynomial]([UnitLength(range(turned)), *(Zero(c, forms.poses, each) for c in conditions)])
                         for each in (slack, None))
     found: list[PoseBox] = []
     lost = 0
@@ -215,22 +214,6 @@ def told_far(boxes: Iterable[PoseBox]) -> str:
     """How many are told for the rounded geometry alone, in words."""
     far = sum(box.rounded for box in boxes)
     return f", {far} far from real ones for the rounded geometry" if far else ""
-
-
-@dataclass(frozen=True)
-class UnitCircle:
-    """c² + s² = 1 of two unknowns, by their numbers."""
-
-    c: int
-    s: int
-
-    def value(self, x: Sequence[Any]) -> Any:
-        """The value at x."""
-        return x[self.c] * x[self.c] + x[self.s] * x[self.s] - 1
-
-    def slopes(self, x: Sequence[Any]) -> Any:
-        """The derivative by each unknown at x."""
-        return [2 * v if k in (self.c, self.s) else 0 * v for k, v in enumerate(x)]
 
 
 def zeros(equations: Sequence[Polynomial], proposed: Iterable[Array]) -> tuple[list[PoseBox], int]:

@@ -231,14 +231,14 @@ def _axes(start: ClosedConfiguration, motion: PlatformMotion, plane: Pose | None
     if not fixed and motion.planar:
         plane, turned = replace(plane, phi=0.0), True
     places = [part for part in parts if part in "xyz" and part not in fixed]
-    count = motion.translations.shape[1] - len(fixed & set("xyz"))
+    count = motion.shifts - len(fixed & set("xyz"))
     if count == 3:
         plane, places, count = replace(plane, z=round(_coordinates(motion, start, ("z",))[0], 9)), places[:2], 2
-    if count == 2 <= motion.dof:
+    if count == 2:
         return plane, max(combinations(places, 2), key=lambda pair: _spread(motion, pair))
-    if count == 1 and "phi" in parts and not turned and motion.dof > motion.translations.shape[1]:
+    if count == 1 and "phi" in parts and not turned and motion.dof > motion.shifts:
         return plane, (places[0], "phi")
-    left = [part for part in parts if part in places or (part == "phi" and motion.dof > motion.translations.shape[1])]
+    left = [part for part in parts if part in places or (part == "phi" and motion.dof > motion.shifts)]
     told = " and ".join(left) + (", which depend on each other" if len(left) > 1 else "")
     allowed = ["fewer parts held"] if fixed else []
     allowed += [f"for a line of poses --grid {left[0]}=-0.1:0.1:9 of check, accuracy or basins"] if left else []

@@ -112,7 +112,7 @@ def singular(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = No
     >>> hrsynth.singular("rrrrr_m1", points=200)
     <Singularity: rrrrr_m1, watching 1, 2: the tangents τ1, τ2 are parallel>
     """
-    setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed)
+    setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed, driven=real)
     measured = MeasuredRobot.of_motors(setting) if real else MeasuredRobot.of_directions(setting)
     question, verdict = measured.question, measured.verdict
     if not verdict.dof:

@@ -114,7 +114,8 @@ def _mechanism(graph: JointGraph, base: str, platform: str, assembly: LoopAssemb
     links = {name: replace(link, pose=poses[name]) for name, link in graph.links.items()}
     mechanism = Mechanism(graph.name, links, with_limits(joints, assembly, values), base, platform,
                           tuple(graph.observations), (), graph.camera, tuple(graph.rest), graph.file,
-                          tuple(graph.notes), formation=graph.formation)
+                          tuple(graph.notes), formation=graph.formation,
+                          turns=graph.turns if platform == graph.platform else None)
     mechanism = as_written(spanning(mechanism), graph.sights, graph.cameras, graph.file)
     return replace(mechanism, couplings=tuple(_couplings(graph, mechanism)))
 

@@ -29,7 +29,7 @@ WITHIN = {
 """What stands in the elements that say what the robot is."""
 ATTRIBUTES = {
     "origin": {"xyz", "rpy"}, "axis": {"xyz"}, "axis2": {"xyz"}, "ratio": {"value"}, **{tag: {"link"} for tag in _ENDS},
-    "platform": {"link"}, "camera": {"link", "name"},
+    "platform": {"link", "turns"}, "camera": {"link", "name"},
     "observe": {"leg", "link", "joint", "axis", "kind", "camera", "at", "radius"},
     "limit": {"lower", "upper", "effort", "velocity", "acceleration", "deceleration", "jerk", "free"},
 }

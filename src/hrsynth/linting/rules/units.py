@@ -43,11 +43,16 @@ def _convert(numbers: list[NumberAt]) -> Mend | None:
 def _limits(file: LintedFile) -> Iterator[Spot]:
     if file.dialect == "mjcf":  # in which degrees are the default
         return
-    for each in limits(file):
-        ends = [end for end in (each.lower, each.upper) if end is not None]
-        if each.turns and any(in_degrees(end.value) for end in ends):
+    every = [(each, [end for end in (each.lower, each.upper) if end is not None])
+             for each in limits(file) if each.turns]
+    numbers = [end.value or 0.0 for _, ends in every for end in ends]
+    whole = any(map(in_degrees, numbers)) and all(value % IN_DEGREES == 0 for value in numbers)
+    for each, ends in every:
+        sure = any(in_degrees(end.value) for end in ends)
+        if sure or (whole and any(end.value for end in ends)):
             values = " to ".join(str(end.text) for end in ends)
-            yield Spot(xml.line(each.element), f"joint {each.joint!r}: limits {values} rad", _convert(ends))
+            beside = "" if sure else ", beside others that look like degrees"
+            yield Spot(xml.line(each.element), f"joint {each.joint!r}: limits {values} rad{beside}", _convert(ends))
 
 
 def _angles(file: LintedFile) -> Iterator[Spot]:

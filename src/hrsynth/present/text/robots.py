@@ -73,7 +73,7 @@ def derivation(found: Derivation) -> str:
         *formation(found.verdict.formation),
         ("mode", _modes(observed)),
         ("architecture", wrap_lines(exact_words(found.exact, found.verdict.rank), LINE - NAMES)),
-        *lost_rows(found.verdict), ("at zero", at_zero(found.verdict)),
+        *lost_rows(found.verdict), ("at zero", [f"{each} (hrsynth check)" for each in at_zero(found.verdict)]),
         ("", [] if found.verdict.has_interaction_matrix else NO_MATRIX),
         ("certificate", wrap_lines(certificate(found.certificate), LINE - NAMES)),
     ]
@@ -98,7 +98,7 @@ def at_zero(found: Verdict) -> list[str]:
     if rank is None:
         return []
     return [f"{f'only {rank}' if rank else 'none'} of {found.dof} freedoms seen: the zero configuration is a Type 2 "
-            "singularity (hrsynth check)"]
+            "singularity"]
 
 
 def formation(found: Formation | None) -> Rows:

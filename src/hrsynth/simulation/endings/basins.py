@@ -218,7 +218,7 @@ class BasinSearch:
         elif motion.planar:
             fixed = Pose(phi=float(place_of(motion, X, ("phi",))[0]))
         else:
-            fixed = Pose(z=float(motion.position(X)[2])) if motion.translations.shape[1] == 3 else Pose()
+            fixed = Pose(z=float(motion.position(X)[2])) if motion.shifts == 3 else Pose()
         return Mapper(self.setting, Blur(np.zeros(0))).plane(fixed, steps or (SIDE if self.flow else SIDE_ONE_BY_ONE))
 
     def over(self, grid: Grid, seed: int) -> Basins:

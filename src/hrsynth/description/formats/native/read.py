@@ -18,7 +18,7 @@ from ....mechanism.sights import NamedCamera
 from ....tolerances import NO_FINER, SAME_DIRECTION, SAME_GEOMETRY
 from ... import chains, xml
 from ...dialect import RobotFile
-from ...elements import LIMITS
+from ...elements import LIMITS, TURNS
 from ...jointgraph import JointSpec, TreeJoint, first_body, zero_poses
 from ...jointmotion import require_closed, residual
 from ...sights import SightSpec, as_written
@@ -54,6 +54,7 @@ class _NativeReader(UrdfReader):
     observations: list[Direction] = field(default_factory=list)
     platform: str | None = None
     formation: bool = False
+    turns: bool | None = None
     seen: list[SightSpec] = field(default_factory=list)
     cameras: list[NamedCamera] = field(default_factory=list)
     camera: str | None = None
@@ -143,6 +144,10 @@ class _NativeReader(UrdfReader):
                 link = self.attribute(child, "link")
                 if self.check_link(link, xml.line(child), f"{role}: unknown link"):
                     setattr(self, role, link)
+                if role == "platform":
+                    if (text := child.get("turns", "true")) not in TURNS:
+                        self.defect(xml.line(child), "turns of <platform>", text, "true, false")
+                    self.turns = TURNS.get(child.get("turns", ""))
             elif role == "platform":
                 self.formation = bool(self.seen)
                 if not self.formation:
@@ -243,7 +248,8 @@ class _NativeReader(UrdfReader):
                                        self.motors.get(joint.name), joint.limits, joint.in_tree, joint.xml, joint.line)
         links = {key: replace(link, pose=poses[key]) for key, link in self.links.items()}
         mechanism = Mechanism(name, links, joints, base, platform, tuple(self.observations), tuple(self.couplings),
-                              self.camera, tuple(self.rest), self.file, formation=self.formation)
+                              self.camera, tuple(self.rest), self.file, formation=self.formation,
+                              turns=self.turns)
         found = None if self.as_written or not loops else self.repair_rounding(mechanism, loops, poses)
         if found is not None:
             return found

@@ -163,7 +163,8 @@ class _NativeWriter:
         if all(joint.in_tree for joint in robot.joints.values()):
             element.set("serial", "true")
         if not robot.formation:
-            etree.SubElement(element, "platform", link=robot.platform)
+            said = {} if robot.turns is None else {"turns": str(robot.turns).lower()}
+            etree.SubElement(element, "platform", said, link=robot.platform)
         if robot.camera is not None:
             etree.SubElement(element, "camera", link=robot.camera)
         for camera in robot.cameras:

@@ -11,7 +11,7 @@ from ....mechanism.model import JointType, Limits, Link, Motor
 from ....mechanism.observations.direction import Direction
 from ... import xml
 from ...dialect import RobotFile
-from ...elements import sound_limits
+from ...elements import TURNS, sound_limits
 from ...jointgraph import GearSpec, JointGraph, JointSpec, comma_list
 from ..extensions import DRAKE, is_drake, local
 from .conventions import CONVENTIONS
@@ -127,6 +127,7 @@ class _TolerantReader(UrdfReader):
                 link = None if element is None else element.get("link")
                 if element is not None and self.check_link(link, xml.line(element), f"{tag}: unknown link"):
                     setattr(graph, tag, link)
+                    graph.turns = TURNS.get(element.get("turns", ""), graph.turns)
             graph.sights, graph.cameras = self.sights(own)
             graph.formation = graph.platform is None and bool(graph.sights)
             for element in own.findall("observe"):

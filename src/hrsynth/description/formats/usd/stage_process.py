@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import resource
 import sys
 from pathlib import Path
@@ -162,7 +163,9 @@ def main(largest: str, most: str, task: str, name: str, *rest: str) -> None:
     except (Tf.ErrorException, RuntimeError, OSError, MemoryError, RecursionError) as error:
         text = " ".join(str(error).split())
         what = text.partition(" : ")[2] or text or type(error).__name__
-        refuse(f"OpenUSD refuses it: {what[:300]}, allowed: a whole stage")
+        place = re.search(r"([^'/]*):(\d+):\d+: ", what)
+        refuse(f"OpenUSD cannot read {place[1]} from line {place[2]} on, allowed: a whole stage" if place else
+               f"OpenUSD refuses it: {what[:300]}, allowed: a whole stage")
     os._exit(0)
 
 

@@ -27,7 +27,7 @@ from .watch import smallest
 def answer(request: Request) -> dict[str, Any]:
     """Three sentences about a robot at its zero configuration, of the smallest sets of legs that see most the one with
     the least error there."""
-    setting = ObservedRobot.of(request.mechanism, None, request.camera)
+    setting = ObservedRobot.of(request.mechanism, "all", request.camera)
     found = [(watching(setting, each), each) for each in smallest(setting)]
     start = setting.everything.start
     chosen, verdict = min(found, key=lambda pair: _size(error(pair[0], start)))

@@ -24,7 +24,7 @@ from ....mechanism.observation import labels_of
 from ....mechanism.observations.direction import Direction
 from ....tolerances import NAMED
 from ...text.poses import STATES
-from ...text.robots import certificate, exact_words
+from ...text.robots import at_zero, certificate, exact_words
 from ...view.states import HIDDEN
 from ...view.view import machine_of
 from ..commands import lines
@@ -61,9 +61,7 @@ def answer(request: Request) -> dict[str, Any]:
 
 def words(verdict: Verdict) -> str:
     """What a set of legs sees, and that it sees less at the zero configuration, where it does."""
-    fewer = verdict.rank_at_zero
-    return verdict.verdict if fewer is None else (
-        f"{verdict.verdict}, but at the zero configuration only {fewer} of {verdict.dof} freedoms are seen")
+    return "; ".join([verdict.verdict, *at_zero(verdict)])
 
 
 def describe_lost(freedom: Freedom, point: list[float]) -> dict[str, Any]:
@@ -105,7 +103,7 @@ def condition(setting: ObservedRobot) -> str:
 
 def all_legs(setting: ObservedRobot) -> ObservedRobot:
     """The same robot with all legs watched."""
-    return ObservedRobot.of(setting.robot)
+    return ObservedRobot.of(setting.robot, "all")
 
 
 @lru_cache(maxsize=REMEMBERED)
