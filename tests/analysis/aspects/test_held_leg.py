@@ -13,6 +13,7 @@ from analysis.aspects.six_modes import six_modes
 from hrsynth.analysis.aspects.atlas import Atlas, atlas
 from hrsynth.analysis.aspects.held_leg import HeldLegSection, SectionPoint, section
 from hrsynth.analysis.aspects.three_cranks import ThreeCranks, mode_counts, three_cranks
+from hrsynth.description import native
 from hrsynth.families.planar import six_poses
 from hrsynth.kinematics.configuration import ClosedConfiguration
 
@@ -138,6 +139,22 @@ def test_the_section_holds_all_modes_of_the_goal():
     for place in places.values():
         assert np.max(np.abs(place.rods - goal.rods)) < 1e-9
         assert np.abs(place.cranks) == pytest.approx(drawn.robot.cranks, abs=1e-9)
+
+
+@pytest.mark.parametrize("axis", ["0 0 1", "0 0 -1"])
+def test_the_turn_of_a_mode_is_counted_as_phi_of_its_pose(axis: str):
+    """Whatever the sense of the file's axes."""
+    text = hrsynth.shipped()["3rrr_m1"].read_text(encoding="utf-8")
+    assert '<axis xyz="0 0 1"/>' in text
+    found = atlas(native.parse(text.replace('<axis xyz="0 0 1"/>', f'<axis xyz="{axis}"/>')))
+    places = [at for at in found.places if at is not None]
+    made = three_cranks(found.aspects, places)
+    assert not isinstance(made, str)
+    turns = [at.pose(found.aspects.setting.mechanism.platform)[:3, 0] for at in places]
+    phi = [np.arctan2(turn[1], turn[0]) for turn in turns]
+    assert len(phi) == 2
+    assert abs(phi[1] - phi[0]) > 0.1
+    assert [place.turn for place in made[1]] == pytest.approx([each - phi[0] for each in phi], abs=1e-9)
 
 
 @pytest.mark.some(2)

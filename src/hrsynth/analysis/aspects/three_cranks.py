@@ -57,8 +57,9 @@ def three_cranks(aspects: Aspects, configurations: Sequence[ClosedConfiguration]
     chosen = [(k, limb) for k, limb in (limbs[label] for label in labels) if isinstance(limb, OnCrank)]
     if not len(pattern.limbs) == len(chosen) == 3:
         return "the legs are not three rods on cranks"
-    x = perpendicular(chosen[0][1].axis)
-    plane = np.array([x, np.cross(chosen[0][1].axis, x)]).T @ [1, 1j]
+    normal = setting.motion.normal
+    x = perpendicular(normal)
+    plane = np.array([x, np.cross(normal, x)]).T @ [1, 1j]
     feet = np.array([limb.centre for _, limb in chosen])
     places, tips = [], []
     home = pattern.coordinates.of(configurations[:1])[1][0]
