@@ -141,6 +141,20 @@ def test_the_section_holds_all_modes_of_the_goal():
         assert np.abs(place.cranks) == pytest.approx(drawn.robot.cranks, abs=1e-9)
 
 
+def test_modes_are_counted_where_the_second_corner_just_reaches_its_circle():
+    """Few places count what many do: a whole column of the picture was wrong where two ways of the first corner nearly
+    join, or have nearly parted."""
+    rng = np.random.default_rng(3)
+    feet = np.array([0, 2, 1 + 1.7j]) + 0.3 * (rng.normal(size=3) + 1j * rng.normal(size=3))
+    cranks, rods = rng.uniform(0.6, 1.4, (2, 3))
+    robot = ThreeCranks(("1", "2", "3"), feet, cranks, rods,
+                        np.array([0, rng.uniform(0.5, 1), rng.uniform(0.3, 1) * np.exp(1j)]))
+    first, second = np.linspace(-np.pi, np.pi, 161), np.linspace(-np.pi, np.pi, 16)
+    few, many = (mode_counts(robot, 1 + 0j, first, second, steps) for steps in (480, 6000))
+    assert set(np.unique(many)) == {0, 2, 4, 6}
+    assert np.sum(few != many) <= 1
+
+
 @pytest.mark.parametrize("axis", ["0 0 1", "0 0 -1"])
 def test_the_turn_of_a_mode_is_counted_as_phi_of_its_pose(axis: str):
     """Whatever the sense of the file's axes."""
