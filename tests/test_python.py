@@ -65,6 +65,7 @@ def test_a_wrong_keyword_is_told_with_the_nearest_and_all(ask: Any, near: str):
     (lambda: hrsynth.lint(hrsynth.load("3rrr_m1")), "a path, the name of a shipped robot"),
     (lambda: hrsynth.save("3rrr_m1", "x.xml", meshes="move"), "keep, copy"),
     (lambda: hrsynth.branch("rrrrr_m1", [1, 2]), "hip=-1:1"),
+    (lambda: hrsynth.branch("rrrrr_m1", "shoulder_1"), "^a box of motors, found 'shoulder_1', allowed: low:high"),
     (lambda: hrsynth.draw(5), "what a function of hrsynth answers"),
     (lambda: hrsynth.check("rrrrr_m1", seed="a"), "seed, found 'a', allowed: an integer"),
     (lambda: hrsynth.check("rrrrr_m1", seed=-1), "at least 0"),
