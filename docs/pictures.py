@@ -93,7 +93,7 @@ PICTURES: dict[str, str | Page | SitePage | Family | Panels] = {
     "accuracy_quattro.png": "accuracy quattro --observe 1,4 --cone 0.1deg --plane z=-0.7",
     "atlas_six_poses.png": Family("atlas", "six_poses"),
     "basins_quattro.png": "basins quattro --observe 1,4 --to x=0,y=0,z=-0.7,phi=0 --plane z=-0.7,phi=0",
-    "catalog.png": Page("catalog site --group spatial --base-motors --verdict controllable --motion 1T2R", "-o", 1250,
+    "catalog.png": Page("catalog site --group spatial --base-motors --verdict controllable --motion 3R", "-o", 1250,
                         1100, "index.html"),
     "catalog_page.png": Page("catalog site --group planar --legs '3-R*RR'", "-o", 1250, 1100, "p/96081be379a6.html"),
     "derivation_quattro.svg": "quattro 1,4",

@@ -65,7 +65,18 @@ def test_a_wrong_keyword_is_told_with_the_nearest_and_all(ask: Any, near: str):
     (lambda: hrsynth.lint(hrsynth.load("3rrr_m1")), "a path, the name of a shipped robot"),
     (lambda: hrsynth.save("3rrr_m1", "x.xml", meshes="move"), "keep, copy"),
     (lambda: hrsynth.branch("rrrrr_m1", [1, 2]), "hip=-1:1"),
-    (lambda: hrsynth.draw(5), "what a function of hrsynth answers")])
+    (lambda: hrsynth.branch("rrrrr_m1", "shoulder_1"), "^a box of motors, found 'shoulder_1', allowed: low:high"),
+    (lambda: hrsynth.draw(5), "what a function of hrsynth answers"),
+    (lambda: hrsynth.check("rrrrr_m1", seed="a"), "seed, found 'a', allowed: an integer"),
+    (lambda: hrsynth.check("rrrrr_m1", seed=-1), "at least 0"),
+    (lambda: hrsynth.branch("rrrrr_m1", effort=1.5), "effort, found 1.5, allowed: an integer"),
+    (lambda: hrsynth.modes("rrrrr_m1", real="maybe"), "True or False"),
+    (lambda: hrsynth.modes("rrrrr_m1", effort=True), "effort, found True, allowed: a number"),
+    (lambda: hrsynth.advise("rrrrr_m1", price={"encoder": 1}), "a text"),
+    (lambda: hrsynth.accuracy("rrrrr_m1", cone=[1]), "more than 0 and less than 90deg"),
+    (lambda: hrsynth.accuracy("rrrrr_m1", cone=0.01, noise=3), "a text such as 0.1deg"),
+    (lambda: hrsynth.servo("rrrrr_m1", start="x=0", goal="x=0", gain="x"), "a number"),
+    (lambda: hrsynth.servo("rrrrr_m1", start="x=0", goal="x=0", noise=3), "a text such as 0.1deg")])
 def test_a_value_of_another_kind_is_told_with_what_is_allowed(ask: Any, allowed: str):
     with pytest.raises(BadRequest, match=allowed):
         ask()

@@ -19,6 +19,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hrsynth.analysis.asked import observe
 from hrsynth.analysis.check import check
 from hrsynth.analysis.controllability import _smallest, legs
 from hrsynth.analysis.derive import Derivation, derive
@@ -34,6 +35,7 @@ from hrsynth.mechanism.observations.point import ImagePoint
 from hrsynth.mechanism.sights import NamedCamera
 from hrsynth.present.report.answer import describe_seen
 from hrsynth.present.show import text
+from hrsynth.present.text.tables import LINE, head
 from strategies import random_rotation
 
 Pairs = Sequence[tuple[int, int]]
@@ -388,6 +390,10 @@ def test_the_file_of_the_page_is_a_formation(page: str):
     assert found.formation
     assert found.bodies == ("b1", "b2", "b3", "b4")
     assert len(found.observations) == 10
+    observed = dict(head(observe(found)))["observed"]
+    assert len(observed) > 1
+    assert max(map(len, observed)) <= LINE
+    assert all(line.endswith(",") for line in observed[:-1])
 
 
 def test_a_file_without_a_platform_must_be_a_formation():

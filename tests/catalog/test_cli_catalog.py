@@ -20,6 +20,7 @@ from hrsynth.catalog.words import parse
 from hrsynth.cli import execute
 from hrsynth.cli.progress import Progress
 from hrsynth.present.text.catalog import SHOWN, entries
+from hrsynth.present.text.tables import LINE
 
 
 @pytest.fixture
@@ -63,6 +64,17 @@ def test_a_list_reads_only_the_entries_that_it_prints():
     assert told[-1].startswith("1000 of 2000 architectures, the first 100 shown")
     assert records.read == SHOWN
     assert "shown" not in entries(records[:SHOWN], 2000)
+
+
+def test_why_a_word_is_refused_makes_no_column_wide():
+    reason = "the mechanism cannot move " * 8
+    seen = {"word": "a", "notation": "3-RRR", "dof": 3, "motion": "2T1R", "verdict": "controllable", "rank": 3,
+            "fewest": 3}
+    told = entries([seen, {"word": "b", "notation": "3-PPP", "refused": reason}], 2).splitlines()
+    assert max(map(len, told)) <= LINE
+    assert "refused" in told[3]
+    words = [*told[3].split()[3:], *" ".join(told[4:-2]).split()]
+    assert " ".join(words) == reason.strip()
 
 
 def test_build_writes_and_tells_what_it_did(run, tmp_path: Path):

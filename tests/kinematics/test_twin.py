@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pinocchio as pin
 import pytest
 
+from hrsynth.errors import BadMechanism
 from hrsynth.geometry.vectors import Array
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.kinematics.relation import Measurement, relation
 from hrsynth.mechanism.builder import Builder
-from hrsynth.mechanism.model import JointType, Mechanism
+from hrsynth.mechanism.model import Joint, JointType, Mechanism, Motor
 from kinematics.robots import ROBOTS, seen_by_oracle, setting_of, state_of, walked
 from oracle import Oracle, same_relation
 from strategies import deltas, planar, pods, random_direction, random_normal, random_rotation, recut, transformed
@@ -206,6 +209,14 @@ def test_length_only_scales() -> None:
     basis = seen_by_oracle(Oracle(mechanism), state_of(other, other.q0), question, 3 * mechanism.length)
     assert same_relation(relation(at, question).basis, basis) < AGREE
     assert same_relation(relation(everything.start, question).basis, basis) > 0.1
+
+
+def test_a_motor_on_a_floating_joint_that_others_hold_is_refused() -> None:
+    robot = cycle("RRRR", np.random.default_rng(0))
+    free = robot.changed(joints=[Joint("free", JointType.FREE, "base", "link_2", np.zeros(3))])
+    assert PinocchioModel(free).model.nv == PinocchioModel(robot).model.nv
+    with pytest.raises(BadMechanism, match="a motor on a floating joint whose link other joints hold, found 'free'"):
+        PinocchioModel(free.changed(joints=[replace(free.joints["free"], motor=Motor("m"))]))
 
 
 def test_actuated_coordinates_are_those_of_the_motors() -> None:

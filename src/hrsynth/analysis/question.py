@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import warnings
 from collections import OrderedDict
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Mapping
 from functools import wraps
-from inspect import signature
+from inspect import Signature, signature
+from numbers import Integral, Real
 from threading import Lock
 from typing import Any, ParamSpec, TypeVar
+
+import numpy as np
 
 from ..budgets import REMEMBERED_ANSWERS, REMEMBERED_GRIDS
 from ..errors import BadRequest, MissingExtra
@@ -18,6 +21,11 @@ from .observed import as_robot, forget_robots, legs_asked
 
 P = ParamSpec("P")
 R = TypeVar("R")
+
+
+KINDS: dict[str, tuple[Any, str]] = {"int": (Integral, "an integer"), "float": (Real, "a number"),
+                                     "str": (str, "a text"), "bool": ((bool, np.bool_), "True or False")}
+"""What an argument must be whose annotation is one of these, and in words."""
 
 
 class AnswerMemory:
@@ -61,6 +69,20 @@ def forget_answers() -> None:
         memory.kept.clear()
 
 
+def require_kinds(known: Signature, given: Mapping[str, Any]) -> None:
+    """Raise ``BadRequest`` for an argument that is no number, text or truth value where the signature asks for one, or
+    a negative seed."""
+    for name, value in given.items():
+        kind, *none = str(known.parameters[name].annotation).split(" | ")
+        if kind not in KINDS or none not in ([], ["None"]) or (none and value is None):
+            continue
+        right, word = KINDS[kind]
+        if not isinstance(value, right) or (isinstance(value, bool) and kind != "bool"):
+            raise BadRequest(name, value, word)
+        if name == "seed" and value < 0:
+            raise BadRequest(name, value, f"{word}, at least 0")
+
+
 def question(*, formations: bool = False, **old: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
     """A function of a robot whose answers are frozen values: the robot is also taken by its name or path, and what was
     asked before is not computed again. ``old`` names of options, each with the one that it has now, are taken for one
@@ -85,6 +107,7 @@ def question(*, formations: bool = False, **old: str) -> Callable[[Callable[P, R
                 bound = known.bind(*args, **given)
             except TypeError as error:
                 raise TypeError(f"{function.__name__}: {error}; it takes {', '.join(known.parameters)}") from None
+            require_kinds(known, bound.arguments)
             robot = bound.arguments["robot"] = as_robot(bound.arguments["robot"])
             source = robot if isinstance(robot, Mechanism) else robot.robot
             if source.formation and not formations:

@@ -298,7 +298,7 @@ def _general(question: Measurement) -> General:
     M = sympy.MatrixSymbol("M", sum(question.sizes), size)
     where = {"M": "rates of what is observed for a basis of the platform's motions: M = Y K (X K)^+",
              "K": "basis of the links' motions on which no wrench that a joint transmits does work",
-             "X": "twist of the platform", "Y": "rates of what is observed", "d": "freedoms of the platform"}
+             "X": "twist of the platform", "Y": "rates of what is observed"}
     words = "the legs, with their measurements held, transmit no wrench against some motion of the platform"
     return General(words, sympy.Determinant(M.T * M), where=where, question=question)
 

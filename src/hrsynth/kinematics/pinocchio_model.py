@@ -112,8 +112,12 @@ class PinocchioModel:
             missing = sorted(set(mechanism.links) - reached)
             raise BadMechanism(f"{mechanism.name}: links that no joint connects to the base", ", ".join(missing))
         used = {joint.name for joint, _ in ordered}
-        loops = [j for j in mechanism.joints.values() if j.name not in used and j.type is not JointType.FREE]
-        return ordered, loops
+        left = [joint for joint in joints if joint.name not in used]
+        driven = ", ".join(joint.name for joint in left if joint.type is JointType.FREE and joint.actuated)
+        if driven:
+            raise BadMechanism(f"{mechanism.name}: a motor on a floating joint whose link other joints hold", driven,
+                               "motors on those")
+        return ordered, [joint for joint in left if joint.type is not JointType.FREE]
 
     def _chain(self, joint: Joint, parent: str) -> list[object]:
         """Pinocchio's joint models for a joint seen from ``parent``."""

@@ -33,6 +33,15 @@ class Noise:
     bias: bool = False
 
     @classmethod
+    def read(cls, given: object) -> Noise | None:
+        """What is given as a text, or is that already; raises ``BadRequest``."""
+        if given is None or isinstance(given, Noise):
+            return given
+        if not isinstance(given, str):
+            raise BadRequest("noise", given, "a text such as 0.1deg, 0.3px or 1mm")
+        return cls.parse(given)
+
+    @classmethod
     def parse(cls, text: str) -> Noise:
         """The amounts that ``0.1deg``, ``0.002``, ``0.3px`` or ``0.3px,1mm`` says; raises ``BadRequest``."""
         found: dict[str, float] = {}

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..geometry.vectors import Array
 from ..simulation.ending import ANTIPODAL, BOUNDARY, GOAL, MINIMUM, MODE, SIGHT, TIME, UNDECIDED
 from ..simulation.endings.basins import LETTERS, NOT_REACHED, BasinEnd, Basins, place_of
 from ..simulation.endings.flow import Flags, Places
@@ -42,6 +43,8 @@ ROOM = 3.0
 """Cells from the border of a basin at which its letter has room."""
 SEEN, RING = 0.05, 26
 """Part of a map's width below which what is certified is not seen; the diameter (points) of the ring about it."""
+BESIDE = 13.0
+"""Points from the mark of an end to its letter."""
 DARKEST, LIGHTEST = 0.4, 0.5
 """Where a kind has more ends than shades: the darkest, as part of the first shade; the lightest, as part of what the
 last one lacks of white."""
@@ -253,11 +256,27 @@ def _ends(place: Any, plane: MapPlane, found: Basins, level: float | None) -> se
                    markerfacecolor="black" if inside else "none", markeredgecolor="black", markeredgewidth=1.2)
         spots.append((float(u[0]), float(v[0]), letter))
         drawn.add((each.ending.name, inside))
-    for k, (x, y, letter) in enumerate(spots):
-        turn = 2 * np.pi * (k + 0.5) / len(spots)
-        place.annotate(letter, (x, y), (13 * np.cos(turn), 13 * np.sin(turn)), textcoords="offset points", fontsize=9,
-                       ha="center", va="center", zorder=6, path_effects=outline_strokes())
+    points = place.get_window_extent().width * 72 / place.figure.dpi
+    wide = np.ptp(plane.at(cell_edges(plane.x), plane.y[0])[0])
+    marks = np.array([spot[:2] for spot in spots]).reshape(-1, 2) * points / wide
+    for (x, y, letter), offset in zip(spots, letter_offsets(marks, BESIDE), strict=True):
+        place.annotate(letter, (x, y), offset, textcoords="offset points", fontsize=9, ha="center", va="center",
+                       zorder=6, path_effects=outline_strokes())
     return drawn
+
+
+def letter_offsets(marks: Array, distance: float) -> list[tuple[float, float]]:
+    """Where the letter of each mark (n, 2) is, seen from it: of all directions the one in which it is farthest from the
+    other marks and from the letters before."""
+    turns = 2 * np.pi * (np.arange(16) + 0.5) / 16
+    ways = distance * np.column_stack([np.cos(turns), np.sin(turns)])
+    taken, found = list(marks), list[tuple[float, float]]()
+    for mark in marks:
+        room = [min(float(np.linalg.norm(mark + way - each)) for each in taken) for way in ways]
+        way = ways[int(np.argmax(np.round(room, 6)))]
+        taken.append(mark + way)
+        found.append((float(way[0]), float(way[1])))
+    return found
 
 
 def table(found: Basins) -> bytes:

@@ -151,8 +151,8 @@ def settle_title(figure: Any, title: Any) -> float:
 
 
 def wrap(text: Any, width: float) -> None:
-    """Break the lines of a text of a figure at spaces, so that none is longer than ``width`` inches, and all that come
-    of one are about as long."""
+    """Break the lines of a text of a figure at spaces, but for those of units and of lists of numbers, so that none is
+    longer than ``width`` inches, and all that come of one are about as long."""
     def length(line: str) -> float:
         text.set_text(line)
         box = text.get_window_extent()
@@ -161,7 +161,7 @@ def wrap(text: Any, width: float) -> None:
     lines = []
     for given in text.get_text().split("\n"):
         whole = length(given)
-        words = re.split(r"(?<!=) (?!=|m\b)", given)
+        words = re.split(r"(?<!=)(?!(?<=\d,) \d) (?!=|m\b)", given)
         broken = [given]
         if whole > width:
             least = -(-whole // width)

@@ -21,6 +21,8 @@ from .state import State
 
 BUDGET = 400
 """The largest number of proposals a derivation may try."""
+TAKEN_BACK = " (taken back: legs remain)"
+"""How the reasons of steps end that served only for a proposal that was not kept."""
 
 
 class Comparison(Protocol):
@@ -178,7 +180,7 @@ def best(stage: Stage, after: Strategy, left: Callable[[Rewriting], Iterable[str
 
 
 def _taken_back(step: Step) -> Step:
-    return replace(step, accepted=False, reason=step.reason + " (taken back: legs remain)", state=None)
+    return replace(step, accepted=False, reason=step.reason + TAKEN_BACK, state=None)
 
 
 def observed_legs(at: Rewriting) -> tuple[str, ...]:

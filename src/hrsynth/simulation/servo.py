@@ -84,7 +84,7 @@ class Conditions:
     """Longest run (s)."""
 
     def __post_init__(self) -> None:
-        noise = Noise.parse(self.noise) if isinstance(self.noise, str) else self.noise
+        noise = Noise.read(self.noise)
         if self.bias and noise is None:
             raise BadRequest("a bias without noise", "none", "an amount of noise, such as 0.1deg")
         if noise is not None:

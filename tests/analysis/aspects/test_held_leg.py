@@ -13,6 +13,7 @@ from analysis.aspects.six_modes import six_modes
 from hrsynth.analysis.aspects.atlas import Atlas, atlas
 from hrsynth.analysis.aspects.held_leg import HeldLegSection, SectionPoint, section
 from hrsynth.analysis.aspects.three_cranks import ThreeCranks, mode_counts, three_cranks
+from hrsynth.description import native
 from hrsynth.families.planar import six_poses
 from hrsynth.kinematics.configuration import ClosedConfiguration
 
@@ -138,6 +139,36 @@ def test_the_section_holds_all_modes_of_the_goal():
     for place in places.values():
         assert np.max(np.abs(place.rods - goal.rods)) < 1e-9
         assert np.abs(place.cranks) == pytest.approx(drawn.robot.cranks, abs=1e-9)
+
+
+def test_modes_are_counted_where_the_second_corner_just_reaches_its_circle():
+    """Few places count what many do: a whole column of the picture was wrong where two ways of the first corner nearly
+    join, or have nearly parted."""
+    rng = np.random.default_rng(3)
+    feet = np.array([0, 2, 1 + 1.7j]) + 0.3 * (rng.normal(size=3) + 1j * rng.normal(size=3))
+    cranks, rods = rng.uniform(0.6, 1.4, (2, 3))
+    robot = ThreeCranks(("1", "2", "3"), feet, cranks, rods,
+                        np.array([0, rng.uniform(0.5, 1), rng.uniform(0.3, 1) * np.exp(1j)]))
+    first, second = np.linspace(-np.pi, np.pi, 161), np.linspace(-np.pi, np.pi, 16)
+    few, many = (mode_counts(robot, 1 + 0j, first, second, steps) for steps in (480, 6000))
+    assert set(np.unique(many)) == {0, 2, 4, 6}
+    assert np.sum(few != many) <= 1
+
+
+@pytest.mark.parametrize("axis", ["0 0 1", "0 0 -1"])
+def test_the_turn_of_a_mode_is_counted_as_phi_of_its_pose(axis: str):
+    """Whatever the sense of the file's axes."""
+    text = hrsynth.shipped()["3rrr_m1"].read_text(encoding="utf-8")
+    assert '<axis xyz="0 0 1"/>' in text
+    found = atlas(native.parse(text.replace('<axis xyz="0 0 1"/>', f'<axis xyz="{axis}"/>')))
+    places = [at for at in found.places if at is not None]
+    made = three_cranks(found.aspects, places)
+    assert not isinstance(made, str)
+    turns = [at.pose(found.aspects.setting.mechanism.platform)[:3, 0] for at in places]
+    phi = [np.arctan2(turn[1], turn[0]) for turn in turns]
+    assert len(phi) == 2
+    assert abs(phi[1] - phi[0]) > 0.1
+    assert [place.turn for place in made[1]] == pytest.approx([each - phi[0] for each in phi], abs=1e-9)
 
 
 @pytest.mark.some(2)

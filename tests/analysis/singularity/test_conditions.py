@@ -170,6 +170,8 @@ def test_a_condition_without_named_wrenches_defines_its_symbols_and_tells_no_ang
     assert "named wrenches" not in text(general)
     for meaning in general.condition.where.values():
         assert set(re.findall(r"\b[A-Z]\b", meaning)) <= general.condition.where.keys(), meaning
+    used = " ".join([str(general.condition.expression), *general.condition.where.values()])
+    assert general.condition.where.keys() <= set(re.findall(r"\b[A-Za-z]\b", used))
 
 
 @pytest.mark.slow

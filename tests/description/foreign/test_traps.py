@@ -367,3 +367,17 @@ def test_loops_that_rounding_may_hold_are_refused_as_such(tmp_path: Path):
         read(tmp_path, text)
     assert "gap" not in str(caught.value)
     assert caught.value.directions == 1
+
+
+def test_the_free_joint_of_a_platform_is_no_way_to_the_base(tmp_path: Path):
+    legs, closures, sites = "", "", ""
+    for k, (x, y) in enumerate([(0.3, 0.1), (-0.3, 0.0), (0.1, -0.3)], 1):
+        legs += (f'<body name="crank{k}" pos="{x} {y} 0"><joint type="hinge" axis="0 0 1"/>'
+                 f'<body name="rod{k}" pos="0.02 0.1 0"><joint type="hinge" axis="0 0 1"/>'
+                 f'<site name="tip{k}" pos="{-0.7 * x} {-0.7 * y} 0"/></body></body>')
+        sites += f'<site name="at{k}" pos="{0.3 * x + 0.02} {0.3 * y + 0.1} 0"/>'
+        closures += f'<connect site1="tip{k}" site2="at{k}"/>'
+    robot = read(tmp_path, f'<mujoco><worldbody>{legs}<body name="plate"><freejoint/>{sites}</body></worldbody>'
+                           f'<equality>{closures}</equality></mujoco>', "xml")
+    assert robot.platform == "plate"
+    assert "the platform is link 'plate', which 3 ways connect to the base" in "".join(map(str, robot.notes))

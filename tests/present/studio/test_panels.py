@@ -141,6 +141,28 @@ def test_the_error_that_is_shown_is_that_of_the_legs_that_are_watched(tab: Tab, 
     assert "no bound" in page.locator("#now").inner_text()
 
 
+@pytest.mark.parametrize("name", ["rrrrr_m1", "quattro"])
+def test_another_hidden_robot_is_not_drawn_where_the_one_before_was(name: str, tab: Tab, address: str):
+    """Its places come with the next state that is asked for; until then the page knows none."""
+    page = opened(tab, address, name)
+    panel = show(page, "legs")
+    answered(page)
+    page.get_by_role("radio", name="Side by side").check()
+    answered(page)
+    for box in panel.get_by_role("checkbox").all()[1:]:
+        box.uncheck()
+    answered(page)
+    page.get_by_role("radio", name="Robot", exact=True).check()
+    panel.locator(".sets button").first.click()
+    answered(page)
+    assert page.evaluate("studio.state.hidden") is None
+    show(page, "modes")
+    page.get_by_role("radio", name="Side by side").check()
+    answered(page)
+    assert page.evaluate("studio.state.hidden.length === studio.stage.machines.hidden.links.length")
+    assert tab.complaints == []
+
+
 def drawn(page: Any) -> Any:
     """The values of the plane that is drawn."""
     return page.evaluate("() => studio.panels.plane.record?.values ?? null")

@@ -20,7 +20,7 @@ from hrsynth.errors import BadRequest, PlaneNotMet
 from hrsynth.geometry.screws import point_velocity
 from hrsynth.geometry.vectors import rotation_from_rpy
 from hrsynth.mechanism.pose import asked_pose
-from hrsynth.present.basins import MARKS, SHADES, colours, picture
+from hrsynth.present.basins import BESIDE, MARKS, SHADES, colours, letter_offsets, picture
 from hrsynth.present.outputs import OUTPUTS
 from hrsynth.present.paper import PNG
 from hrsynth.present.runs import ENDS
@@ -355,6 +355,16 @@ def test_every_ending_has_its_colours_and_its_mark():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("marks", [[(0, 0), (26, 0), (0, 0), (7, 0)], [(0, 0), (18, 0)], [(0, 0), (18, 18), (36, 0)]])
+def test_letters_of_ends_that_are_near_each_other_are_apart(marks: list[tuple[float, float]]):
+    """A letter is 9 points tall: none is on another one, nor on the mark of another end."""
+    places = np.array(marks, dtype=float)
+    letters = places + np.array(letter_offsets(places, BESIDE))
+    assert np.linalg.norm(letters - places, axis=1) == pytest.approx(BESIDE)
+    assert min(np.linalg.norm(a - b) for i, a in enumerate(letters) for b in letters[:i]) > 9
+    assert min(np.linalg.norm(a - b) for a in letters for b in places) > 9
+
+
 def test_a_servo_run_takes_the_example_of_each_end_and_ends_there():
     """The platform's turn follows from x and y: an example that says another one is refused."""
     found = hrsynth.basins("rrrrr_m1", to="x=0.02,y=0.15", grid="x=-0.01:0.24:2,y=-0.08:0.1:2", jobs=1)

@@ -10,6 +10,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from numbers import Real
+from typing import Any
 
 import numpy as np
 
@@ -35,7 +37,7 @@ def half_angles(cones: Cones, observed: Sequence[Observation]) -> Array:
     that is observed, or is not between 0 and 90 degrees."""
     given = _parse(cones) if isinstance(cones, str) else cones
     if not isinstance(given, Mapping):
-        return np.full(len(observed), _require_angle(float(given), given))
+        return np.full(len(observed), _require_angle(given, given))
     given = {str(name): _angle(value) if isinstance(value, str) else value for name, value in given.items()}
     names = {name for o in observed for name in (o.leg, o.link)}
     unknown = [name for name in given if name not in names]
@@ -75,12 +77,12 @@ def _angle(text: str) -> float:
     return _require_angle(value if digits == text else math.radians(value), text)
 
 
-def _require_angle(value: float, shown: object) -> float:
-    if not 0 < value < math.pi / 2:
+def _require_angle(value: Any, shown: object) -> float:
+    if not (isinstance(value, Real) and 0 < float(value) < math.pi / 2):
         raise BadRequest("half-angle of a cone", shown, ALLOWED)
     if value < NARROWEST_CONE:
         raise BadRequest("half-angle of a cone", shown, f"at least {NARROWEST_CONE:g} (radians)")
-    return value
+    return float(value)
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +115,7 @@ class Blur(Value):
     @classmethod
     def of(cls, cone: Cones | None, noise: str | Noise | None, observed: Sequence[Observation]) -> Blur:
         """What a user says; raises ``BadRequest`` where nothing is said of a direction, or of anything else."""
-        amounts = Noise.parse(noise) if isinstance(noise, str) else noise
+        amounts = Noise.read(noise)
         axes = [o for o in observed if isinstance(o, SeenAxis)]
         others = [o for o in observed if not isinstance(o, SeenAxis)]
         if cone is None and amounts is None:

@@ -57,8 +57,9 @@ def three_cranks(aspects: Aspects, configurations: Sequence[ClosedConfiguration]
     chosen = [(k, limb) for k, limb in (limbs[label] for label in labels) if isinstance(limb, OnCrank)]
     if not len(pattern.limbs) == len(chosen) == 3:
         return "the legs are not three rods on cranks"
-    x = perpendicular(chosen[0][1].axis)
-    plane = np.array([x, np.cross(chosen[0][1].axis, x)]).T @ [1, 1j]
+    normal = setting.motion.normal
+    x = perpendicular(normal)
+    plane = np.array([x, np.cross(normal, x)]).T @ [1, 1j]
     feet = np.array([limb.centre for _, limb in chosen])
     places, tips = [], []
     home = pattern.coordinates.of(configurations[:1])[1][0]
@@ -79,21 +80,26 @@ def three_cranks(aspects: Aspects, configurations: Sequence[ClosedConfiguration]
 
 def mode_counts(robot: ThreeCranks, held: complex, first: Array, second: Array, steps: int) -> NDArray[np.int_]:
     """How many modes there are where the second and third rod have these directions (n,), (m,) (rad), (n, m): how often
-    the third corner crosses its circle while the first two go around theirs, looked at in ``steps`` places."""
-    a = robot.feet[0] + robot.rods[0] * held + robot.cranks[0] * np.exp(2j * np.pi * np.arange(steps + 1) / steps)
+    the third corner crosses its circle while the first two go around theirs, looked at in ``steps`` places. The first
+    corner goes as far as the second reaches its circle, ``about`` the line to that circle's centre either way; places
+    are dense at both ends, where the second corner's two ways meet."""
+    hub, arm = robot.feet[0] + robot.rods[0] * held, abs(robot.corners[1])
     ends = robot.feet[2] + robot.rods[2] * np.exp(1j * second)[:, None]
+    part = (1 - np.cos(np.pi * np.arange(steps // 2 + 1) / (steps // 2))) / 2
     counts = np.zeros((len(first), len(second)), dtype=int)
     for row, angle in enumerate(first):
-        away, arm = robot.feet[1] + robot.rods[1] * np.exp(1j * angle) - a, abs(robot.corners[1])
+        to = robot.feet[1] + robot.rods[1] * np.exp(1j * angle) - hub
+        reach = np.array([arm - robot.cranks[1], arm + robot.cranks[1]]) ** 2
+        scale = max(2 * abs(to) * robot.cranks[0], np.finfo(float).tiny)
+        cosines = (abs(to) ** 2 + robot.cranks[0] ** 2 - reach) / scale
+        near, far = np.arccos(np.clip(cosines, -1, 1))
+        about = np.angle(to) + np.array([[1], [-1]]) * (near + (far - near) * part)
+        a = robot.cranks[0] * np.exp(1j * about)
+        away = to - a
         share = (np.abs(away) ** 2 + arm**2 - robot.cranks[1] ** 2) / 2
-        margin = (np.abs(away) * arm) ** 2 - share**2
-        there, aside = margin > 0, np.sqrt(np.maximum(margin, 0))
-        ways = [np.abs(a + away * (share + sign * 1j * aside) / np.abs(away) ** 2 * robot.corners[2] / robot.corners[1]
-                       - ends) > robot.cranks[2] for sign in (1, -1)]
-        for way in ways:
-            counts[row] += np.sum((way[:, 1:] != way[:, :-1]) & there[1:] & there[:-1], axis=1)
-        # where the second corner's two ways end they meet
-        limits = np.flatnonzero(there[1:] != there[:-1])
-        inner = np.where(there[limits], limits, limits + 1)
-        counts[row] += np.sum(ways[0][:, inner] != ways[1][:, inner], axis=1)
+        aside = np.sqrt(np.maximum((np.abs(away) * arm) ** 2 - share**2, 0))
+        for sign in (1, -1):
+            corners = a + away * (share + sign * 1j * aside) / np.abs(away) ** 2 * robot.corners[2] / robot.corners[1]
+            out = np.abs(hub + corners[:, None] - ends) > robot.cranks[2]
+            counts[row] += np.sum(out[..., 1:] != out[..., :-1], axis=(0, 2))
     return counts

@@ -166,7 +166,8 @@ def parsed_box(box: BoxLike | None) -> dict[str, tuple[float, float]]:
         try:
             low, high = (float(v) for v in (interval.split(":") if isinstance(interval, str) else interval))
         except (TypeError, ValueError):
-            raise BadRequest(f"interval of motor {name!r}", interval, "low:high, such as hip=-1:1") from None
+            raise BadRequest(f"interval of motor {name!r}" if name else "a box of motors", interval,
+                             "low:high, such as hip=-1:1") from None
         found[str(name).strip()] = (low, high)
     return found
 

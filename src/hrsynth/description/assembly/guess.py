@@ -139,7 +139,8 @@ class _RigidBodies:
         most = max(ways.values(), default=0)
         best = [body for body in others if ways.get(body) == most]
         if most >= 3 and len(best) == 1:
-            return best[0], f"which {most} ways connect to the base", ()
+            floats = sum(joint.type is JointType.FREE for link in self.members[best[0]] for joint in self.joints[link])
+            return best[0], f"which {most - floats} ways connect to the base", ()
         if len(framed) == 1:
             return framed[0], "the only frame on a fixed joint", ()
         distance = graphs.distances(self.near, self.base)

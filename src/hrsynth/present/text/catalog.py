@@ -7,7 +7,7 @@ from typing import Any
 
 from .tables import listing, table
 
-HEADS = ("word", "robot", "dof", "motion", "hidden robot", "verdict", "rank", "legs needed")
+HEADS = ("word", "robot", "dof", "motion", "hidden robot", "verdict", "rank", "legs needed, or why refused")
 LEGEND = "* a motor   ══ the watched link"
 SHOWN = 100
 """Entries of a list that are printed."""
@@ -47,7 +47,7 @@ def describe_site(done: Mapping[str, Any]) -> str:
 
 def _row(record: Record) -> tuple[str, ...]:
     if "refused" in record:
-        return (record["word"], record.get("notation", ""), "", "", "", f"refused: {record['refused']}", "", "")
+        return (record["word"], record.get("notation", ""), "", "", "", "refused", "", str(record["refused"]))
     return (record["word"], record["notation"], str(record["dof"]), record["motion"], record.get("hidden", "none"),
             record["verdict"], f"{record['rank']} of {record['dof']}", str(record["fewest"]))
 

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import groupby
 from math import comb, degrees, prod
 from typing import TYPE_CHECKING
 
 from ...analysis.exact import ExactVerdict, power_above
 from ...analysis.verdict import ELSEWHERE
 from ...errors import HrsynthError
+from ...rewrite.strategy import TAKEN_BACK
 from ...tolerances import RANK_CUTOFF, RANK_GAP, SAME_RELATION, SURELY_SOMETHING
 from .branches import UNITS, ends, limits
-from .tables import LINE, Rows, camera, describe_watched, head, known_row, listing, sets, table, wrap_lines
+from .tables import LINE, NAMES, Rows, camera, describe_watched, head, known_row, listing, sets, table, wrap_lines
 
 if TYPE_CHECKING:
     from ...analysis.advice import Advice, FurtherMeasurement
@@ -23,14 +25,13 @@ if TYPE_CHECKING:
     from ...codegen.export import ExportedCode
     from ...kinematics.certificate import Certificate
     from ...mechanism import Mechanism
+    from ...rewrite.strategy import Step
     from ..view.view import View
 
 NO_FREEDOM = "the platform has no freedom"
 NO_MATRIX = "there is no interaction matrix: observed links move while the platform rests"
 _KINDS = {"leg": "leg (direction of its default segment)", "direction": "direction of another link",
           "line": "position of an observed line", "encoder": "encoder on a joint", "offered": "--see"}
-NAMES = 14
-"""Columns before the values of a derivation."""
 _SHOWN = 6
 """Sets of measurements listed at most."""
 
@@ -81,9 +82,20 @@ def derivation(found: Derivation) -> str:
         rows.append(("paper's form", [f"{paper.hidden}: {'equivalent' if paper.equivalent else 'NOT equivalent'}"
                                       f" ({paper.reason})", *(f"gains {freedom.name}" for freedom in paper.gains),
                                       *(f"loses {freedom.name}" for freedom in paper.loses)]))
-    steps = [(step.rule, step.leg or "all", "yes" if step.accepted else "no",
-              "" if step.largest_angle is None else f"{step.largest_angle:.1e}", step.reason) for step in found.steps]
-    return "\n".join([listing(rows), "", table(steps, ("rule", "leg", "taken", "angle", "why"))])
+    return "\n".join([listing(rows), "", table(list(_attempts(found.steps)), ("rule", "leg", "taken", "angle", "why"))])
+
+
+def _attempts(steps: Sequence[Step]) -> Iterator[tuple[str, ...]]:
+    """A line a step; of a rule's proposals that were taken back the first is shown, and how many more there were."""
+    for back, each in groupby(steps, lambda step: step.reason.endswith(TAKEN_BACK)):
+        run = list(each)
+        starts = [i for i, step in enumerate(run) if step.rule == run[0].rule] if back else [0]
+        for step in run[:starts[1]] if len(starts) > 1 else run:
+            angle = "" if step.largest_angle is None else f"{step.largest_angle:.1e}"
+            yield step.rule, step.leg or "all", "yes" if step.accepted else "no", angle, step.reason
+        if starts[1:]:
+            yield run[0].rule, run[0].leg or "all", "no", "", (
+                f"{len(starts) - 1} more proposals, taken back as well (--json lists them)")
 
 
 def lost_rows(found: Verdict) -> Rows:

@@ -20,6 +20,8 @@ GAP: Rows = [("", "")]
 """An empty line."""
 LINE, LEAST = 100, 30
 """Columns of a table, and of its last column at least: beyond, that one is wrapped."""
+NAMES = 14
+"""Columns before the values of an answer, at most."""
 
 
 def width(text: str) -> int:
@@ -87,8 +89,9 @@ def beyond_limits(joints: Sequence[str]) -> Rows:
 
 def head(found: ObservedRobot) -> Rows:
     """The robot and what is observed of it."""
+    seen = ", ".join(label_of(each).replace(" ", "\u00a0") for each in found.observed)
     return [("robot", f"{found.robot.name}   {found.anatomy.architecture()}"),
-            ("observed", ", ".join(map(label_of, found.observed)))]
+            ("observed", wrap_lines(seen, LINE - NAMES))]
 
 
 def label_of(observation: Observation) -> str:

@@ -70,8 +70,7 @@ class LegsPanel extends Panel {
     this.found = found;
     this.studio.judge(found.error);
     this.tell(found);
-    this.studio.stage.hidden(found.hidden);
-    this.studio.hasHidden(Boolean(found.hidden));
+    this.studio.rehide(found.hidden);
     this.entered();
     this.same.show(found);
   }

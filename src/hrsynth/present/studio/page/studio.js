@@ -92,8 +92,7 @@ class Studio {
   async reveal() {
     const found = await this.panels.move.ask("watch", "Deriving the hidden robot");
     if (!found?.hidden) return;
-    this.stage.hidden(found.hidden);
-    this.hasHidden(true);
+    this.rehide(found.hidden);
     this.layouts.querySelector("input[value=overlay]").checked = true;
     this.arrange("overlay");
   }
@@ -193,6 +192,13 @@ class Studio {
     this.layouts = radios("Shown", layouts, "real", (layout) => this.arrange(layout));
     $("tools").append(this.layouts, button("Fit", () => this.stage.fit(), { "aria-label": "Fit the robot into the picture" }));
     this.hasHidden(false);
+  }
+
+  /* Another hidden robot (null: none): where the one before it was says nothing of it. */
+  rehide(record) {
+    this.state = { ...this.state, hidden: null };
+    this.stage.hidden(record);
+    this.hasHidden(Boolean(record));
   }
 
   /* Whether there is a hidden robot to be shown; what was chosen stays chosen. */
