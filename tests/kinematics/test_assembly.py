@@ -12,6 +12,7 @@ from hrsynth.description import load, shipped
 from hrsynth.geometry.vectors import pose
 from hrsynth.kinematics.assembly import Assembler
 from hrsynth.kinematics.configuration import ClosedConfiguration, measure
+from hrsynth.kinematics.limits import SINGLE
 from hrsynth.mechanism.model import JointType, Limits
 
 ROBOTS = sorted(shipped())
@@ -77,4 +78,19 @@ def test_limits_of_joints_are_kept():
         found = assembler(setting).at(bodies(setting, setting.everything.start), ())
         assert found.configuration is not None
         assert found.reachable is reachable
+        assert found.beyond == (() if reachable else (limited.name,))
+
+
+@pytest.mark.parametrize("name", ["quattro", "i4l"])
+def test_limits_of_the_platforms_own_joints_are_kept(name: str):
+    """A joint between the platform's bodies is on no leg; where its range does not hold the pose it is named."""
+    setting = ObservedRobot.of(load(shipped()[name]), samples=1)
+    legs = {joint for leg in setting.anatomy.legs for joint in leg.joints}
+    inside = [joint for joint in setting.mechanism.joints.values() if joint.name not in legs and joint.type in SINGLE]
+    assert inside
+    for upper, reachable in ((0.01, True), (-0.01, False)):
+        limited = replace(inside[0], limits=Limits(lower=-0.2, upper=upper))
+        changed = ObservedRobot.of(setting.robot.changed(joints=[limited]), samples=1)
+        found = assembler(changed).at(bodies(changed, changed.everything.start), ())
+        assert found.reachable is (True if reachable else None)
         assert found.beyond == (() if reachable else (limited.name,))
