@@ -343,7 +343,9 @@ def atlas(found: Atlas) -> str:
             told.setdefault(pair_words(pair), []).append("{}, {}".format(*pair.numbers))
     rows += [(first, [words, *textwrap.wrap("; ".join(rest), initial_indent="so are modes ")])
              for words, (first, *rest) in told.items()]
-    return listing(rows)
+    paths = [pair.answer for pair in found.pairs if pair.verdict == SAME and pair.answer is not None]
+    passed = ", ".join(dict.fromkeys(name for each in paths for name in each.unlimited))
+    return listing([*rows, *known_row("not proved", f"limits of joints {passed}" if passed else None)])
 
 
 def aspect_groups(found: Atlas) -> str:
