@@ -117,6 +117,7 @@ def test_limits_of_joints_that_are_joined_are_said_to_be_left_out():
     asked = "x=0.3,y=0.1,z=1,rpy=0/0/0"
     for told in (hrsynth.modes(robot.changed(joints=[bent]), ["1", "2", "3"], at=asked),
                  hrsynth.check(robot.changed(joints=[bent]), at=asked),
-                 hrsynth.accuracy(robot.changed(joints=[bent]), at=asked, cone=1e-3)):
+                 hrsynth.accuracy(robot.changed(joints=[bent]), at=asked, cone=1e-3),
+                 hrsynth.select(robot.changed(joints=[bent]), observe=["1"], start=asked, goal=asked, cone=1e-3)):
         assert "those of b_0 are not looked at" in " ".join(str(told).split())
         assert told.setting.unlimited == ("b_0",)

@@ -285,7 +285,7 @@ def selection(found: Selection) -> str:
     wrong = ("cones", f"{angle} about each direction") if blur.noise is None else (
         "observed", ", ".join(f"{o.leg} {blur.words(i, o)}" for i, o in enumerate(observed)))
     rows = [name, ("from", str(found.start)), ("to", str(found.goal)), wrong,
-            ("sets", f"{len(found.candidates)}, kept: {len(found.kept)}")]
+            *dropped_limits(found.setting), ("sets", f"{len(found.candidates)}, kept: {len(found.kept)}")]
     if found.unexamined:
         rows.append(("", f"not examined: {len(found.unexamined)} ({found.left})"))
     if found.sight is not None:
