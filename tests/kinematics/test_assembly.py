@@ -7,11 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import hrsynth
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.description import load, shipped
 from hrsynth.geometry.vectors import pose
 from hrsynth.kinematics.assembly import Assembler
 from hrsynth.kinematics.configuration import ClosedConfiguration, measure
+from hrsynth.kinematics.limits import SINGLE
+from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.model import JointType, Limits
 
 ROBOTS = sorted(shipped())
@@ -78,3 +81,43 @@ def test_limits_of_joints_are_kept():
         assert found.configuration is not None
         assert found.reachable is reachable
         assert found.beyond == (() if reachable else (limited.name,))
+
+
+@pytest.mark.parametrize("name", ["quattro", "i4l"])
+def test_limits_of_the_platforms_own_joints_are_kept(name: str):
+    """A joint between the platform's bodies is on no leg; where its range does not hold the pose it is named."""
+    setting = ObservedRobot.of(load(shipped()[name]), samples=1)
+    legs = {joint for leg in setting.anatomy.legs for joint in leg.joints}
+    inside = [joint for joint in setting.mechanism.joints.values() if joint.name not in legs and joint.type in SINGLE]
+    assert inside
+    for upper, reachable in ((0.01, True), (-0.01, False)):
+        limited = replace(inside[0], limits=Limits(lower=-0.2, upper=upper))
+        changed = ObservedRobot.of(setting.robot.changed(joints=[limited]), samples=1)
+        found = assembler(changed).at(bodies(changed, changed.everything.start), ())
+        assert found.reachable is (True if reachable else None)
+        assert found.beyond == (() if reachable else (limited.name,))
+
+
+def test_limits_of_joints_that_are_joined_are_said_to_be_left_out():
+    """Two R that meet at right angles are one U: their own limits are not looked at, and each answer says so."""
+    b = Builder("knuckles")
+    feet = [np.array([np.cos(a), np.sin(a), 0.0]) for a in 2 * np.pi / 6 * np.arange(6) + np.tile([0.1, -0.2], 3)]
+    for link in ("base", *(f"{part}_{i}" for i in range(6) for part in ("knuckle", "barrel", "rod")), "platform"):
+        b.link(link)
+    for i, foot in enumerate(feet):
+        tip = 0.5 * feet[(i + 1) % 6 if i % 2 else i - 1] + [0, 0, 1.0]
+        first = np.cross(tip - foot, [0.3, 0.1, 1.0])
+        b.joint(f"a_{i}", "R", "base", f"knuckle_{i}", at=foot, axis=first)
+        b.joint(f"b_{i}", "R", f"knuckle_{i}", f"barrel_{i}", at=foot, axis=np.cross(first, tip - foot))
+        b.joint(f"p_{i}", "P", f"barrel_{i}", f"rod_{i}", at=(foot + tip) / 2, axis=tip - foot, motor=True)
+        b.joint(f"s_{i}", "S", f"rod_{i}", "platform", at=tip, loop=i > 0)
+    robot = b.build(platform="platform")
+    bent = replace(robot.joints["b_0"], limits=Limits(lower=-0.01, upper=0.01))
+    assert hrsynth.modes(robot, ["1", "2", "3"]).to_dict()["unlimited"] == []
+    asked = "x=0.3,y=0.1,z=1,rpy=0/0/0"
+    for told in (hrsynth.modes(robot.changed(joints=[bent]), ["1", "2", "3"], at=asked),
+                 hrsynth.check(robot.changed(joints=[bent]), at=asked),
+                 hrsynth.accuracy(robot.changed(joints=[bent]), at=asked, cone=1e-3),
+                 hrsynth.select(robot.changed(joints=[bent]), observe=["1"], start=asked, goal=asked, cone=1e-3)):
+        assert "those of b_0 are not looked at" in " ".join(str(told).split())
+        assert told.setting.unlimited == ("b_0",)

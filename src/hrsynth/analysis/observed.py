@@ -217,6 +217,11 @@ class ObservedRobot(Value):
         total = written.mobility
         return Mobility(total, total - (self.mobility.total - self.mobility.idle))
 
+    @property
+    def unlimited(self) -> tuple[str, ...]:
+        """Joints whose limits are not looked at, as the normal form joins them into others."""
+        return tuple(name for name in self.robot.limited if name not in self.mechanism.limited)
+
     def measuring(self, observations: tuple[Observation, ...]) -> Samples:
         """The samples' configurations again, with ρ for other observations (and no ways)."""
         drawn = self.everything

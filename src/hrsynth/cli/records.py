@@ -670,6 +670,7 @@ class ListedModes(OfRobot, WrittenTo):
     degenerate: str | None
     continuum: int | None
     meant: list[MeantRecord]
+    unlimited: Annotated[list[str], "joints whose limits are not looked at, as they are parts of other joints"]
 
 
 class AssemblyModesRecord(ListedModes):

@@ -21,6 +21,7 @@ from hrsynth.cli import execute
 from hrsynth.errors import BadRequest, PoseNotReached
 from hrsynth.families.planar import six_poses
 from hrsynth.kinematics.configuration import measure
+from hrsynth.mechanism import Limits
 
 ROBOTS = [("quattro", "1,4"), ("gough_stewart", "1,3,5"), ("rrrrr_m1", None), ("delta", "1,2"), ("3prr_m1", None)]
 
@@ -92,6 +93,19 @@ def test_a_cuspidal_robot_goes_from_mode_to_mode_with_the_same_directions():
         assert np.max(np.abs(seen[0] - seen[1])) < 1e-9
         link = found.aspects.motion.link
         assert np.max(np.abs(answer.start.configuration.pose(link) - answer.goal.configuration.pose(link))) > 0.01
+
+
+@pytest.mark.slow
+def test_limits_that_no_path_considers_are_named():
+    """A limit on one side is not enclosed along a path: what leads from mode to mode may pass it."""
+    robot = hrsynth.load("quattro")
+    elbow = next(joint for joint in robot.joints.values() if joint.type.value == "R" and not joint.actuated)
+    found = hrsynth.atlas(robot.changed(joints=[replace(elbow, limits=Limits(lower=-1.0))]), "1,4")
+    paths = [pair.answer for pair in found.pairs if pair.verdict == SAME and pair.answer is not None]
+    assert paths
+    assert all(each.unlimited == (elbow.name,) for each in paths)
+    assert str(found).rstrip().endswith(f"limits of joints {elbow.name}")
+    assert "limits of joints" not in str(atlas_of("quattro", "1,4"))
 
 
 def test_the_shipped_quattro_changes_its_mode_without_a_singularity():

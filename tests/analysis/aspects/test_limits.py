@@ -126,7 +126,7 @@ def test_a_pose_beyond_a_limit_is_named_and_still_separated():
         opposite = answer.start.value * answer.goal.value < 0
         verdicts.append(answer.verdict)
         assert answer.verdict == (SEPARATED if opposite else UNDECIDED)
-        assert opposite or answer.reason == "at the goal beyond its limits: joint elbow_1"
+        assert opposite or answer.reason == "at the goal on its limits or beyond: joint elbow_1"
     assert set(verdicts) == {SEPARATED, UNDECIDED}
 
 
@@ -138,3 +138,13 @@ def test_limits_that_are_not_considered_are_named(limits: Limits):
     answer = aspects.join(places[0], places[0])
     assert (answer.verdict, answer.limits) == (SAME, ("elbow_2",))
     assert answer.not_proved.startswith("limits of joints elbow_1; ")
+
+
+def test_a_pose_on_a_limit_is_not_called_beyond_it():
+    """A joint that rests on its stop where the path begins: nothing is proved, and it is not said to be beyond it."""
+    aspects = Aspects.of(with_limits(load("3rrr_m1"), {"elbow_1": Limits(0.0, 1.0)}))
+    others = random_walk(aspects.setting.samples.start, 40, 0)
+    goal = next(at for at in others if 0.01 < coordinates(at, "elbow_1") < 0.9)
+    answer = aspects.join(aspects.setting.samples.start, goal)
+    assert answer.verdict == UNDECIDED
+    assert answer.reason == "at the start on its limits or beyond: joint elbow_1"

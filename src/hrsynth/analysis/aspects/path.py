@@ -292,7 +292,7 @@ class Aspects(Value):
         for end, enclosure, place, turn in zip(("start", "goal"), enclosures, p, R, strict=False):
             beyond = enclosure.forms.beyond(place, turn)
             if beyond:
-                return replace(answer, reason=f"at the {end} beyond its limits: joint {', '.join(beyond)}")
+                return replace(answer, reason=f"at the {end} on its limits or beyond: joint {', '.join(beyond)}")
         region = PoseRegion.around(coordinates, p, R)
         found = plan((enclosures[0], enclosures[1]), region, (p[0], R[0]), (p[1], R[1]), seed=seed, budget=budget)
         answer = self._add_ways(answer, found, self.pattern)

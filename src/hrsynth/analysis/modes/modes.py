@@ -128,7 +128,7 @@ class AssemblyModes(Result, shown_as="modes"):
                 "antipodal": [self._record(each) for each in self.antipodal],
                 "degenerate": found.degenerate, "continuum": found.continuum,
                 "motions": [{"pose": self.pose_of(each).to_dict(), **each.to_dict()} for each in self.motions],
-                "meant": [each.to_dict(self.labels) for each in found.meant]}
+                "meant": [each.to_dict(self.labels) for each in found.meant], "unlimited": list(self.setting.unlimited)}
 
     def _record(self, mode: AssemblyMode) -> dict[str, Any]:
         places = [] if self.formation is None else [

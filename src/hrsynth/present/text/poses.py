@@ -24,6 +24,7 @@ from .tables import (
     beyond_limits,
     camera,
     describe_watched,
+    dropped_limits,
     head,
     is_bounded,
     known_row,
@@ -53,7 +54,8 @@ def check(found: Check) -> str:
     rows = [head(found.setting)[0], ("observed", seen), *camera(found.setting),
             *known_row("mobility", None if written in (None, generic) else
                    f"{written.total} as the file is written, {generic.total} in normal form"),
-            ("lengths in", f"{found.length:.4g} m (the characteristic length), angles in radians")]
+            ("lengths in", f"{found.length:.4g} m (the characteristic length), angles in radians"),
+            *dropped_limits(found.setting)]
     for posture in found.postures:
         rows += [*GAP, ("pose", str(posture.pose)), *_posture(posture, found.length, found.setting)]
     for each in found.unreached:
@@ -185,7 +187,7 @@ def modes(found: AssemblyModes) -> str:
         legs = ", ".join(found.labels[k] for k in each.legs)
         rows.append(("meant", f"legs {legs} share a joint centre of the {each.where} (to {each.defect:.1e} m; "
                               "--as-written takes the numbers as they are)"))
-    rows += known_row("special", count.degenerate)
+    rows += [*known_row("special", count.degenerate), *dropped_limits(found.setting)]
     for number, motion in enumerate(found.motions, 1):
         place = "the pose itself" if motion.goal else str(found.pose_of(motion))
         starts = f"{motion.met} start{'s' * (motion.met > 1)}"
@@ -341,7 +343,9 @@ def atlas(found: Atlas) -> str:
             told.setdefault(pair_words(pair), []).append("{}, {}".format(*pair.numbers))
     rows += [(first, [words, *textwrap.wrap("; ".join(rest), initial_indent="so are modes ")])
              for words, (first, *rest) in told.items()]
-    return listing(rows)
+    paths = [pair.answer for pair in found.pairs if pair.verdict == SAME and pair.answer is not None]
+    passed = ", ".join(dict.fromkeys(name for each in paths for name in each.unlimited))
+    return listing([*rows, *known_row("not proved", f"limits of joints {passed}" if passed else None)])
 
 
 def aspect_groups(found: Atlas) -> str:

@@ -19,6 +19,7 @@ from .tables import (
     Rows,
     beyond_limits,
     camera,
+    dropped_limits,
     head,
     is_bounded,
     known_row,
@@ -58,7 +59,8 @@ def servo(found: Servo) -> str:
             ("controller", f"gain {found.gain:g} per second, sensed: {found.sense}"
                            + ("" if found.depth == "exact" else f", depth: {found.depth}")
                            + ("" if found.noise is None else f", noise {found.noise}")),
-            *GAP, ("ended", [f"{found.ended} after {run.times[-1]:.3g} s", found.ending.reason]),
+            *dropped_limits(found.setting), *GAP,
+            ("ended", [f"{found.ended} after {run.times[-1]:.3g} s", found.ending.reason]),
             ("at", str(found.pose))]
     if found.ended != "goal":
         rows.append(("", f"{1e3 * off[0]:.4g} mm and {_degrees(off[1])} degrees from the goal"))
@@ -130,7 +132,8 @@ def accuracy(found: Accuracy) -> str:
     name, _ = head(found.setting)
     rows = [name, ("observed", ", ".join(f"{label_of(o)} {found.blur.words(i, o)}"
                                          for i, o in enumerate(found.setting.observed))),
-            *camera(found.setting), ("errors", f"largest over all errors {found.blur.inside}, to first order")]
+            *camera(found.setting), ("errors", f"largest over all errors {found.blur.inside}, to first order"),
+            *dropped_limits(found.setting)]
     length = found.setting.everything.twin.length
     if found.field is not None:
         rows += [*GAP, *field_rows(found), *_limits_left(found)]
@@ -282,7 +285,7 @@ def selection(found: Selection) -> str:
     wrong = ("cones", f"{angle} about each direction") if blur.noise is None else (
         "observed", ", ".join(f"{o.leg} {blur.words(i, o)}" for i, o in enumerate(observed)))
     rows = [name, ("from", str(found.start)), ("to", str(found.goal)), wrong,
-            ("sets", f"{len(found.candidates)}, kept: {len(found.kept)}")]
+            *dropped_limits(found.setting), ("sets", f"{len(found.candidates)}, kept: {len(found.kept)}")]
     if found.unexamined:
         rows.append(("", f"not examined: {len(found.unexamined)} ({found.left})"))
     if found.sight is not None:

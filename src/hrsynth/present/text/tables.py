@@ -87,6 +87,12 @@ def beyond_limits(joints: Sequence[str]) -> Rows:
     return known_row("limits", f"beyond those of {', '.join(joints)}" if joints else None)
 
 
+def dropped_limits(setting: ObservedRobot) -> Rows:
+    """The joints whose limits are not looked at."""
+    joints = ", ".join(setting.unlimited)
+    return [("limits", f"those of {joints} are not looked at: they are parts of other joints")] if joints else []
+
+
 def head(found: ObservedRobot) -> Rows:
     """The robot and what is observed of it."""
     seen = ", ".join(label_of(each).replace(" ", "\u00a0") for each in found.observed)
