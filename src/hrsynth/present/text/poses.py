@@ -196,13 +196,13 @@ def modes(found: AssemblyModes) -> str:
     for number, mode in enumerate(found.modes, 1):
         rows += [*GAP, (f"mode {number}", [f"{mode.pose}" + ("   (the pose itself)" if mode.goal else ""),
                  proof_words(mode) if mode.fits is not None else f"{proof_words(mode)}, residual {mode.residual:.1e}",
-                 *ahead(mode), *at_mode(mode, found.kind)])]
+                 *ahead(mode), *at_mode(mode, found)])]
     for number, mode in enumerate(found.antipodal, 1):
         rows += [*GAP, (f"antipodal {number}", [f"{mode.pose}   not a mode: the opposite value of "
                                                 f"{', '.join(mode.opposite)}", proof_words(mode), *ahead(mode)])]
     for number, mode in enumerate(found.near, 1):
         rows += [*GAP, (f"near {number}", [f"{mode.pose}   residual {mode.residual:.2e}: almost a mode"
-                 + (", and none" if count.complete else ""), *at_mode(mode, found.kind)])]
+                 + (", and none" if count.complete else ""), *at_mode(mode, found)])]
     return listing(rows)
 
 
@@ -262,23 +262,26 @@ def proof_words(mode: AssemblyMode) -> str:
     return f"{'a mode by construction, its place ' if mode.goal else ''}not proved, {known}"
 
 
-def at_mode(mode: AssemblyMode, kind: str) -> list[str]:
-    """What the real robot does at a mode."""
+def at_mode(mode: AssemblyMode, found: AssemblyModes) -> list[str]:
+    """What the real robot does at a mode of a list."""
+    there, hidden = assembly(mode, found.setting.unlimited), found.kind == "hidden"
     if mode.type2_distance is None:
-        seen = NO_MATRIX if kind == "hidden" else "the motors can move there while the platform rests"
-        return [*assembly(mode), *[seen] * (mode.configuration is not None)]
-    matrix = "Mᵀ" if kind == "hidden" else "the motors' Jacobian (motor rates by platform twist)"
-    return [*assembly(mode), f"smallest singular value of {matrix} {mode.type2_distance:.3g}"]
+        seen = NO_MATRIX if hidden else "the motors can move there while the platform rests"
+        return [*there, *[seen] * (mode.configuration is not None)]
+    matrix = "Mᵀ" if hidden else "the motors' Jacobian (motor rates by platform twist)"
+    return [*there, f"smallest singular value of {matrix} {mode.type2_distance:.3g}"]
 
 
-def assembly(mode: AssemblyMode) -> list[str]:
-    """Whether the real robot can be assembled at a mode, and why not."""
+def assembly(mode: AssemblyMode, unlimited: Sequence[str] = ()) -> list[str]:
+    """Whether the real robot can be assembled at a mode, and why not; ``unlimited`` joints have limits that are not
+    looked at."""
     def several(noun: str, labels: Sequence[str]) -> str:
         return f"{noun}{'s' * (len(labels) > 1)} {', '.join(labels)}"
 
     match mode.assembly:
         case "yes":
-            return ["the real robot can be assembled there"]
+            return ["the real robot can be assembled there" + (
+                ", as far as limits are looked at" if unlimited else "")]
         case "beyond limits":
             return [f"the real robot can be assembled there only beyond the limits of {', '.join(mode.beyond)}"]
         case "no":

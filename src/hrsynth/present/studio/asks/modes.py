@@ -38,6 +38,7 @@ def _mode(request: Request, found: AssemblyModes, number: int, mode: AssemblyMod
         there = at_mode(found, ModeNumber(number))
     except PoseNotReached:
         there = None
-    return {**drawn.scene(), "words": f"{drawn.words}: {'the pose itself' if mode.goal else assembly(mode)[0]}",
+    told = "the pose itself" if mode.goal else assembly(mode, found.setting.unlimited)[0]
+    return {**drawn.scene(), "words": f"{drawn.words}: {told}",
             "pose": mode.pose.to_dict(), "goal": mode.goal,
             "here": None if there is None else request.describe_here(Posed(there))}
