@@ -204,7 +204,8 @@ def advise(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None
     """The cheapest sets of further measurements with which u̇ = 0 forces t = 0 (theory.md 6; MMT 5.3): the smallest,
     unless ``price``, as ``encoder=0.5,point=3``, says what one measurement of a kind costs (default: 1).
 
-    ``observe`` holds leg labels or link names (default: all legs), ``camera`` the link that carries the camera.
+    ``observe`` holds leg labels or link names (default: what the robot observes, else all legs), ``camera`` the link
+    that carries the camera.
     Candidates are the default segment of a further leg, the direction of any other link of a leg, the position of a
     line whose direction is observed, an encoder on any joint, and what is offered (``offer``: texts as for ``see``; one
     without a place, ``point:plate``, stands for several places of that link). Every returned set is verified at all

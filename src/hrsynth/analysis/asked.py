@@ -26,13 +26,14 @@ def observe(robot: RobotLike, legs: LegsLike = None, camera: CameraLike = None, 
     """A robot with what is watched of it, its normal form and samples of its motion: the starting point of every
     question.
 
-    ``legs`` holds leg labels or link names (in a string, separated by commas); None or ``["all"]`` means all legs at
-    their default segments. ``camera`` names the link that carries the camera; ``NAME=LINK@x,y,z/r,p,y`` is a further,
-    named one, in the link's frame (x right, y down, z ahead; metres, radians or ``deg``). ``see`` holds other
-    observations, ``[CAMERA=]KIND:LINK@x,y,z/dx,dy,dz/radius`` (:mod:`hrsynth.mechanism.observations`), which replace
-    all legs if ``legs`` is None. ``at`` is a pose that replaces the zero configuration: on the same branch if that
-    reaches the pose, otherwise in another operation mode that was met; or a mode of the zero configuration with what is
-    watched, ``mode:2``, at which ``modes`` found the robot assembled.
+    ``legs`` holds leg labels or link names (in a string, separated by commas); ``["all"]`` means all legs, None
+    what the robot itself observes, else all legs at their default segments. ``camera`` names the link that carries
+    the camera; ``NAME=LINK@x,y,z/r,p,y`` is a further, named one, in the link's frame (x right, y down, z ahead;
+    metres, radians or ``deg``). ``see`` holds other observations, ``[CAMERA=]KIND:LINK@x,y,z/dx,dy,dz/radius``
+    (:mod:`hrsynth.mechanism.observations`), which replace all legs if ``legs`` is None. ``at`` is a pose that
+    replaces the zero configuration: on the same branch if that reaches the pose, otherwise in another operation
+    mode that was met; or a mode of the zero configuration with what is watched, ``mode:2``, at which ``modes``
+    found the robot assembled.
 
     Raises ``BadRequest`` for unknown labels, links, parts of a pose and modes, ``PoseNotReached``.
 
