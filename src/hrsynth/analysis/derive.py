@@ -141,11 +141,12 @@ def derive(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None
     """The certified hidden robot of a robot and the legs that are watched (MMT 3.2; docs/pages/theory.md, sections 3 to
     5).
 
-    ``observe`` holds leg labels or link names (default: what the robot observes, else all legs); ``camera`` names
-    the link that carries the camera (default: the base), or further cameras, and ``see`` says what these see (:func:`hrsynth.observe`); ``at`` is a pose
-    that replaces the zero configuration, in another operation mode if necessary, or one of its modes (``mode:2``); an
-    observed robot already has all of that. ``form`` is ``simplified`` or ``general``; ``paper``: also give the paper's
-    own form. Raises ``BadRequest`` for unknown names, ``NotCertified`` if even the exact lift fails.
+    ``observe`` holds leg labels or link names (default: what the robot observes, else all legs); ``camera`` names the
+    link that carries the camera (default: the base), or further cameras, and ``see`` says what these see
+    (:func:`hrsynth.observe`); ``at`` is a pose that replaces the zero configuration, in another operation mode if
+    necessary, or one of its modes (``mode:2``); an observed robot already has all of that. ``form`` is ``simplified``
+    or ``general``; ``paper``: also give the paper's own form. Raises ``BadRequest`` for unknown names, ``NotCertified``
+    if even the exact lift fails.
 
     >>> found = hrsynth.derive("3rrr_m1", [1, 2, 3])
     >>> found
