@@ -72,6 +72,15 @@ def ask(capfd: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, s
     return status, *capfd.readouterr()
 
 
+@pytest.mark.parametrize("content", ["", "<robot"])
+def test_a_file_that_is_no_robot_file_is_refused(tmp_path: Path, capfd: pytest.CaptureFixture[str], content: str):
+    file = tmp_path / "robot.urdf"
+    file.write_text(content)
+    status, out, err = ask(capfd, str(file))
+    assert (status, out) == (2, "")
+    assert re.fullmatch(r"hrsynth: .*robot\.urdf:\d: (an empty file|malformed XML), .*\n", err)
+
+
 @pytest.mark.parametrize(("arguments", "words"), [
     (["nobody"], "neither a file nor a shipped robot"), (["nothing.urdf"], "no such file"),
     (["--port", "70000"], "65535"), (["--port", "-1"], "at least 0"),

@@ -4,6 +4,7 @@ pictures in any kind of file."""
 from __future__ import annotations
 
 import doctest
+import math
 import re
 import subprocess
 import sys
@@ -76,7 +77,15 @@ def test_a_wrong_keyword_is_told_with_the_nearest_and_all(ask: Any, near: str):
     (lambda: hrsynth.accuracy("rrrrr_m1", cone=[1]), "more than 0 and less than 90deg"),
     (lambda: hrsynth.accuracy("rrrrr_m1", cone=0.01, noise=3), "a text such as 0.1deg"),
     (lambda: hrsynth.servo("rrrrr_m1", start="x=0", goal="x=0", gain="x"), "a number"),
-    (lambda: hrsynth.servo("rrrrr_m1", start="x=0", goal="x=0", noise=3), "a text such as 0.1deg")])
+    (lambda: hrsynth.servo("rrrrr_m1", start="x=0", goal="x=0", noise=3), "a text such as 0.1deg"),
+    (lambda: hrsynth.singular("rrrrr_m1", points=0), "points, found 0, allowed: an integer, at least 1"),
+    (lambda: hrsynth.modes("rrrrr_m1", effort=-1), "effort, found -1, allowed: a number, at least 0"),
+    (lambda: hrsynth.modes("rrrrr_m1", effort=math.nan), "effort, found nan, allowed: a number, at least 0"),
+    (lambda: hrsynth.verify(None), "a file, allowed: its path"),
+    (lambda: hrsynth.save("rrrrr_m1", None), "a file, allowed: its path"),
+    (lambda: hrsynth.draw(hrsynth.derive("rrrrr_m1"), 3), "a file, found 3, allowed: its path"),
+    (lambda: hrsynth.accuracy("rrrrr_m1", cone=0.01, grid="x=0:0.1:2,y=0", into=3), "a file, found 3"),
+    (lambda: hrsynth.studio(3, open_=False), "a robot's file, found 3")])
 def test_a_value_of_another_kind_is_told_with_what_is_allowed(ask: Any, allowed: str):
     with pytest.raises(BadRequest, match=allowed):
         ask()

@@ -191,6 +191,11 @@ def test_bad_input_is_one_line(run, folder: Path, tmp_path: Path, monkeypatch: p
     assert sorted(file.name for file in tmp_path.iterdir()) == ["small"]
 
 
+def test_what_is_seen_is_no_name_to_search_for(run, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("hrsynth.catalog.query.find_named", None)
+    check_refused(run("show", "3(Rz*-Rz-Rz)@nosuch"), "kinds such as 3point")
+
+
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
 def test_a_folder_that_cannot_be_written_is_one_line(run, tmp_path: Path):
     (tmp_path / "locked").mkdir(mode=0o500)

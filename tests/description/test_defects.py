@@ -206,6 +206,15 @@ def test_a_comment_may_speak_of_declarations():
     assert native.parse(edited((2, '<link name="base"/><!-- <!DOCTYPE x> -->'))).base == "base"
 
 
+@pytest.mark.parametrize("sign", ["&#10;", "&#x0A;", "&#013;", "&#xd;", "&#9;"])
+def test_a_name_is_one_line(sign: str):
+    text = FOUR_BAR.replace('"base"', f'"ba{sign}se"')
+    found = native.parse(text.replace('<robot name="', f'<robot name="a{sign}'))
+    assert (found.base, found.name[:2]) == ("ba se", "a ")
+    kept = native.parse(FOUR_BAR.replace('"base"', '"ba&#160;se"'))
+    assert kept.base == "ba\xa0se"
+
+
 @pytest.mark.parametrize(("changes", "residual"), [
     ([(30, '<origin xyz="2 0 1"/>')], 1.0),
     ([(9, '<origin rpy="0 0.1 0"/>')], 0.1),

@@ -71,7 +71,7 @@ def forget_answers() -> None:
 
 def require_kinds(known: Signature, given: Mapping[str, Any]) -> None:
     """Raise ``BadRequest`` for an argument that is no number, text or truth value where the signature asks for one, or
-    a negative seed."""
+    less than a seed, a number of points or an effort can be."""
     for name, value in given.items():
         kind, *none = str(known.parameters[name].annotation).split(" | ")
         if kind not in KINDS or none not in ([], ["None"]) or (none and value is None):
@@ -79,8 +79,9 @@ def require_kinds(known: Signature, given: Mapping[str, Any]) -> None:
         right, word = KINDS[kind]
         if not isinstance(value, right) or (isinstance(value, bool) and kind != "bool"):
             raise BadRequest(name, value, word)
-        if name == "seed" and value < 0:
-            raise BadRequest(name, value, f"{word}, at least 0")
+        least = {"seed": 0, "points": 1, "effort": 0}.get(name)
+        if least is not None and not value >= least:
+            raise BadRequest(name, value, f"{word}, at least {least}")
 
 
 def question(*, formations: bool = False, **old: str) -> Callable[[Callable[P, R]], Callable[P, R]]:

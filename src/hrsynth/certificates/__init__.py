@@ -12,6 +12,7 @@ from ..analysis.aspects.path import PathAnswer
 from ..analysis.derive import Derivation
 from ..analysis.modes.modes import AssemblyModes
 from ..description import load
+from ..description.files import as_path
 from ..errors import BadRequest, CertificateRefused, PoseNotReached
 from ..mechanism import Mechanism
 from ..tolerances import SAME_RELATION
@@ -55,9 +56,9 @@ def verify(source: Mapping[str, Any] | str | Path, robot: Mechanism | str | Path
     if isinstance(source, Mapping):
         record, name = dict(source), "the certificate"
     else:
-        name = str(source)
+        name = str(file := as_path(source))
         try:
-            record = json.loads(Path(source).read_text(encoding="utf-8"), object_pairs_hook=once)
+            record = json.loads(file.read_text(encoding="utf-8"), object_pairs_hook=once)
         except NotAccepted as reason:
             raise CertificateRefused(name, str(reason)) from None
         except (OSError, ValueError, RecursionError) as error:

@@ -245,7 +245,7 @@ def _word(text: str, kept: str | None) -> tuple[str, str]:
     try:
         return str(parse(text)), ""
     except BadRequest:
-        found = find_named(text, kept) if text.strip() else []
+        found = find_named(text, kept) if text.strip() and "@" not in text else []  # no name has what is seen
         if not found and "(" in text:
             raise
         if not found:

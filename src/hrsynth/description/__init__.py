@@ -15,7 +15,7 @@ from ..results import with_spelling
 from . import formats
 from .dialect import Dialect
 from .example_data import PREFIX, examples
-from .files import require_same, require_writable, write_whole
+from .files import as_path, require_same, require_writable, write_whole
 from .formats import native
 from .meshes import carry_meshes, taken_back, write_meshes
 from .overrides import Overrides
@@ -138,7 +138,7 @@ def save(mechanism: Mechanism | str | Path, path: str | Path, dialect: str | Non
     """
     if meshes not in ("keep", "copy"):
         raise BadRequest("meshes", meshes, ("keep", "copy"))
-    target = Path(path)
+    target = as_path(path)
     chosen, mechanism = _dialect(target, dialect), load(mechanism)
     robot, copies, notes = carry_meshes(mechanism, target, chosen.meshes, copy=meshes == "copy")
     new = write_meshes(copies)

@@ -11,6 +11,13 @@ from pathlib import Path
 from ..errors import BadRequest
 
 
+def as_path(file: object) -> Path:
+    """The path of a file; raises ``BadRequest`` for what is none."""
+    if not isinstance(file, str | os.PathLike):
+        raise BadRequest("a file", file, "its path")
+    return Path(file)
+
+
 def require_writable(path: str | Path) -> Path:
     """Where a file will be; raises ``BadRequest`` where it cannot be written: before long work, not after it."""
     require_folder(path)

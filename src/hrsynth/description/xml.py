@@ -22,6 +22,8 @@ _COMMENT = re.compile(rb"<!--.*?-->|<\?.*?\?>", re.DOTALL)
 """Comments and processing instructions: either may hold what looks like the other."""
 _PREFIX = re.compile(r"Namespace prefix (?P<prefix>[A-Za-z_][\w.-]*) (?:on|for) ", re.ASCII)
 _ROOT = re.compile(rb"(?:\xef\xbb\xbf)?(?:\s+|<\?.*?\?>|<!--.*?-->)*<[^\s/>]+", re.DOTALL)
+_BREAK = re.compile(rb"&#0*(?:9|10|13);|&#x0*[9aAdD];")
+"""Tabs and ends of lines as references: in names they would be kept, where plain ones are read as spaces."""
 _DECLARATION = re.compile(rb"<!\s*(DOCTYPE|ENTITY)")
 
 _ATTRIBUTE = re.compile(r"@(?P<name>(\{[^}]*\})?[^=]*)=(?P<value>.*)", re.DOTALL)
@@ -77,6 +79,7 @@ def document(text: bytes | str, file: str, notes: list[Note] | None = None) -> E
                       line=data.count(b"\n", 0, error.start) + 1) from None
     if (count := data.count(b"<") - data.count(b"</")) > MOST_ELEMENTS:
         raise refusal(file, "too many elements", f"up to {MOST_ELEMENTS}", value=str(count))
+    data = _BREAK.sub(b" ", data)
     bare = _COMMENT.sub(lambda match: b"\n" * match[0].count(b"\n"), data)
     if declaration := _DECLARATION.search(bare):
         raise refusal(file, "a document type declaration, which is not allowed",

@@ -8,7 +8,6 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import BadRequest, MissingExtra
@@ -17,6 +16,8 @@ from ..version import __version__
 from .outputs import FIGURES, OUTPUTS, File, function
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from ..mechanism.pose import Pose
 
 PICTURES = (*FIGURES, ".gif")
@@ -125,9 +126,9 @@ def draw(result: Result, file: str | Path | None = None, *, plane: Pose | str | 
 
 def _ending(file: str | Path, endings: tuple[str, ...]) -> str:
     """The ending of a file that a picture can be written to; raises ``BadRequest``."""
-    from ..description.files import require_writable
+    from ..description.files import as_path, require_writable
 
-    ending = Path(file).suffix.lower()
+    ending = as_path(file).suffix.lower()
     if ending not in endings:
         raise BadRequest("cannot write the picture: unknown extension", str(file), endings)
     require_writable(file)

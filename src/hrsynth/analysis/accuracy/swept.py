@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...budgets import SWEEP_DRAWN, SWEEP_PART
-from ...description.files import require_alone, require_writable
+from ...description.files import as_path, require_alone, require_writable
 from ...errors import BadRequest, BuildStopped, PlaneNotMet
 from ...geometry.vectors import Array
 from ...mechanism.pose import Grid
@@ -111,7 +111,7 @@ def _spots(mapper: Mapper, grid: Grid, draft: _SweepDraft, tally: Tally, seed: i
 
 def require_file(path: str | Path) -> Path:
     """Where the file will be; raises ``BadRequest``."""
-    if Path(path).suffix.lower() != ENDING:
+    if as_path(path).suffix.lower() != ENDING:
         raise BadRequest("errors are written part by part to an array", str(path), f"a file that ends in {ENDING}")
     return require_writable(path)
 

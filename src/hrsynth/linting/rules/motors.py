@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ...mechanism.model import Mechanism
+from ...mechanism import graphs
+from ...mechanism.model import JointType, Mechanism
 from ..findings import LintRule, Spot
 from ..freedoms import Pair
 from ..subject import LintedFile
@@ -40,6 +41,18 @@ def _many(file: LintedFile) -> Iterator[Spot]:
         yield Spot(None, f"{driven} coordinates are driven, and {whole - rest} of them are independent")
 
 
+def _floating(file: LintedFile) -> Iterator[Spot]:
+    robot = file.mechanism
+    if robot is None:
+        return
+    joints = list(robot.joints.values())
+    tree = {joint.name for joint in
+            graphs.spanning_forest(robot.links, joints, [joint.type is JointType.FREE for joint in joints])}
+    for joint in joints:
+        if joint.type is JointType.FREE and joint.actuated and joint.name not in tree:
+            yield Spot(None, f"motor on the floating joint {joint.name!r}, whose link other joints hold")
+
+
 RULES = (
     LintRule("motor-none", "note", "no motor",
              "The Type 2 singularities of the real robot depend on which joints are driven; URDF+ and plain URDF "
@@ -51,4 +64,7 @@ RULES = (
     LintRule("motors-many", "warning", "more driven coordinates than the mechanism has",
              "Tools put an actuator on every joint, passive ones too. The motors then work against each other.",
              "remove the motors of passive joints, or name the driven ones: --motors JOINTS", _many),
+    LintRule("motor-floating", "error", "a motor on a floating joint whose link other joints hold",
+             "The joint holds nothing and has no coordinates of its own: commands that move the robot refuse the file.",
+             "drive the joints that hold the link, and remove this motor", _floating),
 )

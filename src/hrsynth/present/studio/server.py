@@ -45,15 +45,15 @@ def studio(robot: str | Path | Mechanism | None = None, observe: Iterable[str | 
     """Serve the studio on this machine, with a robot, a folder of robots or nothing, and open it in the browser:
     returns a server with ``address`` and ``stop()``, which also ends with this process. Port 0 is any free port.
 
-    Raises ``BadRequest`` for an unknown robot and a port that is not available, ``BadRobotFile`` for a missing file,
-    ``MissingExtra``.
+    Raises ``BadRequest`` for an unknown robot and a port that is not available, ``BadRobotFile`` for a file
+    that is missing or no robot file, ``MissingExtra``.
 
     >>> server = hrsynth.studio("3rrr_m1", open_=False)
     >>> server.stop()
     """
     from ...description import file_of
     from ...description.overrides import names
-    from ...description.xml import content
+    from ...description.reading import robot_file
     from ...mechanism import Mechanism
 
     watched = names(observe if observe is None or isinstance(observe, str) else map(str, observe))
@@ -63,10 +63,10 @@ def studio(robot: str | Path | Mechanism | None = None, observe: Iterable[str | 
     elif isinstance(robot, Mechanism):
         given = _as_read(robot)
         here = Opening(given=given, mechanism=robot if given is None else None, first=first)
-    elif Path(robot).is_dir():
+    elif os.path.isdir(robot):
         here = Opening(folder=Path(robot))
     else:
-        content(file_of(robot))
+        robot_file(file_of(robot))
         here = Opening(given={"robot": str(robot), "options": {}}, first=first)
     server = StudioServer(here, port)
     if open_:
