@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 import strategies as some
@@ -55,6 +55,7 @@ def test_a_loop_of_every_type(kind: JointType, seed: int):
 @settings(deadline=None, max_examples=150)
 @given(st.lists(st.sampled_from(IN_TREE), min_size=1, max_size=12), st.lists(st.sampled_from(IN_LOOP), max_size=6),
        SEEDS, st.sampled_from([1.0, 1e-3, 0.99, 500.0]))
+@example(tree=[JointType.REVOLUTE], loops=[JointType.FIXED], seed=222, scale=500.0)  # a platform that cannot move
 def test_any_tree_with_any_loops_at_any_size(tree: list[JointType], loops: list[JointType], seed: int, scale: float):
     mechanism = every_joint(tree, loops, seed, scale)
     read = check_round_trip(mechanism)

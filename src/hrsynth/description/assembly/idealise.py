@@ -16,7 +16,7 @@ from itertools import combinations
 import numpy as np
 
 from ...budgets import FINER_TRIES, LARGEST_RELATED
-from ...errors import HeldByRounding, RankUndecided, StructureUndecided
+from ...errors import BadMechanism, HeldByRounding, RankUndecided, StructureUndecided
 from ...geometry.gauss_newton import Damping, Residual, descend
 from ...geometry.ranks import singular_decomposition
 from ...geometry.vectors import Array, unit
@@ -80,6 +80,10 @@ def as_meant(mechanism: Mechanism, residual: float, tolerance: float, possible: 
     HeldByRounding
         Where they hold a direction by what was open alone.
     """
+    try:
+        normal_form(mechanism)
+    except BadMechanism:  # a platform that cannot move: said where its motion is asked for
+        return mechanism
     fine = tolerance
     for _ in range(FINER_TRIES):
         ideal = nearest(mechanism, fine)
