@@ -37,6 +37,11 @@ class MeasuredRobot(Value):
         """The motors' coordinates: the real robot. Raises ``BadRequest`` where it has no motor."""
         return cls(setting, setting.measuring(motors(setting).observations))
 
+    @classmethod
+    def of(cls, setting: ObservedRobot, real: bool) -> MeasuredRobot:
+        """The ``real`` robot or the hidden one."""
+        return cls.of_motors(setting) if real else cls.of_directions(setting)
+
     @property
     def question(self) -> Measurement:
         """What is asked at each configuration."""

@@ -94,7 +94,7 @@ def _held_measurements(found: AssemblyModes) -> Iterator[list[Any] | None]:
     """What is measured: a link's directions and points, the link from which they are seen, and how they are seen at the
     goal; None of another kind."""
     setting, at = found.setting, found.goal
-    measured = MeasuredRobot.of_motors(setting) if found.kind == "real" else MeasuredRobot.of_directions(setting)
+    measured = MeasuredRobot.of(setting, found.kind == "real")
     observations, mechanism = measured.question.observations, setting.mechanism
     for each in observations:
         if isinstance(each, Direction):

@@ -139,8 +139,7 @@ def _as_chain(found: AssemblyModes, about: Mapping[str, Any], robot: ClosedRobot
 
 def _measured_robot(found: AssemblyModes) -> MeasuredRobot:
     """What the list holds."""
-    make = MeasuredRobot.of_motors if found.kind == "real" else MeasuredRobot.of_directions
-    return make(found.setting)
+    return MeasuredRobot.of(found.setting, found.kind == "real")
 
 
 def _seal(systems: list[dict[str, Any]], about: Mapping[str, Any], robot: ClosedRobot | None, count: int

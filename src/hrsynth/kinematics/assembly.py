@@ -96,11 +96,10 @@ class Assembler:
     def platform(self, bodies: Mapping[str, Array]) -> dict[str, Array]:
         """The poses (4, 4) of all links of the platform where the bodies on which legs end have these; raises
         ``LoopsNotClosed`` where its own joints do not allow that."""
-        twin, q = self._platform_closed(bodies)
-        return {link: twin.pose(q, link) for link in self.anatomy.platform}
+        return self._platform_at(bodies)[0]
 
-    def _platform_closed(self, bodies: Mapping[str, Array]) -> tuple[PinocchioModel, Array]:
-        """The platform alone with its bodies at these poses."""
+    def _platform_at(self, bodies: Mapping[str, Array]) -> tuple[dict[str, Array], list[str]]:
+        """The same with its joints that are beyond their limits there."""
         mechanism, body = self._platform, self.anatomy.legs[0].attach
         displacement = bodies[body] @ inverse(mechanism.links[body].pose)
         poses = {link: displacement @ mechanism.links[link].pose for link in self.anatomy.platform}
@@ -111,7 +110,7 @@ class Assembler:
         for start in _starts(twin):
             q, residual = solve(twin, start, target, tolerance=SOLVED, iterations=60)
             if residual <= CLOSED and all(_turned_as(twin.pose(q, body), X) for body, X in bodies.items()):
-                return twin, q
+                return {link: twin.pose(q, link) for link in self.anatomy.platform}, limits.outside(twin, q)
         raise LoopsNotClosed(twin.mechanism.name, residual, CLOSED, "inside the platform")
 
     @cached_property
@@ -122,9 +121,8 @@ class Assembler:
            ) -> Assembly:
         """The robot with the bodies (on which legs end) at these poses (4, 4), known to ``within`` (characteristic
         lengths, radians), and the measured values as given."""
-        alike, own_q = self._platform_closed(bodies)
-        platform = {link: alike.pose(own_q, link) for link in self.anatomy.platform}
-        poses, beyond = dict(platform), limits.outside(alike, own_q)
+        platform, beyond = self._platform_at(bodies)
+        poses = dict(platform)
         missing, misses, held = list[str](), list[tuple[str, Miss]](), False
         for leg in self.anatomy.legs:
             own = [each for each in measured if each[0].leg == leg.label]

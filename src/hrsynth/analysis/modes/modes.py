@@ -177,7 +177,7 @@ def modes(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None,
     if asked is not None:
         wanted = motion.goal(asked, setting.robot.name)
         goal = reach(goal, setting.everything.question, asked, motion)
-    measured = MeasuredRobot.of_motors(setting) if real else MeasuredRobot.of_directions(setting)
+    measured = MeasuredRobot.of(setting, real)
     pose = motion.pose(goal.pose(motion.link))
     kind = "real" if real else "hidden"
     free = setting.dof - measured.rank

@@ -113,7 +113,7 @@ def singular(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = No
     <Singularity: rrrrr_m1, watching 1, 2: the tangents τ1, τ2 are parallel>
     """
     setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed, driven=real)
-    measured = MeasuredRobot.of_motors(setting) if real else MeasuredRobot.of_directions(setting)
+    measured = MeasuredRobot.of(setting, real)
     question, verdict = measured.question, measured.verdict
     if not verdict.dof:
         raise BadRequest(f"{setting.robot.name}: the platform has no freedom to lose", setting.mechanism.platform,
