@@ -44,8 +44,12 @@ def follows(here: ClosedConfiguration, step: Array, there: ClosedConfiguration) 
     if not len(kept):
         return True
     return (_alike(kept, there.strengths) and _same_side(here, there)
-            and turned_little(here.kernel()[0], there.kernel()[0])
-            and all(alike_after(here, part * step) for part in (0.5, 1.0)))
+            and turned_little(here.kernel()[0], there.kernel()[0]) and alike_along(here, step))
+
+
+def alike_along(here: ClosedConfiguration, step: Array) -> bool:
+    """Whether the loops' singular values half way along a step and at its end are like those ``here``."""
+    return not len(here.strengths) or all(alike_after(here, part * step) for part in (0.5, 1.0))
 
 
 def turned_little(A: Array, B: Array) -> bool:

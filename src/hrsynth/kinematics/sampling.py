@@ -30,7 +30,7 @@ from ..tolerances import (
     SURELY_SOMETHING,
     UNMOVING,
 )
-from .branch import OperationMode, Signature, group_modes, turns_of
+from .branch import OperationMode, Signature, alike_along, group_modes, turns_of
 from .configuration import ClosedConfiguration
 from .pinocchio_model import PinocchioModel
 from .relation import Measurement, Relation, relation, relations
@@ -161,6 +161,17 @@ class _Stride:
         """The next part of it, (nv,)."""
         return self.part * shorten_step(STEP * self.velocity, 3 * STEP)
 
+    def shortened(self) -> _Stride | None:
+        """With its next part halved, which did not follow the branch; None where it would be too small."""
+        return replace(self, part=self.part / 2) if self.part / 2 >= HALVED[-1] else None
+
+    def ahead(self) -> _Stride | None:
+        """With a next part that may follow the branch, which is told before it is closed."""
+        if alike_along(self.here, self.tangent()):
+            return self
+        shorter = self.shortened()
+        return shorter and shorter.ahead()
+
     def on(self, basis: Array) -> Array:
         """Its direction in a basis of (t, u̇)."""
         return np.asarray(basis.T @ self.direction)
@@ -274,8 +285,8 @@ class _Walks:
             for (i, at), there in zip(going.items(), self._parts(list(going.values())), strict=True):
                 came = at.came + at.part
                 if there is None:
-                    if at.part / 2 >= HALVED[-1]:
-                        onward[i] = replace(at, part=at.part / 2)
+                    if (shorter := at.shortened()) is not None:
+                        onward[i] = shorter
                 elif there.kernel()[1].weakest >= weakest[i]:
                     passed = (*at.passed, there)
                     if came < 1:
@@ -289,7 +300,7 @@ class _Walks:
                     del onward[i]
                 else:
                     onward[i] = replace(onward[i], velocity=each[0], direction=each[1])
-            going = onward
+            going = {i: ahead for i, at in onward.items() if (ahead := at.ahead()) is not None}
         return ended
 
     def _parts(self, strides: Sequence[_Stride]) -> list[ClosedConfiguration | None]:
