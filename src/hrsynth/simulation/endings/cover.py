@@ -30,6 +30,7 @@ from .joint_error import JointError
 from .loop_error import LoopError, LoopSubdivision
 from .planes import PlaneError
 from .pose_error import NotEnclosed, PoseError
+from .spring_error import SpringError, SpringSubdivision
 from .struts import Struts
 from .subdivision import CriticalBox, Subdivision
 
@@ -59,10 +60,10 @@ class Cover(Value):
     unread: tuple[str, ...] = ()
     """Legs in space with joints of which it is not known where they lock: there it was not looked."""
 
-    loop: LoopError | None = None
-    """The loop of two watched legs, of which rests were sought by the force that closes it: it was not looked where a
-    leg that is not watched is stretched, nor where as many watched directions as are ``flat`` are at right angles to
-    the desired ones."""
+    loop: LoopError | SpringError | None = None
+    """The watched legs, where rests were sought by the forces of two or three: it was not looked where a leg that is
+    not watched is stretched, nor where as many watched directions as are ``flat`` are at right angles to the desired
+    ones."""
     spent: bool = False
     """Whether boxes are left open because no more were allowed."""
 
@@ -128,7 +129,7 @@ def cover(setting: ObservedRobot, goal: ClosedConfiguration, *, vanishing: bool 
         return Cover((), (), 1.0, 0, False, str(why))
     low, high, bounded = bounds(error, reach)
     charts, endless = [each.list_charts(bounded) for each in families], families[0].endless
-    loop = next((each for each in families if isinstance(each, LoopError)), None)
+    loop = next((each for each in families if isinstance(each, LoopError | SpringError)), None)
     parts = [[_boxes(each, low, high, reach, vanishing or loop not in (None, each)) for each in some]
              for some in charts]
     every = [part for some in parts for part in some]
@@ -143,7 +144,8 @@ def cover(setting: ObservedRobot, goal: ClosedConfiguration, *, vanishing: bool 
             if not any(_same(zero, other, family) for other in own):
                 own.append(zero)
         own = [_on_line(each, family.error, error) if len(each.x) < error.size else each for each in own]
-        found += [each for each in own if loop is None or not any(_alike(each, other, loop) for other in found)]
+        found += [each for each in own if not isinstance(loop, LoopError)
+                  or not any(_alike(each, other, loop) for other in found)]
     left, lost = (
         [corners for part in every for corners in _corners(part.error, boxes(part), error.size)]
         for boxes in (lambda part: part.left, lambda part: part.lost))
@@ -158,7 +160,8 @@ def cover(setting: ObservedRobot, goal: ClosedConfiguration, *, vanishing: bool 
     return Cover(tuple(found), tuple(left), sum(each.share for each in every) / len(every),
                  sum(each.boxes for each in every), bounded or endless, "",
                  None if endless and not bounded else (low, high), error,
-                 () if any(each.short for each in charts[0]) else tuple(free), struts, tuple(locked),
+                 () if isinstance(loop, SpringError) or any(each.short for each in charts[0]) else tuple(free), struts,
+                 tuple(locked),
                  () if struts is not None else unread(setting), loop, any(each.spent for each in every))
 
 
@@ -176,7 +179,9 @@ def _families(setting: ObservedRobot, goal: ClosedConfiguration, vanishing: bool
         return _read(planes[0].error), [*planes], None
     _read(error)
     if error.turns.shape[1] > 1:
-        raise NotEnclosed("the platform turns about more than one axis")
+        if vanishing:
+            raise NotEnclosed("the platform turns about more than one axis")
+        return error, [SpringError.about(error)], None
     struts = Struts.of(setting, goal, error)
     if struts is not None:
         return error, [*struts.whole(), *([] if vanishing else struts.locked_errors())], struts
@@ -203,7 +208,10 @@ def _boxes(error: JointError, low: Array, high: Array, reach: float, vanishing: 
         reach = max(reach, COVER_MARGIN * float(ends))
         low, high = np.full(3, -reach), np.full(3, reach)
     corners = error.box(low, high, reach)
-    return LoopSubdivision(error, *corners) if isinstance(error, LoopError) else Subdivision(error, *corners, vanishing)
+    if isinstance(error, LoopError | SpringError):
+        kind = LoopSubdivision if isinstance(error, LoopError) else SpringSubdivision
+        return kind(error, *corners)
+    return Subdivision(error, *corners, vanishing)
 
 
 def _corners(error: JointError, boxes: Sequence[tuple[Array, Array]], size: int) -> Iterator[tuple[Array, Array]]:
