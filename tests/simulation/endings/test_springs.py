@@ -81,7 +81,7 @@ def met_by_hand(error, rng, starts, far=4.0):
             move *= min(1.0, 0.5 / np.abs(move).max())
             p, R = p + move[:3], turned(move[3:]) @ R
             if np.abs(move).max() < 1e-11:
-                g, c, forces = slope(error, p, R)
+                g, c, _ = slope(error, p, R)
                 if (np.abs(g).max() < 1e-13 and np.abs(c).min() > 1e-3 and np.abs(p).max() < 30
                         and np.linalg.matrix_rank(J, tol=1e-6 * np.abs(J).max()) == 6):
                     found.append((p, R))
@@ -95,7 +95,7 @@ def met_by_hand(error, rng, starts, far=4.0):
 
 def coordinates(error, p, R):
     """The chart in which a pose's plane is, and its coordinates there, by hand."""
-    a, b, wanted = geometry(error)
+    a, b, _ = geometry(error)
     points = p + b @ R.T
     normal = np.cross(points[1] - points[0], points[2] - points[0])
     m = normal / normal[np.abs(normal).argmax()]
@@ -128,8 +128,8 @@ def test_at_each_rest_the_springs_balance(seed: int) -> None:
         left = np.concatenate([chart.closing.together(forms).v[0, 0], chart.left.together(forms).v[0, 0]])
         assert np.abs(left).max() < 1e-7 * max(1.0, float(np.abs(p).max())) ** 2
         sub = SpringSubdivision(chart, *chart.box(y, y, 1.0))
-        (over, tell, _), = sub._over_pose(y[None])
-        q, turn = over.pose(np.array(tell(y[None], 0 * y[None])[0]))
+        (over, told, _), = sub.over_pose(y[None])
+        q, turn = over.pose(told.together(forms).v[0])
         assert np.abs(turn[0] - R).max() < 1e-6
         assert np.abs(q[0] - p).max() < 1e-6 * max(1.0, float(np.abs(p).max()))
 
@@ -153,8 +153,8 @@ def test_where_the_springs_balance_the_error_has_no_slope(seed: int) -> None:
         y = y + move * np.minimum(1.0, 0.5 / np.maximum(np.abs(move).max(axis=1), 1e-300))[:, None]
     y = y[(np.abs(F).max(axis=1) < 1e-10) & (np.abs(np.cos(y[:, 3:6])).min(axis=1) > 1e-3)
           & ((np.abs(y[:, 2]) > 1e-2) | (not chart.distant))]
-    for over, tell, own in SpringSubdivision(chart, low, high)._over_pose(y):
-        for p, R in zip(*over.pose(tell(y[own], 0 * y[own])[0]), strict=True):
+    for over, told, own in SpringSubdivision(chart, low, high).over_pose(y):
+        for p, R in zip(*over.pose(told.together(forms_of(y[own], 0 * y[own])).v[0]), strict=True):
             g, c, _ = slope(error, p, R)
             if np.abs(c).min() > 1e-3:
                 count += 1

@@ -13,6 +13,7 @@ from ...analysis.observed import ObservedRobot
 from ...budgets import SIGN_BOXES, SIGN_CHOICES
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
+from ...kinematics.locked import leg_twists
 from ...kinematics.relation import Measurement
 from ...mechanism.pose import Pose
 from ...progress import part
@@ -107,12 +108,19 @@ class Covers(Value):
         told = self.every
         places = [told.place(each.configuration, directions(each.configuration, self.question)[0]) for each in rests]
         held = [told.holds(each.configuration) and (told.loop is None or len(each.across) < told.loop.flat)
+                and not self._locks(told.unread, each.configuration)
                 for each, place in zip(rests, places, strict=True) if place is None]
         within = None if told.bounded or told.error is None else COVER_REACH * told.error.length
         shorter = SHORTEST_ROD * told.error.length if told.short and told.error is not None else None
         alone = tuple(self._alone(told, each) for k, each in enumerate(told.found) if k not in places)
         return RestCover(told, alone, sum(held), within, shorter,
                          sum(told.is_turned(each.configuration) for each in rests), len(held) - sum(held))
+
+    def _locks(self, labels: Sequence[str], at: ClosedConfiguration) -> bool:
+        """Whether the joints of a leg lock: they move its end in fewer ways than at the zero configuration."""
+        start, base = self.setting.everything.start, self.setting.mechanism.base
+        return any(leg_twists(at, leg, (), base).shape[1] < leg_twists(start, leg, (), base).shape[1]
+                   for leg in self.setting.anatomy.legs if leg.label in labels)
 
     def _alone(self, told: Cover, box: CriticalBox) -> BoxedRest:
         """A critical point that is no rest of the list."""

@@ -12,7 +12,7 @@ r₁ sin(t − θ) c₂ (u₂* × u₂) = r₂ cos θ sin θ (n × u₂).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -31,8 +31,6 @@ from .pose_error import NotEnclosed, Number, PoseError
 from .reached import narrow_joint as joint_bounds
 from .subdivision import CriticalBox, Subdivision, forms_of
 
-Tell = Callable[[Array, Array], tuple[Array, Array]]
-"""The corners of what boxes (middle, half edges) hold in other coordinates."""
 NARROWINGS = 16
 """How many times the place of a zero is narrowed."""
 
@@ -280,23 +278,8 @@ class LoopSubdivision(Subdivision):
         """The rests at zeros, each once: over the pose exactly one is proved in a box that holds all that lie in that
         of the zero. Those are left out which a leg that is not watched does not reach; what is not decided is left
         open."""
-        # with more equations than unknowns there need be no zero: what is told of it is narrowed, from the whole room
-        at, room = (np.array(each) for each in zip(*self.proved, *self.flat, strict=True))
-        reach = room + np.abs(x - at)
-        for _ in range(NARROWINGS):
-            reach = np.fmin(reach, self._krawczyk(x, reach)[1])
-        return [zero for over, tell, own in self._over_pose(x)
-                for zero in self._report_over(over, tell, x[own], reach[own])]
-
-    def _over_pose(self, x: Array) -> Iterator[tuple[JointError, Tell, Flags]]:
-        """The error over the pose in some charts, what tells of boxes where in it they are, and which zeros (c, n) it
-        is for."""
-        yield self.error.over_pose, self.error.enclose_chart, np.ones(len(x), dtype=bool)
-
-    def _report_over(self, over: JointError, tell: Tell, x: Array, reach: Array) -> list[CriticalBox]:
-        """Those of zeros in one chart."""
-        kept = list[int]()
-        y, (low, high) = np.mean(tell(x, 0 * x), axis=0), tell(x, reach)
+        over, kept, reach = self.error.over_pose, list[int](), self._narrow_zeros(x)
+        y, (low, high) = np.mean(self.error.enclose_chart(x, 0 * x), axis=0), self.error.enclose_chart(x, reach)
         room = np.maximum(high - y, y - low)
         for k in range(len(x)):
             apart = np.abs(y[kept] - y[k])
@@ -304,24 +287,13 @@ class LoopSubdivision(Subdivision):
                 kept.append(k)
         x, reach, y, room = (each[kept] for each in (x, reach, y, room))
         # as wide as the smallest boxes are to be in which a zero nearby is sought
-        whole = np.full(y.shape[1], max(1.0, float(room.max(initial=0.0)) / SMALLEST_BOX))
+        whole = np.full(y.shape[1], max(1.0, float(room.max()) / SMALLEST_BOX))
         part = Subdivision(over, -whole, whole)
         P = pivots(part._values(forms_of(y, 0 * y))[1].v[0])[0]
         settled = np.all(room < MET_AGAIN, axis=1) & part._unique(y, np.full(y.shape, MET_AGAIN), P, 1.0)
         rest = np.flatnonzero(~settled)
         if len(rest):
             settled[rest] = part._near_zero(y[rest], room[rest], P[rest])
-        settled |= self._excepted(over, y, room)
-        zeros = self._reached(part, y, settled)
-        self.left += list(zip(x[~settled], reach[~settled], strict=True))
-        return zeros
-
-    def _excepted(self, over: JointError, y: Array, room: Array) -> Flags:
-        """Which boxes of the chart hold only rests that are not looked at."""
-        return np.zeros(len(y), dtype=bool)
-
-    def _reached(self, part: Subdivision, y: Array, settled: Flags) -> list[CriticalBox]:
-        """The zeros that all legs reach; of those at which that is not known the box is not ``settled``."""
         zeros = part.zeros()
         if zeros:
             forms = forms_of(*(np.array([getattr(each, name) for each in zeros]) for name in ("x", "radius")))
@@ -330,4 +302,14 @@ class LoopSubdivision(Subdivision):
             for zero in (each for each, known in zip(zeros, reached | beyond, strict=True) if not known):
                 settled[np.abs(y - zero.x).max(axis=1).argmin()] = False
             zeros = [each for each, good in zip(zeros, reached, strict=True) if good]
+        self.left += list(zip(x[~settled], reach[~settled], strict=True))
         return zeros
+
+    def _narrow_zeros(self, x: Array) -> Array:
+        """How far from places (c, n) zeros are. With more equations than unknowns there need be none: what is told of
+        it is narrowed, from the whole room."""
+        at, room = (np.array(each) for each in zip(*self.proved, *self.flat, strict=True))
+        reach = room + np.abs(x - at)
+        for _ in range(NARROWINGS):
+            reach = np.fmin(reach, self._krawczyk(x, reach)[1])
+        return reach

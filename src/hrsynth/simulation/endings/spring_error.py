@@ -1,11 +1,11 @@
 """Rests of a platform that moves as it likes on three watched rods that slide, as equilibria of springs.
 
-Rod i goes from a base point a_i to a point b_i of the platform, along u_i; c_i = u_i · u_i*. E = ½ Σ (1 − c_i²) pulls
-at b_i with f_i = c_i (u_i* − c_i u_i) / |b_i − a_i|. With t_i = c_i / |b_i − a_i| and H_i = a_i + u_i* / t_i, a point of
-the desired line, this is t_i² (H_i − b_i), a spring of no length; and f_i · (b_i − a_i) = 0. Three forces that balance
-each other on a body lie in the plane m · x = d of their points b_i. So where no c_i vanishes it holds all H_i, and
-tells t_i = m · u_i* / (d − m · a_i). Springs in this plane tell the platform's place there, and its angle ψ but for
-half a turn. Three unknowns are left, two of m and d, for the three equations f_i · (b_i − a_i) = 0.
+Rod i goes from a base point a_i to a point b_i of the platform, along u_i; c_i = u_i · u_i*. E = ½ Σ (1 − c_i²)
+pulls at b_i with f_i = c_i (u_i* − c_i u_i) / |b_i − a_i|. With t_i = c_i / |b_i − a_i| and H_i = a_i + u_i* / t_i
+this is t_i² (H_i − b_i), a spring of no length to a point of the desired line; and f_i · (b_i − a_i) = 0. Three forces
+that balance each other on a body lie in the plane m · x = d of their points b_i. So where no c_i vanishes it holds all
+H_i, and tells t_i = m · u_i* / (d − m · a_i). Springs in this plane tell the platform's place there, and its angle ψ
+but for half a turn. Three unknowns are left, two of m and d, for the three equations f_i · (b_i − a_i) = 0.
 
 Coordinates: the components of m but that which is 1; d, or for planes far away w = 1 / d; α_i, whose tangents are t_i,
 or t_i / w; ψ. Nothing is special where a plane holds a desired line (α_i is free) or where springs do not tell ψ. Where
@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import combinations, product
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -26,13 +26,24 @@ import numpy as np
 from ...batch.enclosures import BoxFormula
 from ...closed_forms.legs import ClosedFormLeg, SlidingRod
 from ...geometry.affine import AffineForms, combine
-from ...geometry.components import combination, cosine, dot, minus, plus, scale, sine, sqrt, transform_vector
+from ...geometry.components import (
+    Components,
+    combination,
+    cosine,
+    dot,
+    minus,
+    plus,
+    scale,
+    sine,
+    sqrt,
+    transform_vector,
+)
 from ...geometry.so3 import quaternions
 from ...geometry.vectors import Array
-from ...tolerances import BOX_ROUNDING, EXACT, MET_AGAIN, SAME_ENDING
-from .elimination import Flags, Places, away
-from .joint_error import JointError, of_robot
-from .loop_error import LoopSubdivision, Tell
+from ...tolerances import AFFINE_ROUNDING, EXACT, KNOWN_NUMBER, MET_AGAIN, SAME_ENDING
+from .elimination import Flags, Places, away, entries, inverse
+from .joint_error import JointError, of_robot, total
+from .loop_error import LoopSubdivision
 from .planes import TURNED, PlaneError
 from .pose_error import NotEnclosed, Number, PoseError
 from .reached import narrow_joint
@@ -40,6 +51,53 @@ from .subdivision import CriticalBox, Subdivision, forms_of
 
 NEAREST_FAR = 2.0
 """How far (characteristic lengths) planes are from which on they count as far away."""
+PAIRS, OTHERS = ((0, 1), (0, 2), (1, 2)), ((1, 2), (0, 2), (0, 1))
+"""The pairs of three rods; and those of the others, of each."""
+
+
+@dataclass(frozen=True, eq=False)
+class Springs:
+    """The springs in two axes of the platform's plane: of each rod sin α and cos α, b from the first one, a and u*; and
+    w, 1 where the plane is not far away. All t are over w, and all forces times Π cos² α."""
+
+    S: Sequence[Any]
+    C: Sequence[Any]
+    b: Sequence[Components]
+    a: Sequence[Components]
+    u: Sequence[Components]
+    w: Any
+
+    @cached_property
+    def stiffness(self) -> list[Any]:
+        """t² of each."""
+        return [s * s * each for s, each in zip(self.S, self._scales, strict=True)]
+
+    @cached_property
+    def pulls(self) -> list[Any]:
+        """t of each."""
+        return [s * c * each for s, c, each in zip(self.S, self.C, self._scales, strict=True)]
+
+    @property
+    def _scales(self) -> list[Any]:
+        return [self.C[j] * self.C[j] * (self.C[k] * self.C[k]) for j, k in OTHERS]
+
+    @cached_property
+    def place(self) -> Components:
+        """Where the first b is, times w, so that all forces balance."""
+        parts = [plus(scale(pull, u), scale(self.w * own, minus(a, b)))
+                 for pull, own, u, a, b in zip(self.pulls, self.stiffness, self.u, self.a, self.b, strict=True)]
+        return scale(1.0 / total(self.stiffness), [total(each) for each in zip(*parts, strict=True)])
+
+    @cached_property
+    def rods(self) -> list[Components]:
+        """b − a of each, times w."""
+        return [plus(self.place, scale(self.w, minus(b, a))) for b, a in zip(self.b, self.a, strict=True)]
+
+    @cached_property
+    def forces(self) -> list[Components]:
+        """f of each."""
+        return [minus(scale(pull, u), scale(own, rod))
+                for pull, own, u, rod in zip(self.pulls, self.stiffness, self.u, self.rods, strict=True)]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -50,6 +108,8 @@ class SpringError(JointError):
     one: int = field(default=0, kw_only=True)
     distant: bool = field(default=False, kw_only=True)
     side: float = field(default=1.0, kw_only=True)
+    flat = 1
+    """How many watched directions are at right angles to the desired ones where rests are not looked at."""
 
     @classmethod
     def about(cls, error: PoseError) -> SpringError:
@@ -75,11 +135,6 @@ class SpringError(JointError):
         watched = {each.limb for each in self.error.seen}
         return [each for i, each in enumerate(self.error.limbs) if i not in watched]
 
-    @property
-    def flat(self) -> int:
-        """How many watched directions are at right angles to the desired ones where rests are not looked at."""
-        return 1
-
     @cached_property
     def desired(self) -> Array:
         """u* (3, 3)."""
@@ -104,12 +159,12 @@ class SpringError(JointError):
     def sizes(self) -> Array:
         """The sides b₁b₂, b₁b₃, b₂b₃ of the triangle, and twice its area over the longest."""
         b = np.array([each.tip.turned for each in self.limbs])
-        sides = [float(np.linalg.norm(b[i] - b[j])) for i, j in combinations(range(3), 2)]
+        sides = [float(np.linalg.norm(b[i] - b[j])) for i, j in PAIRS]
         area = float(np.linalg.norm(np.cross(b[1] - b[0], b[2] - b[0])))
         return np.array([*sides, area / max(*sides, EXACT)])
 
     @property
-    def charts(self) -> tuple[JointError, ...]:
+    def charts(self) -> tuple[SpringError, ...]:
         """Those that together hold all planes, and both sides of the platform."""
         return tuple(replace(self, one=one, distant=distant, side=side)
                      for one, distant, side in product(range(3), (False, True), (1.0, -1.0)))
@@ -154,38 +209,16 @@ class SpringError(JointError):
 
     def across(self, m: list[Any], number: Number) -> list[list[Any]]:
         """Two unit vectors in the plane, and its normal: the axes, turned by the shortest way to it."""
-        size = 1.0 / sqrt(dot(m, m))
-        n = scale(size, m)
-        eye = number(np.eye(3))
-        both = plus(n, eye[self.one])
-        return [*(minus(eye[k], scale(n[k] * (1.0 / (1.0 + n[self.one])), both)) for k in self._others), n]
+        n, eye = scale(1.0 / sqrt(dot(m, m)), m), number(np.eye(3))
+        both, share = plus(n, eye[self.one]), 1.0 / (1.0 + n[self.one])
+        return [*(minus(eye[k % 3], scale(n[k % 3] * share, both)) for k in (self.one + 1, self.one + 2)), n]
 
-    @property
-    def _others(self) -> list[int]:
-        return [(self.one + 1) % 3, (self.one + 2) % 3]
-
-    def springs(self, y: Sequence[Any], number: Number) -> dict[str, Any]:
-        """In the plane's axes: b from the platform's first point, a, u* (3, 2); sines, cosines of α; weights of b and
-        of u*; b − a times w, the moment, forces."""
-        m, *_ = self.plane(y, number)
-        x1, x2, _ = self.across(m, number)
-        w = y[2] if self.distant else number(1.0)
-        S, C = [sine(z) for z in y[3:6]], [cosine(z) for z in y[3:6]]
-        a = [[dot(x, number(each)) for x in (x1, x2)] for each in self.bases]
-        u = [[dot(x, number(each)) for x in (x1, x2)] for each in self.desired]
-        K = [C[j] * C[j] * (C[k] * C[k]) for j, k in ((1, 2), (0, 2), (0, 1))]
-        weights, pulls = ([s * each * k for s, each, k in zip(S, some, K, strict=True)] for some in (S, C))
-        b = self._points(y[6], number)
-        whole = weights[0] + weights[1] + weights[2]
-        inverse = 1.0 / whole
-        place = [inverse * total for total in _sum(
-            plus(scale(z, own), scale(w * g, minus(at, point)))
-            for z, g, own, at, point in zip(pulls, weights, u, a, b, strict=True))]
-        away_ = [plus(place, scale(w, minus(point, at))) for point, at in zip(b, a, strict=True)]
-        forces = [minus(scale(z, own), scale(g, each)) for z, g, own, each in zip(
-            pulls, weights, u, away_, strict=True)]
-        return {"b": b, "a": a, "u": u, "S": S, "C": C, "away": away_, "forces": forces, "place": place, "w": w,
-                "weights": weights, "pulls": pulls, "whole": whole}
+    def springs(self, y: Sequence[Any], number: Number) -> Springs:
+        """Those at coordinates y."""
+        x1, x2, _ = self.across(self.plane(y, number)[0], number)
+        a, u = ([[dot(x, number(each)) for x in (x1, x2)] for each in some] for some in (self.bases, self.desired))
+        return Springs([sine(z) for z in y[3:6]], [cosine(z) for z in y[3:6]], self._points(y[6], number), a, u,
+                       y[2] if self.distant else number(1.0))
 
     def _points(self, angle: Any, number: Number) -> list[list[Any]]:
         """The b in the plane's axes, from the first, turned by ψ."""
@@ -199,15 +232,14 @@ class SpringError(JointError):
     def rest(self, y: Sequence[Any], number: Number) -> list[Any]:
         """What is left: of each rod f · (b − a) by its length, and by its force; and Σ f · (R b − a)."""
         at = self.springs(y, number)
-        S, C, u, B = (at[name] for name in ("S", "C", "u", "away"))
+        S, C, u, B = at.S, at.C, at.u, at.rods
         found = [s * _dot(each, each) - c * _dot(own, each) for s, c, own, each in zip(S, C, u, B, strict=True)]
         pull = [minus(scale(s * c, own), scale(s * s, each)) for s, c, own, each in zip(S, C, u, B, strict=True)]
-        for i in range(3):
-            j, k = (each for each in range(3) if each != i)
+        for i, (j, k) in enumerate(OTHERS):
             left = scale(-1.0, plus(scale(C[k] * C[k], pull[j]), scale(C[j] * C[j], pull[k])))
             both = C[j] * C[j] * (C[k] * C[k])
             found.append(S[i] * both * _dot(u[i], left) - C[i] * _dot(left, left))
-        found.append(_total(_dot(f, minus(b, a)) for f, b, a in zip(at["forces"], at["b"], at["a"], strict=True)))
+        found.append(total(_dot(f, minus(b, a)) for f, b, a in zip(at.forces, at.b, at.a, strict=True)))
         return found
 
     def told_joints(self, y: Sequence[Any], number: Number) -> list[Any]:
@@ -220,16 +252,16 @@ class SpringError(JointError):
     def turn(self, y: Sequence[Any], number: Number) -> tuple[Any, Any]:
         """The moment's part with cos ψ, and with sin ψ: of each two rods the sides of the triangle and of the H."""
         at = self.springs([*y[:6], number(0.0)], number)
-        S, C, u, b = (at[name] for name in ("S", "C", "u", "b"))
+        S, C, u, b = at.S, at.C, at.u, at.b
         across, level = list[Any](), list[Any]()
-        for i, j in combinations(range(3), 2):
+        for i, j in PAIRS:
             rest, both = C[3 - i - j], S[i] * S[j]
-            ends = plus(scale(at["w"] * both, minus(at["a"][i], at["a"][j])),
+            ends = plus(scale(at.w * both, minus(at.a[i], at.a[j])),
                         minus(scale(S[j] * C[i], u[i]), scale(S[i] * C[j], u[j])))
             pull, side = scale(rest * rest * both, ends), minus(b[i], b[j])
-            across.append(_cross(side, pull))
+            across.append(side[0] * pull[1] - side[1] * pull[0])
             level.append(-_dot(side, pull))
-        return _total(across), _total(level)
+        return total(across), total(level)
 
     @cached_property
     def closing(self) -> BoxFormula:
@@ -249,32 +281,32 @@ class SpringError(JointError):
 
         return of_robot(formula, 7)
 
-    def over_pose(self, one: int) -> PlaneError:
-        """The same error over the pose, in the chart of its turn in which a component of the quaternion is 1."""
+    def in_pose(self, one: int, far: int | None) -> PlaneError:
+        """The same error over the pose, in the chart of its turn in which a component of the quaternion is 1, and of
+        its shift about the goal or of those ``far`` away."""
         error = self.error
-        return PlaneError(error, (), error, shortest=0.0, offset=np.zeros(3), follow=np.zeros((3, 9)),
+        return PlaneError(error, (), error, far, shortest=0.0, offset=np.zeros(3), follow=np.zeros((3, 9)),
                           along=error.shifts, span=np.eye(4), forms=np.zeros((0, 4, 4)), one=one)
 
-    def tell_pose(self, one: int) -> BoxFormula:
+    def tell_pose(self, one: int, far: int | None) -> BoxFormula:
         """Its coordinates there."""
         def formula(y: Sequence[Any], number: Number) -> list[Any]:
-            at, (m, *_) = self.springs(y, number), self.plane(y, number)
+            at, m = self.springs(y, number), self.plane(y, number)[0]
             x1, x2, n = self.across(m, number)
             c, s, error = cosine(y[6]), sine(y[6]), self.error
             axes = [plus(scale(c, x1), scale(s, x2)),
                     scale(self.side, minus(scale(c, x2), scale(s, x1))), scale(self.side, n)]
             # R by rows, from the axes of the platform
-            R = [_total(axis[i] * number(own[j]) for axis, own in zip(axes, self.frame, strict=True))
+            R = [total(axis[i] * number(own[j]) for axis, own in zip(axes, self.frame, strict=True))
                  for i in range(3) for j in range(3)]
-            near = sqrt(dot(m, m))
-            scaled = 1.0 / y[2] if self.distant else number(1.0)
-            depth = (scaled if self.distant else y[2]) * (1.0 / near)
-            point = plus(scale(scaled, plus(scale(at["place"][0], x1), scale(at["place"][1], x2))), scale(depth, n))
+            level, away_ = plus(scale(at.place[0], x1), scale(at.place[1], x2)), scale(1.0 / sqrt(dot(m, m)), n)
+            point = scale(1.0 / y[2], plus(level, away_)) if self.distant else plus(level, scale(y[2], away_))
             point = minus(minus(point, transform_vector(R, number(self.limbs[0].tip.turned))), number(error.p))
+            shift = [dot(point, number(way)) for way in error.shifts.T]
+            if far is not None:
+                shift = [(1.0 if k == far else each) * (1.0 / shift[far]) for k, each in enumerate(shift)]
             parts = [combination([*R, number(1.0)], row[None], number)[0] for row in PRODUCTS[one]]
-            inverse = 1.0 / parts[one]
-            return [*(dot(point, number(way)) for way in error.shifts.T),
-                    *(inverse * each for k, each in enumerate(parts) if k != one)]
+            return [*shift, *(each * (1.0 / parts[one]) for k, each in enumerate(parts) if k != one)]
 
         return of_robot(formula, 7)
 
@@ -297,23 +329,14 @@ PRODUCTS = np.linalg.pinv(np.concatenate([TURNED.reshape(9, 16), np.eye(4).resha
 """Products of two components of a unit quaternion, as forms of R by rows and of 1."""
 
 
-def _cross(a: Sequence[Any], b: Sequence[Any]) -> Any:
-    return a[0] * b[1] - a[1] * b[0]
-
-
-def _dot(a: Sequence[Any], b: Sequence[Any]) -> Any:
+def _dot(a: Components, b: Components) -> Any:
     return a[0] * b[0] + a[1] * b[1]
 
 
-def _total(parts: Any) -> Any:
-    first, *rest = parts
-    for each in rest:
-        first = first + each
-    return first
-
-
-def _sum(parts: Any) -> list[Any]:
-    return [_total(each) for each in zip(*parts, strict=True)]
+def _about(told: BoxFormula, middle: Array, half: Array) -> tuple[Array, Array]:
+    """What a formula tells of the middle of boxes, and how far from that it can be in them."""
+    at, found = told.together(forms_of(middle, 0 * middle)), told.together(forms_of(middle, half))
+    return at.v[0], np.maximum(found.high - at.v[0], at.v[0] - found.low)
 
 
 class SpringSubdivision(LoopSubdivision):
@@ -342,46 +365,81 @@ class SpringSubdivision(LoopSubdivision):
         return low, high
 
     def _apart(self, low: Array, high: Array) -> Flags:
-        """Whether sides of the triangle are too long or too short: b_i is on the sphere over a_i H_i."""
-        error = self.error
-        found = np.zeros(len(low), dtype=bool)
+        """Whether sides of the triangle are too long or too short: each b is on the sphere over a and H = a + τ u*."""
+        error, found = self.error, np.zeros(len(low), dtype=bool)
         with np.errstate(all="ignore"):
-            ends = 1 / np.tan(np.stack([low[:, 3:6], high[:, 3:6]]))
-            through = (low[:, 3:6] <= 0) & (high[:, 3:6] >= 0)
-            lo, hi = np.where(through, -np.inf, ends[1]), np.where(through, np.inf, ends[0])
+            ends, through = 1 / np.tan([low[:, 3:6], high[:, 3:6]]), (low[:, 3:6] <= 0) & (high[:, 3:6] >= 0)
+            least, most = np.where(through, -np.inf, ends[1]), np.where(through, np.inf, ends[0])
             if error.distant:
-                w = np.stack([low[:, 2], high[:, 2]])
-                inv = 1 / w
-                bad = (w[0] <= 0) & (w[1] >= 0)
-                every = np.stack([t * i[:, None] for t in (lo, hi) for i in inv])
-                lo, hi = (np.where(bad[:, None], sign * np.inf, pick(every, axis=0)) for sign, pick in (
-                    (-1.0, np.min), (1.0, np.max)))
-            for length, (i, j) in zip(error.sizes, combinations(range(3), 2), strict=False):
-                middle = error.bases[i] - error.bases[j] + (
-                    ((lo + hi)[:, i, None] * error.desired[i] - (lo + hi)[:, j, None] * error.desired[j]) / 4)
-                room = (hi - lo)[:, i] / 4 + (hi - lo)[:, j] / 4
-                radius = np.maximum(np.abs(lo), np.abs(hi))
-                radius = (radius[:, i] + radius[:, j]) / 2 + room
-                off = np.linalg.norm(middle, axis=1)
-                found |= np.abs(off - length) > (radius + BOX_ROUNDING * (1 + off)) * (1 + BOX_ROUNDING)
+                w = np.array([low[:, 2:3], high[:, 2:3]])
+                every, endless = [tau / each for tau in (least, most) for each in w], np.prod(w, axis=0) <= 0
+                least, most = np.where(endless, -np.inf, np.min(every, axis=0)), np.where(
+                    endless, np.inf, np.max(every, axis=0))
+            middle = error.bases + ((least + most) / 4)[:, :, None] * error.desired
+            radius = (np.maximum(np.abs(least), np.abs(most)) + (most - least) / 2) / 2
+            for length, (i, j) in zip(error.sizes, PAIRS, strict=False):
+                away_, room = np.linalg.norm(middle[:, i] - middle[:, j], axis=1), radius[:, i] + radius[:, j]
+                found |= np.abs(away_ - length) > room + 8 * KNOWN_NUMBER * (1 + away_ + room)
         return found
 
     def _settle(self, tube: list[AffineForms], P: Places, N: Places) -> tuple[Flags, AffineForms]:
         F = self.error.left.together(tube)
         return away(F), F
 
-    def _over_pose(self, x: Array) -> Iterator[tuple[JointError, Tell, Flags]]:
-        q = np.abs(quaternions(np.array([self._turn(each) for each in x])))
+    def _report(self, x: Array, reach: Array) -> list[CriticalBox]:
+        """The rests at zeros that are proved; without those at which a watched direction is at right angles to the
+        desired one. What is not decided is left open."""
+        found, reach = list[CriticalBox](), self._narrow_zeros(x)
+        proved = self._exist(x, reach)
+        for over, told, own in self.over_pose(x):
+            y, room = _about(told, x[own], reach[own])
+            u = over.directions.together(forms_of(y, room))
+            wanted = np.einsum("ij,ik->ijk", np.eye(3), self.error.desired).reshape(3, 9)
+            cosines = combine(np.broadcast_to(wanted, (len(y), 3, 9)), u)
+            across = np.any(cosines.size < SAME_ENDING, axis=1)
+            settled = across | proved[own]
+            for zero in Subdivision(over, -np.ones(6), np.ones(6))._report(y, room) if len(y) else []:
+                k = int(np.abs(over.pose(y)[0] - zero.p / over.error.length).max(axis=1).argmin())
+                settled[k] &= across[k] or self._is_long(zero)
+                found += [zero] if settled[k] and not across[k] else []
+            self.left += list(zip(x[own][~settled], reach[own][~settled], strict=True))
+        return found
+
+    def _exist(self, x: Array, reach: Array) -> Flags:
+        """Whether boxes about places (c, 7) hold exactly one zero, and no t is endless there: of each rod one of both
+        equations, the force's where it is short."""
+        short = np.abs(np.cos(x[:, 3:6])) < np.abs(np.sin(x[:, 3:6]))
+        rows = np.concatenate([np.broadcast_to(np.arange(4), (len(x), 4)), 4 + np.arange(3) + 3 * short], axis=1)
+        proved = np.zeros(len(x), dtype=bool)
+        for about in (np.full(x.shape, radius) for radius in MET_AGAIN / 4.0 ** np.arange(4)):
+            F, K = self._equations(x, about)
+            F, K = entries(F, rows), entries(K.transposed(), rows).transposed()
+            Y = inverse(K.v[0])
+            with np.errstate(all="ignore"):
+                off = ((np.eye(7) - combine(Y, K)).size @ about[..., None])[..., 0]
+                proved |= np.all((combine(Y, F).size + off) * (1 + AFFINE_ROUNDING) < about, axis=1)
+        return proved & np.all(np.abs(np.cos(x[:, 3:6])) > 2 * MET_AGAIN, axis=1)
+
+    def _is_long(self, zero: CriticalBox) -> bool:
+        """Whether no rod may have no length there."""
+        error = self.error.error
+        arms = np.array([limb.tip.turned for limb in error.limbs])
+        rods = zero.p / error.length + arms @ zero.R.T - np.array([limb.centre for limb in error.limbs])
+        return bool(np.linalg.norm(rods, axis=1).min() > 4 * (MET_AGAIN + zero.radius.max()) * (1 + np.abs(arms).max()))
+
+    def over_pose(self, x: Array) -> Iterator[tuple[PlaneError, BoxFormula, Flags]]:
+        """The error over the pose in some charts, what tells coordinates there, and of which zeros (c, 7)."""
+        near = np.abs(quaternions(np.array([self._turn(each) for each in x]))).argmax(axis=1)
         for one in range(4):
-            own = q.argmax(axis=1) == one
-            if own.any():
-                told = self.error.tell_pose(one)
-
-                def tell(middle: Array, half: Array, told: BoxFormula = told) -> tuple[Array, Array]:
-                    found = told.together(forms_of(middle, half))
-                    return found.low, found.high
-
-                yield self.error.over_pose(one), tell, own
+            own = near == one
+            shift = np.full((len(x), 3), np.nan)
+            shift[own] = _about(self.error.tell_pose(one, None), x[own], 0 * x[own])[0][:, :3]
+            with np.errstate(invalid="ignore"):
+                away_, most = np.abs(shift).max(axis=1) > NEAREST_FAR, np.abs(shift).argmax(axis=1)
+            for far in (None, 0, 1, 2):
+                some = own & (~away_ if far is None else away_ & (most == far))
+                if some.any():
+                    yield self.error.in_pose(one, far), self.error.tell_pose(one, far), some
 
     def _turn(self, y: Array) -> Array:
         """R at coordinates (n,)."""
@@ -389,23 +447,3 @@ class SpringSubdivision(LoopSubdivision):
         x1, x2, n = (np.array(each) for each in self.error.across(m, np.asarray))
         c, s, side = np.cos(y[6]), np.sin(y[6]), self.error.side
         return np.asarray(np.stack([c * x1 + s * x2, side * (c * x2 - s * x1), side * n], axis=1) @ self.error.frame)
-
-    def _excepted(self, over: JointError, y: Array, room: Array) -> Flags:
-        """Those at which a watched direction is at right angles to the desired one."""
-        u, wanted = over.directions.together(forms_of(y, room)), np.zeros((3, 9))
-        for k in range(3):
-            wanted[k, 3 * k : 3 * k + 3] = self.error.desired[k]
-        return np.asarray(np.any(combine(np.broadcast_to(wanted, (len(y), 3, 9)), u).size < SAME_ENDING, axis=1))
-
-    def _reached(self, part: Subdivision, y: Array, settled: Flags) -> list[CriticalBox]:
-        """A rod that slides reaches any place but its own base point."""
-        found, error = list[CriticalBox](), self.error.error
-        for zero in part.zeros():
-            near = 2 * float(zero.radius.max()) + MET_AGAIN
-            away_ = [np.linalg.norm(zero.p / error.length + zero.R @ each.tip.turned + each.tip.constant - each.centre)
-                     for each in error.limbs]
-            if min(away_) > near * (1 + max(float(np.linalg.norm(each.tip.turned)) for each in error.limbs)):
-                found.append(zero)
-            else:
-                settled[:] = False
-        return found
