@@ -78,6 +78,8 @@ def met_by_hand(error, rng, starts, far=4.0):
                 move = np.linalg.solve(J, -g)
             except np.linalg.LinAlgError:
                 break
+            if not np.isfinite(move).all():
+                break
             move *= min(1.0, 0.5 / np.abs(move).max())
             p, R = p + move[:3], turned(move[3:]) @ R
             if np.abs(move).max() < 1e-11:
@@ -115,7 +117,7 @@ def coordinates(error, p, R):
     return chart, np.array([*np.delete(m, one), 1 / d if chart.distant else d, *alpha, psi])
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(1, 2)
 @pytest.mark.parametrize("seed", range(ROBOTS))
 def test_at_each_rest_the_springs_balance(seed: int) -> None:
     """Of random rods: at each pose that is met by hand all equations vanish, and they tell the same pose."""
@@ -134,7 +136,7 @@ def test_at_each_rest_the_springs_balance(seed: int) -> None:
         assert np.abs(q[0] - p).max() < 1e-6 * max(1.0, float(np.abs(p).max()))
 
 
-@pytest.mark.some(1)
+@pytest.mark.some(1, 2)
 @pytest.mark.parametrize("seed", range(ROBOTS))
 def test_where_the_springs_balance_the_error_has_no_slope(seed: int) -> None:
     """Of random rods: where the equations vanish, but where a direction is at right angles to the desired one or a rod
@@ -162,26 +164,25 @@ def test_where_the_springs_balance_the_error_has_no_slope(seed: int) -> None:
     assert count > 1
 
 
-@pytest.mark.slow
-def test_boxes_of_a_chart_hold_what_is_met_there_and_no_more() -> None:
+@pytest.mark.some(0, 1)
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_boxes_of_a_chart_hold_what_is_met_there_and_no_more(side: float) -> None:
     """Of the Gough-Stewart platform with three legs watched: in the planes far above or below the base, boxes are left
     open nowhere, and prove the poses that Newton's method meets, and no other."""
     error = of_robot()
-    own = []
-    for side in (1.0, -1.0):
-        chart = next(each for each in SpringError.about(error).charts
-                     if each.one == 2 and each.distant and each.side == side)
-        part = SpringSubdivision(chart, *chart.box(np.zeros(3), np.zeros(3), 1.0))
-        part.run(8_000_000)
-        own += [(each.p / error.length, each.R) for each in part.zeros()]
-        assert not part.left
-        assert not part.lost
+    chart = next(each for each in SpringError.about(error).charts
+                 if each.one == 2 and each.distant and each.side == side)
+    part = SpringSubdivision(chart, *chart.box(np.zeros(3), np.zeros(3), 1.0))
+    part.run(8_000_000)
+    own = [(each.p / error.length, each.R) for each in part.zeros()]
+    assert not part.left
+    assert not part.lost
     met = []
     for p, R in met_by_hand(error, np.random.default_rng(3), STARTS):
-        chart, _ = coordinates(error, p, R)
-        if chart.one == 2 and chart.distant:
+        at, _ = coordinates(error, p, R)
+        if (at.one, at.distant, at.side) == (2, True, side):
             met.append((p, R))
-    assert met
+    assert own
 
     def held(pose, poses):
         far = max(1.0, float(np.abs(pose[0]).max()))
