@@ -3,16 +3,17 @@ asks for a coordinate or a turn beyond them, and the proof that every closure of
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import product
+from itertools import combinations, product
 from typing import Any
 
 import numpy as np
 
+from ..geometry import lines
 from ..geometry.balls import Field, around
 from ..geometry.vectors import Array, dot
-from ..mechanism import JointType, Mechanism
+from ..mechanism import Joint, JointType, Mechanism
 from ..mechanism.wrist import Wrist
 from ..tolerances import OUT_OF_REACH, SAME_GEOMETRY, SAME_POINT
 from .configuration import ClosedConfiguration
@@ -93,6 +94,37 @@ def outside(twin: PinocchioModel, q: Array, joints: Sequence[str] | None = None)
     return ([name for name in wrists_beyond(twin, q) if name in joints]
             + [name for name, value in coordinates(twin, q).items()
                if mechanism.stops[name].joint in joints and is_excluded(mechanism, name, value, value)])
+
+
+def surely_outside(twin: PinocchioModel, q: Array, bodies: Iterable[str], within: float) -> bool:
+    """Whether a joint has one value only, but for whole turns, and is beyond its limits: it joins two of these bodies,
+    whose poses are known to ``within`` (characteristic lengths, radians), or links that two parallel R join to them."""
+    mechanism, within = twin.mechanism, max(within, OUT_OF_REACH)
+    doubts = dict.fromkeys(bodies, (within * twin.length, within))
+
+    def doubt(joint: Joint, link: str) -> float:
+        """How far a joint's centre on a link can be from where it is (m)."""
+        shift, turn = doubts[link]
+        return shift + turn * float(np.linalg.norm(mechanism.links[link].pose[:3, 3] - joint.point))
+
+    for link in mechanism.links.keys() - doubts.keys():
+        hinges = [joint for joint in mechanism.joints_of(link)
+                  if joint.type is JointType.REVOLUTE and joint.other(link) in doubts]
+        for one, other in combinations(hinges, 2):
+            apart = lines.distance(other.point, one.point, one.axis)
+            if lines.parallel(one.axis, other.axis) and apart > SAME_POINT * twin.length:
+                ends = [doubt(joint, joint.other(link)) for joint in (one, other)]
+                turn = 2 * sum(ends) / apart + doubts[one.other(link)][1]
+                arm = float(np.linalg.norm(mechanism.links[link].pose[:3, 3] - one.point))
+                doubts[link] = ends[0] + turn * arm, turn
+    for name, value in coordinates(twin, q).items():
+        joint = mechanism.joints[mechanism.stops[name].joint]
+        if all(link in doubts for link in joint.links):
+            turn = sum(doubts[link][1] for link in joint.links)
+            error = sum(doubt(joint, link) for link in joint.links) + turn * abs(value) if joint.type.slides else turn
+            if is_excluded(mechanism, name, value - error, value + error):
+                return True
+    return False
 
 
 def is_excluded(mechanism: Mechanism, joint: str, low: float, high: float) -> bool:
