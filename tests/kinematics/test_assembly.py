@@ -141,7 +141,9 @@ def test_limits_of_joints_that_are_joined_are_said_to_be_left_out():
         words = " ".join(str(told).split())
         assert "those of s_ring are not looked at" in words
         assert words.count("assembled there") == words.count("assembled there, as far as limits are looked at")
-        assert told.setting.unlimited == ("s_ring",)
+        assert told.to_dict()["unlimited"] == ["s_ring"]
+    run = hrsynth.servo(robot.changed(joints=[bent]), start="z=0.01", goal="z=0", time=0.1)
+    assert run.to_dict()["unlimited"] == ["s_ring"]
 
 
 def test_limits_of_two_turns_that_are_one_joint_are_kept():

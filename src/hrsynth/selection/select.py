@@ -210,6 +210,7 @@ class Selection(Result, shown_as="select"):
                 "noise": self.blur.amounts,
                 "sight": camera, "best": None if best is None else list(best.legs), "fewer": self.fewer,
                 "not_examined": {"count": len(self.unexamined), "reason": self.left},
+                "unlimited": list(self.setting.unlimited),
                 "sets": [each.to_dict() for each in self.candidates]}
 
 
