@@ -19,7 +19,7 @@ from ..errors import BadMechanism
 from ..geometry.vectors import Array, frozen, inverse, unit
 from ..results import Result, Value, content
 from ..tolerances import NO_SPREAD, SAME_GEOMETRY
-from .graphs import Adjacency, adjacency
+from .graphs import Adjacency, adjacency, spanning_forest
 from .observation import Observation
 from .sights import NamedCamera
 from .wrist import Wrist
@@ -306,6 +306,14 @@ class Mechanism(Result, shown_as="robot"):
                  if limits is not None and (limits.lower, limits.upper) != (None, None)}
         return {name: Stop(joint, place, -np.inf if lower is None else lower, np.inf if upper is None else upper)
                 for name, (joint, place, lower, upper) in given.items()}
+
+    @cached_property
+    def idle(self) -> tuple[str, ...]:
+        """The floating joints of links that other joints hold: they hold nothing and have no coordinates."""
+        joints = list(self.joints.values())
+        floats = [joint.type is JointType.FREE for joint in joints]
+        tree = {joint.name for joint in spanning_forest(self.links, joints, floats)} if any(floats) else self.joints
+        return tuple(joint.name for joint in joints if joint.name not in tree and joint.type is JointType.FREE)
 
     @cached_property
     def wrists(self) -> dict[str, Wrist]:
