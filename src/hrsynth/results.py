@@ -26,13 +26,6 @@ def finite(value: float | None) -> float | None:
     return None if value is None or not isfinite(value) else float(value)
 
 
-def plain_number(text: str, kind: type = float) -> Any:
-    """The number that a user writes, in ASCII digits without underscores; raises ``ValueError``."""
-    if not text.isascii() or "_" in text:
-        raise ValueError(text)
-    return kind(text)
-
-
 class Value:
     """A frozen dataclass (with ``repr=False``) that is one line at a prompt, and is pickled and copied by its fields:
     what was computed from them is computed again where it is asked for, and arrays stay read-only."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -10,10 +11,11 @@ import pytest
 import hrsynth
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.description import load, shipped
-from hrsynth.geometry.vectors import pose
+from hrsynth.geometry.vectors import pose, unit
 from hrsynth.kinematics.assembly import Assembler
 from hrsynth.kinematics.configuration import ClosedConfiguration, measure
-from hrsynth.kinematics.limits import SINGLE
+from hrsynth.kinematics.limits import SINGLE, Stops
+from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.model import JointType, Limits
 
@@ -85,7 +87,8 @@ def test_limits_of_joints_are_kept():
 
 @pytest.mark.parametrize("name", ["quattro", "i4l"])
 def test_limits_of_the_platforms_own_joints_are_kept(name: str):
-    """A joint between the platform's bodies is on no leg; where its range does not hold the pose it is named."""
+    """A joint between the platform's bodies is on no leg; where its range does not hold the pose it is named, and no
+    other value is possible, unless the pose is known too roughly for that."""
     setting = ObservedRobot.of(load(shipped()[name]), samples=1)
     legs = {joint for leg in setting.anatomy.legs for joint in leg.joints}
     inside = [joint for joint in setting.mechanism.joints.values() if joint.name not in legs and joint.type in SINGLE]
@@ -94,25 +97,39 @@ def test_limits_of_the_platforms_own_joints_are_kept(name: str):
         limited = replace(inside[0], limits=Limits(lower=-0.2, upper=upper))
         changed = ObservedRobot.of(setting.robot.changed(joints=[limited]), samples=1)
         found = assembler(changed).at(bodies(changed, changed.everything.start), ())
-        assert found.reachable is (True if reachable else None)
+        assert found.reachable is reachable
         assert found.beyond == (() if reachable else (limited.name,))
+        rough = assembler(changed).at(bodies(changed, changed.everything.start), (), within=0.1)
+        assert rough.reachable is (True if reachable else None)
 
 
-def test_limits_of_joints_that_are_joined_are_said_to_be_left_out():
-    """Two R that meet at right angles are one U: their own limits are not looked at, and each answer says so."""
+def knuckles() -> tuple[Mechanism, np.ndarray, np.ndarray]:
+    """Six legs of two R that meet, a slide and, the first of them, a ball of three R; the axis of the first R and the
+    direction of the first leg."""
     b = Builder("knuckles")
     feet = [np.array([np.cos(a), np.sin(a), 0.0]) for a in 2 * np.pi / 6 * np.arange(6) + np.tile([0.1, -0.2], 3)]
-    for link in ("base", *(f"{part}_{i}" for i in range(6) for part in ("knuckle", "barrel", "rod")), "platform"):
+    for link in ("base", *(f"{part}_{i}" for i in range(6) for part in ("knuckle", "barrel", "rod")), "ring", "cross",
+                 "platform"):
         b.link(link)
+    drawn = []
     for i, foot in enumerate(feet):
         tip = 0.5 * feet[(i + 1) % 6 if i % 2 else i - 1] + [0, 0, 1.0]
         first = np.cross(tip - foot, [0.3, 0.1, 1.0])
+        drawn.append([unit(first), unit(tip - foot)])
         b.joint(f"a_{i}", "R", "base", f"knuckle_{i}", at=foot, axis=first)
         b.joint(f"b_{i}", "R", f"knuckle_{i}", f"barrel_{i}", at=foot, axis=np.cross(first, tip - foot))
         b.joint(f"p_{i}", "P", f"barrel_{i}", f"rod_{i}", at=(foot + tip) / 2, axis=tip - foot, motor=True)
-        b.joint(f"s_{i}", "S", f"rod_{i}", "platform", at=tip, loop=i > 0)
-    robot = b.build(platform="platform")
-    bent = replace(robot.joints["b_0"], limits=Limits(lower=-0.01, upper=0.01))
+        if i:
+            b.joint(f"s_{i}", "S", f"rod_{i}", "platform", at=tip, loop=True)
+    for axis, ends in zip(np.eye(3), pairwise(["rod_0", "ring", "cross", "platform"]), strict=True):
+        b.joint(f"s_{ends[0]}", "R", *ends, at=0.5 * feet[-1] + [0, 0, 1.0], axis=axis)
+    return b.build(platform="platform"), *drawn[0]
+
+
+def test_limits_of_joints_that_are_joined_are_said_to_be_left_out():
+    """Three R through one point are one S: their own limits are not looked at, and each answer says so."""
+    robot, *_ = knuckles()
+    bent = replace(robot.joints["s_ring"], limits=Limits(lower=-0.01, upper=0.01))
     free = hrsynth.modes(robot, ["1", "2", "3"])
     assert free.to_dict()["unlimited"] == []
     assert "as far as limits" not in str(free)
@@ -122,6 +139,33 @@ def test_limits_of_joints_that_are_joined_are_said_to_be_left_out():
                  hrsynth.accuracy(robot.changed(joints=[bent]), at=asked, cone=1e-3),
                  hrsynth.select(robot.changed(joints=[bent]), observe=["1"], start=asked, goal=asked, cone=1e-3)):
         words = " ".join(str(told).split())
-        assert "those of b_0 are not looked at" in words
+        assert "those of s_ring are not looked at" in words
         assert words.count("assembled there") == words.count("assembled there, as far as limits are looked at")
-        assert told.setting.unlimited == ("b_0",)
+        assert told.to_dict()["unlimited"] == ["s_ring"]
+    run = hrsynth.servo(robot.changed(joints=[bent]), start="z=0.01", goal="z=0", time=0.1)
+    assert run.to_dict()["unlimited"] == ["s_ring"]
+
+
+def test_limits_of_two_turns_that_are_one_joint_are_kept():
+    """Two R that meet at right angles are one U, whose turns are computed here from how the barrel is turned."""
+    robot, first, along = knuckles()
+    second = np.cross(first, along)
+
+    def turn(name: str, at: ClosedConfiguration | None) -> float:
+        assert at is not None
+        R = at.pose("barrel_0")[:3, :3] @ robot.links["barrel_0"].pose[:3, :3].T
+        if name == "a_0":
+            return float(np.arctan2(along @ -R @ second, second @ R @ second))
+        return float(np.arctan2(first @ -R @ along, first @ R @ first))
+
+    for name, upper in (("b_0", 0.01), ("a_0", 0.5)):
+        bent = robot.changed(joints=[replace(robot.joints[name], limits=Limits(lower=-0.01, upper=upper))])
+        setting = ObservedRobot.of(bent)
+        assert setting.unlimited == ()
+        assert Stops.of(setting.everything.twin, setting.everything.twin.q0).spans == {name: (-0.01, upper)}
+        posed = hrsynth.check(bent, at="x=0.3,y=0.4,z=0.1,rpy=0/0/0").postures[0]
+        told = [(posed.configuration, posed.beyond)] + [
+            (mode.configuration, mode.beyond) for mode in hrsynth.modes(bent, ["2", "3", "4"]).modes]
+        for at, beyond in told:
+            assert beyond == (() if -0.01 - 1e-7 <= turn(name, at) <= upper + 1e-7 else (name,))
+        assert {beyond for _, beyond in told} == {(), (name,)}

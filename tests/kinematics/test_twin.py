@@ -225,3 +225,24 @@ def test_actuated_coordinates_are_those_of_the_motors() -> None:
     assert len(names) == 4
     assert twin.actuated_indices() == [i for name in names for i in twin.coordinates[name]]
     assert len(set(twin.actuated_indices())) == 4
+
+
+def test_of_two_floating_joints_the_same_is_idle_with_gears() -> None:
+    """Which of two floating joints holds two links that a hinge joins is said once, whatever gears weigh."""
+    b = Builder("two floats")
+    for link in ("base", "wheel", "one", "other"):
+        b.link(link)
+    b.joint("wheel", "R", "base", "wheel", axis=(0, 0, 1))
+    b.joint("first", "6", "base", "one")
+    b.joint("hinge", "R", "one", "other", axis=(0, 0, 1))
+    b.joint("second", "6", "base", "other")
+    b.coupling("gear", "wheel", "other", 2.0)
+    robot = b.build("other")
+    (idle,) = robot.idle
+    for name in ("first", "second"):
+        driven = robot.changed(joints=[replace(robot.joints[name], motor=Motor("m"))])
+        if name == idle:
+            with pytest.raises(BadMechanism, match=f"found '{name}'"):
+                PinocchioModel(driven)
+        else:
+            assert PinocchioModel(driven).mechanism.joints[name].actuated

@@ -262,9 +262,9 @@ def test_a_blind_camera_discards_every_set() -> None:
 
 
 @pytest.mark.parametrize(("options", "word"), [
-    ({"cone": "90deg"}, "half-angle"), ({"cone": "1=0.1deg"}, "no cone"), ({"size": 0}, "largest sets"),
+    ({"cone": "90deg"}, "half-angle"), ({"cone": "1=0.1deg"}, "no cone"), ({"size": 0}, "size, found 0"),
     ({"runs": -1}, "runs"), ({"sight": "x=0"}, "camera"), ({"sight": "x=0,y=0,z=0,rpy=0/0/0", "focal": 0.0}, "focal"),
-    ({"seconds": 0.0}, "seconds"), ({"examine": 0}, "examined"), ({"start": "w=1"}, "unknown part")])
+    ({"seconds": 0.0}, "seconds"), ({"examine": 0}, "examine, found 0"), ({"start": "w=1"}, "unknown part")])
 def test_bad_requests(options: dict, word: str) -> None:
     with pytest.raises(BadRequest) as caught:
         select(load("quattro"), **{"start": START, "goal": GOAL, **options})

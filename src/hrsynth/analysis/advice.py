@@ -20,7 +20,8 @@ from ..mechanism import Direction, Joint, JointType, Mechanism, Observation
 from ..mechanism.observations import kinds
 from ..mechanism.sensors import encoders, observation_of, observed_line
 from ..progress import tell
-from ..results import Result, Value, plain_number
+from ..ranges import plain_number
+from ..results import Result, Value
 from ..tolerances import RANK_CUTOFF, SAME_PRICE, SAME_RELATION
 from .observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike, as_robot, as_texts, restrict_samples
 from .question import question

@@ -12,6 +12,7 @@ from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.locked import rezero
 from ..mechanism.model import Mechanism
 from ..mechanism.pose import ModeNumber, Pose, PoseLike, asked_pose
+from ..ranges import require_range
 from ..results import with_spelling
 from ..tolerances import AS_PRINTED
 from .observed import SAMPLES, CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike, as_robot
@@ -44,6 +45,7 @@ def observe(robot: RobotLike, legs: LegsLike = None, camera: CameraLike = None, 
     False
     """
     robot = as_robot(robot)
+    require_range("observe", "seed", seed, "an integer")
     if at is None:
         return ObservedRobot.of(robot, legs, camera, see=see, samples=samples, seed=seed)
     if isinstance(robot, ObservedRobot):

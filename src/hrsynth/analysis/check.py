@@ -95,7 +95,7 @@ class Check(Result, shown_as="check"):
                 "configurations": [each.to_dict() for each in self.postures],
                 "unreached": [{"pose": each.pose, "reason": each.reason} for each in self.unreached],
                 "redundant": [each.to_dict() for each in self.redundant],
-                "grid": self.grid and self.grid.to_dict()}
+                "grid": self.grid and self.grid.to_dict(), "unlimited": list(self.setting.unlimited)}
 
 
 @question(formations=True)

@@ -220,7 +220,7 @@ class ObservedRobot(Value):
     @property
     def unlimited(self) -> tuple[str, ...]:
         """Joints whose limits are not looked at, as the normal form joins them into others."""
-        return tuple(name for name in self.robot.limited if name not in self.mechanism.limited)
+        return tuple(name for name in self.robot.limited if name not in self.mechanism.stops)
 
     def measuring(self, observations: tuple[Observation, ...]) -> Samples:
         """The samples' configurations again, with ρ for other observations (and no ways)."""

@@ -16,6 +16,7 @@ import numpy as np
 from ..budgets import REMEMBERED_ANSWERS, REMEMBERED_GRIDS
 from ..errors import BadRequest, MissingExtra
 from ..mechanism import Mechanism
+from ..ranges import require_range
 from ..results import content, require_keywords
 from .observed import as_robot, forget_robots, legs_asked
 
@@ -69,9 +70,9 @@ def forget_answers() -> None:
         memory.kept.clear()
 
 
-def require_kinds(known: Signature, given: Mapping[str, Any]) -> None:
+def require_kinds(question: str, known: Signature, given: Mapping[str, Any]) -> None:
     """Raise ``BadRequest`` for an argument that is no number, text or truth value where the signature asks for one, or
-    less than a seed, a number of points or an effort can be."""
+    a number out of its range."""
     for name, value in given.items():
         kind, *none = str(known.parameters[name].annotation).split(" | ")
         if kind not in KINDS or none not in ([], ["None"]) or (none and value is None):
@@ -79,9 +80,7 @@ def require_kinds(known: Signature, given: Mapping[str, Any]) -> None:
         right, word = KINDS[kind]
         if not isinstance(value, right) or (isinstance(value, bool) and kind != "bool"):
             raise BadRequest(name, value, word)
-        least = {"seed": 0, "points": 1, "effort": 0}.get(name)
-        if least is not None and not value >= least:
-            raise BadRequest(name, value, f"{word}, at least {least}")
+        require_range(question, name, value, word)
 
 
 def question(*, formations: bool = False, **old: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
@@ -108,7 +107,7 @@ def question(*, formations: bool = False, **old: str) -> Callable[[Callable[P, R
                 bound = known.bind(*args, **given)
             except TypeError as error:
                 raise TypeError(f"{function.__name__}: {error}; it takes {', '.join(known.parameters)}") from None
-            require_kinds(known, bound.arguments)
+            require_kinds(function.__name__, known, bound.arguments)
             robot = bound.arguments["robot"] = as_robot(bound.arguments["robot"])
             source = robot if isinstance(robot, Mechanism) else robot.robot
             if source.formation and not formations:

@@ -6,9 +6,10 @@ from __future__ import annotations
 import contextlib
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+from ..ranges import in_range, plain_number, range_of, range_words
 from .colour import say
 
 if TYPE_CHECKING:
@@ -73,22 +74,26 @@ class Option:
         """Whether one value names several things, so that a second value would not be taken for the only one."""
         return self.metavar in ("LEGS", "LINKS", "JOINTS")
 
+    def ranged(self, question: str) -> Option:
+        """The same with the range that a question has for it."""
+        low, high = range_of(question, self.name)
+        return replace(self, low=self.low if low is None else low, high=self.high if high is None else high)
+
     def read(self, text: str) -> Any:
         """A value as it is written on the command line; raises ``BadRequest``."""
         from ..errors import BadRequest
-        from ..results import plain_number
 
         if self.kind not in (int, float):
             return text
-        ends = [f"at {end} {value:g}" for end, value in (("least", self.low), ("most", self.high)) if value is not None]
         try:
             number = plain_number(text, self.kind)
-            if (self.low is None or number >= self.low) and (self.high is None or number <= self.high):
+            if in_range(number, self.low, self.high):
                 return number
         except ValueError:
             pass
         name = self.names[0] if self.names else self.value
-        raise BadRequest(name, text, ", ".join(["an integer" if self.kind is int else "a number", *ends])) from None
+        word = "an integer" if self.kind is int else "a number"
+        raise BadRequest(name, text, ", ".join([word, *range_words(self.low, self.high)])) from None
 
 
 def flag(name: str, help: str, group: str = OWN) -> Option:
@@ -124,7 +129,7 @@ OFFER = Option("offer", "What could be observed in addition, written as for --se
                "point:plate, several places of that link; separate more by commas, or repeat.",
                "[CAMERA=]KIND:LINK[@x,y,z/dx,dy,dz/radius]",
                list[str], group=WATCHING)
-SEED = Option("seed", "Seed of the random configurations.", "NUMBER", int, 0, low=0)
+SEED = Option("seed", "Seed of the random configurations.", "NUMBER", int, 0)
 SOURCE = (
     Option("robot", "A robot file in any dialect, a shipped robot's name, or example:NAME.", "ROBOT", default=NEEDED,
            argument=True, words=shipped_names),

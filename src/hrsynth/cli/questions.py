@@ -54,7 +54,7 @@ class Question:
         """Make it a command."""
         drawn = FIGURE if any(each.drawn for each in OUTPUTS[self.name].files) else ()
         options = SOURCE[0], *self.options, *[SEED] * self.seeded, *drawn, JSON, *SOURCE[1:]
-        add_command(app, self.name, self.help, options, self.answer, self.examples)
+        add_command(app, self.name, self.help, [each.ranged(self.name) for each in options], self.answer, self.examples)
 
     def answer(self, *, json: bool, **values: Any) -> None:
         """Ask, write the files that are asked for, print."""
@@ -183,7 +183,7 @@ DEPTH = Option("depth", "Depths in images that the control law uses: exact, desi
                "constant:METRES.", default="exact")
 BOX = Option("box", "Intervals of motors (m, rad), such as hip=-1:1,slide=0:0.2 (default: the file's limits, else a "
              "whole turn, or a characteristic length either way).", "INTERVALS")
-CELLS = Option("effort", "Most cells to try for each part of the loops.", "COUNT", int, BRANCH_CELLS, low=1)
+CELLS = Option("effort", "Most cells to try for each part of the loops.", "COUNT", int, BRANCH_CELLS)
 QUESTIONS = (
     Question("derive", "The hidden robot of a robot, how it is derived, its certificate, and what the controller can "
              "see.",
@@ -209,9 +209,8 @@ QUESTIONS = (
              "drawn.",
              (*WATCHED, SEE, flag("real", "Ask about the real robot with its own motors instead of the hidden one."),
               Option("plane", "Plane of poses to draw, such as z=-0.7.", "PART=VALUE"), _file("singular"),
-              Option("points", "Number of random poses at which the condition is checked.", None, int, 10_000, low=1,
-                     high=10_000_000),
-              Option("steps", "Poses along each side of the plane.", None, int, 51, low=5, high=300)),
+              Option("points", "Number of random poses at which the condition is checked.", None, int, 10_000),
+              Option("steps", "Poses along each side of the plane.", None, int, 51)),
              ("quattro --observe 1,4", "quattro --observe 1,4 --plane z=-0.7,phi=0 -o locus.png",
               f"gough_stewart {POINTS}")),
     Question("advise", "What is missing: the smallest sets of further measurements that make a robot controllable.",
@@ -231,7 +230,7 @@ QUESTIONS = (
                      "printed without --at (default: the zero configuration).", "POSE"),
               *WATCHED, SEE, flag("real", "Hold the real robot's own motors instead."),
               Option("effort", "Time limit for a list (estimated seconds on one core); what needs more is left out, "
-                     "and reported.", "SECONDS", float, EFFORT, low=0),
+                     "and reported.", "SECONDS", float, EFFORT),
               _file("modes"), _file("modes", "certificate")),
              ("quattro --observe 1,3 --at x=0.05,y=0.1,z=-0.7", "3rrr_m1 --real -o modes.png",
               "quattro --observe 1,4 --certificate c.json", f"gough_stewart {POINTS}")),
@@ -248,7 +247,7 @@ QUESTIONS = (
               "3rrr_m1 --start x=0,y=0 --goal mode:2 --certificate c.json")),
     Question("servo", "A simulated servo run on what is observed: where it ends, and what it passes on the way.",
              (START, _goal("Pose whose measurements are desired."), *WATCHED, SEE,
-              Option("gain", "λ of the control law (1/s).", None, float, 0.8, high=1e6),
+              Option("gain", "λ of the control law (1/s).", None, float, 0.8),
               Option("noise", "Errors of measurements, such as 0.1deg, 0.3px (in images) or 1mm.",
                      "AMOUNT"),
               flag("bias", "Keep the error of each measurement constant."),
@@ -270,7 +269,7 @@ QUESTIONS = (
                      "POSE", default=NEEDED), *WATCHED, SEE, DEPTH,
               flag("complete", "Try to prove that the list is complete, by boxes of platform poses."),
               Option("effort", "Most boxes of poses to look at (10,000 to 40,000 take a second).", "COUNT", int,
-                     COVER_BOXES, low=1),
+                     COVER_BOXES),
               _file("endings")),
              ("3rrr_m1 --at x=0.02,y=0,phi=10deg", "quattro --observe 1,4 --at x=0.05,y=0.1,z=-0.7 -o endings.png")),
     Question("basins", "Where the servo loop to a goal ends, from each start of a line, plane or box of poses.",
@@ -281,8 +280,8 @@ QUESTIONS = (
               Option("grid", "A line, plane or box of starts, such as x=-0.3:0.3:50,y=-0.3:0.3:50,z=-0.7 "
                      "(from:to:count).", "GRID"),
               Option("steps", "Starts along each side of the plane (default: 100; 15 if each is simulated separately).",
-                     None, int, low=2, high=300),
-              Option("jobs", "Processes (default: one per core).", None, int, low=1),
+                     None, int),
+              Option("jobs", "Processes (default: one per core).", None, int),
               _file("basins")),
              ("quattro --observe 1,4 --to z=-0.7 --plane z=-0.7,phi=0 -o basins.png",
               "3rrr_m1 --to x=0,y=0,phi=0 --grid x=-0.1:0.1:50,y=0,phi=0")),
@@ -293,9 +292,9 @@ QUESTIONS = (
               Option("plane", "Plane of poses, such as z=-0.7, as far as it is reached.", "PART=VALUE"),
               Option("grid", "A line, plane or box of poses, such as x=-0.3:0.3:21,y=0,z=-0.7 (from:to:count).",
                      "GRID"),
-              Option("steps", "Poses along each side of the plane.", None, int, low=5, high=300),
+              Option("steps", "Poses along each side of the plane.", None, int),
               Option("nonlinear", "Try this many errors (at least the worst to first order) at each pose; on a "
-                     "plane or grid, at its worst poses.", "COUNT", int, 0, low=0),
+                     "plane or grid, at its worst poses.", "COUNT", int, 0),
               _file("accuracy")),
              ("delta --cone 0.1deg --at x=0.1", "delta --cone 0.1deg --plane z=-0.6 -o map.png")),
     Question("select", "Which legs to watch for a motion from start to goal: all sets, ranked by where else the loop "
@@ -303,15 +302,15 @@ QUESTIONS = (
              (START, _goal("Goal pose."),
               Option("cone", "Half-angle of the cone about each direction, or one per leg: 1=0.1deg,2=0.2deg,… "
                      "(default: 0.1deg).", "ANGLE"),
-              NOISE, *WATCHED, SEE, Option("size", "Largest number of legs in a set.", None, int, 4, low=1),
-              Option("runs", "How many sets, best first, must pass a simulated run.", None, int, 3, low=0),
+              NOISE, *WATCHED, SEE, Option("size", "Largest number of legs in a set.", None, int, 4),
+              Option("runs", "How many sets, best first, must pass a simulated run.", None, int, 3),
               Option("endings", "For how many of the examined sets, the most accurate first, to compute where "
-                     "else the loop may end.", None, int, 20, low=0),
+                     "else the loop may end.", None, int, 20),
               Option("sight", "Pose of the camera on the link that carries it (x right, y down, z ahead), such as "
                      "x=0,y=0,z=0.5,rpy=180deg/0/0; or auto.", "POSE"),
               Option("focal", "Focal length of the camera, for pictures of 640 × 480 pixels.", "PIXELS", float, 800.0),
               Option("examine", "For how many sets, the most accurate first, to compute modes, aspects and runs.", None,
-                     int, 20, low=1),
+                     int, 20),
               Option("seconds", "Deprecated, because the answer then depends on the machine: time after which no "
                      "further set is examined.", None, float)),
              ("quattro --start x=0.1 --goal x=-0.05,phi=20deg",), after=_warn_deprecated),

@@ -30,6 +30,12 @@ class OfRobot(Head):
     robot: str
 
 
+class LimitsLeft(TypedDict):
+    """What is not looked at."""
+
+    unlimited: Annotated[list[str], "joints whose limits are not looked at, as they are parts of other joints"]
+
+
 class WrittenTo(TypedDict):
     """The file that was requested with -o."""
 
@@ -375,7 +381,7 @@ class Unreached(TypedDict):
     reason: str
 
 
-class CheckAnswer(OfRobot, WrittenTo):
+class CheckAnswer(OfRobot, WrittenTo, LimitsLeft):
     """Mobility, ranks, singularities and redundant constraints at poses and over a grid."""
 
     characteristic_length: float
@@ -651,7 +657,7 @@ class SelfMotionRecord(TypedDict):
     within_rad: float
 
 
-class ListedModes(OfRobot, WrittenTo):
+class ListedModes(OfRobot, WrittenTo, LimitsLeft):
     """All assembly modes; `complex` is null where no count is proved."""
 
     kind: Literal["hidden", "real", "formation"]
@@ -670,7 +676,6 @@ class ListedModes(OfRobot, WrittenTo):
     degenerate: str | None
     continuum: int | None
     meant: list[MeantRecord]
-    unlimited: Annotated[list[str], "joints whose limits are not looked at, as they are parts of other joints"]
 
 
 class AssemblyModesRecord(ListedModes):
@@ -824,7 +829,7 @@ Servo = TypedDict("Servo", {
     "from": PoseRecord, "to": PoseRecord, "gain": float, "depth": str, "sense": Literal["exact", "edges", "pictures"],
     "noise": str | None, "ended": str, "reason": str, "pose": PoseRecord, "matched_mode": int | None,
     "modes": list[ModeRecord] | None, "type2": TrackRecord, "notes": list[str], "spread": SpreadRecord | None,
-    "times": list[float], "error": list[list[float]], "poses": list[PoseRecord]})
+    "unlimited": list[str], "times": list[float], "error": list[list[float]], "poses": list[PoseRecord]})
 Servo.__doc__ = "A servo run: where it ended, and at each time (s) the pose and the error of each direction."
 
 
@@ -1051,7 +1056,7 @@ class SweptRecord(TypedDict):
     orientation_deg: ErrorRangeRecord
 
 
-class AccuracyAnswer(OfRobot, WrittenTo):
+class AccuracyAnswer(OfRobot, WrittenTo, LimitsLeft):
     """The largest errors at poses; for a plane or grid also its axes and a table of each error, or what was swept to a
     file. ``noise``: by unit (px, m, rad), of observations that are not directions; ``exact``: those without errors."""
 
@@ -1135,7 +1140,7 @@ class UnexaminedRecord(TypedDict):
 Select = TypedDict("Select", {
     "command": str, "version": str, "robot": str, "from": PoseRecord, "to": PoseRecord, "camera": str,
     "cones": dict[str, float], "noise": dict[str, float], "sight": dict[str, Any] | None, "best": list[str] | None,
-    "fewer": str | None, "not_examined": UnexaminedRecord, "sets": list[CandidateRecord]})
+    "fewer": str | None, "not_examined": UnexaminedRecord, "unlimited": list[str], "sets": list[CandidateRecord]})
 Select.__doc__ = "The sets for a displacement, ranked; the cones by leg in degrees, noise by its unit (px, m, rad)."
 
 

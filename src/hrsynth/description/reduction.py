@@ -15,7 +15,7 @@ from ..mechanism.model import Joint, JointType, Link, Mechanism, Motor, Note
 from ..mechanism.screws import elementary
 from . import chains
 from .chains import CUT, WELD
-from .tree import is_connected, spanning
+from .tree import spanning
 
 
 def reduce(mechanism: Mechanism, tree: Collection[JointType], loops: Collection[JointType],
@@ -25,7 +25,7 @@ def reduce(mechanism: Mechanism, tree: Collection[JointType], loops: Collection[
 
     Raises ``BadRequest`` where a link in between would take the name of another.
     """
-    given = spanning(_without_idle_joints(mechanism) if JointType.FREE not in tree else mechanism)
+    given = spanning(mechanism if JointType.FREE in tree else mechanism.changed(remove_joints=mechanism.idle))
     links, joints = dict(given.links), {}
 
     def link(name: str, joint: Joint) -> str:
@@ -61,14 +61,6 @@ def reduce(mechanism: Mechanism, tree: Collection[JointType], loops: Collection[
         weld = Joint(joint.name + WELD, JointType.FIXED, name, joint.successor, joint.point, in_tree=False)
         joints[weld.name] = weld
     return replace(given, links=links, joints=joints), ()
-
-
-def _without_idle_joints(mechanism: Mechanism) -> Mechanism:
-    """Without the free joints of links that other joints hold: they say nothing."""
-    for joint in [each for each in mechanism.joints.values() if each.type is JointType.FREE]:
-        rest = mechanism.changed(remove_joints=[joint.name])
-        mechanism = rest if is_connected(rest) else mechanism
-    return mechanism
 
 
 def require_free_world(robot: Mechanism, world: str, dialect: str) -> None:

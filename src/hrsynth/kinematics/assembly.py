@@ -41,8 +41,8 @@ none of these."""
 class Assembly:
     """What became of a robot at a pose: the configuration, or None and the legs that were not closed (``open``), with
     what proves of legs that they cannot be (``misses``); joints that are outside their limits there (``beyond``), and
-    whether all closures of a leg are (``held``); the poses (4, 4) of the platform's links; couplings that were not
-    closed where all legs are (``gears``)."""
+    whether all closures of a leg, or of the platform, are (``held``); the poses (4, 4) of the platform's links;
+    couplings that were not closed where all legs are (``gears``)."""
 
     configuration: ClosedConfiguration | None
     open: tuple[str, ...] = ()
@@ -98,8 +98,10 @@ class Assembler:
         ``LoopsNotClosed`` where its own joints do not allow that."""
         return self._platform_at(bodies)[0]
 
-    def _platform_at(self, bodies: Mapping[str, Array]) -> tuple[dict[str, Array], list[str]]:
-        """The same with its joints that are beyond their limits there."""
+    def _platform_at(self, bodies: Mapping[str, Array], within: float = 0.0
+                     ) -> tuple[dict[str, Array], list[str], bool]:
+        """The same with its joints that are beyond their limits there, and whether one is that has no other
+        value where the bodies are, which is known to ``within``."""
         mechanism, body = self._platform, self.anatomy.legs[0].attach
         displacement = bodies[body] @ inverse(mechanism.links[body].pose)
         poses = {link: displacement @ mechanism.links[link].pose for link in self.anatomy.platform}
@@ -110,7 +112,8 @@ class Assembler:
         for start in _starts(twin):
             q, residual = solve(twin, start, target, tolerance=SOLVED, iterations=60)
             if residual <= CLOSED and all(_turned_as(twin.pose(q, body), X) for body, X in bodies.items()):
-                return {link: twin.pose(q, link) for link in self.anatomy.platform}, limits.outside(twin, q)
+                return ({link: twin.pose(q, link) for link in self.anatomy.platform}, limits.outside(twin, q),
+                        self.anatomy.point is None and limits.surely_outside(twin, q, bodies, within))
         raise LoopsNotClosed(twin.mechanism.name, residual, CLOSED, "inside the platform")
 
     @cached_property
@@ -121,9 +124,9 @@ class Assembler:
            ) -> Assembly:
         """The robot with the bodies (on which legs end) at these poses (4, 4), known to ``within`` (characteristic
         lengths, radians), and the measured values as given."""
-        platform, beyond = self._platform_at(bodies)
+        platform, beyond, held = self._platform_at(bodies, within)
         poses = dict(platform)
-        missing, misses, held = list[str](), list[tuple[str, Miss]](), False
+        missing, misses = list[str](), list[tuple[str, Miss]]()
         for leg in self.anatomy.legs:
             own = [each for each in measured if each[0].leg == leg.label]
             closing = self._leg(leg, bodies[leg.attach], own, within)

@@ -3,16 +3,17 @@ asks for a coordinate or a turn beyond them, and the proof that every closure of
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import product
+from itertools import combinations, product
 from typing import Any
 
 import numpy as np
 
+from ..geometry import lines
 from ..geometry.balls import Field, around
 from ..geometry.vectors import Array, dot
-from ..mechanism import JointType, Mechanism
+from ..mechanism import Joint, JointType, Mechanism
 from ..mechanism.wrist import Wrist
 from ..tolerances import OUT_OF_REACH, SAME_GEOMETRY, SAME_POINT
 from .configuration import ClosedConfiguration
@@ -27,7 +28,7 @@ AT_END = 1e-2
 
 @dataclass(frozen=True, eq=False)
 class Stops:
-    """What stops the joints of a robot that moves on from a configuration: of each R or P that has limits the interval
+    """What stops the joints of a robot that moves on from a configuration: of each coordinate with limits the interval
     (m, rad) of its coordinate. Turns are not counted modulo 2π on the way, but where the way begins: a coordinate
     beyond the limits that a whole turn brings between them is taken as that one."""
 
@@ -36,9 +37,11 @@ class Stops:
     @classmethod
     def of(cls, twin: PinocchioModel, q: Array) -> Stops:
         """Those of a way that begins at q."""
-        limited, joints = twin.mechanism.limited, twin.mechanism.joints
-        return cls({name: _about(value, *limited[name]) if joints[name].type is JointType.REVOLUTE else limited[name]
-                    for name, value in coordinates(twin, q).items()})
+        stops, joints, spans = twin.mechanism.stops, twin.mechanism.joints, dict[str, tuple[float, float]]()
+        for name, value in coordinates(twin, q).items():
+            joint, _, *span = stops[name]
+            spans[name] = (span[0], span[1]) if joints[joint].type.slides else _about(value, *span)
+        return cls(spans)
 
     def margins(self, twin: PinocchioModel, q: Array) -> dict[str, float]:
         """How far each joint, and each wrist, is from the nearer limit (m, rad); negative beyond it."""
@@ -60,10 +63,11 @@ def _about(value: float, lower: float, upper: float) -> tuple[float, float]:
 
 
 def coordinates(twin: PinocchioModel, q: Array) -> dict[str, float]:
-    """The coordinate (m, rad) of each R or P that has limits."""
+    """The coordinate (m, rad) of each R or P that has limits, by the name that it has in the file."""
     step, joints = twin.difference(twin.q0, q), twin.mechanism.joints
-    return {name: float(step[twin.coordinates[name][0]]) * (twin.length if joints[name].type.slides else 1.0)
-            for name in twin.mechanism.limited if name in twin.coordinates and joints[name].type in SINGLE}
+    return {name: float(step[twin.coordinates[joint][place]]) * (twin.length if joints[joint].type.slides else 1.0)
+            for name, (joint, place, *_) in twin.mechanism.stops.items()
+            if joint in twin.coordinates and (joints[joint].type in SINGLE or joints[joint].turns)}
 
 
 def wrist_margins(twin: PinocchioModel, q: Array) -> dict[str, float]:
@@ -85,19 +89,51 @@ def wrists_beyond(twin: PinocchioModel, q: Array) -> list[str]:
 def outside(twin: PinocchioModel, q: Array, joints: Sequence[str] | None = None) -> list[str]:
     """Those joints (default: of all), turning or sliding about one axis, whose coordinates are outside their limits
     (turns count modulo 2π), and the wrists beyond their intervals."""
-    values = coordinates(twin, q)
-    joints = [*twin.mechanism.joints] if joints is None else joints
+    mechanism = twin.mechanism
+    joints = [*mechanism.joints] if joints is None else joints
     return ([name for name in wrists_beyond(twin, q) if name in joints]
-            + [name for name in joints
-               if name in values and is_excluded(twin.mechanism, name, values[name], values[name])])
+            + [name for name, value in coordinates(twin, q).items()
+               if mechanism.stops[name].joint in joints and is_excluded(mechanism, name, value, value)])
+
+
+def surely_outside(twin: PinocchioModel, q: Array, bodies: Iterable[str], within: float) -> bool:
+    """Whether a joint has one value only, but for whole turns, and is beyond its limits: it joins two of these bodies,
+    whose poses are known to ``within`` (characteristic lengths, radians), or links that two parallel R join to them."""
+    mechanism, within = twin.mechanism, max(within, OUT_OF_REACH)
+    doubts = dict.fromkeys(bodies, (within * twin.length, within))
+
+    def doubt(joint: Joint, link: str) -> float:
+        """How far a joint's centre on a link can be from where it is (m)."""
+        shift, turn = doubts[link]
+        return shift + turn * float(np.linalg.norm(mechanism.links[link].pose[:3, 3] - joint.point))
+
+    for link in mechanism.links.keys() - doubts.keys():
+        hinges = [joint for joint in mechanism.joints_of(link)
+                  if joint.type is JointType.REVOLUTE and joint.other(link) in doubts]
+        for one, other in combinations(hinges, 2):
+            apart = lines.distance(other.point, one.point, one.axis)
+            if lines.parallel(one.axis, other.axis) and apart > SAME_POINT * twin.length:
+                ends = [doubt(joint, joint.other(link)) for joint in (one, other)]
+                turn = 2 * sum(ends) / apart + doubts[one.other(link)][1]
+                arm = float(np.linalg.norm(mechanism.links[link].pose[:3, 3] - one.point))
+                doubts[link] = ends[0] + turn * arm, turn
+    for name, value in coordinates(twin, q).items():
+        joint = mechanism.joints[mechanism.stops[name].joint]
+        if all(link in doubts for link in joint.links):
+            turn = sum(doubts[link][1] for link in joint.links)
+            error = sum(doubt(joint, link) for link in joint.links) + turn * abs(value) if joint.type.slides else turn
+            if is_excluded(mechanism, name, value - error, value + error):
+                return True
+    return False
 
 
 def is_excluded(mechanism: Mechanism, joint: str, low: float, high: float) -> bool:
     """Whether no coordinate from ``low`` to ``high`` is within a joint's limits, turns modulo 2π."""
-    if joint not in mechanism.limited:
+    if joint not in mechanism.stops:
         return False
-    lower, upper = mechanism.limited[joint][0] - SAME_POINT, mechanism.limited[joint][1] + SAME_POINT
-    if mechanism.joints[joint].type is not JointType.REVOLUTE:
+    stop = mechanism.stops[joint]
+    lower, upper = stop.lower - SAME_POINT, stop.upper + SAME_POINT
+    if mechanism.joints[stop.joint].type.slides:
         return high < lower or low > upper
     # the smallest turn 2πk that brings ``high`` to the lower limit must take ``low`` beyond the upper one
     turns = np.ceil((lower - high) / (2 * np.pi)) if np.isfinite(lower) else -np.inf

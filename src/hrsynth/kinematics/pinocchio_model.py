@@ -103,7 +103,7 @@ class PinocchioModel:
     def _span(self) -> tuple[list[tuple[Joint, str]], list[Joint]]:
         mechanism = self.mechanism
         geared = {link for c in mechanism.couplings for link in (c.predecessor, c.successor)}
-        joints = list(mechanism.joints.values())
+        joints = [joint for joint in mechanism.joints.values() if joint.name not in mechanism.idle]
         weights = [_WEIGHT[joint.type.value] - (0.5 if joint.successor in geared else 0) for joint in joints]
         tree = graphs.spanning_forest(mechanism.links, joints, weights)
         ordered = [(joint, parent) for joint, parent, _ in graphs.outward(mechanism.base, tree)]
@@ -112,12 +112,11 @@ class PinocchioModel:
             missing = sorted(set(mechanism.links) - reached)
             raise BadMechanism(f"{mechanism.name}: links that no joint connects to the base", ", ".join(missing))
         used = {joint.name for joint, _ in ordered}
-        left = [joint for joint in joints if joint.name not in used]
-        driven = ", ".join(joint.name for joint in left if joint.type is JointType.FREE and joint.actuated)
+        driven = ", ".join(name for name in mechanism.idle if mechanism.joints[name].actuated)
         if driven:
             raise BadMechanism(f"{mechanism.name}: a motor on a floating joint whose link other joints hold", driven,
                                "motors on those")
-        return ordered, [joint for joint in left if joint.type is not JointType.FREE]
+        return ordered, [joint for joint in joints if joint.name not in used]
 
     def _chain(self, joint: Joint, parent: str) -> list[object]:
         """Pinocchio's joint models for a joint seen from ``parent``."""

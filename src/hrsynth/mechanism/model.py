@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
 from itertools import chain, count
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from ..errors import BadMechanism
 from ..geometry.vectors import Array, frozen, inverse, unit
 from ..results import Result, Value, content
 from ..tolerances import NO_SPREAD, SAME_GEOMETRY
-from .graphs import Adjacency, adjacency
+from .graphs import Adjacency, adjacency, spanning_forest
 from .observation import Observation
 from .sights import NamedCamera
 from .wrist import Wrist
@@ -61,6 +61,15 @@ class Limits:
     upper: float | None = None
     velocity: float | None = None
     effort: float | None = None
+
+
+class Stop(NamedTuple):
+    """From where to where (m, rad) a joint's coordinate goes, infinite if there is no limit, and which one it is."""
+
+    joint: str
+    place: int
+    lower: float
+    upper: float
 
 
 @dataclass(frozen=True)
@@ -110,6 +119,8 @@ class Joint(Value):
     line: int | None = field(default=None, compare=False)
     wrist: Wrist | None = None
     """What limits a spherical joint that stands for several R (normal form)."""
+    turns: tuple[tuple[str, Limits | None], ...] = ()
+    """Names and limits of the two R that a U stands for, in the order of its axes (normal form)."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "type", JointType(self.type))
@@ -149,7 +160,8 @@ class Joint(Value):
     def _turned(self) -> Joint:
         axes = tuple(-axis for axis in reversed(self.axes))
         wrist = None if self.wrist is None else self.wrist.turned()
-        return replace(self, predecessor=self.successor, successor=self.predecessor, axes=axes, wrist=wrist)
+        return replace(self, predecessor=self.successor, successor=self.predecessor, axes=axes, wrist=wrist,
+                       turns=self.turns[::-1])
 
     def relinked(self, old: str, new: str) -> Joint:
         """The joint with its end on ``old`` moved to ``new``."""
@@ -283,10 +295,25 @@ class Mechanism(Result, shown_as="robot"):
     @cached_property
     def limited(self) -> dict[str, tuple[float, float]]:
         """The joints whose coordinates are limited: lower and upper limit (m, rad), infinite if there is none."""
-        given = {name: (joint.limits.lower, joint.limits.upper) for name, joint in self.joints.items()
-                 if joint.limits is not None and (joint.limits.lower, joint.limits.upper) != (None, None)}
-        return {name: (-np.inf if lower is None else lower, np.inf if upper is None else upper)
-                for name, (lower, upper) in given.items()}
+        return {name: (lower, upper) for name, (joint, _, lower, upper) in self.stops.items()
+                if not self.joints[joint].turns}
+
+    @cached_property
+    def stops(self) -> dict[str, Stop]:
+        """The same, and each R with limits that is joined with another into a U."""
+        given = {name: (joint.name, place, limits.lower, limits.upper) for joint in self.joints.values()
+                 for place, (name, limits) in enumerate(joint.turns or ((joint.name, joint.limits),))
+                 if limits is not None and (limits.lower, limits.upper) != (None, None)}
+        return {name: Stop(joint, place, -np.inf if lower is None else lower, np.inf if upper is None else upper)
+                for name, (joint, place, lower, upper) in given.items()}
+
+    @cached_property
+    def idle(self) -> tuple[str, ...]:
+        """The floating joints of links that other joints hold: they hold nothing and have no coordinates."""
+        joints = list(self.joints.values())
+        floats = [joint.type is JointType.FREE for joint in joints]
+        tree = {joint.name for joint in spanning_forest(self.links, joints, floats)} if any(floats) else self.joints
+        return tuple(joint.name for joint in joints if joint.name not in tree and joint.type is JointType.FREE)
 
     @cached_property
     def wrists(self) -> dict[str, Wrist]:

@@ -21,7 +21,7 @@ from ..geometry.vectors import Array, angle_between
 from ..results import Value, with_value
 from ..tolerances import SAME_POINT
 from . import graphs
-from .model import Joint, JointType, Mechanism
+from .model import Joint, JointType, Limits, Mechanism
 from .wrist import Interval, Wrist, chain_arcs
 
 
@@ -143,7 +143,8 @@ def _pair(mechanism: Mechanism, a: Joint, b: Joint) -> Joint | None:
             return _join(a, b) if lines.distance(b.point, a.point, a.axis) <= near else None
         centre = lines.meeting_point([(a.point, a.axis), (b.point, b.axis)], near)
         if centre is not None and lines.perpendicular(a.axis, b.axis):
-            return _join(a, b, JointType.UNIVERSAL, centre, (a.axis, b.axis))
+            turns = () if a.limits is b.limits is None else ((a.name, a.limits), (b.name, b.limits))
+            return _join(a, b, JointType.UNIVERSAL, centre, (a.axis, b.axis), turns=turns)
     elif kinds == "PP" and lines.parallel(a.axis, b.axis):
         return _join(a, b)
     elif kinds in ("RU", "UR"):
@@ -163,12 +164,14 @@ def _pair(mechanism: Mechanism, a: Joint, b: Joint) -> Joint | None:
 
 
 def _join(a: Joint, b: Joint, type: JointType | None = None, point: Array | None = None,
-            axes: tuple[Array, ...] = (), wrist: Wrist | None = None) -> Joint:
-    """One joint from a's predecessor to b's successor, without limits: of a's type and place where none is given."""
+            axes: tuple[Array, ...] = (), wrist: Wrist | None = None, turns: tuple[tuple[str, Limits | None], ...] = ()
+            ) -> Joint:
+    """One joint from a's predecessor to b's successor, without limits of its own: of a's type and place where none is
+    given."""
     if type is None or point is None:
         return replace(a, predecessor=a.predecessor, successor=b.successor, limits=None)
     return replace(a, type=type, point=point, axes=axes, predecessor=a.predecessor, successor=b.successor, limits=None,
-                   wrist=wrist)
+                   wrist=wrist, turns=turns)
 
 
 def _wrist(*joints: Joint) -> Wrist | None:

@@ -18,7 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 from ..budgets import FARTHEST_POSE, LARGEST_GRID
 from ..errors import BadRequest
 from ..geometry.vectors import Array, rotation_from_rpy
-from ..results import Value, plain_number
+from ..ranges import plain_number
+from ..results import Value
 from ..tolerances import AS_PRINTED, HALF_TURN
 
 SCALARS = ("x", "y", "z", "phi")

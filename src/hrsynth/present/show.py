@@ -11,6 +11,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from ..errors import BadRequest, MissingExtra
+from ..ranges import require_range
 from ..results import Result, with_spelling
 from ..version import __version__
 from .outputs import FIGURES, OUTPUTS, File, function
@@ -102,6 +103,7 @@ def draw(result: Result, file: str | Path | None = None, *, plane: Pose | str | 
 
     Raises ``BadRequest`` for a result that has no picture.
     """
+    require_range("draw", "steps", steps, "an integer")
     asked = {"plane": plane, "steps": steps, "seed": 0, "width": width, "font": font}
     if not isinstance(result, Result):
         raise BadRequest("a picture of", repr(result), "what a function of hrsynth answers")

@@ -21,8 +21,6 @@ from .state import State
 
 BUDGET = 400
 """The largest number of proposals a derivation may try."""
-TAKEN_BACK = " (taken back: legs remain)"
-"""How the reasons of steps end that served only for a proposal that was not kept."""
 
 
 class Comparison(Protocol):
@@ -44,7 +42,8 @@ Check = Callable[[Mechanism, tuple[str, ...]], Comparison]
 class Step:
     """One attempt: the rule, the leg (None: all), whether it was accepted, why, and the angle if it was measured;
     ``state`` is what an accepted rewriting left behind, ``always`` whether the rule holds for every robot, ``bodies``
-    the links, besides the platform, whose twists must not change."""
+    the links, besides the platform, whose twists must not change, ``taken_back`` whether it served only for a proposal
+    that was not kept."""
 
     rule: str
     leg: str | None
@@ -54,6 +53,7 @@ class Step:
     state: State | None = field(default=None, compare=False, repr=False)
     always: bool = field(default=False, compare=False, repr=False)
     bodies: tuple[str, ...] = field(default=(), compare=False, repr=False)
+    taken_back: bool = field(default=False, repr=False)
 
     def measured(self, check: Check) -> Step:
         """The step with its own angle, where it was accepted unchecked."""
@@ -180,7 +180,7 @@ def best(stage: Stage, after: Strategy, left: Callable[[Rewriting], Iterable[str
 
 
 def _taken_back(step: Step) -> Step:
-    return replace(step, accepted=False, reason=step.reason + TAKEN_BACK, state=None)
+    return replace(step, accepted=False, reason=f"{step.reason} (taken back: legs remain)", state=None, taken_back=True)
 
 
 def observed_legs(at: Rewriting) -> tuple[str, ...]:

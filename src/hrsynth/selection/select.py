@@ -33,6 +33,7 @@ from ..mechanism.observation import labels_of
 from ..mechanism.observations.direction import SeenAxis
 from ..mechanism.pose import Pose, PoseLike, asked_pose
 from ..progress import part, tell
+from ..ranges import require_range
 from ..results import Compared, Result, Value, by_name
 from ..simulation.camera import cylinders, place_camera
 from ..simulation.ending import GOAL
@@ -75,11 +76,8 @@ class Criteria:
     def __post_init__(self) -> None:
         if self.sight is None and self.focal != FOCAL:
             raise BadRequest("focal length without a camera", self.focal, "together with --sight")
-        for what, value, least in (("legs of the largest sets", self.size, 1), ("number of runs", self.runs, 0),
-                                   ("sets whose endings are sought", self.endings, 0),
-                                   ("sets that are examined", self.examine, 1)):
-            if value < least:
-                raise BadRequest(what, value, f"at least {least}")
+        for name in ("size", "runs", "endings", "examine"):
+            require_range("select", name, getattr(self, name), "an integer")
         if self.seconds is not None and not self.seconds > 0:
             raise BadRequest("seconds", self.seconds, "a positive number")
 
@@ -210,6 +208,7 @@ class Selection(Result, shown_as="select"):
                 "noise": self.blur.amounts,
                 "sight": camera, "best": None if best is None else list(best.legs), "fewer": self.fewer,
                 "not_examined": {"count": len(self.unexamined), "reason": self.left},
+                "unlimited": list(self.setting.unlimited),
                 "sets": [each.to_dict() for each in self.candidates]}
 
 

@@ -138,5 +138,6 @@ class Servo(Result, shown_as="servo"):
                 "modes": None if found.modes is None else [each.to_dict() for each in found.modes.modes],
                 "type2": self.track.to_dict(self.run.times.tolist()),
                 "notes": list(self.notes), "spread": None if self.spread is None else self.spread.to_dict(),
+                "unlimited": list(self.setting.unlimited),
                 "times": self.run.times.tolist(), "error": self.errors.tolist(),
                 "poses": [self.pose_of(at).to_dict() for at in self.run.configurations]}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from contextlib import suppress
 from dataclasses import replace
 from functools import cache
@@ -523,3 +524,17 @@ def test_rests_within_the_limits_of_joints_are_counted(reach: float) -> None:
     (told,) = [line.strip() for line in text(found).splitlines() if "within all limits" in line]
     alone = inside == 1
     assert told == f"within all limits of joints {inside} of these {len(turns)}" + ": the goal alone" * alone
+
+
+@pytest.mark.slow
+def test_rests_whose_rows_would_be_equal_are_one_row_with_their_number() -> None:
+    """Where rods may point either way a pose has two rests, with equal rows if working modes are not known."""
+    found = hrsynth.endings("rprpr_m2", at="x=0.03,y=0.22")
+    told = replace(found, rests=tuple(replace(each, other_legs=None, side=None) for each in found.rests))
+    pairs = [number for number in Counter((str(each.pose), each.stability, each.kind, each.reversed, each.across)
+                                          for each in told.rests).values() if number > 1]
+    assert pairs
+    text = " ".join(str(told).split())
+    assert text.count("2 rests, whose links stand differently") == len(pairs)
+    assert "whose links stand differently" not in str(found)
+    assert "more (--json lists them)" not in text

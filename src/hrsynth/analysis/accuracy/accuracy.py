@@ -70,7 +70,8 @@ class Accuracy(Result, shown_as="accuracy"):
                  for o, cone in zip(self.setting.observed, self.cones, strict=True) if cone]
         noise = {"noise": self.blur.amounts, "exact": list(self.blur.exact(self.setting.observed))}
         return {**self.setting.to_dict(), "cones": cones, **noise, **(self.field.to_dict() if self.field else {}),
-                **(self.swept.to_dict() if self.swept else {}), "poses": poses}
+                **(self.swept.to_dict() if self.swept else {}), "poses": poses,
+                "unlimited": list(self.setting.unlimited)}
 
 
 @question(cones="cone", samples="nonlinear")

@@ -22,7 +22,8 @@ from ...kinematics.relation import Measurement
 from ...mechanism import Observation
 from ...mechanism.noise import Noise, blurs
 from ...mechanism.observations.direction import SeenAxis
-from ...results import Value, plain_number
+from ...ranges import plain_number
+from ...results import Value
 from ...tolerances import NARROWEST_CONE, SEEN_ABOVE
 
 EXAMPLE = "0.1deg, 0.002 (radians), or one for each leg such as 1=0.1deg,2=0.2deg"

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ...mechanism import graphs
-from ...mechanism.model import JointType, Mechanism
+from ...mechanism.model import Mechanism
 from ..findings import LintRule, Spot
 from ..freedoms import Pair
 from ..subject import LintedFile
@@ -45,12 +44,9 @@ def _floating(file: LintedFile) -> Iterator[Spot]:
     robot = file.mechanism
     if robot is None:
         return
-    joints = list(robot.joints.values())
-    tree = {joint.name for joint in
-            graphs.spanning_forest(robot.links, joints, [joint.type is JointType.FREE for joint in joints])}
-    for joint in joints:
-        if joint.type is JointType.FREE and joint.actuated and joint.name not in tree:
-            yield Spot(None, f"motor on the floating joint {joint.name!r}, whose link other joints hold")
+    for name in robot.idle:
+        if robot.joints[name].actuated:
+            yield Spot(None, f"motor on the floating joint {name!r}, whose link other joints hold")
 
 
 RULES = (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from typing import TYPE_CHECKING
 
 from .tables import GAP, Rows, camera, head, listing, name_all, table
@@ -21,14 +22,15 @@ def endings(found: Endings) -> str:
     boxed = [each for each in found.rests if each.proved]
     rows: Rows = [*head(found.setting), *camera(found.setting), ("goal", str(found.pose)),
                   *([] if found.depth == "exact" else [("depth", f"{found.depth}, as the law assumes it")]), *GAP,
-                  ("attract", table([_line(each) for each in drawn], HEADS).splitlines()), *GAP]
+                  ("attract", table(_lines(drawn)[0], HEADS).splitlines()), *GAP]
     if any(each.beyond for each in drawn):
         inside = [each for each in drawn if not each.beyond]
         rows[-1:] = [("", f"within all limits of joints {len(inside)} of these {len(drawn)}"
                           + (": the goal alone" if [each.kind for each in inside] == ["goal"] else "")), *GAP]
     if others:
-        told = table([_line(each) for each in others[:LISTED_SADDLES]], HEADS).splitlines()
-        left = len(others) - LISTED_SADDLES
+        lines, counts = _lines(others)
+        left = sum(counts[LISTED_SADDLES:])
+        told = table(lines[:LISTED_SADDLES], HEADS).splitlines()
         rows += [("do not", [*told, *([f"and {left} more (--json lists them)"] if left > 0 else [])]), *GAP]
     rows += [("enclosed", _describe_enclosed(found, boxed)), *GAP]
     rows += [("continua", [f"‖e‖ = {each.error:.3g}, {each.stability}{_why(each)}" for each in found.continua])]
@@ -111,6 +113,14 @@ def _describe_enclosed(found: Endings, boxed: list[RestPoint]) -> list[str]:
     what = "the loops" if not found.measured else f"the loops, of {', '.join(found.measured)} as far as independent"
     return [f"{len(boxed)} of {len(found.rests)}: exactly one rest within {1e3 * wide[0]:.1g} mm and {wide[1]:.1g} "
             f"rad, proved for {what}", f"whether it attracts is proved for {sum(each.decided for each in boxed)}"]
+
+
+def _lines(rests: list[RestPoint]) -> tuple[list[list[str]], list[int]]:
+    """A row a rest, and one, with their number, of those whose rows would be equal: rods point the other way, or other
+    links stand elsewhere, as rests with the same poses and measurements are one."""
+    rows = Counter(tuple(_line(each)) for each in rests)
+    return [[*row, notes if count == 1 else f"{notes}{'; ' * bool(notes)}{count} rests, whose links stand differently"]
+            for (*row, notes), count in rows.items()], list(rows.values())
 
 
 def _line(each: RestPoint) -> list[str]:

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 from ...analysis.exact import ExactVerdict, power_above
 from ...analysis.verdict import ELSEWHERE
 from ...errors import HrsynthError
-from ...rewrite.strategy import TAKEN_BACK
 from ...tolerances import RANK_CUTOFF, RANK_GAP, SAME_RELATION, SURELY_SOMETHING
 from .branches import UNITS, ends, limits
 from .tables import LINE, NAMES, Rows, camera, describe_watched, head, known_row, listing, sets, table, wrap_lines
@@ -87,7 +86,7 @@ def derivation(found: Derivation) -> str:
 
 def _attempts(steps: Sequence[Step]) -> Iterator[tuple[str, ...]]:
     """A line a step; of a rule's proposals that were taken back the first is shown, and how many more there were."""
-    for back, each in groupby(steps, lambda step: step.reason.endswith(TAKEN_BACK)):
+    for back, each in groupby(steps, lambda step: step.taken_back):
         run = list(each)
         starts = [i for i, step in enumerate(run) if step.rule == run[0].rule] if back else [0]
         for step in run[:starts[1]] if len(starts) > 1 else run:

@@ -149,7 +149,7 @@ def accuracy(found: Accuracy) -> str:
 
 def _limits_left(found: Accuracy) -> Rows:
     """Whose limits a grid passes over."""
-    limited = ", ".join(found.setting.mechanism.limited)
+    limited = ", ".join(found.setting.mechanism.stops)
     return [("limits", f"those of {limited} are not checked")] if limited else []
 
 

@@ -347,7 +347,7 @@ def hindrances(setting: ObservedRobot) -> tuple[str, ...]:
     kinds = dict.fromkeys("" if each.by_segment else each.kind for each in setting.observed if id(each) not in own)
     found = [f"observations of kind {kind} are fed back" if kind else "other links are watched than by default"
              for kind in kinds]
-    if setting.mechanism.limited:
+    if setting.mechanism.stops:
         found.append("a joint has limits")
     return tuple(found) or (("a leg has no closed form",) if setting.placer is None else ())
 

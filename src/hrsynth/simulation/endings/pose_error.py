@@ -160,7 +160,7 @@ class PoseError(Value):
         rules = tuple(f"direction of leg {o.leg}" for o in seen if o.rule is not None)
         return cls(coordinates.length, motion, p[0], R[0], motion.translations,
                    motion.rotations if coordinates.turning else np.zeros((3, 0)), limbs, seen,
-                   (*known.fitted, *rules), (*mechanism.limited, *mechanism.wrists), coordinates=coordinates)
+                   (*known.fitted, *rules), (*mechanism.stops, *mechanism.wrists), coordinates=coordinates)
 
     @property
     def size(self) -> int:
