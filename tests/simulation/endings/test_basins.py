@@ -344,7 +344,7 @@ def test_other_robots_are_simulated_one_by_one():
 
 @pytest.mark.parametrize(("asked", "word"), [
     ({"plane": "z=-0.7", "grid": "x=0:0.1:2"}, "both"), ({"grid": "x=0:1:400,y=0:1:400"}, "160000"),
-    ({"jobs": 0, "grid": "x=0:0.1:2"}, "processes")])
+    ({"jobs": 0, "grid": "x=0:0.1:2"}, "jobs")])
 def test_what_cannot_be_asked_is_refused(asked: dict[str, str], word: str):
     with pytest.raises(BadRequest, match=word):
         hrsynth.basins("quattro", "1,4", to="z=-0.7", **asked)
