@@ -169,6 +169,23 @@ def test_a_gearbox_couples_the_two_joints_on_its_reference_body(tmp_path: Path):
     assert [(c.predecessor, c.successor, c.ratio) for c in robot.couplings] == [("fast", "slow", -0.25)]
 
 
+def test_a_mimic_of_sdformat_follows_its_joint_from_a_reference(tmp_path: Path):
+    joint = ('<joint name="{}" type="revolute"><parent>{}</parent><child>{}</child><axis><xyz>0 0 1</xyz>{}</axis>'
+             "</joint>")
+    mimic = '<mimic joint="{}"><multiplier>-2</multiplier><offset>0.5</offset><reference>0.1</reference></mimic>'
+    links = "".join(f'<link name="{name}"/>' for name in ("base", "one", "two"))
+    joints = joint.format("p", "base", "one", "") + joint.format("q", "one", "two", mimic)
+    text = f'<sdf version="1.11"><model name="m">{links}{joints}</model></sdf>'
+    robot = read(tmp_path, text.format("p"), "sdf", platform="two")
+    assert full_mobility(robot) == 1
+    assert [(c.predecessor, c.successor, c.ratio) for c in robot.couplings] == [("one", "two", -2.0)]
+    q = [np.arctan2(robot.links[n].pose[1, 0], robot.links[n].pose[0, 0]) for n in ("one", "two")]
+    assert q[1] - q[0] == pytest.approx(-2 * (q[0] - 0.1) + 0.5)
+    alone = read(tmp_path, text.format("x"), "sdf", platform="two")
+    assert full_mobility(alone) == 2
+    assert any("there is no joint 'x'" in note.text for note in alone.notes)
+
+
 def test_missing_second_axes_are_the_default_and_a_guess(tmp_path: Path):
     text = ('<sdf version="1.5"><model name="m"><link name="base"/><link name="arm"/><joint name="u" type="{}">'
             '<parent>base</parent><child>arm</child><axis><xyz>{}</xyz></axis></joint></model></sdf>')
