@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from hrsynth.description import load
 from hrsynth.errors import BadMechanism
 from hrsynth.geometry.vectors import Array
 from hrsynth.kinematics.configuration import ClosedConfiguration
@@ -225,3 +226,15 @@ def test_actuated_coordinates_are_those_of_the_motors() -> None:
     assert len(names) == 4
     assert twin.actuated_indices() == [i for name in names for i in twin.coordinates[name]]
     assert len(set(twin.actuated_indices())) == 4
+
+
+def test_motors_on_a_ball_at_which_a_loop_is_cut_hold_both_links_together() -> None:
+    robot = load("gough_stewart", motors=["wrist_2", "wrist_5"])
+    twin = PinocchioModel(robot)
+    at = ClosedConfiguration.of(twin, twin.q0)
+    free, _ = at.kernel()
+    turns = np.vstack([(at.velocity("platform") - at.velocity(rod))[3:] @ free for rod in ("rod_2", "rod_5")])
+    driven = free[twin.actuated_indices()]
+    assert len(driven) == 6
+    ranks = [np.linalg.matrix_rank(rows, tol=AGREE) for rows in (driven, turns, np.vstack((driven, turns)))]
+    assert ranks[0] == ranks[1] == ranks[2] >= 3
