@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from numbers import Real
 
 import numpy as np
 
@@ -53,8 +54,9 @@ class Overrides:
         if tolerance is not None and as_written:
             raise BadRequest("--as-written keeps the numbers, --tolerance says how far they are changed",
                              f"{tolerance:g}", "one of the two")
-        if tolerance is not None and not EXACT < tolerance <= LARGEST_NOISE:
-            raise BadRequest("tolerance", f"{tolerance:g}",
+        number = isinstance(tolerance, Real)
+        if tolerance is not None and not (number and EXACT < tolerance <= LARGEST_NOISE):
+            raise BadRequest("tolerance", f"{tolerance:g}" if number else tolerance,
                              f"{EXACT:g} to {LARGEST_NOISE:g} (characteristic lengths, radians)")
         return cls(motors=names(motors), close=closures(close), freeze=names(freeze or ()) or (),
                    observe=names(observe), tolerance=tolerance, as_written=as_written, **more)
@@ -88,14 +90,16 @@ def names(value: str | Iterable[str] | None) -> tuple[str, ...] | None:
     """A list of names, also as one text set apart by commas."""
     if value is None:
         return None
-    parts = value.split(",") if isinstance(value, str) else list(value)
+    parts = value.split(",") if isinstance(value, str) else [*value] if isinstance(value, Iterable) else [value]
+    if not all(isinstance(name, str) for name in parts):
+        raise BadRequest("names", value, "texts in a list, or one text with commas")
     return tuple(name.strip() for name in parts)
 
 
 def closures(value: str | Iterable[str]) -> tuple[str, ...]:
     """A list of closures, also as one text set apart by commas, of which points have some of their own."""
     if not isinstance(value, str):
-        return tuple(each.strip() for each in value)
+        return names(value) or ()
     whole = re.fullmatch(rf"\s*{_CLOSURE.pattern}(?:\s*,\s*{_CLOSURE.pattern.replace('?P<', '?P<_')})*\s*", value)
     return tuple(match[0].strip() for match in _CLOSURE.finditer(value)) if whole else names(value) or ()
 
