@@ -141,6 +141,24 @@ def test_a_mimic_is_a_gear_and_no_motor(tmp_path: Path):
     assert np.linalg.norm(x) == pytest.approx(1)
 
 
+def test_gears_stay_with_their_joints_whatever_link_is_the_base(tmp_path: Path):
+    text = bars([("p", "one", "base", origin(0)), ("q", "two", "one", origin(1)), ("r", "tip", "two", origin(1))], "")
+    for link, ratio in (("two", 0.5), ("tip", -0.7)):
+        text = text.replace(f'<child link="{link}"/>', f'<child link="{link}"/><mimic joint="p" multiplier="{ratio}"/>')
+    back = read(tmp_path, text, base="tip", platform="base")
+    assert full_mobility(back) == 1
+    assert [(c.predecessor, c.successor, c.ratio) for c in back.couplings] == [("base", "one", 0.5),
+                                                                               ("base", "two", -0.7)]
+    twin = PinocchioModel(back)
+    at_zero = ClosedConfiguration.of(twin, twin.q0)
+    base, one = (at_zero.velocity(link)[5] @ at_zero.kernel()[0] for link in ("base", "one"))
+    assert base / (one - base) == pytest.approx(-(1 + 0.5 - 0.7))
+    part = read(tmp_path, text, base="base", platform="two")
+    assert [each.name for each in part.couplings] == ["mimic_q"]
+    with pytest.raises(BadRequest, match="gears join joints between 'one' and 'tip' through others, found 'p'"):
+        read(tmp_path, text, base="one", platform="tip")
+
+
 def test_a_screw_of_either_convention_couples_turn_and_travel(tmp_path: Path):
     text = ('<sdf version="1.10"><model name="m"><link name="base"/><link name="nut"/><joint name="s" type="screw">'
             '<parent>base</parent><child>nut</child><axis><xyz>0 0 1</xyz></axis>{}</joint></model></sdf>')
