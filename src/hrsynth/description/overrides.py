@@ -81,7 +81,7 @@ class Overrides:
         for name in self.freeze:
             if name not in graph.joints:
                 raise BadRequest("--freeze: no such joint", name, comma_list(graph.joints, like=name))
-            graph.joints[name] = replace(graph.joints[name], type=JointType.FIXED, axes=(), motor=None, limits=None)
+            _freeze(graph, name)
         if self.motors is not None:
             _drive(graph, self.motors)
 
@@ -102,6 +102,21 @@ def closures(value: str | Iterable[str]) -> tuple[str, ...]:
         return names(value) or ()
     whole = re.fullmatch(rf"\s*{_CLOSURE.pattern}(?:\s*,\s*{_CLOSURE.pattern.replace('?P<', '?P<_')})*\s*", value)
     return tuple(match[0].strip() for match in _CLOSURE.finditer(value)) if whole else names(value) or ()
+
+
+def _freeze(graph: JointGraph, name: str) -> None:
+    """Hold a joint at zero, and with it those that gears join to it."""
+    graph.joints[name] = replace(graph.joints[name], type=JointType.FIXED, axes=(), motor=None, limits=None)
+    geared = [gear for gear in graph.gears if name in (gear.driver, gear.driven)]
+    graph.gears = [gear for gear in graph.gears if gear not in geared]
+    for gear in geared:
+        other = gear.driven if name == gear.driver else gear.driver
+        if gear.offset:
+            raise BadRequest(f"--freeze: joint {name!r} at zero, and with it {other!r} away from zero by the gear "
+                             f"{gear.name!r}", gear.offset, "joints that gears without an offset join")
+        if gear.ratio or other == gear.driven:
+            graph.note("merged", f"joint {other!r} is held by the gear {gear.name!r}: {name!r} is frozen")
+            _freeze(graph, other)
 
 
 def _close(graph: JointGraph, wish: str) -> None:

@@ -11,7 +11,7 @@ import pytest
 from description.foreign.examples import FILES, MJCF, TREE, A, B, C, D, at, ends, mjcf, urdf
 from description.foreign.test_dialects import lines, mobility
 from hrsynth.description import load
-from hrsynth.errors import BadRequest, HeldByRounding, HrsynthError, LoopsNotClosed, RankUndecided
+from hrsynth.errors import BadMechanism, BadRequest, HeldByRounding, HrsynthError, LoopsNotClosed, RankUndecided
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.mechanism import JointType, Mechanism
@@ -139,6 +139,26 @@ def test_a_mimic_is_a_gear_and_no_motor(tmp_path: Path):
     q = [np.arctan2(robot.links[n].pose[1, 0], robot.links[n].pose[0, 0]) for n in ("one", "two")]
     assert q[1] - q[0] == pytest.approx(-2 * q[0] + 0.5)
     assert np.linalg.norm(x) == pytest.approx(1)
+
+
+def test_a_gear_that_would_hold_its_joint_is_refused_and_the_joint_frozen(tmp_path: Path):
+    text = bars([("p", "one", "base", origin(0)), ("q", "two", "one", origin(1))], "").replace(
+        '<child link="two"/>', '<child link="two"/><mimic joint="p" multiplier="0"/>')
+    told = r"urdf:\d+: coupling 'mimic_q', which would hold joint 'q', found 0.0, .*freeze q"
+    with pytest.raises(BadMechanism, match=told):
+        read(tmp_path, text, platform="two")
+    assert full_mobility(read(tmp_path, text, platform="two", freeze=["q"])) == 1
+
+
+def test_a_frozen_joint_holds_those_that_gears_join_to_it(tmp_path: Path):
+    text = bars([("p", "one", "base", origin(0)), ("q", "two", "one", origin(1)), ("r", "tip", "two", origin(1))], "")
+    geared = text.replace('<child link="two"/>', '<child link="two"/><mimic joint="p" multiplier="-2"/>')
+    held = read(tmp_path, geared, platform="tip", freeze=["q"])
+    assert full_mobility(held) == 1
+    assert [joint.name for joint in held.joints.values() if joint.type is not JointType.FIXED] == ["r"]
+    away = geared.replace('multiplier="-2"', 'multiplier="-2" offset="0.5"')
+    with pytest.raises(BadRequest, match="--freeze: joint 'p' at zero, and with it 'q' away from zero by the gear"):
+        read(tmp_path, away, platform="tip", freeze=["p"])
 
 
 def test_gears_stay_with_their_joints_whatever_link_is_the_base(tmp_path: Path):
