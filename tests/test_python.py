@@ -94,6 +94,12 @@ def test_a_wrong_keyword_is_told_with_the_nearest_and_all(ask: Any, near: str):
     (lambda: hrsynth.save("rrrrr_m1", None), "a file, allowed: its path"),
     (lambda: hrsynth.draw(hrsynth.derive("rrrrr_m1"), 3), "a file, found 3, allowed: its path"),
     (lambda: hrsynth.accuracy("rrrrr_m1", cone=0.01, grid="x=0:0.1:2,y=0", into=3), "a file, found 3"),
+    (lambda: hrsynth.check("rrrrr_m1", grid={"x": (0, 0.1, 2)}), "^a grid, found .*, allowed: a text such as x=-0.3"),
+    (lambda: hrsynth.accuracy("rrrrr_m1", cone=0.01, grid=["x=0:0.1:2"]), "^a grid, found .*, allowed: a text"),
+    (lambda: hrsynth.load("rrrrr_m1", motors=[1]), "^names, found .*, allowed: texts in"),  # type: ignore[list-item]
+    (lambda: hrsynth.load("rrrrr_m1", motors=1), "^names, found 1, allowed: texts in a list"),
+    (lambda: hrsynth.load("rrrrr_m1", close=[("a", "b")]), "^names, found"),  # type: ignore[list-item]
+    (lambda: hrsynth.load("rrrrr_m1", tolerance="x"), "^tolerance, found 'x', allowed: 1e-11"),
     (lambda: hrsynth.studio(3, open_=False), "a robot's file, found 3")])
 def test_a_value_of_another_kind_is_told_with_what_is_allowed(ask: Any, allowed: str):
     with pytest.raises(BadRequest, match=allowed):

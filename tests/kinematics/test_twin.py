@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from hrsynth.description import load
 from hrsynth.errors import BadMechanism
 from hrsynth.geometry.vectors import Array
 from hrsynth.kinematics.configuration import ClosedConfiguration
@@ -246,3 +247,15 @@ def test_of_two_floating_joints_the_same_is_idle_with_gears() -> None:
                 PinocchioModel(driven)
         else:
             assert PinocchioModel(driven).mechanism.joints[name].actuated
+
+
+def test_motors_on_a_ball_at_which_a_loop_is_cut_hold_both_links_together() -> None:
+    robot = load("gough_stewart", motors=["wrist_2", "wrist_5"])
+    twin = PinocchioModel(robot)
+    at = ClosedConfiguration.of(twin, twin.q0)
+    free, _ = at.kernel()
+    turns = np.vstack([(at.velocity("platform") - at.velocity(rod))[3:] @ free for rod in ("rod_2", "rod_5")])
+    driven = free[twin.actuated_indices()]
+    assert len(driven) == 6
+    ranks = [np.linalg.matrix_rank(rows, tol=AGREE) for rows in (driven, turns, np.vstack((driven, turns)))]
+    assert ranks[0] == ranks[1] == ranks[2] >= 3

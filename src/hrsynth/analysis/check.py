@@ -117,7 +117,7 @@ def check(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None,
     <Check: 3rrr_m1, watching 1, 2, 3: x=0,y=0,z=0,phi=0deg regular; x=0.01,y=0,z=0,phi=0deg regular>
     """
     poses = asked_poses(at)
-    cells = Grid.parse(grid) if isinstance(grid, str) else grid
+    cells = None if grid is None else Grid.parse(grid)
     setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed).telling(poses)
     examiner = ConfigurationAnalysis.of(setting)
     start, question, motion = setting.everything.start, setting.everything.question, setting.motion

@@ -163,6 +163,15 @@ class JointGraph:
         """Add a joint that closes a loop; of ``axes`` it takes as many as its type has."""
         self.joints[name] = JointSpec(name, kind, ends, tuple(axes[: kind.axes]), None, (), line, motor, in_tree=False)
 
+    def follow(self, gears: Iterable[GearSpec]) -> None:
+        """Add what mimics say, once all joints are known: a joint of one freedom follows another."""
+        for gear in gears:
+            ends = [self.joints.get(name) for name in (gear.driver, gear.driven)]
+            if all(joint is not None and joint.type in (JointType.REVOLUTE, JointType.PRISMATIC) for joint in ends):
+                self.gears.append(replace(gear, name=self.fresh(gear.name)))
+            elif ends[0] is None:
+                self.note("ignored", f"the mimic of joint {gear.driven!r}: there is no joint {gear.driver!r}")
+
     def scale(self, factor: float) -> None:
         """Multiply all lengths: frames on links, limits and gears of slides."""
         self.unit *= factor

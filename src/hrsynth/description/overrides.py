@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from numbers import Real
 
 import numpy as np
 
@@ -53,8 +54,9 @@ class Overrides:
         if tolerance is not None and as_written:
             raise BadRequest("--as-written keeps the numbers, --tolerance says how far they are changed",
                              f"{tolerance:g}", "one of the two")
-        if tolerance is not None and not EXACT < tolerance <= LARGEST_NOISE:
-            raise BadRequest("tolerance", f"{tolerance:g}",
+        number = isinstance(tolerance, Real)
+        if tolerance is not None and not (number and EXACT < tolerance <= LARGEST_NOISE):
+            raise BadRequest("tolerance", f"{tolerance:g}" if number else tolerance,
                              f"{EXACT:g} to {LARGEST_NOISE:g} (characteristic lengths, radians)")
         return cls(motors=names(motors), close=closures(close), freeze=names(freeze or ()) or (),
                    observe=names(observe), tolerance=tolerance, as_written=as_written, **more)
@@ -79,7 +81,7 @@ class Overrides:
         for name in self.freeze:
             if name not in graph.joints:
                 raise BadRequest("--freeze: no such joint", name, comma_list(graph.joints, like=name))
-            graph.joints[name] = replace(graph.joints[name], type=JointType.FIXED, axes=(), motor=None, limits=None)
+            _freeze(graph, name)
         if self.motors is not None:
             _drive(graph, self.motors)
 
@@ -88,16 +90,33 @@ def names(value: str | Iterable[str] | None) -> tuple[str, ...] | None:
     """A list of names, also as one text set apart by commas."""
     if value is None:
         return None
-    parts = value.split(",") if isinstance(value, str) else list(value)
+    parts = value.split(",") if isinstance(value, str) else [*value] if isinstance(value, Iterable) else [value]
+    if not all(isinstance(name, str) for name in parts):
+        raise BadRequest("names", value, "texts in a list, or one text with commas")
     return tuple(name.strip() for name in parts)
 
 
 def closures(value: str | Iterable[str]) -> tuple[str, ...]:
     """A list of closures, also as one text set apart by commas, of which points have some of their own."""
     if not isinstance(value, str):
-        return tuple(each.strip() for each in value)
+        return names(value) or ()
     whole = re.fullmatch(rf"\s*{_CLOSURE.pattern}(?:\s*,\s*{_CLOSURE.pattern.replace('?P<', '?P<_')})*\s*", value)
     return tuple(match[0].strip() for match in _CLOSURE.finditer(value)) if whole else names(value) or ()
+
+
+def _freeze(graph: JointGraph, name: str) -> None:
+    """Hold a joint at zero, and with it those that gears join to it."""
+    graph.joints[name] = replace(graph.joints[name], type=JointType.FIXED, axes=(), motor=None, limits=None)
+    geared = [gear for gear in graph.gears if name in (gear.driver, gear.driven)]
+    graph.gears = [gear for gear in graph.gears if gear not in geared]
+    for gear in geared:
+        other = gear.driven if name == gear.driver else gear.driver
+        if gear.offset:
+            raise BadRequest(f"--freeze: joint {name!r} at zero, and with it {other!r} away from zero by the gear "
+                             f"{gear.name!r}", gear.offset, "joints that gears without an offset join")
+        if gear.ratio or other == gear.driven:
+            graph.note("merged", f"joint {other!r} is held by the gear {gear.name!r}: {name!r} is frozen")
+            _freeze(graph, other)
 
 
 def _close(graph: JointGraph, wish: str) -> None:

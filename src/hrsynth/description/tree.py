@@ -62,7 +62,11 @@ def _cut(mechanism: Mechanism) -> Mechanism:
     for joint in loops.values():
         if joint.type is JointType.FREE:
             raise BadMechanism(f"joint {joint.name!r} closes a loop without constraining it", joint.type.value)
-    return replace(mechanism, links=links, joints=tree | loops)
+    carried = {name: joint.successor for name, joint in tree.items()}
+    couplings = tuple(replace(each, predecessor=carried[mechanism.carrier(each, each.predecessor).name],
+                              successor=carried[mechanism.carrier(each, each.successor).name])
+                      for each in mechanism.couplings)
+    return replace(mechanism, links=links, joints=tree | loops, couplings=couplings)
 
 
 def is_spanning(mechanism: Mechanism) -> bool:

@@ -155,15 +155,16 @@ class PinocchioModel:
         self._body[child] = self._body[parent] if joint.type is JointType.FIXED else self._add(joint, parent, "")
 
     def _loop(self, joint: Joint) -> tuple[int, int, bool]:
-        """The two frames of a loop, and whether a ball holds their points together."""
+        """The two frames of a loop, and whether a ball holds their points together: one that no motor turns."""
         near, far = (self._body[link] for link in joint.links)
-        if joint.type not in (JointType.SPHERICAL, JointType.FIXED):
+        ball = joint.type is JointType.SPHERICAL and not joint.actuated
+        if not ball and joint.type is not JointType.FIXED:
             near = self._add(joint, joint.predecessor, "__cut")
         point = joint.point / self.length
         first, second = (self.model.addFrame(pin.Frame(
             f"{joint.name}__{end}", body, pin.SE3(_UPRIGHT, point - self._centre[body]), pin.FrameType.OP_FRAME))
             for end, body in enumerate((near, far)))
-        return first, second, joint.type is JointType.SPHERICAL
+        return first, second, ball
 
     def _gear_rows(self) -> Array:
         """One row a coupling: successor's rate − ratio × predecessor's rate (metres, radians)."""

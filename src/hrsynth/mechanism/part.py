@@ -32,6 +32,15 @@ def between(mechanism: Mechanism, base: str, platform: str) -> Mechanism:
     camera = mechanism.camera if mechanism.camera in inside else None
     observations = tuple(o for o in mechanism.observations
                          if o.link in inside and (o.seen_from is None or o.seen_from in inside))
+    own = {name for name, joint in mechanism.joints.items() if inside.issuperset(joint.links)}
+    geared = {each: (mechanism.carrier(each, each.predecessor).name, mechanism.carrier(each, each.successor).name)
+              for each in mechanism.couplings}
+    beyond: nx.Graph[str] = nx.Graph(ends for ends in geared.values() if not own.issuperset(ends))
+    for chain in nx.connected_components(beyond):
+        if len(chain & own) > 1:
+            raise BadRequest(f"{mechanism.name}: gears join joints between {base!r} and {platform!r} through others",
+                             ", ".join(sorted(chain - own)), "a base and a platform with these between them")
+    couplings = tuple(each for each, ends in geared.items() if own.issuperset(ends))
     cameras = tuple(each for each in mechanism.cameras if each.link in inside)
     notes = mechanism.notes
     if gone:
@@ -39,4 +48,4 @@ def between(mechanism: Mechanism, base: str, platform: str) -> Mechanism:
                                          + ", ".join(gone[:5]) + (" …" if gone[5:] else "")))
     kept = replace(mechanism, base=base, platform=platform, camera=camera, observations=observations, notes=notes,
                    cameras=cameras, turns=mechanism.turns if platform == mechanism.platform else None)
-    return kept.changed(remove_links=gone)
+    return kept.changed(remove_links=gone, couplings=couplings)

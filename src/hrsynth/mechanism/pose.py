@@ -208,9 +208,13 @@ class Grid(Value):
     fixed: Pose
 
     @classmethod
-    def parse(cls, text: str, largest: int = LARGEST_GRID) -> Grid:
-        """The grid written as ``x=-0.3:0.3:21,y=0:0.1:5,z=-0.7`` (from:to:count), of at most ``largest`` poses; raises
-        ``BadRequest``."""
+    def parse(cls, text: Grid | str, largest: int = LARGEST_GRID) -> Grid:
+        """The grid written as ``x=-0.3:0.3:21,y=0:0.1:5,z=-0.7`` (from:to:count), of at most ``largest`` poses, or one
+        as it is; raises ``BadRequest``."""
+        if isinstance(text, Grid):
+            return text
+        if not isinstance(text, str):
+            raise BadRequest("a grid", text, "a text such as x=-0.3:0.3:21,y=-0.3:0.3:21,z=-0.7")
         axes: list[tuple[str, Array]] = []
         single: list[str] = []
         for name, value in _fields(text, "grid"):

@@ -11,7 +11,7 @@ import pytest
 from description.foreign.examples import FILES, MJCF, TREE, A, B, C, D, at, ends, mjcf, urdf
 from description.foreign.test_dialects import lines, mobility
 from hrsynth.description import load
-from hrsynth.errors import BadRequest, HeldByRounding, HrsynthError, LoopsNotClosed, RankUndecided
+from hrsynth.errors import BadMechanism, BadRequest, HeldByRounding, HrsynthError, LoopsNotClosed, RankUndecided
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.mechanism import JointType, Mechanism
@@ -141,6 +141,44 @@ def test_a_mimic_is_a_gear_and_no_motor(tmp_path: Path):
     assert np.linalg.norm(x) == pytest.approx(1)
 
 
+def test_a_gear_that_would_hold_its_joint_is_refused_and_the_joint_frozen(tmp_path: Path):
+    text = bars([("p", "one", "base", origin(0)), ("q", "two", "one", origin(1))], "").replace(
+        '<child link="two"/>', '<child link="two"/><mimic joint="p" multiplier="0"/>')
+    told = r"urdf:\d+: coupling 'mimic_q', which would hold joint 'q', found 0.0, .*freeze q"
+    with pytest.raises(BadMechanism, match=told):
+        read(tmp_path, text, platform="two")
+    assert full_mobility(read(tmp_path, text, platform="two", freeze=["q"])) == 1
+
+
+def test_a_frozen_joint_holds_those_that_gears_join_to_it(tmp_path: Path):
+    text = bars([("p", "one", "base", origin(0)), ("q", "two", "one", origin(1)), ("r", "tip", "two", origin(1))], "")
+    geared = text.replace('<child link="two"/>', '<child link="two"/><mimic joint="p" multiplier="-2"/>')
+    held = read(tmp_path, geared, platform="tip", freeze=["q"])
+    assert full_mobility(held) == 1
+    assert [joint.name for joint in held.joints.values() if joint.type is not JointType.FIXED] == ["r"]
+    away = geared.replace('multiplier="-2"', 'multiplier="-2" offset="0.5"')
+    with pytest.raises(BadRequest, match="--freeze: joint 'p' at zero, and with it 'q' away from zero by the gear"):
+        read(tmp_path, away, platform="tip", freeze=["p"])
+
+
+def test_gears_stay_with_their_joints_whatever_link_is_the_base(tmp_path: Path):
+    text = bars([("p", "one", "base", origin(0)), ("q", "two", "one", origin(1)), ("r", "tip", "two", origin(1))], "")
+    for link, ratio in (("two", 0.5), ("tip", -0.7)):
+        text = text.replace(f'<child link="{link}"/>', f'<child link="{link}"/><mimic joint="p" multiplier="{ratio}"/>')
+    back = read(tmp_path, text, base="tip", platform="base")
+    assert full_mobility(back) == 1
+    assert [(c.predecessor, c.successor, c.ratio) for c in back.couplings] == [("base", "one", 0.5),
+                                                                               ("base", "two", -0.7)]
+    twin = PinocchioModel(back)
+    at_zero = ClosedConfiguration.of(twin, twin.q0)
+    base, one = (at_zero.velocity(link)[5] @ at_zero.kernel()[0] for link in ("base", "one"))
+    assert base / (one - base) == pytest.approx(-(1 + 0.5 - 0.7))
+    part = read(tmp_path, text, base="base", platform="two")
+    assert [each.name for each in part.couplings] == ["mimic_q"]
+    with pytest.raises(BadRequest, match="gears join joints between 'one' and 'tip' through others, found 'p'"):
+        read(tmp_path, text, base="one", platform="tip")
+
+
 def test_a_screw_of_either_convention_couples_turn_and_travel(tmp_path: Path):
     text = ('<sdf version="1.10"><model name="m"><link name="base"/><link name="nut"/><joint name="s" type="screw">'
             '<parent>base</parent><child>nut</child><axis><xyz>0 0 1</xyz></axis>{}</joint></model></sdf>')
@@ -167,6 +205,23 @@ def test_a_gearbox_couples_the_two_joints_on_its_reference_body(tmp_path: Path):
     robot = read(tmp_path, text, "sdf", platform="slow")
     assert full_mobility(robot) == 1
     assert [(c.predecessor, c.successor, c.ratio) for c in robot.couplings] == [("fast", "slow", -0.25)]
+
+
+def test_a_mimic_of_sdformat_follows_its_joint_from_a_reference(tmp_path: Path):
+    joint = ('<joint name="{}" type="revolute"><parent>{}</parent><child>{}</child><axis><xyz>0 0 1</xyz>{}</axis>'
+             "</joint>")
+    mimic = '<mimic joint="{}"><multiplier>-2</multiplier><offset>0.5</offset><reference>0.1</reference></mimic>'
+    links = "".join(f'<link name="{name}"/>' for name in ("base", "one", "two"))
+    joints = joint.format("p", "base", "one", "") + joint.format("q", "one", "two", mimic)
+    text = f'<sdf version="1.11"><model name="m">{links}{joints}</model></sdf>'
+    robot = read(tmp_path, text.format("p"), "sdf", platform="two")
+    assert full_mobility(robot) == 1
+    assert [(c.predecessor, c.successor, c.ratio) for c in robot.couplings] == [("one", "two", -2.0)]
+    q = [np.arctan2(robot.links[n].pose[1, 0], robot.links[n].pose[0, 0]) for n in ("one", "two")]
+    assert q[1] - q[0] == pytest.approx(-2 * (q[0] - 0.1) + 0.5)
+    alone = read(tmp_path, text.format("x"), "sdf", platform="two")
+    assert full_mobility(alone) == 2
+    assert any("there is no joint 'x'" in note.text for note in alone.notes)
 
 
 def test_missing_second_axes_are_the_default_and_a_guess(tmp_path: Path):

@@ -66,13 +66,14 @@ def test_gears_are_written_where_the_dialect_has_them(tmp_path: Path):
     text = bars([("p", "one", "base", origin(0)), ("q", "two", "one", origin(1))], "").replace(
         '<child link="two"/>', '<child link="two"/><mimic joint="p" multiplier="-2"/>')
     robot = read(tmp_path, text)
-    for ending in (".xml", ".yaml"):
+    for ending in ENDINGS:
         assert save(robot, tmp_path / f"out{ending}") == ()
         back = load(tmp_path / f"out{ending}")
         assert [(c.predecessor, c.successor, c.ratio) for c in back.couplings] == [("one", "two", -2.0)]
         assert full_mobility(back) == 1
-    (lost,) = save(robot, tmp_path / "out.sdf")
-    assert "no coupling" in lost.text
+    twice = robot.changed(couplings=[*robot.couplings, replace(robot.couplings[0], name="again")])
+    (lost,) = save(twice, tmp_path / "out.sdf")
+    assert "mimic_q" in lost.text
 
 
 @pytest.mark.parametrize("ending", [*ENDINGS, ".usda"])

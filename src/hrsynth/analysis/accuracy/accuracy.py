@@ -111,7 +111,7 @@ def accuracy(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = No
         if nonlinear and not wanted:
             raise BadRequest("samples at the worst poses of a file", nonlinear, "samples at single poses")
     held = None if plane is None else as_pose(plane)
-    cells = grid if not isinstance(grid, str) else Grid.parse(grid, LARGEST_FIELD if into is None else LARGEST_SWEEP)
+    cells = None if grid is None else Grid.parse(grid, LARGEST_FIELD if into is None else LARGEST_SWEEP)
     setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed).telling(wanted)
     blur = Blur.of(cone, noise, setting.observed)
     sees_all(setting)

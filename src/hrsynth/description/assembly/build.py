@@ -141,6 +141,10 @@ def _couplings(graph: JointGraph, mechanism: Mechanism) -> list[Coupling]:
     for gear in graph.gears:
         ends = [mechanism.joints.get(name) for name in (gear.driver, gear.driven)]
         joints = [joint for joint in ends if joint is not None and joint.in_tree and joint.type.freedoms == 1]
+        if len(joints) == 2 and gear.ratio == 0:
+            where = graph.file if gear.line is None else f"{graph.file}:{gear.line}"
+            raise BadMechanism(f"{where}: coupling {gear.name!r}, which would hold joint {gear.driven!r}", gear.ratio,
+                               f"a ratio other than 0, or --freeze {gear.driven}")
         if len(joints) == 2:
             found.append(Coupling(gear.name, joints[0].successor, joints[1].successor, gear.ratio, gear.line))
         elif all(joint is None or joint.type is not JointType.FIXED for joint in

@@ -190,7 +190,7 @@ def basins(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None
         raise BadRequest("number of processes", jobs, "1 or more")
     task = ServoTask.between(setting, goal, goal, Conditions(depth=depth))
     search = BasinSearch(setting, goal, task, jobs or os.cpu_count() or 1)
-    return search.over(Grid.parse(grid, FLOW_STARTS) if grid else search.plane(plane, steps), seed)
+    return search.over(search.plane(plane, steps) if grid is None else Grid.parse(grid, FLOW_STARTS), seed)
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -86,6 +86,20 @@ def add(reader: XmlReader, graph: JointGraph, element: xml.Element, links: tuple
         limit = element.find("axis/limit")
         limits = sound_limits(lambda key: text(limit, key))
         graph.joints[name] = JointSpec(name, JointType(kind), (one, two), axes, limits, (), line, None, in_tree)
+
+
+def mimics(reader: XmlReader, joints: Iterable[tuple[str, xml.Element]]) -> list[GearSpec]:
+    """What ``<mimic>`` says: q = multiplier × (q of the other joint − reference) + offset."""
+    found = []
+    for prefix, element in joints:
+        for mimic in element.findall("axis/mimic"):
+            name, driver = element.get("name"), reader.attribute(mimic, "joint")
+            ratio, offset, start = (float(numbers(reader, mimic.find(tag), (default,))[0]) for tag, default in
+                                    (("multiplier", 1.0), ("offset", 0.0), ("reference", 0.0)))
+            if name is not None and driver is not None:
+                found.append(GearSpec(f"mimic_{prefix}{name}", prefix + driver, prefix + name, ratio,
+                                      offset - ratio * start, xml.line(mimic)))
+    return found
 
 
 def _axis(reader: XmlReader, graph: JointGraph, joint: xml.Element, tag: str, frames: JointFrames,

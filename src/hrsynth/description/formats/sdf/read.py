@@ -20,7 +20,7 @@ from ...postures import value_of
 from ..extensions import read_drake, read_plugins
 from ..paired import onshape_pairs, other_pairs
 from .content import read_content
-from .joint import JointFrames, add, guess_motors, name_gears, numbers, pose_of, text
+from .joint import JointFrames, add, guess_motors, mimics, name_gears, numbers, pose_of, text
 
 MODEL, WORLD = "__model__", "world"
 VERSIONS = "1.4 to 1.12"
@@ -63,6 +63,7 @@ class _SdfReader(XmlReader):
             self._joint(prefix, element)
         graph.note_assumed()
         name_gears(self, graph)
+        graph.follow(mimics(self, self.joints))
         guess_motors(graph)
         self._states(model.get("name"))
         self._closures(model)

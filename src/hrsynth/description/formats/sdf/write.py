@@ -30,10 +30,11 @@ def write(mechanism: Mechanism) -> Written:
     robot, lost = reduce(mechanism, tuple(_NAMES), tuple(_NAMES), tuple(_NAMES), BODY)
     require_free_world(robot, WORLD, "SDFormat")
     lost = (*lost, *_names(robot))
-    if robot.couplings:
-        lost = (*lost, Note("warning", "SDFormat has no coupling of joints on different bodies; not written: "
-                                       + ", ".join(coupling.name for coupling in robot.couplings)))
-    root = etree.Element("sdf", version="1.9")
+    gears = {gear.successor: gear for gear in robot.couplings}
+    if len(gears) < len(robot.couplings):
+        more = comma_list(gear.name for gear in robot.couplings if gear not in gears.values())
+        lost = (*lost, Note("warning", f"a joint of SDFormat follows one other joint; not written: {more}"))
+    root = etree.Element("sdf", version="1.11" if gears else "1.9")
     model = etree.SubElement(root, "model", name=robot.name, nsmap={PREFIX: NAMESPACE})
     for link in robot.links.values():
         if link.name != WORLD:
@@ -44,8 +45,10 @@ def write(mechanism: Mechanism) -> Written:
         weld = etree.SubElement(model, "joint", name=robot.fresh("to_world"), type="fixed")
         etree.SubElement(weld, "parent").text = WORLD
         etree.SubElement(weld, "child").text = robot.base
+    carrier = {joint.successor: joint.name for joint in robot.joints.values() if joint.in_tree}
     for joint in sorted(robot.joints.values(), key=lambda each: not each.in_tree):
-        _joint(model, robot, joint)
+        gear = gears.get(joint.successor) if joint.in_tree else None
+        _joint(model, robot, joint, None if gear is None else (carrier[gear.predecessor], gear.ratio))
     for key, text in annotations_of(robot, motors=True):
         etree.SubElement(model, f"{{{NAMESPACE}}}{key}").text = text
     return Written((xml.text_of(root),), (*lost, *unsaid(robot, SIZES, dialect="SDFormat")))
@@ -63,7 +66,7 @@ def _names(robot: Mechanism) -> list[Note]:
     return [Note("warning", "names that Gazebo refuses, rename them: " + comma_list(odd))] if odd else []
 
 
-def _joint(model: xml.Element, robot: Mechanism, joint: Joint) -> None:
+def _joint(model: xml.Element, robot: Mechanism, joint: Joint, gear: tuple[str, float] | None) -> None:
     bounded = joint.limits is not None and (joint.limits.lower is not None or joint.limits.upper is not None)
     kind = "continuous" if joint.type is JointType.REVOLUTE and not bounded else _NAMES[joint.type]
     element = etree.SubElement(model, "joint", name=joint.name, type=kind)
@@ -75,6 +78,10 @@ def _joint(model: xml.Element, robot: Mechanism, joint: Joint) -> None:
     for tag, axis in zip(("axis", "axis2"), joint.axes, strict=False):
         part = etree.SubElement(element, tag)
         etree.SubElement(part, "xyz", expressed_in="__model__").text = numerals.axis(axis)
+        if gear is not None:
+            mimic = etree.SubElement(part, "mimic", joint=gear[0])
+            for key, value in (("multiplier", gear[1]), ("offset", 0.0), ("reference", 0.0)):
+                etree.SubElement(mimic, key).text = numerals.exact(value)
         if joint.limits is not None and tag == "axis":
             limit = etree.SubElement(part, "limit")
             for key in ("lower", "upper", "effort", "velocity"):

@@ -12,7 +12,7 @@ from ....mechanism.observations.direction import Direction
 from ... import xml
 from ...dialect import RobotFile
 from ...elements import TURNS, sound_limits
-from ...jointgraph import GearSpec, JointGraph, JointSpec, comma_list
+from ...jointgraph import GearSpec, JointGraph, comma_list
 from ..extensions import DRAKE, is_drake, local
 from .conventions import CONVENTIONS
 from .elements import TREE_TYPES, UrdfReader, is_sight
@@ -113,11 +113,7 @@ class _TolerantReader(UrdfReader):
             else:
                 graph.gears.append(GearSpec(coupling.name, str(ends[0]), str(ends[1]), coupling.ratio, 0.0,
                                             coupling.line))
-        for gear in self.mimics:
-            if gear.driver not in graph.joints:
-                graph.note("ignored", f"the mimic of joint {gear.driven!r}: there is no joint {gear.driver!r}")
-            elif all(_is_single(graph.joints[name]) for name in (gear.driver, gear.driven)):
-                graph.gears.append(replace(gear, name=graph.fresh(gear.name)))
+        graph.follow(self.mimics)
 
     def own(self, graph: JointGraph) -> None:
         """Platform, camera and observations where the file has an ``<hrsynth>`` element all the same."""
@@ -137,7 +133,3 @@ class _TolerantReader(UrdfReader):
                 if self.check_link(link, xml.line(element), "observe: unknown link") and leg and link:
                     axis = self.direction(element, "axis", (0, 0, 1))
                     graph.observations.append(Direction(leg, link, np.asarray(axis), line=xml.line(element)))
-
-
-def _is_single(joint: JointSpec) -> bool:
-    return joint.type in (JointType.REVOLUTE, JointType.PRISMATIC)
