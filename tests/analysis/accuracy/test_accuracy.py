@@ -304,7 +304,7 @@ def legend(found: Accuracy) -> list[str]:
     ("1,9", "0.1deg", {}, "no leg or link"),
     ("1,4", "0.1deg", {"plane": "z=-0.7", "grid": "x=0:1:2"}, "both"),
     ("1,4", "0.1deg", {"steps": 5}, "poses a side"),
-    ("1,4", "0.1deg", {"nonlinear": -1}, "samples"),
+    ("1,4", "0.1deg", {"nonlinear": -1}, "nonlinear"),
     ("1,4", "0.1deg", {"plane": "w=1"}, "unknown part"),
 ])
 def test_bad_requests(legs: str, cones: str, options: dict, word: str) -> None:
