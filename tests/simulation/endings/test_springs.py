@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hrsynth.closed_forms.legs import OnCrank
 from hrsynth.simulation.endings.cover import cover
 from hrsynth.simulation.endings.pose_error import NotEnclosed, PoseError
 from hrsynth.simulation.endings.spring_error import SpringError, SpringSubdivision
@@ -191,6 +192,33 @@ def test_boxes_of_a_chart_hold_what_is_met_there_and_no_more(side: float) -> Non
     assert all(held(each, own) for each in met)
     for p, R in own:
         assert np.abs(slope(error, p, R)[0]).max() < 1e-9
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rod, rests, boxes", [(0.5, 1, 0), (0.2, 0, 0), (0.3, 0, 1)])
+def test_rests_that_a_leg_does_not_reach_are_left_out(rod: float, rests: int, boxes: int) -> None:
+    """The goal of the Gough-Stewart platform, a leg that is not watched being a crank with a rod, which lies within its
+    reach, beyond it, or stretched; that is left open."""
+    error = of_robot()
+    idle = next(i for i in range(len(error.limbs)) if i not in {each.limb for each in error.seen})
+    tip = error.limbs[idle].tip
+    place = error.p + error.R @ tip.turned
+    crank = OnCrank("", tip, centre=place - [0.5, 0.0, 0.0], axis=np.array([0.0, 0.0, 1.0]), radius=0.2, rod=rod)
+    limbs = [crank if i == idle else limb for i, limb in enumerate(error.limbs)]
+    chart, y = coordinates(replace(error, limbs=tuple(limbs)), error.p, error.R)
+    part = SpringSubdivision(chart, y - 0.001, y + 0.0012)
+    part.run(1000)
+    assert not part.left
+    assert (len(part.zeros()), len(part.left)) == (rests, boxes)
+
+
+def test_a_zero_may_be_another_than_that_of_a_box() -> None:
+    """No rest is proved where the zero of a box may lie farther away than the one that is proved to exist."""
+    error = of_robot()
+    chart, y = coordinates(error, error.p, error.R)
+    part = SpringSubdivision(chart, y - 1, y + 1)
+    assert part._exist(y[None], np.full((1, 7), 1e-9)).all()
+    assert not part._exist(y[None], np.full((1, 7), 1e-6)).any()
 
 
 def test_other_watched_legs_are_refused() -> None:
