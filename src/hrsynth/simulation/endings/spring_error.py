@@ -410,14 +410,16 @@ class SpringSubdivision(LoopSubdivision):
         short = np.abs(np.cos(x[:, 3:6])) < np.abs(np.sin(x[:, 3:6]))
         rows = np.concatenate([np.broadcast_to(np.arange(4), (len(x), 4)), 4 + np.arange(3) + 3 * short], axis=1)
         proved = np.zeros(len(x), dtype=bool)
-        for about in (np.full(x.shape, radius) for radius in MET_AGAIN / 4.0 ** np.arange(4)):
+        for radius in MET_AGAIN * 4.0 ** np.arange(-3, 4):
+            about = np.full(x.shape, radius)
             F, K = self._equations(x, about)
             F, K = entries(F, rows), entries(K.transposed(), rows).transposed()
             Y = inverse(K.v[0])
             with np.errstate(all="ignore"):
                 off = ((np.eye(7) - combine(Y, K)).size @ about[..., None])[..., 0]
-                proved |= np.all(np.maximum(reach, (combine(Y, F).size + off) * (1 + AFFINE_ROUNDING)) < about, axis=1)
-        return proved & np.all(np.abs(np.cos(x[:, 3:6])) > 2 * MET_AGAIN, axis=1)
+                far = np.maximum(reach, (combine(Y, F).size + off) * (1 + AFFINE_ROUNDING))
+            proved |= np.all(far < about, axis=1) & np.all(np.abs(np.cos(x[:, 3:6])) > 2 * radius, axis=1)
+        return proved
 
     def over_pose(self, x: Array) -> Iterator[tuple[PlaneError, BoxFormula, Flags]]:
         """The error over the pose in some charts, what tells coordinates there, and of which zeros (c, 7)."""
