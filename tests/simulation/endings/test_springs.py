@@ -5,13 +5,17 @@ and no other."""
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from hrsynth.closed_forms.legs import OnCrank
-from hrsynth.simulation.endings.cover import _same, cover
+from hrsynth.present.text.endings import _complete
+from hrsynth.simulation.endings.cover import Cover, _same, cover
 from hrsynth.simulation.endings.pose_error import NotEnclosed, PoseError
+from hrsynth.simulation.endings.rests import RestCover
 from hrsynth.simulation.endings.spring_error import SpringError, SpringSubdivision
 from hrsynth.simulation.endings.subdivision import CriticalBox, forms_of
 from simulation import scenes
@@ -232,6 +236,13 @@ def test_rests_half_a_turn_apart_are_two() -> None:
     assert len(boxes) == 2
     assert [[_same(one, other, SpringError.about(error)) for one in boxes] for other in boxes] == [
         [True, False], [False, True]]
+
+
+def test_words_except_legs_without_a_length() -> None:
+    """Where rests are those of springs, legs that are not watched may be telescopic ones."""
+    told = RestCover(Cover((), (), 0.0, 10, True, loop=SpringError.about(of_robot())), (), 0, None)
+    found: Any = SimpleNamespace(cover=told)
+    assert "leg 2 or 4 or 6 is stretched or has no length, or a watched direction is" in _complete(found)[0]
 
 
 def test_a_zero_may_be_another_than_that_of_a_box() -> None:
