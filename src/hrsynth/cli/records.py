@@ -895,10 +895,10 @@ class RestCoverRecord(TypedDict):
     all; `within_m` of the goal, null if the legs bound the box. Left out are: sliding rods shorter than `shorter_m`
     (null if there are none); a platform that only translates, in any but one of `turns` turns, at `turned` poses of the
     list; poses at which the joints of the legs `unread` lock; and (null if these were searched) those at which one of
-    the legs `unstretched` is stretched or `across` watched directions are at right angles to the desired ones. `apart`
-    of the list lie where nothing was searched. At `crossings` points of the platform rests fill curves, because two
-    legs' joints lock. `alone` are the proved ones that are not in the list, `strangers` of the list are not among
-    the proved ones."""
+    the legs `unstretched` is stretched or has no length, or `across` watched directions are at right angles to the
+    desired ones. `apart` of the list lie where nothing was searched. At `crossings` points of the platform rests fill
+    curves, because two legs' joints lock. `alone` are the proved ones that are not in the list, `strangers` of the list
+    are not among the proved ones."""
 
     complete: bool
     proved: int

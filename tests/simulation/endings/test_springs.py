@@ -5,14 +5,19 @@ and no other."""
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from hrsynth.simulation.endings.cover import cover
+from hrsynth.closed_forms.legs import OnCrank
+from hrsynth.present.text.endings import _complete
+from hrsynth.simulation.endings.cover import Cover, _same, cover
 from hrsynth.simulation.endings.pose_error import NotEnclosed, PoseError
+from hrsynth.simulation.endings.rests import RestCover
 from hrsynth.simulation.endings.spring_error import SpringError, SpringSubdivision
-from hrsynth.simulation.endings.subdivision import forms_of
+from hrsynth.simulation.endings.subdivision import CriticalBox, forms_of
 from simulation import scenes
 
 LEGS, ROBOTS, STARTS = ("1", "3", "5"), 12, 1000
@@ -191,6 +196,62 @@ def test_boxes_of_a_chart_hold_what_is_met_there_and_no_more(side: float) -> Non
     assert all(held(each, own) for each in met)
     for p, R in own:
         assert np.abs(slope(error, p, R)[0]).max() < 1e-9
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("rod", "rests", "boxes"), [(0.5, 1, 0), (0.2, 0, 0), (0.3, 0, 1)])
+def test_rests_that_a_leg_does_not_reach_are_left_out(rod: float, rests: int, boxes: int) -> None:
+    """The goal of the Gough-Stewart platform, a leg that is not watched being a crank with a rod, which lies within its
+    reach, beyond it, or stretched; that is left open."""
+    error = of_robot()
+    idle = next(i for i in range(len(error.limbs)) if i not in {each.limb for each in error.seen})
+    tip = error.limbs[idle].tip
+    place = error.p + error.R @ tip.turned
+    crank = OnCrank("", tip, centre=place - [0.5, 0.0, 0.0], axis=np.array([0.0, 0.0, 1.0]), radius=0.2, rod=rod)
+    limbs = [crank if i == idle else limb for i, limb in enumerate(error.limbs)]
+    chart, y = coordinates(replace(error, limbs=tuple(limbs)), error.p, error.R)
+    part = SpringSubdivision(chart, y - 0.001, y + 0.0012)
+    part.run(1000)
+    assert not part.left
+    assert (len(part.zeros()), len(part.left)) == (rests, boxes)
+
+
+@pytest.mark.slow
+def test_rests_half_a_turn_apart_are_two() -> None:
+    """Two balls lie on an axis through the platform's point, the third rod meets it at right angles: half a turn about
+    it from the goal is another mode, with the same point and the same directions but for signs."""
+    error, boxes = random_error(3), list[CriticalBox]()
+    limbs, R = list(error.limbs), error.R
+    for each, arm in zip(error.seen, ([0.3, 0.0, 0.0], [-0.4, 0.0, 0.0], [0.1, 0.5, 0.0]), strict=True):
+        limb = limbs[each.limb]
+        limbs[each.limb] = replace(limb, tip=replace(limb.tip, turned=np.array(arm)),
+                                   centre=error.p + R @ [0.1, 1.3, 0.0] if arm[1] else limb.centre)
+    error = replace(error, limbs=tuple(limbs))
+    for turn in (np.eye(3), np.diag([1.0, -1.0, -1.0])):
+        chart, y = coordinates(error, error.p, R @ turn)
+        part = SpringSubdivision(chart, y - 2e-4, y + 2.3e-4)
+        part.run(60_000)
+        boxes += part.zeros()
+        assert not part.left
+    assert len(boxes) == 2
+    assert [[_same(one, other, SpringError.about(error)) for one in boxes] for other in boxes] == [
+        [True, False], [False, True]]
+
+
+def test_words_except_legs_without_a_length() -> None:
+    """Where rests are those of springs, legs that are not watched may be telescopic ones."""
+    told = RestCover(Cover((), (), 0.0, 10, True, loop=SpringError.about(of_robot())), (), 0, None)
+    found: Any = SimpleNamespace(cover=told)
+    assert "leg 2 or 4 or 6 is stretched or has no length, or a watched direction is" in _complete(found)[0]
+
+
+def test_a_zero_may_be_another_than_that_of_a_box() -> None:
+    """No rest is proved where the zero of a box may lie farther away than the one that is proved to exist."""
+    error = of_robot()
+    chart, y = coordinates(error, error.p, error.R)
+    part = SpringSubdivision(chart, y - 1, y + 1)
+    assert part._exist(y[None], np.full((1, 7), 1e-9)).all()
+    assert not part._exist(y[None], np.full((1, 7), 1e-4)).any()
 
 
 def test_other_watched_legs_are_refused() -> None:

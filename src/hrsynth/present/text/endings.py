@@ -76,7 +76,7 @@ def _complete(found: Endings) -> list[str]:
     where += "" if told.shorter is None else f", no rod shorter than {1e3 * told.shorter:.3g} mm"
     apart = [f"the joints of {name_all('leg', told.cover.unread)} lock"] if told.cover.unread else []
     if told.unstretched is not None:
-        apart += [f"leg {' or '.join(told.unstretched)} is stretched"] if told.unstretched else []
+        apart += [f"leg {' or '.join(told.unstretched)} is stretched or has no length"] if told.unstretched else []
         apart += ["a watched direction is at right angles to the desired one" if told.across == 1 else
                   "both watched directions are at right angles to the desired ones"]
     where += f", except for poses at which {', or '.join(apart)}" if apart else ""

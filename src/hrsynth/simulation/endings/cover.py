@@ -310,11 +310,12 @@ def _alike(one: CriticalBox, other: CriticalBox, loop: LoopError) -> bool:
 
 def _same(one: CriticalBox, other: CriticalBox, error: JointError) -> bool:
     """Whether two enclosed zeros are at one pose with the same directions, or opposite ones: enclosures of what is
-    watched meet."""
+    watched meet, of turns by an angle and by half a turn less it as well."""
     watched = {each.limb for each in error.error.seen}
     own = [*range(error.error.size), *(k for k, i in enumerate(error.joints, error.error.size) if i in watched)]
     apart = np.linalg.norm(np.cross(one.directions, other.directions), axis=1).max(initial=0.0)
-    return _meet(one, other, error, own) and bool(apart < SAME_ENDING)
+    turned = float(np.abs(one.R - other.R).max())
+    return _meet(one, other, error, own) and max(apart, turned) < SAME_ENDING
 
 
 def _meet(one: CriticalBox, other: CriticalBox, error: JointError, own: list[int]) -> bool:

@@ -25,7 +25,7 @@ import numpy as np
 
 from ...batch.enclosures import BoxFormula
 from ...closed_forms.legs import ClosedFormLeg, SlidingRod
-from ...geometry.affine import AffineForms, combine
+from ...geometry.affine import AffineForms, combine, stack
 from ...geometry.components import (
     Components,
     combination,
@@ -388,54 +388,50 @@ class SpringSubdivision(LoopSubdivision):
 
     def _report(self, x: Array, reach: Array) -> list[CriticalBox]:
         """The rests at zeros that are proved; without those at which a watched direction is at right angles to the
-        desired one. What is not decided is left open."""
+        desired one, or which a leg does not reach. What is not decided is left open: also where a rod may have no
+        length."""
         found, reach = list[CriticalBox](), self._narrow_zeros(x)
         proved = self._exist(x, reach)
         for over, told, own in self.over_pose(x):
-            y, room = _about(told, x[own], reach[own])
-            u = over.directions.together(forms_of(y, room))
+            (y, room), part = _about(told, x[own], reach[own]), Subdivision(over, -np.ones(6), np.ones(6))
+            forms = forms_of(y, room)
             wanted = np.einsum("ij,ik->ijk", np.eye(3), self.error.desired).reshape(3, 9)
-            cosines = combine(np.broadcast_to(wanted, (len(y), 3, 9)), u)
-            across = np.any(cosines.size < SAME_ENDING, axis=1)
-            settled = across | proved[own]
-            for zero in Subdivision(over, -np.ones(6), np.ones(6))._report(y, room) if len(y) else []:
-                k = int(np.abs(over.pose(y)[0] - zero.p / over.error.length).max(axis=1).argmin())
-                settled[k] &= across[k] or self._is_long(zero)
-                found += [zero] if settled[k] and not across[k] else []
-            self.left += list(zip(x[own][~settled], reach[own][~settled], strict=True))
+            cosines = combine(np.broadcast_to(wanted, (len(y), 3, 9)), over.directions.together(forms))
+            margins = stack(part._values(forms)[3])
+            out = np.any(cosines.size < SAME_ENDING, axis=1) | np.any(margins.high < 0, axis=1)
+            good = ~out & proved[own] & np.all(margins.low > 0, axis=1)
+            found += part._report(y[good], room[good]) if good.any() else []
+            self.left += list(zip(x[own][~out & ~good], reach[own][~out & ~good], strict=True))
         return found
 
     def _exist(self, x: Array, reach: Array) -> Flags:
-        """Whether boxes about places (c, 7) hold exactly one zero, and no t is endless there: of each rod one of both
-        equations, the force's where it is short."""
+        """Whether boxes about places (c, 7) that hold all within ``reach`` hold exactly one zero, and no t is endless
+        there: of each rod one of both equations, the force's where it is short."""
         short = np.abs(np.cos(x[:, 3:6])) < np.abs(np.sin(x[:, 3:6]))
         rows = np.concatenate([np.broadcast_to(np.arange(4), (len(x), 4)), 4 + np.arange(3) + 3 * short], axis=1)
         proved = np.zeros(len(x), dtype=bool)
-        for about in (np.full(x.shape, radius) for radius in MET_AGAIN / 4.0 ** np.arange(4)):
+        for radius in MET_AGAIN * 4.0 ** np.arange(-3, 4):
+            about = np.full(x.shape, radius)
             F, K = self._equations(x, about)
             F, K = entries(F, rows), entries(K.transposed(), rows).transposed()
             Y = inverse(K.v[0])
             with np.errstate(all="ignore"):
                 off = ((np.eye(7) - combine(Y, K)).size @ about[..., None])[..., 0]
-                proved |= np.all((combine(Y, F).size + off) * (1 + AFFINE_ROUNDING) < about, axis=1)
-        return proved & np.all(np.abs(np.cos(x[:, 3:6])) > 2 * MET_AGAIN, axis=1)
-
-    def _is_long(self, zero: CriticalBox) -> bool:
-        """Whether no rod may have no length there."""
-        error = self.error.error
-        arms = np.array([limb.tip.turned for limb in error.limbs])
-        rods = zero.p / error.length + arms @ zero.R.T - np.array([limb.centre for limb in error.limbs])
-        return bool(np.linalg.norm(rods, axis=1).min() > 4 * (MET_AGAIN + zero.radius.max()) * (1 + np.abs(arms).max()))
+                far = np.maximum(reach, (combine(Y, F).size + off) * (1 + AFFINE_ROUNDING))
+            proved |= np.all(far < about, axis=1) & np.all(np.abs(np.cos(x[:, 3:6])) > 2 * radius, axis=1)
+        return proved
 
     def over_pose(self, x: Array) -> Iterator[tuple[PlaneError, BoxFormula, Flags]]:
         """The error over the pose in some charts, what tells coordinates there, and of which zeros (c, 7)."""
         near = np.abs(quaternions(np.array([self._turn(each) for each in x]))).argmax(axis=1)
+        # where not all rods slide, no leg reaches far
+        slide = all(isinstance(each, SlidingRod) for each in self.error.error.limbs)
         for one in range(4):
             own = near == one
             shift = np.full((len(x), 3), np.nan)
             shift[own] = _about(self.error.tell_pose(one, None), x[own], 0 * x[own])[0][:, :3]
             with np.errstate(invalid="ignore"):
-                away_, most = np.abs(shift).max(axis=1) > NEAREST_FAR, np.abs(shift).argmax(axis=1)
+                away_, most = slide & (np.abs(shift).max(axis=1) > NEAREST_FAR), np.abs(shift).argmax(axis=1)
             for far in (None, 0, 1, 2):
                 some = own & (~away_ if far is None else away_ & (most == far))
                 if some.any():
