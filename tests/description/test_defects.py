@@ -129,6 +129,9 @@ DEFECTS: dict[str, tuple[list, list[tuple[int, str]]]] = {
                                    '<transmission name="m">')],
                              [(34, "coupling without <ratio>, g"), (34, "second coupling of the same name, g"),
                               (34, "coupling without <successor>, g"), (34, "value of <ratio>, 1 2, one number")]),
+    "gear of a link with itself": ([(34, '<coupling name="g"><predecessor link="crank"/><successor link="crank"/>'
+                                         '<ratio value="2"/></coupling><transmission name="m">')],
+                                   [(34, "successor of a coupling, coupled with itself, crank, another link")]),
     "gear that holds": ([(34, '<coupling name="g"><predecessor link="crank"/><successor link="bar"/>'
                               '<ratio value="-0"/></coupling><transmission name="m">')],
                         [(34, "ratio of a coupling, which would hold its second joint, -0, a number other than 0")]),

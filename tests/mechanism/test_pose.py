@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from hrsynth.errors import BadRequest
 from hrsynth.geometry.vectors import pose, rotation_from_rpy
-from hrsynth.mechanism.pose import Grid, Pose
+from hrsynth.mechanism.pose import Grid, Pose, asked_poses
 from oracle import exponential
 
 numbers = st.floats(-5, 5).map(lambda value: round(value, 4) + 0.0)
@@ -96,3 +96,10 @@ def test_what_is_refused_of_a_grid(text: str, what: str) -> None:
     with pytest.raises(BadRequest) as caught:
         Grid.parse(text)
     assert what in str(caught.value)
+
+
+@pytest.mark.parametrize("given", [b"x=1", bytearray(b"x=1"), [b"x=1"]])
+def test_bytes_are_no_pose(given: object) -> None:
+    """Their numbers are letters."""
+    with pytest.raises(BadRequest, match="a pose"):
+        asked_poses(given)

@@ -146,6 +146,8 @@ def as_pose(given: PoseLike) -> Pose:
         if isinstance(given, Mapping):
             return Pose.parse(",".join(f"{name}={_as_text(value)}" for name, value in given.items()
                                        if value is not None))
+        if isinstance(given, bytes | bytearray):
+            raise TypeError
         numbers = np.asarray(getattr(given, "homogeneous", given), dtype=float)
     except (TypeError, ValueError):
         raise BadRequest("a pose", given, POSES) from None
@@ -173,7 +175,7 @@ def asked_poses(given: PoseLike | Iterable[PoseLike] | None) -> list[Pose | Mode
     if given is None:
         return []
     several: Any = given
-    if isinstance(given, str | Pose | ModeNumber | Mapping) or hasattr(given, "homogeneous"):
+    if isinstance(given, str | bytes | bytearray | Pose | ModeNumber | Mapping) or hasattr(given, "homogeneous"):
         several = [given]
     elif not isinstance(given, Iterable) or (isinstance(given, np.ndarray) and given.ndim == 0):
         raise BadRequest("poses", given, f"one or several of: {POSES}")

@@ -295,6 +295,7 @@ def legend(found: Accuracy) -> list[str]:
     ("1,4", "0", {}, "half-angle"),
     ("1,4", "90deg", {}, "half-angle"),
     ("1,4", "-1deg", {}, "half-angle"),
+    ("1,4", True, {}, "half-angle"),
     ("1,4", "wide", {}, "not a number"),
     ("1,4", "nan", {}, "half-angle"),
     ("1,4", "1=0.1deg", {}, "leg 4 has no cone"),
@@ -307,7 +308,7 @@ def legend(found: Accuracy) -> list[str]:
     ("1,4", "0.1deg", {"nonlinear": -1}, "nonlinear"),
     ("1,4", "0.1deg", {"plane": "w=1"}, "unknown part"),
 ])
-def test_bad_requests(legs: str, cones: str, options: dict, word: str) -> None:
+def test_bad_requests(legs: str, cones: str | bool, options: dict, word: str) -> None:
     with pytest.raises(BadRequest) as caught:
         accuracy(load("quattro"), legs, cone=cones, **options)
     assert word in str(caught.value)

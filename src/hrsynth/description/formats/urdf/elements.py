@@ -166,6 +166,8 @@ class UrdfReader(XmlReader):
         one, two = self.ends(element, tags, (ORIGIN, ORIGIN))
         for end, tag in zip((one, two), tags, strict=True):
             self.check_link(end.link, end.line, f"{tag} of a coupling: unknown link")
+        if one.link and one.link == two.link:
+            self.defect(two.line, "successor of a coupling, coupled with itself", two.link, "another link")
         ratio = self.only(element, "ratio")
         if ratio is None:
             self.defect(xml.line(element), "coupling without <ratio>", name)
