@@ -79,7 +79,7 @@ def _angle(text: str) -> float:
 
 
 def _require_angle(value: Any, shown: object) -> float:
-    if not (isinstance(value, Real) and not isinstance(value, bool) and 0 < float(value) < math.pi / 2):
+    if isinstance(value, bool) or not (isinstance(value, Real) and 0 < float(value) < math.pi / 2):
         raise BadRequest("half-angle of a cone", shown, ALLOWED)
     if value < NARROWEST_CONE:
         raise BadRequest("half-angle of a cone", shown, f"at least {NARROWEST_CONE:g} (radians)")
