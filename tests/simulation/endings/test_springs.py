@@ -85,7 +85,7 @@ def met_by_hand(error, rng, starts, far=4.0):
                 break
             if not np.isfinite(move).all():
                 break
-            move *= min(1.0, 0.5 / np.abs(move).max())
+            move *= min(1.0, 0.5 / max(float(np.abs(move).max()), 1e-300))
             p, R = p + move[:3], turned(move[3:]) @ R
             if np.abs(move).max() < 1e-11:
                 g, c, _ = slope(error, p, R)
