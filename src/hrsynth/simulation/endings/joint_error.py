@@ -108,6 +108,12 @@ class JointError(Value):
         return rodless(error) - error.p
 
     @property
+    def idle(self) -> list[ClosedFormLeg]:
+        """The limbs that are not watched."""
+        watched = {each.limb for each in self.error.seen}
+        return [each for i, each in enumerate(self.error.limbs) if i not in watched]
+
+    @property
     def freedoms(self) -> int:
         """Coordinates of the pose."""
         return self.error.size

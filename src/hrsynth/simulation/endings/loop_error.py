@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from ...batch.enclosures import BoxFormula
-from ...closed_forms.legs import ClosedFormLeg, OnCrank, OnRail, SlidingRod
+from ...closed_forms.legs import OnCrank, OnRail, SlidingRod
 from ...geometry.affine import AffineForms, stack
 from ...geometry.components import Components, cosine, cross, dot, minus, plus, scale, sine
 from ...geometry.vectors import Array
@@ -87,16 +87,10 @@ class LoopError(JointError):
         without a force fill curves or surfaces in space."""
         return 1 if self.error.size > self.error.shifts.shape[1] else 2
 
-    @property
-    def idle(self) -> list[ClosedFormLeg]:
-        """The limbs that are not watched."""
-        return [each for i, each in enumerate(self.error.limbs) if i not in self.joints]
-
     @cached_property
     def desired(self) -> list[Array]:
         """u* of both rods."""
-        error = self.error
-        return [np.array(error._direction(each, error.p, error.R.ravel(), lambda value: value)) for each in error.seen]
+        return [np.array(each) for each in self.wanted]
 
     @cached_property
     def terms(self) -> list[Term]:

@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from ...batch.enclosures import BoxFormula
-from ...closed_forms.legs import ClosedFormLeg, SlidingRod
+from ...closed_forms.legs import SlidingRod
 from ...geometry.affine import AffineForms, combine, stack
 from ...geometry.components import (
     Components,
@@ -129,17 +129,10 @@ class SpringError(JointError):
         return [limb for each in self.error.seen if each.limb is not None
                 and isinstance(limb := self.error.limbs[each.limb], SlidingRod)]
 
-    @property
-    def idle(self) -> list[ClosedFormLeg]:
-        """The limbs that are not watched."""
-        watched = {each.limb for each in self.error.seen}
-        return [each for i, each in enumerate(self.error.limbs) if i not in watched]
-
     @cached_property
     def desired(self) -> Array:
         """u* (3, 3)."""
-        error = self.error
-        return np.array([error._direction(each, error.p, error.R.ravel(), lambda value: value) for each in error.seen])
+        return np.array(self.wanted)
 
     @cached_property
     def bases(self) -> Array:
@@ -147,9 +140,14 @@ class SpringError(JointError):
         return np.array([each.centre - each.tip.constant for each in self.limbs])
 
     @cached_property
+    def points(self) -> Array:
+        """b (3, 3), in the platform's axes."""
+        return np.array([each.tip.turned for each in self.limbs])
+
+    @cached_property
     def frame(self) -> Array:
         """Axes of the platform (3, 3): along b₂ − b₁, across it in the plane of the b, and normal to it."""
-        b = np.array([each.tip.turned for each in self.limbs])
+        b = self.points
         one, normal = b[1] - b[0], np.cross(b[1] - b[0], b[2] - b[0])
         with np.errstate(all="ignore"):
             one, normal = one / np.linalg.norm(one), normal / np.linalg.norm(normal)
@@ -158,7 +156,7 @@ class SpringError(JointError):
     @cached_property
     def sizes(self) -> Array:
         """The sides b₁b₂, b₁b₃, b₂b₃ of the triangle, and twice its area over the longest."""
-        b = np.array([each.tip.turned for each in self.limbs])
+        b = self.points
         sides = [float(np.linalg.norm(b[i] - b[j])) for i, j in PAIRS]
         area = float(np.linalg.norm(np.cross(b[1] - b[0], b[2] - b[0])))
         return np.array([*sides, area / max(*sides, EXACT)])
@@ -223,11 +221,18 @@ class SpringError(JointError):
     def _points(self, angle: Any, number: Number) -> list[list[Any]]:
         """The b in the plane's axes, from the first, turned by ψ."""
         c, s, side, found = cosine(angle), sine(angle), self.side, list[list[Any]]()
-        b = np.array([each.tip.turned for each in self.limbs])
-        for x, z in (b - b[0]) @ self.frame[:2].T:
+        for x, z in (self.points - self.points[0]) @ self.frame[:2].T:
             x, z = number(x), number(z)
             found.append([c * x - s * (side * z), s * x + c * (side * z)])
         return found
+
+    def rotation(self, y: Sequence[Any], number: Number) -> list[Any]:
+        """R by rows."""
+        x1, x2, n = self.across(self.plane(y, number)[0], number)
+        c, s, side = cosine(y[6]), sine(y[6]), self.side
+        axes = [plus(scale(c, x1), scale(s, x2)), scale(side, minus(scale(c, x2), scale(s, x1))), scale(side, n)]
+        return [total(axis[i] * number(own[j]) for axis, own in zip(axes, self.frame, strict=True))
+                for i in range(3) for j in range(3)]
 
     def rest(self, y: Sequence[Any], number: Number) -> list[Any]:
         """What is left: of each rod f · (b − a) by its length, and by its force; and Σ f · (R b − a)."""
@@ -293,15 +298,10 @@ class SpringError(JointError):
         def formula(y: Sequence[Any], number: Number) -> list[Any]:
             at, m = self.springs(y, number), self.plane(y, number)[0]
             x1, x2, n = self.across(m, number)
-            c, s, error = cosine(y[6]), sine(y[6]), self.error
-            axes = [plus(scale(c, x1), scale(s, x2)),
-                    scale(self.side, minus(scale(c, x2), scale(s, x1))), scale(self.side, n)]
-            # R by rows, from the axes of the platform
-            R = [total(axis[i] * number(own[j]) for axis, own in zip(axes, self.frame, strict=True))
-                 for i in range(3) for j in range(3)]
+            error, R = self.error, self.rotation(y, number)
             level, away_ = plus(scale(at.place[0], x1), scale(at.place[1], x2)), scale(1.0 / sqrt(dot(m, m)), n)
             point = scale(1.0 / y[2], plus(level, away_)) if self.distant else plus(level, scale(y[2], away_))
-            point = minus(minus(point, transform_vector(R, number(self.limbs[0].tip.turned))), number(error.p))
+            point = minus(minus(point, transform_vector(R, number(self.points[0]))), number(error.p))
             shift = [dot(point, number(way)) for way in error.shifts.T]
             if far is not None:
                 shift = [(1.0 if k == far else each) * (1.0 / shift[far]) for k, each in enumerate(shift)]
@@ -423,7 +423,8 @@ class SpringSubdivision(LoopSubdivision):
 
     def over_pose(self, x: Array) -> Iterator[tuple[PlaneError, BoxFormula, Flags]]:
         """The error over the pose in some charts, what tells coordinates there, and of which zeros (c, 7)."""
-        near = np.abs(quaternions(np.array([self._turn(each) for each in x]))).argmax(axis=1)
+        R = np.reshape([self.error.rotation(list(each), np.asarray) for each in x], (-1, 3, 3))
+        near = np.abs(quaternions(R)).argmax(axis=1)
         # where not all rods slide, no leg reaches far
         slide = all(isinstance(each, SlidingRod) for each in self.error.error.limbs)
         for one in range(4):
@@ -436,10 +437,3 @@ class SpringSubdivision(LoopSubdivision):
                 some = own & (~away_ if far is None else away_ & (most == far))
                 if some.any():
                     yield self.error.in_pose(one, far), self.error.tell_pose(one, far), some
-
-    def _turn(self, y: Array) -> Array:
-        """R at coordinates (n,)."""
-        m, *_ = self.error.plane(list(y), np.asarray)
-        x1, x2, n = (np.array(each) for each in self.error.across(m, np.asarray))
-        c, s, side = np.cos(y[6]), np.sin(y[6]), self.error.side
-        return np.asarray(np.stack([c * x1 + s * x2, side * (c * x2 - s * x1), side * n], axis=1) @ self.error.frame)
