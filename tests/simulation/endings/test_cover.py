@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
 
 from hrsynth import load
 from hrsynth.analysis.asked import configurations_at
@@ -144,6 +145,104 @@ def test_joints_are_narrowed_to_where_the_legs_close(name):
     assert cut > 6
 
 
+class Looked(Subdivision):
+    """Boxes, with all tubes that were looked at."""
+
+    tubes: list
+
+    def _settle(self, tube, P, N):
+        self.tubes.append((np.array([each.v for each in tube]), np.array([each.r for each in tube]), P, N))
+        return super()._settle(tube, P, N)
+
+
+def closed(error, y, P):
+    """Coordinates (c, n), those of P (c, k) so that the equations hold; no numbers where Newton's method does not
+    meet them."""
+    n, k = error.size
+    y = y.copy()
+    for _ in range(12):
+        told = np.array([each.v[0] for each in error.slopes.at(
+            [affine(x, np.zeros((len(y), 0)), 0 * x) for x in y.T])]).T
+        g, M = told[:, :k], told[:, k : k + k * n].reshape(-1, k, n)
+        step = np.linalg.pinv(np.take_along_axis(M, P[:, None], 2)) @ g[..., None]
+        np.put_along_axis(y, P, np.take_along_axis(y, P, 1) - step[..., 0], 1)
+    return np.where(np.abs(g).max(axis=1, keepdims=True) < 1e-10, y, np.nan)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["3rpr_m1", "3rrr_m1", "orthoglide", "quattro"])
+def test_a_tube_holds_all_that_meets_the_equations_in_its_box(name):
+    """In the box's own symbols and those of what each equation leaves open, one after the other."""
+    setting, rng = ObservedRobot.of(name), np.random.default_rng(0)
+    error = JointError.of(PoseError.of(setting, setting.everything.start))
+    (n, k), (low, high) = error.size, error.box(*bounds(error.error, 1.0)[:2], 1.0)
+    part, met = Looked(error, low, high), 0
+    for times in np.repeat([0.1, 0.03, 0.01, 0.001], 8):
+        y = np.full((1, n), np.nan)
+        while np.isnan(y).any():
+            y = closed(error, rng.uniform(low, high)[None], np.arange(n - k, n)[None])
+        half = times * (high - low)[None] * rng.uniform(0.3, 1, (1, n))
+        middle, part.tubes = y + half * rng.uniform(-0.9, 0.9, (1, n)), []
+        part._open(middle, half)
+        for v, r, P, N in part.tubes:
+            x = np.repeat(middle, 60, axis=0) + half * rng.uniform(-1, 1, (60, n))
+            x = closed(error, x, np.repeat(P, 60, axis=0))
+            x = x[np.all(np.abs(x - middle) < half, axis=1)]
+            met += len(x)
+            d = n - k
+            # the symbols of N, and what is left of P then
+            at, own = v[N[0], 0, 0], v[N[0], 1 : 1 + d, 0]
+            symbols = np.linalg.solve(own, (x[:, N[0]] - at).T).T
+            assert np.all(np.abs(symbols) < 1 + 1e-9)
+            left = x[:, P[0]] - v[P[0], 0, 0] - symbols @ v[P[0], 1 : 1 + d, 0].T
+            doubt = v[P[0], 1 + d :, 0]
+            assert np.all(np.abs(left) < np.abs(doubt).sum(axis=1) + r[P[0], 0] + 1e-9)
+            if np.all(r[P[0], 0] < 1e-9) and np.linalg.cond(doubt) < 1e6:
+                assert np.all(np.abs(np.linalg.solve(doubt, left.T)) < 1 + 1e-6)
+    assert met > 200
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["3rpr_m1", "3rrr_m1", "quattro"])
+def test_moments_about_a_tip_are_those_of_the_other_legs(name):
+    """By differences of the other legs' part of E, in the closed forms of their working modes, while the platform turns
+    about the tip."""
+    setting, rng = ObservedRobot.of(name), np.random.default_rng(0)
+    error = JointError.of(PoseError.of(setting, setting.everything.start))
+    (n, k), (low, high) = error.size, error.box(*bounds(error.error, 1.0)[:2], 1.0)
+    assert len(error.apart) == (2 if name == "quattro" else 3)
+    pose, met = error.error, 0
+    while met < 20:
+        y = closed(error, rng.uniform(low, high)[None], np.arange(n - k, n)[None])
+        if np.isnan(y).any():
+            continue
+        forms = [affine(x, np.zeros((1, 0)), 0 * x) for x in y.T]
+        told = np.array([each.v[0, 0] for each in error.moments.at(forms)])
+        M = np.array([each.v[0, 0] for each in error.slopes.at(forms)])[k : k + k * n].reshape(k, n)
+        p, R = (each[0] for each in error.pose(y))
+        for row, (at, rest) in zip(told, error.apart, strict=True):
+            arm, wanted = pose.limbs[at].tip.turned, dict(zip(
+                [each.limb for each in pose.seen], np.array(error.wanted, dtype=float), strict=True))
+            levels, sides = [], error.directions.at(forms)
+            here = np.array([each.v[0, 0] for each in sides]).reshape(-1, 3)
+            for angle in (STEP, -STEP):
+                turned = Rotation.from_rotvec(angle * pose.turns[:, 0]).as_matrix() @ R
+                moved, E = p + R @ arm - turned @ arm, 0.0
+                for place, each in enumerate(pose.seen):
+                    if each.limb in rest:
+                        limb, u = pose.limbs[each.limb], []
+                        for mode in (1.0, -1.0):
+                            found = replace(limb, mode=mode).direction(moved[None], turned[None])[0][0]
+                            u.append(found * each.sense)
+                        own = min(u, key=lambda each, there=here[place]: np.abs(each - there).max())
+                        E += 0.5 * (1 - (own @ wanted[each.limb]) ** 2)
+                levels.append(E)
+            slopes_ = np.prod([M[error.joints.index(i), error.freedoms + error.joints.index(i)] for i in rest])
+            if np.isfinite(levels).all() and abs(slopes_) > 0.05:
+                assert np.isclose((levels[1] - levels[0]) / (2 * STEP) * slopes_, row, atol=1e-6)
+                met += 1
+
+
 @given(st.integers(0, 2**32 - 1))
 def test_no_place_of_a_joint_is_lost(seed):
     """A crank's and a sliding rod's angle z solves a quadratic in exp(iz), a slider's way one of its own; of a tip in
@@ -189,7 +288,7 @@ def test_a_closed_surface_of_poses_has_the_kinds_that_its_shape_asks_for():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "budget"), [("rprpr_m1", None), ("rrrrr_m1", None), ("rrrrr_m1", 20_000)])
+@pytest.mark.parametrize(("name", "budget"), [("rprpr_m1", None), ("rrrrr_m1", None), ("rrrrr_m1", 5_000)])
 def test_no_other_critical_point_is_met(name, budget):
     """Where boxes are left open, they are told; away from them the list is whole."""
     setting = ObservedRobot.of(name)

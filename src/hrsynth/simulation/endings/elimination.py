@@ -77,13 +77,13 @@ def _eliminate(k: int, n: int) -> BoxFormula:
     return trace_formula(formula, n * (k + 1))
 
 
-def away(F: AffineForms) -> Flags:
+def away(F: AffineForms, own: int) -> Flags:
     """Whether F (c, d) is enclosed away from zero: a component of it, F along its own middle, or a component in the
-    coordinates in which it is nearest to the box's own."""
+    coordinates in which it is nearest to the first symbols, the box's ``own``."""
     with np.errstate(all="ignore"):
         found = np.any(np.abs(F.v[0]) > F.spread * (1 + AFFINE_ROUNDING), axis=1)
         found |= combine(np.nan_to_num(F.v[0])[:, None, :], F).low[:, 0] > 0
-        near = combine(pseudo_inverse(np.moveaxis(F.v[1:], 0, -1)), F)
+        near = combine(pseudo_inverse(np.moveaxis(F.v[1 : 1 + own], 0, -1)), F)
         found |= np.any(np.abs(near.v[0]) > near.spread * (1 + AFFINE_ROUNDING), axis=1)
     return np.asarray(found)
 

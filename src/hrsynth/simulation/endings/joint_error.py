@@ -41,7 +41,7 @@ from ...geometry.duals import Dual
 from ...geometry.so3 import exponential
 from ...geometry.vectors import Array, hat
 from ...results import Value
-from ...tolerances import FOLLOWED, KNOWN_NUMBER, SHORTEST_ROD
+from ...tolerances import EXACT, FOLLOWED, KNOWN_NUMBER, SHORTEST_ROD
 from .pose_error import Number, PoseError
 
 of_robot = partial(trace_formula, off=KNOWN_NUMBER)
@@ -235,7 +235,10 @@ class JointError(Value):
                 continue
             carried = scale(number(limb.radius), ring) if isinstance(limb, OnCrank) else scale(z, number(limb.axis))
             rod = minus(way, carried)
-            g.append((dot(rod, rod) - number(limb.rod**2)) * 0.5)
+            if isinstance(limb, OnCrank):
+                g.append((dot(way, way) - number(limb.rod**2 - limb.radius**2)) * 0.5 - dot(way, carried))
+            else:
+                g.append((dot(rod, rod) - number(limb.rod**2)) * 0.5)
             told.append(scale(number(1 / limb.rod), rod))
         seen = list[Sequence[Dual]]()
         for each in error.seen:
@@ -344,6 +347,52 @@ class JointError(Value):
                     *(each.value for each in margins)]
 
         return of_robot(formula, n)
+
+    @cached_property
+    def apart(self) -> list[tuple[int, list[int]]]:
+        """Of each point of the platform about which it turns on which some watched legs act, one of these, and those
+        that act elsewhere; limbs that have joints all."""
+        if self.far is not None or self.short is not None or self.error.turns.shape[1] != 1:
+            return []
+        watched = [each.limb for each in self.error.seen]
+        if any(i not in self.joints for i in watched):
+            return []
+        axis, found = self.error.R.T @ self.error.turns[:, 0], list[tuple[int, list[int]]]()
+        for i in sorted(set(self.joints) & set(watched)):
+            arms = {k: np.cross(axis, self.error.limbs[k].tip.turned - self.error.limbs[i].tip.turned)
+                    for k in self.joints if k in watched}
+            rest = [k for k, arm in arms.items() if np.abs(arm).max() > EXACT]
+            if rest and rest not in [each for _, each in found]:
+                found.append((i, rest))
+        return found
+
+    @cached_property
+    def moments(self) -> BoxFormula:
+        """Moments that vanish at a critical point: those about a watched leg's tip, to which the legs there add
+        nothing. That of a leg is c (∂c g_θ − c_θ ∂g) / g_θ along a turn about the tip, all times all g_θ."""
+        def formula(y: Sequence[Any], number: Number) -> list[Any]:
+            error, k, found = self.error, self.error.shifts.shape[1], list[Any]()
+            g = self.parts(y, number)[0]
+            rotation = self._place_platform(y, number, self.make_constant(number))[2]
+            cosines = dict(zip([each.limb for each in error.seen], self._cosines(y, number), strict=True))
+            for at, rest in self.apart:
+                arm = transform_vector([each.value for each in rotation], number(error.limbs[at].tip.turned))
+                way = cross(arm, number(error.turns[:, 0]))
+                along = [dot(way, number(each)) for each in error.shifts.T]
+                slopes = {i: g[self.joints.index(i)].rates[error.size + self.joints.index(i)] for i in rest}
+                parts = []
+                for i in rest:
+                    c, own = cosines[i], g[self.joints.index(i)]
+                    of_c, of_g = (total([each.rates[k], *(a * b for a, b in zip(along, each.rates, strict=False))])
+                              for each in (c, own))
+                    part = c.value * (of_c * slopes[i] - c.rates[error.size + self.joints.index(i)] * of_g)
+                    for other in rest:
+                        part = part if other == i else part * slopes[other]
+                    parts.append(part)
+                found.append(total(parts))
+            return found
+
+        return of_robot(formula, self.size[0])
 
     def _cosines(self, y: Sequence[Any], number: Number) -> list[Dual]:
         return [dot(u, wanted) for u, wanted in self._directions(y, number)]

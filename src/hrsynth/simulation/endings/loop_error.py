@@ -251,7 +251,7 @@ class LoopSubdivision(Subdivision):
 
     def _settle(self, tube: list[AffineForms], P: Places, N: Places) -> tuple[Flags, AffineForms]:
         F = self.error.left.together(tube)
-        settled = away(F)
+        settled = away(F, N.shape[1])
         # where n may lie along both rods |λ| may have no bound: the closure itself may be singular
         small = np.all(np.stack([each.spread for each in tube], axis=1) <= SINGULAR_BOX * self.whole, axis=1)
         slips = self.error.slips.together(tube)

@@ -384,7 +384,7 @@ class SpringSubdivision(LoopSubdivision):
 
     def _settle(self, tube: list[AffineForms], P: Places, N: Places) -> tuple[Flags, AffineForms]:
         F = self.error.left.together(tube)
-        return away(F), F
+        return away(F, N.shape[1]), F
 
     def _report(self, x: Array, reach: Array) -> list[CriticalBox]:
         """The rests at zeros that are proved; without those at which a watched direction is at right angles to the

@@ -5,8 +5,9 @@ Coordinates y and equations g are those of :mod:`.joint_error`. At a critical po
 choice P of as many coordinates as there are equations, F = ∇E_N − ∇E_P (∇g_P)⁻¹ ∇g_N vanishes, N the other
 coordinates. A box is settled where g or F is enclosed away from zero, where a leg without a joint does not reach, or
 where Krawczyk's operator on (∇E + μ ∇g, g) proves that a box about it holds exactly one zero; where poses are asked for
-at which the error vanishes, also where that is enclosed away from zero. g = 0 narrows the others, and tells the
-coordinates P in terms of N alone.
+at which the error vanishes, also where that is enclosed away from zero; and where a moment is that would vanish. g = 0
+narrows the others, and tells the coordinates P in terms of N and of what each equation leaves open: of this one symbol
+each stands in all of P, so that what an equation leaves open counts once.
 """
 
 from __future__ import annotations
@@ -49,6 +50,13 @@ SINGULAR = -2
 """In the place of an axis: a box is left open, ∇g may lose rank in it."""
 STRETCHED = 8.0
 """Ratio of a box's edges, as parts of those of the whole, above which the longest is cut."""
+TOLD = 2.0
+"""How many times as large slopes by joints count where it is chosen which coordinates the others tell: joints follow in
+closed form."""
+FOLLOWING = 0.25
+"""What part of its edge counts of a coordinate that the others tell where it is chosen which is cut."""
+COARSE = 0.02
+"""Part of the whole box from which edges on this is so: in small boxes that are left the others may tell nothing."""
 NARROWED = 0.6
 """Part of an edge to which g = 0 narrows it below which a box is looked at again before it is cut."""
 
@@ -141,8 +149,10 @@ class Subdivision:
         gone = np.any(low > high, axis=1)
         with np.errstate(all="ignore"):
             J = np.where(half[:, None] > 0, np.moveaxis(g.v[1:], 0, -1) / half[:, None], 0.0)
+        J[:, :, self.error.freedoms :] *= TOLD
         P, N = pivots(J)
-        follow = combine(inverse(columns(np.moveaxis(g.v[1:], 0, -1), P)), g)
+        back = inverse(columns(np.moveaxis(g.v[1:], 0, -1), P))
+        follow = combine(back, g)
         inner = _narrow_symbols(follow, P)
         low, high = np.maximum(low, inner[0]), np.minimum(high, inner[1])
         gone |= np.any(low > high, axis=1)
@@ -152,9 +162,9 @@ class Subdivision:
         look = np.flatnonzero(~gone & (tiny | np.all(high - low >= 2 * NARROWED, axis=1)))
         if len(look):
             tube, loose = _tube(own[look], size[look], middle[look], half[look], P[look], N[look],
-                                AffineForms(follow.v[:, look], follow.r[look]))
+                                AffineForms(follow.v[:, look], follow.r[look]), (back * g.r[:, None])[look])
             settled, F = self._settle(tube, P[look], N[look])
-            step = solution(np.moveaxis(F.v[1:], 0, -1), F.v[0])
+            step = solution(np.moveaxis(F.v[1 : 1 + N.shape[1]], 0, -1), F.v[0])
             finite = np.isfinite(F.r).all(axis=1)
             likely = ~settled & finite & (tiny[look] | np.all(np.abs(step) < 3.0, axis=1))
             for wider in WIDER:
@@ -178,24 +188,29 @@ class Subdivision:
         """Whether nothing is asked for on a tube, and F there."""
         _, M, slope, margins = self._values(tube)
         F, minors = reduced_gradient(M, slope, P, N)
-        settled = away(F)
+        settled = away(F, N.shape[1])
         rest = np.flatnonzero(~settled)
-        settled[rest] = away(AffineForms(minors.v[:, rest], minors.r[rest]))
+        settled[rest] = away(AffineForms(minors.v[:, rest], minors.r[rest]), N.shape[1])
         if self.vanishing:
-            settled |= away(self.error.asked.together(tube))
+            settled |= away(self.error.asked.together(tube), N.shape[1])
+        if self.error.apart:
+            settled |= away(self.error.moments.together(tube), N.shape[1])
         for margin in margins:
             settled |= margin.high < 0
         return settled, F
 
     def _axes(self, size: Array, N: Places, F: AffineForms, loose: Flags) -> Places:
-        """Across which axes boxes are cut: that along which F changes most, or the longest, of those coordinates (c, n)
-        that are ``loose``."""
-        share, slopes = size / self.whole, np.abs(np.moveaxis(F.v[1:], 0, -1)).max(axis=1, initial=0.0)
-        changes = np.zeros(share.shape)
+        """Across which axes boxes are cut: that along which F changes most where only N are ``loose`` (c, n) and no
+        edge is much longer than the others; else the longest of N, or one of the other loose ones where it is longer
+        still: a surface that N tells would be cut to more and smaller pieces by all axes."""
+        share, slopes = size / self.whole, np.abs(np.moveaxis(F.v[1 : 1 + N.shape[1]], 0, -1)).max(axis=1, initial=0.0)
+        changes, large = np.zeros(share.shape), share.max(axis=1, keepdims=True) > COARSE
+        weight = np.where(loose, np.where(large, FOLLOWING, 1.0), 0.0)
         np.put_along_axis(changes, N, np.where(np.isfinite(slopes), slopes, 0.0), 1)
+        np.put_along_axis(weight, N, 1.0, 1)
         even = share.max(axis=1) <= STRETCHED * np.take_along_axis(share, N, 1).max(axis=1)
         known = even & np.isfinite(F.r).all(axis=1) & changes.any(axis=1) & (loose.sum(axis=1) == N.shape[1])
-        return np.where(known, changes.argmax(axis=1), np.where(loose, share, 0.0).argmax(axis=1))
+        return np.where(known, changes.argmax(axis=1), (share * weight).argmax(axis=1))
 
     def _values(self, forms: list[AffineForms]) -> tuple[AffineForms, AffineForms, AffineForms, list[AffineForms]]:
         """g (c, k), its rates (c, k, n), those of E (c, n), reach margins."""
@@ -378,25 +393,29 @@ def _narrow_symbols(g: AffineForms, P: Places | None = None) -> tuple[Array, Arr
     return (at - far).max(axis=1, initial=-1.0), (at + far).min(axis=1, initial=1.0)
 
 
-def _tube(middle: Array, half: Array, old: Array, edges: Array, P: Places, N: Places, follow: AffineForms
+def _tube(middle: Array, half: Array, old: Array, edges: Array, P: Places, N: Places, follow: AffineForms, doubts: Array
           ) -> tuple[list[AffineForms], Flags]:
-    """The coordinates of boxes (c, n), those of P as they follow from N: ε_P = −(f₀ + Σ f_N ε_N) ± r in the symbols of
-    the ``old`` boxes, or as wide as they are where that is no narrower: these are loose (c, n), as those of N are."""
-    slopes, radius = np.zeros((*middle.shape, N.shape[1])), np.zeros(middle.shape)
+    """The coordinates of boxes (c, n), those of P as they follow from N: ε_P = −(f₀ + Σ f_N ε_N + Σ ``doubts`` δ) ± r
+    in the symbols of the ``old`` boxes, δ what each equation leaves open, the same for all of P; or as wide as they are
+    where that is no narrower: these are loose (c, n), as those of N are."""
+    (c, n), d, k = middle.shape, N.shape[1], P.shape[1]
+    slopes, radius = np.zeros((c, n, d + k)), np.zeros((c, n))
     own, was = np.take_along_axis(half, N, 1), np.take_along_axis(edges, N, 1)
-    np.put_along_axis(slopes, N[:, :, None], own[:, :, None] * np.eye(N.shape[1]), 1)
+    np.put_along_axis(slopes[:, :, :d], N[:, :, None], own[:, :, None] * np.eye(d), 1)
     with np.errstate(all="ignore"):
         ratio = np.where(was > 0, own / was, 0.0)
         shift = np.where(was > 0, np.take_along_axis(middle - old, N, 1) / was, 0.0)
         J, wide = columns(np.moveaxis(follow.v[1:], 0, -1), N), np.take_along_axis(edges, P, 1)
         at = np.take_along_axis(old, P, 1) - wide * (follow.v[0] + (J * shift[:, None]).sum(-1))
-        along, doubt = -wide[:, :, None] * J * ratio[:, None], wide * (follow.r + BOX_ROUNDING)
+        along, doubt = -wide[:, :, None] * np.concatenate([J * ratio[:, None], doubts], 2), wide * (
+            follow.r + BOX_ROUNDING)
+        rounded = wide * (np.maximum(follow.r - np.abs(doubts).sum(axis=2), 0.0) + 2 * BOX_ROUNDING)
     plain = np.take_along_axis(half, P, 1)
     good = np.isfinite(doubt) & np.isfinite(at) & np.isfinite(along).all(axis=-1) & (doubt < plain)
     centre = middle.copy()
     np.put_along_axis(centre, P, np.where(good, at, np.take_along_axis(middle, P, 1)), 1)
     np.put_along_axis(slopes, P[:, :, None], np.where(good[:, :, None], along, 0.0), 1)
-    np.put_along_axis(radius, P, np.where(good, doubt, plain), 1)
-    loose = np.ones(middle.shape, dtype=bool)
+    np.put_along_axis(radius, P, np.where(good, rounded, plain), 1)
+    loose = np.ones((c, n), dtype=bool)
     np.put_along_axis(loose, P, ~(good & (doubt < NARROWED * plain)), 1)
-    return [affine(centre[:, i], slopes[:, i], radius[:, i]) for i in range(middle.shape[1])], loose
+    return [affine(centre[:, i], slopes[:, i], radius[:, i]) for i in range(n)], loose
