@@ -211,6 +211,8 @@ def test_moments_about_a_tip_are_those_of_the_other_legs(name):
     error = JointError.of(PoseError.of(setting, setting.everything.start))
     (n, k), (low, high) = error.size, error.box(*bounds(error.error, 1.0)[:2], 1.0)
     assert len(error.apart) == (2 if name == "quattro" else 3)
+    # a leg that is not watched pushes where it is stretched
+    assert not JointError.of(replace(error.error, seen=error.error.seen[1:])).apart
     pose, met = error.error, 0
     while met < 20:
         y = closed(error, rng.uniform(low, high)[None], np.arange(n - k, n)[None])

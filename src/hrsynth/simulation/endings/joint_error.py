@@ -350,18 +350,16 @@ class JointError(Value):
 
     @cached_property
     def apart(self) -> list[tuple[int, list[int]]]:
-        """Of each point of the platform about which it turns on which some watched legs act, one of these, and those
-        that act elsewhere; limbs that have joints all."""
+        """Of each point of the platform about which it turns on which legs act, one of these, and those that act
+        elsewhere; none where not all legs have joints and are watched: a leg that is not would push at its limit."""
         if self.far is not None or self.short is not None or self.error.turns.shape[1] != 1:
             return []
-        watched = [each.limb for each in self.error.seen]
-        if any(i not in self.joints for i in watched):
+        if not set(range(len(self.error.limbs))) == set(self.joints) == {each.limb for each in self.error.seen}:
             return []
         axis, found = self.error.R.T @ self.error.turns[:, 0], list[tuple[int, list[int]]]()
-        for i in sorted(set(self.joints) & set(watched)):
-            arms = {k: np.cross(axis, self.error.limbs[k].tip.turned - self.error.limbs[i].tip.turned)
-                    for k in self.joints if k in watched}
-            rest = [k for k, arm in arms.items() if np.abs(arm).max() > EXACT]
+        tips = [each.tip.turned for each in self.error.limbs]
+        for i, tip in enumerate(tips):
+            rest = [k for k, other in enumerate(tips) if np.abs(np.cross(axis, other - tip)).max() > EXACT]
             if rest and rest not in [each for _, each in found]:
                 found.append((i, rest))
         return found
