@@ -236,6 +236,7 @@ class JointError(Value):
             carried = scale(number(limb.radius), ring) if isinstance(limb, OnCrank) else scale(z, number(limb.axis))
             rod = minus(way, carried)
             if isinstance(limb, OnCrank):
+                # multiplied out: the square of the crank is known
                 g.append((dot(way, way) - number(limb.rod**2 - limb.radius**2)) * 0.5 - dot(way, carried))
             else:
                 g.append((dot(rod, rod) - number(limb.rod**2)) * 0.5)
@@ -373,17 +374,18 @@ class JointError(Value):
             g = self.parts(y, number)[0]
             rotation = self._place_platform(y, number, self.make_constant(number))[2]
             cosines = dict(zip([each.limb for each in error.seen], self._cosines(y, number), strict=True))
+            # all legs have joints, in their order
+            slopes = [each.rates[self.freedoms + i] for i, each in enumerate(g)]
             for at, rest in self.apart:
                 arm = transform_vector([each.value for each in rotation], number(error.limbs[at].tip.turned))
                 way = cross(arm, number(error.turns[:, 0]))
                 along = [dot(way, number(each)) for each in error.shifts.T]
-                slopes = {i: g[self.joints.index(i)].rates[error.size + self.joints.index(i)] for i in rest}
                 parts = []
                 for i in rest:
-                    c, own = cosines[i], g[self.joints.index(i)]
+                    c = cosines[i]
                     of_c, of_g = (total([each.rates[k], *(a * b for a, b in zip(along, each.rates, strict=False))])
-                              for each in (c, own))
-                    part = c.value * (of_c * slopes[i] - c.rates[error.size + self.joints.index(i)] * of_g)
+                                  for each in (c, g[i]))
+                    part = c.value * (of_c * slopes[i] - c.rates[self.freedoms + i] * of_g)
                     for other in rest:
                         part = part if other == i else part * slopes[other]
                     parts.append(part)

@@ -193,10 +193,12 @@ class Subdivision:
         settled[rest] = away(AffineForms(minors.v[:, rest], minors.r[rest]), N.shape[1])
         if self.vanishing:
             settled |= away(self.error.asked.together(tube), N.shape[1])
-        if self.error.apart:
-            settled |= away(self.error.moments.together(tube), N.shape[1])
         for margin in margins:
             settled |= margin.high < 0
+        rest = np.flatnonzero(~settled)
+        if self.error.apart and len(rest):
+            left = [AffineForms(each.v[:, rest], each.r[rest]) for each in tube]
+            settled[rest] = away(self.error.moments.together(left), N.shape[1])
         return settled, F
 
     def _axes(self, size: Array, N: Places, F: AffineForms, loose: Flags) -> Places:
