@@ -411,6 +411,10 @@ BOX_STEPS_IN_NUMPY, BOXES_A_CALL = 40_000_000, 600
 long as a call."""
 BOXES_AT_ONCE = 4096
 """Boxes of those that are looked at together."""
+BOXES_ALONE = 400_000
+"""Boxes of them that are looked at before the work is shared among processes."""
+BOX_PARTS, BOXES_A_PART = 16, 200_000
+"""Into how many parts it is then split, and how many boxes of each are looked at before it is split again."""
 
 # The audit of published tables
 

@@ -179,6 +179,7 @@ BEGIN = Option("at", "Pose to start from instead of the zero configuration, perh
                "mode:2.", "POSE")
 START = Option("start", "Start pose, such as x=0.02,y=0.1,z=-0.7; mode:2 is a mode with the directions at the goal.",
                "POSE", default=NEEDED, old=("--from",))
+JOBS = Option("jobs", "Processes (default: one per core).", None, int)
 DEPTH = Option("depth", "Depths in images that the control law uses: exact, desired (those at the goal) or "
                "constant:METRES.", default="exact")
 BOX = Option("box", "Intervals of motors (m, rad), such as hip=-1:1,slide=0:0.2 (default: the file's limits, else a "
@@ -269,7 +270,7 @@ QUESTIONS = (
                      "POSE", default=NEEDED), *WATCHED, SEE, DEPTH,
               flag("complete", "Try to prove that the list is complete, by boxes of platform poses."),
               Option("effort", "Most boxes of poses to look at (10,000 to 40,000 take a second).", "COUNT", int,
-                     COVER_BOXES),
+                     COVER_BOXES), JOBS,
               _file("endings")),
              ("3rrr_m1 --at x=0.02,y=0,phi=10deg", "quattro --observe 1,4 --at x=0.05,y=0.1,z=-0.7 -o endings.png")),
     Question("basins", "Where the servo loop to a goal ends, from each start of a line, plane or box of poses.",
@@ -281,7 +282,7 @@ QUESTIONS = (
                      "(from:to:count).", "GRID"),
               Option("steps", "Starts along each side of the plane (default: 100; 15 if each is simulated separately).",
                      None, int),
-              Option("jobs", "Processes (default: one per core).", None, int),
+              JOBS,
               _file("basins")),
              ("quattro --observe 1,4 --to z=-0.7 --plane z=-0.7,phi=0 -o basins.png",
               "3rrr_m1 --to x=0,y=0,phi=0 --grid x=-0.1:0.1:50,y=0,phi=0")),

@@ -186,8 +186,6 @@ def basins(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None
     if plane is not None and grid is not None:
         raise BadRequest("basins: both a plane and a grid are given", str(grid), "one of them")
     (goal,) = configurations_at(setting, [asked])
-    if jobs is not None and jobs < 1:
-        raise BadRequest("number of processes", jobs, "1 or more")
     task = ServoTask.between(setting, goal, goal, Conditions(depth=depth))
     search = BasinSearch(setting, goal, task, jobs or os.cpu_count() or 1)
     return search.over(search.plane(plane, steps) if grid is None else Grid.parse(grid, FLOW_STARTS), seed)

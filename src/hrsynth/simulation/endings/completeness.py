@@ -48,14 +48,16 @@ class Covers(Value):
         return self.setting.samples.question
 
     @classmethod
-    def of(cls, setting: ObservedRobot, goal: ClosedConfiguration, system: RestSystem, boxes: int | None) -> Covers:
-        """Those of a goal; all critical ones with as many ``boxes`` at most, if that is asked."""
+    def of(cls, setting: ObservedRobot, goal: ClosedConfiguration, system: RestSystem, boxes: int | None, jobs: int
+           ) -> Covers:
+        """Those of a goal; all critical ones with as many ``boxes`` at most, if that is asked, in so many processes
+        (``jobs``)."""
         with part("poses without an error"):
-            found = cover(setting, goal, vanishing=True, budget=boxes or SIGN_BOXES)
+            found = cover(setting, goal, vanishing=True, budget=boxes or SIGN_BOXES, jobs=jobs)
         if boxes is None:
             return cls(system, setting, found, None)
         with part("all rests"):
-            return cls(system, setting, found, cover(setting, goal, budget=boxes))
+            return cls(system, setting, found, cover(setting, goal, budget=boxes, jobs=jobs))
 
     def find_missed(self, known: Sequence[ClosedConfiguration], q: Array, idle: int, turn: int = 0
                     ) -> list[Critical]:

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 
@@ -33,6 +34,9 @@ from .pose_error import NotEnclosed, PoseError
 from .spring_error import SpringError, SpringSubdivision
 from .struts import Struts
 from .subdivision import CriticalBox, Subdivision
+
+FINER = (1 / 4, 1 / 16, 1 / 64)
+"""Parts of the edges of small boxes in which equations may be dependent, to which they are cut where they are many."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -119,10 +123,11 @@ class Cover(Value):
 
 
 def cover(setting: ObservedRobot, goal: ClosedConfiguration, *, vanishing: bool = False, budget: int = COVER_BOXES,
-          reach: float = COVER_REACH) -> Cover:
+          reach: float = COVER_REACH, jobs: int = 1) -> Cover:
     """All critical points of the error to a goal that subdivision finds and proves, in every working mode: wherever
     legs reach, however far away where all rods slide in a plane, otherwise in a box that is ``reach`` characteristic
-    lengths wide either way. ``vanishing``: those alone at which the error vanishes."""
+    lengths wide either way. ``vanishing``: those alone at which the error vanishes. Many boxes are shared by so many
+    processes (``jobs``)."""
     try:
         error, families, struts = _families(setting, goal, vanishing)
     except NotEnclosed as why:
@@ -135,7 +140,8 @@ def cover(setting: ObservedRobot, goal: ClosedConfiguration, *, vanishing: bool 
     every = [part for some in parts for part in some]
     # the small ones first: what they do not use is left for the others
     for k, part in enumerate(reversed(every)):
-        part.run((budget - sum(each.boxes for each in every)) // (len(every) - k), k, len(every))
+        part.run((budget - sum(each.boxes for each in every)) // (len(every) - k), k, len(every), jobs)
+    _cut_long(every, (high - low)[: error.size], budget, jobs)
     found: list[CriticalBox] = []
     for family, some in zip(families, parts, strict=True):
         own: list[CriticalBox] = []
@@ -222,6 +228,19 @@ def _corners(error: JointError, boxes: Sequence[tuple[Array, Array]], size: int)
     if error.error.size < size:
         low, high = np.full((len(boxes), size), -np.inf), np.full((len(boxes), size), np.inf)
     yield from zip(low[:, :size], high[:, :size], strict=True)
+
+
+def _cut_long(every: Sequence[Subdivision], whole: Array, budget: int, jobs: int) -> None:
+    """Cut lost boxes on that together fill more than what can be told as one place, more finely step by step."""
+    for part in FINER:
+        own = [list(_corners(each.error, each.lost, len(whole))) for each in every]
+        long = [(low, high) for low, high in join_boxes(chain(*own))
+                if np.isfinite(high - low).all() and np.any(high - low > LOCKED_PLACE * whole)]
+        for each, boxes in zip(every, own, strict=True):
+            chosen = [any(np.all((a <= low) & (high <= b)) for a, b in long) for low, high in boxes]
+            left = budget - sum(other.boxes for other in every)
+            if any(chosen) and left > 0:
+                each.cut_lost(chosen, part * SINGULAR_BOX, left, jobs)
 
 
 def _places(places: Sequence[tuple[Array, Array]], left: Sequence[tuple[Array, Array]], whole: Array

@@ -182,13 +182,12 @@ def _lost_rank(K: Array) -> Array:
 def negative(K: AffineForms) -> Array:
     """The numbers (c,) of negative eigenvalues of all symmetric matrices in K (c, n, n), −1 where that was not proved:
     of VᵀKV each diagonal entry outweighs its row."""
-    middle, spread = K.v[0], K.spread
-    known = np.isfinite(middle).all(axis=(-1, -2)) & np.isfinite(spread).all(axis=(-1, -2))
-    middle, spread = (np.where(known[:, None, None], each, 0.0) for each in (middle, spread))
-    _, V = np.linalg.eigh((middle + np.swapaxes(middle, -1, -2)) / 2)
-    back, size = np.swapaxes(V, -1, -2), np.abs(V)
-    D = back @ middle @ V
-    doubt = np.swapaxes(size, -1, -2) @ (spread + 8 * AFFINE_ROUNDING * (np.abs(middle) + spread)) @ size
+    known = np.asarray(np.isfinite(K.size).all(axis=(-1, -2)))
+    K = AffineForms(np.where(known[:, None, None], K.v, 0.0), np.where(known[:, None, None], K.r, 0.0))
+    back = np.swapaxes(np.linalg.eigh((K.v[0] + np.swapaxes(K.v[0], -1, -2)) / 2)[1], -1, -2)
+    # what entries share is counted once
+    turned = combine(back, combine(back, K).transposed())
+    D, doubt = turned.v[0], turned.spread
     scale = 1 / np.sqrt(np.abs(np.diagonal(D, axis1=-2, axis2=-1)) + 1e-300)
     D, doubt = (each * scale[..., :, None] * scale[..., None, :] for each in (D, doubt))
     diagonal = np.diagonal(D, axis1=-2, axis2=-1)

@@ -3,6 +3,7 @@ them attract (docs/pages/theory.md, section 11)."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -55,8 +56,8 @@ NEARBY = 0.02
 
 @question()
 def endings(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
-            at: PoseLike, depth: str = "exact", complete: bool = False, effort: int = COVER_BOXES, seed: int = 0
-            ) -> Endings:
+            at: PoseLike, depth: str = "exact", complete: bool = False, effort: int = COVER_BOXES,
+            jobs: int | None = None, seed: int = 0) -> Endings:
     """All poses at which the loop can rest that servoes what is observed at ``at``: the goal, modes and antipodal
     poses, where the error vanishes, and critical poses, where it does not; and which of them attract.
 
@@ -64,7 +65,8 @@ def endings(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = Non
     exactly at the critical points of ½ ‖e‖² on the closed loops (theory.md 11); those at which a camera does not see
     what it has to see are left out. They are sought from random walks on the branch of the zero configuration.
     ``complete``: try to prove that they are all, by subdivision of a box of platform poses (seconds to minutes) into
-    ``effort`` boxes at most.
+    ``effort`` boxes at most; where these are many, so many processes share them (``jobs``, by default one per core), on
+    whose number no answer depends.
     ``depth`` is that of ``servo``; if the law assumes depths, its command is not a gradient, and rests are only found.
 
     Raises ``BadRequest`` for unknown names, observations that do not see the platform, a singular goal, or one at which
@@ -84,7 +86,7 @@ def endings(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = Non
     search = RestSearch.of(setting, goal, depth)
     require_sight(setting, search.law, "goal", goal)
     tell("rests")
-    return search.answer(seed, complete=complete, effort=effort)
+    return search.answer(seed, complete=complete, effort=effort, jobs=jobs or os.cpu_count() or 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,10 +112,10 @@ class RestSearch:
                    np.array(values) if by_directions else values, depth)
 
     def answer(self, seed: int = 0, *, minima: bool = False, rounds: Iterable[Array] | None = None,
-               complete: bool = False, effort: int = COVER_BOXES) -> Endings:
+               complete: bool = False, effort: int = COVER_BOXES, jobs: int = 1) -> Endings:
         """The rests that were found; ``minima`` and ``rounds`` as for :func:`.critical_points`, of minima alone neither
         lists nor enclosures; ``complete``: whether it is to be proved that they are all, with ``effort`` boxes at
-        most."""
+        most in so many processes (``jobs``)."""
         setting, motion = self.setting, self.setting.motion
         further = None if minima or self.system.supposes else self._further(seed)
         found = critical_points(self.system, setting, self.goal, seed, minima=minima, rounds=rounds, further=further,
@@ -122,7 +124,7 @@ class RestSearch:
         isolated = self._in_mode(found.isolated)
         covers = None
         if not minima and all(each.by_segment for each in setting.observed):
-            covers = Covers.of(setting, self.goal, self.system, effort if complete else None)
+            covers = Covers.of(setting, self.goal, self.system, effort if complete else None, jobs)
         for turn in range(MISSED_ROUNDS):
             if covers is None:
                 break

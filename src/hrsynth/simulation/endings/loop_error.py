@@ -24,12 +24,12 @@ from ...closed_forms.legs import OnCrank, OnRail, SlidingRod
 from ...geometry.affine import AffineForms, stack
 from ...geometry.components import Components, cosine, cross, dot, minus, plus, scale, sine
 from ...geometry.vectors import Array
-from ...tolerances import EXACT, FOLLOWED, MET_AGAIN, SINGULAR_BOX, SMALLEST_BOX
+from ...tolerances import EXACT, FOLLOWED, MET_AGAIN, SMALLEST_BOX
 from .elimination import Flags, Places, away, pivots
 from .joint_error import JointError, across, of_robot
 from .pose_error import NotEnclosed, Number, PoseError
 from .reached import narrow_joint as joint_bounds
-from .subdivision import CriticalBox, Subdivision, forms_of
+from .subdivision import CriticalBox, Subdivision, forms_of, hull
 
 NARROWINGS = 16
 """How many times the place of a zero is narrowed."""
@@ -253,22 +253,23 @@ class LoopSubdivision(Subdivision):
         F = self.error.left.together(tube)
         settled = away(F, N.shape[1])
         # where n may lie along both rods |λ| may have no bound: the closure itself may be singular
-        small = np.all(np.stack([each.spread for each in tube], axis=1) <= SINGULAR_BOX * self.whole, axis=1)
+        small = np.all(np.stack([each.spread for each in tube], axis=1) <= self.singular * self.whole, axis=1)
         slips = self.error.slips.together(tube)
         F.r[small & ~settled & ~np.any((slips.low > 0) | (slips.high < 0), axis=1)] = np.inf
         return settled, F
 
-    def _multipliers(self, middle: Array, wide: Array, P: Places) -> tuple[Array, Array, Flags]:
-        return np.zeros((len(middle), 0)), np.zeros((len(middle), 0)), np.ones(len(middle), dtype=bool)
+    def _multipliers(self, middle: Array, wide: Array, P: Places) -> tuple[AffineForms, Flags]:
+        none = AffineForms(np.zeros((middle.shape[1] + 1, len(middle), 0)), np.zeros((len(middle), 0)))
+        return none, np.ones(len(middle), dtype=bool)
 
-    def _equations(self, at: Array, about: Array) -> tuple[AffineForms, AffineForms]:
-        forms = forms_of(at, 0 * at)
-        F = stack([*self.error.closing.at(forms), *self.error.left.at(forms)])
-        K = self.error.bends.together(forms_of(at, about))
+    def _equations(self, at: Array, forms: list[AffineForms]) -> tuple[AffineForms, AffineForms]:
+        still = forms_of(at, 0 * at)
+        F = stack([*self.error.closing.at(still), *self.error.left.at(still)])
+        K = self.error.bends.together(forms)
         shape = (*F.r.shape, at.shape[1])
         return F, AffineForms(K.v.reshape(-1, *shape), K.r.reshape(shape))
 
-    def _report(self, x: Array, reach: Array) -> list[CriticalBox]:
+    def _report(self, x: Array, reach: Array, frame: Array) -> list[CriticalBox]:
         """The rests at zeros, each once: over the pose exactly one is proved in a box that holds all that lie in that
         of the zero. Those are left out which a leg that is not watched does not reach; what is not decided is left
         open."""
@@ -302,8 +303,8 @@ class LoopSubdivision(Subdivision):
     def _narrow_zeros(self, x: Array) -> Array:
         """How far from places (c, n) zeros are. With more equations than unknowns there need be none: what is told of
         it is narrowed, from the whole room."""
-        at, room = (np.array(each) for each in zip(*self.proved, *self.flat, strict=True))
-        reach = room + np.abs(x - at)
+        at, room, frame = self._rooms()
+        reach = hull(room, frame) + np.abs(x - at)
         for _ in range(NARROWINGS):
             reach = np.fmin(reach, self._krawczyk(x, reach)[1])
         return reach

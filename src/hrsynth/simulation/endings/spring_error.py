@@ -386,7 +386,7 @@ class SpringSubdivision(LoopSubdivision):
         F = self.error.left.together(tube)
         return away(F, N.shape[1]), F
 
-    def _report(self, x: Array, reach: Array) -> list[CriticalBox]:
+    def _report(self, x: Array, reach: Array, frame: Array) -> list[CriticalBox]:
         """The rests at zeros that are proved; without those at which a watched direction is at right angles to the
         desired one, or which a leg does not reach. What is not decided is left open: also where a rod may have no
         length."""
@@ -400,7 +400,8 @@ class SpringSubdivision(LoopSubdivision):
             margins = stack(part._values(forms)[3])
             out = np.any(cosines.size < SAME_ENDING, axis=1) | np.any(margins.high < 0, axis=1)
             good = ~out & proved[own] & np.all(margins.low > 0, axis=1)
-            found += part._report(y[good], room[good]) if good.any() else []
+            still = np.broadcast_to(np.eye(y.shape[1]), (int(good.sum()), *2 * y.shape[1:]))
+            found += part._report(y[good], room[good], still) if good.any() else []
             self.left += list(zip(x[own][~out & ~good], reach[own][~out & ~good], strict=True))
         return found
 
@@ -412,7 +413,7 @@ class SpringSubdivision(LoopSubdivision):
         proved = np.zeros(len(x), dtype=bool)
         for radius in MET_AGAIN * 4.0 ** np.arange(-3, 4):
             about = np.full(x.shape, radius)
-            F, K = self._equations(x, about)
+            F, K = self._equations(x, forms_of(x, about))
             F, K = entries(F, rows), entries(K.transposed(), rows).transposed()
             Y = inverse(K.v[0])
             with np.errstate(all="ignore"):

@@ -12,13 +12,16 @@ each stands in all of P, so that what an equation leaves open counts once.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+import pickle
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
-from ...budgets import BOXES_AT_ONCE
-from ...geometry.affine import AffineForms, affine, combine
+from ...budgets import BOX_PARTS, BOXES_A_PART, BOXES_ALONE, BOXES_AT_ONCE
+from ...geometry.affine import AffineForms, affine, combine, stack
 from ...geometry.vectors import Array
 from ...progress import tell
 from ...results import Value
@@ -42,10 +45,10 @@ from .reached import narrow_joints
 
 WIDER = (1.25, 4.0)
 """By how much boxes are larger in which exactly one zero is to be proved, one after the other."""
-INFLATED = (2.0, 8.0, 32.0)
-"""How many times as large as what is open of a zero such boxes are about one nearby, one after the other."""
-AROUND = 16.0 ** np.arange(4, 0, -1)
-"""How many times as large as the smallest boxes those are about a zero nearby, one after the other."""
+INFLATED = 4.0
+"""How many times as large as what numbers leave open of a zero nearby such boxes are at least."""
+AROUND = 16.0 ** np.arange(4, -1, -1)
+"""How many times as large as the smallest boxes those are about a zero nearby at least, one after the other."""
 SINGULAR = -2
 """In the place of an axis: a box is left open, ∇g may lose rank in it."""
 STRETCHED = 8.0
@@ -92,8 +95,11 @@ class Subdivision:
     """Small boxes in which the equations of the legs may be dependent."""
     proved: list[tuple[Array, Array]] = field(default_factory=list)
     """Coordinates and multipliers, and the room about them, in which exactly one zero is proved."""
-    flat: list[tuple[Array, Array]] = field(default_factory=list)
-    """The same of zeros that are flat."""
+    flat: list[tuple[Array, Array, Array]] = field(default_factory=list)
+    """The same of zeros that are flat, the room in a frame, and this (columns)."""
+
+    singular: float = SINGULAR_BOX
+    """Part of the whole from which edges on boxes with equations that may be dependent are small."""
 
     @property
     def whole(self) -> Array:
@@ -105,32 +111,77 @@ class Subdivision:
         """What part of the whole is left open."""
         return float(sum(np.prod(half / self.whole) for _, half in self.left))
 
-    def run(self, budget: int, place: int = 0, places: int = 1) -> None:
+    def run(self, budget: int, place: int = 0, places: int = 1, jobs: int = 1) -> None:
         """Cut boxes until all are settled, too small, or so many were looked at; of so many ``places`` at which this is
         done, it is told which it is at, how much space is settled, and how many boxes wait: the last per cent of space
-        may need most boxes."""
-        whole = self.whole
-        middle, half, share = ((self.low + self.high) / 2)[None], whole[None], self.share
+        may need most boxes. Many boxes are shared by so many processes (``jobs``), on whose number nothing depends."""
+        which = "" if places == 1 else f" of search {place + 1} of {places}"
+        self._run(((self.low + self.high) / 2)[None], self.whole[None], budget, jobs, f"boxes{which}")
+
+    def cut_lost(self, chosen: Sequence[bool], singular: float, budget: int, jobs: int = 1) -> None:
+        """Cut on those of the lost boxes that were ``chosen``, down to a smaller part of the whole."""
+        own = [each for each, is_own in zip(self.lost, chosen, strict=True) if is_own]
+        self.lost = [each for each, is_own in zip(self.lost, chosen, strict=True) if not is_own]
+        self.singular = singular
+        middle, half = (np.array([each[k] for each in own]) for k in range(2))
+        self._run(middle, half, self.boxes + budget, jobs, "boxes where legs may lock")
+
+    def _run(self, middle: Array, half: Array, budget: int, jobs: int, stage: str) -> None:
+        """Cut boxes (c, n): here as long as they are few, then in parts, those that wait dealt out again and again."""
+        def say(looked: int, waiting: int, share: float) -> None:
+            tell(f"{stage}: {np.floor(100 * (1 - share)):.0f} % of the space settled, {looked:,} looked at of at most "
+                 f"{budget:,}, {waiting:,} waiting")
+
+        middle, half = self._cut(middle, half, min(budget, self.boxes + BOXES_ALONE), say)
+        if len(middle) and self.boxes < budget:
+            from joblib import Parallel, delayed
+
+            given = pickle.dumps(replace(self, boxes=0, left=[], lost=[], proved=[], flat=[]))
+            with Parallel(n_jobs=jobs, batch_size=1, return_as="generator") as pool:
+                while len(middle) and self.boxes < budget:
+                    most, waiting = -(-min(BOXES_A_PART * BOX_PARTS, budget - self.boxes) // BOX_PARTS), list[Any]()
+                    count, share = len(middle), self.share + self._fill(half)
+                    for boxes, found, rest in pool(
+                            delayed(_cut_part)(given, middle[k::BOX_PARTS], half[k::BOX_PARTS], most)
+                            for k in range(min(BOX_PARTS, count))):
+                        for own, new in zip(self._lists, found, strict=True):
+                            own += new
+                        self.boxes += boxes
+                        waiting.append(rest)
+                        say(self.boxes, count, share)
+                    middle, half = (np.concatenate(each) for each in zip(*waiting, strict=True))
+        self.left += list(zip(middle, half, strict=True))
+        self.spent |= len(middle) > 0
+
+    @property
+    def _lists(self) -> list[list[Any]]:
+        """What is found of each kind."""
+        return [self.left, self.lost, self.proved, self.flat]
+
+    def _fill(self, half: Array) -> float:
+        """What part of the whole boxes of half edges (c, n) fill."""
+        return float(np.prod(half / self.whole, axis=1).sum())
+
+    def _cut(self, middle: Array, half: Array, budget: int, say: Callable[[int, int, float], None]
+             ) -> tuple[Array, Array]:
+        """The boxes of these that wait when so many were looked at."""
+        share = self.share
         while len(middle) and self.boxes < budget:
-            settled = 1 - share - float(np.prod(half / whole, axis=1).sum())
-            which = "" if places == 1 else f" of search {place + 1} of {places}"
-            tell(f"boxes{which}: {np.floor(100 * settled):.0f} % of the space settled, {self.boxes:,} looked at of at "
-                 f"most {budget:,}, {len(middle):,} waiting")
+            say(self.boxes, len(middle), share + self._fill(half))
             # the smallest first: memory stays small
             first = max(0, len(middle) - BOXES_AT_ONCE)
             part, size, axis = self._open(middle[first:], half[first:])
             self.boxes += len(middle) - first
-            lost, small = axis == SINGULAR, np.all(size <= SMALLEST_BOX * whole, axis=1)
+            lost, small = axis == SINGULAR, np.all(size <= SMALLEST_BOX * self.whole, axis=1)
             for where, boxes in ((small & ~lost, self.left), (lost, self.lost)):
                 boxes += list(zip(part[where], size[where], strict=True))
-            share += float(np.prod(size[small & ~lost] / whole, axis=1).sum())
+            share += self._fill(size[small & ~lost])
             small |= lost
             again, rest = ~small & (axis < 0), ~small & (axis >= 0)
             below, edges = cut(part[rest], size[rest], axis[rest])
             middle = np.concatenate([middle[:first], part[again], below])
             half = np.concatenate([half[:first], size[again], edges])
-        self.left += list(zip(middle, half, strict=True))
-        self.spent = len(middle) > 0
+        return middle, half
 
     def _open(self, middle: Array, half: Array) -> tuple[Array, Array, Places]:
         """Boxes (c, n) that are not settled, narrowed, and the axes (c,) across which they are to be cut, −1 of those
@@ -176,7 +227,7 @@ class Subdivision:
             if len(close):
                 settled[close] = self._near_zero(own[look[close]], size[look[close]], P[look[close]])
             gone[look[settled]] = True
-            lost = ~finite & np.all(size[look] <= SINGULAR_BOX * self.whole, axis=1)
+            lost = ~finite & np.all(size[look] <= self.singular * self.whole, axis=1)
             axis[look] = np.where(lost, SINGULAR, self._axes(size[look], N[look], F, loose))
         return own[~gone], size[~gone], axis[~gone]
 
@@ -226,8 +277,9 @@ class Subdivision:
         """Boxes (c, n) in which, made ``wider``, exactly one zero is proved, or that there is none in them."""
         n, wide = self.error.size[0], np.maximum(
             wider * np.maximum(half, THINNEST_BOX * half.max(axis=1, keepdims=True)), MET_AGAIN)
-        mu, room, known = self._multipliers(middle, wide, P)
-        room = np.maximum(room.max(axis=1, keepdims=True, initial=0.0), MET_AGAIN) * np.ones_like(mu)
+        multipliers, known = self._multipliers(middle, wide, P)
+        mu = multipliers.v[0]
+        room = np.maximum(multipliers.spread.max(axis=1, keepdims=True, initial=0.0), MET_AGAIN) * np.ones_like(mu)
         at, about = np.concatenate([middle, mu], axis=1), np.concatenate([wide, WIDER[0] * room], axis=1)
         shift, reach = self._krawczyk(at, about)
         with np.errstate(all="ignore"):
@@ -239,48 +291,40 @@ class Subdivision:
 
     def _near_zero(self, middle: Array, half: Array, P: Places) -> Flags:
         """Boxes (c, n) that lie, with their multipliers, in a box about a zero nearby that is proved to be the only one
-        there: its edges are equal, or in the ratio in which the numbers of the file leave the zero open
-        (epsilon-inflation). New ones are sought from the smallest boxes alone."""
+        there: in the frame of K there, in which what is flat, or what numbers of the file leave open, is one direction,
+        however steep the others are (epsilon-inflation). New ones are sought from the smallest boxes alone."""
         smallest = np.all(half <= SMALLEST_BOX * self.whole, axis=1)
         if not self.flat and not smallest.any():
             return smallest
-        mu, room, known = self._multipliers(middle, half, P)
-        at, own = np.concatenate([middle, mu], axis=1), np.concatenate([half, room], axis=1)
-        found = known & self._near(at, own)
+        multipliers, known = self._multipliers(middle, half, P)
+        own = stack([*forms_of(middle, half), *(multipliers[..., i] for i in range(multipliers.r.shape[1]))])
+        found = known & self._near(own)
         left = np.flatnonzero(known & ~found & smallest)
         if not len(left):
             return found
-        x = at[left]
-        for _ in range(8):
-            x = x - self._krawczyk(x, 0 * x)[0]
-        open_by = self._krawczyk(x, 0 * x)[1]
-        for about in (*self._around(x, P[left]), *(times * open_by for times in INFLATED)):
+        x = self._approach(own.v[0, left])
+        frame = self._frame(x)
+        open_by = INFLATED * self._krawczyk(x, 0 * x, frame)[1]
+        for times in AROUND:
+            about = np.maximum(open_by, times * SMALLEST_BOX * float(self.whole.max()))
             with np.errstate(all="ignore"):
-                one = np.all(self._krawczyk(x, about)[1] < about, axis=1)
-                one &= np.all(np.abs(at[left] - x) + own[left] <= about, axis=1)
+                one = np.all(self._krawczyk(x, about, frame)[1] < about, axis=1)
+            one &= _inside(AffineForms(own.v[:, left], own.r[left]), x, about, frame)
             while np.any(new := one & ~found[left]):
                 i = int(new.argmax())
-                self.flat.append((x[i], about[i]))
-                found[left] |= self._near(at[left], own[left])
+                self.flat.append((x[i], about[i], frame[i]))
+                found[left] |= self._near(AffineForms(own.v[:, left], own.r[left]))
         return found
 
-    def _around(self, x: Array, P: Places) -> Iterator[Array]:
-        """Half the edges (c, n + k) of boxes about zeros x, the largest first: equal ones of the coordinates, those of
-        the multipliers as they follow."""
-        n = self.error.size[0]
-        for times in AROUND:
-            wide = np.full((len(x), n), times * SMALLEST_BOX * float(self.whole.max()))
-            _, room, _ = self._multipliers(x[:, :n], wide, P)
-            yield np.concatenate([wide, WIDER[0] * room], axis=1)
+    def _near(self, boxes: AffineForms) -> Flags:
+        """Which of them, (c, n + k), lie in one about a flat zero."""
+        found = np.zeros(len(boxes.r), dtype=bool)
+        for zero in self.flat:
+            found |= _inside(boxes, *(each[None] for each in zero))
+        return found
 
-    def _near(self, at: Array, half: Array) -> Flags:
-        """Boxes (c, n + k) that lie in one about a flat zero."""
-        return np.any([np.all(np.abs(at - x) + half <= about, axis=1) for x, about in self.flat], axis=0) if (
-            self.flat) else np.zeros(len(at), dtype=bool)
-
-    def _multipliers(self, middle: Array, wide: Array, P: Places) -> tuple[Array, Array, Flags]:
-        """Multipliers (c, k) at the middle of boxes, how far they are from there at critical points in them, and
-        whether that is known."""
+    def _multipliers(self, middle: Array, wide: Array, P: Places) -> tuple[AffineForms, Flags]:
+        """Multipliers (c, k) at critical points in boxes, in the symbols of these, and whether they are known."""
         k = self.error.size[1]
         _, M, slope, _ = self._values(forms_of(middle, 0 * middle))
         back = inverse(columns(M.v[0], P))
@@ -293,30 +337,47 @@ class Subdivision:
         off = (combine(turned, rates.transposed()) - np.eye(k)).size
         with np.errstate(all="ignore"):
             most = (pull.size.max(axis=1, initial=0.0) / (1 - off.sum(axis=-1).max(axis=1, initial=0.0)))[:, None]
-            room = (pull.size + (off * most[:, None]).sum(axis=-1)) * (1 + BOX_ROUNDING)
-        known = np.isfinite(room).all(axis=1) & np.all(most >= 0, axis=1)
-        return mu, np.where(known[:, None], room, 1.0), known
+            found = AffineForms(-pull.v, (pull.r + np.abs(pull.v[0]) + (off * most[:, None]).sum(axis=-1))
+                                * (1 + BOX_ROUNDING))
+        found.v[0] = mu
+        known = np.isfinite(found.size).all(axis=1) & np.all(most >= 0, axis=1)
+        keep = known[:, None]
+        return AffineForms(np.where(keep, found.v, 0.0), np.where(keep, found.r, 1.0)), known
 
-    def _krawczyk(self, at: Array, about: Array) -> tuple[Array, Array]:
+    def _approach(self, x: Array) -> Array:
+        """Coordinates and multipliers (c, n + k) after some of Newton's steps."""
+        for _ in range(8):
+            x = x - self._krawczyk(x, 0 * x)[0]
+        return x
+
+    def _frame(self, x: Array) -> Array:
+        """The frames (columns) in which K is orthogonal at places (c, n + k), multipliers counted by their size."""
+        K, size = np.nan_to_num(self._equations(x, forms_of(x, 0 * x))[1].v[0]), np.maximum(1.0, np.abs(x))
+        size[:, : self.error.size[0]] = 1.0
+        return np.asarray(size[:, :, None] * np.swapaxes(np.linalg.svd(K * size[:, None])[2], 1, 2))
+
+    def _krawczyk(self, at: Array, about: Array, frame: Array | None = None) -> tuple[Array, Array]:
         """Newton's step from coordinates and multipliers (c, n + k), and how far from there the operator over a box
-        about them reaches."""
-        pull, K = self._equations(at, about)
+        about them reaches; the box and both in a frame, or in the coordinates themselves."""
+        pull, K = self._equations(at, forms_of(at, about, frame))
+        if frame is not None:
+            K = combine(np.swapaxes(frame, 1, 2), K.transposed()).transposed()
         Y = pseudo_inverse(K.v[0])
         with np.errstate(all="ignore"):
             shift = combine(Y, pull)
             off = ((np.eye(at.shape[1]) - combine(Y, K)).size @ about[..., None])[..., 0]
             return shift.v[0], (shift.size + off) * (1 + AFFINE_ROUNDING)
 
-    def _equations(self, at: Array, about: Array) -> tuple[AffineForms, AffineForms]:
+    def _equations(self, at: Array, forms: list[AffineForms]) -> tuple[AffineForms, AffineForms]:
         """(∇E + μ ∇g, g) (c, n + k) at places, and its derivatives over boxes about these."""
         n, k = self.error.size
         g, M, slope, _ = self._values(forms_of(at[:, :n], 0 * at[:, :n]))
         mu = at[:, n:]
         pull = slope + (M * mu[:, :, None]).sum(-2)
         phi = AffineForms(np.concatenate([pull.v, g.v], axis=-1), np.concatenate([pull.r, g.r], axis=-1))
-        out = self.error.bends.together(forms_of(at, about))
+        out = self.error.bends.together(forms)
         # the rates of g along the fields, which multiply μ: those by the coordinates but for a far chart
-        rates = self._values(forms_of(at, about)[:n])[1]
+        rates = self._values(forms[:n])[1]
         c, K = len(at), AffineForms(np.zeros((len(out.v), len(at), n + k, n + k)), np.zeros((len(at), n + k, n + k)))
         K.v[..., :n, :n], K.r[:, :n, :n] = out.v[..., : n * n].reshape(-1, c, n, n), out.r[:, : n * n].reshape(c, n, n)
         K.v[..., n:, :n] = out.v[..., n * n :].reshape(len(out.v), c, k, n)
@@ -330,34 +391,41 @@ class Subdivision:
         if not self.proved and not self.flat:
             return []
         n, far = self.error.size[0], self.error.far
-        at, room = (np.array(each) for each in zip(*self.proved, *self.flat, strict=True))
-        x, reach, left = at.copy(), room.copy(), np.arange(len(at))
-        for _ in range(8):
-            x = x - self._krawczyk(x, 0 * x)[0]
+        at, room, frame = self._rooms()
+        x, reach, left, back = self._approach(at), room.copy(), np.arange(len(at)), inverse(frame)
+        apart = np.abs(back @ (x - at)[..., None])[..., 0]
         for radius in MET_AGAIN * 4.0 ** np.arange(8):
-            found = self._krawczyk(x[left], np.full(x[left].shape, radius))[1]
-            done = np.all((found < radius) & (np.abs(x - at)[left] + radius <= room[left]), axis=1)
+            found = self._krawczyk(x[left], np.full(x[left].shape, radius), frame[left])[1]
+            done = np.all((found < radius) & (apart[left] + radius <= room[left]), axis=1)
             reach[left[done]] = found[done]
             left = left[~done]
             if not len(left):
                 break
         if len(left):
             # nearly flat ones: the operator over the room holds the zero, and again over what it reaches
-            inside = np.all(np.abs(x - at)[left] <= room[left], axis=1)
-            x[left] = np.where(inside[:, None], x[left], at[left])
-            reach[left] = np.fmin(room[left], self._krawczyk(at[left], room[left])[1]) + np.abs(x - at)[left]
+            inside = np.all(apart[left] <= room[left], axis=1)[:, None]
+            x[left], own = np.where(inside, x[left], at[left]), frame[left]
+            reach[left] = np.fmin(room[left], self._krawczyk(at[left], room[left], own)[1]) + np.where(
+                inside, apart[left], 0.0)
             for _ in range(8):
-                reach[left] = np.fmin(reach[left], self._krawczyk(x[left], reach[left])[1])
+                reach[left] = np.fmin(reach[left], self._krawczyk(x[left], reach[left], own)[1])
         if far is not None:
-            endless = np.abs(x[:, far]) <= reach[:, far]
-            self.left += [(at[i, :n], room[i, :n]) for i in np.flatnonzero(endless)]
-            x, reach = x[~endless], reach[~endless]
-        return self._report(x, reach) if len(x) else []
+            along, most = (hull(each, frame) for each in (reach, room))
+            endless = np.abs(x[:, far]) <= along[:, far]
+            self.left += [(at[i, :n], most[i, :n]) for i in np.flatnonzero(endless)]
+            x, reach, frame = x[~endless], reach[~endless], frame[~endless]
+        return self._report(x, reach, frame) if len(x) else []
 
-    def _report(self, x: Array, reach: Array) -> list[CriticalBox]:
-        """What boxes with one zero each hold."""
-        (n, k), error, far = self.error.size, self.error.error, self.error.far
-        K, forms = self._equations(x, reach)[1], forms_of(x[:, :n], reach[:, :n])
+    def _rooms(self) -> tuple[Array, Array, Array]:
+        """All boxes in which exactly one zero is proved: their middles (c, n + k), the room in frames, and these."""
+        every = [*((at, room, np.eye(len(at))) for at, room in self.proved), *self.flat]
+        at, room, frame = (np.array(each) for each in zip(*every, strict=True))
+        return at, room, frame
+
+    def _report(self, x: Array, reach: Array, frame: Array) -> list[CriticalBox]:
+        """What boxes in frames with one zero each hold."""
+        (n, k), error, far, forms = self.error.size, self.error.error, self.error.far, forms_of(x, reach, frame)
+        K, forms, reach = self._equations(x, forms)[1], forms[:n], hull(reach, frame)
         if far is not None:
             # rates by the turn itself, so that K is symmetric at the zero
             for place in self.error.turning:
@@ -374,10 +442,39 @@ class Subdivision:
                 for i in range(len(x))]
 
 
-def forms_of(middle: Array, half: Array) -> list[AffineForms]:
-    """The coordinates of boxes (c, n), and what cutting and narrowing them may have rounded."""
-    eye, off = np.eye(middle.shape[1]), AFFINE_ROUNDING * (1 + np.abs(middle))
-    return [affine(middle[:, i], half[:, i, None] * eye[i], off[:, i]) for i in range(len(eye))]
+def _cut_part(given: bytes, middle: Array, half: Array, budget: int
+              ) -> tuple[int, list[list[Any]], tuple[Array, Array]]:
+    """How many boxes were cut, what was found of each kind, and the boxes that wait when so many were looked at."""
+    part = replace(_read(given), left=[], lost=[], proved=[], flat=[])
+    waiting = part._cut(middle, half, budget, lambda *_: None)
+    return part.boxes, part._lists, waiting
+
+
+@lru_cache(maxsize=2)
+def _read(given: bytes) -> Subdivision:
+    """Boxes whose formulas are traced once in each process."""
+    found: Subdivision = pickle.loads(given)
+    return found
+
+
+def forms_of(middle: Array, half: Array, frame: Array | None = None) -> list[AffineForms]:
+    """The coordinates of boxes (c, n), in a frame (columns) or as they are, and what cutting and narrowing them may
+    have rounded."""
+    off = AFFINE_ROUNDING * (1 + np.abs(middle))
+    edges = half[:, None] * (np.eye(middle.shape[1]) if frame is None else frame)
+    return [affine(middle[:, i], edges[:, i], off[:, i]) for i in range(middle.shape[1])]
+
+
+def hull(half: Array, frame: Array) -> Array:
+    """How far boxes (c, n) in frames reach in the coordinates themselves."""
+    return np.asarray((np.abs(frame) @ half[..., None])[..., 0] * (1 + BOX_ROUNDING))
+
+
+def _inside(boxes: AffineForms, at: Array, about: Array, frame: Array) -> Flags:
+    """Whether boxes lie in those of half the edges ``about`` in frames about places (c, n)."""
+    apart = AffineForms(boxes.v.copy(), boxes.r)
+    apart.v[0] -= at
+    return np.asarray(np.all(combine(inverse(frame), apart).size <= about, axis=1))
 
 
 def _narrow_symbols(g: AffineForms, P: Places | None = None) -> tuple[Array, Array]:
