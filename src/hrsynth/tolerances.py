@@ -448,6 +448,8 @@ COVER_ROOM = 1e-6
 """How much farther than linear programs say boxes go, in characteristic lengths: these are solved to 1e-7."""
 SINGULAR_BOX = 1e-4
 """The same of a box in which the equations of the legs may be dependent."""
+SINGULAR_FINER = SINGULAR_BOX / 4, SINGULAR_BOX / 16, SINGULAR_BOX / 64
+"""Parts of the whole to which such boxes are cut, one after the other, where they fill more than one place together."""
 LOCKED_PLACE = 0.01
 """Longest edge of what such boxes fill together, as part of all, to be told as one place; what is longer is open."""
 

@@ -4,6 +4,7 @@ on a closed surface their kinds sum up to what its shape asks for."""
 from dataclasses import replace
 from itertools import product
 
+import mpmath
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -14,14 +15,14 @@ from scipy.spatial.transform import Rotation
 from hrsynth import load
 from hrsynth.analysis.asked import configurations_at
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.budgets import COVER_BOXES
+from hrsynth.budgets import BOXES_AT_ONCE, COVER_BOXES
 from hrsynth.closed_forms.legs import OnCrank, OnRail, OnRod, SlidingRod
 from hrsynth.geometry.affine import affine
-from hrsynth.geometry.vectors import Array
+from hrsynth.geometry.vectors import Array, hat
 from hrsynth.mechanism.pose import asked_pose
-from hrsynth.simulation.endings.cover import _places, bounds, cover
+from hrsynth.simulation.endings.cover import _cut_long, _places, bounds, cover, join_boxes
 from hrsynth.simulation.endings.flow import Places
-from hrsynth.simulation.endings.joint_error import JointError
+from hrsynth.simulation.endings.joint_error import JointError, across
 from hrsynth.simulation.endings.pose_error import PoseError
 from hrsynth.simulation.endings.reached import narrow_joint, narrow_joints
 from hrsynth.simulation.endings.subdivision import Subdivision, forms_of
@@ -464,6 +465,125 @@ def test_smallest_boxes_about_a_flat_zero_are_settled():
     met = [x for mode in product((-1.0, 1.0), repeat=3) for x in newton(
         error, [own * sign for own, sign in zip(modes, mode, strict=True)], np.array([zero[:3]]) + 1e-4)]
     assert min(np.abs(x - zero[:3]).max() for x in met) < 1e-4
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("p", "falling"), [((-0.129945, -1.045162, 3.455622), 2), ((-0.168081, -0.870224, -0.598767), 1)])
+def test_a_rest_beside_a_place_that_locks_is_one_zero(p: tuple[float, ...], falling: int) -> None:
+    """Half a millimetre from a place at which two rods of a Quattro's plate are parallel, and both square to what their
+    cranks do, K has a singular value of 1e-10, and the numbers of the file leave the pose open by 1e-6: boxes find one
+    rest, and so does Newton's method on differences of E in 50 digits."""
+    error = PoseError.of(scenes.setting("quattro"), scenes.goal("quattro"))
+    joints = JointError.of(error)
+    part = Subdivision(joints, *joints.box(*bounds(error, 1.0)[:2], 1.0))
+    middle, half = (part.low + part.high) / 2, part.whole.copy()
+    middle[:3], half[:3] = p, 4e-3
+    part._run(middle[None], half[None], 100_000, 1, "")
+    assert not part.left
+    (zero,) = part.zeros()
+    assert len(part.flat) == 1
+    assert zero.falling == falling
+    with mpmath.workdps(50):
+        level = exact_level(error, zero.x)
+        x = mpmath.matrix(zero.x[:4].tolist())
+        for _ in range(4):
+            slope, bend = differences(level, x)
+            x -= mpmath.lu_solve(bend, slope)
+        slope, bend = differences(level, x)
+        assert mpmath.norm(slope) < 1e-20
+        assert all(abs(x[i] - zero.x[i]) < zero.radius[i] for i in range(4))
+        assert sum(value < 0 for value in mpmath.eigsy(bend, eigvals_only=True)) == falling
+        assert zero.error[0] < mpmath.sqrt(2 * level(x)) < zero.error[1]
+
+
+def exact_level(error, y):
+    """E in many digits for cranks, as a function of the pose's coordinates, in the working modes of joints y."""
+    legs = []
+    for limb, angle, wanted in zip(error.limbs, y[error.size :], JointError.of(error).wanted, strict=True):
+        one, two = (mpmath.matrix(each.tolist()) for each in across(limb))
+        legs.append((limb, one, two, mpmath.matrix(np.asarray(wanted, dtype=float).tolist()), angle))
+
+    def dot(a, b):
+        return mpmath.fsum(v * w for v, w in zip(a, b, strict=True))
+
+    def level(x):
+        point, found = mpmath.matrix(error.p.tolist()), mpmath.mpf(0)
+        for k, way in enumerate(error.shifts.T.tolist()):
+            point += x[k] * mpmath.matrix(way)
+        K = mpmath.matrix(hat(error.turns[:, 0]).tolist())
+        turn = mpmath.eye(3) + mpmath.sin(x[3]) * K + (1 - mpmath.cos(x[3])) * K * K
+        R = turn * mpmath.matrix(error.R.tolist())
+        for limb, one, two, wanted, angle in legs:
+            tip = R * mpmath.matrix(limb.tip.turned.tolist()) + mpmath.matrix(limb.tip.constant.tolist())
+            way = point + tip - mpmath.matrix(limb.centre.tolist())
+            a, b = dot(way, one), dot(way, two)
+            half = mpmath.acos((dot(way, way) + limb.radius**2 - limb.rod**2) / (2 * limb.radius * mpmath.hypot(a, b)))
+            middle = mpmath.atan2(b, a)
+            at = middle + half if mpmath.sin(angle - middle) > 0 else middle - half
+            u = (way - limb.radius * (mpmath.cos(at) * one + mpmath.sin(at) * two)) / limb.rod
+            found += (1 - dot(u, wanted) ** 2) / 2
+        return found
+
+    return level
+
+
+def differences(level, x):
+    """First and second differences of a function in many digits."""
+    step, n = mpmath.mpf(10) ** -15, len(x)
+    ways = [mpmath.matrix([step * (i == j) for j in range(n)]) for i in range(n)]
+    slope = mpmath.matrix([(level(x + way) - level(x - way)) / (2 * step) for way in ways])
+    bend = mpmath.matrix(n, n)
+    for i, one in enumerate(ways):
+        for j, two in enumerate(ways[: i + 1]):
+            bend[i, j] = bend[j, i] = (level(x + one + two) - level(x + one - two) - level(x - one + two)
+                                       + level(x - one - two)) / (4 * step**2)
+    return slope, bend
+
+
+@pytest.mark.slow
+def test_boxes_that_fill_a_long_place_are_cut_finer() -> None:
+    """Where two rods of a Quattro's plate are parallel the moment about their tip nearly vanishes over some degrees of its
+    turn: boxes of a ten thousandth of the whole are too coarse to tell where."""
+    error = PoseError.of(scenes.setting("quattro"), scenes.goal("quattro"))
+    joints, (low, high, _) = JointError.of(error), bounds(error, 1.0)
+    part = Subdivision(joints, *joints.box(low, high, 1.0))
+    middle, half = (part.low + part.high) / 2, part.whole.copy()
+    middle[:3], half[:3] = (-0.0674, -0.9928, 3.4557), 0.012
+    part._run(middle[None], half[None], 200_000, 1, "")
+    size = (high - low)[:4]
+
+    def longest() -> float:
+        return max(float(((b - a) / size).max()) for a, b in join_boxes((m[:4] - h[:4], m[:4] + h[:4])
+                                                                       for m, h in part.lost))
+
+    assert part.lost
+    assert not part.left
+    assert longest() > LOCKED_PLACE
+    _cut_long([part], size, 500_000, 1)
+    assert part.lost
+    assert not part.left
+    assert longest() < LOCKED_PLACE / 2
+
+
+@pytest.mark.slow
+def test_nothing_depends_on_the_number_of_processes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Parts are dealt out as soon as there are some, and each goes on for a little: the boxes are the same, and so is
+    what they hold."""
+    setting = ObservedRobot.of("rrrrr_m1")
+    alone = cover(setting, setting.everything.start)
+    monkeypatch.setattr("hrsynth.simulation.endings.subdivision.BOXES_ALONE", 300)
+    monkeypatch.setattr("hrsynth.simulation.endings.subdivision.BOXES_A_PART", 100)
+    for jobs in (1, 2):
+        shared = cover(setting, setting.everything.start, jobs=jobs)
+        assert shared.complete
+        assert shared.boxes == alone.boxes
+        assert len(shared.found) == len(alone.found) == 30
+        places = np.array([each.x for each in shared.found])
+        assert all(np.abs(places - each.x).max(axis=1).min() < 1e-9 for each in alone.found)
+    few = cover(setting, setting.everything.start, jobs=2, budget=2000)
+    assert few.spent
+    assert not few.complete
+    assert 2000 <= few.boxes < 2000 + 16 * BOXES_AT_ONCE
 
 
 @settings(deadline=None)

@@ -26,6 +26,7 @@ from ...tolerances import (
     SAME_ENDING,
     SHORTEST_ROD,
     SINGULAR_BOX,
+    SINGULAR_FINER,
 )
 from .joint_error import JointError
 from .loop_error import LoopError, LoopSubdivision
@@ -34,9 +35,6 @@ from .pose_error import NotEnclosed, PoseError
 from .spring_error import SpringError, SpringSubdivision
 from .struts import Struts
 from .subdivision import CriticalBox, Subdivision
-
-FINER = (1 / 4, 1 / 16, 1 / 64)
-"""Parts of the edges of small boxes in which equations may be dependent, to which they are cut where they are many."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -232,7 +230,7 @@ def _corners(error: JointError, boxes: Sequence[tuple[Array, Array]], size: int)
 
 def _cut_long(every: Sequence[Subdivision], whole: Array, budget: int, jobs: int) -> None:
     """Cut lost boxes on that together fill more than what can be told as one place, more finely step by step."""
-    for part in FINER:
+    for finer in SINGULAR_FINER:
         own = [list(_corners(each.error, each.lost, len(whole))) for each in every]
         long = [(low, high) for low, high in join_boxes(chain(*own))
                 if np.isfinite(high - low).all() and np.any(high - low > LOCKED_PLACE * whole)]
@@ -240,7 +238,7 @@ def _cut_long(every: Sequence[Subdivision], whole: Array, budget: int, jobs: int
             chosen = [any(np.all((a <= low) & (high <= b)) for a, b in long) for low, high in boxes]
             left = budget - sum(other.boxes for other in every)
             if any(chosen) and left > 0:
-                each.cut_lost(chosen, part * SINGULAR_BOX, left, jobs)
+                each.cut_lost(chosen, finer, left, jobs)
 
 
 def _places(places: Sequence[tuple[Array, Array]], left: Sequence[tuple[Array, Array]], whole: Array

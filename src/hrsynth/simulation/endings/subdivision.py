@@ -48,7 +48,7 @@ WIDER = (1.25, 4.0)
 INFLATED = 4.0
 """How many times as large as what numbers leave open of a zero nearby such boxes are at least."""
 AROUND = 16.0 ** np.arange(4, -1, -1)
-"""How many times as large as the smallest boxes those are about a zero nearby at least, one after the other."""
+"""How many times as large as the smallest boxes those are at least that they hold, one after the other."""
 SINGULAR = -2
 """In the place of an axis: a box is left open, ∇g may lose rank in it."""
 STRETCHED = 8.0
@@ -150,6 +150,9 @@ class Subdivision:
                         waiting.append(rest)
                         say(self.boxes, count, share)
                     middle, half = (np.concatenate(each) for each in zip(*waiting, strict=True))
+                    # the smallest last again
+                    order = np.argsort(-np.prod(half / self.whole, axis=1), kind="stable")
+                    middle, half = middle[order], half[order]
         self.left += list(zip(middle, half, strict=True))
         self.spent |= len(middle) > 0
 
@@ -296,8 +299,7 @@ class Subdivision:
         smallest = np.all(half <= SMALLEST_BOX * self.whole, axis=1)
         if not self.flat and not smallest.any():
             return smallest
-        multipliers, known = self._multipliers(middle, half, P)
-        own = stack([*forms_of(middle, half), *(multipliers[..., i] for i in range(multipliers.r.shape[1]))])
+        own, known = self._with_multipliers(middle, half, P)
         found = known & self._near(own)
         left = np.flatnonzero(known & ~found & smallest)
         if not len(left):
@@ -305,23 +307,30 @@ class Subdivision:
         x = self._approach(own.v[0, left])
         frame = self._frame(x)
         open_by = INFLATED * self._krawczyk(x, 0 * x, frame)[1]
+        own, y = AffineForms(own.v[:, left], own.r[left]), x[:, : middle.shape[1]]
         for times in AROUND:
-            about = np.maximum(open_by, times * SMALLEST_BOX * float(self.whole.max()))
+            cube = np.full(y.shape, times * SMALLEST_BOX * float(self.whole.max()))
+            about = np.maximum(open_by, WIDER[0] * _apart(self._with_multipliers(y, cube, P[left])[0], x, frame))
             with np.errstate(all="ignore"):
                 one = np.all(self._krawczyk(x, about, frame)[1] < about, axis=1)
-            one &= _inside(AffineForms(own.v[:, left], own.r[left]), x, about, frame)
+            one &= np.all(_apart(own, x, frame) <= about, axis=1)
             while np.any(new := one & ~found[left]):
                 i = int(new.argmax())
                 self.flat.append((x[i], about[i], frame[i]))
-                found[left] |= self._near(AffineForms(own.v[:, left], own.r[left]))
+                found[left] |= self._near(own)
         return found
 
     def _near(self, boxes: AffineForms) -> Flags:
         """Which of them, (c, n + k), lie in one about a flat zero."""
         found = np.zeros(len(boxes.r), dtype=bool)
-        for zero in self.flat:
-            found |= _inside(boxes, *(each[None] for each in zero))
+        for at, about, frame in self.flat:
+            found |= np.all(_apart(boxes, at[None], frame[None]) <= about, axis=1)
         return found
+
+    def _with_multipliers(self, middle: Array, half: Array, P: Places) -> tuple[AffineForms, Flags]:
+        """Boxes (c, n) with their multipliers, (c, n + k), and whether these are known."""
+        found, known = self._multipliers(middle, half, P)
+        return stack([*forms_of(middle, half), *(found[..., i] for i in range(found.r.shape[1]))]), known
 
     def _multipliers(self, middle: Array, wide: Array, P: Places) -> tuple[AffineForms, Flags]:
         """Multipliers (c, k) at critical points in boxes, in the symbols of these, and whether they are known."""
@@ -470,11 +479,11 @@ def hull(half: Array, frame: Array) -> Array:
     return np.asarray((np.abs(frame) @ half[..., None])[..., 0] * (1 + BOX_ROUNDING))
 
 
-def _inside(boxes: AffineForms, at: Array, about: Array, frame: Array) -> Flags:
-    """Whether boxes lie in those of half the edges ``about`` in frames about places (c, n)."""
+def _apart(boxes: AffineForms, at: Array, frame: Array) -> Array:
+    """How far boxes reach from places (c, n), in frames."""
     apart = AffineForms(boxes.v.copy(), boxes.r)
     apart.v[0] -= at
-    return np.asarray(np.all(combine(inverse(frame), apart).size <= about, axis=1))
+    return combine(inverse(frame), apart).size
 
 
 def _narrow_symbols(g: AffineForms, P: Places | None = None) -> tuple[Array, Array]:
