@@ -468,7 +468,8 @@ def test_smallest_boxes_about_a_flat_zero_are_settled():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("p", "falling"), [((-0.129945, -1.045162, 3.455622), 2), ((-0.168081, -0.870224, -0.598767), 1)])
+@pytest.mark.parametrize(("p", "falling"), [
+    ((-0.129945, -1.045162, 3.455622), 2), ((-0.168081, -0.870224, -0.598767), 1)])
 def test_a_rest_beside_a_place_that_locks_is_one_zero(p: tuple[float, ...], falling: int) -> None:
     """Half a millimetre from a place at which two rods of a Quattro's plate are parallel, and both square to what their
     cranks do, K has a singular value of 1e-10, and the numbers of the file leave the pose open by 1e-6: boxes find one
@@ -542,8 +543,8 @@ def differences(level, x):
 
 @pytest.mark.slow
 def test_boxes_that_fill_a_long_place_are_cut_finer() -> None:
-    """Where two rods of a Quattro's plate are parallel the moment about their tip nearly vanishes over some degrees of its
-    turn: boxes of a ten thousandth of the whole are too coarse to tell where."""
+    """Where two rods of a Quattro's plate are parallel the moment about their tip nearly vanishes over some degrees of
+    its turn: boxes of a ten thousandth of the whole are too coarse to tell where."""
     error = PoseError.of(scenes.setting("quattro"), scenes.goal("quattro"))
     joints, (low, high, _) = JointError.of(error), bounds(error, 1.0)
     part = Subdivision(joints, *joints.box(low, high, 1.0))
