@@ -20,7 +20,7 @@ from hrsynth.closed_forms.legs import OnCrank, OnRail, OnRod, SlidingRod
 from hrsynth.geometry.affine import affine
 from hrsynth.geometry.vectors import Array, hat
 from hrsynth.mechanism.pose import asked_pose
-from hrsynth.simulation.endings.cover import _cut_long, _places, bounds, cover, join_boxes
+from hrsynth.simulation.endings.cover import Cover, _cut_long, _places, bounds, cover, join_boxes
 from hrsynth.simulation.endings.flow import Places
 from hrsynth.simulation.endings.joint_error import JointError, across
 from hrsynth.simulation.endings.pose_error import PoseError
@@ -539,6 +539,15 @@ def differences(level, x):
             bend[i, j] = bend[j, i] = (level(x + one + two) - level(x + one - two) - level(x - one + two)
                                        + level(x - one - two)) / (4 * step**2)
     return slope, bend
+
+
+@pytest.mark.parametrize(("turn", "inside"), [(0.0, True), (2 * np.pi, True), (-2 * np.pi + 0.005, True), (0.1, False),
+                                              (np.pi, False)])
+def test_a_place_that_locks_is_at_a_turn(turn: float, inside: bool) -> None:
+    """Only at its turn, whatever number of whole turns it is told with, a place excepts what is listed there."""
+    error, goal = PoseError.of(scenes.setting("quattro"), scenes.goal("quattro")), scenes.goal("quattro")
+    told = Cover((), (), 0.0, 0, True, error=error, locked=((np.array([0.0, 0.0, 0.0, turn]), np.full(4, 0.01)),))
+    assert told.holds(goal) is not inside
 
 
 @pytest.mark.slow

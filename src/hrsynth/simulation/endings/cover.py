@@ -13,6 +13,7 @@ import numpy as np
 from ...analysis.observed import ObservedRobot
 from ...budgets import COVER_BOXES
 from ...closed_forms.legs import ClosedFormLeg, OnCrank, OnRail, SlidingRod
+from ...geometry.so3 import turn_about
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...mechanism import JointType
@@ -88,11 +89,16 @@ class Cover(Value):
         if any(abs(margin) < SAME_ENDING for margin in margins):
             return False
         x = self.error.shifts.T @ (p - self.error.p)
-        if any(np.all(np.abs(x - middle[:k]) <= half[:k] + FOLLOWED) for middle, half in self.locked):
-            return False
+        if self.error.turns.shape[1] == 1:
+            x = np.append(x, turn_about(self.error.turns[:, 0], R @ self.error.R.T)[0])
+        for middle, half in self.locked:
+            away = np.abs(x - middle[: len(x)])
+            away[k:] = np.minimum(away[k:] % (2 * np.pi), -away[k:] % (2 * np.pi))
+            if np.all(away <= half[: len(x)] + FOLLOWED):
+                return False
         if self.box is None:
             return True
-        return bool(np.all(self.box[0][:k] <= x) and np.all(x <= self.box[1][:k]))
+        return bool(np.all(self.box[0][:k] <= x[:k]) and np.all(x[:k] <= self.box[1][:k]))
 
     @property
     def turns(self) -> tuple[Array, ...]:
