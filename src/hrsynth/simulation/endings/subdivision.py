@@ -318,6 +318,7 @@ class Subdivision:
                 i = int(new.argmax())
                 self.flat.append((x[i], about[i], frame[i]))
                 found[left] |= self._near(own)
+                found[left[i]] = True
         return found
 
     def _near(self, boxes: AffineForms) -> Flags:
@@ -361,9 +362,10 @@ class Subdivision:
 
     def _frame(self, x: Array) -> Array:
         """The frames (columns) in which K is orthogonal at places (c, n + k), multipliers counted by their size."""
-        K, size = np.nan_to_num(self._equations(x, forms_of(x, 0 * x))[1].v[0]), np.maximum(1.0, np.abs(x))
+        K, size = self._equations(x, forms_of(x, 0 * x))[1].v[0], np.maximum(1.0, np.abs(x))
         size[:, : self.error.size[0]] = 1.0
-        return np.asarray(size[:, :, None] * np.swapaxes(np.linalg.svd(K * size[:, None])[2], 1, 2))
+        rows = np.linalg.svd(np.where(np.isfinite(K), K, 0.0) * size[:, None])[2]
+        return np.asarray(size[:, :, None] * np.swapaxes(rows, 1, 2))
 
     def _krawczyk(self, at: Array, about: Array, frame: Array | None = None) -> tuple[Array, Array]:
         """Newton's step from coordinates and multipliers (c, n + k), and how far from there the operator over a box
