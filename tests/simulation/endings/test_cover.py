@@ -471,9 +471,9 @@ def test_smallest_boxes_about_a_flat_zero_are_settled():
 @pytest.mark.parametrize(("p", "falling"), [
     ((-0.129945, -1.045162, 3.455622), 2), ((-0.168081, -0.870224, -0.598767), 1)])
 def test_a_rest_beside_a_place_that_locks_is_one_zero(p: tuple[float, ...], falling: int) -> None:
-    """Three or five millimetres from a place at which two rods of a Quattro's plate are parallel, and both square to what
-    their cranks do, K has a singular value of 1e-10, and the numbers of the file leave the pose open by 1e-6: boxes find
-    one rest, and so does Newton's method on differences of E in 50 digits."""
+    """Three or five millimetres from a place at which two rods of a Quattro's plate are parallel, and both square to
+    what their cranks do, K has a singular value of 1e-10, and the numbers of the file leave the pose open by 1e-6:
+    boxes find one rest, and so does Newton's method on differences of E in 50 digits."""
     error = PoseError.of(scenes.setting("quattro"), scenes.goal("quattro"))
     joints = JointError.of(error)
     part = Subdivision(joints, *joints.box(*bounds(error, 1.0)[:2], 1.0))
