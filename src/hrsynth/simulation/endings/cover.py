@@ -269,15 +269,22 @@ def _places(places: Sequence[tuple[Array, Array]], left: Sequence[tuple[Array, A
 
 
 def join_boxes(boxes: Iterable[Sequence[Array]]) -> list[tuple[Array, Array]]:
-    """The corners of a box about each group of boxes (lower, upper corner) that are nearly together."""
-    groups: list[tuple[Array, Array]] = []
+    """The corners of a box about each group of boxes (lower, upper corner) that are nearly together; those without an
+    end are one group by themselves."""
+    groups, endless = list[tuple[Array, Array]](), list[tuple[Array, Array]]()
     for low, high in boxes:
         room = 3 * (high - low)
+        if not np.isfinite(room).all():
+            endless.append((low, high))
+            continue
         while near := [k for k, (a, b) in enumerate(groups) if np.all((a <= high + room) & (low <= b + room))]:
             low, high = np.min([low, *(groups[k][0] for k in near)], axis=0), np.max(
                 [high, *(groups[k][1] for k in near)], axis=0)
             groups = [each for k, each in enumerate(groups) if k not in near]
         groups.append((low, high))
+    if endless:
+        low, high = map(np.array, zip(*endless, strict=True))
+        groups.append((low.min(axis=0), high.max(axis=0)))
     return groups
 
 

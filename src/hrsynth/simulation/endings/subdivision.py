@@ -99,7 +99,7 @@ class Subdivision:
     """The same of zeros that are flat, the room in a frame, and this (columns)."""
 
     singular: float = SINGULAR_BOX
-    """Part of the whole from which edges on boxes with equations that may be dependent are small."""
+    """Part of the whole: boxes with edges below it in which equations may be dependent are not cut further."""
 
     @property
     def whole(self) -> Array:
@@ -137,13 +137,13 @@ class Subdivision:
             from joblib import Parallel, delayed
 
             given = pickle.dumps(replace(self, boxes=0, left=[], lost=[], proved=[], flat=[]))
-            with Parallel(n_jobs=jobs, batch_size=1, return_as="generator") as pool:
+            with Parallel(n_jobs=min(jobs, BOX_PARTS), batch_size=1, return_as="generator") as pool:
                 while len(middle) and self.boxes < budget:
-                    most, waiting = -(-min(BOXES_A_PART * BOX_PARTS, budget - self.boxes) // BOX_PARTS), list[Any]()
-                    count, share = len(middle), self.share + self._fill(half)
+                    room, waiting = min(BOXES_A_PART * BOX_PARTS, budget - self.boxes), list[Any]()
+                    count, share, parts = len(middle), self.share + self._fill(half), min(BOX_PARTS, len(middle), room)
                     for boxes, found, rest in pool(
-                            delayed(_cut_part)(given, middle[k::BOX_PARTS], half[k::BOX_PARTS], most)
-                            for k in range(min(BOX_PARTS, count))):
+                            delayed(_cut_part)(given, middle[k::parts], half[k::parts], room // parts)
+                            for k in range(parts)):
                         for own, new in zip(self._lists, found, strict=True):
                             own += new
                         self.boxes += boxes
@@ -172,7 +172,7 @@ class Subdivision:
         while len(middle) and self.boxes < budget:
             say(self.boxes, len(middle), share + self._fill(half))
             # the smallest first: memory stays small
-            first = max(0, len(middle) - BOXES_AT_ONCE)
+            first = max(0, len(middle) - min(BOXES_AT_ONCE, budget - self.boxes))
             part, size, axis = self._open(middle[first:], half[first:])
             self.boxes += len(middle) - first
             lost, small = axis == SINGULAR, np.all(size <= SMALLEST_BOX * self.whole, axis=1)
@@ -305,6 +305,7 @@ class Subdivision:
         if not len(left):
             return found
         x = self._approach(own.v[0, left])
+        x = np.where(np.isfinite(x), x, 0.0)
         frame = self._frame(x)
         open_by = INFLATED * self._krawczyk(x, 0 * x, frame)[1]
         own, y = AffineForms(own.v[:, left], own.r[left]), x[:, : middle.shape[1]]
@@ -361,7 +362,8 @@ class Subdivision:
         return x
 
     def _frame(self, x: Array) -> Array:
-        """The frames (columns) in which K is orthogonal at places (c, n + k), multipliers counted by their size."""
+        """Frames (columns) in which the columns of K are at right angles, at places (c, n + k): its right singular
+        vectors where multipliers are counted by their size."""
         K, size = self._equations(x, forms_of(x, 0 * x))[1].v[0], np.maximum(1.0, np.abs(x))
         size[:, : self.error.size[0]] = 1.0
         rows = np.linalg.svd(np.where(np.isfinite(K), K, 0.0) * size[:, None])[2]
@@ -436,7 +438,7 @@ class Subdivision:
     def _report(self, x: Array, reach: Array, frame: Array) -> list[CriticalBox]:
         """What boxes in frames with one zero each hold."""
         (n, k), error, far, forms = self.error.size, self.error.error, self.error.far, forms_of(x, reach, frame)
-        K, forms, reach = self._equations(x, forms)[1], forms[:n], hull(reach, frame)
+        K, forms, radius = self._equations(x, forms)[1], forms[:n], hull(reach, frame)
         if far is not None:
             # rates by the turn itself, so that K is symmetric at the zero
             for place in self.error.turning:
@@ -446,7 +448,7 @@ class Subdivision:
         e, u = self.error.errors.together(forms), self.error.directions.together(forms_of(x[:, :n], 0 * x[:, :n]))
         least, most = np.maximum(np.maximum(e.low, -e.high), 0.0), e.size
         p, R = self.error.pose(x[:, :n])
-        low, high = self.error.enclose_chart(x[:, :n], reach[:, :n])
+        low, high = self.error.enclose_chart(x[:, :n], radius[:, :n])
         return [CriticalBox(error.length * p[i], R[i], (low[i] + high[i]) / 2, (high[i] - low[i]) / 2,
                             (float(np.linalg.norm(least[i])), float(np.linalg.norm(most[i]))),
                             int(falling[i]) if falling[i] >= 0 else None, u.v[0, i].reshape(-1, 3))
@@ -483,9 +485,14 @@ def hull(half: Array, frame: Array) -> Array:
 
 def _apart(boxes: AffineForms, at: Array, frame: Array) -> Array:
     """How far boxes reach from places (c, n), in frames."""
-    apart = AffineForms(boxes.v.copy(), boxes.r)
+    apart, back = AffineForms(boxes.v.copy(), boxes.r), inverse(frame)
     apart.v[0] -= at
-    return combine(inverse(frame), apart).size
+    with np.errstate(all="ignore"):
+        size = combine(back, apart).size
+        # s = back (z − at) + (1 − back frame) s
+        off = (np.abs(np.eye(frame.shape[-1]) - back @ frame)
+               + AFFINE_ROUNDING * (np.abs(back) @ np.abs(frame))).sum(axis=-1)
+        return np.asarray(size + off * (size.max(axis=1) / (1 - off.max(axis=1)))[:, None])
 
 
 def _narrow_symbols(g: AffineForms, P: Places | None = None) -> tuple[Array, Array]:
