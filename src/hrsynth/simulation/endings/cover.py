@@ -91,11 +91,10 @@ class Cover(Value):
         x = self.error.shifts.T @ (p - self.error.p)
         if self.error.turns.shape[1] == 1:
             x = np.append(x, turn_about(self.error.turns[:, 0], R @ self.error.R.T)[0])
-        for middle, half in self.locked:
-            away = np.abs(x - middle[: len(x)])
-            away[k:] = np.minimum(away[k:] % (2 * np.pi), -away[k:] % (2 * np.pi))
-            if np.all(away <= half[: len(x)] + FOLLOWED):
-                return False
+        periods = np.where(np.arange(len(x)) < k, np.inf, 2 * np.pi)
+        if any(np.all(_away(x, middle[: len(x)], periods) <= half[: len(x)] + FOLLOWED)
+               for middle, half in self.locked):
+            return False
         if self.box is None:
             return True
         return bool(np.all(self.box[0][:k] <= x[:k]) and np.all(x[:k] <= self.box[1][:k]))
@@ -350,8 +349,13 @@ def _same(one: CriticalBox, other: CriticalBox, error: JointError) -> bool:
 
 def _meet(one: CriticalBox, other: CriticalBox, error: JointError, own: list[int]) -> bool:
     """Whether enclosures of two zeros meet in some of the coordinates, but for periods."""
-    away, periods = np.abs(one.x[own] - other.x[own]), error.periods[own]
-    turns = np.isfinite(periods)
+    away = _away(one.x[own], other.x[own], error.periods[own])
+    return bool(np.all(away <= one.radius[own] + other.radius[own] + FOLLOWED))
+
+
+def _away(one: Array, other: Array, periods: Array) -> Array:
+    """How far coordinates (n,) are from others, but for periods."""
+    away, turns = np.abs(one - other), np.isfinite(periods)
     away[turns] %= periods[turns]
     away[turns] = np.minimum(away[turns], periods[turns] - away[turns])
-    return bool(np.all(away <= one.radius[own] + other.radius[own] + FOLLOWED))
+    return away

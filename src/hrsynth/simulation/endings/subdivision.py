@@ -492,7 +492,8 @@ def _apart(boxes: AffineForms, at: Array, frame: Array) -> Array:
         # s = back (z − at) + (1 − back frame) s
         off = (np.abs(np.eye(frame.shape[-1]) - back @ frame)
                + AFFINE_ROUNDING * (np.abs(back) @ np.abs(frame))).sum(axis=-1)
-        return np.asarray(size + off * (size.max(axis=1) / (1 - off.max(axis=1)))[:, None])
+        left = 1 - off.max(axis=1)
+        return np.asarray(size + off * np.where(left > 0, size.max(axis=1) / left, np.inf)[:, None])
 
 
 def _narrow_symbols(g: AffineForms, P: Places | None = None) -> tuple[Array, Array]:
