@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import math
+import time
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import hrsynth
 from hrsynth.description import load, native
+from hrsynth.description.formats.urdf.xacro import expand
+from hrsynth.description.formats.urdf.xacro_process import CONSTANTS, MATH, PYTHON, VALUES, Expression
 from hrsynth.errors import BadRobotFile, HrsynthError
 
 xacro = pytest.importorskip("xacro")
@@ -118,3 +124,142 @@ def test_lint_tells_lines(tmp_path: Path):
     found = hrsynth.lint(written(tmp_path, 'parent link="base"', 'parent link="bass"')).findings
     assert {f"{each.file}:{each.line}" for each in found if "unknown link" in each.message} == {
         place_of(tmp_path, '<joint name="shoulder')}
+
+
+NAMES = {**CONSTANTS, "x": 0.25, "n": 3, "side": "left", "legs": {"a": {"length": 2}, "b": [1, 2.5]}, "none": None}
+FUNCTIONS = {**MATH, **PYTHON, **{f"math.{name}": call for name, call in MATH.items()}}
+NUMBER = st.recursive(
+    st.sampled_from(["x", "n", "2", "0.5", "-3", "pi", "legs['b'][1]", "legs['a']['length']", "len(side)"]),
+    lambda part: st.one_of(
+        st.tuples(part, st.sampled_from(["+", "-", "*", "/", "//", "%"]), part).map(lambda each: f"({' '.join(each)})"),
+        st.tuples(part, st.sampled_from(["<", "<=", "==", "!="]), part, part, part).map(
+            lambda each: f"({each[3]} if {each[0]} {each[1]} {each[2]} else {each[4]})"),
+        st.tuples(part, st.sampled_from(["and", "or"]), part).map(lambda each: f"({' '.join(each)})"),
+        st.tuples(st.sampled_from(["cos", "abs", "float", "not"]), part).map(lambda each: f"({each[0]} ({each[1]}))"),
+        st.tuples(part, part).map(lambda each: f"max({each[0]}, {each[1]})"),
+        part.map(lambda each: f"[{each}, 1, {each}][-1]")), max_leaves=8)
+
+
+def outcome(call, text: str):
+    """A value, or the kind of error."""
+    try:
+        return call(text)
+    except (ArithmeticError, ValueError) as error:
+        return type(error).__name__
+
+
+@given(NUMBER)
+def test_expressions_have_the_value_that_python_gives(text: str):
+    mine = outcome(Expression(NAMES, FUNCTIONS).evaluate, text)
+    assert repr(mine) == repr(outcome(lambda each: eval(each, {**FUNCTIONS, **NAMES, "math": math}), text))
+
+
+@pytest.mark.parametrize(("text", "value"), [
+    ("'leg_' + side", "leg_left"), ("'%s_%d' % (side, n)", "left_3"), ("side == 'left' and n in [1, 3]", True),
+    ("legs.a.length", 2), ("side.upper()[0:2]", "LE"), ("math.sqrt(math.pi ** 2)", math.pi), ("1 < n < 4", True),
+    ("none is None", True), ("'a,b'.split(',')[1]", "b"), ("dict(k=n)['k']", 3), ("list(range(2))", [0, 1]),
+    ("2 ** 3 ** 2", 512),
+])
+def test_expressions_of_robot_files_are_evaluated(text: str, value: object):
+    assert Expression(NAMES, FUNCTIONS).evaluate(text) == value
+
+
+OBJECTS = "python.vars(python.type(python.type(0)))['__getattribute__'](python.type(0), '__base__')"
+ESCAPES = {
+    "an inner code object": "(lambda: [c for c in ().__class__.__base__.__subclasses__() if c.__name__ == "
+                            "'_wrap_close'][0].__init__.__globals__['system']('touch MADE'))()",
+    "vars of a type": f"python.vars({OBJECTS})['__getattribute__'](xacro.load_yaml, '__globals__')['os']"
+                      ".system('touch MADE')",
+    "a format": "'{0.__class__.__init__.__globals__}'.format(legs)",
+    "a function as a value": "[xacro.load_yaml][0]('x')",
+    "a type": "python.type(0)", "vars": "vars(math)", "a module": "math", "a namespace": "xacro", "hash": "python.hash",
+    "a comprehension": "[c for c in 'ab']", "a lambda": "(lambda: 0)", "a walrus": "(a := 1)",
+    "an f-string": "f'{side!r}'", "a starred": "max(*[1, 2])", "double stars": "dict(**legs)",
+    "bytes": "b'a'", "a dunder": "side.__class__",
+    "a generator": "sum(i for i in [1])", "await": "await side", "an item of a text": "side.real",
+    "import": "__import__('os')", "eval": "eval('1')", "open": "open('MADE', 'w')", "getattr": "getattr(side, 'upper')",
+}
+
+
+@pytest.mark.parametrize("name", ESCAPES)
+def test_what_is_not_on_the_list_is_refused(name: str):
+    with pytest.raises((ValueError, NameError, TypeError, KeyError, SyntaxError)):
+        Expression(NAMES, FUNCTIONS).evaluate(ESCAPES[name])
+
+
+@pytest.mark.parametrize("form", ["${%s}", "$(eval %s)"])
+@pytest.mark.some(6)
+@pytest.mark.parametrize("name", ESCAPES)
+def test_opening_a_file_runs_nothing(name: str, form: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(tmp_path)
+    value = (form % ESCAPES[name]).replace("'", "&apos;").replace("<", "&lt;")
+    path = tmp_path / "robot.urdf"
+    path.write_text(HEAD + f'<link name="base"/><link name="b"/><link name="a{value}"/></robot>')
+    with pytest.raises(BadRobotFile) as refused:
+        load(path)
+    assert refused.value.lines()[0].startswith(f"{path}:2: xacro refuses it: ")
+    assert {each.name for each in tmp_path.iterdir()} == {"robot.urdf"}
+
+
+ATOMS = st.sampled_from(["x", "legs", "side", "math", "max", "str", "1", "''", "None"])
+
+
+@given(st.recursive(ATOMS, lambda part: st.one_of(
+    part.map(lambda each: f"({each}).upper"), st.tuples(part, part).map(lambda each: f"{each[0]}[{each[1]}]"),
+    st.tuples(part, part).map(lambda each: f"{each[0]}({each[1]})"), part.map(lambda each: f"{each}.__class__"),
+    st.tuples(part, part).map(lambda each: f"({each[0]} + {each[1]})"), part.map(lambda each: f"dict(k={each})"))))
+def test_no_expression_has_an_object_of_python_as_its_value(text: str):
+    try:
+        found = Expression(NAMES, FUNCTIONS).evaluate(text)
+    except (ValueError, NameError, TypeError, KeyError, IndexError, SyntaxError):
+        return
+    pending = [found]
+    while pending:
+        each = pending.pop()
+        assert type(each) in VALUES
+        if isinstance(each, dict):
+            pending += [*each.keys(), *each.values()]
+        elif isinstance(each, list | tuple):
+            pending += each
+
+
+LARGE = {
+    "a power": "${9 ** 9 ** 9}", "a text": "${'a' * 10 ** 12}", "a list": "${list(range(10 ** 12))}",
+    "a width": "${'%999999999999d' % 1}", "a factorial": "${factorial(10 ** 9)}", "a long name": "${'a' * 10 ** 8}",
+    "signs": "${" + "-" * 5000 + "1}", "parentheses": "${" + "(" * 5000 + "1" + ")" * 5000 + "}",
+    "another file": "${xacro.load_yaml('/etc/passwd')}", "a file above": "${xacro.load_yaml('../settings.yaml')}",
+}
+
+
+@pytest.mark.some(3, 8)
+@pytest.mark.parametrize("name", LARGE)
+def test_large_values_and_other_files_are_refused_in_time(name: str, tmp_path: Path):
+    folder = tmp_path / "robot"
+    folder.mkdir()
+    (tmp_path / "settings.yaml").write_text("a: 1\n")
+    (folder / "robot.urdf").write_text(HEAD + f'<link name="a{LARGE[name]}"/></robot>')
+    start = time.monotonic()
+    with pytest.raises(BadRobotFile) as refused:
+        load(folder / "robot.urdf")
+    assert time.monotonic() - start < 20
+    assert len(refused.value.lines()[0]) < 1000
+
+
+def test_the_environment_is_not_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("HRSYNTH_SECRET", "secret")
+    (tmp_path / "robot.urdf").write_text(
+        HEAD + '<link name="a$(optenv HRSYNTH_SECRET none)b$(env HRSYNTH_SECRET)"/></robot>')
+    assert expand(tmp_path / "robot.urdf")[0].get("name") == "anoneb"
+
+
+def test_settings_of_the_own_folder_are_read(tmp_path: Path):
+    path = written(tmp_path, '"crank" value="0.4"', '"crank" value="${xacro.load_yaml(\'arms.yaml\').crank[0]}"')
+    (tmp_path / "arms.yaml").write_text("crank: [0.4]\n")
+    assert load(path).differences(load(written(tmp_path))) == []
+
+
+def test_a_document_type_of_an_included_file_is_refused(tmp_path: Path):
+    path = written(tmp_path)
+    (tmp_path / "parts.xacro").write_text('<!DOCTYPE robot [<!ENTITY a "b">]>\n' + PARTS)
+    with pytest.raises(BadRobotFile, match="document type declaration"):
+        load(path)

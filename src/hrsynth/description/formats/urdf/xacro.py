@@ -7,7 +7,7 @@ import json
 import sys
 from pathlib import Path
 
-from ....budgets import XACRO_SECONDS
+from ....budgets import LARGEST_FILE, XACRO_SECONDS
 from ... import xml
 
 
@@ -29,11 +29,14 @@ def expand(path: Path) -> xml.Element:
     if importlib.util.find_spec("xacro") is None:
         raise xml.refusal(path, "a xacro file, and the package xacro is not installed",
                           "the extra hrsynth[xacro], or the URDF that it expands to")
-    command = [sys.executable, "-P", str(Path(__file__).with_name("xacro_process.py")), str(path.resolve())]
+    process = Path(__file__).with_name("xacro_process.py")
+    command = [sys.executable, "-P", str(process), str(path.resolve()), str(LARGEST_FILE)]
     try:
         run = subprocess.run(command, capture_output=True, text=True, timeout=XACRO_SECONDS, check=False)
     except subprocess.TimeoutExpired:
         raise xml.refusal(path, "xacro did not finish", f"{XACRO_SECONDS} seconds") from None
+    if run.returncode < 0:
+        raise xml.refusal(path, "xacro was stopped", f"{XACRO_SECONDS} seconds and 900 MB of memory")
     if run.returncode:
         file, line, said = _last_message(run.stderr)
         raise xml.refusal(path if file is None else xml.beside(path, file),

@@ -2,24 +2,201 @@
 line of each element, then the document; no files are written, none read elsewhere. What is wrong is one line of JSON
 on standard error.
 
-``$(find PACKAGE)`` stands for the folder, the file's own or one above it, that has what follows.
+Expressions are Python's in syntax only: a walker over the syntax tree computes them from an allow-list. Its values are
+numbers, texts, truth values, None, and lists and dictionaries of these; functions can be called but are no values, and
+nothing has attributes. The package's own ``eval`` is taken away.
+
+``$(find PACKAGE)`` stands for the folder, the file's own or one above it, that has what follows. Variables of the
+environment are empty.
 """
 
 from __future__ import annotations
 
+import ast
 import json
-import resource
+import math
+import operator
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 from xml.dom import expatbuilder, minidom
 
-MEMORY = 900_000_000
-SECONDS = 4
+LIMITS = {"AS": 900_000_000, "CPU": 4, "FSIZE": 0, "NOFILE": 64, "CORE": 0, "NPROC": 0}
+"""Limits of the process by the names of ``resource``: bytes, seconds, numbers. That of processes (NPROC) does not hold
+for root."""
 LEVELS = 4
 """Folders above the file in which a package's files are looked for."""
+LONGEST_POWER = 10_000
+"""Bits that a power of whole numbers may have."""
 MARK = "/find:package"
+
+VALUES = (bool, int, float, str, list, tuple, dict, type(None))
+OPERATORS: dict[type[ast.AST], Callable[..., Any]] = {
+    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
+    ast.FloorDiv: operator.floordiv, ast.Mod: operator.mod,
+    ast.UAdd: operator.pos, ast.USub: operator.neg, ast.Not: operator.not_,
+    ast.Eq: operator.eq, ast.NotEq: operator.ne, ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt,
+    ast.GtE: operator.ge, ast.Is: operator.is_, ast.IsNot: operator.is_not,
+    ast.In: lambda one, many: one in many, ast.NotIn: lambda one, many: one not in many,
+}
+CONSTANTS = {name: value for name, value in vars(math).items() if isinstance(value, float)}
+TEXT_METHODS = ("lower", "upper", "strip", "split", "replace", "startswith", "endswith")
+
+
+def in_list(call: Callable[..., Any]) -> Callable[..., list[Any]]:
+    """A function that returns a list of what an iterator gives."""
+    return lambda *arguments: list(call(*arguments))
+
+
+Functions: TypeAlias = dict[str, Callable[..., Any]]
+MATH: Functions = {name: call for name, call in vars(math).items() if callable(call) and not name.startswith("_")}
+PYTHON: Functions = {
+    "abs": abs, "all": all, "any": any, "bool": bool, "dict": dict, "divmod": divmod, "float": float, "int": int,
+    "len": len, "list": list, "max": max, "min": min, "round": round, "sorted": sorted, "str": str, "sum": sum,
+    "tuple": tuple, "range": in_list(range), "reversed": in_list(reversed), "zip": in_list(zip),
+    "enumerate": in_list(enumerate),
+}
+
+
+def power(base: Any, exponent: Any) -> Any:
+    """A power, in floats where the whole number would be long."""
+    if isinstance(base, int) and isinstance(exponent, int) and abs(base).bit_length() * exponent > LONGEST_POWER:
+        return float(base) ** float(exponent)
+    return base ** exponent
+
+
+class Expression:
+    """The value of an expression of the allowed syntax, given the names and functions it may use."""
+
+    def __init__(self, names: Mapping[str, Any], functions: Mapping[str, Callable[..., Any]]) -> None:
+        self.names, self.functions = names, functions
+
+    def evaluate(self, text: str) -> Any:
+        """Return the value; raises ``ValueError`` for what is not allowed, and what the operations raise."""
+        return self.value(ast.parse(text.strip(), mode="eval").body)
+
+    def value(self, node: ast.AST | None) -> Any:
+        """Return the value of a part, which is one of ``VALUES``."""
+        method = getattr(self, f"value_of_{type(node).__name__}", None)
+        if method is None:
+            raise ValueError(f"{type(node).__name__} is no part of an expression that is read")
+        found = method(node)
+        if not isinstance(found, VALUES):
+            raise ValueError(f"a value of type {type(found).__name__} is no part of an expression that is read")
+        return found
+
+    def value_of_NoneType(self, node: None) -> Any:
+        return None
+
+    def value_of_Constant(self, node: ast.Constant) -> Any:
+        return node.value
+
+    def value_of_Name(self, node: ast.Name) -> Any:
+        if node.id not in self.names:
+            raise NameError(f"name {node.id!r} is not defined")
+        return self.names[node.id]
+
+    def value_of_List(self, node: ast.List | ast.Tuple) -> Any:
+        return [self.value(part) for part in node.elts]
+
+    def value_of_Tuple(self, node: ast.Tuple) -> Any:
+        return tuple(self.value_of_List(node))
+
+    def value_of_Dict(self, node: ast.Dict) -> Any:
+        return {self.value(key): self.value(part) for key, part in zip(node.keys, node.values, strict=True)}
+
+    def value_of_UnaryOp(self, node: ast.UnaryOp) -> Any:
+        return OPERATORS[type(node.op)](self.value(node.operand))
+
+    def value_of_BinOp(self, node: ast.BinOp) -> Any:
+        left, right = self.value(node.left), self.value(node.right)
+        return power(left, right) if isinstance(node.op, ast.Pow) else OPERATORS[type(node.op)](left, right)
+
+    def value_of_BoolOp(self, node: ast.BoolOp) -> Any:
+        found = self.value(node.values[0])
+        for part in node.values[1:]:
+            if bool(found) == isinstance(node.op, ast.Or):
+                return found
+            found = self.value(part)
+        return found
+
+    def value_of_Compare(self, node: ast.Compare) -> Any:
+        left = self.value(node.left)
+        for op, part in zip(node.ops, node.comparators, strict=True):
+            right = self.value(part)
+            if not OPERATORS[type(op)](left, right):
+                return False
+            left = right
+        return True
+
+    def value_of_IfExp(self, node: ast.IfExp) -> Any:
+        return self.value(node.body if self.value(node.test) else node.orelse)
+
+    def value_of_Subscript(self, node: ast.Subscript) -> Any:
+        if isinstance(node.slice, ast.Slice):
+            ends = node.slice.lower, node.slice.upper, node.slice.step
+            return self.value(node.value)[slice(*map(self.value, ends))]
+        return self.value(node.value)[self.value(node.slice)]
+
+    def value_of_Attribute(self, node: ast.Attribute) -> Any:
+        """The constant of a namespace (``math.pi``), or the item of a dictionary (``legs.length``)."""
+        if isinstance(node.value, ast.Name) and node.value.id == "math" and "math" not in self.names:
+            return CONSTANTS[node.attr]
+        holder = self.value(node.value)
+        if not isinstance(holder, dict):
+            raise ValueError(f".{node.attr} stands behind what is no dictionary")
+        return holder[node.attr]
+
+    def value_of_Call(self, node: ast.Call) -> Any:
+        arguments = [self.value(part) for part in node.args]
+        if any(part.arg is None for part in node.keywords):
+            raise ValueError("** is no part of an expression that is read")
+        options = {str(part.arg): self.value(part.value) for part in node.keywords}
+        name = ast.unparse(node.func)
+        if name in self.functions:
+            return self.functions[name](*arguments, **options)
+        if isinstance(node.func, ast.Attribute) and node.func.attr in TEXT_METHODS:
+            holder = self.value(node.func.value)
+            if isinstance(holder, str):
+                return getattr(holder, node.func.attr)(*arguments)
+        raise NameError(f"name {name!r} is not defined" if isinstance(node.func, ast.Name) else
+                        f"{name!r} is no function that is read")
+
+
+def restrict(xacro: Any, substitution: Any, locate: Callable[[str], str]) -> None:
+    """Have the package evaluate its expressions here, and read files that are located only."""
+    def fail(*texts: Any) -> None:
+        raise ValueError(" ".join(map(str, texts)))
+
+    def forbidden(*arguments: Any) -> None:
+        raise ValueError("this version of the package xacro evaluates what hrsynth does not expect")
+
+    given = xacro.substitution_args_context
+    files: Functions = {"load_yaml": xacro.load_yaml, "abs_filename": locate, "dotify": dict}
+    more: Functions = {**files, "tokenize": xacro.tokenize, "fatal": fail, "arg": lambda name: given["arg"][name]}
+    functions = {**MATH, **PYTHON, **files}
+    for space, calls in (("math", MATH), ("python", PYTHON), ("xacro", more)):
+        functions |= {f"{space}.{name}": call for name, call in calls.items()}
+
+    def evaluate(text: str, names: Any, local: Any = None) -> Any:
+        return Expression(names, functions).evaluate(text)
+
+    def evaluate_argument(text: str, context: Any) -> str:
+        typed = {name: substitution.convert_value(value, "auto") for name, value in context.get("arg", {}).items()}
+        names = {**CONSTANTS, "true": True, "false": False, **typed}
+        own: Functions = {"arg": lambda name: typed[name], "find": lambda package: MARK,
+                          "dirname": lambda: substitution._eval_dirname(context.get("filename"))}
+        return str(Expression(names, {**functions, **own}).evaluate(text))
+
+    for module, names in ((xacro, ("safe_eval", "_global_symbols", "abs_filename_spec")),
+                          (substitution, ("_eval", "_eval_find", "_eval_env", "_eval_optenv"))):
+        if not all(hasattr(module, name) for name in names):
+            forbidden()
+        module.eval = module.exec = module.compile = forbidden
+    xacro.safe_eval, xacro._global_symbols, xacro.abs_filename_spec = evaluate, dict(CONSTANTS), locate
+    substitution._eval, substitution._eval_find = evaluate_argument, lambda package: MARK
+    substitution._eval_env, substitution._eval_optenv = lambda variable: "", lambda variable, default="": default
 
 
 def located(spec: str, folder: Path) -> str:
@@ -31,7 +208,7 @@ def located(spec: str, folder: Path) -> str:
         for home in (folder, *list(folder.parents)[:LEVELS]):
             for start in range(len(rest.parts)):
                 candidate = home.joinpath(*rest.parts[start:])
-                if candidate.is_file():
+                if candidate.is_file() and candidate.resolve().is_relative_to(home):
                     return str(candidate)
         raise ValueError(f"no folder above the file has {rest}")
     path = Path(spec) if Path(spec).is_absolute() else folder / spec
@@ -52,6 +229,10 @@ class PlacedBuilder(expatbuilder.ExpatBuilderNS):
         super().start_element_handler(name, attributes)
         begun: Any = self.curNode
         begun.place = (self.file, self.getParser().CurrentLineNumber)
+
+    def start_doctype_decl_handler(self, *parts: Any) -> None:
+        """Refuse entities."""
+        raise ValueError("a document type declaration is not allowed")
 
 
 def watched(xacro: Any) -> list[Any]:
@@ -93,26 +274,36 @@ def wrong(xacro: Any, error: Exception, at: list[Any]) -> dict[str, Any]:
     return {"file": file, "line": line, "said": told}
 
 
-def main(name: str) -> None:
-    """Expand one file under limits of time, memory and writing."""
-    for limit, amount in ((resource.RLIMIT_AS, MEMORY), (resource.RLIMIT_CPU, SECONDS)):
-        resource.setrlimit(limit, (amount, amount))
+def limit() -> None:
+    """Set the limits of this process that the system has."""
+    try:
+        import resource
+    except ImportError:
+        return
+    for name, amount in LIMITS.items():
+        if hasattr(resource, f"RLIMIT_{name}"):
+            resource.setrlimit(getattr(resource, f"RLIMIT_{name}"), (amount, amount))
+
+
+def main(name: str, largest: str) -> None:
+    """Expand one file to at most so many bytes."""
+    limit()
     import xacro
     from xacro import substitution_args
 
     folder = Path(name).resolve().parent
-    substitution_args._eval_find = lambda package: MARK
-    substitution_args._eval_env = lambda variable: ""
-    xacro.abs_filename_spec = lambda spec: located(spec, folder)
     at = watched(xacro)
     try:
-        made = xacro.process_file(name)
+        restrict(xacro, substitution_args, lambda spec: located(spec, folder))
+        made = xacro.process_file(name, verbosity=0)
         places = [getattr(each, "place", None) for each in made.getElementsByTagName("*")]
         text = made.toxml()
+        if len(text) > int(largest):
+            raise ValueError(f"{len(text)} characters when expanded, allowed: {largest}")
     except Exception as error:
         sys.exit(json.dumps(wrong(xacro, error, at)))
     sys.stdout.write(json.dumps(places) + "\n" + text)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    main(*sys.argv[1:])
