@@ -169,7 +169,6 @@ class Database:
         kept = {} if not self.path.exists() else {
             name: self.lines([name], {}) for name in self.groups() if name != group}
         with writable(self.path), replacement(self.path, sync=True) as draft:
-            draft.unlink(missing_ok=True)
             try:
                 _write_tables(draft, {**kept, group: lines})
             except sqlite3.Error as error:

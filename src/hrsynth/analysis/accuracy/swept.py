@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...budgets import SWEEP_DRAWN, SWEEP_PART
-from ...description.files import as_path, require_alone, require_writable
+from ...description.files import as_path, open_kept, require_alone, require_writable
 from ...errors import BadRequest, BuildStopped, PlaneNotMet
 from ...geometry.vectors import Array
 from ...mechanism.pose import Grid
@@ -129,10 +129,10 @@ class _SweepDraft:
         self._head, self._whole = head.getvalue(), grid.size * ROW.itemsize
         self._files = ExitStack()
         with _stopping(self.journal), ExitStack() as files:
-            self._lines = files.enter_context(open(os.open(self.journal, os.O_RDWR | os.O_CREAT, 0o666), "r+b"))
+            self._lines = files.enter_context(open(open_kept(self.journal), "r+b"))
             require_alone(self._lines.fileno(), "another sweep writes this file", self.journal, "one sweep at a time")
             self.compiled, self.tally = self._resume(asked, compiled)
-            self._rows = files.enter_context(open(os.open(self.part, os.O_RDWR | os.O_CREAT, 0o666), "r+b"))
+            self._rows = files.enter_context(open(open_kept(self.part), "r+b"))
             self._begin(asked)
             self._files = files.pop_all()
 
