@@ -1,4 +1,4 @@
-"""Files are written whole or not at all."""
+"""Files are written whole or not at all; lines that are kept between two runs carry a checksum."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import contextlib
 import os
 import secrets
 import shutil
+import zlib
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
@@ -114,6 +115,17 @@ def open_kept(path: Path, flags: int = os.O_RDWR) -> int:
     """Open a file that outlives a run, and whose name can be known before, made where there is none. Raises
     ``OSError``, for a symbolic link as well."""
     return os.open(path, flags | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o666)
+
+
+def seal_line(text: str) -> str:
+    """A line with its checksum behind it."""
+    return f"{text} {zlib.crc32(text.encode()):08x}"
+
+
+def unseal_line(raw: bytes) -> str | None:
+    """The line that :func:`seal_line` sealed, without its end; None for a damaged one."""
+    text, _, checksum = raw.rstrip(b"\n").rpartition(b" ")
+    return text.decode() if checksum == b"%08x" % zlib.crc32(text) and text.isascii() else None
 
 
 def require_alone(handle: int, otherwise: str, path: Path, allowed: str = "one build at a time") -> None:
