@@ -1,4 +1,5 @@
-"""Work that several processes share; they end with the process that shares it out, however that ends."""
+"""Work that several processes share; they end with the process that shares it out, however that ends. What needs more
+of the operating system than Python has everywhere."""
 
 from __future__ import annotations
 
@@ -7,14 +8,24 @@ import signal
 import time
 import warnings
 from collections.abc import Callable, Generator, Iterable
+from importlib import import_module
 from threading import Thread
 from typing import TypeVar
 
-from .errors import WorkersLost
+from .errors import NeedsPosix, WorkersLost
 
 PARENT_WATCH = 0.5
 """Seconds within which a worker notices that its parent has ended."""
 T = TypeVar("T")
+
+
+def require_posix(what: str, *modules: str) -> None:
+    """Raise ``NeedsPosix`` where one of the modules is missing."""
+    for module in modules:
+        try:
+            import_module(module)
+        except ImportError:
+            raise NeedsPosix(what, module) from None
 
 
 def run_shared(works: Iterable[Callable[[], T]], jobs: int, *, ordered: bool = True) -> Generator[T, None, None]:

@@ -104,8 +104,8 @@ ANY_FIELD = st.fixed_dictionaries({}, optional={
 def test_lines_are_left_unread_only_where_they_do_not_fit(asked: dict[str, Any]):
     """Whatever is asked for, and however the file was written."""
     told, hold = may_fit(asked), fits(asked)
-    for line, spaced, read in _every_line():
-        assert told(line) or not hold(read)
+    for text, spaced, read in _every_line():
+        assert told(text) or not hold(read)
         assert told(spaced)
 
 
@@ -262,8 +262,9 @@ def test_a_record_with_a_field_of_another_kind_or_without_it_is_one_line(field: 
 
 
 ODD_FILES = {
-    "deep": b'{"word":' + 100_000 * b"[" + 100_000 * b"]" + b"}", "deep head": None, "not UTF-8": b"\xff\xfe{}", "a list": b"[]",
-    "empty line": b"", "a number": b"9" * 5000, "a surrogate": b'{"word":"\\ud800","group":"g"}', "zeros": b"\0" * 40}
+    "deep": b'{"word":' + 100_000 * b"[" + 100_000 * b"]" + b"}", "deep head": b"", "not UTF-8": b"\xff\xfe{}",
+    "a list": b"[]", "empty line": b"", "a number": b"9" * 5000, "zeros": b"\0" * 40,
+    "a surrogate": b'{"word":"\\ud800","group":"g"}'}
 
 
 @pytest.mark.some(5)
@@ -283,8 +284,9 @@ def test_an_odd_file_is_one_line(name: str, tmp_path: Path, capsys):
             file.write_bytes(100_000 * b"[" + b"\n")
         case _:
             file.write_bytes(head + ODD_FILES[name] + b"\n")
-    for arguments in (*commands(tmp_path, "3(Rz*-Rz-Rz)"), ["catalog", "build", "planar", "--check", "-o", str(tmp_path)],
-                      ["catalog", "site", "--catalog", str(tmp_path), "-o", str(tmp_path / "site")]):
+    for arguments in (*commands(tmp_path, "3(Rz*-Rz-Rz)"),
+                      ["catalog", "build", "planar", "--check", "-o", str(tmp_path)], [
+                          "catalog", "site", "--catalog", str(tmp_path), "-o", str(tmp_path / "site")]):
         status = execute(arguments)
         said = capsys.readouterr()
         if "show" not in arguments or status:  # it may be of another group
@@ -402,7 +404,8 @@ def test_a_fresh_catalog_is_not_stale(stores: tuple[Path, Path]):
     ('{"word":"(c01)"', '"word":"(c01)"', "not a record of the catalog")])
 def test_what_is_stale_is_told(old: str, new: str, said: str, stores: tuple[Path, Path], tmp_path: Path):
     for file in stores[0].iterdir():
-        (tmp_path / file.name).write_text(without_checksum(file.read_text()).replace(old, new, -1 if "idle" in old else 1))
+        text = without_checksum(file.read_text())
+        (tmp_path / file.name).write_text(text.replace(old, new, -1 if "idle" in old else 1))
     stale = check(tmp_path, ["c"], source=source((30, 20)))
     assert any(said in each for each in stale), stale
     assert all("\n" not in each for each in stale)

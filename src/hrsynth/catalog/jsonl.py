@@ -20,9 +20,10 @@ _LINE_START, _GROUP = '{"word":"', '","group":"'
 FORMAT = 1
 """Version of the lines, the journal and the tables."""
 
-TEXTS = ("word", "group", "notation", "hidden", "motion", "verdict", "condition", "modes_proof", "cure", "see", "refused")
-COUNTS = ("legs", "dof", "mobility", "idle", "rank", "instances", "confirmed", "fewest", "motors", "motor_rank", "attempt",
-          "modes_bound", "modes_seen")
+TEXTS = ("word", "group", "notation", "hidden", "motion", "verdict", "condition", "modes_proof", "cure", "see",
+         "refused")
+COUNTS = ("legs", "dof", "mobility", "idle", "rank", "instances", "confirmed", "fewest", "motors", "motor_rank",
+          "attempt", "modes_bound", "modes_seen")
 FLAGS = ("exact", "driven", "base_motors")
 LISTS = ("lost", "steps", "modes_legs")
 """Fields of a record by the kind of their values: texts, whole numbers, true or false, lists of texts."""

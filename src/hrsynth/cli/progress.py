@@ -98,5 +98,6 @@ class Progress:
 
         columns = [progress.MofNCompleteColumn(), progress.TimeRemainingColumn(), progress.TextColumn("left")] if (
             self._counted) else [progress.TextColumn("step {task.completed:.0f}"), progress.TimeElapsedColumn()]
-        return progress.Progress(progress.TextColumn("{task.description}", markup=False), progress.BarColumn(), *columns,
+        what = progress.TextColumn("{task.description}", markup=False)
+        return progress.Progress(what, progress.BarColumn(), *columns,
                                  console=Console(stderr=True), transient=True, speed_estimate_period=SPEED_OVER)

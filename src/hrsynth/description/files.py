@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from ..errors import BadRequest
+from ..processes import require_posix
 
 
 def as_path(file: object) -> Path:
@@ -130,6 +131,7 @@ def unseal_line(raw: bytes) -> str | None:
 
 def require_alone(handle: int, otherwise: str, path: Path, allowed: str = "one build at a time") -> None:
     """Lock an open file or folder until it is closed; raises ``BadRequest`` where another process has it."""
+    require_posix("a file that several processes may write", "fcntl")
     import fcntl
 
     try:

@@ -118,8 +118,8 @@ def require_file(path: str | Path) -> Path:
 
 class _SweepDraft:
     """The array of a grid that is being written, and its journal: what was asked, then a line a part. Both are on the
-    disk when a part counts as done; a last line that was torn is cut off, and a damaged one, found by its checksum, does
-    not count."""
+    disk when a part counts as done; a last line that was torn is cut off, and a damaged one, found by its checksum,
+    does not count."""
 
     def __init__(self, target: Path, grid: Grid, asked: str, compiled: bool) -> None:
         self.target = target
@@ -158,7 +158,8 @@ class _SweepDraft:
             done = next((Tally.parse(each) for each in reversed(parts) if each is not None), Tally())
             there = self.part.stat().st_size if self.part.exists() else 0
         except (ValueError, KeyError, TypeError, RecursionError):
-            raise BadRequest("no journal of a sweep with checksums", str(self.journal), "another file, or that one removed") from None
+            raise BadRequest("no journal of a sweep with checksums", str(self.journal),
+                             "another file, or that one removed") from None
         return told["compiled"], done if there >= self._place(done.done) else Tally()
 
     def _begin(self, asked: str) -> None:

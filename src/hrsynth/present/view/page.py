@@ -33,7 +33,8 @@ def page(found: View) -> str:
         return "".join(file.read_text(encoding="utf-8") for file in files)
 
     made = Environment(autoescape=True, undefined=StrictUndefined)
-    made.policies["json.dumps_kwargs"] = {"sort_keys": True, "ensure_ascii": False}  # nothing that steers is hidden in an escape
+    # nothing that steers is hidden in an escape
+    made.policies["json.dumps_kwargs"] = {"sort_keys": True, "ensure_ascii": False}
     template = made.from_string(text(FOLDER / "page.html"))
     return name_steering(template.render(
         robot=found.setting.robot.name, scene=found.scene(), style=text(FOLDER / "page.css", STAGE / "stage.css"),
