@@ -96,7 +96,8 @@ def _are(values: Any, kind: type) -> bool:
 
 
 def _is_choice(each: dict[str, Any]) -> bool:
-    return type(each.get("rank")) is int and _are(legs := each.get("joints"), list) and legs != [] and all(
+    legs: Any = each.get("joints")
+    return type(each.get("rank")) is int and _are(legs, list) and legs != [] and all(
         _are(joints, int) for joints in legs)
 
 
