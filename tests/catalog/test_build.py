@@ -45,7 +45,8 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
 
 
 def started(target: Path, delay: float, workers: int = 1) -> subprocess.Popen[bytes]:
-    environment = os.environ | {"PYTHONPATH": str(TESTS), "STUB_DELAY": str(delay)}
+    found = os.pathsep.join([str(TESTS), *filter(None, [os.environ.get("PYTHONPATH")])])
+    environment = os.environ | {"PYTHONPATH": found, "STUB_DELAY": str(delay)}
     command = [sys.executable, "-m", "catalog.stub", str(target), str(workers)]
     return subprocess.Popen(command, env=environment, stderr=subprocess.DEVNULL, start_new_session=True)
 
