@@ -22,7 +22,8 @@ from email import message_from_bytes
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-NEEDED = ("Makefile", "CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "LICENSE", "README.md", "mkdocs.yml",
+NEEDED = ("Makefile", "CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "LICENSE", "LICENSE.three.js",
+          "README.md", "SECURITY.md", "mkdocs.yml",
           "requirements/main.txt", "robots/quattro.urdf", "catalog/mixed.jsonl.gz", "notebooks/1_the_idea.ipynb",
           "docs/pages/theory.md", "tests/oracle.py", "benchmarks/table.py", "src/hrsynth/claims.toml")
 """What a source archive must hold, of each kind of file something."""

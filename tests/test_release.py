@@ -29,6 +29,21 @@ def test_the_version_is_one_in_package_changelog_and_citation():
     assert f"\nversion: {version}\ndate-released: {date}\n" in citation
 
 
+def test_the_licence_is_that_of_all_that_is_shipped():
+    """The expression names the licence of the bundled three.js, whose text is the one in the bundle."""
+    assert PROJECT["license"] == "BSD-3-Clause AND MIT"
+    texts = {name: (ROOT / name).read_text(encoding="utf-8") for name in PROJECT["license-files"]}
+    assert texts["LICENSE"].startswith("BSD 3-Clause License")
+    (bundle,) = (ROOT / "src").rglob("*.min.js")
+    told = texts["LICENSE.three.js"]
+    assert str(bundle.relative_to(ROOT)) in told
+    assert told[told.index("The MIT License"):].strip() in bundle.read_text(encoding="utf-8")
+
+
+def test_a_defect_of_security_is_reported_to_the_authors():
+    assert PROJECT["authors"][0]["email"] in (ROOT / "SECURITY.md").read_text(encoding="utf-8")
+
+
 def test_all_files_of_the_catalog_and_all_robots_are_package_data():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     told = project["tool"]["setuptools"]["package-data"]["hrsynth"]

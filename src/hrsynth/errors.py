@@ -366,6 +366,22 @@ class NotRendered(Unanswered):
         super().__init__(f"pictures cannot be rendered here: {reason} (MUJOCO_GL chooses between egl, osmesa and glfw)")
 
 
+class NeedsPosix(Unanswered):
+    """Something that this operating system does not offer: what needs it, and the module that is missing."""
+
+    def __init__(self, what: str, module: str) -> None:
+        self.what, self.module = what, module
+        super().__init__(f"{what} needs a POSIX system: this Python has no module {module}")
+
+
+class WorkersLost(Unanswered):
+    """Processes that share work and ended before it was done, and why."""
+
+    def __init__(self, reason: str) -> None:
+        self.reason = reason
+        super().__init__(f"{reason}: it may have run out of memory; fewer processes (--jobs) need less")
+
+
 class BuildStopped(Unanswered):
     """A build of the catalog, or a sweep to a file, that cannot continue: why, and the journal that keeps what was
     done, if any."""

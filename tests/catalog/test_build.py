@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import gzip
 import os
@@ -10,6 +11,7 @@ import signal
 import subprocess
 import sys
 import time
+import zlib
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -18,12 +20,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from catalog.stub import REFUSED, broken, died, entry, source
+from catalog.stub import REFUSED, broken, died, entry, source, without_checksum
 from hrsynth.catalog import load
 from hrsynth.catalog.build import architectures, build, check
 from hrsynth.catalog.journal import Journal
 from hrsynth.catalog.jsonl import decode_lines, encode_lines, line
 from hrsynth.catalog.store import store
+from hrsynth.description.files import seal_line
 from hrsynth.errors import BadRequest, BuildStopped, HrsynthError
 
 TESTS = Path(__file__).resolve().parent.parent
@@ -42,7 +45,8 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
 
 
 def started(target: Path, delay: float, workers: int = 1) -> subprocess.Popen[bytes]:
-    environment = os.environ | {"PYTHONPATH": str(TESTS), "STUB_DELAY": str(delay)}
+    found = os.pathsep.join([str(TESTS), *filter(None, [os.environ.get("PYTHONPATH")])])
+    environment = os.environ | {"PYTHONPATH": found, "STUB_DELAY": str(delay)}
     command = [sys.executable, "-m", "catalog.stub", str(target), str(workers)]
     return subprocess.Popen(command, env=environment, stderr=subprocess.DEVNULL, start_new_session=True)
 
@@ -75,7 +79,8 @@ def test_a_group_is_one_file_sorted_compact_and_ascii(whole: dict[str, bytes]):
     assert list(whole) == ["c.jsonl", "d.jsonl"]
     for group, data in zip("cd", whole.values(), strict=True):
         head, *lines = data.decode("ascii").splitlines()
-        assert head == f'{{"format":1,"catalog":1,"group":"{group}","count":{len(lines)}}}'
+        crc = zlib.crc32(data.partition(b"\n")[2])
+        assert head == f'{{"format":1,"catalog":1,"group":"{group}","count":{len(lines)},"crc32":"{crc:08x}"}}'
         assert lines == [line({**entry_or_refused(word), "word": word, "group": group})
                          for word in sorted(source().groups[group]())]
         assert b"null" not in data
@@ -160,15 +165,15 @@ def test_a_torn_journal_is_read_up_to_where_it_is_whole(cut: int, tail: bytes, b
         parts = data.splitlines(keepends=True)
         data = b"".join([*parts[:broken], b"\0" * (len(parts[broken]) - 1) + b"\n", *parts[broken + 1:]])
     path.write_bytes(data + tail.replace(b"\n", b" "))
-    whole = [text for text in lines if f"{text}\n".encode() in data]
+    whole = [text for text in lines if f"{seal_line(text)}\n".encode() in data]
     with Journal(path, "x") as journal:
         found = [f"(w{i})" for i, text in enumerate(lines) if text in whole]
         assert [f"(w{i})" in journal for i in range(8)] == [text in whole for text in lines]
         assert list(journal.lines(found)) == whole
-        journal.add([("(new)", '{"word":"(new)"}')])
+        journal.add([("(new)", new := line({**entry("(new)"), "group": "x"}))])
     with Journal(path, "x") as journal:
         assert len(journal) == len(whole) + 1
-        assert list(journal.lines(["(new)"])) == ['{"word":"(new)"}']
+        assert list(journal.lines(["(new)"])) == [new]
 
 
 def test_a_record_is_on_the_disk_before_the_next_is_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
@@ -184,13 +189,51 @@ def test_a_record_is_on_the_disk_before_the_next_is_made(tmp_path: Path, monkeyp
 
 def test_a_journal_of_something_else_is_refused(tmp_path: Path):
     path = tmp_path / "c.jsonl.part"
-    for text, said in [("a list\nof words\n", "not a head"), ('{"format":1,"catalog":99}\n', "another version")]:
+    for text, said in [("a list\nof words\n", "a journal without checksums"),
+                       ('{"format":1,"catalog":1,"group":"c"}\n', "a journal without checksums .*removed, or --anew"),
+                       (seal_line("words") + "\n", "not a head"),
+                       (seal_line('{"format":1,"catalog":99}') + "\n", "another version")]:
         path.write_text(text)
         with pytest.raises(BadRequest, match=said):
             build(tmp_path, ["c"], source=source())
         assert path.read_text() == text
     build(tmp_path, ["c"], source=source(), anew=True)
     assert len(load(tmp_path)) == 24
+
+
+@settings(max_examples=30, deadline=None)
+@given(place=st.floats(0, 1, exclude_max=True), bit=st.integers(0, 7))
+def test_a_bit_that_flips_in_a_journal_is_found(place: float, bit: int, whole: dict[str, bytes],
+                                                tmp_path_factory: pytest.TempPathFactory):
+    """Its record is made again; in the first line the journal is refused."""
+    folder = tmp_path_factory.mktemp("flipped")
+    build(folder, ["c"], source=source(), limit=10)
+    path = folder / "c.jsonl.part"
+    data = bytearray(path.read_bytes())
+    data[at := int(place * len(data))] ^= 1 << bit
+    path.write_bytes(data)
+    if at <= bytes(data).index(b"\n"):
+        with pytest.raises(BadRequest):
+            build(folder, ["c"], source=source())
+    else:
+        (done,) = build(folder, ["c"], source=source())
+        assert done.now > 14
+        assert content(folder) == {"c.jsonl": whole["c.jsonl"]}
+
+
+@settings(max_examples=100, deadline=None)
+@given(place=st.floats(0, 1, exclude_max=True), bit=st.integers(0, 7), packed=st.booleans())
+def test_a_bit_that_flips_in_a_finished_file_is_found(place: float, bit: int, packed: bool, whole: dict[str, bytes],
+                                                      tmp_path_factory: pytest.TempPathFactory):
+    """Either the file is refused or its lines are what they were, as after a change of the time in gzip's head."""
+    data = whole["c.jsonl"]
+    lines = decode_lines(data, "c")
+    data = bytearray(gzip.compress(encode_lines("c", lines, checksum=False), mtime=0) if packed else data)
+    data[int(place * len(data))] ^= 1 << bit
+    folder = tmp_path_factory.mktemp("flipped")
+    (folder / ("c.jsonl.gz" if packed else "c.jsonl")).write_bytes(data)
+    with contextlib.suppress(BadRequest):
+        assert store(folder).lines(["c"], {}) == lines
 
 
 def test_one_build_at_a_time(tmp_path: Path):
@@ -318,7 +361,8 @@ def test_a_large_group_is_packed_and_holds_the_same(tmp_path: Path, whole: dict[
     monkeypatch.setattr("hrsynth.catalog.store.PACKED_ABOVE", 20)
     build(tmp_path, source=source())
     assert sorted(content(tmp_path)) == ["c.jsonl.gz", "d.jsonl"]
-    assert gzip.decompress((tmp_path / "c.jsonl.gz").read_bytes()) == whole["c.jsonl"]
+    packed = gzip.decompress((tmp_path / "c.jsonl.gz").read_bytes())
+    assert packed.decode() == without_checksum(whole["c.jsonl"].decode())
     kept = store(tmp_path)
     assert kept.groups() == ["c", "d"]
     assert kept.lines(["c"], {}) == decode_lines(whole["c.jsonl"], "c")

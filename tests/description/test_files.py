@@ -10,6 +10,7 @@ import pytest
 
 from description.samples import FOUR_BAR, with_rods
 from hrsynth import description
+from hrsynth.description import files
 from hrsynth.errors import BadRequest, BadRobotFile
 from hrsynth.mechanism.model import Mechanism
 
@@ -111,3 +112,33 @@ def test_a_link_to_a_file_stays_a_link(tmp_path: Path):
     description.save(robot, link)
     assert link.is_symlink()
     assert description.load(real).name == "rods"
+
+
+def test_a_planted_link_is_never_written_through(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Whoever guesses the name under which a file is drafted, or kept between two runs, gains nothing."""
+    victim = tmp_path / "victim"
+    victim.write_text("precious")
+    monkeypatch.setattr("secrets.token_hex", lambda size: "0" * 2 * size)
+    planted = tmp_path / f".robot.urdf.{'0' * 8}.tmp"
+    planted.symlink_to(victim)
+    with pytest.raises(BadRequest) as caught:
+        description.save(with_rods(), tmp_path / "robot.urdf")
+    assert len(caught.value.lines()) == 1
+    monkeypatch.undo()
+    for name in (f".robot.urdf.{os.getpid()}.tmp", "robot.urdf.part"):
+        (tmp_path / name).symlink_to(victim)
+    description.save(with_rods(), tmp_path / "robot.urdf")
+    with pytest.raises(OSError, match="symbolic link"):
+        files.open_kept(tmp_path / "robot.urdf.part")
+    assert victim.read_text() == "precious"
+    assert planted.is_symlink()
+
+
+@pytest.mark.parametrize("mask", [0o022, 0o077])
+def test_a_new_file_has_the_permissions_that_the_user_set(tmp_path: Path, mask: int):
+    before = os.umask(mask)
+    try:
+        description.save(with_rods(), tmp_path / "robot.urdf")
+    finally:
+        os.umask(before)
+    assert (tmp_path / "robot.urdf").stat().st_mode & 0o777 == 0o666 & ~mask

@@ -6,9 +6,11 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from hrsynth.geometry.so3 import exponential, quaternions, rotation_of
-from hrsynth.geometry.vectors import angle_between, cross, dot, hat, triple
+from hrsynth.geometry.vectors import angle_between, cross, dot, hat, steady_order, triple
 
 SHAPES = [((3,), (3,)), ((5, 3), (3,)), ((4, 1, 3), (5, 3))]
 
@@ -58,3 +60,12 @@ def test_the_angle_between_a_vector_and_its_turn(angle: float) -> None:
     normal = np.cross(v, rng.normal(size=3))
     turned = exponential(angle * normal / np.linalg.norm(normal)) @ v
     assert angle_between(v, turned) == pytest.approx(angle, abs=1e-14)
+
+
+@given(st.lists(st.tuples(*3 * [st.integers(-2, 2)]), min_size=1, max_size=12, unique=True), st.randoms())
+def test_an_order_is_that_of_the_rows_whatever_their_last_digits_and_places(rows, random) -> None:
+    """Rows of small integers, none twice, have one order."""
+    random.shuffle(rows)
+    near = [[value * (1 + 1e-9 * random.uniform(-1, 1)) + 1e-12 * random.uniform(-1, 1) for value in row]
+            for row in rows]
+    assert [rows[i] for i in steady_order(np.array(near), 1e-6)] == sorted(rows)

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import os
-import warnings
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Callable, Iterable
 from contextlib import closing
 from functools import partial
 from inspect import signature
@@ -14,6 +13,7 @@ from typing import Any
 
 from ..errors import BadRequest, HrsynthError
 from ..mechanism.pose import ModeNumber, Pose, PoseLike, asked_poses
+from ..processes import run_shared
 from ..progress import tell
 from ..results import Result, brief
 from .observed import LegsLike, RobotLike, as_names, as_robot
@@ -59,7 +59,8 @@ def map(question: str | Callable[..., Any], robots: RobotLike | Iterable[RobotLi
     size = max(1, ceil(len(asked) / ceil(PARTS_EACH * workers / max(1, len(groups)))))
     parts = [[{**group, **at} for at in asked[k : k + size]] for group in groups for k in range(0, len(asked), size)]
     answers: list[Any] = []
-    with closing(_done(partial(_answer_part, function, errors), parts, min(workers, len(parts)))) as done:
+    with closing(run_shared([partial(_answer_part, function, errors, part) for part in parts], min(workers, len(parts)))
+                 ) as done:
         for found in done:
             answers += found
             tell("questions")
@@ -88,23 +89,6 @@ def _function(question: str | Callable[..., Any]) -> Callable[..., Any]:
     if not (callable(found) and "robot" in signature(found).parameters):
         raise BadRequest("a question", question, "a function of hrsynth that takes a robot, or its name, such as check")
     return found
-
-
-def _done(answered: Callable[[list[Given]], list[Any]], parts: list[list[Given]], workers: int
-          ) -> Generator[list[Any], None, None]:
-    """What the parts give, in their order; the others are given up where it is closed."""
-    if workers <= 1:
-        yield from (answered(part) for part in parts)
-        return
-    from joblib import Parallel, delayed
-
-    done = Parallel(n_jobs=workers, batch_size=1, return_as="generator")(delayed(answered)(part) for part in parts)
-    try:
-        for found in done:  # noqa: UP028 (the rest is closed in silence)
-            yield found
-    finally:
-        with warnings.catch_warnings(action="ignore"):
-            done.close()
 
 
 def _answer_part(function: Callable[..., Any], errors: str, part: list[Given]) -> list[Any]:

@@ -262,11 +262,12 @@ def compiled_module(text: str) -> Any:
     """The module of a text, compiled or from numba's cache, which goes by the file that holds the text."""
     import importlib.util
 
+    from ..description.files import replacement
+
     file = _file_of(text)
     if not file.exists() or file.read_text(encoding="utf-8") != text:
-        part = file.with_suffix(f".{os.getpid()}")
-        part.write_text(text, encoding="utf-8")
-        part.replace(file)
+        with replacement(file) as draft:
+            draft.write_text(text, encoding="utf-8")
     spec = importlib.util.spec_from_file_location(file.stem, file)
     assert spec is not None
     assert spec.loader is not None

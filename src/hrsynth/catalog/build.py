@@ -19,7 +19,7 @@ from typing import Any
 from ..errors import BadRequest, BuildStopped, HrsynthError
 from .executors import Executor, Made, Stopped, executor
 from .journal import Journal
-from .jsonl import encode_lines, line, word_of
+from .jsonl import leading_word, line, word_of
 from .store import Folder, Store, store
 
 CHUNK = 8
@@ -191,7 +191,7 @@ def _stale(kept: Store, group: str, source: WordSource, team: Executor, sample: 
            ) -> Iterator[str]:
     try:
         lines = kept.lines([group], {})
-        stored = {word_of(line): line for line in lines}
+        stored = {word_of(line, str(kept.file(group))): line for line in lines}
     except BadRequest as error:
         yield f"{group}: {error}"
         return
@@ -199,7 +199,7 @@ def _stale(kept: Store, group: str, source: WordSource, team: Executor, sample: 
         yield f"{group}: not in {kept.path}"
         return
     words = source.words(group)
-    if isinstance(kept, Folder) and kept.content(group) != encode_lines(group, lines):
+    if isinstance(kept, Folder) and list(lines) != sorted(lines, key=leading_word):
         yield f"{group}: {kept.file(group)} is not sorted"
     yield from _some(group, "missing", [word for word in words if word not in stored])
     yield from _some(group, "no longer of the group", sorted(stored.keys() - set(words)))

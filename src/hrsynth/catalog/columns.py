@@ -56,13 +56,16 @@ class Columns:
 
     def values(self, name: str) -> list[Any]:
         """The values of a field that records have, each once, sorted."""
-        return sorted(value for each in self._as_list(name) for value in each if value is not None)
+        try:
+            return sorted(value for each in self._as_list(name) for value in each if value is not None)
+        except TypeError:
+            raise self._unreadable(name) from None
 
     def _as_list(self, name: str) -> list[list[Any]]:
         """Each value that a field has, in a list; an empty one for records without the field."""
         try:
             return [list(json.loads(each)) for each in self._texts(name)]
-        except (ValueError, TypeError):
+        except (ValueError, TypeError, RecursionError):
             raise self._unreadable(name) from None
 
     def _or_words(self, found: Flags, name: str, test: Callable[[Texts], Flags]) -> Flags:

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import logging
-import os
-import time
 from collections.abc import Callable, Iterable, Iterator
-from functools import cache
+from functools import partial
 from itertools import islice
 from typing import Any
 
 from ..budgets import PARTS_AHEAD
-from ..errors import BadRequest, MissingExtra
+from ..errors import BadRequest, MissingExtra, WorkersLost
+from ..processes import run_shared
 from ..version import __version__
 
 Made = list[tuple[str, str]]
@@ -22,8 +21,6 @@ Executor = Callable[[Task, Iterable[list[str]]], Iterator[Made]]
 
 PATIENCE = 10.0
 """Seconds within which a cluster has to answer."""
-PARENT_WATCH = 0.5
-"""Seconds within which a worker process notices that its parent was killed."""
 
 
 class Stopped(Exception):
@@ -59,35 +56,10 @@ def _alone(task: Task, parts: Iterable[list[str]]) -> Iterator[Made]:
 
 
 def _together(task: Task, parts: Iterable[list[str]], workers: int) -> Iterator[Made]:
-    from joblib import Parallel, delayed
-    from joblib.externals.loky.process_executor import BrokenProcessPool, TerminatedWorkerError
-
-    pool = Parallel(n_jobs=workers, batch_size=1, pre_dispatch=2 * workers, return_as="generator_unordered")
     try:
-        yield from pool(delayed(_in_child)(os.getpid(), task, part) for part in parts)
-    except TerminatedWorkerError:
-        raise Stopped("a worker process died") from None
-    except BrokenProcessPool as error:
-        raise Stopped(f"the worker processes cannot be used: {str(error).splitlines()[0]}") from None
-
-
-def _in_child(parent: int, task: Task, part: list[str]) -> Made:
-    """What a part gives, in a process that does not outlive the one that started it."""
-    _watch_parent(parent)
-    return task(part)
-
-
-@cache
-def _watch_parent(parent: int) -> None:
-    from threading import Thread
-
-    Thread(target=_end_with, args=(parent,), daemon=True).start()
-
-
-def _end_with(parent: int) -> None:
-    while os.getppid() == parent:
-        time.sleep(PARENT_WATCH)
-    os._exit(1)
+        yield from run_shared((partial(task, part) for part in parts), workers, ordered=False)
+    except WorkersLost as lost:
+        raise Stopped(lost.reason) from None
 
 
 def _run_on_cluster(task: Task, parts: Iterable[list[str]], address: str) -> Iterator[Made]:

@@ -78,7 +78,7 @@ def fits(asked: Mapping[str, Any]) -> Callable[[Record], bool]:
 def may_fit(asked: Mapping[str, Any]) -> Callable[[str], bool]:
     """Whether the line of a record may fit all that is asked for and not None, without reading it."""
     every = [each.line for each in conditions(asked).values() if each.line]
-    return lambda line: all(told(line) for told in every) or not is_written(line)
+    return lambda line: not is_written(line) or all(told(line) for told in every)
 
 
 def _any_of(every: Sequence[RecordCondition]) -> RecordCondition:

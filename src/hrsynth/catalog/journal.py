@@ -7,7 +7,7 @@ import os
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from ..description.files import require_alone
+from ..description.files import open_kept, require_alone, seal_line, unseal_line
 from ..errors import BadRequest, BuildStopped
 from .jsonl import head, read_head, word_of
 
@@ -17,15 +17,15 @@ ENDING = ".part"
 class Journal:
     """An append-only file of records in the order in which they were made; open in one process at a time.
 
-    A last line that was torn is cut off, a line that cannot be read is passed over: those records are made again.
-    Raises ``BadRequest`` for a journal of another version, one that another build has open, or one that cannot be
-    opened, ``BuildStopped`` where the disk takes no more.
+    Each line ends with its checksum. A last line that was torn is cut off, a damaged one is passed over: those records
+    are made again. Raises ``BadRequest`` for a journal of another version, one that another build has open, or one that
+    cannot be opened, ``BuildStopped`` where the disk takes no more.
     """
 
     def __init__(self, path: Path, group: str, *, anew: bool = False) -> None:
         self.path = path
         try:
-            self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o666)
+            self._file = open_kept(path, os.O_RDWR | os.O_APPEND)
         except OSError as error:
             raise BadRequest(f"cannot write the journal: {error.strerror}", str(path)) from None
         try:
@@ -58,11 +58,11 @@ class Journal:
     def add(self, made: Iterable[tuple[str, str]]) -> None:
         """Append words with their lines; returns when they are on the disk."""
         made = list(made)
-        self._append("".join(f"{text}\n" for _, text in made))
-        place = self._end - sum(len(text) + 1 for _, text in made)
-        for word, text in made:
+        lines, place = [f"{seal_line(text)}\n" for _, text in made], self._end
+        self._append("".join(lines))
+        for (word, text), line in zip(made, lines, strict=True):
             self._places[word] = place, len(text)
-            place += len(text) + 1
+            place += len(line)
 
     def remove(self) -> None:
         """The records are in the store: the journal is no longer needed."""
@@ -77,15 +77,19 @@ class Journal:
             for raw in content:
                 if not raw.endswith(b"\n"):
                     break
+                text = unseal_line(raw)
                 if self._end == 0:
-                    read_head(raw, str(self.path), "not the journal of a build", str(self.path))
-                else:
-                    with contextlib.suppress(ValueError, BadRequest):
-                        places[word_of(raw.decode("ascii"))] = self._end, len(raw) - 1
+                    if text is None:
+                        raise BadRequest("a journal without checksums (of an older version) or with a damaged first "
+                                         "line", str(self.path), "that file removed, or --anew")
+                    read_head(text, str(self.path), "not the journal of a build", str(self.path))
+                elif text is not None:
+                    with contextlib.suppress(BadRequest):
+                        places[word_of(text)] = self._end, len(text)
                 self._end += len(raw)
         os.ftruncate(self._file, self._end)
         if self._end == 0:
-            self._append(head(group) + "\n")
+            self._append(seal_line(head(group)) + "\n")
         return places
 
     def _append(self, text: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import zlib
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -12,10 +13,23 @@ from .words import VERSION
 Record = Mapping[str, Any]
 """What the catalog says of one architecture; a field that is missing is not known or does not apply."""
 
+CHECKSUM = "crc32"
+"""What the head of a file that is not packed calls the checksum of all lines behind it."""
 _LINE_START, _GROUP = '{"word":"', '","group":"'
 
 FORMAT = 1
 """Version of the lines, the journal and the tables."""
+
+TEXTS = ("word", "group", "notation", "hidden", "motion", "verdict", "condition", "modes_proof", "cure", "see",
+         "refused")
+COUNTS = ("legs", "dof", "mobility", "idle", "rank", "instances", "confirmed", "fewest", "motors", "motor_rank",
+          "attempt", "modes_bound", "modes_seen")
+FLAGS = ("exact", "driven", "base_motors")
+LISTS = ("lost", "steps", "modes_legs")
+"""Fields of a record by the kind of their values: texts, whole numbers, true or false, lists of texts."""
+NEEDED = ("notation", "motion", "verdict", "legs", "dof", "mobility", "idle", "rank", "instances", "fewest", "motors",
+          "exact", "base_motors")
+"""Fields of a record that is not refused."""
 
 
 def line(entry: Record) -> str:
@@ -25,10 +39,9 @@ def line(entry: Record) -> str:
     return json.dumps(first | rest, separators=(",", ":"), allow_nan=False)
 
 
-def head(group: str, count: int | None = None) -> str:
-    """The first line of a file; a journal's says no count."""
-    counted = {} if count is None else {"count": count}
-    return json.dumps({"format": FORMAT, "catalog": VERSION, "group": group, **counted}, separators=(",", ":"))
+def head(group: str, **more: object) -> str:
+    """The first line of a file, or of a journal, which says no more than this."""
+    return json.dumps({"format": FORMAT, "catalog": VERSION, "group": group, **more}, separators=(",", ":"))
 
 
 def read_head(text: str | bytes, file: str, otherwise: str, value: str | None, *needed: str) -> Mapping[str, Any]:
@@ -36,26 +49,61 @@ def read_head(text: str | bytes, file: str, otherwise: str, value: str | None, *
     try:
         known = json.loads(text)
         versions, *_ = (known["format"], known["catalog"]), *(known[name] for name in needed)
-    except (ValueError, TypeError, KeyError):
+    except (ValueError, TypeError, KeyError, RecursionError):
         raise BadRequest(f"{otherwise}: its first line is not a header", value) from None
     require_version(versions, file)
     return dict(known)
 
 
-def record(text: str) -> Record:
-    """The record of a line; raises ``BadRequest`` where it holds none."""
+def record(text: str, file: str | None = None) -> Record:
+    """The record of a line, each of its fields of the kind that all others rely on; raises ``BadRequest``, which names
+    the file, where it is none."""
     try:
         found = json.loads(text)
-        if isinstance(found["word"], str):
-            return dict(found)
-    except (ValueError, TypeError, KeyError):
-        pass
-    raise BadRequest("not a record of the catalog", text[:60], "an object of JSON with a word")
+        wrong = _wrong_field(found) if isinstance(found, dict) else "an object of JSON with a word"
+    except (ValueError, RecursionError):
+        wrong = "an object of JSON with a word"
+    if wrong:
+        raise BadRequest("not a record of the catalog" if file is None else f"{file}: not a record of the catalog",
+                         text[:60], wrong)
+    return dict(found)
 
 
-def word_of(text: str) -> str:
+def _wrong_field(found: dict[str, Any]) -> str:
+    """What a record lacks; nothing where it is whole."""
+    for name in ("word", "group", *(() if "refused" in found else NEEDED)):
+        if name not in found:
+            return f"an object of JSON with a {name}"
+    for names, kind, said in ((TEXTS, str, "a text"), (COUNTS, int, "a whole number"), (FLAGS, bool, "true or false")):
+        for name in names:
+            if name in found and type(found[name]) is not kind:
+                return f"{name}: {said}"
+    for name in LISTS:
+        if not _are(found.get(name, []), str):
+            return f"{name}: a list of texts"
+    if not (_are(legs := found.get("minimal", []), list) and all(_are(each, str) for each in legs)):
+        return "minimal: a list of lists of texts"
+    if not (_are(choices := found.get("choices", []), dict) and all(map(_is_choice, choices))):
+        return "choices: a list of objects with joints and rank"
+    if "modes_bound" in found and "modes_seen" not in found:
+        return "modes_seen beside modes_bound"
+    return ""
+
+
+def _are(values: Any, kind: type) -> bool:
+    """Whether this is a list of values of a kind."""
+    return type(values) is list and all(type(each) is kind for each in values)
+
+
+def _is_choice(each: dict[str, Any]) -> bool:
+    legs: Any = each.get("joints")
+    return type(each.get("rank")) is int and _are(legs, list) and legs != [] and all(
+        _are(joints, int) for joints in legs)
+
+
+def word_of(text: str, file: str | None = None) -> str:
     """The word of a record's line."""
-    return str(record(text)["word"])
+    return str(record(text, file)["word"])
 
 
 def is_written(text: str) -> bool:
@@ -63,10 +111,10 @@ def is_written(text: str) -> bool:
     return text.startswith(_LINE_START) and _GROUP in text and '": ' not in text and "\\u" not in text
 
 
-def leading_word(text: str) -> str:
-    """The word with which a line begins that :func:`line` wrote."""
+def leading_word(text: str, file: str | None = None) -> str:
+    """The word with which a line begins that :func:`line` wrote, else that of its record."""
     end = text.find('"', len(_LINE_START)) if text.startswith(_LINE_START) else -1
-    return text[len(_LINE_START):end] if end > 0 else word_of(text)
+    return text[len(_LINE_START):end] if end > 0 else word_of(text, file)
 
 
 def written_text(text: str, name: str) -> str:
@@ -74,29 +122,41 @@ def written_text(text: str, name: str) -> str:
     return text.partition(f'"{name}":"')[2].partition('"')[0]
 
 
-def encode_lines(group: str, lines: Iterable[str]) -> bytes:
-    """The bytes of a group's file, sorted by word, whatever the order of the lines."""
+def encode_lines(group: str, lines: Iterable[str], *, checksum: bool = True) -> bytes:
+    """The bytes of a group's file, sorted by word, whatever the order of the lines; their ``checksum`` stands in the
+    head, but for a file that is packed: gzip has its own."""
     ordered = sorted(lines, key=leading_word)
-    return "".join(f"{each}\n" for each in [head(group, len(ordered)), *ordered]).encode("ascii")
+    content = "".join(f"{each}\n" for each in ordered).encode("ascii")
+    crc = {CHECKSUM: _checksum(content)} if checksum else {}
+    return head(group, count=len(ordered), **crc).encode("ascii") + b"\n" + content
 
 
-def head_count(first: str | bytes, file: str) -> int:
+def _checksum(content: bytes) -> str:
+    return f"{zlib.crc32(content):08x}"
+
+
+def head_count(first: bytes, file: str) -> int:
     """The number of records that a file's first line says; raises ``BadRequest`` where it says none."""
-    count = read_head(first, file, f"{file}: not a catalog file", None, "count")["count"]
-    if not isinstance(count, int):
-        raise BadRequest(f"{file}: number of records", count, "a whole number")
-    return count
+    return int(_read_count(first, file)["count"])
+
+
+def _read_count(first: bytes, file: str) -> Mapping[str, Any]:
+    told = read_head(first, file, f"{file}: not a catalog file", None, "count")
+    if type(told["count"]) is not int:
+        raise BadRequest(f"{file}: number of records", told["count"], "a whole number")
+    return told
 
 
 def decode_lines(content: bytes, file: str) -> list[str]:
-    """The lines of a group's file; raises ``BadRequest`` for another version, a file cut off or of something else."""
-    try:
-        first, *lines = content.decode("ascii").splitlines() or [""]
-    except UnicodeDecodeError:
-        first, lines = "", []
-    count = head_count(first, file)
-    if len(lines) != count or not content.endswith(b"\n"):
-        raise BadRequest(f"{file}: truncated, records", len(lines), str(count))
+    """The lines of a group's file; raises ``BadRequest`` for another version, a file that is damaged, cut off or of
+    something else."""
+    first, _, rest = content.partition(b"\n")
+    told = _read_count(first, file)
+    if CHECKSUM in told and told[CHECKSUM] != (found := _checksum(rest)) and rest.count(b"\n") >= told["count"]:
+        raise BadRequest(f"{file}: damaged, checksum", found, f"{told[CHECKSUM]}; build it again")
+    lines = rest.decode("ascii", "replace").splitlines()
+    if len(lines) != told["count"] or not content.endswith(b"\n"):
+        raise BadRequest(f"{file}: truncated, records", len(lines), str(told["count"]))
     return lines
 
 

@@ -22,8 +22,8 @@ from .words import SENSORS, parse
 class ReadRecords(Sequence[Record]):
     """The records of lines, each read when it is looked at first."""
 
-    def __init__(self, lines: Sequence[str]) -> None:
-        self._lines = lines
+    def __init__(self, lines: Sequence[str], source: str | None = None) -> None:
+        self._lines, self._source = lines, source
         self._read: list[Record | None] = [None] * len(lines)
 
     def __len__(self) -> int:
@@ -31,7 +31,7 @@ class ReadRecords(Sequence[Record]):
 
     def words(self) -> list[str]:
         """The words of all, none of which is read for that."""
-        return [leading_word(each) for each in self._lines]
+        return [leading_word(each, self._source) for each in self._lines]
 
     @overload
     def __getitem__(self, place: int) -> Record: ...
@@ -44,7 +44,7 @@ class ReadRecords(Sequence[Record]):
             return [self[i] for i in range(*place.indices(len(self)))]
         found = self._read[place]
         if found is None:
-            found = self._read[place] = record(self._lines[place])
+            found = self._read[place] = record(self._lines[place], self._source)
         return found
 
 
@@ -114,7 +114,7 @@ def load(path: str | Path | None = None, **asked: Any) -> Catalog:
     require_askable(asked)
     kept = _there(path)
     groups = _groups(kept, asked)
-    found = Catalog(ReadRecords(kept.lines(groups, asked)))
+    found = Catalog(ReadRecords(kept.lines(groups, asked), str(kept.path)))
     return found if kept.decides(asked) else found.where(**asked)
 
 

@@ -109,7 +109,7 @@ class Folder:
         plain, packed = (self.path / f"{group}{ending}" for ending in (LINES, PACKED))
         large = len(lines) > PACKED_ABOVE
         file, other = (packed, plain) if large else (plain, packed)
-        content = encode_lines(group, lines)
+        content = encode_lines(group, lines, checksum=not large)
         with writable(file), replacement(file, sync=True) as draft:
             draft.write_bytes(gzip.compress(content, mtime=0) if large else content)
         other.unlink(missing_ok=True)
@@ -142,8 +142,12 @@ class Database:
             if not _is_new(file):
                 fits = may_fit(asked)
                 return [line for group in sorted(groups) for line in _old_lines(file, group) if fits(line)]
-            found = np.concatenate([np.full(count, name in groups) for name, count in file.execute(
-                "SELECT name, count FROM groups ORDER BY name")] or [np.zeros(0, bool)])
+            counts = file.execute("SELECT name, count FROM groups ORDER BY name").fetchall()
+            (last,) = file.execute("SELECT ifnull(max(record), -1) FROM lines").fetchone()
+            if not all(type(count) is int and count > 0 for _, count in counts) or sum(
+                    count for _, count in counts) != last + 1:
+                raise BadRequest(f"{self.path}: not a catalog file: its groups and its lines differ in number")
+            found = np.concatenate([np.full(count, name in groups) for name, count in counts] or [np.zeros(0, bool)])
             columns, told = Columns(self.path, file, found), conditions(asked)
             for name in ASKED:  # patterns and texts last, of rows that are still there
                 if name in told and (rows := told[name].rows) and found.any():
@@ -169,7 +173,6 @@ class Database:
         kept = {} if not self.path.exists() else {
             name: self.lines([name], {}) for name in self.groups() if name != group}
         with writable(self.path), replacement(self.path, sync=True) as draft:
-            draft.unlink(missing_ok=True)
             try:
                 _write_tables(draft, {**kept, group: lines})
             except sqlite3.Error as error:
@@ -236,7 +239,8 @@ def _old_lines(file: sqlite3.Connection, group: str) -> Iterator[str]:
     """The lines of a group in a file of an older version: in the table of records, or in one of their own."""
     apart = file.execute("SELECT 1 FROM sqlite_master WHERE name = 'lines'").fetchone()
     where = "records JOIN lines ON record = records.rowid" if apart else "records"
-    return (line for line, in file.execute(f'SELECT line FROM {where} WHERE "group" = ? ORDER BY word', (group,)))
+    return (line for line, in file.execute(
+        f"""SELECT ifnull(CAST(line AS TEXT), '') FROM {where} WHERE "group" = ? ORDER BY word""", (group,)))
 
 
 def _values(lines: Iterable[str], name: str) -> list[Any]:

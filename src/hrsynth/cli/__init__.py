@@ -10,7 +10,7 @@ import sys
 
 from . import completion, files, importing, lint, schema, studio
 from .catalog import catalog
-from .colour import say
+from .colour import close, say
 from .commands import Group
 from .questions import QUESTIONS
 
@@ -40,6 +40,11 @@ def main(arguments: list[str] | None = None) -> None:
         os.environ.setdefault(library, "1")
     gc.set_threshold(200_000)
     sys.stdout, sys.stderr = sys.stdout or io.StringIO(), sys.stderr or io.StringIO()
+    for number in range(3):  # no file that is opened takes the place of a closed one
+        try:
+            os.fstat(number)
+        except OSError:
+            os.dup2(os.open(os.devnull, os.O_RDWR), number)
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(encoding="utf-8", errors="replace")
@@ -55,14 +60,14 @@ def execute(arguments: list[str] | None = None) -> int:
     except SystemExit as end:
         return int(end.code or 0)
     except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        close(sys.stdout)
         return 0
     except KeyboardInterrupt:
         return 130
     except OSError as error:
         if error.filename is not None or error.errno not in (errno.ENOSPC, errno.EIO, errno.EBADF):
             return _report_failure(error)
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        close(sys.stdout)
         say(f"hrsynth: cannot write to standard output: {error.strerror}", err=True)
         return 2
     except Exception as error:

@@ -10,7 +10,7 @@ from itertools import takewhile
 from typing import Any
 
 from ..errors import BadRequest
-from .colour import heading, say
+from .colour import paint_help, say
 from .options import NEEDED, OUTPUT, OWN, READING, WATCHING, Option, warn
 
 HELP = ("-h", "--help")
@@ -41,7 +41,7 @@ class DeclaredCommand:
         """Run the command on the words after its name, or show its help; ``beside`` are other commands."""
         values = self.values(words, beside)
         if values is None:
-            say(self.help_text())
+            say(self.help_text(), paint=paint_help)
         else:
             self.run(**values)
 
@@ -134,7 +134,7 @@ class Group:
         """Run the command that the first word names on those after it; without one show the help."""
         name, *rest = words or HELP
         if name in HELP:
-            say(self.help_text())
+            say(self.help_text(), paint=paint_help)
         elif name == "--version" and self.version is not None:
             say(f"{self.path} {self.version()}")
         elif name.startswith("-"):
@@ -165,7 +165,7 @@ def add_command(group: Group, name: str, help: str, options: Sequence[Option], r
 
 def _examples(path: str, examples: Sequence[str]) -> list[str]:
     """What follows a command's name, a line each; none where there are none."""
-    return ["\n".join([f"{heading('Examples')}:", *(f"  {path} {each}" for each in examples)])] if examples else []
+    return ["\n".join(["Examples:", *(f"  {path} {each}" for each in examples)])] if examples else []
 
 
 def _width() -> int:
@@ -188,7 +188,7 @@ def _section(title: str, rows: Sequence[tuple[str, str]]) -> list[str]:
     if not rows:
         return []
     column = min(max(len(name) for name, _ in rows), 30) + 2
-    lines = [f"{heading(title)}:"]
+    lines = [f"{title}:"]
     for name, told in rows:
         first, apart = f"  {name:{column}}", " " * (column + 2)
         if len(name) > column - 2:

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from ..characters import escape_steering
 from .colour import say
 from .commands import Group, add_command
 from .options import JSON, NEEDED, SOURCE, WATCHING, Option, flag, output, quiet_robot_of, robot_of, warn
@@ -318,7 +319,7 @@ def _answer(question: str, default: str | None, meant: Callable[[str], T], view:
 
     more = ("; v: a picture" if view else "") + ("" if default is None else f" [{default}]")
     while True:
-        text = input(f"{question}{more}: ").strip()
+        text = input(escape_steering(f"{question}{more}: ")).strip()
         if view is not None and text == "v":
             view()
             continue

@@ -48,7 +48,7 @@ def lint(files: list[str], format: str, fail_on: str, json: bool, reader: list[s
     if json or format == "json":
         say(record("lint", None, found.to_dict()))
     elif format == "text":
-        say(paint(hrsynth.text(found)))
+        say(hrsynth.text(found), paint=paint)
     else:
         say(shown.github(found) if format == "github" else shown.sarif(found))
     if found.unread:

@@ -10,6 +10,9 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Any, Self
 
+from ..characters import escape_steering
+from .colour import say
+
 SPEED_OVER = 600.0
 """Seconds over which the speed of a build is averaged: words differ much."""
 SILENT = 30.0
@@ -57,11 +60,11 @@ class Progress:
         self._show(part, there, every)
 
     def _show(self, what: str, done: int, total: int | None = None) -> None:
-        self._what = what
+        self._what = escape_steering(what)
         if self._bar is None and self._counted:
             self._begin()
         if self._bar is not None:
-            self._bar.update(self._bar.task_ids[0], description=what, completed=done, total=total)
+            self._bar.update(self._bar.task_ids[0], description=self._what, completed=done, total=total)
 
     def _begin(self) -> None:
         """Show the bar, once its time has come."""
@@ -84,7 +87,7 @@ class Progress:
             if self._start == float("inf"):
                 return
             passed = time.monotonic() - self._began
-            print(f"hrsynth: {self._what}, step {self._steps}, {passed:.0f} s", file=sys.stderr, flush=True)
+            say(f"hrsynth: {self._what}, step {self._steps}, {passed:.0f} s", err=True)
             self._timer = self._arm(passed, self._line)
             self._timer.start()
 
@@ -95,5 +98,6 @@ class Progress:
 
         columns = [progress.MofNCompleteColumn(), progress.TimeRemainingColumn(), progress.TextColumn("left")] if (
             self._counted) else [progress.TextColumn("step {task.completed:.0f}"), progress.TimeElapsedColumn()]
-        return progress.Progress(progress.TextColumn("{task.description}"), progress.BarColumn(), *columns,
+        what = progress.TextColumn("{task.description}", markup=False)
+        return progress.Progress(what, progress.BarColumn(), *columns,
                                  console=Console(stderr=True), transient=True, speed_estimate_period=SPEED_OVER)

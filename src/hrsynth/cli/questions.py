@@ -104,7 +104,7 @@ class Question:
         elif self.shows is not None and not any(written.values()):
             self.shows(found, source=source, **values)
         else:
-            say(paint(text(found)))
+            say(text(found), paint=paint)
             for each, path in files.items():
                 if path is not None:
                     say(each.sentence(path))

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..budgets import INVERSE_STEPS_AT_RUN, NEWTON_STEPS_AT_RUN
+from ..characters import name_steering
 from ..tolerances import (
     GENERATED_LAST_STEP,
     GENERATED_NEAR,
@@ -98,7 +99,7 @@ def program(source: Source, language: str, told: Sequence[str]) -> str:
         "length": repr(float(mechanism.length)), "near": GENERATED_NEAR, "last_step": GENERATED_LAST_STEP,
         "legs": source.legs and trace_inverse(source.legs), "far": repr(branch.far), "reached": GENERATED_REACHED,
         "turn": repr(2 * math.pi), "singular": GENERATED_SINGULAR}
-    return _templates().get_template(TEMPLATES[language]).render(**values)
+    return name_steering(_templates().get_template(TEMPLATES[language]).render(**values))
 
 
 @cache

@@ -1,14 +1,17 @@
-"""Files are written whole or not at all."""
+"""Files are written whole or not at all; lines that are kept between two runs carry a checksum."""
 
 from __future__ import annotations
 
 import contextlib
 import os
+import secrets
 import shutil
+import zlib
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from ..errors import BadRequest
+from ..processes import require_posix
 
 
 def as_path(file: object) -> Path:
@@ -31,9 +34,7 @@ def require_folder(path: str | Path) -> None:
         target = Path(os.path.realpath(path))
         if not target.parent.is_dir():
             raise _unwritten("no such folder", target.parent)
-        tried = _draft(target, "try")
-        tried.touch()
-        tried.unlink()
+        _new_draft(target).unlink()
     except (OSError, ValueError) as error:
         raise _unwritten(f"no such file can be made in its folder ({_reason(error)})", path) from None
 
@@ -85,18 +86,20 @@ def _reason(error: OSError | ValueError) -> str:
     return getattr(error, "strerror", None) or str(error)
 
 
-def _draft(target: Path, ending: str) -> Path:
-    """The name beside a file under which it is written, or tried."""
-    return target.with_name(f".{target.name}.{os.getpid()}.{ending}")
+def _new_draft(target: Path) -> Path:
+    """Make an empty file of a random name beside a file; nothing that is there under this name is followed."""
+    draft = target.with_name(f".{target.name}.{secrets.token_hex(4)}.tmp")
+    os.close(os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
+    return draft
 
 
 @contextlib.contextmanager
 def replacement(path: str | Path, *, sync: bool = False) -> Iterator[Path]:
-    """A temporary name beside a file; what is written there takes the file's place when the block ends without an
-    error, with ``sync`` not before it is on the disk. Raises ``BadRequest`` for a directory or a device, ``OSError``
-    where the disk refuses."""
+    """An empty file beside a file; what is written there takes the file's place when the block ends without an error,
+    with ``sync`` not before it is on the disk. Raises ``BadRequest`` for a directory or a device, ``OSError`` where
+    the disk refuses."""
     target = replaceable(path)
-    draft = _draft(target, "tmp")
+    draft = _new_draft(target)
     try:
         yield draft
         if target.exists():
@@ -109,8 +112,26 @@ def replacement(path: str | Path, *, sync: bool = False) -> Iterator[Path]:
         draft.unlink(missing_ok=True)
 
 
+def open_kept(path: Path, flags: int = os.O_RDWR) -> int:
+    """Open a file that outlives a run, and whose name can be known before, made where there is none. Raises
+    ``OSError``, for a symbolic link as well."""
+    return os.open(path, flags | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o666)
+
+
+def seal_line(text: str) -> str:
+    """A line with its checksum behind it."""
+    return f"{text} {zlib.crc32(text.encode()):08x}"
+
+
+def unseal_line(raw: bytes) -> str | None:
+    """The line that :func:`seal_line` sealed, without its end; None for a damaged one."""
+    text, _, checksum = raw.rstrip(b"\n").rpartition(b" ")
+    return text.decode() if checksum == b"%08x" % zlib.crc32(text) and text.isascii() else None
+
+
 def require_alone(handle: int, otherwise: str, path: Path, allowed: str = "one build at a time") -> None:
     """Lock an open file or folder until it is closed; raises ``BadRequest`` where another process has it."""
+    require_posix("a file that several processes may write", "fcntl")
     import fcntl
 
     try:

@@ -172,3 +172,13 @@ def nested_lists(values: Array) -> list[Any]:
     found = values.astype(object)
     found[~np.isfinite(values)] = None
     return list(found.tolist())
+
+
+def steady_order(rows: Array, apart: float) -> list[int]:
+    """The lexicographic order of rows (n, k) that no last digit decides: in a column, values between which lie only
+    gaps of at most ``apart`` count as equal."""
+    places = [np.empty(len(rows), dtype=int) for _ in range(rows.shape[1])]
+    for place, column in zip(places, rows.T, strict=True):
+        order = np.argsort(column, kind="stable")
+        place[order] = np.cumsum(np.diff(column[order], prepend=column[order][:1]) > apart)
+    return np.lexsort([*reversed(places)]).tolist() if places else list(range(len(rows)))

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ..characters import name_steering
 from ..errors import BadRequest
 from .sketch import NAME_ON_AXIS, NUMBER_ON_AXIS
 
@@ -115,8 +116,10 @@ def require_font(name: str) -> str | None:
 
 def print_figure(figure: Any, paper: Paper) -> bytes:
     """The bytes of a matplotlib figure; of a PNG without ``savefig``, which would draw it twice."""
-    import matplotlib
+    import matplotlib.text
 
+    for each in figure.findobj(matplotlib.text.Text):
+        each.set_text(name_steering(each.get_text()))
     stream = io.BytesIO()
     paper.fit(figure)
     if paper.ending == ".png":

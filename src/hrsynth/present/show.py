@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from ..characters import name_steering
 from ..errors import BadRequest, MissingExtra
 from ..ranges import require_range
 from ..results import Result, with_spelling
@@ -85,7 +86,7 @@ def html(result: Result) -> str:
             return str(function(inline)(result))
         except MissingExtra as error:
             said = f"{said}\n\n{error}"
-    shown = re.sub("(.)\u0332", r"<u>\1</u>", markup.escape(said))
+    shown = re.sub("(.)\u0332", r"<u>\1</u>", markup.escape(name_steering(said)))
     return f'<pre style="white-space: pre; overflow-x: auto">{shown}</pre>'
 
 

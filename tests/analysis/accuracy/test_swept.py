@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
 from typing import Any
 
@@ -72,6 +73,24 @@ def test_a_sweep_goes_on_with_the_same_bytes(tmp_path: Path, monkeypatch: pytest
     assert found.tally == whole.tally
     assert (tmp_path / "s.npy").read_bytes() == (tmp_path / "whole.npy").read_bytes()
     assert sorted(each.name for each in tmp_path.iterdir()) == ["s.npy", "whole.npy"]
+
+
+def test_a_damaged_line_of_the_journal_does_not_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A digit that changed on the disk: the part is made again; a first line without checksum is refused."""
+    whole = swept_to(tmp_path / "whole.npy", 50, monkeypatch)
+    _, journal = broken_off(tmp_path / "s.npy", monkeypatch)
+    *lines, last = journal.read_text().splitlines(keepends=True)
+    assert '"reached": ' in last
+    damaged = re.sub(r'("reached": )(\d)', lambda found: f"{found[1]}{(int(found[2]) + 1) % 10}", last, count=1)
+    journal.write_text("".join([*lines, damaged]))
+    found = swept_to(tmp_path / "s.npy", 50, monkeypatch)
+    assert (found.before, found.tally) == (100, whole.tally)
+    assert (tmp_path / "s.npy").read_bytes() == (tmp_path / "whole.npy").read_bytes()
+    broken_off(tmp_path / "t.npy", monkeypatch)
+    journal = tmp_path / "t.npy.journal"
+    journal.write_text(re.sub(r" [0-9a-f]{8}$", "", journal.read_text(), flags=re.MULTILINE))
+    with pytest.raises(BadRequest, match="no journal of a sweep with checksums"):
+        swept_to(tmp_path / "t.npy", 50, monkeypatch)
 
 
 def test_a_lost_part_is_made_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -32,7 +32,7 @@ from hrsynth.simulation.endings.cover import bounds
 from hrsynth.simulation.endings.critical_poses import CriticalPoses, Lift, _held_sets, critical_poses
 from hrsynth.simulation.endings.descent import CriticalPoint, Tangents, descend, walk_at_random
 from hrsynth.simulation.endings.enclosure import _rates, enclose_points
-from hrsynth.simulation.endings.endings import RestSearch, _ways, endings
+from hrsynth.simulation.endings.endings import RestSearch, _sort, _ways, endings
 from hrsynth.simulation.endings.error import RestEquations
 from hrsynth.simulation.endings.pose_error import PoseError
 from hrsynth.simulation.endings.pose_system import LegSystem
@@ -49,6 +49,19 @@ FIVE_BAR, POSE = "rrrrr_m1", "x=0.02,y=0.25"
 @cache
 def listed(name: str = FIVE_BAR, pose: str = POSE) -> Endings:
     return endings(name, at=pose)
+
+
+def test_the_order_of_rests_is_that_of_what_they_are():
+    """Not of how they were found, nor of the last digits of their errors, which differ between libraries."""
+    found, rng = listed(), np.random.default_rng(0)
+    rests, link, length = [*found.endings, *found.singular], found.setting.motion.link, found.goal.twin.length
+    ordered = _sort(rests, link, length)
+    assert [*dict.fromkeys(each.kind for each in ordered)] == ["goal", "mode", "antipodal", "critical"]
+    for _ in range(20):
+        other = [replace(rests[i], error=rests[i].error * (1 + 1e-9 * rng.normal()) + 1e-14 * rng.random())
+                 for i in rng.permutation(len(rests))]
+        assert [each.configuration for each in _sort(other, link, length)] == [each.configuration for each in ordered]
+    assert found.endings == tuple(each for each in ordered if each in found.endings)
 
 
 def link_poses(scene: Descent, each: RestPoint) -> np.ndarray:

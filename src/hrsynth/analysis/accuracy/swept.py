@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...budgets import SWEEP_DRAWN, SWEEP_PART
-from ...description.files import as_path, require_alone, require_writable
+from ...description.files import as_path, open_kept, require_alone, require_writable, seal_line, unseal_line
 from ...errors import BadRequest, BuildStopped, PlaneNotMet
 from ...geometry.vectors import Array
 from ...mechanism.pose import Grid
@@ -118,7 +118,8 @@ def require_file(path: str | Path) -> Path:
 
 class _SweepDraft:
     """The array of a grid that is being written, and its journal: what was asked, then a line a part. Both are on the
-    disk when a part counts as done; a last line that was torn is cut off."""
+    disk when a part counts as done; a last line that was torn is cut off, and a damaged one, found by its checksum,
+    does not count."""
 
     def __init__(self, target: Path, grid: Grid, asked: str, compiled: bool) -> None:
         self.target = target
@@ -129,10 +130,10 @@ class _SweepDraft:
         self._head, self._whole = head.getvalue(), grid.size * ROW.itemsize
         self._files = ExitStack()
         with _stopping(self.journal), ExitStack() as files:
-            self._lines = files.enter_context(open(os.open(self.journal, os.O_RDWR | os.O_CREAT, 0o666), "r+b"))
+            self._lines = files.enter_context(open(open_kept(self.journal), "r+b"))
             require_alone(self._lines.fileno(), "another sweep writes this file", self.journal, "one sweep at a time")
             self.compiled, self.tally = self._resume(asked, compiled)
-            self._rows = files.enter_context(open(os.open(self.part, os.O_RDWR | os.O_CREAT, 0o666), "r+b"))
+            self._rows = files.enter_context(open(open_kept(self.part), "r+b"))
             self._begin(asked)
             self._files = files.pop_all()
 
@@ -145,18 +146,20 @@ class _SweepDraft:
     def _resume(self, asked: str, compiled: bool) -> tuple[bool, Tally]:
         """Whether it is done by numba, and how far it came; raises ``BadRequest`` for another question's journal."""
         content = self._lines.read()
-        lines = content[: content.rfind(b"\n") + 1].decode("ascii", "replace").splitlines()
+        lines = content[: content.rfind(b"\n") + 1].splitlines()
         if not lines:
             return compiled, Tally()
+        first, *parts = map(unseal_line, lines)
         try:
-            told = json.loads(lines[0])
+            told = json.loads(first or "")
             if told["asked"] != asked:
                 raise BadRequest("another sweep to this file was interrupted", str(self.journal),
                                  "the same question, another file, or that journal removed")
-            done = Tally.parse(lines[-1]) if lines[1:] else Tally()
+            done = next((Tally.parse(each) for each in reversed(parts) if each is not None), Tally())
             there = self.part.stat().st_size if self.part.exists() else 0
-        except (ValueError, KeyError, TypeError):
-            raise BadRequest("no journal of a sweep", str(self.journal), "another file, or that one removed") from None
+        except (ValueError, KeyError, TypeError, RecursionError):
+            raise BadRequest("no journal of a sweep with checksums", str(self.journal),
+                             "another file, or that one removed") from None
         return told["compiled"], done if there >= self._place(done.done) else Tally()
 
     def _begin(self, asked: str) -> None:
@@ -180,7 +183,7 @@ class _SweepDraft:
         return len(self._head) + done * ROW.itemsize
 
     def _line(self, text: str) -> None:
-        self._lines.write(text.encode("ascii") + b"\n")
+        self._lines.write(seal_line(text).encode("ascii") + b"\n")
         self._lines.flush()
         os.fsync(self._lines.fileno())
 

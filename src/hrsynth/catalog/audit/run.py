@@ -156,7 +156,7 @@ class _Kept:
             self._file.write("".join([first + "\n", *whole]))
         except OSError as error:
             raise BadRequest(f"no file for the records: {error.strerror}", str(path)) from None
-        except (ValueError, KeyError):
+        except (ValueError, KeyError, TypeError, RecursionError):
             raise BadRequest("no records of an audit", str(path), "a new file") from None
 
     def __enter__(self) -> _Kept:

@@ -57,7 +57,7 @@ def require_replaceable(site: Path, said: str) -> None:
 @contextlib.contextmanager
 def _lock(folder: Path) -> Iterator[None]:
     folder.mkdir(exist_ok=True)
-    handle = os.open(folder, os.O_RDONLY | os.O_CLOEXEC)
+    handle = os.open(folder, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0))
     try:
         require_alone(handle, "another build is writing this site", folder)
         yield

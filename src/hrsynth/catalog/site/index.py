@@ -11,6 +11,7 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ...characters import name_steering
 from ...version import __version__
 from ..known import alias, order
 from .folder import FOLDERS
@@ -92,12 +93,12 @@ def _places(values: list[str | None]) -> dict[str, Any]:
 
 
 def _compact(data: object) -> str:
-    return json.dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+    return name_steering(json.dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False))
 
 
 def render(template: str, **values: Any) -> str:
     """The text of a template with these values."""
-    return _environment().get_template(template).render(values)
+    return name_steering(_environment().get_template(template).render(values))
 
 
 def notation(text: str) -> Markup:
@@ -113,6 +114,7 @@ def _environment() -> Environment:
 
     made = Environment(loader=PackageLoader("hrsynth.catalog.site"), autoescape=True, trim_blocks=True,
                        lstrip_blocks=True, undefined=StrictUndefined)
+    made.policies["json.dumps_kwargs"] = {"sort_keys": True, "ensure_ascii": False}
     made.filters.update(notation=notation, named=address_name)
     made.globals.update(explained=EXPLAINED)
     return made

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from xml.sax.saxutils import escape, quoteattr
 
+from ...characters import name_steering
+
 MOTOR = "#bdbdbd"
 """Fill of what a real motor drives (MMT Table 1)."""
 VIRTUAL = "#b3400a"
@@ -55,7 +57,8 @@ def lines(points: Iterable[Iterable[Place]]) -> str:
 
 def picture(width: float, height: float, name: str, description: str, *content: str) -> str:
     """A whole drawing, on its own or inside a page."""
-    return (f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {number(width)} {number(height)}" '
-            f'width="{number(width)}" height="{number(height)}" role="img" aria-label={quoteattr(name)} '
-            f'font-family="{FONT}" font-size="12">{title(name)}{element("desc", escape(description))}'
-            f'{"".join(content)}</svg>\n')
+    return name_steering(
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {number(width)} {number(height)}" '
+        f'width="{number(width)}" height="{number(height)}" role="img" aria-label={quoteattr(name)} '
+        f'font-family="{FONT}" font-size="12">{title(name)}{element("desc", escape(description))}'
+        f'{"".join(content)}</svg>\n')

@@ -7,6 +7,7 @@ from functools import cache
 from typing import Any
 
 from ...analysis.derive import Derivation
+from ...characters import name_steering
 from ...tolerances import RANK_GAP, SAME_RELATION
 from ...version import __version__
 from ..drawings.schematic import graph_svg
@@ -37,7 +38,7 @@ def page(found: Derivation, told: Parts) -> bytes:
     if found.hidden is not None:
         graphs.append(graph_svg(found.hidden, observed=observed, virtual=actuators(found),
                                 title=f"Joint graph of the hidden robot of {name}"))
-    return str(_template().render(
+    return name_steering(_template().render(
         found=found, setting=found.setting, told=told, answer=list(answer(found, told)),
         portrait=Portrait.of(found.setting).svg(*PORTRAIT), name=name, graphs=graphs, real=str(found.architecture),
         hidden=found.hidden_architecture and str(found.hidden_architecture), pairs=pairs(found),

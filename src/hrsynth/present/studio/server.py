@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...budgets import FAREWELL_SECONDS, LARGEST_ASK, MOST_CONNECTIONS, SENDER_SECONDS
 from ...errors import BadRequest, FileTooLarge, HrsynthError, MissingExtra
+from ...processes import require_posix
 from ...results import with_spelling
 from .guard import HOST, Guard
 from .processes import DESK, ForkServer
@@ -152,6 +153,7 @@ class StudioServer:
     """
 
     def __init__(self, opening: Opening, port: int = 0, *, desk: str = DESK) -> None:
+        require_libraries()
         listener = bound(port)
         self.forks = ForkServer(desk)  # while modules are loaded there, the server's are loaded here
         try:
@@ -192,7 +194,8 @@ class StudioServer:
 
 
 def require_libraries() -> None:
-    """Raise ``MissingExtra`` where what serves the page is not installed."""
+    """Raise ``NeedsPosix`` or ``MissingExtra`` where what serves the page is not there."""
+    require_posix("the studio", "fcntl", "resource")
     if None in map(find_spec, ("starlette", "uvicorn", "websockets")):
         raise MissingExtra("serving a page", "studio")
 
@@ -200,7 +203,6 @@ def require_libraries() -> None:
 def make_server(opening: Opening, port: int, forks: ForkServer
                 ) -> tuple[Server, Guard, tempfile.TemporaryDirectory[str]]:
     """The server, not started, who guards it, and the folder of what is dropped into its pages."""
-    require_libraries()
     import h11
     import uvicorn
     from uvicorn.protocols.http.h11_impl import H11Protocol

@@ -24,6 +24,7 @@ from pathlib import Path
 from typing import Any
 
 from ...budgets import LARGEST_ANSWER, WORKER_BYTES
+from ...characters import name_steering, restore_steering
 from ...errors import HrsynthError
 
 FRAME = struct.Struct("!I")
@@ -132,14 +133,14 @@ def answer_all(channel: socket.socket, desk: Callable[..., Any]) -> None:
         place = b"" if uploads is None else f"{uploads.resolve()}/".encode()  # what was dropped in is named alone
         _write(stream, READY)
         while asked := _read(stream):
-            _write(stream, answer_message(found, json.loads(asked)).replace(place, b""))
+            _write(stream, answer_message(found, json.loads(restore_steering(asked.decode()))).replace(place, b""))
 
 
 def answer_message(desk: Any, asked: dict[str, Any]) -> bytes:
     """The message to the page: the answer, or what went wrong, as the command line says it."""
     reply: dict[str, Any] = {"n": asked["n"]}
     try:
-        told = json.dumps({**reply, "answer": desk.answer(asked)}, ensure_ascii=False, allow_nan=False).encode()
+        told = _encode({**reply, "answer": desk.answer(asked)})
         if len(told) <= LARGEST_ANSWER:
             return told
         reply |= failure(f"the answer has {len(told)} bytes, at most {LARGEST_ANSWER} are sent", "TooLarge")
@@ -152,7 +153,11 @@ def answer_message(desk: Any, asked: dict[str, Any]) -> bytes:
             traceback.print_exc()
         what = " ".join(f"{type(error).__name__}: {error}".split())
         reply |= failure(f"a defect of hrsynth itself, please report it: {what}", "Defect")
-    return json.dumps(reply).encode()
+    return _encode(reply)
+
+
+def _encode(message: dict[str, Any]) -> bytes:
+    return name_steering(json.dumps(message, ensure_ascii=False, allow_nan=False)).encode()
 
 
 def failure(error: str, kind: str) -> dict[str, str]:

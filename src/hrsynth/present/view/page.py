@@ -5,6 +5,7 @@ from __future__ import annotations
 from html import escape
 from pathlib import Path
 
+from ...characters import name_steering
 from .view import View
 
 FOLDER = Path(__file__).parent
@@ -20,7 +21,7 @@ def static(found: View) -> bytes:
 
 def inline(found: View) -> str:
     """The same page in a frame, for a notebook."""
-    return (f'<iframe srcdoc="{escape(page(found))}" title="{escape(found.headline())}" '
+    return (f'<iframe srcdoc="{escape(page(found))}" title="{escape(name_steering(found.headline()))}" '
             'style="width: 100%; height: 560px; border: 0"></iframe>')
 
 
@@ -31,7 +32,10 @@ def page(found: View) -> str:
     def text(*files: Path) -> str:
         return "".join(file.read_text(encoding="utf-8") for file in files)
 
-    template = Environment(autoescape=True, undefined=StrictUndefined).from_string(text(FOLDER / "page.html"))
-    return template.render(robot=found.setting.robot.name, scene=found.scene(),
-                           style=text(FOLDER / "page.css", STAGE / "stage.css"), three=text(STAGE / "three.min.js"),
-                           script=text(*(STAGE / name for name in SCRIPTS), FOLDER / "page.js"))
+    made = Environment(autoescape=True, undefined=StrictUndefined)
+    # nothing that steers is hidden in an escape
+    made.policies["json.dumps_kwargs"] = {"sort_keys": True, "ensure_ascii": False}
+    template = made.from_string(text(FOLDER / "page.html"))
+    return name_steering(template.render(
+        robot=found.setting.robot.name, scene=found.scene(), style=text(FOLDER / "page.css", STAGE / "stage.css"),
+        three=text(STAGE / "three.min.js"), script=text(*(STAGE / name for name in SCRIPTS), FOLDER / "page.js")))

@@ -38,6 +38,7 @@ from ...geometry.vectors import Array, pose_difference
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
 from ...mechanism.pose import Grid, Pose, PoseLike, as_pose, asked_pose
+from ...processes import run_shared
 from ...progress import tell
 from ...results import Result, Value
 from ...tolerances import RUNS_ALIKE, SEEN_ABOVE
@@ -327,14 +328,10 @@ class BasinSearch:
 
     def _run_all(self, works: Sequence[Callable[[], Any]]) -> list[Any]:
         """What pieces of work give, in their order."""
-        if self.jobs == 1 or len(works) == 1:
-            return [work() for work in works]
-        from joblib import Parallel, delayed
-
-        found = []
-        for each in Parallel(n_jobs=min(self.jobs, len(works)), batch_size=1, return_as="generator")(
-                delayed(work)() for work in works):
-            tell("run")
+        jobs, found = min(self.jobs, len(works)), []
+        for each in run_shared(works, jobs):
+            if jobs > 1:
+                tell("run")
             found.append(each)
         return found
 

@@ -27,7 +27,7 @@ from ...constraints.condition import Condition
 from ...constraints.pattern import ConstraintPattern, placing_links
 from ...errors import HrsynthError, LoopsNotClosed
 from ...geometry.affine import affine
-from ...geometry.vectors import Array, pose_difference, transform
+from ...geometry.vectors import Array, pose_difference, steady_order, transform
 from ...kinematics.assembly import of_links
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.limits import outside
@@ -144,11 +144,11 @@ class RestSearch:
                        if (each := self.read(one, box)) is not None], self)
         continua = [each for one in self._in_mode(found.continua) if (each := self.read(one)) is not None
                     and not (covers is not None and covers.proves(each))]
-        measured = tuple(dict.fromkeys(name for box in boxes if box for name in box.measured))
-        order = {GOAL: 0, MODE: 1, ANTIPODAL: 2, CRITICAL: 3}
-        rests.sort(key=lambda each: (order[each.kind], not each.stable, each.error))
+        measured = tuple(sorted({name for box in boxes if box for name in box.measured}))
+        rests, continua = (_sort(each, motion.link, self.goal.twin.length) for each in (rests, continua))
         if covers is not None:
             lists = covers.complete_signs(lists, np.array(self.desired))
+        lists.sort(key=lambda each: (len(each.reversed), each.reversed))
         return Endings(setting, self.goal, motion.pose(self.goal.pose(motion.link)), self.desired, tuple(rests),
                        tuple(continua), tuple(lists), measured, found,
                        None if covers is None else covers.judge(rests), self.depth)
@@ -346,6 +346,17 @@ def _ways(rests: Sequence[RestPoint], search: RestSearch) -> list[RestPoint]:
             for group in groups]
     return [replace(rests[k], ways=len(group), met=sum(rests[i].met for i in group))
             for k, group in zip(best, groups, strict=True)]
+
+
+def _sort(rests: Sequence[RestPoint], link: str, length: float) -> list[RestPoint]:
+    """Rests by kind, stable ones first, by their error and by where the platform is, then by legs in other working
+    modes: by what they are, not by the order in which they were found."""
+    kinds = (GOAL, MODE, ANTIPODAL, CRITICAL)
+    named = sorted(rests, key=lambda each: (each.reversed, each.other_legs or ()))
+    poses = [each.configuration.pose(link) for each in named]
+    rows = [[kinds.index(each.kind), not each.stable, each.error, *(X[:3, 3] / length), *X[:3, :3].ravel()]
+            for each, X in zip(named, poses, strict=True)]
+    return [named[i] for i in steady_order(np.array(rows, dtype=float).reshape(len(rows), 15), SAME_ENDING)]
 
 
 def _telling_values(at: ClosedConfiguration, search: RestSearch) -> Array:

@@ -15,7 +15,7 @@ from __future__ import annotations
 import pickle
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -23,6 +23,7 @@ import numpy as np
 from ...budgets import BOX_PARTS, BOXES_A_PART, BOXES_ALONE, BOXES_AT_ONCE
 from ...geometry.affine import AffineForms, affine, combine, stack
 from ...geometry.vectors import Array
+from ...processes import run_shared
 from ...progress import tell
 from ...results import Value
 from ...tolerances import AFFINE_ROUNDING, BOX_ROUNDING, MET_AGAIN, SINGULAR_BOX, SMALLEST_BOX, THINNEST_BOX
@@ -134,25 +135,22 @@ class Subdivision:
 
         middle, half = self._cut(middle, half, min(budget, self.boxes + BOXES_ALONE), say)
         if len(middle) and self.boxes < budget:
-            from joblib import Parallel, delayed
-
             given = pickle.dumps(replace(self, boxes=0, left=[], lost=[], proved=[], flat=[]))
-            with Parallel(n_jobs=min(jobs, BOX_PARTS), batch_size=1, return_as="generator") as pool:
-                while len(middle) and self.boxes < budget:
-                    room, waiting = min(BOXES_A_PART * BOX_PARTS, budget - self.boxes), list[Any]()
-                    count, share, parts = len(middle), self.share + self._fill(half), min(BOX_PARTS, len(middle), room)
-                    for boxes, found, rest in pool(
-                            delayed(_cut_part)(given, middle[k::parts], half[k::parts], room // parts)
-                            for k in range(parts)):
-                        for own, new in zip(self._lists, found, strict=True):
-                            own += new
-                        self.boxes += boxes
-                        waiting.append(rest)
-                        say(self.boxes, count, share)
-                    middle, half = (np.concatenate(each) for each in zip(*waiting, strict=True))
-                    # the smallest last again
-                    order = np.argsort(-np.prod(half / self.whole, axis=1), kind="stable")
-                    middle, half = middle[order], half[order]
+            while len(middle) and self.boxes < budget:
+                room, waiting = min(BOXES_A_PART * BOX_PARTS, budget - self.boxes), list[Any]()
+                count, share, parts = len(middle), self.share + self._fill(half), min(BOX_PARTS, len(middle), room)
+                works = [partial(_cut_part, given, middle[k::parts], half[k::parts], room // parts)
+                         for k in range(parts)]
+                for boxes, found, rest in run_shared(works, min(jobs, BOX_PARTS)):
+                    for own, new in zip(self._lists, found, strict=True):
+                        own += new
+                    self.boxes += boxes
+                    waiting.append(rest)
+                    say(self.boxes, count, share)
+                middle, half = (np.concatenate(each) for each in zip(*waiting, strict=True))
+                # the smallest last again
+                order = np.argsort(-np.prod(half / self.whole, axis=1), kind="stable")
+                middle, half = middle[order], half[order]
         self.left += list(zip(middle, half, strict=True))
         self.spent |= len(middle) > 0
 

@@ -13,6 +13,7 @@ from typing import Any
 
 from ....budgets import LARGEST_FILE, MOST_INCLUDES, USD_SECONDS
 from ....errors import BadRequest, MissingExtra
+from ....processes import require_posix
 from ... import xml
 
 PROCESS = Path(__file__).with_name("stage_process.py")
@@ -47,6 +48,7 @@ def binary(text: str, path: Path) -> bytes:
 def _require_package(path: Path) -> None:
     if importlib.util.find_spec("pxr") is None:
         raise MissingExtra(f"{path}: USD", "usd")
+    require_posix(f"{path}: USD, which is read under limits of time and memory,", "resource")
 
 
 def _run(path: Path, *arguments: str) -> bytes:
