@@ -81,7 +81,7 @@ WHOLE = {
     "6pus": gram("spatial", SIX.format("p"), "123456"), "hexa": gram("spatial", SIX.format("τ"), "123456"),
     "gough_stewart": gram("spatial", SIX.format("u"), "123456"),
     "hexaglide": always("spatial", "translation along x", 6, lines("p", "123456")),
-    "i4l": always("bodies", "translation along x", 4, lines("p", "1234")),
+    "i4l": always("bodies", "translation along x", 3, lines("p", "1234")),
     "uranesx": always("translations", "translation along z", 3, lines("p", "123")),
     "prrrp_parallel": always("translations", "translation along y", 2, lines("p", "12")),
     "prrrp_parallel_point": always("translations", "translation along y", 2, lines("p", "12")),
