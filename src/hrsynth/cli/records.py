@@ -582,8 +582,8 @@ class Branch(OfRobot):
     box: str
     tried: int
     parts: list[BranchPartRecord]
-    back: Annotated[Array | None, "low and high of a box of all motors, no two of which give the platform one pose "
-                                  "(proved); null without a proof"]
+    back: Annotated[Array | None, "low and high of a box of all motors, no two of which give the platform one pose on the "
+                                  "branch (proved); null without a proof"]
     regular: Annotated[bool, "whether the proved box has no Type 1 singularity (proved)"]
     limits: list[BranchLimitRecord]
     motors_beyond: list[MotorBeyondRecord]
@@ -782,7 +782,8 @@ class Exported(OfRobot, WrittenTo):
     inverse: Annotated[Literal["closed form", "Newton's method"], "how the program finds the motors of a pose"]
     steps: Annotated[int | None, "steps of Newton's method that are enough in each part (proved), or null"]
     error: Annotated[float | None, "how far an answer is off at most (rad, 1, characteristic lengths; proved), or null"]
-    back: Annotated[Array | None, "low and high of motors, no two of which give the platform one pose (proved)"]
+    back: Annotated[Array | None, "low and high of motors, no two of which give the platform one pose on the branch "
+                    "(proved)"]
     parts: list[ExportedPart]
     limits: list[BranchLimitRecord]
     free: list[FreeMotorRecord]
