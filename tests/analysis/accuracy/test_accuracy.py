@@ -232,7 +232,7 @@ def test_a_plane_of_a_robot_whose_legs_are_iterated() -> None:
 @pytest.mark.parametrize(("name", "grid"), [
     ("3rps", "x=0:0.004:2,y=0"), ("gough_stewart", "x=0:0.004:2,y=0,z=0.3,rpy=0/0/0")])
 def test_a_grid_says_that_its_bounds_may_be_too_large(name: str, grid: str) -> None:
-    """Found one by one or by the batch: what an ascent attains lies below each error of the grid, by its gap at most."""
+    """Found one by one or by the batch: what an ascent attains is below each error of the grid, by its gap at most."""
     found = accuracy(name, cone=CONE, grid=grid)
     field = found.field
     assert field is not None
