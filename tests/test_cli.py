@@ -553,7 +553,7 @@ def test_singular_json_where_a_freedom_is_always_lost(run):
     data = run("singular", "uranesx", "--json").data
     check_record(data, "singular", "uranesx")
     assert data["always"] is True
-    assert data["words"].startswith("always: translation along z is never seen")
+    assert data["words"].startswith("always: 1 of 3 freedoms is never seen: translation along z")
     assert (data["expression"], data["verdict"]) == ("0", "partially controllable")
     assert data["checked"] == {"points": 0, "disagreements": 0}
 

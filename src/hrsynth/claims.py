@@ -19,7 +19,8 @@ from typing import Any
 
 CERTAIN = re.compile(r"\b(prove[ns]?|proved|proofs?|certif\w+|complete\w*|cannot|never|always|exact\w*|enclose[sd]?|"
                      r"enclosures?|guarantee\w*|impossible|unique\w*|rigorous\w*|isolated|necessarily|separated|"
-                     r"same aspect|only beyond|controllable|uncontrollable)\b|^(rigid|flexible)$", re.IGNORECASE)
+                     r"same aspect|only beyond|upper bounds?|controllable|uncontrollable)\b|^(rigid|flexible)$",
+                     re.IGNORECASE)
 """The words that make a text a claim."""
 
 

@@ -70,6 +70,28 @@ def test_a_rocker_leads_back_between_its_dead_points_alone(seed):
 
 
 @pytest.mark.slow
+def test_on_another_branch_other_motors_in_the_box_give_the_same_pose():
+    """Crank and rocker turn all round on either branch: the rods' circles meet in two places of the crank's pin."""
+    bars, angle = (0.3, 1.0, 0.9, 1.1), 0.3
+    proof = branch(rocker_driven(bars, angle, 1), {"a": (-1.0, 1.0)})
+    assert proof.regular
+    assert proof.back is not None
+    (low,), (high,) = proof.back
+    ground, crank, coupler, rocker = bars
+    q = np.linspace(low, high, 101)
+    turned = rocker_angle(bars, angle, 1, q)
+    assert np.all(np.diff(turned) > 0) or np.all(np.diff(turned) < 0)
+    C = rocker * np.stack([np.cos(turned), np.sin(turned), 0 * turned], axis=-1) + [ground, 0.0, 0.0]
+    others = [np.array([np.arctan2(*circles(np.zeros(3), at, crank, coupler, side)[1::-1]) for at in C]) - angle
+              for side in (1, -1)]
+    away = [np.abs((each - q + np.pi) % (2 * np.pi) - np.pi) for each in others]
+    assert np.max(np.minimum(*away)) < 1e-9
+    other = np.where(away[0] > away[1], *others)
+    assert np.any((low < other) & (other < high) & (np.maximum(*away) > 0.1))
+    assert "same platform pose on this branch, proved" in str(proof)
+
+
+@pytest.mark.slow
 def test_without_a_dead_point_the_whole_box_leads_back():
     bars, angle, side = crank_rockers(np.random.default_rng(1))
     low, high = (0.9 * dead_points(bars, angle, side)).tolist()

@@ -245,7 +245,8 @@ def test_motors_that_the_box_takes_beyond_their_limits_are_told() -> None:
 
 @pytest.mark.slow
 def test_limits_are_undecided_within_the_tube_alone() -> None:
-    """A limit at the largest angle: beyond what a tube bounds it is kept, below passed, between not decided."""
+    """A limit at the largest angle, by closed form: beyond what a tube bounds it is kept, below passed, between not
+    decided."""
     robot = four_bar()
     (part,) = hrsynth.branch(robot, box_of(robot, 0.4)).parts
     k = part.passive.index("knee")
@@ -259,6 +260,9 @@ def test_limits_are_undecided_within_the_tube_alone() -> None:
         return limit.verdict
 
     most, least = max(np.add(top, radius)), max(np.subtract(top, radius))
+    q = np.append(np.linspace(-0.4, 0.4, 10_001), 0.0)
+    knee = coupler(q)[1] - q
+    assert least - 1e-12 <= np.max(knee - knee[-1]) <= most + 1e-12
     assert [verdict(most + 1e-9), verdict((most + least) / 2), verdict(least - 1e-9)] == ["kept", "undecided", "passed"]
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import hrsynth
+from hrsynth.analysis.modes.assembly_mode import AssemblyMode
 from hrsynth.geometry.vectors import inverse, rotation_about, unit
 from hrsynth.kinematics.assembly import ASSEMBLED, BEYOND, IMPOSSIBLE, NOT_FOUND, Assembler, Assembly
 from hrsynth.kinematics.closures import LegEnd, closures
@@ -17,6 +18,8 @@ from hrsynth.mechanism import Joint, Mechanism
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.legs import decompose
 from hrsynth.mechanism.model import JointType, Limits
+from hrsynth.mechanism.pose import Pose
+from hrsynth.present.text.poses import assembly
 from kinematics.placing import miss
 from strategies import deltas, planar, pods, random_direction, random_normal, random_rotation
 
@@ -230,3 +233,24 @@ def test_beyond_limits_is_said_only_where_all_closures_are():
     assert other.verdict == ASSEMBLED
     last = assembled(with_limits(mechanism, "joint_1_3", 0.001, 0.002), np.eye(4))
     assert (last.verdict, last.reachable, last.beyond) == (NOT_FOUND, None, ("joint_1_3",))
+
+
+def test_beyond_limits_names_the_joints_of_the_closure_that_was_found() -> None:
+    """Of both closures of a leg no elbow is within its limits, and of one no shoulder: that one is named with both
+    joints, and the words do not say that the robot is beyond the shoulder's in the other."""
+    mechanism = planar(["RRR"] * 3, np.random.default_rng(2), [{0}] * 3)
+    shoulder, elbow = (mechanism.joints[name] for name in ("joint_1_1", "joint_1_2"))
+    arm, rod = elbow.point - shoulder.point, mechanism.joints["joint_1_3"].point - shoulder.point
+    turn = 2 * np.arctan2(shoulder.axis @ np.cross(arm, rod), arm @ rod)  # mirrors the elbow at the rod
+    tight = with_limits(mechanism, elbow.name, 0.001, 0.01)
+    low, high = sorted((turn - 0.1, turn + 0.1))
+    found = assembled(with_limits(tight, shoulder.name, low, high), np.eye(4))
+    assert (found.verdict, found.beyond) == (BEYOND, (shoulder.name, elbow.name))
+    free = with_limits(with_limits(mechanism, elbow.name, 0.05, 6.2), shoulder.name, low, high)
+    assert assembled(free, np.eye(4)).verdict == ASSEMBLED
+    assert "only beyond limits of joints: as found, of joint_1_1, joint_1_2" in words_of(found)
+
+
+def words_of(found: Assembly) -> str:
+    mode = AssemblyMode(Pose(), 0.0, 0.0, 0.0, False, found.reachable, None, found.verdict, beyond=found.beyond)
+    return " ".join(assembly(mode))

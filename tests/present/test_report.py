@@ -161,7 +161,8 @@ def test_what_is_refused_is_one_sentence():
     told = [text_of(each) for each in page.xpath("//*[@class='refused']")]
     assert told == [
         "The measurements leave 1 of the platform's freedoms undetermined: a continuum of dimension 1.",
-        "There is no accuracy map. The error is infinite at every pose, the legs do not see translation along z."]
+        "There is no accuracy map. The error is infinite at every pose, the legs do not see translation along z (at "
+        "the zero configuration)."]
 
 
 def test_a_part_that_fails_leaves_its_reason():

@@ -54,7 +54,8 @@ class GridCheck(Value):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Check(Result, shown_as="check"):
-    """What is observed, the postures at the requested poses, and the loop constraints that are always redundant."""
+    """What is observed, the postures at the requested poses, and the loop constraints that are redundant at
+    generic ones."""
 
     setting: ObservedRobot
     postures: tuple[Posture, ...]

@@ -97,8 +97,8 @@ def interaction_matrix(found: Relation) -> Array | None:
 
 @dataclass(frozen=True)
 class Redundancy:
-    """``rows`` constraints of the loop that the file calls ``loop`` repeat what earlier loops say already; at all
-    configurations where ``generic``."""
+    """``rows`` constraints of the loop that the file calls ``loop`` repeat what earlier loops say already; at
+    generic configurations where ``generic``."""
 
     loop: str
     rows: int

@@ -58,6 +58,18 @@ class Verdict(Result, shown_as="verdict"):
         """Whether a singular value lies so near to the cutoff that slightly other geometry has another verdict."""
         return (self.rank > 0 and self.counted < SURELY_SOMETHING) or self.dropped > SURELY_ZERO
 
+    @property
+    def named(self) -> str:
+        """The lost freedoms, and where they have these names: at other configurations others are lost."""
+        names = "; ".join(each.name for each in self.lost)
+        return names if ELSEWHERE in names else f"{names} (at the zero configuration)"
+
+    @property
+    def never(self) -> str:
+        """How many freedoms are lost at all configurations, and which at one of them."""
+        count = len(self.lost)
+        return f"{count} of {self.dof} freedoms {'is' if count == 1 else 'are'} never seen: {self.named}"
+
     def headline(self) -> str:
         """The legs, the verdict and the rank."""
         return f"legs {', '.join(self.legs)}: {self.verdict}, rank {self.rank} of {self.dof}"

@@ -194,7 +194,7 @@ QUESTIONS = (
               _file("derive"), _file("derive", "report"), _file("derive", "certificate")),
              ("quattro --observe 1,4", "quattro --observe 1,4 -o hidden.urdf --report quattro.html",
               "robot.urdf --platform plate --motors hip_1,hip_2,hip_3", f"gough_stewart {POINTS}")),
-    Question("legs", "Every set of observed legs: its verdict, the freedoms it loses, and the smallest sets that see "
+    Question("legs", "Sets of observed legs: their verdicts, the freedoms they lose, and the smallest sets that see "
              "the most.",
              (*WATCHED, SEE, BEGIN), ("quattro", "quattro --observe arm_1,arm_2,rod_3a", "quattro --camera platform",
                                       "delta --observe 1,2 --see inclination:rod_1a")),
@@ -226,7 +226,8 @@ QUESTIONS = (
              "configuration, and where that ends.",
              (BOX, CELLS),
              ("rrrrr_m1 --box shoulder_1=-0.2:0.2,shoulder_2=-0.2:0.2",), seeded=False),
-    Question("modes", "All assembly modes: every pose of the platform with the same measurements.",
+    Question("modes", "Assembly modes: poses of the platform with the same measurements, and whether they are proved "
+             "to be all.",
              (Option("at", "Pose whose measurements are held, such as x=0.02,y=0.1,z=-0.7; or mode:2 of the list "
                      "printed without --at (default: the zero configuration).", "POSE"),
               *WATCHED, SEE, flag("real", "Hold the real robot's own motors instead."),
@@ -264,7 +265,7 @@ QUESTIONS = (
              ("quattro --observe 1,4 --start x=0.1 --goal x=-0.05 -o run.png",
               "delta --start x=0 --goal x=0.05 --noise 0.1deg --json",
               f"gough_stewart {POINTS} --start x=0.02 --goal x=0")),
-    Question("endings", "All poses at which the servo loop can rest, and which of them attract: the goal, modes, "
+    Question("endings", "Poses at which the servo loop can rest, and which of them attract: the goal, modes, "
              "antipodal poses, critical poses of the error.",
              (Option("at", "The goal: pose whose measurements are desired, such as x=0.02,y=0.1,z=-0.7; or mode:2.",
                      "POSE", default=NEEDED), *WATCHED, SEE, DEPTH,

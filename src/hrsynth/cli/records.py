@@ -306,7 +306,7 @@ class ConstraintRecord(TypedDict):
 
 
 class RedundantRecord(TypedDict):
-    """Redundant constraints of a loop, named as in the file; `generic`: at all configurations."""
+    """Redundant constraints of a loop, named as in the file; `generic`: at generic configurations."""
 
     loop: str
     rows: int
@@ -582,8 +582,8 @@ class Branch(OfRobot):
     box: str
     tried: int
     parts: list[BranchPartRecord]
-    back: Annotated[Array | None, "low and high of a box of all motors, no two of which give the platform one pose "
-                                  "(proved); null without a proof"]
+    back: Annotated[Array | None, "low and high of a box of all motors, no two of which give the platform one pose on "
+                                  "the branch (proved); null without a proof"]
     regular: Annotated[bool, "whether the proved box has no Type 1 singularity (proved)"]
     limits: list[BranchLimitRecord]
     motors_beyond: list[MotorBeyondRecord]
@@ -658,7 +658,7 @@ class SelfMotionRecord(TypedDict):
 
 
 class ListedModes(OfRobot, WrittenTo, LimitsLeft):
-    """All assembly modes; `complex` is null where no count is proved."""
+    """Assembly modes, all if `complete`; `complex` is null where no count is proved."""
 
     kind: Literal["hidden", "real", "formation"]
     at: PoseRecord
@@ -679,7 +679,7 @@ class ListedModes(OfRobot, WrittenTo, LimitsLeft):
 
 
 class AssemblyModesRecord(ListedModes):
-    """All assembly modes, and the requested certificate."""
+    """Assembly modes, and the requested certificate."""
 
     certificate_file: str | None
 
@@ -782,7 +782,8 @@ class Exported(OfRobot, WrittenTo):
     inverse: Annotated[Literal["closed form", "Newton's method"], "how the program finds the motors of a pose"]
     steps: Annotated[int | None, "steps of Newton's method that are enough in each part (proved), or null"]
     error: Annotated[float | None, "how far an answer is off at most (rad, 1, characteristic lengths; proved), or null"]
-    back: Annotated[Array | None, "low and high of motors, no two of which give the platform one pose (proved)"]
+    back: Annotated[Array | None, "low and high of motors, no two of which give the platform one pose on the branch "
+                    "(proved)"]
     parts: list[ExportedPart]
     limits: list[BranchLimitRecord]
     free: list[FreeMotorRecord]
@@ -921,8 +922,8 @@ class RestCoverRecord(TypedDict):
 
 
 class EndingsAnswer(OfRobot, WrittenTo):
-    """All poses at which a loop can rest: where all velocities are seen, where fewer are (`singular`), and one from
-    each family that fills a curve or surface (`continua`)."""
+    """Poses at which a loop can rest, all in what `cover` holds if `complete`: where all velocities are seen, where
+    fewer are (`singular`), and one from each family that fills a curve or surface (`continua`)."""
 
     at: PoseRecord
     observed: list[Watched]
@@ -956,8 +957,9 @@ class BasinEndRecord(TypedDict):
 
 
 class CertifiedRecord(TypedDict):
-    """The distance from the goal within which every start is proved to end there, and what share of the goal's basin
-    among the starts that covers; the larger distance that holds as long as the law is not damped, if there is one."""
+    """The distance from the goal within which every start in its working mode is proved to end there, and what share of
+    the goal's basin among the starts that covers; the larger distance that holds as long as the law is not damped, if
+    there is one."""
 
     words: str
     radius_m: float

@@ -75,7 +75,8 @@ def export(robot: RobotLike, lang: str = "c++", box: BoxLike | None = None, *, o
     motors for a pose, and the interaction matrix of the watched directions (``observe``, ``camera`` as for ``derive``).
 
     It answers where :func:`.branch` proves the branch (``box``, ``effort`` as there) and refuses elsewhere. The same
-    robot gives the same text. Raises what ``branch`` raises, ``NothingProved``, ``BadRequest`` for another language.
+    robot gives the same text on one machine. Raises what ``branch`` raises, ``NothingProved``, ``BadRequest`` for
+    another language.
 
     >>> hrsynth.export("rrrrr_m1", "numpy", {"shoulder_1": (-0.05, 0.05), "shoulder_2": (-0.05, 0.05)}).lang
     'numpy'

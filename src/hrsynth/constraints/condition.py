@@ -303,9 +303,9 @@ def _general(question: Measurement) -> General:
     return General(words, sympy.Determinant(M.T * M), where=where, question=question)
 
 
-def always(pattern: ConstraintPattern, lost: Sequence[str]) -> str:
-    """Words for a robot that loses a freedom everywhere."""
-    text = f"always: {'; '.join(lost)} {'is' if len(lost) == 1 else 'are'} never seen"
+def always(pattern: ConstraintPattern, lost: str) -> str:
+    """Words for a robot that loses freedoms everywhere, with those that say how many and which."""
+    text = f"always: {lost}"
     lines = [leg for leg in pattern.legs if leg.line is not None]
     if pattern.motion == "spatial" and (names := _on_one_line(pattern.legs)):
         return f"{text}, because {names} are on one line, about which the platform can turn"

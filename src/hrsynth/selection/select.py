@@ -297,8 +297,8 @@ class _Work:
         try:
             verdict = verdict_of(setting, legs, setting.samples)
             if verdict.verdict != CONTROLLABLE:
-                lost = "; ".join(freedom.name for freedom in verdict.lost)
-                return Candidate(legs, verdict.verdict, verdict.verdict + (f", not seen: {lost}" if lost else ""))
+                lost = f", not seen: {verdict.named}" if verdict.lost else ""
+                return Candidate(legs, verdict.verdict, verdict.verdict + lost)
             analysis = ConfigurationAnalysis.of(setting)
             ends = (("start", self.start), ("goal", self.goal))
             behind = [(name, unseen(at, setting.samples.question)) for name, at in ends]

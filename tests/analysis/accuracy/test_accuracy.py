@@ -18,6 +18,7 @@ from hrsynth.analysis.accuracy.pose_errors import _descend, _width, error_axes, 
 from hrsynth.analysis.accuracy.sampled import true_errors
 from hrsynth.analysis.accuracy.singular_search import singular_poses
 from hrsynth.analysis.observed import ObservedRobot
+from hrsynth.batch.reach import sweep
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, HrsynthError, PlaneNotMet, PoseNotReached
 from hrsynth.geometry.vectors import Array
@@ -225,6 +226,24 @@ def test_a_plane_of_a_robot_whose_legs_are_iterated() -> None:
     assert field.spots is None
     assert field.reached.all()
     assert (field.position > 0).all()
+
+
+@pytest.mark.some(1, 1)
+@pytest.mark.parametrize(("name", "grid"), [
+    ("3rps", "x=0:0.004:2,y=0"), ("gough_stewart", "x=0:0.004:2,y=0,z=0.3,rpy=0/0/0")])
+def test_a_grid_says_that_its_bounds_may_be_too_large(name: str, grid: str) -> None:
+    """Found one by one or by the batch: what an ascent attains is below each error of the grid, by its gap at most."""
+    found = accuracy(name, cone=CONE, grid=grid)
+    field = found.field
+    assert field is not None
+    assert (field.spots is None) == (name == "3rps")
+    assert field.gap > 1e-3
+    assert "three cones or more: upper bounds, nowhere more than" in runs.accuracy(found)
+    starts = sweep(found.setting.everything.start, found.setting.everything.question, field.grid, found.setting.motion)
+    for k, at in enumerate(starts):
+        met = largest_by_ascent(at, found.setting.samples.question, found.blur)
+        for mine, theirs in zip((field.position.flat[k], field.orientation.flat[k]), met, strict=True):
+            assert mine / (1 + field.gap) * (1 - 1e-6) <= theirs <= mine * (1 + 1e-6)
 
 
 def test_singular_poses_of_a_plane_are_singular() -> None:

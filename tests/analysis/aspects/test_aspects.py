@@ -323,7 +323,7 @@ def test_reasons_why_nothing_is_decided():
     places = list(random_walk(lost.setting.samples.start, 2))
     answer = lost.join(*places)
     assert (answer.verdict, answer.certified) == (UNDECIDED, False)
-    assert "never seen: translation along y" in answer.reason
+    assert "1 of 2 freedoms is never seen: translation along y (at the zero configuration)" in answer.reason
 
     parasitic = aspects_of("3rps")
     verdicts = set()

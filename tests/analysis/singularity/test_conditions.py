@@ -14,6 +14,8 @@ from hrsynth.constraints.condition import _general
 from hrsynth.constraints.vector_algebra import products, vector
 from hrsynth.description import load, shipped
 from hrsynth.geometry.vectors import inverse
+from hrsynth.kinematics.relation import relation
+from hrsynth.kinematics.walking import random_walk
 from hrsynth.present.show import text
 
 
@@ -45,10 +47,11 @@ def lines(kind: str, legs: str) -> str:
     return ", ".join(kind + i for i in legs)
 
 
-def always(motion: str, freedoms: str, because: str = "") -> tuple[str, str, str]:
-    several = "are" if ";" in freedoms else "is"
+def always(motion: str, freedoms: str, dof: int, because: str = "") -> tuple[str, str, str]:
+    count = freedoms.count(";") + 1
     reason = f", because the P axes {because} are parallel" if because else ""
-    return motion, f"always: {freedoms} {several} never seen{reason}", "0"
+    return motion, (f"always: {count} of {dof} freedoms {'is' if count == 1 else 'are'} never seen: {freedoms} (at the "
+                    f"zero configuration){reason}"), "0"
 
 
 def gram(motion: str, words: str, legs: str) -> tuple[str, str, str]:
@@ -60,8 +63,8 @@ def flat(kind: str, noun: str) -> tuple[str, str, str]:
     return "translations", f"the {noun} {kind}1, {kind}2 are parallel", f"det(n, {symbol}1, {symbol}2)"
 
 
-BLIND = always("other", "translation along x; translation along y; rotation about the platform's z axis")
-PLANE = always("translations", "translation along x; translation along y")
+BLIND = always("other", "translation along x; translation along y; rotation about the platform's z axis", 3)
+PLANE = always("translations", "translation along x; translation along y", 3)
 RAILS = parallel("p", "123", "never: the P axes p1, p2, p3 are constant and not all parallel")
 TWO_RAILS = ("translations", "never: the P axes p1, p2 are constant and not parallel", "det(n, p1, p2)")
 TANGENTS = parallel("τ", "123", "the tangents τ1, τ2, τ3 are all parallel")
@@ -77,11 +80,11 @@ WHOLE = {
     "3rps": spatial("u"),
     "6pus": gram("spatial", SIX.format("p"), "123456"), "hexa": gram("spatial", SIX.format("τ"), "123456"),
     "gough_stewart": gram("spatial", SIX.format("u"), "123456"),
-    "hexaglide": always("spatial", "translation along x", lines("p", "123456")),
-    "i4l": always("bodies", "translation along x", lines("p", "1234")),
-    "uranesx": always("translations", "translation along z", lines("p", "123")),
-    "prrrp_parallel": always("translations", "translation along y", lines("p", "12")),
-    "prrrp_parallel_point": always("translations", "translation along y", lines("p", "12")),
+    "hexaglide": always("spatial", "translation along x", 6, lines("p", "123456")),
+    "i4l": always("bodies", "translation along x", 3, lines("p", "1234")),
+    "uranesx": always("translations", "translation along z", 3, lines("p", "123")),
+    "prrrp_parallel": always("translations", "translation along y", 2, lines("p", "12")),
+    "prrrp_parallel_point": always("translations", "translation along y", 2, lines("p", "12")),
     "prrrp_m1": TWO_RAILS, "prrrp_m2": TWO_RAILS,
     "quattro": gram("bodies", f"{HALVES} (i = 1, 2, 3, 4)", "1234"),
     "quattro_rigid": parallel("τ", "1234", "the tangents τ1, τ2, τ3, τ4 are all parallel"),
@@ -98,7 +101,7 @@ def split_platform(i: str, j: str) -> tuple[str, str, str]:
 
 SOME = {
     ("gough_stewart", "1,2,3"): spatial("u"), ("hexa", "1,2,3"): spatial("τ"), ("6pus", "1,2,3"): spatial("p"),
-    ("hexaglide", "1,2,3"): always("spatial", "translation along x", lines("p", "123")),
+    ("hexaglide", "1,2,3"): always("spatial", "translation along x", 6, lines("p", "123")),
     ("delta", "1,2"): parallel("τ", "12", "the tangents τ1, τ2 are parallel"),
     ("quattro", "1,4"): split_platform("1", "4"), ("quattro", "1,3"): split_platform("1", "3"),
     **{("quattro_rigid", f"{i},{j}"): parallel("τ", i + j, f"the tangents τ{i}, τ{j} are parallel")
@@ -186,3 +189,24 @@ def test_a_line_and_a_plane_are_told_by_their_vectors():
         assert abs(each.pose.to_dict()["z"] - 0.3) < 1e-6
     both = singular("3upu", "1", see=see, points=100)
     assert both.words == "the watched directions u1 and the z axes z4 are parallel, also to the plane normal to r5"
+
+
+@pytest.mark.some(2, 2)
+@pytest.mark.parametrize(("robot", "legs", "moves"), [
+    ("3rrr_m1", "1,2", True), ("uranesx", "1,2", False), ("3rps", "1,2", True), ("delta", "1", True)])
+def test_as_many_freedoms_are_lost_everywhere_but_not_the_named_ones(robot: str, legs: str, moves: bool) -> None:
+    """At configurations of another walk: what is named is lost at the zero configuration, where the words put it."""
+    answer = found(robot, legs)
+    count, named = len(answer.verdict.lost), np.column_stack([each.twist for each in answer.verdict.lost])
+    assert answer.words.startswith(f"always: {count} of {answer.verdict.dof} freedoms")
+    assert "(at the zero configuration)" in answer.words
+    start, scale = answer.setting.everything.start, np.repeat([1 / answer.setting.mechanism.length, 1.0], 3)[:, None]
+    seen = []
+    for at in (start, *random_walk(start, 12, seed=8)):
+        lost = relation(at, answer.question).unobserved_twists
+        lost = np.vstack([lost, np.zeros((6 - len(lost), lost.shape[1]))])
+        assert lost.shape[1] >= count
+        scaled = scale * named
+        seen.append(float(np.linalg.norm(scaled - lost @ (np.linalg.pinv(lost) @ scaled)) / np.linalg.norm(scaled)))
+    assert seen[0] < 1e-7
+    assert (max(seen) > 1e-3) is moves

@@ -11,12 +11,17 @@ from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.batch.enclosures import trace_formula
 from hrsynth.geometry.affine import affine
 from hrsynth.geometry.so3 import exponential, logarithm
+from hrsynth.kinematics.configuration import ClosedConfiguration
+from hrsynth.kinematics.tasks import solve
 from hrsynth.mechanism.model import Limits
+from hrsynth.mechanism.pose import Pose
 from hrsynth.simulation.endings.cones import ConeProver, RisingCones
+from hrsynth.simulation.endings.endings import RestSearch
 from hrsynth.simulation.endings.inward import InwardProver, inward_radius
 from hrsynth.simulation.endings.pose_error import PoseError
 from hrsynth.simulation.endings.radius import CERTIFIED, UNDECIDED, certified_radius
-from hrsynth.simulation.law import damped_inverses
+from hrsynth.simulation.law import FixedDirections, damped_inverses
+from hrsynth.simulation.run import Loop
 from strategies import random_rotation, transformed
 
 
@@ -177,8 +182,10 @@ def test_roots_and_inverses_of_forms_hold_those_of_numbers():
             assert np.all((form.low <= value + 1e-12)[known] & (value <= form.high + 1e-12)[known])
 
 
-@pytest.mark.long
-@pytest.mark.parametrize(("name", "led"), [pytest.param("rrrrr_m1", False, marks=pytest.mark.long), ("3rrr_m1", True)])
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "led"), [
+    ("3rpr_m1", True), pytest.param("rrrrr_m1", False, marks=pytest.mark.long),
+    pytest.param("3rrr_m1", True, marks=pytest.mark.long)])
 def test_all_starts_within_it_end_at_the_goal(name, led):
     """Also where the base is tilted; of the five-bar, whose pose has parts that depend on each other, it is proved."""
     rng = np.random.default_rng(2)
@@ -187,6 +194,27 @@ def test_all_starts_within_it_end_at_the_goal(name, led):
     assert found.length > 0.01 * setting.mechanism.length
     if led:
         assert np.all(ends(setting, found, starts(found, rng, 200)) < 1e-6)
+
+
+@pytest.mark.slow
+def test_a_start_in_another_working_mode_may_end_elsewhere():
+    """A five-bar at the goal's pose whose legs are both bent the other way: the words are about one working mode."""
+    setting = ObservedRobot.of("rrrrr_m1")
+    goal, motion = setting.everything.start, setting.motion
+    found = certified(setting)
+    assert found.words.endswith("of the goal in its working mode")
+    place, rng, apart = motion.position(goal.pose(motion.link)), np.random.default_rng(0), []
+    there = motion.goal(Pose(x=float(place[0]), y=float(place[1])), "five-bar")
+    while not apart:
+        q, residual = solve(goal.twin, goal.twin.integrate(goal.q, rng.uniform(-3, 3, goal.twin.nv)), there)
+        at = ClosedConfiguration.of(goal.twin, q)
+        if residual < 1e-9 and np.abs(at.pose(motion.link) - goal.pose(motion.link)).max() > 0.1:
+            apart.append(at)
+    assert found.holds(apart[0].pose(motion.link))
+    search = RestSearch.of(setting, goal)
+    run = Loop(replace(search.law, gain=0.8), setting.everything.question, FixedDirections(search.desired)).simulate(
+        apart[0], 60.0)
+    assert np.linalg.norm(motion.position(run.last.pose(motion.link)) - place) > 2 * found.length
 
 
 def test_a_goal_that_the_directions_do_not_see_is_undecided():

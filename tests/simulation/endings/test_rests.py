@@ -6,7 +6,7 @@ from collections import Counter
 from contextlib import suppress
 from dataclasses import replace
 from functools import cache
-from itertools import islice
+from itertools import combinations, islice
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +18,11 @@ from scipy.optimize import least_squares
 import hrsynth
 from hrsynth.analysis.modes.modes import modes
 from hrsynth.analysis.observed import ObservedRobot
+from hrsynth.constraints.pattern import placing_links
 from hrsynth.errors import BadRequest
 from hrsynth.geometry.affine import AffineForms
 from hrsynth.geometry.so3 import exponential, logarithm
-from hrsynth.geometry.vectors import pose
+from hrsynth.geometry.vectors import pose, pose_difference
 from hrsynth.kinematics.chart import TangentChart
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.locked import joint_at
@@ -36,7 +37,7 @@ from hrsynth.simulation.endings.endings import RestSearch, _sort, _ways, endings
 from hrsynth.simulation.endings.error import RestEquations
 from hrsynth.simulation.endings.pose_error import PoseError
 from hrsynth.simulation.endings.pose_system import LegSystem
-from hrsynth.simulation.endings.rests import Endings, RestPoint, stability
+from hrsynth.simulation.endings.rests import Endings, RestPoint, SignedModes, stability
 from hrsynth.simulation.endings.search import ToldApart, anywhere, starts
 from hrsynth.simulation.law import FixedDirections, directions
 from hrsynth.simulation.run import Loop
@@ -265,6 +266,43 @@ def test_nothing_is_enclosed_beside_a_rest() -> None:
         moved = CriticalPoint(q + 1e-4, np.zeros(search.system.size[1]), 0.0, np.zeros(2), 0.0)
         (box,) = enclose_points(search.system, [moved], 0)
         assert box is None or np.all(np.abs(box.q - q) <= box.radius)
+
+
+@pytest.mark.slow
+def test_what_is_alone_in_its_box_may_share_its_pose() -> None:
+    """A rod may point either way at one pose: two rests there, whose boxes of joint coordinates are far apart."""
+    found = endings("rprpr_m2", at="x=0.03,y=0.22")
+    scale = found.setting.mechanism.length
+    same = [(one, other) for one, other in combinations([each for each in found.rests if each.proved], 2)
+            if all(pose_difference(one.configuration.pose(link), other.configuration.pose(link), scale) < 1e-9
+                   for link in placing_links(found.setting.anatomy))]
+    assert same
+    system = RestSearch.of(found.setting, found.goal).system
+    for pair in same:
+        points = [CriticalPoint(system.system.read(each.configuration.pose), np.zeros(system.size[1]), 0.0, np.zeros(2),
+                                0.0) for each in pair]
+        one, other = enclose_points(system, points, 0)
+        assert one is not None
+        assert other is not None
+        away = np.abs((one.q - other.q + np.pi) % (2 * np.pi) - np.pi)
+        assert np.max(away) > 0.1 > 1e6 * max(one.radius.max(), other.radius.max())
+    assert "each the only rest in a box of joint coordinates" in text(found)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "turns", "words"), [
+    ("linear_delta", 1, ", with the platform turned as at the goal"),
+    ("3upu", 2, ", in the 2 turns in which the platform translates"), ("3rrr_m1", 1, "")])
+def test_where_a_platform_only_translates_nothing_is_said_of_other_turns(name: str, turns: int, words: str) -> None:
+    """Of poses with reversed legs that boxes exclude, and of those that they count where no list does."""
+    found, lists = listed(), (SignedModes(("1",), None, 0, turns),)
+    told = text(replace(found, setting=ObservedRobot.of(name), lists=lists))
+    assert f"poses with leg 1 reversed: none, proved by boxes of poses{words}" in told.splitlines()[-2]
+    open_ = replace(found.lists[0].listed, found=replace(found.lists[0].listed.found, complete=False))
+    told = text(replace(found, setting=ObservedRobot.of(name), lists=(SignedModes(("1",), open_, 3, turns),)))
+    assert told.splitlines()[-2].endswith(f"poses with leg 1 reversed: 3, proved to be all by boxes of poses{words}")
+    told = text(replace(found, lists=(SignedModes((), open_, None),)))
+    assert "found, not proved to be all" in told.splitlines()[-2]
 
 
 @pytest.mark.slow

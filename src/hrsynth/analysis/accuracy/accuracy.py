@@ -150,8 +150,7 @@ def sees_all(setting: ObservedRobot, otherwise: str = "the error is infinite at 
     """Raise ``BadRequest`` where the observed legs do not see all of the platform's freedoms, saying what follows."""
     verdict = verdict_of(setting, setting.labels, setting.samples)
     if verdict.lost:
-        lost = "; ".join(freedom.name for freedom in verdict.lost)
         what, cure = (("the legs do", "legs that make") if all(each.by_segment for each in setting.observed) else
                       ("what is observed does", "observations that make"))
-        raise BadRequest(f"{setting.robot.name}: {otherwise}{what} not see {lost}", ", ".join(setting.labels),
+        raise BadRequest(f"{setting.robot.name}: {otherwise}{what} not see {verdict.named}", ", ".join(setting.labels),
                          f"{cure} it controllable (hrsynth legs lists them, hrsynth advise what else to measure)")

@@ -224,16 +224,16 @@ class Mapper(Value):
     def _one_by_one(self, grid: Grid) -> Seen:
         everything = self.setting.everything
         found = sweep(everything.start, everything.question, grid, self.setting.motion, self.setting.placer)
-        table = np.full((3, len(found)), np.nan)
+        table = np.full((5, len(found)), np.nan)
         for i, at in enumerate(found):
             if at is not None and unseen(at, self.question) is None:
                 tell("errors")
                 rates, twists = reading(at, self.question)
-                table[:2, i] = maxima(at, self.question, self.blur)
-                table[2, i] = _weakest(rates, twists, at.twin.length)
+                table[:4, i] = maxima(at, self.question, self.blur).ravel()
+                table[4, i] = _weakest(rates, twists, at.twin.length)
         plane = PlaneOfPoses(self.question, self.setting.motion, grid)
-        return Seen(np.isfinite(table[2]), table[0], table[1], lambda: None, lambda: table[2], 0.0,
-                    partial(plane.curve, found) if grid.ndim == 2 else None)
+        return Seen(np.isfinite(table[4]), table[0], table[1], lambda: None, lambda: table[4],
+                    _gap(table[:2], table[2:4]), partial(plane.curve, found) if grid.ndim == 2 else None)
 
     def spots(self, grid: Grid, seen: Seen, seed: int, count: int = SPOTS, cells: NDArray[np.int64] | None = None
               ) -> Spots:
@@ -251,7 +251,7 @@ class Mapper(Value):
                 continue
             met += 1
             for mine, theirs, all_of in zip((seen.position[i], seen.orientation[i]),
-                                            maxima(at, self.question, self.blur), sizes, strict=True):
+                                            maxima(at, self.question, self.blur)[0], sizes, strict=True):
                 scale = max(mine, float(np.median(all_of[all_of > 0])) if (all_of > 0).any() else 1.0)
                 largest = max(largest, abs(mine - theirs) / scale)
         if largest > SAME_RELATION + seen.gap:

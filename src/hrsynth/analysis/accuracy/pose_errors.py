@@ -87,11 +87,11 @@ def reading(at: ClosedConfiguration, question: Measurement) -> tuple[Array, Arra
     return found.rates, twists
 
 
-def maxima(at: ClosedConfiguration, question: Measurement, blur: Blur) -> tuple[float, float]:
-    """The largest position (m) and orientation error (rad) at a configuration; infinite where a freedom is lost."""
-    found = [np.inf if part is None else float(bounds_of_maps(part.J[None], part.only)[0][0])
-             for part in _parts(at, question, blur)]
-    return found[0], found[1]
+def maxima(at: ClosedConfiguration, question: Measurement, blur: Blur) -> Array:
+    """Upper and lower bounds (2, 2) of the largest position (m) and orientation error (rad) at a configuration, one in
+    each column; infinite where a freedom is lost."""
+    return np.stack([np.full(2, np.inf) if part is None else np.ravel(bounds_of_maps(part.J[None], part.only))
+                     for part in _parts(at, question, blur)], axis=1)
 
 
 def largest_by_ascent(at: ClosedConfiguration, question: Measurement, blur: Blur) -> tuple[float, float]:

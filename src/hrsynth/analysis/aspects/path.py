@@ -185,8 +185,8 @@ class Aspects(Value):
     motion: PlatformMotion
     structure: ConstraintPattern
     condition: Condition
-    lost: tuple[str, ...]
-    """Freedoms that are never seen: then every pose is singular."""
+    lost: str
+    """Freedoms that are never seen, in words; empty where there are none. With them every pose is singular."""
 
     @classmethod
     def of(cls, robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None,
@@ -195,7 +195,7 @@ class Aspects(Value):
         setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed)
         seen = MeasuredRobot.of_directions(setting)
         return cls(setting, setting.motion, seen.pattern, seen.condition,
-                   tuple(freedom.name for freedom in seen.verdict.lost))
+                   seen.verdict.never if seen.verdict.lost else "")
 
     @property
     def members(self) -> list[ClosedConfiguration]:
@@ -238,7 +238,7 @@ class Aspects(Value):
         answer = PathAnswer(self.setting, UNDECIDED, False, tuple(end.pose for end in ends), None, 0, ends[0], ends[1],
                             "", found.signed)
         if self.lost:
-            return replace(answer, reason=f"every pose is singular, never seen: {'; '.join(self.lost)}")
+            return replace(answer, reason=f"every pose is singular, {self.lost}")
         if min(abs(end.value) for end in ends) < CLEAR:
             least = min(ends, key=lambda end: abs(end.value))
             told = "a pose lies on the singular locus, or too near to it to be distinguished"

@@ -121,7 +121,7 @@ def singular(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = No
     tell("pattern of the legs' wrenches")
     pattern = measured.pattern
     if verdict.rank < verdict.dof:
-        words = always(pattern, [freedom.name for freedom in verdict.lost])
+        words = always(pattern, verdict.never)
         return Singularity(setting, question, real, verdict, pattern, None, words, None, ())
     found = measured.condition
     checked = agreement(setting.everything.start, question, pattern, found, points, seed=seed,

@@ -42,7 +42,7 @@ def describe_seen(found: Derivation) -> str:
         return (f"Watching {watched} shows {verdict.rank} of the bodies' {found.dof} freedoms. Not seen: "
                 f"{', '.join(bodies.trivial) or 'no trivial motion'}{rest}.")
     text = f"Watching {watched} shows {verdict.rank} of the platform's {found.dof} freedoms"
-    return text + (": not " + "; ".join(each.name for each in verdict.lost) if verdict.lost else "") + "."
+    return text + (f": not {verdict.named}" if verdict.lost else "") + "."
 
 
 def enough(found: Derivation, legs: Legs) -> str:

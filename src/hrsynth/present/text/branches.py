@@ -44,13 +44,13 @@ def _back(found: BranchProof) -> Rows:
     else:
         (low, high), (least, most) = found.back, found.proved
         whole = bool((low == least).all() and (high == most).all())
-        rows.append(("way back", "no two motor settings in the proved box give the same platform pose, proved" if whole
-                     else "no two motor settings in a part of the proved box give the same platform pose, proved"))
+        rows.append(("way back", f"no two motor settings in {'' if whole else 'a part of '}the proved box give the "
+                     "same platform pose on this branch, proved"))
         if not whole:
             rows.append(("that part", [f"{name} {a:.6g} to {b:.6g}" for name, a, b in
                                        zip(found.motors, low, high, strict=True)]))
     if found.regular:
-        rows.append(("Type 1", "no such singularity in the proved box, proved"))
+        rows.append(("Type 1", "no such singularity on this branch in the proved box, proved"))
     return rows
 
 

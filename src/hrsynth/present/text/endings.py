@@ -6,6 +6,7 @@ import math
 from collections import Counter
 from typing import TYPE_CHECKING
 
+from .poses import all_of
 from .tables import GAP, Rows, camera, head, listing, name_all, table
 
 if TYPE_CHECKING:
@@ -35,7 +36,7 @@ def endings(found: Endings) -> str:
     rows += [("enclosed", _describe_enclosed(found, boxed)), *GAP]
     rows += [("continua", [f"‖e‖ = {each.error:.3g}, {each.stability}{_why(each)}" for each in found.continua])]
     rows += [("all", [*(_signs(each, found) for each in found.lists if _are_met(each)),
-                      *_others([each for each in found.lists if not _are_met(each)]), *_complete(found)])]
+                      *_others(found, [each for each in found.lists if not _are_met(each)]), *_complete(found)])]
     return listing(rows)
 
 
@@ -47,15 +48,16 @@ def _are_met(each: SignedModes) -> bool:
     return each.listed is not None or bool(each.boxes)
 
 
-def _others(unmet: list[SignedModes]) -> list[str]:
+def _others(found: Endings, unmet: list[SignedModes]) -> list[str]:
     """The choices of reversed legs at which no pose was met."""
     proved = sum(each.empty for each in unmet)
     if not unmet:
         return []
     what = (f"{name_all('leg', unmet[0].reversed)} reversed" if len(unmet) == 1 else
             f"{len(unmet)} other choices of reversed legs")
-    return [f"poses with {what}: none, proved by boxes of poses" if proved == len(unmet) else
-            f"poses with {what}: none found, not proved"]
+    if proved < len(unmet):
+        return [f"poses with {what}: none found, not proved"]
+    return [f"poses with {what}: none, proved by boxes of poses{_turned(found, unmet[0].turns)}"]
 
 
 def _complete(found: Endings) -> list[str]:
@@ -71,8 +73,8 @@ def _complete(found: Endings) -> list[str]:
     if told.cover.struts is not None:
         where += f", while the platform translates, in {'the one turn' if turns == 1 else f'each of the {turns} turns'}"
         where += " in which it can"
-    elif told.turned:
-        where += ", with the platform turned as at the goal"
+    else:
+        where += _turned(found)
     where += "" if told.shorter is None else f", no rod shorter than {1e3 * told.shorter:.3g} mm"
     apart = [f"the joints of {name_all('leg', told.cover.unread)} lock"] if told.cover.unread else []
     if told.unstretched is not None:
@@ -111,8 +113,9 @@ def _describe_enclosed(found: Endings, boxed: list[RestPoint]) -> list[str]:
         return []
     wide = max(each.shift for each in boxed), max(each.turn for each in boxed)
     what = "the loops" if not found.measured else f"the loops, of {', '.join(found.measured)} as far as independent"
-    return [f"{len(boxed)} of {len(found.rests)}: exactly one rest within {1e3 * wide[0]:.1g} mm and {wide[1]:.1g} "
-            f"rad, proved for {what}", f"whether it attracts is proved for {sum(each.decided for each in boxed)}"]
+    return [f"{len(boxed)} of {len(found.rests)}: each the only rest in a box of joint coordinates, proved for {what}",
+            f"which puts it within {1e3 * wide[0]:.1g} mm and {wide[1]:.1g} rad; whether it attracts is proved for "
+            f"{sum(each.decided for each in boxed)}"]
 
 
 def _lines(rests: list[RestPoint]) -> tuple[list[list[str]], list[int]]:
@@ -150,11 +153,19 @@ def _signs(each: SignedModes, found: Endings) -> str:
     which = f"with {name_all('leg', each.reversed)} reversed" if each.reversed else f"with the desired {what}"
     if each.listed is None:
         return f"poses {which}: found, not listed"
-    known = "proved to be all" if each.complete else "found, not proved to be all"
-    if each.turns > 1 and each.boxes is not None:
-        known += (f" with the platform turned as at the goal, {each.boxes} in the {each.turns} turns in which it "
-                  "translates")
-    return f"poses {which}: {each.listed.count}, {known}"
+    if each.boxes is not None and not each.listed.found.complete:
+        return f"poses {which}: {each.boxes}, proved to be all by boxes of poses{_turned(found, each.turns)}"
+    more = each.turns > 1 and each.boxes is not None
+    return f"poses {which}: {each.listed.count}, {all_of(each.listed)}" + (
+        f"; {each.boxes} in the {each.turns} turns in which the platform translates" if more else "")
+
+
+def _turned(found: Endings, turns: int = 1) -> str:
+    """How a platform that only translates is turned where boxes looked; empty where it turns."""
+    if found.setting.motion.rotations.shape[1]:
+        return ""
+    return (", with the platform turned as at the goal" if turns == 1 else
+            f", in the {turns} turns in which the platform translates")
 
 
 def _why(each: RestPoint) -> str:

@@ -117,7 +117,7 @@ def _posture(posture: Posture, length: float, setting: ObservedRobot) -> Rows:
 
 
 def _kinds(name: str, what: str, kinds: Kinds, lost: str, *, whole: bool = True) -> Rows:
-    state = STATES[kinds.state] if whole or kinds.state != REGULAR else "as few as at any pose, not singular"
+    state = STATES[kinds.state] if whole or kinds.state != REGULAR else "as many as at generic poses, not singular"
     if kinds.classes is not None and kinds.classes.RO < 0:
         state += f", but special: {-kinds.classes.RO} fewer are lost than at generic poses"
     title = f"{what}: {state} (smallest rank gap {kinds.gap:.1e}, needed {RANK_GAP:.0e})"
@@ -283,7 +283,8 @@ def assembly(mode: AssemblyMode, unlimited: Sequence[str] = ()) -> list[str]:
             return ["the real robot can be assembled there" + (
                 ", as far as limits are looked at" if unlimited else "")]
         case "beyond limits":
-            return [f"the real robot can be assembled there only beyond the limits of {', '.join(mode.beyond)}"]
+            return [f"the real robot can be assembled there only beyond limits of joints: as found, of "
+                    f"{', '.join(mode.beyond)}"]
         case "no":
             return [f"the real robot cannot be assembled there: {several('leg', [leg for leg, _ in mode.misses])}",
                     *(f"leg {leg}: {miss}" for leg, miss in mode.misses)]

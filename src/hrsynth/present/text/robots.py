@@ -232,7 +232,7 @@ def describe_export(found: ExportedCode) -> str:
     if proof.back is not None:
         rows.append(("way back", [f"{name} {low:.6g} to {high:.6g}" for name, low, high in
                                   zip(proof.motors, *proof.back, strict=True)]
-                     + ["no two motor settings in this box give the same platform pose, proved"]))
+                     + ["no two motor settings in this box give the same platform pose on this branch, proved"]))
     return listing([*rows, ("size", f"{len(found.code.encode()) / 1024:.0f} kB")])
 
 

@@ -296,9 +296,10 @@ def selection(found: Selection) -> str:
                  "aspect", *(["seen"] if sight else []), "run"]
         blocks.append(table([_row(each, sight, length) for each in found.kept], heads))
         blocks.append("others: poses besides the goal that were found to attract the loop; certified: how far\n"
-                      "around the goal runs are certified to end at it; mm, degrees: largest errors at the goal;\n"
-                      "modes: those of the start / of the goal, in brackets those that the robot was found to\n"
-                      "reach; – not computed. Best first: by others, by certified (alike within a power of two), by mm")
+                      "around the goal runs in its working mode are certified to end at it; mm, degrees:\n"
+                      "largest errors at the goal; modes: those of the start / of the goal, in brackets those\n"
+                      "that the robot was found to reach; – not computed. Best first: by others, by certified\n"
+                      "(alike within a power of two), by mm")
         radii = [each.ends.radius for each in found.kept if each.ends is not None and each.ends.radius is not None]
         points = dict.fromkeys(each.measured for each in radii if each.measured)
         blocks += [f"distances from the goal: {each}" for each in points]

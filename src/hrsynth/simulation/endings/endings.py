@@ -58,7 +58,7 @@ NEARBY = 0.02
 def endings(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
             at: PoseLike, depth: str = "exact", complete: bool = False, effort: int = COVER_BOXES,
             jobs: int | None = None, seed: int = 0) -> Endings:
-    """All poses at which the loop can rest that servoes what is observed at ``at``: the goal, modes and antipodal
+    """Poses at which the loop can rest that servoes what is observed at ``at``: the goal, modes and antipodal
     poses, where the error vanishes, and critical poses, where it does not; and which of them attract.
 
     ``observe``, ``camera`` and ``see`` are as for ``derive``; each kind of observation has its error. The law rests

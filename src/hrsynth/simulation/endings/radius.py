@@ -82,7 +82,7 @@ class CertifiedRadius(Value):
     def _within(self, length: float, angle: float | None) -> str:
         turn = "" if angle is None else f" and {np.degrees(angle):.2g}°"
         at = f", {self.measured}" if self.measured else ""
-        return f"within {1e3 * length:.3g} mm{turn} of the goal{at}"
+        return f"within {1e3 * length:.3g} mm{turn} of the goal in its working mode{at}"
 
     def holds(self, X: Array) -> bool:
         """Whether a platform pose X (4, 4) is one of those starts."""

@@ -32,7 +32,8 @@ class RestPoint:
     ``stability`` stable (it attracts), saddle, unstable (nothing is drawn to it) or undecided; ``curvatures`` are the
     eigenvalues of the Hessian of ½ ‖e‖² along the motions of the loops (characteristic lengths, radians), ascending.
 
-    Exactly one rest lies within ``shift`` (m) and ``turn`` (rad) of ``pose``, infinite if it was only found;
+    It is the only one in a box of joint coordinates, which is within ``shift`` (m) and ``turn`` (rad) of ``pose``,
+    infinite if it was only found; others may have the same pose in other working modes.
     ``decided``: whether the signs of the curvatures are proved. ``reversed`` names legs whose direction is opposite to
     the desired one, ``across`` those at right angles to it. ``singular`` says why fewer velocities are seen there than
     at other poses, None if all are; ``boundary`` whether that is a leg's reach. Linearised, the loop without damping

@@ -76,7 +76,7 @@ class CriticalPoints(Value):
     def words(self) -> str:
         """What was done, and how well it covers."""
         also = f", {self.posed} more over the platform's pose" if self.posed else ""
-        also += "" if self.unmet is None else f"; an estimate, by how often each was met: {self.unmet or 'no'} more"
+        also += "" if self.unmet is None else f"; estimated, by how often each was met: at least {self.unmet} more"
         return (f"found from {self.starts:,} random starts, {self.late} of {len(self.isolated) - self.posed} "
                 f"configurations first in the second half of these{also}")
 

@@ -17,7 +17,7 @@ from ....geometry.vectors import Array
 from ....kinematics.platform_motion import PlatformMotion
 from ....tolerances import SAME_RELATION
 from ...text.poses import all_of
-from ...text.tables import list_words, name_all
+from ...text.tables import name_all
 from ..commands import lines
 from ..request import Request
 from ..scale import LOST, error
@@ -56,9 +56,9 @@ def which(verdict: Verdict) -> str:
     if not verdict.rank:
         return ("Watching the legs does not help: their directions do not change with the platform wherever it was "
                 "tried.")
-    return (f"Watching legs is not enough: even with all of them {list_words([each.name for each in verdict.lost])} "
-            f"stay{'s' * (len(verdict.lost) == 1)} unseen wherever it was tried ({verdict.dof - verdict.rank} of "
-            f"{verdict.dof} freedoms).")
+    lost = len(verdict.lost)
+    return (f"Watching legs is not enough: even with all of them {lost} of {verdict.dof} freedoms "
+            f"stay{'s' * (lost == 1)} unseen wherever it was tried: {verdict.named}.")
 
 
 def blind(verdict: Verdict) -> list[str]:

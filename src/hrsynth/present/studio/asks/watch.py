@@ -95,7 +95,7 @@ def condition(setting: ObservedRobot) -> str:
     robot = MeasuredRobot.of_directions(setting)
     try:
         if robot.verdict.lost:
-            return always(robot.pattern, [each.name for each in robot.verdict.lost])
+            return always(robot.pattern, robot.verdict.never)
         return robot.condition.words
     except HrsynthError as problem:
         return str(problem)
