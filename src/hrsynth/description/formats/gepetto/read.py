@@ -31,7 +31,7 @@ def read(file: RobotFile) -> JointGraph:
         raise xml.refusal(beside, "none of the keys of this dialect", ", ".join(KEYS))
     notes: list[Note] = []
     root = xml.document(xml.content(path), str(path), notes) if file.root is None else file.root
-    graph = read_urdf(RobotFile(path, root), frames=not settings.get("closed_loop"))
+    graph = read_urdf(replace(file, path=path, root=root), frames=not settings.get("closed_loop"))
     graph.dialect = "Gepetto"
     graph.notes[:0] = notes
     if beside.stem != path.stem:

@@ -23,6 +23,7 @@ from ...jointgraph import JointSpec, TreeJoint, first_body, zero_poses
 from ...jointmotion import require_closed, residual
 from ...sights import SightSpec, as_written
 from ..urdf.elements import INTERFACE, UrdfReader, is_sight, simple_transmission
+from ..urdf.names import NAMES
 
 OWN_TAGS = ("platform", "camera", "observe")
 """What an ``<hrsynth>`` element is read for; other children are kept, unless they look like one of these."""
@@ -40,8 +41,11 @@ def read(file: RobotFile) -> Mechanism:
     LoopsNotClosed
         Where a loop is open at the zero configuration.
     """
-    return _NativeReader(str(file.path), file.document, tolerance=file.tolerance,
-                         as_written=file.as_written).mechanism()
+    root = file.document
+    defects, notes = NAMES.check(root, file)
+    robot = _NativeReader(str(file.path), root, defects, tolerance=file.tolerance,
+                          as_written=file.as_written).mechanism()
+    return replace(robot, notes=(*notes, *robot.notes)) if notes else robot
 
 
 def parse(text: bytes | str, file: str = "<text>") -> Mechanism:

@@ -1,0 +1,167 @@
+"""Names of elements and attributes that a format has: a mistyped one is a defect, another unknown one a note.
+
+A name is mistyped if its format has it nowhere and one edit (a character inserted, deleted, replaced or exchanged with
+the next; letter case, ``-`` and ``_`` do not count) makes it a name that its element can have and lacks. Names with a
+prefix or in a namespace belong to other programs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+from ..errors import Defect
+from ..mechanism.model import Note
+from . import xml
+from .dialect import RobotFile
+
+ANY = "..."
+"""In a table: an element may hold names that the format does not have, of which nothing is said."""
+
+
+@dataclass(frozen=True)
+class ElementNames:
+    """Names that an element can have: attributes, child elements, those of them that may be repeated; ``open``: whether
+    it may hold names of other programs."""
+
+    attributes: frozenset[str]
+    children: frozenset[str]
+    repeated: frozenset[str]
+    open: bool
+
+
+@dataclass(frozen=True, eq=False)
+class UnknownName:
+    """A name that a format does not have in its place; ``meant`` are the names of which it is a misspelling."""
+
+    element: xml.Element
+    name: str
+    is_attribute: bool
+    meant: tuple[str, ...] = ()
+
+    @property
+    def line(self) -> int | None:
+        """The line of the element that has the attribute, or of the element itself."""
+        return xml.line(self.element)
+
+    @property
+    def place(self) -> str:
+        """Which kind of name it is, and of which element."""
+        if self.is_attribute:
+            return f"attribute of <{self.element.tag}>"
+        parent = self.element.getparent()
+        return "element" if parent is None else f"element in <{parent.tag}>"
+
+    @property
+    def remedy(self) -> str:
+        """The names that are meant, as they are written."""
+        return " or ".join(self.meant if self.is_attribute else (f"<{each}>" for each in self.meant))
+
+
+@dataclass(frozen=True, eq=False)
+class Vocabulary:
+    """The names of a format. ``text`` has a line ``element: attributes | children`` for each element that is read
+    (``parent/element`` where its names depend on the parent; a child with ``*`` may be repeated); ``others`` are names
+    that the format has elsewhere."""
+
+    format: str
+    text: str
+    others: str = ""
+    inside: Mapping[str, Vocabulary] = field(default_factory=dict)
+    """The formats of some ``parent/element``, with all that is in them."""
+
+    @cached_property
+    def elements(self) -> dict[str, ElementNames]:
+        """The table."""
+        found = dict[str, ElementNames]()
+        for row in filter(str.strip, self.text.splitlines()):
+            keys, _, names = row.partition(":")
+            attributes, children = (set(part.split()) for part in (names + "|").split("|")[:2])
+            known = ElementNames(frozenset(attributes - {ANY}), frozenset(each.rstrip("*") for each in children - {ANY}),
+                                 frozenset(each[:-1] for each in children if each.endswith("*")),
+                                 ANY in attributes | children)
+            found |= dict.fromkeys(keys.split(), known)
+        return found
+
+    @cached_property
+    def elsewhere(self) -> frozenset[str]:
+        """Names of which nothing is said, wherever they stand."""
+        return frozenset(self.others.split())
+
+    @cached_property
+    def names(self) -> tuple[frozenset[str], frozenset[str]]:
+        """All names of elements, and of attributes."""
+        rows = self.elements.values()
+        return (self.elsewhere.union(*(each.children for each in rows)),
+                self.elsewhere.union(*(each.attributes for each in rows)))
+
+    def unknown(self, root: xml.Element) -> Iterator[UnknownName]:
+        """The names in a document that the format does not have where they stand, in the order of the document."""
+        key = str(root.tag)
+        return self._of(root, self.elements[key]) if key in self.elements else iter(())
+
+    def _of(self, element: xml.Element, known: ElementNames) -> Iterator[UnknownName]:
+        elements, attributes = self.names
+        given = [str(name) for name in element.attrib]
+        for name in given:
+            if not is_foreign(name) and name not in known.attributes:
+                meant = () if name in attributes else misspelt(name, known.attributes.difference(given))
+                if meant or not (known.open or name in self.elsewhere):
+                    yield UnknownName(element, name, True, meant)
+        children = xml.children(element)
+        tags = {str(child.tag) for child in children}
+        for child in children:
+            tag = str(child.tag)
+            if tag in known.children:
+                key = f"{element.tag}/{tag}"
+                format = self.inside.get(key, self)
+                inner = format.elements.get(key) or format.elements.get(tag)
+                if inner is not None:
+                    yield from format._of(child, inner)
+            elif not is_foreign(tag):
+                meant = () if tag in elements else misspelt(tag, known.children - (tags - known.repeated))
+                if meant or not (known.open or tag in self.elsewhere):
+                    yield UnknownName(child, tag, False, meant)
+
+    def check(self, root: xml.Element, file: RobotFile) -> tuple[list[Defect], list[Note]]:
+        """The defects of a document's mistyped names, and a note of each other unknown name; mistyped names are no
+        defects of a file that is read in spite of them."""
+        defects, notes = [], dict[tuple[str, str], list[UnknownName]]()
+        for each in self.unknown(root):
+            if each.meant and not file.as_spelt:
+                where = getattr(each.line, "file", str(file.path))
+                value = each.name if each.is_attribute else f"<{each.name}>"
+                defects.append(Defect(where, each.line, f"unknown {each.place}", value, each.remedy))
+            elif not each.meant:
+                notes.setdefault((each.name, each.place), []).append(each)
+        return defects, [self._note(found) for found in notes.values()]
+
+    def _note(self, found: list[UnknownName]) -> Note:
+        first = found[0]
+        where = "" if first.line is None else f" (line {first.line}{', and more' * (len(found) > 1)})"
+        return Note("ignored", f"unknown {first.place}: {self.format} has no {first.name!r}{where}")
+
+
+def is_foreign(name: str) -> bool:
+    """Whether a name has a namespace or a prefix: it belongs to another program."""
+    return "}" in name or ":" in name
+
+
+def misspelt(name: str, known: Iterable[str]) -> tuple[str, ...]:
+    """The ``known`` names that one edit makes of a name, in order; those that differ in case, ``-`` or ``_`` alone."""
+    plain = _plain(name)
+    return tuple(sorted(each for each in known if plain == (other := _plain(each)) or _is_one_edit(plain, other)))
+
+
+def _plain(name: str) -> str:
+    return name.casefold().replace("-", "").replace("_", "")
+
+
+def _is_one_edit(one: str, two: str) -> bool:
+    """Whether a character inserted, deleted, replaced or exchanged with the next makes one text the other."""
+    if abs(len(one) - len(two)) > 1:
+        return False
+    k = next((k for k, (a, b) in enumerate(zip(one, two, strict=False)) if a != b), min(len(one), len(two)))
+    a, b = one[k:], two[k:]
+    return a[1:] == b[1:] or a[1:] == b or a == b[1:] or (a[2:] == b[2:] and a[:2] == b[1::-1])
