@@ -1,18 +1,20 @@
 """Names of elements and attributes that a format has: a mistyped one is a defect, another unknown one a note.
 
-A name is mistyped if its format has it nowhere and one edit (a character inserted, deleted, replaced or exchanged with
-the next; letter case, ``-`` and ``_`` do not count) makes it a name that its element can have and lacks. Names with a
-prefix or in a namespace belong to other programs.
+A name is mistyped if its element cannot have it and one edit (a character inserted, deleted, replaced or exchanged with
+the next; letter case, ``-`` and ``_`` do not count) makes it a name that the element can have and lacks, or can have
+repeatedly. Names with a prefix or in a namespace belong to other programs.
 """
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
 from ..errors import Defect
 from ..mechanism.model import Note
+from ..tolerances import LIKE_A_WORD
 from . import xml
 from .dialect import RobotFile
 
@@ -33,12 +35,14 @@ class ElementNames:
 
 @dataclass(frozen=True, eq=False)
 class UnknownName:
-    """A name that a format does not have in its place; ``meant`` are the names of which it is a misspelling."""
+    """A name that a format does not have in its place, the ``known`` ones there, and those ``meant``: it is a
+    misspelling of these."""
 
     element: xml.Element
     name: str
     is_attribute: bool
-    meant: tuple[str, ...] = ()
+    known: frozenset[str]
+    meant: tuple[str, ...]
 
     @property
     def line(self) -> int | None:
@@ -54,18 +58,26 @@ class UnknownName:
         return "element" if parent is None else f"element in <{parent.tag}>"
 
     @property
+    def found(self) -> str:
+        """The name as it is written."""
+        return self._written(self.name)
+
+    @property
     def remedy(self) -> str:
-        """The names that are meant, as they are written."""
-        return " or ".join(self.meant if self.is_attribute else (f"<{each}>" for each in self.meant))
+        """The names that are meant, or one that is alike, as they are written."""
+        alike = difflib.get_close_matches(self.name.casefold(), self.known, n=1, cutoff=LIKE_A_WORD)
+        return " or ".join(map(self._written, self.meant or alike))
+
+    def _written(self, name: str) -> str:
+        return name if self.is_attribute else f"<{name}>"
 
 
 @dataclass(frozen=True, eq=False)
 class Vocabulary:
     """The names of a format. ``text`` has a line ``element: attributes | children`` for each element that is read
-    (``parent/element`` where its names depend on the parent; a child with ``*`` may be repeated); ``others`` are names
-    that the format has elsewhere."""
+    (``parent/element`` where its names depend on the parent; a child with ``*`` may be repeated, ``...`` stands for
+    names of other programs); ``others`` are names of which nothing is said wherever they stand."""
 
-    format: str
     text: str
     others: str = ""
     inside: Mapping[str, Vocabulary] = field(default_factory=dict)
@@ -84,17 +96,9 @@ class Vocabulary:
             found |= dict.fromkeys(keys.split(), known)
         return found
 
-    @cached_property
-    def elsewhere(self) -> frozenset[str]:
-        """Names of which nothing is said, wherever they stand."""
-        return frozenset(self.others.split())
-
-    @cached_property
-    def names(self) -> tuple[frozenset[str], frozenset[str]]:
-        """All names of elements, and of attributes."""
-        rows = self.elements.values()
-        return (self.elsewhere.union(*(each.children for each in rows)),
-                self.elsewhere.union(*(each.attributes for each in rows)))
+    def is_other(self, name: str) -> bool:
+        """Whether nothing is said of a name: one of the ``others``, or with a prefix or a namespace."""
+        return "}" in name or ":" in name or name in self.others.split()
 
     def unknown(self, root: xml.Element) -> Iterator[UnknownName]:
         """The names in a document that the format does not have where they stand, in the order of the document."""
@@ -102,50 +106,46 @@ class Vocabulary:
         return self._of(root, self.elements[key]) if key in self.elements else iter(())
 
     def _of(self, element: xml.Element, known: ElementNames) -> Iterator[UnknownName]:
-        elements, attributes = self.names
         given = [str(name) for name in element.attrib]
         for name in given:
-            if not is_foreign(name) and name not in known.attributes:
-                meant = () if name in attributes else misspelt(name, known.attributes.difference(given))
-                if meant or not (known.open or name in self.elsewhere):
-                    yield UnknownName(element, name, True, meant)
+            if name not in known.attributes and not self.is_other(name):
+                meant = misspelt(name, known.attributes.difference(given))
+                if meant or not known.open:
+                    yield UnknownName(element, name, True, known.attributes, meant)
         children = xml.children(element)
         tags = {str(child.tag) for child in children}
         for child in children:
             tag = str(child.tag)
             if tag in known.children:
                 key = f"{element.tag}/{tag}"
-                format = self.inside.get(key, self)
-                inner = format.elements.get(key) or format.elements.get(tag)
-                if inner is not None:
-                    yield from format._of(child, inner)
-            elif not is_foreign(tag):
-                meant = () if tag in elements else misspelt(tag, known.children - (tags - known.repeated))
-                if meant or not (known.open or tag in self.elsewhere):
-                    yield UnknownName(child, tag, False, meant)
+                inner = self.inside.get(key, self)
+                names = inner.elements.get(key) or inner.elements.get(tag)
+                if names is not None:
+                    yield from inner._of(child, names)
+            elif not self.is_other(tag):
+                meant = misspelt(tag, known.children - (tags - known.repeated))
+                if meant or not known.open:
+                    yield UnknownName(child, tag, False, known.children, meant)
 
     def check(self, root: xml.Element, file: RobotFile) -> tuple[list[Defect], list[Note]]:
         """The defects of a document's mistyped names, and a note of each other unknown name; mistyped names are no
         defects of a file that is read in spite of them."""
-        defects, notes = [], dict[tuple[str, str], list[UnknownName]]()
+        defects, notes = list[Defect](), dict[tuple[str, str], list[UnknownName]]()
         for each in self.unknown(root):
-            if each.meant and not file.as_spelt:
-                where = getattr(each.line, "file", str(file.path))
-                value = each.name if each.is_attribute else f"<{each.name}>"
-                defects.append(Defect(where, each.line, f"unknown {each.place}", value, each.remedy))
-            elif not each.meant:
+            if not each.meant:
                 notes.setdefault((each.name, each.place), []).append(each)
-        return defects, [self._note(found) for found in notes.values()]
-
-    def _note(self, found: list[UnknownName]) -> Note:
-        first = found[0]
-        where = "" if first.line is None else f" (line {first.line}{', and more' * (len(found) > 1)})"
-        return Note("ignored", f"unknown {first.place}: {self.format} has no {first.name!r}{where}")
+            elif not file.as_spelt:
+                where = getattr(each.line, "file", str(file.path))
+                defects.append(Defect(where, each.line, f"unknown {each.place}", each.found, each.remedy))
+        return defects, [_note_of(found) for found in notes.values()]
 
 
-def is_foreign(name: str) -> bool:
-    """Whether a name has a namespace or a prefix: it belongs to another program."""
-    return "}" in name or ":" in name
+def _note_of(found: list[UnknownName]) -> Note:
+    """The note of one name, wherever it stands."""
+    first = found[0]
+    alike = first.remedy and f" (perhaps {first.remedy})"
+    where = "" if first.line is None else f" (line {first.line}{', and more' * (len(found) > 1)})"
+    return Note("ignored", f"unknown {first.place}, found {first.found}{alike}{where}")
 
 
 def misspelt(name: str, known: Iterable[str]) -> tuple[str, ...]:

@@ -14,10 +14,10 @@ _ACTUATOR = ("actdim actearly actlimited actrange area armature bias biasprm bia
              "cranklength cranksite ctrllimited ctrlrange damping dampratio delay diameter dynprm dyntype ffrange "
              "force forcelimited forcerange fpmax fvmax gain gainprm gaintype gear group imax inductance inheritrange "
              "input interp joint jointinparent ki kp kv lengthrange lmax lmin lugre motorconst name nominal nsample "
-             "posrange range refsite resistance saturation scale site slewmax slidersite tendon thermal timeconst user "
-             "velrange vmax")
+             "posrange range refsite resistance saturation scale site slewmax slidersite tausmooth tendon thermal timeconst "
+             "user velrange vmax")
 _INSIDE = "body* joint* freejoint* geom* site* camera* light* attach* composite* flexcomp* plugin* frame* replicate* include*"
-NAMES = Vocabulary("MJCF", f"""
+NAMES = Vocabulary(f"""
 mujoco: model | compiler* option* size* statistic* visual* default* asset* worldbody* contact* deformable* equality* tendon* actuator* sensor* keyframe* custom* extension* include*
 compiler: alignfree angle assetdir autolimits balanceinertia boundinertia boundmass conflict coordinate discardvisual eulerseq fitaabb fusestatic inertiafromgeom inertiagrouprange meshdir passthrough savecanonical savecompiled saveinertial settotalmass strippath texturedir usethread convexhull exactmeshinertia | lengthrange
 default: class | default* mesh* texture material* joint* geom* site* camera light pair equality* tendon include* {_ACTUATORS.replace(" ", "* ")}* plugin*

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ...vocabulary import Vocabulary
 
-NAMES = Vocabulary("SDFormat", """
+NAMES = Vocabulary("""
 sdf gazebo: version | world* model* actor* light* include*
 world: name | model* frame* joint* plugin* include* state* physics* light* actor* gui scene audio wind gravity magnetic_field atmosphere spherical_coordinates road* population*
 state: world_name name | model* sim_time wall_time real_time iterations insertions deletions light* joint*
