@@ -328,7 +328,8 @@ def test_frames_of_consecutive_joints_may_coincide(tmp_path: Path, joints: tuple
     (('<axis xyz="0 0 1"', '<Axis xyz="0 0 1"'), "<axis", "nearly <axis>", "error"),
     (("<predecessor link=\"dist_2\">\n      <origin xyz", "<predecessor link=\"dist_2\">\n      <origin xy"),
      "<predecessor link=\"dist_2\">", "attribute of <origin>, found xy, nearly xyz", "error"),
-    (("<hrsynth>", "<hydraulics/>\n<hrsynth>"), "<hrsynth>", "element in <robot>, found <hydraulics>", "note"),
+    (("<hrsynth>", "<hydraulics/>\n<hrsynth>"), "<hrsynth>",
+     "element in <robot>, found <hydraulics>", "note"),
     (("<hrsynth>", '<w:thing xmlns:w="urn:w"/>\n<hrsynth>'), "", "", "")])
 def test_what_a_format_does_not_have_is_named_with_its_line(tmp_path: Path, change: tuple[str, ...], line: str, says: str,
                                                         severity: str):

@@ -76,7 +76,7 @@ class UnknownName:
 class Vocabulary:
     """The names of a format. ``text`` has a line ``element: attributes | children`` for each element that is read
     (``parent/element`` where its names depend on the parent; a child with ``*`` may be repeated, ``...`` stands for
-    names of other programs); ``others`` are names of which nothing is said wherever they stand."""
+    names of other programs; indented lines continue one). ``others`` are names of which nothing is said."""
 
     text: str
     others: str = ""
@@ -87,12 +87,12 @@ class Vocabulary:
     def elements(self) -> dict[str, ElementNames]:
         """The table."""
         found = dict[str, ElementNames]()
-        for row in filter(str.strip, self.text.splitlines()):
+        for row in filter(str.strip, self.text.replace("\n    ", " ").splitlines()):
             keys, _, names = row.partition(":")
             attributes, children = (set(part.split()) for part in (names + "|").split("|")[:2])
-            known = ElementNames(frozenset(attributes - {ANY}), frozenset(each.rstrip("*") for each in children - {ANY}),
-                                 frozenset(each[:-1] for each in children if each.endswith("*")),
-                                 ANY in attributes | children)
+            several = frozenset(each[:-1] for each in children if each.endswith("*"))
+            once = frozenset(each for each in children - {ANY} if not each.endswith("*"))
+            known = ElementNames(frozenset(attributes), once | several, several, ANY in children)
             found |= dict.fromkeys(keys.split(), known)
         return found
 

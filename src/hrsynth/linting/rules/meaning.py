@@ -11,6 +11,7 @@ from ...mechanism.normal import normal_form
 from ..findings import LintRule, Spot
 from ..subject import LintedFile, defects_of
 
+
 def _unknown(file: LintedFile) -> Iterator[Spot]:
     if file.root is None or file.dialect is None:
         return

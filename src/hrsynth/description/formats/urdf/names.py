@@ -6,9 +6,12 @@ from ...vocabulary import Vocabulary
 from ..sdf.names import NAMES as SDF
 
 NAMES = Vocabulary("""
-robot: name version | link* joint* loop* coupling* transmission* hrsynth material* gazebo* constraint* loop_joint* frame* sensor* ros2_control* mujoco*
-link: name type | inertial visual* collision* contact origin sensor* self_collision_checking collision_checking* kinematic gravity surface self_filter
-joint: name type dont_collapse independent | origin parent child axis axis2 limit mimic dynamics calibration safety_controller joint_properties
+robot: name version | link* joint* loop* coupling* transmission* hrsynth material* gazebo* constraint* loop_joint*
+    frame* sensor* ros2_control* mujoco*
+link: name type | inertial visual* collision* contact origin sensor* self_collision_checking collision_checking*
+    kinematic gravity surface self_filter
+joint: name type dont_collapse independent | origin parent child axis axis2 limit mimic dynamics calibration
+    safety_controller joint_properties
 loop: name type | predecessor successor axis axis2 limit dynamics
 parent child predecessor successor: link | origin
 coupling: name | predecessor successor ratio
