@@ -331,8 +331,8 @@ def test_frames_of_consecutive_joints_may_coincide(tmp_path: Path, joints: tuple
     (("<hrsynth>", "<hydraulics/>\n<hrsynth>"), "<hrsynth>",
      "element in <robot>, found <hydraulics>", "note"),
     (("<hrsynth>", '<w:thing xmlns:w="urn:w"/>\n<hrsynth>'), "", "", "")])
-def test_what_a_format_does_not_have_is_named_with_its_line(tmp_path: Path, change: tuple[str, ...], line: str, says: str,
-                                                        severity: str):
+def test_what_a_format_lacks_is_named_with_its_line(tmp_path: Path, change: tuple[str, ...], line: str, says: str,
+                                                    severity: str):
     text = shipped()["3rrr_m1"].read_text()
     assert rules_in(shipped()["3rrr_m1"])["element-unknown"] == 0
     path = tmp_path / "robot.urdf"
