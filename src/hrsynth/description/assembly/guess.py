@@ -21,7 +21,9 @@ _WORD = re.compile("[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
 _END = re.compile("(.*(foot|hand|flange|gripper|effector|platform))|feet|toe|sole|tool|tcp|eef?")
 """Words in the names of links that end a robot: feet, tools."""
 _SENSOR = re.compile("imu|gyro(scope)?|accelerometer|magnetometer|.*camera|lidar|laser|.*sensor|gps|rgbd?|microphone")
-_ROD = re.compile(".*rod|strut|crank")
+_ROD = re.compile(".*rod|strut")
+_DRIVE = re.compile(".*rod|strut|crank|motor|actuator|rotor|reference")
+"""Words in the names of what moves a foot or tool."""
 _PLATE = re.compile("plat", re.IGNORECASE)
 
 
@@ -37,8 +39,9 @@ def base(graph: JointGraph) -> str:
 
 def standing(graph: JointGraph, base: str, wanted: str | None, platform: str | None = None) -> str:
     """The link from which a robot is read: its base; where the ``wanted`` one hangs on something else, the root of
-    that; of a robot that only a free joint holds (``<freejoint>``), or three slides and three turns that place it, the link
-    that floats; where all hangs on one slide and the loops begin at what slides, that link: a rail is no leg. ``platform`` is the one that is given."""
+    that; of a robot that only a free joint holds (``<freejoint>``), or three slides and three turns that place it, the
+    link that floats; where all hangs on one slide and the loops begin at what slides, that link: a rail is no leg.
+    ``platform`` is the one that is given."""
     bonds = graphs.adjacency(graph.links, (joint.links for joint in graph.joints.values()))
     if wanted is not None and wanted in graph.links and wanted not in graphs.component(bonds, base):
         base = wanted
@@ -54,7 +57,7 @@ def standing(graph: JointGraph, base: str, wanted: str | None, platform: str | N
             break
         (bearer,) = held
         trunk = next(link for link in bearer.links if link != base)
-        if bearer.type is JointType.FREE and (loops or (platform != trunk and len(graph.joints) > 1)):
+        if bearer.type is JointType.FREE and (loops or (platform != trunk and _moving(graph, trunk) > 2)):
             how = f"floats on the free joint {bearer.name!r}: it is the base, and what it floats in is left out"
         elif loops and bearer.type is JointType.PRISMATIC and _is_rail(graph, bearer, trunk, platform):
             how = (f"slides on the rail {bearer.name!r}: it is the base, and what it slides on is left out "
@@ -86,20 +89,24 @@ def _without_float(graph: JointGraph, base: str, named: set[str | None]) -> str:
         chain.append(joint)
     left = {each.links[0] for each in chain}
     slides, turns = ([axis for axis, kind in zip(axes, kinds, strict=False) if kind == each] for each in "PR")
-    moving = [joint for joint in graph.joints.values()
-              if link in joint.links and joint not in chain and joint.kind is not JointType.FIXED]
     geared = {name for gear in graph.gears for name in (gear.driver, gear.driven)}
-    if sorted(kinds) != list("PPPRRR") or len(moving) < 2 or graph.platform in left or named & left or any(
+    if sorted(kinds) != list("PPPRRR") or _moving(graph, link) < 3 or graph.platform in left or named & left or any(
             each.motor is not None or each.name in geared for each in chain):
         return base
     ranks = [np.linalg.matrix_rank(np.array(each), SAME_DIRECTION) for each in (slides, turns)]
     if ranks != [3, 3] or np.max(np.abs(np.array(centres) - centres[0])) > SAME_POINT:
         return base
-    graph.note("guess", f"{link!r} floats on the joints {', '.join(each.name for each in chain)}, which place it: it is "
-                        f"the base, and what it floats in is left out (--base {base} to keep it)")
+    names = ", ".join(each.name for each in chain)
+    graph.note("guess", f"{link!r} floats on the joints {names}, which place it: it is the base, and what it floats in "
+                        f"is left out (--base {base} to keep it)")
     for each in chain:
         del graph.joints[each.name], graph.links[each.links[0]]
     return link
+
+
+def _moving(graph: JointGraph, link: str) -> int:
+    """How many joints of a link are not fixed."""
+    return sum(link in joint.links and joint.kind is not JointType.FIXED for joint in graph.joints.values())
 
 
 def _is_rail(graph: JointGraph, slide: JointSpec, trunk: str, platform: str | None) -> bool:
@@ -159,7 +166,7 @@ def has_word(name: str, words: re.Pattern[str]) -> bool:
 
 
 def _ends_robot(name: str) -> bool:
-    return has_word(name, _END) and not has_word(name, _SENSOR) and not has_word(name, _ROD)
+    return has_word(name, _END) and not has_word(name, _SENSOR) and not has_word(name, _DRIVE)
 
 
 def _common(bodies: Sequence[str], *hints: Sequence[str]) -> Sequence[str]:
@@ -182,6 +189,8 @@ class _RigidBodies:
         self.base = into[base]
         pairs = [(into[a], into[b]) for a, b in (joint.links for joint in joints)]
         self.near = graphs.adjacency(self.members, (pair for pair in pairs if pair[0] != pair[1]))
+        parts = sum(1 for _ in graphs.components(self.near))
+        self.loops = sum(map(len, self.near.values())) > 2 * (len(self.near) - parts)
         self.closing = graph.closing
         self.joints: dict[str, list[JointSpec]] = {link: [] for link in graph.links}
         for joint in joints:
@@ -190,11 +199,11 @@ class _RigidBodies:
 
     def platform(self) -> tuple[str | None, str, Sequence[str]]:
         """The platform's link and why, or None and the bodies that could be the platform."""
-        others = [body for body in self.near if body != self.base and not self._is_never(body)]
+        moving = [body for body in self.near if body != self.base]
+        others = [body for body in moving if not self._is_never(body)] or moving
         framed = [body for body in others if self._frames(body)]
         named = self._named(others)
-        parts = sum(1 for _ in graphs.components(self.near))
-        if sum(map(len, self.near.values())) == 2 * (len(self.near) - parts):  # a forest
+        if not self.loops:
             rivals = [body for body in others if len(self.near[body]) == 1]
             if len(rivals) == 1:
                 return self.title(rivals[0]), "the end of the chain", ()
@@ -255,12 +264,12 @@ class _RigidBodies:
         return min(filter(_ends_robot, self.members[body]), key=lambda link: link != title, default=title)
 
     def _is_never(self, body: str) -> bool:
-        """Whether a body is a sensor, or a rod: by its name, or as it turns freely about the line of two ball joints."""
+        """Whether a body is a sensor, or in a loop a rod: by its name, or as it turns freely about a line of two ball
+        joints."""
         name = self.title(body)
         kinds = {joint.type for link in self.members[body] for joint in self.joints[link]} - {JointType.FIXED}
-        return has_word(name, _SENSOR) or has_word(name, _ROD) or (
-            len(self.near[body]) == 2 and JointType.SPHERICAL in kinds
-            and kinds <= {JointType.SPHERICAL, JointType.UNIVERSAL})
+        return has_word(name, _SENSOR) or (len(self.near[body]) == 2 and (has_word(name, _ROD) or (
+            JointType.SPHERICAL in kinds and kinds <= {JointType.SPHERICAL, JointType.UNIVERSAL})))
 
     def _blocks(self) -> list[set[str]]:
         """The bodies of each loop, of several loops where they share two bodies, and of each bond in no loop; none
@@ -278,7 +287,8 @@ class _RigidBodies:
         for block in self._blocks():
             root = min(block, key=distance.__getitem__)
             if root != self.base:
-                bodies, most = self._most_ways([body for body in others if body in block and body != root], root, block)
+                inside = [body for body in others if body in block and body != root]
+                bodies, most = self._most_ways(inside, root, block)
                 found += bodies
                 why = f"which {most} ways connect to {self.title(root)!r}" if bodies else why
         return found, why

@@ -12,7 +12,7 @@ from lxml import etree
 from ....errors import BadRobotFile
 from ....geometry.vectors import Array
 from ....mechanism import graphs
-from ....mechanism.model import Joint, JointType, Limits, Mechanism, Motor
+from ....mechanism.model import FIRST, NAMED, Joint, JointType, Limits, Mechanism, Motor
 from ....mechanism.observations.direction import Direction
 from ....mechanism.sights import NamedCamera
 from ....tolerances import NO_FINER, SAME_DIRECTION, SAME_GEOMETRY
@@ -253,7 +253,7 @@ class _NativeReader(UrdfReader):
         links = {key: replace(link, pose=poses[key]) for key, link in self.links.items()}
         mechanism = Mechanism(name, links, joints, base, platform, tuple(self.observations), tuple(self.couplings),
                               self.camera, tuple(self.rest), self.file, formation=self.formation,
-                              turns=self.turns)
+                              turns=self.turns, choice=FIRST if self.formation else NAMED)
         found = None if self.as_written or not loops else self.repair_rounding(mechanism, loops, poses)
         if found is not None:
             return found
