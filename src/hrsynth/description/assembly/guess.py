@@ -217,6 +217,8 @@ class _RigidBodies:
             distance = graphs.distances(self.near, self.base)
             rivals = [body for body in distance if distance[body] == max(distance.values())]
             closed, why = self._closed(others, distance)
+        if named and closed and not {*named} & {*closed}:
+            return None, "", [*named, *closed]
         if named := _common(named, closed, framed):
             return (self._end_of(named[0]), "whose name is that of a foot or tool", ()) if len(named) == 1 else (
                 None, "", named)
