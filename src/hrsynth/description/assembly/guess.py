@@ -169,7 +169,7 @@ def _ends_robot(name: str) -> bool:
     return has_word(name, _END) and not has_word(name, _SENSOR) and not has_word(name, _DRIVE)
 
 
-def _common(bodies: Sequence[str], *hints: Sequence[str]) -> Sequence[str]:
+def _common(bodies: list[str], *hints: list[str]) -> list[str]:
     """Those of several bodies that further hints name as well, where one does."""
     for hint in hints:
         bodies = [body for body in bodies if body in hint] or bodies
@@ -219,10 +219,12 @@ class _RigidBodies:
             closed, why = self._closed(others, distance)
         if named and closed and not {*named} & {*closed}:
             return None, "", [*named, *closed]
-        if named := _common(named, closed, framed):
+        if named:
+            named = _common(named, closed, framed)
             return (self._end_of(named[0]), "whose name is that of a foot or tool", ()) if len(named) == 1 else (
                 None, "", named)
-        if closed := _common(closed, framed):
+        if closed:
+            closed = _common(closed, framed)
             return (self.title(closed[0]), why, ()) if len(closed) == 1 else (None, "", closed)
         if len(framed) == 1:
             return self.title(framed[0]), "the only frame on a fixed joint", ()
@@ -240,7 +242,7 @@ class _RigidBodies:
         ends = [body for body in self.near if often[body] == 1 and any(body in block for block in last)]
         every = list(dict.fromkeys([*rivals, *ends]))
         found = [body for body in every if not self._is_never(body)]
-        names = map(self._end_of, found if len(found) > 1 else every)
+        names = map(self._end_of, found or every)
         return sorted(names, key=lambda name: (0, len(name)) if _ends_robot(name) or _PLATE.search(name) else (1, 0))
 
     def title(self, body: str) -> str:
