@@ -156,6 +156,20 @@ def test_a_mistyped_axis_is_refused_with_its_line(tmp_path: Path, capsys: pytest
     assert capsys.readouterr().err == f"hrsynth: {path}:{line}: unknown attribute of <axis>, found xyx, allowed: xyz\n"
 
 
+@pytest.mark.parametrize("wrong", ["closed_lop", "closedLoop", "closed-loop", "name_mto", "joint_names"])
+def test_a_mistyped_key_beside_a_urdf_is_refused_with_its_line(wrong: str, tmp_path: Path):
+    save(load("quattro"), tmp_path / "robot.yaml")
+    path = tmp_path / "robot.yaml"
+    text = path.read_text()
+    (key,) = (key for key in ("closed_loop", "name_mot", "joint_name") if misspelt(wrong, [key]))
+    text = text if f"{key}:" in text else f"{text}{key}: []\n"
+    path.write_text(text.replace(f"{key}:", f"{wrong}:"))
+    line = path.read_text().split(f"{wrong}:")[0].count("\n") + 1
+    with pytest.raises(BadRobotFile) as caught:
+        load(path)
+    assert str(caught.value.defects[0]) == f"{path}:{line}: unknown key, found {wrong}, allowed: {key}"
+
+
 def test_another_unknown_name_is_said_once_and_names_of_other_programs_are_not(tmp_path: Path, capsys):
     text = shipped()["3rrr_m1"].read_text()
     path = tmp_path / "robot.urdf"
