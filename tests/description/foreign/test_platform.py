@@ -13,6 +13,7 @@ import hrsynth
 from hrsynth.cli import execute
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, GuessedPlatform
+from hrsynth.mechanism import Mechanism
 
 
 def joint(name: str, kind: str, parent: str, child: str, xyz: str = "0 0 0", axis: str = "0 1 0") -> str:
@@ -41,7 +42,7 @@ def ankle(foot: str = "foot", rods: tuple[str, str] = ("rod_l", "rod_r"), kind: 
     return robot(*joints, loops=loops)
 
 
-def read(folder: Path, text: str, **given: object) -> hrsynth.Mechanism:
+def read(folder: Path, text: str, **given: str) -> Mechanism:
     path = folder / "robot.urdf"
     path.write_text(text)
     with warnings.catch_warnings():
