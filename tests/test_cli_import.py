@@ -158,7 +158,7 @@ def test_its_record_holds_the_command(tmp_path: Path, capsys, monkeypatch):
              "--observe", "crank", "-o", "out.urdf"]
     assert execute([*asked, "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
-    assert (found["base"], found["platform"], found["motors"]) == ("base", "bar", ["a"])
+    assert (found["base"], found["platform"]["link"], found["motors"]) == ("base", "bar", ["a"])
     assert "crank" in found["observed"].values()
     assert sorted(shlex.split(found["repeat"])) == sorted(["hrsynth", *asked, "--yes"])
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
+import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
@@ -29,6 +30,18 @@ class HrsynthError(Exception):
 def _error(kind: type[HrsynthError], args: tuple[Any, ...]) -> HrsynthError:
     """An error of a kind, its constructor not called."""
     return kind.__new__(kind, *args)
+
+
+def warn_caller(text: str, kind: type[Warning]) -> None:
+    """Warn of something at the line outside of this package from which it was asked."""
+    level, frame = 1, sys._getframe()
+    while frame.f_back is not None and str(frame.f_globals.get("__name__")).partition(".")[0] == "hrsynth":
+        level, frame = level + 1, frame.f_back
+    warnings.warn(text, kind, stacklevel=level)
+
+
+class GuessedPlatform(UserWarning):
+    """Warning that a file names no platform, and which link is taken for it."""
 
 
 @dataclass(frozen=True)

@@ -321,15 +321,18 @@ def test_frames_of_consecutive_joints_may_coincide(tmp_path: Path, joints: tuple
 
 @pytest.mark.parametrize(("change", "line", "says", "severity"), [
     (("<transmission name", "<tranmission name", "</transmission>", "</tranmission>"), "<transmission name",
-     "<tranmission> in robot, nearly <transmission>", "warning"),
-    (('<axis xyz="0 0 1"', '<axis xzy="0 0 1"'), "<axis", "attribute 'xzy' of <axis> in joint", "warning"),
-    (('<axis xyz="0 0 1"', '<Axis xyz="0 0 1"'), "<axis", "nearly <axis>", "warning"),
+     "element in <robot>, found <tranmission>, nearly <transmission>", "error"),
+    (("<transmission name", "<tranmision name", "</transmission>", "</tranmision>"), "<transmission name",
+     "element in <robot>, found <tranmision>, nearly <transmission>", "warning"),
+    (('<axis xyz="0 0 1"', '<axis xzy="0 0 1"'), "<axis", "attribute of <axis>, found xzy, nearly xyz", "error"),
+    (('<axis xyz="0 0 1"', '<Axis xyz="0 0 1"'), "<axis", "nearly <axis>", "error"),
     (("<predecessor link=\"dist_2\">\n      <origin xyz", "<predecessor link=\"dist_2\">\n      <origin xy"),
-     "<predecessor link=\"dist_2\">", "attribute 'xy' of <origin> in loop 'wrist_2'", "warning"),
-    (("<hrsynth>", "<hydraulics/>\n<hrsynth>"), "<hrsynth>", "<hydraulics> in robot", "note"),
+     "<predecessor link=\"dist_2\">", "attribute of <origin>, found xy, nearly xyz", "error"),
+    (("<hrsynth>", "<hydraulics/>\n<hrsynth>"), "<hrsynth>",
+     "element in <robot>, found <hydraulics>", "note"),
     (("<hrsynth>", '<w:thing xmlns:w="urn:w"/>\n<hrsynth>'), "", "", "")])
-def test_what_urdf_does_not_know_is_named_with_its_line(tmp_path: Path, change: tuple[str, ...], line: str, says: str,
-                                                        severity: str):
+def test_what_a_format_lacks_is_named_with_its_line(tmp_path: Path, change: tuple[str, ...], line: str, says: str,
+                                                    severity: str):
     text = shipped()["3rrr_m1"].read_text()
     assert rules_in(shipped()["3rrr_m1"])["element-unknown"] == 0
     path = tmp_path / "robot.urdf"

@@ -7,7 +7,9 @@ import gc
 import io
 import os
 import sys
+import warnings
 
+from ..errors import GuessedPlatform
 from . import completion, files, importing, lint, schema, studio
 from .catalog import catalog
 from .colour import close, say
@@ -54,7 +56,9 @@ def main(arguments: list[str] | None = None) -> None:
 def execute(arguments: list[str] | None = None) -> int:
     """Run a command; the exit status."""
     try:
-        app.main(sys.argv[1:] if arguments is None else arguments)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", GuessedPlatform)  # a note says it
+            app.main(sys.argv[1:] if arguments is None else arguments)
         sys.stdout.flush()
         return 0
     except SystemExit as end:

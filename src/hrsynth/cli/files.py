@@ -58,9 +58,9 @@ def convert(target: str | None, output: str | None, to: str | None, meshes: str,
         warn(warning)
     fields = {"file": target, "files": files, "links": len(mechanism.links), "joints": len(mechanism.joints),
               "warnings": lost}
-    say(record("convert", mechanism.name, fields) if json
-               else f"{mechanism.name} with {fields['links']} links and {fields['joints']} joints is written to "
-                    f"{' and '.join(files)}.")
+    say(record("convert", mechanism, fields) if json
+               else f"{mechanism.name} with {fields['links']} links and {fields['joints']} joints, platform "
+                    f"{mechanism.platform_words}, is written to {' and '.join(files)}.")
 
 
 def verify(certificate: str, robot: str | None, json: bool) -> None:
@@ -72,7 +72,7 @@ def verify(certificate: str, robot: str | None, json: bool) -> None:
     mechanism = None if robot is None else load(robot)
     proved = checked(certificate, mechanism)
     fields = {"file": certificate, "accepted": True, "proved": proved}
-    say(record("verify", None if mechanism is None else mechanism.name, fields)
+    say(record("verify", mechanism, fields)
                if json else f"accepted: {proved}")
 
 

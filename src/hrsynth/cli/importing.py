@@ -55,13 +55,13 @@ def importing(target: str, observe: str | None, yes: bool, view: bool, json: boo
     again = repeat_command(source, observe, target)
     if json:
         fields = {"file": target, "repeat": again, "links": len(mechanism.links), "joints": len(mechanism.joints),
-                  "base": mechanism.base, "platform": mechanism.platform, "motors": motors,
+                  "base": mechanism.base, "motors": motors,
                   "observed": {leg: seen.link for leg, seen in _segments(mechanism).items()},
                   "notes": notes, "warnings": lost}
-        say(record("import", mechanism.name, fields))
+        say(record("import", mechanism, fields))
     else:
-        say(f"{mechanism.name} with {len(mechanism.links)} links and {len(mechanism.joints)} joints is written "
-                   f"to {target}.\nThe same without questions: {again}")
+        say(f"{mechanism.name} with {len(mechanism.links)} links and {len(mechanism.joints)} joints, platform "
+                   f"{mechanism.platform_words}, is written to {target}.\nThe same without questions: {again}")
 
 
 def repeat_command(source: dict[str, Any], observe: str | None, target: str) -> str:

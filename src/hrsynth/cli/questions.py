@@ -100,7 +100,7 @@ class Question:
             write()
         written = {each.field: path for each, path in files.items() if each.field is not None}
         if json:
-            say(record(self.name, mechanism.name, {**found.to_dict(), **more, **written}))
+            say(record(self.name, mechanism, {**found.to_dict(), **more, **written}))
         elif self.shows is not None and not any(written.values()):
             self.shows(found, source=source, **values)
         else:

@@ -24,10 +24,19 @@ class Head(TypedDict):
     version: str
 
 
+class PlatformRecord(TypedDict):
+    """The link that is the platform (the first body of a formation); what chose it, and why."""
+
+    link: str
+    chosen: Literal["file", "option", "guess"]
+    reason: str
+
+
 class OfRobot(Head):
     """The fields with which an answer about a robot begins."""
 
     robot: str
+    platform: PlatformRecord
 
 
 class LimitsLeft(TypedDict):
@@ -826,7 +835,8 @@ class SpreadRecord(TypedDict):
 
 
 Servo = TypedDict("Servo", {
-    "command": str, "version": str, "robot": str, "file": str | None, "observed": list[Watched], "camera": str,
+    "command": str, "version": str, "robot": str,
+    "platform": PlatformRecord, "file": str | None, "observed": list[Watched], "camera": str,
     "from": PoseRecord, "to": PoseRecord, "gain": float, "depth": str, "sense": Literal["exact", "edges", "pictures"],
     "noise": str | None, "ended": str, "reason": str, "pose": PoseRecord, "matched_mode": int | None,
     "modes": list[ModeRecord] | None, "type2": TrackRecord, "notes": list[str], "spread": SpreadRecord | None,
@@ -1140,7 +1150,8 @@ class UnexaminedRecord(TypedDict):
 
 
 Select = TypedDict("Select", {
-    "command": str, "version": str, "robot": str, "from": PoseRecord, "to": PoseRecord, "camera": str,
+    "command": str, "version": str, "robot": str,
+    "platform": PlatformRecord, "from": PoseRecord, "to": PoseRecord, "camera": str,
     "cones": dict[str, float], "noise": dict[str, float], "sight": dict[str, Any] | None, "best": list[str] | None,
     "fewer": str | None, "not_examined": UnexaminedRecord, "unlimited": list[str], "sets": list[CandidateRecord]})
 Select.__doc__ = "The sets for a displacement, ranked; the cones by leg in degrees, noise by its unit (px, m, rad)."
@@ -1214,7 +1225,6 @@ class Import(OfRobot):
     links: int
     joints: int
     base: str
-    platform: str
     motors: list[str]
     observed: dict[str, str]
     notes: list[str]
@@ -1225,6 +1235,7 @@ class Verify(Head):
     """A certificate that was accepted, and what it proves."""
 
     robot: NotRequired[str]
+    platform: NotRequired[PlatformRecord]
     file: str
     accepted: bool
     proved: str

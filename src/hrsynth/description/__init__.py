@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from importlib import resources
 from pathlib import Path
 
-from ..errors import BadRequest
+from ..errors import BadRequest, GuessedPlatform, warn_caller
 from ..mechanism.model import Mechanism, Note
 from ..results import with_spelling
 from . import formats
@@ -44,6 +44,8 @@ def load(robot: str | Path | Mechanism, *, base: str | None = None, platform: st
     """The mechanism of a robot file in any dialect, of a shipped robot given by its name, or of one from the package
     example-robot-data (``example:cassie``); a mechanism is returned unchanged.
 
+    Where the platform is guessed, ``GuessedPlatform`` (a ``UserWarning`` of ``hrsynth.errors``) is warned of.
+
     What a file does not say can be given: the ``platform`` link, the joints of the ``motors``, the links to ``observe``
     at their default segments, closures ``A:B[:type]`` that make the frames of two links (or points ``A@x,y,z`` in them)
     meet, joints to ``freeze``, a ``keyframe`` named in the file or in an SRDF file next to it, which becomes the zero
@@ -76,7 +78,11 @@ def load(robot: str | Path | Mechanism, *, base: str | None = None, platform: st
             raise BadRequest("options that fill in a robot file are given for a robot that is already read",
                              robot.name, "the file of a robot, or its name")
         return robot
-    return read(file_of(robot), overrides)
+    found = read(file_of(robot), overrides)
+    if found.choice is not None and found.choice.chosen == "guess":
+        warn_caller(f"{found.name}: the platform is link {found.platform!r}, {found.choice} "
+                    f"(platform={found.platform!r} to say so)", GuessedPlatform)
+    return found
 
 
 def file_of(robot: str | Path) -> Path:

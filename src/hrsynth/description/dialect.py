@@ -16,7 +16,8 @@ from .jointgraph import JointGraph
 class RobotFile:
     """A file that was opened: its place, its document (None where it is no XML), whether what it says of itself stands,
     as nothing was given that changes it, what it begins with, and what was left out of its text; up to what
-    ``tolerance`` relations of its joints are made exact (None: as its digits say), or that they stay ``as_written``."""
+    ``tolerance`` relations of its joints are made exact (None: as its digits say), or that they stay ``as_written``;
+    whether mistyped names are let pass (``as_spelt``)."""
 
     path: Path
     root: xml.Element | None
@@ -25,6 +26,7 @@ class RobotFile:
     notes: tuple[Note, ...] = ()
     tolerance: float | None = None
     as_written: bool = False
+    as_spelt: bool = False
 
     @property
     def document(self) -> xml.Element:

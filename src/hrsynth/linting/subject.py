@@ -53,7 +53,8 @@ class LintedFile:
 
     def open(self, *, strict: bool = False) -> RobotFile:
         """The file as readers get it, which may change its document."""
-        return replace(self._opened, root=copy.deepcopy(self.root), strict=strict and not self.given.any)
+        return replace(self._opened, root=copy.deepcopy(self.root), strict=strict and not self.given.any,
+                       as_spelt=not strict)
 
     def graph(self) -> JointGraph:
         """What the file says before anything is put together; raises ``BadRobotFile``."""

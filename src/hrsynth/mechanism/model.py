@@ -193,6 +193,23 @@ class Note:
         return f"{self.kind}: {self.text}"
 
 
+@dataclass(frozen=True)
+class PlatformChoice:
+    """How the platform was chosen: by the ``file``, an ``option`` or a ``guess``; and the reason, in words."""
+
+    chosen: str
+    reason: str
+
+    def __str__(self) -> str:
+        return f"a guess: {self.reason}" if self.chosen == "guess" else self.reason
+
+
+NAMED = PlatformChoice("file", "named in the file")
+GIVEN = PlatformChoice("option", "given by --platform")
+FIRST = PlatformChoice("file", "the first of the bodies that observe or are observed")
+"""Of a formation."""
+
+
 def fresh_name(name: str, taken: Container[str]) -> str:
     """``name``, or ``name_2``, ``name_3`` … if it is taken."""
     return next(each for each in chain([name], (f"{name}_{number}" for number in count(2))) if each not in taken)
@@ -222,6 +239,8 @@ class Mechanism(Result, shown_as="robot"):
     observation could tell; ``platform`` is then only the first of them."""
     turns: bool | None = None
     """Whether the platform's turn counts, as it does in the real robot of a hidden one; None: by the joints."""
+    choice: PlatformChoice | None = field(default=None, compare=False)
+    """How the platform was chosen; None in a mechanism that was read from no file."""
 
     def headline(self) -> str:
         """The name, and the number of its parts."""
@@ -279,6 +298,11 @@ class Mechanism(Result, shown_as="robot"):
         for seen in self.observations:
             told |= dict.fromkeys({seen.link, seen.seen_from or self.reference} - {self.base}, True)
         return (self.platform, *(link for link in self.links if told[link] and link != self.platform))
+
+    @property
+    def platform_words(self) -> str:
+        """The platform, or the bodies of a formation, and how it was chosen."""
+        return ", ".join(self.bodies) + ("" if self.choice is None else f" ({self.choice})")
 
     @cached_property
     def adjacency(self) -> Adjacency:

@@ -20,6 +20,7 @@ from .outputs import FIGURES, OUTPUTS, File, function
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from ..mechanism.model import Mechanism
     from ..mechanism.pose import Pose
 
 PICTURES = (*FIGURES, ".gif")
@@ -65,10 +66,13 @@ def text(result: Result) -> str:
     return shown
 
 
-def record(command: str, robot: str | None, fields: dict[str, Any]) -> str:
-    """The JSON text of a command's answer: one object, always with ``command`` and ``version`` (no NaN, no
-    infinity)."""
-    head: dict[str, Any] = {} if robot is None else {"robot": robot}
+def record(command: str, robot: Mechanism | None, fields: dict[str, Any]) -> str:
+    """The JSON text of a command's answer: one object, always with ``command`` and ``version``, with the name of the
+    ``robot`` and its platform where it is about one (no NaN, no infinity)."""
+    head: dict[str, Any] = {}
+    if robot is not None:
+        chosen = None if robot.choice is None else {"chosen": robot.choice.chosen, "reason": robot.choice.reason}
+        head = {"robot": robot.name, "platform": {"link": robot.platform, **(chosen or {})}}
     return json.dumps({**head, "command": command, "version": __version__, **fields}, ensure_ascii=False, indent=2,
                       allow_nan=False)
 

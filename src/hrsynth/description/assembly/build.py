@@ -8,7 +8,7 @@ from dataclasses import replace
 from ...budgets import MOST_LOOP_COORDINATES
 from ...errors import BadMechanism, BadRequest, LoopsNotClosed
 from ...geometry.vectors import Array, unit
-from ...mechanism.model import Coupling, Joint, JointType, Mechanism, Note
+from ...mechanism.model import FIRST, GIVEN, NAMED, Coupling, Joint, JointType, Mechanism, Note, PlatformChoice
 from ...tolerances import NO_FINER, NOISE, ROUNDED, SAME_GEOMETRY
 from ..jointgraph import JointGraph, JointSpec, comma_list
 from ..jointmotion import cure
@@ -48,8 +48,7 @@ def build(graph: JointGraph, overrides: Overrides) -> Mechanism:
     if open_chain := without_loop(graph, base):
         graph.note("open", open_chain)
     graph.formation = graph.formation and overrides.platform is None
-    platform = (overrides.platform or graph.platform or (graph.formation and guess.formation(graph, base))
-                or guess.platform(graph, overrides.base or base))
+    platform, choice = _platform(graph, overrides, base)
     if platform == base and overrides.base is None:
         raise BadRequest(f"{graph.file}: the platform is the base", platform, "another link")
     start = None if overrides.keyframe is None else graph.in_metres(posture(graph, overrides.keyframe))
@@ -70,7 +69,7 @@ def build(graph: JointGraph, overrides: Overrides) -> Mechanism:
         raise LoopsNotClosed(graph.file, solution.residual, assembly.noise, assembly.worst(solution.values)[0],
                              cure(solution.residual) or POSTURE)
     _note_solution(graph, assembly, solution, overrides.keyframe)
-    mechanism = _mechanism(graph, base, platform, assembly, solution.values)
+    mechanism = replace(_mechanism(graph, base, platform, assembly, solution.values), choice=choice)
     mechanism = closures.points_as_hinges(mechanism, tolerance)
     if not all(joint.in_tree for joint in mechanism.joints.values()):
         if not overrides.as_written:
@@ -82,6 +81,17 @@ def build(graph: JointGraph, overrides: Overrides) -> Mechanism:
     if graph.platform is None:
         mechanism = without_coordinates(mechanism)
     return with_weighed_motors(mechanism)
+
+
+def _platform(graph: JointGraph, overrides: Overrides, base: str) -> tuple[str, PlatformChoice]:
+    """The platform's link, and how it was chosen."""
+    if overrides.platform is not None:
+        return overrides.platform, GIVEN
+    first = guess.formation(graph, base) if graph.platform is None and graph.formation else graph.platform
+    if first is not None:
+        return first, FIRST if graph.formation else NAMED
+    link, why = guess.platform(graph, overrides.base or base)
+    return link, PlatformChoice("guess", why)
 
 
 def deviation(digits: Digits, length: float) -> float:

@@ -1,18 +1,30 @@
-"""What a file leaves open, guessed by structure where that is safe: the base and the platform. Never by names, which
-only order what is offered."""
+"""What a file leaves open, guessed where it hints at one choice only: the base and the platform, by structure, then by
+names of feet and tools. A sensor is never the platform, nor a rod that a name or two ball joints tell."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
+
+import numpy as np
 
 from ...budgets import LARGEST_GUESSED
 from ...errors import BadRequest
+from ...geometry.vectors import Array, inverse
 from ...mechanism import graphs
 from ...mechanism.model import JointType
+from ...tolerances import SAME_DIRECTION, SAME_POINT
 from ..jointgraph import JointGraph, JointSpec, first_body
 
-_FOOT = re.compile("foot|toe|sole|tool|flange|hand|plat", re.IGNORECASE)
+_WORD = re.compile("[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
+_END = re.compile("(.*(foot|hand|flange|gripper|effector|platform))|feet|toe|sole|tool|tcp|eef?")
+"""Words in the names of links that end a robot: feet, tools."""
+_SENSOR = re.compile("imu|gyro(scope)?|accelerometer|magnetometer|.*camera|lidar|laser|.*sensor|gps|rgbd?|microphone")
+_ROD = re.compile(".*rod|strut")
+_DRIVE = re.compile(".*rod|strut|crank|motor|actuator|rotor|reference")
+"""Words in the names of what moves a foot or tool."""
+_PLATE = re.compile("plat", re.IGNORECASE)
 
 
 def base(graph: JointGraph) -> str:
@@ -27,25 +39,27 @@ def base(graph: JointGraph) -> str:
 
 def standing(graph: JointGraph, base: str, wanted: str | None, platform: str | None = None) -> str:
     """The link from which a robot is read: its base; where the ``wanted`` one hangs on something else, the root of
-    that; of a robot with loops that only a free joint holds (``<freejoint>``), the link that floats; where all hangs on
-    one slide and the loops begin at what slides, that link: a rail is no leg. ``platform`` is the one that is given."""
+    that; of a robot that only a free joint holds (``<freejoint>``), or three slides and three turns that place it, the
+    link that floats; where all hangs on one slide and the loops begin at what slides, that link: a rail is no leg.
+    ``platform`` is the one that is given."""
     bonds = graphs.adjacency(graph.links, (joint.links for joint in graph.joints.values()))
     if wanted is not None and wanted in graph.links and wanted not in graphs.component(bonds, base):
         base = wanted
         carriers = {joint.links[1]: joint.links[0] for joint in graph.joints.values() if joint.in_tree}
         for _ in carriers:
             base = carriers.get(base, base)
-    if all(joint.in_tree for joint in graph.joints.values()):
-        return base
+    if wanted != base:
+        base = _without_float(graph, base, {wanted, platform})
+    loops = not all(joint.in_tree for joint in graph.joints.values())
     while wanted != base:
         held = [joint for joint in graph.joints.values() if base in joint.links]
         if len(held) != 1:
             break
         (bearer,) = held
         trunk = next(link for link in bearer.links if link != base)
-        if bearer.type is JointType.FREE:
+        if bearer.type is JointType.FREE and (loops or (platform != trunk and _moving(graph, trunk) > 2)):
             how = f"floats on the free joint {bearer.name!r}: it is the base, and what it floats in is left out"
-        elif bearer.type is JointType.PRISMATIC and _is_rail(graph, bearer, trunk, platform):
+        elif loops and bearer.type is JointType.PRISMATIC and _is_rail(graph, bearer, trunk, platform):
             how = (f"slides on the rail {bearer.name!r}: it is the base, and what it slides on is left out "
                    f"(--base {base} to keep it)")
         else:
@@ -54,6 +68,45 @@ def standing(graph: JointGraph, base: str, wanted: str | None, platform: str | N
         del graph.joints[bearer.name], graph.links[base]
         base = trunk
     return base
+
+
+def _without_float(graph: JointGraph, base: str, named: set[str | None]) -> str:
+    """The link that floats on three slides and three turns about one point, where several joints hang on it and nothing
+    drives or names what is in between, which is then left out; else ``base``."""
+    chain, link, X = list[JointSpec](), base, np.eye(4)
+    kinds, axes, centres = "", list[Array](), list[Array]()
+    while len(kinds) < 6:
+        more = [joint for joint in graph.joints.values() if link in joint.links and joint not in chain]
+        if len(more) != 1 or more[0].links[0] != link:
+            return base
+        (joint,) = more
+        X = X @ joint.ends[0].X
+        if joint.kind is not JointType.FIXED:
+            kinds += str(joint.kind)
+            axes += [X[:3, :3] @ axis for axis in joint.axes]
+            centres += [X[:3, 3]] * (joint.kind is JointType.REVOLUTE)
+        X, link = X @ inverse(joint.ends[1].X), joint.links[1]
+        chain.append(joint)
+    left = {each.links[0] for each in chain}
+    slides, turns = ([axis for axis, kind in zip(axes, kinds, strict=False) if kind == each] for each in "PR")
+    geared = {name for gear in graph.gears for name in (gear.driver, gear.driven)}
+    if sorted(kinds) != list("PPPRRR") or _moving(graph, link) < 3 or graph.platform in left or named & left or any(
+            each.motor is not None or each.name in geared for each in chain):
+        return base
+    ranks = [np.linalg.matrix_rank(np.array(each), SAME_DIRECTION) for each in (slides, turns)]
+    if ranks != [3, 3] or np.max(np.abs(np.array(centres) - centres[0])) > SAME_POINT:
+        return base
+    names = ", ".join(each.name for each in chain)
+    graph.note("guess", f"{link!r} floats on the joints {names}, which place it: it is the base, and what it floats in "
+                        f"is left out (--base {base} to keep it)")
+    for each in chain:
+        del graph.joints[each.name], graph.links[each.links[0]]
+    return link
+
+
+def _moving(graph: JointGraph, link: str) -> int:
+    """How many joints of a link are not fixed."""
+    return sum(link in joint.links and joint.kind is not JointType.FIXED for joint in graph.joints.values())
 
 
 def _is_rail(graph: JointGraph, slide: JointSpec, trunk: str, platform: str | None) -> bool:
@@ -80,30 +133,47 @@ def formation(graph: JointGraph, base: str) -> str | None:
     return found
 
 
-def platform(graph: JointGraph, base: str) -> str:
-    """The link that most ways connect to the base; else the only frame on a fixed joint; else the link farthest away.
+def platform(graph: JointGraph, base: str) -> tuple[str, str]:
+    """The link that is guessed, and why: the one that most ways connect to the base; else the only one with the name of
+    a foot or tool; else the one that several loops close; else the only frame on a fixed joint; else the link farthest
+    away.
 
     Raises ``BadRequest`` with the candidates where several are as good.
     """
     bodies = _RigidBodies(graph, base)
     if len(bodies.members) == 1:
         raise BadRequest(f"{graph.file}: no link moves relative to the base", base, "a joint that is not fixed")
-    body, why, rivals = bodies.platform()
-    if body is None:
+    link, why, rivals = bodies.platform()
+    if link is None:
         names = bodies.platform_candidates(rivals)
         chain = "".join(f"; {note.text}" for note in graph.notes if note.kind == "open")
         raise BadRequest(f"{graph.file}: the file does not say which link is the platform, and several could be{chain}",
                          None, "--platform LINK, such as " + ", ".join(names[:12]) + (" …" if names[12:] else ""))
-    link = bodies.title(body)
     graph.note("guess", f"the platform is link {link!r}, {why} (--platform LINK to change it)")
-    return link
+    return link, why
 
 
 def platforms(graph: JointGraph, base: str) -> tuple[list[str], str]:
     """The link that is guessed and why, or the links among which nothing decides, and no reason."""
     bodies = _RigidBodies(graph, base)
-    body, why, rivals = bodies.platform()
-    return bodies.platform_candidates(rivals) if body is None else [bodies.title(body)], why
+    link, why, rivals = bodies.platform()
+    return bodies.platform_candidates(rivals) if link is None else [link], why
+
+
+def has_word(name: str, words: re.Pattern[str]) -> bool:
+    """Whether one of the words of a name is one of ``words``."""
+    return any(words.fullmatch(word.casefold()) for word in _WORD.findall(name))
+
+
+def _ends_robot(name: str) -> bool:
+    return has_word(name, _END) and not has_word(name, _SENSOR) and not has_word(name, _DRIVE)
+
+
+def _common(bodies: list[str], *hints: list[str]) -> list[str]:
+    """Those of several bodies that further hints name as well, where one does."""
+    for hint in hints:
+        bodies = [body for body in bodies if body in hint] or bodies
+    return bodies
 
 
 class _RigidBodies:
@@ -119,6 +189,8 @@ class _RigidBodies:
         self.base = into[base]
         pairs = [(into[a], into[b]) for a, b in (joint.links for joint in joints)]
         self.near = graphs.adjacency(self.members, (pair for pair in pairs if pair[0] != pair[1]))
+        parts = sum(1 for _ in graphs.components(self.near))
+        self.loops = sum(map(len, self.near.values())) > 2 * (len(self.near) - parts)
         self.closing = graph.closing
         self.joints: dict[str, list[JointSpec]] = {link: [] for link in graph.links}
         for joint in joints:
@@ -126,41 +198,52 @@ class _RigidBodies:
                 self.joints[link].append(joint)
 
     def platform(self) -> tuple[str | None, str, Sequence[str]]:
-        """The platform's body and why, or None and the candidates."""
-        others = [body for body in self.near if body != self.base]
+        """The platform's link and why, or None and the bodies that could be the platform."""
+        moving = [body for body in self.near if body != self.base]
+        others = [body for body in moving if not self._is_never(body)] or moving
         framed = [body for body in others if self._frames(body)]
-        parts = sum(1 for _ in graphs.components(self.near))
-        if sum(map(len, self.near.values())) == 2 * (len(self.near) - parts):  # a forest
-            tips = [body for body in others if len(self.near[body]) == 1]
-            if len(tips) == 1:
-                return tips[0], "the end of the chain", ()
-            return (framed[0], "the only frame on a fixed joint", ()) if len(framed) == 1 else (None, "", tips)
-        ways = {body: self._ways(body) for body in others if len(self.near[body]) >= 3}
-        most = max(ways.values(), default=0)
-        best = [body for body in others if ways.get(body) == most]
-        if most >= 3 and len(best) == 1:
-            floats = sum(joint.type is JointType.FREE for link in self.members[best[0]] for joint in self.joints[link])
-            return best[0], f"which {most - floats} ways connect to the base", ()
+        named = self._named(others)
+        if not self.loops:
+            rivals = [body for body in others if len(self.near[body]) == 1]
+            if len(rivals) == 1:
+                return self.title(rivals[0]), "the end of the chain", ()
+            closed, why = list[str](), ""
+        else:
+            found, most = self._most_ways(others, self.base, set(self.near))
+            if len(found) == 1:
+                floats = sum(joint.type is JointType.FREE for link in self.members[found[0]]
+                             for joint in self.joints[link])
+                return self.title(found[0]), f"which {most - floats} ways connect to the base", ()
+            distance = graphs.distances(self.near, self.base)
+            rivals = [body for body in distance if distance[body] == max(distance.values())]
+            closed, why = self._closed(others, distance)
+        if named and closed and not {*named} & {*closed}:
+            return None, "", [*named, *closed]
+        if named:
+            named = _common(named, closed, framed)
+            return (self._end_of(named[0]), "whose name is that of a foot or tool", ()) if len(named) == 1 else (
+                None, "", named)
+        if closed:
+            closed = _common(closed, framed)
+            return (self.title(closed[0]), why, ()) if len(closed) == 1 else (None, "", closed)
         if len(framed) == 1:
-            return framed[0], "the only frame on a fixed joint", ()
-        distance = graphs.distances(self.near, self.base)
-        ends = [body for body in others if distance[body] == max(distance.values())]
-        return (ends[0], "the farthest from the base", ()) if len(ends) == 1 else (None, "", ends)
+            return self.title(framed[0]), "the only frame on a fixed joint", ()
+        if len(rivals) == 1 and self._is_outermost(rivals[0]) and rivals[0] in others:
+            return self.title(rivals[0]), "the farthest from the base", ()
+        near = {body for block in self._blocks() for body in block if block & {*rivals}}
+        return None, "", rivals if len(rivals) > 1 else [*(body for body in others if body in near), *rivals]
 
     def platform_candidates(self, rivals: Sequence[str]) -> list[str]:
         """The links that may be the platform where nothing decides: open ends and what ends in a loop beside the
-        ``rivals``; those first whose names are those of feet and tools."""
-        import networkx as nx
-
-        found = [self.title(each) for each in rivals]
-        if len(self.near) <= LARGEST_GUESSED:
-            graph: nx.Graph[str] = nx.Graph((a, b) for a, ends in self.near.items() for b in ends)
-            joints = set(nx.articulation_points(graph))
-            parts: list[set[str]] = list(map(set, nx.biconnected_components(graph)))  # type: ignore[arg-type]
-            last = [part - joints for part in parts if len(part & joints) == 1 and self.base not in part]
-            found += [self.title(body) for body in self.near if any(body in part for part in last)]
-        names = dict.fromkeys(found)
-        return sorted(names, key=lambda name: (0, len(name)) if _FOOT.search(name) else (1, 0))
+        ``rivals``; those first whose names are those of feet, tools and plates, without sensors and rods."""
+        blocks = self._blocks()
+        often = Counter(body for block in blocks for body in block)
+        last = [block for block in blocks if self.base not in block and sum(often[body] > 1 for body in block) == 1]
+        ends = [body for body in self.near if often[body] == 1 and any(body in block for block in last)]
+        every = list(dict.fromkeys([*rivals, *ends]))
+        found = [body for body in every if not self._is_never(body)]
+        names = map(self._end_of, found or every)
+        return sorted(names, key=lambda name: (0, len(name)) if _ends_robot(name) or _PLATE.search(name) else (1, 0))
 
     def title(self, body: str) -> str:
         """The link that stands for a body: its only frame, else the link with most joints."""
@@ -169,23 +252,78 @@ class _RigidBodies:
             return frames[0]
         return max(self.members[body], key=lambda link: len(self.joints[link]))
 
-    def _ways(self, body: str) -> int:
-        """The number of ways from a body to the base that share no body; not counted where there are too many."""
+    def _named(self, others: Sequence[str]) -> list[str]:
+        """The bodies with a name of a foot or tool, beyond which no other one has."""
+        named = [body for body in others if any(map(_ends_robot, self.members[body]))]
+        return [body for body in named if self._inward(body).issuperset(named)]
+
+    def _inward(self, body: str) -> set[str]:
+        """The bodies that ``body`` does not separate from the base, and itself."""
+        rest = {one: [two for two in ends if two != body] for one, ends in self.near.items() if one != body}
+        return {body, *graphs.component(rest, self.base)}
+
+    def _end_of(self, body: str) -> str:
+        """The link of a body that has a name of a foot or tool, where one has; else the one that stands for it."""
+        title = self.title(body)
+        return min(filter(_ends_robot, self.members[body]), key=lambda link: link != title, default=title)
+
+    def _is_never(self, body: str) -> bool:
+        """Whether a body is a sensor, or in a loop a rod: by its name, or as it turns freely about a line of two ball
+        joints."""
+        name = self.title(body)
+        kinds = {joint.type for link in self.members[body] for joint in self.joints[link]} - {JointType.FIXED}
+        return has_word(name, _SENSOR) or (len(self.near[body]) == 2 and (has_word(name, _ROD) or (
+            JointType.SPHERICAL in kinds and kinds <= {JointType.SPHERICAL, JointType.UNIVERSAL})))
+
+    def _blocks(self) -> list[set[str]]:
+        """The bodies of each loop, of several loops where they share two bodies, and of each bond in no loop; none
+        where there are too many bodies."""
         import networkx as nx
 
         if len(self.near) > LARGEST_GUESSED:
-            return 0
+            return []
         graph: nx.Graph[str] = nx.Graph((a, b) for a, ends in self.near.items() for b in ends)
-        direct = graph.has_edge(self.base, body)
-        if direct:
-            graph.remove_edge(self.base, body)
-        return direct + int(nx.node_connectivity(graph, self.base, body))
+        return list(map(set, nx.biconnected_components(graph)))  # type: ignore[arg-type]
+
+    def _closed(self, others: Sequence[str], distance: Mapping[str, int]) -> tuple[list[str], str]:
+        """The bodies that several loops away from the base close, and why the last one could be the platform."""
+        found, why = list[str](), ""
+        for block in self._blocks():
+            root = min(block, key=distance.__getitem__)
+            if root != self.base:
+                inside = [body for body in others if body in block and body != root]
+                bodies, most = self._most_ways(inside, root, block)
+                found += bodies
+                why = f"which {most} ways connect to {self.title(root)!r}" if bodies else why
+        return found, why
+
+    def _is_outermost(self, body: str) -> bool:
+        """Whether a body ends a chain, or is in a loop with the base."""
+        return len(self.near[body]) == 1 or any({body, self.base} <= block for block in self._blocks())
+
+    def _most_ways(self, others: Sequence[str], root: str, within: set[str]) -> tuple[list[str], int]:
+        """The bodies that most ways connect to ``root``, three at least, that share no body; and how many. Not counted
+        where there are too many bodies."""
+        import networkx as nx
+
+        if len(self.near) > LARGEST_GUESSED:
+            return [], 0
+        ways = dict[str, int]()
+        for body in (each for each in others if len(self.near[each]) >= 3):
+            graph: nx.Graph[str] = nx.Graph((a, b) for a in within for b in self.near[a] if b in within)
+            direct = graph.has_edge(root, body)
+            if direct:
+                graph.remove_edge(root, body)
+            ways[body] = direct + int(nx.node_connectivity(graph, root, body))
+        most = max(ways.values(), default=0)
+        return [body for body, count in ways.items() if count == most >= 3], most
 
     def _frames(self, body: str) -> list[str]:
-        """Links of a body that hang on one fixed joint and carry nothing."""
+        """Links of a body that hang on one fixed joint and carry nothing, without sensors."""
         found = []
         for link in [each for each in self.members[body] if each not in self.closing]:
             own = self.joints[link]
-            if len(own) == 1 and own[0].type is JointType.FIXED and own[0].links[1] == link:
+            if len(own) == 1 and own[0].type is JointType.FIXED and own[0].links[1] == link and not has_word(
+                    link, _SENSOR):
                 found.append(link)
         return found

@@ -10,6 +10,7 @@ from importlib import import_module
 from ...mechanism.model import Mechanism
 from ..dialect import Dialect, Read, RobotFile, Write
 from ..jointgraph import JointGraph
+from ..vocabulary import Vocabulary
 
 NATIVE = "native"
 
@@ -37,6 +38,12 @@ def read(file: RobotFile) -> JointGraph | Mechanism:
         robot.notes[:0] = file.notes
         return robot
     return replace(robot, notes=(*file.notes, *robot.notes)) if file.notes else robot
+
+
+def vocabulary(dialect: str) -> Vocabulary:
+    """The names of a dialect that is XML."""
+    found: Vocabulary = import_module(f"{__name__}.{dialect}.names").NAMES
+    return found
 
 
 def writer(dialect: str) -> Write:

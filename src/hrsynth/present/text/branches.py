@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from .tables import Rows, listing
+from .tables import Rows, listing, robot_row
 
 if TYPE_CHECKING:
     from ...analysis.branch.answer import BranchPart, BranchProof, Toggle
@@ -15,7 +15,7 @@ UNITS = "metres and radians"
 
 def branch(found: BranchProof) -> str:
     """The robot, then each part: its box, how much of it is proved, and what ends that."""
-    rows: Rows = [("robot", found.robot.name), ("motors", ", ".join(found.motors)),
+    rows: Rows = [robot_row(found.robot), ("motors", ", ".join(found.motors)),
                   ("passive", f"{len(found.passive)} coordinates"
                    + (f", {len(found.held)} idle ones held" if found.held else "")),
                   ("box", found.box), ("units", UNITS), *limits(found)]

@@ -12,7 +12,20 @@ from ...analysis.verdict import ELSEWHERE
 from ...errors import HrsynthError
 from ...tolerances import RANK_CUTOFF, RANK_GAP, SAME_RELATION, SURELY_SOMETHING
 from .branches import UNITS, ends, limits
-from .tables import LINE, NAMES, Rows, camera, describe_watched, head, known_row, listing, sets, table, wrap_lines
+from .tables import (
+    LINE,
+    NAMES,
+    Rows,
+    camera,
+    describe_watched,
+    head,
+    known_row,
+    listing,
+    robot_row,
+    sets,
+    table,
+    wrap_lines,
+)
 
 if TYPE_CHECKING:
     from ...analysis.advice import Advice, FurtherMeasurement
@@ -42,7 +55,7 @@ def robot(found: Mechanism) -> str:
     from ...mechanism.sensors import defaults_of
 
     rows: Rows = [("links, joints", f"{len(found.links)}, {len(found.joints)}"), ("base", found.base),
-                  ("bodies", ", ".join(found.bodies)) if found.formation else ("platform", found.platform),
+                  ("bodies", ", ".join(found.bodies)) if found.formation else ("platform", found.platform_words),
                   ("motors", ", ".join(joint.name for joint in found.joints.values() if joint.actuated) or "none"),
                   *known_row("camera on", found.reference if found.reference != found.base else None)]
     try:
@@ -184,7 +197,8 @@ def legs(found: Legs) -> str:
     lost = "lost" if any(ELSEWHERE in row[-1] for row in rows) else f"lost (at {found.where})"
     if found.setting.mechanism.formation:
         lost = f"not seen (at {found.where})"
-    lines = [f"{found.robot}   {found.architecture}   {found.dof} dof", "",
+    lines = [f"{found.robot}   {found.architecture}   {found.dof} dof",
+             f"platform: {found.setting.robot.platform_words}", "",
              *wrap_lines(f"smallest sets of the best rank: {found.smallest}" if found.dof else NO_FREEDOM, more="  "),
              "",
              table(rows, ("legs", "verdict", "rank", "exact", lost)), "",
@@ -212,7 +226,7 @@ def legs(found: Legs) -> str:
 def describe_export(found: ExportedCode) -> str:
     """What the code is of, and where it answers."""
     proof, bounds = found.proof, found.bounds
-    rows: Rows = [("robot", proof.robot.name), ("language", found.lang), ("motors", ", ".join(proof.motors)),
+    rows: Rows = [robot_row(proof.robot), ("language", found.lang), ("motors", ", ".join(proof.motors)),
                   ("joints", f"{len(proof.passive)} passive, {len(proof.held)} idle (held)"),
                   ("directions", ", ".join(found.legs) or "none"),
                   ("inverse", "in closed form" if found.closed else "by Newton's method, from nearby motors"),
@@ -323,7 +337,7 @@ def view(found: View) -> str:
         ends = f"{degrees(low):.3g}° to {degrees(high):.3g}°" if slider.unit == "rad" else f"{low:.4g} to {high:.4g} m"
         sliders.append(f"{slider.name}: {ends}, {len(slider.values)} closed configurations")
     return listing([
-        ("robot", f"{found.setting.robot.name}   {found.machines[0].words}"),
+        robot_row(found.setting.robot, found.machines[0].words),
         head(found.setting)[1],
         *(("hidden robot", machine.words) for machine in found.machines[1:]), ("sliders", sliders),
         ("other modes", ", ".join(outline.label for outline in found.mode_outlines) or []),

@@ -11,7 +11,7 @@ from ...tolerances import LARGEST_FIRST_ORDER
 
 if TYPE_CHECKING:
     from ...analysis.observed import ObservedRobot
-    from ...mechanism import Observation
+    from ...mechanism import Mechanism, Observation
 
 Rows = list[tuple[str, str | Sequence[str]]]
 """Names with their values: several stand under each other, none is no row."""
@@ -93,10 +93,15 @@ def dropped_limits(setting: ObservedRobot) -> Rows:
     return [("limits", f"those of {joints} are not looked at: they are parts of other joints")] if joints else []
 
 
+def robot_row(robot: Mechanism, words: str = "") -> tuple[str, list[str]]:
+    """The robot, its platform and how that was chosen."""
+    return "robot", [f"{robot.name}   {words}".rstrip(), f"platform: {robot.platform_words}"]
+
+
 def head(found: ObservedRobot) -> Rows:
     """The robot and what is observed of it."""
     seen = ", ".join(label_of(each).replace(" ", "\u00a0") for each in found.observed)
-    return [("robot", f"{found.robot.name}   {found.anatomy.architecture()}"),
+    return [robot_row(found.robot, str(found.anatomy.architecture())),
             ("observed", wrap_lines(seen, LINE - NAMES))]
 
 

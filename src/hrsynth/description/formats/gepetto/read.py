@@ -8,12 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from ....errors import BadRobotFile, Defect
 from ....geometry.vectors import Array
 from ....mechanism.model import JointType, Motor, Note
 from ... import xml
 from ...chains import CUT, END, WELD
 from ...dialect import RobotFile
 from ...jointgraph import FrameSpec, JointGraph
+from ...vocabulary import misspelt
 from ..urdf.read import read as read_urdf
 from .settings import KEYS, frames_of, settings_beside, settings_in, urdf_beside
 
@@ -29,14 +31,28 @@ def read(file: RobotFile) -> JointGraph:
     path = urdf_beside(file.path, frames_of(settings or {})) if found is None else file.path
     if settings is None:
         raise xml.refusal(beside, "none of the keys of this dialect", ", ".join(KEYS))
+    if not file.as_spelt:
+        _require_spelling(beside, settings)
     notes: list[Note] = []
     root = xml.document(xml.content(path), str(path), notes) if file.root is None else file.root
-    graph = read_urdf(RobotFile(path, root), frames=not settings.get("closed_loop"))
+    graph = read_urdf(replace(file, path=path, root=root), frames=not settings.get("closed_loop"))
     graph.dialect = "Gepetto"
     graph.notes[:0] = notes
     if beside.stem != path.stem:
         graph.note("guess", f"closures and motors are from {beside.name}, next to {path.name}: it names its frames")
     return _Settings(graph, beside, settings).apply()
+
+
+def _require_spelling(path: Path, said: dict[str, Any]) -> None:
+    """Raise ``BadRobotFile`` for keys that are misspellings of missing ones."""
+    lines = xml.content(path).decode("utf-8").splitlines()
+    wrong = []
+    for key in (str(key) for key in said if key not in KEYS):
+        if meant := misspelt(key, set(KEYS) - set(said)):
+            line = next((number for number, text in enumerate(lines, 1) if text.strip("'\"").startswith(key)), None)
+            wrong.append(Defect(str(path), line, "unknown key", key, " or ".join(meant)))
+    if wrong:
+        raise BadRobotFile(wrong)
 
 
 class _Settings:

@@ -17,6 +17,7 @@ from ...postures import from_keyframe
 from ..paired import onshape_pairs, other_pairs
 from .content import BodyContents
 from .defaults import Compiler, Defaults, with_includes
+from .names import NAMES
 
 WORLD = "world"
 _TYPES = {"hinge": JointType.REVOLUTE, "slide": JointType.PRISMATIC, "ball": JointType.SPHERICAL,
@@ -26,7 +27,11 @@ _TYPES = {"hinge": JointType.REVOLUTE, "slide": JointType.PRISMATIC, "ball": Joi
 def read(file: RobotFile) -> JointGraph:
     """The joint graph of an MJCF document; raises ``BadRobotFile`` with all its defects."""
     name = str(file.path)
-    return _MjcfReader(name, with_includes(file.document, name)).graph()
+    root = with_includes(file.document, name)
+    defects, notes = NAMES.check(root, file)
+    graph = _MjcfReader(name, root, defects).graph()
+    graph.notes[:0] = notes
+    return graph
 
 
 @dataclass

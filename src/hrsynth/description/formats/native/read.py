@@ -12,7 +12,7 @@ from lxml import etree
 from ....errors import BadRobotFile
 from ....geometry.vectors import Array
 from ....mechanism import graphs
-from ....mechanism.model import Joint, JointType, Limits, Mechanism, Motor
+from ....mechanism.model import FIRST, NAMED, Joint, JointType, Limits, Mechanism, Motor
 from ....mechanism.observations.direction import Direction
 from ....mechanism.sights import NamedCamera
 from ....tolerances import NO_FINER, SAME_DIRECTION, SAME_GEOMETRY
@@ -23,6 +23,7 @@ from ...jointgraph import JointSpec, TreeJoint, first_body, zero_poses
 from ...jointmotion import require_closed, residual
 from ...sights import SightSpec, as_written
 from ..urdf.elements import INTERFACE, UrdfReader, is_sight, simple_transmission
+from ..urdf.names import NAMES
 
 OWN_TAGS = ("platform", "camera", "observe")
 """What an ``<hrsynth>`` element is read for; other children are kept, unless they look like one of these."""
@@ -40,8 +41,11 @@ def read(file: RobotFile) -> Mechanism:
     LoopsNotClosed
         Where a loop is open at the zero configuration.
     """
-    return _NativeReader(str(file.path), file.document, tolerance=file.tolerance,
-                         as_written=file.as_written).mechanism()
+    root = file.document
+    defects, notes = NAMES.check(root, file)
+    robot = _NativeReader(str(file.path), root, defects, tolerance=file.tolerance,
+                          as_written=file.as_written).mechanism()
+    return replace(robot, notes=(*notes, *robot.notes)) if notes else robot
 
 
 def parse(text: bytes | str, file: str = "<text>") -> Mechanism:
@@ -249,7 +253,7 @@ class _NativeReader(UrdfReader):
         links = {key: replace(link, pose=poses[key]) for key, link in self.links.items()}
         mechanism = Mechanism(name, links, joints, base, platform, tuple(self.observations), tuple(self.couplings),
                               self.camera, tuple(self.rest), self.file, formation=self.formation,
-                              turns=self.turns)
+                              turns=self.turns, choice=FIRST if self.formation else NAMED)
         found = None if self.as_written or not loops else self.repair_rounding(mechanism, loops, poses)
         if found is not None:
             return found

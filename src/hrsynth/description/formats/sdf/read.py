@@ -21,6 +21,7 @@ from ..extensions import read_drake, read_plugins
 from ..paired import onshape_pairs, other_pairs
 from .content import read_content
 from .joint import JointFrames, add, guess_motors, mimics, name_gears, numbers, pose_of, text
+from .names import NAMES
 
 MODEL, WORLD = "__model__", "world"
 VERSIONS = "1.4 to 1.12"
@@ -28,7 +29,11 @@ VERSIONS = "1.4 to 1.12"
 
 def read(file: RobotFile) -> JointGraph:
     """The joint graph of an SDFormat document; raises ``BadRobotFile`` with all its defects."""
-    return _SdfReader(str(file.path), file.document).graph()
+    root = file.document
+    defects, notes = NAMES.check(root, file)
+    graph = _SdfReader(str(file.path), root, defects).graph()
+    graph.notes[:0] = notes
+    return graph
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,6 +16,7 @@ from ...jointgraph import GearSpec, JointGraph, comma_list
 from ..extensions import DRAKE, is_drake, local
 from .conventions import CONVENTIONS
 from .elements import TREE_TYPES, UrdfReader, is_sight
+from .names import NAMES
 
 WORLD = "world"
 TYPES = {**TREE_TYPES, "spherical": JointType.SPHERICAL, "ball": JointType.SPHERICAL}
@@ -29,7 +30,10 @@ def read(file: RobotFile, *, frames: bool = True) -> JointGraph:
     ``frames`` says whether links may be closing frames by their names: not where loops are given in other words.
     """
     root = file.document
-    return _TolerantReader(str(file.path), root).graph(frames and root.find("hrsynth") is None)
+    defects, notes = NAMES.check(root, file)
+    graph = _TolerantReader(str(file.path), root, defects).graph(frames and root.find("hrsynth") is None)
+    graph.notes[:0] = notes
+    return graph
 
 
 @dataclass
