@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import replace
 
+from ..errors import BadRequest
 from ..geometry.vectors import pose
 from ..mechanism.model import Joint, JointType, Link, Mechanism, Motor, Note
 from ..mechanism.screws import elementary
