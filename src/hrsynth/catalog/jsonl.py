@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from ..budgets import LARGEST_RECORD
 from ..errors import BadRequest
 from .words import VERSION
 
@@ -34,7 +35,7 @@ def head(group: str, count: int | None = None) -> str:
 def read_head(text: str | bytes, file: str, otherwise: str, value: str | None, *needed: str) -> Mapping[str, Any]:
     """What a file's first line says; raises ``BadRequest`` for another version, and in these words for no head."""
     try:
-        known = json.loads(text)
+        known = _loads(text)
         versions, *_ = (known["format"], known["catalog"]), *(known[name] for name in needed)
     except (ValueError, TypeError, KeyError):
         raise BadRequest(f"{otherwise}: its first line is not a header", value) from None
@@ -42,10 +43,20 @@ def read_head(text: str | bytes, file: str, otherwise: str, value: str | None, *
     return dict(known)
 
 
+def _loads(text: str | bytes) -> Any:
+    """What a line holds; raises ``ValueError`` also for one that is too long or nested too deeply."""
+    if len(text) > LARGEST_RECORD:
+        raise ValueError("too long")
+    try:
+        return json.loads(text)
+    except RecursionError:
+        raise ValueError("nested too deeply") from None
+
+
 def record(text: str) -> Record:
     """The record of a line; raises ``BadRequest`` where it holds none."""
     try:
-        found = json.loads(text)
+        found = _loads(text)
         if isinstance(found["word"], str):
             return dict(found)
     except (ValueError, TypeError, KeyError):
@@ -90,14 +101,15 @@ def head_count(first: str | bytes, file: str) -> int:
 
 def decode_lines(content: bytes, file: str) -> list[str]:
     """The lines of a group's file; raises ``BadRequest`` for another version, a file cut off or of something else."""
+    count, found = head_count(content.partition(b"\n")[0], file), content.count(b"\n") - 1
+    if found != count or not content.endswith(b"\n"):
+        raise BadRequest(f"{file}: truncated, records", found, str(count))
+    if len(content) < count * len(_LINE_START + _GROUP):
+        raise BadRequest(f"{file}: lines that are too short for records", f"{len(content)} bytes", f"{count} records")
     try:
-        first, *lines = content.decode("ascii").splitlines() or [""]
+        return content.decode("ascii").split("\n")[1:-1]
     except UnicodeDecodeError:
-        first, lines = "", []
-    count = head_count(first, file)
-    if len(lines) != count or not content.endswith(b"\n"):
-        raise BadRequest(f"{file}: truncated, records", len(lines), str(count))
-    return lines
+        raise BadRequest(f"{file}: not a catalog file: not ASCII") from None
 
 
 def require_version(found: tuple[object, object], file: str) -> None:
