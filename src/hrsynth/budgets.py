@@ -38,7 +38,7 @@ MOST_UNPACKED = 1000
 """Files that an archive may hold."""
 PROCESS_BYTES = 1_700_000_000
 """Bytes of memory (addresses) of a process that reads a file which is not trusted."""
-USD_SECONDS, MESH_SECONDS = 10, 18
+USD_SECONDS, MESH_SECONDS = 10, 15
 """Seconds of one core after which opening a USD stage, and reading the meshes of a robot, is given up; three times as
 many on the clock."""
 MOST_MESHES = 2000
@@ -321,6 +321,8 @@ PICTURE_OVERSAMPLING = 3
 
 PARTS_AHEAD = 3
 """Parts of a build that wait for each thread of a cluster."""
+MOST_RECORDS = 1_000_000
+"""Lines of a compressed file of the catalog."""
 LARGEST_RECORD = 1_000_000
 """Characters of a line of the catalog."""
 LARGEST_WORD = 12

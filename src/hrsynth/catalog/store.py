@@ -14,7 +14,7 @@ from typing import Any, Protocol, overload
 
 import numpy as np
 
-from ..budgets import LARGEST_UNPACKED
+from ..budgets import LARGEST_UNPACKED, MOST_RECORDS
 from ..description.files import replacement
 from ..errors import BadRequest, BuildStopped
 from ..untrusted import gunzip
@@ -91,7 +91,12 @@ class Folder:
         file = self.file(group)
         with _readable(file):
             content = file.read_bytes()
-        return gunzip(content, file) if file.name.endswith(PACKED) else content
+        if not file.name.endswith(PACKED):
+            return content
+        content = gunzip(content, file)
+        if (count := content.count(b"\n")) > MOST_RECORDS:
+            raise BadRequest(f"{file}: lines", count, f"up to {MOST_RECORDS}, or a file that is not compressed")
+        return content
 
     def decides(self, asked: Mapping[str, Any]) -> bool:
         return all(value is None for value in asked.values())
@@ -106,7 +111,7 @@ class Folder:
         lines = list(lines)
         plain, packed = (self.path / f"{group}{ending}" for ending in (LINES, PACKED))
         content = encode_lines(group, lines)
-        large = len(lines) > PACKED_ABOVE and len(content) <= LARGEST_UNPACKED
+        large = PACKED_ABOVE < len(lines) < MOST_RECORDS and len(content) <= LARGEST_UNPACKED
         file, other = (packed, plain) if large else (plain, packed)
         with writable(file), replacement(file, sync=True) as draft:
             draft.write_bytes(gzip.compress(content, mtime=0) if large else content)

@@ -5,10 +5,12 @@ from __future__ import annotations
 
 import io
 import json
+import resource
 import sys
 from pathlib import Path
 from typing import Any
 
+from hrsynth.budgets import PROCESS_BYTES
 from hrsynth.untrusted import packing_defect, refuse
 
 
@@ -49,9 +51,9 @@ def triangles(path: Path, text: str | None, largest: int) -> tuple[Any, Any] | N
         solid: Any = trimesh.load(io.BytesIO(content), file_type=kind, force="mesh", process=False,
                                   resolver=Beside(path, largest) if kind == "gltf" else None)
         points, faces = np.array(solid.vertices, dtype=float), np.array(solid.faces, dtype=np.int64)
-    except MemoryError:
-        raise
-    except Exception:  # readers of many formats, each with errors of its own
+    except Exception as error:  # readers of many formats, each with errors of its own
+        if isinstance(error, MemoryError) or 2048 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss > PROCESS_BYTES:
+            refuse(f"{path.name}: it needs more memory than {PROCESS_BYTES} bytes")
         return None
     return (points, faces) if len(faces) and np.all(np.isfinite(points)) else None
 

@@ -89,8 +89,7 @@ def triangles(names: Iterable[str], robot: str | None, within: Path | None = Non
     try:
         told = io.BytesIO(output(PROCESS, str(LARGEST_FILE), seconds=MESH_SECONDS, given=json.dumps([*files.values()])))
     except BadRequest as error:
-        what = next(iter(files)) if len(files) == 1 else f"{len(files)} meshes, from {next(iter(files))} on"
-        raise BadRequest(f"{robot}: {what}: {error}") from None
+        raise BadRequest(f"the robot's meshes: {error}") from None
     for name in files:
         if (counts := json.loads(told.readline())) is not None:
             points, faces = (np.frombuffer(told.read(24 * count), kind).reshape(-1, 3)
