@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +16,7 @@ from ..errors import BadRequest, CertificateRefused, PoseNotReached
 from ..mechanism import Mechanism
 from ..tolerances import SAME_RELATION
 from . import modes, paths, ranks, verify_certificate, verify_path, verify_ranks
-from .verify_certificate import NotAccepted, once
+from .verify_certificate import NotAccepted, once, rational
 from .verify_path import PathNotAccepted
 from .verify_ranks import RanksNotAccepted
 
@@ -94,6 +93,6 @@ def _same(one: Any, other: Any) -> bool:
     if isinstance(one, list) and isinstance(other, list):
         return len(one) == len(other) and all(map(_same, one, other))
     try:
-        return one == other or abs(Fraction(one) - Fraction(other)) < SAME_RELATION
-    except (TypeError, ValueError, ArithmeticError):
+        return one == other or abs(rational(one) - rational(other)) < SAME_RELATION
+    except (TypeError, ValueError, ArithmeticError, NotAccepted):
         return False
