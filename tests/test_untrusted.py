@@ -1,4 +1,4 @@
-"""Files of strangers, by all doors: nothing in them runs, nothing elsewhere is read, and what they unpack to is limited."""
+"""Files of strangers, by all doors: nothing in them runs, nothing elsewhere is read, what they unpack to is limited."""
 
 from __future__ import annotations
 
@@ -22,12 +22,10 @@ import pytest
 
 from hrsynth import untrusted
 from hrsynth.budgets import LARGEST_UNPACKED, MOST_UNPACKED
-
 from hrsynth.catalog.jsonl import head
-from hrsynth.catalog.words import VERSION
 from hrsynth.certificates import verify
 from hrsynth.cli import execute
-from hrsynth.description import load, save
+from hrsynth.description import save
 from hrsynth.description.meshes import locate_mesh, triangles
 from hrsynth.errors import BadRequest, HrsynthError
 
@@ -88,8 +86,10 @@ def archive(*names: str, size: int | None = None) -> bytes:
 
 
 @pytest.mark.parametrize(("content", "said"), [
-    (archive("a", size=LARGEST_UNPACKED + 1), "unpacks to"), (archive("a", "b", size=LARGEST_UNPACKED // 2 + 1), "unpack"),
-    (archive(*map(str, range(MOST_UNPACKED + 1))), "files"), (archive("3D/../../a"), "lead out"), (archive("/a"), "lead"),
+    (archive("a", size=LARGEST_UNPACKED + 1), "unpacks to"),
+    (archive("a", "b", size=LARGEST_UNPACKED // 2 + 1), "unpacks to"),
+    (archive(*map(str, range(MOST_UNPACKED + 1))), "files"), (archive("3D/../../a"), "lead out"),
+    (archive("/a"), "lead out"),
     (archive("..\\a"), "lead out"), (archive("a")[:-5], "cannot be read"), (archive("a", "b", size=9), None),
     (b"solid", None)])
 def test_archives_are_judged_by_their_lists(content: bytes, said: str | None):
@@ -180,7 +180,8 @@ def test_a_catalog_unpacks_to_no_more_than_is_allowed(line: bytes, count: int, c
 
 def test_a_program_that_reads_has_limits(tmp_path: Path):
     program = tmp_path / "program.py"
-    for body, said in (("bytearray(10**10)", "more memory"), ("import sys; sys.stdout.write('x' * 10**7)", None),
+    for body, said in (("bytearray(10**10)", "more memory"),
+                       ("import sys; sys.stdout.write('x' * 10**7)", None),
                        ("import os; os.abort()", "breaks its reader"), ("while True: pass", "memory or time|did not finish"),
                        ("from hrsynth.untrusted import refuse; refuse('a\\nb')", "a b")):
         program.write_text(f"def main():\n    {body}\n")
@@ -223,8 +224,8 @@ def homes(tmp_path: Path) -> Path:
     ("file://{}/ws/pkg/meshes/a.obj", True), ("model://pkg/urdf/b.obj", True), ("../../other/c.obj", True),
     ("../../../secret.obj", False), ("{}/secret.obj", False), ("file://{}/secret.obj", False), ("link.obj", False),
     ("package://pkg/../../secret.obj", False), ("package://plain/d.obj", False), ("../../plain/d.obj", False),
-    ("package://secret.obj", False), ("http://127.0.0.1:9/a.obj", False), ("file:///etc/passwd", False), ("a\0b", False),
-    ("", False), (".", False)])
+    ("package://secret.obj", False), ("http://127.0.0.1:9/a.obj", False), ("file:///etc/passwd", False),
+    ("a\0b", False), ("", False), (".", False)])
 def test_a_mesh_is_read_in_the_robots_folders_alone(homes: Path, address: str, found: bool):
     folder = homes / "ws" / "pkg" / "urdf"
     assert (locate_mesh(address.format(homes), folder) is not None) is found
@@ -298,7 +299,8 @@ def contents(hit: Path) -> dict[str, bytes]:
     array = io.BytesIO()
     np.save(array, np.array([Touch(hit)], dtype=object), allow_pickle=True)
     return {
-        "pickle": pickle.dumps(Touch(hit)), "array": array.getvalue(), "python": f"#!/usr/bin/python3\n{code}\n".encode(),
+        "pickle": pickle.dumps(Touch(hit)), "array": array.getvalue(),
+        "python": f"#!/usr/bin/python3\n{code}\n".encode(),
         "yaml": f"closed_loop: !!python/object/apply:eval [\"{code}\"]\n".encode(), "zip": archive("robot.urdf"),
         "gzip": gzip.compress(robot("a.stl").encode()), "deep": b"[" * 200_000, "deeper": b'{"word":' * 200_000,
         "xinclude": b'<robot name="r" xmlns:xi="http://www.w3.org/2001/XInclude"><xi:include href="/etc/passwd" '
@@ -319,7 +321,7 @@ def test_hostile_content_is_one_line_at_every_door(command: str, name: str, what
     places = {"FILE": str(folder / name), "FOLDER": str(folder)}
     status = execute([places.get(word, word) for word in command.split()])
     out, err = capsys.readouterr()
-    assert status == (3 if command.startswith("lint") and "error" in out else 2), err
+    assert status in {"lint": (1, 2), "verify": (2, 3)}.get(command.split()[0], (2,)), err
     assert len(err.splitlines()) <= 1
     assert "defect of hrsynth" not in err
     assert "root:" not in out + err
@@ -327,15 +329,14 @@ def test_hostile_content_is_one_line_at_every_door(command: str, name: str, what
     assert [path.name for path in folder.iterdir()] == [name]
 
 
-@pytest.mark.parametrize("command", ["check", pytest.param("derive", marks=pytest.mark.slow),
-                                     pytest.param("singular", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("command", ["check", pytest.param("derive", marks=pytest.mark.slow)])
 def test_names_are_no_code(command: str, tmp_path: Path, capsys, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.chdir(tmp_path)
     text = robot("a.stl")
     for number, name in enumerate(("base", "crank", "bar", "rocker", "a", "b", "c", "d")):
         text = text.replace(f'"{name}"', '"' + CODE.format("hit") + str(number) + '"')
-    (tmp_path / "robot.urdf").write_text(text.replace("</hrsynth>", '<observe leg="' + CODE.format("hit")
-                                                      + '" link="' + CODE.format("hit") + '1" axis="0 0 1"/></hrsynth>'))
+    seen = f'<observe leg="{CODE.format("hit")}" link="{CODE.format("hit")}1" axis="0 0 1"/></hrsynth>'
+    (tmp_path / "robot.urdf").write_text(text.replace("</hrsynth>", seen))
     assert execute([command, "robot.urdf"]) == 0
     assert "__import__" in capsys.readouterr().out
     assert [path.name for path in tmp_path.iterdir()] == ["robot.urdf"]
@@ -402,7 +403,8 @@ def test_from_an_archive_it_says_so_in_one_line(tmp_path: Path):
     with zipfile.ZipFile(tmp_path / "hrsynth.zip", "w") as file:
         for path in package.rglob("*.py"):
             file.write(path, path.relative_to(package.parent))
-    code = f"import sys; sys.path.insert(0, {str(tmp_path / 'hrsynth.zip')!r}); from hrsynth.cli import main; main(['robots'])"
+    code = (f"import sys; sys.path.insert(0, {str(tmp_path / 'hrsynth.zip')!r}); from hrsynth.cli import main; "
+            "main(['robots'])")
     told = subprocess.run([sys.executable, "-P", "-c", code], capture_output=True, text=True)
     assert (told.returncode, told.stdout) == (2, "")
     (said,) = told.stderr.splitlines()

@@ -54,7 +54,8 @@ def packing_defect(content: bytes) -> str | None:
         return f"an archive of {len(files)} files, allowed: up to {MOST_UNPACKED}"
     if size > LARGEST_UNPACKED:
         return f"an archive that unpacks to {size} bytes, allowed: up to {LARGEST_UNPACKED}"
-    if any(each.filename.startswith(("/", "\\")) or ".." in each.filename.replace("\\", "/").split("/") for each in files):
+    names = [each.filename.replace("\\", "/") for each in files]
+    if any(name.startswith("/") or ".." in name.split("/") for name in names):
         return "an archive with names that lead out of it"
     return None
 

@@ -23,10 +23,9 @@ def meshes(setting: ObservedRobot, within: Path | None = None) -> tuple[tuple[Sh
     ``within`` no files are read that do not lie in that folder."""
     robot, mechanism = setting.robot, setting.mechanism
     found, missing, between, count = [], [], [], 0
-    files = triangles([solid.file for name, link in robot.links.items()
-                       if setting.normal.into.get(name) in mechanism.links
-                       for solid in content_of(link, robot).solids if solid.role == "visual" and solid.file is not None],
-                      robot.file, within)
+    shown = [solid for name, link in robot.links.items() if setting.normal.into.get(name) in mechanism.links
+             for solid in content_of(link, robot).solids if solid.role == "visual"]
+    files = triangles([solid.file for solid in shown if solid.file is not None], robot.file, within)
     for name, link in robot.links.items():
         into = setting.normal.into.get(name)
         if into is None or into not in mechanism.links:
