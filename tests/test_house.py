@@ -26,7 +26,7 @@ PACKAGE = ROOT / "src" / "hrsynth"
 
 # A module imports only from its own folder and from those above it here.
 FOLDERS = [
-    {"errors", "tolerances", "budgets", "ranges", "results", "claims", "progress", "version"},
+    {"errors", "tolerances", "budgets", "ranges", "results", "claims", "progress", "untrusted", "version"},
     {"geometry"},
     {"mechanism"},
     {"description"},

@@ -182,7 +182,8 @@ def test_a_program_that_reads_has_limits(tmp_path: Path):
     program = tmp_path / "program.py"
     for body, said in (("bytearray(10**10)", "more memory"),
                        ("import sys; sys.stdout.write('x' * 10**7)", None),
-                       ("import os; os.abort()", "breaks its reader"), ("while True: pass", "memory or time|did not finish"),
+                       ("import os; os.abort()", "breaks its reader"),
+                       ("while True: pass", "memory or time|did not finish"),
                        ("from hrsynth.untrusted import refuse; refuse('a\\nb')", "a b")):
         program.write_text(f"def main():\n    {body}\n")
         if said is None:
@@ -269,7 +270,8 @@ def test_meshes_open_no_other_files_and_unpickle_nothing(tmp_path: Path):
     for name in ("a.stl", "a.npz", "a.pkl", "a.obj", "a.ply", "a.dae"):
         (inner / name).write_bytes(pickle.dumps(Touch(hit)))
     (inner / "a.zip").write_bytes(archive("good.obj"))
-    names = ["good.obj", "in.gltf", "pipe.obj", *sorted(path.name for path in inner.iterdir() if path.name[0] in "aofr")]
+    others = sorted(path.name for path in inner.iterdir() if path.name[0] in "aofr")
+    names = ["good.obj", "in.gltf", "pipe.obj", *others]
     start = time.monotonic()
     found = triangles(names, str(inner / "robot.urdf"))
     assert time.monotonic() - start < 2 * SECONDS
