@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import json
 import os
-import resource
 import runpy
 import subprocess
 import sys
@@ -92,6 +91,8 @@ def output(program: Path, *arguments: str, seconds: int, given: str = "") -> byt
 
 def start(program: str, seconds: str, most: str, *arguments: str) -> None:
     """Run ``main`` of a program within the limits (called in that process)."""
+    import resource
+
     for limit, amount in ((resource.RLIMIT_AS, PROCESS_BYTES), (resource.RLIMIT_CPU, int(seconds)),
                           (resource.RLIMIT_FSIZE, int(most)), (resource.RLIMIT_CORE, 0)):
         hard = resource.getrlimit(limit)[1]

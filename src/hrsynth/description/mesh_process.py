@@ -48,8 +48,8 @@ def triangles(path: Path, text: str | None, largest: int) -> tuple[Any, Any] | N
         refuse(f"{path.name}: {wrong}")
     kind = path.suffix.lower().lstrip(".")
     try:
-        solid: Any = trimesh.load(io.BytesIO(content), file_type=kind, force="mesh", process=False,
-                                  resolver=Beside(path, largest) if kind == "gltf" else None)
+        beside: Any = Beside(path, largest) if kind == "gltf" else None
+        solid: Any = trimesh.load(io.BytesIO(content), file_type=kind, force="mesh", process=False, resolver=beside)
         points, faces = np.array(solid.vertices, dtype=float), np.array(solid.faces, dtype=np.int64)
     except Exception as error:  # readers of many formats, each with errors of its own
         if isinstance(error, MemoryError) or 2048 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss > PROCESS_BYTES:

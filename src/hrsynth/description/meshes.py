@@ -132,7 +132,7 @@ def carry_meshes(robot: Mechanism, target: Path, endings: tuple[str, ...] | None
     source = source if source.is_dir() else source.parent
     moved: dict[str, str | None] = {}
     files: dict[Path, Callable[[], bytes]] = {}
-    missing, outside, foreign, inside, strange = [], [], [], [], []
+    missing, outside, foreign, inside, strange = (list[str]() for _ in range(5))
 
     def place(name: str) -> str | None:
         """What the mesh is called in the new file; None where it has to be left out."""

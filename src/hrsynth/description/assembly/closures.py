@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Set
 from dataclasses import replace
 from itertools import pairwise
 
@@ -131,11 +131,11 @@ def _flat(joint: Joint, normal: Array, within: float) -> bool:
     return joint.type is JointType.FIXED
 
 
-def join_halves(graph: JointGraph, given: tuple[Collection[str | None], Collection[str]] = ((), ())) -> None:
+def join_halves(graph: JointGraph, given: tuple[Set[str | None], Set[str]] = (frozenset(), frozenset())) -> None:
     """What our writers cut is whole again: frames of closures go, and the joint before a rigid closure closes the loop
     itself. What only has such names, as any file may, stays as it is: what is joined means the same either way, and is
     neither named by something else in the file nor among the links and joints that are ``given``."""
-    links, joints = (here.union(there) for here, there in zip(graph.named, given, strict=True))
+    links, joints = graph.named[0] | given[0], graph.named[1] | given[1]
 
     def bare(name: str) -> bool:
         return not graph.links[name].xml and name not in links
@@ -153,7 +153,7 @@ def join_halves(graph: JointGraph, given: tuple[Collection[str | None], Collecti
         _join(graph, name, bare, joints)
 
 
-def _join(graph: JointGraph, name: str, bare: Callable[[str], bool], busy: Collection[str]) -> None:
+def _join(graph: JointGraph, name: str, bare: Callable[[str], bool], busy: Set[str]) -> None:
     """Let the joint that carries a cut half take the place of the rigid closure."""
     own = [joint for joint in graph.joints.values() if name in joint.links]
     stem = name.removesuffix(CUT)
