@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -93,6 +94,9 @@ def _same(one: Any, other: Any) -> bool:
     if isinstance(one, list) and isinstance(other, list):
         return len(one) == len(other) and all(map(_same, one, other))
     try:
-        return one == other or abs(rational(one) - rational(other)) < SAME_RELATION
+        if one == other:
+            return True
+        x, y = (rational(each) if isinstance(each, str) else Fraction(each) for each in (one, other))
+        return abs(x - y) < SAME_RELATION
     except (TypeError, ValueError, ArithmeticError, NotAccepted):
         return False
