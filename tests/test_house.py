@@ -27,7 +27,7 @@ PACKAGE = ROOT / "src" / "hrsynth"
 # A module imports only from its own folder and from those above it here.
 FOLDERS = [
     {"errors", "tolerances", "budgets", "ranges", "results", "claims", "processes", "progress"} | {
-        "characters", "version"},
+        "characters", "untrusted", "version"},
     {"geometry"},
     {"mechanism"},
     {"description"},

@@ -32,8 +32,15 @@ MOST_NESTED_MODELS = 20
 """Models in models above which an SDFormat file is refused."""
 XACRO_SECONDS = 4
 """Seconds after which expanding a xacro file is given up."""
-USD_SECONDS = 30
-"""Seconds after which opening a USD stage is given up."""
+LARGEST_UNPACKED = 200_000_000
+"""Bytes that a file may unpack to, all in it together: a catalog, an archive, what is read of a robot's meshes."""
+MOST_UNPACKED = 1000
+"""Files that an archive may hold."""
+PROCESS_BYTES = 1_700_000_000
+"""Bytes of memory (addresses) of a process that reads a file which is not trusted."""
+USD_SECONDS, MESH_SECONDS = 10, 15
+"""Seconds of one core after which opening a USD stage, and reading the meshes of a robot, is given up; three times as
+many on the clock."""
 MOST_MESHES = 2000
 """Files of meshes that are copied with a robot."""
 LARGEST_MESHES = 2_000_000_000
@@ -314,6 +321,10 @@ PICTURE_OVERSAMPLING = 3
 
 PARTS_AHEAD = 3
 """Parts of a build that wait for each thread of a cluster."""
+MOST_RECORDS = 1_000_000
+"""Lines of a compressed file of the catalog."""
+LARGEST_RECORD = 1_000_000
+"""Characters of a line of the catalog."""
 LARGEST_WORD = 12
 """Legs of a word of the catalog."""
 

@@ -7,6 +7,7 @@ import zlib
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from ..budgets import LARGEST_RECORD
 from ..errors import BadRequest
 from .words import VERSION
 
@@ -47,21 +48,31 @@ def head(group: str, **more: object) -> str:
 def read_head(text: str | bytes, file: str, otherwise: str, value: str | None, *needed: str) -> Mapping[str, Any]:
     """What a file's first line says; raises ``BadRequest`` for another version, and in these words for no head."""
     try:
-        known = json.loads(text)
+        known = _loads(text)
         versions, *_ = (known["format"], known["catalog"]), *(known[name] for name in needed)
-    except (ValueError, TypeError, KeyError, RecursionError):
+    except (ValueError, TypeError, KeyError):
         raise BadRequest(f"{otherwise}: its first line is not a header", value) from None
     require_version(versions, file)
     return dict(known)
+
+
+def _loads(text: str | bytes) -> Any:
+    """What a line holds; raises ``ValueError`` also for one that is too long or nested too deeply."""
+    if len(text) > LARGEST_RECORD:
+        raise ValueError("too long")
+    try:
+        return json.loads(text)
+    except RecursionError:
+        raise ValueError("nested too deeply") from None
 
 
 def record(text: str, file: str | None = None) -> Record:
     """The record of a line, each of its fields of the kind that all others rely on; raises ``BadRequest``, which names
     the file, where it is none."""
     try:
-        found = json.loads(text)
+        found = _loads(text)
         wrong = _wrong_field(found) if isinstance(found, dict) else "an object of JSON with a word"
-    except (ValueError, RecursionError):
+    except ValueError:
         wrong = "an object of JSON with a word"
     if wrong:
         raise BadRequest("not a record of the catalog" if file is None else f"{file}: not a record of the catalog",
@@ -151,13 +162,12 @@ def decode_lines(content: bytes, file: str) -> list[str]:
     """The lines of a group's file; raises ``BadRequest`` for another version, a file that is damaged, cut off or of
     something else."""
     first, _, rest = content.partition(b"\n")
-    told = _read_count(first, file)
-    if CHECKSUM in told and told[CHECKSUM] != (found := _checksum(rest)) and rest.count(b"\n") >= told["count"]:
-        raise BadRequest(f"{file}: damaged, checksum", found, f"{told[CHECKSUM]}; build it again")
-    lines = rest.decode("ascii", "replace").splitlines()
-    if len(lines) != told["count"] or not content.endswith(b"\n"):
-        raise BadRequest(f"{file}: truncated, records", len(lines), str(told["count"]))
-    return lines
+    told, found = _read_count(first, file), rest.count(b"\n")
+    if CHECKSUM in told and told[CHECKSUM] != (crc := _checksum(rest)) and found >= told["count"]:
+        raise BadRequest(f"{file}: damaged, checksum", crc, f"{told[CHECKSUM]}; build it again")
+    if found != told["count"] or not content.endswith(b"\n"):
+        raise BadRequest(f"{file}: truncated, records", found, str(told["count"]))
+    return rest.decode("ascii", "replace").split("\n")[:-1]
 
 
 def require_version(found: tuple[object, object], file: str) -> None:

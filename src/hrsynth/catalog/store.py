@@ -7,7 +7,6 @@ import errno
 import gzip
 import json
 import sqlite3
-import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from importlib import resources
 from pathlib import Path
@@ -15,8 +14,10 @@ from typing import Any, Protocol, overload
 
 import numpy as np
 
+from ..budgets import LARGEST_UNPACKED, MOST_RECORDS
 from ..description.files import replacement
 from ..errors import BadRequest, BuildStopped
+from ..untrusted import gunzip
 from .columns import Columns, ColumnWriter
 from .fits import ASKED, conditions, may_fit
 from .journal import ENDING, Journal
@@ -33,7 +34,7 @@ READ_AT_ONCE = 100
 PAGE = 16_384
 """Bytes of a page of a SQLite file: columns of some megabytes are read in few."""
 PACKED_ABOVE = 5_000
-"""Records of a group above which its file is compressed."""
+"""Records of a group above which its file is compressed, where it may unpack to so much."""
 PUBLISHED = "published"
 """The shipped catalog of published robots."""
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
@@ -90,10 +91,12 @@ class Folder:
         file = self.file(group)
         with _readable(file):
             content = file.read_bytes()
-        try:
-            return gzip.decompress(content) if file.name.endswith(PACKED) else content
-        except (OSError, EOFError, zlib.error):
-            raise BadRequest(f"{file}: truncated, or not compressed with gzip") from None
+        if not file.name.endswith(PACKED):
+            return content
+        content = gunzip(content, file)
+        if (count := content.count(b"\n")) > MOST_RECORDS:
+            raise BadRequest(f"{file}: lines", count, f"up to {MOST_RECORDS}, or a file that is not compressed")
+        return content
 
     def decides(self, asked: Mapping[str, Any]) -> bool:
         return all(value is None for value in asked.values())
@@ -107,9 +110,11 @@ class Folder:
     def write(self, group: str, lines: Iterable[str]) -> None:
         lines = list(lines)
         plain, packed = (self.path / f"{group}{ending}" for ending in (LINES, PACKED))
-        large = len(lines) > PACKED_ABOVE
-        file, other = (packed, plain) if large else (plain, packed)
+        large = PACKED_ABOVE < len(lines) < MOST_RECORDS
         content = encode_lines(group, lines, checksum=not large)
+        if large and len(content) > LARGEST_UNPACKED:
+            large, content = False, encode_lines(group, lines)
+        file, other = (packed, plain) if large else (plain, packed)
         with writable(file), replacement(file, sync=True) as draft:
             draft.write_bytes(gzip.compress(content, mtime=0) if large else content)
         other.unlink(missing_ok=True)

@@ -17,7 +17,7 @@ from ..errors import BadRequest, CertificateRefused, PoseNotReached
 from ..mechanism import Mechanism
 from ..tolerances import SAME_RELATION
 from . import modes, paths, ranks, verify_certificate, verify_path, verify_ranks
-from .verify_certificate import NotAccepted, once
+from .verify_certificate import NotAccepted, once, rational
 from .verify_path import PathNotAccepted
 from .verify_ranks import RanksNotAccepted
 
@@ -94,6 +94,9 @@ def _same(one: Any, other: Any) -> bool:
     if isinstance(one, list) and isinstance(other, list):
         return len(one) == len(other) and all(map(_same, one, other))
     try:
-        return one == other or abs(Fraction(one) - Fraction(other)) < SAME_RELATION
-    except (TypeError, ValueError, ArithmeticError):
+        if one == other:
+            return True
+        x, y = (rational(each) if isinstance(each, str) else Fraction(each) for each in (one, other))
+        return abs(x - y) < SAME_RELATION
+    except (TypeError, ValueError, ArithmeticError, NotAccepted):
         return False

@@ -50,6 +50,10 @@ def main(arguments: list[str] | None = None) -> None:
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(encoding="utf-8", errors="replace")
+    if not os.path.isfile(__file__):
+        say(f"hrsynth: it runs from a folder, not from an archive, found {os.path.dirname(os.path.dirname(__file__))}, "
+            "allowed: a package that pip installs", err=True)
+        sys.exit(2)
     sys.exit(execute(arguments))
 
 

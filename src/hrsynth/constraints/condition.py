@@ -283,7 +283,7 @@ def _name_condition(pattern: ConstraintPattern, words: str, expression: Any, sig
     """A condition with the meaning of its symbols and the factors that were split off."""
     import sympy
 
-    expression = sympy.sympify(expression)
+    expression = sympy.sympify(expression, strict=True)  # texts are no formulas
     used = {str(symbol) for each in (expression, *(part for part, _ in parts)) for symbol in each.free_symbols}
     used |= {leg.eye.symbol for leg in pattern.legs if leg.eye is not None}
     named = {f.symbol: f.meaning for f in pattern.features if f.symbol in used or matrices}

@@ -14,11 +14,13 @@ joint of that name joins the link. Points and axes are compared at the zero conf
 from __future__ import annotations
 
 import re
+from collections.abc import Container
 from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
+from ..errors import BadRequest
 from ..mechanism.model import Joint, JointType, Link, Mechanism, Motor
 from ..tolerances import SAME_DIRECTION, SAME_POINT
 
@@ -42,6 +44,13 @@ def part(name: str, number: int) -> str:
 def part_names(name: str, count: int) -> list[str]:
     """The names of the joints that a joint (or its motors) is written as: its own where it is one."""
     return [name] if count <= 1 else [part(name, number + 1) for number in range(count)]
+
+
+def require_free(name: str, joint: Joint, *taken: Container[str]) -> None:
+    """Raise ``BadRequest`` where what a joint is written as would take the name of another part."""
+    if any(name in each for each in taken):
+        raise BadRequest(f"a part of joint {joint.name!r}, as it is written, would take the name of another", name,
+                         "another name of that one")
 
 
 def merge(mechanism: Mechanism) -> Mechanism:

@@ -158,6 +158,15 @@ class JointGraph:
         """``name``, or ``name_2``, ``name_3`` … if it is taken."""
         return fresh_name(name, self.links.keys() | self.joints.keys())
 
+    @property
+    def named(self) -> tuple[set[str | None], set[str]]:
+        """The links and the joints that the file names for more than where they hang."""
+        links = {self.base, self.platform, self.camera, *(each.link for each in self.cameras)}
+        links |= {name for each in self.observations for name in (each.link, each.seen_from)}
+        joints = {name for gear in self.gears for name in (gear.driver, gear.driven)}
+        seen = {each.link for each in self.sights}
+        return links | seen, joints | (seen - self.links.keys())
+
     def close(self, name: str, kind: JointType, ends: tuple[FrameSpec, FrameSpec], axes: Sequence[Array] = (Z,),
               line: int | None = None, motor: Motor | None = None) -> None:
         """Add a joint that closes a loop; of ``axes`` it takes as many as its type has."""

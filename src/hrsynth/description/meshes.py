@@ -7,67 +7,95 @@ file is ``FILE#PRIM``.
 from __future__ import annotations
 
 import io
+import json
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..budgets import LARGEST_FILE, LARGEST_MESHES, MOST_MESHES
+from ..budgets import LARGEST_FILE, LARGEST_MESHES, MESH_SECONDS, MOST_MESHES
 from ..errors import BadRequest, HrsynthError
 from ..geometry.vectors import Array
 from ..mechanism.model import Mechanism, Note
+from ..untrusted import output
 from . import xml
 from .jointgraph import comma_list
 
 KNOWN = (".stl", ".obj", ".dae", ".ply", ".off", ".msh", ".glb", ".gltf", ".3mf", ".wrl", ".usd", ".usda", ".usdc")
-"""What meshes are called: no other file is ever copied."""
+"""What meshes are called: no other file is read or copied."""
+MANIFESTS = ("package.xml", "model.config")
+"""Files that a package of ROS or a model of Gazebo has."""
+PROCESS = Path(__file__).with_name("mesh_process.py")
 
 
 def locate_mesh(name: str, folder: Path) -> Path | None:
     """The file that a mesh's address names: beside the robot file, or of a package in a folder above it; None where
-    there is none on this machine."""
+    there is none on this machine, or it lies outside of the robot's folders, links followed."""
+    return next((path for path in _candidates(name, folder) if _belongs(path.resolve(), folder.resolve())), None)
+
+
+def _belongs(path: Path, folder: Path) -> bool:
+    """Whether a file lies in the folders of a robot: its package, which is the nearest folder with a manifest, and
+    packages beside that; without one the folder above that of the robot's file, or only that where the one above is a
+    user's home or holds everything."""
+    package = next((each for each in (folder, *folder.parents) if _is_package(each)), None)
+    if package is None:
+        home = Path.home().resolve()
+        wide = folder.parent in (Path(folder.anchor), home, home.parent)
+        return path.is_relative_to(folder if wide else folder.parent)
+    if path.is_relative_to(package) or not path.is_relative_to(package.parent):
+        return path.is_relative_to(package)
+    return _is_package(package.parent / path.relative_to(package.parent).parts[0])
+
+
+def _is_package(folder: Path) -> bool:
+    return any((folder / name).is_file() for name in MANIFESTS)
+
+
+def _candidates(name: str, folder: Path) -> Iterator[Path]:
+    """The files that an address may mean."""
     scheme, _, rest = name.partition("://")
     try:
-        if not rest:
-            return folder / name if (folder / name).is_file() else None
-        if scheme == "file":
-            return Path(rest) if Path(rest).is_file() else None
+        paths = [folder / name] if not rest else [Path(rest)] if scheme == "file" else []
         if scheme in ("package", "model") and (rest := rest.lstrip("/")):
-            for parent in (folder, *folder.resolve().parents):
-                for path in (parent / rest, parent / Path(*Path(rest).parts[1:])):
-                    if path.is_file():
-                        return path
+            paths = [path for parent in (folder, *folder.resolve().parents)
+                     for path in (parent / rest, parent / Path(*Path(rest).parts[1:]))]
+        yield from (path for path in paths if path.is_file())
     except (OSError, ValueError):
-        return None
-    return None
+        return
 
 
-def triangles(name: str, robot: str | None, within: Path | None = None) -> tuple[Array, Any] | None:
-    """The points (n, 3) and triangles (m, 3) of a mesh that the file of a robot names; None where it cannot be read.
-    With ``within`` only files of that folder are read, also those that lie flat in it."""
+def triangles(names: Iterable[str], robot: str | None, within: Path | None = None
+              ) -> dict[str, tuple[Array, Any] | None]:
+    """The points (n, 3) and triangles (m, 3) of meshes that the file of a robot names; None for those that cannot be
+    read. With ``within`` only files of that folder are read, also those that lie flat in it. Raises ``BadRequest`` for
+    what unpacks to too much."""
     folder = Path(robot).parent if robot else Path()
-    path = locate_mesh(name, folder)
-    if within is not None:
-        path = _within_folder(path or within / Path(name).name, within)
-    import trimesh
-
+    found: dict[str, tuple[Array, Any] | None] = dict.fromkeys(names)
+    files: dict[str, tuple[str, str | None]] = {}
+    for name in found:
+        path = locate_mesh(name, folder)
+        if within is not None:
+            path = _within_folder(path or within / Path(name).name, within)
+        if path is not None and path.suffix.lower() in KNOWN:
+            files[name] = str(path.resolve()), None
+        elif path is None and (inner := _inner(name, folder, within)) is not None:
+            files[name] = f"{name}.obj", inner.decode()
+    if not files:
+        return found
     try:
-        if path is None:
-            inner = _inner(name, folder, within)
-            if inner is None:
-                return None
-            solid: Any = trimesh.load(io.BytesIO(inner), file_type="obj", force="mesh", process=False)
-        elif path.stat().st_size > LARGEST_FILE:
-            return None
-        else:
-            solid = trimesh.load(path, force="mesh", process=False)
-        points, faces = np.array(solid.vertices, dtype=float), np.array(solid.faces)
-    except Exception:  # readers of many formats, each with errors of its own
-        return None
-    return (points, faces) if len(faces) and np.all(np.isfinite(points)) else None
+        told = io.BytesIO(output(PROCESS, str(LARGEST_FILE), seconds=MESH_SECONDS, given=json.dumps([*files.values()])))
+    except BadRequest as error:
+        raise BadRequest(f"the robot's meshes: {error}") from None
+    for name in files:
+        if (counts := json.loads(told.readline())) is not None:
+            points, faces = (np.frombuffer(told.read(24 * count), kind).reshape(-1, 3)
+                             for count, kind in zip(counts, (float, np.int64), strict=True))
+            found[name] = points, faces
+    return found
 
 
 def _within_folder(path: Path, within: Path) -> Path | None:
@@ -104,14 +132,14 @@ def carry_meshes(robot: Mechanism, target: Path, endings: tuple[str, ...] | None
     source = source if source.is_dir() else source.parent
     moved: dict[str, str | None] = {}
     files: dict[Path, Callable[[], bytes]] = {}
-    missing, foreign, inside, strange = [], [], [], []
+    missing, outside, foreign, inside, strange = (list[str]() for _ in range(5))
 
     def place(name: str) -> str | None:
         """What the mesh is called in the new file; None where it has to be left out."""
         path, (file, sign, prim) = locate_mesh(name, source), name.partition("#")
         inner = locate_mesh(file, source) if path is None and sign else None
         if path is None and inner is None:
-            missing.append(name)
+            (outside if any(_candidates(name, source)) else missing).append(name)
             return name if endings is None else None
         ending = ".obj" if path is None else path.suffix.lower()
         if endings is not None and (ending not in endings or (inner is not None and not copy) or _is_text(path)):
@@ -154,6 +182,7 @@ def carry_meshes(robot: Mechanism, target: Path, endings: tuple[str, ...] | None
         raise BadRequest(f"{robot.name}: files of meshes", len(files), f"up to {MOST_MESHES}")
     notes = []
     for names, what in ((missing, "missing meshes" + (" are not written" if endings else "")),
+                        (outside, "meshes outside of the robot's folders are left alone"),
                         (foreign, f"meshes are not written, as only binary files {', '.join(endings or ())} can be"),
                         (strange, "files whose names are not those of meshes are not copied"),
                         (inside, "meshes lie in the USD file (--meshes copy makes files of them)")):

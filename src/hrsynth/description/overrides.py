@@ -67,6 +67,13 @@ class Overrides:
         return bool(self.close or self.freeze) or any(
             each is not None for each in (self.platform, self.motors, self.unit, self.keyframe))
 
+    @property
+    def named(self) -> tuple[set[str | None], set[str]]:
+        """The links and the joints that are named."""
+        ends = [match[end].partition("@")[0] for each in self.close if (match := _CLOSURE.fullmatch(each))
+                for end in ("one", "two")]
+        return {self.base, self.platform, *(self.observe or ()), *ends}, {*(self.motors or ()), *self.freeze}
+
     def apply(self, graph: JointGraph) -> None:
         """Unit, closures, frozen joints and motors, in the graph of a file."""
         if self.unit is not None:

@@ -29,8 +29,7 @@ def reduce(mechanism: Mechanism, tree: Collection[JointType], loops: Collection[
     links, joints = dict(given.links), {}
 
     def link(name: str, joint: Joint) -> str:
-        if name in links or name in given.joints:
-            raise BadRequest(f"an intermediate link of joint {joint.name!r} would take the name of another part", name)
+        chains.require_free(name, joint, links, given.joints)
         links[name] = Link(name, pose(joint.point))
         return name
 
@@ -42,6 +41,7 @@ def reduce(mechanism: Mechanism, tree: Collection[JointType], loops: Collection[
         before = joint.predecessor
         for number, (kind, direction) in enumerate(parts, 1):
             name = chains.part(joint.name, number)
+            chains.require_free(name, joint, given.joints)
             after = joint.successor if number == len(parts) else link(name + body, joint)
             motor = None if joint.motor is None else Motor(chains.part(joint.motor.name, number))
             joints[name] = Joint(name, kind, before, after, joint.point, (direction,), motor, joint.limits)
@@ -58,6 +58,7 @@ def reduce(mechanism: Mechanism, tree: Collection[JointType], loops: Collection[
             continue
         name = link(joint.name + CUT, joint)
         put(replace(joint, successor=name, in_tree=True))
+        chains.require_free(joint.name + WELD, joint, given.joints)
         weld = Joint(joint.name + WELD, JointType.FIXED, name, joint.successor, joint.point, in_tree=False)
         joints[weld.name] = weld
     return replace(given, links=links, joints=joints), ()

@@ -37,7 +37,7 @@ def build(graph: JointGraph, overrides: Overrides) -> Mechanism:
     LoopsNotClosed, RankUndecided
         Where loops stay open, or where rounded numbers leave no gap between what is free and what is not.
     """
-    closures.join_halves(graph)
+    closures.join_halves(graph, overrides.named)
     overrides.apply(graph)
     closures.merge_points(graph)
     base = guess.standing(graph, graph.base or guess.base(graph), overrides.base, overrides.platform)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Callable, Set
 from dataclasses import replace
 from itertools import pairwise
 
@@ -130,55 +131,79 @@ def _flat(joint: Joint, normal: Array, within: float) -> bool:
     return joint.type is JointType.FIXED
 
 
-def join_halves(graph: JointGraph) -> None:
+def join_halves(graph: JointGraph, given: tuple[Set[str | None], Set[str]] = (frozenset(), frozenset())) -> None:
     """What our writers cut is whole again: frames of closures go, and the joint before a rigid closure closes the loop
-    itself."""
-    for name in [link for link in graph.links if link.endswith((CUT, END))]:
+    itself. What only has such names, as any file may, stays as it is: what is joined means the same either way, and is
+    neither named by something else in the file nor among the links and joints that are ``given``."""
+    links, joints = graph.named[0] | given[0], graph.named[1] | given[1]
+
+    def bare(name: str) -> bool:
+        return not graph.links[name].xml and name not in links
+
+    for name in [link for link in graph.links if link.endswith((CUT, END)) and bare(link)]:
         own = [joint for joint in graph.joints.values() if name in joint.links]
         if len(own) == 2 and sum(not joint.in_tree for joint in own) == 1:
             carrier, closure = sorted(own, key=lambda joint: not joint.in_tree)
-            if carrier.type is JointType.FIXED and carrier.links[1] == name:
+            if carrier.type is JointType.FIXED and carrier.links[1] == name and carrier.name not in joints:
                 del graph.joints[carrier.name], graph.links[name]
                 here = closure.links.index(name)
                 X = carrier.ends[0].X @ inverse(carrier.ends[1].X) @ closure.ends[here].X
                 graph.joints[closure.name] = _with_end(closure, here, carrier.links[0], X, closure.line)
-    for name in [link for link in graph.links if link.endswith(CUT)]:
-        _join(graph, name)
+    for name in [link for link in graph.links if link.endswith(CUT) and bare(link)]:
+        _join(graph, name, bare, joints)
 
 
-def _join(graph: JointGraph, name: str) -> None:
+def _join(graph: JointGraph, name: str, bare: Callable[[str], bool], busy: Set[str]) -> None:
     """Let the joint that carries a cut half take the place of the rigid closure."""
     own = [joint for joint in graph.joints.values() if name in joint.links]
-    welds = [joint for joint in own if joint.type is JointType.FIXED and not joint.in_tree]
     stem = name.removesuffix(CUT)
-    chain = [graph.joints[key] for key in (stem, *(part(stem, k) for k in (1, 2, 3))) if key in graph.joints]
-    chain = [joint for joint in chain if joint not in welds]
-    if len(own) != 2 or len(welds) != 1 or not chain or chain[-1].links[1] != name:
+    counted = [part(stem, k) for k in (1, 2, 3)]
+    carriers, welds = ([joint for joint in own if joint.in_tree is in_tree] for in_tree in (True, False))
+    if len(carriers) != 1 or len(welds) != 1 or welds[0].type is not JointType.FIXED or carriers[0].links[1] != name:
         return
-    whole = _whole(stem, chain)
+    (last,), (weld,) = carriers, welds
+    names = [stem] if last.name == stem else counted[: counted.index(last.name) + 1] if last.name in counted[1:] else []
+    chain = [graph.joints[each] for each in names if each in graph.joints]
+    between = [joint.links[1] for joint in chain[:-1]]
+    taken = stem in graph.joints and graph.joints[stem] not in (last, weld)
+    if not chain or len(chain) < len(names) or taken or not busy.isdisjoint((*names, weld.name)) or not all(
+            bare(link) and sum(link in joint.links for joint in graph.joints.values()) == 2 for link in between):
+        return
+    whole = _whole(stem, chain, ROUNDED * graph.digits.last_place)
     if whole is None:
         return
-    weld = welds[0]
     here = weld.links.index(name)
-    X = weld.ends[1 - here].X @ inverse(weld.ends[here].X) @ chain[-1].ends[1].X
+    X = weld.ends[1 - here].X @ inverse(weld.ends[here].X) @ last.ends[1].X
     for joint in (*chain, weld):
         del graph.joints[joint.name]
-    for link in (name, *(joint.links[1] for joint in chain[:-1])):
+    for link in (name, *between):
         del graph.links[link]
     graph.joints[stem] = replace(_with_end(whole, 1, weld.links[1 - here], X, weld.line), in_tree=False)
 
 
-def _whole(name: str, chain: list[JointSpec]) -> JointSpec | None:
-    """The joint that a chain of joints at one place is."""
-    if len(chain) == 1:
-        return chain[0]
+def _whole(name: str, chain: list[JointSpec], noise: float) -> JointSpec | None:
+    """The joint that a chain of joints at one place is, to the file's decimals; None where it is none by its links,
+    geometry, motors or limits."""
+    first, *others = chain
+    if not others:
+        return first
     kind = WHOLES.get("".join(str(joint.type) for joint in chain))
-    if kind is None or any(a.links[1] != b.links[0] for a, b in pairwise(chain)):
+    if kind is None or any(a.links[1] != b.links[0] for a, b in pairwise(chain)) or any(
+            joint.limits != first.limits or (joint.motor is None) != (first.motor is None) or joint.xml
+            for joint in others):
         return None
-    axes = tuple(joint.axes[0] for joint in chain)
-    axes = axes if kind is JointType.UNIVERSAL else axes[-1:] if kind.axes else ()
-    motor = chain[0].motor and Motor(chain[0].motor.name.removesuffix("__1"))
-    return replace(chain[0], name=name, type=kind, axes=axes, motor=motor)
+    frames = [np.eye(4)]
+    for a, b in pairwise(chain):
+        frames.append(frames[-1] @ inverse(a.ends[1].X) @ b.ends[0].X)
+    axes = [unit(X[:3, :3] @ joint.axes[0]) for X, joint in zip(frames, chain, strict=True)]
+    wanted = np.ones((2, 2)) if kind is JointType.CYLINDRICAL else np.eye(len(chain))
+    points = np.array([X[:3, 3] for X in frames])
+    if np.max(np.abs(points)) > NOISE + noise or np.max(np.abs(np.array(axes) @ np.array(axes).T - wanted)) > (
+            NOISE + noise):
+        return None
+    kept = first.axes[:1] + chain[-1].axes[:1] if kind is JointType.UNIVERSAL else tuple(axes[-1:]) * kind.axes
+    motor = first.motor and Motor(first.motor.name.removesuffix("__1"))
+    return replace(first, name=name, type=kind, axes=kept, motor=motor)
 
 
 def _with_end(joint: JointSpec, place: int, link: str, X: Array, line: int | None) -> JointSpec:

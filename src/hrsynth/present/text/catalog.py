@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from ...errors import BadRequest
 from .tables import listing, table
 
 HEADS = ("word", "robot", "dof", "motion", "hidden robot", "verdict", "rank", "legs needed, or why refused")
@@ -32,6 +33,13 @@ def entry(record: Record, drawn: str, note: str = "") -> str:
     return "\n\n".join([head, *legs, listing(_all(record)), *filter(None, [note])])
 
 
+LISTED: Mapping[str, type] = {**dict.fromkeys(("notation", "motion", "verdict"), str),
+                              **dict.fromkeys(("dof", "rank", "fewest"), int)}
+"""What every record that was not refused says in a list, and of which type."""
+TOLD: Mapping[str, type] = {**LISTED, "exact": bool, **dict.fromkeys(("mobility", "idle", "instances"), int)}
+"""The same of one that is shown in full."""
+
+
 def describe_built(groups: Iterable[Mapping[str, Any]]) -> str:
     """A line a group that was built."""
     rows = [(*(str(each[name]) for name in ("group", "words", "now", "before")), each["file"] or "not complete")
@@ -45,7 +53,16 @@ def describe_site(done: Mapping[str, Any]) -> str:
     return f"{done['architectures']:,} architectures on {pages}: {done['index']}"
 
 
+def require_whole(record: Record, needed: Mapping[str, type]) -> None:
+    """Raise ``BadRequest`` for a record of a file that does not say all that is shown, as a build does."""
+    wrong = [name for name, kind in needed.items() if not isinstance(record.get(name), kind)]
+    if wrong and "refused" not in record:
+        raise BadRequest(f"the catalog's record of {record['word'][:60]!r} is not whole", ", ".join(wrong),
+                         "records as hrsynth catalog build writes them")
+
+
 def _row(record: Record) -> tuple[str, ...]:
+    require_whole(record, LISTED)
     if "refused" in record:
         return (record["word"], record.get("notation", ""), "", "", "", "refused", "", str(record["refused"]))
     return (record["word"], record["notation"], str(record["dof"]), record["motion"], record.get("hidden", "none"),
@@ -53,13 +70,14 @@ def _row(record: Record) -> tuple[str, ...]:
 
 
 def _all(record: Record) -> list[tuple[str, str]]:
-    found = [("group", str(record["group"])), *facts(record)]
+    found = [("group", str(record.get("group", ""))), *facts(record)]
     found += [("motors", motors(record))] if "motors" in record else []
     return [*found, ("choices", "  ".join(map(choice, record["choices"])))] if "choices" in record else found
 
 
 def facts(record: Record) -> Iterable[tuple[str, str]]:
     """What is known whatever is driven, by name; what is not known is left out."""
+    require_whole(record, TOLD)
     if "refused" in record:
         yield "refused", str(record["refused"])
         return

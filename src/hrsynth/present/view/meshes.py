@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,9 @@ def meshes(setting: ObservedRobot, within: Path | None = None) -> tuple[tuple[Sh
     ``within`` no files are read that do not lie in that folder."""
     robot, mechanism = setting.robot, setting.mechanism
     found, missing, between, count = [], [], [], 0
+    shown = [solid for name, link in robot.links.items() if setting.normal.into.get(name) in mechanism.links
+             for solid in content_of(link, robot).solids if solid.role == "visual"]
+    files = triangles([solid.file for solid in shown if solid.file is not None], robot.file, within)
     for name, link in robot.links.items():
         into = setting.normal.into.get(name)
         if into is None or into not in mechanism.links:
@@ -32,7 +36,7 @@ def meshes(setting: ObservedRobot, within: Path | None = None) -> tuple[tuple[Sh
         for solid in content_of(link, robot).solids:
             if solid.role != "visual":
                 continue
-            surface = _surface(solid, robot.file, within)
+            surface = _surface(solid, files)
             if surface is None:
                 missing.append(f"{name}: {solid.file}")
                 continue
@@ -48,13 +52,13 @@ def meshes(setting: ObservedRobot, within: Path | None = None) -> tuple[tuple[Sh
     return tuple(found), tuple(notes)
 
 
-def _surface(solid: Solid, file: str | None, within: Path | None) -> tuple[Array, Any] | None:
+def _surface(solid: Solid, files: Mapping[str, tuple[Array, Any] | None]) -> tuple[Array, Any] | None:
     """The points (n, 3) and triangles (m, 3) of a visual in its own frame (m), None of a mesh that cannot be read."""
+    if solid.file is not None:
+        read = files[solid.file]
+        return None if read is None else (read[0] * np.array(solid.scale), read[1])
     from trimesh import creation
 
-    if solid.file is not None:
-        read = triangles(solid.file, file, within)
-        return None if read is None else (read[0] * np.array(solid.scale), read[1])
     if solid.kind == "box":
         made = creation.box(extents=solid.sizes)
     elif solid.kind == "sphere":

@@ -51,6 +51,8 @@ class _MjcfReader(XmlReader):
         self.defaults = Defaults(self)
         self.contents = BodyContents(self, self.compiler, self.defaults)
         graph = self.result = JointGraph(root.get("model") or "robot", self.file, "MJCF", digits=self.digits)
+        self.bodies = {str(each.get("name")) for each in root.iter("body")}
+        self.named = self.bodies.union(str(each.get("name")) for each in root.iter("joint", "freejoint"))
         graph.links[WORLD] = Link(WORLD)
         graph.base = WORLD
         self.placed[WORLD] = ORIGIN
@@ -92,7 +94,7 @@ class _MjcfReader(XmlReader):
 
     def _body(self, element: xml.Element, parent: str, childclass: str | None, X_PB: Array) -> None:
         graph = self.result
-        name = element.get("name") or graph.fresh("body")
+        name = element.get("name") or self._fresh("body")
         if name in graph.links:
             self.defect(xml.line(element), "second body of the same name", name)
             return
@@ -100,7 +102,7 @@ class _MjcfReader(XmlReader):
         self.placed[name] = self.placed[parent] @ X_PB
         joints = [child for child in xml.children(element) if child.tag in ("joint", "freejoint")]
         if not joints:
-            title = graph.fresh(f"{name}_fixed")
+            title = self._fresh(f"{name}_fixed")
             ends = FrameSpec(parent, X_PB), FrameSpec(name)
             graph.joints[title] = JointSpec(title, JointType.FIXED, ends, line=xml.line(element))
         before, X = parent, X_PB
@@ -113,7 +115,7 @@ class _MjcfReader(XmlReader):
         """One joint of a body: from the link before it to the body, or to a link in between."""
         graph = self.result
         given = self.defaults.of(element, childclass)
-        name = element.get("name") or graph.fresh(f"{body}_joint")
+        name = element.get("name") or self._fresh(f"{body}_joint")
         kind = JointType.FREE if element.tag == "freejoint" else _TYPES.get(given.get("type", "hinge"))
         if kind is None:
             self.defect(xml.line(element), "unknown joint type", given.get("type"), ", ".join(_TYPES))
@@ -123,7 +125,7 @@ class _MjcfReader(XmlReader):
             return before, X
         after = body
         if not last:
-            after = graph.fresh(name)
+            after = fresh_name(name, graph.links.keys() | self.bodies)
             graph.links[after] = Link(after, line=xml.line(element))
             self.placed[after] = self.placed[body]
         centre = self._numbers(element, given, "pos", (0, 0, 0)) if kind is not JointType.FREE else np.zeros(3)
@@ -137,6 +139,10 @@ class _MjcfReader(XmlReader):
         graph.joints[name] = JointSpec(name, kind, ends, axes, self._limits(element, given, name, kind),
                                        line=xml.line(element))
         return after, ORIGIN
+
+    def _fresh(self, name: str) -> str:
+        """A name for what has none, that nothing in the document has."""
+        return fresh_name(name, self.result.links.keys() | self.result.joints.keys() | self.named)
 
     def _numbers(self, element: xml.Element, given: dict[str, str], key: str, default: tuple[float, ...]) -> Array:
         return self.values(given.get(key), default, xml.line(element), f"{key} of <{element.tag}>")

@@ -106,6 +106,8 @@ class _NativeWriter:
         names = joint_names(joint)
         links = [joint.predecessor, *names[:-1], joint.name + chains.TIP if tip else joint.successor]
         elements = []
+        for name in names[1:]:
+            chains.require_free(name, joint, self.mechanism.joints)
         for number, (name, (kind, axis)) in enumerate(zip(names, parts, strict=True)):
             if links[number + 1] != joint.successor:
                 elements.append(self._between(links[number + 1], joint))
@@ -126,8 +128,7 @@ class _NativeWriter:
         return elements
 
     def _between(self, name: str, joint: Joint) -> xml.Element:
-        if name in self.mechanism.links or name in self.mechanism.joints:
-            raise BadRequest(f"an intermediate link of joint {joint.name!r} would take the name of another part", name)
+        chains.require_free(name, joint, self.mechanism.links, self.mechanism.joints)
         return xml.new("link", name=name)
 
     def _loop(self, joint: Joint) -> xml.Element:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ....geometry.vectors import Array, pose, rotation_from_rpy
-from ....mechanism.model import JointType, Link, Motor
+from ....mechanism.model import JointType, Link, Motor, fresh_name
 from ....tolerances import NOISE, WITHOUT_DIRECTION
 from ... import xml
 from ...chains import part
@@ -74,7 +74,9 @@ def add(reader: XmlReader, graph: JointGraph, element: xml.Element, links: tuple
     if kind == "G":
         _add_gear(reader, graph, element, links, name)
     elif kind == "H" or (kind == "U" and abs(float(axes[0] @ axes[1])) > NOISE):
-        link, first, second = graph.fresh(part(name, 1)), part(name, 1), part(name, 2)
+        taken = {prefix + str(each.get("name")) for each in reader.root.iter("joint", "link")} | set(graph.joints)
+        first, second = (fresh_name(part(name, k), taken | set(graph.links)) for k in (1, 2))
+        link = first
         between = FrameSpec(link, ORIGIN, line)
         graph.links[link] = Link(link, line=line)
         graph.joints[first] = JointSpec(first, JointType.REVOLUTE, (one, between), axes[:1], line=line)

@@ -38,7 +38,8 @@ def read(file: RobotFile) -> JointGraph:
     """The joint graph of a USD stage; raises ``BadRobotFile`` with all its defects, ``MissingExtra`` without the
     package of OpenUSD."""
     if file.start.startswith(b"PK"):
-        raise xml.refusal(file.path, "a package of USD files, which is not read", "the .usd file in it (unzip)")
+        raise xml.refusal(file.path, "a zip archive, such as a package of USD files, which is not read",
+                          "the robot file in it (unzip)")
     told = prims(file.path)
     return _StageReader(str(file.path), told).graph()
 

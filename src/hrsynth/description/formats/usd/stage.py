@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import importlib.util
 import json
-import os
-import subprocess
-import sys
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -14,6 +11,7 @@ from typing import Any
 from ....budgets import LARGEST_FILE, MOST_INCLUDES, USD_SECONDS
 from ....errors import BadRequest, MissingExtra
 from ....processes import require_posix
+from ....untrusted import output
 from ... import xml
 
 PROCESS = Path(__file__).with_name("stage_process.py")
@@ -53,14 +51,7 @@ def _require_package(path: Path) -> None:
 
 def _run(path: Path, *arguments: str) -> bytes:
     _require_package(path)
-    command = [sys.executable, "-P", str(PROCESS), str(LARGEST_FILE), str(MOST_INCLUDES), *arguments]
     try:
-        own = {key: value for key, value in os.environ.items() if key != "PXR_AR_DEFAULT_SEARCH_PATH"}
-        run = subprocess.run(command, capture_output=True, timeout=USD_SECONDS, check=False, env=own)
-    except (subprocess.TimeoutExpired, ValueError):
-        raise xml.refusal(path, "OpenUSD did not finish", f"{USD_SECONDS} seconds") from None
-    if run.returncode:
-        lines = [line for line in run.stderr.decode("utf-8", "replace").splitlines() if line.startswith("refused: ")]
-        what = lines[-1].removeprefix("refused: ") if lines else "OpenUSD does not open it"
-        raise xml.refusal(path, what[:400])
-    return run.stdout
+        return output(PROCESS, str(LARGEST_FILE), str(MOST_INCLUDES), *arguments, seconds=USD_SECONDS)
+    except BadRequest as error:
+        raise xml.refusal(path, str(error)) from None

@@ -1,4 +1,4 @@
-"""Run as a program, under limits of time and memory: what a USD stage holds as JSON, one of its meshes, or its binary
+"""Run by :func:`untrusted.output`: what a USD stage holds as JSON, one of its meshes, or its binary
 form. Layers are composed only from the stage's own folder."""
 
 from __future__ import annotations
@@ -6,23 +6,16 @@ from __future__ import annotations
 import json
 import os
 import re
-import resource
 import sys
 from pathlib import Path
 from typing import Any
 
-MEMORY = 2_000_000_000
-SECONDS = 10
+from hrsynth.untrusted import refuse
+
 LISTED = 64
 """Entries of an array beyond which only their number is told."""
 MOST_PRIMS = 50_000
 ENDINGS = (".usd", ".usda", ".usdc")
-
-
-def refuse(what: str) -> None:
-    """End with what is wrong."""
-    print("refused: " + " ".join(what.split()), file=sys.stderr)
-    os._exit(2)
 
 
 def require_inside(start: Path, largest: int, most: int) -> list[str]:
@@ -145,8 +138,6 @@ def obj(stage: Any, path: str) -> str:
 
 def main(largest: str, most: str, task: str, name: str, *rest: str) -> None:
     """One task on one file."""
-    for limit, amount in ((resource.RLIMIT_AS, MEMORY), (resource.RLIMIT_CPU, SECONDS)):
-        resource.setrlimit(limit, (amount, amount))
     try:
         from pxr import Tf, Usd
     except ImportError as error:
@@ -160,14 +151,9 @@ def main(largest: str, most: str, task: str, name: str, *rest: str) -> None:
             found = json.dumps({**told(stage), "missing": missing}) if task == "prims" else obj(stage, rest[0])
             sys.stdout.write(found)
         sys.stdout.flush()
-    except (Tf.ErrorException, RuntimeError, OSError, MemoryError, RecursionError) as error:
+    except (Tf.ErrorException, RuntimeError, OSError) as error:
         text = " ".join(str(error).split())
         what = text.partition(" : ")[2] or text or type(error).__name__
         place = re.search(r"([^'/]*):(\d+):\d+: ", what)
         refuse(f"OpenUSD cannot read {place[1]} from line {place[2]} on, allowed: a whole stage" if place else
                f"OpenUSD refuses it: {what[:300]}, allowed: a whole stage")
-    os._exit(0)
-
-
-if __name__ == "__main__":
-    main(*sys.argv[1:])

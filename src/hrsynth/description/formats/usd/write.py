@@ -56,8 +56,11 @@ class _UsdWriter:
         body += [f"custom string {PREFIX}:name = {_text(robot.name)}",
                  f"custom string[] {PREFIX}:says = [{', '.join(map(_text, says))}]"]
         unread: list[str] = []
+        contents = {name: content_of(link, robot) for name, link in robot.links.items()}
+        self.meshes = triangles([solid.file for content in contents.values() for solid in content.solids
+                                 if solid.file is not None], robot.file)
         for name, link in robot.links.items():
-            body += self._body(name, link.pose, content_of(link, robot), unread)
+            body += self._body(name, link.pose, contents[name], unread)
         order = [*outward(robot), *(joint for joint in robot.joints.values() if not joint.in_tree)]
         weld = [f"rel physics:body1 = </{self.root}/{self.names[robot.base]}>"]
         joints = _prim("PhysicsFixedJoint", "to_world", weld)
@@ -111,7 +114,7 @@ class _UsdWriter:
         apis = ["PhysicsCollisionAPI"] if solid.role == "collision" else []
         kind, scale = {"box": "Cube"}.get(solid.kind, solid.kind.capitalize()), (1.0, 1.0, 1.0)
         if solid.file is not None:
-            found = triangles(solid.file, self.robot.file)
+            found = self.meshes[solid.file]
             lines += [f"custom string {PREFIX}:mesh = {_text(solid.file)}",
                       f"custom double3 {PREFIX}:scale = {_tuple(solid.scale)}"]
             if found is None:

@@ -1,0 +1,413 @@
+"""Files of strangers, by all doors: nothing in them runs, nothing elsewhere is read, what they unpack to is limited."""
+
+from __future__ import annotations
+
+import ast
+import gzip
+import io
+import json
+import os
+import pickle
+import re
+import struct
+import subprocess
+import sys
+import time
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hrsynth import untrusted
+from hrsynth.budgets import LARGEST_UNPACKED, MOST_UNPACKED
+from hrsynth.catalog.jsonl import head
+from hrsynth.certificates import verify
+from hrsynth.cli import execute
+from hrsynth.description import save
+from hrsynth.description.meshes import locate_mesh, triangles
+from hrsynth.errors import BadRequest, HrsynthError
+
+ROOT = Path(__file__).resolve().parent.parent
+LINKS = '<link name="base"/><link name="crank">{}</link><link name="bar"/><link name="rocker"/>'
+JOINT = ('<joint name="{}" type="continuous"><parent link="{}"/><child link="{}"/><origin xyz="{}"/><axis xyz="0 1 0"/>'
+         "</joint>")
+LOOP = ('<loop name="d" type="revolute"><predecessor link="rocker"><origin xyz="0 0 1"/></predecessor>'
+        '<successor link="bar"><origin xyz="2 0 0"/></successor><axis xyz="0 1 0"/></loop>'
+        '<transmission name="m"><joint name="a"/></transmission><hrsynth><platform link="bar"/></hrsynth>')
+SECONDS, BYTES = 60, 2_000_000_000
+
+
+def robot(mesh: str) -> str:
+    visual = f'<visual><geometry><mesh filename="{mesh}"/></geometry></visual>'
+    joints = "".join(JOINT.format(*each) for each in (
+        ("a", "base", "crank", "0 0 0"), ("b", "crank", "bar", "0 0 1"), ("c", "base", "rocker", "2 0 0")))
+    return f'<robot name="r">{LINKS.format(visual)}{joints}{LOOP}</robot>'
+
+
+class Touch:
+    """Makes a file where it is unpickled."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def __reduce__(self) -> object:
+        return open, (str(self.path), "w")
+
+
+# What a file unpacks to
+
+def test_gzip_is_inflated_up_to_the_limit(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(untrusted, "LARGEST_UNPACKED", 1000)
+    one = gzip.compress(b"x" * 600)
+    assert untrusted.gunzip(gzip.compress(b"x" * 1000), "f") == b"x" * 1000
+    assert untrusted.gunzip(one + b"\0" * 8, "f") == b"x" * 600
+    for bomb in (gzip.compress(b"x" * 1001), one + one, gzip.compress(b"x" * 10**7)):
+        with pytest.raises(BadRequest, match="unpacks to, found 'more than 1000 bytes'"):
+            untrusted.gunzip(bomb, "f")
+    for bad in (one[:-9], b"\x1f\x8bno", one + b"rest", gzip.compress(one)[:5]):
+        with pytest.raises(BadRequest, match="truncated, or not compressed"):
+            untrusted.gunzip(bad, "f")
+
+
+def archive(*names: str, size: int | None = None) -> bytes:
+    """A zip archive; with ``size`` its list of files says that each has so many bytes."""
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w") as file:
+        for name in names:
+            file.writestr(name, b"x")
+    data = bytearray(out.getvalue())
+    at = data.find(b"PK\x01\x02")
+    while size is not None and at >= 0:
+        data[at + 24 : at + 28] = struct.pack("<I", size)
+        at = data.find(b"PK\x01\x02", at + 1)
+    return bytes(data)
+
+
+@pytest.mark.parametrize(("content", "said"), [
+    (archive("a", size=LARGEST_UNPACKED + 1), "unpacks to"),
+    (archive("a", "b", size=LARGEST_UNPACKED // 2 + 1), "unpacks to"),
+    (archive(*map(str, range(MOST_UNPACKED + 1))), "files"), (archive("3D/../../a"), "lead out"),
+    (archive("/a"), "lead out"),
+    (archive("..\\a"), "lead out"), (archive("a")[:-5], "cannot be read"), (archive("a", "b", size=9), None),
+    (b"solid", None)])
+def test_archives_are_judged_by_their_lists(content: bytes, said: str | None):
+    found = untrusted.packing_defect(content)
+    assert (found is None) is (said is None)
+    assert said is None or said in str(found)
+
+
+def bomb_3mf(path: Path, vertices: int) -> None:
+    """Equal vertices, and one triangle."""
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as file, file.open(
+            "3D/3dmodel.model", "w", force_zip64=True) as model:
+        space = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
+        model.write(f'<model unit="meter" xmlns="{space}"><resources><object id="1" type="model"><mesh><vertices>'
+                    .encode())
+        for _ in range(vertices // 10_000):
+            model.write(b'<vertex x="0" y="0" z="0"/>' * 10_000)
+        model.write(b'</vertices><triangles><triangle v1="0" v2="1" v3="2"/></triangles></mesh></object></resources>'
+                    b'<build><item objectid="1"/></build></model>')
+
+
+def bomb_glb(path: Path) -> None:
+    """A mesh of 60,000 points, which 20,000 nodes hold."""
+    points = struct.pack("<9f", 0, 0, 0, 1, 0, 0, 0, 1, 0) * 20_000
+    text = json.dumps({
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": list(range(20_000))}],
+        "nodes": [{"mesh": 0}] * 20_000, "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 60_000, "type": "VEC3"}],
+        "bufferViews": [{"buffer": 0, "byteLength": len(points)}], "buffers": [{"byteLength": len(points)}]}).encode()
+    text += b" " * (-len(text) % 4)
+    path.write_bytes(struct.pack("<4sII", b"glTF", 2, 28 + len(text) + len(points))
+                     + struct.pack("<I4s", len(text), b"JSON") + text
+                     + struct.pack("<I4s", len(points), b"BIN\0") + points)
+
+
+def bomb_catalog(folder: Path, line: bytes, count: int) -> None:
+    folder.mkdir()
+    with gzip.open(folder / "planar.jsonl.gz", "wb", compresslevel=9) as file:
+        file.write(head("planar", count).encode() + b"\n")
+        for _ in range(count // 100_000):
+            file.write(line * 100_000)
+
+
+def run(*arguments: str) -> tuple[int, str, int]:
+    """Exit status and standard error of a command, and the largest memory (bytes) of it and the processes it starts."""
+    code = ("import subprocess, sys, resource\nrun = subprocess.run([sys.executable, '-m', 'hrsynth', *sys.argv[1:]], "
+            "capture_output=True, text=True)\nprint(run.returncode, resource.getrusage(resource.RUSAGE_CHILDREN)"
+            ".ru_maxrss, run.stderr, sep='\\n')")
+    told = subprocess.run([sys.executable, "-c", code, *arguments], capture_output=True, text=True, check=True,
+                          timeout=3 * SECONDS).stdout
+    status, memory, errors = told.split("\n", 2)
+    return int(status), errors.strip(), int(memory) * 1024
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["bomb.3mf", "large.3mf", "bomb.glb"])
+@pytest.mark.parametrize("command", ["convert ROBOT out.usda", "view ROBOT --static out.html"])
+def test_a_mesh_unpacks_to_no_more_than_is_allowed(name: str, command: str, tmp_path: Path):
+    if name.endswith(".3mf"):
+        bomb_3mf(tmp_path / name, 20_000_000 if name == "bomb.3mf" else 7_000_000)
+    else:
+        bomb_glb(tmp_path / name)
+    (tmp_path / "robot.urdf").write_text(robot(name))
+    words = [str(tmp_path / {"ROBOT": "robot.urdf"}.get(word, word)) if "." in word or word == "ROBOT" else word
+             for word in command.split()]
+    start = os.times()
+    status, errors, memory = run(*words)
+    end = os.times()
+    errors = "\n".join(line for line in errors.splitlines() if "working" not in line and ", step " not in line)
+    assert (status, len(errors.splitlines())) == (2, 1), errors
+    assert name in errors
+    assert memory < BYTES
+    assert end.children_user + end.children_system - start.children_user - start.children_system < SECONDS
+    assert not list(tmp_path.glob("out.*"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("line", "count"), [(b"\n", 10**9), (b'{"word":"a","group":"planar"}\n', 5 * 10**6)])
+@pytest.mark.parametrize("command", [["list"], ["show", "a"]])
+def test_a_catalog_unpacks_to_no_more_than_is_allowed(line: bytes, count: int, command: list[str], tmp_path: Path):
+    bomb_catalog(tmp_path / "catalog", line, count)
+    assert (tmp_path / "catalog" / "planar.jsonl.gz").stat().st_size < 3_000_000
+    status, errors, memory = run("catalog", *command, "--catalog", str(tmp_path / "catalog"))
+    assert (status, len(errors.splitlines())) == (2, 1), errors
+    assert "up to" in errors
+    assert memory < BYTES
+
+
+def test_a_program_that_reads_has_limits(tmp_path: Path):
+    program = tmp_path / "program.py"
+    for body, said in (("bytearray(10**10)", "more memory"),
+                       ("import sys; sys.stdout.write('x' * 10**7)", None),
+                       ("import os; os.abort()", "breaks its reader"),
+                       ("while True: pass", "memory or time|did not finish"),
+                       ("from hrsynth.untrusted import refuse; refuse('a\\nb')", "a b")):
+        program.write_text(f"def main():\n    {body}\n")
+        if said is None:
+            assert untrusted.output(program, seconds=1) == b"x" * 10**7
+            continue
+        with pytest.raises(BadRequest, match=said):
+            untrusted.output(program, seconds=1)
+
+
+@pytest.mark.slow
+def test_it_prints_no_more_than_a_file_may_unpack_to(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(untrusted, "LARGEST_UNPACKED", 10**6)
+    (tmp_path / "program.py").write_text("def main():\n    print('x' * 10**7)\n")
+    with pytest.raises(BadRequest, match="more than 1000000 bytes"):
+        untrusted.output(tmp_path / "program.py", seconds=5)
+
+
+# What is read
+
+def tetrahedron(path: Path) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n")
+    return path
+
+
+@pytest.fixture
+def homes(tmp_path: Path) -> Path:
+    """A robot's file in a package, with meshes in it, beside it, and elsewhere."""
+    for name in ("ws/pkg/meshes/a.obj", "ws/pkg/urdf/b.obj", "ws/other/c.obj", "ws/plain/d.obj", "secret.obj"):
+        tetrahedron(tmp_path / name)
+    for name in ("pkg", "other"):
+        (tmp_path / "ws" / name / "package.xml").write_text("<package/>")
+    (tmp_path / "ws" / "pkg" / "urdf" / "link.obj").symlink_to(tmp_path / "secret.obj")
+    return tmp_path
+
+
+@pytest.mark.parametrize(("address", "found"), [
+    ("b.obj", True), ("../meshes/a.obj", True), ("package://pkg/meshes/a.obj", True), ("package://other/c.obj", True),
+    ("file://{}/ws/pkg/meshes/a.obj", True), ("model://pkg/urdf/b.obj", True), ("../../other/c.obj", True),
+    ("../../../secret.obj", False), ("{}/secret.obj", False), ("file://{}/secret.obj", False), ("link.obj", False),
+    ("package://pkg/../../secret.obj", False), ("package://plain/d.obj", False), ("../../plain/d.obj", False),
+    ("package://secret.obj", False), ("http://127.0.0.1:9/a.obj", False), ("file:///etc/passwd", False),
+    ("a\0b", False), ("", False), (".", False)])
+def test_a_mesh_is_read_in_the_robots_folders_alone(homes: Path, address: str, found: bool):
+    folder = homes / "ws" / "pkg" / "urdf"
+    assert (locate_mesh(address.format(homes), folder) is not None) is found
+
+
+def test_without_a_package_the_folder_above_is_the_last(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    (tmp_path / "a" / "robot").mkdir(parents=True)
+    tetrahedron(tmp_path / "far.obj")
+    tetrahedron(tmp_path / "a" / "meshes" / "near.obj")
+    assert locate_mesh("../meshes/near.obj", tmp_path / "a" / "robot") is not None
+    assert locate_mesh("../../far.obj", tmp_path / "a" / "robot") is None
+    monkeypatch.setenv("HOME", str(tmp_path / "a"))
+    assert locate_mesh("../meshes/near.obj", tmp_path / "a" / "robot") is None
+
+
+def test_what_lies_elsewhere_is_not_copied(homes: Path):
+    (homes / "ws" / "pkg" / "urdf" / "robot.urdf").write_text(robot("../../../secret.obj"))
+    (homes / "out").mkdir()
+    (note,) = save(homes / "ws" / "pkg" / "urdf" / "robot.urdf", homes / "out" / "robot.sdf", meshes="copy")
+    assert note.text == "meshes outside of the robot's folders are left alone: ../../../secret.obj"
+    assert [path.name for path in (homes / "out").iterdir()] == ["robot.sdf"]
+
+
+def test_meshes_open_no_other_files_and_unpickle_nothing(tmp_path: Path):
+    """Of a buffer that leads out, of materials, and of files whose formats are no meshes nothing is read."""
+    inner = tmp_path / "robot"
+    tetrahedron(inner / "good.obj")
+    points = np.eye(3, dtype=np.float32).tobytes()
+    (tmp_path / "out.bin").write_bytes(points)
+    (inner / "in.bin").write_bytes(points)
+    for name, uri in (("in.gltf", "in.bin"), ("out.gltf", "../out.bin"), ("file.gltf", f"file://{tmp_path}/out.bin"),
+                      ("remote.gltf", "http://127.0.0.1:9/out.bin")):
+        (inner / name).write_text(json.dumps({
+            "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+            "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+            "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
+            "bufferViews": [{"buffer": 0, "byteLength": 36}], "buffers": [{"uri": uri, "byteLength": 36}]}))
+    hit = tmp_path / "hit"
+    os.mkfifo(inner / "pipe.mtl")
+    (inner / "pipe.obj").write_text("mtllib pipe.mtl\n" + (inner / "good.obj").read_text())
+    for name in ("a.stl", "a.npz", "a.pkl", "a.obj", "a.ply", "a.dae"):
+        (inner / name).write_bytes(pickle.dumps(Touch(hit)))
+    (inner / "a.zip").write_bytes(archive("good.obj"))
+    others = sorted(path.name for path in inner.iterdir() if path.name[0] in "aofr")
+    names = ["good.obj", "in.gltf", "pipe.obj", *others]
+    start = time.monotonic()
+    found = triangles(names, str(inner / "robot.urdf"))
+    assert time.monotonic() - start < 2 * SECONDS
+    assert [name for name, mesh in found.items() if mesh is not None] == ["good.obj", "in.gltf", "pipe.obj"]
+    assert not hit.exists()
+
+
+# What is in files never runs
+
+CODE = "__import__('pathlib').Path({!r}).write_text('x')"
+
+
+def doors() -> Iterator[tuple[str, str]]:
+    """Every door by which a file comes in, as a command, and what the file is called."""
+    for name in ("robot.urdf", "robot.xml", "robot.sdf", "robot.usda", "robot.usd", "robot.usdz", "robot.yaml",
+                 "robot.zip", "robot.urdf.gz", "robot"):
+        yield "check FILE", name
+    yield "lint FILE", "robot.urdf"
+    yield "verify FILE", "c.json"
+    yield "catalog list --catalog FOLDER", "planar.jsonl"
+    yield "catalog list --catalog FOLDER", "planar.jsonl.gz"
+    yield "catalog list --catalog FILE", "planar.sqlite"
+
+
+def contents(hit: Path) -> dict[str, bytes]:
+    code = CODE.format(str(hit))
+    array = io.BytesIO()
+    np.save(array, np.array([Touch(hit)], dtype=object), allow_pickle=True)
+    return {
+        "pickle": pickle.dumps(Touch(hit)), "array": array.getvalue(),
+        "python": f"#!/usr/bin/python3\n{code}\n".encode(),
+        "yaml": f"closed_loop: !!python/object/apply:eval [\"{code}\"]\n".encode(), "zip": archive("robot.urdf"),
+        "gzip": gzip.compress(robot("a.stl").encode()), "deep": b"[" * 200_000, "deeper": b'{"word":' * 200_000,
+        "xinclude": b'<robot name="r" xmlns:xi="http://www.w3.org/2001/XInclude"><xi:include href="/etc/passwd" '
+                    b'parse="text"/></robot>',
+        "external": b'<!DOCTYPE r [<!ENTITY e SYSTEM "file:///etc/passwd">]><robot name="&e;"><link name="a"/></robot>',
+        "included": b'<mujoco><include file="/etc/passwd"/></mujoco>',
+        "fetched": b'<sdf version="1.9"><include><uri>file:///etc</uri></include></sdf>',
+        "zeros": b"\0" * 5000, "nothing": b"", "number": b'{"format": 1e999999999}'}
+
+
+@pytest.mark.some(12)
+@pytest.mark.parametrize("what", list(contents(Path())))
+@pytest.mark.parametrize(("command", "name"), list(doors()), ids=lambda each: each.replace(" ", "_"))
+def test_hostile_content_is_one_line_at_every_door(command: str, name: str, what: str, tmp_path: Path, capsys):
+    hit, folder = tmp_path / "hit", tmp_path / "in"
+    folder.mkdir()
+    (folder / name).write_bytes(contents(hit)[what])
+    places = {"FILE": str(folder / name), "FOLDER": str(folder)}
+    status = execute([places.get(word, word) for word in command.split()])
+    out, err = capsys.readouterr()
+    assert status in {"lint": (1, 2), "verify": (2, 3)}.get(command.split()[0], (2,)), err
+    assert len(err.splitlines()) <= 1
+    assert "defect of hrsynth" not in err
+    assert "root:" not in out + err
+    assert not hit.exists()
+    assert [path.name for path in folder.iterdir()] == [name]
+
+
+@pytest.mark.parametrize("command", ["check", pytest.param("derive", marks=pytest.mark.slow)])
+def test_names_are_no_code(command: str, tmp_path: Path, capsys, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(tmp_path)
+    text = robot("a.stl")
+    for number, name in enumerate(("base", "crank", "bar", "rocker", "a", "b", "c", "d")):
+        text = text.replace(f'"{name}"', '"' + CODE.format("hit") + str(number) + '"')
+    seen = f'<observe leg="{CODE.format("hit")}" link="{CODE.format("hit")}1" axis="0 0 1"/></hrsynth>'
+    (tmp_path / "robot.urdf").write_text(text.replace("</hrsynth>", seen))
+    assert execute([command, "robot.urdf"]) == 0
+    assert "__import__" in capsys.readouterr().out
+    assert [path.name for path in tmp_path.iterdir()] == ["robot.urdf"]
+
+
+ALLOWED = {
+    "batch/sections.py": {"exec"}, "codegen/rounding.py": {"exec"}, "batch/program.py": {"exec_module"},
+    "simulation/endings/subdivision.py": {"loads of pickle"}, "untrusted.py": {"run_path"}}
+"""What runs text or unpickles, of this program's own making: straight-line code of numbers, the state of a search that
+goes to another process, a program of the package."""
+
+
+def calls(path: Path) -> Iterator[str]:
+    text = path.read_text(encoding="utf-8")
+    if not re.search(r"eval|exec|compile|import__|os\.|run_|parse_expr|_load|loads|sympify|pickle|shell|yaml", text):
+        return
+    for node in ast.walk(ast.parse(text)):
+        if not isinstance(node, ast.Call):
+            continue
+        name = ast.unparse(node.func)
+        last, keys = name.rpartition(".")[2], {each.arg: each.value for each in node.keywords}
+        if name in ("eval", "exec", "compile", "__import__", "os.system", "os.popen") or last in (
+                "exec_module", "run_path", "run_module", "parse_expr", "unsafe_load", "full_load"):
+            yield last
+        elif re.fullmatch(r"(pickle|joblib|marshal|shelve|dill|torch)\.(loads?|open)", name):
+            yield f"{last} of {name.partition('.')[0]}"
+        elif (last == "sympify" and "strict" not in keys) or "allow_pickle" in keys or "shell" in keys or (
+                name == "yaml.load"):
+            yield last
+
+
+@pytest.mark.slow
+def test_nothing_that_runs_text_is_called_but_on_own_text():
+    package = ROOT / "src" / "hrsynth"
+    found = {str(path.relative_to(package)): told for path in package.rglob("*.py") if (told := set(calls(path)))}
+    assert found == ALLOWED
+
+
+# Certificates and catalogs
+
+def test_a_number_of_a_certificate_is_short(tmp_path: Path):
+    for text in ('{"format":"hrsynth-certificate-1","claim":"modes","tips":[["1e999999999","0","0"]],"systems":[]}',
+                 '{"claim":"ranks"}', "[]", '{"claim":"path","claim":"modes"}', '{"claim":' + '{"a":' * 9000):
+        (tmp_path / "c.json").write_text(text)
+        with pytest.raises(HrsynthError) as caught:
+            verify(tmp_path / "c.json")
+        assert len(caught.value.lines()) == 1
+
+
+@pytest.mark.parametrize("line", ['{"word":"a","group":"planar"}', '{"word":"a","group":"planar","notation":3}',
+                                  '{"word":"a","a":' + "[" * 100_000, '{"word":"a","a":"' + "x" * 1_100_000 + '"}'],
+                         ids=["bare", "typed", "deep", "long"])
+def test_a_record_that_is_not_whole_is_one_line(line: str, tmp_path: Path, capsys):
+    (tmp_path / "planar.jsonl").write_text(f"{head('planar', 1)}\n{line}\n")
+    assert execute(["catalog", "list", "--catalog", str(tmp_path)]) == 2
+    (said,) = capsys.readouterr().err.splitlines()
+    assert "record" in said
+
+
+# Where the program is
+
+def test_from_an_archive_it_says_so_in_one_line(tmp_path: Path):
+    package = ROOT / "src" / "hrsynth"
+    with zipfile.ZipFile(tmp_path / "hrsynth.zip", "w") as file:
+        for path in package.rglob("*.py"):
+            file.write(path, path.relative_to(package.parent))
+    code = (f"import sys; sys.path.insert(0, {str(tmp_path / 'hrsynth.zip')!r}); from hrsynth.cli import main; "
+            "main(['robots'])")
+    told = subprocess.run([sys.executable, "-P", "-c", code], capture_output=True, text=True)
+    assert (told.returncode, told.stdout) == (2, "")
+    (said,) = told.stderr.splitlines()
+    assert "from a folder, not from an archive" in said
