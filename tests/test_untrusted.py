@@ -128,7 +128,7 @@ def bomb_glb(path: Path) -> None:
 def bomb_catalog(folder: Path, line: bytes, count: int) -> None:
     folder.mkdir()
     with gzip.open(folder / "planar.jsonl.gz", "wb", compresslevel=9) as file:
-        file.write(head("planar", count).encode() + b"\n")
+        file.write(head("planar", count=count).encode() + b"\n")
         for _ in range(count // 100_000):
             file.write(line * 100_000)
 
@@ -392,7 +392,7 @@ def test_a_number_of_a_certificate_is_short(tmp_path: Path):
                                   '{"word":"a","a":' + "[" * 100_000, '{"word":"a","a":"' + "x" * 1_100_000 + '"}'],
                          ids=["bare", "typed", "deep", "long"])
 def test_a_record_that_is_not_whole_is_one_line(line: str, tmp_path: Path, capsys):
-    (tmp_path / "planar.jsonl").write_text(f"{head('planar', 1)}\n{line}\n")
+    (tmp_path / "planar.jsonl").write_text(f"{head('planar', count=1)}\n{line}\n")
     assert execute(["catalog", "list", "--catalog", str(tmp_path)]) == 2
     (said,) = capsys.readouterr().err.splitlines()
     assert "record" in said
