@@ -93,6 +93,11 @@ class PathAnswer(Result, shown_as="path"):
     """Joints whose limits hold all along a certified path."""
     unlimited: tuple[str, ...] = ()
     """Joints whose limits are not considered."""
+    any_mode: bool = False
+    """Whether the goal is a pose, whatever the working modes of its legs, and not a configuration."""
+    goal_modes: tuple[tuple[float, ...], ...] = ()
+    """Working modes of all limbs at the goal in which the sign is proved to be opposite to the start's, where they are
+    separated."""
     road: SampledRoad | None = None
     """The straight way, sampled; where neither a path nor a separation was enclosed."""
 
@@ -239,7 +244,7 @@ class Aspects(Value):
         ends = [PathEnd(self.motion.pose(at.pose(self.motion.link)), at, float(value))
                 for at, value in zip((start, goal), values, strict=True)]
         answer = PathAnswer(self.setting, UNDECIDED, False, tuple(end.pose for end in ends), None, 0, ends[0], ends[1],
-                            "", found.signed)
+                            "", found.signed, any_mode=any_mode)
         if self.lost:
             return replace(answer, reason=f"every pose is singular, never seen: {'; '.join(self.lost)}")
         if min(abs(end.value) for end in ends) < CLEAR:
@@ -251,9 +256,9 @@ class Aspects(Value):
         try:
             enclosures = [self.enclosure(end.configuration) for end in ends]
         except NoLegForm as why:
-            answer = _pointwise(answer, str(why), any_mode)
+            answer = _pointwise(answer, str(why))
             return answer if answer.verdict == SEPARATED else replace(answer, road=self.road(start, goal))
-        return self._decide(answer, enclosures, seed, budget, any_mode)
+        return self._decide(answer, enclosures, seed, budget)
 
     def road(self, start: ClosedConfiguration, goal: ClosedConfiguration) -> SampledRoad:
         """The straight way of the platform from a configuration to the pose of another, sampled."""
@@ -274,8 +279,8 @@ class Aspects(Value):
         return SampledRoad(len(way), float(abs(values[worst])), motion.pose(way[worst].pose(motion.link)), changes,
                            float(fractions[len(way) - 1]), lost)
 
-    def _decide(self, answer: PathAnswer, enclosures: Sequence[ConditionEnclosure], seed: int, budget: int,
-                any_mode: bool) -> PathAnswer:
+    def _decide(self, answer: PathAnswer, enclosures: Sequence[ConditionEnclosure], seed: int, budget: int
+                ) -> PathAnswer:
         """The verdict where poses decide what the legs do."""
         assert isinstance(self.pattern, LegPattern)
         coordinates = self.pattern.coordinates
@@ -287,34 +292,35 @@ class Aspects(Value):
         if not all(sure) or margin == 0:
             return replace(answer, reason="at a pose reach or value cannot be enclosed away from zero")
         if enclosures[0].signed and values[0] * values[1] < 0:
-            seen = () if any_mode else {o.leg for o in self.setting.observed}
-            others, margin = self._across(enclosures[1], (p[1], R[1]), values, seen)
+            seen = () if answer.any_mode else {o.leg for o in self.setting.observed}
+            across, others, margin = self._across(enclosures[1], (p[1], R[1]), values, seen)
             if not others:
-                return replace(answer, verdict=SEPARATED, certified=not fitted, margin=margin, boxes=2, reason=(
-                    f"the expression is enclosed with opposite signs at the two {_ends(any_mode)}: every path between "
-                    f"them {answer.where}crosses its zeros{forms}"))
+                return replace(answer, verdict=SEPARATED, certified=not fitted, margin=margin, boxes=1 + len(across),
+                               goal_modes=across, reason=(
+                    f"the expression is enclosed with opposite signs at the two {_ends(answer.any_mode)}: every path "
+                    f"between them {answer.where}crosses its zeros{forms}"))
             return self._lead_to_other_modes(answer, enclosures[0], others, (p, R), seed, budget)
         if answer.signed and answer.start.value * answer.goal.value < 0:
-            return _pointwise(answer, "its sign is that of a determinant", any_mode)
+            return _pointwise(answer, "its sign is that of a determinant")
         return self._lead(answer, enclosures, (p, R), seed, budget)
 
     def _across(self, goal: ConditionEnclosure, place: Place, values: Sequence[float], seen: Collection[str]
-                ) -> tuple[list[ConditionEnclosure], float]:
-        """The working modes of the goal, of legs that are not ``seen``, in which neither the value's sign is proved to
-        be opposite to the start's, nor a joint to be beyond its limits; first those with the fewest other modes. And
-        the smallest |value| at the start and in all others."""
-        limbs, others, margin = goal.forms.limbs, [], min(map(abs, values))
+                ) -> tuple[tuple[tuple[float, ...], ...], list[ConditionEnclosure], float]:
+        """Of the working modes of the goal, of legs that are not ``seen``: those in which the value's sign is proved to
+        be opposite to the start's; those in which it is not, nor a joint proved to be beyond its limits, first those
+        nearest to the goal's; and the smallest |value| at the start and in the former."""
+        limbs, across, others, margin = goal.forms.limbs, [goal.forms.modes], [], min(map(abs, values))
         able = [k for k in sorted(limbs_of(tuple(goal.forms.vectors.values()))) if limbs[k].label not in seen]
         for k in range(1, len(able) + 1):
             for part in combinations(able, k):
-                forms = reduce(LegForms.flipped, part, goal.forms)
-                there = replace(goal, forms=forms)
+                there = replace(goal, forms=reduce(LegForms.flipped, part, goal.forms))
                 sure, value = enclose_value(there.unlimited, *place)
                 if sure and value * values[0] < 0:
+                    across.append(there.forms.modes)
                     margin = min(margin, abs(value))
                 elif not is_beyond(there, *place):
                     others.append(there)
-        return others, margin
+        return tuple(across), others, margin
 
     def _lead_to_other_modes(self, answer: PathAnswer, start: ConditionEnclosure, others: Sequence[ConditionEnclosure],
                              poses: tuple[Array, Array], seed: int, budget: int) -> PathAnswer:
@@ -394,10 +400,17 @@ def path(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, 
     <PathAnswer: 3rrr_m1, watching 1, 2, 3: same aspect>
     """
     wanted = [asked_pose(each) for each in (start, goal)]
-    aspects = Aspects.of(ObservedRobot.of(robot, observe, camera, see=see, seed=seed).telling(wanted), seed=seed)
+    setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed)
+    return between_poses(setting, wanted, any_mode=not isinstance(wanted[1], ModeNumber), seed=seed, budget=budget)
+
+
+def between_poses(setting: ObservedRobot, wanted: Sequence[Pose | ModeNumber], *, any_mode: bool, seed: int = 0,
+                  budget: int = BUDGET) -> PathAnswer:
+    """What :meth:`Aspects.join` says of the configurations at a start and a goal."""
+    aspects = Aspects.of(setting.telling(wanted), seed=seed)
     tell("poses")
     first, last = configurations_at(aspects.setting, wanted, by_modes=True)
-    return aspects.join(first, last, seed=seed, budget=budget, any_mode=not isinstance(wanted[1], ModeNumber))
+    return aspects.join(first, last, seed=seed, budget=budget, any_mode=any_mode)
 
 
 def leads(ways: Sequence[PathSegment], start: Place, goal: Place, enclosures: Sequence[ConditionEnclosure]) -> bool:
@@ -432,13 +445,13 @@ def _ends(any_mode: bool) -> str:
         "configurations, each in the working modes that the observed directions there show")
 
 
-def _pointwise(answer: PathAnswer, why: str, any_mode: bool) -> PathAnswer:
+def _pointwise(answer: PathAnswer, why: str) -> PathAnswer:
     """What the two configurations alone tell: a continuous expression of opposite signs separates them."""
     ends = answer.start.value, answer.goal.value
     if answer.signed and ends[0] * ends[1] < 0:
         found = ("the expression has opposite signs at the two configurations, every path between them "
                  f"{answer.where}crosses its zeros; not certified by intervals: {why}")
-        if any_mode:
+        if answer.any_mode:
             return replace(answer, reason=f"{found}; the goal was not tested in other working modes")
         return replace(answer, verdict=SEPARATED, margin=min(map(abs, ends)), reason=found)
     return replace(answer, reason=f"no path can be certified: {why}")
