@@ -44,8 +44,9 @@ BLOCK = 10
 """Pairs of poses of one task."""
 STEP, CLEAR, NEAR = 0.04, 0.02, 1e-3
 """Length of a step; least singular value on a way; where two configurations are one (all in characteristic lengths)."""
-SMOOTH = 0.4
-"""No step is longer than this part of the least singular value."""
+SMOOTH, FINE = 0.15, 0.04
+"""No step is longer than this part of the least singular value, which falls by up to ten in a unit of length; nor one of
+those by which a way is confirmed."""
 TARGETS, STEPS = 12, 10
 """Configurations that are headed for at once, and steps towards each."""
 
@@ -207,12 +208,17 @@ class Search:
 
     def holds(self, way: State) -> Array:
         """Whether small steps from each configuration of a way to the next never come near a singularity."""
-        at, goals = way[:-1], self.spots(way)[1:]
-        good = np.ones(len(at), dtype=bool)
-        for _ in range(24):
-            at = self.towards(at, goals, np.full(len(at), STEP / 8))
-            good &= self.clear(at) > CLEAR / 2
-        return good & (np.linalg.norm(self.spots(at) - goals, axis=1) < NEAR)
+        at, goals, clear = way[:-1], self.spots(way)[1:], self.clear(way[:-1])
+        good, there = clear > CLEAR / 2, np.zeros(len(at), dtype=bool)
+        for _ in range(400):
+            there |= np.linalg.norm(self.spots(at) - goals, axis=1) < NEAR
+            going = np.flatnonzero(good & ~there)
+            if not good.all() or not len(going):
+                break
+            moved = self.towards(at[going], goals[going], np.minimum(STEP / 4, FINE * clear[going]))
+            at.theta[going], at.quats[going], clear[going] = moved.theta, moved.quats, self.clear(moved)
+            good = clear > CLEAR / 2
+        return good & (there | ~good.all())
 
 
 def detour(case: Case, told: Any, seconds: float = 20.0) -> State | None:
@@ -238,8 +244,10 @@ def attacked(task: tuple[str, int]) -> dict[str, Any]:
             known = joined(known, at[good])
         said: Counter[str] = Counter()
         wrong = []
-        for _ in range(BLOCK):
-            one, other = (case.text_of(known[[int(k)]]) for k in rng.integers(len(known), size=2))
+        search = Search(case, case.directions(hrsynth.check(case.engine, ROBOTS[name][1]).setting.observed))
+        anywhere = joined(known, search.assembled(rng, case.robot.zero(), False))
+        while sum(said.values()) - said["refused"] < BLOCK and said["refused"] < 10 * BLOCK:
+            one, other = (case.text_of(some[[int(rng.integers(len(some)))]]) for some in (known, anywhere))
             told = case.asked("path", lambda one=one, other=other: hrsynth.path(
                 case.engine, ROBOTS[name][1], start=one, goal=other, budget=400))
             said["refused" if told is None else told.verdict] += 1

@@ -387,10 +387,12 @@ def path(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, 
     The path passes only through poses at which everything seen has a value, in front of the camera or not.
 
     Both poses are reached from the zero configuration in its working mode; or, if no small steps lead to a pose that is
-    a mode of the other, as ``modes`` found the robot assembled there. On the way legs may pass their limits into other
-    working modes (Type 1). A certificate encloses, by interval arithmetic, the value of the condition away from zero,
+    a mode of the other, as ``modes`` found the robot assembled there. The start is meant in these working modes; the
+    goal in any, or, where it is given as a mode, with its directions. On the way legs may pass their limits into other
+    working modes (Type 1), but no rod length zero. A certificate encloses, by interval arithmetic, the value of the condition away from zero,
     the reach of every leg and the limits of R and P joints all along the path, for all poses within
-    ``tolerances.FOLLOWED`` of it; opposite signs of an expression at the two ends separate them. At most ``budget``
+    ``tolerances.FOLLOWED`` of it; opposite signs of an expression at the start and in all working modes of the goal
+    that joint limits allow separate them. At most ``budget``
     intervals are tried. If nothing can be enclosed the straight path is sampled. ``observe``, ``camera`` and ``see``
     are as for ``derive``.
 
