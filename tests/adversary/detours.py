@@ -1,8 +1,8 @@
 """Pairs of poses that ``path`` calls separated, and a search for ways between them through all working modes.
 
-``python -m adversary.detours --pairs 1000 --workers 2 --log detours.jsonl`` (from ``tests/``): ten robots in turn, a line
-of the log a robot and a block of pairs, so that a run that was broken off goes on; a table at the end; exit status 1
-where a way without singularity was found.
+``python -m adversary.detours --pairs 1000 --workers 2 --log detours.jsonl`` (from ``tests/``): ten robots in turn; a
+line of the log a block of pairs of one robot, so that a run that was broken off goes on (with the same code); a table at
+the end; exit status 1 where a way without singularity was found.
 
 The search knows nothing of closed forms, working modes or expressions. It grows two trees of configurations, in steps
 small enough that legs go through their limits and rods through length zero: one from the start, one from all
@@ -45,8 +45,8 @@ BLOCK = 10
 STEP, CLEAR, NEAR = 0.04, 0.02, 1e-3
 """Length of a step; least singular value on a way; where two configurations are one (all in characteristic lengths)."""
 SMOOTH, FINE = 0.15, 0.04
-"""No step is longer than this part of the least singular value, which falls by up to ten in a unit of length; nor one of
-those by which a way is confirmed."""
+"""No step is longer than this part of the least singular value, which falls by up to ten in a unit of length; nor one
+of those by which a way is confirmed."""
 TARGETS, STEPS = 12, 10
 """Configurations that are headed for at once, and steps towards each."""
 
@@ -135,13 +135,15 @@ class Search:
         """One step from each configuration towards places of the joints, loops closed again."""
         x, J = self.robot.items(self.joints, self.robot.frames(at))
         count = x.shape[1]
-        J = np.swapaxes(J, 2, 3).reshape(len(at), -1, self.robot.size) * self.metric / self.robot.length / np.sqrt(count)
-        away = goals - x.reshape(len(at), -1) / self.robot.length / np.sqrt(count)
+        unit = self.robot.length * np.sqrt(count)
+        J = np.swapaxes(J, 2, 3).reshape(len(at), -1, self.robot.size) * self.metric / unit
+        away = goals - x.reshape(len(at), -1) / unit
         move = np.zeros((len(at), self.robot.size))
         for k, local in enumerate(self.case.study.locals(at)):
             ahead = J[k] @ local.N
             z = np.linalg.pinv(ahead, rcond=1e-6) @ away[k]
-            move[k] = self.metric * (local.N @ z) * min(1.0, float(sizes[k]) / max(float(np.linalg.norm(ahead @ z)), 1e-12))
+            size = max(float(np.linalg.norm(ahead @ z)), 1e-12)
+            move[k] = self.metric * (local.N @ z) * min(1.0, float(sizes[k]) / size)
         return polished(self.robot, self.robot.loops, self.robot.moved(at, move), steps=3)[0]
 
     def assembled(self, rng: np.random.Generator, at: State, held: bool) -> State:
@@ -159,7 +161,7 @@ class Search:
         found.theta[:] -= np.where(robot.slides[: robot.scalars], 0, 2 * np.pi * np.round(found.theta / (2 * np.pi)))
         return found[self.clear(found) > CLEAR] if held else found
 
-    def way(self, start: State, goal: State, rng: np.random.Generator, seconds: float = 20.0) -> State | None:
+    def way(self, start: State, goal: State, rng: np.random.Generator, seconds: float = 6.0) -> State | None:
         """Configurations from a start to one with a goal's pose, none near a singularity; None where none is found."""
         goals, anywhere = self.assembled(rng, goal, True), self.assembled(rng, start, False)
         if not len(goals) or not self.clear(start)[0] > CLEAR:
@@ -221,7 +223,7 @@ class Search:
         return good & (there | ~good.all())
 
 
-def detour(case: Case, told: Any, seconds: float = 20.0) -> State | None:
+def detour(case: Case, told: Any, seconds: float = 6.0) -> State | None:
     """A way between the two poses of an answer of ``path`` that it would have to call no separation."""
     items = case.directions(told.setting.observed)
     start, goal = case.fitted(told.start.configuration), case.fitted(told.goal.configuration)

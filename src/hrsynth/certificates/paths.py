@@ -13,8 +13,8 @@ import numpy as np
 from ..analysis.aspects.path import Aspects, PathAnswer, between_poses
 from ..analysis.aspects.path_segments import StraightSegment
 from ..analysis.aspects.vector_expressions import DerivedVector, LegVector, VectorExpression, limbs_of
-from ..analysis.observed import ObservedRobot
 from ..analysis.aspects.words import SEPARATED
+from ..analysis.observed import ObservedRobot
 from ..closed_forms.legs import ClosedFormLeg, OnCrank, OnRail, SlidingRod
 from ..closed_forms.platform_points import PlatformPoint
 from ..constraints.condition import Named
@@ -162,7 +162,8 @@ def _cut(record: dict[str, Any], motion: PlatformCoordinates, ways: Sequence[Str
 
 def _is_proved(record: dict[str, Any], one: Node, other: Node) -> bool:
     try:
-        sign(condition(record, record["modes"][0], *place(record["motion"], node(one), node(other))))
+        motion = record["motion"]
+        sign(condition(record, record["modes"][0], *place(motion, node(one, motion), node(other, motion))))
     except PathNotAccepted:
         return False
     return True

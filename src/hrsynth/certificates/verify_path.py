@@ -235,13 +235,14 @@ def sign(found: Interval) -> int:
     return 1 if found[0] > 0 else -1
 
 
-def node(record: Any) -> list[list[Fraction]]:  # a pose in the platform's coordinates
+def node(record: Any, motion: Any) -> list[list[Fraction]]:  # a pose in the platform's coordinates
     need(isinstance(record, list) and len(record) == 2, "a pose of another form")
+    need(len(record[0]) == len(motion["along"]), "a shift that the platform does not have")
+    need(len(record[1]) == len(motion["about"]) + 1, "a turn that the platform does not have")
     return [[number(x) for x in part] for part in record]
 
 
-def combined(factors: list[Interval], vectors: Any, why: str) -> Vector:  # the sum of factors times vectors
-    need(isinstance(vectors, list) and len(factors) == len(vectors), why)
+def combined(factors: list[Interval], vectors: Any) -> Vector:  # the sum of factors times vectors
     found: Vector = [(0, 0)] * 3
     for factor, each in zip(factors, vectors, strict=True):
         found = add(found, scaled(factor, vector(each)))
@@ -249,16 +250,17 @@ def combined(factors: list[Interval], vectors: Any, why: str) -> Vector:  # the 
 
 
 def place(motion: Any, one: Any, other: Any) -> tuple[Vector, Vector]:  # p and q between two poses
-    shift, (w, *turn) = ([interval(x, y) for x, y in zip(*parts, strict=True)] for parts in zip(one, other, strict=True))
-    p = add(vector(motion["origin"]), combined(shift, motion["along"], "a shift that the platform does not have"))
-    v = combined(turn, motion["about"], "a turn that the platform does not have")
+    shift, (w, *turn) = ([interval(x, y) for x, y in zip(*ends, strict=True)] for ends in zip(one, other, strict=True))
+    p = add(vector(motion["origin"]), combined(shift, motion["along"]))
+    v = combined(turn, motion["about"])
     W, *V = (interval(number(x)) for x in motion["home"])
     return p, [minus(times(w, W), dot(v, V)), *add(add(scaled(w, V), scaled(W, v)), cross(v, V))]
 
 
 def path(record: Any) -> str:
     need("motion" in record, "it does not say which motions the platform has")
-    nodes, motion, modes = [node(each) for each in record["path"]], record["motion"], record["modes"]
+    motion, modes = record["motion"], record["modes"]
+    nodes = [node(each, motion) for each in record["path"]]
     need(record["verdict"] in ("same aspect", "separated") and len(nodes) > 1, "another verdict, or too few poses")
     need(record["ends"] == [record["path"][0], record["path"][-1]], "the ends of another path")
     of = f"(platform: translations {len(motion['along'])}, rotations {len(motion['about'])})"

@@ -141,7 +141,7 @@ def test_opposite_signs_are_separated_and_equal_signs_never(robot: str, observe:
 @pytest.mark.some(2)
 @pytest.mark.parametrize(("robot", "observe"), SIGNED)
 def test_separated_poses_are_so_in_all_working_modes(robot: str, observe: str | None):
-    """A goal with the start's sign in one of its working modes is never separated; the others, by SymPy's signs, are."""
+    """A goal with the start's sign in one of its working modes is never separated; others, by SymPy's signs, are."""
     aspects = aspects_of(robot, observe)
     assert isinstance(aspects.pattern, LegPattern)
     met = 0
@@ -162,7 +162,8 @@ def test_separated_poses_are_so_in_all_working_modes(robot: str, observe: str | 
 
 
 @pytest.mark.parametrize(("start", "goal", "leg"), [
-    ("x=0.01,y=-0.015,phi=0", "x=-0.1073,y=-0.0315,phi=5.58deg", "3"), ("x=0,y=0", "x=-0.091,y=-0.053,phi=0.1", "1, 2")])
+    ("x=0.01,y=-0.015,phi=0", "x=-0.1073,y=-0.0315,phi=5.58deg", "3"),
+    ("x=0,y=0", "x=-0.091,y=-0.053,phi=0.1", "1, 2")])
 def test_a_goal_on_the_other_side_is_reached_through_a_fold(start: str, goal: str, leg: str):
     answer = path(load("3rrr_m1"), start=start, goal=goal)
     assert (answer.verdict, answer.certified) == (SAME, True)

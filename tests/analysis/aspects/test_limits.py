@@ -135,7 +135,7 @@ def test_a_rod_may_pass_length_zero_unless_it_is_limited(room: float | None):
     """Each rod of a 3-RPR turned over changes the sign, so poses are separated only where slides cannot pass zero."""
     robot, slides = load("3rpr_m1"), ("slide_1", "slide_2", "slide_3")
     aspects = Aspects.of(robot if room is None else with_limits(robot, {name: Limits(-room, room) for name in slides}))
-    near = [at for at in random_walk(aspects.setting.samples.start, 150, 0)
+    near = [at for at in random_walk(aspects.setting.samples.start, 150, 1)
             if all(abs(coordinates(at, name)) < 0.24 for name in slides)]
     values = aspects.condition.evaluate(aspects.structure.values_at(near))
     answer = aspects.join(near[int(np.argmin(values))], near[int(np.argmax(values))], any_mode=True, budget=20)

@@ -324,7 +324,7 @@ class Aspects(Value):
 
     def _lead_to_other_modes(self, answer: PathAnswer, start: ConditionEnclosure, others: Sequence[ConditionEnclosure],
                              poses: tuple[Array, Array], seed: int, budget: int) -> PathAnswer:
-        """A path to the goal in a working mode in which its sign is that of the start; ``undecided`` if none is found."""
+        """A path to the goal in a working mode in which its sign is the start's; ``undecided`` if none is found."""
         spent, limbs = 0, self.enclosure(answer.goal.configuration).forms.limbs
         for there in others:
             legs = [one.label for one, other in zip(limbs, there.forms.limbs, strict=True) if one.mode != other.mode]
@@ -339,9 +339,9 @@ class Aspects(Value):
         legs = dict.fromkeys(one.label for there in others for one, other in zip(limbs, there.forms.limbs, strict=True)
                              if one.mode != other.mode)
         return replace(answer, boxes=spent, reason=(
-            "the expression has opposite signs at the start and at the goal in the working modes reached, so every path "
-            f"between these crosses its zeros; but not in other working modes of leg {', '.join(legs)} at the goal, and "
-            "no path to these was proved"))
+            "the expression has opposite signs at the start and at the goal in the working modes reached, so every "
+            "path between these crosses its zeros; but not in other working modes of leg "
+            f"{', '.join(legs)} at the goal, and no path to these was proved"))
 
     def _lead(self, answer: PathAnswer, enclosures: Sequence[ConditionEnclosure], poses: tuple[Array, Array], seed: int,
               budget: int) -> PathAnswer:
@@ -389,12 +389,11 @@ def path(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, 
     Both poses are reached from the zero configuration in its working mode; or, if no small steps lead to a pose that is
     a mode of the other, as ``modes`` found the robot assembled there. The start is meant in these working modes; the
     goal in any, or, where it is given as a mode, with its directions. On the way legs may pass their limits into other
-    working modes (Type 1), but no rod length zero. A certificate encloses, by interval arithmetic, the value of the condition away from zero,
-    the reach of every leg and the limits of R and P joints all along the path, for all poses within
-    ``tolerances.FOLLOWED`` of it; opposite signs of an expression at the start and in all working modes of the goal
-    that joint limits allow separate them. At most ``budget``
-    intervals are tried. If nothing can be enclosed the straight path is sampled. ``observe``, ``camera`` and ``see``
-    are as for ``derive``.
+    working modes (Type 1), but no rod length zero. A certificate encloses, by interval arithmetic, the value of the
+    condition away from zero, the reach of every leg and the limits of R and P joints all along the path, for all poses
+    within ``tolerances.FOLLOWED`` of it. Opposite signs of an expression, at the start and in all working modes of the
+    goal that joint limits allow, separate the two. At most ``budget`` intervals are tried. If nothing can be enclosed
+    the straight path is sampled. ``observe``, ``camera`` and ``see`` are as for ``derive``.
 
     Raises ``BadRequest`` for unknown names and parts of a pose, ``PoseNotReached``.
 
