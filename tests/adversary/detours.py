@@ -1,8 +1,8 @@
 """Pairs of poses that ``path`` calls separated, and a search for ways between them through all working modes.
 
 ``python -m adversary.detours --pairs 1000 --workers 2 --log detours.jsonl`` (from ``tests/``): ten robots in turn; a
-line of the log a block of pairs of one robot, so that a run that was broken off goes on (with the same code); a table at
-the end; exit status 1 where a way without singularity was found.
+line of the log a block of pairs of one robot, so that a run that was broken off goes on (with the same code); a table
+at the end; exit status 1 where a way without singularity was found.
 
 The search knows nothing of closed forms, working modes or expressions. It grows two trees of configurations, in steps
 small enough that legs go through their limits and rods through length zero: one from the start, one from all

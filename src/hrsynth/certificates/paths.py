@@ -46,7 +46,7 @@ def certificate(found: PathAnswer) -> dict[str, Any]:
     aspects = Aspects.of(found.setting)
     assert not isinstance(aspects.pattern, str)
     assert isinstance(aspects.condition, Named)
-    forms, motion = aspects.enclosure(found.start.configuration).forms, PlatformCoordinates.of(aspects)
+    forms, motion = aspects.enclosure(found.start.configuration).forms, WrittenMotions.of(aspects)
     try:
         record = {"format": "hrsynth-certificate-1", "claim": "path", "robot": name, "verdict": found.verdict,
                   "observed": [[o.leg, o.link] for o in found.setting.observed], "any_mode": found.any_mode,
@@ -73,7 +73,7 @@ def certificate(found: PathAnswer) -> dict[str, Any]:
 
 
 @dataclass(frozen=True, eq=False)
-class PlatformCoordinates:
+class WrittenMotions:
     """The motions of a platform as the checker reads them: its point starts from ``origin`` (3,) and moves ``along``
     vectors (k, 3), the platform turns from ``home``, a quaternion (4,), ``about`` axes (m, 3), m = 0, 1 or 3."""
 
@@ -83,7 +83,7 @@ class PlatformCoordinates:
     about: Array
 
     @classmethod
-    def of(cls, aspects: Aspects) -> PlatformCoordinates:
+    def of(cls, aspects: Aspects) -> WrittenMotions:
         """The motions that the robot shows."""
         assert not isinstance(aspects.pattern, str)
         coordinates = aspects.pattern.coordinates
@@ -135,7 +135,7 @@ def _pose(record: dict[str, Any]) -> Pose:
     return Pose(**parts)
 
 
-def _cut(record: dict[str, Any], motion: PlatformCoordinates, ways: Sequence[StraightSegment], count: int
+def _cut(record: dict[str, Any], motion: WrittenMotions, ways: Sequence[StraightSegment], count: int
          ) -> list[Node]:
     """Poses along straight ways, so near to each other that the checker's intervals prove each piece."""
     if not ways or len(ways) < count:
