@@ -639,7 +639,8 @@ def test_singular_answers_3_where_condition_and_rank_disagree(run, tmp_path: Pat
 
 @pytest.mark.parametrize(("arguments", "verdict"), [
     (["rrrrr_m1", "--start", "x=0.05", "--goal", "x=-0.01,y=0.03"], "same aspect"),
-    (["3rrr_m1", "--start", "x=0,y=0", "--goal", "x=-0.091,y=-0.053,phi=0.1"], "separated"),
+    (["3prr_m1", "--start", "x=0,y=0", "--goal", "x=0.0585,y=0.073,phi=-88deg"], "separated"),
+    (["3rrr_m1", "--start", "x=0,y=0", "--goal", "mode:2"], "separated"),
     (["3rps", "--start", "z=0.5", "--goal", "z=0.51"], "undecided")])
 def test_path_json_is_the_contract_whatever_the_verdict(run, arguments: list[str], verdict: str):
     data = run("path", *arguments, "--json").data

@@ -9,8 +9,11 @@ import numpy as np
 import pytest
 
 import hrsynth
+from adversary import detours
 from adversary.case import HELD, WRONG, Case
 from adversary.claims import enclosures, endings, errors, lists, loci, poses, rewritten, verdicts, ways
+from adversary.drafts import Made
+from adversary.kinds import planar_leg
 from adversary.run import ALL, attacked, made, tasks, wrong
 
 ROBOTS = Path(__file__).resolve().parents[2] / "robots"
@@ -184,6 +187,33 @@ def test_poses_falsely_called_separated_are_found():
     told = hrsynth.path(case.engine, start="x=0,y=0,phi=0", goal="x=0.05,y=0.02,phi=0.1")
     ways.judge(case, replace(told, verdict="separated"))
     assert outcomes(case, "separated") == {WRONG}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("through", ["a fold of leg 3", "a rod of no length"])
+def test_a_way_through_a_singular_leg_is_found(through, tmp_path):
+    """Poses whose signs differ in the working modes reached: another working mode of the goal is on the same side."""
+    if through == "a fold of leg 3":
+        case, ends = shipped("3rrr_m1"), ("x=0.01,y=-0.015,phi=0", "x=-0.1073,y=-0.0315,phi=5.58deg")
+    else:
+        rods = Made("rods", np.array([1.0, 1.0, 0.0]))
+        for i, (A, B) in enumerate((((0, 0), (1, 1)), ((4, 0.1), (2, 1)), ((1.1, 3), (1, 2))), 1):
+            planar_leg(rods, i, "RPR", np.array([*A, 0.0]), np.array([*B, 0.0]), np.random.default_rng(0), motor=1)
+        (tmp_path / "rods.urdf").write_text(rods.text(None), encoding="utf-8")
+        case = Case("rods", 0, tmp_path / "rods.urdf", np.random.default_rng(0))
+        ends = "x=1,y=1,phi=0", "x=-0.35,y=-0.36,phi=-0.3"
+    told = hrsynth.path(case.engine, start=ends[0], goal=ends[1], budget=50)
+    assert told.verdict == "undecided"
+    assert told.start.value * told.goal.value < 0
+    way = detours.detour(case, told, seconds=120)
+    assert way is not None
+    assert len(way) > 10
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", detours.ROBOTS)
+def test_no_detour_between_separated_poses_is_found(name):
+    assert not detours.attacked((name, 0))["wrong"]
 
 
 @pytest.mark.slow

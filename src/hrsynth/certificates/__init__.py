@@ -13,7 +13,7 @@ from ..analysis.derive import Derivation
 from ..analysis.modes.modes import AssemblyModes
 from ..description import load
 from ..description.files import as_path
-from ..errors import BadRequest, CertificateRefused, PoseNotReached
+from ..errors import BadRequest, CertificateRefused, NoCertificate, PoseNotReached
 from ..mechanism import Mechanism
 from ..tolerances import SAME_RELATION
 from . import modes, paths, ranks, verify_certificate, verify_path, verify_ranks
@@ -76,7 +76,7 @@ def verify(source: Mapping[str, Any] | str | Path, robot: Mechanism | str | Path
         robot = load(robot)
         try:
             own = {"modes": modes, "ranks": ranks, "path": paths}[record["claim"]].again(record, robot)
-        except (BadRequest, PoseNotReached) as error:
+        except (BadRequest, NoCertificate, PoseNotReached) as error:
             raise CertificateRefused(name, f"it is not for {robot.name}: {error}") from None
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise CertificateRefused(name, f"it does not say which legs and pose it is for ({error!r})") from None

@@ -3,32 +3,37 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from fractions import Fraction
+from itertools import product
 from typing import Any
 
 import numpy as np
 
-from ..analysis.aspects.path import Aspects, PathAnswer
-from ..analysis.aspects.path import path as asked
+from ..analysis.aspects.path import Aspects, PathAnswer, between_poses
 from ..analysis.aspects.path_segments import StraightSegment
-from ..analysis.aspects.vector_expressions import DerivedVector, LegVector, VectorExpression
+from ..analysis.aspects.vector_expressions import DerivedVector, LegVector, VectorExpression, limbs_of
 from ..analysis.aspects.words import SEPARATED
+from ..analysis.observed import ObservedRobot
 from ..closed_forms.legs import ClosedFormLeg, OnCrank, OnRail, SlidingRod
 from ..closed_forms.platform_points import PlatformPoint
 from ..constraints.condition import Named
 from ..errors import NoCertificate
-from ..geometry.so3 import quaternions
+from ..geometry.so3 import quaternions, rotation_of
 from ..geometry.vectors import Array
 from ..mechanism import Mechanism
 from ..mechanism.pose import Pose
+from ..tolerances import FOLLOWED
 from .closures import write_numbers
-from .verify_path import PathNotAccepted, condition, digest, interval, pose, sign, verify
+from .verify_path import PathNotAccepted, condition, digest, node, place, sign, verify
 
+PIVOT = 0.1
+"""Smallest part along an axis of the base by which a vector of a platform's motions is scaled to one there."""
 PIECES = 4096
 """Pieces into which a way is cut at most."""
 
 Node = list[Any]
-"""A pose as the checker reads it: p (3,) and q (4,)."""
+"""A pose in the coordinates of the platform's motions, as the checker reads it."""
 
 
 def certificate(found: PathAnswer) -> dict[str, Any]:
@@ -39,18 +44,26 @@ def certificate(found: PathAnswer) -> dict[str, Any]:
     if not all(o.by_segment for o in found.setting.observed):
         raise NoCertificate(name, "what is observed is not the direction of a segment")
     aspects = Aspects.of(found.setting)
-    ends = [found.start, found.goal] if found.verdict == SEPARATED else [found.start]
-    enclosures = [aspects.enclosure(end.configuration) for end in ends]
+    assert not isinstance(aspects.pattern, str)
     assert isinstance(aspects.condition, Named)
+    forms, motion = aspects.enclosure(found.start.configuration).forms, WrittenMotions.of(aspects)
     try:
         record = {"format": "hrsynth-certificate-1", "claim": "path", "robot": name, "verdict": found.verdict,
-                  "observed": [[o.leg, o.link] for o in found.setting.observed],
-                  "start": found.start.pose.to_dict(), "goal": found.goal.pose.to_dict(),
-                  "legs": [[_leg(limb) for limb in each.forms.limbs] for each in enclosures],
-                  "vectors": {symbol: _vector(each) for symbol, each in sorted(enclosures[0].forms.vectors.items())},
-                  "points": list(enclosures[0].forms.points), "condition": _tree(aspects.condition.expression)}
-        record["path"] = _separate(aspects, found) if found.verdict == SEPARATED else _cut(
-            record, [way for way in found.ways if isinstance(way, StraightSegment)], len(found.ways))
+                  "observed": [[o.leg, o.link] for o in found.setting.observed], "any_mode": found.any_mode,
+                  "start": found.start.pose.to_dict(), "goal": found.goal.pose.to_dict(), "motion": motion.to_dict(),
+                  "legs": [_leg(limb) for limb in forms.limbs], "modes": [list(map(int, forms.modes))],
+                  "vectors": {symbol: _vector(each) for symbol, each in sorted(forms.vectors.items())},
+                  "points": list(forms.points), "condition": _tree(aspects.condition.expression)}
+        if found.verdict == SEPARATED:
+            used = limbs_of(tuple(forms.vectors.values()))
+            record["modes"] += sorted({modes for known in found.goal_modes for modes in product(*(
+                [int(mode)] if k in used or not found.any_mode else [-1, 1] for k, mode in enumerate(known)))})
+            ends = aspects.pattern.coordinates.of([found.start.configuration, found.goal.configuration])
+            record["path"] = [motion.node(p, R, None) for p, R in zip(*ends, strict=True)]
+        else:
+            ways = [way for way in found.ways if isinstance(way, StraightSegment)]
+            record["path"] = _cut(record, motion, ways, len(found.ways))
+        record["modes"] = [list(modes) for modes in record["modes"]]
         record["ends"] = [record["path"][0], record["path"][-1]]
         record["sha256"] = digest(record)
         verify(record)
@@ -59,10 +72,61 @@ def certificate(found: PathAnswer) -> dict[str, Any]:
     return record
 
 
+@dataclass(frozen=True, eq=False)
+class WrittenMotions:
+    """The motions of a platform as the checker reads them: its point starts from ``origin`` (3,) and moves ``along``
+    vectors (k, 3), the platform turns from ``home``, a quaternion (4,), ``about`` axes (m, 3), m = 0, 1 or 3."""
+
+    origin: Array
+    along: Array
+    home: Array
+    about: Array
+
+    @classmethod
+    def of(cls, aspects: Aspects) -> WrittenMotions:
+        """The motions that the robot shows."""
+        assert not isinstance(aspects.pattern, str)
+        coordinates = aspects.pattern.coordinates
+        p, R = coordinates.of(aspects.members[:1])
+        turns = coordinates.motion.rotations[:, : 3 * coordinates.turning]
+        home = np.eye(4)[0] if turns.shape[1] == 3 else quaternions(R[0])
+        return cls(p[0], _reduced(coordinates.motion.translations.T), home, _reduced(turns.T))
+
+    def node(self, p: Array, R: Array, before: Node | None) -> Node:
+        """A pose, its quaternion on the side of the one before."""
+        shift = np.linalg.lstsq(self.along.T, p - self.origin, rcond=None)[0]
+        w, *v = quaternions(R @ rotation_of(self.home).T)
+        turn = np.array([w, *np.linalg.lstsq(self.about.T, np.array(v), rcond=None)[0]])
+        if before is not None and sum(float(Fraction(x)) * y for x, y in zip(before[1], turn, strict=True)) < 0:
+            turn = -turn
+        return [write_numbers(shift), write_numbers(turn)]
+
+    def to_dict(self) -> dict[str, Any]:
+        """As the checker reads it."""
+        return {key: write_numbers(getattr(self, key)) for key in ("origin", "along", "home", "about")}
+
+
+def _reduced(rows: Array) -> Array:
+    """The rows (k, 3) of a space's basis in echelon form, which depends on the space alone; numbers that are nearly
+    whole are."""
+    found, done = np.array(rows, dtype=float), 0
+    for column in range(3):
+        if done < len(found):
+            best = done + int(np.argmax(np.abs(found[done:, column])))
+            if abs(found[best, column]) > PIVOT:
+                found[[done, best]] = found[[best, done]]
+                found[done] /= found[done, column]
+                others = np.arange(len(found)) != done
+                found[others] -= np.outer(found[others, column], found[done])
+                done += 1
+    return np.where(np.abs(found - np.round(found)) < FOLLOWED, np.round(found), found)
+
+
 def again(record: dict[str, Any], robot: Mechanism) -> dict[str, Any]:
     """The certificate of the same question about a robot."""
-    start, goal = (_pose(record[end]) for end in ("start", "goal"))
-    return certificate(asked(robot, [link for _, link in record["observed"]], start=start, goal=goal))
+    setting = ObservedRobot.of(robot, [link for _, link in record["observed"]])
+    ends = [_pose(record[end]) for end in ("start", "goal")]
+    return certificate(between_poses(setting, ends, any_mode=bool(record["any_mode"])))
 
 
 def _pose(record: dict[str, Any]) -> Pose:
@@ -71,15 +135,21 @@ def _pose(record: dict[str, Any]) -> Pose:
     return Pose(**parts)
 
 
-def _cut(record: dict[str, Any], ways: Sequence[StraightSegment], count: int) -> list[Node]:
+def _cut(record: dict[str, Any], motion: WrittenMotions, ways: Sequence[StraightSegment], count: int
+         ) -> list[Node]:
     """Poses along straight ways, so near to each other that the checker's intervals prove each piece."""
     if not ways or len(ways) < count:
         raise PathNotAccepted("a leg changes its working mode on the way")
-    found = [_node(ways[0], 0.0, None)]
+
+    def at(way: StraightSegment, fraction: float, before: Node | None) -> Node:
+        p, R = way.at(np.array([fraction]))
+        return motion.node(p[0], R[0], before)
+
+    found = [at(ways[0], 0.0, None)]
     for way in ways:
         ends, low = [1.0], 0.0
         while ends:
-            new = _node(way, ends[-1], found[-1])
+            new = at(way, ends[-1], found[-1])
             if _is_proved(record, found[-1], new):
                 found.append(new)
                 low = ends.pop()
@@ -92,37 +162,16 @@ def _cut(record: dict[str, Any], ways: Sequence[StraightSegment], count: int) ->
 
 def _is_proved(record: dict[str, Any], one: Node, other: Node) -> bool:
     try:
-        p, q = ([interval(x, y) for x, y in zip(*parts, strict=True)]
-                for parts in zip(pose(one), pose(other), strict=True))
-        sign(condition(record, record["legs"][0], p, q))
+        motion = record["motion"]
+        sign(condition(record, record["modes"][0], *place(motion, node(one, motion), node(other, motion))))
     except PathNotAccepted:
         return False
     return True
 
 
-def _separate(aspects: Aspects, found: PathAnswer) -> list[Node]:
-    """The two poses."""
-    assert not isinstance(aspects.pattern, str)
-    p, R = aspects.pattern.coordinates.of([found.start.configuration, found.goal.configuration])
-    return [_write_node(*each, None) for each in zip(p, R, strict=True)]
-
-
-def _node(way: StraightSegment, fraction: float, before: Node | None) -> Node:
-    """A pose on a way, its quaternion on the side of the one before."""
-    p, R = way.at(np.array([fraction]))
-    return _write_node(p[0], R[0], before)
-
-
-def _write_node(p: Array, R: Array, before: Node | None) -> Node:
-    q = quaternions(R)
-    if before is not None and sum(float(Fraction(x)) * float(y) for x, y in zip(before[1], q, strict=True)) < 0:
-        q = -q
-    return [write_numbers(p), write_numbers(q)]
-
-
 def _leg(limb: ClosedFormLeg) -> dict[str, Any]:
-    """A leg with its working mode."""
-    found = {"mode": int(limb.mode), "tip": _rule(limb.tip), "centre": write_numbers(limb.centre)}
+    """A leg without its working mode."""
+    found = {"tip": _rule(limb.tip), "centre": write_numbers(limb.centre)}
     if isinstance(limb, OnCrank):
         return {"kind": "crank", "axis": write_numbers(limb.axis), "radius": write_numbers(float(limb.radius)),
                 "rod": write_numbers(float(limb.rod)), **found}

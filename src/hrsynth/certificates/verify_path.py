@@ -1,13 +1,21 @@
 """Check a certificate of a path: `python verify_path.py c.json`. Integers and fractions only.
 
-A *pose* is the position p of a point and a quaternion q, which need not be of length one. On a path both go straight
-from pose to pose, so the platform turns about one axis on each piece. Each leg is in closed form: its tip, a vector of
-the pose, decides what it carries in its *working mode*, as long as the leg reaches (theory.md, section 9).
+The platform has *motions*: a point starts from `origin` and moves along some vectors, and the platform turns from
+`home` about no axis, one, or three. Poses are written in coordinates of these motions, so no pose leaves them: a factor
+for each vector; and w and a factor for each axis, the quaternion w + the sum of factors times axes, of any length. On a
+path all of these go straight from pose to pose. Each leg is in closed form: its tip, a vector of the pose, decides what
+it carries in its *working mode*, as long as the leg reaches (theory.md, section 9).
 
-*same aspect*: on each piece, p, q and all that follows are enclosed in intervals whose ends are rounded outwards to
-multiples of 2^-96. All legs reach, and the condition, an expression in vectors, is nowhere zero: it keeps its sign from
-the first pose to the last. *separated*: it has other signs at two poses, so it is zero on every path between them, in
-whatever working modes. That the condition is that of the hidden robot's Type 2 singularities is not proved here.
+*same aspect*: on each piece, the coordinates and all that follows are enclosed in intervals whose ends are rounded
+outwards to multiples of 2^-96. All legs reach, in the working modes of the file, and the condition, an expression in
+vectors, is nowhere zero: it keeps its sign from the first pose to the last. *separated*: at the first pose, in the
+first working modes of the file, it has one sign; at the last, in each of the others, the opposite one. It is continuous
+where legs pass from one working mode to another, so it is zero on every path from the first configuration to one of the
+last. How many of all working modes there are among these is printed.
+
+Not proved here: that the condition is that of the hidden robot's Type 2 singularities, that motions, legs and condition
+are a robot's (`hrsynth verify --robot` compares them), joint limits. The keys robot, observed, start and goal are
+for that comparison; the ends of the path are in `ends`.
 """
 
 import hashlib
@@ -171,11 +179,11 @@ def slide(leg: Any, D: Vector, side: Interval) -> Vector:
 LEGS: dict[str, Any] = {"crank": (crank, True), "rail": (rail, True), "slide": (slide, False)}
 
 
-def carried(leg: Any, p: Vector, R: list[Vector]) -> Vector:  # what a leg carries at poses
+def carried(leg: Any, mode: Any, p: Vector, R: list[Vector]) -> Vector:  # what a leg carries at poses
     solve, placed = LEGS[leg["kind"]]
-    need(type(leg["mode"]) is int and leg["mode"] in (1, -1), "a working mode")
+    need(type(mode) is int and mode in (1, -1), "a working mode")
     centre = vector(leg["centre"])
-    found = solve(leg, sub(point(leg["tip"], p, R), centre), (leg["mode"] * ONE,) * 2)
+    found = solve(leg, sub(point(leg["tip"], p, R), centre), (mode * ONE,) * 2)
     return add(centre, found) if placed else found
 
 
@@ -204,6 +212,7 @@ def evaluated(tree: Any, values: Any) -> Any:  # an expression: a number, a symb
     need(name in ("+", "*") and found, "an operation of another name")
     result, *others = sorted(found, key=lambda each: isinstance(each, tuple))
     for each in others:
+        need(name == "+" or isinstance(each, tuple), "a product of vectors")
         if name == "*":
             result = scaled(each, result) if isinstance(result, list) else times(each, result)
         else:
@@ -211,9 +220,9 @@ def evaluated(tree: Any, values: Any) -> Any:  # an expression: a number, a symb
     return result
 
 
-def condition(record: Any, legs: Any, p: Vector, q: Vector) -> Interval:  # its value at all poses in boxes
+def condition(record: Any, modes: Any, p: Vector, q: Vector) -> Interval:  # its value at all poses in boxes
     R = rotation(q)
-    held = [carried(leg, p, R) for leg in legs]
+    held = [carried(leg, mode, p, R) for leg, mode in zip(record["legs"], modes, strict=True)]
     values = {symbol: valued(each, p, R, held) for symbol, each in record["vectors"].items()}
     values |= {symbol: sub(values[symbol], values[record["points"][0]]) for symbol in record["points"]}
     found = evaluated(record["condition"], values)
@@ -226,30 +235,46 @@ def sign(found: Interval) -> int:
     return 1 if found[0] > 0 else -1
 
 
-def pose(record: Any) -> list[list[Fraction]]:
-    need(len(record) == 2 and list(map(len, record)) == [3, 4], "a pose of another form")
+def node(record: Any, motion: Any) -> list[list[Fraction]]:  # a pose in the platform's coordinates
+    need(isinstance(record, list) and len(record) == 2, "a pose of another form")
+    need(len(record[0]) == len(motion["along"]), "a shift that the platform does not have")
+    need(len(record[1]) == len(motion["about"]) + 1, "a turn that the platform does not have")
     return [[number(x) for x in part] for part in record]
 
 
+def combined(factors: list[Interval], vectors: Any) -> Vector:  # the sum of factors times vectors
+    found: Vector = [(0, 0)] * 3
+    for factor, each in zip(factors, vectors, strict=True):
+        found = add(found, scaled(factor, vector(each)))
+    return found
+
+
+def place(motion: Any, one: Any, other: Any) -> tuple[Vector, Vector]:  # p and q between two poses
+    shift, (w, *turn) = ([interval(x, y) for x, y in zip(*ends, strict=True)] for ends in zip(one, other, strict=True))
+    p = add(vector(motion["origin"]), combined(shift, motion["along"]))
+    v = combined(turn, motion["about"])
+    W, *V = (interval(number(x)) for x in motion["home"])
+    return p, [minus(times(w, W), dot(v, V)), *add(add(scaled(w, V), scaled(W, v)), cross(v, V))]
+
+
 def path(record: Any) -> str:
-    poses, legs = [pose(each) for each in record["path"]], record["legs"]
-    need(record["verdict"] in ("same aspect", "separated") and len(poses) > 1, "another verdict, or too few poses")
+    need("motion" in record, "it does not say which motions the platform has")
+    motion, modes = record["motion"], record["modes"]
+    nodes = [node(each, motion) for each in record["path"]]
+    need(record["verdict"] in ("same aspect", "separated") and len(nodes) > 1, "another verdict, or too few poses")
     need(record["ends"] == [record["path"][0], record["path"][-1]], "the ends of another path")
+    of = f"(platform: translations {len(motion['along'])}, rotations {len(motion['about'])})"
     if record["verdict"] == "separated":
-        need(len(poses) == len(legs) == 2, "two poses, each in its working modes")
-        fixed = [[{**leg, "mode": None} for leg in each] for each in legs]
-        need(fixed[0] == fixed[1], "legs that are not the same at both poses")
-        one, other = (sign(condition(record, each, [interval(x) for x in p], [interval(x) for x in q]))
-                      for (p, q), each in zip(poses, legs, strict=True))
-        need(one != other, "the condition has one sign at both poses")
-        return "separated: the condition has opposite signs at the two poses"
-    need(len(legs) == 1, "one set of working modes")
-    signs = set()
-    for piece in pairwise(poses):
-        p, q = ([interval(x, y) for x, y in zip(*parts, strict=True)] for parts in zip(*piece, strict=True))
-        signs.add(sign(condition(record, legs[0], p, q)))
+        need(len(nodes) == 2 and len({tuple(each) for each in modes[1:]}) == len(modes) - 1 > 0, "two poses, and modes")
+        first, *last = (sign(condition(record, each, *place(motion, nodes[k > 0], nodes[k > 0])))
+                        for k, each in enumerate(modes))
+        need(first not in last, "the condition has one sign at both poses")
+        return (f"separated: the condition has opposite signs at two poses, at the second one in {len(last)} of "
+                f"{2 ** len(record['legs'])} working modes {of}")
+    need(len(modes) == 1, "one set of working modes")
+    signs = {sign(condition(record, modes[0], *place(motion, *piece))) for piece in pairwise(nodes)}
     need(len(signs) == 1, "the condition changes its sign")
-    return f"same aspect: on {len(poses) - 1} pieces of a path all legs reach and the condition is nowhere zero"
+    return f"same aspect: on {len(nodes) - 1} pieces of a path all legs reach and the condition is nowhere zero {of}"
 
 
 def digest(record: Any) -> str:

@@ -337,7 +337,8 @@ class _Work:
             aspect = Decision(answer.verdict, answer.reason)
         except HrsynthError as error:
             aspect = Decision("undecided", str(error))
-        why = f"start and goal lie in different aspects: {aspect.reason}" if aspect.verdict == SEPARATED else None
+        why = ("start and goal, with the directions observed at them, lie in different aspects: "
+               f"{aspect.reason}") if aspect.verdict == SEPARATED else None
         return replace(candidate, start_modes=start_modes, goal_modes=goal_modes, aspect=aspect, discarded=why)
 
     @staticmethod

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from fractions import Fraction
 from functools import cache
-from itertools import pairwise
+from itertools import pairwise, product
 
 import flint
 import numpy as np
@@ -22,6 +22,7 @@ from hrsynth.analysis.aspects.road_map import PoseRegion, plan
 from hrsynth.analysis.aspects.words import SAME, SEPARATED, UNDECIDED
 from hrsynth.analysis.singularity.agreement import smallest_of
 from hrsynth.closed_forms.legs import OnCrank
+from hrsynth.constraints.vector_algebra import evaluate
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, PoseNotReached
 from hrsynth.geometry.balls import balls, below, jets, mean_value_form
@@ -135,6 +136,40 @@ def test_opposite_signs_are_separated_and_equal_signs_never(robot: str, observe:
         answer, sides = aspects.join(*pair), signs(aspects, *pair)
         assert (answer.verdict == SEPARATED) is bool(sides[0] != sides[1])
         assert answer.certified or answer.verdict == UNDECIDED
+
+
+@pytest.mark.some(2)
+@pytest.mark.parametrize(("robot", "observe"), SIGNED)
+def test_separated_poses_are_so_in_all_working_modes(robot: str, observe: str | None):
+    """A goal with the start's sign in one of its working modes is never separated; others, by SymPy's signs, are."""
+    aspects = aspects_of(robot, observe)
+    assert isinstance(aspects.pattern, LegPattern)
+    met = 0
+    for pair in pairs(robot, observe, 8, seed=2):
+        sides = signs(aspects, *pair)
+        if sides[0] == sides[1]:
+            continue
+        forms = aspects.enclosure(pair[1]).forms
+        p, R = aspects.pattern.coordinates.of([pair[1]])
+        found = {float(np.sign(evaluate(aspects.condition.expression, replace(forms, limbs=tuple(
+            replace(limb, mode=mode) for limb, mode in zip(forms.limbs, modes, strict=True))).at(p, R).values)[0]))
+            for modes in product((1.0, -1.0), repeat=len(forms.limbs))}
+        met += 1
+        answer = aspects.join(*pair, any_mode=True, budget=20)
+        assert (answer.verdict == SEPARATED) is (found == {sides[1]})
+        assert answer.verdict == SEPARATED or "other working mode" in answer.reason
+    assert met or robot == "quattro_rigid"
+
+
+@pytest.mark.parametrize(("start", "goal", "leg"), [
+    ("x=0.01,y=-0.015,phi=0", "x=-0.1073,y=-0.0315,phi=5.58deg", "3"),
+    ("x=0,y=0", "x=-0.091,y=-0.053,phi=0.1", "1, 2")])
+def test_a_goal_on_the_other_side_is_reached_through_a_fold(start: str, goal: str, leg: str):
+    answer = path(load("3rrr_m1"), start=start, goal=goal)
+    assert (answer.verdict, answer.certified) == (SAME, True)
+    assert answer.reason.endswith(f"at the goal the robot is then in the other working mode of leg {leg}")
+    assert answer.start.value * answer.goal.value > 0
+    assert set(leg.split(", ")) == {each for each, _ in answer.crossings}
 
 
 @pytest.mark.slow

@@ -130,6 +130,19 @@ def test_a_pose_beyond_a_limit_is_named_and_still_separated():
     assert set(verdicts) == {SEPARATED, UNDECIDED}
 
 
+@pytest.mark.parametrize("room", [None, 0.25])
+def test_a_rod_may_pass_length_zero_unless_it_is_limited(room: float | None):
+    """Each rod of a 3-RPR turned over changes the sign, so poses are separated only where slides cannot pass zero."""
+    robot, slides = load("3rpr_m1"), ("slide_1", "slide_2", "slide_3")
+    aspects = Aspects.of(robot if room is None else with_limits(robot, {name: Limits(-room, room) for name in slides}))
+    near = [at for at in random_walk(aspects.setting.samples.start, 150, 1)
+            if all(abs(coordinates(at, name)) < 0.24 for name in slides)]
+    values = aspects.condition.evaluate(aspects.structure.values_at(near))
+    answer = aspects.join(near[int(np.argmin(values))], near[int(np.argmax(values))], any_mode=True, budget=20)
+    assert answer.start.value * answer.goal.value < 0
+    assert (answer.verdict, answer.certified) == ((UNDECIDED, False) if room is None else (SEPARATED, True))
+
+
 @pytest.mark.some(1)
 @pytest.mark.parametrize("limits", [Limits(-4.0, 4.0), Limits(lower=-1.0)])
 def test_limits_that_are_not_considered_are_named(limits: Limits):

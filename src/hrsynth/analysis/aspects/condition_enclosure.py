@@ -16,6 +16,7 @@ from ...geometry.balls import Field, above_zero, balls, below, finite, jets, mea
 from ...geometry.vectors import Array, cross, dot, triple
 from .leg_forms import LegForms
 from .path_segments import StraightSegment, WorkingModeChange
+from .vector_expressions import limbs_of
 
 PathSegment = StraightSegment | WorkingModeChange
 Leading = tuple[int, Field] | None
@@ -135,6 +136,16 @@ def enclose_value(enclosure: ConditionEnclosure, p: Array, R: Array) -> tuple[bo
     reached, values = enclosure.at(*here.at(balls([0.0], [0.0])))
     _, middle = enclosure.at(*here.at(np.zeros(1)))
     return bool(reached[0]), float(np.sign(middle[0]) * below(values)[0])
+
+
+def is_beyond(enclosure: ConditionEnclosure, p: Array, R: Array) -> bool:
+    """Whether a joint whose limits follow from the pose and from limbs of the condition is proved to be beyond them at
+    one pose, whatever the working modes of other limbs."""
+    forms = enclosure.forms
+    known = limbs_of(tuple(forms.vectors.values()))
+    forms = replace(forms, bounds=tuple(bound for bound in forms.bounds if limbs_of(bound) <= known))
+    margins = forms.at(*StraightSegment(p, R, np.zeros(3), np.zeros(3)).at(balls([0.0], [0.0]))).reach_margins
+    return bool(above_zero(-margins[:, len(forms.limbs) :]).any())
 
 
 def _weakest(values: dict[str, Field], condition: Named) -> float:

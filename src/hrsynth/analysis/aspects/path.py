@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, reduce
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
 from ...kinematics.steps import lead_to, track
-from ...mechanism.pose import Pose, PoseLike, asked_pose
+from ...mechanism.pose import ModeNumber, Pose, PoseLike, asked_pose
 from ...progress import tell
 from ...results import Result, Value
 from ...tolerances import AS_PRINTED, RANK_CUTOFF, RANK_GAP, SOLVED
@@ -25,17 +26,18 @@ from ..measured import MeasuredRobot
 from ..observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike
 from ..question import question
 from ..singularity.agreement import smallest_of, weakest
-from .condition_enclosure import ConditionEnclosure, PathSegment, enclose_value, sign_of
-from .leg_forms import LegPattern, pattern
+from .condition_enclosure import ConditionEnclosure, PathSegment, enclose_value, is_beyond, sign_of
+from .leg_forms import LegForms, LegPattern, pattern
 from .path_segments import PathCoordinates, Place, WorkingModeChange, path_coordinates
 from .road_map import PlannedPath, PoseRegion, plan
-from .vector_expressions import NoLegForm
+from .vector_expressions import NoLegForm, limbs_of
 from .words import SAME, SEPARATED, UNDECIDED
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PathEnd(Value):
-    """A requested pose: the whole pose that is reached, its configuration, and the value of the condition there."""
+    """A requested pose: the whole pose that is reached, the configuration in which it is, and the value of the
+    condition there; at the goal of a path the value in the working modes in which the path ends."""
 
     pose: Pose
     configuration: ClosedConfiguration
@@ -91,6 +93,11 @@ class PathAnswer(Result, shown_as="path"):
     """Joints whose limits hold all along a certified path."""
     unlimited: tuple[str, ...] = ()
     """Joints whose limits are not considered."""
+    any_mode: bool = False
+    """Whether the goal is a pose, whatever the working modes of its legs, and not a configuration."""
+    goal_modes: tuple[tuple[float, ...], ...] = ()
+    """Working modes of all limbs at the goal in which the sign is proved to be opposite to the start's, where they are
+    separated."""
     road: SampledRoad | None = None
     """The straight way, sampled; where neither a path nor a separation was enclosed."""
 
@@ -228,15 +235,16 @@ class Aspects(Value):
             raise NoLegForm(str(self.pattern))
         return ConditionEnclosure(self.condition, self.pattern.forms(at))
 
-    def join(self, start: ClosedConfiguration, goal: ClosedConfiguration, *, seed: int = 0, budget: int = BUDGET
-             ) -> PathAnswer:
-        """Whether a path without Type 2 singularity joins two configurations."""
+    def join(self, start: ClosedConfiguration, goal: ClosedConfiguration, *, seed: int = 0, budget: int = BUDGET,
+             any_mode: bool = False) -> PathAnswer:
+        """Whether a path without Type 2 singularity leads from a configuration to another, where legs that are not
+        observed may be in any working mode; with ``any_mode`` to the other's pose, all legs in any working mode."""
         found, scene = self.condition, self.structure.values_at([start, goal])
         values = found.evaluate(scene) if found.signed else smallest_of(found.rows(scene))
         ends = [PathEnd(self.motion.pose(at.pose(self.motion.link)), at, float(value))
                 for at, value in zip((start, goal), values, strict=True)]
         answer = PathAnswer(self.setting, UNDECIDED, False, tuple(end.pose for end in ends), None, 0, ends[0], ends[1],
-                            "", found.signed)
+                            "", found.signed, any_mode=any_mode)
         if self.lost:
             return replace(answer, reason=f"every pose is singular, {self.lost}")
         if min(abs(end.value) for end in ends) < CLEAR:
@@ -284,11 +292,62 @@ class Aspects(Value):
         if not all(sure) or margin == 0:
             return replace(answer, reason="at a pose reach or value cannot be enclosed away from zero")
         if enclosures[0].signed and values[0] * values[1] < 0:
-            return replace(answer, verdict=SEPARATED, certified=not fitted, margin=margin, boxes=2, reason=(
-                "the expression is enclosed with opposite signs at the two configurations: every path between them "
-                f"{answer.where}crosses its zeros{forms}"))
+            seen = () if answer.any_mode else {o.leg for o in self.setting.observed}
+            across, others, margin = self._across(enclosures[1], (p[1], R[1]), values, seen)
+            if not others:
+                return replace(answer, verdict=SEPARATED, certified=not fitted, margin=margin, boxes=1 + len(across),
+                               goal_modes=across, reason=(
+                    f"the expression is enclosed with opposite signs at the two {_ends(answer.any_mode)}: every path "
+                    f"between them {answer.where}crosses its zeros{forms}"))
+            return self._lead_to_other_modes(answer, enclosures[0], others, (p, R), seed, budget)
         if answer.signed and answer.start.value * answer.goal.value < 0:
             return _pointwise(answer, "its sign is that of a determinant")
+        return self._lead(answer, enclosures, (p, R), seed, budget)
+
+    def _across(self, goal: ConditionEnclosure, place: Place, values: Sequence[float], seen: Collection[str]
+                ) -> tuple[tuple[tuple[float, ...], ...], list[ConditionEnclosure], float]:
+        """Of the working modes of the goal, of legs that are not ``seen``: those in which the value's sign is proved to
+        be opposite to the start's; those in which it is not, nor a joint proved to be beyond its limits, first those
+        nearest to the goal's; and the smallest |value| at the start and in the former."""
+        limbs, across, others, margin = goal.forms.limbs, [goal.forms.modes], [], min(map(abs, values))
+        able = [k for k in sorted(limbs_of(tuple(goal.forms.vectors.values()))) if limbs[k].label not in seen]
+        for k in range(1, len(able) + 1):
+            for part in combinations(able, k):
+                there = replace(goal, forms=reduce(LegForms.flipped, part, goal.forms))
+                sure, value = enclose_value(there.unlimited, *place)
+                if sure and value * values[0] < 0:
+                    across.append(there.forms.modes)
+                    margin = min(margin, abs(value))
+                elif not is_beyond(there, *place):
+                    others.append(there)
+        return tuple(across), others, margin
+
+    def _lead_to_other_modes(self, answer: PathAnswer, start: ConditionEnclosure, others: Sequence[ConditionEnclosure],
+                             poses: tuple[Array, Array], seed: int, budget: int) -> PathAnswer:
+        """A path to the goal in a working mode in which its sign is the start's; ``undecided`` if none is found."""
+        spent, limbs = 0, self.enclosure(answer.goal.configuration).forms.limbs
+        for there in others:
+            legs = [one.label for one, other in zip(limbs, there.forms.limbs, strict=True) if one.mode != other.mode]
+            (p, R), modes = poses, f"in the other working mode of leg {', '.join(dict.fromkeys(legs))}"
+            if spent < budget and there.at(p[1:2], R[1:2])[1][0] * answer.start.value > 0:
+                found = self._lead(answer, (start, there), poses, seed, budget - spent)
+                spent += found.boxes
+                if found.verdict == SAME:
+                    value = float(there.at(p[1:2], R[1:2])[1][0])
+                    return replace(found, goal=replace(answer.goal, value=value), boxes=spent, reason=(
+                        f"{found.reason}; at the goal the robot is then {modes}"))
+        legs = dict.fromkeys(one.label for there in others for one, other in zip(limbs, there.forms.limbs, strict=True)
+                             if one.mode != other.mode)
+        return replace(answer, boxes=spent, reason=(
+            "the expression has opposite signs at the start and at the goal in the working modes reached, so every "
+            "path between these crosses its zeros; but not in other working modes of leg "
+            f"{', '.join(legs)} at the goal, and no path to these was proved"))
+
+    def _lead(self, answer: PathAnswer, enclosures: Sequence[ConditionEnclosure], poses: tuple[Array, Array], seed: int,
+              budget: int) -> PathAnswer:
+        """The verdict by a path between the first two poses."""
+        assert isinstance(self.pattern, LegPattern)
+        (p, R), coordinates, fitted = poses, self.pattern.coordinates, self.pattern.fitted
         for end, enclosure, place, turn in zip(("start", "goal"), enclosures, p, R, strict=False):
             beyond = enclosure.forms.beyond(place, turn)
             if beyond:
@@ -305,6 +364,7 @@ class Aspects(Value):
             return replace(answer, road=self.road(*ends), reason=(
                 "the condition and the reach of all rods are enclosed along the path, not whether the loops inside leg "
                 f"{', '.join(self.pattern.loose)} close on it"))
+        forms = f", for forms that are fitted to samples: {', '.join(fitted)}" if fitted else ""
         return replace(answer, verdict=SAME, certified=not fitted, margin=found.margin, reason=(
             f"the condition and the reach of all legs are enclosed away from zero along the path{forms}"))
 
@@ -327,12 +387,13 @@ def path(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, 
     The path passes only through poses at which everything seen has a value, in front of the camera or not.
 
     Both poses are reached from the zero configuration in its working mode; or, if no small steps lead to a pose that is
-    a mode of the other, as ``modes`` found the robot assembled there. On the way legs may pass their limits into other
-    working modes (Type 1). A certificate encloses, by interval arithmetic, the value of the condition away from zero,
-    the reach of every leg and the limits of R and P joints all along the path, for all poses within
-    ``tolerances.FOLLOWED`` of it; opposite signs of an expression at the two ends separate them. At most ``budget``
-    intervals are tried. If nothing can be enclosed the straight path is sampled. ``observe``, ``camera`` and ``see``
-    are as for ``derive``.
+    a mode of the other, as ``modes`` found the robot assembled there. The start is meant in these working modes; the
+    goal in any, or, where it is given as a mode, with its directions. On the way legs may pass their limits into other
+    working modes (Type 1), but no rod length zero. A certificate encloses, by interval arithmetic, the value of the
+    condition away from zero, the reach of every leg and the limits of R and P joints all along the path, for all poses
+    within ``tolerances.FOLLOWED`` of it. Opposite signs of an expression, at the start and in all working modes of the
+    goal that joint limits allow, separate the two. At most ``budget`` intervals are tried. If nothing can be enclosed
+    the straight path is sampled. ``observe``, ``camera`` and ``see`` are as for ``derive``.
 
     Raises ``BadRequest`` for unknown names and parts of a pose, ``PoseNotReached``.
 
@@ -340,10 +401,17 @@ def path(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, 
     <PathAnswer: 3rrr_m1, watching 1, 2, 3: same aspect>
     """
     wanted = [asked_pose(each) for each in (start, goal)]
-    aspects = Aspects.of(ObservedRobot.of(robot, observe, camera, see=see, seed=seed).telling(wanted), seed=seed)
+    setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed)
+    return between_poses(setting, wanted, any_mode=not isinstance(wanted[1], ModeNumber), seed=seed, budget=budget)
+
+
+def between_poses(setting: ObservedRobot, wanted: Sequence[Pose | ModeNumber], *, any_mode: bool, seed: int = 0,
+                  budget: int = BUDGET) -> PathAnswer:
+    """What :meth:`Aspects.join` says of the configurations at a start and a goal."""
+    aspects = Aspects.of(setting.telling(wanted), seed=seed)
     tell("poses")
     first, last = configurations_at(aspects.setting, wanted, by_modes=True)
-    return aspects.join(first, last, seed=seed, budget=budget)
+    return aspects.join(first, last, seed=seed, budget=budget, any_mode=any_mode)
 
 
 def leads(ways: Sequence[PathSegment], start: Place, goal: Place, enclosures: Sequence[ConditionEnclosure]) -> bool:
@@ -372,11 +440,19 @@ def _why_undecided(found: PlannedPath, enclosures: Sequence[ConditionEnclosure],
     return f"no path was proved: {used}; leg {', '.join(legs)} is in different working modes at the two poses"
 
 
+def _ends(any_mode: bool) -> str:
+    """Which ends of a path are meant."""
+    return "poses, at the goal in each working mode within joint limits" if any_mode else (
+        "configurations, each in the working modes that the observed directions there show")
+
+
 def _pointwise(answer: PathAnswer, why: str) -> PathAnswer:
     """What the two configurations alone tell: a continuous expression of opposite signs separates them."""
     ends = answer.start.value, answer.goal.value
     if answer.signed and ends[0] * ends[1] < 0:
-        return replace(answer, verdict=SEPARATED, margin=min(map(abs, ends)), reason=(
-            "the expression has opposite signs at the two configurations, every path between them "
-            f"{answer.where}crosses its zeros; not certified by intervals: {why}"))
+        found = ("the expression has opposite signs at the two configurations, every path between them "
+                 f"{answer.where}crosses its zeros; not certified by intervals: {why}")
+        if answer.any_mode:
+            return replace(answer, reason=f"{found}; the goal was not tested in other working modes")
+        return replace(answer, verdict=SEPARATED, margin=min(map(abs, ends)), reason=found)
     return replace(answer, reason=f"no path can be certified: {why}")

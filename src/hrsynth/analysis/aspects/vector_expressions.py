@@ -8,7 +8,8 @@ joint is a P, or an R or C along it. All of it holds at the zero configuration t
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, is_dataclass
+from typing import Any
 
 import numpy as np
 
@@ -94,6 +95,15 @@ def value_of(each: VectorExpression, p: Field, R: Field, carried: Sequence[Field
         return each.value(*(value_of(part, p, R, carried) for part in each.parts))
     along = value_of(each.end, p, R, carried) - value_of(each.start, p, R, carried)
     return unit_balls(along if each.axis is None else cross(value_of(each.axis, p, R, carried), along))
+
+
+def limbs_of(each: Any) -> set[int]:
+    """The limbs whose vectors an expression, or what is made of expressions, follows from."""
+    if isinstance(each, LegVector):
+        return {each.limb}
+    parts = each if isinstance(each, tuple) else [getattr(each, f.name) for f in fields(each)] if is_dataclass(
+        each) else []
+    return set().union(*map(limbs_of, parts))
 
 
 @dataclass(frozen=True, eq=False)
