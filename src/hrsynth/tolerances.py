@@ -199,6 +199,11 @@ NO_NEAR_MODE = 0.3
 """Misses (sizes of the mechanism) beyond which a start leads to no near mode."""
 SAME_NEAR_MODE = 1e-6
 """Difference of poses and of misses (sizes of the mechanism) below which two stationary poses are one."""
+SAME_NEAR_POSE = 1e-4
+"""Difference of poses (characteristic lengths, entries of turns) below which two minima of a difference of measured
+values are one."""
+CURVATURE_STEP = 1e-4
+"""Step (characteristic lengths, radians) of the differences of the slope of such a difference."""
 MEANT = 1e-5
 """Distance (sizes of the mechanism) up to which joint centres count as meant to coincide, where the next larger one is
 ``RANK_GAP`` times as large at least."""

@@ -69,6 +69,11 @@ def _parse(text: str) -> float | dict[str, float]:
     return found
 
 
+def single_angle(cone: float | str) -> float:
+    """One half-angle (rad) for all that is observed; raises ``BadRequest``."""
+    return _angle(cone) if isinstance(cone, str) else _require_angle(cone, cone)
+
+
 def _angle(text: str) -> float:
     digits = text.removesuffix("deg").strip()
     try:

@@ -1,0 +1,175 @@
+"""Near modes: poses that a measurement with an error cannot tell from the goal (docs/pages/theory.md, section 8).
+
+Lists of modes are of the numbers as they are. Where more is observed than needed, a mode of exact dimensions is none of
+rounded ones, but what is measured there differs by no more than the rounding, and the loop rests there as before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from ...budgets import NEAR_MODE_STEPS
+from ...errors import LoopsNotClosed
+from ...geometry.so3 import angle_of
+from ...geometry.vectors import Array
+from ...kinematics.configuration import ClosedConfiguration
+from ...kinematics.platform_motion import PlatformMotion
+from ...kinematics.relation import Measurement, relation
+from ...kinematics.tasks import Held, shorten_step, solve
+from ...ranges import plain_number
+from ...results import Value
+from ...tolerances import CURVATURE_STEP, SAME_GEOMETRY, SAME_NEAR_POSE, SOLVED, SURELY_SOMETHING
+from ..accuracy.cones import single_angle
+from ..observed import ObservedRobot
+from .assembly_mode import AssemblyMode, found_mode
+from .motions import bodies_apart
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class NearMode(AssemblyMode):
+    """A pose whose measured values differ from the goal's by ``angle`` at most (rad; lengths in characteristic
+    lengths), ``distance`` (m) and ``turned`` (rad) from the goal's. ``stable``: whether the difference has an isolated
+    minimum there, which attracts the loop; None where the robot was not assembled. ``family``: it is one of a
+    connected set of poses, no isolated minimum."""
+
+    angle: float = 0.0
+    distance: float = 0.0
+    turned: float = 0.0
+    stable: bool | None = None
+    family: bool = False
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line."""
+        return {**super().to_dict(), "angle": self.angle, "distance_m": self.distance, "turned_rad": self.turned,
+                "stable": self.stable, "family": self.family}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Minimum(Value):
+    """A closed configuration at which the difference of measured values is stationary, the largest of these differences
+    (rad), and the eigenvalues of the loop linearised there, over −λ; none where the values leave a freedom."""
+
+    configuration: ClosedConfiguration
+    angle: float
+    rates: Array
+
+    @property
+    def family(self) -> bool:
+        """Whether the values leave a freedom there."""
+        return not self.rates.size
+
+    @property
+    def isolated(self) -> bool:
+        """Whether it is an isolated minimum."""
+        return bool(self.rates.size and self.rates.min() > 0.0)
+
+
+def descend(start: ClosedConfiguration, question: Measurement, held: Held) -> Minimum | None:
+    """The stationary difference of what is held to which Gauss and Newton's method leads on the closed loops; None
+    where it leads to none, or the loops open."""
+    at, twin = start, start.twin
+    error, along = _moving(at, held)
+    for _ in range(NEAR_MODE_STEPS):
+        step = along.motions @ np.linalg.lstsq(along.rates, -error, rcond=None)[0]
+        q, residual = solve(twin, twin.integrate(at.q, shorten_step(step, 0.5)), tolerance=SOLVED)
+        try:
+            at = ClosedConfiguration.of(twin, q)
+        except LoopsNotClosed:
+            return None
+        error, along = _moving(at, held)
+        if float(np.abs(step).max(initial=0.0)) < SAME_GEOMETRY:
+            break
+    else:
+        return None
+    sizes = [float(np.linalg.norm(part)) for part in np.split(error, np.cumsum([o.size for o, _ in held.measured])[:-1])]
+    angle = 2 * float(np.arcsin(min(1.0, max(sizes, default=0.0) / 2)))
+    there = relation(at, question)
+    if there.rank < there.dof.value or there.seen.weakest < SURELY_SOMETHING:
+        return Minimum(at, angle, np.zeros(0))
+    return Minimum(at, angle, _rates(at, held, along))
+
+
+@dataclass(frozen=True, eq=False)
+class _Moving:
+    """Motions of the loops (nv, k) that change what is measured, and the rates (rows, k) of that."""
+
+    motions: Array
+    rates: Array
+
+
+def _moving(at: ClosedConfiguration, held: Held) -> tuple[Array, _Moving]:
+    """How far what is held is off, and the motions that change it."""
+    error, rates = held.rows(at.twin, at.q)
+    kernel = at.kernel()[0]
+    _, sizes, ways = np.linalg.svd(rates @ kernel, full_matrices=False)
+    motions = kernel @ ways[sizes > SURELY_SOMETHING].T
+    return error, _Moving(motions, rates @ motions)
+
+
+def _rates(at: ClosedConfiguration, held: Held, along: _Moving) -> Array:
+    """The eigenvalues of (JᵀJ)⁻¹ H, H the Hessian of ½ ‖e‖² along motions, J the rates of e: by differences of the
+    slope, of which the part beside JᵀJ is of the size of e."""
+    twin, n = at.twin, along.motions
+    bends = np.zeros((n.shape[1],) * 2)
+    for k, way in enumerate(n.T):
+        for sign in (1.0, -1.0):
+            q, _ = solve(twin, twin.integrate(at.q, sign * CURVATURE_STEP * way), tolerance=SOLVED)
+            J = twin.jacobian(q)
+            error, rates = held.rows(twin, q)
+            carried = n - np.linalg.pinv(J, rcond=SURELY_SOMETHING) @ (J @ n)
+            bends[k] += sign * (error @ rates @ carried) / (2 * CURVATURE_STEP)
+    gram = along.rates.T @ along.rates
+    return np.asarray(np.sort(np.linalg.eigvals(np.linalg.solve(gram, (bends + bends.T) / 2)).real))
+
+
+def near_modes(setting: ObservedRobot, goal: ClosedConfiguration, question: Measurement, known: Sequence[AssemblyMode],
+               candidates: Sequence[AssemblyMode], bound: float) -> tuple[NearMode, ...]:
+    """The near modes with differences up to ``bound`` (rad) to which candidates lead, those of least difference first:
+    isolated minima, none of them the goal or a ``known`` mode, and one of those that are connected."""
+    held, found = Held.at(goal.twin, goal.q, question.reference, question.observations), list[NearMode]()
+    for mode in candidates if bound else ():
+        near = _near(setting, goal, question, held, mode)
+        if near is None or near.angle > bound:
+            continue
+        bodies = near.bodies or {}
+        others = [{body: goal.pose(body) for body in bodies}, *(each.bodies or {} for each in (*known, *found))]
+        if all(bodies_apart(bodies, other, question, goal.twin.length) > SAME_NEAR_POSE for other in others):
+            found.append(near)
+    families = [each for each in found if each.family]
+    return tuple(sorted((each for each in found if each not in families[1:]), key=lambda each: each.angle))
+
+
+def _near(setting: ObservedRobot, goal: ClosedConfiguration, question: Measurement, held: Held, mode: AssemblyMode
+          ) -> NearMode | None:
+    """A candidate as a near mode; one at which the robot was not assembled as it is, its residual as the difference."""
+    angle, stable, family = mode.residual, None, False
+    if mode.configuration is not None:
+        least = descend(mode.configuration, question, held)
+        if least is None or not (least.isolated or least.family):
+            return None
+        at, angle, stable, family = least.configuration, least.angle, least.isolated or None, least.family
+        mode = found_mode(setting, question, at, {body: at.pose(body) for body in mode.bodies or {}}, mode.residual)
+    distance, turned = distance_from(setting.motion, goal, mode)
+    return NearMode(**{each.name: getattr(mode, each.name) for each in fields(AssemblyMode)}, angle=angle,
+                    distance=distance, turned=turned, stable=stable, family=family)
+
+
+def distance_from(motion: PlatformMotion, goal: ClosedConfiguration, mode: AssemblyMode) -> tuple[float, float]:
+    """How far the platform is from its pose at the goal (m, rad)."""
+    home, there = goal.pose(motion.link), mode.pose
+    at = np.array([there.x, there.y, there.z], dtype=float)
+    return float(np.linalg.norm(at - motion.position(home))), (
+        0.0 if there.rotation is None else angle_of(there.rotation @ home[:3, :3].T))
+
+
+def measurement_bound(cone: float | str) -> float:
+    """An error of measurements (rad) as a user writes it, 0 for none; raises ``BadRequest``."""
+    try:
+        exact = plain_number(str(cone).removesuffix("deg").strip()) == 0
+    except ValueError:
+        exact = False
+    return 0.0 if exact else single_angle(cone)
