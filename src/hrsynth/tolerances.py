@@ -199,6 +199,8 @@ NO_NEAR_MODE = 0.3
 """Misses (sizes of the mechanism) beyond which a start leads to no near mode."""
 SAME_NEAR_MODE = 1e-6
 """Difference of poses and of misses (sizes of the mechanism) below which two stationary poses are one."""
+MEASUREMENT_BOUND = "0.1deg"
+"""Error of a measurement up to which poses are not told apart, where nothing is said."""
 SAME_NEAR_POSE = 1e-4
 """Difference of poses (characteristic lengths, entries of turns) below which two minima of a difference of measured
 values are one."""

@@ -20,7 +20,7 @@ from ...kinematics.tasks import Task
 from ...mechanism.pose import ModeNumber, Pose, PoseLike, asked_pose
 from ...progress import tell
 from ...results import Result
-from ...tolerances import SAME_NEAR_POSE
+from ...tolerances import MEASUREMENT_BOUND, SAME_NEAR_POSE
 from ..formation import Formation
 from ..measured import MeasuredRobot
 from ..observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike
@@ -33,7 +33,7 @@ from .carried_modes import solve_carried
 from .drift import drift
 from .formed import formation_modes
 from .motions import SelfMotion, self_motion
-from .near import NearMode, measurement_bound, near_modes
+from .near import NearMode, measurement_bound, near_modes, poses_alike
 from .planar_loops import PlanarLoops
 from .planar_modes import solve_loops
 from .posed import PosedPlatform, solve_posed
@@ -44,8 +44,6 @@ from .solve import SystemModes, continuum
 from .tips import TipLoci
 from .ways import better_ways, solve_tips, without_couplings
 
-CONE = "0.1deg"
-"""Error of a measurement up to which poses are not told apart where nothing is said."""
 WITHIN = {"formation": "configurations up to trivial motions",
           "translations": "poses turned as this one", "bodies": "poses whose bodies are turned as at this one",
           "planar": "poses in the plane of motion", "spatial": "poses in space", "oriented": "poses in space"}
@@ -106,7 +104,14 @@ class AssemblyModes(Result, shown_as="modes"):
         """The robot and how many modes there are."""
         if self.formation is not None:
             return f"{self.setting.headline()}: {self.count} (formation)"
-        return f"{self.setting.headline()}: {self.count} ({self.kind} robot) at {self.pose}"
+        alike = f"{self.alike} (" if self.kind == "hidden" and self.modes else ""
+        return (f"{self.setting.headline()}: {alike}{self.count}{', ' if alike else ' ('}{self.kind} robot) at "
+                f"{self.pose}")
+
+    @property
+    def alike(self) -> str:
+        """How many poses a measurement with an error does not tell from each other, in words."""
+        return poses_alike(self.modes, self.near)
 
     @property
     def count(self) -> str:
@@ -146,7 +151,7 @@ class AssemblyModes(Result, shown_as="modes"):
 
 @question(formations=True)
 def modes(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
-          at: PoseLike | ClosedConfiguration | None = None, real: bool = False, cone: float | str = CONE,
+          at: PoseLike | ClosedConfiguration | None = None, real: bool = False, cone: float | str = MEASUREMENT_BOUND,
           as_written: bool = False, effort: float = EFFORT, seed: int = 0) -> AssemblyModes:
     """All poses with what is observed at ``at`` (default: the zero configuration), or with ``real`` the motors'
     coordinates: complex solutions counted, real ones enclosed (theory.md 8; MMT 3.3, 4.1.2, 4.2).

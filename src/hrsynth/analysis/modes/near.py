@@ -16,6 +16,7 @@ from ...budgets import NEAR_MODE_STEPS
 from ...errors import LoopsNotClosed
 from ...geometry.so3 import angle_of
 from ...geometry.vectors import Array
+from ...kinematics.assembly import of_links
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
 from ...kinematics.relation import Measurement, relation
@@ -41,6 +42,13 @@ class NearMode(AssemblyMode):
     turned: float = 0.0
     stable: bool | None = None
     family: bool = False
+
+    @property
+    def differs(self) -> str:
+        """By how much what is measured differs at most, and how far away the pose is."""
+        far = f"{1e3 * self.distance:.3g} mm away" if self.distance > SAME_NEAR_POSE * self.length else (
+            f"turned by {np.degrees(self.turned):.3g}°")
+        return f"by {degrees(self.angle)}, {far}"
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
@@ -148,7 +156,11 @@ def _near(setting: ObservedRobot, goal: ClosedConfiguration, question: Measureme
     """A candidate as a near mode; one at which the robot was not assembled as it is, its residual as the difference."""
     angle, stable, family = mode.residual, None, False
     if mode.configuration is not None:
-        least = descend(mode.configuration, question, held)
+        try:
+            start = of_links(goal.twin, mode.configuration.pose)
+        except LoopsNotClosed:
+            return None
+        least = descend(start, question, held)
         if least is None or not (least.isolated or least.family):
             return None
         at, angle, stable, family = least.configuration, least.angle, least.isolated or None, least.family
@@ -156,6 +168,27 @@ def _near(setting: ObservedRobot, goal: ClosedConfiguration, question: Measureme
     distance, turned = distance_from(setting.motion, goal, mode)
     return NearMode(**{each.name: getattr(mode, each.name) for each in fields(AssemblyMode)}, angle=angle,
                     distance=distance, turned=turned, stable=stable, family=family)
+
+
+def degrees(angle: float) -> str:
+    """An angle (rad) in degrees, at least so large as to be no zero."""
+    return f"{max(float(np.degrees(angle)), 1e-9):.1g}°"
+
+
+def poses_alike(modes: Sequence[AssemblyMode], near: Sequence[NearMode]) -> str:
+    """How many poses a measurement with an error does not tell apart, and what the others are."""
+    count = len(modes) + len(near)
+    if count < 2:
+        return "no other pose looks the same"
+    exact = sum(not mode.goal for mode in modes)
+    others = [f"{exact} with the same values"] * bool(exact)
+    isolated = [each for each in near if not each.family]
+    if len(isolated) == 1:
+        others.append(f"one that differs {isolated[0].differs}")
+    elif isolated:
+        others.append(f"{len(isolated)} that differ by up to {degrees(isolated[-1].angle)}")
+    others += [f"a continuous family that differs {each.differs} at one of its poses" for each in near if each.family]
+    return f"{count} poses look the same" + (f": {', '.join(['the goal', *others][:-1])} and {others[-1]}" if near else "")
 
 
 def distance_from(motion: PlatformMotion, goal: ClosedConfiguration, mode: AssemblyMode) -> tuple[float, float]:
