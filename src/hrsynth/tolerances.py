@@ -204,6 +204,9 @@ MEASUREMENT_BOUND = "0.1deg"
 SAME_NEAR_POSE = 1e-4
 """Difference of poses (characteristic lengths, entries of turns) below which two minima of a difference of measured
 values are one."""
+FAMILY_STEP = 0.02
+"""Step (characteristic lengths, radians) along a freedom that values leave at a near mode, over which they are to stay
+within the bound if it is one of a continuous family."""
 CURVATURE_STEP = 1e-4
 """Step (characteristic lengths, radians) of the differences of the slope of such a difference."""
 MEANT = 1e-5

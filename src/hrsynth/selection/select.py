@@ -84,8 +84,8 @@ class Criteria:
 
 @dataclass(frozen=True)
 class ModeCount:
-    """How many assembly modes, near ones too, there are with the directions of a pose, in how many of them the robot was found
-    assembled, and whether these are proved to be all; ``why`` they are not listed, otherwise empty."""
+    """How many assembly modes, near ones too, there are with the directions of a pose, in how many of them the robot
+    was found assembled, and whether these are proved to be all; ``why`` they are not listed, otherwise empty."""
 
     count: int | None
     reachable: int | None

@@ -25,7 +25,6 @@ from ..formation import Formation
 from ..measured import MeasuredRobot
 from ..observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike
 from ..question import question
-from ..singularity.agreement import weakest
 from .assembly_mode import AssemblyMode, ModeReader, found_mode
 from .branches import Model
 from .carried import CarriedPlatform
@@ -38,7 +37,6 @@ from .planar_loops import PlanarLoops
 from .planar_modes import solve_loops
 from .posed import PosedPlatform, solve_posed
 from .search import FoundMode, leaves_free, search
-from .sighted import behind
 from .single_loop import solve_loop
 from .solve import SystemModes, continuum
 from .tips import TipLoci
@@ -137,7 +135,8 @@ class AssemblyModes(Result, shown_as="modes"):
                 "complex": None if found.continuum else found.complex, "complete": found.complete,
                 "bound": found.bound, "proof": found.proof,
                 **({} if self.formation is None else {"formation": self.formation.to_dict()}),
-                "modes": [self._record(each) for each in self.modes], "near_modes": [each.to_dict() for each in self.near], "measurement_bound": self.bound,
+                "modes": [self._record(each) for each in self.modes],
+                "near_modes": [each.to_dict() for each in self.near], "measurement_bound": self.bound,
                 "antipodal": [self._record(each) for each in self.antipodal],
                 "degenerate": found.degenerate, "continuum": found.continuum,
                 "motions": [{"pose": self.pose_of(each).to_dict(), **each.to_dict()} for each in self.motions],
@@ -159,8 +158,8 @@ def modes(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None,
     A Π stays a parallelogram, never crossed (except in planar mechanisms that are closed loop by loop, and in
     searches); if legs or measurements keep the platform from turning, turned poses (another operation mode) are not
     searched for. Poses that a measurement with an error up to ``cone`` (rad, or as ``"0.1deg"``; 0 for none) does not
-    tell from the goal are listed too, as ``near``: found, not proved. ``observe``, ``camera`` and ``see`` are as for ``derive``; ``at`` may be a closed configuration of an
-    observed robot. Joint centres that nearly coincide, and solutions nearly at infinity, are taken to be so if that is
+    tell from the goal are listed too, as ``near``: found, not proved. ``observe``, ``camera`` and ``see`` are as for
+    ``derive``; ``at`` may be a closed configuration of an observed robot. Joint centres that nearly coincide, and solutions nearly at infinity, are taken to be so if that is
     clearly meant, unless ``as_written`` is true. ``effort`` is the time limit for a list (seconds on one core),
     estimated from its size before it starts. For a formation: all configurations, trivial motions aside, with what is
     measured at the zero configuration.
@@ -174,7 +173,7 @@ def modes(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None,
     not clear whether special geometry is meant.
 
     >>> hrsynth.modes("3rrr_m1", at="x=0,y=0,phi=0")
-    <AssemblyModes: 3rrr_m1, watching 1, 2, 3: 2 real of 6 complex (hidden robot) at x=0,y=0,z=0,phi=0deg>
+    <AssemblyModes: 3rrr_m1, watching 1, 2, 3: 2 poses look the same (2 real of 6 complex, hidden robot) at x=0,y=0,z=0,phi=0deg>
     """
     if real and (observe not in (None, "all", ["all"]) or see is not None):
         raise BadRequest("the motors are held instead of what is observed", f"real with {observe or see}",

@@ -19,11 +19,11 @@ from ...geometry.vectors import Array
 from ...kinematics.assembly import of_links
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
-from ...kinematics.relation import Measurement, relation
+from ...kinematics.relation import Measurement, platform_motions, relation
 from ...kinematics.tasks import Held, shorten_step, solve
 from ...ranges import plain_number
 from ...results import Value
-from ...tolerances import CURVATURE_STEP, SAME_GEOMETRY, SAME_NEAR_POSE, SOLVED, SURELY_SOMETHING
+from ...tolerances import CURVATURE_STEP, FAMILY_STEP, SAME_GEOMETRY, SAME_NEAR_POSE, SOLVED, SURELY_SOMETHING
 from ..accuracy.cones import single_angle
 from ..observed import ObservedRobot
 from .assembly_mode import AssemblyMode, found_mode
@@ -57,81 +57,73 @@ class NearMode(AssemblyMode):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Minimum(Value):
+class StationaryPose(Value):
     """A closed configuration at which the difference of measured values is stationary, the largest of these differences
-    (rad), and the eigenvalues of the loop linearised there, over −λ; none where the values leave a freedom."""
+    (rad); whether it is an ``isolated`` minimum, which attracts the loop, or one of a ``family`` of poses with
+    differences up to a bound."""
 
     configuration: ClosedConfiguration
     angle: float
-    rates: Array
-
-    @property
-    def family(self) -> bool:
-        """Whether the values leave a freedom there."""
-        return not self.rates.size
-
-    @property
-    def isolated(self) -> bool:
-        """Whether it is an isolated minimum."""
-        return bool(self.rates.size and self.rates.min() > 0.0)
+    isolated: bool
+    family: bool
 
 
-def descend(start: ClosedConfiguration, question: Measurement, held: Held) -> Minimum | None:
+def descend(start: ClosedConfiguration, question: Measurement, held: Held, bound: float) -> StationaryPose | None:
     """The stationary difference of what is held to which Gauss and Newton's method leads on the closed loops; None
-    where it leads to none, or the loops open."""
+    where it leads to none, or the loops open. Where the values leave a freedom, a family is a motion either way with
+    differences up to ``bound`` (rad)."""
     at, twin = start, start.twin
-    error, along = _moving(at, held)
+    error, motions, rates = _changes(at, held)
     for _ in range(NEAR_MODE_STEPS):
-        step = along.motions @ np.linalg.lstsq(along.rates, -error, rcond=None)[0]
-        q, residual = solve(twin, twin.integrate(at.q, shorten_step(step, 0.5)), tolerance=SOLVED)
+        step = motions @ np.linalg.lstsq(rates, -error, rcond=None)[0]
+        q, _ = solve(twin, twin.integrate(at.q, shorten_step(step, 0.5)), tolerance=SOLVED)
         try:
             at = ClosedConfiguration.of(twin, q)
         except LoopsNotClosed:
             return None
-        error, along = _moving(at, held)
+        error, motions, rates = _changes(at, held)
         if float(np.abs(step).max(initial=0.0)) < SAME_GEOMETRY:
             break
     else:
         return None
-    sizes = [float(np.linalg.norm(part)) for part in np.split(error, np.cumsum([o.size for o, _ in held.measured])[:-1])]
-    angle = 2 * float(np.arcsin(min(1.0, max(sizes, default=0.0) / 2)))
-    there = relation(at, question)
-    if there.rank < there.dof.value or there.seen.weakest < SURELY_SOMETHING:
-        return Minimum(at, angle, np.zeros(0))
-    return Minimum(at, angle, _rates(at, held, along))
+    angle, there = _largest(error, held), relation(at, question)
+    if there.rank == there.dof.value and there.seen.weakest >= SURELY_SOMETHING:
+        return StationaryPose(at, angle, bool(_loop_rates(at, held, motions, rates).min(initial=1.0) > 0.0), False)
+    moving = platform_motions(at, question)
+    way = moving @ np.linalg.svd(held.rows(twin, at.q)[1] @ moving)[2][-1]
+    beside = (solve(twin, twin.integrate(at.q, step * way), tolerance=SOLVED)[0]
+              for step in (FAMILY_STEP, -FAMILY_STEP))
+    return StationaryPose(at, angle, False, all(_largest(held.rows(twin, q)[0], held) <= bound for q in beside))
 
 
-@dataclass(frozen=True, eq=False)
-class _Moving:
-    """Motions of the loops (nv, k) that change what is measured, and the rates (rows, k) of that."""
-
-    motions: Array
-    rates: Array
+def _largest(error: Array, held: Held) -> float:
+    """The largest angle (rad) of the differences of what is held, one below the other (rows,)."""
+    parts = np.split(error, np.cumsum([o.size for o, _ in held.measured])[:-1])
+    return 2 * float(np.arcsin(min(1.0, max((float(np.linalg.norm(part)) for part in parts), default=0.0) / 2)))
 
 
-def _moving(at: ClosedConfiguration, held: Held) -> tuple[Array, _Moving]:
-    """How far what is held is off, and the motions that change it."""
+def _changes(at: ClosedConfiguration, held: Held) -> tuple[Array, Array, Array]:
+    """How far what is held is off (rows,), the motions of the loops (nv, k) that change it, and its rates (rows, k)."""
     error, rates = held.rows(at.twin, at.q)
     kernel = at.kernel()[0]
     _, sizes, ways = np.linalg.svd(rates @ kernel, full_matrices=False)
     motions = kernel @ ways[sizes > SURELY_SOMETHING].T
-    return error, _Moving(motions, rates @ motions)
+    return error, motions, rates @ motions
 
 
-def _rates(at: ClosedConfiguration, held: Held, along: _Moving) -> Array:
+def _loop_rates(at: ClosedConfiguration, held: Held, motions: Array, rates: Array) -> Array:
     """The eigenvalues of (JᵀJ)⁻¹ H, H the Hessian of ½ ‖e‖² along motions, J the rates of e: by differences of the
     slope, of which the part beside JᵀJ is of the size of e."""
-    twin, n = at.twin, along.motions
-    bends = np.zeros((n.shape[1],) * 2)
-    for k, way in enumerate(n.T):
+    twin = at.twin
+    bends = np.zeros((motions.shape[1],) * 2)
+    for k, way in enumerate(motions.T):
         for sign in (1.0, -1.0):
             q, _ = solve(twin, twin.integrate(at.q, sign * CURVATURE_STEP * way), tolerance=SOLVED)
             J = twin.jacobian(q)
-            error, rates = held.rows(twin, q)
-            carried = n - np.linalg.pinv(J, rcond=SURELY_SOMETHING) @ (J @ n)
-            bends[k] += sign * (error @ rates @ carried) / (2 * CURVATURE_STEP)
-    gram = along.rates.T @ along.rates
-    return np.asarray(np.sort(np.linalg.eigvals(np.linalg.solve(gram, (bends + bends.T) / 2)).real))
+            error, slopes = held.rows(twin, q)
+            carried = motions - np.linalg.pinv(J, rcond=SURELY_SOMETHING) @ (J @ motions)
+            bends[k] += sign * (error @ slopes @ carried) / (2 * CURVATURE_STEP)
+    return np.asarray(np.sort(np.linalg.eigvals(np.linalg.solve(rates.T @ rates, (bends + bends.T) / 2)).real))
 
 
 def near_modes(setting: ObservedRobot, goal: ClosedConfiguration, question: Measurement, known: Sequence[AssemblyMode],
@@ -140,7 +132,7 @@ def near_modes(setting: ObservedRobot, goal: ClosedConfiguration, question: Meas
     isolated minima, none of them the goal or a ``known`` mode, and one of those that are connected."""
     held, found = Held.at(goal.twin, goal.q, question.reference, question.observations), list[NearMode]()
     for mode in candidates if bound else ():
-        near = _near(setting, goal, question, held, mode)
+        near = _near(setting, goal, question, held, mode, bound)
         if near is None or near.angle > bound:
             continue
         bodies = near.bodies or {}
@@ -151,8 +143,8 @@ def near_modes(setting: ObservedRobot, goal: ClosedConfiguration, question: Meas
     return tuple(sorted((each for each in found if each not in families[1:]), key=lambda each: each.angle))
 
 
-def _near(setting: ObservedRobot, goal: ClosedConfiguration, question: Measurement, held: Held, mode: AssemblyMode
-          ) -> NearMode | None:
+def _near(setting: ObservedRobot, goal: ClosedConfiguration, question: Measurement, held: Held, mode: AssemblyMode,
+          bound: float) -> NearMode | None:
     """A candidate as a near mode; one at which the robot was not assembled as it is, its residual as the difference."""
     angle, stable, family = mode.residual, None, False
     if mode.configuration is not None:
@@ -160,7 +152,7 @@ def _near(setting: ObservedRobot, goal: ClosedConfiguration, question: Measureme
             start = of_links(goal.twin, mode.configuration.pose)
         except LoopsNotClosed:
             return None
-        least = descend(start, question, held)
+        least = descend(start, question, held, bound)
         if least is None or not (least.isolated or least.family):
             return None
         at, angle, stable, family = least.configuration, least.angle, least.isolated or None, least.family
@@ -179,7 +171,7 @@ def poses_alike(modes: Sequence[AssemblyMode], near: Sequence[NearMode]) -> str:
     """How many poses a measurement with an error does not tell apart, and what the others are."""
     count = len(modes) + len(near)
     if count < 2:
-        return "no other pose looks the same"
+        return "no other pose was found to look the same"
     exact = sum(not mode.goal for mode in modes)
     others = [f"{exact} with the same values"] * bool(exact)
     isolated = [each for each in near if not each.family]
@@ -188,7 +180,8 @@ def poses_alike(modes: Sequence[AssemblyMode], near: Sequence[NearMode]) -> str:
     elif isolated:
         others.append(f"{len(isolated)} that differ by up to {degrees(isolated[-1].angle)}")
     others += [f"a continuous family that differs {each.differs} at one of its poses" for each in near if each.family]
-    return f"{count} poses look the same" + (f": {', '.join(['the goal', *others][:-1])} and {others[-1]}" if near else "")
+    told = f": {', '.join(['the goal', *others[:-1]])} and {others[-1]}" if near else ""
+    return f"{count} poses look the same{told}"
 
 
 def distance_from(motion: PlatformMotion, goal: ClosedConfiguration, mode: AssemblyMode) -> tuple[float, float]:

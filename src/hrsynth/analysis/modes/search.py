@@ -120,7 +120,7 @@ def search(goal: ClosedConfiguration, question: Measurement, bodies: Sequence[st
 
 def _add_near(near: list[FoundMode], twin: PinocchioModel, q: Array, residual: float, bodies: Sequence[str],
               question: Measurement) -> None:
-    """Close the loops where an approach ended that met loops and measurements nearly, and add that pose if it is new."""
+    """Close the loops where a start ended that met loops and measurements nearly, and add that pose if it is new."""
     q, left = solve(twin, q, tolerance=SOLVED)
     if left > CLOSED:
         return

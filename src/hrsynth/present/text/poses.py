@@ -182,7 +182,7 @@ def modes(found: AssemblyModes) -> str:
         return _describe_formation(found, [name, seen, *formation(found.formation)])
     rows = [name, *([seen] if found.kind == "hidden" else []), ("held", f"{_describe_held(found)} at {found.pose}")]
     if found.near:
-        rows += [("alike", f"{found.alike} (found, for errors up to {np.degrees(found.bound):.3g}°)")]
+        rows += [("alike", f"{found.alike} (found, not proved, for errors up to {np.degrees(found.bound):.3g}°)")]
     if count.continuum is None or count.complex is None:
         rows += [("modes", f"{found.count}, {all_of(found)}"),
                  ("proof", count.proof)]
@@ -204,7 +204,7 @@ def modes(found: AssemblyModes) -> str:
         rows += [*GAP, (f"antipodal {number}", [f"{mode.pose}   not a mode: the opposite value of "
                                                 f"{', '.join(mode.opposite)}", proof_words(mode), *ahead(mode)])]
     for number, mode in enumerate(found.near, 1):
-        rows += [*GAP, (f"near {number}", [f"{mode.pose}   found; what is measured differs {mode.differs}",
+        rows += [*GAP, (f"near {number}", [f"{mode.pose}   found, not proved; what is measured differs {mode.differs}",
                                            *_rests(mode), *ahead(mode), *at_mode(mode, found)])]
     return listing(rows)
 

@@ -13,9 +13,6 @@ from ....analysis.modes.near import degrees, distance_from
 from ....analysis.observed import ObservedRobot
 from ....analysis.verdict import CONTROLLABLE, Verdict
 from ....errors import HrsynthError
-from ....geometry.so3 import angle_of
-from ....geometry.vectors import Array
-from ....kinematics.platform_motion import PlatformMotion
 from ....tolerances import SAME_RELATION
 from ...text.poses import all_of
 from ...text.tables import list_words, name_all
