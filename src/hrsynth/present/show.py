@@ -99,7 +99,7 @@ def draw(result: Result, file: str | Path | None = None, *, plane: Pose | str | 
 
     >>> picture = hrsynth.draw(hrsynth.modes("3rrr_m1"), width="88mm")
     >>> picture
-    <Picture: 3rrr_m1, watching 1, 2, 3: 2 poses look the same (2 real of 6 complex, hidden robot) at x=0.01,y=-0.015,z=0,phi=0deg>
+    <Picture: 3rrr_m1, watching 1, 2, 3: 2 real of 6 complex (hidden robot) at x=0.01,y=-0.015,z=0,phi=0deg>
 
     Raises ``BadRequest`` for a result that has no picture.
     """

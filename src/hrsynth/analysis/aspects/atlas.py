@@ -150,7 +150,7 @@ def atlas(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None,
     real robot was not found assembled are undecided. Raises what ``modes`` raises.
 
     >>> hrsynth.atlas("rrrrr_m1")
-    <Atlas: rrrrr_m1, watching 1, 2: 2 poses look the same (2 real of 2 complex, hidden robot) at x=0.02,y=0.24,z=0,phi=0deg, aspects: 2>
+    <Atlas: rrrrr_m1, watching 1, 2: 2 real of 2 complex (hidden robot) at x=0.02,y=0.24,z=0,phi=0deg, aspects: 2>
     """
     listed = modes(robot, observe, camera, see=see, at=at, seed=seed)
     aspects = Aspects.of(listed.setting, seed=seed)

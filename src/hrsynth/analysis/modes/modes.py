@@ -102,9 +102,9 @@ class AssemblyModes(Result, shown_as="modes"):
         """The robot and how many modes there are."""
         if self.formation is not None:
             return f"{self.setting.headline()}: {self.count} (formation)"
-        alike = f"{self.alike} (" if self.kind == "hidden" and self.modes else ""
-        return (f"{self.setting.headline()}: {alike}{self.count}{', ' if alike else ' ('}{self.kind} robot) at "
-                f"{self.pose}")
+        said = f"{self.count} ({self.kind} robot)" if not self.near else (
+            f"{self.alike} ({self.count}, {self.kind} robot)")
+        return f"{self.setting.headline()}: {said} at {self.pose}"
 
     @property
     def alike(self) -> str:
@@ -159,10 +159,10 @@ def modes(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None,
     searches); if legs or measurements keep the platform from turning, turned poses (another operation mode) are not
     searched for. Poses that a measurement with an error up to ``cone`` (rad, or as ``"0.1deg"``; 0 for none) does not
     tell from the goal are listed too, as ``near``: found, not proved. ``observe``, ``camera`` and ``see`` are as for
-    ``derive``; ``at`` may be a closed configuration of an observed robot. Joint centres that nearly coincide, and solutions nearly at infinity, are taken to be so if that is
-    clearly meant, unless ``as_written`` is true. ``effort`` is the time limit for a list (seconds on one core),
-    estimated from its size before it starts. For a formation: all configurations, trivial motions aside, with what is
-    measured at the zero configuration.
+    ``derive``; ``at`` may be a closed configuration of an observed robot. Joint centres that nearly coincide, and
+    solutions nearly at infinity, are taken to be so if that is clearly meant, unless ``as_written`` is true.
+    ``effort`` is the time limit for a list (seconds on one core), estimated from its size before it starts. For a
+    formation: all configurations, trivial motions aside, with what is measured at the zero configuration.
 
     If the tips' paths are of no known kind, or the solver that they need gives up or is not installed, the whole robot
     is closed from random starts (:mod:`.search`): these modes are found, for any kind of closing, and nothing says that
@@ -173,7 +173,7 @@ def modes(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None,
     not clear whether special geometry is meant.
 
     >>> hrsynth.modes("3rrr_m1", at="x=0,y=0,phi=0")
-    <AssemblyModes: 3rrr_m1, watching 1, 2, 3: 2 poses look the same (2 real of 6 complex, hidden robot) at x=0,y=0,z=0,phi=0deg>
+    <AssemblyModes: 3rrr_m1, watching 1, 2, 3: 2 real of 6 complex (hidden robot) at x=0,y=0,z=0,phi=0deg>
     """
     if real and (observe not in (None, "all", ["all"]) or see is not None):
         raise BadRequest("the motors are held instead of what is observed", f"real with {observe or see}",

@@ -168,10 +168,8 @@ def degrees(angle: float) -> str:
 
 
 def poses_alike(modes: Sequence[AssemblyMode], near: Sequence[NearMode]) -> str:
-    """How many poses a measurement with an error does not tell apart, and what the others are."""
+    """How many poses a measurement with an error does not tell apart, and what those other than the goal are."""
     count = len(modes) + len(near)
-    if count < 2:
-        return "no other pose was found to look the same"
     exact = sum(not mode.goal for mode in modes)
     others = [f"{exact} with the same values"] * bool(exact)
     isolated = [each for each in near if not each.family]
@@ -180,8 +178,7 @@ def poses_alike(modes: Sequence[AssemblyMode], near: Sequence[NearMode]) -> str:
     elif isolated:
         others.append(f"{len(isolated)} that differ by up to {degrees(isolated[-1].angle)}")
     others += [f"a continuous family that differs {each.differs} at one of its poses" for each in near if each.family]
-    told = f": {', '.join(['the goal', *others[:-1]])} and {others[-1]}" if near else ""
-    return f"{count} poses look the same{told}"
+    return f"{count} poses look the same: {', '.join(['the goal', *others[:-1]])} and {others[-1]}"
 
 
 def distance_from(motion: PlatformMotion, goal: ClosedConfiguration, mode: AssemblyMode) -> tuple[float, float]:
