@@ -31,7 +31,7 @@ FIELDS = {
     "singular": {"measured", "dof", "verdict", "lost", "always", "never", "unexamined", "words", "expression",
                  "where", "factors",
                  "characteristic_length", "checked", "examples", "locus", "file"},
-    "modes": {"kind", "at", "observed", "complex", "complete", "proof", "modes", "near", "degenerate", "continuum"},
+    "modes": {"kind", "at", "observed", "complex", "complete", "proof", "modes", "near_modes", "degenerate", "continuum"},
     "path": {"verdict", "certified", "path", "margin", "boxes", "start", "goal", "reason", "value", "point"},
     "servo": {"observed", "from", "to", "gain", "sense", "noise", "ended", "reason", "pose", "matched_mode", "modes",
               "type2", "notes", "spread", "error", "times", "poses", "file"},

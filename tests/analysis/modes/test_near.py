@@ -17,7 +17,7 @@ from hrsynth.analysis.modes.modes import AssemblyModes
 from hrsynth.analysis.modes.near import descend, measurement_bound
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.description import load, shipped
-from hrsynth.errors import BadRequest
+from hrsynth.errors import BadRequest, NotConfined
 from hrsynth.geometry.vectors import angle_between, pose, rotation_about, unit
 from hrsynth.kinematics.configuration import ClosedConfiguration, measure
 from hrsynth.kinematics.tasks import Held
@@ -104,6 +104,21 @@ def test_every_answer_counts_it(cad: Mechanism):
     assert found.to_dict()["near_modes"][0]["stable"] is True
     assert "one other pose, 24 cm away" in rest(found.setting)[1]
     assert any(words in each for each in answer(derived, Parts(left, left, found, left)))
+
+
+@pytest.mark.slow
+def test_a_search_finds_what_a_list_proposes(cad: Mechanism, monkeypatch: pytest.MonkeyPatch):
+    (listed,) = hrsynth.modes(cad).near
+
+    def refuse(*_: object) -> None:
+        raise NotConfined("delta", "no list is to be made")
+
+    monkeypatch.setattr("hrsynth.analysis.modes.modes._modes_by_system", refuse)
+    hrsynth.forget()
+    (met,) = hrsynth.modes(cad).near
+    assert met.stable
+    assert met.angle == pytest.approx(listed.angle, rel=1e-4)
+    assert met.distance == pytest.approx(listed.distance, rel=1e-6)
 
 
 @pytest.mark.slow
