@@ -119,6 +119,7 @@ def test_a_search_finds_what_a_list_proposes(cad: Mechanism, monkeypatch: pytest
     assert met.stable
     assert met.angle == pytest.approx(listed.angle, rel=1e-4)
     assert met.distance == pytest.approx(listed.distance, rel=1e-6)
+    hrsynth.forget()
 
 
 @pytest.mark.slow
