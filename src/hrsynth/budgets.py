@@ -189,6 +189,8 @@ SEARCH_QUIET = 100
 """Starts in a row that close without a new mode after which the search ends."""
 SEARCH_ITERATIONS = 100
 """Iterations in which each of them is closed, at most."""
+NEAR_MODE_STEPS = 60
+"""Steps in which a near mode is found from a candidate, at most."""
 SEARCH_MOTIONS = 12
 """Self-motions that one search follows at most."""
 MOTION_STEPS = 100

@@ -199,6 +199,16 @@ NO_NEAR_MODE = 0.3
 """Misses (sizes of the mechanism) beyond which a start leads to no near mode."""
 SAME_NEAR_MODE = 1e-6
 """Difference of poses and of misses (sizes of the mechanism) below which two stationary poses are one."""
+MEASUREMENT_BOUND = "0.1deg"
+"""Error of a measurement up to which poses are not told apart, where nothing is said."""
+SAME_NEAR_POSE = 1e-4
+"""Difference of poses (characteristic lengths, entries of turns) below which two minima of a difference of measured
+values are one."""
+FAMILY_STEP = 0.02
+"""Step (characteristic lengths, radians) along a freedom that values leave at a near mode, over which they are to stay
+within the bound if it is one of a continuous family."""
+CURVATURE_STEP = 1e-4
+"""Step (characteristic lengths, radians) of the differences of the slope of such a difference."""
 MEANT = 1e-5
 """Distance (sizes of the mechanism) up to which joint centres count as meant to coincide, where the next larger one is
 ``RANK_GAP`` times as large at least."""

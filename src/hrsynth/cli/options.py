@@ -185,6 +185,8 @@ def told_radians(option: str, text: str | None) -> None:
             angle = float(field.rpartition("=")[2])
         except ValueError:
             continue
+        if not angle:
+            continue
         warn(f"--{option} {field.strip()}: taken as radians, {math.degrees(angle):.3g} degrees "
              f"({field.strip()}deg for degrees)")
 

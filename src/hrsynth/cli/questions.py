@@ -10,6 +10,7 @@ from typing import Any
 from ..budgets import BRANCH_CELLS, COVER_BOXES, EFFORT
 from ..present.outputs import OUTPUTS
 from ..progress import following
+from ..tolerances import MEASUREMENT_BOUND
 from .colour import paint, say
 from .commands import Group, add_command
 from .options import (
@@ -231,6 +232,8 @@ QUESTIONS = (
              (Option("at", "Pose whose measurements are held, such as x=0.02,y=0.1,z=-0.7; or mode:2 of the list "
                      "printed without --at (default: the zero configuration).", "POSE"),
               *WATCHED, SEE, flag("real", "Hold the real robot's own motors instead."),
+              Option("cone", "Error of a measurement: poses that differ by no more are near modes; 0 for none.",
+                     "ANGLE", default=MEASUREMENT_BOUND),
               Option("effort", "Time limit for a list (estimated seconds on one core); what needs more is left out, "
                      "and reported.", "SECONDS", float, EFFORT),
               _file("modes"), _file("modes", "certificate")),

@@ -642,6 +642,17 @@ class ModeRecord(TypedDict):
                                                      "they are nearest to the file's"]]
 
 
+class NearModeRecord(ModeRecord):
+    """A pose that a measurement with an error does not tell from the goal; `stable` whether the difference is least
+    there, so that the loop rests; `family` that it is one of a connected set."""
+
+    angle: Annotated[float, "largest difference of a measured value (rad; lengths in characteristic lengths)"]
+    distance_m: Annotated[float, "from the goal"]
+    turned_rad: Annotated[float, "from the goal"]
+    stable: bool | None
+    family: bool
+
+
 class MeantRecord(TypedDict):
     """Legs whose joint centres are taken to coincide."""
 
@@ -680,7 +691,8 @@ class ListedModes(OfRobot, WrittenTo, LimitsLeft):
     proof: str
     modes: list[ModeRecord]
     motions: list[SelfMotionRecord]
-    near: list[ModeRecord]
+    near_modes: Annotated[list[NearModeRecord], "found, not proved to be all"]
+    measurement_bound: Annotated[float, "error (rad) up to which near modes are sought"]
     antipodal: list[ModeRecord]
     degenerate: str | None
     continuum: int | None

@@ -84,8 +84,8 @@ class Criteria:
 
 @dataclass(frozen=True)
 class ModeCount:
-    """How many assembly modes there are with the directions of a pose, in how many of them the robot was found
-    assembled, and whether these are proved to be all; ``why`` they are not listed, otherwise empty."""
+    """How many assembly modes, near ones too, there are with the directions of a pose, in how many of them the robot
+    was found assembled, and whether these are proved to be all; ``why`` they are not listed, otherwise empty."""
 
     count: int | None
     reachable: int | None
@@ -95,7 +95,8 @@ class ModeCount:
     @classmethod
     def of(cls, found: AssemblyModes) -> ModeCount:
         """Of a list of modes."""
-        return cls(len(found.modes), sum(mode.reachable is True for mode in found.modes), found.found.complete)
+        alike = (*found.modes, *found.near)
+        return cls(len(alike), sum(mode.reachable is True for mode in alike), found.found.complete)
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""

@@ -16,7 +16,7 @@ from ..geometry.vectors import Array, pose_difference
 from ..kinematics.configuration import ClosedConfiguration
 from ..mechanism.observations.direction import SeenAxis
 from ..results import Value
-from ..tolerances import DAMPED, SAME_RELATION
+from ..tolerances import DAMPED, NEAR_MODE, SAME_NEAR_POSE, SAME_RELATION
 from .law import Command, Measures
 from .run import AWAY, EFFORT, LIMIT, LOST, OPEN, POISED, REST, SERVED_AT, UNMEASURED, UNSEEN, Run
 
@@ -52,7 +52,7 @@ class EndingClassifier(Value):
         if run.stopped in (REST, POISED):
             ending = rest(self.setting, run.last, last)
             loose = "" if run.stopped == REST else "; this rest was not found to attract"
-            return replace(ending, reason=ending.reason + loose)
+            return replace(ending, reason=ending.reason + loose + self._near(run.last, last.size))
         if run.stopped == LIMIT:
             return Ending(BOUNDARY, f"joint {run.joint} is at its limit")
         if run.stopped == UNSEEN:
@@ -76,6 +76,18 @@ class EndingClassifier(Value):
             way = (f"; it was still on its way to a rest that attracts, found at {pose}, where the distance left falls "
                    f"by a factor of e every {slow:.3g} s")
         return Ending(TIME, f"{over}, with ‖e‖ = {last.size:.3g}{way}")
+
+    def _near(self, at: ClosedConfiguration, size: float) -> str:
+        """Which near mode of the goal a rest is, if any."""
+        motion = self.setting.motion
+        try:
+            listed = modes(self.setting, at=motion.pose(self.goal.pose(motion.link))) if size < NEAR_MODE else None
+        except HrsynthError:
+            return ""
+        return next((f"; it is near mode {k} of the goal: what is measured differs {mode.differs}"
+                     for k, mode in enumerate(() if listed is None else listed.near, 1)
+                     if mode.bodies and all(pose_difference(at.pose(body), X, at.twin.length) <= SAME_NEAR_POSE
+                                            for body, X in mode.bodies.items())), "")
 
     def _unseen(self, at: ClosedConfiguration) -> str:
         """What a camera has lost."""

@@ -26,7 +26,8 @@ from ...ranges import plain_number
 from ...results import Value
 from ...tolerances import NARROWEST_CONE, SEEN_ABOVE
 
-EXAMPLE = "0.1deg, 0.002 (radians), or one for each leg such as 1=0.1deg,2=0.2deg"
+ANGLES = "0.1deg, 0.002 (radians)"
+EXAMPLE = f"{ANGLES}, or one for each leg such as 1=0.1deg,2=0.2deg"
 ALLOWED = "more than 0 and less than 90deg"
 
 Cones = float | str | Mapping[str, float | str] | Mapping[int, float | str]
@@ -69,12 +70,17 @@ def _parse(text: str) -> float | dict[str, float]:
     return found
 
 
-def _angle(text: str) -> float:
+def single_angle(cone: float | str) -> float:
+    """One half-angle (rad) for all that is observed; raises ``BadRequest``."""
+    return _angle(cone, ANGLES) if isinstance(cone, str) else _require_angle(cone, cone)
+
+
+def _angle(text: str, allowed: str = EXAMPLE) -> float:
     digits = text.removesuffix("deg").strip()
     try:
         value = plain_number(digits)
     except ValueError:
-        raise BadRequest("cone: not a number", text, EXAMPLE) from None
+        raise BadRequest("cone: not a number", text, allowed) from None
     return _require_angle(value if digits == text else math.radians(value), text)
 
 

@@ -100,6 +100,16 @@ class AssemblyMode:
                 "behind": None if self.behind is None else list(self.behind)}
 
 
+def found_mode(setting: ObservedRobot, question: Measurement, at: ClosedConfiguration, bodies: dict[str, Array],
+               residual: float, goal: bool = False) -> AssemblyMode:
+    """A closed configuration that was found, as a mode of which nothing is proved."""
+    beyond, X = tuple(outside(at.twin, at.q)), at.pose(setting.motion.link)
+    found = Assembly(at, (), beyond)
+    return AssemblyMode(setting.motion.pose(X), np.inf, np.pi, residual, goal, found.reachable, weakest(at, question),
+                        found.verdict, (), beyond, (), at, length=at.twin.length, bodies=bodies,
+                        behind=behind(question.observations, at.pose))
+
+
 class ModeReader:
     """Poses of a system read as poses of the robot."""
 

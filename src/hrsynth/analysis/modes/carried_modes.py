@@ -182,7 +182,8 @@ def _judge(system: CarriedPlatform) -> SystemModes:
              f"too{told_far(boxes)}, {len(real)} real")
     if not besides:
         return SystemModes(len(boxes), tuple(modes), True, proof, bound=bound, enclosed=True)
-    return SystemModes.of_more(modes, len(real) - len(kept), f"from {n} of {len(system.told)} conditions: {proof}",
+    out = [as_mode(system, box, False) for box in real if box not in kept]
+    return SystemModes.of_more(modes, out, f"from {n} of {len(system.told)} conditions: {proof}",
                                bound)
 
 

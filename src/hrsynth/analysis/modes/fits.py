@@ -104,7 +104,7 @@ def stationary(system: System, starts: Sequence[Array], known: Sequence[Array]) 
             continue
         q = _least_misses(system, start)
         miss = residual(system, q)
-        if VANISHES < miss <= NEAR_MODE and all(_apart(system, q, other) > SAME_NEAR_MODE for other in seen):
+        if miss <= NEAR_MODE and all(_apart(system, q, other) > SAME_NEAR_MODE for other in seen):
             found.append((miss, q))
             seen.append(q)
     return [q for _, q in sorted(found, key=lambda each: each[0])]

@@ -20,23 +20,23 @@ from ...kinematics.tasks import Task
 from ...mechanism.pose import ModeNumber, Pose, PoseLike, asked_pose
 from ...progress import tell
 from ...results import Result
+from ...tolerances import MEASUREMENT_BOUND, SAME_NEAR_POSE
 from ..formation import Formation
 from ..measured import MeasuredRobot
 from ..observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike
 from ..question import question
-from ..singularity.agreement import weakest
-from .assembly_mode import AssemblyMode, ModeReader
+from .assembly_mode import AssemblyMode, ModeReader, found_mode
 from .branches import Model
 from .carried import CarriedPlatform
 from .carried_modes import solve_carried
 from .drift import drift
 from .formed import formation_modes
 from .motions import SelfMotion, self_motion
+from .near import NearMode, measurement_bound, near_modes, poses_alike
 from .planar_loops import PlanarLoops
 from .planar_modes import solve_loops
 from .posed import PosedPlatform, solve_posed
 from .search import FoundMode, leaves_free, search
-from .sighted import behind
 from .single_loop import solve_loop
 from .solve import SystemModes, continuum
 from .tips import TipLoci
@@ -63,7 +63,11 @@ class AssemblyModes(Result, shown_as="modes"):
     pose: Pose
     found: SystemModes
     modes: tuple[AssemblyMode, ...]
-    near: tuple[AssemblyMode, ...]
+    candidates: tuple[AssemblyMode, ...] = ()
+    """Where near modes are sought: working material, none once they are."""
+    near: tuple[NearMode, ...] = ()
+    """Other poses at which what is measured differs by no more than ``bound`` (rad)."""
+    bound: float = 0.0
     model: Model | None = None
     motions: tuple[SelfMotion, ...] = ()
     antipodal: tuple[AssemblyMode, ...] = ()
@@ -98,7 +102,14 @@ class AssemblyModes(Result, shown_as="modes"):
         """The robot and how many modes there are."""
         if self.formation is not None:
             return f"{self.setting.headline()}: {self.count} (formation)"
-        return f"{self.setting.headline()}: {self.count} ({self.kind} robot) at {self.pose}"
+        said = f"{self.count} ({self.kind} robot)" if not self.near else (
+            f"{self.alike} ({self.count}, {self.kind} robot)")
+        return f"{self.setting.headline()}: {said} at {self.pose}"
+
+    @property
+    def alike(self) -> str:
+        """How many poses a measurement with an error does not tell from each other, in words."""
+        return poses_alike(self.modes, self.near)
 
     @property
     def count(self) -> str:
@@ -124,7 +135,8 @@ class AssemblyModes(Result, shown_as="modes"):
                 "complex": None if found.continuum else found.complex, "complete": found.complete,
                 "bound": found.bound, "proof": found.proof,
                 **({} if self.formation is None else {"formation": self.formation.to_dict()}),
-                "modes": [self._record(each) for each in self.modes], "near": [each.to_dict() for each in self.near],
+                "modes": [self._record(each) for each in self.modes],
+                "near_modes": [each.to_dict() for each in self.near], "measurement_bound": self.bound,
                 "antipodal": [self._record(each) for each in self.antipodal],
                 "degenerate": found.degenerate, "continuum": found.continuum,
                 "motions": [{"pose": self.pose_of(each).to_dict(), **each.to_dict()} for each in self.motions],
@@ -138,18 +150,19 @@ class AssemblyModes(Result, shown_as="modes"):
 
 @question(formations=True)
 def modes(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
-          at: PoseLike | ClosedConfiguration | None = None, real: bool = False, as_written: bool = False,
-          effort: float = EFFORT, seed: int = 0) -> AssemblyModes:
+          at: PoseLike | ClosedConfiguration | None = None, real: bool = False, cone: float | str = MEASUREMENT_BOUND,
+          as_written: bool = False, effort: float = EFFORT, seed: int = 0) -> AssemblyModes:
     """All poses with what is observed at ``at`` (default: the zero configuration), or with ``real`` the motors'
     coordinates: complex solutions counted, real ones enclosed (theory.md 8; MMT 3.3, 4.1.2, 4.2).
 
     A Π stays a parallelogram, never crossed (except in planar mechanisms that are closed loop by loop, and in
     searches); if legs or measurements keep the platform from turning, turned poses (another operation mode) are not
-    searched for. ``observe``, ``camera`` and ``see`` are as for ``derive``; ``at`` may be a closed configuration of an
-    observed robot. Joint centres that nearly coincide, and solutions nearly at infinity, are taken to be so if that is
-    clearly meant, unless ``as_written`` is true. ``effort`` is the time limit for a list (seconds on one core),
-    estimated from its size before it starts. For a formation: all configurations, trivial motions aside, with what is
-    measured at the zero configuration.
+    searched for. Poses that a measurement with an error up to ``cone`` (rad, or as ``"0.1deg"``; 0 for none) does not
+    tell from the goal are listed too, as ``near``: found, not proved. ``observe``, ``camera`` and ``see`` are as for
+    ``derive``; ``at`` may be a closed configuration of an observed robot. Joint centres that nearly coincide, and
+    solutions nearly at infinity, are taken to be so if that is clearly meant, unless ``as_written`` is true.
+    ``effort`` is the time limit for a list (seconds on one core), estimated from its size before it starts. For a
+    formation: all configurations, trivial motions aside, with what is measured at the zero configuration.
 
     If the tips' paths are of no known kind, or the solver that they need gives up or is not installed, the whole robot
     is closed from random starts (:mod:`.search`): these modes are found, for any kind of closing, and nothing says that
@@ -165,6 +178,7 @@ def modes(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None,
     if real and (observe not in (None, "all", ["all"]) or see is not None):
         raise BadRequest("the motors are held instead of what is observed", f"real with {observe or see}",
                          "one of the two")
+    bound = measurement_bound(cone)
     setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed, driven=real)
     if setting.robot.formation:
         return _modes_of_formation(setting, at, real)
@@ -178,6 +192,15 @@ def modes(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None,
         wanted = motion.goal(asked, setting.robot.name)
         goal = reach(goal, setting.everything.question, asked, motion)
     measured = MeasuredRobot.of(setting, real)
+    found = _list_modes(setting, measured, goal, wanted, real, as_written, effort)
+    near = near_modes(setting, goal, measured.question, found.modes, found.candidates, bound)
+    return replace(found, candidates=(), near=near, bound=bound)
+
+
+def _list_modes(setting: ObservedRobot, measured: MeasuredRobot, goal: ClosedConfiguration, wanted: Task | None,
+                real: bool, as_written: bool, effort: float) -> AssemblyModes:
+    """The modes of the numbers as they are, and where near ones are sought."""
+    motion = setting.motion
     pose = motion.pose(goal.pose(motion.link))
     kind = "real" if real else "hidden"
     free = setting.dof - measured.rank
@@ -185,7 +208,7 @@ def modes(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None,
         text = f"the {'motors' if real else 'measurements'} leave {free} of the platform's freedoms undetermined"
         own = self_motion(goal, measured.question, placing_links(setting.anatomy), goal=True)
         return AssemblyModes(setting, kind, goal, pose, continuum(f"{text}: a continuum of dimension {free}", free),
-                             (), (), motions=() if own is None else (own,))
+                             (), motions=() if own is None else (own,))
     tell("modes")
     try:
         if not as_written and _moves(setting, measured.question, goal):
@@ -224,7 +247,7 @@ def _modes_of_formation(setting: ObservedRobot, where: object, real: bool) -> As
             (), whole.beyond, (), at, proved=found.complete, length=goal.twin.length, bodies=each.bodies,
             opposite=each.opposite))
     return AssemblyModes(setting, "formation", goal, Pose.of(goal.pose(first)), system,
-                         tuple(mode for mode in listed if not mode.opposite), (), formation=found.formation,
+                         tuple(mode for mode in listed if not mode.opposite), formation=found.formation,
                          antipodal=tuple(mode for mode in listed if mode.opposite))
 
 
@@ -259,19 +282,12 @@ def _modes_by_search(setting: ObservedRobot, question: Measurement, goal: Closed
     found = SystemModes(None, (), False, f"{done.words}; not counted: {reason}", degenerate=done.degenerate,
                         continuum=size)
     return AssemblyModes(setting, kind, goal, pose, found,
-                         tuple(_unproved_mode(setting, question, mode, mode.configuration is goal)
-                               for mode in done.modes),
-                         (), motions=done.motions)
+                         tuple(_read_found(setting, question, mode, mode.configuration is goal) for mode in done.modes),
+                         tuple(_read_found(setting, question, mode) for mode in done.near), motions=done.motions)
 
 
-def _unproved_mode(setting: ObservedRobot, question: Measurement, mode: FoundMode, goal: bool) -> AssemblyMode:
-    """A closing that was found, as a mode of which nothing is proved."""
-    at, motion = mode.configuration, setting.motion
-    beyond = tuple(outside(at.twin, at.q))
-    found = Assembly(at, (), beyond)
-    return AssemblyMode(motion.pose(at.pose(motion.link)), np.inf, np.pi, mode.residual, goal, found.reachable,
-                        weakest(at, question), found.verdict, (), beyond, (), at, length=at.twin.length,
-                        bodies=mode.bodies, behind=behind(question.observations, at.pose))
+def _read_found(setting: ObservedRobot, question: Measurement, mode: FoundMode, goal: bool = False) -> AssemblyMode:
+    return found_mode(setting, question, mode.configuration, mode.bodies, mode.residual, goal)
 
 
 def _modes_by_system(setting: ObservedRobot, measured: MeasuredRobot, goal: ClosedConfiguration, wanted: Task | None,
@@ -309,9 +325,9 @@ def _modes_by_system(setting: ObservedRobot, measured: MeasuredRobot, goal: Clos
     at_goal = min(found.modes, key=reader.away, default=None)
     ordered = sorted(found.modes, key=lambda mode: mode is not at_goal)
     read = [reader.read(mode, mode is at_goal) for mode in ordered]
-    near = [reader.read(mode, False) for mode in found.near]
+    near = [reader.read(mode, False) for mode in found.near if reader.away(mode) > SAME_NEAR_POSE]
     return AssemblyModes(setting, kind, goal, pose, found, tuple(mode for mode in read if not mode.opposite),
-                         tuple(mode for mode in near if not mode.opposite), made,
+                         tuple(mode for mode in near if not mode.opposite), model=made,
                          antipodal=tuple(mode for mode in read if mode.opposite))
 
 

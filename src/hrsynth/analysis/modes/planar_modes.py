@@ -101,7 +101,7 @@ def _judge(system: PlanarLoops) -> SystemModes:
         return SystemModes(len(boxes), modes, True, proof, bound=bound, enclosed=True)
     kept = [box for box in real if box is at_goal[0] or not is_excluded(system, box)]
     modes = tuple(_mode(system, box, box is at_goal[0]) for box in kept)
-    return SystemModes.of_more(modes, len(real) - len(kept), proof, bound)
+    return SystemModes.of_more(modes, [_mode(system, box, False) for box in real if box not in kept], proof, bound)
 
 
 def enclosures(system: PlanarLoops) -> list[PoseBox]:

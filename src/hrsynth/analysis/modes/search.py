@@ -16,10 +16,11 @@ from ...errors import NotMeasured
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.limits import outside
+from ...kinematics.pinocchio_model import PinocchioModel
 from ...kinematics.relation import Measurement, relation
 from ...kinematics.tasks import Held, solve
 from ...progress import tell
-from ...tolerances import CLOSED, SAME_RELATION, SOLVED, SURELY_SOMETHING
+from ...tolerances import CLOSED, NEAR_MODE, SAME_RELATION, SOLVED, SURELY_SOMETHING
 from .motions import SelfMotion, bodies_apart, self_motion
 
 
@@ -45,6 +46,8 @@ class ModeSearch:
     starts: int
     closed: int
     loose: int
+    near: tuple[FoundMode, ...] = ()
+    """Closings at which the measurements are nearly those of the goal, each pose once."""
 
     @property
     def words(self) -> str:
@@ -74,6 +77,7 @@ def search(goal: ClosedConfiguration, question: Measurement, bodies: Sequence[st
     found = [FoundMode(goal, _poses(goal, bodies), goal.residual, 1)] if own is None else []
     motions = [] if own is None else [own]
     starts = closed = loose = quiet = 0
+    near = list[FoundMode]()
     while starts < SEARCH_STARTS and quiet < SEARCH_QUIET:
         number, starts = starts, starts + 1
         tell("starts")
@@ -84,6 +88,8 @@ def search(goal: ClosedConfiguration, question: Measurement, bodies: Sequence[st
         except NotMeasured:  # on the way a point came to a camera's centre
             continue
         if residual > CLOSED:
+            if residual <= NEAR_MODE:
+                _add_near(near, twin, q, residual, bodies, question)
             continue
         closed, quiet = closed + 1, quiet + 1
         at = ClosedConfiguration.of(twin, q)
@@ -109,7 +115,19 @@ def search(goal: ClosedConfiguration, question: Measurement, bodies: Sequence[st
             else:
                 motions.append(replace(motion, met=1))
                 quiet = 0
-    return ModeSearch(tuple(found), tuple(motions), starts, closed, loose)
+    return ModeSearch(tuple(found), tuple(motions), starts, closed, loose, tuple(near))
+
+
+def _add_near(near: list[FoundMode], twin: PinocchioModel, q: Array, residual: float, bodies: Sequence[str],
+              question: Measurement) -> None:
+    """Close the loops where a start ended that met loops and measurements nearly, and add that pose if it is new."""
+    q, left = solve(twin, q, tolerance=SOLVED)
+    if left > CLOSED:
+        return
+    at = ClosedConfiguration.of(twin, q)
+    poses = _poses(at, bodies)
+    if all(bodies_apart(each.bodies, poses, question, twin.length) > NEAR_MODE for each in near):
+        near.append(FoundMode(at, poses, residual, 1))
 
 
 def leaves_free(at: ClosedConfiguration, question: Measurement) -> bool:

@@ -308,7 +308,8 @@ def _zeros(linear: _Linear) -> SystemModes | None:
     modes = [_mode(linear.loop, each[0], each is at_goal[0]) for each in kept]
     proof = (f"{LARGEST_CHAIN} free joints of one loop: at most {len(sure)} closings by the degree of a determinant, "
              f"{len(sure)} zeros enclosed apart from each other, complex ones too, {len(told)} real")
-    return SystemModes.of_more(modes, len(told) - len(kept), proof, "class")
+    out = [as_mode(linear.loop, box, False) for box, excluded in told if (box, excluded) not in kept]
+    return SystemModes.of_more(modes, out, proof, "class")
 
 
 def _box_of_joints(linear: _Linear, t: Any) -> tuple[PoseBox, bool] | None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...geometry.vectors import Array, frozen
 from ...results import Value
-from ...tolerances import FARTHEST, NEARLY_DOUBLE, SAME_RELATION, TIP_ROUNDING, VANISHES
+from ...tolerances import FARTHEST, NEAR_MODE, NEARLY_DOUBLE, SAME_RELATION, TIP_ROUNDING, VANISHES
 from .bounds import Bound, least_bound
 from .curves import Point
 from .fits import Meant, as_meant, dimension, is_excluded, meets, residual, stationary, torn, words
@@ -113,14 +113,16 @@ class SystemModes(Value):
     """Whether no choice of legs has finitely many solutions, on some branches of the legs at least."""
 
     @classmethod
-    def of_more(cls, modes: Sequence[SystemMode], out: int, proof: str, bound: str) -> SystemModes:
+    def of_more(cls, modes: Sequence[SystemMode], out: Sequence[SystemMode], proof: str, bound: str) -> SystemModes:
         """Where more is told than a square part needs, all of whose zeros are known: those of its real zeros that are
-        not excluded, as ``out`` others are, by all that is told."""
+        not excluded, as others are (``out``), by all that is told."""
         fitting = tuple(mode for mode in modes if mode.proved or mode.residual <= VANISHES)
         open_ = len(modes) - len(fitting)
-        told = words(True, False, [mode.residual for mode in fitting if not mode.proved], out, open_)
-        return cls(len(fitting), fitting, not open_, f"{proof}; of these {told}", bound="none" if open_ else bound,
-                   enclosed=True)
+        told = words(True, False, [mode.residual for mode in fitting if not mode.proved], len(out), open_)
+        near = tuple(replace(mode, near=True) for mode in (*out, *modes)
+                     if mode not in fitting and mode.residual <= NEAR_MODE)
+        return cls(len(fitting), fitting, not open_, f"{proof}; of these {told}", near,
+                   bound="none" if open_ else bound, enclosed=True)
 
     def __getstate__(self) -> dict[str, Any]:
         return {**super().__getstate__(), "solved": ()}
@@ -249,7 +251,6 @@ def _judge(system: System, square: Part, roots: Roots, others: Iterable[tuple[Pa
         modes, open_ = (*modes, at_goal), [mode for mode in open_ if not _same(system, mode.q, goal)]
         enclosed = False
     near = () if others is None else _near(system, found, modes, others)
-    near = tuple(_nearly(system, mode.q) for mode in found if mode not in left and mode.residual <= VANISHES) + near
     fitting = [mode.residual for mode in modes if mode is not at_goal]
     proof = (f"from {len(square.legs)} of {len(system.curves)} tips: {proof}; of these "
              + words(at_goal is not None, lost, fitting, len(found) - len(left), len(open_)))

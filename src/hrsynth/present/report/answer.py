@@ -27,7 +27,8 @@ def answer(found: Derivation, told: Parts) -> Iterator[str]:
     modes = told.modes
     if not isinstance(modes, Refused) and modes.found.continuum is None and modes.modes:
         count = len(modes.modes)
-        yield (f"At home {count} pose{'s have' if count > 1 else ' has'} the same {describe_held(found.setting)} "
+        yield (f"At home {modes.alike}; a run that starts far away may end at another than its goal." if modes.near else
+               f"At home {count} pose{'s have' if count > 1 else ' has'} the same {describe_held(found.setting)} "
                f"({all_of(modes)})"
                + ("; a run that starts far away may end at another than its goal." if count > 1 else "."))
     if not isinstance(told.accuracy, Refused):

@@ -6,6 +6,8 @@ import math
 from collections import Counter
 from typing import TYPE_CHECKING
 
+from ...analysis.modes.near import degrees, measurement_bound
+from ...tolerances import MEASUREMENT_BOUND
 from .poses import all_of
 from .tables import GAP, Rows, camera, head, listing, name_all, table
 
@@ -142,6 +144,8 @@ def _line(each: RestPoint) -> list[str]:
         notes.append(f"{name_all('leg', each.other_legs)} in another working mode")
     if each.beyond:
         notes.append(f"beyond the limits of {', '.join(each.beyond)}")
+    if each.kind == "critical" and each.stable and each.error <= measurement_bound(MEASUREMENT_BOUND):
+        notes.append(f"a near mode: no direction differs by more than {degrees(each.error)}")
     if each.rates and each.kind == "critical":
         notes.append(f"rates {', '.join(f'{(low + high) / 2:.3g}' for low, high in each.rates)}")
     return [each.kind, f"{each.error:.3g}" if each.kind == "critical" else "0", each.stability, str(each.pose),

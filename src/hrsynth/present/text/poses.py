@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from ...analysis.check import Check, GridCheck
     from ...analysis.modes.assembly_mode import AssemblyMode
     from ...analysis.modes.modes import AssemblyModes
+    from ...analysis.modes.near import NearMode
     from ...analysis.observed import ObservedRobot
     from ...analysis.posture import Distances, Kinds, Posture
     from ...analysis.singularity.singular import Singularity
@@ -180,6 +181,8 @@ def modes(found: AssemblyModes) -> str:
     if found.formation is not None:
         return _describe_formation(found, [name, seen, *formation(found.formation)])
     rows = [name, *([seen] if found.kind == "hidden" else []), ("held", f"{_describe_held(found)} at {found.pose}")]
+    if found.near:
+        rows += [("alike", f"{found.alike} (found, not proved, for errors up to {np.degrees(found.bound):.3g}°)")]
     if count.continuum is None or count.complex is None:
         rows += [("modes", f"{found.count}, {all_of(found)}"),
                  ("proof", count.proof)]
@@ -201,8 +204,8 @@ def modes(found: AssemblyModes) -> str:
         rows += [*GAP, (f"antipodal {number}", [f"{mode.pose}   not a mode: the opposite value of "
                                                 f"{', '.join(mode.opposite)}", proof_words(mode), *ahead(mode)])]
     for number, mode in enumerate(found.near, 1):
-        rows += [*GAP, (f"near {number}", [f"{mode.pose}   residual {mode.residual:.2e}: almost a mode"
-                 + (", and none" if count.complete else ""), *at_mode(mode, found)])]
+        rows += [*GAP, (f"near {number}", [f"{mode.pose}   found, not proved; what is measured differs {mode.differs}",
+                                           *_rests(mode), *ahead(mode), *at_mode(mode, found)])]
     return listing(rows)
 
 
@@ -226,6 +229,13 @@ def _describe_held(found: AssemblyModes) -> str:
     if found.kind == "hidden" and not all(o.by_segment for o in found.setting.observed):
         return "what is observed"
     return _SINCE[found.kind]
+
+
+def _rests(mode: NearMode) -> list[str]:
+    """What the loop does at a near mode."""
+    if mode.family:
+        return ["one of a continuous family: the loop may rest at any of them"]
+    return ["the loop rests there, stable"] if mode.stable else []
 
 
 def ahead(mode: AssemblyMode) -> list[str]:

@@ -55,8 +55,9 @@ def mode_outlines(setting: ObservedRobot) -> tuple[tuple[ModeOutline, ...], tupl
     if found.found.continuum is not None:
         return (), (f"assembly modes are not shown: {found.found.degenerate}",)
     notes = () if found.found.complete else ("perhaps not all assembly modes are shown",)
-    return tuple(outline(setting, str(number), mode) for number, mode in enumerate(found.modes, 1)
-                 if not mode.goal), notes
+    listed = [(str(number), mode) for number, mode in enumerate(found.modes, 1) if not mode.goal]
+    listed += [(f"near {number}", mode) for number, mode in enumerate(found.near, 1)]
+    return tuple(outline(setting, *each) for each in listed), notes
 
 
 def outline(setting: ObservedRobot, label: str, mode: AssemblyMode) -> ModeOutline:

@@ -9,12 +9,10 @@ import numpy as np
 
 from ....analysis.modes.assembly_mode import AssemblyMode
 from ....analysis.modes.modes import AssemblyModes, modes
+from ....analysis.modes.near import degrees, distance_from
 from ....analysis.observed import ObservedRobot
 from ....analysis.verdict import CONTROLLABLE, Verdict
 from ....errors import HrsynthError
-from ....geometry.so3 import angle_of
-from ....geometry.vectors import Array
-from ....kinematics.platform_motion import PlatformMotion
 from ....tolerances import SAME_RELATION
 from ...text.poses import all_of
 from ...text.tables import name_all
@@ -91,7 +89,7 @@ def _elsewhere(setting: ObservedRobot) -> str:
         return f"Other poses at which the loop may stop could not be listed: {problem}."
     if found.found.continuum is not None or found.motions:
         return "The loop may stop anywhere on a whole curve of poses at which the legs look the same."
-    others = [mode for mode in found.modes if not mode.goal]
+    others: list[AssemblyMode] = [*(mode for mode in found.modes if not mode.goal), *found.near]
     met = [mode for mode in others if mode.reachable is not False]
     return _others(found, len(others), met)
 
@@ -106,20 +104,13 @@ def _others(found: AssemblyModes, count: int, met: list[AssemblyMode]) -> str:
             words = f"No other pose has the same directions ({all_of(found)})" if known else (
                 "No other pose was found at which the legs look the same")
         return f"{words}." if known else f"{words}; there may be others that were not found."
-    away = sorted(_apart(found.setting.motion, found.goal.pose, mode) for mode in met)
+    away = sorted(distance_from(found.setting.motion, found.goal, mode) for mode in met)
     near, turn = away[0]
     far = f"{_length(near)} away" if near > SAME_RELATION else f"turned by {np.degrees(turn):.2g}°"
     where = f"one other pose, {far}" if len(met) == 1 else f"{_number(len(met))} other poses, the nearest {far}"
+    if found.near:
+        where += f" (directions that differ by no more than {degrees(found.near[-1].angle)})"
     return f"The loop may stop at {where}{'' if known else ', and perhaps at others that were not found'}."
-
-
-def _apart(motion: PlatformMotion, pose: Any, mode: AssemblyMode) -> tuple[float, float]:
-    """How far a mode is from the pose itself: metres, radians."""
-    home: Array = pose(motion.link)
-    at = np.array([mode.pose.x, mode.pose.y, mode.pose.z], dtype=float)
-    turned = mode.pose.rotation
-    return float(np.linalg.norm(at - motion.position(home))), (
-        0.0 if turned is None else angle_of(turned @ home[:3, :3].T))
 
 
 def _length(metres: float) -> str:

@@ -6,7 +6,9 @@ from typing import Any
 
 from ....analysis.modes.assembly_mode import AssemblyMode
 from ....analysis.modes.modes import AssemblyModes, at_mode, modes
+from ....analysis.modes.near import NearMode
 from ....errors import PoseNotReached
+from ....kinematics.configuration import ClosedConfiguration
 from ....mechanism.pose import ModeNumber
 from ...text.poses import all_of, assembly
 from ...view.mode_outlines import outline
@@ -20,7 +22,8 @@ def answer(request: Request) -> dict[str, Any]:
     setting = request.seeing()
     here = request.here(request.mover())
     found = modes(setting, at=here.real)
-    return {"modes": [_mode(request, found, number, mode) for number, mode in enumerate(found.modes, 1)],
+    return {"modes": [*(_mode(request, found, number, mode) for number, mode in enumerate(found.modes, 1)),
+                      *(_near(request, found, number, mode) for number, mode in enumerate(found.near, 1))],
             "words": words(found), **lines_at(request, "modes", setting, here.real)}
 
 
@@ -29,16 +32,27 @@ def words(found: AssemblyModes) -> str:
     if found.found.continuum is not None and found.found.complex is not None:
         return f"a continuum of poses: {found.found.degenerate}"
     more = "" if found.found.degenerate is None else f"; {found.found.degenerate}"
-    return f"{found.count}, {all_of(found)}; {found.found.proof}{more}"
+    alike = f"{found.alike}; " if found.near else ""
+    return f"{alike}{found.count}, {all_of(found)}; {found.found.proof}{more}"
 
 
 def _mode(request: Request, found: AssemblyModes, number: int, mode: AssemblyMode) -> dict[str, Any]:
-    drawn = outline(found.setting, f"mode {number}", mode)
     try:
         there = at_mode(found, ModeNumber(number))
     except PoseNotReached:
         there = None
     told = "the pose itself" if mode.goal else assembly(mode, found.setting.unlimited)[0]
+    return _told(request, found, f"mode {number}", mode, told, there)
+
+
+def _near(request: Request, found: AssemblyModes, number: int, mode: NearMode) -> dict[str, Any]:
+    told = f"differs {mode.differs}; {assembly(mode, found.setting.unlimited)[0]}"
+    return _told(request, found, f"near {number}", mode, told, mode.configuration)
+
+
+def _told(request: Request, found: AssemblyModes, label: str, mode: AssemblyMode, told: str,
+          there: ClosedConfiguration | None) -> dict[str, Any]:
+    drawn = outline(found.setting, label, mode)
     return {**drawn.scene(), "words": f"{drawn.words}: {told}",
             "pose": mode.pose.to_dict(), "goal": mode.goal,
             "here": None if there is None else request.describe_here(Posed(there))}

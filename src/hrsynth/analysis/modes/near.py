@@ -1,0 +1,198 @@
+"""Near modes: poses that a measurement with an error cannot tell from the goal (docs/pages/theory.md, section 8).
+
+Lists of modes are of the numbers as they are. Where more is observed than needed, a mode of exact dimensions is none of
+rounded ones, but what is measured there differs by no more than the rounding, and the loop rests there as before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from ...budgets import NEAR_MODE_STEPS
+from ...errors import LoopsNotClosed
+from ...geometry.so3 import angle_of
+from ...geometry.vectors import Array
+from ...kinematics.assembly import of_links
+from ...kinematics.configuration import ClosedConfiguration
+from ...kinematics.platform_motion import PlatformMotion
+from ...kinematics.relation import Measurement, platform_motions, relation
+from ...kinematics.tasks import Held, shorten_step, solve
+from ...ranges import plain_number
+from ...results import Value
+from ...tolerances import CURVATURE_STEP, FAMILY_STEP, SAME_GEOMETRY, SAME_NEAR_POSE, SOLVED, SURELY_SOMETHING
+from ..accuracy.cones import single_angle
+from ..observed import ObservedRobot
+from .assembly_mode import AssemblyMode, found_mode
+from .motions import bodies_apart
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class NearMode(AssemblyMode):
+    """A pose whose measured values differ from the goal's by ``angle`` at most (rad; lengths in characteristic
+    lengths), ``distance`` (m) and ``turned`` (rad) from the goal's. ``stable``: whether the difference has an isolated
+    minimum there, which attracts the loop; None where the robot was not assembled. ``family``: it is one of a
+    connected set of poses, no isolated minimum."""
+
+    angle: float = 0.0
+    distance: float = 0.0
+    turned: float = 0.0
+    stable: bool | None = None
+    family: bool = False
+
+    @property
+    def differs(self) -> str:
+        """By how much what is measured differs at most, and how far away the pose is."""
+        far = f"{1e3 * self.distance:.3g} mm away" if self.distance > SAME_NEAR_POSE * self.length else (
+            f"turned by {np.degrees(self.turned):.3g}°")
+        return f"by {degrees(self.angle)}, {far}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line."""
+        return {**super().to_dict(), "angle": self.angle, "distance_m": self.distance, "turned_rad": self.turned,
+                "stable": self.stable, "family": self.family}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class StationaryPose(Value):
+    """A closed configuration at which the difference of measured values is stationary, the largest of these differences
+    (rad); whether it is an ``isolated`` minimum, which attracts the loop, or one of a ``family`` of poses with
+    differences up to a bound."""
+
+    configuration: ClosedConfiguration
+    angle: float
+    isolated: bool
+    family: bool
+
+
+def descend(start: ClosedConfiguration, question: Measurement, held: Held, bound: float) -> StationaryPose | None:
+    """The stationary difference of what is held to which Gauss and Newton's method leads on the closed loops; None
+    where it leads to none, or the loops open. Where the values leave a freedom, a family is a motion either way with
+    differences up to ``bound`` (rad)."""
+    at, twin = start, start.twin
+    error, motions, rates = _changes(at, held)
+    for _ in range(NEAR_MODE_STEPS):
+        step = motions @ np.linalg.lstsq(rates, -error, rcond=None)[0]
+        q, _ = solve(twin, twin.integrate(at.q, shorten_step(step, 0.5)), tolerance=SOLVED)
+        try:
+            at = ClosedConfiguration.of(twin, q)
+        except LoopsNotClosed:
+            return None
+        error, motions, rates = _changes(at, held)
+        if float(np.abs(step).max(initial=0.0)) < SAME_GEOMETRY:
+            break
+    else:
+        return None
+    angle, there = _largest(error, held), relation(at, question)
+    if there.rank == there.dof.value and there.seen.weakest >= SURELY_SOMETHING:
+        return StationaryPose(at, angle, bool(_loop_rates(at, held, motions, rates).min(initial=1.0) > 0.0), False)
+    moving = platform_motions(at, question)
+    way = moving @ np.linalg.svd(held.rows(twin, at.q)[1] @ moving)[2][-1]
+    beside = (solve(twin, twin.integrate(at.q, step * way), tolerance=SOLVED)[0]
+              for step in (FAMILY_STEP, -FAMILY_STEP))
+    return StationaryPose(at, angle, False, all(_largest(held.rows(twin, q)[0], held) <= bound for q in beside))
+
+
+def _largest(error: Array, held: Held) -> float:
+    """The largest angle (rad) of the differences of what is held, one below the other (rows,)."""
+    parts = np.split(error, np.cumsum([o.size for o, _ in held.measured])[:-1])
+    return 2 * float(np.arcsin(min(1.0, max((float(np.linalg.norm(part)) for part in parts), default=0.0) / 2)))
+
+
+def _changes(at: ClosedConfiguration, held: Held) -> tuple[Array, Array, Array]:
+    """How far what is held is off (rows,), the motions of the loops (nv, k) that change it, and its rates (rows, k)."""
+    error, rates = held.rows(at.twin, at.q)
+    kernel = at.kernel()[0]
+    _, sizes, ways = np.linalg.svd(rates @ kernel, full_matrices=False)
+    motions = kernel @ ways[sizes > SURELY_SOMETHING].T
+    return error, motions, rates @ motions
+
+
+def _loop_rates(at: ClosedConfiguration, held: Held, motions: Array, rates: Array) -> Array:
+    """The eigenvalues of (JᵀJ)⁻¹ H, H the Hessian of ½ ‖e‖² along motions, J the rates of e: by differences of the
+    slope, of which the part beside JᵀJ is of the size of e."""
+    twin = at.twin
+    bends = np.zeros((motions.shape[1],) * 2)
+    for k, way in enumerate(motions.T):
+        for sign in (1.0, -1.0):
+            q, _ = solve(twin, twin.integrate(at.q, sign * CURVATURE_STEP * way), tolerance=SOLVED)
+            J = twin.jacobian(q)
+            error, slopes = held.rows(twin, q)
+            carried = motions - np.linalg.pinv(J, rcond=SURELY_SOMETHING) @ (J @ motions)
+            bends[k] += sign * (error @ slopes @ carried) / (2 * CURVATURE_STEP)
+    return np.asarray(np.sort(np.linalg.eigvals(np.linalg.solve(rates.T @ rates, (bends + bends.T) / 2)).real))
+
+
+def near_modes(setting: ObservedRobot, goal: ClosedConfiguration, question: Measurement, known: Sequence[AssemblyMode],
+               candidates: Sequence[AssemblyMode], bound: float) -> tuple[NearMode, ...]:
+    """The near modes with differences up to ``bound`` (rad) to which candidates lead, those of least difference first:
+    isolated minima, none of them the goal or a ``known`` mode, and one of those that are connected."""
+    held, found = Held.at(goal.twin, goal.q, question.reference, question.observations), list[NearMode]()
+    for mode in candidates if bound else ():
+        near = _near(setting, goal, question, held, mode, bound)
+        if near is None or near.angle > bound:
+            continue
+        bodies = near.bodies or {}
+        others = [{body: goal.pose(body) for body in bodies}, *(each.bodies or {} for each in (*known, *found))]
+        if all(bodies_apart(bodies, other, question, goal.twin.length) > SAME_NEAR_POSE for other in others):
+            found.append(near)
+    families = [each for each in found if each.family]
+    return tuple(sorted((each for each in found if each not in families[1:]), key=lambda each: each.angle))
+
+
+def _near(setting: ObservedRobot, goal: ClosedConfiguration, question: Measurement, held: Held, mode: AssemblyMode,
+          bound: float) -> NearMode | None:
+    """A candidate as a near mode; one at which the robot was not assembled as it is, its residual as the difference."""
+    angle, stable, family = mode.residual, None, False
+    if mode.configuration is not None:
+        try:
+            start = of_links(goal.twin, mode.configuration.pose)
+        except LoopsNotClosed:
+            return None
+        least = descend(start, question, held, bound)
+        if least is None or not (least.isolated or least.family):
+            return None
+        at, angle, stable, family = least.configuration, least.angle, least.isolated or None, least.family
+        mode = found_mode(setting, question, at, {body: at.pose(body) for body in mode.bodies or {}}, mode.residual)
+    distance, turned = distance_from(setting.motion, goal, mode)
+    return NearMode(**{each.name: getattr(mode, each.name) for each in fields(AssemblyMode)}, angle=angle,
+                    distance=distance, turned=turned, stable=stable, family=family)
+
+
+def degrees(angle: float) -> str:
+    """An angle (rad) in degrees, at least so large as to be no zero."""
+    return f"{max(float(np.degrees(angle)), 1e-9):.1g}°"
+
+
+def poses_alike(modes: Sequence[AssemblyMode], near: Sequence[NearMode]) -> str:
+    """How many poses a measurement with an error does not tell apart, and what those other than the goal are."""
+    count = len(modes) + len(near)
+    exact = sum(not mode.goal for mode in modes)
+    others = [f"{exact} with the same values"] * bool(exact)
+    isolated = [each for each in near if not each.family]
+    if len(isolated) == 1:
+        others.append(f"one that differs {isolated[0].differs}")
+    elif isolated:
+        others.append(f"{len(isolated)} that differ by up to {degrees(isolated[-1].angle)}")
+    others += [f"a continuous family that differs {each.differs} at one of its poses" for each in near if each.family]
+    return f"{count} poses look the same: {', '.join(['the goal', *others[:-1]])} and {others[-1]}"
+
+
+def distance_from(motion: PlatformMotion, goal: ClosedConfiguration, mode: AssemblyMode) -> tuple[float, float]:
+    """How far the platform is from its pose at the goal (m, rad)."""
+    home, there = goal.pose(motion.link), mode.pose
+    at = np.array([there.x, there.y, there.z], dtype=float)
+    return float(np.linalg.norm(at - motion.position(home))), (
+        0.0 if there.rotation is None else angle_of(there.rotation @ home[:3, :3].T))
+
+
+def measurement_bound(cone: float | str) -> float:
+    """An error of measurements (rad) as a user writes it, 0 for none; raises ``BadRequest``."""
+    try:
+        exact = plain_number(str(cone).removesuffix("deg").strip()) == 0
+    except ValueError:
+        exact = False
+    return 0.0 if exact else single_angle(cone)
