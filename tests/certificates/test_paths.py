@@ -96,7 +96,8 @@ def test_a_separation_says_how_many_working_modes_it_is_of():
     assert "in 8 of 8 working modes" in hrsynth.verify(record, "3prr_m1")
     rng, mixed = random.Random(5), 0
     for _ in range(12):
-        node = [[str(Fraction(rng.randint(-30, 30), 100)) for _ in "xy"], ["1", str(Fraction(rng.randint(-40, 40), 100))]]
+        shift = [str(Fraction(rng.randint(-30, 30), 100)) for _ in "xy"]
+        node = [shift, ["1", str(Fraction(rng.randint(-40, 40), 100))]]
         record = json.loads(separated())
         record["path"][1] = record["ends"][1] = node
         sides = {modes: judged(record, [record["modes"][0], list(modes)]) for modes in product((1, -1), repeat=3)}

@@ -336,12 +336,12 @@ class Aspects(Value):
                     value = float(there.at(p[1:2], R[1:2])[1][0])
                     return replace(found, goal=replace(answer.goal, value=value), boxes=spent, reason=(
                         f"{found.reason}; at the goal the robot is then {modes}"))
-        legs = dict.fromkeys(one.label for there in others for one, other in zip(limbs, there.forms.limbs, strict=True)
+        able = dict.fromkeys(one.label for there in others for one, other in zip(limbs, there.forms.limbs, strict=True)
                              if one.mode != other.mode)
         return replace(answer, boxes=spent, reason=(
             "the expression has opposite signs at the start and at the goal in the working modes reached, so every "
             "path between these crosses its zeros; but not in other working modes of leg "
-            f"{', '.join(legs)} at the goal, and no path to these was proved"))
+            f"{', '.join(able)} at the goal, and no path to these was proved"))
 
     def _lead(self, answer: PathAnswer, enclosures: Sequence[ConditionEnclosure], poses: tuple[Array, Array], seed: int,
               budget: int) -> PathAnswer:
