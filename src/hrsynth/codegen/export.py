@@ -89,7 +89,7 @@ def export(robot: RobotLike, lang: str = "c++", box: BoxLike | None = None, *, o
         raise BadRequest(f"{proof.robot.name}: loops that its motors move", 0, "one or more")
     tell("code")
     branch_ = TubedBranch.of(proof, parsed_box(box))
-    source = Source.of(branch_, watched, closed_inverse(given, proof, branch_))
+    source = Source.of(branch_, watched, closed_inverse(given if proof.robot in (given, getattr(given, "robot", None)) else proof.robot, proof, branch_))
     code = program(source, lang, _describe_program(proof, source, lang, box, effort))
     return ExportedCode(proof, lang, tuple(each.leg for each in watched), bool(source.legs), source.bounds,
                         sum(len(part.bounded) for part in source.parts), code, _free(proof, branch_))
