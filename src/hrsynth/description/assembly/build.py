@@ -14,7 +14,7 @@ from ..jointgraph import JointGraph, JointSpec, comma_list
 from ..jointmotion import cure
 from ..numerals import Digits
 from ..overrides import Overrides
-from ..postures import posture
+from ..postures import STAY, posture
 from ..sights import as_written
 from ..tree import spanning
 from . import closures, guess
@@ -78,7 +78,9 @@ def build(graph: JointGraph, overrides: Overrides) -> Mechanism:
             mechanism = as_meant(mechanism, solution.residual, tolerance, possible)
         elif solution.residual > SAME_GEOMETRY:
             raise LoopsNotClosed(graph.file, solution.residual, SAME_GEOMETRY, assembly.worst(solution.values)[0])
-        mechanism = _away_from_singular(spanning(mechanism))
+        mechanism = spanning(mechanism)
+        if overrides.keyframe != STAY:
+            mechanism = _away_from_singular(mechanism)
     if graph.platform is None:
         mechanism = without_coordinates(mechanism)
     return with_weighed_motors(mechanism)

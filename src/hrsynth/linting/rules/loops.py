@@ -91,8 +91,13 @@ def _miss(joint: JointSpec, poses: dict[str, np.ndarray], length: float) -> floa
 def _mend_zero(file: LintedFile, graph: JointGraph, assembly: LoopAssembly, closed: LoopSolution) -> Mend | None:
     """Let every joint that moved count from where it is closed: its origin takes the displacement, its limits and the
     offset of its mimic lose it."""
-    if file.dialect != "urdf" or file.expanded:
+    if file.dialect != "urdf" or file.expanded or closed.beyond:
         return None
+    for name, q in closing(assembly, closed.values).items():
+        limits = graph.joints[name].limits
+        if limits is not None and not (-np.inf if limits.lower is None else limits.lower) <= q <= (
+                np.inf if limits.upper is None else limits.upper):
+            return None
     moved = []
     for joint, _, _ in assembly.tree:
         if np.array_equal(displacement(joint, closed.values[joint.name]), np.eye(4)):
