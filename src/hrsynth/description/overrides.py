@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from numbers import Real
 
 import numpy as np
@@ -66,6 +66,18 @@ class Overrides:
         """Whether anything is given that changes what the file says."""
         return bool(self.close or self.freeze) or any(
             each is not None for each in (self.platform, self.motors, self.unit, self.keyframe))
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """The options of the command line that say the same; ``--observe`` is left to what is watched."""
+        found: list[str] = []
+        for each in fields(self):
+            value, flag = getattr(self, each.name), f"--{each.name.replace('_', '-')}"
+            if each.name == "close":
+                found += [word for closure in value for word in (flag, closure)]
+            elif each.name != "observe" and value not in (None, (), False):
+                found += [flag] if value is True else [flag, ",".join(value) if isinstance(value, tuple) else str(value)]
+        return tuple(found)
 
     def apply(self, graph: JointGraph) -> None:
         """Unit, closures, frozen joints and motors, in the graph of a file."""

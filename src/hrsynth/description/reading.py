@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import replace
+from hashlib import sha256
 from pathlib import Path
 
 from ..budgets import LARGEST_ROBOT, MOST_LINKS
@@ -28,7 +29,9 @@ def read(path: Path, overrides: Overrides) -> Mechanism:
     Raises ``BadRobotFile`` for what is no robot, ``BadRequest`` for what has to be given, ``LoopsNotClosed`` and
     ``RankUndecided`` where its loops stay open or undecided.
     """
-    return understood(robot_file(path, overrides), overrides)
+    robot = understood(robot_file(path, overrides), overrides)
+    data = b"" if robot.file is None else xml.content(Path(robot.file))
+    return replace(robot, options=overrides.words, sha256=sha256(data).hexdigest())
 
 
 def understood(file: RobotFile, overrides: Overrides) -> Mechanism:

@@ -227,6 +227,10 @@ class Mechanism(Result, shown_as="robot"):
     file: str | None = field(default=None, compare=False)
     notes: tuple[Note, ...] = field(default=(), compare=False)
     """What reading the file had to settle."""
+    options: tuple[str, ...] = field(default=(), compare=False)
+    """The options of the command line with which its file was read."""
+    sha256: str | None = field(default=None, compare=False)
+    """The hash of that file's bytes."""
     cameras: tuple[NamedCamera, ...] = ()
     """The cameras that have a name: what observations of their own reference see from."""
     formation: bool = False

@@ -181,6 +181,13 @@ class BranchProof(Result, shown_as="branch"):
         return self.robot
 
     @property
+    def held_at(self) -> dict[str, float]:
+        """Where the idle coordinates are held (m, rad)."""
+        system = self.system
+        every = dict(zip(system.names, (system.zero * system.units).tolist(), strict=True))
+        return {name: every[name] for name in self.held}
+
+    @property
     def proved(self) -> tuple[Array, Array]:
         """The boxes of all parts together, low and high in the order of ``motors``; infinite for motors in no loop."""
         found = np.full((2, len(self.motors)), np.inf) * [[-1], [1]]
