@@ -14,7 +14,8 @@ from functools import cache
 
 import numpy as np
 
-from ..description.assembly.zero import SINGLE, zeroed_at
+from ..description.assembly.loops import SINGLE
+from ..description.assembly.zero import zeroed_at
 from ..geometry.ranks import kernel_basis, range_bases, range_basis, spectra
 from ..geometry.screws import point_velocity
 from ..geometry.vectors import Array, hat

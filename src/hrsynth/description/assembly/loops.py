@@ -6,6 +6,7 @@ resist (redundant constraints, disturbed by rounded numbers) are not followed. L
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 
@@ -14,7 +15,8 @@ import numpy as np
 from ...budgets import FIRMER_BY, HELD_TRIES, LOOP_EFFORT, LOOP_STRIDE, LOOP_TRIES, SINGULAR_STEPS
 from ...geometry.gauss_newton import Damping, Residual, descend
 from ...geometry.ranks import Rank, rank_of, singular_decomposition
-from ...geometry.vectors import Array, inverse, pose
+from ...geometry.so3 import quaternions
+from ...geometry.vectors import Array, inverse, pose, unit
 from ...mechanism.model import JointType, Mechanism
 from ...tolerances import EXACT, FAINT, LIMIT_MARGIN, NEARLY_SINGULAR, NEWTON_REACH, NOISE, RANK_CUTOFF, RANK_GAP, SOLVED, WITHOUT_DIRECTION
 from ..jointgraph import (
@@ -31,6 +33,7 @@ from ..jointgraph import (
 from ..jointmotion import displacement, opening, screws, step_along, zero
 
 DAMPING = Damping(start=1.0, eased=0.1, least=1e-3, most=1e6)
+SINGLE = (JointType.REVOLUTE, JointType.PRISMATIC)
 Values = dict[str, Array]
 """The value of every tree joint."""
 
@@ -257,18 +260,38 @@ class LoopAssembly:
         return found
 
     def beyond(self, values: Values) -> dict[str, Array]:
-        """The tree joints beyond their limits, each with the nearest value a little within them."""
-        found = {}
-        for joint, _, _ in self.tree:
-            if joint.limits is None or joint.kind not in (JointType.REVOLUTE, JointType.PRISMATIC):
+        """The R and P beyond their limits, each with the nearest value a little within them."""
+        found, closing = {}, self.closing(values)
+        for joint in [*(joint for joint, _, _ in self.tree), *self.loops]:
+            if joint.limits is None or joint.kind not in SINGLE:
                 continue
             unit = self.unit(joint)
             lower, upper = (far if bound is None else bound / unit
                             for bound, far in ((joint.limits.lower, -np.inf), (joint.limits.upper, np.inf)))
-            if lower < upper and not lower - EXACT <= values[joint.name][0] <= upper + EXACT:
+            value = values.get(joint.name, np.array([closing.get(joint.name, 0.0) / unit]))
+            if lower < upper and not lower - EXACT <= value[0] <= upper + EXACT:
                 inside = min(LIMIT_MARGIN, (upper - lower) / 4)
-                found[joint.name] = np.clip(values[joint.name], lower + inside, upper - inside)
+                found[joint.name] = np.clip(value, lower + inside, upper - inside)
         return found
+
+    def closing(self, values: Values) -> dict[str, float]:
+        """How far from their zero (m, rad) ``values`` put the R and P at which loops are closed: that of a closure is
+        where all tree joints are at zero, that of a joint of the file's tree where its two frames meet."""
+        now, then = self.scaled_poses(values), self.scaled_poses({joint.name: zero(joint) for joint, _, _ in self.tree})
+        found = {}
+        for spec in self.loops:
+            if spec.kind not in SINGLE:
+                continue
+            X, Y = spec.frames(now)
+            X_0, Y_0 = spec.frames(then)
+            D, D_0 = inverse(X) @ Y, np.eye(4) if spec.in_tree else inverse(X_0) @ Y_0
+            axis = unit(spec.axes[0])
+            if spec.kind is JointType.PRISMATIC:
+                found[spec.name] = float(axis @ (D[:3, 3] - D_0[:3, 3])) * self.length
+            else:
+                turn = quaternions(D[:3, :3] @ D_0[:3, :3].T)
+                found[spec.name] = 2 * math.atan2(float(axis @ turn[1:]), float(turn[0]))
+        return {name: q for name, q in found.items() if abs(q) > EXACT}
 
     @classmethod
     def of(cls, mechanism: Mechanism) -> LoopAssembly:
@@ -330,7 +353,7 @@ def _within_limits(assembly: LoopAssembly, values: Values, held: frozenset[str],
     values, residual = assembly.close(values, held=held)
     first = LoopSolution(values, residual, pushed, tuple(assembly.beyond(values)))
     for _ in range(HELD_TRIES if residual <= assembly.noise else 0):
-        inside = {name: value for name, value in assembly.beyond(values).items() if name not in held}
+        inside = {name: value for name, value in assembly.beyond(values).items() if name in values and name not in held}
         if not inside:
             break
         held |= inside.keys()

@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
 
-from ...geometry.so3 import quaternions, turns_about
+from ...geometry.so3 import turns_about
 from ...geometry.vectors import Array, frozen, inverse, pose, transform, unit
 from ...mechanism.model import Joint, JointType, Limits, Mechanism
 from ...tolerances import EXACT, NOISE, SAME_GEOMETRY, SAME_POINT
 from .. import numerals, xml
 from ..jointgraph import ORIGIN, comma_list, scale_pose
-from ..jointmotion import displacement, zero
-from .loops import LoopAssembly, Values
+from ..jointmotion import displacement
+from .loops import SINGLE, LoopAssembly, Values
 
-SINGLE = (JointType.REVOLUTE, JointType.PRISMATIC)
 COUNTED_FROM_ZERO = {"safety_controller": ("soft_lower_limit", "soft_upper_limit"),
                      "calibration": ("rising", "falling", "reference_position")}
 """Attributes of elements of a joint that are coordinates of it."""
@@ -127,7 +125,7 @@ def with_offsets(joints: Mapping[str, Joint], assembly: LoopAssembly, values: Va
             X_P = X[spec.links[0]] @ scale_pose(spec.ends[0].X, assembly.length)
             D = scale_pose(displacement(spec, value), assembly.length)
             found[spec.name] = _displaced(joint, X_P @ inverse(D) @ inverse(X_P))
-    for name, q in closing(assembly, values).items():
+    for name, q in assembly.closing(values).items():
         found[name] = _counted_from(joints[name], np.array([q]))
     return found
 
@@ -136,27 +134,6 @@ def _singles(assembly: LoopAssembly, values: Values) -> dict[str, float]:
     """The coordinates (m, rad) of the R and P of the tree."""
     return {spec.name: float(values[spec.name][0]) * assembly.unit(spec) for spec, _, _ in assembly.tree
             if spec.kind in SINGLE}
-
-
-def closing(assembly: LoopAssembly, values: Values) -> dict[str, float]:
-    """How far from their zero (m, rad) ``values`` put the R and P at which loops are closed: that of a closure is where
-    all tree joints are at zero, that of a joint of the file's tree where its two frames meet."""
-    there = {spec.name: zero(spec) for spec, _, _ in assembly.tree}
-    now, then = assembly.scaled_poses(values), assembly.scaled_poses(there)
-    found = {}
-    for spec in assembly.loops:
-        if spec.kind not in SINGLE:
-            continue
-        X, Y = spec.frames(now)
-        X_0, Y_0 = spec.frames(then)
-        D, D_0 = inverse(X) @ Y, np.eye(4) if spec.in_tree else inverse(X_0) @ Y_0
-        axis = unit(spec.axes[0])
-        if spec.kind is JointType.PRISMATIC:
-            found[spec.name] = float(axis @ (D[:3, 3] - D_0[:3, 3])) * assembly.length
-        else:
-            turn = quaternions(D[:3, :3] @ D_0[:3, :3].T)
-            found[spec.name] = 2 * math.atan2(float(axis @ turn[1:]), float(turn[0]))
-    return {name: q for name, q in found.items() if abs(q) > EXACT}
 
 
 def _recount(fragment: str, q: float) -> str:

@@ -13,7 +13,7 @@ from ...description.assembly import guess
 from ...description.assembly.build import rounding
 from ...description.assembly.candidates import closure_candidates
 from ...description.assembly.loops import LoopAssembly, LoopSolution, Values, solve
-from ...description.assembly.zero import closing, count_from, moves
+from ...description.assembly.zero import count_from, moves
 from ...description.jointgraph import JointGraph, JointSpec
 from ...description.jointmotion import displacement, opening
 from ...errors import HrsynthError
@@ -93,11 +93,6 @@ def _mend_zero(file: LintedFile, graph: JointGraph, assembly: LoopAssembly, clos
     offset of its mimic lose it."""
     if file.dialect != "urdf" or file.expanded or closed.beyond:
         return None
-    for name, q in closing(assembly, closed.values).items():
-        limits = graph.joints[name].limits
-        if limits is not None and not (-np.inf if limits.lower is None else limits.lower) <= q <= (
-                np.inf if limits.upper is None else limits.upper):
-            return None
     moved = []
     for joint, _, _ in assembly.tree:
         if np.array_equal(displacement(joint, closed.values[joint.name]), np.eye(4)):
@@ -125,7 +120,7 @@ def _rezero(moved: list[tuple[JointSpec, xml.Element]], values: Values, graph: J
         origin.set("xyz", numerals.exact_vector(X[:3, 3]))
         origin.set("rpy", numerals.exact_vector(numerals.rpy(X[:3, :3])))
         _shift_limits(element, q)
-    shifts = closing(assembly, values)
+    shifts = assembly.closing(values)
     for element in moved[0][1].getroottree().iter("loop"):
         if q := shifts.get(str(element.get("name")), 0.0):
             _shift_limits(element, q)
