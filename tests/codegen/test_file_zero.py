@@ -72,7 +72,8 @@ class Case:
         found = {self.joints[0].parent: np.eye(4)}
         for joint in self.joints:
             if joint.closes is None:
-                found[joint.child] = found[joint.parent] @ pose(joint.at) @ joint.displacement(values.get(joint.name, 0))
+                moved = joint.displacement(values.get(joint.name, 0.0))
+                found[joint.child] = found[joint.parent] @ pose(joint.at) @ moved
         return found
 
 
@@ -91,7 +92,8 @@ def follower(seed: int, slides: bool = False) -> Case:
 
 def open_bars(seed: int) -> Case:
     """A four-bar, all upright at zero: its passive joints close it."""
-    crank, rod, rocker, ground = np.random.default_rng(seed).uniform((0.1, 0.4, 0.3, 0.3), (0.14, 0.5, 0.4, 0.4)).tolist()
+    sizes = np.random.default_rng(seed).uniform((0.1, 0.4, 0.3, 0.3), (0.14, 0.5, 0.4, 0.4))
+    crank, rod, rocker, ground = sizes.tolist()
     return Case((FileJoint("drive", "base", "crank", (0.0, 0.0, 0.0), "y", motor=True),
                  FileJoint("knee", "crank", "rod", (0.0, 0.0, crank), "y", extra='<limit lower="-3" upper="3"/>'),
                  FileJoint("swing", "base", "rocker", (ground, 0.0, 0.0), "y"),

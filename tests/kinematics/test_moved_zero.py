@@ -100,7 +100,7 @@ def numbers(record: object) -> list[float]:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", POSES)
 def test_answers_are_those_of_the_same_robot(name: str):
-    """At a pose, and of the robot whose zero it is: mobility, ranks, limits, modes, and the verdict on a path from it."""
+    """At a pose, and of the robot whose zero it is: mobility, ranks, limits, modes, the verdict on a path from it."""
     robot, pose = limited(hrsynth.load(name), seed=4), POSES[name]
     moved = hrsynth.observe(robot, at=pose)
     one, two = (hrsynth.check(robot, at=pose).to_dict(), hrsynth.check(moved).to_dict())

@@ -90,7 +90,8 @@ def export(robot: RobotLike, lang: str = "c++", box: BoxLike | None = None, *, o
         raise BadRequest(f"{proof.robot.name}: loops that its motors move", 0, "one or more")
     tell("code")
     branch_ = TubedBranch.of(proof, parsed_box(box))
-    source = Source.of(branch_, watched, closed_inverse(given if proof.robot in (given, getattr(given, "robot", None)) else proof.robot, proof, branch_))
+    moved = proof.robot not in (given, getattr(given, "robot", None))
+    source = Source.of(branch_, watched, closed_inverse(proof.robot if moved else given, proof, branch_))
     code = program(source, lang, _describe_program(proof, source, lang, box, effort, as_texts(camera)))
     return ExportedCode(proof, lang, tuple(each.leg for each in watched), bool(source.legs), source.bounds,
                         sum(len(part.bounded) for part in source.parts), code, _free(proof, branch_))
@@ -161,8 +162,8 @@ def _describe_program(proof: BranchProof, source: Source, lang: str, box: BoxLik
     used = {branch_.system.coordinates[i].joint for i in (*branch_.motors, *branch_.passive)}
     if loose := [joint.name for joint in robot.joints.values() if joint.name in used and joint.offset is not None
                  and joint.offset.ndim > 1]:
-        lines.append("Balls, planar and floating joints that count from the robot's zero configuration, not the file's: "
-                     + ", ".join(loose))
+        lines.append("Balls, planar and floating joints that count from the zero configuration, not the file's zero: "
+                     f"{', '.join(loose)}")
     lines += [f"Limits of joints without a motor, {each}" for each in proof.limits_in_words()]
     lines += [f"Limit of a motor that the box passes: {each}" for each in proof.motors_beyond()]
     return lines

@@ -24,7 +24,8 @@ def rows(system: LoopSystem, values: Sequence[Any]) -> list[Row]:
     found = [row for loop in system.loops for row in zip(*residuals(system, loop, values, loop.rows), strict=True)]
     for gear in system.gears:
         pair = [(i, rate) for i, rate in ((gear.second, 1.0), (gear.first, -gear.ratio)) if values[i] is not None]
-        found.append((sum((system.coordinates[i].from_zero(values[i]) * rate for i, rate in pair), np.zeros(1)), dict(pair)))
+        terms = (system.coordinates[i].from_zero(values[i]) * rate for i, rate in pair)
+        found.append((sum(terms, np.zeros(1)), dict(pair)))
     return found
 
 
@@ -55,8 +56,8 @@ def cut(system: LoopSystem) -> list[tuple[str, JointLoop, int]]:
 
 
 def cut_coordinate(system: LoopSystem, values: Sequence[Any], loop: JointLoop, which: int) -> Row:
-    """A coordinate of a cut joint, its turn from the zero configuration between −π and π, with its derivatives; lengths in
-    metres."""
+    """A coordinate of a cut joint (m, rad), its turn from the zero configuration between −π and π, with its
+    derivatives."""
     joint: Joint = system.mechanism.joints[loop.name]
     chains = loop.chains if loop.ends == joint.links else loop.chains[::-1]
     one, other = (system.displacement(chain, values) for chain in chains)

@@ -76,7 +76,8 @@ class Overrides:
             if each.name == "close":
                 found += [word for closure in value for word in (flag, closure)]
             elif each.name != "observe" and value not in (None, (), False):
-                found += [flag] if value is True else [flag, ",".join(value) if isinstance(value, tuple) else str(value)]
+                words = [",".join(value) if isinstance(value, tuple) else str(value)]
+                found += [flag, *([] if value is True else words)]
         return tuple(found)
 
     def apply(self, graph: JointGraph) -> None:

@@ -33,8 +33,8 @@ _PREFERRED = {"F": 0, "6": 1, "P": 2, "R": 3, "C": 4, "U": 5, "E": 6, "S": 7}
 @dataclass(frozen=True, eq=False, repr=False)
 class TreeCoordinate(Value):
     """One coordinate of a joint: a turn (rad) about, or a slide (characteristic lengths) along an ``axis`` (3,) through
-    ``point`` (3,), both as they lie at zero; ``parent`` is the coordinate before it, −1 at the base; ``zero`` is what it
-    counts there."""
+    ``point`` (3,), both as they lie at zero; ``parent`` is the coordinate before it, −1 at the base; ``zero`` is what
+    it counts there."""
 
     name: str
     joint: str

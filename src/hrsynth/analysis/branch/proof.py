@@ -60,8 +60,8 @@ def branch(robot: RobotLike, box: BoxLike | None = None, *, effort: int = BRANCH
     found, grown = [], []
     for part in parts:
         grid, coarsest = _grid(part, intervals), COARSEST_BRANCH_CELL * _reach(part, intervals)
-        growth = Growth(part, grid, system.zero[list(part.driven)], system.zero[list(part.unknowns)], _depth(part), effort,
-                        coarsest, _first(grid, system.zero[list(part.driven)], coarsest, effort)).run()
+        q0, x0 = (system.zero[list(places)] for places in (part.driven, part.unknowns))
+        growth = Growth(part, grid, q0, x0, _depth(part), effort, coarsest, _first(grid, q0, coarsest, effort)).run()
         grown.append(growth)
         found.append(_answer(part, growth))
         tell("parts")

@@ -18,7 +18,18 @@ from ...geometry.ranks import Rank, rank_of, singular_decomposition
 from ...geometry.so3 import quaternions
 from ...geometry.vectors import Array, inverse, pose, unit
 from ...mechanism.model import JointType, Mechanism
-from ...tolerances import EXACT, FAINT, LIMIT_MARGIN, NEARLY_SINGULAR, NEWTON_REACH, NOISE, RANK_CUTOFF, RANK_GAP, SOLVED, WITHOUT_DIRECTION
+from ...tolerances import (
+    EXACT,
+    FAINT,
+    LIMIT_MARGIN,
+    NEARLY_SINGULAR,
+    NEWTON_REACH,
+    NOISE,
+    RANK_CUTOFF,
+    RANK_GAP,
+    SOLVED,
+    WITHOUT_DIRECTION,
+)
 from ..jointgraph import (
     ORIGIN,
     FrameSpec,
@@ -353,7 +364,8 @@ def _within_limits(assembly: LoopAssembly, values: Values, held: frozenset[str],
     values, residual = assembly.close(values, held=held)
     first = LoopSolution(values, residual, pushed, tuple(assembly.beyond(values)))
     for _ in range(HELD_TRIES if residual <= assembly.noise else 0):
-        inside = {name: value for name, value in assembly.beyond(values).items() if name in values and name not in held}
+        inside = {name: value for name, value in assembly.beyond(values).items()
+                  if name in values and name not in held}
         if not inside:
             break
         held |= inside.keys()
@@ -364,8 +376,8 @@ def _within_limits(assembly: LoopAssembly, values: Values, held: frozenset[str],
 
 
 def regular_values(assembly: LoopAssembly, values: Values) -> Values | None:
-    """The closed values, as near to ``values`` as they are found, at which the loops have fewer freedoms, or resist much
-    more firmly, where ``values`` are singular or nearly so; None where they are neither, or nothing better is found."""
+    """The closed values, as near to ``values`` as they are found, at which the loops have fewer freedoms, or resist
+    much more firmly, where ``values`` are singular or nearly so; None where they are neither, or nothing is found."""
     here = assembly.rank(values)
     if assembly.freedoms(here) == 0:
         return None

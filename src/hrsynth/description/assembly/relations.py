@@ -291,7 +291,8 @@ def of_centres(at: JointCoordinates, normal: Mechanism, x: Array) -> Iterator[Ge
             size = float(np.linalg.norm(arm))
             if size > at.within / OBLIQUE:
                 miss = float(np.linalg.norm(np.cross(arm, vector(places[2])))) / max(1.0, size)
-                yield GeometricRelation("in line with an axis", (one.name, two.name, slide.name), _on_line, places, miss)
+                names = (one.name, two.name, slide.name)
+                yield GeometricRelation("in line with an axis", names, _on_line, places, miss)
     yield from _rods(bodies, spot, at, vector)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from types import MappingProxyType
@@ -9,7 +10,7 @@ from types import MappingProxyType
 import numpy as np
 
 from ...geometry.so3 import turns_about
-from ...geometry.vectors import Array, frozen, inverse, pose, transform, unit
+from ...geometry.vectors import Array, frozen, inverse, pose, transform
 from ...mechanism.model import Joint, JointType, Limits, Mechanism
 from ...tolerances import EXACT, NOISE, SAME_GEOMETRY, SAME_POINT
 from .. import numerals, xml
@@ -31,9 +32,9 @@ def zeroed_at(mechanism: Mechanism, poses: Mapping[str, Array], known: Mapping[s
              ) -> Mechanism:
     """The same mechanism with its links, all of them, at these poses (4, 4) as its zero configuration.
 
-    Limits, wrists, and what else a joint has that is counted from zero, move with it. ``known`` are coordinates (m, rad)
-    of R and P there; turns that are not known are within half a one, or the whole turns from that at which they are
-    within their limits.
+    Limits, wrists, and what else a joint has that is counted from zero, move with it. ``known`` are coordinates of R
+    and P there (m, rad); turns that are not known are within half a one, or the whole turns from that at which they
+    are within their limits.
     """
     motion = {name: poses[name] @ link.inverse for name, link in mechanism.links.items()}
     joints = []
@@ -112,8 +113,8 @@ def _shifted(limits: Limits | None, q: float) -> Limits | None:
 
 
 def with_offsets(joints: Mapping[str, Joint], assembly: LoopAssembly, values: Values) -> dict[str, Joint]:
-    """The joints of a file, which lie where ``values`` put them, with limits, and what else of them the file counts from
-    its zero, counted from there."""
+    """The joints of a file, which lie where ``values`` put them, with limits, and what else the file counts from its
+    zero, counted from there."""
     found = dict(joints)
     X = assembly.poses(values)
     for spec, _, _ in assembly.tree:
