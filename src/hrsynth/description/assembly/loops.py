@@ -285,6 +285,15 @@ class LoopAssembly:
                 found[joint.name] = np.clip(value, lower + inside, upper - inside)
         return found
 
+    def wound(self, values: Values, residual: float) -> tuple[Values, float]:
+        """The same values (and what they leave open) with turns by whole ones that bring joints within their limits."""
+        geared = {name for gear in self.gears for name in (gear.driver, gear.driven)}
+        free = {joint.name for joint, _, _ in self.tree if joint.kind is JointType.REVOLUTE} - geared
+        turns = {name: values[name] + 2 * np.pi * np.round((inside - values[name]) / (2 * np.pi))
+                 for name, inside in self.beyond(values).items() if name in free}
+        still = self.beyond(values | turns)
+        return values | {name: value for name, value in turns.items() if name not in still}, residual
+
     def closing(self, values: Values) -> dict[str, float]:
         """How far from their zero (m, rad) ``values`` put the R and P at which loops are closed: that of a closure is
         where all tree joints are at zero, that of a joint of the file's tree where its two frames meet."""
@@ -359,17 +368,19 @@ def solve(assembly: LoopAssembly, seed: int = 0) -> LoopSolution:
 
 
 def _within_limits(assembly: LoopAssembly, values: Values, held: frozenset[str], pushed: bool) -> LoopSolution:
-    """The closed values that are reached; where joints are beyond their limits there, with these held within them if
-    that closes."""
-    values, residual = assembly.close(values, held=held)
+    """The closed values that are reached; where joints are beyond their limits there, with these held within them, or
+    let go again from where that comes nearest to closing."""
+    values, residual = assembly.wound(*assembly.close(values, held=held))
     first = LoopSolution(values, residual, pushed, tuple(assembly.beyond(values)))
     for _ in range(HELD_TRIES if residual <= assembly.noise else 0):
         inside = {name: value for name, value in assembly.beyond(values).items()
                   if name in values and name not in held}
         if not inside:
             break
-        held |= inside.keys()
-        values, residual = assembly.close(assembly.followed(values | inside), held=held)
+        near, left = assembly.wound(*assembly.close(assembly.followed(values | inside), held=held | inside.keys()))
+        values, residual = assembly.wound(*assembly.close(near, held=held))
+        if left <= assembly.noise:
+            values, residual, held = near, left, held | inside.keys()
     if residual <= assembly.noise and not assembly.beyond(values):
         return LoopSolution(values, residual, pushed)
     return first

@@ -74,7 +74,7 @@ def _coordinates(joint: Joint, D: Array) -> Array | None:
     if joint.type not in (*SINGLE, JointType.UNIVERSAL, JointType.CYLINDRICAL):
         return None
     slide = [joint.axis @ (transform(D, joint.point) - joint.point)] if joint.type.slides else []
-    turns = [] if joint.type is JointType.PRISMATIC else turns_about(np.array(joint.axes), D[:3, :3])
+    turns = np.zeros(0) if joint.type is JointType.PRISMATIC else turns_about(np.array(joint.axes), D[:3, :3])
     limits = [*(each for _, each in joint.turns), *([] if joint.turns else [joint.limits]), None, None]
     return np.array([*slide, *(_within(float(angle), each) for angle, each in zip(turns, limits, strict=False))])
 
