@@ -65,6 +65,10 @@ LOOP_EFFORT = 100_000
 """Joints visited there (and their like) after which solving is given up: some seconds."""
 LOOP_TRIES = 24
 """Random pushes and steps before the best pose found has to do."""
+HELD_TRIES = 4
+"""Of these those in which motors, or joints at their limits, are held."""
+SINGULAR_STEPS = (0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.0)
+"""Steps (radians, characteristic lengths) by which a singular zero pose is left, the first that does."""
 NEARBY_AGREED = 4
 """Configurations nearby that must agree before a zero pose is called special."""
 FIRMER_BY = 2.0

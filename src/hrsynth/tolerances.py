@@ -135,10 +135,10 @@ OBLIQUE = 0.1
 """Sine of the angle between two axes below which where they meet is not looked at."""
 FAINT = 1e-3
 """Singular value of a file's loops, as part of the largest, below which a direction is held by rounding alone."""
+LIMIT_MARGIN = 0.1
+"""How far within its limits (radians, characteristic lengths) a joint is put where a file's loops close beyond them."""
 NEARLY_SINGULAR = 5e-3
 """Weakest singular value, as part of the largest, below which a foreign file's zero pose is left for a firmer one."""
-FIRM = 3e-2
-"""Weakest singular value, as part of the largest, at which a pose is firm enough."""
 NEWTON_REACH = 1e4
 """Length of a Newton step in a foreign file's loops, as a multiple of the residual that it removes, beyond which it
 follows rounded numbers."""

@@ -120,7 +120,8 @@ def question(*, formations: bool = False, **old: str) -> Callable[[Callable[P, R
             if "observe" in every.arguments:
                 every.arguments["observe"] = legs_asked(robot, every.arguments["observe"], every.arguments.get("see"))
             options = [(name, content(value)) for name, value in every.arguments.items() if name != "robot"]
-            key = (function.__qualname__, robot, source.file, source.notes, *options)
+            key = (function.__qualname__, robot, source.file, source.notes, source.options,
+                   source.sha256, *options)
             try:
                 hash(key)
             except TypeError:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from ..analysis.branch.answer import BranchProof
 from ..analysis.branch.proof import BoxLike, branch, parsed_box
-from ..analysis.observed import CameraLike, LegsLike, ObservedRobot, RobotLike, as_robot
+from ..analysis.observed import CameraLike, LegsLike, ObservedRobot, RobotLike, as_robot, as_texts
 from ..analysis.question import question
 from ..budgets import BRANCH_CELLS
 from ..errors import BadRequest, HrsynthError
@@ -90,8 +91,9 @@ def export(robot: RobotLike, lang: str = "c++", box: BoxLike | None = None, *, o
         raise BadRequest(f"{proof.robot.name}: loops that its motors move", 0, "one or more")
     tell("code")
     branch_ = TubedBranch.of(proof, parsed_box(box))
-    source = Source.of(branch_, watched, closed_inverse(given, proof, branch_))
-    code = program(source, lang, _describe_program(proof, source, lang, box, effort))
+    moved = proof.robot not in (given, getattr(given, "robot", None))
+    source = Source.of(branch_, watched, closed_inverse(proof.robot if moved else given, proof, branch_))
+    code = program(source, lang, _describe_program(proof, source, lang, box, effort, as_texts(camera)))
     return ExportedCode(proof, lang, tuple(each.leg for each in watched), bool(source.legs), source.bounds,
                         sum(len(part.bounded) for part in source.parts), code, _free(proof, branch_))
 
@@ -122,7 +124,8 @@ def _free(proof: BranchProof, branch_: TubedBranch) -> tuple[tuple[str, float, f
                  zip(proof.motors, branch_.lower, branch_.upper, strict=True) if name not in moving)
 
 
-def _describe_program(proof: BranchProof, source: Source, lang: str, box: BoxLike | None, effort: int) -> list[str]:
+def _describe_program(proof: BranchProof, source: Source, lang: str, box: BoxLike | None, effort: int,
+                      camera: tuple[str, ...]) -> list[str]:
     """What the program says of itself."""
     from ..version import __version__
 
@@ -131,11 +134,16 @@ def _describe_program(proof: BranchProof, source: Source, lang: str, box: BoxLik
     asked = box if isinstance(box, str) else ",".join(f"{name}={low}:{high}" for name, (low, high) in pairs.items())
     file = Path(robot.file).name if robot.file else robot.name
     legs = ",".join(each.leg for each in source.observed)
-    options = "".join(f" --{name} {value}" for name, value in (
-        ("observe", legs), ("box", asked), ("effort", effort if effort != BRANCH_CELLS else "")) if value)
-    lines = [f"Made by hrsynth {__version__}: hrsynth export {file} --lang {lang}{options}",
-             f"Robot {robot.name}: {len(proof.motors)} motors, {len(proof.passive)} passive coordinates; idle, held at "
-             f"0: {', '.join(proof.held) or 'none'}.", "Motors in order; values outside these ranges are refused:"]
+    words = ["hrsynth", "export", file, *robot.options, "--lang", lang]
+    words += [word for name, value in (
+        ("observe", legs), *(("camera", each) for each in camera), ("box", asked),
+        ("effort", "" if effort == BRANCH_CELLS else str(effort))) if value for word in (f"--{name}", value)]
+    held = [f"{name} = {zero:.6g}" if zero else name for name, zero in proof.held_at.items()]
+    lines = [f"Made by hrsynth {__version__}: {shlex.join(words)}",
+             *([f"SHA-256 of {file}: {robot.sha256}"] if robot.sha256 else []),
+             f"Robot {robot.name}: {len(proof.motors)} motors, {len(proof.passive)} passive coordinates; idle, held"
+             f"{'' if any(proof.held_at.values()) else ' at 0'}: {', '.join(held) or 'none'}.",
+             "Motors in order; values outside these ranges are refused:"]
     rows = zip(proof.motors, branch_.lower.tolist(), branch_.upper.tolist(), branch_.motors, strict=True)
     lines += [f"  q[{k}] {name}: {low!r} to {high!r} {branch_.unit_name(i)}"
               for k, (name, low, high, i) in enumerate(rows)]
@@ -152,6 +160,11 @@ def _describe_program(proof: BranchProof, source: Source, lang: str, box: BoxLik
               f"closed to {GENERATED_CLOSED:g} (cosines, or of {branch_.far:.6g} m), and the joints are in the cell's "
               "tube, in which the loops have one closure (proved).", *_bounds(source),
               "The proof takes the robot's numbers as the file has them."]
+    used = {branch_.system.coordinates[i].joint for i in (*branch_.motors, *branch_.passive)}
+    if loose := [joint.name for joint in robot.joints.values() if joint.name in used and joint.offset is not None
+                 and joint.offset.ndim > 1]:
+        lines.append("Balls, planar and floating joints that count from the zero configuration, not the file's zero: "
+                     f"{', '.join(loose)}")
     lines += [f"Limits of joints without a motor, {each}" for each in proof.limits_in_words()]
     lines += [f"Limit of a motor that the box passes: {each}" for each in proof.motors_beyond()]
     return lines

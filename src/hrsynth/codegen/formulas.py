@@ -24,7 +24,8 @@ def rows(system: LoopSystem, values: Sequence[Any]) -> list[Row]:
     found = [row for loop in system.loops for row in zip(*residuals(system, loop, values, loop.rows), strict=True)]
     for gear in system.gears:
         pair = [(i, rate) for i, rate in ((gear.second, 1.0), (gear.first, -gear.ratio)) if values[i] is not None]
-        found.append((sum((values[i] * rate for i, rate in pair), np.zeros(1)), dict(pair)))
+        terms = (system.coordinates[i].from_zero(values[i]) * rate for i, rate in pair)
+        found.append((sum(terms, np.zeros(1)), dict(pair)))
     return found
 
 
@@ -55,17 +56,19 @@ def cut(system: LoopSystem) -> list[tuple[str, JointLoop, int]]:
 
 
 def cut_coordinate(system: LoopSystem, values: Sequence[Any], loop: JointLoop, which: int) -> Row:
-    """A coordinate of a cut joint, turns between −π and π, with its derivatives."""
+    """A coordinate of a cut joint (m, rad), its turn from the zero configuration between −π and π, with its
+    derivatives."""
     joint: Joint = system.mechanism.joints[loop.name]
     chains = loop.chains if loop.ends == joint.links else loop.chains[::-1]
     one, other = (system.displacement(chain, values) for chain in chains)
     sides = [(place, i, swept, sign) for chain, swept, sign in zip(chains, (one, other), (-1.0, 1.0), strict=True)
              for place, i in enumerate(chain) if values[i] is not None]
     axis = rotate(one.R, joint.axis)
+    zero = 0.0 if joint.offset is None else float(joint.offset[which])
     if joint.type.slides and which == 0:
         # d/dq n·(B − A) = n·(v_B − v_A'), A' the point of the first body at B: n turns with that body
         A, B = one.at(loop.point), other.at(loop.point)
-        return dot_product(axis, B - A), {i: dot_product(axis, swept.rate(place, B)) * sign for place, i, swept,
+        return dot_product(axis, B - A) + zero, {i: dot_product(axis, swept.rate(place, B)) * sign for place, i, swept,
                                           sign in sides}
     if joint.type is JointType.UNIVERSAL:
         first, second = joint.axes
@@ -80,5 +83,6 @@ def cut_coordinate(system: LoopSystem, values: Sequence[Any], loop: JointLoop, w
         normal, side = plane_axes(joint.axis)
         start, moved, across = rotate(one.R, normal), rotate(other.R, normal), rotate(one.R, side)
     # d(turn) = axis·(ω_B − ω_A), the other axis of a U being normal to this one
-    return arctan2(*(np.ravel(dot_product(each, moved))[0] for each in (across, start))), {
+    turn = arctan2(*(np.ravel(dot_product(each, moved))[0] for each in (across, start)))
+    return turn + zero if zero else turn, {
         i: dot_product(axis, _turn(swept, place)) * sign for place, i, swept, sign in sides}

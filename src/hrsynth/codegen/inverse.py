@@ -78,11 +78,15 @@ class LegMotor(Value):
         margin, found = self.read(position, R)
         axis, zero = self.coordinate.axis, self.zero
         if self.reads == "length":
-            return margin, found - zero
+            return margin, self._filed(found - zero)
         if self.coordinate.slides:
-            return margin, dot(minus(found, zero), axis)
+            return margin, self._filed(dot(minus(found, zero), axis))
         arm = zero - axis * (axis @ zero)
-        return margin, arctan2(dot(cross(axis, arm), found), dot(arm, found))
+        return margin, self._filed(arctan2(dot(cross(axis, arm), found), dot(arm, found)))
+
+    def _filed(self, value: Any) -> Any:
+        """A coordinate from the zero configuration as the file counts it."""
+        return value + self.coordinate.zero if self.coordinate.zero else value
 
 
 def trace_inverse(rules: Sequence[LegMotor]) -> TracedFunction:
@@ -126,11 +130,11 @@ def closed_inverse(robot: RobotLike, proof: BranchProof, branch: TubedBranch) ->
 def _samples(proof: BranchProof, branch: TubedBranch) -> tuple[Array, Array]:
     """Motors (n, m) in the proved box, zero first, and the poses (n, 4, 4) of the platform's frame on the branch."""
     low, high = proof.proved
-    q = np.random.default_rng(0).uniform(low, high, (SAMPLES, len(low)))
-    q[0] = 0.0
     system = proof.system
+    q = np.random.default_rng(0).uniform(low, high, (SAMPLES, len(low)))
     place = {name: i for i, name in enumerate(system.names)}
-    values = np.zeros((SAMPLES, len(place)))
+    values = np.tile(system.zero * system.units, (SAMPLES, 1))
+    q[0] = values[0, [place[name] for name in proof.motors]]
     values[:, [place[name] for name in proof.motors]] = q
     for part, loops in zip(proof.parts, parts_of(system)[0], strict=True):
         near = [cell.at(row) for row in values[:, loops.driven] if (cell := part.find(row)) is not None]

@@ -62,7 +62,7 @@ class TubePart(Value):
 @dataclass(frozen=True, eq=False, repr=False)
 class TubedBranch(Value):
     """The loops in metres, the motors' coordinates and the bounds (m,) of the proved box, the parts; coordinates in no
-    part are held at 0."""
+    part are held as they are at the zero configuration."""
 
     system: LoopSystem
     motors: tuple[int, ...]
@@ -92,7 +92,7 @@ class TubedBranch(Value):
             unknowns = tuple(table[name] for name in part.passive)
             parts.append(TubePart(driven, unknowns, cells, solved[unknowns]))
         for place, i in enumerate(motors):
-            low, high = proof.robot.limited.get(system.coordinates[i].joint, (-np.inf, np.inf))
+            low, high = proof.robot.filed.get(system.coordinates[i].joint, (-np.inf, np.inf))
             if not np.isfinite(lower[place]):  # in no loop
                 ends = asked.get(system.coordinates[i].name, (-FARTHEST_MOTOR, FARTHEST_MOTOR))
                 lower[place], upper[place] = max(low, ends[0]), min(high, ends[1])
@@ -130,7 +130,7 @@ class TubedBranch(Value):
 
     def evaluate(self, q: Array, x: Array) -> tuple[Array, Array]:
         """All equations (e,) and their derivatives (e, N) at q and x, in the order of ``motors`` and ``passive``."""
-        values = np.zeros(len(self.system.coordinates))
+        values = self.system.zero
         values[list(self.motors)], values[list(self.passive)] = q, x
         return whole(self.system, self.system.loops, self.system.gears, values)
 

@@ -21,6 +21,7 @@ from itertools import pairwise
 import numpy as np
 
 from ..errors import BadRequest
+from ..geometry.vectors import Array
 from ..mechanism.model import Joint, JointType, Link, Mechanism, Motor
 from ..tolerances import SAME_DIRECTION, SAME_POINT
 
@@ -128,7 +129,15 @@ def _whole(name: str, chain: list[Joint], between: list[Link | None], length: fl
             axes = axes if kind is JointType.UNIVERSAL else axes[2:]
     if not same:
         return None
-    return replace(first, name=name, type=kind, successor=chain[-1].successor, axes=tuple(axes), motor=_motor(chain))
+    return replace(first, name=name, type=kind, successor=chain[-1].successor, axes=tuple(axes), motor=_motor(chain),
+                   offset=_offset(kind, chain))
+
+
+def _offset(kind: JointType, chain: list[Joint]) -> Array | None:
+    """Where the file counts the whole from: of turns about a ball's centre, and of planes, that is not kept."""
+    if kind not in (JointType.UNIVERSAL, JointType.CYLINDRICAL) or all(joint.offset is None for joint in chain):
+        return None
+    return np.concatenate([np.zeros(1) if joint.offset is None else joint.offset for joint in chain])
 
 
 def _motor(chain: list[Joint]) -> Motor | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from numbers import Real
 
 import numpy as np
@@ -73,6 +73,19 @@ class Overrides:
         ends = [match[end].partition("@")[0] for each in self.close if (match := _CLOSURE.fullmatch(each))
                 for end in ("one", "two")]
         return {self.base, self.platform, *(self.observe or ()), *ends}, {*(self.motors or ()), *self.freeze}
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """The options of the command line that say the same; ``--observe`` is left to what is watched."""
+        found: list[str] = []
+        for each in fields(self):
+            value, flag = getattr(self, each.name), f"--{each.name.replace('_', '-')}"
+            if each.name == "close":
+                found += [word for closure in value for word in (flag, closure)]
+            elif each.name != "observe" and value not in (None, (), False):
+                words = [",".join(value) if isinstance(value, tuple) else str(value)]
+                found += [flag, *([] if value is True else words)]
+        return tuple(found)
 
     def apply(self, graph: JointGraph) -> None:
         """Unit, closures, frozen joints and motors, in the graph of a file."""

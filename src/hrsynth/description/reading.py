@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import os
 from dataclasses import replace
+from hashlib import sha256
 from pathlib import Path
 
 from ..budgets import LARGEST_ROBOT, MOST_LINKS
+from ..errors import LoopsNotClosed
 from ..mechanism.model import Mechanism, Note
 from ..mechanism.part import between
 from . import formats, xml
 from .dialect import RobotFile
 from .formats.urdf import xacro
 from .jointgraph import JointGraph
+from .jointmotion import cure
 from .overrides import Overrides, observe_links
 from .tree import spanning
 
@@ -26,12 +29,19 @@ def read(path: Path, overrides: Overrides) -> Mechanism:
     Raises ``BadRobotFile`` for what is no robot, ``BadRequest`` for what has to be given, ``LoopsNotClosed`` and
     ``RankUndecided`` where its loops stay open or undecided.
     """
-    return understood(robot_file(path, overrides), overrides)
+    robot = understood(robot_file(path, overrides), overrides)
+    data = b"" if robot.file is None else xml.content(Path(robot.file))
+    return replace(robot, options=overrides.words, sha256=sha256(data).hexdigest())
 
 
 def understood(file: RobotFile, overrides: Overrides) -> Mechanism:
     """The mechanism of a file that was opened; raises as :func:`read`."""
-    robot = formats.read(file)
+    try:
+        robot = formats.read(file)
+    except LoopsNotClosed as error:
+        if file.as_written or not file.strict or not cure(error.residual):
+            raise
+        robot = formats.read(replace(file, strict=False))  # rounded: closed as files of other tools are
     if isinstance(robot, JointGraph):
         if len(robot.links) > MOST_LINKS or len(robot.joints) > 2 * MOST_LINKS:
             raise xml.refusal(file.path, f"{len(robot.links)} links and {len(robot.joints)} joints",

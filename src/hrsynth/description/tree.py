@@ -106,7 +106,9 @@ def _in_base_frame(mechanism: Mechanism) -> Mechanism:
     links[mechanism.base] = replace(links[mechanism.base], pose=np.eye(4))
     joints = {
         name: replace(joint, point=X_BW[:3, :3] @ joint.point + X_BW[:3, 3],
-                      axes=tuple(X_BW[:3, :3] @ axis for axis in joint.axes))
+                      axes=tuple(X_BW[:3, :3] @ axis for axis in joint.axes),
+                      offset=X_BW @ joint.offset @ X_WB if joint.offset is not None and joint.offset.ndim == 2
+                      else joint.offset)
         for name, joint in mechanism.joints.items()
     }
     return replace(mechanism, links=links, joints=joints)  # observations are given in their links' frames

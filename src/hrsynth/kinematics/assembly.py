@@ -14,6 +14,7 @@ from itertools import product
 import numpy as np
 
 from ..budgets import LEG_ITERATIONS
+from ..description.assembly.zero import zeroed_at
 from ..errors import LoopsNotClosed
 from ..geometry.vectors import Array, inverse
 from ..mechanism import Joint, JointType, Mechanism, Observation
@@ -23,7 +24,6 @@ from . import limits
 from .closures import UNDECIDED, Closures, LegEnd, Miss, leg_closures
 from .configuration import ClosedConfiguration
 from .leg_reach import alone
-from .locked import zeroed_at
 from .pinocchio_model import PinocchioModel
 from .tasks import LinkPoses, Target, solve
 from .ways import Part, ways

@@ -8,12 +8,14 @@ Source: docs/pages/theory.md, section 7.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 
+from ..description.assembly.loops import SINGLE
+from ..description.assembly.zero import zeroed_at
 from ..geometry.ranks import kernel_basis, range_bases, range_basis, spectra
 from ..geometry.screws import point_velocity
 from ..geometry.vectors import Array, hat
@@ -130,20 +132,11 @@ def carry_joint(mechanism: Mechanism, joint: Joint, pose: Callable[[str], Array]
 
 def rezero(at: ClosedConfiguration) -> Mechanism:
     """The same mechanism with ``at`` as its zero configuration."""
-    mechanism = at.twin.mechanism
-    return zeroed_at(mechanism, {name: at.pose(name) for name in mechanism.links})
-
-
-def zeroed_at(mechanism: Mechanism, poses: Mapping[str, Array]) -> Mechanism:
-    """The same mechanism with its links, all of them, at these poses (4, 4) as its zero configuration."""
-    joints = []
-    for joint in mechanism.joints.values():
-        point, axes = carry_joint(mechanism, joint, poses.__getitem__)
-        wrist = None if joint.wrist is None else joint.wrist.carried(
-            *(poses[link][:3, :3] @ mechanism.links[link].pose[:3, :3].T for link in joint.links))
-        joints.append(replace(joint, point=point, axes=tuple(axes), wrist=wrist))
-    return mechanism.changed(links=[replace(link, pose=poses[name]) for name, link in mechanism.links.items()],
-                             joints=joints)
+    mechanism, twin = at.twin.mechanism, at.twin
+    step = twin.difference(twin.q0, at.q)
+    known = {name: float(step[twin.coordinates[name][0]]) * (twin.length if joint.type.slides else 1.0)
+             for name, joint in mechanism.joints.items() if joint.type in SINGLE and name in twin.coordinates}
+    return zeroed_at(mechanism, {name: at.pose(name) for name in mechanism.links}, known)
 
 
 @dataclass(frozen=True, eq=False)

@@ -121,6 +121,10 @@ class Joint(Value):
     """What limits a spherical joint that stands for several R (normal form)."""
     turns: tuple[tuple[str, Limits | None], ...] = ()
     """Names and limits of the two R that a U stands for, in the order of its axes (normal form)."""
+    offset: Array | None = None
+    """Where the file counts from, None for the zero configuration: of R, P, U and C the file's coordinates (m, rad) at
+    the zero configuration; of others the displacement (4, 4), in the base's frame with the predecessor at rest, that
+    brings the successor to the file's zero."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "type", JointType(self.type))
@@ -160,8 +164,11 @@ class Joint(Value):
     def _turned(self) -> Joint:
         axes = tuple(-axis for axis in reversed(self.axes))
         wrist = None if self.wrist is None else self.wrist.turned()
+        offset = self.offset
+        if offset is not None and self.type is not JointType.CYLINDRICAL:
+            offset = offset[::-1] if offset.ndim == 1 else inverse(offset)
         return replace(self, predecessor=self.successor, successor=self.predecessor, axes=axes, wrist=wrist,
-                       turns=self.turns[::-1])
+                       turns=self.turns[::-1], offset=offset)
 
     def relinked(self, old: str, new: str) -> Joint:
         """The joint with its end on ``old`` moved to ``new``."""
@@ -210,6 +217,11 @@ FIRST = PlatformChoice("file", "the first of the bodies that observe or are obse
 """Of a formation."""
 
 
+def _counted(bound: float, joint: Joint) -> float:
+    """A limit from the file's zero, to the digits that adding and taking away leaves."""
+    return bound if joint.offset is None or joint.offset.ndim > 1 else float(f"{bound + joint.offset[0]:.15g}")
+
+
 def fresh_name(name: str, taken: Container[str]) -> str:
     """``name``, or ``name_2``, ``name_3`` … if it is taken."""
     return next(each for each in chain([name], (f"{name}_{number}" for number in count(2))) if each not in taken)
@@ -232,6 +244,10 @@ class Mechanism(Result, shown_as="robot"):
     file: str | None = field(default=None, compare=False)
     notes: tuple[Note, ...] = field(default=(), compare=False)
     """What reading the file had to settle."""
+    options: tuple[str, ...] = field(default=(), compare=False)
+    """The options of the command line with which its file was read."""
+    sha256: str | None = field(default=None, compare=False)
+    """The hash of that file's bytes."""
     cameras: tuple[NamedCamera, ...] = ()
     """The cameras that have a name: what observations of their own reference see from."""
     formation: bool = False
@@ -330,6 +346,12 @@ class Mechanism(Result, shown_as="robot"):
                  if limits is not None and (limits.lower, limits.upper) != (None, None)}
         return {name: Stop(joint, place, -np.inf if lower is None else lower, np.inf if upper is None else upper)
                 for name, (joint, place, lower, upper) in given.items()}
+
+    @cached_property
+    def filed(self) -> dict[str, tuple[float, float]]:
+        """The same as :attr:`limited`, as the file counts."""
+        return {name: (_counted(lower, self.joints[name]), _counted(upper, self.joints[name]))
+                for name, (lower, upper) in self.limited.items()}
 
     @cached_property
     def idle(self) -> tuple[str, ...]:

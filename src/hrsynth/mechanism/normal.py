@@ -169,9 +169,9 @@ def _join(a: Joint, b: Joint, type: JointType | None = None, point: Array | None
     """One joint from a's predecessor to b's successor, without limits of its own: of a's type and place where none is
     given."""
     if type is None or point is None:
-        return replace(a, predecessor=a.predecessor, successor=b.successor, limits=None)
+        return replace(a, predecessor=a.predecessor, successor=b.successor, limits=None, offset=None)
     return replace(a, type=type, point=point, axes=axes, predecessor=a.predecessor, successor=b.successor, limits=None,
-                   wrist=wrist, turns=turns)
+                   wrist=wrist, turns=turns, offset=None)
 
 
 def _wrist(*joints: Joint) -> Wrist | None:

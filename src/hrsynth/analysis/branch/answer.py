@@ -154,7 +154,8 @@ class BranchProof(Result, shown_as="branch"):
     """The branch of the zero configuration: q ↦ x from motors to passive coordinates, part by part.
 
     ``system`` has the coordinates (name, axis, point, parent: the tree in order) and the loops' equations; lengths in
-    it are in ``system.length`` m, those of the parts in m. ``held`` are idle coordinates, which stay zero."""
+    it are in ``system.length`` m, those of the parts in m. ``held`` are idle coordinates, which stay as they are. All
+    coordinates count from the file's zero."""
 
     robot: Mechanism
     system: LoopSystem
@@ -178,6 +179,13 @@ class BranchProof(Result, shown_as="branch"):
     def setting(self) -> Mechanism:
         """The robot: what is compared besides the record."""
         return self.robot
+
+    @property
+    def held_at(self) -> dict[str, float]:
+        """Where the idle coordinates are held (m, rad)."""
+        system = self.system
+        every = dict(zip(system.names, (system.zero * system.units).tolist(), strict=True))
+        return {name: every[name] for name in self.held}
 
     @property
     def proved(self) -> tuple[Array, Array]:
@@ -208,7 +216,7 @@ class BranchProof(Result, shown_as="branch"):
             low = np.min([each.low for each in part.cells], axis=0)
             high = np.max([each.high for each in part.cells], axis=0)
             reach |= dict(zip(part.motors, zip(low.tolist(), high.tolist(), strict=True), strict=True))
-        limited = self.robot.limited
+        limited = self.robot.filed
         return [(name, limited[name], (low, high)) for name, (low, high) in reach.items()
                 if name in limited and (low < limited[name][0] or high > limited[name][1])]
 

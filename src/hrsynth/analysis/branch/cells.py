@@ -226,7 +226,8 @@ def evaluate_equations(part: LoopPart, equations: Sequence[LoopEquation], forms:
             for i, rate in ((each.of.second, 1.0), (each.of.first, -each.of.ratio)):
                 form = forms[i]
                 if form is not None:
-                    values[k], slopes[k][i] = values[k] + form * rate, slopes[k].get(i, 0.0) + rate
+                    values[k] = values[k] + part.system.coordinates[i].from_zero(form) * rate
+                    slopes[k][i] = slopes[k].get(i, 0.0) + rate
         else:
             groups.setdefault(id(each.of), []).append(k)
     for members in groups.values():

@@ -21,9 +21,9 @@ def branch_limits(robot: Mechanism, motors: Sequence[str], parts: Sequence[Branc
     for name in robot.joints:
         if name in robot.wrists:
             yield BranchLimit(name, None, None, None, None, UNSEEN)
-        if name in motors or name not in robot.limited:
+        if name in motors or name not in robot.filed:
             continue
-        lower, upper = robot.limited[name]
+        lower, upper = robot.filed[name]
         part = next((each for each in parts if name in each.passive and each.cells), None)
         if part is not None:
             k = part.passive.index(name)
@@ -36,6 +36,8 @@ def branch_limits(robot: Mechanism, motors: Sequence[str], parts: Sequence[Branc
             verdict = KEPT if lower <= least and most <= upper else PASSED if passed else OPEN
             yield BranchLimit(name, lower, upper, least, most, verdict)
         elif name in held:
-            yield BranchLimit(name, lower, upper, 0.0, 0.0, KEPT if lower <= 0 <= upper else PASSED)
+            offset = robot.joints[name].offset
+            at = 0.0 if offset is None else float(offset[0])
+            yield BranchLimit(name, lower, upper, at, at, KEPT if lower <= at <= upper else PASSED)
         else:
             yield BranchLimit(name, lower, upper, None, None, UNSEEN)

@@ -18,7 +18,7 @@ import numpy as np
 
 from ...errors import BadMechanism
 from ...geometry import lines
-from ...geometry.affine import cross_product, dot_product
+from ...geometry.affine import AffineForms, cross_product, dot_product
 from ...geometry.so3 import turns_about
 from ...geometry.vectors import Array, cross, frozen, hat, inverse, plane_axes, transform
 from ...mechanism import Joint, JointType, Mechanism, graphs
@@ -33,7 +33,8 @@ _PREFERRED = {"F": 0, "6": 1, "P": 2, "R": 3, "C": 4, "U": 5, "E": 6, "S": 7}
 @dataclass(frozen=True, eq=False, repr=False)
 class TreeCoordinate(Value):
     """One coordinate of a joint: a turn (rad) about, or a slide (characteristic lengths) along an ``axis`` (3,) through
-    ``point`` (3,), both as they lie at zero; ``parent`` is the coordinate before it, −1 at the base."""
+    ``point`` (3,), both as they lie at zero; ``parent`` is the coordinate before it, −1 at the base; ``zero`` is what
+    it counts there."""
 
     name: str
     joint: str
@@ -42,6 +43,16 @@ class TreeCoordinate(Value):
     point: Array
     parent: int
     driven: bool = False
+    zero: float = 0.0
+
+    def from_zero(self, value: Any) -> Any:
+        """Values, floats or forms, counted from the zero configuration; an angle keeps the symbol of its bend."""
+        if not self.zero:
+            return value
+        found = value - self.zero
+        if isinstance(value, AffineForms):
+            found.bend = value.bend
+        return found
 
 
 @dataclass(frozen=True)
@@ -80,7 +91,8 @@ class JointLoop(Value):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class GearEquation(Value):
-    """A coupling: coordinate ``second`` − ``ratio`` · coordinate ``first`` = 0 (characteristic lengths, radians)."""
+    """A coupling: coordinate ``second`` − ``ratio`` · coordinate ``first``, each from the zero configuration, = 0
+    (characteristic lengths, radians)."""
 
     name: str
     first: int
@@ -116,6 +128,23 @@ class LoopSystem(Value):
         return tuple(i for i, each in enumerate(self.coordinates) if each.driven)
 
     @property
+    def zero(self) -> Array:
+        """The coordinates (N,) of the zero configuration."""
+        return np.array([each.zero for each in self.coordinates])
+
+    @property
+    def as_filed(self) -> LoopSystem:
+        """The same with coordinates that count from the file's zero; those of balls, planes and free bodies from the
+        zero configuration."""
+        joints, length, found = self.mechanism.joints, self.length, list(self.coordinates)
+        for name in {each.joint for each in found if each.joint in joints}:
+            offset, own = joints[name].offset, [i for i, each in enumerate(found) if each.joint == name]
+            if offset is not None and offset.ndim == 1:
+                for i, zero in zip(sorted(own, key=lambda i: found[i].name), offset.tolist(), strict=True):
+                    found[i] = replace(found[i], zero=zero / (length if found[i].slides else 1.0))
+        return replace(self, coordinates=tuple(found))
+
+    @property
     def metric(self) -> LoopSystem:
         """The same in metres; what is zero but for rounding is zero."""
         def point(p: Array) -> Array:
@@ -128,7 +157,8 @@ class LoopSystem(Value):
         units = self.units
         return replace(
             self, length=1.0,
-            coordinates=tuple(replace(each, axis=frozen(_drop_rounding(each.axis)), point=point(each.point))
+            coordinates=tuple(replace(each, axis=frozen(_drop_rounding(each.axis)), point=point(each.point),
+                                      zero=each.zero * (self.length if each.slides else 1.0))
                               for each in self.coordinates),
             loops=tuple(replace(each, point=point(each.point), rows=tuple(map(row, each.rows)))
                         for each in self.loops),
@@ -161,7 +191,7 @@ class LoopSystem(Value):
             turns = [i for i in own if not self.coordinates[i].slides]
             if turns:
                 found[turns] = turns_about(np.array([self.coordinates[i].axis for i in turns]), moved[:3, :3])
-        return found
+        return found + self.zero
 
     def pose(self, link: str, values: Sequence[float] | Array) -> Array:
         """X_BL (…, 4, 4), m, of a link for coordinates (N, …)."""
@@ -201,6 +231,7 @@ class Swept:
             points.append(None if each.slides else o)
             if value is None:
                 continue
+            value = each.from_zero(value)
             if each.slides:
                 o = o + axes[-1] * value[..., None]
                 continue

@@ -147,7 +147,7 @@ def whole(system: LoopSystem, loops: Sequence[JointLoop], gears: Sequence[GearEq
         for i, rate in ((gear.second, 1.0), (gear.first, -gear.ratio)):
             rates[..., place, i] += rate
             if values[i] is not None:
-                errors[..., place] += values[i] * rate
+                errors[..., place] += system.coordinates[i].from_zero(values[i]) * rate
         place += 1
     return errors, rates
 
@@ -173,7 +173,7 @@ def _idle(system: LoopSystem) -> set[int]:
     Raises ``BadRequest`` where what is driven is not independent at zero.
     """
     held: set[int] = set()
-    _, rates = whole(system, system.loops, system.gears, np.zeros(len(system.coordinates)))
+    _, rates = whole(system, system.loops, system.gears, system.zero)
     looped = {i for loop in system.loops for i in loop.coordinates}
     looped |= {i for gear in system.gears for i in (gear.first, gear.second)}
     # a ball on a rod spins about it
@@ -264,7 +264,7 @@ def _part(system: LoopSystem, group: tuple[list[int], list[JointLoop], list[Gear
     candidates += [LoopEquation(gear) for gear in gears]
     last = {i for own in swung.values() for i in own}
     main = [i for i in unknowns if i not in last]
-    zero = np.zeros(len(system.coordinates))
+    zero = system.zero
     rates = np.array([_slope(system, each, zero) for each in candidates]).reshape(len(candidates), len(zero))[:, main]
     # independent equations at zero, the firmest first
     order = qr(rates.T, mode="r", pivoting=True)[1][: len(main)] if main else []

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ...budgets import BRANCH_CELLS, BRANCH_DEPTH, COARSEST_BRANCH_CELL, WIDEST_BRANCH_BOX
+from ...description.assembly.zero import at_file_zero
 from ...errors import BadMechanism, BadRequest, LoopsNotClosed
 from ...geometry.vectors import Array
 from ...mechanism import Mechanism
@@ -51,13 +52,16 @@ def branch(robot: RobotLike, box: BoxLike | None = None, *, effort: int = BRANCH
     motors = [name for name, joint in mechanism.joints.items() if joint.actuated]
     if not motors:
         raise BadRequest(f"{mechanism.name} has no motor", None, "one or more: --motors names them")
+    asked = parsed_box(box)
+    if not all(low <= _zero(mechanism, name) <= high for name, (low, high) in asked.items()):
+        mechanism = at_file_zero(mechanism) or mechanism
     system, parts, held = _choose_shape(mechanism, motors, box)
     intervals, source = _box(system, box)
     found, grown = [], []
     for part in parts:
         grid, coarsest = _grid(part, intervals), COARSEST_BRANCH_CELL * _reach(part, intervals)
-        growth = Growth(part, grid, np.zeros(len(part.driven)), np.zeros(len(part.unknowns)), _depth(part), effort,
-                        coarsest, _first(grid, coarsest, effort)).run()
+        q0, x0 = (system.zero[list(places)] for places in (part.driven, part.unknowns))
+        growth = Growth(part, grid, q0, x0, _depth(part), effort, coarsest, _first(grid, q0, coarsest, effort)).run()
         grown.append(growth)
         found.append(_answer(part, growth))
         tell("parts")
@@ -76,15 +80,15 @@ Shaped = tuple[LoopSystem, tuple[LoopPart, ...], tuple[int, ...]]
 def _choose_shape(mechanism: Mechanism, motors: Sequence[str], box: BoxLike | None) -> Shaped:
     """The loops in the coordinates in which the larger cell about zero is proved: those of the joints alone, or with
     the pose of the platform, seen from which all legs are alike."""
-    system = loop_system(mechanism, motors)
-    errors, _ = whole(system, system.loops, system.gears, np.zeros(len(system.coordinates)))
+    system = loop_system(mechanism, motors).as_filed
+    errors, _ = whole(system, system.loops, system.gears, system.zero)
     if len(errors) and np.linalg.norm(errors) > CLOSED:
         raise LoopsNotClosed(mechanism.name, float(np.linalg.norm(errors)), CLOSED, system.loops[0].name)
     joints: Shaped = (system, *parts_of(system))
     if len(joints[1]) != 1 or mechanism.base == mechanism.platform:
         return joints
     try:
-        other = loop_system(mechanism, motors, free=True)
+        other = loop_system(mechanism, motors, free=True).as_filed
     except BadMechanism:  # a motor or a gear carries the platform itself
         return joints
     posed: Shaped = (other, *parts_of(other))
@@ -99,18 +103,19 @@ def _reach(part: LoopPart, intervals: Mapping[int, tuple[float, float]]) -> floa
     grid = _grid(part, intervals)
     sizes = np.array([scale * 2.0**-k for k in range(2 * BRANCH_DEPTH) for scale in (1.0, 0.7)])
     half = np.minimum(grid.high - grid.low, 2 * np.pi)[None] / 2 * sizes[:, None]
-    tubes = prove_all(part, np.zeros(half.shape), half, np.zeros((len(half), len(part.unknowns))))
+    q, x = (np.tile(part.system.zero[list(places)], (len(half), 1)) for places in (part.driven, part.unknowns))
+    tubes = prove_all(part, q, half, x)
     return max((float(size) for size, tube in zip(sizes, tubes, strict=True) if tube is not None), default=0.0)
 
 
-def _first(grid: CellGrid, coarsest: float, effort: int) -> list[GrownCell]:
+def _first(grid: CellGrid, zero: Array, coarsest: float, effort: int) -> list[GrownCell]:
     """The cells to begin with: the box, or, where the effort is spent before cells that are not too coarse fill it, as
     many as it allows of those that are proved about zero."""
     n = len(grid.low)
     if not coarsest or coarsest**n * effort >= 1:
         return whole_box(n)
     half = coarsest / COARSEST_BRANCH_CELL * np.minimum(grid.high - grid.low, 2 * np.pi) / 2
-    return lattice(grid, np.zeros(n), half, effort)
+    return lattice(grid, zero, half, effort)
 
 
 def _depth(part: LoopPart) -> int:
@@ -125,7 +130,7 @@ def _grid(part: LoopPart, intervals: Mapping[int, tuple[float, float]]) -> CellG
 def _box(system: LoopSystem, box: BoxLike | None) -> tuple[dict[int, tuple[float, float]], str]:
     """The interval of each driven coordinate, in the system's units, and where they come from."""
     given = parsed_box(box)
-    limits = system.mechanism.limited
+    limits = system.mechanism.filed
     found, sources = {}, set()
     for i in system.driven:
         each = system.coordinates[i]
@@ -139,16 +144,23 @@ def _box(system: LoopSystem, box: BoxLike | None) -> tuple[dict[int, tuple[float
             sources.add("limits of the file")
         else:
             reach = system.length if each.slides else np.pi
-            low, high = max(low, -reach), min(high, reach)
+            low, high = max(low, each.zero * unit - reach), min(high, each.zero * unit + reach)
             sources.add("a characteristic length either way" if each.slides else "a whole turn")
-        if not low <= 0 <= high or not 0 < high - low <= WIDEST_BRANCH_BOX * unit:
+        zero = round(each.zero * unit, 12)
+        if not low <= zero <= high or not 0 < high - low <= WIDEST_BRANCH_BOX * unit:
             raise BadRequest(f"interval of motor {each.name!r}", f"{low:g}:{high:g}",
-                             "low < high, with the zero configuration in it, at most "
+                             f"low < high, with the zero configuration in it (there it is {zero:.6g}), at most "
                              f"{WIDEST_BRANCH_BOX * unit:.4g} {'m' if each.slides else 'rad'} wide")
         found[i] = low / unit, high / unit
     if given:
         raise BadRequest("motors of the box", ", ".join(sorted(given)), [system.names[i] for i in system.driven])
     return found, ", ".join(sorted(sources))
+
+
+def _zero(mechanism: Mechanism, name: str) -> float:
+    """The file's coordinate of a motor at the zero configuration."""
+    joint = mechanism.joints.get(name)
+    return 0.0 if joint is None or joint.offset is None or joint.offset.ndim > 1 else float(joint.offset[0])
 
 
 def parsed_box(box: BoxLike | None) -> dict[str, tuple[float, float]]:

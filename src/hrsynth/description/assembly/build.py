@@ -14,7 +14,7 @@ from ..jointgraph import JointGraph, JointSpec, comma_list
 from ..jointmotion import cure
 from ..numerals import Digits
 from ..overrides import Overrides
-from ..postures import posture
+from ..postures import STAY, posture
 from ..sights import as_written
 from ..tree import spanning
 from . import closures, guess
@@ -22,7 +22,7 @@ from .candidates import without_loop
 from .coordinates import with_weighed_motors, without_coordinates
 from .idealise import as_meant
 from .loops import LoopAssembly, LoopSolution, Values, regular_values, solve
-from .zero import moves, with_limits, with_zero_at
+from .zero import moves, with_offsets, with_zero_at
 
 POSTURE = "from a posture near to closing them: --keyframe NAME of the file, or FILE.srdf:NAME"
 
@@ -77,7 +77,9 @@ def build(graph: JointGraph, overrides: Overrides) -> Mechanism:
             mechanism = as_meant(mechanism, solution.residual, tolerance, possible)
         elif solution.residual > SAME_GEOMETRY:
             raise LoopsNotClosed(graph.file, solution.residual, SAME_GEOMETRY, assembly.worst(solution.values)[0])
-        mechanism = _away_from_singular(spanning(mechanism))
+        mechanism = spanning(mechanism)
+        if overrides.keyframe != STAY:
+            mechanism = _away_from_singular(mechanism)
     if graph.platform is None:
         mechanism = without_coordinates(mechanism)
     return with_weighed_motors(mechanism)
@@ -122,7 +124,7 @@ def _mechanism(graph: JointGraph, base: str, platform: str, assembly: LoopAssemb
     tree = {joint.name for joint, _, _ in assembly.tree}
     joints = {name: joint_at(joint, poses, name in tree) for name, joint in graph.joints.items()}
     links = {name: replace(link, pose=poses[name]) for name, link in graph.links.items()}
-    mechanism = Mechanism(graph.name, links, with_limits(joints, assembly, values), base, platform,
+    mechanism = Mechanism(graph.name, links, with_offsets(joints, assembly, values), base, platform,
                           tuple(graph.observations), (), graph.camera, tuple(graph.rest), graph.file,
                           tuple(graph.notes), formation=graph.formation,
                           turns=graph.turns if platform == graph.platform else None)

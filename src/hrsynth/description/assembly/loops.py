@@ -6,17 +6,30 @@ resist (redundant constraints, disturbed by rounded numbers) are not followed. L
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import math
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...budgets import FIRMER_BY, LOOP_EFFORT, LOOP_STRIDE, LOOP_TRIES
+from ...budgets import FIRMER_BY, HELD_TRIES, LOOP_EFFORT, LOOP_STRIDE, LOOP_TRIES, SINGULAR_STEPS
 from ...geometry.gauss_newton import Damping, Residual, descend
 from ...geometry.ranks import Rank, rank_of, singular_decomposition
-from ...geometry.vectors import Array, inverse, pose
+from ...geometry.so3 import quaternions
+from ...geometry.vectors import Array, inverse, pose, unit
 from ...mechanism.model import JointType, Mechanism
-from ...tolerances import FAINT, FIRM, NEARLY_SINGULAR, NEWTON_REACH, NOISE, RANK_CUTOFF, RANK_GAP, SOLVED
+from ...tolerances import (
+    EXACT,
+    FAINT,
+    LIMIT_MARGIN,
+    NEARLY_SINGULAR,
+    NEWTON_REACH,
+    NOISE,
+    RANK_CUTOFF,
+    RANK_GAP,
+    SOLVED,
+    WITHOUT_DIRECTION,
+)
 from ..jointgraph import (
     ORIGIN,
     FrameSpec,
@@ -31,6 +44,7 @@ from ..jointgraph import (
 from ..jointmotion import displacement, opening, screws, step_along, zero
 
 DAMPING = Damping(start=1.0, eased=0.1, least=1e-3, most=1e6)
+SINGLE = (JointType.REVOLUTE, JointType.PRISMATIC)
 Values = dict[str, Array]
 """The value of every tree joint."""
 
@@ -171,9 +185,14 @@ class LoopAssembly:
             after[joint.name] = step_along(joint, values[joint.name], step[self._columns[joint.name]], R)
         return after
 
-    def close(self, values: Values, iterations: int = 60) -> tuple[Values, float]:
-        """The closed values that are reached from ``values``, and what is left open."""
+    def close(self, values: Values, iterations: int = 60, held: Collection[str] = ()) -> tuple[Values, float]:
+        """The closed values that are reached from ``values``, some joints held, and what is left open."""
         before = np.inf
+        moving = self.moving(held)
+
+        def system(values: Values) -> tuple[Array, Array]:
+            error, J = self.system(values)
+            return error, J * moving
 
         def content(at: Residual) -> bool:
             nonlocal before
@@ -184,10 +203,15 @@ class LoopAssembly:
         def propose(values: Values, at: Residual, factor: float) -> Values:
             return self.step(values, self._damped_step(at, factor))
 
-        values, left = descend(values, self.system, propose, DAMPING, iterations, content)
-        return self._polish(values, left) if SOLVED < left.size < self.noise else (values, left.size)
+        values, left = descend(values, system, propose, DAMPING, iterations, content)
+        return self._polish(values, left, system) if SOLVED < left.size < self.noise else (values, left.size)
 
-    def _polish(self, values: Values, at: Residual) -> tuple[Values, float]:
+    def moving(self, held: Collection[str]) -> Array:
+        """1 for the active coordinates, 0 for those of joints that are held, (size,)."""
+        return np.array([float(joint.name not in held) for joint in self.active for _ in range(joint.kind.freedoms)])
+
+    def _polish(self, values: Values, at: Residual, system: Callable[[Values], tuple[Array, Array]]
+                ) -> tuple[Values, float]:
         """Plain Newton steps, faint directions too, as long as they are short for the residual that they remove."""
         start = (values, at.size)
         for _ in range(10):
@@ -195,7 +219,7 @@ class LoopAssembly:
             if np.max(np.abs(step), initial=0.0) > NEWTON_REACH * at.size:
                 return start
             values = self.step(values, step)
-            at = Residual.of(*self.system(values))
+            at = Residual.of(*system(values))
             if at.size <= SOLVED:
                 return values, at.size
         return start
@@ -232,6 +256,63 @@ class LoopAssembly:
         miss, name = max(found, default=(0.0, "none"))
         return name, miss
 
+    @property
+    def leaders(self) -> tuple[frozenset[str], frozenset[str]]:
+        """The joints that drive others, motors and gears, and the motors alone."""
+        motors = frozenset(joint.name for joint in self.active if joint.motor is not None)
+        followers = {gear.driven for gear in self.gears}
+        return motors | {gear.driver for gear in self.gears if gear.driver not in followers}, motors
+
+    def followed(self, values: Values) -> Values:
+        """The values with each follower of a gear where its driver puts it."""
+        found = dict(values)
+        for _ in self.gears:  # a follower may lead another
+            found |= {gear.driven: gear.ratio * found[gear.driver] + gear.offset for gear in self.gears}
+        return found
+
+    def beyond(self, values: Values) -> dict[str, Array]:
+        """The R and P beyond their limits, each with the nearest value a little within them."""
+        found, closing = {}, self.closing(values)
+        for joint in [*(joint for joint, _, _ in self.tree), *self.loops]:
+            if joint.limits is None or joint.kind not in SINGLE:
+                continue
+            unit = self.unit(joint)
+            lower, upper = (far if bound is None else bound / unit
+                            for bound, far in ((joint.limits.lower, -np.inf), (joint.limits.upper, np.inf)))
+            value = values.get(joint.name, np.array([closing.get(joint.name, 0.0) / unit]))
+            if lower < upper and not lower - EXACT <= value[0] <= upper + EXACT:
+                inside = min(LIMIT_MARGIN, (upper - lower) / 4)
+                found[joint.name] = np.clip(value, lower + inside, upper - inside)
+        return found
+
+    def wound(self, values: Values, residual: float) -> tuple[Values, float]:
+        """The same values (and what they leave open) with turns by whole ones that bring joints within their limits."""
+        geared = {name for gear in self.gears for name in (gear.driver, gear.driven)}
+        free = {joint.name for joint, _, _ in self.tree if joint.kind is JointType.REVOLUTE} - geared
+        turns = {name: values[name] + 2 * np.pi * np.round((inside - values[name]) / (2 * np.pi))
+                 for name, inside in self.beyond(values).items() if name in free}
+        still = self.beyond(values | turns)
+        return values | {name: value for name, value in turns.items() if name not in still}, residual
+
+    def closing(self, values: Values) -> dict[str, float]:
+        """How far from their zero (m, rad) ``values`` put the R and P at which loops are closed: that of a closure is
+        where all tree joints are at zero, that of a joint of the file's tree where its two frames meet."""
+        now, then = self.scaled_poses(values), self.scaled_poses({joint.name: zero(joint) for joint, _, _ in self.tree})
+        found = {}
+        for spec in self.loops:
+            if spec.kind not in SINGLE:
+                continue
+            X, Y = spec.frames(now)
+            X_0, Y_0 = spec.frames(then)
+            D, D_0 = inverse(X) @ Y, np.eye(4) if spec.in_tree else inverse(X_0) @ Y_0
+            axis = unit(spec.axes[0])
+            if spec.kind is JointType.PRISMATIC:
+                found[spec.name] = float(axis @ (D[:3, 3] - D_0[:3, 3])) * self.length
+            else:
+                turn = quaternions(D[:3, :3] @ D_0[:3, :3].T)
+                found[spec.name] = 2 * math.atan2(float(axis @ turn[1:]), float(turn[0]))
+        return {name: q for name, q in found.items() if abs(q) > EXACT}
+
     @classmethod
     def of(cls, mechanism: Mechanism) -> LoopAssembly:
         """The assembly of a mechanism's own joints: closed at zero."""
@@ -261,47 +342,85 @@ class LoopSolution:
     values: Values
     residual: float
     pushed: bool = False
+    beyond: tuple[str, ...] = ()
+    """The joints that are beyond their limits."""
 
 
 def solve(assembly: LoopAssembly, seed: int = 0) -> LoopSolution:
-    """Close all loops from zero; where that stalls (flat and collinear poses), from randomly pushed values too."""
-    best = LoopSolution(*assembly.close(assembly.zero()))
-    rng = np.random.default_rng(seed)
-    for number in range(LOOP_TRIES):
-        if best.residual <= assembly.noise:
+    """Close all loops from zero, within the limits of the joints where that is found: by passive joints, else by the
+    drivers of gears too, else by all. Where that stalls (flat and collinear poses), from randomly pushed values too."""
+    found: list[LoopSolution] = []
+    start = assembly.followed(assembly.zero())
+    for held in dict.fromkeys((*assembly.leaders, frozenset[str]())):
+        rng = np.random.default_rng(seed)
+        for number in range(LOOP_TRIES + 1 if not held else HELD_TRIES):
+            values = start
+            if number:
+                push = (0.1, 0.3, 0.6, 1.0)[min(3, (number - 1) // 6)]
+                values = assembly.step(start, push * rng.normal(size=assembly.size) * assembly.moving(held))
+            solution = _within_limits(assembly, values, held, number > 0)
+            found.append(solution)
+            if solution.residual <= assembly.noise and not solution.beyond:
+                return solution
+            if any(each.residual <= assembly.noise for each in found) and number >= HELD_TRIES:
+                break
+    return min(found, key=lambda each: each.residual if each.residual > assembly.noise else 0.0)
+
+
+def _within_limits(assembly: LoopAssembly, values: Values, held: frozenset[str], pushed: bool) -> LoopSolution:
+    """The closed values that are reached; where joints are beyond their limits there, with these held within them, or
+    let go again from where that comes nearest to closing."""
+    values, residual = assembly.wound(*assembly.close(values, held=held))
+    first = LoopSolution(values, residual, pushed, tuple(assembly.beyond(values)))
+    for _ in range(HELD_TRIES if residual <= assembly.noise else 0):
+        inside = {name: value for name, value in assembly.beyond(values).items()
+                  if name in values and name not in held}
+        if not inside:
             break
-        amplitude = (0.1, 0.3, 0.6, 1.0)[min(3, number // 6)]
-        start = assembly.step(assembly.zero(), amplitude * rng.normal(size=assembly.size))
-        values, residual = assembly.close(start)
-        if residual < best.residual:
-            best = LoopSolution(values, residual, True)
-    return best
+        near, left = assembly.wound(*assembly.close(assembly.followed(values | inside), held=held | inside.keys()))
+        values, residual = assembly.wound(*assembly.close(near, held=held))
+        if left <= assembly.noise:
+            values, residual, held = near, left, held | inside.keys()
+    if residual <= assembly.noise and not assembly.beyond(values):
+        return LoopSolution(values, residual, pushed)
+    return first
 
 
 def regular_values(assembly: LoopAssembly, values: Values) -> Values | None:
-    """Closed values near ``values`` with fewer freedoms, or with loops that resist much more firmly, where ``values``
-    are singular or nearly so; None where they are neither, or nothing better is found."""
+    """The closed values, as near to ``values`` as they are found, at which the loops have fewer freedoms, or resist
+    much more firmly, where ``values`` are singular or nearly so; None where they are neither, or nothing is found."""
     here = assembly.rank(values)
     if assembly.freedoms(here) == 0:
         return None
+    kernel = assembly.kernel(values)
+    found: list[tuple[int, float, Values]] = []
     rng = np.random.default_rng(0)
-    best, found, origin = replace(here, weakest=FIRMER_BY * here.weakest), None, values
-    for number in range(LOOP_TRIES):
-        if found is not None and best.weakest > FIRM:
-            break
-        if number >= 3 and found is None and here.weakest > NEARLY_SINGULAR:
-            break
-        kernel = assembly.kernel(origin)
-        step = kernel @ rng.normal(size=kernel.shape[1])
-        step *= (0.3, 0.15, 0.5)[number % 3] / float(np.max(np.abs(step), initial=1e-12))
-        there, residual = assembly.close(assembly.step(origin, step))
+
+    def look(size: float, direction: Array) -> bool:
+        """Whether a step leads to closed values, which are kept where the loops hold more, or more firmly, there."""
+        there, residual = assembly.close(assembly.step(values, size / float(np.max(np.abs(direction))) * direction))
         rank = assembly.rank(there)
-        if residual > 10 * SOLVED or rank.gap < RANK_GAP:
-            continue
-        firmer = rank.weakest > best.weakest and (found is not None or here.weakest <= NEARLY_SINGULAR)
-        if rank.value > best.value or (rank.value == best.value and firmer):
-            best, found, origin = rank, there, there
-    return found
+        if residual <= 10 * SOLVED and rank.gap >= RANK_GAP and (
+                rank.value > here.value or (rank.value == here.value and rank.weakest > FIRMER_BY * here.weakest)):
+            found.append((rank.value, rank.weakest, there))
+        return residual <= 10 * SOLVED
+
+    closed = [look(size, kernel @ rng.normal(size=kernel.shape[1])) for size in (0.3, 0.15, 0.5)]
+    if here.weakest > NEARLY_SINGULAR and any(closed) and not any(value > here.value for value, _, _ in found):
+        return None
+    every = rng.permutation(kernel @ kernel.T)  # each joint moved, as the loops allow
+    ways = [way for way in every if np.max(np.abs(way)) > WITHOUT_DIRECTION][: LOOP_TRIES // 2]
+    for size in SINGULAR_STEPS:
+        before = len(found)
+        for way in ways:
+            look(size, way)
+            look(size, -way)
+        most = max((value for value, _, _ in found), default=0)
+        firm = [each for each in found[before:] if each[0] == most and each[1] > NEARLY_SINGULAR]
+        if firm:
+            there = max(firm, key=lambda each: each[1])[2]
+            return regular_values(assembly, there) or there  # other loops may still be singular
+    return max(found, key=lambda each: each[:2])[2] if found else None
 
 
 def _slip(gear: GearSpec, values: Values) -> Array:

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable, Container, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
+from itertools import combinations, product
 from typing import Any
 
 import numpy as np
@@ -283,6 +283,16 @@ def of_centres(at: JointCoordinates, normal: Mechanism, x: Array) -> Iterator[Ge
                                         float(np.linalg.norm(np.cross(arm, vector(a)))))
                 yield GeometricRelation("square to an axis", names, _across, (i, j, a), abs(float(arm @ vector(a))))
         yield from _flat([(joint.name, spot(joint)) for joint in balls], vector, at.within)
+    for slide in normal.joints.values():
+        ends = [[each for each in bodies.on[bodies.of[link]] if each.type in BALLS] for link in slide.links]
+        for one, two in product(*ends) if slide.type is JointType.PRISMATIC else ():  # a rod that spins
+            places = (spot(one), spot(two), way(slide.axis))
+            arm = vector(places[0]) - vector(places[1])
+            size = float(np.linalg.norm(arm))
+            if size > at.within / OBLIQUE:
+                miss = float(np.linalg.norm(np.cross(arm, vector(places[2])))) / max(1.0, size)
+                names = (one.name, two.name, slide.name)
+                yield GeometricRelation("in line with an axis", names, _on_line, places, miss)
     yield from _rods(bodies, spot, at, vector)
 
 

@@ -1,78 +1,140 @@
-"""Another closed configuration as a mechanism's zero pose."""
+"""Another closed configuration as a mechanism's zero configuration: the one place where that moves."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 
-from ...geometry.so3 import quaternions
-from ...geometry.vectors import inverse, unit
-from ...mechanism.model import Joint, JointType, Mechanism
-from ...tolerances import EXACT, NOISE
+from ...geometry.so3 import turns_about
+from ...geometry.vectors import Array, frozen, inverse, pose, transform
+from ...mechanism.model import Joint, JointType, Limits, Mechanism
+from ...tolerances import EXACT, NOISE, SAME_GEOMETRY, SAME_POINT
 from .. import numerals, xml
-from ..jointgraph import comma_list
-from ..jointmotion import zero
-from .loops import LoopAssembly, Values
+from ..jointgraph import ORIGIN, comma_list, scale_pose
+from ..jointmotion import displacement
+from .loops import SINGLE, LoopAssembly, Values
 
-SINGLE = (JointType.REVOLUTE, JointType.PRISMATIC)
 COUNTED_FROM_ZERO = {"safety_controller": ("soft_lower_limit", "soft_upper_limit"),
                      "calibration": ("rising", "falling", "reference_position")}
 """Attributes of elements of a joint that are coordinates of it."""
 
 
 def with_zero_at(mechanism: Mechanism, assembly: LoopAssembly, values: Values) -> Mechanism:
-    """The same mechanism with another closed configuration for its zero."""
-    poses = assembly.poses(values)
-    motion = {name: poses[name] @ inverse(link.pose) for name, link in mechanism.links.items()}
-    joints = {}
+    """The same mechanism with another closed configuration for its zero; the assembly's joints count from its zero."""
+    return zeroed_at(mechanism, assembly.poses(values), _singles(assembly, values))
+
+
+def zeroed_at(mechanism: Mechanism, poses: Mapping[str, Array], known: Mapping[str, float] = MappingProxyType({})
+             ) -> Mechanism:
+    """The same mechanism with its links, all of them, at these poses (4, 4) as its zero configuration.
+
+    Limits, wrists, and what else a joint has that is counted from zero, move with it. ``known`` are coordinates of R
+    and P there (m, rad); turns that are not known are within half a one, or the whole turns from that at which they
+    are within their limits.
+    """
+    motion = {name: poses[name] @ link.inverse for name, link in mechanism.links.items()}
+    joints = []
     for joint in mechanism.joints.values():
         X, Y = (motion[link] for link in joint.links)
         axes = tuple(Z[:3, :3] @ axis for Z, axis in zip((X, Y), joint.axes, strict=False))
-        joints[joint.name] = replace(joint, point=X[:3, :3] @ joint.point + X[:3, 3], axes=axes)
-    links = {name: replace(link, pose=poses[name]) for name, link in mechanism.links.items()}
-    return replace(mechanism, links=links, joints=with_limits(joints, assembly, values))
+        wrist = None if joint.wrist is None else joint.wrist.carried(X[:3, :3], Y[:3, :3])
+        moved = replace(joint, point=X[:3, :3] @ joint.point + X[:3, 3], axes=axes, wrist=wrist)
+        q = np.array([known[joint.name]]) if joint.name in known else _coordinates(joint, inverse(X) @ Y)
+        joints.append(_displaced(moved, X @ (ORIGIN if joint.offset is None else joint.offset) @ inverse(Y))
+                      if q is None else _counted_from(moved, q))
+    return mechanism.changed(links=[replace(link, pose=poses[name]) for name, link in mechanism.links.items()],
+                             joints=joints)
 
 
-def with_limits(joints: Mapping[str, Joint], assembly: LoopAssembly, values: Values) -> dict[str, Joint]:
-    """The joints with the limits of R and P, and what else of them the file counts from zero, from where ``values`` put
-    them."""
+def at_file_zero(mechanism: Mechanism) -> Mechanism | None:
+    """The same mechanism with the file's zero for its zero configuration; None where its loops are open there."""
+    assembly = LoopAssembly.of(mechanism)
+    values = assembly.zero()
+    for spec, _, _ in assembly.tree:
+        joint = mechanism.joints[spec.name]
+        if joint.offset is None:
+            continue
+        if joint.offset.ndim == 1:
+            values[spec.name] = -joint.offset / ([assembly.length, 1.0] if joint.type is JointType.CYLINDRICAL
+                                                 else assembly.unit(spec))
+            continue
+        centre = pose(joint.point)
+        D = scale_pose(inverse(centre) @ joint.offset @ centre, 1 / assembly.length)
+        values[spec.name] = D if joint.type is not JointType.PLANAR else np.array(
+            [turns_about(axis[None], D[:3, :3])[0] if K is not None else axis @ D[:3, 3] for axis, K in spec.parts])
+    return with_zero_at(mechanism, assembly, values) if assembly.worst(values)[1] <= SAME_GEOMETRY else None
+
+
+def _coordinates(joint: Joint, D: Array) -> Array | None:
+    """The coordinates of an R, P, U or C whose successor is displaced by D (4, 4), seen from its predecessor."""
+    if joint.type not in (*SINGLE, JointType.UNIVERSAL, JointType.CYLINDRICAL):
+        return None
+    slide = [joint.axis @ (transform(D, joint.point) - joint.point)] if joint.type.slides else []
+    turns = np.zeros(0) if joint.type is JointType.PRISMATIC else turns_about(np.array(joint.axes), D[:3, :3])
+    limits = [*(each for _, each in joint.turns), *([] if joint.turns else [joint.limits]), None, None]
+    return np.array([*slide, *(_within(float(angle), each) for angle, each in zip(turns, limits, strict=False))])
+
+
+def _within(angle: float, limits: Limits | None) -> float:
+    """An angle, or the whole turns from it that are within the limits, if it is not."""
+    lower = -np.inf if limits is None or limits.lower is None else limits.lower
+    upper = np.inf if limits is None or limits.upper is None else limits.upper
+    turns = [angle + 2 * np.pi * k for k in (0, 1, -1)]
+    return min(turns, key=lambda each: max(lower - each, each - upper, SAME_POINT))
+
+
+def _counted_from(joint: Joint, q: Array) -> Joint:
+    """A joint that counts from its coordinates q (m, rad), its geometry as it is."""
+    q = np.where(np.abs(q) > EXACT, q, 0.0)
+    if not q.any():
+        return joint
+    offset = q if joint.offset is None else q + joint.offset
+    moved = replace(joint, offset=frozen(offset) if np.abs(offset).max() > EXACT else None, turns=tuple(
+        (name, _shifted(limits, float(angle))) for (name, limits), angle in zip(joint.turns, q, strict=False)))
+    return moved if len(q) > 1 else replace(moved, limits=_shifted(joint.limits, float(q[0])),
+                                            xml=tuple(_recount(each, float(q[0])) for each in joint.xml))
+
+
+def _displaced(joint: Joint, F: Array) -> Joint:
+    """A joint whose successor has to be displaced by F (4, 4) to be where the file counts from."""
+    return replace(joint, offset=frozen(F) if np.abs(F - np.eye(4)).max() > EXACT else None)
+
+
+def _shifted(limits: Limits | None, q: float) -> Limits | None:
+    """Limits counted from q."""
+    if limits is None:
+        return None
+    lower, upper = (None if bound is None else bound - q for bound in (limits.lower, limits.upper))
+    return replace(limits, lower=lower, upper=upper)
+
+
+def with_offsets(joints: Mapping[str, Joint], assembly: LoopAssembly, values: Values) -> dict[str, Joint]:
+    """The joints of a file, which lie where ``values`` put them, with limits, and what else the file counts from its
+    zero, counted from there."""
     found = dict(joints)
-    told = {spec.name: float(values[spec.name][0]) * assembly.unit(spec) for spec, _, _ in assembly.tree
-            if spec.kind in SINGLE}
-    told |= closing(assembly, values)
-    for name, q in told.items():
-        joint = joints[name]
-        limits = joint.limits
-        if q:
-            if limits is not None:
-                lower, upper = (None if bound is None else bound - q for bound in (limits.lower, limits.upper))
-                limits = replace(limits, lower=lower, upper=upper)
-            found[joint.name] = replace(joint, limits=limits, xml=tuple(_recount(each, q) for each in joint.xml))
+    X = assembly.poses(values)
+    for spec, _, _ in assembly.tree:
+        value, joint = values[spec.name], found[spec.name]
+        if spec.kind in (*SINGLE, JointType.UNIVERSAL, JointType.CYLINDRICAL):
+            unit = [assembly.length, 1.0] if spec.kind is JointType.CYLINDRICAL else assembly.unit(spec)
+            found[spec.name] = _counted_from(joint, value * unit)
+        else:
+            X_P = X[spec.links[0]] @ scale_pose(spec.ends[0].X, assembly.length)
+            D = scale_pose(displacement(spec, value), assembly.length)
+            found[spec.name] = _displaced(joint, X_P @ inverse(D) @ inverse(X_P))
+    for name, q in assembly.closing(values).items():
+        found[name] = _counted_from(joints[name], np.array([q]))
     return found
 
 
-def closing(assembly: LoopAssembly, values: Values) -> dict[str, float]:
-    """How far from their zero (m, rad) ``values`` put the R and P at which loops are closed: that of a closure is where
-    all tree joints are at zero, that of a joint of the file's tree where its two frames meet."""
-    there = {spec.name: zero(spec) for spec, _, _ in assembly.tree}
-    now, then = assembly.scaled_poses(values), assembly.scaled_poses(there)
-    found = {}
-    for spec in assembly.loops:
-        if spec.kind not in SINGLE:
-            continue
-        X, Y = spec.frames(now)
-        X_0, Y_0 = spec.frames(then)
-        D, D_0 = inverse(X) @ Y, np.eye(4) if spec.in_tree else inverse(X_0) @ Y_0
-        axis = unit(spec.axes[0])
-        if spec.kind is JointType.PRISMATIC:
-            found[spec.name] = float(axis @ (D[:3, 3] - D_0[:3, 3])) * assembly.length
-        else:
-            turn = quaternions(D[:3, :3] @ D_0[:3, :3].T)
-            found[spec.name] = 2 * math.atan2(float(axis @ turn[1:]), float(turn[0]))
-    return {name: q for name, q in found.items() if abs(q) > EXACT}
+def _singles(assembly: LoopAssembly, values: Values) -> dict[str, float]:
+    """The coordinates (m, rad) of the R and P of the tree."""
+    return {spec.name: float(values[spec.name][0]) * assembly.unit(spec) for spec, _, _ in assembly.tree
+            if spec.kind in SINGLE}
 
 
 def _recount(fragment: str, q: float) -> str:

@@ -13,7 +13,7 @@ from ...description.assembly import guess
 from ...description.assembly.build import rounding
 from ...description.assembly.candidates import closure_candidates
 from ...description.assembly.loops import LoopAssembly, LoopSolution, Values, solve
-from ...description.assembly.zero import closing, count_from, moves
+from ...description.assembly.zero import count_from, moves
 from ...description.jointgraph import JointGraph, JointSpec
 from ...description.jointmotion import displacement, opening
 from ...errors import HrsynthError
@@ -91,7 +91,7 @@ def _miss(joint: JointSpec, poses: dict[str, np.ndarray], length: float) -> floa
 def _mend_zero(file: LintedFile, graph: JointGraph, assembly: LoopAssembly, closed: LoopSolution) -> Mend | None:
     """Let every joint that moved count from where it is closed: its origin takes the displacement, its limits and the
     offset of its mimic lose it."""
-    if file.dialect != "urdf" or file.expanded:
+    if file.dialect != "urdf" or file.expanded or closed.beyond:
         return None
     moved = []
     for joint, _, _ in assembly.tree:
@@ -120,7 +120,7 @@ def _rezero(moved: list[tuple[JointSpec, xml.Element]], values: Values, graph: J
         origin.set("xyz", numerals.exact_vector(X[:3, 3]))
         origin.set("rpy", numerals.exact_vector(numerals.rpy(X[:3, :3])))
         _shift_limits(element, q)
-    shifts = closing(assembly, values)
+    shifts = assembly.closing(values)
     for element in moved[0][1].getroottree().iter("loop"):
         if q := shifts.get(str(element.get("name")), 0.0):
             _shift_limits(element, q)

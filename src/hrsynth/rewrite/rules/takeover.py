@@ -80,7 +80,7 @@ def apply(state: State, found: Substitution | None) -> State:
     actuator = mechanism.joints[chain.actuator]
     taken = replace(actuator, point=chain.anchor) if found.own is None else found.own
     joints = [replace(taken, name=actuator.name, motor=actuator.motor, predecessor=chain.carrier, successor=chain.link,
-                      in_tree=True, limits=None, turns=(), xml=())]
+                      in_tree=True, limits=None, turns=(), xml=(), offset=None)]
     if chain.carrier != chain.before:
         kind, axes = (JointType.SPHERICAL, ()) if found.turning is None else (JointType.REVOLUTE, (found.turning,))
         joints.append(Joint(mechanism.fresh(f"follow_{chain.leg}"), kind, str(chain.before), chain.carrier,
