@@ -113,8 +113,8 @@ def test_answers_are_those_of_the_same_robot(name: str):
     for mode, other in zip(found.modes, again.modes, strict=True):
         assert numbers(mode.to_dict()["pose"]) == pytest.approx(numbers(other.to_dict()["pose"]), abs=1e-6)
     goal = str(hrsynth.observe(robot).motion.pose(robot.links[robot.platform].pose))
-    one, two = (hrsynth.path(each, start=pose, goal=goal) for each in (robot, moved))
-    assert one.verdict == two.verdict
+    verdicts = [hrsynth.path(each, start=pose, goal=goal).verdict for each in (robot, moved)]
+    assert verdicts[0] == verdicts[1]
 
 
 @pytest.mark.slow

@@ -82,12 +82,12 @@ def test_answers_are_those_of_the_single_commands(watched: str) -> None:
     assert mine.errors.position.largest == pytest.approx(theirs.position.largest, rel=1e-7)
     assert mine.errors.orientation.largest == pytest.approx(theirs.orientation.largest, rel=1e-7)
     assert mine.aspect is not None
-    theirs = path(robot, watched, start=START, goal=GOAL)
+    led = path(robot, watched, start=START, goal=GOAL)
     if mine.aspect.verdict == "separated":  # from the directions at the goal, whose pose has other working modes too
         assert "with the directions observed at them" in (mine.discarded or "")
-        assert theirs.verdict == "separated" or "other working mode" in theirs.reason
+        assert led.verdict == "separated" or "other working mode" in led.reason
     else:
-        assert (mine.aspect.verdict, mine.discarded) == (theirs.verdict, None)
+        assert (mine.aspect.verdict, mine.discarded) == (led.verdict, None)
     for counted, at in ((mine.start_modes, START), (mine.goal_modes, GOAL)):
         listed = modes(robot, watched, at=at)
         assert counted is not None
