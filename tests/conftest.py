@@ -9,12 +9,17 @@ from functools import lru_cache
 from typing import Any
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 pytest_plugins = ["browser"]
 
 gc.set_threshold(50_000, 20, 50)  # little of what tests make is a circle: to look for some takes a tenth of the time
 for library in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
     os.environ.setdefault(library, "1")
+
+# no law is about time: on a busy machine an example may take long, or be long in the making
+settings.register_profile("untimed", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("untimed")
 
 
 @pytest.fixture(autouse=True, scope="session")

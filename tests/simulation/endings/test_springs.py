@@ -241,7 +241,7 @@ def test_rests_half_a_turn_apart_are_two() -> None:
 def test_words_except_legs_without_a_length() -> None:
     """Where rests are those of springs, legs that are not watched may be telescopic ones."""
     told = RestCover(Cover((), (), 0.0, 10, True, loop=SpringError.about(of_robot())), (), 0, None)
-    found: Any = SimpleNamespace(cover=told)
+    found: Any = SimpleNamespace(cover=told, setting=scenes.setting("gough_stewart", ("1", "3", "5")))
     assert "leg 2 or 4 or 6 is stretched or has no length, or a watched direction is" in _complete(found)[0]
 
 
