@@ -10,11 +10,13 @@ import sys
 from importlib import import_module
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import hrsynth
 from description.samples import FOUR_BAR
 from description.test_defects import DEFECTS, edited
+from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.cli import execute
 from hrsynth.cli.questions import QUESTIONS
 from hrsynth.description import shipped
@@ -449,6 +451,20 @@ def test_check_answers_3_where_a_rank_is_not_clear(run, monkeypatch: pytest.Monk
     assert run("check", "3rrr_m1", "--grid", "x=0:0.01:2").status == 0
 
 
+def test_the_mobility_is_the_same_in_all_answers(monkeypatch: pytest.MonkeyPatch):
+    """Null where the file's own mechanism cannot be sampled."""
+    robot = hrsynth.observe("delta")
+    for case in range(2):
+        answers = [answer.to_dict()["mobility"] for answer in (hrsynth.check(robot), hrsynth.derive(robot))]
+        assert answers[0] == answers[1]
+        assert (answers[0]["as_written"] is None) == bool(case)
+        monkeypatch.setattr(ObservedRobot, "mobility_as_written", property(lambda _: refuse()))
+
+
+def refuse() -> None:
+    raise BadRequest("robot", "", "one that can be sampled")
+
+
 # ---- advise
 
 
@@ -465,6 +481,23 @@ def test_advise_json_is_the_contract(run):
         (added,) = each["measurements"]
         assert added["kind"] in ("encoder", "line")
         assert added["of"] in {"guide_1", "guide_2", "guide_3", "rod_1a", "rod_2a", "rod_3a"}
+
+
+def test_advise_json_has_the_place_and_axis_of_all_but_encoders():
+    """A record and its link are enough to observe the same again."""
+    found = hrsynth.advise("uranesx")
+    offered = hrsynth.advise("quattro", "1", offer="point:platform,inclination")
+    kinds = set()
+    for each in (measurement for answer in (found, offered) for one in answer.sets for measurement in one.measurements):
+        record, seen = each.to_dict(), each.observation
+        kinds.add(each.kind)
+        if each.kind == "encoder":
+            assert "at" not in record
+        else:
+            assert (record["at"] is not None) == (seen.kind in ("line", "point"))
+            assert (record["axis"] is not None) == (seen.kind != "point")
+            assert record["axis"] is None or np.linalg.norm(record["axis"]) == pytest.approx(1)
+    assert kinds >= {"line", "encoder", "leg", "offered"}
 
 
 def test_advise_json_where_nothing_is_missing(run):

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from hrsynth import check, legs, select
+from hrsynth import check, derive, legs, select
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.description import load
 from hrsynth.geometry.so3 import exponential
@@ -69,6 +69,7 @@ def test_mobility_is_that_of_the_normal_form_and_that_of_the_file(tmp_path):
     written = oracle.mobility(oracle.zero())
     assert (found.setting.mobility.total, found.as_written.total) == (2, written) == (2, 3)
     assert found.to_dict()["mobility"]["as_written"]["total"] == 3
+    assert derive(found.setting).to_dict()["mobility"] == found.to_dict()["mobility"]
     assert "3 as the file is written, 2 in normal form" in str(found)
 
 

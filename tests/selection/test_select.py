@@ -32,6 +32,7 @@ from hrsynth.simulation.camera import Camera, cylinders
 from hrsynth.simulation.endings.basins import basins
 from hrsynth.simulation.endings.endings import RestSearch
 from hrsynth.simulation.endings.radius import CertifiedRadius, certified_radius
+from hrsynth.tolerances import SAME_RELATION
 
 START, GOAL = "x=0,y=0,z=-0.75,phi=0", "x=-0.2,y=0,z=-0.56,phi=0"
 
@@ -110,6 +111,18 @@ def test_a_run_that_ends_elsewhere_discards_its_set() -> None:
     assert ran.run is not None
     assert ran.run.verdict == "mode"
     assert "ends in: mode" in str(ran.discarded)
+
+
+def test_bounds_of_errors_have_their_gaps():
+    found = select("3rrr_m1", start="x=0,y=0", goal="x=0.02,y=0", runs=0, endings=0, examine=1)
+    for each, record in zip(found.candidates, found.to_dict()["sets"], strict=True):
+        if each.errors is not None:
+            own = (each.errors.position.gap, each.errors.orientation.gap)
+            assert (record["position_gap"], record["orientation_gap"]) == own
+            assert len(each.legs) > 2 or max(own) < SAME_RELATION
+    most = max(max(record["position_gap"] or 0, record["orientation_gap"] or 0) for record in found.to_dict()["sets"])
+    assert most > SAME_RELATION
+    assert "three cones or more: upper bounds, none more than" in str(found)
 
 
 def told(selection: Selection) -> dict[tuple[str, ...], dict]:

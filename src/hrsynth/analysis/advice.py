@@ -60,7 +60,8 @@ class FurtherMeasurement(Value):
         record: dict[str, Any] = {"kind": self.kind, "of": self.of, "leg": self.leg}
         if self.kind == "encoder":
             return {**record, "axis": self.axis, "actuated": self.actuated}
-        return {**record, "link": self.observation.link}
+        seen = self.observation.to_dict()
+        return {**record, **{name: seen[name] for name in ("link", "at", "axis")}}
 
 
 def candidates(setting: ObservedRobot, offered: Sequence[str] = ()) -> tuple[FurtherMeasurement, ...]:

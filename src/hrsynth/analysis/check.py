@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..batch.reach import grid_dependence, sweep
-from ..errors import HrsynthError, PlaneNotMet, PoseNotReached
+from ..errors import PlaneNotMet, PoseNotReached
 from ..kinematics.configuration import ClosedConfiguration
 from ..mechanism.pose import Grid, PoseLike, asked_poses
 from ..progress import tell
@@ -72,10 +72,7 @@ class Check(Result, shown_as="check"):
     @property
     def as_written(self) -> Mobility | None:
         """The mobility of the file's own links and joints, None where no samples of them can be drawn."""
-        try:
-            return self.setting.mobility_as_written
-        except HrsynthError:
-            return None
+        return self.setting.mobility_if_written
 
     def headline(self) -> str:
         """The robot, and the state of its hidden robot at each pose."""
@@ -88,11 +85,9 @@ class Check(Result, shown_as="check"):
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line, without the command's own fields."""
-        generic, written = self.setting.mobility, self.as_written
         return {"characteristic_length": self.length,
                 **self.setting.to_dict(), "watched": self.setting.watched_dict(),
-                "mobility": {"total": generic.total, "idle": generic.idle,
-                             "as_written": written and {"total": written.total, "idle": written.idle}},
+                "mobility": self.setting.mobility_dict(),
                 "configurations": [each.to_dict() for each in self.postures],
                 "unreached": [{"pose": each.pose, "reason": each.reason} for each in self.unreached],
                 "redundant": [each.to_dict() for each in self.redundant],

@@ -109,7 +109,6 @@ class Derivation(Result, shown_as="derive"):
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line, without the command's own fields."""
         hidden = self.hidden_architecture
-        written = self.setting.mobility_as_written
         return {
             **self.setting.to_dict(),
             "notation": {"real": self.architecture.unicode, "hidden": hidden and hidden.unicode,
@@ -117,8 +116,7 @@ class Derivation(Result, shown_as="derive"):
                          "hidden_latex": hidden and hidden.latex},
             "form": self.form,
             "dof": self.dof,
-            "mobility": {"total": self.mobility.total, "idle": self.mobility.idle,
-                         "as_written": {"total": written.total, "idle": written.idle}},
+            "mobility": self.setting.mobility_dict(),
             "verdict": self.verdict.verdict,
             "lost": [freedom.to_dict() for freedom in self.verdict.lost],
             "rank": self.verdict.rank, "margin": self.verdict.margin,

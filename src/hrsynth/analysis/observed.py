@@ -15,7 +15,7 @@ import numpy as np
 from ..budgets import REMEMBERED
 from ..description import load
 from ..description.sights import CAMERA, SEE, SightSpec, parse_camera, parse_see, with_sights
-from ..errors import BadMechanism, BadRequest, NoSegment, NotSampled
+from ..errors import BadMechanism, BadRequest, HrsynthError, NoSegment, NotSampled
 from ..geometry.ranks import range_bases
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.pinocchio_model import PinocchioModel
@@ -216,6 +216,20 @@ class ObservedRobot(Value):
         written = sample(PinocchioModel(self.robot, self.mechanism.length), question, 3, seed=1)
         total = written.mobility
         return Mobility(total, total - (self.mobility.total - self.mobility.idle))
+
+    @property
+    def mobility_if_written(self) -> Mobility | None:
+        """The same; None where no samples of the file's own mechanism can be drawn."""
+        try:
+            return self.mobility_as_written
+        except HrsynthError:
+            return None
+
+    def mobility_dict(self) -> dict[str, Any]:
+        """Mobility in normal form and as written, as the records of the command line have it."""
+        own, written = self.mobility, self.mobility_if_written
+        return {"total": own.total, "idle": own.idle,
+                "as_written": written and {"total": written.total, "idle": written.idle}}
 
     @property
     def unlimited(self) -> tuple[str, ...]:

@@ -270,8 +270,8 @@ QUESTIONS = (
               f"gough_stewart {POINTS} --start x=0.02 --goal x=0")),
     Question("endings", "Poses at which the servo loop can rest, and which of them attract: the goal, modes, "
              "antipodal poses, critical poses of the error.",
-             (Option("at", "The goal: pose whose measurements are desired, such as x=0.02,y=0.1,z=-0.7; or mode:2.",
-                     "POSE", default=NEEDED), *WATCHED, SEE, DEPTH,
+             (Option("at", "The goal: pose whose measurements are desired, such as x=0.02,y=0.1,z=-0.7; or mode:2 "
+                     "(default: the zero configuration).", "POSE"), *WATCHED, SEE, DEPTH,
               flag("complete", "Try to prove that the list is complete, by boxes of platform poses."),
               Option("effort", "Most boxes of poses to look at (10,000 to 40,000 take a second).", "COUNT", int,
                      COVER_BOXES), JOBS,

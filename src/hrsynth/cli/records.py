@@ -95,13 +95,7 @@ class MobilityRecord(TypedDict):
 
 
 class MobilityWritten(MobilityRecord):
-    """The same, also for the file as it is written."""
-
-    as_written: MobilityRecord
-
-
-class MobilityMaybeWritten(MobilityRecord):
-    """The same; null if the file's own mechanism could not be sampled."""
+    """The same, also for the file as it is written; null if the file's own mechanism could not be sampled."""
 
     as_written: MobilityRecord | None
 
@@ -397,7 +391,7 @@ class CheckAnswer(OfRobot, WrittenTo, LimitsLeft):
     observed: list[Watched]
     camera: str
     watched: list[WatchedAxis]
-    mobility: MobilityMaybeWritten
+    mobility: MobilityWritten
     configurations: list[PostureRecord]
     unreached: list[Unreached]
     redundant: list[RedundantRecord]
@@ -483,13 +477,16 @@ class Singular(OfRobot, WrittenTo):
 
 
 class FurtherRecord(TypedDict):
-    """A measurement that could be added; an encoder has `axis` and `actuated`, others have `link`."""
+    """A measurement that could be added. An encoder has `actuated`, and as its `axis` the word for the coordinate that it
+    reads (null if there is only one); others have the `link`, and a point `at` (m) and an `axis` in its frame (null if
+    there are none)."""
 
     kind: Literal["leg", "direction", "line", "encoder", "offered"]
     of: Annotated[str, "the leg, the link, the joint, or the words of --see"]
     leg: Annotated[str | None, "null: of a joint or a link inside the platform"]
     link: NotRequired[str]
-    axis: NotRequired[Any]
+    at: NotRequired[list[float] | None]
+    axis: NotRequired[list[float] | str | None]
     actuated: NotRequired[bool]
 
 
@@ -1139,14 +1136,17 @@ class LoopEndsRecord(TypedDict):
 
 
 class CandidateRecord(TypedDict):
-    """A set of legs; null for what was not computed."""
+    """A set of legs; null for what was not computed. Each error is an upper bound, too large by at most its gap (relative
+    to what is attained)."""
 
     legs: list[str]
     verdict: Word
     discarded: str | None
     examined: bool
     position_mm: Number
+    position_gap: Number
     orientation_deg: Number
+    orientation_gap: Number
     seen: dict[str, float] | None
     modes: EndCounts
     aspect: DecisionRecord | None

@@ -52,6 +52,15 @@ def listed(name: str = FIVE_BAR, pose: str = POSE) -> Endings:
     return endings(name, at=pose)
 
 
+def test_without_a_pose_the_goal_is_the_zero_configuration(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(RestSearch, "answer", lambda search, *_, **__: search)
+    found, robot = endings(FIVE_BAR), hrsynth.observe(FIVE_BAR)
+    zero = robot.everything.start
+    assert all(np.allclose(found.goal.pose(link), zero.pose(link), atol=1e-12) for link in robot.mechanism.links)
+    there = endings(FIVE_BAR, at=str(robot.motion.pose(zero.pose(robot.motion.link))))
+    assert np.allclose(np.array(found.desired), np.array(there.desired), atol=1e-9)
+
+
 def test_the_order_of_rests_is_that_of_what_they_are():
     """Not of how they were found, nor of the last digits of their errors, which differ between libraries."""
     found, rng = listed(), np.random.default_rng(0)

@@ -30,6 +30,7 @@ from .tables import (
 
 if TYPE_CHECKING:
     from ...analysis.accuracy.accuracy import Accuracy
+    from ...analysis.accuracy.cones import Blur
     from ...analysis.accuracy.error_map import Spots
     from ...analysis.accuracy.pose_errors import ErrorEllipsoid, PoseErrors
     from ...analysis.accuracy.sampled import Sampled
@@ -202,10 +203,13 @@ def _grid_rows(found: Accuracy, grid: Grid, reached: str, position: str, orienta
     if spots is not None and spots.count:
         rows.append(("checked", f"against Pinocchio at {spots.count} random poses, largest difference "
                                 f"{spots.difference:.1e}"))
-    if gap > SAME_RELATION:
-        rows.append(("", f"three {found.blur.each}s or more: upper bounds, nowhere more than {_percent(gap)} % too "
-                         "large"))
-    return rows
+    return [*rows, *(("", line) for line in _bounds(found.blur, "nowhere", gap))]
+
+
+def _bounds(blur: Blur, where: str, gap: float) -> list[str]:
+    """How much too large errors may be, if they are bounds."""
+    return [f"three {blur.each}s or more: upper bounds, {where} more than {_percent(gap)} % too large"] if (
+        gap > SAME_RELATION) else []
 
 
 def _range(found: ErrorRange, errors: Array | None, unit: float, word: str) -> str:
@@ -305,6 +309,9 @@ def selection(found: Selection) -> str:
         blocks += [f"distances from the goal: {each}" for each in points]
         if found.fewer is not None:
             blocks.append(found.fewer)
+    gaps = [part.gap for each in (*found.kept, *found.unexamined) if (errors := each.errors) is not None
+            for part in (errors.position, errors.orientation)]
+    blocks += _bounds(blur, "none", max(gaps, default=0.0))
     if found.unexamined:
         blocks.append(table([[_row(each, sight, length)[i] for i in (0, 3, 4)] for each in found.unexamined],
                             ["not examined", "mm", "degrees"]))

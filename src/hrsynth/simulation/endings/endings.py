@@ -56,10 +56,11 @@ NEARBY = 0.02
 
 @question()
 def endings(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
-            at: PoseLike, depth: str = "exact", complete: bool = False, effort: int = COVER_BOXES,
+            at: PoseLike | None = None, depth: str = "exact", complete: bool = False, effort: int = COVER_BOXES,
             jobs: int | None = None, seed: int = 0) -> Endings:
-    """Poses at which the loop can rest that servoes what is observed at ``at``: the goal, modes and antipodal
-    poses, where the error vanishes, and critical poses, where it does not; and which of them attract.
+    """Poses at which the loop can rest that servoes what is observed at ``at`` (default: the zero configuration): the
+    goal, modes and antipodal poses, where the error vanishes, and critical poses, where it does not; and which of them
+    attract.
 
     ``observe``, ``camera`` and ``see`` are as for ``derive``; each kind of observation has its error. The law rests
     exactly at the critical points of ½ ‖e‖² on the closed loops (theory.md 11); those at which a camera does not see
@@ -78,10 +79,10 @@ def endings(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = Non
     setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed)
     if complete:
         setting.by_segments("subdivision")
-    asked = asked_pose(at)
-    setting = setting.telling([asked])
+    asked = [] if at is None else [asked_pose(at)]
+    setting = setting.telling(asked)
     require_seen(setting)
-    (goal,) = configurations_at(setting, [asked])
+    goal = next(iter(configurations_at(setting, asked)), setting.everything.start)
     require_regular(ConfigurationAnalysis.of(setting), "goal", goal)
     search = RestSearch.of(setting, goal, depth)
     require_sight(setting, search.law, "goal", goal)
