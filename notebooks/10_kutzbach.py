@@ -131,9 +131,9 @@ plt.show()
 # %% [markdown]
 # A machine with that geometry is loose only in this orientation of its platform. Worse are robots that move like this
 # at *every* pose (*architecturally singular*, O. Ma and J. Angeles, 1992). A Gough-Stewart platform whose base and
-# platform are plane and similar is one if its six joints lie on a conic. Let (x, y) be a base point and t + s R (x, y, 0)
-# the platform's. Each Plücker coordinate of the leg's line is then a sum of multiples of 1, x, y, x², xy, y², the same
-# ones for all legs. On a conic these six are dependent, hence the six lines as well. Similar hexagons with corners
+# platform are plane and similar is one if its six joints lie on a conic. Let (x, y) be a base point and t + s R (x, y, 0) the
+# platform's. Each Plücker coordinate of the leg's line is then a sum of multiples of 1, x, y, x², xy, y², the
+# same ones for all legs. On a conic these six are dependent, hence the six lines as well. Similar hexagons with corners
 # anywhere are not enough. The smallest singular value of the six lines, over random poses:
 
 # %%
@@ -154,7 +154,8 @@ def least_and_most(base, poses=200):
 angles = np.radians([20, 100, 140, 220, 260, 340])
 on_a_circle = np.column_stack([np.cos(angles), np.sin(angles), 0 * angles])
 anywhere = on_a_circle * [[1], [0.7], [1.2], [0.9], [1.1], [0.8]]
-for name, base in (("on a circle", on_a_circle), ("on an ellipse", on_a_circle * [2, 1, 1]), ("on no conic", anywhere)):
+bases = {"on a circle": on_a_circle, "on an ellipse": on_a_circle * [2, 1, 1], "on no conic": anywhere}
+for name, base in bases.items():
     least, most = least_and_most(base)
     print(f"{name:14} from {least:.1e} to {most:.1e}")
     assert (most < 1e-12) == (name != "on no conic")

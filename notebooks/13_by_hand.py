@@ -143,8 +143,8 @@ print(f"in the image: {across_image:.2f}°; towards the camera: {along_view:.2f}
 assert along_view > 10 * across_image
 
 # %% [markdown]
-# The direction in the image is known well, the inclination towards the camera badly: by a factor of about h / R. That is
-# why `accuracy` takes an angle of error, and why thick rods near the camera are good rods to watch.
+# The direction in the image is known well, the inclination towards the camera badly: by a factor of about h / R. That
+# is why `accuracy` takes an angle of error, and why thick rods near the camera are good rods to watch.
 #
 # ## The loop
 #
@@ -153,11 +153,14 @@ assert along_view > 10 * across_image
 
 
 # %%
+STRAIGHT = np.eye(3)
+
+
 def skew(w):
     return np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
 
 
-def loop(start, desired, legs=(0, 2), gain=2.0, step=0.04, time=8.0, crank=CRANK, camera=np.eye(3)):
+def loop(start, desired, legs=(0, 2), gain=2.0, step=0.04, time=8.0, crank=CRANK, camera=STRAIGHT):
     """Places of the platform: the controller has M of a model with this crank, and sees through a turned camera."""
     P, places = np.array(start, float), [np.array(start, float)]
     for _ in range(int(time / step)):
@@ -256,9 +259,9 @@ for mode in held.modes:
     assert (lengths.min() > 0) == mode.goal
 
 # %% [markdown]
-# At the other mode slide 1 has gone through its joint and out on the other side. Its axis still points as at the goal, but
-# no cylinder is built so: a real leg would have to turn around, and the camera would see it point the other way. Give
-# the slides limits in the robot's file, and `modes` says *beyond limits* there.
+# At the other mode slide 1 has gone through its joint and out on the other side. Its axis still points as at the
+# goal, but no cylinder is built so: a real leg would have to turn around, and the camera would see it point the other
+# way. Give the slides limits in the robot's file, and `modes` says *beyond limits* there.
 #
 # ## Exercises
 #

@@ -206,8 +206,9 @@ def test_every_set_of_legs_is_certified(robot: str, legs: tuple[str, ...]) -> No
     halves = {"12": 3, "34": 3} if robot == "quattro" else {}
     assert derivation.verdict.rank == (one if len(legs) == 1 else halves.get("".join(legs), best))
     assert derivation.verdict.verdict == (CONTROLLABLE if derivation.verdict.rank == derivation.dof else PARTIAL)
-    assert derivation.unchecked is not None
-    assert derivation.unchecked.equivalent or derivation.unchecked.gains or derivation.unchecked.loses or derivation.unchecked.reason
+    unchecked = derivation.unchecked
+    assert unchecked is not None
+    assert unchecked.equivalent or unchecked.gains or unchecked.loses or unchecked.reason
     hidden = derivation.hidden_architecture
     assert hidden is not None
     if len(legs) == 2 and derivation.verdict.verdict == CONTROLLABLE and robot != "quattro_rigid":

@@ -43,8 +43,7 @@ STEP_SAMPLES = 3
 
 @dataclass(frozen=True, eq=False, repr=False)
 class UncheckedForm(Value):
-    """The architecture that the rules give when no condition is checked, whether it is equivalent, and the freedoms that
-    it gains or loses."""
+    """The architecture of unchecked rules, whether it is equivalent, and the freedoms that it gains or loses."""
 
     hidden: Architecture
     equivalent: bool
@@ -146,8 +145,8 @@ def derive(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None
     link that carries the camera (default: the base), or further cameras, and ``see`` says what these see
     (:func:`hrsynth.observe`); ``at`` is a pose that replaces the zero configuration, in another operation mode if
     necessary, or one of its modes (``mode:2``); an observed robot already has all of that. ``form`` is ``simplified``
-    or ``general``; ``unchecked``: also give the form of unchecked rules. Raises ``BadRequest`` for unknown names, ``NotCertified``
-    if even the exact lift fails.
+    or ``general``; ``unchecked``: also give the form of unchecked rules. Raises ``BadRequest`` for unknown names,
+    ``NotCertified`` if even the exact lift fails.
 
     >>> found = hrsynth.derive("3rrr_m1", [1, 2, 3])
     >>> found
@@ -263,7 +262,8 @@ def _unchecked_form(setting: ObservedRobot, evidence: Evidence, samples: Samples
             return UncheckedForm(architecture, True, certificate.largest_angle, reason="it is the certified form")
         found = certify(samples, rewriting.state.mechanism, count=STEP_SAMPLES, complete=False)
         if found.passed:
-            return UncheckedForm(architecture, True, found.largest_angle, reason="equivalent, but not the simplest form")
+            reason = "equivalent, but not the simplest form"
+            return UncheckedForm(architecture, True, found.largest_angle, reason=reason)
         tried.append((found, architecture))
     found, architecture = min(reversed(tried), key=lambda pair: pair[0].largest_angle)
     gains, loses = _exchanged_freedoms(setting.anatomy, found)

@@ -1,4 +1,4 @@
-"""What the papers print: forms of hidden robots, and assembly modes with what became of each when it was computed again."""
+"""What the papers print: forms of hidden robots, and assembly modes with what is computed for each."""
 
 from __future__ import annotations
 

@@ -34,7 +34,8 @@ _ACROSS = ("x=0.02,y=0.1,z=-0.7,phi=0", "x=-0.2,y=0.01,z=-0.7,phi=0")
 _DOWN = ("x=0.05,y=0.05,z=-0.8,phi=0", "x=0.03,y=0.03,z=-0.65,phi=0")
 _RIGID = ("x=0.1,y=0.04,z=-0.93", "x=0,y=-0.25,z=-0.7")
 _RIGID_2 = ("x=0.1,y=0.04,z=-0.93", "x=0,y=-0.3,z=-0.85")
-_TURNS = "in position: this noise averages out except for a shift in z, see below; in orientation the order is as printed"
+_TURNS = ("in position: this noise averages out except for a shift in z, see below; in orientation the order is as "
+          "printed")
 _HELD = "not a mode, but this noise holds the run there; without noise it continues to the goal"
 _PERSISTS = "about the size of the bound: of errors that do not average out"
 _AVERAGED = "this noise averages out; errors of the experiment persist, see below"
@@ -72,8 +73,8 @@ NOISY = (
     Replay("MMT 5.1.3, Fig. 29", "quattro", _ALL, _DOWN, noise="0.1deg", ended="goal", said="best",
            order="Fig. 29", place=1),
     Replay("IROS V, Fig. 7a", "quattro_rigid", ("1", "2"), _RIGID_2, gain=5, noise="0.01deg", ended="goal",
-           said="1.6 mm", remark="2.7 times what errors of 0.01° can make at this pose, to first order", order="Fig. 7a",
-           place=3, printed=(0.0016, None)),
+           said="1.6 mm", remark="2.7 times what errors of 0.01° can make at this pose, to first order",
+           order="Fig. 7a", place=3, printed=(0.0016, None)),
     Replay("IROS V, Fig. 7a", "quattro_rigid", ("1", "3"), _RIGID_2, gain=5, noise="0.01deg", ended="goal",
            said="0.22 mm", remark=_PERSISTS, order="Fig. 7a", place=2, printed=(0.00022, None)),
     Replay("IROS V, Fig. 7a", "quattro_rigid", _ALL, _RIGID_2, gain=5, noise="0.01deg", ended="goal",

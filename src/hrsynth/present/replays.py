@@ -17,7 +17,8 @@ from ..simulation.servo import servo
 from .markdown import table as markdown
 
 START = "<!-- generated: replays -->"
-HEADS = ("source", "robot", "legs", "noise", "printed", "computed", "same ending?", "printed : computed", "bound", "word")
+HEADS = ("source", "robot", "legs", "noise", "printed", "computed", "same ending?", "printed : computed", "bound",
+         "word")
 BENCH_LASTS = 8.0
 """Time constants 1 / λ of a run on the physics bench."""
 DRAWS = 4
@@ -54,8 +55,9 @@ def row(replay: Replay) -> tuple[str, ...]:
     else:
         here += f" {_place(found.pose)}"
     noise = "–" if replay.noise is None else replay.noise if "deg" in replay.noise else f"{replay.noise} rad, bench"
+    same = "yes" if found.ended == replay.ended else "no"
     return (replay.source, f"`{replay.robot}`", ", ".join(replay.legs), noise, f"{replay.ended} {replay.said}",
-            here, "yes" if found.ended == replay.ended else "no", _figures(replay, found), _bound(replay), replay.remark)
+            here, same, _figures(replay, found), _bound(replay), replay.remark)
 
 
 def _figures(replay: Replay, found: Servo) -> str:
