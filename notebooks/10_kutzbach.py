@@ -72,11 +72,14 @@ for name, make in LINKAGES.items():
 # Schatz's is at work in every chemist's Turbula mixer.
 #
 # With one hinge driven and held, a ring has a few closings. These are the assembly modes of the real robot. Written in
-# dual quaternions, they are among the four zeros of a determinant. Here two of the zeros are closings, so there are no
-# others:
+# dual quaternions, they are among the four zeros of a determinant, and all four are enclosed. Two of them are real: the
+# pose itself, and one at which all legs *fit*. There is no third closing. That the second is one is not proved: a ring
+# with a redundant constraint meets more equations than it has unknowns, and a fit to 1e-13 may still be a miss:
 
 # %%
-print(hrsynth.modes(hrsynth.load(folder / "plane_symmetric_bricard.urdf"), real=True))
+ring = hrsynth.modes(hrsynth.load(folder / "plane_symmetric_bricard.urdf"), real=True)
+print(ring)
+assert len(ring.modes) == 2
 
 # %% [markdown]
 # ## How special is it?
@@ -127,9 +130,39 @@ plt.show()
 
 # %% [markdown]
 # A machine with that geometry is loose only in this orientation of its platform. Worse are robots that move like this
-# at *every* pose: M. Husty and A. Karger showed that all Gough-Stewart platforms whose base and platform are similar
-# are like that (*architecturally singular*). Two such hexagons have 20° (base) and 40° (platform) as half the angle
-# between paired joints. With all six motors held, the platform is loose, wherever it is:
+# at *every* pose (*architecturally singular*, O. Ma and J. Angeles, 1992). A Gough-Stewart platform whose base and
+# platform are plane and similar is one if its six joints lie on a conic. Let (x, y) be a base point and
+# t + s R (x, y, 0) the platform's. Each Plücker coordinate of the leg's line is then a sum of multiples of 1, x, y, x², xy, y², the
+# same ones for all legs. On a conic these six are dependent, hence the six lines as well. Similar hexagons with corners
+# anywhere are not enough. The smallest singular value of the six lines, over random poses:
+
+# %%
+rng = np.random.default_rng(1)
+
+
+def least_and_most(base, poses=200):
+    """Least and largest smallest singular value of the lines from base points to those of a platform half as large."""
+    found = []
+    for _ in range(poses):
+        turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        tips = 0.5 * base @ (turn * np.linalg.det(turn)).T + rng.uniform([-0.3, -0.3, 0.4], [0.3, 0.3, 1.0])
+        lines = np.hstack([tips - base, np.cross(base, tips)])
+        found.append(np.linalg.svd(lines / np.linalg.norm(tips - base, axis=1)[:, None], compute_uv=False)[-1])
+    return min(found), max(found)
+
+
+angles = np.radians([20, 100, 140, 220, 260, 340])
+on_a_circle = np.column_stack([np.cos(angles), np.sin(angles), 0 * angles])
+anywhere = on_a_circle * [[1], [0.7], [1.2], [0.9], [1.1], [0.8]]
+bases = {"on a circle": on_a_circle, "on an ellipse": on_a_circle * [2, 1, 1], "on no conic": anywhere}
+for name, base in bases.items():
+    least, most = least_and_most(base)
+    print(f"{name:14} from {least:.1e} to {most:.1e}")
+    assert (most < 1e-12) == (name != "on no conic")
+
+# %% [markdown]
+# Two similar hexagons on circles have 20° (base) and 40° (platform) as half the angle between paired joints. With all
+# six motors held, the platform is loose. A single pose shows it here, the theorem all of them:
 
 # %%
 print(hrsynth.modes(gough_stewart(base_half=np.radians(20), platform_half=np.radians(40)), real=True))

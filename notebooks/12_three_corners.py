@@ -151,8 +151,8 @@ for found in by_three:
 #
 # ## The fourth corner
 #
-# With a fourth corner in their plane the image determines the pose, and no cylinder is left: its rows restore the rank
-# where those of the other three lose it.
+# With a fourth corner in their plane the image determines the pose. Where the cylinder was, its rows restore the rank
+# that those of the other three lose, unless it lies on their circle.
 
 # %%
 square = np.vstack([CORNERS, [[0.15, -0.3, 0]]])
@@ -163,10 +163,13 @@ on = middle + [0, radius, 0.9]
 print("on the cylinder: smallest singular value with three corners",
       np.linalg.svd(interaction(on, DOWN, CORNERS), compute_uv=False)[-1].round(12), "with four",
       np.linalg.svd(interaction(on, DOWN, square), compute_uv=False)[-1].round(4))
+fourth = middle + [radius * np.cos(2), radius * np.sin(2), 0]
+print("four corners on one circle:",
+      np.linalg.svd(interaction(on, DOWN, np.vstack([CORNERS, [fourth]])), compute_uv=False)[-1].round(12))
 
 # %% [markdown]
 # Four corners give eight numbers for six freedoms: the loop may also rest where the error is not zero but has no
-# component that a motion could lessen (a *local minimum*). That is rarer, and `servo` names it.
+# component that a motion could lessen (a *local minimum*). `servo` names it.
 #
 # ## Exercises
 #
@@ -197,5 +200,8 @@ for name, far in (("on", 1.0), ("off", 1.3)):
 print("on:", f"at most {least['on'][1]:.1e};", "off:", f"at least {least['off'][0]:.1e}")
 
 # %% jupyter={"source_hidden": true} tags=["solution"]
-# 3. it bends the paths; the other poses remain
-print([hrsynth.servo(three, start=start, goal=GOAL, depth="desired").ended for start in starts[:2]])
+# 3. of these eight starts more reach the goal; but the other poses remain, and one run still ends at one
+by_depth = [hrsynth.servo(three, start=start, goal=GOAL, depth="desired").ended for start in starts]
+reached = [[found.ended for found in by_three].count("goal"), by_depth.count("goal")]
+print("goal reached with the depths of each image:", reached[0], "of 8; with those at the goal:", reached[1], "of 8")
+assert reached == [4, 7]

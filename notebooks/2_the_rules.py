@@ -184,8 +184,9 @@ rrs = b.build(platform="platform")
 
 found = hrsynth.derive(rrs)
 print("certified:    ", found.hidden_architecture)
-print("paper's form: ", found.paper.hidden, "–", "equivalent" if found.paper.equivalent else "not equivalent")
-print("               ", found.paper.reason)
+unchecked = found.unchecked
+print("unchecked:    ", unchecked.hidden, "–", "equivalent" if unchecked.equivalent else "not equivalent")
+print("              ", unchecked.reason)
 
 # %% [markdown]
 # The real leg lets its tip move on a surface, two freedoms, and one direction sees both. ΠU̲S would let the tip move

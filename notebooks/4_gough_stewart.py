@@ -194,8 +194,8 @@ print(len(everything.modes), "mode,", len(everything.near), "near modes")
 # ## Exercises
 #
 # 1. Put the camera on the platform (`camera="platform"`). Which planes must meet now? Guess before you run it.
-# 2. Tsai's 3-UP̲U (`3upu`) only translates. How many legs must be watched? MMT gives the hidden robot 2-U̲PU for two
-#    watched legs. What does the certificate say?
+# 2. Tsai's 3-UP̲U (`3upu`) only translates. How many legs must be watched? MMT 4.2.1 gives U̲PU as the hidden leg.
+#    Are two such legs the hidden robot for two watched legs? What does the certificate say?
 # 3. How many of the eight modes are real at random poses? Draw twenty and count. Can the number be odd?
 
 # %% [markdown]
@@ -210,8 +210,8 @@ print(hrsynth.singular(robot, ["1", "3", "5"], camera="platform", points=100).wo
 tsai = hrsynth.load("3upu")
 print("smallest sets:", hrsynth.legs(tsai).smallest)
 two = hrsynth.derive(tsai, observe=["1", "2"])
-print("certified:", two.hidden_architecture, "  paper's form:", two.paper.hidden, two.paper.reason)
-assert not two.paper.equivalent
+print("certified:", two.hidden_architecture, "  unchecked rules:", two.unchecked.hidden, two.unchecked.reason)
+assert not two.unchecked.equivalent
 
 # %% jupyter={"source_hidden": true} tags=["solution"]
 # 3. complex solutions come in pairs, so of eight an even number is real

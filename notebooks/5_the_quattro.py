@@ -20,9 +20,19 @@ print(hrsynth.legs(robot))
 # %% [markdown]
 # Two directions are four numbers, and the platform has four freedoms. Yet not every pair will do. Legs 1 and 2 hang on
 # the same half of the platform, 3 and 4 on the other. Watching both legs of one half does not show how the other half
-# turns about the hinge. One leg on each half is needed, which leaves four pairs.
-#
-# All four have the same hidden robot. In each watched leg the arm becomes a parallelogram, and the legs that are not
+# turns about the hinge. One leg on each half is needed, which leaves four pairs. (The paper counts six, in MMT 5.1.2
+# and A.2: pairs on one half have a hidden robot of the same letters, 2-Π-{2-U̲U}, but the platform's other half hangs
+# free on it.)
+
+# %%
+for pair in (["1", "2"], ["1", "4"]):
+    found = hrsynth.derive(robot, observe=pair)
+    print(pair, found.hidden_architecture, f"rank {found.verdict.rank} of {found.dof}", found.verdict.verdict)
+    assert str(found.hidden_architecture) == "2-Π-{2-U̲U}"
+    assert found.verdict.rank == (3 if pair == ["1", "2"] else 4)
+
+# %% [markdown]
+# In each watched leg the arm becomes a parallelogram, and the legs that are not
 # watched disappear, once the ends of the watched ones are changed:
 
 # %%
@@ -39,9 +49,11 @@ hrsynth.draw(hidden)
 #
 # ## Assembly modes
 #
-# With its direction held, the tip of a leg moves on a circle, that of its parallelogram. The platform joins two such
-# circles. One of them, carried along the other, sweeps a surface that MMT 4.2.2 calls a Bohemian dome. The goal of the
-# paper's first simulation (MMT 5.1.3), for two of the pairs:
+# With its direction held, the tip of a leg moves on a circle, that of its parallelogram. The platform has a circle of
+# its own: as its halves turn on each other, the second hinge runs on a horizontal circle about the first. That circle,
+# carried along the circle of one leg, sweeps a surface that MMT 4.2.2 calls a Bohemian dome. It is of degree four, so
+# the circle of the other leg meets it in at most eight points: the modes. The goal of the paper's first simulation
+# (MMT 5.1.3), for two of the pairs:
 
 # %%
 pairs = {legs: hrsynth.derive(robot, observe=list(legs)) for legs in ("14", "23")}

@@ -51,8 +51,8 @@ print(hrsynth.derive(robot, observe=["1"]))
 
 # %% [markdown]
 # The crank is watched and it is driven, so the hidden robot is the real one: the camera is an encoder here. The
-# rocker, which is not watched, must stay. Without it the bar could turn about the crank's end, as the paper's form
-# below the certificate would.
+# rocker, which is not watched, must stay. Without it the bar could turn about the crank's end, as the form of
+# unchecked rules, below the certificate, would.
 #
 # With the crank's direction held, the four-bar has two poses, its bar and rocker folded to one side or the other:
 

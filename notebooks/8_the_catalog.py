@@ -80,10 +80,11 @@ for verdict, colour in colours.items():
 place.set(xlabel="legs of the smallest set", ylabel="architectures")
 place.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
 plt.show()
+assert counts["controllable", 3] > counts["controllable", 2]
 
 # %% [markdown]
 # Fewer than two legs can never do: a direction is two numbers, and there are three freedoms. Most of the controllable
-# robots need three. The robots that are not controllable lose a freedom whatever is watched. The field `lost` says
+# robots here need three. The robots that are not controllable lose a freedom whatever is watched. The field `lost` says
 # which, and `cure` what would help:
 
 # %%
@@ -113,9 +114,22 @@ place.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
 plt.show()
 
 # %% [markdown]
-# Legs with no slide are at the top, legs with two slides at the bottom: a link that only slides has a direction that
-# says nothing. For planar robots this is a theorem, with its proof on the page *What the catalog says*. While a
-# watched direction is held, the platform's instantaneous centre stays on a line, and the legs see the rank of their
+# A link that only slides has a direction that says nothing, so slides make it harder. But the order is not strict: some
+# chains with a slide are always controllable, and half of the architectures with RPPR legs are, which have two:
+
+# %%
+for slides in range(3):
+    some = [verdicts[name] for name in names if name.count("P") - name.count("Pi") == slides]
+    share = sum(each["controllable"] for each in some) / sum(each.total() for each in some)
+    print(f"{slides} slides: {100 * share:.0f} % controllable")
+always = [name for name in names if verdicts[name]["controllable"] == verdicts[name].total()]
+print("always controllable:", *always)
+assert {"RRPR", "RPRR"} <= {*always}
+assert 2 * verdicts["RPPR"]["controllable"] == verdicts["RPPR"].total()
+
+# %% [markdown]
+# For planar robots what a leg sees is a theorem, with its proof on the page *What the catalog says*. While a watched
+# direction is held, the platform's instantaneous centre stays on a line, and the legs see the rank of their
 # lines. Here is a test on a 3-RRR with random joints; the watched link follows the second R:
 
 # %%
@@ -167,10 +181,13 @@ for record in catalog.where(group="pods", motion="3T"):
         print(f"{record['word']:28}{record['notation']:14}{record['verdict']:24}{record['fewest']} legs")
 
 # %% jupyter={"source_hidden": true} tags=["solution"]
-# 2. legs whose last segment only slides, or that meet the platform in a slide, cannot be servoed
+# 2. the letters do not decide: 3-P*RR stands in all three lists. Which link is watched (!) and whether the slides of
+#    the legs are parallel (Px, not Ph) do. In notebook 3 the slides are not parallel and the last link is watched.
 planar = [record for record in catalog.where(group="planar", dof=3, legs=3) if "+" not in record["word"]]
 for verdict in ("controllable", "partially controllable", "uncontrollable"):
-    print(f"{verdict:24}", *sorted({record["notation"] for record in planar if record["verdict"] == verdict}))
+    listed = sorted({record["notation"] for record in planar if record["verdict"] == verdict})
+    print(f"{verdict:24}", *listed)
+    assert "3-P*RR" in listed
 
 # %% jupyter={"source_hidden": true} tags=["solution"]
 # 3. the catalog keeps one of the smallest cures, advise lists all of them

@@ -24,7 +24,7 @@ from hrsynth.errors import BadRequest
 from hrsynth.present.outputs import OUTPUTS
 
 FIELDS = {
-    "derive": {"observed", "notation", "dof", "mobility", "verdict", "lost", "paper_form", "steps", "certificate",
+    "derive": {"observed", "notation", "dof", "mobility", "verdict", "lost", "unchecked_form", "steps", "certificate",
                "hidden_file", "report_file", "architecture"},
     "legs": {"sets", "minimal"},
     "advise": {"verdict", "rank", "dof", "lost", "nothing_missing", "sets", "size", "tried", "complete"},

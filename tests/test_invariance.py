@@ -30,7 +30,7 @@ def essence(found: Derivation) -> tuple[object, ...]:
     hidden = found.hidden_architecture
     words = None if hidden is None else sorted((word.text(), count) for count, word in hidden.terms)
     return (words, found.verdict.verdict, found.verdict.rank, found.dof, found.mobility, len(found.verdict.lost),
-            found.certificate.passed, found.paper and found.paper.equivalent)
+            found.certificate.passed, found.unchecked and found.unchecked.equivalent)
 
 
 @cache

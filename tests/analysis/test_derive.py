@@ -152,15 +152,15 @@ def test_all_legs_observed(robot: str) -> None:
     if expected.hidden is None:
         assert derivation.hidden is None
         assert derivation.hidden_architecture is None
-        assert derivation.paper is None
+        assert derivation.unchecked is None
         assert "vanishes" in derivation.certificate.reason
         return
     assert derivation.hidden_architecture is not None
     assert derivation.hidden_architecture.ascii == expected.hidden
     assert derivation.certificate.reason == ""
-    assert derivation.paper is not None
-    assert derivation.paper.equivalent
-    assert derivation.paper.hidden == derivation.hidden_architecture
+    assert derivation.unchecked is not None
+    assert derivation.unchecked.equivalent
+    assert derivation.unchecked.hidden == derivation.hidden_architecture
     emitted(derivation)
 
 
@@ -206,8 +206,9 @@ def test_every_set_of_legs_is_certified(robot: str, legs: tuple[str, ...]) -> No
     halves = {"12": 3, "34": 3} if robot == "quattro" else {}
     assert derivation.verdict.rank == (one if len(legs) == 1 else halves.get("".join(legs), best))
     assert derivation.verdict.verdict == (CONTROLLABLE if derivation.verdict.rank == derivation.dof else PARTIAL)
-    assert derivation.paper is not None
-    assert derivation.paper.equivalent or derivation.paper.gains or derivation.paper.loses or derivation.paper.reason
+    unchecked = derivation.unchecked
+    assert unchecked is not None
+    assert unchecked.equivalent or unchecked.gains or unchecked.loses or unchecked.reason
     hidden = derivation.hidden_architecture
     assert hidden is not None
     if len(legs) == 2 and derivation.verdict.verdict == CONTROLLABLE and robot != "quattro_rigid":
@@ -248,8 +249,8 @@ def test_architectures_of_the_papers(robot: str, legs: tuple[str, ...], hidden: 
     assert derivation.hidden_architecture is not None
     assert derivation.hidden_architecture.ascii == hidden
     assert derivation.verdict.verdict == CONTROLLABLE
-    assert derivation.paper is not None
-    assert derivation.paper.equivalent
+    assert derivation.unchecked is not None
+    assert derivation.unchecked.equivalent
     removed = set(derivation.setting.anatomy.labels) - set(legs)
     assert {step.leg for step in derivation.steps if step.rule == "leg removal" and step.accepted} >= removed
 
@@ -269,20 +270,20 @@ def test_steps_are_those_that_are_taken_one_by_one(robot: str, legs: tuple[str, 
 
 
 def test_one_leg_of_a_delta_needs_another() -> None:
-    """The paper's form frees the platform: it may turn; a real leg has to stay."""
+    """The unchecked form frees the platform: it may turn; a real leg has to stay."""
     derivation = derived("delta", ("1",))
     certified(derivation)
     emitted(derivation)
-    paper = derivation.paper
-    assert paper is not None
-    assert not paper.equivalent
-    assert paper.hidden.ascii == "Pi-{2-U*U}"
-    assert paper.largest_angle > SAME_RELATION
-    assert len(paper.gains) == 1
-    assert paper.gains[0].name.startswith("rotation about")
-    assert np.linalg.norm(paper.gains[0].twist[3:]) == pytest.approx(1)
-    assert paper.loses == ()
-    assert paper.reason
+    unchecked = derivation.unchecked
+    assert unchecked is not None
+    assert not unchecked.equivalent
+    assert unchecked.hidden.ascii == "Pi-{2-U*U}"
+    assert unchecked.largest_angle > SAME_RELATION
+    assert len(unchecked.gains) == 1
+    assert unchecked.gains[0].name.startswith("rotation about")
+    assert np.linalg.norm(unchecked.gains[0].twist[3:]) == pytest.approx(1)
+    assert unchecked.loses == ()
+    assert unchecked.reason
     assert derivation.hidden_architecture is not None
     assert derivation.hidden_architecture.ascii == "Pi-{2-U*U}+R-{2-SS}"
     assert [step.leg for step in derivation.steps if step.rule == "keep"] == ["3"]
@@ -312,12 +313,12 @@ def test_two_legs_of_3upu_need_the_third() -> None:
     emitted(derivation)
     assert derivation.hidden_architecture is not None
     assert derivation.hidden_architecture.ascii == "2-U*PU+UPU"
-    paper = derivation.paper
-    assert paper is not None
-    assert not paper.equivalent
-    assert paper.hidden.ascii == "2-U*PU"
-    assert [freedom.name.split(" about ")[0] for freedom in paper.gains] == ["rotation"]
-    assert paper.loses == ()
+    unchecked = derivation.unchecked
+    assert unchecked is not None
+    assert not unchecked.equivalent
+    assert unchecked.hidden.ascii == "2-U*PU"
+    assert [freedom.name.split(" about ")[0] for freedom in unchecked.gains] == ["rotation"]
+    assert unchecked.loses == ()
     keep = [step for step in derivation.steps if step.rule == "keep"]
     assert [step.leg for step in keep] == ["3"]
     refused = [step for step in derivation.steps if step.rule == "leg removal" and not step.accepted]
@@ -405,7 +406,7 @@ def test_the_general_form(robot: str, hidden: str) -> None:
     certified(derivation)
     emitted(derivation)
     assert derivation.form == "general"
-    assert derivation.paper is None
+    assert derivation.unchecked is None
     assert derivation.hidden_architecture is not None
     assert derivation.hidden_architecture.ascii == hidden
 
@@ -432,7 +433,7 @@ def test_progress_is_told() -> None:
     told: list[str] = []
     with hrsynth.following(told.append):
         derive(load("rrrrr_m1"))
-    assert {"sampling", "certificate", "the paper's form"} <= set(told)
+    assert {"sampling", "certificate", "the unchecked form"} <= set(told)
 
 
 @pytest.mark.parametrize(("observe", "camera", "form", "value", "allowed"), [
@@ -466,7 +467,7 @@ def test_the_record() -> None:
     assert record["mobility"]["idle"] == 6
     assert record["certificate"]["passed"] is True
     assert record["notation"]["real_ascii"] == "3-R*-{2-SS}"
-    assert record["paper_form"]["equivalent"] is False
+    assert record["unchecked_form"]["equivalent"] is False
     assert all(len(freedom["twist"]) == 6 for freedom in record["lost"])
     assert {step["rule"] for step in record["steps"]} >= {"motors off", "lift", "takeover", "leg removal", "keep"}
 

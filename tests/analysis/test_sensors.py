@@ -187,7 +187,7 @@ def test_three_points_of_a_free_body_are_three_ups() -> None:
     assert found.hidden_architecture is not None
     assert found.hidden_architecture.unicode == "3-U̲PS"
     assert (str(found.architecture), found.verdict.verdict, found.verdict.rank) == ("6", "controllable", 6)
-    assert found.paper is None
+    assert found.unchecked is None
 
 
 @pytest.mark.some(1)

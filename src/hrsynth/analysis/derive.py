@@ -1,4 +1,4 @@
-"""From a robot to its certified hidden robot: rewriting, certificate, verdict, and the paper's own form beside it."""
+"""From a robot to its certified hidden robot: rewriting, certificate, verdict, and the unchecked form beside it."""
 
 from __future__ import annotations
 
@@ -42,8 +42,8 @@ STEP_SAMPLES = 3
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PaperForm(Value):
-    """The architecture that the paper's rules alone give, and whether it is equivalent; freedoms it gains or loses."""
+class UncheckedForm(Value):
+    """The architecture of unchecked rules, whether it is equivalent, and the freedoms that it gains or loses."""
 
     hidden: Architecture
     equivalent: bool
@@ -75,7 +75,7 @@ class Derivation(Result, shown_as="derive"):
     taken: tuple[Step, ...]
     """All attempts; those of the observed legs were compared with the real robot all together."""
     certificate: Certificate
-    paper: PaperForm | None
+    unchecked: UncheckedForm | None
 
     @cached_property
     def steps(self) -> tuple[Step, ...]:
@@ -126,7 +126,7 @@ class Derivation(Result, shown_as="derive"):
             "has_interaction_matrix": self.verdict.has_interaction_matrix,
             "interaction_matrix": self.verdict.has_interaction_matrix,
             "architecture": self.exact.to_dict(),
-            "paper_form": self.paper and self.paper.to_dict(),
+            "unchecked_form": self.unchecked and self.unchecked.to_dict(),
             "steps": [{"rule": s.rule, "leg": s.leg, "accepted": s.accepted, "reason": s.reason,
                        "largest_angle": s.largest_angle} for s in self.steps],
             "certificate": self.certificate.to_dict(), **self.setting.modes_dict(),
@@ -135,7 +135,7 @@ class Derivation(Result, shown_as="derive"):
 
 @question(formations=True)
 def derive(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
-           at: PoseLike | None = None, form: str = "simplified", paper: bool = True, seed: int = 0) -> Derivation:
+           at: PoseLike | None = None, form: str = "simplified", unchecked: bool = True, seed: int = 0) -> Derivation:
     """The certified hidden robot of a robot and the legs that are watched (MMT 3.2; docs/pages/theory.md, sections 3 to
     5).
 
@@ -143,8 +143,8 @@ def derive(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None
     link that carries the camera (default: the base), or further cameras, and ``see`` says what these see
     (:func:`hrsynth.observe`); ``at`` is a pose that replaces the zero configuration, in another operation mode if
     necessary, or one of its modes (``mode:2``); an observed robot already has all of that. ``form`` is ``simplified``
-    or ``general``; ``paper``: also give the paper's own form. Raises ``BadRequest`` for unknown names, ``NotCertified``
-    if even the exact lift fails.
+    or ``general``; ``unchecked``: also give the form of unchecked rules. Raises ``BadRequest`` for unknown names,
+    ``NotCertified`` if even the exact lift fails.
 
     >>> found = hrsynth.derive("3rrr_m1", [1, 2, 3])
     >>> found
@@ -166,19 +166,19 @@ def derive(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None
         if hidden is not None and certificate.passed and result.virtual_only:
             break
     architecture: Architecture | None = None
-    by_paper = None
+    without_checks = None
     if hidden is not None:
         if not (certificate.passed and result.virtual_only):
             result, hidden, certificate = _fallback(setting, evidence, samples, certificate, FORMS[form])
         architecture = result.state.architecture()
         segments = all(each.by_segment for each in setting.observed)
-        if paper and form == "simplified" and architecture is not None and segments:
-            tell("the paper's form")
-            by_paper = _paper_form(setting, evidence, samples, architecture, certificate)
+        if unchecked and form == "simplified" and architecture is not None and segments:
+            tell("the unchecked form")
+            without_checks = _unchecked_form(setting, evidence, samples, architecture, certificate)
     elif not certificate.passed:
         raise NotCertified(setting.robot.name, certificate.largest_angle, SAME_RELATION)
     return Derivation(setting.robot, setting, form, anatomy.architecture(), hidden, architecture, verdict, exact,
-                      result.steps, certificate, by_paper)
+                      result.steps, certificate, without_checks)
 
 
 def _certify(setting: ObservedRobot, state: State, samples: Samples) -> tuple[Mechanism | None, Certificate]:
@@ -244,9 +244,9 @@ def _blind(samples: Samples) -> Certificate:
     return Certificate(len(samples.members), samples.discarded, angle, gap, 0.0, passed, reason)
 
 
-def _paper_form(setting: ObservedRobot, evidence: Evidence, samples: Samples, certified: Architecture,
-                certificate: Certificate) -> PaperForm:
-    """Apply the paper's rules without looking, and compare what they give with the real robot.
+def _unchecked_form(setting: ObservedRobot, evidence: Evidence, samples: Samples, certified: Architecture,
+                certificate: Certificate) -> UncheckedForm:
+    """Apply the rules without checking their conditions, and compare what they give with the real robot.
 
     The ends of the legs are changed only where the hidden robot would not keep its dof otherwise (MMT 3.2).
     """
@@ -257,14 +257,15 @@ def _paper_form(setting: ObservedRobot, evidence: Evidence, samples: Samples, ce
     for rewriting in trusting(evidence, change_ends=change):
         architecture = rewriting.state.architecture()
         if architecture == certified:
-            return PaperForm(architecture, True, certificate.largest_angle, reason="it is the certified form")
+            return UncheckedForm(architecture, True, certificate.largest_angle, reason="it is the certified form")
         found = certify(samples, rewriting.state.mechanism, count=STEP_SAMPLES, complete=False)
         if found.passed:
-            return PaperForm(architecture, True, found.largest_angle, reason="equivalent, but not the simplest form")
+            reason = "equivalent, but not the simplest form"
+            return UncheckedForm(architecture, True, found.largest_angle, reason=reason)
         tried.append((found, architecture))
     found, architecture = min(reversed(tried), key=lambda pair: pair[0].largest_angle)
     gains, loses = _exchanged_freedoms(setting.anatomy, found)
-    return PaperForm(architecture, False, found.largest_angle, gains, loses, found.reason)
+    return UncheckedForm(architecture, False, found.largest_angle, gains, loses, found.reason)
 
 
 def _planar(samples: Samples) -> bool:

@@ -131,7 +131,7 @@ def study(drawn: Mechanism, sets: Callable[[int], Iterable[tuple[int, ...]]], at
     setting = observe(drawn, samples=SAMPLES)
     if not setting.dof:
         raise NotConfirmed(setting.robot.name, "its platform does not move")
-    derivation = derive(setting, paper=False)
+    derivation = derive(setting, unchecked=False)
     exact = architecture(setting) if proved or derivation.exact.exact else None
     if exact is not None:
         _agree(exact, setting.samples, derivation.verdict)

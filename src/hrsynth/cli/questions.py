@@ -190,7 +190,7 @@ QUESTIONS = (
     Question("derive", "The hidden robot of a robot, how it is derived, its certificate, and what the controller can "
              "see.",
              (*WATCHED, SEE, BEGIN,
-              Option("form", "simplified (as in the paper) or general (sliders, all legs kept).", default="simplified",
+              Option("form", "simplified (by all rules) or general (sliders, all legs kept).", default="simplified",
                      words=("simplified", "general")),
               _file("derive"), _file("derive", "report"), _file("derive", "certificate")),
              ("quattro --observe 1,4", "quattro --observe 1,4 -o hidden.urdf --report quattro.html",

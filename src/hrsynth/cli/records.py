@@ -160,8 +160,8 @@ class NotationRecord(TypedDict):
     hidden_latex: str | None
 
 
-class PaperRecord(TypedDict):
-    """The form that the paper's rules alone give."""
+class UncheckedRecord(TypedDict):
+    """The form that the rules give when no condition is checked."""
 
     hidden_ascii: str
     equivalent: bool
@@ -234,7 +234,7 @@ class Derive(OfRobot, Modes):
     has_interaction_matrix: bool
     interaction_matrix: bool
     architecture: ArchitectureRecord
-    paper_form: PaperRecord | None
+    unchecked_form: UncheckedRecord | None
     steps: list[StepRecord]
     certificate: CertificateRecord
     hidden_file: str | None

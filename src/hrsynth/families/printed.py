@@ -1,4 +1,4 @@
-"""Assembly modes as the papers print them, with what became of each when it was computed again (MMT 5.1.3, IROS V)."""
+"""What the papers print: forms of hidden robots, and assembly modes with what is computed for each."""
 
 from __future__ import annotations
 
@@ -65,3 +65,38 @@ CLAIMS = (
 def printed_poses() -> Iterator[tuple[PrintedClaim, PrintedMode]]:
     """Each printed pose with its claim."""
     return ((claim, mode) for claim in CLAIMS for mode in claim.modes)
+
+
+@dataclass(frozen=True)
+class PrintedForm:
+    """A hidden robot, or the form of each of its legs, that a paper prints for a robot of the families."""
+
+    source: str
+    real: str
+    hidden: tuple[str, ...]
+    """In Unicode; several where the paper leaves the choice."""
+    robot: str
+    legs: tuple[str, ...] | None = None
+
+
+FORMS = (
+    PrintedForm("MMT 4.1.1, Table 1", "RPR leg", ("R̲PR",), "3rpr_m1"),
+    PrintedForm("MMT 4.1.1, Table 1", "PRR leg", ("PR̲R",), "3prr_m1"),
+    PrintedForm("MMT 4.1.1, Table 1", "PRP leg", ("PR̲P",), "3prp"),
+    PrintedForm("MMT 4.1.1, Table 1", "RRP leg", ("ΠR̲P",), "3rrp"),
+    PrintedForm("MMT 4.1.2, Fig. 6", "3-RRR", ("3-ΠR̲R",), "3rrr_m1"),
+    PrintedForm("MMT 4.2.1", "UPS leg", ("U̲PS",), "gough_stewart"),
+    PrintedForm("MMT 4.2.1, Fig. 10", "6-UPS", ("3-U̲PS",), "gough_stewart", ("1", "3", "5")),
+    PrintedForm("MMT 4.2.1", "UPU leg", ("U̲PU",), "3upu"),
+    PrintedForm("MMT 4.2.1", "RPS leg", ("R̲PS",), "3rps"),
+    PrintedForm("MMT 4.2.2", "R-{2-US} leg", ("Π-{2-U̲S}", "Π-{2-U̲U}"), "delta"),
+    PrintedForm("MMT 4.2.2", "RUU leg", ("ΠU̲U",), "3ruu"),
+    PrintedForm("MMT 4.2.2", "RUS leg", ("ΠU̲S",), "hexa"),
+    PrintedForm("MMT 4.2.2", "P-{2-US} leg", ("P-{2-U̲S}", "P-{2-U̲U}"), "linear_delta"),
+    PrintedForm("MMT 4.2.2", "PUU leg", ("PU̲U",), "3puu"),
+    PrintedForm("MMT 4.2.2", "PUS leg", ("PU̲S",), "6pus"),
+    PrintedForm("MMT 4.2.2, Fig. 13", "Quattro", ("2-Π-{2-U̲U}",), "quattro", ("1", "4")),
+    PrintedForm("MMT 4.3, Fig. 17", "PRRRP, P parallel", ("PR̲RR̲P",), "prrrp_parallel"),
+    PrintedForm("IROS III-A, Fig. 3", "Quattro, rigid", ("2-Π-{2-U̲U}",), "quattro_rigid", ("1", "2")),
+)
+"""All of them that are of the same robots as those of the families."""

@@ -1,4 +1,4 @@
-"""The table of assembly modes that the papers print, beside those that are computed."""
+"""The tables of forms and of assembly modes that the papers print, beside those that are computed."""
 
 from __future__ import annotations
 
@@ -6,14 +6,31 @@ import math
 from collections.abc import Iterator
 from functools import cache
 
+from ..analysis.derive import derive
 from ..analysis.modes.assembly_mode import AssemblyMode
 from ..analysis.modes.modes import AssemblyModes, modes
 from ..description import load, shipped
-from ..families.printed import CLAIMS, Place, PrintedClaim
+from ..families.printed import CLAIMS, FORMS, Place, PrintedClaim, PrintedForm
 from .markdown import table as markdown
 
 START = "<!-- generated: printed modes -->"
 HEADS = ("source", "robot", "legs", "printed x, y, z (φ = 0)", "computed x, y, z; φ", "apart", "word")
+
+FORMS_START = "<!-- generated: printed forms -->"
+FORMS_HEADS = ("source", "real", "hidden, as printed", "robot", "legs", "derived", "as printed?")
+
+
+def forms_table() -> str:
+    """The Markdown table of printed forms, each with the hidden robot that is derived."""
+    return markdown(FORMS_HEADS, map(form_row, FORMS))
+
+
+def form_row(form: PrintedForm) -> tuple[str, ...]:
+    """One printed form's row."""
+    found = str(derive(load(shipped()[form.robot]), form.legs, unchecked=False).hidden_architecture)
+    same = any(found in (each, f"{found.partition('-')[0]}-{each}") for each in form.hidden)
+    return (form.source, form.real, " or ".join(form.hidden), f"`{form.robot}`",
+            ", ".join(form.legs) if form.legs else "all", found, "yes" if same else "no")
 
 
 @cache

@@ -53,5 +53,5 @@ def _smallest(sets: Sequence[Sequence[str]]) -> str:
 
 if __name__ == "__main__":
     for argument in sys.argv[1:]:
-        rewrite(argument, {START: table, **{each.START: each.table
+        rewrite(argument, {START: table, printed.FORMS_START: printed.forms_table, **{each.START: each.table
                                             for each in (printed, replays, lint_rules, observation_kinds)}})

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
 
+from ..analysis.accuracy.accuracy import accuracy
 from ..description import load, shipped
 from ..families.replays import REPLAYS, Replay
 from ..mechanism.pose import Pose
@@ -15,7 +17,8 @@ from ..simulation.servo import servo
 from .markdown import table as markdown
 
 START = "<!-- generated: replays -->"
-HEADS = ("source", "robot", "legs", "noise", "printed", "computed", "agree?", "word")
+HEADS = ("source", "robot", "legs", "noise", "printed", "computed", "same ending?", "printed : computed", "bound",
+         "word")
 BENCH_LASTS = 8.0
 """Time constants 1 / λ of a run on the physics bench."""
 DRAWS = 4
@@ -52,15 +55,26 @@ def row(replay: Replay) -> tuple[str, ...]:
     else:
         here += f" {_place(found.pose)}"
     noise = "–" if replay.noise is None else replay.noise if "deg" in replay.noise else f"{replay.noise} rad, bench"
-    return (replay.source, f"`{replay.robot}`", ", ".join(replay.legs), noise, f"{replay.ended} {replay.said}",
-            here, _agrees(replay, found), replay.remark)
-
-
-def _agrees(replay: Replay, found: Servo) -> str:
-    """Whether the ending is the printed one, and for accuracies whether their order is."""
     same = "yes" if found.ended == replay.ended else "no"
-    if not replay.order:
-        return same
+    return (replay.source, f"`{replay.robot}`", ", ".join(replay.legs), noise, f"{replay.ended} {replay.said}",
+            here, same, _figures(replay, found), _bound(replay), replay.remark)
+
+
+def _figures(replay: Replay, found: Servo) -> str:
+    """How the figures compare: the distance of two places, or the ratios of errors and their order."""
+    if found.spread is None:
+        printed = [float(v) for v in replay.said.strip("()").replace("−", "-").split(",")]
+        apart = math.dist(printed, [v or 0.0 for v in (found.pose.x, found.pose.y, found.pose.z)])
+        return f"{1e3 * apart:.0f} mm apart"
+    ratios = [f"{theirs / mine:.2g} ({unit})" for theirs, mine, unit in zip(
+        replay.printed, _error(replay), ("position", "orientation"), strict=True) if theirs is not None]
+    if replay.order:
+        ratios.append(f"order {'as printed' if _in_order(replay) else 'differs'}")
+    return ", ".join(ratios) or "–"
+
+
+def _in_order(replay: Replay) -> bool:
+    """Whether the errors of position rank as printed."""
     mine, _ = _error(replay)
     for other in REPLAYS:
         if other.order != replay.order or other is replay:
@@ -71,8 +85,17 @@ def _agrees(replay: Replay, found: Servo) -> str:
         else:
             fits = (mine < theirs) == (replay.place < other.place)
         if not fits:
-            return f"{same}; order of errors no"
-    return f"{same}; order of errors yes"
+            return False
+    return True
+
+
+def _bound(replay: Replay) -> str:
+    """The largest error that directions within a cone of the printed noise can cause at the goal, to first order."""
+    if replay.noise is None or "deg" not in replay.noise:
+        return "–"
+    found = accuracy(load(shipped()[replay.robot]), replay.legs, cone=replay.noise, at=replay.way[1]).poses[0]
+    turn = f", {found.orientation.largest:.1g} rad" if found.orientation.largest > 0 else ""
+    return f"{1e3 * found.position.largest:.2g} mm{turn}"
 
 
 def _error(replay: Replay) -> tuple[float, float]:

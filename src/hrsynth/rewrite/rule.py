@@ -94,7 +94,7 @@ class Rule(Generic[Place, Found]):
     def proposals(self, state: State, evidence: Evidence, leg: str = "", *, waive: bool = False
                   ) -> Iterator[Proposal | Refusal]:
         """The leg rewritten at all of its places at once, in order of preference, until a refusal; with ``waive`` side
-        conditions are waived: the rule does what the paper's text does without looking."""
+        conditions are waived: the rule is applied unchecked."""
         silent = True
         for each in self._rewritten(state, evidence, tuple(self.places(state, leg)), (), waive):
             silent = False

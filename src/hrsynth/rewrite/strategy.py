@@ -221,7 +221,7 @@ SIMPLIFIED = chain(
     GENERAL,
     each_leg(observed_legs, Stage.FORM),
     unless_blind(chain(DROPPED, best(Stage.ENDS, DROPPED, unobserved_legs), keep_unobserved)))
-"""The form of the paper, as far as the certificate goes along with it: where unobserved legs hold the platform, the
+"""The simplified form, as far as the certificate goes along with it: where unobserved legs hold the platform, the
 ends of the observed legs are changed; what still does not go is kept."""
 
 
@@ -230,7 +230,7 @@ FORMS = {"simplified": SIMPLIFIED, "general": GENERAL}
 
 
 def trusting(evidence: Evidence, *, change_ends: bool) -> list[Rewriting]:
-    """The form that the paper's rules alone give, nothing checked; with ``change_ends`` one for each choice of outer
+    """The forms that the rules give when no condition is checked; with ``change_ends`` one for each choice of outer
     axes besides."""
     start = chain(GENERAL, each_leg(observed_legs, Stage.FORM))(Rewriting.of(evidence))
     starts = [start]

@@ -149,7 +149,7 @@ def study(record: Record) -> Study:
         return Study(attempt)
     try:
         setting = observe(mechanism(model(parse(record["word"])), attempt), samples=SAMPLES)
-        found = derive(setting, paper=False)
+        found = derive(setting, unchecked=False)
     except HrsynthError as error:
         return Study(attempt, differs=str(error).splitlines()[0])
     return Study(attempt, found, _difference(found, record))

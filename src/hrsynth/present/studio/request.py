@@ -159,7 +159,7 @@ class Request(Value):
     @cached_property
     def derivation(self) -> Derivation:
         """The hidden robot of the watched legs."""
-        return derive(self.seeing(), paper=False)
+        return derive(self.seeing(), unchecked=False)
 
     def mover(self, hidden: bool = False) -> Mover:
         """What moves the robot, and with ``hidden`` its hidden robot beside it."""

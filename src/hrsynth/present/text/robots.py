@@ -71,7 +71,7 @@ def robot(found: Mechanism) -> str:
 
 def derivation(found: Derivation) -> str:
     """The hidden robot first, the proof next, the trace last."""
-    mobility, hidden, paper, observed = found.mobility, found.hidden_architecture, found.paper, found.setting
+    mobility, hidden, unchecked, observed = found.mobility, found.hidden_architecture, found.unchecked, found.setting
     dof = [f"{found.dof} (mobility {mobility.total}, of which {mobility.idle} idle)"]
     if observed.anatomy.point is not None:
         dof.append("the platform is a point: its velocity is controlled, its rotation is idle")
@@ -90,10 +90,11 @@ def derivation(found: Derivation) -> str:
         ("", [] if found.verdict.has_interaction_matrix else NO_MATRIX),
         ("certificate", wrap_lines(certificate(found.certificate), LINE - NAMES)),
     ]
-    if paper is not None:
-        rows.append(("paper's form", [f"{paper.hidden}: {'equivalent' if paper.equivalent else 'NOT equivalent'}"
-                                      f" ({paper.reason})", *(f"gains {freedom.name}" for freedom in paper.gains),
-                                      *(f"loses {freedom.name}" for freedom in paper.loses)]))
+    if unchecked is not None:
+        equivalent = "equivalent" if unchecked.equivalent else "NOT equivalent"
+        rows.append(("unchecked", [f"{unchecked.hidden}: {equivalent} ({unchecked.reason})",
+                                   *(f"gains {freedom.name}" for freedom in unchecked.gains),
+                                   *(f"loses {freedom.name}" for freedom in unchecked.loses)]))
     return "\n".join([listing(rows), "", table(list(_attempts(found.steps)), ("rule", "leg", "taken", "angle", "why"))])
 
 
