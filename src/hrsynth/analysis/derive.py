@@ -85,6 +85,12 @@ class Derivation(Result, shown_as="derive"):
         return tuple(step.measured(check) for step in self.taken)
 
     @property
+    def equal_where(self) -> tuple[str, ...]:
+        """Conditions under which ρ is the real robot's at any closed configuration of the branch, singular ones included
+        (theory.md, section 4); elsewhere the hidden robot may have more or fewer singularities."""
+        return tuple(dict.fromkeys(each for step in self.taken if step.accepted for each in step.keeps))
+
+    @property
     def dof(self) -> int:
         """The robot's dof."""
         return self.setting.dof
@@ -132,7 +138,7 @@ class Derivation(Result, shown_as="derive"):
             "unchecked_form": self.unchecked and self.unchecked.to_dict(),
             "steps": [{"rule": s.rule, "leg": s.leg, "accepted": s.accepted, "reason": s.reason,
                        "largest_angle": s.largest_angle} for s in self.steps],
-            "certificate": self.certificate.to_dict(), **self.setting.modes_dict(),
+            "certificate": self.certificate.to_dict(), "equal_where": list(self.equal_where), **self.setting.modes_dict(),
         }
 
 

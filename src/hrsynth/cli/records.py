@@ -234,6 +234,7 @@ class Derive(OfRobot, Modes):
     unchecked_form: UncheckedRecord | None
     steps: list[StepRecord]
     certificate: CertificateRecord
+    equal_where: list[str]
     hidden_file: str | None
     report_file: str | None
     certificate_file: str | None
@@ -325,10 +326,12 @@ class DistancesRecord(TypedDict):
 
 
 class PostureRecord(KindsRecord):
-    """Everything about one configuration; ``beyond`` names the joints that are beyond their limits there."""
+    """Everything about one configuration; ``beyond`` names the joints that are beyond their limits there, ``flat_wrists``
+    S joints made of several R whose axes nearly lie in a plane, and the angle to it (rad)."""
 
     pose: PoseRecord
     beyond: list[str]
+    flat_wrists: dict[str, float]
     mobility: MobilityRecord
     dof: int
     rank_M: int
