@@ -16,7 +16,7 @@ from itertools import combinations, islice
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
+from scipy.optimize import brentq, least_squares
 
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.geometry.vectors import Array, hat, inverse, perpendicular, pose, rotation_about, unit
@@ -24,12 +24,15 @@ from hrsynth.kinematics.locked import rezero
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.model import JointType, Mechanism
+from hrsynth.rewrite.rule import AXES, LOOPS
+from hrsynth.rewrite.rules import leg_removal, pi_form, rules
 from hrsynth.rewrite.state import State, VirtualChain
+from hrsynth.rewrite.strategy import Rewriting
 from hrsynth.tolerances import SAME_RELATION
 from kinematics.robots import walked
 from oracle import GAP, Oracle, Undecided, same_relation, span, split_rank
 from rewrite.test_rules import lifted, simplified
-from strategies import deltas, pods, random_normal
+from strategies import deltas, pods, random_direction, random_normal
 
 Poses = dict[str, Array]
 """The pose (4, 4) of each link."""
@@ -89,12 +92,13 @@ def reached(rng: np.random.Generator, draw: Callable[[np.random.Generator], Pose
 
 
 def crossing(rng: np.random.Generator, draw: Callable[[np.random.Generator], Array],
-             at: Callable[[Array], Poses | None], value: Callable[[Poses], float]) -> Poses:
+             at: Callable[[Array], Poses | None], value: Callable[[Array], float]) -> Poses:
     """A configuration at which a value vanishes, between two of other signs; raises ``NoCase``."""
-    known = [(x, value(found)) for x in (draw(rng) for _ in range(300)) if (found := at(x)) is not None]
+    known = [(x, value(x)) for x in (draw(rng) for _ in range(300)) if at(x) is not None]
     for (one, before), (other, after) in combinations(known, 2):
         if before * after < 0 and all(at(one + s * (other - one)) is not None for s in np.linspace(0, 1, 9)):
-            s = brentq(lambda s: value(at(one + s * (other - one))), 0, 1, xtol=1e-15, rtol=1e-15)  # type: ignore[arg-type]
+            way = other - one
+            s = brentq(lambda s, one=one, way=way: value(one + s * way), 0, 1, xtol=1e-15, rtol=1e-15)
             return at(one + s * (other - one))  # type: ignore[return-value]
     raise NoCase
 
@@ -193,14 +197,41 @@ class Delta:
         v = along * unit(w) + np.sqrt(l1 - along**2) * (rotation_about(unit(w), rng.uniform(0, 2 * np.pi)) @ start)
         return self.at(v - c, angles)
 
-    def couples(self, at: Poses) -> float:
+    def direction(self, k: int, p: Array) -> Array | None:
+        """u of a leg; None out of reach."""
+        angle = self.angle(k, p)
+        return None if angle is None else unit(self.rod(k, angle, p))
+
+    def couples(self, p: Array) -> float:
         """det of the couples that the three pairs of rods transmit: zero where the platform can turn."""
-        found = []
-        for k in self.legs:
-            link = self.robot.links[f"rod_{k}a"]
-            u = at[link.name][:3, :3] @ link.pose[:3, :3].T @ unit(np.subtract(*self.ends[k][0][::-1]))
-            found.append(unit(np.cross(self.side(k), u)))
-        return float(np.linalg.det(found))
+        u = {k: self.direction(k, p) for k in self.legs}
+        return float(np.linalg.det([unit(np.cross(self.side(k), u[k])) for k in self.legs]))
+
+    def released(self, rng: np.random.Generator) -> Poses | None:
+        """Legs 1 and 2, their ends changed, no longer keep the platform from turning, leg 3 does: the couples of their
+        rods, along side × u, and the moments of the U at their ends, along u less its part along their outer axes, are
+        normal to the axis of the turn. So the axis says what u is."""
+        hidden = simplified(ObservedRobot.of(self.robot, ("1", "2"), samples=3)).state
+        outer = {chain.leg: hidden.mechanism.joints[chain.actuator].axes[0] for chain in hidden.chains}
+
+        def ends(x: Array) -> Array:
+            """Where legs 1 and 2 have the platform with arms at x[:2], if it is to turn about x[2:]."""
+            found = []
+            for k in (1, 2):
+                W, B = self.ends[k][0]
+                D, o = turn(self.hinge[k].axis, x[k - 1], self.hinge[k].point), outer[str(k)]
+                u = np.cross(np.cross(x[2:], self.side(k)), x[2:] - (x[2:] @ o) * o)
+                found.append(D[:3, :3] @ W + D[:3, 3] + np.linalg.norm(B - W) * np.sign(u @ (B - W)) * unit(u) - B)
+            return np.array(found)
+
+        for _ in range(10):
+            start = np.r_[rng.uniform(-1, 1, 2), random_direction(rng)]
+            x = least_squares(lambda x: ends(x)[0] - ends(x)[1], start, xtol=1e-15, ftol=1e-15, gtol=1e-15,
+                              max_nfev=60).x
+            one, other = ends(x)
+            if np.linalg.norm(one - other) < 1e-14 and (at := self.at(one, {1: x[0], 2: x[1]})) is not None:
+                return at
+        raise NoCase
 
 
 def delta(rng: np.random.Generator, observe: tuple[str, ...], kind: str) -> Case:
@@ -326,13 +357,13 @@ class Planar:
         c = bend(rng.uniform(-1, 1)) @ self.crank[2]
         return self.along(rng, 2, c, unit(c) * np.linalg.norm(self.rod[2]))
 
-    def normals(self, at: Poses) -> float:
+    def normals(self, x: Array) -> float:
         """det of the lines through the tips along the cranks: zero where they meet in a point."""
         rows = []
         for k in range(3):
-            D = at[f"crank_{k + 1}"]
-            c = D[:2, :2] @ self.crank[k]
-            B = at["platform"][:2, :2] @ self.tip[k] + at["platform"][:2, 3]
+            leg = self.leg(k, x)
+            assert leg is not None
+            c, B = leg[0], bend(x[2]) @ self.tip[k] + x[:2]
             rows.append([*c, B[0] * c[1] - B[1] * c[0]])
         return float(np.linalg.det(rows))
 
@@ -392,9 +423,9 @@ class Pod:
         wanted = self.foot[k].point + rng.uniform(0.8, 1.5) * direction
         return np.r_[x[:3] + R.T @ (wanted - now), x[3:]]
 
-    def planes(self, at: Poses) -> float:
+    def planes(self, x: Array) -> float:
         """The determinant of the speeds of tips 1 to 3 along their legs."""
-        D = at["platform"] @ inverse(self.robot.links["platform"].pose)
+        D = self.moved(x)
         B = [D[:3, :3] @ self.tip[k] + D[:3, 3] for k in (1, 2, 3)]
         u = [unit(B[k - 1] - self.foot[k].point) for k in (1, 2, 3)]
         b = [B[(i + 1) % 3] - B[i] for i in range(3)]
@@ -547,7 +578,73 @@ def apart(one: Seen, other: Seen) -> float:
     return max(same_relation(one.relation, other.relation), same_relation(one.lost, other.lost), loose)
 
 
-# --- the law ------------------------------------------------------------------------------------------------------------
+# --- the conditions ---------------------------------------------------------------------------------------------------
+
+def full_loops(setting: ObservedRobot, hidden: State, at: Poses) -> bool:
+    """Whether the real robot has the mobility that it has at its samples."""
+    real = setting.mechanism
+    return Oracle(real).mobility(np.array([at[n] for n in real.links])) == setting.mobility.total
+
+
+def out_of_plane(setting: ObservedRobot, hidden: State, at: Poses) -> bool:
+    """Whether no u lies in the plane of the axes of its U̲, or along that of its R̲."""
+    state = dict(zip(hidden.mechanism.links, stand(hidden, setting.mechanism, at), strict=True))
+    for chain in hidden.chains:
+        joint, real = hidden.mechanism.joints[chain.actuator], setting.mechanism.links[chain.link]
+        u = at[chain.link][:3, :3] @ real.pose[:3, :3].T @ chain.direction
+        axes = [joint.axes[0]]
+        for axis in joint.axes[1:]:
+            own = hidden.mechanism.links[joint.successor].pose
+            axes.append(state[joint.successor][:3, :3] @ own[:3, :3].T @ axis)
+        if np.linalg.svd(np.array([*axes, u]))[1][-1] < 1e-6:
+            return False
+    return True
+
+
+def not_flat(setting: ObservedRobot, hidden: State, at: Poses) -> bool:
+    """Whether in each new parallelogram the cranks are not along the line of their feet."""
+    mechanism = hidden.mechanism
+    state = dict(zip(mechanism.links, stand(hidden, setting.mechanism, at), strict=True))
+    for chain in hidden.chains:
+        feet, crank = [], np.zeros(3)
+        for joint in mechanism.joints_of(chain.carrier):
+            link = joint.other(chain.carrier)
+            for base in mechanism.joints_of(link):
+                if mechanism.base in base.links and base.type is JointType.REVOLUTE and link != chain.link:
+                    D = state[link] @ inverse(mechanism.links[link].pose)
+                    radius = joint.point - base.point
+                    crank = D[:3, :3] @ (radius - (radius @ base.axis) * base.axis)
+                    feet.append(base.point - (base.point @ base.axis) * base.axis)
+        if len(feet) == 2 and np.linalg.norm(np.cross(unit(feet[1] - feet[0]), unit(crank))) < 1e-6:
+            return False
+    return True
+
+
+def spanned(setting: ObservedRobot, hidden: State, at: Poses) -> bool:
+    """Whether each removed leg, by itself, allows the platform all that the rest allows it."""
+    real, length = setting.mechanism, setting.samples.twin.length
+    rest = Oracle(hidden.mechanism)
+    state = stand(hidden, real, at)
+    allowed = rest.twist(rest.kernel(state)[0], real.platform)
+    for label in hidden.removed:
+        leg = setting.anatomy.leg(label)
+        part = Mechanism.of("leg", [real.links[n] for n in real.links if n in {*leg.links, real.base, leg.attach}],
+                            [real.joints[n] for n in leg.joints], base=real.base, platform=leg.attach)
+        alone = Oracle(part)
+        own = alone.twist(alone.kernel(np.array([at[n] for n in part.links]))[0], leg.attach)
+        scale = np.repeat([1 / length, 1.0], 3)[:, None]
+        one, other = span(scale * own), span(scale * allowed)
+        if np.linalg.norm(other - one @ (one.T @ other)) > SAME_RELATION:
+            return False
+    return True
+
+
+CONDITIONS = {LOOPS: full_loops, AXES: out_of_plane, pi_form.RULE.keeps[0]: not_flat,
+              leg_removal.RULE.keeps[0]: spanned}
+"""Each condition in words, and whether it holds for a hidden robot where the real one's links are at some poses."""
+
+
+# --- the law ---------------------------------------------------------------------------------------------------------
 
 ALL = ("1", "2", "3")
 KINDS: dict[str, tuple[str, Callable[[np.random.Generator], Case]]] = {
@@ -556,6 +653,7 @@ KINDS: dict[str, tuple[str, Callable[[np.random.Generator], Case]]] = {
     "removed leg stretched, Delta": ("leg removal", partial(delta, observe=ALL[:2], kind="stretched")),
     "removed leg stretched, 3-RRR": ("leg removal", partial(planar, observe=ALL[:2], kind="stretched")),
     "removed leg along the first axis of its U": ("leg removal", partial(pod, kind="removed")),
+    "the rest lets the platform turn": ("leg removal", partial(delta, observe=ALL[:2], kind="released")),
     "platform can turn": ("end change", partial(delta, observe=ALL[:2], kind="couples")),
     "own parallelogram flat, ΠRR": ("anchor locus", partial(planar, observe=ALL, kind="flat_loop", first="ΠRR")),
     "own parallelogram flat, ΠPR": ("direction locus", partial(planar, observe=ALL, kind="flat_loop", first="ΠPR")),
@@ -565,12 +663,44 @@ KINDS: dict[str, tuple[str, Callable[[np.random.Generator], Case]]] = {
 """What fails, the rule whose condition that is, and robots with such a configuration."""
 
 
-def case_of(make: Callable[[np.random.Generator], Case], seed: int) -> Case:
-    """A robot of a kind that has the configurations."""
-    rng = np.random.default_rng(seed)
-    for _ in range(60):
+MEMBERS = [(kind, seed) for seed in range(19) for kind in KINDS][:200]
+
+
+def derived_case(kind: str, seed: int) -> tuple[Case, ObservedRobot, Rewriting]:
+    """The first random robot of a kind that has the configurations, and for which the rule is accepted."""
+    rng, (rule, make) = np.random.default_rng(seed), KINDS[kind]
+    for _ in range(200):
         try:
-            return make(rng)
+            case = make(rng)
         except NoCase:
             continue
+        setting = ObservedRobot.of(case.robot, case.observe, samples=3)
+        found = simplified(setting)
+        if any(step.rule == rule and step.accepted for step in found.steps):
+            return case, setting, found
     raise AssertionError("no robot of this kind")
+
+
+@pytest.mark.some(4, 22)
+@pytest.mark.parametrize(("kind", "seed"), MEMBERS)
+def test_the_relation_is_kept_where_the_conditions_hold(kind: str, seed: int) -> None:
+    """The lift is the real robot at each configuration but where u is along e₁, the simplified robot where all that
+    its rules ask for holds; where a rule's condition fails, it differs."""
+    case, setting, found = derived_case(kind, seed)
+    real, lift, hidden = setting.mechanism, lifted(setting), found.state
+    asked = {each for step in found.steps if step.accepted for each in step.keeps}
+
+    def at(poses: Poses) -> list[float]:
+        """How far lift and simplified robot are from the real one."""
+        ours = seen(real, np.array([poses[name] for name in real.links]), setting)
+        return [apart(ours, seen(other.mechanism, stand(other, real, poses), setting, other))
+                for other in (lift, hidden)]
+
+    for poses in case.holds:
+        assert all(CONDITIONS[each](setting, hidden, poses) for each in asked)
+        assert max(at(poses)) < SAME_RELATION
+    (rule,) = (each for each in rules() if each.name == KINDS[kind][0])
+    assert not all(CONDITIONS[each](setting, hidden, case.fails) for each in rule.keeps)
+    one, other = at(case.fails)
+    assert (one > DIFFERENT) if rule.name == "lift" else (one < SAME_RELATION)
+    assert other > DIFFERENT

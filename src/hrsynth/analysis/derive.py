@@ -86,7 +86,7 @@ class Derivation(Result, shown_as="derive"):
 
     @property
     def equal_where(self) -> tuple[str, ...]:
-        """Conditions under which ρ is the real robot's at any closed configuration of the branch, singular ones included
+        """Conditions under which ρ is the real robot's at a closed configuration of the branch, be it singular
         (theory.md, section 4); elsewhere the hidden robot may have more or fewer singularities."""
         return tuple(dict.fromkeys(each for step in self.taken if step.accepted for each in step.keeps))
 

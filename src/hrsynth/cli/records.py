@@ -326,8 +326,8 @@ class DistancesRecord(TypedDict):
 
 
 class PostureRecord(KindsRecord):
-    """Everything about one configuration; ``beyond`` names the joints that are beyond their limits there, ``flat_wrists``
-    S joints made of several R whose axes nearly lie in a plane, and the angle to it (rad)."""
+    """Everything about one configuration; ``beyond`` names the joints that are beyond their limits there,
+    ``flat_wrists`` S joints made of several R whose axes nearly lie in a plane, and the angle to it (rad)."""
 
     pose: PoseRecord
     beyond: list[str]

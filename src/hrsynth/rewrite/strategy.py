@@ -42,8 +42,8 @@ Check = Callable[[Mechanism, tuple[str, ...]], Comparison]
 class Step:
     """One attempt: the rule, the leg (None: all), whether it was accepted, why, and the angle if it was measured;
     ``state`` is what an accepted rewriting left behind, ``always`` whether the rule holds for every robot, ``keeps``
-    where it keeps ρ at singular configurations too, ``bodies`` the links, besides the platform, whose twists must not change, ``taken_back`` whether it served only for a proposal
-    that was not kept."""
+    where it keeps ρ at singular configurations too, ``bodies`` the links, besides the platform, whose twists must not
+    change, ``taken_back`` whether it served only for a proposal that was not kept."""
 
     rule: str
     leg: str | None
