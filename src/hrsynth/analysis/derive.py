@@ -169,8 +169,8 @@ def derive(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None
     exact = exact_architecture(setting).verdict(setting.observed)
     evidence = Evidence(anatomy, samples)
 
-    for unchecked in (OBSERVED_STAGES, ()):
-        result = FORMS[form](Rewriting.of(evidence, _check(samples, STEP_SAMPLES), unchecked))
+    for trusted in (OBSERVED_STAGES, ()):
+        result = FORMS[form](Rewriting.of(evidence, _check(samples, STEP_SAMPLES), trusted))
         hidden, certificate = _certify(setting, result.state, samples)
         if hidden is not None and certificate.passed and result.virtual_only:
             break
