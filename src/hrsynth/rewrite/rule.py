@@ -16,7 +16,7 @@ from .evidence import Evidence
 from .state import State, VirtualChain
 
 LOOPS = "the robot's loops have their generic rank"
-AXES = "no observed direction lies in the plane of its actuator's axes"
+AXES = "no virtual chain is singular: no observed direction lies in the plane of its actuator's axes"
 """Conditions under which several rules keep ρ at singular configurations too (docs/pages/theory.md, section 4)."""
 
 Place = TypeVar("Place")
