@@ -132,9 +132,9 @@ plt.show()
 # A machine with that geometry is loose only in this orientation of its platform. Worse are robots that move like this
 # at *every* pose (*architecturally singular*, O. Ma and J. Angeles, 1992). A Gough-Stewart platform whose base and
 # platform are plane and similar is one if its six joints lie on a conic. Let (x, y) be a base point and
-# t + s R (x, y, 0) the platform's. Each Plücker coordinate of the leg's line is then a sum of multiples of 1, x, y, x², xy, y², the
-# same ones for all legs. On a conic these six are dependent, hence the six lines as well. Similar hexagons with corners
-# anywhere are not enough. The smallest singular value of the six lines, over random poses:
+# t + s R (x, y, 0) the platform's. Each Plücker coordinate of the leg's line is then a sum of multiples of 1, x, y,
+# x², xy, y², the same ones for all legs. On a conic these six are dependent, hence the six lines as well. Similar
+# hexagons with corners anywhere are not enough. The smallest singular value of the six lines, over random poses:
 
 # %%
 rng = np.random.default_rng(1)

@@ -376,7 +376,7 @@ def split(mechanism: Mechanism, rng: Rng, kinds: Collection[str] = SPLITS) -> Me
         axes: tuple[Array, ...] = tuple(random_rotation(rng).T)
     else:
         axes = joint.axes if kind == "universal" else joint.axes * 2
-    return _serial(mechanism, rng, joint, axes)
+    return serial(mechanism, rng, joint, axes)
 
 
 def oblique(mechanism: Mechanism, rng: Rng, name: str, angles: Sequence[float]) -> Mechanism:
@@ -386,10 +386,10 @@ def oblique(mechanism: Mechanism, rng: Rng, name: str, angles: Sequence[float]) 
     for angle in angles:
         axes.append(rotation_about(normal, angle) @ axes[-1])
         normal = rotation_about(axes[-1], rng.uniform(0.5, 2.5)) @ normal
-    return _serial(mechanism, rng, mechanism.joints[name], axes)
+    return serial(mechanism, rng, mechanism.joints[name], axes)
 
 
-def _serial(mechanism: Mechanism, rng: Rng, joint: Joint, axes: Sequence[Array]) -> Mechanism:
+def serial(mechanism: Mechanism, rng: Rng, joint: Joint, axes: Sequence[Array]) -> Mechanism:
     """A joint replaced by R joints at its centre, through bare links; the last one closes the loop if it did."""
     last = len(axes) - 1
     names = [mechanism.fresh(f"{joint.name}__{k + 1}") for k in range(last + 1)]

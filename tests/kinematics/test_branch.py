@@ -280,6 +280,37 @@ def test_a_triangle_does_not_move() -> None:
         ObservedRobot.of(b.build("plate"), samples=2)
 
 
+def equal_rods(feet: Array, along: Array) -> Mechanism:
+    """A plate on equal parallel rods from these feet."""
+    b = Builder("equal_rods")
+    b.link("base")
+    b.link("plate", at=along)
+    for k, foot in enumerate(feet):
+        b.link(f"rod_{k}", at=foot)
+        b.joint(f"u_{k}", "U", "base", f"rod_{k}", at=foot, axis=(1, 0, 0), axis2=np.cross(along, [1, 0, 0]))
+        b.joint(f"s_{k}", "S", f"rod_{k}", "plate", at=foot + along, loop=k > 0)
+    return b.build("plate")
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_three_equal_parallel_rods_turn_their_plate(seed: int) -> None:
+    """They lie on a circular cylinder, about whose axis rods turn by any angle; other four do not."""
+    rng, along = np.random.default_rng(seed), np.array([0.3, 0.1, 0.8])
+    feet = np.c_[rng.normal(size=(4, 2)), np.zeros(4)]
+    assert ObservedRobot.of(equal_rods(feet[:3], along), samples=2).dof == 3
+    u, length = along / np.linalg.norm(along), float(np.linalg.norm(along))
+    across = feet - np.outer(feet @ u, u)
+    sides = across[1:3] - across[0]
+    centre = across[0] + np.linalg.solve(np.vstack([sides, u]), [*(np.sum(sides**2, axis=1) / 2), 0])
+    radius = float(np.linalg.norm(across[0] - centre))
+    angle = 0.5 * length / radius
+    R = Rotation.from_rotvec(angle * u).as_matrix()
+    shift = centre - R @ centre + np.sqrt(length**2 - (2 * radius * np.sin(angle / 2))**2) * u
+    ends = np.linalg.norm(feet @ R.T + shift - feet, axis=1)
+    np.testing.assert_allclose(ends[:3], length, rtol=1e-12)
+    assert abs(ends[3] - length) > 1e-4 * length
+
+
 @pytest.mark.slow
 @pytest.mark.some(1)
 @pytest.mark.parametrize(("rods", "seed"), [(5, 1), (6, 1)])
@@ -288,14 +319,7 @@ def test_equal_parallel_rods_do_not_turn_their_plate(rods: int, seed: int) -> No
     the nearest with rods of this length is not turned."""
     feet = np.c_[np.random.default_rng(seed).normal(size=(rods, 2)), np.zeros(rods)]
     along = np.array([0.3, 0.1, 0.8])
-    b = Builder("equal_rods")
-    b.link("base")
-    b.link("plate", at=along)
-    for k, foot in enumerate(feet):
-        b.link(f"rod_{k}", at=foot)
-        b.joint(f"u_{k}", "U", "base", f"rod_{k}", at=foot, axis=(1, 0, 0), axis2=np.cross(along, [1, 0, 0]))
-        b.joint(f"s_{k}", "S", f"rod_{k}", "plate", at=foot + along, loop=k > 0)
-    robot = b.build("plate")
+    robot = equal_rods(feet, along)
     twin = PinocchioModel(robot)
     assert ClosedConfiguration.of(twin, twin.q0).kernel()[0].shape[1] == 3
     with pytest.raises(Shaky, match="mobility 3, but it can move on in only 2 ways"):

@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from hrsynth.analysis.check import check
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.batch.reach import reach
 from hrsynth.errors import PoseNotReached
@@ -18,7 +19,7 @@ from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.normal import normal_form
 from hrsynth.mechanism.pose import Pose
-from strategies import oblique, pods, random_direction, random_rotation, transformed
+from strategies import oblique, pods, random_direction, random_rotation, serial, transformed
 
 Rng = np.random.Generator
 
@@ -190,3 +191,19 @@ def test_a_way_ends_where_the_three_axes_turn_no_further(seed: int) -> None:
             assert f"joint {name}, which stands for several R" in str(here)
         count[isinstance(here, ClosedConfiguration)] += 1
     assert min(count.values()) > 0
+
+
+@pytest.mark.parametrize("apart", [2e-3, 9e-3, 0.3])
+def test_check_says_where_three_axes_lie_in_a_plane(apart: float) -> None:
+    """Three R with perpendicular neighbours make every turn, but lose one where the outer two are parallel; the S that
+    stands for them does not, and `check` names it."""
+    rng = np.random.default_rng(3)
+    free = pods(["RPS", *["UPS"] * 4], rng, square=True)
+    first, second, _ = random_rotation(rng).T
+    axes = [first, second, rotation_about(second, apart) @ first]
+    found = check(serial(free, rng, free.joints["tip_1"], axes))
+    assert np.linalg.svd(np.array(axes), compute_uv=False)[-1] == pytest.approx(apart / np.sqrt(2), rel=1e-1)
+    (posture,) = found.postures
+    assert not posture.beyond
+    assert posture.flat_wrists == ({"tip_1__1": pytest.approx(apart, abs=1e-9)} if apart < 0.01 else {})
+    assert ("in two ways: not counted" in str(found)) is (apart < 0.01)

@@ -102,7 +102,8 @@ def check(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None,
     ``grid``.
 
     Statements about the hidden robot are read from the real robot's relation with the observed directions, which is
-    also the hidden robot's (theory.md 3); those about the real robot take its motors' coordinates as what is measured.
+    that of the exact lift at every closed configuration (theory.md 3), not from the form that ``derive`` gives; those
+    about the real robot take its motors' coordinates as what is measured.
     Generic values are those of random samples. ``observe`` and ``camera`` are as for ``derive``.
 
     Of several poses, those out of reach are listed in ``unreached``. Raises ``BadRequest`` for unknown names and for

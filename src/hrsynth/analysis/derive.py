@@ -84,6 +84,12 @@ class Derivation(Result, shown_as="derive"):
         return tuple(step.measured(check) for step in self.taken)
 
     @property
+    def equal_where(self) -> tuple[str, ...]:
+        """Conditions under which ρ is the real robot's at a closed configuration of the branch, be it singular
+        (theory.md, section 4); elsewhere the hidden robot may have more or fewer singularities."""
+        return tuple(dict.fromkeys(each for step in self.taken if step.accepted for each in step.keeps))
+
+    @property
     def dof(self) -> int:
         """The robot's dof."""
         return self.setting.dof
@@ -129,7 +135,8 @@ class Derivation(Result, shown_as="derive"):
             "unchecked_form": self.unchecked and self.unchecked.to_dict(),
             "steps": [{"rule": s.rule, "leg": s.leg, "accepted": s.accepted, "reason": s.reason,
                        "largest_angle": s.largest_angle} for s in self.steps],
-            "certificate": self.certificate.to_dict(), **self.setting.modes_dict(),
+            "certificate": self.certificate.to_dict(), "equal_where": list(self.equal_where),
+            **self.setting.modes_dict(),
         }
 
 
@@ -160,8 +167,8 @@ def derive(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None
     exact = exact_architecture(setting).verdict(setting.observed)
     evidence = Evidence(anatomy, samples)
 
-    for unchecked in (OBSERVED_STAGES, ()):
-        result = FORMS[form](Rewriting.of(evidence, _check(samples, STEP_SAMPLES), unchecked))
+    for trusted in (OBSERVED_STAGES, ()):
+        result = FORMS[form](Rewriting.of(evidence, _check(samples, STEP_SAMPLES), trusted))
         hidden, certificate = _certify(setting, result.state, samples)
         if hidden is not None and certificate.passed and result.virtual_only:
             break

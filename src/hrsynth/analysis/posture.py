@@ -11,7 +11,7 @@ import numpy as np
 from ..budgets import REMEMBERED
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
-from ..kinematics.limits import outside
+from ..kinematics.limits import flat_wrists, outside
 from ..kinematics.relation import Relation, relation, relation_of
 from ..mechanism.pose import Pose
 from ..results import Value
@@ -115,6 +115,12 @@ class Posture(Value):
         """The joints that are beyond their limits."""
         return tuple(outside(self.configuration.twin, self.configuration.q))
 
+    @cached_property
+    def flat_wrists(self) -> dict[str, float]:
+        """S joints that stand for several R which are (nearly, rad) at a singularity of their own, which the S does not
+        have (docs/pages/theory.md, section 1)."""
+        return flat_wrists(self.configuration.twin, self.configuration.q)
+
     @property
     def gap(self) -> float:
         """The smallest gap of all ranks."""
@@ -133,7 +139,7 @@ class Posture(Value):
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
         hidden = self.hidden.to_dict()
-        return {"pose": self.pose.to_dict(), "beyond": list(self.beyond),
+        return {"pose": self.pose.to_dict(), "beyond": list(self.beyond), "flat_wrists": self.flat_wrists,
                 "mobility": {"total": self.mobility.total, "idle": self.mobility.idle}, "dof": self.dof,
                 "rank_M": hidden.pop("rank"), **hidden, "condition": self.distances.condition,
                 "real": self.real and self.real.to_dict(),

@@ -237,6 +237,7 @@ class Derive(OfRobot, Modes):
     unchecked_form: UncheckedRecord | None
     steps: list[StepRecord]
     certificate: CertificateRecord
+    equal_where: list[str]
     hidden_file: str | None
     report_file: str | None
     certificate_file: str | None
@@ -328,10 +329,12 @@ class DistancesRecord(TypedDict):
 
 
 class PostureRecord(KindsRecord):
-    """Everything about one configuration; ``beyond`` names the joints that are beyond their limits there."""
+    """Everything about one configuration; ``beyond`` names the joints that are beyond their limits there,
+    ``flat_wrists`` S joints made of several R whose axes nearly lie in a plane, and the angle to it (rad)."""
 
     pose: PoseRecord
     beyond: list[str]
+    flat_wrists: dict[str, float]
     mobility: MobilityRecord
     dof: int
     rank_M: int
@@ -477,9 +480,9 @@ class Singular(OfRobot, WrittenTo):
 
 
 class FurtherRecord(TypedDict):
-    """A measurement that could be added. An encoder has `actuated`, and as its `axis` the word for the coordinate that it
-    reads (null if there is only one); others have the `link`, and a point `at` (m) and an `axis` in its frame (null if
-    there are none)."""
+    """A measurement that could be added. An encoder has `actuated`, and as its `axis` the word for the coordinate that
+    it reads (null if there is only one); others have the `link`, and a point `at` (m) and an `axis` in its frame (null
+    if there are none)."""
 
     kind: Literal["leg", "direction", "line", "encoder", "offered"]
     of: Annotated[str, "the leg, the link, the joint, or the words of --see"]
@@ -1136,8 +1139,8 @@ class LoopEndsRecord(TypedDict):
 
 
 class CandidateRecord(TypedDict):
-    """A set of legs; null for what was not computed. Each error is an upper bound, too large by at most its gap (relative
-    to what is attained)."""
+    """A set of legs; null for what was not computed. Each error is an upper bound, too large by at most its gap
+    (relative to what is attained)."""
 
     legs: list[str]
     verdict: Word

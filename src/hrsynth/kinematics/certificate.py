@@ -1,4 +1,4 @@
-"""The certificate: a hidden robot follows the real one and has the same relation ρ.
+"""The certificate: at generic configurations a hidden robot follows the real one and has the same relation ρ.
 
 Source: docs/pages/theory.md, section 5.
 """

@@ -72,13 +72,21 @@ def coordinates(twin: PinocchioModel, q: Array) -> dict[str, float]:
 
 def wrist_margins(twin: PinocchioModel, q: Array) -> dict[str, float]:
     """How far each wrist is from the nearer end of its interval (rad); negative beyond it."""
+    return {name: _carried(twin, q, name, wrist).margin() for name, wrist in twin.mechanism.wrists.items()}
+
+
+def flat_wrists(twin: PinocchioModel, q: Array) -> dict[str, float]:
+    """Spherical joints that stand for several R whose axes nearly lie in a plane, where they turn in two ways only, and
+    how far they are from it (rad)."""
+    every = {name: _carried(twin, q, name, joint.wrist).flatness()
+             for name, joint in twin.mechanism.joints.items() if joint.wrist is not None}
+    return {name: flatness for name, flatness in every.items() if flatness < AT_END}
+
+
+def _carried(twin: PinocchioModel, q: Array, name: str, wrist: Wrist) -> Wrist:
     mechanism = twin.mechanism
-    found = {}
-    for name, wrist in mechanism.wrists.items():
-        turns = (twin.pose(q, link)[:3, :3] @ mechanism.links[link].pose[:3, :3].T
-                 for link in mechanism.joints[name].links)
-        found[name] = wrist.carried(*turns).margin()
-    return found
+    return wrist.carried(*(twin.pose(q, link)[:3, :3] @ mechanism.links[link].pose[:3, :3].T
+                           for link in mechanism.joints[name].links))
 
 
 def wrists_beyond(twin: PinocchioModel, q: Array) -> list[str]:

@@ -116,7 +116,8 @@ def _parts(joint: Joint, near: str) -> list[Part]:
     point, name = np.asarray(seen.point), (joint.name,)
     one = (*name, "") if joint.type.freedoms > 1 else name
     if joint.type is JointType.SPHERICAL:
-        return [Part(False, point, None, name, limit=seen.wrist)]
+        limit = seen.wrist if seen.wrist is not None and seen.wrist.limits else None
+        return [Part(False, point, None, name, limit=limit)]
     return [Part(kind is JointType.PRISMATIC, point, axis, one) for kind, axis in elementary(joint.type, seen.axes)]
 
 

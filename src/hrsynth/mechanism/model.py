@@ -118,7 +118,7 @@ class Joint(Value):
     xml: tuple[str, ...] = ()
     line: int | None = field(default=None, compare=False)
     wrist: Wrist | None = None
-    """What limits a spherical joint that stands for several R (normal form)."""
+    """The turns of a spherical joint that stands for several R, where they are limited or of three R (normal form)."""
     turns: tuple[tuple[str, Limits | None], ...] = ()
     """Names and limits of the two R that a U stands for, in the order of its axes (normal form)."""
     offset: Array | None = None
@@ -364,7 +364,8 @@ class Mechanism(Result, shown_as="robot"):
     @cached_property
     def wrists(self) -> dict[str, Wrist]:
         """The spherical joints that cannot make every turn."""
-        return {name: joint.wrist for name, joint in self.joints.items() if joint.wrist is not None}
+        return {name: joint.wrist for name, joint in self.joints.items()
+                if joint.wrist is not None and joint.wrist.limits}
 
     @cached_property
     def length(self) -> float:

@@ -178,17 +178,20 @@ def _wrist(*joints: Joint) -> Wrist | None:
     """What turns several joints about one centre, one after the other, cannot make together."""
     ends: tuple[Array, Array] | None = None
     span: Interval = 0.0, 0.0
+    count = 0
     for joint in joints:
         if joint.axes:
             angle = angle_between(joint.axes[0], joint.axes[-1])
             first, last, own = joint.axes[0], joint.axes[-1], (angle, angle)
         elif joint.wrist is not None:
             first, last, own = joint.wrist.first, joint.wrist.last, (joint.wrist.low, joint.wrist.high)
+            count += joint.wrist.count
         else:
             return None
         span = own if ends is None else chain_arcs(span, angle_between(ends[1], first), own)
         ends = (first if ends is None else ends[0]), last
-    return None if ends is None else Wrist.of(*ends, span)
+        count += len(joint.axes)
+    return None if ends is None else Wrist.of(*ends, span, count)
 
 
 def _triple(mechanism: Mechanism, a: Joint, b: Joint, c: Joint) -> Joint | None:

@@ -22,18 +22,25 @@ Interval = tuple[float, float]
 class Wrist(Value):
     """A spherical joint that stands for turns about axes through its centre: the ``first``, fixed in the predecessor,
     and the ``last``, fixed in the successor, unit vectors at the zero configuration, are ``low`` to ``high`` (rad)
-    apart. At an end of the interval the axes lie in a plane, and the turns lose a freedom."""
+    apart. Where ``count`` axes are three, they lie in a plane at an end of the interval, and the turns lose a freedom;
+    of more axes, only at an end that limits them."""
 
     first: Array
     last: Array
     low: float
     high: float
+    count: int = 3
 
     @classmethod
-    def of(cls, first: Array, last: Array, interval: Interval) -> Wrist | None:
-        """None where every turn can be made."""
-        wrist = cls(first, last, *interval)
-        return wrist if wrist.lower is not None or wrist.upper is not None else None
+    def of(cls, first: Array, last: Array, interval: Interval, count: int) -> Wrist | None:
+        """None where every turn can be made, and in three ways at all of them."""
+        wrist = cls(first, last, *interval, count)
+        return wrist if wrist.limits or count == 3 else None
+
+    @property
+    def limits(self) -> bool:
+        """Whether there are turns that cannot be made."""
+        return self.lower is not None or self.upper is not None
 
     @property
     def lower(self) -> float | None:
@@ -47,17 +54,23 @@ class Wrist(Value):
 
     def turned(self) -> Wrist:
         """The same with predecessor and successor exchanged."""
-        return Wrist(self.last, self.first, self.low, self.high)
+        return Wrist(self.last, self.first, self.low, self.high, self.count)
 
     def carried(self, predecessor: Array, successor: Array) -> Wrist:
         """With its axes where two links turned by these (3, 3) carry them."""
-        return Wrist(predecessor @ self.first, successor @ self.last, self.low, self.high)
+        return Wrist(predecessor @ self.first, successor @ self.last, self.low, self.high, self.count)
 
     def margin(self) -> float:
         """How far the angle is from the nearer end (rad); negative beyond it."""
         angle = angle_between(self.first, self.last)
         return min(np.inf if self.lower is None else angle - self.lower,
                    np.inf if self.upper is None else self.upper - angle)
+
+    def flatness(self) -> float:
+        """How far the angle is from the nearer end at which the axes lie in a plane (rad)."""
+        angle = angle_between(self.first, self.last)
+        ends = (self.low, self.high) if self.count == 3 else (self.lower, self.upper)
+        return min((abs(angle - end) for end in ends if end is not None), default=np.inf)
 
 
 def chain_arcs(one: Interval, gap: float, other: Interval) -> Interval:

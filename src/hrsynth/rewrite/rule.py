@@ -15,6 +15,10 @@ from typing import Generic, TypeVar
 from .evidence import Evidence
 from .state import State, VirtualChain
 
+LOOPS = "the robot's loops have their generic rank"
+AXES = "no virtual chain is singular: no observed direction lies in the plane of its actuator's axes"
+"""Conditions under which several rules keep ρ at singular configurations too (docs/pages/theory.md, section 4)."""
+
 Place = TypeVar("Place")
 Found = TypeVar("Found")
 
@@ -90,6 +94,9 @@ class Rule(Generic[Place, Found]):
     """Why it is refused where nothing is found at any place of a leg."""
     always: bool = False
     """Whether it holds for every robot: nothing is right where it is not accepted."""
+    keeps: tuple[str, ...] = ()
+    """Where ρ is kept at singular configurations too, of which the certificate has none: sufficient conditions in words
+    (docs/pages/theory.md, section 4); none needed where it is empty."""
 
     def proposals(self, state: State, evidence: Evidence, leg: str = "", *, waive: bool = False
                   ) -> Iterator[Proposal | Refusal]:

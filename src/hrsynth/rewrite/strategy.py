@@ -41,9 +41,9 @@ Check = Callable[[Mechanism, tuple[str, ...]], Comparison]
 @dataclass(frozen=True)
 class Step:
     """One attempt: the rule, the leg (None: all), whether it was accepted, why, and the angle if it was measured;
-    ``state`` is what an accepted rewriting left behind, ``always`` whether the rule holds for every robot, ``bodies``
-    the links, besides the platform, whose twists must not change, ``taken_back`` whether it served only for a proposal
-    that was not kept."""
+    ``state`` is what an accepted rewriting left behind, ``always`` whether the rule holds for every robot, ``keeps``
+    where it keeps ρ at singular configurations too, ``bodies`` the links, besides the platform, whose twists must not
+    change, ``taken_back`` whether it served only for a proposal that was not kept."""
 
     rule: str
     leg: str | None
@@ -52,6 +52,7 @@ class Step:
     largest_angle: float | None
     state: State | None = field(default=None, compare=False, repr=False)
     always: bool = field(default=False, compare=False, repr=False)
+    keeps: tuple[str, ...] = field(default=(), compare=False, repr=False)
     bodies: tuple[str, ...] = field(default=(), compare=False, repr=False)
     taken_back: bool = field(default=False, repr=False)
 
@@ -117,7 +118,7 @@ class Rewriting:
     def _after(self, rule: Rule[Any, Any], leg: str | None, accepted: bool, reason: str, angle: float | None = None,
                proposal: Proposal | None = None) -> Rewriting:
         state, bodies = (proposal.state, proposal.bodies) if accepted and proposal else (None, ())
-        step = Step(rule.name, leg, accepted, reason, angle, state, rule.always, bodies)
+        step = Step(rule.name, leg, accepted, reason, angle, state, rule.always, rule.keeps, bodies)
         return replace(self, state=state or self.state, steps=(*self.steps, step))
 
 

@@ -384,7 +384,8 @@ class Aspects(Value):
 def path(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
          start: PoseLike, goal: PoseLike, seed: int = 0, budget: int = BUDGET) -> PathAnswer:
     """Whether a path without Type 2 singularity of the hidden robot joins two poses (docs/pages/theory.md, section 9).
-    The path passes only through poses at which everything seen has a value, in front of the camera or not.
+    Its condition is that of the real robot's relation, which is the exact lift's (theory.md 3). The path passes only
+    through poses at which everything seen has a value, in front of the camera or not.
 
     Both poses are reached from the zero configuration in its working mode; or, if no small steps lead to a pose that is
     a mode of the other, as ``modes`` found the robot assembled there. The start is meant in these working modes; the

@@ -105,6 +105,7 @@ def singular(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = No
              see: SeeLike = None, real: bool = False, points: int = POINTS, seed: int = 0) -> Singularity:
     """The Type 2 condition of the hidden robot (``real``: of the real robot with its own motors), theory.md 7; MMT 3.3.
 
+    It is computed from the real robot's legs and relation, which are those of the exact lift (theory.md 3).
     Words, expression and rank are compared at ``points`` random reachable poses and at singular poses constructed from
     the expression; raises ``Disagreement`` if they do not agree, ``BadRequest`` if a robot has no motor, or a platform
     that rests while segments of its legs move.

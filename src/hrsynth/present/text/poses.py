@@ -92,6 +92,9 @@ def _posture(posture: Posture, length: float, setting: ObservedRobot) -> Rows:
     mobility, far, dof = posture.mobility, posture.distances, posture.dof
     whose = "bodies have" if setting.mechanism.formation else "platform has"
     rows = [*beyond_limits(posture.beyond),
+            *(("flat wrist", f"the R that make {name} one S are {math.degrees(angle):.2g} degrees from where their "
+               "axes lie in a plane and turn it in two ways: not counted below")
+              for name, angle in posture.flat_wrists.items()),
             ("mobility", f"{mobility.total}, of which {mobility.idle} idle; the {whose} " + (
         "one freedom" if dof == 1 else f"{dof} freedoms")),
             *_kinds("hidden robot", f"the {shown} show {posture.hidden.rank} of {dof}", posture.hidden, "not seen",

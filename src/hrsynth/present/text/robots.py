@@ -89,6 +89,7 @@ def derivation(found: Derivation) -> str:
         *lost_rows(found.verdict), ("at zero", [f"{each} (hrsynth check)" for each in at_zero(found.verdict)]),
         ("", [] if found.verdict.has_interaction_matrix else NO_MATRIX),
         ("certificate", wrap_lines(certificate(found.certificate), LINE - NAMES)),
+        ("equal where", wrap_lines("; ".join(found.equal_where), LINE - NAMES) if hidden else []),
     ]
     if unchecked is not None:
         equivalent = "equivalent" if unchecked.equivalent else "NOT equivalent"

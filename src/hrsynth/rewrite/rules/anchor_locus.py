@@ -12,7 +12,7 @@ from dataclasses import replace
 from ...geometry.vectors import Array
 from ...mechanism import Joint, JointType
 from ..evidence import Evidence
-from ..rule import Match, Rule, Stage, each_chain
+from ..rule import AXES, LOOPS, Match, Rule, Stage, each_chain
 from ..state import State, VirtualChain
 
 Carried = tuple[VirtualChain, str | Array]
@@ -63,4 +63,5 @@ def _sliding(state: State, chain: VirtualChain, axes: Array) -> State:
 
 
 RULE = Rule("anchor locus", "MMT 3.2", Stage.ANCHOR, find, apply, each_chain,
-            otherwise="the anchor moves in space, or the part before the observed link is not a chain of its own")
+            otherwise="the anchor moves in space, or the part before the observed link is not a chain of its own",
+            keeps=(LOOPS, AXES))

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 from ...mechanism import Joint, JointType
 from ..evidence import Evidence
-from ..rule import Match, Rule, Stage, each_chain
+from ..rule import AXES, LOOPS, Match, Rule, Stage, each_chain
 from ..state import State, VirtualChain, ball_to_universal
 
 Beside = tuple[VirtualChain, list[Joint]]
@@ -46,4 +46,4 @@ def apply(state: State, found: Beside) -> State:
     return state.with_chain(chain, chain, mechanism.changed(joints=moved))
 
 
-RULE = Rule("companion", "MMT Fig. 13", Stage.BESIDE, find, apply, each_chain)
+RULE = Rule("companion", "MMT Fig. 13", Stage.BESIDE, find, apply, each_chain, keeps=(LOOPS, AXES))

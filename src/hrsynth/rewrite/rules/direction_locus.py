@@ -12,7 +12,7 @@ from dataclasses import replace
 from ...geometry.vectors import Array
 from ...mechanism import JointType
 from ..evidence import Evidence, locus
-from ..rule import Match, Rule, Stage, each_chain
+from ..rule import AXES, LOOPS, Match, Rule, Stage, each_chain
 from ..state import State, VirtualChain
 
 Turning = tuple[VirtualChain, Array | None]
@@ -45,4 +45,4 @@ def apply(state: State, found: Turning) -> State:
 
 
 RULE = Rule("direction locus", "MMT 3.2, 4.1.1", Stage.DIRECTION, find, apply, each_chain,
-            otherwise="the direction moves in two ways")
+            otherwise="the direction moves in two ways", keeps=(LOOPS, AXES))

@@ -16,7 +16,7 @@ import numpy as np
 from ...geometry.vectors import Array, perpendicular, unit
 from ...mechanism import Joint, JointType
 from ..evidence import Evidence
-from ..rule import Match, Refusal, Rule, Stage, whole_leg
+from ..rule import AXES, LOOPS, Match, Refusal, Rule, Stage, whole_leg
 from ..state import State, VirtualChain, ball_to_universal
 
 OUTER_AXES = ((0.0, 0.0, 0.0), (0, 0, 1), (1, 1, 0), (1, -1, 0), (0, 1, 1), (0, 1, -1), (1, 2, 3), (3, -1, 2))
@@ -90,4 +90,4 @@ def apply(state: State, found: list[LegEnds]) -> State:
     return state
 
 
-RULE = Rule("end change", "MMT 3.2, 4.2.2", Stage.ENDS, find, apply, whole_leg)
+RULE = Rule("end change", "MMT 3.2, 4.2.2", Stage.ENDS, find, apply, whole_leg, keeps=(LOOPS, AXES))

@@ -44,4 +44,5 @@ def apply(state: State, leg: str) -> State:
     return replace(state, mechanism=changed, removed=(*state.removed, leg))
 
 
-RULE = Rule("leg removal", "MMT 4.2", Stage.LEG, find, apply, whole_leg)
+RULE = Rule("leg removal", "MMT 4.2", Stage.LEG, find, apply, whole_leg,
+            keeps=("the wrenches of removed legs are among those of the rest",))

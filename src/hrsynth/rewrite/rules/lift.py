@@ -18,7 +18,7 @@ from ...mechanism.observations.direction import SeenAxis
 from ...mechanism.observations.encoder import Encoder
 from ...mechanism.sights import CameraObservation, VirtualJoint
 from ..evidence import Evidence, ProximalChain
-from ..rule import Match, Rule, Stage, whole_leg
+from ..rule import AXES, Match, Rule, Stage, whole_leg
 from ..state import SensorChain, State, VirtualChain
 
 SEGMENT = ("slide_x", "slide_y", "slide_z", "virtual", "roll"), ("guide_x", "guide_y", "carrier", "bearing")
@@ -121,4 +121,5 @@ def _encode(state: State, seen: Encoder) -> State:
     return replace(state, mechanism=changed, sensors=(*state.sensors, sensor))
 
 
-RULE = Rule("lift", "MMT 3.2, Fig. 2(b)", Stage.LIFT, find, apply, whole_leg, always=True)
+RULE = Rule("lift", "MMT 3.2, Fig. 2(b)", Stage.LIFT, find, apply, whole_leg, always=True,
+            keeps=(AXES,))

@@ -55,4 +55,4 @@ def apply(state: State, found: Circling) -> State:
                             {link.name: chain.leg for link in links})
 
 
-RULE = Rule("pi form", "MMT Fig. 4(c)", Stage.FORM, find, apply, each_chain)
+RULE = Rule("pi form", "MMT Fig. 4(c)", Stage.FORM, find, apply, each_chain, keeps=("no Π is flat",))

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ..evidence import Evidence
-from ..rule import Match, Refusal, Rule, Stage, each_chain
+from ..rule import AXES, Match, Refusal, Rule, Stage, each_chain
 from ..state import State, VirtualChain
 from .takeover import Substitution, apply, substitution
 
@@ -19,4 +19,4 @@ def find(state: State, evidence: Evidence, chain: VirtualChain) -> Iterator[Matc
         yield from substitution(state, evidence, chain)
 
 
-RULE = Rule("prismatic merge", "MMT 4.2.1", Stage.JOINT, find, apply, each_chain)
+RULE = Rule("prismatic merge", "MMT 4.2.1", Stage.JOINT, find, apply, each_chain, keeps=(AXES,))

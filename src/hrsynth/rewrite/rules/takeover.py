@@ -18,7 +18,7 @@ from ...geometry.lines import parallel
 from ...geometry.vectors import Array
 from ...mechanism import Joint, JointType
 from ..evidence import Evidence, ProximalChain
-from ..rule import Match, Refusal, Rule, Stage, each_chain
+from ..rule import AXES, LOOPS, Match, Refusal, Rule, Stage, each_chain
 from ..state import State, VirtualChain, towards
 
 
@@ -91,4 +91,5 @@ def apply(state: State, found: Substitution | None) -> State:
                             changed)
 
 
-RULE = Rule("takeover", "MMT 3.2, Fig. 2(b)", Stage.JOINT, find, apply, each_chain)
+RULE = Rule("takeover", "MMT 3.2, Fig. 2(b)", Stage.JOINT, find, apply, each_chain,
+            keeps=(LOOPS, AXES))
