@@ -344,8 +344,8 @@ def test_check_json_is_the_contract(run):
     check_record(data, "check", "delta")
     assert [one["leg"] for one in data["observed"]] == ["1", "2"]
     first, second = data["configurations"]
-    assert first.keys() == {"pose", "beyond", "mobility", "dof", "rank_M", "gap", "condition", "type1", "type2",
-                            "type3", "classes", "lost", "real", "constraint", "redundant", "distances"}
+    assert first.keys() == {"pose", "beyond", "flat_wrists", "mobility", "dof", "rank_M", "gap", "condition", "type1",
+                            "type2", "type3", "classes", "lost", "real", "constraint", "redundant", "distances"}
     assert [first["pose"][name] for name in "xyz"] == pytest.approx([0.02, 0.1, -0.62])
     assert second["pose"]["x"] == pytest.approx(0, abs=1e-8)
     assert first["pose"]["rpy"] == pytest.approx([0, 0, 0], abs=1e-8)
