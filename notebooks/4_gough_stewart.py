@@ -137,8 +137,8 @@ dict(ends)
 # Where does a motion escape the camera? The platform must move so that each tip moves along its line, v(Bᵢ) ∥ uᵢ.
 # Statics says the same more simply: with the virtual motors held, leg i can push the tip only at right angles to uᵢ,
 # so its forces lie in the plane through Bᵢ normal to uᵢ. The three pencils of forces fail to hold the platform when
-# the three planes, and the plane of the three tips, meet in one point, which may be at infinity (MMT 4.2.1, Fig. 10). `singular` finds this
-# condition by itself and checks it against the rank:
+# the three planes, and the plane of the three tips, meet in one point, which may be at infinity (MMT 4.2.1, Fig. 10).
+# `singular` finds this condition by itself and checks it against the rank:
 
 # %%
 condition = hrsynth.singular(robot, ["1", "3", "5"], points=300)
