@@ -143,6 +143,14 @@ def test_derive_text_has_the_hidden_robot_and_the_verdict(run):
 
 
 @pytest.mark.some(1)
+def test_pairs_of_the_same_letters_are_told_apart_by_their_links(run):
+    one, other = (run("derive", "quattro", "--observe", legs).out for legs in ("1,2", "1,4"))
+    hidden = [line for line in one.splitlines() if line.startswith("hidden robot")]
+    assert hidden == [line for line in other.splitlines() if line.startswith("hidden robot")]
+    assert "plate_12: 1, 2; plate_34: 3, 4" in one
+    assert "legs end on" not in run("derive", "quattro_rigid", "--observe", "1,4").out
+
+
 @pytest.mark.parametrize(("name", "legs"), [("delta", "all"), ("quattro", "1,4"), ("3rrr_m1", "all")])
 def test_the_written_file_is_a_robot_again(run, tmp_path: Path, name: str, legs: str):
     hidden, again, copy = (tmp_path / f"{each}.urdf" for each in ("hidden", "again", "copy"))

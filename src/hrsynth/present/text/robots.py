@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from ...codegen.export import ExportedCode
     from ...kinematics.certificate import Certificate
     from ...mechanism import Mechanism
+    from ...mechanism.legs import LegDecomposition
     from ...rewrite.strategy import Step
     from ..view.view import View
 
@@ -79,7 +80,7 @@ def derivation(found: Derivation) -> str:
     if found.verdict.formation is not None:
         dof[0] = f"{found.dof} of {len(found.verdict.formation.bodies)} bodies{dof[0].removeprefix(str(found.dof))}"
     rows: Rows = [
-        name, ("dof", dof), seen, *camera(observed),
+        name, *_ends(observed.anatomy), ("dof", dof), seen, *camera(observed),
         ("hidden robot", str(hidden) if hidden else "none: every observed direction is constant"),
         ("verdict", [found.verdict.verdict, *([NO_FREEDOM] if not found.dof else []),
                      *([near(found.verdict)] if found.verdict.near else [])]),
@@ -97,6 +98,13 @@ def derivation(found: Derivation) -> str:
                                    *(f"gains {freedom.name}" for freedom in unchecked.gains),
                                    *(f"loses {freedom.name}" for freedom in unchecked.loses)]))
     return "\n".join([listing(rows), "", table(list(_attempts(found.steps)), ("rule", "leg", "taken", "angle", "why"))])
+
+
+def _ends(anatomy: LegDecomposition) -> Rows:
+    """The link of an articulated platform on which each leg ends: with the same letters it makes another robot."""
+    links = {leg.attach: [each.label for each in anatomy.legs if each.attach == leg.attach] for leg in anatomy.legs}
+    return [] if len(links) < 2 else [
+        ("legs end on", "; ".join(f"{link}: {', '.join(labels)}" for link, labels in links.items()))]
 
 
 def _attempts(steps: Sequence[Step]) -> Iterator[tuple[str, ...]]:
