@@ -411,8 +411,8 @@ def test_files_of_other_dialects(tmp_path: Path, ending: str) -> None:
 
 @pytest.mark.slow
 def test_a_compiler_that_drops_checks_or_changes_sums_is_refused(tmp_path: Path) -> None:
-    """With -ffast-math what is no number may pass the comparisons that refuse it; where sums and quotients are not those
-    that are written, the bounds of rounding do not hold."""
+    """With -ffast-math what is no number may pass the comparisons that refuse it; where sums and quotients are not
+    those that are written, the bounds of rounding do not hold."""
     header = tmp_path / "robot.hpp"
     header.write_text(exported(four_bar(), 0.4, "c++").code, encoding="utf-8")
     command = ["g++", "-E", f"-isystem{eigen()}", str(header)]

@@ -477,9 +477,9 @@ class Singular(OfRobot, WrittenTo):
 
 
 class FurtherRecord(TypedDict):
-    """A measurement that could be added. An encoder has `actuated`, and as its `axis` the word for the coordinate that it
-    reads (null if there is only one); others have the `link`, and a point `at` (m) and an `axis` in its frame (null if
-    there are none)."""
+    """A measurement that could be added. An encoder has `actuated`, and as its `axis` the word for the coordinate that
+    it reads (null if there is only one); others have the `link`, and a point `at` (m) and an `axis` in its frame (null
+    if there are none)."""
 
     kind: Literal["leg", "direction", "line", "encoder", "offered"]
     of: Annotated[str, "the leg, the link, the joint, or the words of --see"]
@@ -1124,8 +1124,8 @@ class LoopEndsRecord(TypedDict):
 
 
 class CandidateRecord(TypedDict):
-    """A set of legs; null for what was not computed. Each error is an upper bound, too large by at most its gap (relative
-    to what is attained)."""
+    """A set of legs; null for what was not computed. Each error is an upper bound, too large by at most its gap
+    (relative to what is attained)."""
 
     legs: list[str]
     verdict: Word
