@@ -62,11 +62,11 @@ def test_without_a_pose_the_goal_is_the_zero_configuration(monkeypatch: pytest.M
 
 
 SLIDES = """<robot name="far"><link name="base"/><link name="c1"/><link name="r1"/><link name="c2"/><link name="r2"/>
-<joint name="a1" type="prismatic"><parent link="base"/><child link="c1"/><origin xyz="{0} {1} 0"/><axis xyz="{2} {3} 0"/>
-  <limit lower="-6" upper="6" effort="0" velocity="0"/></joint>
+<joint name="a1" type="prismatic"><parent link="base"/><child link="c1"/><origin xyz="{0} {1} 0"/>
+  <axis xyz="{2} {3} 0"/><limit lower="-6" upper="6" effort="0" velocity="0"/></joint>
 <joint name="b1" type="continuous"><parent link="c1"/><child link="r1"/><axis xyz="0 0 1"/></joint>
-<joint name="a2" type="prismatic"><parent link="base"/><child link="c2"/><origin xyz="{4} {5} 0"/><axis xyz="{6} {7} 0"/>
-  <limit lower="-6" upper="6" effort="0" velocity="0"/></joint>
+<joint name="a2" type="prismatic"><parent link="base"/><child link="c2"/><origin xyz="{4} {5} 0"/>
+  <axis xyz="{6} {7} 0"/><limit lower="-6" upper="6" effort="0" velocity="0"/></joint>
 <joint name="b2" type="continuous"><parent link="c2"/><child link="r2"/><axis xyz="0 0 1"/></joint>
 <loop name="c" type="revolute"><predecessor link="r1"><origin xyz="{8} {9} 0"/></predecessor>
   <successor link="r2"><origin xyz="{10} {11} 0"/></successor><axis xyz="0 0 1"/></loop>
@@ -74,8 +74,8 @@ SLIDES = """<robot name="far"><link name="base"/><link name="c1"/><link name="r1
   <actuator name="m1"/></transmission>
 <transmission name="m2"><type>transmission_interface/SimpleTransmission</type><joint name="a2"/>
   <actuator name="m2"/></transmission>
-<hrsynth><platform link="r1"/><observe leg="1" link="r1" axis="{8} {9} 0"/><observe leg="2" link="r2" axis="{10} {11} 0"/>
-</hrsynth></robot>"""
+<hrsynth><platform link="r1"/><observe leg="1" link="r1" axis="{8} {9} 0"/>
+  <observe leg="2" link="r2" axis="{10} {11} 0"/></hrsynth></robot>"""
 
 
 class OnSlides:
@@ -97,7 +97,8 @@ class OnSlides:
         """The slides and the platform's x axis at each."""
         found = []
         for k, m in ((k, m) for k in range(4) for m in range(4)):
-            ends = [foot + self.turned(rod, turns) for foot, rod, turns in zip(self.feet, self.rods, (k, m), strict=True)]
+            ends = [foot + self.turned(rod, turns)
+                    for foot, rod, turns in zip(self.feet, self.rods, (k, m), strict=True)]
             slides = np.linalg.solve(np.column_stack([self.axes[0], -self.axes[1]]), ends[1] - ends[0])
             found.append((slides, self.turned(np.array([1.0, 0.0]), k)))
         return found
