@@ -6,7 +6,7 @@ from collections import Counter
 from contextlib import suppress
 from dataclasses import replace
 from functools import cache
-from itertools import combinations, islice
+from itertools import combinations, islice, product
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +29,7 @@ from hrsynth.kinematics.locked import joint_at
 from hrsynth.mechanism.model import Limits
 from hrsynth.present.text.endings import endings as text
 from hrsynth.simulation.endings.completeness import Covers
-from hrsynth.simulation.endings.cover import bounds
+from hrsynth.simulation.endings.cover import bounds, cover
 from hrsynth.simulation.endings.critical_poses import CriticalPoses, Lift, _held_sets, critical_poses
 from hrsynth.simulation.endings.descent import CriticalPoint, Tangents, descend, walk_at_random
 from hrsynth.simulation.endings.enclosure import _rates, enclose_points
@@ -59,6 +59,93 @@ def test_without_a_pose_the_goal_is_the_zero_configuration(monkeypatch: pytest.M
     assert all(np.allclose(found.goal.pose(link), zero.pose(link), atol=1e-12) for link in robot.mechanism.links)
     there = endings(FIVE_BAR, at=str(robot.motion.pose(zero.pose(robot.motion.link))))
     assert np.allclose(np.array(found.desired), np.array(there.desired), atol=1e-9)
+
+
+SLIDES = """<robot name="far"><link name="base"/><link name="c1"/><link name="r1"/><link name="c2"/><link name="r2"/>
+<joint name="a1" type="prismatic"><parent link="base"/><child link="c1"/><origin xyz="{0} {1} 0"/>
+  <axis xyz="{2} {3} 0"/><limit lower="-6" upper="6" effort="0" velocity="0"/></joint>
+<joint name="b1" type="continuous"><parent link="c1"/><child link="r1"/><axis xyz="0 0 1"/></joint>
+<joint name="a2" type="prismatic"><parent link="base"/><child link="c2"/><origin xyz="{4} {5} 0"/>
+  <axis xyz="{6} {7} 0"/><limit lower="-6" upper="6" effort="0" velocity="0"/></joint>
+<joint name="b2" type="continuous"><parent link="c2"/><child link="r2"/><axis xyz="0 0 1"/></joint>
+<loop name="c" type="revolute"><predecessor link="r1"><origin xyz="{8} {9} 0"/></predecessor>
+  <successor link="r2"><origin xyz="{10} {11} 0"/></successor><axis xyz="0 0 1"/></loop>
+<transmission name="m1"><type>transmission_interface/SimpleTransmission</type><joint name="a1"/>
+  <actuator name="m1"/></transmission>
+<transmission name="m2"><type>transmission_interface/SimpleTransmission</type><joint name="a2"/>
+  <actuator name="m2"/></transmission>
+<hrsynth><platform link="r1"/><observe leg="1" link="r1" axis="{8} {9} 0"/>
+  <observe leg="2" link="r2" axis="{10} {11} 0"/></hrsynth></robot>"""
+
+
+class OnSlides:
+    """Two rods on slides that are nearly parallel, the first the platform: E = ½ (sin² φ₁ + sin² φ₂), and whatever the
+    angles are, slides close the loop. So its rests are the pairs of quarter turns."""
+
+    def __init__(self, folder: Path, seed: int) -> None:
+        rng = np.random.default_rng(seed)
+        ways = rng.uniform(1.3, 1.5), rng.uniform(1.6, 1.8)
+        self.axes = np.array([[np.cos(way), np.sin(way)] for way in ways])
+        self.feet, self.rods = rng.uniform(0, 0.4, (2, 2)), rng.uniform(0.3, 0.9, (2, 2))
+        self.rods[1] = self.feet[0] + self.rods[0] - self.feet[1]
+        numbers = np.concatenate([*np.stack([self.feet, self.axes], axis=1).reshape(2, 4), self.rods.ravel()])
+        (folder / "far.urdf").write_text(SLIDES.format(*map(repr, map(float, numbers))))
+        self.robot = hrsynth.observe(folder / "far.urdf")
+
+    @property
+    def rests(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        """The slides and the platform's x axis at each."""
+        found = []
+        for k, m in ((k, m) for k in range(4) for m in range(4)):
+            ends = [foot + self.turned(rod, turns)
+                    for foot, rod, turns in zip(self.feet, self.rods, (k, m), strict=True)]
+            slides = np.linalg.solve(np.column_stack([self.axes[0], -self.axes[1]]), ends[1] - ends[0])
+            found.append((slides, self.turned(np.array([1.0, 0.0]), k)))
+        return found
+
+    @staticmethod
+    def turned(vector: np.ndarray, quarters: int) -> np.ndarray:
+        """A vector after quarter turns."""
+        z = complex(*vector) * 1j**quarters
+        return np.array([z.real, z.imag])
+
+    def count(self, slides: np.ndarray, turn: np.ndarray, poses: list[np.ndarray]) -> int:
+        """How many of the platform's poses (4, 4) are that rest."""
+        wanted = [*(self.feet[0] + slides[0] * self.axes[0]), *turn]
+        return sum(np.abs(np.array([*X[:2, 3], *X[:2, 0]]) - wanted).max() < 1e-6 for X in poses)
+
+
+def test_starts_go_as_far_as_slides_do(tmp_path: Path):
+    """Turns are drawn evenly, however far the slides are to go for that."""
+    robot = OnSlides(tmp_path, 0).robot
+    search = RestSearch.of(robot, robot.everything.start)
+    q = anywhere(search.system, np.random.default_rng(0), 200)
+    turns = q[:, [not each.slides for each in search.system.system.coordinates]]
+    for quarters in product(range(4), repeat=2):
+        assert np.any(np.all(np.cos(turns - np.pi / 2 * np.array(quarters)) > 0.7, axis=1))
+
+
+@pytest.mark.some(1, 4)
+@pytest.mark.parametrize("seed", range(5))
+def test_boxes_prove_all_rests_of_a_rod_on_slides_that_is_the_platform(seed: int, tmp_path: Path):
+    case = OnSlides(tmp_path, seed)
+    told = cover(case.robot, case.robot.everything.start, budget=2_000_000)
+    assert told.complete
+    assert told.bounded
+    assert len(told.found) == 16
+    poses = [pose(box.p, box.R) for box in told.found]
+    assert all(case.count(slides, turn, poses) == 1 for slides, turn in case.rests)
+
+
+@pytest.mark.slow
+def test_rests_are_found_as_far_as_slides_go(tmp_path: Path):
+    """All that lie within the limits, without boxes."""
+    case = OnSlides(tmp_path, 0)
+    found = endings(case.robot)
+    poses = [each.configuration.pose("r1") for each in (*found.endings, *found.singular)]
+    within = [each for each in case.rests if np.abs(each[0]).max() < 6]
+    assert any(np.abs(slides).max() > 3 for slides, _ in within)
+    assert all(case.count(slides, turn, poses) == 1 for slides, turn in within)
 
 
 def test_the_order_of_rests_is_that_of_what_they_are():

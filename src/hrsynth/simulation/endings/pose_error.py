@@ -19,11 +19,11 @@ from numpy.typing import NDArray
 
 from ...analysis.aspects.leg_forms import LegPattern, pattern
 from ...analysis.aspects.path_segments import PathCoordinates, path_coordinates
-from ...analysis.aspects.vector_expressions import NoLegForm
+from ...analysis.aspects.vector_expressions import JointRules, NoLegForm
 from ...analysis.observed import ObservedRobot
-from ...closed_forms.legs import ClosedFormLeg, OnCrank, OnRod, SlidingRod
+from ...closed_forms.legs import ClosedFormLeg, OnCrank, OnRail, OnRod, SlidingRod
 from ...closed_forms.platform_points import PlatformPoint, platform_point
-from ...constraints.named_vectors import BodyVector, poses_at
+from ...constraints.named_vectors import BodyVector, NamedVector, poses_at
 from ...geometry.components import (
     Components,
     cayley,
@@ -43,7 +43,7 @@ from ...kinematics.platform_motion import PlatformMotion
 from ...mechanism.observation import Observation
 from ...mechanism.observations.direction import Direction
 from ...results import Value
-from ...tolerances import FOLLOWED
+from ...tolerances import EXACT, FOLLOWED
 
 Number = Callable[[Any], Any]
 Place = tuple[Components, Components]
@@ -153,13 +153,19 @@ class PoseError(Value):
         """That over what changes in the platform's pose; raises ``NotEnclosed``, or ``NoLegForm`` where a leg has
         none."""
         configurations, mechanism = [setting.everything.start, *setting.configurations], setting.mechanism
+        motion = coordinates.motion
         known = pattern(setting.anatomy, [], coordinates, configurations)
-        limbs = known.forms(goal).limbs
-        seen = tuple(_seen_direction(o, known, limbs, [goal, *configurations]) for o in setting.observed)
-        (p, R), motion = coordinates.of([goal]), coordinates.motion
-        rules = tuple(f"direction of leg {o.leg}" for o in seen if o.rule is not None)
+        # a leg on whose rail the point itself lies asks for nothing: the point's one shift goes along it
+        pairs = [(limb, carried) for limb, carried in zip(known.forms(goal).limbs, known.carried, strict=True)
+                 if not (isinstance(limb, OnRail) and limb.rod <= EXACT and motion.translations.shape[1] == 1
+                         and not np.any(limb.tip.turned))]
+        read = JointRules.of(setting.anatomy, coordinates, configurations)
+        seen = tuple(_seen_direction(o, known, pairs, read, [goal, *configurations]) for o in setting.observed)
+        p, R = coordinates.of([goal])
+        rules = tuple(f"direction of leg {o.leg}" for o in seen if o.rule is not None and o.rule.fitted)
         return cls(coordinates.length, motion, p[0], R[0], motion.translations,
-                   motion.rotations if coordinates.turning else np.zeros((3, 0)), limbs, seen,
+                   motion.rotations if coordinates.turning else np.zeros((3, 0)),
+                   tuple(limb for limb, _ in pairs), seen,
                    (*known.fitted, *rules), (*mechanism.stops, *mechanism.wrists), coordinates=coordinates)
 
     @property
@@ -270,14 +276,14 @@ def require_directions(setting: ObservedRobot) -> None:
         raise NotEnclosed("joints are coupled")
 
 
-def _seen_direction(observation: Observation, known: LegPattern, limbs: Sequence[ClosedFormLeg],
-          configurations: Sequence[ClosedConfiguration]) -> SeenDirection:
+def _seen_direction(observation: Observation, known: LegPattern, pairs: Sequence[tuple[ClosedFormLeg, NamedVector]],
+                    read: JointRules, configurations: Sequence[ClosedConfiguration]) -> SeenDirection:
     """Which limb's rod an observed direction is, at all configurations; raises ``NotEnclosed``."""
     assert isinstance(observation, Direction)
     feature = BodyVector("u", "observed", observation.link, observation.direction)
     u = feature.value(poses_at(configurations, feature.links))
     p, R = known.coordinates.of(configurations)
-    for i, (limb, carried) in enumerate(zip(limbs, known.carried, strict=True)):
+    for i, (limb, carried) in enumerate(pairs):
         if not isinstance(limb, OnRod | SlidingRod):
             continue
         held = carried.value(poses_at(configurations, carried.links))
@@ -285,7 +291,7 @@ def _seen_direction(observation: Observation, known: LegPattern, limbs: Sequence
         for sense in (1.0, -1.0):
             if np.max(np.abs(u - sense * rods)) < FOLLOWED:
                 return SeenDirection(observation.leg, sense, i)
-    rule = platform_point(u, p, R)
+    rule = read.rule(feature) or platform_point(u, p, R)
     if rule is not None and not rule.follows:
         # what does not turn with the platform is the same everywhere
         if known.coordinates.turning and np.any(rule.turned) and np.any(rule.constant):

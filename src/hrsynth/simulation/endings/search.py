@@ -22,6 +22,7 @@ from ...budgets import (
     ENDING_ROUNDS,
     ENDING_STARTS,
     ENDING_WALK,
+    FARTHEST_ENDING,
     POSE_WALKS,
 )
 from ...constraints.pattern import placing_links
@@ -44,7 +45,9 @@ from .error import DirectionTerm, RestEquations, RestSystem
 BESIDE = 0.5
 """So many times as many starts lie a few random steps beside rests that were found, where there are no closed forms."""
 WIDEST_SLIDE = 2.5
-"""Coordinate of a slide (characteristic lengths) up to which one is drawn."""
+"""Coordinate of a slide (characteristic lengths) up to which one is drawn, or farther where its limits are."""
+SLIDE_STEPS = 3
+"""Gauss and Newton's steps of slides alone: one does where the equations are linear in these."""
 FAMILY_TRIES = 8
 """Points of one continuum, at most, of which one is to lie in the operation mode of the zero configuration."""
 
@@ -62,7 +65,7 @@ class CriticalPoints(Value):
     """What a search found: isolated critical points, and of those that fill curves or surfaces one for each value of E
     and signs of the curvatures; how many ``starts`` there were, and how many of the isolated ones the last half of them
     found first (``late``); how many only the search over the platform's pose found (``posed``), and an estimate of how
-    many more there are at least that it did not meet (``unmet``, None where there was none)."""
+    many more there are at least that such starts lead to (``unmet``, None where there was no such search)."""
 
     isolated: tuple[Critical, ...]
     continua: tuple[Critical, ...]
@@ -76,7 +79,7 @@ class CriticalPoints(Value):
     def words(self) -> str:
         """What was done, and how well it covers."""
         also = f", {self.posed} more over the platform's pose" if self.posed else ""
-        also += "" if self.unmet is None else f"; estimated, by how often each was met: at least {self.unmet} more"
+        also += f"; estimated, by how often each was met: at least {self.unmet} more" if self.unmet else ""
         return (f"found from {self.starts:,} random starts, {self.late} of {len(self.isolated) - self.posed} "
                 f"configurations first in the second half of these{also}")
 
@@ -114,7 +117,8 @@ def critical_points(system: RestSystem, setting: ObservedRobot, goal: ClosedConf
     rng = np.random.default_rng([seed, 1])
     known = ToldApart(system, setting)
     fresh: list[int] = []
-    points = descend(system, homes[:1], np.zeros(1, dtype=np.intp), idle)
+    farthest = FARTHEST_ENDING + float(reaches(system).max(initial=0.0))
+    points = descend(system, homes[:1], np.zeros(1, dtype=np.intp), idle, farthest)
     most = max(ENDING_ROUNDS, ENDING_EFFORT // system.size[0])
     met = [homes]
     lies_near = not minima and further is None and all(isinstance(each, DirectionTerm) for each in system.terms)
@@ -128,7 +132,7 @@ def critical_points(system: RestSystem, setting: ObservedRobot, goal: ClosedConf
             q = np.concatenate([q, walk_at_random(system, some, rng, 1 + len(fresh) % 3)])
         # what attracts matters most: two of five starts go down all along
         index = rng.integers(freedoms + 1, size=len(q)) * (rng.random(len(q)) < (0.0 if minima else 0.6))
-        points += descend(system, q, index, idle)
+        points += descend(system, q, index, idle, farthest)
         fresh.append(known.add(points))
         points = []
         met.append(q)
@@ -228,11 +232,27 @@ class ToldApart:
 
 
 def anywhere(system: RestSystem, rng: np.random.Generator, count: int) -> Array:
-    """Closed configurations (c, N) to which random coordinates lead, as many as close."""
+    """Closed configurations (c, N) to which random coordinates lead, as many as close. From every other one the slides
+    alone are moved at first, as far as random turns need: what slides reach ends at no other limit."""
     slides = np.array([each.slides for each in system.system.coordinates])
     q = rng.uniform(-1.0, 1.0, (count, len(slides))) * np.where(slides, WIDEST_SLIDE, np.pi)
+    if slides.any():
+        wide = np.minimum(reaches(system), FARTHEST_ENDING) / WIDEST_SLIDE
+        q[::2] *= np.where(slides, 1 + rng.uniform(size=(len(q[::2]), 1)) * (wide - 1), 1.0)
+        for _ in range(SLIDE_STEPS):
+            G, DG = system.closures(q[::2])
+            q[::2, slides] -= times(np.linalg.pinv(DG[:, :, slides], rcond=CLOSURES_MEET), G)
     q = close_loops(system, q, 40)
     return q[are_closed(system, q)]
+
+
+def reaches(system: RestSystem) -> Array:
+    """How far (characteristic lengths) starts have each slide, (N,): to its limits where it has some; 0 of turns."""
+    loops = system.system
+    ends = {stop.joint: max((abs(end) for end in (stop.lower, stop.upper) if np.isfinite(end)), default=0.0)
+            for stop in loops.mechanism.stops.values()}
+    return np.array([max(WIDEST_SLIDE, ends.get(each.joint, 0.0) / loops.length) if each.slides else 0.0
+                     for each in loops.coordinates])
 
 
 def in_mode(system: RestSystem, setting: ObservedRobot, q: Array) -> NDArray[np.bool_]:
