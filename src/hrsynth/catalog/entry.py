@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import combinations, groupby
@@ -154,6 +154,41 @@ def study(drawn: Mechanism, sets: Callable[[int], Iterable[tuple[int, ...]]], at
     return ArchitectureStudy(facts, attempt, *_encoders(setting))
 
 
+@dataclass(frozen=True)
+class SmallestSet:
+    """A smallest set of legs, or of observations, and its hidden robot in the dimensions of a record; what went wrong
+    where none was found."""
+
+    legs: tuple[str, ...]
+    hidden: str | None
+    problem: str | None = None
+
+    def __str__(self) -> str:
+        return f"{{{', '.join(self.legs)}}}: {self.hidden or self.problem or 'none'}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line."""
+        return {"legs": list(self.legs), "hidden": self.hidden, "problem": self.problem}
+
+
+def smallest_sets(record: Mapping[str, Any], drawn: Mechanism) -> tuple[SmallestSet, ...]:
+    """The hidden robot of each smallest set of a record, derived now for the mechanism that was studied."""
+    if not record.get("minimal"):
+        return ()
+    setting, found = observe(drawn, samples=SAMPLES), []
+    for legs in map(tuple, record["minimal"]):
+        if len(legs) == len(_watch(setting)):
+            found.append(SmallestSet(legs, record.get("hidden")))
+            continue
+        try:
+            derivation = derive(_observing(setting, legs), unchecked=False)
+        except HrsynthError as error:
+            found.append(SmallestSet(legs, None, str(error).splitlines()[0]))
+        else:
+            found.append(SmallestSet(legs, derivation.hidden_architecture and derivation.hidden_architecture.ascii))
+    return tuple(found)
+
+
 def _agree(exact: ExactArchitecture, samples: Samples, found: Verdict) -> None:
     """Raise ``NotConfirmed`` unless the exact verdict is that of the closed configurations."""
     generic = exact.verdict(samples.question.observations)
@@ -167,6 +202,11 @@ def _agree(exact: ExactArchitecture, samples: Samples, found: Verdict) -> None:
 def _watch(setting: ObservedRobot) -> tuple[Observation, ...]:
     """The segments of all legs, or what is seen instead."""
     return setting.segments if all(each.by_segment for each in setting.observed) else setting.observed
+
+
+def _observing(setting: ObservedRobot, legs: Sequence[str]) -> ObservedRobot:
+    """The robot of which these legs are observed, or these of what is observed instead."""
+    return replace(setting, observed=tuple(each for each in _watch(setting) if each.leg in legs))
 
 
 def _kinds(word: RobotWord) -> list[str]:
@@ -234,8 +274,7 @@ def _singular(setting: ObservedRobot) -> dict[str, Any]:
 def _modes(setting: ObservedRobot, fewest: Sequence[Sequence[str]]) -> dict[str, Any]:
     """Complex assembly modes of a smallest set of legs, by what there are no more if not by a resultant, and the most
     real ones of some configurations: of the first set, or else of that of which fewest can be expected."""
-    robots = [MeasuredRobot.of_directions(replace(setting, observed=tuple(o for o in _watch(setting) if o.leg in legs)))
-              for legs in fewest]
+    robots = [MeasuredRobot.of_directions(_observing(setting, legs)) for legs in fewest]
     at = setting.configurations[0]
 
     def tried() -> Iterator[int]:

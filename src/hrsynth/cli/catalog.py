@@ -3,7 +3,8 @@
 Their records, besides ``command`` ("catalog build" …) and ``version``: ``build`` gives ``groups``, each with
 ``group``, ``words``, ``now`` (made), ``before`` and ``file`` (null while it is not complete), with ``--check`` instead
 ``stale``, one text for each thing; ``list`` gives ``total`` and ``entries``; ``show`` gives ``entry``, ``drawing``
-(lines), ``note`` and ``file``; ``site`` as told by ``catalog site --help``; ``audit``
+(lines), ``note``, ``smallest`` (the smallest sets with their hidden
+robots) and ``file``; ``site`` as told by ``catalog site --help``; ``audit``
 its table by groups and every disagreement.
 """
 
@@ -125,7 +126,9 @@ def _require_known(kept: str | None, asked: dict[str, Any]) -> None:
 
 def show(word: str, output: str | None, tables: str | None, kept: str | None, json: bool) -> None:
     """Show one architecture."""
+    from ..catalog.entry import smallest_sets
     from ..description import save, targets
+    from ..errors import BadRequest
     from ..present.text.catalog import entry
 
     if output is not None:
@@ -133,25 +136,30 @@ def show(word: str, output: str | None, tables: str | None, kept: str | None, js
     with Progress():
         found = _of_word(word, kept) if tables is None else _of_tables(word, tables, kept)
         if output is not None:
+            if "refused" in found.record:
+                raise BadRequest(f"no robot of a refused architecture is written: {found.record['refused']}", word,
+                                 "an architecture with a verdict: hrsynth catalog list")
             robot = found.mechanism()
+        smallest = smallest_sets(found.record, found.studied()) if found.studied is not None else ()
     if output is not None:
         for warning in save(robot, output):
             warn(str(warning))
     _say("show", {"entry": dict(found.record), "drawing": found.drawn.splitlines(), "note": found.note or None,
-                  "file": output},
-         entry(found.record, found.drawn, found.note)
+                  "smallest": [each.to_dict() for each in smallest], "file": output},
+         entry(found.record, found.drawn, found.note, smallest)
          + ("" if output is None else f"\n\nThe robot is written to {output}."), json)
 
 
 @dataclass(frozen=True)
 class _Shown:
-    """An architecture: its record, how it is drawn (nothing where it is no word), what else is to be said, and a robot
-    of it."""
+    """An architecture: its record, how it is drawn (nothing where it is no word), what else is to be said, a robot
+    of it, and the one that was studied (None where its geometry is not at hand)."""
 
     record: Any
     drawn: str
     note: str
     mechanism: Callable[[], Mechanism]
+    studied: Callable[[], Mechanism] | None = None
 
 
 def _no_geometry(name: str) -> Mechanism:
@@ -163,6 +171,7 @@ def _no_geometry(name: str) -> Mechanism:
 def _of_word(text: str, kept: str | None) -> _Shown:
     from ..catalog import load
     from ..catalog.drawing import drawing
+    from ..catalog.entry import model
     from ..catalog.geometry import mechanism
     from ..catalog.words import parse
 
@@ -172,7 +181,8 @@ def _of_word(text: str, kept: str | None) -> _Shown:
     architecture = parse(word)
     record, note = _known_record(str(architecture), kept)
     return _Shown(record, drawing(architecture), "; ".join(each for each in (note, others) if each),
-                  lambda: mechanism(architecture, record.get("attempt", 0)))
+                  lambda: mechanism(architecture, record.get("attempt", 0)),
+                  lambda: mechanism(model(architecture), record.get("attempt", 0)))
 
 
 def _of_tables(name: str, folder: str, kept: str | None) -> _Shown:
@@ -187,7 +197,7 @@ def _of_tables(name: str, folder: str, kept: str | None) -> _Shown:
     else:
         ((_, line),) = make_records(PublishedEntry(folder), robot.group, [name])
         record, note = javascript.loads(line), "studied now"
-    return _Shown(record, "", note, lambda: mechanism(robot))
+    return _Shown(record, "", note, lambda: mechanism(robot), lambda: mechanism(robot))
 
 
 def site(output: str, workers: int, anew: bool, kept: str | None, json: bool, **asked: Any) -> None:

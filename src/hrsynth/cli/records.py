@@ -1307,12 +1307,21 @@ class CatalogList(Head):
     entries: list[Entry]
 
 
+class SmallestSetRecord(TypedDict):
+    """A smallest set of legs and its hidden robot; what went wrong where none was derived."""
+
+    legs: list[str]
+    hidden: str | None
+    problem: str | None
+
+
 class CatalogShow(Head, WrittenTo):
-    """One architecture, drawn and in full."""
+    """One architecture, drawn and in full; `smallest` is empty where nothing is observed or no geometry is at hand."""
 
     entry: Entry
     drawing: list[str]
     note: str | None
+    smallest: list[SmallestSetRecord]
 
 
 class BuiltGroup(TypedDict):

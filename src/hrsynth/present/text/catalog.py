@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ...errors import BadRequest
 from .tables import listing, table
+
+if TYPE_CHECKING:
+    from ...catalog.entry import SmallestSet
 
 HEADS = ("word", "robot", "dof", "motion", "hidden robot", "verdict", "rank", "legs needed, or why refused")
 LEGEND = "* a motor   ══ the watched link"
@@ -26,11 +29,11 @@ def entries(records: Sequence[Record], total: int) -> str:
     return f"{table([_row(record) for record in records[:SHOWN]], HEADS)}\n\n{count}" if records else count
 
 
-def entry(record: Record, drawn: str, note: str = "") -> str:
-    """One entry: its legs drawn, then what is known of it."""
+def entry(record: Record, drawn: str, note: str = "", smallest: Sequence[SmallestSet] = ()) -> str:
+    """One entry: its legs drawn, then what is known of it, with the hidden robots of its ``smallest`` sets."""
     head = f"{record['word']}   {record.get('notation', '')}".rstrip()
     legs = [f"{drawn}\n{LEGEND}"] if drawn else []
-    return "\n\n".join([head, *legs, listing(_all(record)), *filter(None, [note])])
+    return "\n\n".join([head, *legs, listing(_all(record, smallest)), *filter(None, [note])])
 
 
 LISTED: Mapping[str, type] = {**dict.fromkeys(("notation", "motion", "verdict"), str),
@@ -69,14 +72,15 @@ def _row(record: Record) -> tuple[str, ...]:
             record["verdict"], f"{record['rank']} of {record['dof']}", str(record["fewest"]))
 
 
-def _all(record: Record) -> list[tuple[str, str]]:
-    found = [("group", str(record.get("group", ""))), *facts(record)]
+def _all(record: Record, smallest: Sequence[SmallestSet]) -> list[tuple[str, str]]:
+    found = [("group", str(record.get("group", ""))), *facts(record, smallest)]
     found += [("motors", motors(record))] if "motors" in record else []
     return [*found, ("choices", "  ".join(map(choice, record["choices"])))] if "choices" in record else found
 
 
-def facts(record: Record) -> Iterable[tuple[str, str]]:
-    """What is known whatever is driven, by name; what is not known is left out."""
+def facts(record: Record, smallest: Sequence[SmallestSet] = ()) -> Iterable[tuple[str, str]]:
+    """What is known whatever is driven, by name; what is not known is left out. ``smallest``: the smallest sets with
+    their hidden robots."""
     require_whole(record, TOLD)
     if "refused" in record:
         yield "refused", str(record["refused"])
@@ -97,6 +101,8 @@ def facts(record: Record) -> Iterable[tuple[str, str]]:
     told, what = ("held", "observations") if "see" in record else ("watched", "legs")
     if record.get("minimal"):
         yield f"{what} needed", "  ".join("{" + ", ".join(legs) + "}" for legs in record["minimal"])
+    if any(each.hidden != record.get("hidden") for each in smallest):
+        yield "hidden robots", "; ".join(map(str, smallest))
     if record.get("condition"):
         yield "Type 2", str(record["condition"])
     if record.get("modes_bound") is not None:
