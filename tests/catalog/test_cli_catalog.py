@@ -116,7 +116,7 @@ def test_list_finds_what_python_finds(run, folder: Path):
         assert data["entries"] == list(wanted)
         status, out, _ = run("list", "--catalog", folder, *options)
         assert status == 0
-        assert out.splitlines()[-1] == f"{len(wanted)} of 42 architectures"
+        assert out.splitlines()[-1] == f"{len(wanted)} of 42 architectures in the groups c, d"
         assert len(out.splitlines()) == (len(wanted) + 4 if len(wanted) else 1)
 
 

@@ -1301,9 +1301,10 @@ class Entry(TypedDict, total=False):
 
 
 class CatalogList(Head):
-    """The architectures that fit."""
+    """The architectures that fit, among all of these groups."""
 
     total: int
+    groups: list[str]
     entries: list[Entry]
 
 

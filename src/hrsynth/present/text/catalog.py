@@ -21,9 +21,13 @@ PROOFS = {"class": "no more by the degrees of their equations", "rank": "no more
 Record = Mapping[str, Any]
 
 
-def entries(records: Sequence[Record], total: int) -> str:
-    """A line an entry, the first of many, and how many of all they are; no others are looked at."""
-    count = f"{len(records)} of {total} architectures"
+def entries(records: Sequence[Record], total: int, groups: Sequence[str] = ()) -> str:
+    """A line an entry, the first of many, and how many of all they are, in which groups; no others are looked at."""
+    tables = [name for name in groups if name[:1].isdigit()]
+    count = f"{len(records)} of {total} architectures" + "".join(
+        f" {what} {', '.join(names)}" for what, names in (
+            ("in the groups", [name for name in groups if name not in tables]),
+            ("and of published robots", tables)) if names)
     if len(records) > SHOWN:
         count += f", the first {SHOWN} shown (all with --json; --legs, --motion, --verdict … ask for fewer)"
     return f"{table([_row(record) for record in records[:SHOWN]], HEADS)}\n\n{count}" if records else count
@@ -69,7 +73,12 @@ def _row(record: Record) -> tuple[str, ...]:
     if "refused" in record:
         return (record["word"], record.get("notation", ""), "", "", "", "refused", "", str(record["refused"]))
     return (record["word"], record["notation"], str(record["dof"]), record["motion"], record.get("hidden", "none"),
-            record["verdict"], f"{record['rank']} of {record['dof']}", str(record["fewest"]))
+            record["verdict"], f"{record['rank']} of {record['dof']}",
+            ": ".join(filter(None, [str(record["fewest"]), _sets(record)])))
+
+
+def _sets(record: Record) -> str:
+    return "  ".join("{" + ", ".join(legs) + "}" for legs in record.get("minimal", ()))
 
 
 def _all(record: Record, smallest: Sequence[SmallestSet]) -> list[tuple[str, str]]:
@@ -100,7 +109,7 @@ def facts(record: Record, smallest: Sequence[SmallestSet] = ()) -> Iterable[tupl
         yield "lost", "; ".join(record["lost"])
     told, what = ("held", "observations") if "see" in record else ("watched", "legs")
     if record.get("minimal"):
-        yield f"{what} needed", "  ".join("{" + ", ".join(legs) + "}" for legs in record["minimal"])
+        yield f"{what} needed", _sets(record)
     if any(each.hidden != record.get("hidden") for each in smallest):
         yield "hidden robots", "; ".join(map(str, smallest))
     if record.get("condition"):
