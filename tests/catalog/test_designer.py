@@ -1,4 +1,4 @@
-"""Questions of a designer, each one command over all that is shipped: the answer is that of a plain count of the lines."""
+"""Questions of a designer, each one command over all that is shipped: a plain count of the lines gives the answer."""
 
 from __future__ import annotations
 

@@ -154,39 +154,22 @@ def study(drawn: Mechanism, sets: Callable[[int], Iterable[tuple[int, ...]]], at
     return ArchitectureStudy(facts, attempt, *_encoders(setting))
 
 
-@dataclass(frozen=True)
-class SmallestSet:
-    """A smallest set of legs, or of observations, and its hidden robot in the dimensions of a record; what went wrong
-    where none was found."""
-
-    legs: tuple[str, ...]
-    hidden: str | None
-    problem: str | None = None
-
-    def __str__(self) -> str:
-        return f"{{{', '.join(self.legs)}}}: {self.hidden or self.problem or 'none'}"
-
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line."""
-        return {"legs": list(self.legs), "hidden": self.hidden, "problem": self.problem}
-
-
-def smallest_sets(record: Mapping[str, Any], drawn: Mechanism) -> tuple[SmallestSet, ...]:
-    """The hidden robot of each smallest set of a record, derived now for the mechanism that was studied."""
+def smallest_sets(record: Mapping[str, Any], drawn: Mechanism) -> list[dict[str, Any]]:
+    """The smallest sets of a record, each with its ``legs`` and its ``hidden`` robot, derived now for the mechanism
+    that was studied; ``problem`` is what went wrong."""
     if not record.get("minimal"):
-        return ()
+        return []
     setting, found = observe(drawn, samples=SAMPLES), []
-    for legs in map(tuple, record["minimal"]):
-        if len(legs) == len(_watch(setting)):
-            found.append(SmallestSet(legs, record.get("hidden")))
-            continue
-        try:
-            derivation = derive(_observing(setting, legs), unchecked=False)
-        except HrsynthError as error:
-            found.append(SmallestSet(legs, None, str(error).splitlines()[0]))
-        else:
-            found.append(SmallestSet(legs, derivation.hidden_architecture and derivation.hidden_architecture.ascii))
-    return tuple(found)
+    for legs in record["minimal"]:
+        hidden, problem = record.get("hidden"), None
+        if len(legs) < len(_watch(setting)):
+            try:
+                form = derive(_observing(setting, legs), unchecked=False).hidden_architecture
+                hidden = None if form is None else form.ascii
+            except HrsynthError as error:
+                hidden, problem = None, str(error).splitlines()[0]
+        found.append({"legs": list(legs), "hidden": hidden, "problem": problem})
+    return found
 
 
 def _agree(exact: ExactArchitecture, samples: Samples, found: Verdict) -> None:

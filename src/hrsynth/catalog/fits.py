@@ -99,7 +99,8 @@ def _condition(name: str, value: Any) -> RecordCondition:
 
 
 def _condition_on(name: str, value: Any) -> RecordCondition:
-    if name in ("legs", "see", "text", "motors") and not isinstance(value, str) and (name, type(value)) != ("legs", int):
+    of_texts = name in ("legs", "see", "text", "motors")
+    if of_texts and not isinstance(value, str) and (name, type(value)) != ("legs", int):
         raise BadRequest(f"the catalog cannot be asked for {name}", value, "a text, or a number of legs")
     match name:
         case "legs" if isinstance(value, str) and not (value.isdecimal() and len(value) <= LONGEST_COUNT):

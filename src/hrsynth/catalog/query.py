@@ -15,7 +15,7 @@ from ..results import Value
 from .fits import fits, require_askable
 from .jsonl import Record, leading_word, record
 from .known import alias, is_called, order
-from .store import DATABASES, Shipped, Store, shipped_folder, store
+from .store import DATABASES, ShippedCatalogs, Store, shipped_folder, store
 from .words import SENSORS, parse
 
 
@@ -164,7 +164,7 @@ def _tuple(value: object) -> tuple[object, ...]:
 def _there(path: str | Path | None) -> Store:
     """The store of a path, the shipped one where there is none; raises ``BadRequest`` where nothing is."""
     kept = shipped_folder() if path is None else store(path)
-    if path is not None and not kept.path.exists() and not isinstance(kept, Shipped):
+    if path is not None and not kept.path.exists() and not isinstance(kept, ShippedCatalogs):
         raise BadRequest("no such catalog", str(path), f"a folder, or a file that ends in {', '.join(DATABASES)}")
     if not kept.groups():
         raise BadRequest("nothing in the catalog", str(kept.path), "one that was built by hrsynth catalog build")

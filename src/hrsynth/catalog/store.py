@@ -131,7 +131,7 @@ class Folder:
         return packed if packed.exists() else self.path / f"{group}{LINES}"
 
 
-class Shipped(Folder):
+class ShippedCatalogs(Folder):
     """All that comes with the package: the groups of words, and beside them those of the published robots."""
 
     def groups(self) -> list[str]:
@@ -275,7 +275,7 @@ def store(path: str | Path) -> Store:
     where there is no such folder."""
     path = Path(path)
     if path == Path(ALL) and not path.exists():
-        return Shipped(shipped_folder().path)
+        return ShippedCatalogs(shipped_folder().path)
     if path == Path(PUBLISHED) and not path.exists():
         return Folder(shipped_folder().path / PUBLISHED)
     return Database(path) if path.suffix in DATABASES else Folder(path)

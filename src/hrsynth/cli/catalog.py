@@ -2,10 +2,9 @@
 
 Their records, besides ``command`` ("catalog build" …) and ``version``: ``build`` gives ``groups``, each with
 ``group``, ``words``, ``now`` (made), ``before`` and ``file`` (null while it is not complete), with ``--check`` instead
-``stale``, one text for each thing; ``list`` gives ``total``, ``groups`` (those that are covered) and ``entries``; ``show`` gives ``entry``, ``drawing``
-(lines), ``note``, ``smallest`` (the smallest sets with their hidden
-robots) and ``file``; ``site`` as told by ``catalog site --help``; ``audit``
-its table by groups and every disagreement.
+``stale``, one text for each thing; ``list`` gives ``total``, ``groups`` (those that are covered) and ``entries``;
+``show`` gives ``entry``, ``drawing`` (lines), ``note``, ``smallest`` (the smallest sets with their hidden robots) and
+``file``; ``site`` as told by ``catalog site --help``; ``audit`` its table by groups and every disagreement.
 """
 
 from __future__ import annotations
@@ -32,8 +31,9 @@ if TYPE_CHECKING:
 catalog = Group("hrsynth catalog", "The catalog of architectures: what can be controlled by watching legs.",
                 examples=("list --legs 3-R*RR --verdict controllable", "show Delta -o delta.urdf", "list -h"))
 VERDICTS = ("controllable", "partially controllable", "uncontrollable")
-KEPT = Option("kept", "A folder or SQLite file; or published: the shipped catalog of published robots; or all: this and "
-              "the shipped catalog of words (default: all for list, else that of words).", "PATH", flags=("--catalog",))
+KEPT = Option("kept", "A folder or SQLite file; or published: the shipped catalog of published robots; or all: this "
+              "and the shipped catalog of words (default: all for list, else that of words).", "PATH",
+              flags=("--catalog",))
 WORKERS = Option("workers", "Processes that share the work.", None, int, 1, low=1)
 TABLES = Option("tables", "Take robots of published tables (their format is on the page 'audit') instead of the words "
                 "listed here.", "FOLDER")
@@ -171,12 +171,12 @@ def show(word: str, output: str | None, tables: str | None, kept: str | None, js
                 raise BadRequest(f"no robot of a refused architecture is written: {found.record['refused']}", word,
                                  "an architecture with a verdict: hrsynth catalog list")
             robot = found.mechanism()
-        smallest = smallest_sets(found.record, found.studied()) if found.studied is not None else ()
+        smallest = [] if found.studied is None else smallest_sets(found.record, found.studied())
     if output is not None:
         for warning in save(robot, output):
             warn(str(warning))
     _say("show", {"entry": dict(found.record), "drawing": found.drawn.splitlines(), "note": found.note or None,
-                  "smallest": [each.to_dict() for each in smallest], "file": output},
+                  "smallest": smallest, "file": output},
          entry(found.record, found.drawn, found.note, smallest)
          + ("" if output is None else f"\n\nThe robot is written to {output}."), json)
 

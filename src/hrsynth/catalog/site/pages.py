@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
@@ -19,7 +19,7 @@ from ...present.portrait import Portrait
 from ...present.text.catalog import facts, motors
 from ...present.view.view import plane_normal
 from ...rewrite.strategy import Step
-from ..entry import SAMPLES, SmallestSet, model, smallest_sets
+from ..entry import SAMPLES, model, smallest_sets
 from ..executors import Made, Stopped
 from ..geometry import mechanism
 from ..jsonl import Record
@@ -133,7 +133,7 @@ class Study:
     attempt: int
     derivation: Derivation | None = None
     differs: str = ""
-    smallest: tuple[SmallestSet, ...] = ()
+    smallest: Sequence[Record] = ()
 
     @property
     def observed(self) -> tuple[str, ...] | None:

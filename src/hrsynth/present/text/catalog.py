@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ...errors import BadRequest
 from .tables import listing, table
-
-if TYPE_CHECKING:
-    from ...catalog.entry import SmallestSet
 
 HEADS = ("word", "robot", "dof", "motion", "hidden robot", "verdict", "rank", "legs needed, or why refused")
 LEGEND = "* a motor   ══ the watched link"
@@ -33,7 +30,7 @@ def entries(records: Sequence[Record], total: int, groups: Sequence[str] = ()) -
     return f"{table([_row(record) for record in records[:SHOWN]], HEADS)}\n\n{count}" if records else count
 
 
-def entry(record: Record, drawn: str, note: str = "", smallest: Sequence[SmallestSet] = ()) -> str:
+def entry(record: Record, drawn: str, note: str = "", smallest: Sequence[Record] = ()) -> str:
     """One entry: its legs drawn, then what is known of it, with the hidden robots of its ``smallest`` sets."""
     head = f"{record['word']}   {record.get('notation', '')}".rstrip()
     legs = [f"{drawn}\n{LEGEND}"] if drawn else []
@@ -81,13 +78,13 @@ def _sets(record: Record) -> str:
     return "  ".join("{" + ", ".join(legs) + "}" for legs in record.get("minimal", ()))
 
 
-def _all(record: Record, smallest: Sequence[SmallestSet]) -> list[tuple[str, str]]:
+def _all(record: Record, smallest: Sequence[Record]) -> list[tuple[str, str]]:
     found = [("group", str(record.get("group", ""))), *facts(record, smallest)]
     found += [("motors", motors(record))] if "motors" in record else []
     return [*found, ("choices", "  ".join(map(choice, record["choices"])))] if "choices" in record else found
 
 
-def facts(record: Record, smallest: Sequence[SmallestSet] = ()) -> Iterable[tuple[str, str]]:
+def facts(record: Record, smallest: Sequence[Record] = ()) -> Iterable[tuple[str, str]]:
     """What is known whatever is driven, by name; what is not known is left out. ``smallest``: the smallest sets with
     their hidden robots."""
     require_whole(record, TOLD)
@@ -110,8 +107,9 @@ def facts(record: Record, smallest: Sequence[SmallestSet] = ()) -> Iterable[tupl
     told, what = ("held", "observations") if "see" in record else ("watched", "legs")
     if record.get("minimal"):
         yield f"{what} needed", _sets(record)
-    if any(each.hidden != record.get("hidden") for each in smallest):
-        yield "hidden robots", "; ".join(map(str, smallest))
+    if any(each["hidden"] != record.get("hidden") for each in smallest):
+        yield "hidden robots", "; ".join(f"{{{', '.join(each['legs'])}}}: {each['hidden'] or each['problem'] or 'none'}"
+                                         for each in smallest)
     if record.get("condition"):
         yield "Type 2", str(record["condition"])
     if record.get("modes_bound") is not None:
