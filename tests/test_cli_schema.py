@@ -46,7 +46,7 @@ QUICK = {
     "convert": ["delta d.yaml", "3rrr_m1 r.sdf"],
     "import": ["delta -o d.urdf"],
     "catalog build": ["--check --sample 1 planar"],
-    "catalog list": ["--legs 3 --dof 2", "--text refused"],
+    "catalog list": ["--legs 3 --dof 2", "--text 'no confirmed'"],
     "catalog show": ["'3(Rz*-Rz-Rz)'"],
     "catalog site": ["-o site --text '3(Rz*-Rz-Rz)'"],
     "catalog audit": ["tables --only 2T1R"],

@@ -66,7 +66,7 @@ def entry(word: str) -> dict[str, Any]:
             "verdict": verdict, "rank": rank, "exact": True, "instances": 1 if rank == dof else 5,
             "base_motors": draw.random() < 0.5, "motors": legs, "fewest": min(rank, legs), "minimal": [["1"]],
             "lost": ["rotation"] if rank < dof else [], "condition": "the lines σ meet",
-            "modes_bound": 2 * rank or None, "modes_seen": rank or None}
+            "modes_bound": 2 * rank or None, "modes_seen": rank or None, "driven": draw.random() < 0.5}
 
 
 def without_checksum(text: str) -> str:

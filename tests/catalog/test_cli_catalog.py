@@ -116,7 +116,7 @@ def test_list_finds_what_python_finds(run, folder: Path):
         assert data["entries"] == list(wanted)
         status, out, _ = run("list", "--catalog", folder, *options)
         assert status == 0
-        assert out.splitlines()[-1] == f"{len(wanted)} of 42 architectures"
+        assert out.splitlines()[-1] == f"{len(wanted)} of 42 architectures in the groups c, d"
         assert len(out.splitlines()) == (len(wanted) + 4 if len(wanted) else 1)
 
 
@@ -143,6 +143,37 @@ def test_show_draws_and_writes_a_robot(run, tmp_path: Path):
     data = json.loads(run("show", word, "--catalog", store, "--json")[1])
     assert (data["command"], data["note"], data["file"]) == ("catalog show", None, None)
     assert data["entry"] == facts
+
+
+PLATES = "bar:(Pk*-2SSt)+(Rt*-2SSt)|(Pk*-2SSt)+(Rt*-2SSt)"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("word", [PLATES, "4(Px*-Uyn-Uny)", "(Ph*-Pj-Ra-Ra)+(Ph*-Pj-Ra-Ra-Rb)+(Ph*-Pj-Ra-Rb-Ra)"])
+def test_each_smallest_set_has_the_hidden_robot_of_its_legs(run, word: str, tmp_path: Path):
+    """It is what `derive` finds in the robot file; the sets are those of `legs`, none where nothing is observed."""
+    file = tmp_path / "robot.urdf"
+    data = json.loads(run("show", word, "-o", file, "--json")[1])
+    alone = [(each["legs"], hrsynth.derive(file, observe=each["legs"]).hidden_architecture.ascii)
+             for each in data["smallest"]]
+    assert [(each["legs"], each["hidden"]) for each in data["smallest"]] == alone
+    assert all(each["problem"] is None for each in data["smallest"])
+    sets, told = [each["legs"] for each in data["smallest"]], hrsynth.legs(file).minimal
+    assert sets == data["entry"]["minimal"]
+    assert set(map(tuple, sets)) <= set(told)
+    assert bool(told) == (data["entry"]["rank"] > 0)
+    assert data["entry"]["fewest"] == (len(told[0]) if told else 0)
+
+
+def test_plates_are_told_apart_by_the_hidden_robots_of_pairs(run):
+    assert re.search(r"^hidden robots  \{1, 3\}: 2-P-\{2-U\*U\}; .*\{2, 4\}: 2-Pi-\{2-U\*U\}$", run("show", PLATES)[1],
+                     re.MULTILINE)
+
+
+def test_no_robot_of_a_refused_architecture_is_written(run, tmp_path: Path):
+    file = tmp_path / "robot.urdf"
+    check_refused(run("show", "2(Px*-2SSy)", "-o", file), "no robot of a refused architecture is written: no confirmed")
+    assert not file.exists()
 
 
 def test_show_studies_what_is_not_in_the_catalog(run, folder: Path):

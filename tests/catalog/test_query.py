@@ -35,6 +35,9 @@ ASKED = st.fixed_dictionaries({}, optional={
     "motion": st.sampled_from(["2T", "3T", "3T1R", "3T2R", "6T"]),
     "verdict": st.sampled_from([*VERDICTS, VERDICTS[:2], "none"]),
     "base_motors": st.sampled_from([None, True, False]),
+    "driven": st.sampled_from([None, True, False]),
+    "motors": st.sampled_from(["R", "P+R"]),
+    "parallelograms": st.sampled_from([None, True, False]),
     "fewest": st.integers(0, 6),
     "modes": st.integers(1, 9),
     "legs": st.one_of(st.integers(1, 7), st.sampled_from(["3", "?-R*", "*S", "6-UPS", "UPS", "R?R", "(c0?*)", "R-{*"]),
@@ -63,6 +66,10 @@ def plainly(record: dict[str, Any], asked: dict[str, Any]) -> bool:
             met = any(plain_legs(record, str(each)) for each in values)
         elif name == "modes":
             met = record.get("modes_bound") in values
+        elif name == "motors":  # words here have no letters of joints
+            met = False
+        elif name == "parallelograms":
+            met = "refused" not in record and False in values
         else:
             met = name in record and record[name] in values
         if not met:
@@ -214,7 +221,7 @@ def test_odd_questions_have_the_same_answer_everywhere(asked: dict[str, Any], st
 
 
 @pytest.mark.parametrize("asked", [{"legs": 3.5}, {"legs": b"3"}, {"see": 3}, {"text": 3},
-                                   {"see": "9" * 5000 + "point"}], ids=range(5))
+                                   {"see": "9" * 5000 + "point"}, {"motors": "X"}, {"motors": ""}], ids=range(7))
 def test_what_no_record_can_have_is_refused(asked: dict[str, Any], stores: tuple[Path, Path]):
     for file in stores:
         with pytest.raises(BadRequest):

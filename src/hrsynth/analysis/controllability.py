@@ -44,6 +44,7 @@ class Legs(Result, shown_as="legs"):
     complete: bool
     """Whether all sets are listed."""
     minimal: tuple[tuple[str, ...], ...] = field(default=())
+    """The smallest sets of the best rank; none where that is 0, as in the catalog."""
     minimal_complete: bool = True
     """Whether ``minimal`` has all smallest sets; else it has one of which none can be left out."""
     where: str = "the zero configuration"
@@ -56,7 +57,7 @@ class Legs(Result, shown_as="legs"):
     @property
     def smallest(self) -> str:
         """The smallest sets as text."""
-        return "  ".join("{" + ", ".join(each) + "}" for each in self.minimal)
+        return "  ".join("{" + ", ".join(each) + "}" for each in self.minimal) or "none, the best rank is 0"
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
@@ -135,6 +136,6 @@ def legs(robot: RobotLike, camera: CameraLike = None, *, observe: LegsLike = Non
         tell("sets of legs")
     best = max(each.rank for each in sets)
     smallest = min(len(each.legs) for each in sets if each.rank == best)
-    minimal = tuple(each.legs for each in sets if each.rank == best and len(each.legs) == smallest)
+    minimal = tuple(each.legs for each in sets if best and each.rank == best and len(each.legs) == smallest)
     return Legs(setting, setting.robot.name, anatomy.architecture().ascii, setting.dof, tuple(sets), tuple(exact),
                 complete, minimal, known, **({} if at is None else {"where": str(asked_pose(at))}))

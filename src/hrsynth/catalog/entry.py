@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import combinations, groupby
@@ -154,6 +154,24 @@ def study(drawn: Mechanism, sets: Callable[[int], Iterable[tuple[int, ...]]], at
     return ArchitectureStudy(facts, attempt, *_encoders(setting))
 
 
+def smallest_sets(record: Mapping[str, Any], drawn: Mechanism) -> list[dict[str, Any]]:
+    """The smallest sets of a record, each with its ``legs`` and its ``hidden`` robot, derived now for the mechanism
+    that was studied; ``problem`` is what went wrong."""
+    if not record.get("minimal"):
+        return []
+    setting, found = observe(drawn, samples=SAMPLES), []
+    for legs in record["minimal"]:
+        hidden, problem = record.get("hidden"), None
+        if len(legs) < len(_watch(setting)):
+            try:
+                form = derive(_observing(setting, legs), unchecked=False).hidden_architecture
+                hidden = None if form is None else form.ascii
+            except HrsynthError as error:
+                hidden, problem = None, str(error).splitlines()[0]
+        found.append({"legs": list(legs), "hidden": hidden, "problem": problem})
+    return found
+
+
 def _agree(exact: ExactArchitecture, samples: Samples, found: Verdict) -> None:
     """Raise ``NotConfirmed`` unless the exact verdict is that of the closed configurations."""
     generic = exact.verdict(samples.question.observations)
@@ -167,6 +185,11 @@ def _agree(exact: ExactArchitecture, samples: Samples, found: Verdict) -> None:
 def _watch(setting: ObservedRobot) -> tuple[Observation, ...]:
     """The segments of all legs, or what is seen instead."""
     return setting.segments if all(each.by_segment for each in setting.observed) else setting.observed
+
+
+def _observing(setting: ObservedRobot, legs: Sequence[str]) -> ObservedRobot:
+    """The robot of which these legs are observed, or these of what is observed instead."""
+    return replace(setting, observed=tuple(each for each in _watch(setting) if each.leg in legs))
 
 
 def _kinds(word: RobotWord) -> list[str]:
@@ -234,8 +257,7 @@ def _singular(setting: ObservedRobot) -> dict[str, Any]:
 def _modes(setting: ObservedRobot, fewest: Sequence[Sequence[str]]) -> dict[str, Any]:
     """Complex assembly modes of a smallest set of legs, by what there are no more if not by a resultant, and the most
     real ones of some configurations: of the first set, or else of that of which fewest can be expected."""
-    robots = [MeasuredRobot.of_directions(replace(setting, observed=tuple(o for o in _watch(setting) if o.leg in legs)))
-              for legs in fewest]
+    robots = [MeasuredRobot.of_directions(_observing(setting, legs)) for legs in fewest]
     at = setting.configurations[0]
 
     def tried() -> Iterator[int]:

@@ -13,12 +13,13 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..errors import BadRequest
-from .jsonl import Record, is_written, leading_word, written_text
+from .jsonl import FLAGS, Record, is_written, leading_word, written_text
 from .known import is_called, kinds, kinds_called, known_as
 from .search import Flags
-from .words import LONGEST_COUNT, count_equal, sights
+from .words import LONGEST_COUNT, MOVED, count_equal, sights
 
-ASKED = ("group", "dof", "motion", "verdict", "base_motors", "fewest", "see", "modes", "legs", "text")
+ASKED = ("group", "dof", "motion", "verdict", "base_motors", "driven", "motors", "parallelograms", "fewest", "see",
+         "modes", "legs", "text")
 """What can be asked for."""
 TEXTS = ("notation", "hidden", "steps", "others")
 """Columns of a SQLite file in which a text is sought: fields, and all others together but the word, with the names
@@ -98,7 +99,8 @@ def _condition(name: str, value: Any) -> RecordCondition:
 
 
 def _condition_on(name: str, value: Any) -> RecordCondition:
-    if name in ("legs", "see", "text") and not isinstance(value, str) and (name, type(value)) != ("legs", int):
+    of_texts = name in ("legs", "see", "text", "motors")
+    if of_texts and not isinstance(value, str) and (name, type(value)) != ("legs", int):
         raise BadRequest(f"the catalog cannot be asked for {name}", value, "a text, or a number of legs")
     match name:
         case "legs" if isinstance(value, str) and not (value.isdecimal() and len(value) <= LONGEST_COUNT):
@@ -127,6 +129,12 @@ def _condition_on(name: str, value: Any) -> RecordCondition:
                 None if APART in text else lambda rows: rows.holding(text),
                 (lambda line: text in line.casefold() or (
                     bool(kinds_called(text)) and kinds(leading_word(line)) in kinds_called(text))) if plain else None)
+        case "motors" | "parallelograms":
+            read = driven_kinds if name == "motors" else has_parallelograms
+            value = "+".join(_motor_letters(value)) if name == "motors" else value
+            return RecordCondition(
+                lambda record: "refused" not in record and read(record) == value, None,
+                lambda line: '"choices":' in line or "\\" in line or read({"word": leading_word(line)}) == value)
         case "legs":
             value = int(value)
         case "see":
@@ -135,12 +143,36 @@ def _condition_on(name: str, value: Any) -> RecordCondition:
             name = "modes_bound"
     # 1 is True and 3.0 is 3: these are not so written
     exact = isinstance(value, str) or (isinstance(value, int) and abs(value) < 2**63 and isinstance(
-        value, bool) == (name == "base_motors"))
+        value, bool) == (name in FLAGS))
     part = f"{json.dumps(name)}:{json.dumps(value)}" if exact else ""
     return RecordCondition(
         lambda record: name in record and bool(record[name] == value),
-        lambda rows: rows.having(name, lambda found: bool(found == value)),
+        (lambda rows: rows.having(name, lambda found: bool(found == value))) if name in FIELDS else None,
         (lambda line: part in line) if exact else None)
+
+
+def driven_kinds(record: Record) -> str:
+    """The kinds of driven joints ("R", "P+R"), as a word marks them; of a published robot those of the first choice of
+    motors that determines all freedoms, or else of the first."""
+    choices = record.get("choices")
+    if not choices:
+        return "+".join(sorted(set(re.findall(r"([RPCU])[a-z]*\*", record["word"]))))
+    chosen = next((each for each in choices if each["rank"] == record["dof"]), choices[0])
+    chain = re.match(r"P[0-9]+?([RP]+)", record["word"])
+    kinds = chain[1] if chain else ""
+    return "+".join(sorted({kinds[j - 1] for leg in chosen["joints"] for j in leg if 0 < j <= len(kinds)}))
+
+
+def has_parallelograms(record: Record) -> bool:
+    """Whether a leg has a parallelogram, or two equal parallel rods."""
+    return re.search("Pi|2SS|2US", record["word"]) is not None
+
+
+def _motor_letters(text: str) -> list[str]:
+    letters = sorted(set(text.split("+")))
+    if not set(letters) <= set(MOVED):
+        raise BadRequest("the catalog cannot be asked for motors", text, f"{', '.join(MOVED)}, or several joined by +")
+    return letters
 
 
 def chains(record: Record) -> set[str]:

@@ -15,7 +15,7 @@ from ..results import Value
 from .fits import fits, require_askable
 from .jsonl import Record, leading_word, record
 from .known import alias, is_called, order
-from .store import DATABASES, Store, shipped_folder, store
+from .store import DATABASES, ShippedCatalogs, Store, shipped_folder, store
 from .words import SENSORS, parse
 
 
@@ -77,7 +77,10 @@ class Catalog(Value):
         ``group``, ``dof``, ``motion`` ("3T", "2T1R"), ``verdict``, ``base_motors``, ``fewest`` (legs of the smallest
         set that sees all that can be seen), ``modes`` (complex ones of such a set) and ``see`` ("3point": what is seen
         of the platform instead of legs) must be equal. ``legs`` is their number, or a pattern of ``*`` and ``?`` for
-        the notation or for the chain of one leg, with or without motor marks. ``text`` must occur in some field, or in
+        the notation or for the chain of one leg, with or without motor marks. ``motors`` ("R", "P", "P+R" …) are the
+        kinds of all driven joints, and ``driven`` says whether the motors determine all freedoms; of a published robot
+        its first choice of motors that does counts. ``parallelograms``: whether a leg has one, or two equal rods.
+        ``text`` must occur in some field, or in
         a name under which the robot is known. Several values in a tuple: any of them.
         """
         require_askable(asked)
@@ -105,7 +108,7 @@ class Catalog(Value):
 
 def load(path: str | Path | None = None, **asked: Any) -> Catalog:
     """The shipped catalog, or that of a folder or SQLite file; ``published``: the shipped one of published robots
-    (docs/pages/audit.md). ``asked`` as for ``Catalog.where``.
+    (docs/pages/audit.md); ``all``: both. ``asked`` as for ``Catalog.where``.
 
     What is seen of platforms instead of legs (the group ``sensors``) is left out unless ``group`` or ``see`` asks for
     it. Of a SQLite file only the records that fit are read. Raises ``BadRequest`` if there is no catalog, or one of
@@ -129,9 +132,12 @@ def find_named(text: str, path: str | Path | None = None) -> list[Record]:
 
 def count(path: str | Path | None = None, **asked: Any) -> int:
     """How many records there are of the groups among which those lie that are ``asked`` for."""
-    kept = _there(path)
-    groups = _groups(kept, asked if asked.get("group") == SENSORS else {**asked, "group": None})
-    return sum(kept.count(name) for name in groups)
+    return sum(map(_there(path).count, covered(path, **asked)))
+
+
+def covered(path: str | Path | None = None, **asked: Any) -> list[str]:
+    """The names of the groups among which those lie that are ``asked`` for."""
+    return _groups(_there(path), asked if asked.get("group") == SENSORS else {**asked, "group": None})
 
 
 def groups_of(path: str | Path | None = None) -> list[str]:
@@ -158,7 +164,7 @@ def _tuple(value: object) -> tuple[object, ...]:
 def _there(path: str | Path | None) -> Store:
     """The store of a path, the shipped one where there is none; raises ``BadRequest`` where nothing is."""
     kept = shipped_folder() if path is None else store(path)
-    if path is not None and not kept.path.exists():
+    if path is not None and not kept.path.exists() and not isinstance(kept, ShippedCatalogs):
         raise BadRequest("no such catalog", str(path), f"a folder, or a file that ends in {', '.join(DATABASES)}")
     if not kept.groups():
         raise BadRequest("nothing in the catalog", str(kept.path), "one that was built by hrsynth catalog build")

@@ -37,6 +37,8 @@ PACKED_ABOVE = 5_000
 """Records of a group above which its file is compressed, where it may unpack to so much."""
 PUBLISHED = "published"
 """The shipped catalog of published robots."""
+ALL = "all"
+"""This one and the shipped catalog of words."""
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
 
@@ -127,6 +129,21 @@ class Folder:
     def file(self, group: str) -> Path:
         packed = self.path / f"{group}{PACKED}"
         return packed if packed.exists() else self.path / f"{group}{LINES}"
+
+
+class ShippedCatalogs(Folder):
+    """All that comes with the package: the groups of words, and beside them those of the published robots."""
+
+    def groups(self) -> list[str]:
+        return [*super().groups(), *self._published.groups()]
+
+    def file(self, group: str) -> Path:
+        own = super().file(group)
+        return own if own.exists() else self._published.file(group)
+
+    @property
+    def _published(self) -> Folder:
+        return Folder(self.path / PUBLISHED)
 
 
 class Database:
@@ -254,9 +271,11 @@ def _values(lines: Iterable[str], name: str) -> list[Any]:
 
 
 def store(path: str | Path) -> Store:
-    """The store of this name: a SQLite file by its ending, else a folder; ``published`` of the package, where there is
-    no such folder."""
+    """The store of this name: a SQLite file by its ending, else a folder; ``published`` or ``all`` of the package,
+    where there is no such folder."""
     path = Path(path)
+    if path == Path(ALL) and not path.exists():
+        return ShippedCatalogs(shipped_folder().path)
     if path == Path(PUBLISHED) and not path.exists():
         return Folder(shipped_folder().path / PUBLISHED)
     return Database(path) if path.suffix in DATABASES else Folder(path)

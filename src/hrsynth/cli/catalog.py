@@ -2,9 +2,9 @@
 
 Their records, besides ``command`` ("catalog build" …) and ``version``: ``build`` gives ``groups``, each with
 ``group``, ``words``, ``now`` (made), ``before`` and ``file`` (null while it is not complete), with ``--check`` instead
-``stale``, one text for each thing; ``list`` gives ``total`` and ``entries``; ``show`` gives ``entry``, ``drawing``
-(lines), ``note`` and ``file``; ``site`` as told by ``catalog site --help``; ``audit``
-its table by groups and every disagreement.
+``stale``, one text for each thing; ``list`` gives ``total``, ``groups`` (those that are covered) and ``entries``;
+``show`` gives ``entry``, ``drawing`` (lines), ``note``, ``smallest`` (the smallest sets with their hidden robots) and
+``file``; ``site`` as told by ``catalog site --help``; ``audit`` its table by groups and every disagreement.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import json as javascript
 import shlex
 from collections.abc import Callable
 from dataclasses import dataclass
+from difflib import get_close_matches
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,14 +24,16 @@ from .options import JSON, NEEDED, Option, flag, output, warn
 from .progress import Progress
 
 if TYPE_CHECKING:
+    from ..catalog import Catalog
     from ..catalog.build import WordSource
     from ..mechanism import Mechanism
 
 catalog = Group("hrsynth catalog", "The catalog of architectures: what can be controlled by watching legs.",
                 examples=("list --legs 3-R*RR --verdict controllable", "show Delta -o delta.urdf", "list -h"))
 VERDICTS = ("controllable", "partially controllable", "uncontrollable")
-KEPT = Option("kept", "A folder or SQLite file; or published: the shipped catalog of published robots (default: the "
-              "shipped catalog of words).", "PATH", flags=("--catalog",))
+KEPT = Option("kept", "A folder or SQLite file; or published: the shipped catalog of published robots; or all: this "
+              "and the shipped catalog of words (default: all for list, else that of words).", "PATH",
+              flags=("--catalog",))
 WORKERS = Option("workers", "Processes that share the work.", None, int, 1, low=1)
 TABLES = Option("tables", "Take robots of published tables (their format is on the page 'audit') instead of the words "
                 "listed here.", "FOLDER")
@@ -44,6 +47,10 @@ FILTER = (
            "camera each.", "KINDS"),
     Option("group", "planar, mixed, pods, deltas, spatial, sensors; for published tables 3T0R and the like."),
     Option("base_motors", "Whether all motors are on the base.", kind=bool, flags=("--base-motors/--moving-motors",)),
+    Option("motors", "Kinds of all driven joints: R, P, U, C, or several joined by +.", "KINDS"),
+    Option("driven", "Whether the motors determine all freedoms.", kind=bool, flags=("--driven/--not-driven",)),
+    Option("parallelograms", "Whether a leg has a parallelogram, or two equal parallel rods.", kind=bool,
+           flags=("--parallelograms/--no-parallelograms",)),
     Option("fewest", "Number of legs that must be watched.", kind=int, low=0),
     Option("modes", "Number of assembly modes, complex ones too.", kind=int, low=0),
     Option("text", "Text that occurs in any field, or a name: Delta."),
@@ -93,15 +100,34 @@ def build(groups: list[str] | None, output: str | None, tables: str | None, work
 
 def entries(kept: str | None, json: bool, **asked: Any) -> None:
     """List the architectures that fit."""
-    from ..catalog import load
-    from ..catalog.query import count
+    from ..catalog.query import count, covered
+    from ..catalog.store import ALL
     from ..present.text.catalog import entries as written
 
-    found, total = load(kept, **asked), count(kept, **asked)
+    kept = kept or ALL
+    found, total, groups = _asked(kept, asked), count(kept, **asked), covered(kept, **asked)
+    _say("list", {"total": total, "groups": groups, "entries": [dict(each) for each in found] if json else []},
+         "" if json else written(found.records, total, groups), json)
+
+
+def _asked(kept: str | None, asked: dict[str, Any]) -> Catalog:
+    """The architectures that fit; raises ``BadRequest`` for a search that none can fit, or that says nothing."""
+    from ..catalog import load
+    from ..errors import BadRequest
+
+    if asked["text"] is not None and not asked["text"].strip():
+        raise BadRequest("--text: nothing to look for", asked["text"], f"a name or a text: {', '.join(_names()[:3])} …")
+    found = load(kept, **asked)
     if not found:
         _require_known(kept, asked)
-    _say("list", {"total": total, "entries": [dict(each) for each in found] if json else []},
-         "" if json else written(found.records, total), json)
+    return found
+
+
+def _names() -> list[str]:
+    """The names under which robots are known."""
+    from ..catalog.known import aliases
+
+    return sorted({name for names in aliases().values() for name in names.split(", ")})
 
 
 def _require_known(kept: str | None, asked: dict[str, Any]) -> None:
@@ -112,20 +138,28 @@ def _require_known(kept: str | None, asked: dict[str, Any]) -> None:
 
     groups = groups_of(kept)
     named = {"group": groups, "verdict": VERDICTS}
-    for name in ("group", "verdict", "motion", "dof", "fewest"):
+    for name, field in (("group", ""), ("verdict", ""), ("motion", "motion"), ("dof", "dof"), ("fewest", "fewest"),
+                        ("modes", "modes_bound")):
         if asked[name] is not None and asked[name] not in (
-                known := named[name] if name in named else values(name, kept)):
+                known := named[name] if name in named else values(field, kept)):
             raise BadRequest(f"no architecture of the catalog has this --{name}", asked[name],
                              list(map(str, sorted(known))))
     if asked["legs"] is not None and not load(kept, group=tuple(groups), legs=asked["legs"]):
         raise BadRequest("no architecture of the catalog has such legs", asked["legs"], "their number, "
                          f"{', '.join(map(str, values('legs', kept)))}, or a pattern in which * and ? stand for "
                          "letters: 3-R*RR, PUS, 6-*")
+    if asked["text"] is not None and not load(kept, group=tuple(groups), text=asked["text"]):
+        near = {name.casefold(): name for names in _names() for name in (names, *names.split())}
+        close = get_close_matches(asked["text"].casefold(), near, cutoff=0.5)
+        raise BadRequest("no architecture of the catalog has this --text in a field or a name", asked["text"],
+                         ", ".join([near[name] for name in close] or _names()[:3]) + " …")
 
 
 def show(word: str, output: str | None, tables: str | None, kept: str | None, json: bool) -> None:
     """Show one architecture."""
+    from ..catalog.entry import smallest_sets
     from ..description import save, targets
+    from ..errors import BadRequest
     from ..present.text.catalog import entry
 
     if output is not None:
@@ -133,25 +167,30 @@ def show(word: str, output: str | None, tables: str | None, kept: str | None, js
     with Progress():
         found = _of_word(word, kept) if tables is None else _of_tables(word, tables, kept)
         if output is not None:
+            if "refused" in found.record:
+                raise BadRequest(f"no robot of a refused architecture is written: {found.record['refused']}", word,
+                                 "an architecture with a verdict: hrsynth catalog list")
             robot = found.mechanism()
+        smallest = [] if found.studied is None else smallest_sets(found.record, found.studied())
     if output is not None:
         for warning in save(robot, output):
             warn(str(warning))
     _say("show", {"entry": dict(found.record), "drawing": found.drawn.splitlines(), "note": found.note or None,
-                  "file": output},
-         entry(found.record, found.drawn, found.note)
+                  "smallest": smallest, "file": output},
+         entry(found.record, found.drawn, found.note, smallest)
          + ("" if output is None else f"\n\nThe robot is written to {output}."), json)
 
 
 @dataclass(frozen=True)
 class _Shown:
-    """An architecture: its record, how it is drawn (nothing where it is no word), what else is to be said, and a robot
-    of it."""
+    """An architecture: its record, how it is drawn (nothing where it is no word), what else is to be said, a robot
+    of it, and the one that was studied (None where its geometry is not at hand)."""
 
     record: Any
     drawn: str
     note: str
     mechanism: Callable[[], Mechanism]
+    studied: Callable[[], Mechanism] | None = None
 
 
 def _no_geometry(name: str) -> Mechanism:
@@ -163,16 +202,19 @@ def _no_geometry(name: str) -> Mechanism:
 def _of_word(text: str, kept: str | None) -> _Shown:
     from ..catalog import load
     from ..catalog.drawing import drawing
+    from ..catalog.entry import model
     from ..catalog.geometry import mechanism
+    from ..catalog.store import ALL
     from ..catalog.words import parse
 
-    if text.isalnum() and kept is not None and text in (every := load(kept)) and "choices" in every[text]:
+    if text.isalnum() and text in (every := load(kept or ALL)) and "choices" in every[text]:
         return _Shown(every[text], "", "", partial(_no_geometry, text))
     word, others = _word(text, kept)
     architecture = parse(word)
     record, note = _known_record(str(architecture), kept)
     return _Shown(record, drawing(architecture), "; ".join(each for each in (note, others) if each),
-                  lambda: mechanism(architecture, record.get("attempt", 0)))
+                  lambda: mechanism(architecture, record.get("attempt", 0)),
+                  lambda: mechanism(model(architecture), record.get("attempt", 0)))
 
 
 def _of_tables(name: str, folder: str, kept: str | None) -> _Shown:
@@ -187,20 +229,18 @@ def _of_tables(name: str, folder: str, kept: str | None) -> _Shown:
     else:
         ((_, line),) = make_records(PublishedEntry(folder), robot.group, [name])
         record, note = javascript.loads(line), "studied now"
-    return _Shown(record, "", note, lambda: mechanism(robot))
+    return _Shown(record, "", note, lambda: mechanism(robot), lambda: mechanism(robot))
 
 
 def site(output: str, workers: int, anew: bool, kept: str | None, json: bool, **asked: Any) -> None:
     """Write the pages of the architectures that fit; of those with equal legs, where nothing is asked for."""
-    from ..catalog import Catalog, load
+    from ..catalog import Catalog
     from ..catalog.known import equal_legs
     from ..catalog.site import site as run
     from ..errors import BadRequest
     from ..present.text.catalog import describe_site
 
-    found = load(kept, **asked)
-    if not found:
-        _require_known(kept, asked)
+    found = _asked(kept, asked)
     if all(value is None for value in asked.values()):
         found, every = Catalog([each for each in found if equal_legs(each["word"])]), len(found)
         if len(found) < every:

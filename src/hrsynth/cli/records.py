@@ -1301,18 +1301,28 @@ class Entry(TypedDict, total=False):
 
 
 class CatalogList(Head):
-    """The architectures that fit."""
+    """The architectures that fit, among all of these groups."""
 
     total: int
+    groups: list[str]
     entries: list[Entry]
 
 
+class SmallestSetRecord(TypedDict):
+    """A smallest set of legs and its hidden robot; what went wrong where none was derived."""
+
+    legs: list[str]
+    hidden: str | None
+    problem: str | None
+
+
 class CatalogShow(Head, WrittenTo):
-    """One architecture, drawn and in full."""
+    """One architecture, drawn and in full; `smallest` is empty where nothing is observed or no geometry is at hand."""
 
     entry: Entry
     drawing: list[str]
     note: str | None
+    smallest: list[SmallestSetRecord]
 
 
 class BuiltGroup(TypedDict):

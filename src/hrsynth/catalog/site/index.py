@@ -34,6 +34,7 @@ EXPLAINED = {
                "them. Uncontrollable: none.",
     "exact": "Whether the verdict is proved in exact arithmetic for the architecture, or for random dimensions.",
     "legs needed": "The smallest sets of legs that show as much as all legs do.",
+    "hidden robots": "The hidden robot of each of these sets alone, derived in the dimensions of the robot file.",
     "Type 2": "Where the platform gains a motion that the watched directions do not show.",
     "modes": "How many poses of the platform have the same watched directions.",
     "cure": "What to measure as well, so that nothing is lost.",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
@@ -19,7 +19,7 @@ from ...present.portrait import Portrait
 from ...present.text.catalog import facts, motors
 from ...present.view.view import plane_normal
 from ...rewrite.strategy import Step
-from ..entry import SAMPLES, model
+from ..entry import SAMPLES, model, smallest_sets
 from ..executors import Made, Stopped
 from ..geometry import mechanism
 from ..jsonl import Record
@@ -54,6 +54,8 @@ def write_pages(folder: str, parts: Iterable[str]) -> Made:
 def _write(folder: Path, structure: Structure, studied: Study) -> None:
     robots: dict[str, Mechanism] = {}
     for record in structure.records:
+        if "refused" in record:
+            continue
         try:
             robot = studied.real(record["word"])
             content = native.write(robot).encode()
@@ -86,7 +88,7 @@ def page(structure: Structure, studied: Study, robots: dict[str, Mechanism], dra
     real = None if shown is None else robot_svg(shown, observed=_known_links(studied.observed, shown),
                                                 title="Real robot")
     return render(
-        "page.html", structure=structure, fact=structure.fact, facts=list(facts(structure.fact)),
+        "page.html", structure=structure, fact=structure.fact, facts=list(facts(structure.fact, studied.smallest)),
         turned=None if drawn is None else drawn.scene(), alias=alias(structure.fact["word"]),
         cure=cure(structure.fact), rules=list(rules(structure.fact)),
         differs=studied.differs, real=real,
@@ -131,6 +133,7 @@ class Study:
     attempt: int
     derivation: Derivation | None = None
     differs: str = ""
+    smallest: Sequence[Record] = ()
 
     @property
     def observed(self) -> tuple[str, ...] | None:
@@ -148,11 +151,11 @@ def study(record: Record) -> Study:
     if "refused" in record:
         return Study(attempt)
     try:
-        setting = observe(mechanism(model(parse(record["word"])), attempt), samples=SAMPLES)
-        found = derive(setting, unchecked=False)
+        drawn = mechanism(model(parse(record["word"])), attempt)
+        found = derive(observe(drawn, samples=SAMPLES), unchecked=False)
     except HrsynthError as error:
         return Study(attempt, differs=str(error).splitlines()[0])
-    return Study(attempt, found, _difference(found, record))
+    return Study(attempt, found, _difference(found, record), smallest_sets(record, drawn))
 
 
 def _difference(found: Derivation, record: Record) -> str:

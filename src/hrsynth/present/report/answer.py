@@ -49,6 +49,8 @@ def describe_seen(found: Derivation) -> str:
 def enough(found: Derivation, legs: Legs) -> str:
     """Which sets of legs are the smallest that show as much as any."""
     best = max(each.rank for each in legs.sets)
+    if not best:
+        return f"No set of {things(found.setting)} shows any of the {found.dof} freedoms."
     sets = "; ".join(_legs(each, found.setting) for each in legs.minimal[:4])
     more = len(legs.minimal) - 4
     return (f"Fewest {things(found.setting)} that show {best} of {found.dof}: {sets}"

@@ -18,19 +18,23 @@ PROOFS = {"class": "no more by the degrees of their equations", "rank": "no more
 Record = Mapping[str, Any]
 
 
-def entries(records: Sequence[Record], total: int) -> str:
-    """A line an entry, the first of many, and how many of all they are; no others are looked at."""
-    count = f"{len(records)} of {total} architectures"
+def entries(records: Sequence[Record], total: int, groups: Sequence[str] = ()) -> str:
+    """A line an entry, the first of many, and how many of all they are, in which groups; no others are looked at."""
+    tables = [name for name in groups if name[:1].isdigit()]
+    count = f"{len(records)} of {total} architectures" + "".join(
+        f" {what} {', '.join(names)}" for what, names in (
+            ("in the groups", [name for name in groups if name not in tables]),
+            ("and of published robots", tables)) if names)
     if len(records) > SHOWN:
         count += f", the first {SHOWN} shown (all with --json; --legs, --motion, --verdict … ask for fewer)"
     return f"{table([_row(record) for record in records[:SHOWN]], HEADS)}\n\n{count}" if records else count
 
 
-def entry(record: Record, drawn: str, note: str = "") -> str:
-    """One entry: its legs drawn, then what is known of it."""
+def entry(record: Record, drawn: str, note: str = "", smallest: Sequence[Record] = ()) -> str:
+    """One entry: its legs drawn, then what is known of it, with the hidden robots of its ``smallest`` sets."""
     head = f"{record['word']}   {record.get('notation', '')}".rstrip()
     legs = [f"{drawn}\n{LEGEND}"] if drawn else []
-    return "\n\n".join([head, *legs, listing(_all(record)), *filter(None, [note])])
+    return "\n\n".join([head, *legs, listing(_all(record, smallest)), *filter(None, [note])])
 
 
 LISTED: Mapping[str, type] = {**dict.fromkeys(("notation", "motion", "verdict"), str),
@@ -66,17 +70,23 @@ def _row(record: Record) -> tuple[str, ...]:
     if "refused" in record:
         return (record["word"], record.get("notation", ""), "", "", "", "refused", "", str(record["refused"]))
     return (record["word"], record["notation"], str(record["dof"]), record["motion"], record.get("hidden", "none"),
-            record["verdict"], f"{record['rank']} of {record['dof']}", str(record["fewest"]))
+            record["verdict"], f"{record['rank']} of {record['dof']}",
+            ": ".join(filter(None, [str(record["fewest"]), _sets(record)])))
 
 
-def _all(record: Record) -> list[tuple[str, str]]:
-    found = [("group", str(record.get("group", ""))), *facts(record)]
+def _sets(record: Record) -> str:
+    return "  ".join("{" + ", ".join(legs) + "}" for legs in record.get("minimal", ()))
+
+
+def _all(record: Record, smallest: Sequence[Record]) -> list[tuple[str, str]]:
+    found = [("group", str(record.get("group", ""))), *facts(record, smallest)]
     found += [("motors", motors(record))] if "motors" in record else []
     return [*found, ("choices", "  ".join(map(choice, record["choices"])))] if "choices" in record else found
 
 
-def facts(record: Record) -> Iterable[tuple[str, str]]:
-    """What is known whatever is driven, by name; what is not known is left out."""
+def facts(record: Record, smallest: Sequence[Record] = ()) -> Iterable[tuple[str, str]]:
+    """What is known whatever is driven, by name; what is not known is left out. ``smallest``: the smallest sets with
+    their hidden robots."""
     require_whole(record, TOLD)
     if "refused" in record:
         yield "refused", str(record["refused"])
@@ -96,7 +106,10 @@ def facts(record: Record) -> Iterable[tuple[str, str]]:
         yield "lost", "; ".join(record["lost"])
     told, what = ("held", "observations") if "see" in record else ("watched", "legs")
     if record.get("minimal"):
-        yield f"{what} needed", "  ".join("{" + ", ".join(legs) + "}" for legs in record["minimal"])
+        yield f"{what} needed", _sets(record)
+    if any(each["hidden"] != record.get("hidden") for each in smallest):
+        yield "hidden robots", "; ".join(f"{{{', '.join(each['legs'])}}}: {each['hidden'] or each['problem'] or 'none'}"
+                                         for each in smallest)
     if record.get("condition"):
         yield "Type 2", str(record["condition"])
     if record.get("modes_bound") is not None:
