@@ -22,6 +22,12 @@ LARGEST_FILE = 20_000_000
 """Bytes above which a robot file is not read at all."""
 MOST_ELEMENTS = 100_000
 """Elements above which an XML document is not parsed."""
+MOST_NAMES = 1000
+"""Different names of elements above which an XML document is refused: the largest format, MJCF, has 150."""
+MOST_UNKNOWN_NAMES = 300
+"""Different names that a format does not have from which on a document is refused."""
+MOST_ATTRIBUTES = 200
+"""Attributes of an element above which an XML document is refused: the most in any format are 50."""
 MOST_PREFIXES = 16
 """Times that a document is parsed again with what stopped the parser left out."""
 MOST_LINKS = 1000

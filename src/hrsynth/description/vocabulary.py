@@ -12,6 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
+from ..budgets import MOST_UNKNOWN_NAMES
 from ..errors import Defect
 from ..mechanism.model import Note
 from ..tolerances import LIKE_A_WORD
@@ -101,9 +102,14 @@ class Vocabulary:
         return "}" in name or ":" in name or name in self.others.split()
 
     def unknown(self, root: xml.Element) -> Iterator[UnknownName]:
-        """The names in a document that the format does not have where they stand, in the order of the document."""
-        key = str(root.tag)
-        return self._of(root, self.elements[key]) if key in self.elements else iter(())
+        """The names in a document that the format does not have where they stand, in the order of the document, until
+        there are too many different ones to compare."""
+        key, met = str(root.tag), set[tuple[str, str]]()
+        for each in self._of(root, self.elements[key]) if key in self.elements else ():
+            met.add((each.name, each.place))
+            if len(met) > MOST_UNKNOWN_NAMES:
+                return
+            yield each
 
     def _of(self, element: xml.Element, known: ElementNames) -> Iterator[UnknownName]:
         given = [str(name) for name in element.attrib]
@@ -137,6 +143,9 @@ class Vocabulary:
             elif not file.as_spelt:
                 where = getattr(each.line, "file", str(file.path))
                 defects.append(Defect(where, each.line, f"unknown {each.place}", each.found, each.remedy))
+        if len({(each.what, each.value) for each in defects}) + len(notes) >= MOST_UNKNOWN_NAMES:
+            raise xml.refusal(file.path, "too many different names that the format does not have",
+                              f"fewer than {MOST_UNKNOWN_NAMES}")
         return defects, [_note_of(found) for found in notes.values()]
 
 

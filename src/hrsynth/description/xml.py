@@ -5,21 +5,21 @@ from __future__ import annotations
 import json
 import re
 import stat
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeAlias
 
 from lxml import etree
 
-from ..budgets import LARGEST_FILE, MOST_ELEMENTS, MOST_PREFIXES
+from ..budgets import LARGEST_FILE, MOST_ATTRIBUTES, MOST_ELEMENTS, MOST_NAMES, MOST_PREFIXES
 from ..errors import BadRequest, BadRobotFile, Defect
 from ..mechanism.model import Note
 
 Element: TypeAlias = etree._Element
 
-_COMMENT = re.compile(rb"<!--.*?-->|<\?.*?\?>", re.DOTALL)
-"""Comments and processing instructions: either may hold what looks like the other."""
+_CLOSED_BY = {b"<!--": b"-->", b"<?": b"?>"}
+"""Ends of comments and of processing instructions: either may hold what looks like the other."""
 _PREFIX = re.compile(r"Namespace prefix (?P<prefix>[A-Za-z_][\w.-]*) (?:on|for) ", re.ASCII)
 _ROOT = re.compile(rb"(?:\xef\xbb\xbf)?(?:\s+|<\?.*?\?>|<!--.*?-->)*<[^\s/>]+", re.DOTALL)
 _BREAK = re.compile(rb"&#0*(?:9|10|13);|&#x0*[9aAdD];")
@@ -80,13 +80,14 @@ def document(text: bytes | str, file: str, notes: list[Note] | None = None) -> E
     if (count := data.count(b"<") - data.count(b"</")) > MOST_ELEMENTS:
         raise refusal(file, "too many elements", f"up to {MOST_ELEMENTS}", value=str(count))
     data = _BREAK.sub(b" ", data)
-    bare = _COMMENT.sub(lambda match: b"\n" * match[0].count(b"\n"), data)
+    bare = _without_comments(data, lambda comment: True)
     if declaration := _DECLARATION.search(bare):
         raise refusal(file, "a document type declaration, which is not allowed",
                       line=bare.count(b"\n", 0, declaration.start()) + 1)
     for _ in range(MOST_PREFIXES):
         try:
             root = etree.fromstring(data, _parser())
+            _require_few_names(root, file)
             if root.getroottree().docinfo.internalDTD is None:
                 return root
             what, at = "a document type declaration, which is not allowed", 1
@@ -103,6 +104,16 @@ def document(text: bytes | str, file: str, notes: list[Note] | None = None) -> E
     raise refusal(file, "malformed XML", "a whole document of XML", value=what, line=at)
 
 
+def _require_few_names(root: Element, file: str) -> None:
+    """Raise ``BadRobotFile`` where there are more names than any format has: what compares names takes its time."""
+    if len(names := {element.tag for element in root.iter("*")}) > MOST_NAMES:
+        raise refusal(file, "too many different elements", f"up to {MOST_NAMES}", value=str(len(names)))
+    for element in root.iter("*"):
+        if len(element.attrib) > MOST_ATTRIBUTES:
+            raise refusal(file, f"too many attributes of <{element.tag}>", f"up to {MOST_ATTRIBUTES}",
+                          value=str(len(element.attrib)), line=line(element))
+
+
 def _mend(data: bytes, what: str, notes: list[Note]) -> bytes:
     """A document without what stopped the parser, where that means nothing: its lines stay where they are."""
     prefix, root = _PREFIX.search(what), _ROOT.match(data)
@@ -113,13 +124,43 @@ def _mend(data: bytes, what: str, notes: list[Note]) -> bytes:
         return data[: root.end()] + declared + data[root.end():]
     if "comment" not in what.lower():
         return data
-    wrong = [match for match in _COMMENT.finditer(data) if _is_wrong(match[0])]
+    wrong = [start for start, end in _comments(data) if _is_wrong(data[start:end])]
     if wrong:
-        line = data.count(b"\n", 0, wrong[0].start()) + 1
+        line = data.count(b"\n", 0, wrong[0]) + 1
         notes.append(Note("ignored", f"{len(wrong)} comments that hold '--', which XML does not allow, the first in "
                                      f"line {line}" if wrong[1:] else
                           f"a comment that holds '--', which XML does not allow, in line {line}"))
-    return _COMMENT.sub(lambda match: b"\n" * match[0].count(b"\n") if _is_wrong(match[0]) else match[0], data)
+    return _without_comments(data, _is_wrong)
+
+
+def _comments(data: bytes) -> Iterator[tuple[int, int]]:
+    """Where comments and processing instructions begin and end; each byte is looked at a bounded number of times."""
+    starts, done = dict.fromkeys(_CLOSED_BY, 0), 0
+    while starts:
+        for opening in list(starts):
+            if starts[opening] < done or not data.startswith(opening, starts[opening]):
+                starts[opening] = data.find(opening, done)
+        starts = {opening: start for opening, start in starts.items() if start >= 0}
+        if not starts:
+            return
+        start, opening = min((start, opening) for opening, start in starts.items())
+        end = data.find(_CLOSED_BY[opening], start + len(opening))
+        if end < 0:  # nor is a later one closed
+            del starts[opening]
+            continue
+        done = end + len(_CLOSED_BY[opening])
+        yield start, done
+
+
+def _without_comments(data: bytes, left_out: Callable[[bytes], bool]) -> bytes:
+    """A document without those of its comments, whose lines stay."""
+    parts, at = [], 0
+    for start, end in _comments(data):
+        comment = data[start:end]
+        if left_out(comment):
+            parts += [data[at:start], b"\n" * comment.count(b"\n")]
+            at = end
+    return b"".join([*parts, data[at:]])
 
 
 def _is_wrong(comment: bytes) -> bool:

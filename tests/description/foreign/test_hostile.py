@@ -13,6 +13,7 @@ import pytest
 
 from description.foreign.examples import FILES, MJCF, SDF, URDF
 from hrsynth.description import load
+from hrsynth.description.xml import _comments as comments
 from hrsynth.errors import HrsynthError
 
 SECONDS, BYTES = 5, 1_000_000_000
@@ -235,3 +236,31 @@ def test_no_instruction_or_comment_hides_a_declaration(dialect: str, before: str
             assert_refused(made(tmp_path, text), "a document type declaration", "not allowed")
             if "ENTITY" in body:
                 assert_refused(made(tmp_path, text.replace('"four_bar"', '"&a;"', 1)), "not allowed")
+
+
+NAMES = {
+    "open comments": '<robot name="a">' + "<!--        " * 95_000 + "</robot>",
+    "open instructions": '<robot name="a">' + "<?a    " * 95_000 + "</robot>",
+    "comments in comments": '<robot name="a">' + "<!-- <? --> ?>" * 40_000 + "<",
+    "attributes": "<robot name='a'><link " + " ".join(f"a{k}='1'" for k in range(100_000)) + "/></robot>",
+    "elements": "<robot name='a'>" + "".join(f"<lin{k}/>" for k in range(90_000)) + "</robot>",
+    "attributes of many elements": "<robot name='a'><link name='b'/>" + "".join(
+        f"<joint name='j{k}' abc{k}='1'/>" for k in range(40_000)) + "</robot>",
+    "defaults": "<mujoco><default>" + "".join(f"<t{k} a='1'/>" for k in range(900)) + "".join(
+        f"<default class='c{k}'>" + f"<geom a{k}='1'/>" for k in range(200)) + "</default>" * 201 + "</mujoco>",
+}
+
+
+@pytest.mark.some(3, 4)
+@pytest.mark.parametrize("name", NAMES)
+def test_what_compares_names_takes_its_time(name: str, tmp_path: Path):
+    assert_refused(made(tmp_path, NAMES[name]))
+
+
+@pytest.mark.parametrize("text", [
+    b"<a/>", b"<a><!-- b --></a>", b"<a><!-- <? --><?c <!-- ?></a>", b"<a><!--><b/>--></a>", b"<!-- a",
+    b"<? <!-- ?> -->", b"<a><?b?><!--c--><!---->x<!-- ?> --></a>"])
+def test_comments_are_those_of_a_pattern(text: bytes):
+    """The pattern takes quadratic time where an end is missing."""
+    pattern = re.compile(rb"<!--.*?-->|<\?.*?\?>", re.DOTALL)
+    assert list(comments(text)) == [match.span() for match in pattern.finditer(text)]

@@ -263,3 +263,36 @@ def test_a_document_type_of_an_included_file_is_refused(tmp_path: Path):
     (tmp_path / "parts.xacro").write_text('<!DOCTYPE robot [<!ENTITY a "b">]>\n' + PARTS)
     with pytest.raises(BadRobotFile, match="document type declaration"):
         load(path)
+
+
+def test_a_package_ends_where_it_says_so(tmp_path: Path):
+    """``$(find …)`` reaches the folder of the package, else the folder above; links and patterns lead nowhere."""
+    inner = tmp_path / "outer" / "package" / "urdf" / "arms"
+    inner.mkdir(parents=True)
+    path = inner / "robot.urdf"
+    places = {"own": inner, "above": inner.parent, "package": inner.parents[1], "outside": inner.parents[2]}
+    for name, folder in places.items():
+        (folder / f"{name}.yaml").write_text(f"name: {name}\n")
+    (inner / "link.yaml").symlink_to(tmp_path / "outer" / "outside.yaml")
+    (inner / "linked").symlink_to(tmp_path / "outer")
+
+    def reads(spec: str) -> bool:
+        path.write_text(HEAD + f'<link name="a${{load_yaml(\'{spec}\').name}}"/></robot>')
+        try:
+            return expand(path)[0].get("name") != ""
+        except BadRobotFile:
+            return False
+
+    assert [reads(f"$(find x)/{name}.yaml") for name in places] == [True, True, False, False]
+    (inner.parents[1] / "package.xml").write_text("<package/>")
+    assert [reads(f"$(find x)/{name}.yaml") for name in places] == [True, True, True, False]
+    assert not any(map(reads, ("$(find x)/etc/hostname", "link.yaml", "linked/outside.yaml", "link*/outside.yaml")))
+
+
+def test_what_the_package_warns_of_is_not_collected(tmp_path: Path):
+    name = "n" * 200_000
+    path = tmp_path / "robot.urdf"
+    path.write_text(HEAD + f'<xacro:macro name="{name}" params="k"><xacro:property name="pi" value="1"/>'
+                    f'<xacro:if value="${{k}}"><xacro:{name} k="${{k - 1}}"/></xacro:if></xacro:macro>'
+                    f'<xacro:{name} k="20"/><link name="a"/></robot>')
+    assert expand(path)[0].get("name") == "a"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 
@@ -14,30 +15,40 @@ from ... import xml
 from ...elements import XmlReader
 from ...jointgraph import comma_list
 
+Layer: TypeAlias = dict[str, dict[str, str]]
+"""Attributes that a class adds, by kind of element."""
+
 
 class Defaults:
     """The attributes that each class gives to each kind of element; classes are nested and inherit."""
 
     def __init__(self, reader: XmlReader) -> None:
         self.reader = reader
-        self.classes: dict[str, dict[str, dict[str, str]]] = {"main": {}}
+        self.classes: dict[str, tuple[Layer, ...]] = {"main": ()}
+        self._given: dict[tuple[str, str], dict[str, str]] = {}
         for element in reader.root.findall("default"):
-            self._read(element, {}, "main")
+            self._read(element, (), "main")
 
-    def _read(self, element: xml.Element, inherited: dict[str, dict[str, str]], name: str) -> None:
-        own = {tag: dict(values) for tag, values in inherited.items()}
-        for tag, values in self.classes.get(name, {}).items():
-            own.setdefault(tag, {}).update(values)
+    def _read(self, element: xml.Element, inherited: tuple[Layer, ...], name: str) -> None:
+        own: Layer = {}
         for child in xml.children(element):
             if child.tag != "default":
                 own.setdefault(child.tag, {}).update(_attributes(child))
-        self.classes[name] = own
+        self.classes[name] = (*inherited, *self.classes.get(name, ()), own)
         for child in element.findall("default"):
             inner = child.get("class")
             if inner is None:
                 self.reader.defect(xml.line(child), "<default> without class")
             else:
-                self._read(child, own, inner)
+                self._read(child, self.classes[name], inner)
+
+    def _of_class(self, name: str, tag: str) -> dict[str, str]:
+        """What a class gives to a kind of element, what it inherits first."""
+        if (name, tag) not in self._given:
+            found = self._given[name, tag] = {}
+            for layer in self.classes[name]:
+                found.update(layer.get(tag, {}))
+        return self._given[name, tag]
 
     def of(self, element: xml.Element, childclass: str | None, tag: str | None = None) -> dict[str, str]:
         """The attributes of an element with those of its class, its own first."""
@@ -45,7 +56,7 @@ class Defaults:
         if name not in self.classes:
             self.reader.defect(xml.line(element), "unknown default class", name, comma_list(self.classes, like=name))
             name = "main"
-        return {**self.classes[name].get(tag or str(element.tag), {}), **_attributes(element)}
+        return {**self._of_class(name, tag or str(element.tag)), **_attributes(element)}
 
 
 def _attributes(element: xml.Element) -> dict[str, str]:

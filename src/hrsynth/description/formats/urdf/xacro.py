@@ -7,7 +7,7 @@ import json
 import sys
 from pathlib import Path
 
-from ....budgets import LARGEST_FILE, XACRO_SECONDS
+from ....budgets import LARGEST_FILE, MOST_ELEMENTS, XACRO_SECONDS
 from ... import xml
 
 
@@ -30,7 +30,7 @@ def expand(path: Path) -> xml.Element:
         raise xml.refusal(path, "a xacro file, and the package xacro is not installed",
                           "the extra hrsynth[xacro], or the URDF that it expands to")
     process = Path(__file__).with_name("xacro_process.py")
-    command = [sys.executable, "-P", str(process), str(path.resolve()), str(LARGEST_FILE)]
+    command = [sys.executable, "-P", str(process), str(path.resolve()), str(LARGEST_FILE), str(MOST_ELEMENTS)]
     try:
         run = subprocess.run(command, capture_output=True, text=True, timeout=XACRO_SECONDS, check=False)
     except subprocess.TimeoutExpired:

@@ -16,6 +16,7 @@ import ast
 import json
 import math
 import operator
+import os
 import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -164,8 +165,17 @@ class Expression:
                         f"{name!r} is no function that is read")
 
 
-def restrict(xacro: Any, substitution: Any, locate: Callable[[str], str]) -> None:
-    """Have the package evaluate its expressions here, and read files that are located only."""
+def restrict(xacro: Any, substitution: Any, folder: Path) -> None:
+    """Have the package evaluate its expressions here, and read files of the folder, or of its package, only."""
+    def locate(spec: str) -> str:
+        return located(spec, folder)
+
+    def read(name: str) -> Any:
+        path = Path(name).resolve()
+        if not path.is_relative_to(package_folders(folder)[-1]):
+            raise ValueError(f"{name} lies outside of the file's package")
+        return open(path, encoding="utf-8")
+
     def fail(*texts: Any) -> None:
         raise ValueError(" ".join(map(str, texts)))
 
@@ -194,27 +204,42 @@ def restrict(xacro: Any, substitution: Any, locate: Callable[[str], str]) -> Non
         if not all(hasattr(module, name) for name in names):
             forbidden()
         module.eval = module.exec = module.compile = forbidden
+    xacro.open = read
     xacro.safe_eval, xacro._global_symbols, xacro.abs_filename_spec = evaluate, dict(CONSTANTS), locate
     substitution._eval, substitution._eval_find = evaluate_argument, lambda package: MARK
     substitution._eval_env, substitution._eval_optenv = lambda variable: "", lambda variable, default="": default
 
 
 def located(spec: str, folder: Path) -> str:
-    """The file that an include names; raises ``ValueError`` for what lies outside of the folder (of the package)."""
+    """The file that an include names; raises ``ValueError`` for what lies outside of the folder (of the package), and
+    for a pattern of files."""
+    if any(letter in spec for letter in "*?["):
+        raise ValueError(f"{spec} is a pattern of files")
     if MARK in spec:
         rest = Path(spec.split(MARK)[-1].lstrip("/"))
         if ".." in rest.parts:
             raise ValueError(f"{rest} leaves the package")
-        for home in (folder, *list(folder.parents)[:LEVELS]):
+        for home in package_folders(folder):
             for start in range(len(rest.parts)):
                 candidate = home.joinpath(*rest.parts[start:])
-                if candidate.is_file() and candidate.resolve().is_relative_to(home):
+                if candidate.is_file():
                     return str(candidate)
         raise ValueError(f"no folder above the file has {rest}")
     path = Path(spec) if Path(spec).is_absolute() else folder / spec
     if not path.resolve().is_relative_to(folder):
         raise ValueError(f"{spec} lies outside of the file's folder")
     return str(path)
+
+
+def package_folders(folder: Path) -> list[Path]:
+    """The folders in which a package's files may lie: the file's own, and those up to the one that says that it is a
+    package; where none does, the one above, unless that is a root or a home."""
+    above = [folder, *folder.parents]
+    for k, each in enumerate(above[:LEVELS + 1]):
+        if any((each / name).is_file() for name in ("package.xml", "model.config")):
+            return above[:k + 1]
+    shared = Path.home(), Path(os.environ.get("TMPDIR", "/tmp"))
+    return above[:2] if len(above) > 2 and above[1] not in shared else above[:1]
 
 
 class PlacedBuilder(expatbuilder.ExpatBuilderNS):
@@ -285,23 +310,27 @@ def limit() -> None:
             resource.setrlimit(getattr(resource, f"RLIMIT_{name}"), (amount, amount))
 
 
-def main(name: str, largest: str) -> None:
-    """Expand one file to at most so many bytes."""
+def main(name: str, largest: str, most: str) -> None:
+    """Expand one file to at most so many characters and elements."""
     limit()
     import xacro
     from xacro import substitution_args
 
     folder = Path(name).resolve().parent
-    at = watched(xacro)
+    at, errors = watched(xacro), sys.stderr
     try:
-        restrict(xacro, substitution_args, lambda spec: located(spec, folder))
+        sys.stderr = open(os.devnull, "w")  # noqa: SIM115 (what the package warns of, without a limit)
+        restrict(xacro, substitution_args, folder)
         made = xacro.process_file(name, verbosity=0)
         places = [getattr(each, "place", None) for each in made.getElementsByTagName("*")]
         text = made.toxml()
         if len(text) > int(largest):
             raise ValueError(f"{len(text)} characters when expanded, allowed: {largest}")
+        if len(places) > int(most):
+            raise ValueError(f"{len(places)} elements when expanded, allowed: {most}")
     except Exception as error:
-        sys.exit(json.dumps(wrong(xacro, error, at)))
+        errors.write(json.dumps(wrong(xacro, error, at)))
+        sys.exit(1)
     sys.stdout.write(json.dumps(places) + "\n" + text)
 
 
