@@ -25,16 +25,17 @@ class Defaults:
     def __init__(self, reader: XmlReader) -> None:
         self.reader = reader
         self.classes: dict[str, tuple[Layer, ...]] = {"main": ()}
+        self._own: dict[str, Layer] = {}
         self._given: dict[tuple[str, str], dict[str, str]] = {}
         for element in reader.root.findall("default"):
             self._read(element, (), "main")
 
     def _read(self, element: xml.Element, inherited: tuple[Layer, ...], name: str) -> None:
-        own: Layer = {}
+        own = self._own.setdefault(name, {})
         for child in xml.children(element):
             if child.tag != "default":
                 own.setdefault(child.tag, {}).update(_attributes(child))
-        self.classes[name] = (*inherited, *self.classes.get(name, ()), own)
+        self.classes[name] = inherited if any(layer is own for layer in inherited) else (*inherited, own)
         for child in element.findall("default"):
             inner = child.get("class")
             if inner is None:
