@@ -222,10 +222,7 @@ def test_an_exponent_is_short(dialect: str, tmp_path: Path):
 def test_a_group_of_shapes_is_a_number(tmp_path: Path):
     for group in ("9" * 5000, "\u0663", "1_0", "x", "", "-1e400"):
         text = MJCF["connect"].replace("<body ", f'<geom size="1" group="{group}"/><body ', 1)
-        try:
-            assert load(made(tmp_path, text)).platform
-        except HrsynthError as error:
-            assert len(error.lines()) == 1
+        assert load(made(tmp_path, text)).platform
 
 
 def test_what_is_no_robot_file_or_folder(tmp_path: Path):
