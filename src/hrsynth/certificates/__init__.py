@@ -76,7 +76,7 @@ def verify(source: Mapping[str, Any] | str | Path, robot: Mechanism | str | Path
             raise NotAccepted("it is not an object")
         checkers = {"path": verify_path, "ranks": verify_ranks}
         checker = checkers.get(str(record.get("claim")), verify_certificate)
-        proved = checker.verify(record) if file is None else _within_limits(Path(checker.__file__), file)
+        proved = checker.verify(record) if file is None else _within_limits(Path(str(checker.__file__)), file)
     except (NotAccepted, PathNotAccepted, RanksNotAccepted, BadRequest) as reason:
         raise CertificateRefused(name, str(reason)) from None
     if robot is not None:
