@@ -21,14 +21,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hrsynth import untrusted
+from hrsynth import certificate, modes, untrusted
+from hrsynth import certificates as certificates_
 from hrsynth.budgets import LARGEST_UNPACKED, MOST_UNPACKED
 from hrsynth.catalog.jsonl import head
-from hrsynth.certificates import verify
+from hrsynth.certificates import verify, verify_certificate, verify_path, verify_ranks
 from hrsynth.cli import execute
 from hrsynth.description import save
 from hrsynth.description.meshes import locate_mesh, triangles
-from hrsynth.errors import BadRequest, HrsynthError
+from hrsynth.errors import BadRequest, CertificateRefused, HrsynthError
 
 ROOT = Path(__file__).resolve().parent.parent
 LINKS = '<link name="base"/><link name="crank">{}</link><link name="bar"/><link name="rocker"/>'
@@ -387,6 +388,66 @@ def test_a_number_of_a_certificate_is_short(tmp_path: Path):
         with pytest.raises(HrsynthError) as caught:
             verify(tmp_path / "c.json")
         assert len(caught.value.lines()) == 1
+
+
+def certificates() -> Iterator[tuple[str, dict[str, Any]]]:
+    """Small certificates that say little and would take long, with the claim that they make."""
+    box = {"reaches": [], "boxes": [], "bound": {"kind": "degrees", "groups": []}}
+    zero, ways = [["1", "0", "0"]], {"loops": [], "besides": [], "links": [], "others": []}
+    for angles, turns in ((300, 1), (30, 1), (12, 12), (10**9, 0)):
+        loop = [[["1", "0"], -1, [turns] * (angles if turns else 0)]]
+        yield f"{angles} angles", {"claim": "modes", "systems": [
+            {"kind": "loops", "tips": zero, "angles": angles, "slides": 0, **ways, "loops": [loop], **box}]}
+    for unknowns, joints in ((10**7, 1), (1, 40), (30, 30)):
+        yield f"{unknowns} unknowns", {"claim": "modes", "systems": [{
+            "kind": "chain", "tips": [*zero, ["0", "1", "0"], ["0", "0", "1"]], "unknowns": unknowns, "normals": [],
+            "joints": [["R", ["0", "0", "1"], ["0", "0", "0"]]] * joints, "ends": [[1]], **box}]}
+    size = 600
+    rows = [[int((i * i + 3 * j * j + i * j) % 7 > 3) for j in range(size)] for i in range(size)]
+    stack = {"of": ["A"], "rank": size, "rows": list(range(size)), "columns": list(range(size)), "kernel": []}
+    yield "ranks", {"claim": "ranks", "matrices": {"A": rows}, "stacks": [stack]}
+    yield "one row often", {"claim": "ranks", "matrices": {"A": [[1] * 200]}, "stacks": [
+        {**stack, "rows": [0] * 10**5, "columns": list(range(200))}]}
+
+
+@pytest.mark.parametrize(("what", "record"), list(certificates()), ids=[name for name, _ in certificates()])
+def test_a_small_certificate_is_checked_soon(what: str, record: dict[str, Any]):
+    checker = verify_ranks if record["claim"] == "ranks" else verify_certificate
+    record = {"format": "hrsynth-certificate-1", "real": 0, "complex": 0, **record}
+    start = time.process_time()
+    with pytest.raises(CertificateRefused, match=r"n < 25|terms|unknowns|rows or columns"):
+        verify({**record, "sha256": checker.digest(record)})
+    assert time.process_time() - start < 5
+
+
+def test_a_certificate_file_is_checked_within_limits(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys):
+    file, checker = tmp_path / "c.json", tmp_path / "checker.py"
+    file.write_text('{"claim": "ranks"}')
+    monkeypatch.setattr(verify_ranks, "__file__", str(checker))
+    monkeypatch.setattr(certificates_, "VERIFY_SECONDS", 1)
+    for body, status, said in (("while True: pass", 3, "memory or time"), ("bytearray(10**10)", 3, "more memory"),
+                               ("print('accepted: rank')", 0, "rank"), ("print('refused: a: b')", 3, "a: b")):
+        checker.write_text(f"def main(name):\n    {body}\n")
+        monkeypatch.setattr(certificates_.ranks, "describe_ranks", lambda record: "")
+        assert execute(["verify", str(file)]) == status
+        (line,) = "".join(capsys.readouterr()).splitlines()
+        assert said in line
+    file.write_text(" " * (verify_ranks.LENGTH + 1))
+    assert execute(["verify", str(file)]) == 2
+    assert f"up to {verify_ranks.LENGTH}" in capsys.readouterr().err
+    for each in (verify_certificate, verify_path, verify_ranks):
+        assert each.main(str(file)) == 3
+        assert "characters" in capsys.readouterr().out
+
+
+def test_a_number_too_large_for_a_pose_is_one_line(tmp_path: Path, capsys):
+    record = certificate(modes("3rpr_m1"))
+    for value in (10**400, -(10**400), 1e300, True):
+        changed = {**record, "at": {**record["at"], "x": value}}
+        (tmp_path / "c.json").write_text(json.dumps({**changed, "sha256": verify_certificate.digest(changed)}))
+        assert execute(["verify", str(tmp_path / "c.json"), "--robot", "3rpr_m1"]) == 3
+        (line,) = capsys.readouterr().err.splitlines()
+        assert "it is not for 3rpr_m1" in line
 
 
 @pytest.mark.parametrize("line", ['{"word":"a","group":"planar"}', '{"word":"a","group":"planar","notation":3}',

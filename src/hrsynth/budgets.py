@@ -47,6 +47,8 @@ PROCESS_BYTES = 1_700_000_000
 USD_SECONDS, MESH_SECONDS = 10, 15
 """Seconds of one core after which opening a USD stage, and reading the meshes of a robot, is given up; three times as
 many on the clock."""
+VERIFY_SECONDS = 40
+"""Seconds of one core after which checking a certificate file is given up."""
 MOST_MESHES = 2000
 """Files of meshes that are copied with a robot."""
 LARGEST_MESHES = 2_000_000_000

@@ -10,6 +10,7 @@ import pytest
 from jsonschema import Draft202012Validator
 
 import hrsynth
+from description.foreign.examples import FILES
 from hrsynth.cli import execute
 from hrsynth.linting.findings import SEVERITIES
 from hrsynth.linting.rules import lint_rules
@@ -208,3 +209,25 @@ def test_a_mend_of_a_file_that_xacro_made_is_left_to_its_source(tmp_path: Path):
     (plain,) = (each for each in hrsynth.lint(tmp_path / "plain.urdf").findings if each.rule == "mass-negative")
     assert [(each.line, each.mends) for each in negative] == [(plain.line, False)]
     assert (found.written, found.mended) == (None, ())
+
+
+@pytest.mark.parametrize("door", ["robot.yaml", ""])
+def test_a_fix_follows_no_link_that_is_not_named(door: str, tmp_path: Path, capsys):
+    files, folder, other = FILES["gepetto: 3d"], tmp_path / "robot", tmp_path / "other.urdf"
+    folder.mkdir()
+    text = files["robot.urdf"].replace('<link name="crank"', '<link nmae="x" name="crank"', 1)
+    limit = '<joint name="a" type="revolute"><limit lower="1" upper="-1"/>'
+    text = re.sub('<joint name="a" type="[a-z]+">', limit, text, count=1)
+    assert limit in text
+    (folder / "robot.yaml").write_text(files["robot.yaml"])
+    other.write_text(text)
+    (folder / "robot.urdf").symlink_to(other)
+    assert execute(["lint", str(folder / door), "--fix"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert str(folder / "robot.urdf") in line
+    assert other.read_text() == text
+    assert (folder / "robot.urdf").is_symlink()
+    assert execute(["lint", str(folder / door), "--fix", "-o", str(tmp_path / "mended.urdf")]) in (0, 1)
+    assert other.read_text() == text
+    execute(["lint", str(folder / "robot.urdf"), "--fix"])
+    assert other.read_text() != text

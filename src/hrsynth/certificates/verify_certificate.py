@@ -23,7 +23,7 @@ import sys
 from fractions import Fraction
 from itertools import combinations, product
 
-PRIME, FIT, WITHIN, FAR = 2147483647, Fraction(1, 10 ** 9), Fraction(1, 10 ** 6), 10 ** 7
+PRIME, FIT, WITHIN, FAR, TERMS, LENGTH = 2147483647, Fraction(1, 10**9), Fraction(1, 10**6), 10**7, 30_000, 5_000_000
 class NotAccepted(Exception):
     """Why a certificate is not accepted."""
 def need(true, why):
@@ -35,7 +35,8 @@ def add(*terms):  # a sum of polynomials {exponents: coefficient}
         for e, c in p.items():
             total[e] = total.get(e, 0) + c
     return {e: c for e, c in total.items() if c}
-def mul(p, q): return add(*({tuple(map(sum, zip(e, f))): c * d for f, d in q.items()} for e, c in p.items()))
+def mul(p, q): return need(len(p) * len(q) <= TERMS, f"more than {TERMS} terms") or add(*(
+    {tuple(map(sum, zip(e, f))): c * d for f, d in q.items()} for e, c in p.items()))
 def times(c, p): return {e: c * d for e, d in p.items() if c * d}
 def minus(p, q): return add(p, times(-1, q))
 def term(c, n, k=None): return {tuple(int(i == k) for i in range(n)): Fraction(c)} if c else {}  # c, or c x_k
@@ -82,11 +83,9 @@ def conditions(point, reach):  # planes and spheres that a point is on: (equatio
     if kind == "sphere":
         return [(add(Q, *(times(-2 * x, p) for x, p in zip(c, N)), times(dot(c, c) - rest[0][0], w)), rest[0])]
     if kind == "circle":
-        sphere = "sphere", [c, [dot(rest[0], rest[0])]]
-        return conditions(point, ("plane", [c, cross(*rest)])) + conditions(point, sphere)
+        return conditions(point, ("plane", [c, cross(*rest)])) + conditions(point, ("sphere", [c, [dot(*rest[:1]*2)]]))
     if kind == "line":
-        first = cross(rest[0], min(axes, key=lambda axis: abs(dot(rest[0], axis))))
-        rest = [first, cross(rest[0], first)]
+        rest = [first := cross(rest[0], min(axes, key=lambda axis: abs(dot(rest[0], axis)))), cross(rest[0], first)]
     return [(add(*map(times, n, N), times(-dot(n, c), w)), n) for n in rest or axes]
 def misfits(equations):  # by how much lengths miss: over a plane's normal, over the squared radius of small spheres
     return [times(1 / (max(map(abs, n)) if len(n) > 1 else min(n[0], Fraction(1))), p) for p, n in equations]
@@ -122,7 +121,7 @@ def loops(system, tips):
             x, y = minus(mul(x, c), mul(y, s)), add(mul(x, s), mul(y, c))
         return x, y
     def total(vectors): return [add(*parts) for parts in zip(*(turned(*each) for each in vectors))]
-    need(system["slides"] >= 0 and len(system["reaches"]) <= len(tips) and not any(b[2] for b in tips), "a plane")
+    need(2 * a <= n < 25 and len(system["reaches"]) <= len(tips) and not any(b[2] for b in tips), "a plane, n < 25")
     found = [p for loop in system["loops"] for p in total(loop)]
     found += [add(*(mul(x, x) for x in (term(1, n, j), term(1, n, a + j))), term(-1, n)) for j in range(a)]
     at = [total([*shift, [b[:2], -1, e]]) for b, (e, shift) in zip(system["tips"], system["links"], strict=True)]
@@ -333,6 +332,7 @@ def modes(record):
 def fair(system, tips):  # has its kind's keys; lengths in units of about its size (translation along planes: any)
     need(system.keys() <= {*f"kind reaches tips boxes bound places {KINDS[system['kind']][1]}".split()}, "another key")
     need(len(tips) < 50 and all(len(b) == 3 for b in tips), "tips of another dimension, or too many")
+    need(len(system.get("joints", ())) - 5 < system.get("unknowns", 0) < 9, "more than 8 unknowns, or 4 joints besides")
     reaches = [reach_of(each) for each in system["reaches"]]
     radii = [v[1] for kind, v in reaches if kind in ("circle", "sphere")]
     spans = [sub(b, places[0]) for places in (tips, [v[0] for _, v in reaches]) for b in places]
@@ -378,11 +378,9 @@ def told(system, each, points, tips, m, r):  # whether the pose puts the tips wh
                 abs(v - dot(row, there) / unit - (x[3] == "0") * c) + off <= WITHIN
                 for v, row, c in zip(at, rows, start, strict=True)), "a tip that is not on its link")
 def digest(record):
-    rest = {key: each for key, each in record.items() if key != "sha256"}
-    return hashlib.sha256(json.dumps(rest, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
-def once(pairs):  # an object of JSON; of two keys a reader may see one, Python the other
-    need(len(dict(pairs)) == len(pairs), "a duplicate key")
-    return dict(pairs)
+    return hashlib.sha256(json.dumps({key: each for key, each in record.items() if key != "sha256"}, sort_keys=True,
+                                     separators=(",", ":")).encode()).hexdigest()
+def once(pairs): return need(len(dict(pairs)) == len(pairs), "a duplicate key") or dict(pairs)  # of JSON: read as one
 def verify(record):  # what a certificate proves, in words; raises NotAccepted
     try:
         need(isinstance(record, dict) and record.get("format") == "hrsynth-certificate-1", "this is no certificate")
@@ -391,10 +389,12 @@ def verify(record):  # what a certificate proves, in words; raises NotAccepted
         return modes(record)
     except Exception as error:
         raise error if isinstance(error, NotAccepted) else NotAccepted(f"no certificate: {error!r}") from None
-if __name__ == "__main__":
+def main(name):  # prints the answer
     try:
-        with open(sys.argv[1], encoding="utf-8") as file:
-            print("accepted:", verify(json.load(file, object_pairs_hook=once)))
-    except (NotAccepted, OSError, ValueError, IndexError, RecursionError) as error:
-        print("refused:", error)
-        sys.exit(3)
+        with open(name, encoding="utf-8") as file:
+            need(len(text := file.read(LENGTH + 1)) <= LENGTH, f"a file of more than {LENGTH} characters")
+        print("accepted:", verify(json.loads(text, object_pairs_hook=once)))
+    except (NotAccepted, OSError, ValueError, RecursionError) as error:
+        return print("refused:", error) or 3
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[-1]))

@@ -27,6 +27,7 @@ from fractions import Fraction
 from itertools import pairwise
 from typing import Any
 
+LENGTH = 5_000_000  # of a certificate's file
 ONE = 1 << 96  # intervals are pairs of integers, in units of one over this
 Interval = tuple[int, int]
 Vector = list[Interval]
@@ -297,10 +298,16 @@ def verify(record: Any) -> str:  # what a certificate proves, in words; raises P
         raise error if isinstance(error, PathNotAccepted) else PathNotAccepted(f"no certificate: {error!r}") from None
 
 
-if __name__ == "__main__":
+def main(name: str) -> int:  # prints the answer
     try:
-        with open(sys.argv[1], encoding="utf-8") as file:
-            print("accepted:", verify(json.load(file, object_pairs_hook=once)))
-    except (PathNotAccepted, OSError, ValueError, IndexError, RecursionError) as error:
+        with open(name, encoding="utf-8") as file:
+            need(len(text := file.read(LENGTH + 1)) <= LENGTH, f"a file of more than {LENGTH} characters")
+        print("accepted:", verify(json.loads(text, object_pairs_hook=once)))
+        return 0
+    except (PathNotAccepted, OSError, ValueError, RecursionError) as error:
         print("refused:", error)
-        sys.exit(3)
+        return 3
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[-1]))

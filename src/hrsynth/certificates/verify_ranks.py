@@ -8,7 +8,7 @@ import hashlib
 import json
 import sys
 
-PRIME = 2147483647
+PRIME, LENGTH, MOST = 2147483647, 5_000_000, 300  # of a file; of rows and columns
 class RanksNotAccepted(Exception):
     """Why a certificate is not accepted."""
 def need(true, why):
@@ -26,11 +26,14 @@ def modular(rows, first):  # the ranks modulo the prime of the first columns and
             row = [(a - row[k] * b) % PRIME for a, b in zip(row, echelon[k], strict=True)] if row[k] else row
     return sum(k < first for k in echelon), len(echelon)
 def ranks(record):
-    need(record["stacks"] and record["matrices"].keys() <= {"A", "X", "Y"}, "no stack, or a matrix of another name")
+    need(0 < len(record["stacks"]) < 8 and record["matrices"].keys() <= {"A", "X", "Y"},
+         "no stack, more than 7, or a matrix of another name")
     for each in record["stacks"]:
         rows, kernel = [row for name in each["of"] for row in record["matrices"][name]], each["kernel"]
         need(rows and all(type(c) is int for row in [*rows, *kernel, [each["rank"]]] for c in row)
              and len(set(each["of"])) == len(each["of"]), "matrices of integers, each once")
+        sizes = map(len, (rows, rows[0], kernel, each["rows"], each["columns"]))
+        need(max(sizes) <= MOST, f"more than {MOST} rows or columns")
         minor = [[rows[i][j] % PRIME for j in each["columns"]] for i in each["rows"]]
         need(len(set(each["columns"])) == len(minor) == modular(minor, 0)[1] == each["rank"], "a minor that is zero")
         need(all(sum(map(int.__mul__, row, v)) == 0 for row in rows for v in kernel), "a vector that is not annulled")
@@ -51,11 +54,12 @@ def verify(record):  # what a certificate proves, in words; raises RanksNotAccep
         return ranks(record)
     except Exception as error:
         raise error if isinstance(error, RanksNotAccepted) else RanksNotAccepted(f"no certificate: {error!r}") from None
-
-if __name__ == "__main__":
+def main(name):  # prints the answer
     try:
-        with open(sys.argv[1], encoding="utf-8") as file:
-            print("accepted:", verify(json.load(file, object_pairs_hook=once)))
-    except (RanksNotAccepted, OSError, ValueError, IndexError, RecursionError) as error:
-        print("refused:", error)
-        sys.exit(3)
+        with open(name, encoding="utf-8") as file:
+            need(len(text := file.read(LENGTH + 1)) <= LENGTH, f"a file of more than {LENGTH} characters")
+        print("accepted:", verify(json.loads(text, object_pairs_hook=once)))
+    except (RanksNotAccepted, OSError, ValueError, RecursionError) as error:
+        return print("refused:", error) or 3
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[-1]))

@@ -23,7 +23,7 @@ ANGLE_DECIMALS = 13
 
 SIMPLE_ANGLE = math.pi / 12
 """Angles that are typed are multiples of this one."""
-_NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,4})?", re.ASCII)
 
 
 @dataclass

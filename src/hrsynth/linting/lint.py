@@ -63,8 +63,8 @@ def lint(files: str | Path | Iterable[str | Path], *, compare: str | Path | None
     ``compare`` is another file of the same robot: differences between the two are reported too. ``reader`` names
     programs that should read the files: a closure that one of them loses is an error. ``ignore`` names rules to leave
     out. With ``fix`` everything that can be mended in only one way is mended, and the file is written, completely or
-    not at all, to ``output`` or over the original; the findings are then those that remain. What no file says is given
-    as for ``load`` (``platform``, ``close`` …).
+    not at all, to ``output`` or over the original (no link that is not named); the findings are then those that remain.
+    What no file says is given as for ``load`` (``platform``, ``close`` …).
 
     Of several files those that cannot be opened, or are no documents, are told in ``unread``. Raises ``BadRobotFile``
     if there is no other; ``BadRequest`` for unknown names, for several files with ``output``, and if the file cannot be
@@ -88,10 +88,10 @@ def lint(files: str | Path | Iterable[str | Path], *, compare: str | Path | None
         require_writable(output)
     given = Overrides.said(**said)
     other = None if compare is None else LintedFile(file_of(compare), given)
-    opened, defects = [], list[Defect]()
-    for path in paths:
+    opened, defects, named = [], list[Defect](), [file_of(path) for path in paths]
+    for path in named:
         try:
-            opened.append(LintedFile(file_of(path), given, readers=programs, other=other))
+            opened.append(LintedFile(path, given, readers=programs, other=other))
         except BadRobotFile as error:
             defects += error.defects
     if not opened:
@@ -102,6 +102,9 @@ def lint(files: str | Path | Iterable[str | Path], *, compare: str | Path | None
         new = [(Path(output or file.path), after.data) for file, after, gone in every if gone or output is not None]
         for target, _ in new:
             require_writable(target)
+            if output is None and target not in named and target.is_symlink():
+                raise BadRequest("nothing is mended: a file that was not named is a link", str(target),
+                                 "the file itself, named, or --output")
         for target, data in new:
             write_whole(target, data)
             written = str(target)

@@ -44,7 +44,7 @@ class Pose:
         if self.phi is not None and self.rpy is not None:
             raise BadRequest("a pose has both phi and rpy", str(self), "one of them")
         for name, values in self.given.items():
-            if not all(map(math.isfinite, values)):
+            if not all(isinstance(value, int) or math.isfinite(value) for value in values):
                 raise BadRequest(f"pose: {name} is not finite", "/".join(map(str, values)), "a finite number")
             if max(map(abs, values)) > FARTHEST_POSE:
                 raise BadRequest(f"pose: {name} is too large", "/".join(map(str, values)), f"at most {FARTHEST_POSE:g}")

@@ -187,6 +187,45 @@ def test_yaml_is_data(yaml: str, tmp_path: Path):
     assert_refused(made(tmp_path, files["robot.urdf"], "robot.urdf"))
 
 
+@pytest.mark.parametrize("yaml", [
+    "!!bool x", "!!int ''", "!!float ''", "!!timestamp x", "!!binary 'é'", "!!str a", "! a", "!!set {a}", "!own a",
+    '"\\UFFFFFFFF"', '"\\U00110000"'])
+def test_yaml_has_no_types(yaml: str, tmp_path: Path):
+    made(tmp_path, FILES["gepetto: 3d"]["robot.urdf"], "robot.urdf")
+    for text in (f"closed_loop: {yaml}", f"closed_loop: [[{yaml}]]", f"{yaml} : 1\ntype: [3d]"):
+        assert_refused(made(tmp_path, text, "robot.yaml"), "YAML")
+
+
+@pytest.mark.parametrize("scalar", ["9" * 5000, ":".join("1" * 300_000), "-" + ":".join(["59"] * 3000) + ".5", "0b1",
+                                    "2001-99-99", ".inf", "<<", "=", "yes"])
+def test_a_scalar_of_yaml_is_a_name(scalar: str, tmp_path: Path):
+    made(tmp_path, FILES["gepetto: 3d"]["robot.urdf"], "robot.urdf")
+    assert_refused(made(tmp_path, f"name_mot: [{scalar}]", "robot.yaml"),
+                   "name_mot: ", "is no name" if len(scalar) > 200 else "no joint")
+
+
+def test_a_key_of_yaml_without_a_value_has_none(tmp_path: Path):
+    files = FILES["gepetto: 3d"]
+    made(tmp_path, files["robot.urdf"], "robot.urdf")
+    for null in ("", "~", "null"):
+        made(tmp_path, f"{files['robot.yaml']}\njoint_name: {null}\njoint_type: {null}\n", "robot.yaml")
+        assert load(tmp_path).platform
+
+
+@pytest.mark.parametrize("dialect", ONE)
+def test_an_exponent_is_short(dialect: str, tmp_path: Path):
+    for sign in ("", "-"):
+        text, count = re.subn(r'(<pose>|(?:xyz|pos)=")[-.\d]+', rf"\g<1>0e{sign}{'9' * 5000}", ONE[dialect], count=1)
+        assert count
+        assert_refused(made(tmp_path, text, f"robot.{dialect}"), "finite numbers")
+
+
+def test_a_group_of_shapes_is_a_number(tmp_path: Path):
+    for group in ("9" * 5000, "\u0663", "1_0", "x", "", "-1e400"):
+        text = MJCF["connect"].replace("<body ", f'<geom size="1" group="{group}"/><body ', 1)
+        assert load(made(tmp_path, text)).platform
+
+
 def test_what_is_no_robot_file_or_folder(tmp_path: Path):
     assert_refused(made(tmp_path, "<html/>", "page.xml"))
     assert_refused(made(tmp_path, "a: 1", "alone.yaml"), "no URDF file next to")

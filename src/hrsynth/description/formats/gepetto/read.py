@@ -23,6 +23,8 @@ TYPES = {"SPHERICAL": JointType.SPHERICAL, "FIXED": JointType.FIXED, "UJOINT": J
          "UNIVERSAL": JointType.UNIVERSAL, "REVOLUTE": JointType.REVOLUTE, "PRISMATIC": JointType.PRISMATIC,
          "CYLINDRICAL": JointType.CYLINDRICAL, "FREEFLYER": JointType.FREE}
 
+LONGEST_NAME = 200
+
 
 def read(file: RobotFile) -> JointGraph:
     """The joint graph of either file of the two."""
@@ -77,7 +79,7 @@ class _Settings:
         return value
 
     def _name(self, key: str, value: object) -> str:
-        if not isinstance(value, str):
+        if not isinstance(value, str) or len(value) > LONGEST_NAME:
             raise xml.refusal(self.path, f"{key}: {str(value)[:60]!r} is no name", "names")
         return value
 

@@ -13,10 +13,12 @@ from ...dialect import RobotFile
 
 ENDINGS = (".yaml", ".yml")
 KEYS = ("closed_loop", "type", "name_mot", "joint_name", "joint_type")
+NULL = ("", "~", "null")
 
 
 def settings_in(path: Path) -> dict[str, Any] | None:
-    """What a YAML file says, None where it is no such file as this dialect has; raises ``BadRobotFile``."""
+    """What a YAML file says, None where it is no such file as this dialect has: lists of names, so that all scalars are
+    read as text, and types are not looked at. Raises ``BadRobotFile``."""
     import yaml
 
     data = xml.content(path)
@@ -24,16 +26,16 @@ def settings_in(path: Path) -> dict[str, Any] | None:
         if len(data) > LARGEST_YAML:
             raise xml.refusal(path, "YAML file too large", f"up to {LARGEST_YAML} bytes")
         depth = 0
-        for count, event in enumerate(yaml.parse(data.decode("utf-8"), Loader=yaml.SafeLoader)):
+        for count, event in enumerate(yaml.parse(data.decode("utf-8"), Loader=yaml.BaseLoader)):
             depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
-            if isinstance(event, yaml.AliasEvent) or depth > 6 or count > 20_000:
-                raise xml.refusal(path, "YAML with aliases, too deep or too long", "lists of names")
-        found = yaml.safe_load(data.decode("utf-8"))
-    except (yaml.YAMLError, UnicodeDecodeError, RecursionError, ValueError) as error:
+            if isinstance(event, yaml.AliasEvent) or getattr(event, "tag", None) or depth > 6 or count > 20_000:
+                raise xml.refusal(path, "YAML with aliases or tags, too deep or too long", "lists of names")
+        found = yaml.BaseLoader(data.decode("utf-8")).get_single_data()
+    except (yaml.YAMLError, RecursionError, ValueError, ArithmeticError, LookupError) as error:
         raise xml.refusal(path, f"not YAML: {' '.join(str(error).split())[:120]}", "a whole file of YAML") from None
     if not isinstance(found, dict) or not set(KEYS) & set(found):
         return None
-    return found
+    return {key: None if isinstance(value, str) and value in NULL else value for key, value in found.items()}
 
 
 def settings_beside(file: RobotFile) -> tuple[Path, dict[str, Any]] | None:

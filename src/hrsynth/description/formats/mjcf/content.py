@@ -73,7 +73,7 @@ class BodyContents:
         kind, X = given.get("type", "mesh" if "mesh" in given else "sphere"), self._place(element)
         group = given.get("group", "0")
         roles = ["visual"] if given.get("contype") == given.get("conaffinity") == "0" else (
-            ["collision"] if group.isdecimal() and int(group) >= 3 else ["visual", "collision"])
+            ["collision"] if (_numbers(group, (0.0,)) or (0.0,))[0] >= 3 else ["visual", "collision"])
         colour = _numbers(given.get("rgba", self.colours.get(given.get("material", "")) or None), (0.0,) * 4)
         shown = given.get("rgba") or self.colours.get(given.get("material", ""))
         sizes = _sizes(given.get("size", ""))
