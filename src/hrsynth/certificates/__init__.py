@@ -12,7 +12,7 @@ from ..analysis.aspects.path import PathAnswer
 from ..analysis.derive import Derivation
 from ..analysis.modes.modes import AssemblyModes
 from ..description import load
-from ..description.files import as_path
+from ..description.files import as_path, open_regular
 from ..errors import BadRequest, CertificateRefused, NoCertificate, PoseNotReached
 from ..mechanism import Mechanism
 from ..tolerances import SAME_RELATION
@@ -58,7 +58,8 @@ def verify(source: Mapping[str, Any] | str | Path, robot: Mechanism | str | Path
     else:
         name = str(file := as_path(source))
         try:
-            record = json.loads(file.read_text(encoding="utf-8"), object_pairs_hook=once)
+            with open_regular(file) as content:
+                record = json.loads(content.read().decode(), object_pairs_hook=once)
         except NotAccepted as reason:
             raise CertificateRefused(name, str(reason)) from None
         except (OSError, ValueError, RecursionError) as error:
