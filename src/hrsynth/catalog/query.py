@@ -47,7 +47,7 @@ class ReadRecords(Sequence[Record]):
         found = self._read[place]
         if found is None:
             line = self._lines[place]
-            self._parts += sum(map(line.count, "[{,"))
+            self._parts += 3 + sum(map(line.count, "[{,"))
             if self._parts > MOST_READ_PARTS:
                 raise BadRequest(f"{self._source or 'catalog'}: records with more than {MOST_READ_PARTS} parts", None,
                                  "fewer records, or smaller ones")

@@ -223,8 +223,8 @@ class Database:
         counts = dict(file.execute("SELECT name, count FROM groups ORDER BY name"))
         count, first, last = file.execute("SELECT count(*), ifnull(min(record), 0), ifnull(max(record), -1) FROM "
                                           "lines").fetchone()
-        if not all(type(each) is int and each > 0 for each in counts.values()) or (sum(counts.values()), 0, last + 1) != (
-                count, first, count):
+        if not all(type(each) is int and each > 0 for each in counts.values()) or (
+                sum(counts.values()), 0, last + 1) != (count, first, count):
             raise BadRequest(f"{self.path}: not a catalog file: its groups and its lines differ in number")
         return counts
 
