@@ -431,7 +431,7 @@ PROGRAMS = {
               "SELECT x + 1 FROM t) SELECT max(x) AS format, 1 AS catalog FROM t",
     "another view": "DROP TABLE lines; CREATE VIEW lines AS SELECT 0 AS record, printf('%.*c', 900000000, 'x') AS line",
     "a computed column": "DROP TABLE lines; CREATE TABLE lines (record INTEGER PRIMARY KEY, line "
-                         "GENERATED ALWAYS AS (printf('%.*c', 900000000, 'x'))); INSERT INTO lines VALUES (0)",
+                         "GENERATED ALWAYS AS (printf('%.*c', 9000, 'x'))); INSERT INTO lines VALUES (0)",
     "a trigger": "CREATE TRIGGER t AFTER INSERT ON lines BEGIN DELETE FROM lines; END",
     "a virtual table": "CREATE VIRTUAL TABLE t USING fts5(x)",
     "a far row": "UPDATE groups SET count = 2000000000; UPDATE lines SET record = 1999999999",
