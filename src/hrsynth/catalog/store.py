@@ -43,7 +43,7 @@ ALL = "all"
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
 
-_PLAIN = re.compile(r"CREATE (TABLE|(UNIQUE )?INDEX)\b(?!.*\bAS\b)", re.IGNORECASE | re.DOTALL)
+_PLAIN = re.compile(r"CREATE (TABLE|(\w+ )?INDEX)\b(?!.*\bAS\b)", re.IGNORECASE | re.DOTALL)
 """A table or an index whose columns are not computed, as a SQLite file has it."""
 
 
