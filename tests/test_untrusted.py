@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import ast
+import contextlib
 import gzip
 import io
 import json
 import os
 import pickle
 import re
+import sqlite3
 import struct
 import subprocess
 import sys
@@ -24,7 +26,10 @@ import pytest
 from hrsynth import certificate, modes, untrusted
 from hrsynth import certificates as certificates_
 from hrsynth.budgets import LARGEST_UNPACKED, MOST_UNPACKED
-from hrsynth.catalog.jsonl import head
+from hrsynth.catalog import query
+from hrsynth.catalog import store as stores
+from hrsynth.catalog.jsonl import head, record
+from hrsynth.catalog.store import store
 from hrsynth.certificates import verify, verify_certificate, verify_path, verify_ranks
 from hrsynth.cli import execute
 from hrsynth.description import save
@@ -60,17 +65,16 @@ class Touch:
 
 # What a file unpacks to
 
-def test_gzip_is_inflated_up_to_the_limit(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(untrusted, "LARGEST_UNPACKED", 1000)
+def test_gzip_is_inflated_up_to_the_limit():
     one = gzip.compress(b"x" * 600)
-    assert untrusted.gunzip(gzip.compress(b"x" * 1000), "f") == b"x" * 1000
-    assert untrusted.gunzip(one + b"\0" * 8, "f") == b"x" * 600
+    assert untrusted.gunzip(gzip.compress(b"x" * 1000), "f", 1000) == b"x" * 1000
+    assert untrusted.gunzip(one + b"\0" * 8, "f", 1000) == b"x" * 600
     for bomb in (gzip.compress(b"x" * 1001), one + one, gzip.compress(b"x" * 10**7)):
         with pytest.raises(BadRequest, match="unpacks to, found 'more than 1000 bytes'"):
-            untrusted.gunzip(bomb, "f")
+            untrusted.gunzip(bomb, "f", 1000)
     for bad in (one[:-9], b"\x1f\x8bno", one + b"rest", gzip.compress(one)[:5]):
         with pytest.raises(BadRequest, match="truncated, or not compressed"):
-            untrusted.gunzip(bad, "f")
+            untrusted.gunzip(bad, "f", 1000)
 
 
 def archive(*names: str, size: int | None = None) -> bytes:
@@ -458,6 +462,82 @@ def test_a_record_that_is_not_whole_is_one_line(line: str, tmp_path: Path, capsy
     assert execute(["catalog", "list", "--catalog", str(tmp_path)]) == 2
     (said,) = capsys.readouterr().err.splitlines()
     assert "record" in said
+
+
+@pytest.mark.parametrize("field", ['"x":[[],[]]', '"x":{"a":1}', '"choices":[{"joints":[[1]],"rank":1,"x":[]}]',
+                                   '"minimal":[' + '["a"],' * 20_000 + '["a"]]'])
+def test_a_record_holds_no_lists_of_unknown_size(field: str):
+    bare = '{"word":"a","group":"planar","refused":"no"'
+    assert record(bare + ',"x":1}')["x"] == 1
+    with pytest.raises(BadRequest, match="not a record"):
+        record(f"{bare},{field}}}")
+
+
+@pytest.mark.parametrize("ending", ["", ".sqlite"])
+def test_records_take_no_more_memory_than_is_allowed(ending: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    lines = [f'{{"word":"{i}","group":"planar","refused":"no","notation":"{"x" * i}"}}' for i in range(5)]
+    (kept := store(tmp_path / f"planar{ending}")).journal("planar").remove()
+    kept.write("planar", lines)
+    for module, name, enough in ((query, "MOST_READ_PARTS", 35), (stores, "LARGEST_CATALOG", sum(map(len, lines)))):
+        with monkeypatch.context() as patch:
+            patch.setattr(module, name, enough + 200 * (module is stores and not ending))
+            assert len(list(query.load(kept.path))) == 5
+            patch.setattr(module, name, enough - 1)
+            with pytest.raises(BadRequest, match=r"planar.*: (records with|lines of) more than|too large"):
+                list(query.load(kept.path))
+
+
+PROGRAMS = {
+    "a view": "ALTER TABLE versions RENAME TO v; CREATE VIEW versions AS WITH RECURSIVE t(x) AS (SELECT 1 UNION ALL "
+              "SELECT x + 1 FROM t) SELECT max(x) AS format, 1 AS catalog FROM t",
+    "another view": "DROP TABLE lines; CREATE VIEW lines AS SELECT 0 AS record, printf('%.*c', 900000000, 'x') AS line",
+    "a computed column": "DROP TABLE lines; CREATE TABLE lines (record INTEGER PRIMARY KEY, line "
+                         "GENERATED ALWAYS AS (printf('%.*c', 9000, 'x'))); INSERT INTO lines VALUES (0)",
+    "a trigger": "CREATE TRIGGER t AFTER INSERT ON lines BEGIN DELETE FROM lines; END",
+    "a virtual table": "CREATE VIRTUAL TABLE t USING fts5(x)",
+    "a far row": "UPDATE groups SET count = 2000000000; UPDATE lines SET record = 1999999999",
+    "a large count": "UPDATE groups SET count = 10000000000000",
+    "no number": "UPDATE groups SET count = 9e999",
+    "no name": "UPDATE groups SET name = x'00'",
+    "a log": "PRAGMA journal_mode = WAL",
+}
+
+
+@pytest.mark.parametrize("what", PROGRAMS)
+def test_a_database_runs_no_program_and_counts_its_rows(what: str, tmp_path: Path, capsys):
+    kept = store(file := tmp_path / "c.sqlite")
+    kept.write("planar", ['{"word":"a","group":"planar","refused":"no"}'])
+    with contextlib.closing(sqlite3.connect(file)) as changed:
+        changed.executescript(PROGRAMS[what])
+    for arguments in (["list"], ["list", "--json", "--modes", "3"], ["show", "3(Rz*-Rz-Rz)"]):
+        status = execute(["catalog", *arguments, "--catalog", str(file)])
+        errors = capsys.readouterr().err
+        assert (status, len(errors.splitlines())) == (2, 1), errors
+        assert "c.sqlite" in errors
+    assert [each.name for each in tmp_path.iterdir()] == ["c.sqlite"]
+
+
+@pytest.mark.parametrize(("change", "asked", "said"), [
+    ("lines SET line = printf('%.*c', 200000, 'x')", {}, "too big"),
+    ("columns SET letters = zeroblob(1000000), ends = x'40420f00', ends_width = 4 WHERE name = 'dof'", {"dof": 3},
+     "'dof' cannot be read")])
+def test_a_text_of_a_database_is_short(change: str, asked: dict[str, Any], said: str, tmp_path: Path):
+    kept = store(file := tmp_path / "c.sqlite")
+    kept.write("planar", ['{"word":"a","group":"planar","refused":"no"}'])
+    with contextlib.closing(sqlite3.connect(file)) as changed:
+        changed.executescript(f"UPDATE {change}")
+    with pytest.raises(BadRequest, match=said):
+        list(query.load(file, **asked))
+
+
+@pytest.mark.parametrize("command", ["catalog list --catalog FOLDER", "catalog list --catalog FOLDER/p.sqlite",
+                                     "verify FOLDER/p.json"])
+def test_a_pipe_is_not_waited_for(command: str, tmp_path: Path, capsys):
+    for name in ("planar.jsonl", "p.sqlite", "p.json"):
+        os.mkfifo(tmp_path / name)
+    assert execute(command.replace("FOLDER", str(tmp_path)).split()) == 2
+    (said,) = capsys.readouterr().err.splitlines()
+    assert "not a regular file" in said
 
 
 # Where the program is

@@ -337,8 +337,13 @@ PARTS_AHEAD = 3
 """Parts of a build that wait for each thread of a cluster."""
 MOST_RECORDS = 1_000_000
 """Lines of a compressed file of the catalog."""
-LARGEST_RECORD = 1_000_000
-"""Characters of a line of the catalog."""
+LARGEST_RECORD = 100_000
+"""Characters of a line of the catalog, of a text in a SQLite file, and of the values of a field there together."""
+LARGEST_CATALOG = 100_000_000
+"""Bytes of the lines of a catalog that are read, unpacked, those of its groups together."""
+MOST_READ_PARTS = 7_000_000
+"""Lists, objects and commas in all records that are read, and three more for each: a part takes up to two hundred bytes
+of memory where all are shown as JSON."""
 LARGEST_WORD = 12
 """Legs of a word of the catalog."""
 

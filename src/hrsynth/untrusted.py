@@ -21,17 +21,16 @@ REFUSED = "refused: "
 """What the last line of such a program begins with where it refuses what it reads."""
 
 
-def gunzip(content: bytes, file: object) -> bytes:
+def gunzip(content: bytes, file: object, most: int) -> bytes:
     """What bytes of gzip unpack to; raises ``BadRequest`` where they are none, cut off, or unpack to too much."""
     parts, size = [], 0
     try:
         while content:
             inflate = zlib.decompressobj(wbits=31)
-            parts.append(inflate.decompress(content, LARGEST_UNPACKED - size + 1))
+            parts.append(inflate.decompress(content, most - size + 1))
             size += len(parts[-1])
-            if size > LARGEST_UNPACKED:
-                raise BadRequest(f"{file}: unpacks to", f"more than {LARGEST_UNPACKED} bytes",
-                                 f"up to {LARGEST_UNPACKED}, or a file that is not compressed")
+            if size > most:
+                raise BadRequest(f"{file}: unpacks to", f"more than {most} bytes", f"up to {most}")
             if not inflate.eof:
                 raise zlib.error
             content = inflate.unused_data.lstrip(b"\0")

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from ..budgets import LARGEST_RECORD
 from ..errors import BadRequest
 from .fits import FIELDS, TEXTS, chains, texts
 from .jsonl import Record
@@ -64,7 +65,10 @@ class Columns:
     def _as_list(self, name: str) -> list[list[Any]]:
         """Each value that a field has, in a list; an empty one for records without the field."""
         try:
-            return [list(json.loads(each)) for each in self._texts(name)]
+            texts = self._texts(name)
+            if len(texts.letters) > LARGEST_RECORD:
+                raise ValueError
+            return [list(json.loads(each)) for each in texts]
         except (ValueError, TypeError, RecursionError):
             raise self._unreadable(name) from None
 

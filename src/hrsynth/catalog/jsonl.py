@@ -96,6 +96,9 @@ def _wrong_field(found: dict[str, Any]) -> str:
         return "minimal: a list of lists of texts"
     if not (_are(choices := found.get("choices", []), dict) and all(map(_is_choice, choices))):
         return "choices: a list of objects with joints and rank"
+    for name in found.keys() - {*LISTS, "minimal", "choices"}:
+        if isinstance(found[name], list | dict):
+            return f"{name[:60]}: no list and no object"
     if "modes_bound" in found and "modes_seen" not in found:
         return "modes_seen beside modes_bound"
     return ""
@@ -109,7 +112,8 @@ def _are(values: Any, kind: type) -> bool:
 def _is_choice(each: dict[str, Any]) -> bool:
     legs: Any = each.get("joints")
     return type(each.get("rank")) is int and _are(legs, list) and legs != [] and all(
-        _are(joints, int) for joints in legs)
+        _are(joints, int) for joints in legs) and not any(
+        isinstance(value, list | dict) for name, value in each.items() if name != "joints")
 
 
 def word_of(text: str, file: str | None = None) -> str:

@@ -10,6 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, overload
 
+from ..budgets import MOST_READ_PARTS
 from ..errors import BadRequest
 from ..results import Value
 from .fits import fits, require_askable
@@ -25,6 +26,7 @@ class ReadRecords(Sequence[Record]):
     def __init__(self, lines: Sequence[str], source: str | None = None) -> None:
         self._lines, self._source = lines, source
         self._read: list[Record | None] = [None] * len(lines)
+        self._parts = 0
 
     def __len__(self) -> int:
         return len(self._lines)
@@ -44,7 +46,12 @@ class ReadRecords(Sequence[Record]):
             return [self[i] for i in range(*place.indices(len(self)))]
         found = self._read[place]
         if found is None:
-            found = self._read[place] = record(self._lines[place], self._source)
+            line = self._lines[place]
+            self._parts += 3 + sum(map(line.count, "[{,"))
+            if self._parts > MOST_READ_PARTS:
+                raise BadRequest(f"{self._source or 'catalog'}: records with more than {MOST_READ_PARTS} parts", None,
+                                 "fewer records, or smaller ones")
+            found = self._read[place] = record(line, self._source)
         return found
 
 

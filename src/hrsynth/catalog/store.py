@@ -6,6 +6,7 @@ import contextlib
 import errno
 import gzip
 import json
+import re
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from importlib import resources
@@ -14,8 +15,8 @@ from typing import Any, Protocol, overload
 
 import numpy as np
 
-from ..budgets import LARGEST_UNPACKED, MOST_RECORDS
-from ..description.files import replacement
+from ..budgets import LARGEST_CATALOG, LARGEST_RECORD, MOST_RECORDS
+from ..description.files import open_regular, replacement
 from ..errors import BadRequest, BuildStopped
 from ..untrusted import gunzip
 from .columns import Columns, ColumnWriter
@@ -40,6 +41,10 @@ PUBLISHED = "published"
 ALL = "all"
 """This one and the shipped catalog of words."""
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+
+
+_PLAIN = re.compile(r"CREATE (TABLE|(\w+ )?INDEX)\b(?!.*\bAS\b)", re.IGNORECASE | re.DOTALL)
+"""A table or an index whose columns are not computed, as a SQLite file has it."""
 
 
 class Store(Protocol):
@@ -85,17 +90,19 @@ class Folder:
 
     def lines(self, groups: Sequence[str], asked: Mapping[str, Any]) -> list[str]:
         fits = may_fit(asked)
-        return [line for group in groups for line in decode_lines(self.content(group), str(self.file(group)))
-                if fits(line)]
+        every = (line for group in groups for line in decode_lines(self.content(group), str(self.file(group))))
+        return [line for line in _limited(every, self.path) if fits(line)]
 
     def content(self, group: str) -> bytes:
         """The bytes of a group's lines; raises ``BadRequest`` where they cannot be read."""
         file = self.file(group)
-        with _readable(file):
-            content = file.read_bytes()
+        with _readable(file), open_regular(file) as stream:
+            content = stream.read(LARGEST_CATALOG + 1)
+        if len(content) > LARGEST_CATALOG:
+            raise BadRequest(f"{file}: file too large", None, f"up to {LARGEST_CATALOG} bytes, or a SQLite file")
         if not file.name.endswith(PACKED):
             return content
-        content = gunzip(content, file)
+        content = gunzip(content, file, LARGEST_CATALOG)
         if (count := content.count(b"\n")) > MOST_RECORDS:
             raise BadRequest(f"{file}: lines", count, f"up to {MOST_RECORDS}, or a file that is not compressed")
         return content
@@ -114,8 +121,9 @@ class Folder:
         plain, packed = (self.path / f"{group}{ending}" for ending in (LINES, PACKED))
         large = PACKED_ABOVE < len(lines) < MOST_RECORDS
         content = encode_lines(group, lines, checksum=not large)
-        if large and len(content) > LARGEST_UNPACKED:
-            large, content = False, encode_lines(group, lines)
+        if len(content) > LARGEST_CATALOG:
+            raise BadRequest(f"{self.path / group}: lines of {len(content)} bytes", None,
+                             f"up to {LARGEST_CATALOG}, or a SQLite file")
         file, other = (packed, plain) if large else (plain, packed)
         with writable(file), replacement(file, sync=True) as draft:
             draft.write_bytes(gzip.compress(content, mtime=0) if large else content)
@@ -156,20 +164,21 @@ class Database:
     def groups(self) -> list[str]:
         with self._read() as file:
             asked = "name FROM groups" if _is_new(file) else 'DISTINCT "group" FROM records'
-            return [name for name, in file.execute(f"SELECT {asked} ORDER BY 1")]
+            found = [name for name, in file.execute(f"SELECT {asked} ORDER BY 1")]
+            if not all(isinstance(name, str) for name in found):
+                raise BadRequest(f"{self.path}: not a catalog file: a group without a name")
+            return found
 
     def lines(self, groups: Sequence[str], asked: Mapping[str, Any]) -> Sequence[str]:
         with _refusing_sqlite_errors(self.path):
             file = self._open()
             if not _is_new(file):
                 fits = may_fit(asked)
-                return [line for group in sorted(groups) for line in _old_lines(file, group) if fits(line)]
-            counts = file.execute("SELECT name, count FROM groups ORDER BY name").fetchall()
-            (last,) = file.execute("SELECT ifnull(max(record), -1) FROM lines").fetchone()
-            if not all(type(count) is int and count > 0 for _, count in counts) or sum(
-                    count for _, count in counts) != last + 1:
-                raise BadRequest(f"{self.path}: not a catalog file: its groups and its lines differ in number")
-            found = np.concatenate([np.full(count, name in groups) for name, count in counts] or [np.zeros(0, bool)])
+                every = (line for group in sorted(groups) for line in _old_lines(file, group))
+                return [line for line in _limited(every, self.path) if fits(line)]
+            counts = self._counts(file)
+            found = np.concatenate([np.full(count, name in groups) for name, count in counts.items()]
+                                   or [np.zeros(0, bool)])
             columns, told = Columns(self.path, file, found), conditions(asked)
             for name in ASKED:  # patterns and texts last, of rows that are still there
                 if name in told and (rows := told[name].rows) and found.any():
@@ -182,8 +191,9 @@ class Database:
 
     def count(self, group: str) -> int:
         with self._read() as file:
-            asked = "sum(count) FROM groups WHERE name" if _is_new(file) else 'count(*) FROM records WHERE "group"'
-            return int(file.execute(f"SELECT {asked} = ?", (group,)).fetchone()[0] or 0)
+            if _is_new(file):
+                return self._counts(file).get(group, 0)
+            return int(file.execute('SELECT count(*) FROM records WHERE "group" = ?', (group,)).fetchone()[0])
 
     def values(self, name: str) -> list[Any]:
         with self._read() as file:
@@ -208,6 +218,16 @@ class Database:
     def file(self, group: str) -> Path:
         return self.path
 
+    def _counts(self, file: sqlite3.Connection) -> dict[str, int]:
+        """How many lines each group has; raises ``BadRequest`` where there are not as many, numbered from 0."""
+        counts = dict(file.execute("SELECT name, count FROM groups ORDER BY name"))
+        count, first, last = file.execute("SELECT count(*), ifnull(min(record), 0), ifnull(max(record), -1) FROM "
+                                          "lines").fetchone()
+        if not all(type(each) is int and each > 0 for each in counts.values()) or (
+                sum(counts.values()), 0, last + 1) != (count, first, count):
+            raise BadRequest(f"{self.path}: not a catalog file: its groups and its lines differ in number")
+        return counts
+
     @contextlib.contextmanager
     def _read(self) -> Iterator[sqlite3.Connection]:
         """The file to read; raises ``BadRequest`` for something else, or another version."""
@@ -215,9 +235,17 @@ class Database:
             yield file
 
     def _open(self) -> sqlite3.Connection:
-        with _readable(self.path):
-            self.path.open("rb").close()
+        """The file to read, where it holds no more than tables: views and triggers are programs."""
+        with _readable(self.path), open_regular(self.path) as stream:
+            head = stream.read(20)
+        if b"\2" in head[18:]:
+            raise BadRequest(f"{self.path}: not a catalog file: it has a write-ahead log")
         file = sqlite3.connect(f"{self.path.absolute().as_uri()}?mode=ro", uri=True, check_same_thread=False)
+        file.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LARGEST_RECORD)
+        file.execute("PRAGMA trusted_schema = OFF")
+        for name, made in file.execute("SELECT name, sql FROM sqlite_master WHERE sql IS NOT NULL"):
+            if not _PLAIN.match(str(made)):
+                raise BadRequest(f"{self.path}: not a catalog file: it holds", name, "plain tables")
         require_version(file.execute("SELECT format, catalog FROM versions").fetchone() or (None, None), str(self.path))
         return file
 
@@ -227,6 +255,7 @@ class StoredLines(Sequence[str]):
 
     def __init__(self, path: Path, file: sqlite3.Connection, numbers: Whole) -> None:
         self._path, self._file, self._numbers, self._read = path, file, numbers, dict[int, list[str]]()
+        self._size = 0
 
     def __len__(self) -> int:
         return len(self._numbers)
@@ -248,8 +277,18 @@ class StoredLines(Sequence[str]):
                                                 "(SELECT value FROM json_each(?))", (json.dumps(wanted),)))
             if not all(isinstance(found.get(number), str) for number in wanted):
                 raise BadRequest(f"{self._path}: not a catalog file: rows without a line")
-            self._read[part] = [found[number] for number in wanted]
+            self._read[part] = list(_limited((found[number] for number in wanted), self._path, self._size))
+            self._size += sum(map(len, self._read[part]))
         return self._read[part][offset]
+
+
+def _limited(lines: Iterable[str], file: Path, size: int = 0) -> Iterator[str]:
+    """Lines; raises ``BadRequest`` where they are larger, with what was read before, than may be read."""
+    for line in lines:
+        size += len(line)
+        if size > LARGEST_CATALOG:
+            raise BadRequest(f"{file}: lines of more than {LARGEST_CATALOG} bytes", None, "a smaller catalog")
+        yield line
 
 
 def _is_new(file: sqlite3.Connection) -> bool:

@@ -13,7 +13,7 @@ from ..analysis.derive import Derivation
 from ..analysis.modes.modes import AssemblyModes
 from ..budgets import VERIFY_SECONDS
 from ..description import load
-from ..description.files import as_path
+from ..description.files import as_path, open_regular
 from ..errors import BadRequest, CertificateRefused, NoCertificate, PoseNotReached
 from ..mechanism import Mechanism
 from ..tolerances import SAME_RELATION
@@ -60,8 +60,8 @@ def verify(source: Mapping[str, Any] | str | Path, robot: Mechanism | str | Path
     else:
         name = str(file := as_path(source))
         try:
-            with file.open(encoding="utf-8") as opened:
-                text = opened.read(verify_certificate.LENGTH + 1)
+            with open_regular(file) as content:
+                text = content.read(verify_certificate.LENGTH + 1).decode()
             if len(text) > verify_certificate.LENGTH:
                 raise BadRequest("the certificate is too long", name, f"up to {verify_certificate.LENGTH} characters")
             record = json.loads(text, object_pairs_hook=once)

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import secrets
 import shutil
+import stat
 import zlib
 from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import BinaryIO
 
 from ..errors import BadRequest
 from ..processes import require_posix
@@ -19,6 +22,19 @@ def as_path(file: object) -> Path:
     if not isinstance(file, str | os.PathLike):
         raise BadRequest("a file", file, "its path")
     return Path(file)
+
+
+class NotRegular(OSError):
+    """What is to be read is a directory, a pipe or a device."""
+
+
+def open_regular(path: str | Path) -> BinaryIO:
+    """A file to read; raises ``NotRegular`` for what may have no end, or waits for another program, else
+    ``OSError``."""
+    mode = os.stat(path).st_mode
+    if not stat.S_ISREG(mode):
+        raise NotRegular(errno.EINVAL, "a directory" if stat.S_ISDIR(mode) else "not a regular file")
+    return open(path, "rb")
 
 
 def require_writable(path: str | Path) -> Path:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
 import re
-import stat
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import lru_cache
 from pathlib import Path
@@ -15,6 +15,7 @@ from lxml import etree
 from ..budgets import LARGEST_FILE, MOST_ATTRIBUTES, MOST_ELEMENTS, MOST_NAMES, MOST_PREFIXES
 from ..errors import BadRequest, BadRobotFile, Defect
 from ..mechanism.model import Note
+from .files import NotRegular, open_regular
 
 Element: TypeAlias = etree._Element
 
@@ -44,15 +45,12 @@ def content(path: str | Path) -> bytes:
     """The bytes of a robot file; raises :class:`BadRobotFile` for what is no readable file of a sensible size."""
     most = f"up to {LARGEST_FILE}"
     try:
-        status = Path(path).stat()
-        if stat.S_ISDIR(status.st_mode):
-            raise refusal(path, "a directory", "a robot file")
-        if not stat.S_ISREG(status.st_mode):
-            raise refusal(path, "not a regular file", "a robot file")
-        if status.st_size > LARGEST_FILE:
-            raise refusal(path, "file too large", most, value=f"{status.st_size} bytes")
-        with open(path, "rb") as stream:
+        with open_regular(path) as stream:
+            if (size := os.fstat(stream.fileno()).st_size) > LARGEST_FILE:
+                raise refusal(path, "file too large", most, value=f"{size} bytes")
             data = stream.read(LARGEST_FILE + 1)
+    except NotRegular as error:
+        raise refusal(path, str(error.strerror), "a robot file") from None
     except FileNotFoundError:
         raise refusal(path, "no such file", "the path of a file that is there") from None
     except (OSError, ValueError) as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html as markup
+import io
 import json
 import re
 from collections.abc import Callable
@@ -73,8 +74,10 @@ def record(command: str, robot: Mechanism | None, fields: dict[str, Any]) -> str
     if robot is not None:
         chosen = None if robot.choice is None else {"chosen": robot.choice.chosen, "reason": robot.choice.reason}
         head = {"robot": robot.name, "platform": {"link": robot.platform, **(chosen or {})}}
-    return json.dumps({**head, "command": command, "version": __version__, **fields}, ensure_ascii=False, indent=2,
-                      allow_nan=False)
+    text = io.StringIO()  # json.dumps keeps all small pieces of the text at once
+    json.dump({**head, "command": command, "version": __version__, **fields}, text, ensure_ascii=False, indent=2,
+              allow_nan=False)
+    return text.getvalue()
 
 
 def html(result: Result) -> str:
