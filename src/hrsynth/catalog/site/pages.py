@@ -54,14 +54,13 @@ def write_pages(folder: str, parts: Iterable[str]) -> Made:
 def _write(folder: Path, structure: Structure, studied: Study) -> None:
     robots: dict[str, Mechanism] = {}
     for record in structure.records:
-        if "refused" in record:
-            continue
         try:
             robot = studied.real(record["word"])
             content = native.write(robot).encode()
         except HrsynthError:
             continue
-        (folder / ROBOTS / f"{address_name(record['word'])}.urdf").write_bytes(content)
+        if "refused" not in record:
+            (folder / ROBOTS / f"{address_name(record['word'])}.urdf").write_bytes(content)
         robots[record["word"]] = robot
     shown = robots.get(structure.fact["word"])
     drawn = None if shown is None else _portrait(shown, studied)
@@ -81,7 +80,7 @@ def _portrait(robot: Mechanism, studied: Study) -> Portrait:
 
 
 def page(structure: Structure, studied: Study, robots: dict[str, Mechanism], drawn: Portrait | None) -> str:
-    """The page; ``robots`` are the mechanisms that have a file, by word; ``drawn`` is the robot in space."""
+    """The page; ``robots`` are the mechanisms that are drawn, by word; ``drawn`` is the robot in space."""
     derivation = studied.derivation
     hidden = None if derivation is None else derivation.hidden
     shown = robots.get(structure.fact["word"])
@@ -95,7 +94,8 @@ def page(structure: Structure, studied: Study, robots: dict[str, Mechanism], dra
         hidden=None if hidden is None else robot_svg(hidden, virtual=_driven_joints(hidden), title="Hidden robot"),
         blind=derivation is not None and hidden is None,
         steps=[] if derivation is None else trace(derivation.steps),
-        variants=[_variant(record, robots.get(record["word"])) for record in structure.records])
+        variants=[_variant(record, None if "refused" in record else robots.get(record["word"]))
+                  for record in structure.records])
 
 
 def _known_links(links: Iterable[str] | None, robot: Mechanism) -> list[str] | None:
