@@ -202,6 +202,8 @@ class CarriedPlatform(System):
     def values(self, q: Array, chosen: Sequence[Told]) -> tuple[Array, Array]:
         """The values (..., m) of conditions and their derivatives (..., m, n) by q."""
         values, slopes = [], []
+        if not chosen:
+            return np.zeros((*np.shape(q)[:-1], 0)), np.zeros((*np.shape(q)[:-1], 0, len(self.freedoms_)))
         for each in chosen:
             c, columns = each.condition, []
             R, p = self.transform(q, each.joints)

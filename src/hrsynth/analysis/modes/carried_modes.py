@@ -209,6 +209,7 @@ def as_mode(system: CarriedPlatform, box: PoseBox, proved: bool, miss: float | N
     shift, turn = system.size * float(np.linalg.norm(spread[:3])), 2.0 * float(np.linalg.norm(spread[3:]))
     if miss is None:
         values, slopes = system.values(q, system.told)
-        miss = float(np.max(np.abs(values) / np.maximum(1.0, np.linalg.norm(slopes, axis=-1))))
+        misses = np.abs(values) / np.maximum(1.0, np.linalg.norm(slopes, axis=-1))
+        miss = float(np.max(misses)) if misses.size else np.inf
     return SystemMode((), max(shift / system.size, turn), shift, turn, miss, frozen(system.pose(q)), frozen(q),
                       proved=proved, fits=not proved)
