@@ -79,14 +79,11 @@ def test_no_process_outlives_the_command(how: signal.Signals, name: str, tmp_pat
         command.wait()
 
 
-def _die() -> None:
-    os.kill(os.getpid(), signal.SIGKILL)
-
-
 @pytest.mark.slow
 def test_a_worker_that_dies_is_one_line():
-    with pytest.raises(WorkersLost, match="worker process") as lost:
-        list(run_shared([_die, _die], 2))
+    die = partial(signal.raise_signal, signal.SIGKILL)  # of a module that each worker can import
+    with pytest.raises(WorkersLost, match="a worker process died") as lost:
+        list(run_shared([die, die], 2))
     assert (lost.value.exit_status, len(lost.value.lines())) == (3, 1)
 
 

@@ -85,6 +85,10 @@ class Vocabulary:
     """The formats of some ``parent/element``, with all that is in them."""
 
     @cached_property
+    def _others(self) -> frozenset[str]:
+        return frozenset(self.others.split())
+
+    @cached_property
     def elements(self) -> dict[str, ElementNames]:
         """The table."""
         found = dict[str, ElementNames]()
@@ -99,7 +103,7 @@ class Vocabulary:
 
     def is_other(self, name: str) -> bool:
         """Whether nothing is said of a name: one of the ``others``, or with a prefix or a namespace."""
-        return "}" in name or ":" in name or name in self.others.split()
+        return "}" in name or ":" in name or name in self._others
 
     def unknown(self, root: xml.Element) -> Iterator[UnknownName]:
         """The names in a document that the format does not have where they stand, in the order of the document, until
