@@ -23,7 +23,7 @@ import sys
 from fractions import Fraction
 from itertools import combinations, product
 
-PRIME, FIT, WITHIN, FAR, TERMS, LENGTH = 2147483647, Fraction(1, 10**9), Fraction(1, 10**6), 10**7, 30_000, 5_000_000
+PRIME, FIT, WITHIN, FAR, TERMS, LENGTH = 2147483647, Fraction(1, 10**9), Fraction(1, 10**6), 10**7, 20_000, 5_000_000
 class NotAccepted(Exception):
     """Why a certificate is not accepted."""
 def need(true, why):

@@ -124,6 +124,8 @@ class _Settings:
         if len(kinds) > count:
             raise xml.refusal(self.path, f"type: {len(kinds)} types of {count} closures", "one each")
         words = [self._name("type", kind).lower() for kind in kinds]
+        if wrong := [word for word in words if not any(map(str.isalpha, word))]:
+            raise xml.refusal(self.path, f"type: {wrong[0]!r} is no type", "3d, 6d")
         return [*words, *[None] * (count - len(words))]
 
     def _link(self, frame: str) -> str:
