@@ -158,6 +158,9 @@ def test_each_smallest_set_has_the_hidden_robot_of_its_legs(run, word: str, tmp_
              for each in data["smallest"]]
     assert [(each["legs"], each["hidden"]) for each in data["smallest"]] == alone
     assert all(each["problem"] is None for each in data["smallest"])
+    for each in data["smallest"]:
+        counted = each["legs"] == data["entry"].get("modes_legs")
+        assert each["near"] == (len(hrsynth.modes(file, observe=each["legs"]).near) if counted else None)
     sets, told = [each["legs"] for each in data["smallest"]], hrsynth.legs(file).minimal
     assert sets == data["entry"]["minimal"]
     assert set(map(tuple, sets)) <= set(told)
@@ -166,8 +169,9 @@ def test_each_smallest_set_has_the_hidden_robot_of_its_legs(run, word: str, tmp_
 
 
 def test_plates_are_told_apart_by_the_hidden_robots_of_pairs(run):
-    assert re.search(r"^hidden robots  \{1, 3\}: 2-P-\{2-U\*U\}; .*\{2, 4\}: 2-Pi-\{2-U\*U\}$", run("show", PLATES)[1],
-                     re.MULTILINE)
+    shown = run("show", PLATES)[1]
+    assert re.search(r"^hidden robots  \{1, 3\}: 2-P-\{2-U\*U\}; .*\{2, 4\}: 2-Pi-\{2-U\*U\}$", shown, re.MULTILINE)
+    assert re.search(r"^modes .*; near modes found: \d+$", shown, re.MULTILINE)
 
 
 def test_no_robot_of_a_refused_architecture_is_written(run, tmp_path: Path):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import combinations, groupby
@@ -14,6 +15,7 @@ from ..analysis.asked import observe
 from ..analysis.derive import derive
 from ..analysis.exact import ExactArchitecture, architecture
 from ..analysis.measured import MeasuredRobot
+from ..analysis.modes.modes import modes
 from ..analysis.modes.solve import SystemModes
 from ..analysis.modes.ways import count_modes as counted_modes
 from ..analysis.modes.ways import expected_modes
@@ -156,19 +158,23 @@ def study(drawn: Mechanism, sets: Callable[[int], Iterable[tuple[int, ...]]], at
 
 def smallest_sets(record: Mapping[str, Any], drawn: Mechanism) -> list[dict[str, Any]]:
     """The smallest sets of a record, each with its ``legs`` and its ``hidden`` robot, derived now for the mechanism
-    that was studied; ``problem`` is what went wrong."""
+    that was studied; ``problem`` is what went wrong. ``near`` is the number of near modes found for the set whose modes
+    the record counts, None for the others."""
     if not record.get("minimal"):
         return []
     setting, found = observe(drawn, samples=SAMPLES), []
     for legs in record["minimal"]:
-        hidden, problem = record.get("hidden"), None
+        hidden, problem, near = record.get("hidden"), None, None
         if len(legs) < len(_watch(setting)):
             try:
                 form = derive(_observing(setting, legs), unchecked=False).hidden_architecture
                 hidden = None if form is None else form.ascii
             except HrsynthError as error:
                 hidden, problem = None, str(error).splitlines()[0]
-        found.append({"legs": list(legs), "hidden": hidden, "problem": problem})
+        if legs == record.get("modes_legs"):
+            with suppress(HrsynthError):
+                near = len(modes(_observing(setting, legs)).near)
+        found.append({"legs": list(legs), "hidden": hidden, "problem": problem, "near": near})
     return found
 
 

@@ -1314,6 +1314,7 @@ class SmallestSetRecord(TypedDict):
     legs: list[str]
     hidden: str | None
     problem: str | None
+    near: Annotated[int | None, "near modes found, where the entry counts the modes of this set"]
 
 
 class CatalogShow(Head, WrittenTo):

@@ -115,8 +115,9 @@ def facts(record: Record, smallest: Sequence[Record] = ()) -> Iterable[tuple[str
     if record.get("modes_bound") is not None:
         legs = f" with {what} {', '.join(record['modes_legs'])} {told}" if record.get("modes_legs") else ""
         proof = f", {PROOFS[record['modes_proof']]}" if record.get("modes_proof") in PROOFS else ""
-        yield "modes", (f"{record['modes_seen']} real seen of {record['modes_bound']} complex{legs}"
-                        f"{proof}; near modes not counted")
+        near = next((each["near"] for each in smallest if each["legs"] == record.get("modes_legs")), None)
+        yield "modes", (f"{record['modes_seen']} real seen of {record['modes_bound']} complex{legs}{proof}; "
+                        f"near modes {'not counted' if near is None else f'found: {near}'}")
     elif record["rank"] < record["dof"]:
         yield "modes", f"a continuum of dimension {record['dof'] - record['rank']} with all {what} {told}"
     if record.get("cure"):
