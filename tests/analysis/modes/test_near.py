@@ -150,3 +150,20 @@ def test_a_stationary_difference_is_a_near_mode_only_where_it_is_least():
         found = descend(at(z), question, held, np.radians(0.1))
         assert found is not None
         assert (found.isolated, found.family, found.angle < 1e-9) == (least, False, least)
+
+
+@pytest.mark.parametrize("name", ["prrrp_parallel", "prrrp_parallel_point"])
+def test_poses_that_fill_a_curve_are_a_family_and_attract_to_no_pose(name: str):
+    """Along parallel slides the directions stay the same; across them they do not."""
+    setting = ObservedRobot.of(name)
+    goal, question = setting.everything.start, setting.samples.question
+    held = Held.at(goal.twin, goal.q, question.reference, question.observations)
+    home = setting.motion.position(goal.pose(setting.motion.link))
+    for x, y in ((0.0, 0.0), (0.0, 0.05), (0.02, 0.05)):
+        beside = configurations_at(setting, [Pose(x=home[0] + x, y=home[1] + y)])[0]
+        found = descend(beside, question, held, 1e-6)
+        assert found is not None
+        assert (found.isolated, found.family) == (False, True)
+        assert found.angle < 1e-9
+        there = setting.motion.position(found.configuration.pose(setting.motion.link))
+        assert there[0] == pytest.approx(home[0], abs=1e-6)
