@@ -107,6 +107,8 @@ def test_answers_are_those_of_the_same_robot(name: str):
     at, zero = (found["configurations"][0] for found in (one, two))
     for field in ("mobility", "dof", "rank_M", "beyond", "classes"):
         assert at[field] == zero[field]
+    assert numbers(one["characteristic_length"]) == numbers(two["characteristic_length"])
+    assert numbers(at) == pytest.approx(numbers(zero), rel=1e-5, abs=1e-6)
     found, again = hrsynth.modes(robot, at=pose), hrsynth.modes(moved)
     assert [(mode.beyond, mode.reachable) for mode in found.modes] == [
         (mode.beyond, mode.reachable) for mode in again.modes]

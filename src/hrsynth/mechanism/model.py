@@ -257,6 +257,8 @@ class Mechanism(Result, shown_as="robot"):
     """Whether the platform's turn counts, as it does in the real robot of a hidden one; None: by the joints."""
     choice: PlatformChoice | None = field(default=None, compare=False)
     """How the platform was chosen; None in a mechanism that was read from no file."""
+    scale: float | None = field(default=None, compare=False)
+    """The characteristic length (m) of the robot whose zero configuration was moved; None where it was not."""
 
     def headline(self) -> str:
         """The name, and the number of its parts."""
@@ -370,9 +372,9 @@ class Mechanism(Result, shown_as="robot"):
     @cached_property
     def length(self) -> float:
         """The characteristic length (m): mean distance of the joint centres from their centroid; 1 if they coincide, up
-        to rounding."""
-        if not self.joints:
-            return 1.0
+        to rounding. It stays the same when another configuration becomes the zero configuration."""
+        if self.scale is not None or not self.joints:
+            return self.scale or 1.0
         points = np.array([joint.point for joint in self.joints.values()])
         spread = float(np.mean(np.linalg.norm(points - points.mean(axis=0), axis=1)))
         return spread if spread > NO_SPREAD * float(np.abs(points).max()) else 1.0

@@ -47,7 +47,7 @@ def zeroed_at(mechanism: Mechanism, poses: Mapping[str, Array], known: Mapping[s
         joints.append(_displaced(moved, X @ (ORIGIN if joint.offset is None else joint.offset) @ inverse(Y))
                       if q is None else _counted_from(moved, q))
     return mechanism.changed(links=[replace(link, pose=poses[name]) for name, link in mechanism.links.items()],
-                             joints=joints)
+                             joints=joints, scale=mechanism.length)
 
 
 def at_file_zero(mechanism: Mechanism) -> Mechanism | None:
