@@ -25,7 +25,7 @@ import pytest
 
 from hrsynth import certificate, modes, untrusted
 from hrsynth import certificates as certificates_
-from hrsynth.budgets import LARGEST_UNPACKED, MOST_UNPACKED
+from hrsynth.budgets import LARGEST_BESIDE, LARGEST_UNPACKED, MOST_UNPACKED
 from hrsynth.catalog import query
 from hrsynth.catalog import store as stores
 from hrsynth.catalog.jsonl import head, record
@@ -33,6 +33,7 @@ from hrsynth.catalog.store import store
 from hrsynth.certificates import verify, verify_certificate, verify_path, verify_ranks
 from hrsynth.cli import execute
 from hrsynth.description import save
+from hrsynth.description.formats.gepetto import settings
 from hrsynth.description.meshes import locate_mesh, triangles
 from hrsynth.errors import BadRequest, CertificateRefused, HrsynthError
 
@@ -422,6 +423,16 @@ def test_a_small_certificate_is_checked_soon(what: str, record: dict[str, Any]):
     with pytest.raises(CertificateRefused, match=r"n < 25|terms|unknowns|rows or columns"):
         verify({**record, "sha256": checker.digest(record)})
     assert time.process_time() - start < 5
+
+
+def test_files_beside_a_robot_that_are_large_together_are_not_read(tmp_path: Path):
+    file, size = tmp_path / "robot.urdf", LARGEST_BESIDE // 10
+    for number in range(12):
+        (tmp_path / f"{number}.yaml").write_bytes(bytes(size))
+    assert settings.in_folder(file, ".yaml") == []
+    for number in range(3):
+        (tmp_path / f"{number}.yaml").unlink()
+    assert len(settings.in_folder(file, ".yaml")) == 9
 
 
 def test_a_certificate_file_is_checked_within_limits(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys):

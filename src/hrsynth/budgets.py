@@ -87,8 +87,8 @@ LINKAGE_STARTS = 200
 """Random starts from which a linkage is closed."""
 MOST_CANDIDATES = 12
 """Pairs of frames that are told as possible closures."""
-MOST_BESIDE = 50
-"""Files of a kind beside a robot file above which none of them is looked at."""
+MOST_BESIDE, LARGEST_BESIDE = 50, 3_000_000
+"""Files of a kind beside a robot file, and their bytes together, above which none of them is looked at."""
 LARGEST_YAML = 1_000_000
 """Bytes of a YAML file above which it is not read."""
 LARGEST_GUESSED = 150

@@ -9,8 +9,10 @@ from __future__ import annotations
 import io
 import json
 import os
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -82,8 +84,8 @@ def triangles(names: Iterable[str], robot: str | None, within: Path | None = Non
             path = _within_folder(path or within / Path(name).name, within)
         if path is not None and path.suffix.lower() in KNOWN:
             files[name] = str(path.resolve()), None
-        elif path is None and (inner := _inner(name, folder, within)) is not None:
-            files[name] = f"{name}.obj", inner.decode()
+    files |= {name: (f"{name}.obj", text) for name, text in _inner([
+        name for name in found if name not in files], folder, within).items()}
     if not files:
         return found
     try:
@@ -106,17 +108,24 @@ def _within_folder(path: Path, within: Path) -> Path | None:
     return None
 
 
-def _inner(name: str, folder: Path, within: Path | None = None) -> bytes | None:
-    """A mesh that lies in a USD file, as the text of an ``.obj`` file."""
-    file, sign, prim = name.partition("#")
-    path = locate_mesh(file, folder) if sign else None
-    if path is not None and within is not None:
-        path = _within_folder(path, within)
-    if path is None:
-        return None
-    from .formats.usd.stage import mesh
+def _inner(names: Iterable[str], folder: Path, within: Path | None = None) -> dict[str, str]:
+    """Those of the meshes that lie in USD files, as the text of ``.obj`` files."""
+    asked: dict[Path, list[str]] = {}
+    wanted: dict[Path, list[str]] = {}
+    for name in names:
+        file, sign, prim = name.partition("#")
+        path = locate_mesh(file, folder) if sign and locate_mesh(name, folder) is None else None
+        if path is not None and within is not None:
+            path = _within_folder(path, within)
+        if path is not None:
+            asked.setdefault(path, []).append(name)
+            wanted.setdefault(path, []).append(prim)
+    if not asked:
+        return {}
+    from .formats.usd.stage import meshes
 
-    return mesh(path, prim)
+    return {name: text for of, texts in zip(asked.values(), meshes(wanted), strict=True)
+            for name, text in zip(of, texts, strict=True)}
 
 
 def carry_meshes(robot: Mechanism, target: Path, endings: tuple[str, ...] | None, *, copy: bool
@@ -132,7 +141,10 @@ def carry_meshes(robot: Mechanism, target: Path, endings: tuple[str, ...] | None
     source = source if source.is_dir() else source.parent
     moved: dict[str, str | None] = {}
     files: dict[Path, Callable[[], bytes]] = {}
-    missing, outside, foreign, inside, strange = (list[str]() for _ in range(5))
+    missing, outside, foreign, inside, strange, drawn = (list[str]() for _ in range(6))
+    copied: dict[tuple[Path, str], str] = {}
+    stems: Counter[str] = Counter()
+    texts = cache(lambda: _inner(drawn, source))
 
     def place(name: str) -> str | None:
         """What the mesh is called in the new file; None where it has to be left out."""
@@ -148,14 +160,23 @@ def carry_meshes(robot: Mechanism, target: Path, endings: tuple[str, ...] | None
         if copy and ending not in KNOWN:
             strange.append(name)
         elif copy:
+            one = (path or inner or source).resolve(), "" if path is not None else prim
+            if one in copied:
+                return copied[one]
+            if len(files) >= MOST_MESHES:
+                raise BadRequest(f"{robot.name}: files of meshes", f"more than {MOST_MESHES}", f"up to {MOST_MESHES}")
             if path is not None and path.stat().st_size > LARGEST_MESHES:
                 raise BadRequest("bytes of a mesh", path.stat().st_size, f"up to {LARGEST_MESHES}")
             stem = Path(prim).name if path is None else path.stem
-            new, number = folder / "meshes" / f"{stem}{ending}", 2
+            new = folder / "meshes" / f"{stem}{ending}"
             while new in files:
-                new, number = folder / "meshes" / f"{stem}_{number}{ending}", number + 1
-            files[new] = path.read_bytes if path is not None else lambda: _inner(name, source) or b""
-            return f"meshes/{new.name}"
+                stems[stem] += 1
+                new = folder / "meshes" / f"{stem}_{stems[stem] + 1}{ending}"
+            if path is None:
+                drawn.append(name)
+            files[new] = path.read_bytes if path is not None else lambda: texts()[name].encode()
+            copied[one] = f"meshes/{new.name}"
+            return copied[one]
         there = path if path is not None else inner
         if locate_mesh(file, folder) is not None and there is not None and endings is None and os.path.samefile(
                 str(locate_mesh(file, folder)), there):
@@ -178,8 +199,6 @@ def carry_meshes(robot: Mechanism, target: Path, endings: tuple[str, ...] | None
             if not any(each.get("filename") == "" for each in meshes):
                 kept.append(fragment if element is None else xml.canonical(element))
         links[title] = replace(link, xml=tuple(kept))
-    if len(files) > MOST_MESHES:
-        raise BadRequest(f"{robot.name}: files of meshes", len(files), f"up to {MOST_MESHES}")
     notes = []
     for names, what in ((missing, "missing meshes" + (" are not written" if endings else "")),
                         (outside, "meshes outside of the robot's folders are left alone"),

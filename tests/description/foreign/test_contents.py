@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +13,8 @@ import pytest
 from hrsynth.cli import execute
 from hrsynth.description import load, save
 from hrsynth.description.contents import Content, content_of
-from hrsynth.description.meshes import locate_mesh
+from hrsynth.description.formats.usd import stage
+from hrsynth.description.meshes import locate_mesh, triangles
 from hrsynth.errors import BadRequest
 from hrsynth.geometry.vectors import rotation_from_rpy
 from hrsynth.mechanism import Mechanism
@@ -160,6 +162,37 @@ def test_meshes_in_a_usd_file_become_files(tmp_path: Path):
     found = [path.read_text().count("\nf ") for path in (tmp_path / "out" / "meshes").iterdir()]
     assert found
     assert set(found) == {4}
+
+
+@pytest.mark.slow
+def test_all_meshes_in_usd_files_are_read_by_one_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    pytest.importorskip("pxr")
+    prim = ('def Mesh "{}" {{\n  point3f[] points = [(0,0,0), (1,0,0), (0,1,0)]\n  int[] faceVertexCounts = [3]\n'
+            '  int[] faceVertexIndices = [0, 1, 2]\n}}')
+    for file in "ab":
+        (tmp_path / f"{file}.usda").write_text("#usda 1.0\n" + "\n".join(prim.format(f"p{k}") for k in range(20)))
+    runs, run = [], stage.output
+    monkeypatch.setattr(stage, "output", lambda *given, **rest: runs.append(given) or run(*given, **rest))
+    names = [f"{file}.usda#/p{k}" for file in "ab" for k in range(20)]
+    found = triangles(names, str(tmp_path / "robot.urdf"))
+    assert [found[name][0].shape for name in names] == [(3, 3)] * 40
+    assert len(runs) == 1
+
+
+def test_a_mesh_is_copied_once_however_it_is_spelt(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    filled(tmp_path)
+    folder = tmp_path / "src"
+    text, name = (folder / "robot.urdf").read_text(), "parts/b.stl"
+    visual = '<visual><geometry><mesh filename="{}"/></geometry></visual>'
+    again = "".join(visual.format("./" * k + name) for k in range(1, 6))
+    link = re.search(r'<link name="[^"]*"\s*>', text)[0]
+    (folder / "robot.urdf").write_text(text.replace(link, link + again, 1))
+    save(folder / "robot.urdf", tmp_path / "out.urdf", meshes="copy")
+    copied = sorted(path.name for path in (tmp_path / "meshes").iterdir())
+    assert [each for each in copied if each.startswith("b")] == ["b.stl"]
+    monkeypatch.setattr("hrsynth.description.meshes.MOST_MESHES", len(copied) - 1)
+    with pytest.raises(BadRequest, match=f"up to {len(copied) - 1}"):
+        save(folder / "robot.urdf", tmp_path / "new" / "out.urdf", meshes="copy")
 
 
 def test_shapes_of_foreign_mjcf(tmp_path: Path):

@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 from typing import Any
 
-from ....budgets import LARGEST_YAML, MOST_BESIDE
+from ....budgets import LARGEST_BESIDE, LARGEST_YAML, MOST_BESIDE
 from ....errors import BadRobotFile
 from ... import xml
 from ...dialect import RobotFile
@@ -21,16 +21,25 @@ def settings_in(path: Path) -> dict[str, Any] | None:
     read as text, and types are not looked at. Raises ``BadRobotFile``."""
     import yaml
 
+    class Lists(yaml.BaseLoader):
+        """Refuses what is more than lists of names as soon as it is met."""
+
+        count = depth = 0
+
+        def get_event(self) -> Any:
+            event = super().get_event()
+            self.count += 1
+            self.depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+            if isinstance(event, yaml.AliasEvent) or getattr(event, "tag", None) or self.depth > 6 or (
+                    self.count > 20_000):
+                raise xml.refusal(path, "YAML with aliases or tags, too deep or too long", "lists of names")
+            return event
+
     data = xml.content(path)
     try:
         if len(data) > LARGEST_YAML:
             raise xml.refusal(path, "YAML file too large", f"up to {LARGEST_YAML} bytes")
-        depth = 0
-        for count, event in enumerate(yaml.parse(data.decode("utf-8"), Loader=yaml.BaseLoader)):
-            depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
-            if isinstance(event, yaml.AliasEvent) or getattr(event, "tag", None) or depth > 6 or count > 20_000:
-                raise xml.refusal(path, "YAML with aliases or tags, too deep or too long", "lists of names")
-        found = yaml.BaseLoader(data.decode("utf-8")).get_single_data()
+        found = Lists(data.decode("utf-8")).get_single_data()
     except (yaml.YAMLError, RecursionError, ValueError, ArithmeticError, LookupError) as error:
         raise xml.refusal(path, f"not YAML: {' '.join(str(error).split())[:120]}", "a whole file of YAML") from None
     if not isinstance(found, dict) or not set(KEYS) & set(found):
@@ -62,12 +71,13 @@ def settings_beside(file: RobotFile) -> tuple[Path, dict[str, Any]] | None:
 
 
 def in_folder(path: Path, *endings: str) -> list[Path]:
-    """The files beside a file that end so, in order; none where they are too many to be meant for it."""
+    """The files beside a file that end so, in order; none where they are too many or too large to be meant for it."""
     try:
         found = sorted(each for each in path.parent.iterdir() if each.suffix.lower() in endings and each != path)
+        small = len(found) <= MOST_BESIDE and sum(each.stat().st_size for each in found) <= LARGEST_BESIDE
     except OSError:
         return []
-    return found if len(found) <= MOST_BESIDE else []
+    return found if small else []
 
 
 def urdf_beside(settings: Path, frames: set[str]) -> Path:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import json
 import tempfile
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,9 +25,13 @@ def prims(path: Path) -> dict[str, Any]:
     return found
 
 
-def mesh(path: Path, prim: str) -> bytes:
-    """A mesh of a stage as the text of an ``.obj`` file, in its own frame and units."""
-    return _run(path, "mesh", str(path), prim)
+def meshes(asked: Mapping[Path, Sequence[str]]) -> list[list[str]]:
+    """Meshes of stages, by their prims, each as the text of an ``.obj`` file in its own frame and units: all in one
+    process."""
+    paths = [*asked]
+    given = json.dumps({str(path): [*prims] for path, prims in asked.items()})
+    found: list[list[str]] = json.loads(_run(paths[0], "meshes", str(paths[0]), given=given)) if paths else []
+    return found
 
 
 def binary(text: str, path: Path) -> bytes:
@@ -49,9 +54,9 @@ def _require_package(path: Path) -> None:
     require_posix(f"{path}: USD, which is read under limits of time and memory,", "resource")
 
 
-def _run(path: Path, *arguments: str) -> bytes:
+def _run(path: Path, *arguments: str, given: str = "") -> bytes:
     _require_package(path)
     try:
-        return output(PROCESS, str(LARGEST_FILE), str(MOST_INCLUDES), *arguments, seconds=USD_SECONDS)
+        return output(PROCESS, str(LARGEST_FILE), str(MOST_INCLUDES), *arguments, seconds=USD_SECONDS, given=given)
     except BadRequest as error:
         raise xml.refusal(path, str(error)) from None

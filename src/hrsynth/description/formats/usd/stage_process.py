@@ -1,4 +1,4 @@
-"""Run by :func:`untrusted.output`: what a USD stage holds as JSON, one of its meshes, or its binary
+"""Run by :func:`untrusted.output`: what a USD stage holds as JSON, meshes of stages, or a binary
 form. Layers are composed only from the stage's own folder."""
 
 from __future__ import annotations
@@ -143,13 +143,15 @@ def main(largest: str, most: str, task: str, name: str, *rest: str) -> None:
     except ImportError as error:
         refuse(f"OpenUSD's package does not load: {error}")
     try:
-        missing = require_inside(Path(name), int(largest), int(most))
-        stage = Usd.Stage.Open(name)
+        texts = []
+        for each, prims in json.load(sys.stdin).items() if task == "meshes" else [(name, [])]:
+            missing = require_inside(Path(each), int(largest), int(most))
+            stage = Usd.Stage.Open(each)
+            texts.append([obj(stage, prim) for prim in prims])
         if task == "binary":
             stage.GetRootLayer().Export(rest[0])
         else:
-            found = json.dumps({**told(stage), "missing": missing}) if task == "prims" else obj(stage, rest[0])
-            sys.stdout.write(found)
+            json.dump({**told(stage), "missing": missing} if task == "prims" else texts, sys.stdout)
         sys.stdout.flush()
     except (Tf.ErrorException, RuntimeError, OSError) as error:
         text = " ".join(str(error).split())
