@@ -1,0 +1,175 @@
+"""The questions whose answers are kept, and how each is asked."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import os
+import random
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PIL import Image
+
+import hrsynth
+from hrsynth.analysis.asked import observe
+from hrsynth.catalog.entry import entry
+from hrsynth.catalog.query import load as catalog
+from hrsynth.cli import execute
+from hrsynth.description import shipped
+
+MODELS = Path(os.environ.get("HRSYNTH_MODELS") or Path(__file__).resolve().parents[3] / "shared" / "models")
+ENDINGS = (".urdf", ".sdf", ".xml", ".xacro")
+COMMANDS = ("derive", "legs", "check", "singular", "advise", "branch", "modes", "atlas", "path", "servo", "endings",
+            "basins", "accuracy", "select", "export", "view", "lint", "verify", "robots", "convert", "import", "studio",
+            "schema", "completion", "catalog")
+ABOUT_ROBOTS: dict[str, tuple[str, ...]] = {
+    "derive": (), "legs": (), "check": (), "singular": (), "advise": (), "modes": (), "modes --real": (), "atlas": (),
+    "accuracy": ("--cone", "0.1deg"), "endings": (), "path": ("--start", "{far}", "--goal", "{home}"),
+    "servo": ("--start", "{near}", "--goal", "{home}"), "select": ("--start", "{near}", "--goal", "{home}"),
+    "lint": ()}
+"""Commands about one robot, with what else they are given: its pose, one beside it, and one at random."""
+FROM_PYTHON = ("derive", "legs", "check", "singular", "advise", "modes", "atlas")
+BRANCHES = {"rrrrr_m1": ("--box", "shoulder_1=-0.1:0.1,shoulder_2=-0.1:0.1")}
+DIALECTS = {"urdf": ".urdf", "mjcf": ".xml", "sdf": ".sdf", "gepetto": ".yaml", "usd": ".usda"}
+PICTURES = {
+    "derive": ("derive", "quattro", "--observe", "1,4"), "check": ("check", "quattro", "--grid", "x=-0.3:0.3:9,z=-0.7"),
+    "singular": ("singular", "quattro", "--observe", "1,4", "--plane", "z=-0.7,phi=0"),
+    "singular of a plane": ("singular", "3rrr_m1", "--plane", "phi=0"),
+    "modes": ("modes", "3rrr_m1", "--real"), "modes in space": ("modes", "quattro", "--observe", "1,3"),
+    "atlas": ("atlas", "3rrr_m1"), "servo": ("servo", "delta", "--start", "x=0", "--goal", "x=0.05"),
+    "servo in a plane": ("servo", "3rrr_m1", "--start", "x=0", "--goal", "x=0.03"),
+    "endings": ("endings", "3rrr_m1"),
+    "basins": ("basins", "rrrrr_m1", "--to", "x=0", "--grid", "x=-0.05:0.05:5,y=0.2"),
+    "accuracy": ("accuracy", "delta", "--cone", "0.1deg", "--plane", "z=-0.6")}
+ENTRIES, SEED, PIXELS = 500, 7, 48
+
+Json = Any
+
+
+@dataclass(frozen=True)
+class Case:
+    """A kind of answer (help, answer, convert, code, picture, entry, schema), and of what."""
+
+    kind: str
+    name: str
+    argv: tuple[str, ...] = ()
+
+    @property
+    def key(self) -> str:
+        """What it is filed under."""
+        return f"{self.kind}: {self.name}"
+
+
+def files() -> dict[str, str]:
+    """The shipped robots by name, and the files of others that are here by their place in the folder."""
+    found = {name: name for name in shipped()}
+    if MODELS.is_dir():
+        found |= {str(path.relative_to(MODELS)): str(path) for path in sorted(MODELS.rglob("*"))
+                  if path.suffix in ENDINGS and path.is_file()}
+    return found
+
+
+def cases() -> Iterator[Case]:
+    """All cases, those of one robot in a row."""
+    yield Case("help", "hrsynth", ("-h",))
+    yield Case("answer", "robots", ("robots",))
+    for command in COMMANDS:
+        yield Case("help", command, (command, "-h"))
+        yield Case("schema", command, ("schema", command))
+    for name, file in files().items():
+        for command, rest in ABOUT_ROBOTS.items():
+            first, *more = command.split()
+            yield Case("answer", f"{command} of {name}", (first, file, *more, *rest))
+        for dialect, ending in DIALECTS.items():
+            yield Case("convert", f"{name} to {dialect}", ("convert", file, "-o", "{folder}/robot" + ending))
+    for name, rest in BRANCHES.items():
+        yield Case("answer", f"branch of {name}", ("branch", name, *rest))
+        for language, ending in (("cpp", ".hpp"), ("numpy", ".py")):
+            yield Case("convert", f"code of {name} in {language}",
+                       ("export", name, *rest, "--lang", language, "-o", "{folder}/code" + ending))
+    for name, argv in PICTURES.items():
+        yield Case("picture", name, (*argv, "-o", "{folder}/picture.png"))
+    words = sorted(each["word"] for each in catalog() if "refused" not in each)
+    for word in random.Random(SEED).sample(words, ENTRIES):
+        yield Case("entry", word)
+
+
+def run(argv: Sequence[str]) -> tuple[int, str, str]:
+    """The exit status of a command and what it prints."""
+    out, err = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        status = execute([*argv])
+    return status, out.getvalue(), err.getvalue()
+
+
+def poses(file: str) -> dict[str, str]:
+    """The robot's pose, one beside it, and that of a sample; the first for all where there is no other."""
+    try:
+        setting = observe(hrsynth.load(file))
+    except hrsynth.HrsynthError:
+        return dict.fromkeys(("home", "near", "far"), "x=0")
+    home = setting.motion.pose(setting.robot.links[setting.motion.link].pose)
+    far = setting.motion.pose(setting.configurations[0].pose(setting.motion.link))
+    near = next((f"{part}={getattr(home, part) + 0.01!r}" for part in ("x", "z", "phi")
+                 if isinstance(getattr(home, part), float) and getattr(home, part) != getattr(far, part)), str(home))
+    return {"home": str(home), "near": near, "far": str(far)}
+
+
+def answer(case: Case) -> Json:
+    """What is kept of a case."""
+    hrsynth.forget()
+    if case.kind == "entry":
+        return {"record": entry(case.name)}
+    with tempfile.TemporaryDirectory() as folder:
+        given = {"folder": folder}
+        if any("{home}" in word for word in case.argv):
+            given |= poses(case.argv[1])
+        argv = [word.format(**given) if word.startswith("{") else word for word in case.argv]
+
+        def plain(text: str) -> str:
+            for path, name in ((folder, "FOLDER"), (str(MODELS), "MODELS"), (str(MODELS.parents[1]), "ROOT")):
+                text = text.replace(path, name)
+            return text
+
+        status, out, err = run(argv)
+        found: dict[str, Json] = {"status": status, "text": plain(out), "errors": plain(err)}
+        if case.kind == "picture":
+            found["pixels"] = pixels(Path(folder) / "picture.png") if status == 0 else None
+        elif case.kind == "convert":
+            found["files"] = {path.name: plain(path.read_text()) for path in sorted(Path(folder).iterdir())}
+        elif case.kind == "schema":
+            found["text"], found["json"] = "", json.loads(out) if status == 0 else None
+        elif case.kind == "answer":
+            out = run([*argv, "--json"])[1]
+            found["json"] = json.loads(plain(out)) if out else None
+            if argv[0] in FROM_PYTHON and len(argv) == 2:
+                found["repr"] = plain(described(argv[0], argv[1]))
+    return found
+
+
+def asked(case: Case) -> tuple[str, Any]:
+    """A case's key and its answer; a defect is an answer too."""
+    try:
+        return case.key, answer(case)
+    except Exception as error:
+        return case.key, {"defect": f"{type(error).__name__}: {error}"}
+
+
+def described(command: str, file: str) -> str:
+    """What Python shows of an answer."""
+    try:
+        return repr(getattr(hrsynth, command)(file))
+    except hrsynth.HrsynthError as error:
+        return f"{type(error).__name__}: {error}"
+
+
+def pixels(path: Path) -> list[list[int]]:
+    """A picture in few grey pixels."""
+    with Image.open(path) as picture:
+        return np.asarray(picture.convert("L").resize((PIXELS, PIXELS), Image.Resampling.BOX)).tolist()

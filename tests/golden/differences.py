@@ -1,0 +1,74 @@
+"""How two answers differ: numbers by more than a tolerance, lists but for their order, texts but for their numbers."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import Any
+
+RELATIVE, ABSOLUTE, HUGE = 1e-5, 1e-7, 1e8
+"""Numbers that differ by no more are equal; what is larger is infinite but for rounding."""
+GREY = 4.0
+"""Mean difference of the pixels of equal pictures, of 255."""
+NUMBER = re.compile(r"-?\b\d+(?:\.\d+)?(?:e[+-]?\d+)?\b")
+MOVING = {"seconds", "version", "generated", "sha256"}
+"""Fields that are others at each run or in each version."""
+
+Json = Any
+
+
+def masked(text: str) -> list[str]:
+    """The lines of a text, numbers and widths of columns left out."""
+    return [" ".join(NUMBER.sub("#", line).replace("─", "-").split()) for line in text.splitlines()]
+
+
+def renamed(value: Json, names: dict[str, str]) -> Json:
+    """The same with other names of fields: those that were changed on purpose."""
+    if isinstance(value, dict):
+        return {names.get(key, key): renamed(part, names) for key, part in value.items()}
+    return [renamed(part, names) for part in value] if isinstance(value, list) else value
+
+
+def differences(old: Json, new: Json, at: str = "") -> Iterator[str]:
+    """Where two values differ, a line each."""
+    if isinstance(old, dict) and isinstance(new, dict):
+        for key in sorted({*old, *new} - MOVING):
+            if key not in old or key not in new:
+                yield f"{at}.{key}: {'new' if key in new else 'gone'}"
+            else:
+                yield from differences(old[key], new[key], f"{at}.{key}")
+    elif isinstance(old, list) and isinstance(new, list):
+        yield from _of_lists(old, new, at)
+    elif isinstance(old, bool) or isinstance(new, bool) or not all(isinstance(x, (int, float)) for x in (old, new)):
+        if isinstance(old, str) and isinstance(new, str):
+            before, after = masked(old), masked(new)
+            if before != after:
+                line = next((k for k, (a, b) in enumerate(zip(before, after, strict=False)) if a != b),
+                            min(len(before), len(after)))
+                yield f"{at}: line {line + 1}: {before[line : line + 1]} is now {after[line : line + 1]}"
+        elif old != new:
+            yield f"{at}: {str(old)[:80]} is now {str(new)[:80]}"
+    elif abs(old - new) > ABSOLUTE + RELATIVE * abs(old) and not min(abs(old), abs(new)) > HUGE:
+        yield f"{at}: {old!r} is now {new!r}"
+
+
+def _of_lists(old: list[Json], new: list[Json], at: str) -> Iterator[str]:
+    """Lists of vectors and numbers in order; of texts and records in any order."""
+    if len(old) != len(new):
+        yield f"{at}: {len(old)} items are now {len(new)}"
+        return
+    left = list(enumerate(new))
+    for place, part in enumerate(old):
+        left.sort(key=lambda each, place=place: each[0] != place)  # type: ignore[misc]
+        free = left[:1] if isinstance(part, (int, float)) else left
+        same = next((each for each in free if next(differences(part, each[1]), None) is None), None)
+        if same is None:
+            yield from differences(part, new[place], f"{at}[{place}]")
+            return
+        left.remove(same)
+
+
+def of_pictures(old: list[list[int]], new: list[list[int]]) -> float:
+    """The mean difference of the pixels of two pictures."""
+    pairs = [(a, b) for one, two in zip(old, new, strict=True) for a, b in zip(one, two, strict=True)]
+    return sum(abs(a - b) for a, b in pairs) / len(pairs)

@@ -1,0 +1,76 @@
+"""``python -m golden.run make`` writes what every command answers, ``… compare`` tells what has changed since.
+
+From ``tests/``. ``--only TEXT``: cases whose names hold it; ``--workers N``. Names of JSON fields that were changed on
+purpose stand in ``renamed.toml``. The exit status of ``compare`` is 1 where anything differs. Files of others are asked
+where they are; cases that only one side has are told.
+"""
+
+from __future__ import annotations
+
+import argparse
+import gzip
+import json
+import multiprocessing
+import sys
+import tomllib
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+from golden.answers import Case, asked, cases
+from golden.differences import GREY, differences, of_pictures, renamed
+
+KEPT = Path(__file__).parent / "answers.jsonl.gz"
+NAMES = Path(__file__).parent / "renamed.toml"
+
+
+def answers(chosen: Iterable[Case], workers: int) -> Iterator[tuple[str, Any]]:
+    """The answers to cases, in order, by processes that last for few cases each."""
+    chosen = list(chosen)
+    with multiprocessing.get_context("spawn").Pool(workers, maxtasksperchild=40) as pool:
+        for place, found in enumerate(pool.imap(asked, chosen), 1):
+            if sys.stderr.isatty() or place % 100 == 0:
+                print(f"{place} of {len(chosen)}: {found[0]}", file=sys.stderr)
+            yield found
+
+
+def changes(old: Any, new: Any, names: dict[str, str]) -> list[str]:
+    """What differs in two answers to one case."""
+    old = renamed(old, names)
+    before, after = old.pop("pixels", None), new.pop("pixels", None)
+    found = list(differences(old, new))
+    if (before is None) != (after is None):
+        found.append("a picture on one side only")
+    elif before is not None and (off := of_pictures(before, after)) > GREY:
+        found.append(f"pixels differ by {off:.1f} of 255 on average")
+    return found
+
+
+def main() -> int:
+    """Make the golden files, or compare with them."""
+    parser = argparse.ArgumentParser(prog="golden", description=__doc__)
+    parser.add_argument("what", choices=("make", "compare"))
+    parser.add_argument("--only", default="")
+    parser.add_argument("--workers", type=int, default=2)
+    given = parser.parse_args()
+    chosen = [case for case in cases() if given.only in case.key]
+    if given.what == "make":
+        kept = [json.dumps([key, found], sort_keys=True) for key, found in answers(chosen, given.workers)]
+        KEPT.write_bytes(gzip.compress("".join(line + "\n" for line in kept).encode(), mtime=0))
+        print(f"{len(kept)} answers, {KEPT.stat().st_size / 1e3:.0f} kB")
+        return 0
+    with gzip.open(KEPT, "rt") as lines:
+        known = dict(map(json.loads, lines))
+    names = tomllib.loads(NAMES.read_text())["fields"]
+    new = [case.key for case in chosen if case.key not in known]
+    differ = 0
+    for key, found in answers((case for case in chosen if case.key in known), given.workers):
+        if told := changes(known[key], json.loads(json.dumps(found)), names):
+            differ += 1
+            print(f"{key}\n  " + "\n  ".join(told[:5]) + (f"\n  … {len(told) - 5} more" if len(told) > 5 else ""))
+    print(f"{len(chosen) - len(new)} answers compared, {differ} differ; {len(new)} new")
+    return int(differ > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
