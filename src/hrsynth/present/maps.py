@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 MARKS = {"type1": ("^", "Type 1"), "type2": ("o", "Type 2"), "type3": ("D", "Type 3"),
          CONSTRAINT: ("s", "constraint singularity"), UNDECIDED: ("X", "not decided")}
 """Marks of singular poses by their state."""
-VALUE = "smallest singular value of $M^T$"
+VALUE = "smallest singular value of Mᵀ"
 LOCI = {"hidden robot": ("crimson", "solid", "o"), "real robot": ("royalblue", "dashed", "s")}
 NEAR_TYPE_1 = 0.5
 """Fraction of its median to which the distance to Type 1 falls at a boundary of that kind."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import wraps
@@ -45,13 +46,14 @@ def library() -> None:
 
 
 def in_style(draw: Callable[Asked, Given]) -> Callable[Asked, Given]:
-    """A function that draws, in the style of all plots."""
+    """A function that draws, in the style of all plots: names as they are, a ``$`` in them too."""
     @wraps(draw)
     def drawn(*given: Asked.args, **named: Asked.kwargs) -> Given:
         library()
         import matplotlib.style
 
-        with matplotlib.style.context(STYLE):
+        with matplotlib.style.context([STYLE, {"text.parse_math": False}]), warnings.catch_warnings():
+            warnings.filterwarnings("ignore", r"Glyph \d+ ")  # drawn as a box
             return draw(*given, **named)
 
     return drawn

@@ -157,15 +157,15 @@ Curve = tuple[str, Array, str, str]
 def _panels(found: Servo) -> Iterator[tuple[str, list[Curve], float | None]]:
     """What is drawn against time: its name, its curves, the lower end of its scale."""
     names = [f"leg {each.leg}" if each.by_segment else each.leg for each in found.setting.observed]
-    yield r"error $\|e_i\|$", [(name, found.errors[:, i], COLOURS[i % 6], STYLES[i % 6])
-                               for i, name in enumerate(names)], 0.0
+    yield "error ‖eᵢ‖", [(name, found.errors[:, i], COLOURS[i % 6], STYLES[i % 6])
+                         for i, name in enumerate(names)], 0.0
     path, goal = found.way, found.goal_position
     moved = [i for i in range(3) if np.ptp(path[:, i]) > UNMOVED or abs(path[-1, i] - goal[i]) > UNMOVED] or [0]
     yield "position − goal (m)", [("xyz"[i], path[:, i] - goal[i], COLOURS[i], STYLES[i]) for i in moved], None
     if np.degrees(found.turns.max()) > LEAST_TURN:
         yield "turn from goal\n(degrees)", [("", np.degrees(found.turns), COLOURS[0], "solid")], 0.0
     if np.isfinite(found.track.smallest).any():
-        yield "distance to the\nsingularity ($M^T$)", [("", found.track.smallest, COLOURS[3], "solid")], 0.0
+        yield "distance to the\nsingularity (Mᵀ)", [("", found.track.smallest, COLOURS[3], "solid")], 0.0
 
 
 def until(found: Servo) -> float:

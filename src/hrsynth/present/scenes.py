@@ -210,7 +210,7 @@ _PLOTS: dict[str, Callable[[AssemblyModes, TipLoci], _Plot]] = {
 
 def _on(tip: Tip, legs: Sequence[Tip]) -> str:
     """What a trace is called: where the tip of a leg can be while the platform is held by these legs alone."""
-    return f"$B_{{{tip.leg}}}$ on leg{'s' if len(legs) > 1 else ''} {', '.join(each.leg for each in legs)}"
+    return f"B{tip.leg} on leg{'s' if len(legs) > 1 else ''} {', '.join(each.leg for each in legs)}"
 
 
 def _deciding(found: AssemblyModes, confined: TipLoci, count: int) -> tuple[int, ...]:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -80,12 +82,12 @@ def in_folder(path: Path, *endings: str) -> list[Path]:
     return found if small else []
 
 
-def urdf_beside(settings: Path, frames: set[str]) -> Path:
+def urdf_beside(settings: Path, frames: set[str], names_in: Callable[[Path], set[str]] | None = None) -> Path:
     """The URDF of the same name, ``robot.urdf``, or the only one that has the frames; raises ``BadRobotFile``."""
     for name in (settings.with_suffix(".urdf").name, "robot.urdf"):
         if settings.with_name(name).is_file():
             return settings.with_name(name)
-    others = [path for path in in_folder(settings, ".urdf") if frames and frames <= _names_in(path)]
+    others = [path for path in in_folder(settings, ".urdf") if frames and frames <= (names_in or _names_in)(path)]
     if len(others) == 1:
         return others[0]
     raise xml.refusal(settings, f"{len(others) or 'no'} URDF file next to the YAML file" + (
@@ -103,15 +105,20 @@ def _names_in(path: Path) -> set[str]:
 
 def partner(path: Path) -> Path | None:
     """The file on the disk that is read together with this one: the YAML file of a URDF, the URDF of a YAML file."""
+    return _partner(path, cache(_names_in))
+
+
+def _partner(path: Path, names_in: Callable[[Path], set[str]]) -> Path | None:
     try:
         if path.suffix.lower() in ENDINGS:
             said = settings_in(path)
-            return None if said is None else urdf_beside(path, frames_of(said))
+            return None if said is None else urdf_beside(path, frames_of(said), names_in)
         found = settings_beside(RobotFile(path, xml.document(xml.content(path), str(path), [])))
     except (BadRobotFile, OSError):
         return None
-    return found[0] if found is not None else next((
-        each for each in in_folder(path, *ENDINGS) if _closing(each) is not None and partner(each) == path), None)
+    beside = in_folder(path, *ENDINGS) if found is None else [found[0]]
+    return next((each for each in beside if found or (
+        _closing(each) is not None and _partner(each, names_in) == path)), None)
 
 
 def frames_of(said: dict[str, Any]) -> set[str]:
