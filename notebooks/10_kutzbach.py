@@ -31,7 +31,8 @@ plt.style.use("hrsynth.present.style")
 linkage = bennett()
 robot = linkage.mechanism("bennett")
 checked = hrsynth.check(robot)
-assert checked.postures[0].mobility.total == 1 and [row.rows for row in checked.redundant] == [3]
+assert checked.postures[0].mobility.total == 1
+assert [row.rows for row in checked.redundant] == [3]
 checked
 
 # %% [markdown]
@@ -52,13 +53,14 @@ for angle in np.linspace(start[1], start[1] + 2.0, 9):
 products = np.tan(np.array(closed)[:, 0] / 2) * np.tan(np.array(closed)[:, 1] / 2)
 print("tan θ₁/2 · tan θ₂/2 from", products.min().round(9), "to", products.max().round(9))
 print("± sin ½(α + β) / sin ½(β − α) =", constant.round(9))
-assert np.ptp(products) < 1e-9 and abs(abs(products[0]) - abs(constant)) < 1e-9
+assert np.ptp(products) < 1e-9
+assert abs(abs(products[0]) - abs(constant)) < 1e-9
 
 # %% [markdown]
 # ## Seven of a kind
 #
-# Others are known; Goldberg's and Myard's are put together from Bennett's. Kutzbach gives n − 6 for a single loop of n hinges; each
-# of these has one freedom, and so 7 − n redundant constraints:
+# Others are known; Goldberg's and Myard's are put together from Bennett's. Kutzbach gives n − 6 for a single loop of n
+# hinges; each of these has one freedom, and so 7 − n redundant constraints:
 
 # %%
 folder = Path(tempfile.mkdtemp())
@@ -67,7 +69,8 @@ for name, make in LINKAGES.items():
     each = make().mechanism(name)
     hrsynth.save(each, folder / f"{name}.urdf")
     found = hrsynth.check(each)
-    assert found.postures[0].mobility.total == 1 and sum(row.rows for row in found.redundant) == 7 - len(each.joints)
+    assert found.postures[0].mobility.total == 1
+    assert sum(row.rows for row in found.redundant) == 7 - len(each.joints)
     redundant = "; ".join(f"{row.rows} of the loop cut at {row.loop}" for row in found.redundant)
     print(f"{name:26}{len(each.joints) - 6:9}{found.postures[0].mobility.total:10}   {redundant}")
 
@@ -115,13 +118,15 @@ for error in np.radians([0.01, 0.1, 1.0]):
 # %%
 robot = three_rpr(motor=2, base=BASE, platform=BASE, home=(0.12, 0.3, 0.0))
 found = hrsynth.modes(robot, real=True)
-assert len(found.motions) == 1 and len(found.modes) == 2
+assert len(found.motions) == 1
+assert len(found.modes) == 2
 found
 
 # %% [markdown]
 # This is a *self-motion*: a curve of assembly modes. The program followed it in small steps, closing the loops after
-# each, until it came back to the start; its length is that of the circle, but for the chords. A self-motion is *found* and never proved,
-# because samples of a curve prove nothing. The other two modes lie on no self-motion: there the platform is turned.
+# each, until it came back to the start; its length is that of the circle, but for the chords. A self-motion is *found*
+# and never proved, because samples of a curve prove nothing. The other two modes lie on no self-motion: there the
+# platform is turned.
 
 # %%
 (motion,) = found.motions

@@ -49,9 +49,9 @@ shown(planar)
 # %% [markdown]
 # ## Why four legs are sometimes worse than two
 #
-# Two legs of the Quattro see its four freedoms; four legs see them twice, which tends to be more accurate (MMT A.2). But with more
-# directions than freedoms the errors can balance: they pull against each other, and the loop rests. Below the goal x =
-# y = 0, z = −0.5 m there is such a pose. The starts are 10 cm below the goal:
+# Two legs of the Quattro see its four freedoms; four legs see them twice, which tends to be more accurate (MMT A.2).
+# But with more directions than freedoms the errors can balance: they pull against each other, and the loop rests. Below
+# the goal x = y = 0, z = −0.5 m there is such a pose. The starts are 10 cm below the goal:
 
 # %%
 goal, starts = "x=0,y=0,z=-0.5,phi=0.3", "x=-0.5:0.5:11,y=-0.5:0.5:11,z=-0.6,phi=0.3"

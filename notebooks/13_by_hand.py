@@ -226,8 +226,9 @@ assert ends[1.0][-1] < ends[1.8][-1] < ends[1.8][0] < ends[2.1][-1]
 # %% [markdown]
 # ## Rails and slides
 #
-# Many linear Deltas have parallel rails (MMT 4.3 names UraneSX and I4L). Their rods point the same way wherever the platform is along
-# the rails, so directions cannot show that freedom, with any number of legs. Rails in three directions do better:
+# Many linear Deltas have parallel rails (MMT 4.3 names UraneSX and I4L). Their rods point the same way wherever the
+# platform is along the rails, so directions cannot show that freedom, with any number of legs. Rails in three
+# directions do better:
 
 # %%
 for name in ("uranesx", "i4l", "linear_delta", "orthoglide"):

@@ -121,7 +121,8 @@ print(hidden.certificate)
 
 # %%
 found = hidden.modes()
-assert found.found.complete and len(found.modes) == 2
+assert found.found.complete
+assert len(found.modes) == 2
 found
 
 # %%
@@ -156,7 +157,8 @@ assert reaching.ended == "goal"
 run = hrsynth.servo(robot, start="x=0,y=0.345", goal=goal)
 metres, _ = run.from_goal
 print(f"ended: {run.ended}, mode {run.ending.matched}, {1e3 * metres:.0f} mm from the goal")
-assert run.ended == "mode" and metres > 0.3
+assert run.ended == "mode"
+assert metres > 0.3
 hrsynth.draw(run)
 
 # %% [markdown]
@@ -167,7 +169,8 @@ hrsynth.draw(run)
 # %%
 answer = hrsynth.path(robot, start="x=0,y=0.345", goal=goal)
 print(answer)
-assert "opposite signs" in answer.reason and answer.verdict == "undecided"
+assert "opposite signs" in answer.reason
+assert answer.verdict == "undecided"
 
 # %% [markdown]
 # The map shows the tip of the workspace, where both poses are. Its colour is the smallest singular value of Mᵀ, the

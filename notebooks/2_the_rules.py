@@ -96,9 +96,9 @@ state = step(start, motors_off)
 # first axis must not turn with the leg: it belongs to a link T that only translates. Three sliders PPP carry T from
 # the base to the rod's end A, and behind U̲ a last joint R lets the rod turn about itself, which no camera sees.
 #
-# The chain PPP-U̲-R has six freedoms, which are independent unless the rod lies along the first axis of U̲. Such a chain
-# constrains nothing. That is the whole proof that the lift is a hidden robot of *any* robot: nothing has changed, except
-# that two of the chain's angles now describe the direction.
+# The chain PPP-U̲-R has six freedoms, which are independent unless the rod lies along the first axis of U̲. Such a
+# chain constrains nothing. That is the whole proof that the lift is a hidden robot of *any* robot: nothing has changed,
+# except that two of the chain's angles now describe the direction.
 
 # %%
 state = step(state, lift)
@@ -208,8 +208,8 @@ trusted = step(state, takeover, trust=True)
 
 # %% [markdown]
 # This is the division of labour: *rules propose, the certificate disposes*. A rule may be too bold. The result is
-# certified all the same, because a step that changes ρ is undone. A robot to which no other rule applies keeps its lift,
-# which needs no rule's condition.
+# certified all the same, because a step that changes ρ is undone. A robot to which no other rule applies keeps its
+# lift, which needs no rule's condition.
 #
 # Two more rules need more than one leg: the removal of legs that are not watched, and the change of joints at the
 # platform that may go with it. Notebooks 4 and 5 use them.

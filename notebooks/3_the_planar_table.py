@@ -78,7 +78,8 @@ wide = three_rrr(proximal=0.23, distal=0.3, platform=list(zip((0.16, 0.19, 0.13)
                  home=(0.01, -0.015, np.radians(-17)))
 six = hrsynth.modes(wide)
 print(len(six.modes), "real of", six.found.complex)
-assert numbers["3rrr_m1"] == (2, 6) and numbers["3rpr_m1"] == numbers["3prr_m1"] == (2, 2)
+assert numbers["3rrr_m1"] == (2, 6)
+assert numbers["3rpr_m1"] == numbers["3prr_m1"] == (2, 2)
 assert len(six.modes) == six.found.complex == 6
 hrsynth.draw(six)
 
@@ -140,7 +141,8 @@ place.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal", xlabel="x 
 plt.show()
 print("the normals miss a common point by", np.sqrt(residual.max(initial=0.0)), "m")
 print("smallest singular value of Mᵀ there:", example.sigma)
-assert residual.max(initial=0.0) < 1e-18 and example.sigma < 1e-9
+assert residual.max(initial=0.0) < 1e-18
+assert example.sigma < 1e-9
 
 # %% [markdown]
 # ## Exercises

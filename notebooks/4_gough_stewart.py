@@ -53,7 +53,8 @@ found = hidden.modes(at=POSE)
 for number, mode in enumerate(found.modes, 1):
     print(number, mode.pose, "(the pose itself)" if mode.goal else "", "" if mode.reachable else "(out of reach)")
 print(found.found.proof)
-assert len(found.modes) == 8 and found.found.complete
+assert len(found.modes) == 8
+assert found.found.complete
 
 # %%
 hrsynth.draw(found)
@@ -167,7 +168,8 @@ normal /= np.linalg.norm(normal)
 print("the three planes meet at", point.round(4))
 print("the platform's plane misses that point by", abs(normal @ (point - B[0])), "m")
 print("smallest singular value of Mᵀ there:", example.sigma)
-assert abs(normal @ (point - B[0])) < 1e-9 and example.sigma < 1e-9
+assert abs(normal @ (point - B[0])) < 1e-9
+assert example.sigma < 1e-9
 print("lost:", "; ".join(freedom.name for freedom in example.lost))
 
 # %%

@@ -136,8 +136,8 @@ hrsynth.draw(maps["24"])
 #
 # MMT Appendix A.2 puts all this in an order: throw away sets of legs for which start and goal are not in one aspect;
 # rank the rest by accuracy; simulate the best (left out here with `runs=0`: the run is above). `select` does it, and
-# first throws away sets that do not see everything or are singular at an end; before accuracy it ranks by where else the loop may end (left
-# out with `endings=0`):
+# first throws away sets that do not see everything or are singular at an end; before accuracy it ranks by where else
+# the loop may end (left out with `endings=0`):
 
 # %%
 best = hrsynth.select(robot, start=START, goal=GOAL, size=2, runs=0, endings=0)
@@ -147,9 +147,9 @@ best
 # ## More legs, and a local minimum
 #
 # Why not watch all four legs? Then eight numbers fix four freedoms, wrong modes are almost ruled out, and the error
-# tends to become smaller (MMT A.2). But this has a price. With more equations than freedoms the error may have *local minima*: poses
-# where the wanted directions are not reached and yet every small motion makes the error larger. The command vanishes
-# there, and the robot stops.
+# tends to become smaller (MMT A.2). But this has a price. With more equations than freedoms the error may have *local
+# minima*: poses where the wanted directions are not reached and yet every small motion makes the error larger. The
+# command vanishes there, and the robot stops.
 #
 # MMT 5.1.3 prints such a run (Figs. 26 and 27). With the printed dimensions it does not stop:
 

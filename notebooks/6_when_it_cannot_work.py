@@ -46,7 +46,9 @@ places = np.array([at.pose(setting.motion.link) for at in setting.configurations
 values = setting.batch.evaluate(places).singular_values
 print("largest singular values from", values[:, 0].min().round(2), "to", values[:, 0].max().round(2))
 print("smallest singular values up to", values[:, -1].max())
-assert len(values) == 20 and values[:, -1].max() < 1e-12 and values[:, 0].min() > 0.5
+assert len(values) == 20
+assert values[:, -1].max() < 1e-12
+assert values[:, 0].min() > 0.5
 
 # %% [markdown]
 # If the rails are not parallel, all is well. The two robots have the same letters, and so do their hidden robots. It
@@ -89,7 +91,8 @@ assert not known
 
 # %%
 advice = hrsynth.advise(hrsynth.load("uranesx"))
-assert advice.size == 1 and {each.kind for cure in advice.sets for each in cure.measurements} == {"line", "encoder"}
+assert advice.size == 1
+assert {each.kind for cure in advice.sets for each in cure.measurements} == {"line", "encoder"}
 advice
 
 # %% [markdown]
@@ -133,8 +136,8 @@ for name, values in (("smallest singular value", smallest), ("largest error", er
     assert abs(abs(slope) - 1) < 0.02
 
 # %% [markdown]
-# The slopes are close to 1 and −1: halve a small angle, and the error doubles. A verdict is a yes or a no about geometry, and an
-# engineer should ask for the number too.
+# The slopes are close to 1 and −1: halve a small angle, and the error doubles. A verdict is a yes or a no about
+# geometry, and an engineer should ask for the number too.
 #
 # ## Exercises
 #

@@ -143,7 +143,8 @@ for _ in range(3):
     kept = twists @ np.linalg.svd(turned)[2][1:].T
     seen.append(np.linalg.svd(kept)[0][:, 2])
 print("rank", np.linalg.matrix_rank(np.array(seen)), "of 3;", catalog["3(Rz*-Rz-Rz)"]["verdict"])
-assert np.linalg.matrix_rank(np.array(seen)) == 3 and catalog["3(Rz*-Rz-Rz)"]["verdict"] == "controllable"
+assert np.linalg.matrix_rank(np.array(seen)) == 3
+assert catalog["3(Rz*-Rz-Rz)"]["verdict"] == "controllable"
 
 # %% [markdown]
 # ## From a word to a robot
