@@ -30,7 +30,10 @@ plt.style.use("hrsynth.present.style")
 # %%
 linkage = bennett()
 robot = linkage.mechanism("bennett")
-hrsynth.check(robot)
+checked = hrsynth.check(robot)
+assert checked.postures[0].mobility.total == 1
+assert [row.rows for row in checked.redundant] == [3]
+checked
 
 # %% [markdown]
 # *Mobility 1*. The last line says how that can be: three of the constraints of the loop repeat others, and −2 + 3 = 1.
@@ -50,12 +53,14 @@ for angle in np.linspace(start[1], start[1] + 2.0, 9):
 products = np.tan(np.array(closed)[:, 0] / 2) * np.tan(np.array(closed)[:, 1] / 2)
 print("tan θ₁/2 · tan θ₂/2 from", products.min().round(9), "to", products.max().round(9))
 print("± sin ½(α + β) / sin ½(β − α) =", constant.round(9))
+assert np.ptp(products) < 1e-9
+assert abs(abs(products[0]) - abs(constant)) < 1e-9
 
 # %% [markdown]
 # ## Seven of a kind
 #
-# Others followed, most of them by putting Bennett's together. Kutzbach gives n − 6 for a single loop of n hinges; each
-# of these has one freedom, and so 7 − n redundant constraints:
+# Others are known; Goldberg's and Myard's are put together from Bennett's. Kutzbach gives n − 6 for a single loop of n
+# hinges; each of these has one freedom, and so 7 − n redundant constraints:
 
 # %%
 folder = Path(tempfile.mkdtemp())
@@ -64,12 +69,14 @@ for name, make in LINKAGES.items():
     each = make().mechanism(name)
     hrsynth.save(each, folder / f"{name}.urdf")
     found = hrsynth.check(each)
+    assert found.postures[0].mobility.total == 1
+    assert sum(row.rows for row in found.redundant) == 7 - len(each.joints)
     redundant = "; ".join(f"{row.rows} of the loop cut at {row.loop}" for row in found.redundant)
     print(f"{name:26}{len(each.joints) - 6:9}{found.postures[0].mobility.total:10}   {redundant}")
 
 # %% [markdown]
 # The loop above saved them as robot files. `python -m hrsynth.families FOLDER bennett schatz` does so from the shell.
-# Schatz's is at work in every chemist's Turbula mixer.
+# Schatz's is at work in the Turbula mixer.
 #
 # With one hinge driven and held, a ring has a few closings. These are the assembly modes of the real robot. Written in
 # dual quaternions, they are among the four zeros of a determinant, and all four are enclosed. Two of them are real: the
@@ -84,8 +91,8 @@ assert len(ring.modes) == 2
 # %% [markdown]
 # ## How special is it?
 #
-# Bennett's condition is an equation. If it is missed by a little, the ring does not close at all: it has two unknowns
-# too few for its equations. Here is by how much it stays open at best, if one twist is wrong:
+# Bennett's condition is an equation. If it is missed by a little, the ring need not close at all: it has two unknowns
+# too few for its equations. Here is by how much it stays open where least squares end, if one twist is wrong:
 
 # %%
 from scipy.optimize import least_squares
@@ -95,6 +102,7 @@ for error in np.radians([0.01, 0.1, 1.0]):
     wrong = type(wrong)(wrong.lengths, wrong.twists + [error, 0, 0, 0], wrong.offsets)
     best = least_squares(lambda angles, ring=wrong: (ring.frames(angles)[-1] - np.eye(4))[:3].ravel(), start)
     print(f"a twist wrong by {np.degrees(error):4.2f}°: open by {np.linalg.norm(best.fun):.1e}")
+    assert np.linalg.norm(best.fun) > 0.2 * error
 
 # %% [markdown]
 # No file holds such numbers exactly. Robots written with ten decimals miss the condition by 1e-10, and are still meant
@@ -110,16 +118,20 @@ for error in np.radians([0.01, 0.1, 1.0]):
 # %%
 robot = three_rpr(motor=2, base=BASE, platform=BASE, home=(0.12, 0.3, 0.0))
 found = hrsynth.modes(robot, real=True)
+assert len(found.motions) == 1
+assert len(found.modes) == 2
 found
 
 # %% [markdown]
 # This is a *self-motion*: a curve of assembly modes. The program followed it in small steps, closing the loops after
-# each, until it came back to the start; its length is that of the circle. A self-motion is *found* and never proved,
-# because samples of a curve prove nothing. The other two modes lie on no self-motion: there the platform is turned.
+# each, until it came back to the start; its length is that of the circle, but for the chords. A self-motion is *found*
+# and never proved, because samples of a curve prove nothing. The other two modes lie on no self-motion: there the
+# platform is turned.
 
 # %%
 (motion,) = found.motions
 print(f"length {motion.shift:.4f} m, circle {2 * np.pi * np.hypot(0.12, 0.3):.4f} m")
+assert 0.999 < motion.shift / (2 * np.pi * np.hypot(0.12, 0.3)) < 1
 places = np.array([each["platform"][:2, 3] for each in motion.way])
 figure, place = plt.subplots(figsize=(4, 4))
 place.plot(*places.T, ".", label="platform, motors held")
@@ -165,7 +177,9 @@ for name, base in bases.items():
 # six motors held, the platform is loose. A single pose shows it here, the theorem all of them:
 
 # %%
-print(hrsynth.modes(gough_stewart(base_half=np.radians(20), platform_half=np.radians(40)), real=True))
+similar = hrsynth.modes(gough_stewart(base_half=np.radians(20), platform_half=np.radians(40)), real=True)
+print(similar)
+assert len(similar.motions) == 1
 
 # %% [markdown]
 # ## Exercises
@@ -185,11 +199,15 @@ setting = hrsynth.observe(hrsynth.load(folder / "sarrus.urdf"))
 poses = np.array([np.linalg.inv(at.pose("link_5")) @ at.pose("link_2") for at in setting.configurations])
 print("largest turn", np.abs(poses[:, :3, :3] - poses[0, :3, :3]).max().round(12))
 print("extent along and across the line", np.linalg.svd(poses[:, :3, 3] - poses[:, :3, 3].mean(0))[1].round(12))
+assert np.abs(poses[:, :3, :3] - poses[0, :3, :3]).max() < 1e-9
+assert np.linalg.svd(poses[:, :3, 3] - poses[:, :3, 3].mean(0))[1][1] < 1e-9
 
 # %% jupyter={"source_hidden": true} tags=["solution"]
 # 2. it breaks up into single modes; as the legs' lines meet in a point, far away, the pose itself is a singular one
 smaller = tuple((0.99 * radius, angle) for radius, angle in BASE)
-print(hrsynth.modes(three_rpr(motor=2, base=BASE, platform=smaller, home=(0.12, 0.3, 0.0)), real=True))
+single = hrsynth.modes(three_rpr(motor=2, base=BASE, platform=smaller, home=(0.12, 0.3, 0.0)), real=True)
+print(single)
+assert not single.motions
 
 # %% jupyter={"source_hidden": true} tags=["solution"]
 # 3. where the proximal links are parallel: there the two circles touch, and if these links are equal too, they are one

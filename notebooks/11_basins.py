@@ -25,6 +25,11 @@ def shown(found):
     plt.show()
 
 
+def reached(found):
+    """How many starts come to the goal."""
+    return int(sum((found.cells == i).sum() for i, each in enumerate(found.ends) if each.ending.name == "goal"))
+
+
 # %% [markdown]
 # ## A planar robot
 #
@@ -44,9 +49,9 @@ shown(planar)
 # %% [markdown]
 # ## Why four legs are sometimes worse than two
 #
-# Two legs of the Quattro see its four freedoms; four legs see them twice, which is more accurate. But with more
-# directions than freedoms the errors can balance: they pull against each other, and the loop rests. Below the goal x =
-# y = 0, z = −0.5 m there is such a pose. The starts are 10 cm below the goal:
+# Two legs of the Quattro see its four freedoms; four legs see them twice, which tends to be more accurate (MMT A.2).
+# But with more directions than freedoms the errors can balance: they pull against each other, and the loop rests. Below
+# the goal x = y = 0, z = −0.5 m there is such a pose. The starts are 10 cm below the goal:
 
 # %%
 goal, starts = "x=0,y=0,z=-0.5,phi=0.3", "x=-0.5:0.5:11,y=-0.5:0.5:11,z=-0.6,phi=0.3"
@@ -58,6 +63,9 @@ shown(four)
 two = hrsynth.basins("quattro", ["2", "3"], to=goal, grid=starts, jobs=1)
 print(two)
 shown(two)
+assert 2.5 < reached(two) / reached(four) < 3
+assert {each.ending.name for each in four.ends} == {"goal", "local minimum"}
+assert {each.ending.name for each in two.ends} == {"goal", "mode", "boundary"}
 
 # %% [markdown]
 # With two legs nearly three times as many of these starts come to the goal as with four. The other runs of the four
@@ -68,7 +76,9 @@ shown(two)
 
 # %%
 for legs in (None, ["2", "3"]):
-    print(len(hrsynth.modes("quattro", legs, at=goal).modes), "modes, legs", legs or "all")
+    count = len(hrsynth.modes("quattro", legs, at=goal).modes)
+    print(count, "modes, legs", legs or "all")
+    assert (count == 1) == (legs is None)
 
 # %% [markdown]
 # ## Exercises
@@ -85,6 +95,7 @@ for legs in (None, ["2", "3"]):
 end = next(each for each in four.ends if each.ending.name == "local minimum")
 batch = hrsynth.observe("quattro").batch
 there, wanted = batch.evaluate(np.stack([end.X, four.target.pose(batch.coordinates.link)])).directions
+assert end.pose.z < -0.5
 print(end.pose, np.degrees(np.linalg.norm(np.cross(there, wanted), axis=-1)).round(2))
 
 # %% jupyter={"source_hidden": true} tags=["solution"]

@@ -79,8 +79,8 @@ place.set(xlabel="x (m)", ylabel="y (m)", aspect="equal", title="camera 0.9 m ab
 plt.show()
 
 # %% [markdown]
-# The dark ring is the cylinder (dashed). Which way the camera looks does not matter: a turn multiplies the determinant
-# by a number that is not zero.
+# The dark ring is the cylinder (dashed; exercise 2 tests it). Which way the camera looks does not matter: a turn
+# multiplies the determinant by a number that is not zero.
 #
 # ## Four poses, one image
 #
@@ -125,6 +125,8 @@ for C, R in poses:
     again = image(C, R, CORNERS)
     print(C.round(4), "image differs by", max(np.abs(again[0] - x).max(), np.abs(again[1] - y).max()).round(12),
           "depths", again[2].round(3))
+    assert max(np.abs(again[0] - x).max(), np.abs(again[1] - y).max()) < 1e-9
+assert len(poses) == 4
 
 # %% [markdown]
 # ## Servoing by three corners
@@ -144,6 +146,8 @@ for found in by_three:
     C = found.settled.pose("camera")[:3, 3]
     nearest = min(np.linalg.norm(C - other) for other, _ in poses)
     print(f"{found.ended:16}", C.round(3), "nearest of the poses above:", f"{1e3 * nearest:.3g} mm")
+    assert nearest < 1e-6
+    assert found.ended in ("goal", "mode")
 
 # %% [markdown]
 # Runs that end in a *mode* reached another of the poses that Grunert's equation lists. The cylinder and the poses
@@ -151,15 +155,23 @@ for found in by_three:
 #
 # ## The fourth corner
 #
-# With a fourth corner in their plane the image determines the pose. Where the cylinder was, its rows restore the rank
-# that those of the other three lose, unless it lies on their circle.
+# With a fourth corner in their plane, no three on a line, the image determines the pose. Its rows also restore the rank
+# that those of the other three lose on the cylinder. If it is not on their circle this is so everywhere: a camera on
+# the cylinders of all four triples would be above a point of all four circles, and those have none in common. At the
+# place below the rank is full on the circle too, but the smallest singular value is smaller:
 
 # %%
 square = np.vstack([CORNERS, [[0.15, -0.3, 0]]])
 four = seeing(square)
 for start in starts[:4]:
-    print(hrsynth.servo(four, start=start, goal=GOAL).ended)
+    by_four = hrsynth.servo(four, start=start, goal=GOAL).ended
+    print(by_four)
+    assert by_four == "goal"
 on = middle + [0, radius, 0.9]
+least_of = [np.linalg.svd(interaction(on, DOWN, some), compute_uv=False)[-1] for some in (
+    CORNERS, np.vstack([CORNERS, [middle + [radius * np.cos(2), radius * np.sin(2), 0]]]), square)]
+assert least_of[0] < 1e-12
+assert 1e-3 < least_of[1] < least_of[2]
 print("on the cylinder: smallest singular value with three corners",
       np.linalg.svd(interaction(on, DOWN, CORNERS), compute_uv=False)[-1].round(12), "with four",
       np.linalg.svd(interaction(on, DOWN, square), compute_uv=False)[-1].round(4))
@@ -197,6 +209,8 @@ for name, far in (("on", 1.0), ("off", 1.3)):
         values.append(np.linalg.svd(interaction(C, DOWN @ (tilt * np.sign(np.diag(tilt))), CORNERS),
                                     compute_uv=False)[-1])
     least[name] = (min(values), max(values))
+assert least["on"][1] < 1e-12
+assert least["off"][0] > 1e-3
 print("on:", f"at most {least['on'][1]:.1e};", "off:", f"at least {least['off'][0]:.1e}")
 
 # %% jupyter={"source_hidden": true} tags=["solution"]

@@ -1,8 +1,8 @@
 # %% [markdown]
 # # 2. The rules, one by one, on a single leg
 #
-# How is a hidden robot found? Notebook 1 guessed it from a picture. This one follows rules, those of MMT 3.2, and
-# checks each of their steps by numbers. The rules work on one leg after another, so a single leg shows them all.
+# How is a hidden robot found? Notebook 1 guessed it from a picture. This one follows rules, most of them from MMT 3.2,
+# and checks each of their steps by numbers. The rules work on one leg after another, so a single leg shows them all.
 #
 # Take a leg of a six-legged robot: a motor turns a crank about a fixed axis, a universal joint connects the crank with
 # a rod, and a ball joint the rod with the platform. Read from the base to the platform this is R̲US, with a line under
@@ -96,9 +96,9 @@ state = step(start, motors_off)
 # first axis must not turn with the leg: it belongs to a link T that only translates. Three sliders PPP carry T from
 # the base to the rod's end A, and behind U̲ a last joint R lets the rod turn about itself, which no camera sees.
 #
-# The chain PPP-U̲-R has six freedoms. A chain with six freedoms constrains nothing. That is the whole proof that the
-# lift is a hidden robot of *any* robot: nothing has changed, except that two of the chain's angles now describe the
-# direction.
+# The chain PPP-U̲-R has six freedoms, which are independent unless the rod lies along the first axis of U̲. Such a
+# chain constrains nothing. That is the whole proof that the lift is a hidden robot of *any* robot: nothing has changed,
+# except that two of the chain's angles now describe the direction.
 
 # %%
 state = step(state, lift)
@@ -150,6 +150,8 @@ state = step(state, pi_form)
 
 # %%
 hidden = hrsynth.derive(leg)
+assert str(state.architecture()) == str(hidden.hidden_architecture)
+assert (hidden.verdict.rank, hidden.verdict.dof) == (2, 3)
 hidden
 
 # %%
@@ -163,7 +165,9 @@ hrsynth.draw(hidden)
 
 # %%
 oblique = rus("oblique", axis=(0.5, 0.5, 0.7))
-print(hrsynth.derive(oblique))
+skew = hrsynth.derive(oblique)
+print(skew)
+assert skew.unchecked.equivalent
 
 # %% [markdown]
 # The takeover is refused, and the result is less pretty, but right. The paper's own form ΠU̲S, printed below the
@@ -187,6 +191,8 @@ print("certified:    ", found.hidden_architecture)
 unchecked = found.unchecked
 print("unchecked:    ", unchecked.hidden, "–", "equivalent" if unchecked.equivalent else "not equivalent")
 print("              ", unchecked.reason)
+assert not unchecked.equivalent
+assert (found.verdict.rank, found.verdict.dof) == (2, 2)
 
 # %% [markdown]
 # The real leg lets its tip move on a surface, two freedoms, and one direction sees both. ΠU̲S would let the tip move
@@ -202,8 +208,8 @@ trusted = step(state, takeover, trust=True)
 
 # %% [markdown]
 # This is the division of labour: *rules propose, the certificate disposes*. A rule may be too bold. The result is
-# certified all the same, because a step that changes ρ is undone. A robot to which no rule applies keeps its lift,
-# which is always right.
+# certified all the same, because a step that changes ρ is undone. A robot to which no other rule applies keeps its
+# lift, which needs no rule's condition.
 #
 # Two more rules need more than one leg: the removal of legs that are not watched, and the change of joints at the
 # platform that may go with it. Notebooks 4 and 5 use them.

@@ -1,9 +1,9 @@
 # %% [markdown]
 # # 3. The planar table
 #
-# MMT's Table 1 lists the planar robots with three equal legs, each leg with three joints of type R (it turns) or P
-# (it slides), one of them driven. Its question for each: what becomes of the leg when the camera watches its
-# direction? This notebook computes that table and adds three columns.
+# MMT's Table 1 lists the legs of planar robots: three joints of type R (it turns) or P (it slides), one of them driven.
+# Its question for each: what becomes of the leg when the camera watches its direction? This notebook computes that
+# table, for robots with three equal legs, and adds three columns.
 #
 # In a planar robot a direction is one angle. The virtual motor is an R̲, not a U̲.
 
@@ -26,9 +26,11 @@ def row(*cells):
 
 
 derived = {name: hrsynth.derive(hrsynth.load(name)) for name in NAMES}
+numbers = {}
 print(row("robot", "real", "hidden", "verdict", "seen", "modes (real of complex)"))
 for name, found in derived.items():
     listed = found.modes()
+    numbers[name] = (len(listed.modes), listed.found.complex)
     count = "a continuum" if listed.found.continuum else f"{len(listed.modes)} of {listed.found.complex}"
     print(row(name, found.architecture, found.hidden_architecture or "none", found.verdict.verdict,
               f"{found.verdict.rank} of {found.verdict.dof}", count))
@@ -58,6 +60,8 @@ print("the same hidden legs as in MMT Table 1, each certified")
 print(derived["3prp"].verdict)
 print()
 print(derived["3rrp"].verdict)
+assert derived["3prp"].verdict.rank == derived["3rrp"].verdict.rank == 1
+assert derived["3ppr_m1"].verdict.rank == derived["3ppr_m2"].verdict.rank == 0
 
 # %% [markdown]
 # **The assembly modes.** With the directions held, the tip of each leg runs on a curve. It is a line if the leg
@@ -74,6 +78,9 @@ wide = three_rrr(proximal=0.23, distal=0.3, platform=list(zip((0.16, 0.19, 0.13)
                  home=(0.01, -0.015, np.radians(-17)))
 six = hrsynth.modes(wide)
 print(len(six.modes), "real of", six.found.complex)
+assert numbers["3rrr_m1"] == (2, 6)
+assert numbers["3rpr_m1"] == numbers["3prr_m1"] == (2, 2)
+assert len(six.modes) == six.found.complex == 6
 hrsynth.draw(six)
 
 # %% [markdown]
@@ -83,6 +90,7 @@ hrsynth.draw(six)
 # %%
 print(six.found.proof)
 print("widest enclosure:", max(mode.radius for mode in six.modes))
+assert six.found.complete
 
 # %% [markdown]
 # ## Singularities
@@ -97,6 +105,7 @@ condition = hrsynth.singular(derived["3rrr_m1"].robot, points=300)
 print(condition.words)
 print(condition.condition.expression)
 print(condition.checked.points, "poses compared,", condition.checked.disagreements, "disagreements")
+assert not condition.checked.disagreements
 
 # %% [markdown]
 # At a singular pose constructed from the expression, the normals do meet (MMT Fig. 8):
@@ -132,6 +141,8 @@ place.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal", xlabel="x 
 plt.show()
 print("the normals miss a common point by", np.sqrt(residual.max(initial=0.0)), "m")
 print("smallest singular value of Mᵀ there:", example.sigma)
+assert residual.max(initial=0.0) < 1e-18
+assert example.sigma < 1e-9
 
 # %% [markdown]
 # ## Exercises
@@ -151,6 +162,7 @@ print("smallest singular value of Mᵀ there:", example.sigma)
 cranks = hrsynth.derive(derived["3rrr_m1"].robot, observe=["prox_1", "prox_2", "prox_3"])
 print(cranks.hidden_architecture, "  real:", cranks.architecture)
 print(cranks.modes().found.complex, "complex modes; with the motors held:", cranks.modes(real=True).found.complex)
+assert cranks.modes().found.complex == cranks.modes(real=True).found.complex == 6
 assert str(cranks.hidden_architecture) == str(cranks.architecture)
 
 # %% jupyter={"source_hidden": true} tags=["solution"]

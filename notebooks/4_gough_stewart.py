@@ -21,6 +21,7 @@ sets = hrsynth.legs(robot)
 for size in range(1, 7):
     words = Counter(f"{each.verdict} (rank {each.rank} of {each.dof})" for each in sets.sets if len(each.legs) == size)
     print(size, "legs watched:", dict(words))
+assert all((each.verdict == "controllable") == (len(each.legs) >= 3) for each in sets.sets)
 
 # %% [markdown]
 # A direction in space is two numbers. Three directions are six numbers, and the platform has six freedoms. So at least
@@ -42,7 +43,7 @@ hrsynth.draw(hidden)
 #
 # Hold the directions. Then the tip of leg i runs on a line: Bᵢ = Aᵢ + rᵢ uᵢ, with unknown lengths r₁, r₃, r₅. The
 # triangle of the tips is rigid, so three distances are known, and each is an equation of degree two. Three quadrics
-# meet in 2 · 2 · 2 = 8 points.
+# meet in at most 2 · 2 · 2 = 8 isolated points.
 #
 # At this pose all eight are real:
 
@@ -52,6 +53,8 @@ found = hidden.modes(at=POSE)
 for number, mode in enumerate(found.modes, 1):
     print(number, mode.pose, "(the pose itself)" if mode.goal else "", "" if mode.reachable else "(out of reach)")
 print(found.found.proof)
+assert len(found.modes) == 8
+assert found.found.complete
 
 # %%
 hrsynth.draw(found)
@@ -101,6 +104,7 @@ for start in np.random.default_rng(0).uniform(0, 1.5, (400, 3)):
 ours = sorted(map(tuple, solutions))
 theirs = sorted(tuple(np.sum((tips(mode) - A) * u, axis=1)) for mode in found.modes)
 print(len(ours), "solutions; largest difference in a leg's length:", np.abs(np.array(ours) - theirs).max(), "m")
+assert np.abs(np.array(ours) - theirs).max() < 1e-9
 
 # %% [markdown]
 # The real robot, its six motors held, has up to 40 poses, complex ones included. This one is symmetric, and twelve of
@@ -110,6 +114,7 @@ print(len(ours), "solutions; largest difference in a leg's length:", np.abs(np.a
 real = hidden.modes(at=POSE, real=True)
 print(f"{len(real.modes)} real of {real.found.complex} complex")
 print(real.found.proof)
+assert real.found.complex == 40 - 12
 
 # %% [markdown]
 # What does a controller do with eight poses that look the same? It ends in one of them, and the start decides in
@@ -126,6 +131,7 @@ for _ in range(6):
         ends[run.ended if run.ending.matched is None else f"mode {run.ending.matched}"] += 1
     except HrsynthError as error:
         ends[type(error).__name__] += 1
+assert all(name == "goal" or name.startswith("mode") for name in ends), ends
 dict(ends)
 
 # %% [markdown]
@@ -145,6 +151,7 @@ condition = hrsynth.singular(robot, ["1", "3", "5"], points=300)
 print(condition.words)
 print(condition.condition.expression)
 print(condition.checked.points, "poses compared,", condition.checked.disagreements, "disagreements")
+assert not condition.checked.disagreements
 
 # %% [markdown]
 # At a singular pose constructed from the expression, intersect three of the planes and see whether the fourth goes
@@ -161,6 +168,8 @@ normal /= np.linalg.norm(normal)
 print("the three planes meet at", point.round(4))
 print("the platform's plane misses that point by", abs(normal @ (point - B[0])), "m")
 print("smallest singular value of Mᵀ there:", example.sigma)
+assert abs(normal @ (point - B[0])) < 1e-9
+assert example.sigma < 1e-9
 print("lost:", "; ".join(freedom.name for freedom in example.lost))
 
 # %%
@@ -189,6 +198,7 @@ plt.show()
 # %%
 everything = hrsynth.modes(robot, at=POSE)
 print(len(everything.modes), "mode,", len(everything.near), "near modes")
+assert len(everything.modes) == 1
 
 # %% [markdown]
 # ## Exercises

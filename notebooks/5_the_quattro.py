@@ -63,6 +63,8 @@ for legs, each in pairs.items():
     for number, mode in enumerate(found.modes, 1):
         print(f"   {number}  {mode.pose!s:52}", "the goal" if mode.goal else "reachable" if mode.reachable
               else "the real robot cannot be assembled there: legs " + ", ".join(mode.open))
+beyond = [set(mode.open) for mode in pairs["23"].modes(at=GOAL).modes if not (mode.goal or mode.reachable)]
+assert beyond == [{"1", "4"}, {"1", "4"}]
 hrsynth.draw(pairs["14"].modes(at=GOAL))
 
 # %% [markdown]
@@ -79,17 +81,22 @@ for run in runs.values():
     metres, radians = run.from_goal
     away = f"{1e3 * metres:.1f} mm and {np.degrees(radians):.1f}° from the goal"
     print(f"legs {', '.join(run.setting.labels)}: {run.ended}, {away}")
+assert [run.ended for run in runs.values()] == ["mode", "goal"]
 hrsynth.draw(runs["14"])
 
 # %% [markdown]
 # With legs 1 and 4 the directions reach their desired values but the robot does not reach the goal: it stops at
-# another assembly mode. The same happens in the paper (MMT Figs. 22 and 23). The reason is the one of notebook 1, a
-# singularity of the hidden robot between start and goal, and it is proved:
+# another assembly mode. The same happens in the paper (MMT Figs. 22 and 23). MMT 3.3 explains it by aspects: start and
+# goal must lie in one. Of legs 2 and 3 that is proved, by a straight path. For legs 1 and 4 a path without Type 2
+# singularity exists too, but at its end both legs are in their other working modes, where their directions are not the
+# desired ones. So it is no way for the controller, and no proof that there is none:
 
 # %%
 for legs in ("14", "23"):
     answer = hrsynth.path(robot, list(legs), start=START, goal=GOAL)
     print(f"legs {', '.join(legs)}: {answer.verdict}. {answer.reason}")
+    assert answer.verdict == "same aspect"
+    assert ("in the other working mode of leg 1, 4" in answer.reason) == (legs == "14")
 print()
 print(hrsynth.singular(robot, ["1", "4"], points=200).words)
 
@@ -101,13 +108,14 @@ print(hrsynth.singular(robot, ["1", "4"], points=200).words)
 second = next(mode for mode in pairs["14"].modes(at=GOAL).modes if not mode.goal and abs(mode.pose.rpy[2]) < 1e-6)
 print(second.pose, " within", second.radius)
 print("printed minus computed:", round(1e3 * (-0.909 - second.pose.z), 1), "mm")
+assert abs(-0.909 - second.pose.z) > 0.005
 
 # %% [markdown]
 # ## Accuracy
 #
 # Cameras are not exact. If each direction may be off by 0.1°, how far may the platform be off? To first order the
-# error is $\delta t = M^{T+} \delta u$, and the largest one for all $\delta u$ inside the cones is found exactly for
-# two legs (MMT Appendix A.1). A map over the plane z = −0.7 m with φ = 0, as in MMT Figs. 19 and 20:
+# error is $\delta t = M^{T+} \delta u$ (MMT Appendix A.1), and the largest one for all $\delta u$ inside the cones is
+# found exactly for two legs. A map over the plane z = −0.7 m with φ = 0, as in MMT Figs. 19 and 20:
 
 # %%
 maps = {legs: hrsynth.accuracy(robot, list(legs), cone="0.1deg", grid="x=-0.5:0.5:81,y=-0.5:0.5:81,z=-0.7,phi=0")
@@ -122,14 +130,14 @@ hrsynth.draw(maps["24"])
 
 # %% [markdown]
 # In the first map the white curve is a singularity of the hidden robot, and the error grows without bound towards it.
-# The second pair of legs has none in this plane. Which pair is better depends on where the robot works.
+# The map of the second pair shows no such curve. Which pair is better depends on where the robot works.
 #
 # ## Choose
 #
-# MMT Appendix A.2 puts all this in an order: throw away sets of legs that do not see everything, that are singular at
-# an end, or that have a singularity between start and goal; rank the rest by accuracy; simulate the best (left out
-# here with `runs=0`: the run is above). `select` does it; before accuracy it ranks by where else the loop may end (left
-# out with `endings=0`):
+# MMT Appendix A.2 puts all this in an order: throw away sets of legs for which start and goal are not in one aspect;
+# rank the rest by accuracy; simulate the best (left out here with `runs=0`: the run is above). `select` does it, and
+# first throws away sets that do not see everything or are singular at an end; before accuracy it ranks by where else
+# the loop may end (left out with `endings=0`):
 
 # %%
 best = hrsynth.select(robot, start=START, goal=GOAL, size=2, runs=0, endings=0)
@@ -139,21 +147,23 @@ best
 # ## More legs, and a local minimum
 #
 # Why not watch all four legs? Then eight numbers fix four freedoms, wrong modes are almost ruled out, and the error
-# becomes smaller. But this has a price. With more equations than freedoms the error may have *local minima*: poses
-# where the wanted directions are not reached and yet every small motion makes the error larger. The command vanishes
-# there, and the robot stops.
+# tends to become smaller (MMT A.2). But this has a price. With more equations than freedoms the error may have *local
+# minima*: poses where the wanted directions are not reached and yet every small motion makes the error larger. The
+# command vanishes there, and the robot stops.
 #
 # MMT 5.1.3 prints such a run (Figs. 26 and 27). With the printed dimensions it does not stop:
 
 # %%
 printed = hrsynth.servo(robot, start="x=0.028,y=0,z=-0.617,phi=0", goal="x=-0.6,y=0,z=-0.8,phi=0")
 print(printed.ended, "at", printed.pose)
+assert printed.ended == "goal"
 
 # %% [markdown]
 # But the phenomenon is real. A search over random starts and goals found this run:
 
 # %%
 stuck = hrsynth.servo(robot, start="x=-0.3,y=0,z=-0.6,phi=0", goal="x=0.05,y=0.07,z=-0.52,phi=0")
+assert stuck.ended == "local minimum"
 stuck
 
 # %% [markdown]
@@ -205,11 +215,12 @@ print("change one millimetre, or 0.01 rad, to each side:", growth.round(7))
 assert (growth > 0).all()
 
 # %% [markdown]
-# Every step makes it worse. So more legs are better on the whole, but they do not cure everything. No rank shows that
+# Every step makes it worse. So more legs do not cure everything. No rank shows that
 # there are no local minima: at this pose Mᵀ has full rank.
 
 # %%
 print(stuck.run.commands[-1].values)
+assert min(stuck.run.commands[-1].values) > 0.05
 
 # %% [markdown]
 # ## Exercises
@@ -228,6 +239,7 @@ print(stuck.run.commands[-1].values)
 # 1. all pairs: two tangents are never parallel in general, and a translating platform is singular only then
 rigid = hrsynth.load("quattro_rigid")
 print(hrsynth.legs(rigid).smallest)
+assert str(hrsynth.legs(rigid).smallest).count("{") == 6
 for pair in (["1", "2"], ["1", "3"]):
     print(pair, hrsynth.modes(rigid, pair, at="x=0,y=-0.25,z=-0.7").found.complex, "complex modes")
 
@@ -237,6 +249,7 @@ noisy = hrsynth.servo(robot, ["2", "3"], start=START, goal=GOAL, noise="0.1deg")
 bound = hrsynth.accuracy(robot, ["2", "3"], cone="0.1deg", at=[GOAL]).poses[0].position.largest
 print(f"strays by {1e3 * noisy.spread.rms_metres:.2f} mm (root mean square)")
 print(f"largest first-order error {1e3 * bound:.2f} mm")
+assert noisy.spread.rms_metres < bound
 
 # %% jupyter={"source_hidden": true} tags=["solution"]
 # 3. the planes of MMT have the tangents as their normals: parallel planes are parallel tangents, and a determinant with

@@ -46,6 +46,9 @@ places = np.array([at.pose(setting.motion.link) for at in setting.configurations
 values = setting.batch.evaluate(places).singular_values
 print("largest singular values from", values[:, 0].min().round(2), "to", values[:, 0].max().round(2))
 print("smallest singular values up to", values[:, -1].max())
+assert len(values) == 20
+assert values[:, -1].max() < 1e-12
+assert values[:, 0].min() > 0.5
 
 # %% [markdown]
 # If the rails are not parallel, all is well. The two robots have the same letters, and so do their hidden robots. It
@@ -67,6 +70,7 @@ print(hrsynth.singular(hrsynth.load("prrrp_m1"), points=100).words)
 for name in ("uranesx", "hexaglide", "i4l", "linear_delta", "orthoglide"):
     verdict = hrsynth.derive(hrsynth.load(name)).verdict
     lost = "; ".join(freedom.name for freedom in verdict.lost) or "–"
+    assert (verdict.verdict == "controllable") == (name in ("linear_delta", "orthoglide"))
     print(f"{name:14}{verdict.verdict:24}rank {verdict.rank} of {verdict.dof}   lost: {lost}")
 
 # %% [markdown]
@@ -75,7 +79,9 @@ for name in ("uranesx", "hexaglide", "i4l", "linear_delta", "orthoglide"):
 # is compared.)
 
 # %%
-print(hrsynth.derive(hrsynth.load("i4l")).verdict.has_interaction_matrix)
+known = hrsynth.derive(hrsynth.load("i4l")).verdict.has_interaction_matrix
+print(known)
+assert not known
 
 # %% [markdown]
 # ## What else must be measured?
@@ -85,6 +91,8 @@ print(hrsynth.derive(hrsynth.load("i4l")).verdict.has_interaction_matrix)
 
 # %%
 advice = hrsynth.advise(hrsynth.load("uranesx"))
+assert advice.size == 1
+assert {each.kind for cure in advice.sets for each in cure.measurements} == {"line", "encoder"}
 advice
 
 # %% [markdown]
@@ -123,11 +131,13 @@ place.set(xlabel="angle between the rails (degrees)", ylabel="largest error for 
 place.grid(alpha=0.3, which="both")
 plt.show()
 for name, values in (("smallest singular value", smallest), ("largest error", errors)):
-    print(f"{name}: slope {np.polyfit(np.log(angles[:3]), np.log(values[:3]), 1)[0]:.3f} at small angles")
+    slope = np.polyfit(np.log(angles[:3]), np.log(values[:3]), 1)[0]
+    print(f"{name}: slope {slope:.3f} at small angles")
+    assert abs(abs(slope) - 1) < 0.02
 
 # %% [markdown]
-# The slopes are 1 and −1: halve the angle, and the error doubles. A verdict is a yes or a no about geometry, and an
-# engineer should ask for the number too.
+# The slopes are close to 1 and −1: halve a small angle, and the error doubles. A verdict is a yes or a no about
+# geometry, and an engineer should ask for the number too.
 #
 # ## Exercises
 #
@@ -142,7 +152,9 @@ for name, values in (("smallest singular value", smallest), ("largest error", er
 
 # %% jupyter={"source_hidden": true} tags=["solution"]
 # 1. three freedoms are lost, and each encoder or line position gives back one
-print(hrsynth.advise(hrsynth.load("3ppr_m1")))
+blind = hrsynth.advise(hrsynth.load("3ppr_m1"))
+print(blind)
+assert blind.size == 3
 
 # %% jupyter={"source_hidden": true} tags=["solution"]
 # 2. another leg needs only the camera; so does the position of a line that is watched already

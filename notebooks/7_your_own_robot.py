@@ -17,7 +17,7 @@ folder = Path(tempfile.mkdtemp())
 # ## A four-bar in URDF
 #
 # URDF describes trees: every link has one parent. A parallel robot has loops. The rule is simple: write a spanning
-# tree, and for each joint that would close a loop write a `<loop>`, which other URDF readers ignore. Two more
+# tree, and for each joint that would close a loop write a `<loop>`, which most other URDF readers ignore. Two more
 # elements say what is driven and what is watched.
 
 # %%
@@ -58,6 +58,7 @@ print(hrsynth.derive(robot, observe=["1"]))
 
 # %%
 found = hrsynth.modes(robot, ["1"])
+assert len(found.modes) == 2
 hrsynth.draw(found)
 
 # %% [markdown]
@@ -133,6 +134,7 @@ for note in other.notes:
 
 # %%
 print(repr(hrsynth.derive(other)))
+assert str(hrsynth.derive(other).hidden_architecture) == str(hrsynth.derive("rrrrr_m1").hidden_architecture)
 print(repr(hrsynth.modes(other)))
 
 # %% [markdown]
@@ -157,6 +159,7 @@ for ending in (".urdf", ".xml", ".sdf"):
 # %%
 again = hrsynth.derive(hrsynth.load(folder / "hidden.urdf"))
 print(again.architecture, "→", again.hidden_architecture)
+assert str(again.architecture) == str(again.hidden_architecture)
 
 # %% [markdown]
 # ## Exercises
@@ -185,9 +188,10 @@ limited = FOUR_BAR.replace('<joint name="a" type="continuous">',
 (folder / "limited.urdf").write_text(limited)
 for mode in hrsynth.modes(hrsynth.load(folder / "limited.urdf"), ["1"]).modes:
     print(mode)
+    assert mode.goal or mode.reachable
 
 # %% jupyter={"source_hidden": true} tags=["solution"]
-# 3. the same joints at the same places
+# 3. the same joints at the same places; only the spheres drawn on the links differ
 from hrsynth.mechanism.builder import Builder
 
 b = Builder("five_bar")
@@ -202,3 +206,4 @@ mine = b.build(platform="rod_1")
 hrsynth.save(mine, folder / "mine.urdf")
 print(repr(hrsynth.derive(mine)))
 print("\n".join(mine.differences(other)) or "no difference")
+assert all(each.startswith("content of link") for each in mine.differences(other))

@@ -21,6 +21,7 @@ from hrsynth.catalog.words import parse
 plt.style.use("hrsynth.present.style")
 catalog = hrsynth.catalog.load()
 print(len(catalog), "architectures")
+assert len(catalog) > 100_000
 for (group, verdict), count in catalog.count("group", "verdict").items():
     print(f"   {group:10}{verdict or 'refused':24}{count}")
 
@@ -142,6 +143,8 @@ for _ in range(3):
     kept = twists @ np.linalg.svd(turned)[2][1:].T
     seen.append(np.linalg.svd(kept)[0][:, 2])
 print("rank", np.linalg.matrix_rank(np.array(seen)), "of 3;", catalog["3(Rz*-Rz-Rz)"]["verdict"])
+assert np.linalg.matrix_rank(np.array(seen)) == 3
+assert catalog["3(Rz*-Rz-Rz)"]["verdict"] == "controllable"
 
 # %% [markdown]
 # ## From a word to a robot
@@ -153,6 +156,7 @@ print("rank", np.linalg.matrix_rank(np.array(seen)), "of 3;", catalog["3(Rz*-Rz-
 robot = mechanism(parse("3(Rt*-2SSt)"), delta.get("attempt", 0))
 hidden = hrsynth.derive(robot, observe=delta["minimal"][0])
 print(hidden.hidden_architecture, "–", hidden.verdict.verdict, "–", hidden.certificate)
+assert hidden.verdict.verdict == delta["verdict"]
 hrsynth.draw(hidden)
 
 # %% [markdown]

@@ -2,8 +2,7 @@
 # # 9. Six poses, seen by a camera
 #
 # In 1992 Innocenti and Parenti-Castelli described a planar robot that can be assembled in six ways with the same
-# lengths of its legs, and that can go from one of them to another without a singularity. Until then most people had
-# believed that a robot must pass a singularity to change its assembly mode.
+# lengths of its legs, and that can go from one of them to another without a singularity.
 #
 # A controller that watches the legs of a 3-RRR drives such a robot without knowing it. This notebook finds its six
 # poses, proves which of them belong together, and leads the controller from one to another.
@@ -31,6 +30,9 @@ print(hidden.architecture, "hides", hidden.hidden_architecture)
 listed = hrsynth.modes(robot)
 print(listed.count)
 print(listed.found.proof)
+assert len(listed.modes) == 6
+assert listed.found.complete
+assert all(mode.goal or mode.reachable for mode in listed.modes)
 hrsynth.draw(listed)
 
 # %% [markdown]
@@ -40,6 +42,7 @@ hrsynth.draw(listed)
 # %%
 idle = hrsynth.servo(robot, start="mode:1", goal="mode:5")
 print(idle)
+assert idle.ended == "mode"
 
 # %% [markdown]
 # ## The atlas
@@ -49,6 +52,8 @@ print(idle)
 # %%
 atlas = hrsynth.atlas(robot)
 print(atlas)
+assert atlas.cuspidal
+assert atlas.aspects_met == "2"
 
 # %% [markdown]
 # Six modes, two aspects, three modes in each. *Separated* is proved by the sign of a determinant, which cannot change
@@ -71,6 +76,7 @@ print(path)
 # %%
 run = hrsynth.servo(robot, start=f"mode:{one}", goal=f"mode:{other}", duration=30, time=40)
 print(run)
+assert run.ended == "goal"
 
 # %%
 hrsynth.draw(run)
@@ -80,13 +86,15 @@ hrsynth.draw(run)
 # away from where it was. No rank was lost, no matrix was singular, no error was large. (The path bends a little at
 # first: the desired directions are interpolated between poses of the line, which matters where the singular value is
 # small.) The smallest singular value falls on the way, to a ninth of its value at the start, and rises again. It is
-# never zero, and it falls as much on many ways that change nothing:
+# never zero:
 
 # %%
 starts = np.linspace(0, 1, 60)
 first, last = (np.array([p.x, p.y]) for p in (path.start.pose, path.goal.pose))
 turn = path.goal.pose.rpy[2] - path.start.pose.rpy[2]
 line = first + starts[:, None] * (last - first)
+assert 0.125 < np.linalg.norm(last - first) < 0.135
+assert 107.5 < abs(np.degrees(turn)) < 108.5
 poses = [f"x={x},y={y},phi={f * turn}" for (x, y), f in zip(line.tolist(), starts, strict=True)]
 values = [posture.distances.type2 for posture in hrsynth.check(robot, at=poses).postures]
 figure, place = plt.subplots(figsize=(6, 3.4))
@@ -116,11 +124,22 @@ section, places = atlas.section
 print(len(section.cusps), "cusps,", sum(cusp.radius is not None for cusp in section.cusps), "of them enclosed")
 print(len(section.nodes), "nodes,", sum(node[0].radius is not None for node in section.nodes), "of them enclosed")
 print("the widest enclosure:", f"{max(cusp.radius for cusp in section.cusps):.1e}")
+assert all(cusp.radius is not None for cusp in section.cusps)
+assert all(node[0].radius is not None for node in section.nodes)
 
 # %% [markdown]
 # What is an engineer to do? Choose a goal that stays away from the cusps, or a start in the goal's own part of its
-# aspect, or add a measurement: an encoder at one crank distinguishes the six poses.
-#
+# aspect, or add a measurement: an encoder at crank 1 distinguishes the six poses, as the crank's end differs in each:
+
+# %%
+zero = np.linalg.inv(robot.links["platform"].pose)
+corner = [*robot.joints["wrist_1"].point, 1.0]
+ends = np.array([(mode.bodies["platform"] @ zero @ corner)[:2] for mode in listed.modes])
+least = min(np.linalg.norm(ends[i] - ends[j]) for i in range(6) for j in range(i))
+print(f"the ends of crank 1 are at least {1e3 * least:.1f} mm apart")
+assert least > 1e-3
+
+# %% [markdown]
 # ## Exercises
 #
 # 1. The Quattro of the paper with legs 1 and 4 watched has four modes. Is its hidden robot cuspidal?
