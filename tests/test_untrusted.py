@@ -36,6 +36,7 @@ from hrsynth.description import save
 from hrsynth.description.formats.gepetto import settings
 from hrsynth.description.meshes import locate_mesh, triangles
 from hrsynth.errors import BadRequest, CertificateRefused, HrsynthError
+from hrsynth.mechanism.model import fresh_name
 
 ROOT = Path(__file__).resolve().parent.parent
 LINKS = '<link name="base"/><link name="crank">{}</link><link name="bar"/><link name="rocker"/>'
@@ -423,6 +424,32 @@ def test_a_small_certificate_is_checked_soon(what: str, record: dict[str, Any]):
     with pytest.raises(CertificateRefused, match=r"n < 25|terms|unknowns|rows or columns"):
         verify({**record, "sha256": checker.digest(record)})
     assert time.process_time() - start < 5
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 7, 8, 9, 1000])
+def test_a_free_name_is_found_without_counting_up_to_it(count: int):
+    class Asked(set[str]):
+        questions = 0
+
+        def __contains__(self, name: object) -> bool:
+            Asked.questions += 1
+            return super().__contains__(name)
+
+    taken = Asked(["a", *(f"a_{number}" for number in range(2, count + 1))])
+    assert fresh_name("a", taken, {}) == f"a_{count + 1}"
+    assert fresh_name("b", taken) == "b"
+    assert Asked.questions < 30
+
+
+def test_of_many_frames_that_nearly_meet_some_are_named(tmp_path: Path):
+    file, tree = tmp_path / "tree.urdf", []
+    for number in range(1, 400):
+        tree.append(f'<link name="l{number}"/>' + JOINT.format(f"j{number}", f"l{(number - 1) // 2}", f"l{number}",
+                                                               "0.1 0 0"))
+    file.write_text(f'<robot name="r"><link name="l0"/>{"".join(tree)}</robot>')
+    start = time.process_time()
+    assert execute(["check", str(file), "--platform", "l9"]) in (2, 3)
+    assert time.process_time() - start < 20
 
 
 def test_files_beside_a_robot_that_are_large_together_are_not_read(tmp_path: Path):

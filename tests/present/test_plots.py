@@ -14,6 +14,7 @@ from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.description import load
 from hrsynth.mechanism.pose import Pose
 from hrsynth.present import maps, plots
+from hrsynth.present.paper import PNG, print_figure, settle
 from hrsynth.present.plots import MapPlane, round_ticks, tick_words
 from hrsynth.present.view.view import plane_normal
 from strategies import random_rotation, transformed
@@ -121,3 +122,21 @@ def test_legends_stand_beside_the_axes():
     figure.savefig(io.BytesIO())
     (beside,) = figure.legends
     assert beside.get_window_extent().x0 >= max(axes.get_window_extent().x1 for axes in figure.axes)
+
+
+@pytest.mark.parametrize("name", [r"$\frac{1$", "$a^{b$", "$$", "a $ b", "$" + r"\sqrt{" * 6 + "$", "机器人"])
+def test_a_name_is_drawn_as_it_is(name: str, recwarn: pytest.WarningsRecorder):
+    @plots.in_style
+    def drawn(text: str) -> bytes:
+        figure, (axes,) = plots.panels(1, 1, 16.0, 5.0)
+        figure.suptitle(text)
+        axes.set_xlabel(text)
+        axes.plot([0, 1], label=text)
+        axes.legend()
+        settle(figure)
+        shown = {each.get_text() for each in (figure._suptitle, axes.xaxis.label)}
+        assert {each.replace("\n", " ") for each in shown} == {text}
+        return print_figure(figure, PNG)
+
+    assert drawn(name) != drawn("x")
+    assert not recwarn.list

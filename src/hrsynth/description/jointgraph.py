@@ -156,7 +156,7 @@ class JointGraph:
 
     def fresh(self, name: str) -> str:
         """``name``, or ``name_2``, ``name_3`` … if it is taken."""
-        return fresh_name(name, self.links.keys() | self.joints.keys())
+        return fresh_name(name, self.links, self.joints)
 
     @property
     def named(self) -> tuple[set[str | None], set[str]]:

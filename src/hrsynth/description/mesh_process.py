@@ -34,7 +34,8 @@ class Beside:
 
 
 def triangles(path: Path, text: str | None, largest: int) -> tuple[Any, Any] | None:
-    """The points (n, 3) and triangles (m, 3) of a mesh in a file, or given as text; None where it cannot be read."""
+    """The points (n, 3), all of them corners, and triangles (m, 3) of a mesh in a file, or given as text; None where it
+    cannot be read."""
     import numpy as np
     import trimesh
 
@@ -50,7 +51,8 @@ def triangles(path: Path, text: str | None, largest: int) -> tuple[Any, Any] | N
     try:
         beside: Any = Beside(path, largest) if kind == "gltf" else None
         solid: Any = trimesh.load(io.BytesIO(content), file_type=kind, force="mesh", process=False, resolver=beside)
-        points, faces = np.array(solid.vertices, dtype=float), np.array(solid.faces, dtype=np.int64)
+        used, faces = np.unique(np.array(solid.faces, dtype=np.int64).reshape(-1, 3), return_inverse=True)
+        points, faces = np.array(solid.vertices, dtype=float)[used], faces.reshape(-1, 3).astype(np.int64)
     except Exception as error:  # readers of many formats, each with errors of its own
         if isinstance(error, MemoryError) or 2048 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss > PROCESS_BYTES:
             refuse(f"{path.name}: it needs more memory than {PROCESS_BYTES} bytes")

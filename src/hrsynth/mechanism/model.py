@@ -10,7 +10,6 @@ from collections.abc import Container, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
-from itertools import chain, count
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -222,9 +221,21 @@ def _counted(bound: float, joint: Joint) -> float:
     return bound if joint.offset is None or joint.offset.ndim > 1 else float(f"{bound + joint.offset[0]:.15g}")
 
 
-def fresh_name(name: str, taken: Container[str]) -> str:
-    """``name``, or ``name_2``, ``name_3`` … if it is taken."""
-    return next(each for each in chain([name], (f"{name}_{number}" for number in count(2))) if each not in taken)
+def fresh_name(name: str, *taken: Container[str]) -> str:
+    """``name``, or ``name_2``, ``name_3`` … if it is taken; not the first of these where names between are free."""
+
+    def free(number: int) -> bool:
+        return not any(f"{name}_{number}" in each for each in taken)
+
+    if not any(name in each for each in taken):
+        return name
+    low, high = 1, 2
+    while not free(high):
+        low, high = high, 2 * high
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (low, middle) if free(middle) else (middle, high)
+    return f"{name}_{high}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -408,7 +419,7 @@ class Mechanism(Result, shown_as="robot"):
 
     def fresh(self, name: str) -> str:
         """``name``, or ``name_2``, ``name_3`` … if it is taken by a link or a joint."""
-        return fresh_name(name, self.links.keys() | self.joints.keys())
+        return fresh_name(name, self.links, self.joints)
 
     def differences(self, other: Mechanism, tolerance: float = SAME_GEOMETRY) -> list[str]:
         """What differs from ``other``, in words; empty if they are the same mechanism (names, order, geometry)."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,20 +52,22 @@ def closure_candidates(graph: JointGraph, base: str) -> tuple[ClosureCandidate, 
     apart_moved = np.linalg.norm(moved[:, None] - moved, axis=2) / assembly.length
     # near at zero, and farther apart elsewhere: joints that turn about the place itself do not separate frames there
     near = np.argwhere(np.triu((apart <= MAY_MEET) & (apart_moved > apart + MAY_MEET / 2), 1))
-    busy = {link: sum(link in j.links for j in joints) for link in links}
+    busy = Counter(link for joint in joints for link in joint.links)
     ranked = sorted(near.tolist(), key=lambda pair: (apart[*pair] > NOISE, sum(busy[links[i]] > 1 for i in pair),
                                                      apart[*pair], *pair))
     found: list[ClosureCandidate] = []
-    taken: list[tuple[frozenset[int], Array]] = []
+    taken: dict[frozenset[int], list[Array]] = {}
     for i, j in ranked:
         bodies = frozenset((body[links[i]], body[links[j]]))
-        if bodies in joined or any(own == bodies and np.linalg.norm(points[i] - p) <= MAY_MEET * assembly.length
-                                   for own, p in taken):
+        places = taken.setdefault(bodies, [])
+        if bodies in joined or any(np.linalg.norm(points[i] - p) <= MAY_MEET * assembly.length for p in places):
             continue
-        taken.append((bodies, points[i]))
+        if len(found) == MOST_CANDIDATES:
+            break
+        places.append(points[i])
         found.append(ClosureCandidate((links[i], links[j]), float(apart[i, j] * assembly.length),
                                       bool(apart[i, j] <= NOISE)))
-    return tuple(found[:MOST_CANDIDATES])
+    return tuple(found)
 
 
 def without_loop(graph: JointGraph, base: str) -> str | None:

@@ -1,6 +1,6 @@
 """Motors off: every real actuator becomes passive.
 
-    R̲ –  →  R –        (MMT 3.2; always)
+    R̲ –  →  R –        (MMT 3.1, 4.2; always)
 """
 
 from __future__ import annotations
@@ -27,4 +27,4 @@ def apply(state: State, driven: list[Joint]) -> State:
     return replace(state, mechanism=state.mechanism.changed(joints=[replace(joint, motor=None) for joint in driven]))
 
 
-RULE = Rule("motors off", "MMT 3.2", Stage.MOTORS, find, apply, whole_leg, always=True)
+RULE = Rule("motors off", "MMT 3.1, 4.2", Stage.MOTORS, find, apply, whole_leg, always=True)

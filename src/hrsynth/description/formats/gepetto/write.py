@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import json
+import math
 from dataclasses import replace
+from typing import Any
 
 from ....geometry.vectors import pose
 from ....mechanism.model import Joint, JointType, Link, Mechanism
@@ -35,5 +36,12 @@ def write(mechanism: Mechanism) -> Written:
         kinds.append("3d" if joint.type is JointType.SPHERICAL else "6d")
     tree = replace(robot, links=links, joints=joints)
     motors = [name for joint in joints.values() if joint.actuated for name in joint_names(joint)]
-    lines = [f"closed_loop: {json.dumps(pairs)}", f"type: {json.dumps(kinds)}", f"name_mot: {json.dumps(motors)}", ""]
-    return Written((text(tree), "\n".join(lines)), lost)
+    lists = {"closed_loop": pairs, "type": kinds, "name_mot": motors}
+    return Written((text(tree), "".join(f"{key}: {_yaml(names)}" for key, names in lists.items())), lost)
+
+
+def _yaml(names: list[Any]) -> str:
+    """A list in one line, every name in quotation marks."""
+    import yaml
+
+    return str(yaml.safe_dump(names, default_flow_style=True, default_style='"', width=math.inf))

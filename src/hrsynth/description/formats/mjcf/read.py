@@ -125,7 +125,7 @@ class _MjcfReader(XmlReader):
             return before, X
         after = body
         if not last:
-            after = fresh_name(name, graph.links.keys() | self.bodies)
+            after = fresh_name(name, graph.links, self.bodies)
             graph.links[after] = Link(after, line=xml.line(element))
             self.placed[after] = self.placed[body]
         centre = self._numbers(element, given, "pos", (0, 0, 0)) if kind is not JointType.FREE else np.zeros(3)
@@ -142,7 +142,7 @@ class _MjcfReader(XmlReader):
 
     def _fresh(self, name: str) -> str:
         """A name for what has none, that nothing in the document has."""
-        return fresh_name(name, self.result.links.keys() | self.result.joints.keys() | self.named)
+        return fresh_name(name, self.result.links, self.result.joints, self.named)
 
     def _numbers(self, element: xml.Element, given: dict[str, str], key: str, default: tuple[float, ...]) -> Array:
         return self.values(given.get(key), default, xml.line(element), f"{key} of <{element.tag}>")

@@ -75,7 +75,7 @@ def add(reader: XmlReader, graph: JointGraph, element: xml.Element, links: tuple
         _add_gear(reader, graph, element, links, name)
     elif kind == "H" or (kind == "U" and abs(float(axes[0] @ axes[1])) > NOISE):
         taken = {prefix + str(each.get("name")) for each in reader.root.iter("joint", "link")} | set(graph.joints)
-        first, second = (fresh_name(part(name, k), taken | set(graph.links)) for k in (1, 2))
+        first, second = (fresh_name(part(name, k), taken, graph.links) for k in (1, 2))
         link = first
         between = FrameSpec(link, ORIGIN, line)
         graph.links[link] = Link(link, line=line)

@@ -47,7 +47,7 @@ def require_inside(start: Path, largest: int, most: int) -> list[str]:
         layer.Traverse(Sdf.Path.absoluteRootPath, look)
         if clips:
             refuse(f"value clips, which are not read, found {clips[0]}")
-        for asset in layer.GetCompositionAssetDependencies():
+        for asset in filter(None, layer.GetCompositionAssetDependencies()):  # an internal reference names none
             cure = "allowed: layers in the file's folder (usdcat --flatten makes one of all)"
             other = Path(os.path.normpath(path.parent / asset)) if "`" not in asset and "://" not in asset else None
             if other is None or not other.resolve().is_relative_to(folder):
