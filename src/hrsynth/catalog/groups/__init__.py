@@ -21,7 +21,7 @@ def group(word: RobotWord) -> str:
     """The group to which a word belongs: the first whose law it obeys."""
     if word.seen:
         return SENSORS
-    laws = {"planar": planar, "pods": pods, "deltas": deltas, "mixed": mixed, "schoenflies": schoenflies}
+    laws = {"planar": planar, "pods": pods, "schoenflies": schoenflies, "deltas": deltas, "mixed": mixed}
     return next((name for name, module in laws.items() if module.belongs(word)), "spatial")
 
 
