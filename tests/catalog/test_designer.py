@@ -21,11 +21,11 @@ JOINT = re.compile(r"(2SS|2US|Pi|R|P|C|U|S)[a-z]*([*]?)!?")
 QUESTIONS: dict[str, tuple[str, dict[str, Any], int]] = {
     "3T1R, R motors at the base, two legs observed": (
         "--motion 3T1R --motors R --base-motors --verdict controllable --fewest 2",
-        {"motion": "3T1R", "motors": {"R"}, "base_motors": True, "verdict": "controllable", "fewest": 2}, 6),
+        {"motion": "3T1R", "motors": {"R"}, "base_motors": True, "verdict": "controllable", "fewest": 2}, 17),
     "the same whose motors determine all freedoms, without parallelograms": (
         "--motion 3T1R --motors R --base-motors --verdict controllable --fewest 2 --driven --no-parallelograms",
         {"motion": "3T1R", "motors": {"R"}, "base_motors": True, "verdict": "controllable", "fewest": 2,
-         "driven": True, "parallelograms": False}, 2),
+         "driven": True, "parallelograms": False}, 9),
     "translations by linear motors at the base": (
         "--motion 3T --motors P --base-motors --driven --no-parallelograms --verdict controllable",
         {"motion": "3T", "motors": {"P"}, "base_motors": True, "driven": True, "parallelograms": False,

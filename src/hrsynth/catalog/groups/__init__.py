@@ -9,10 +9,11 @@ from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 
 from ..words import SENSORS, RobotWord
-from . import deltas, mixed, planar, pods, sensors, spatial
+from . import deltas, mixed, planar, pods, schoenflies, sensors, spatial
 
 _LISTED: Mapping[str, Callable[[], Iterable[RobotWord]]] = {
-    "planar": planar.words, "pods": pods.words, "deltas": deltas.words, "mixed": mixed.words, "spatial": spatial.words}
+    "planar": planar.words, "pods": pods.words, "deltas": deltas.words, "mixed": mixed.words,
+    "schoenflies": schoenflies.words, "spatial": spatial.words}
 """What each module lists, in no order, some of it twice or of another group."""
 
 
@@ -20,7 +21,7 @@ def group(word: RobotWord) -> str:
     """The group to which a word belongs: the first whose law it obeys."""
     if word.seen:
         return SENSORS
-    laws = {"planar": planar, "pods": pods, "deltas": deltas, "mixed": mixed}
+    laws = {"planar": planar, "pods": pods, "schoenflies": schoenflies, "deltas": deltas, "mixed": mixed}
     return next((name for name, module in laws.items() if module.belongs(word)), "spatial")
 
 
