@@ -45,7 +45,8 @@ FILTER = (
     Option("verdict", f"{', '.join(VERDICTS)}.", words=VERDICTS),
     Option("see", "What is seen of the platform instead of legs, such as 3point or 2point+image_line; add ' for one "
            "camera each.", "KINDS"),
-    Option("group", "planar, mixed, pods, deltas, schoenflies, spatial, sensors; for published tables 3T0R and the like."),
+    Option("group", "planar, mixed, pods, deltas, schoenflies, spatial, sensors; for published tables 3T0R and the "
+           "like."),
     Option("base_motors", "Whether all motors are on the base.", kind=bool, flags=("--base-motors/--moving-motors",)),
     Option("motors", "Kinds of all driven joints: R, P, U, C, or several joined by +.", "KINDS"),
     Option("driven", "Whether the motors determine all freedoms.", kind=bool, flags=("--driven/--not-driven",)),

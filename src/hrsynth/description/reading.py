@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from dataclasses import replace
 from hashlib import sha256
+from itertools import islice
 from pathlib import Path
 
 from ..budgets import LARGEST_ROBOT, MOST_LINKS
@@ -83,11 +84,11 @@ def robot_file(path: Path, given: Overrides = AS_IT_IS, *, strict: bool | None =
 
 
 def _require_few(path: Path, root: xml.Element) -> None:
-    """Refuse what has too many links before any of them is read."""
-    for count, _ in enumerate(root.iter("link", "body", "model", "default", "frame"), 1):
-        if count > 2 * MOST_LINKS:
-            raise xml.refusal(path, f"more than {2 * MOST_LINKS} links, bodies and frames",
-                              f"up to {MOST_LINKS} links")
+    """Refuse what has too many links or joints before any of them is read."""
+    links, joints = ("link", "body", "model", "default", "frame"), ("joint", "connect", "weld")
+    for names, most, what in ((links, 2 * MOST_LINKS, "links, bodies and frames"), (joints, 4 * MOST_LINKS, "joints")):
+        if sum(1 for _ in islice(root.iter(*names), most + 1)) > most:
+            raise xml.refusal(path, f"more than {most} {what}", f"up to {MOST_LINKS} links")
 
 
 def _in_folder(path: Path) -> Path:
