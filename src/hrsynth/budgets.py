@@ -87,6 +87,8 @@ LINKAGE_STARTS = 200
 """Random starts from which a linkage is closed."""
 MOST_CANDIDATES = 12
 """Pairs of frames that are told as possible closures."""
+MOST_DEFECTS = 100
+"""Defects of a file after which it is not read on."""
 MOST_BESIDE, LARGEST_BESIDE = 50, 3_000_000
 """Files of a kind beside a robot file, and their bytes together, above which none of them is looked at."""
 LARGEST_YAML = 1_000_000

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..budgets import MOST_DEFECTS
 from ..errors import BadRobotFile, Defect
 from ..geometry.so3 import rotation_of
 from ..geometry.vectors import Array, unit
@@ -30,11 +31,14 @@ class XmlReader:
     digits: numerals.Digits = field(default_factory=numerals.Digits)
 
     def defect(self, line: int | None, what: str, value: str | None = None, allowed: str | None = None) -> None:
-        """Record what is wrong in a line of the file (or of one that it includes)."""
+        """Record what is wrong in a line of the file (or of one that it includes); raises ``BadRobotFile`` where that
+        is enough."""
         if value is not None and len(value) > 80:
             value = value[:77] + "..."
         file = line.file if isinstance(line, xml.SourceLine) else self.file
         self.defects.append(Defect(file, line, what, value, allowed))
+        if len(self.defects) >= MOST_DEFECTS:
+            self.require_sound()
 
     def require_sound(self) -> None:
         """Raise :class:`BadRobotFile` with all defects found so far, where there are any."""

@@ -98,15 +98,15 @@ def _of_state(graph: JointGraph, name: str, state: xml.Element) -> Posture:
 def from_keyframe(joints: Iterable[JointSpec], zeros: Mapping[str, float], qpos: Array) -> Posture | None:
     """The posture of MuJoCo's coordinates, joint after joint: R and P count from ``zeros``, a ball has 4 numbers, a
     free joint 7, its pose in the world. None where there are not as many."""
-    found, rest = dict[str, Array](), list(qpos)
+    found, at = dict[str, Array](), 0
     for joint in joints:
         kind, name = joint.kind, joint.name
         count = {JointType.SPHERICAL: 4, JointType.FREE: 7}.get(kind, 1)
-        value = value_of(kind, rest[:count])
+        value = value_of(kind, list(qpos[at : at + count]))
         if value is None:
             return None
         if kind is JointType.FREE:
             value = frozen(inverse(joint.ends[0].X) @ value)
         found[name] = value if kind.freedoms > 1 else frozen(value - zeros[name])
-        rest = rest[count:]
-    return None if rest else found
+        at += count
+    return found if at == len(qpos) else None

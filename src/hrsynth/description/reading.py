@@ -84,11 +84,12 @@ def robot_file(path: Path, given: Overrides = AS_IT_IS, *, strict: bool | None =
 
 
 def _require_few(path: Path, root: xml.Element) -> None:
-    """Refuse what has too many links or joints before any of them is read."""
+    """Refuse what has too many links, joints or keyframes before any of them is read."""
     links, joints = ("link", "body", "model", "default", "frame"), ("joint", "connect", "weld")
-    for names, most, what in ((links, 2 * MOST_LINKS, "links, bodies and frames"), (joints, 4 * MOST_LINKS, "joints")):
+    for names, most, what in ((links, 2 * MOST_LINKS, "links, bodies and frames"), (joints, 4 * MOST_LINKS, "joints"),
+                              (("key",), MOST_LINKS, "keyframes")):
         if sum(1 for _ in islice(root.iter(*names), most + 1)) > most:
-            raise xml.refusal(path, f"more than {most} {what}", f"up to {MOST_LINKS} links")
+            raise xml.refusal(path, f"more than {most} {what}", f"up to {MOST_LINKS} links or keyframes")
 
 
 def _in_folder(path: Path) -> Path:

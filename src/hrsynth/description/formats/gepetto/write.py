@@ -36,7 +36,7 @@ def write(mechanism: Mechanism) -> Written:
         kinds.append("3d" if joint.type is JointType.SPHERICAL else "6d")
     tree = replace(robot, links=links, joints=joints)
     motors = [name for joint in joints.values() if joint.actuated for name in joint_names(joint)]
-    lists = {"closed_loop": pairs, "type": kinds, "name_mot": motors}
+    lists: dict[str, list[Any]] = {"closed_loop": pairs, "type": kinds, "name_mot": motors}
     return Written((text(tree), "".join(f"{key}: {_yaml(names)}" for key, names in lists.items())), lost)
 
 
