@@ -132,7 +132,7 @@ def test_a_million_links_are_refused_in_time_and_memory(name: str, tmp_path: Pat
     few = name == "just not too many"
     assert run.returncode == (0 if few else 2), run.stderr[-500:]
     assert (tmp_path / "out.sdf").exists() is few
-    lines = {"just not too many": 2, "defects": MOST_DEFECTS // 2}.get(name, 1)  # of each, two defects are alike
+    lines = {"just not too many": 2, "defects": MOST_DEFECTS // 2 + 1}.get(name, 1)  # most are met twice
     assert len(run.stderr.splitlines()) == lines  # that it is an open chain, and its platform
     (peak,) = re.findall(r"VmHWM:\s+(\d+) kB", told.read_text())
     assert 1_000_000 < int(peak) * 1024 < BYTES
