@@ -51,7 +51,7 @@ VERIFY_SECONDS = 40
 """Seconds of one core after which checking a certificate file is given up."""
 MOST_MESHES = 2000
 """Files of meshes that are copied with a robot."""
-LARGEST_MESHES = 2_000_000_000
+LARGEST_MESHES = 500_000_000
 """Bytes that they may have together."""
 MOST_LOOP_COORDINATES = 240
 """Coordinates of joints in loops above which the loops of a foreign file are not solved."""

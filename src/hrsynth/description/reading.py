@@ -77,19 +77,18 @@ def robot_file(path: Path, given: Overrides = AS_IT_IS, *, strict: bool | None =
         return RobotFile(path, None, strict, tolerance=given.tolerance, as_written=given.as_written)
     notes: list[Note] = []
     root = xml.document(data, str(path), notes)
-    if not (strict and root.find("hrsynth") is not None):
-        _require_few(path, root)
+    _require_few(path, root)
     return RobotFile(path, xacro.expand(path) if xacro.is_needed(root) else root, strict, b"", tuple(notes),
                      given.tolerance, given.as_written)
 
 
 def _require_few(path: Path, root: xml.Element) -> None:
-    """Refuse what has too many links, joints or keyframes before any of them is read."""
+    """Refuse what has too many links, joints, keyframes or observations before any of them is read."""
     links, joints = ("link", "body", "model", "default", "frame"), ("joint", "connect", "weld")
     for names, most, what in ((links, 2 * MOST_LINKS, "links, bodies and frames"), (joints, 4 * MOST_LINKS, "joints"),
-                              (("key",), MOST_LINKS, "keyframes")):
+                              (("key", "observe"), MOST_LINKS, "keyframes and observations")):
         if sum(1 for _ in islice(root.iter(*names), most + 1)) > most:
-            raise xml.refusal(path, f"more than {most} {what}", f"up to {MOST_LINKS} links or keyframes")
+            raise xml.refusal(path, f"more than {most} {what}", f"up to {MOST_LINKS} links")
 
 
 def _in_folder(path: Path) -> Path:
