@@ -20,6 +20,7 @@ from ..geometry.vectors import Array, inverse, transform
 from .coupler import chains, points, swept, trace_coupler
 from .skeleton import legs_of, outline
 
+LOWERED = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 GOAL, CLOSES, OPEN, UNKNOWN, NEAR = "goal", "reachable", "unreachable", "unknown", "near"
 _STATES = {True: CLOSES, False: OPEN, None: UNKNOWN}
 AROUND = 1.3
@@ -210,7 +211,7 @@ _PLOTS: dict[str, Callable[[AssemblyModes, TipLoci], _Plot]] = {
 
 def _on(tip: Tip, legs: Sequence[Tip]) -> str:
     """What a trace is called: where the tip of a leg can be while the platform is held by these legs alone."""
-    return f"B{tip.leg} on leg{'s' if len(legs) > 1 else ''} {', '.join(each.leg for each in legs)}"
+    return f"B{tip.leg.translate(LOWERED)} on leg{'s' if len(legs) > 1 else ''} {', '.join(each.leg for each in legs)}"
 
 
 def _deciding(found: AssemblyModes, confined: TipLoci, count: int) -> tuple[int, ...]:
