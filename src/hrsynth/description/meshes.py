@@ -110,22 +110,21 @@ def _within_folder(path: Path, within: Path) -> Path | None:
 
 def _inner(names: Iterable[str], folder: Path, within: Path | None = None) -> dict[str, str]:
     """Those of the meshes that lie in USD files, as the text of ``.obj`` files."""
-    asked: dict[Path, list[str]] = {}
-    wanted: dict[Path, list[str]] = {}
+    asked: dict[Path, dict[str, str]] = {}
     for name in names:
         file, sign, prim = name.partition("#")
         path = locate_mesh(file, folder) if sign and locate_mesh(name, folder) is None else None
         if path is not None and within is not None:
             path = _within_folder(path, within)
         if path is not None:
-            asked.setdefault(path, []).append(name)
-            wanted.setdefault(path, []).append(prim)
+            asked.setdefault(path, {})[name] = prim
     if not asked:
         return {}
     from .formats.usd.stage import meshes
 
-    return {name: text for of, texts in zip(asked.values(), meshes(wanted), strict=True)
-            for name, text in zip(of, texts, strict=True)}
+    found = meshes({path: [*prims.values()] for path, prims in asked.items()})
+    return {name: text for prims, texts in zip(asked.values(), found, strict=True)
+            for name, text in zip(prims, texts, strict=True)}
 
 
 def carry_meshes(robot: Mechanism, target: Path, endings: tuple[str, ...] | None, *, copy: bool
