@@ -88,7 +88,8 @@ def _require_few(path: Path, root: xml.Element) -> None:
     for names, most, what in ((links, 2 * MOST_LINKS, "links, bodies and frames"), (joints, 4 * MOST_LINKS, "joints"),
                               (("key", "observe"), MOST_LINKS, "keyframes and observations")):
         if sum(1 for _ in islice(root.iter(*names), most + 1)) > most:
-            raise xml.refusal(path, f"more than {most} {what}", f"up to {MOST_LINKS} links" if names is links else f"up to {most}")
+            allowed = f"{MOST_LINKS} links" if names is links else most
+            raise xml.refusal(path, f"more than {most} {what}", f"up to {allowed}")
 
 
 def _in_folder(path: Path) -> Path:
