@@ -47,8 +47,8 @@ adversary: setup-dev  ## brute force against the answers for random robots (COUN
 	@mkdir -p build && cd tests && OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 ../$(BIN)/python -m adversary.run \
 		--count $(COUNT) --seed $(SEED) --workers $(JOBS) --log ../build/adversary.jsonl
 
-lint: setup-dev  ## style and import order
-	@$(BIN)/ruff check --quiet . && echo "lint: no complaint"
+lint: setup-dev  ## style, import order and format
+	@$(BIN)/ruff check --quiet . && $(BIN)/ruff format --check --quiet . && echo "lint: no complaint"
 
 types: setup-dev  ## type check
 	@$(BIN)/mypy

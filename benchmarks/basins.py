@@ -12,16 +12,20 @@ import time
 
 import hrsynth
 
-CASES = (("quattro", "1,4", "x=0,y=0,z=-0.7,phi=0", "x=-0.3:0.3:{0},y=-0.3:0.3:{0},z=-0.7,phi=0"),
-         ("quattro", None, "x=0,y=0,z=-0.7,phi=0", "x=-0.3:0.3:{0},y=-0.3:0.3:{0},z=-0.7,phi=0"),
-         ("3rrr_m1", None, "x=0,y=0,phi=0", "x=-0.1:0.1:{0},y=-0.1:0.1:{0},phi=0"))
+CASES = (
+    ("quattro", "1,4", "x=0,y=0,z=-0.7,phi=0", "x=-0.3:0.3:{0},y=-0.3:0.3:{0},z=-0.7,phi=0"),
+    ("quattro", None, "x=0,y=0,z=-0.7,phi=0", "x=-0.3:0.3:{0},y=-0.3:0.3:{0},z=-0.7,phi=0"),
+    ("3rrr_m1", None, "x=0,y=0,phi=0", "x=-0.1:0.1:{0},y=-0.1:0.1:{0},phi=0"),
+)
 """Robot, legs, goal and starts."""
 
 
 def main(side: int = 100, single: int = 10) -> None:
     """Print the table."""
-    print(f"| robot | legs | starts | abreast, {os.cpu_count()} processes (s) | one process, processor (s) "
-          "| one by one (s a run) | ratio |")
+    print(
+        f"| robot | legs | starts | abreast, {os.cpu_count()} processes (s) | one process, processor (s) "
+        "| one by one (s a run) | ratio |"
+    )
     print("| --- | --- | ---: | ---: | ---: | ---: | ---: |")
     for name, legs, goal, grid in CASES:
         hrsynth.observe(name, legs)
@@ -37,8 +41,11 @@ def main(side: int = 100, single: int = 10) -> None:
         for pose in chosen:
             hrsynth.servo(name, legs, start=pose, goal=goal)
         each = (time.process_time() - began) / len(chosen)
-        print(f"| {name} | {legs or 'all'} | {found.starts:,} | {passed:.1f} | {spent:.1f} | {each:.2f} "
-              f"| {each * found.starts / spent:.0f} |", flush=True)
+        print(
+            f"| {name} | {legs or 'all'} | {found.starts:,} | {passed:.1f} | {spent:.1f} | {each:.2f} "
+            f"| {each * found.starts / spent:.0f} |",
+            flush=True,
+        )
 
 
 if __name__ == "__main__":

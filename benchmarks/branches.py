@@ -40,6 +40,7 @@ def proved(name: str, half: float) -> BranchProof | None:
 
 def row(name: str, seconds: int) -> str:
     """One line of the table."""
+
     def stop(*_: object) -> None:
         raise TooLong
 
@@ -64,8 +65,15 @@ def row(name: str, seconds: int) -> str:
     if best is None:
         return f"| {name} | none ({ends}) | | | |"
     half, found, spent = best
-    back = "all of it" if found.back is not None and (found.back[0] == found.proved[0]).all() and (
-        found.back[1] == found.proved[1]).all() else "a part" if found.back is not None else "undecided"
+    back = (
+        "all of it"
+        if found.back is not None
+        and (found.back[0] == found.proved[0]).all()
+        and (found.back[1] == found.proved[1]).all()
+        else "a part"
+        if found.back is not None
+        else "undecided"
+    )
     return f"| {name} | ± {half:.2g} | {sum(len(part.cells) for part in found.parts)} | {back} | {spent:.1f} |"
 
 

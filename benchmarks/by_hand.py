@@ -88,8 +88,12 @@ def maxima_tuned(M: Array, cone: float) -> tuple[Array, Array]:
     J[2] = (Q[:, 2] - R[2, 3] * turn) / R[2, 2]
     J[1] = (Q[:, 1] - R[1, 2] * J[2] - R[1, 3] * turn) / R[1, 1]
     J[0] = (Q[:, 0] - R[0, 1] * J[1] - R[0, 2] * J[2] - R[0, 3] * turn) / R[0, 0]
-    B, C = (np.array([np.einsum("rn,rn->n", J[a, rows], J[b, rows]) for a, b in
-                      ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]) for rows in (slice(3), slice(3, 6)))
+    B, C = (
+        np.array(
+            [np.einsum("rn,rn->n", J[a, rows], J[b, rows]) for a, b in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
+        )
+        for rows in (slice(3), slice(3, 6))
+    )
     return cone * two_cones(B, C), orientation
 
 
@@ -111,8 +115,12 @@ def two_cones(B: Array, C: Array) -> Array:
         best = np.argmax(np.abs(np.array([columns[0, 0], columns[1, 1], columns[2, 2]])), axis=0)
         x, y, z = np.take_along_axis(columns, best[None, None], axis=0)[0]
         scale = 1 / (x * x + y * y + z * z)
-        a, b = (np.sqrt(scale * (G[0] * x * x + G[1] * y * y + G[2] * z * z
-                                 + 2 * (G[3] * x * y + G[4] * x * z + G[5] * y * z))) for G in (B, C))
+        a, b = (
+            np.sqrt(
+                scale * (G[0] * x * x + G[1] * y * y + G[2] * z * z + 2 * (G[3] * x * y + G[4] * x * z + G[5] * y * z))
+            )
+            for G in (B, C)
+        )
         value[live] = np.minimum(value[live], np.sqrt(mean + size))
         off = a * (1 - t) - b * t
         up = off > 0
@@ -122,8 +130,9 @@ def two_cones(B: Array, C: Array) -> Array:
         if not more.any():
             break
         fixed = a / (a + b)
-        t = np.where((fixed > low) & (fixed < high) & (step % 3 == 0), fixed,
-                     low + (high - low) * below / (below - above))
+        t = np.where(
+            (fixed > low) & (fixed < high) & (step % 3 == 0), fixed, low + (high - low) * below / (below - above)
+        )
         live, B, C, t = live[more], B[:, more], C[:, more], t[more]
         low, high, below, above = low[more], high[more], below[more], above[more]
     return value
@@ -151,8 +160,9 @@ def largest(B: Array, C: Array) -> Array:
         if not more.any():
             break
         fixed = a / (a + b)
-        t = np.where((fixed > low) & (fixed < high) & (step % 3 == 0), fixed,
-                     low + (high - low) * below / (below - above))
+        t = np.where(
+            (fixed > low) & (fixed < high) & (step % 3 == 0), fixed, low + (high - low) * below / (below - above)
+        )
         live, B, C, t = live[more], B[more], C[more], t[more]
         low, high, below, above = low[more], high[more], below[more], above[more]
     return value

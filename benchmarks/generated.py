@@ -121,35 +121,68 @@ def generated() -> Iterator[Row]:
             (here / "robot.hpp").write_text(export(robot, box=box).code)
             (here / "robot.xml").write_text(write(robot).texts[0])
             found = []
-            for text, rest, arguments in ((OURS, [], []), (THEIRS, [
-                    f"-isystem{packages / 'mujoco' / 'include'}", str(libraries[0]),
-                    f"-Wl,-rpath,{packages / 'mujoco'}"], [robot.platform, *motors])):
+            for text, rest, arguments in (
+                (OURS, [], []),
+                (
+                    THEIRS,
+                    [
+                        f"-isystem{packages / 'mujoco' / 'include'}",
+                        str(libraries[0]),
+                        f"-Wl,-rpath,{packages / 'mujoco'}",
+                    ],
+                    [robot.platform, *motors],
+                ),
+            ):
                 (here / "main.cpp").write_text(text)
-                subprocess.run(["g++", "-std=c++17", "-O3", "-march=native", f"-DPOSES={POSES}",
-                                f"-DROBOT={_name(name)}", f"-DMOTORS={len(motors)}" if rest else "-DNDEBUG",
-                                f"-isystem{headers}", "main.cpp", *rest, "-o", "main"], cwd=here, check=True)
-                done = subprocess.run(["./main", *arguments], cwd=here, input=given, capture_output=True, text=True,
-                                      check=True)
+                subprocess.run(
+                    [
+                        "g++",
+                        "-std=c++17",
+                        "-O3",
+                        "-march=native",
+                        f"-DPOSES={POSES}",
+                        f"-DROBOT={_name(name)}",
+                        f"-DMOTORS={len(motors)}" if rest else "-DNDEBUG",
+                        f"-isystem{headers}",
+                        "main.cpp",
+                        *rest,
+                        "-o",
+                        "main",
+                    ],
+                    cwd=here,
+                    check=True,
+                )
+                done = subprocess.run(
+                    ["./main", *arguments], cwd=here, input=given, capture_output=True, text=True, check=True
+                )
                 found.append([float(x) for x in done.stdout.split()])
         (forward, both, *p), (theirs, *other) = found
         if not np.allclose(p, other, atol=1e-9):
             raise SystemExit(f"{name}: platforms at {p} and {other}")
         what = f"motors to platform, {name}, one at a time"
-        yield (what, f"generated C++: {1e6 * forward:.2f} µs (with Jacobians {1e6 * both:.2f} µs)",
-               f"MuJoCo on the written MJCF, Newton's method with Eigen: {1e6 * theirs:.1f} µs",
-               f"{theirs / forward:.0f}")
+        yield (
+            what,
+            f"generated C++: {1e6 * forward:.2f} µs (with Jacobians {1e6 * both:.2f} µs)",
+            f"MuJoCo on the written MJCF, Newton's method with Eigen: {1e6 * theirs:.1f} µs",
+            f"{theirs / forward:.0f}",
+        )
         made = ModuleType("made")
         exec(export(robot, "numpy", box).code, made.__dict__)
         twin = PinocchioModel(robot)
         few = rows[:200]
-        batch, loop = least(lambda q=rows, made=made: made.forward(q),
-                            lambda q=few, twin=twin, motors=motors: [_pinocchio(twin, motors, each) for each in q])
+        batch, loop = least(
+            lambda q=rows, made=made: made.forward(q),
+            lambda q=few, twin=twin, motors=motors: [_pinocchio(twin, motors, each) for each in q],
+        )
         gap = max(np.abs(made.forward(each)[3][0] - _pinocchio(twin, motors, each)).max() for each in few[:20])
         if not gap < 1e-9:
             raise SystemExit(f"{name}: platforms differ by {gap:.2g} m")
-        yield (f"motors to platform, {name}, {POSES} together", f"generated NumPy: {1e6 * batch / POSES:.1f} µs a pose",
-               f"a loop over Pinocchio from Python: {1e6 * loop / len(few):.0f} µs",
-               f"{loop / len(few) / (batch / POSES):.0f}")
+        yield (
+            f"motors to platform, {name}, {POSES} together",
+            f"generated NumPy: {1e6 * batch / POSES:.1f} µs a pose",
+            f"a loop over Pinocchio from Python: {1e6 * loop / len(few):.0f} µs",
+            f"{loop / len(few) / (batch / POSES):.0f}",
+        )
 
 
 def _name(robot: str) -> str:

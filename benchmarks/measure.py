@@ -82,8 +82,12 @@ def same(ours: Array, theirs: Array, tolerance: float) -> None:
 
 def told(ours: str, what: str, mine: float, other: str, theirs: float, n: int, m: int | None = None) -> Row:
     rate, their_rate = n / mine, (m or n) / theirs
-    return (what, f"{ours}: {spoken(rate)} poses/s", f"{other}: {spoken(their_rate)} poses/s",
-            f"{rate / their_rate:.{0 if rate > 20 * their_rate else 1}f}")
+    return (
+        what,
+        f"{ours}: {spoken(rate)} poses/s",
+        f"{other}: {spoken(their_rate)} poses/s",
+        f"{rate / their_rate:.{0 if rate > 20 * their_rate else 1}f}",
+    )
 
 
 def spoken(rate: float) -> str:

@@ -58,8 +58,10 @@ def against_msolve(systems: Sequence[System], median: float) -> str:
 
 
 def main(instances: int) -> None:
-    print(f"{'family':46}{'median':>8}{'90 %':>8}{'Newton':>9}{'ratio':>7}{'missed':>10}{'msolve':>10}{'ratio':>7}"
-          f"{'differ':>10}")
+    print(
+        f"{'family':46}{'median':>8}{'90 %':>8}{'Newton':>9}{'ratio':>7}{'missed':>10}{'msolve':>10}{'ratio':>7}"
+        f"{'differ':>10}"
+    )
     for name, family in (FAMILIES | MEETING).items():
         systems = [family.draw(np.random.default_rng(seed)).system for seed in range(instances)]
         solve(systems[0])

@@ -62,11 +62,17 @@ def modes() -> Iterator[Row]:
     for name in ("spatial, three lines", "spatial, three circles", "planar, three circles"):
         systems = [FAMILIES[name].draw(np.random.default_rng(seed)).system for seed in range(SYSTEMS)]
         what = f"all assembly modes with proof: {name}"
-        ours, theirs = least(lambda s=systems: [solve(each) for each in s],
-                             lambda s=systems: [solutions(each, 100, np.random.default_rng(0), real=True, rounds=30)
-                                                for each in s], turns=2)
-        yield (what, f"{1e3 * ours / SYSTEMS:.1f} ms",
-               f"Newton, 100 starts, without proof: {1e3 * theirs / SYSTEMS:.1f} ms", f"{theirs / ours:.0f}")
+        ours, theirs = least(
+            lambda s=systems: [solve(each) for each in s],
+            lambda s=systems: [solutions(each, 100, np.random.default_rng(0), real=True, rounds=30) for each in s],
+            turns=2,
+        )
+        yield (
+            what,
+            f"{1e3 * ours / SYSTEMS:.1f} ms",
+            f"Newton, 100 starts, without proof: {1e3 * theirs / SYSTEMS:.1f} ms",
+            f"{theirs / ours:.0f}",
+        )
         if not installed():
             continue
         few = systems[:EXTERNAL]
@@ -74,10 +80,15 @@ def modes() -> Iterator[Row]:
             counts = len(solve(each).modes), len(solve_by_msolve(each).modes)
             if counts[0] != counts[1]:
                 raise SystemExit(f"{name}: {counts[0]} modes of ours, {counts[1]} of msolve")
-        ours, theirs = least(lambda s=few: [solve(each) for each in s],
-                             lambda s=few: [solve_by_msolve(each) for each in s], turns=1)
-        yield (what, f"{1e3 * ours / EXTERNAL:.1f} ms",
-               f"msolve, with the same proof: {1e3 * theirs / EXTERNAL:.0f} ms", f"{theirs / ours:.0f}")
+        ours, theirs = least(
+            lambda s=few: [solve(each) for each in s], lambda s=few: [solve_by_msolve(each) for each in s], turns=1
+        )
+        yield (
+            what,
+            f"{1e3 * ours / EXTERNAL:.1f} ms",
+            f"msolve, with the same proof: {1e3 * theirs / EXTERNAL:.0f} ms",
+            f"{theirs / ours:.0f}",
+        )
 
 
 def platforms() -> Iterator[Row]:
@@ -92,8 +103,11 @@ def platforms() -> Iterator[Row]:
         if not all((each.complex, each.complete) == (40, True) for each in found):
             raise SystemExit(f"{what}: not all 40 poses were proved")
         few = systems[:EXTERNAL] if installed() else []
-        ours, theirs = least(lambda s=systems: [solve(each, near=False) for each in s],
-                             lambda s=few: [solve_by_msolve(each, near=False) for each in s], turns=1)
+        ours, theirs = least(
+            lambda s=systems: [solve(each, near=False) for each in s],
+            lambda s=few: [solve_by_msolve(each, near=False) for each in s],
+            turns=1,
+        )
         each, other = 1e3 * ours / len(systems), 1e3 * theirs / max(1, len(few))
         against = (f"msolve, with the same proof: {other:.0f} ms", f"{other / each:.0f}") if few else ("–", "–")
         yield (f"all 40 poses with proof, motors held: {what}", f"{each:.0f} ms each", *against)
@@ -138,12 +152,16 @@ def jacobians() -> Iterator[Row]:
         others = [model.qpos0.copy() for _ in places]
         for q in others:
             mujoco.mj_integratePos(model, q, rng.normal(size=model.nv), AROUND)
-        mine, other_time = least(lambda twin=twin, places=places: deque(map(twin.jacobian, places), 0),
-                                 lambda theirs=theirs, others=others: deque(map(theirs, others), 0))
-        yield (f"the loops' Jacobian of one configuration, {robot}",
-               f"{1e6 * mine / EVALUATIONS:.1f} µs ({' × '.join(map(str, twin.jacobian(twin.q0).shape))})",
-               f"MuJoCo on the written MJCF: {1e6 * other_time / EVALUATIONS:.1f} µs "
-               f"({' × '.join(map(str, J.shape))})", f"{other_time / mine:.1f}")
+        mine, other_time = least(
+            lambda twin=twin, places=places: deque(map(twin.jacobian, places), 0),
+            lambda theirs=theirs, others=others: deque(map(theirs, others), 0),
+        )
+        yield (
+            f"the loops' Jacobian of one configuration, {robot}",
+            f"{1e6 * mine / EVALUATIONS:.1f} µs ({' × '.join(map(str, twin.jacobian(twin.q0).shape))})",
+            f"MuJoCo on the written MJCF: {1e6 * other_time / EVALUATIONS:.1f} µs ({' × '.join(map(str, J.shape))})",
+            f"{other_time / mine:.1f}",
+        )
 
 
 def derivations() -> Row:
@@ -155,27 +173,58 @@ def derivations() -> Row:
         spent.append((time.process_time() - start, robot))
     spent.sort()
     middle, slowest = spent[len(spent) // 2][0], spent[-1]
-    return ("the hidden robot with its certificate, each shipped robot, all legs watched",
-            f"median {middle:.2f} s, slowest {slowest[0]:.2f} s ({slowest[1]})", "nobody's", "–")
+    return (
+        "the hidden robot with its certificate, each shipped robot, all legs watched",
+        f"median {middle:.2f} s, slowest {slowest[0]:.2f} s ({slowest[1]})",
+        "nobody's",
+        "–",
+    )
 
 
 def catalog() -> Iterator[Row]:
     """Exact verdicts of words of all groups whose configurations are there, and whole entries."""
-    halves = [subprocess.Popen([sys.executable, __file__, str(seed)], stdout=subprocess.PIPE, text=True)
-              for seed in range(CORES)]
+    halves = [
+        subprocess.Popen([sys.executable, __file__, str(seed)], stdout=subprocess.PIPE, text=True)
+        for seed in range(CORES)
+    ]
     rates = [float(half.communicate()[0]) for half in halves]
-    yield (f"exact verdicts of {CORES * EXACT * len(GROUPS)} architectures of all groups of the catalog, their "
-           "configurations given", f"{sum(rates):.0f} a second on {CORES} cores, by the clock", "nobody's", "–")
+    yield (
+        f"exact verdicts of {CORES * EXACT * len(GROUPS)} architectures of all groups of the catalog, their "
+        "configurations given",
+        f"{sum(rates):.0f} a second on {CORES} cores, by the clock",
+        "nobody's",
+        "–",
+    )
     words = [word for group in _chosen(0) for word in group[:WHOLE]]
     start = spent()
     refused = sum("refused" in entry(word) for word in words)
     rate = len(words) / (spent() - start)
-    yield (f"whole entries of {len(words)} words ({refused} refused), drawing, derivation and confirmation included",
-           f"{rate:.1f} a second on one core", "nobody's", "–")
+    yield (
+        f"whole entries of {len(words)} words ({refused} refused), drawing, derivation and confirmation included",
+        f"{rate:.1f} a second on one core",
+        "nobody's",
+        "–",
+    )
     with TemporaryDirectory() as folder:
-        cells = ["{:.0f} s, {:.0f} MB".format(*alone([
-            sys.executable, "-m", "hrsynth.cli", "catalog", "build", "planar", "-o", f"{folder}/{count}", "--limit",
-            str(count)])) for count in GROWTH]
+        cells = [
+            "{:.0f} s, {:.0f} MB".format(
+                *alone(
+                    [
+                        sys.executable,
+                        "-m",
+                        "hrsynth.cli",
+                        "catalog",
+                        "build",
+                        "planar",
+                        "-o",
+                        f"{folder}/{count}",
+                        "--limit",
+                        str(count),
+                    ]
+                )
+            )
+            for count in GROWTH
+        ]
         yield questions(Path(folder) / "all.sqlite")
     yield f"catalog build planar, the first {', '.join(f'{count:,}' for count in GROWTH)}", "; ".join(cells), "–", "–"
 
@@ -191,17 +240,21 @@ def questions(file: Path) -> Row:
     def told(path: Path | None, asked: dict[str, Any]) -> str:
         return entries(load_catalog(path, **asked).records, count(path, **asked))
 
-    every = sorted(((least(partial(told, file, asked), turns=3)[0], asked) for asked in QUESTIONS),
-                   key=lambda each: each[0])
+    every = sorted(
+        ((least(partial(told, file, asked), turns=3)[0], asked) for asked in QUESTIONS), key=lambda each: each[0]
+    )
     ours, asked = every[-1]
     (theirs,) = least(partial(told, None, asked), turns=1)
     if told(file, asked) != told(None, asked):
         raise SystemExit(f"{asked}: the SQLite file and the lines differ")
-    return (f"{len(every)} questions of catalog list about {sum(map(kept.count, kept.groups())):,} records in a SQLite "
-            f"file; the slowest is {asked}",
-            f"median {1e3 * every[len(every) // 2][0]:.0f} ms, slowest {1e3 * ours:.0f} ms, "
-            f"{sum(each <= LIMIT for each, _ in every)} within {1e3 * LIMIT:.0f} ms",
-            f"the slowest by reading all lines: {1e3 * theirs:.0f} ms", f"{theirs / ours:.0f}")
+    return (
+        f"{len(every)} questions of catalog list about {sum(map(kept.count, kept.groups())):,} records in a SQLite "
+        f"file; the slowest is {asked}",
+        f"median {1e3 * every[len(every) // 2][0]:.0f} ms, slowest {1e3 * ours:.0f} ms, "
+        f"{sum(each <= LIMIT for each, _ in every)} within {1e3 * LIMIT:.0f} ms",
+        f"the slowest by reading all lines: {1e3 * theirs:.0f} ms",
+        f"{theirs / ours:.0f}",
+    )
 
 
 def verdicts(seed: int) -> float:

@@ -52,8 +52,11 @@ def main(*names: str) -> None:
         fewer = {"ask": "watch", "robot": robot, "watch": legs[1:]}
         _, _, less = took(lambda fewer=fewer: DESK.answer(fewer))  # type: ignore[misc]
         spent, passed, residual = np.array(list(moves(robot))).T
-        print(f"| {name} | {1 / np.median(spent):.0f}, {1 / np.median(passed):.0f} | {passed.max():.3f} "
-              f"| {residual.max():.0e} | {first:.2f} | {less:.2f} |", flush=True)
+        print(
+            f"| {name} | {1 / np.median(spent):.0f}, {1 / np.median(passed):.0f} | {passed.max():.3f} "
+            f"| {residual.max():.0e} | {first:.2f} | {less:.2f} |",
+            flush=True,
+        )
 
 
 if __name__ == "__main__":

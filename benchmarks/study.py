@@ -1,6 +1,6 @@
 """A study: how near to a singularity are 1,000 poses of 20 robots, 50 of each? In parallel processes.
 
-    OMP_NUM_THREADS=1 python benchmarks/study.py [JOBS]
+OMP_NUM_THREADS=1 python benchmarks/study.py [JOBS]
 """
 
 from __future__ import annotations

@@ -54,8 +54,10 @@ def exact_maxima() -> Iterator[Row]:
         same(found.position.largest, theirs[0], 1e-4)
         same(found.orientation.largest, theirs[1], 1e-4)
     numba, plain, by, own = least(ours(True), ours(False), hand, tuned)
-    question = replace(setting.everything.question, observations=tuple(
-        o for o in setting.everything.question.observations if o.leg in legs))
+    question = replace(
+        setting.everything.question,
+        observations=tuple(o for o in setting.everything.question.observations if o.leg in legs),
+    )
     assert setting.placer is not None
     some = [at for at in setting.placer.configurations(X[:: len(X) // LOOPED]) if at is not None]
     twin = PinocchioModel(setting.mechanism)
@@ -88,16 +90,23 @@ def exact_maxima() -> Iterator[Row]:
 
 def matrices() -> Iterator[Row]:
     """Mᵀ alone, against NumPy for each robot."""
-    cases = (("quattro_rigid", 0.2, ("1", "3"), rigid), ("gough_stewart", 0.1, ("1", "3", "5"), pods),
-             ("orthoglide", 0.1, ("1", "2"), glide), ("3rrr_m1", 0.05, ("1", "2", "3"), planar))
+    cases = (
+        ("quattro_rigid", 0.2, ("1", "3"), rigid),
+        ("gough_stewart", 0.1, ("1", "3", "5"), pods),
+        ("orthoglide", 0.1, ("1", "2"), glide),
+        ("3rrr_m1", 0.05, ("1", "2", "3"), planar),
+    )
     for robot, size, legs, hand in cases:
         setting, batch = compiled(robot)
         X = plane(batch, size, 0.1 if batch.coordinates.rotations.shape[1] else 0.0)
         theirs = hand(setting, X, legs)
         M = batch.evaluate(X, legs, compiled=True).interaction_matrix
         same(np.linalg.norm(M, axis=(1, 2)), np.linalg.norm(theirs() * units(batch, theirs()), axis=(1, 2)), 1e-9)
-        numba, plain, by = least(lambda b=batch, X=X, legs=legs: b.evaluate(X, legs, compiled=True),
-                                 lambda b=batch, X=X, legs=legs: b.evaluate(X, legs, compiled=False), theirs)
+        numba, plain, by = least(
+            lambda b=batch, X=X, legs=legs: b.evaluate(X, legs, compiled=True),
+            lambda b=batch, X=X, legs=legs: b.evaluate(X, legs, compiled=False),
+            theirs,
+        )
         what = f"Mᵀ alone, {robot}, {len(legs)} legs"
         yield told("numba", what, numba, "NumPy for this robot", by, len(X))
         yield told("NumPy", what, plain, "NumPy for this robot", by, len(X))
@@ -150,21 +159,41 @@ def other_twists() -> Iterator[Row]:
         poses = np.resize(np.array(walk), X.shape)
         slides = None
         if batch.slides:
-            far = [[at.twin.difference(at.twin.q0, at.q)[at.twin.coordinates[name][0]] * at.twin.length
-                    for name in batch.slides] for at in setting.configurations]
+            far = [
+                [
+                    at.twin.difference(at.twin.q0, at.q)[at.twin.coordinates[name][0]] * at.twin.length
+                    for name in batch.slides
+                ]
+                for at in setting.configurations
+            ]
             slides = np.resize(np.array(far), (len(X), len(batch.slides)))
         given = {"slides": slides, "compiled": False}
         found = batch.evaluate(poses, **given)
         assert found.reached[: len(walk)].all()
-        u = np.array([[at.pose(each.link)[:3, :3] @ each.direction for each in setting.segments]
-                      for at in setting.configurations])
+        u = np.array(
+            [
+                [at.pose(each.link)[:3, :3] @ each.direction for each in setting.segments]
+                for at in setting.configurations
+            ]
+        )
         same(found.directions[: len(walk)], u, 1e-9)
-        ours, theirs = least(lambda poses=poses, batch=batch, given=given: batch.evaluate(poses, **given),
-                             lambda: six.evaluate(X, compiled=False))
-        why = "on whose platform a link slides, its coordinate given" if batch.slides else (
-            "whose platform has other twists at each pose")
-        yield told("NumPy", f"Mᵀ alone, all legs, {robot}, {why}", ours, "the Gough-Stewart platform, six legs, NumPy",
-                   theirs, len(X))
+        ours, theirs = least(
+            lambda poses=poses, batch=batch, given=given: batch.evaluate(poses, **given),
+            lambda: six.evaluate(X, compiled=False),
+        )
+        why = (
+            "on whose platform a link slides, its coordinate given"
+            if batch.slides
+            else ("whose platform has other twists at each pose")
+        )
+        yield told(
+            "NumPy",
+            f"Mᵀ alone, all legs, {robot}, {why}",
+            ours,
+            "the Gough-Stewart platform, six legs, NumPy",
+            theirs,
+            len(X),
+        )
 
 
 def growth() -> Iterator[Row]:
@@ -175,8 +204,12 @@ def growth() -> Iterator[Row]:
         legs = [str(i + 1) for i in range(count)]
         times.append(least(lambda legs=legs: batch.evaluate(X, legs, compiled=True), turns=3)[0])
     yield ("Mᵀ, hexa, 40,401 poses, 2 to 6 legs", ", ".join(f"{1e3 * each:.0f} ms" for each in times), "–", "–")
-    cells = [subprocess.run([sys.executable, __file__, str(10**power)], capture_output=True, text=True,
-                            check=True).stdout.strip() for power in range(3, 7)]
+    cells = [
+        subprocess.run(
+            [sys.executable, __file__, str(10**power)], capture_output=True, text=True, check=True
+        ).stdout.strip()
+        for power in range(3, 7)
+    ]
     yield "Mᵀ and both exact error maxima, quattro, two legs, 10³, 10⁴, 10⁵, 10⁶ poses", "; ".join(cells), "–", "–"
 
 

@@ -19,8 +19,18 @@ from hrsynth.present.markdown import replace_between, table
 PAGE = Path(__file__).resolve().parent / "pages" / "catalog_says.md"
 AUDIT = PAGE.with_name("audit.md")
 VERDICTS = (CONTROLLABLE, PARTIAL, BLIND)
-BASES = ("z up", "tangential", "radial", "on a cone", "z up, in pairs", "tangential, in pairs", "radial, in pairs",
-         "on a cone, in pairs", "all along one line of the base's plane", "all normal to the base's plane")
+BASES = (
+    "z up",
+    "tangential",
+    "radial",
+    "on a cone",
+    "z up, in pairs",
+    "tangential, in pairs",
+    "radial, in pairs",
+    "on a cone, in pairs",
+    "all along one line of the base's plane",
+    "all normal to the base's plane",
+)
 """Couplings to the base, from G1 on, by where the axes of the legs' first joints lie."""
 INFINITY, RAIL, GENERAL = "line at infinity", "line across the rails", "line in general position"
 Record = Mapping[str, Any]
@@ -42,8 +52,9 @@ def centres(leg: LegWord, end: int = 0) -> str | None:
     """Where the platform's instantaneous centre can be while the observed direction of a planar leg is held; None where
     that is anywhere. ``end``: how many joints at the platform are left out."""
     last, joints = mark(leg), leg.joints[: len(leg.joints) - end]
-    turning = [i for i, joint in enumerate(joints[: last + 1])
-               if joint.letter == "R" or (joint.letter == "Pi" and i == last)]
+    turning = [
+        i for i, joint in enumerate(joints[: last + 1]) if joint.letter == "R" or (joint.letter == "Pi" and i == last)
+    ]
     if not turning:
         return None
     rest = [joint for i, joint in enumerate(joints) if i not in turning]
@@ -68,7 +79,8 @@ def delta_controllable(word: RobotWord, dof: int) -> bool:
     """Whether deltas of these legs are controllable: their slides are not all parallel, and the legs are enough."""
     first = {leg.unmoved.joints[0] for leg in word.legs}
     parallel = len({joint.axes for joint in first}) == 1 and all(
-        joint.letter == "P" and joint.axes in ("x", "y", "z") for joint in first)
+        joint.letter == "P" and joint.axes in ("x", "y", "z") for joint in first
+    )
     return not parallel and 2 * len(word.legs) >= dof
 
 
@@ -76,7 +88,8 @@ def translating(word: RobotWord) -> bool:
     """Whether a word is of legs that translate (:func:`hrsynth.catalog.groups.spatial.translates`) and of no others."""
     joints = [joint for leg in word.legs for joint in leg.joints]
     return all(joint.letter in "RP" and joint.axes in "abhjk" for joint in joints) and all(
-        translates(leg.chain) for leg in word.legs)
+        translates(leg.chain) for leg in word.legs
+    )
 
 
 def split(leg: LegWord, place: int) -> int:
@@ -111,8 +124,10 @@ def motions(catalog: Catalog) -> str:
     by: dict[str, Counter[str]] = {}
     for each in studied(catalog):
         by.setdefault(each["motion"], Counter())[each["verdict"]] += 1
-    rows = [(motion, f"{sum(found.values()):,}", *(f"{found[v]:,}" for v in VERDICTS), _share(found))
-            for motion, found in sorted(by.items(), key=lambda item: -sum(item[1].values()))]
+    rows = [
+        (motion, f"{sum(found.values()):,}", *(f"{found[v]:,}" for v in VERDICTS), _share(found))
+        for motion, found in sorted(by.items(), key=lambda item: -sum(item[1].values()))
+    ]
     return table(("motion", "architectures", *VERDICTS, "controllable (%)"), rows, 1)
 
 
@@ -128,8 +143,10 @@ def fewest(catalog: Catalog) -> str:
         if each["verdict"] == CONTROLLABLE:
             least = numbers(each)
             by.setdefault((each["motion"], each["group"], least), Counter())[each["fewest"] - least] += 1
-    rows = [(motion, group, least, *(f"{found[k]:,}" if found[k] else "–" for k in range(4)))
-            for (motion, group, least), found in sorted(by.items())]
+    rows = [
+        (motion, group, least, *(f"{found[k]:,}" if found[k] else "–" for k in range(4)))
+        for (motion, group, least), found in sorted(by.items())
+    ]
     return table(("motion", "group", "at least", "so many", "one more", "two more", "three more"), rows, 1)
 
 
@@ -141,8 +158,10 @@ def chains(catalog: Catalog) -> str:
         letters = {"".join(joint.letter for joint in leg.joints) for leg in word.legs}
         if len(letters) == 1:
             by.setdefault((each["group"], *letters), Counter())[each["verdict"]] += 1
-    rows = [(group, f"`{chain}`", *(f"{found[v]:,}" if found[v] else "–" for v in VERDICTS), _share(found))
-            for (group, chain), found in sorted(by.items())]
+    rows = [
+        (group, f"`{chain}`", *(f"{found[v]:,}" if found[v] else "–" for v in VERDICTS), _share(found))
+        for (group, chain), found in sorted(by.items())
+    ]
     return table(("group", "legs", *VERDICTS, "controllable (%)"), rows, 1)
 
 
@@ -159,38 +178,73 @@ def cures(catalog: Catalog) -> str:
 
 def rules(catalog: Catalog) -> str:
     """How many records agree with each rule."""
+
     def agree(records: Iterable[bool]) -> str:
         truth = list(records)
         return f"{sum(truth):,} of {len(truth):,}"
 
     every = studied(catalog)
     rows = [
-        ("planar: rank of the lines of centres", agree(
-            planar_rank(parse(each["word"])) == each["rank"] for each in every if each["group"] == "planar")),
-        ("deltas: slides not all parallel, enough legs", agree(
-            delta_controllable(parse(each["word"]), each["dof"]) == (each["verdict"] == CONTROLLABLE)
-            for each in every if each["group"] == "deltas")),
-        ("legs that translate: directions of R on both sides of the watched link", agree(
-            translation_rank(word) == each["rank"] for each in every if each["group"] in ("mixed", "spatial")
-            if translating(word := parse(each["word"])))),
-        ("at least dof/2 legs, in a plane dof", agree(
-            each["fewest"] >= numbers(each) for each in every if each["verdict"] == CONTROLLABLE))]
+        (
+            "planar: rank of the lines of centres",
+            agree(planar_rank(parse(each["word"])) == each["rank"] for each in every if each["group"] == "planar"),
+        ),
+        (
+            "deltas: slides not all parallel, enough legs",
+            agree(
+                delta_controllable(parse(each["word"]), each["dof"]) == (each["verdict"] == CONTROLLABLE)
+                for each in every
+                if each["group"] == "deltas"
+            ),
+        ),
+        (
+            "legs that translate: directions of R on both sides of the watched link",
+            agree(
+                translation_rank(word) == each["rank"]
+                for each in every
+                if each["group"] in ("mixed", "spatial")
+                if translating(word := parse(each["word"]))
+            ),
+        ),
+        (
+            "at least dof/2 legs, in a plane dof",
+            agree(each["fewest"] >= numbers(each) for each in every if each["verdict"] == CONTROLLABLE),
+        ),
+    ]
     return table(("rule", "agree"), rows, 1)
 
 
 def published(catalog: Catalog) -> str:
     """Verdicts of published robots by the motion that their tables state, and how many of them are not exact."""
     rows = []
-    for group, in catalog.count("group"):
+    for (group,) in catalog.count("group"):
         every = list(catalog.where(group=group))
         found = studied(Catalog(tuple(every)))
         legs = Counter(each["fewest"] for each in found if each["verdict"] == CONTROLLABLE)
-        rows.append((group, f"{len(every):,}", *(f"{sum(each['verdict'] == v for each in found):,}" for v in VERDICTS),
-                     f"{len(every) - len(found):,}", f"{sum(not each['exact'] for each in found):,}",
-                     ", ".join(f"{n}: {count:,}" for n, count in sorted(legs.items())),
-                     f"{sum('modes_bound' in each for each in found):,}"))
-    return table(("group", "robots", *VERDICTS, "refused", "not exact", "legs to watch: controllable robots",
-                  "with a list of modes"), rows, 1)
+        rows.append(
+            (
+                group,
+                f"{len(every):,}",
+                *(f"{sum(each['verdict'] == v for each in found):,}" for v in VERDICTS),
+                f"{len(every) - len(found):,}",
+                f"{sum(not each['exact'] for each in found):,}",
+                ", ".join(f"{n}: {count:,}" for n, count in sorted(legs.items())),
+                f"{sum('modes_bound' in each for each in found):,}",
+            )
+        )
+    return table(
+        (
+            "group",
+            "robots",
+            *VERDICTS,
+            "refused",
+            "not exact",
+            "legs to watch: controllable robots",
+            "with a list of modes",
+        ),
+        rows,
+        1,
+    )
 
 
 def couplings(catalog: Catalog) -> str:
@@ -199,14 +253,18 @@ def couplings(catalog: Catalog) -> str:
     for each in studied(catalog.where(group="3T3R")):
         if match := ROBOT.match(each["word"]):
             counts.setdefault(int(match[4]), Counter())[each["verdict"]] += 1
-    rows = [(BASES[number - 1], f"{sum(found.values()):,}", *(f"{found[v]:,}" for v in VERDICTS), _share(found))
-            for number, found in sorted(counts.items())]
+    rows = [
+        (BASES[number - 1], f"{sum(found.values()):,}", *(f"{found[v]:,}" for v in VERDICTS), _share(found))
+        for number, found in sorted(counts.items())
+    ]
     return table(("first joints", "robots", *VERDICTS, "% controllable"), rows, 1)
 
 
 TABLES = {"motions": motions, "fewest": fewest, "chains": chains, "cures": cures, "rules": rules}
 PAGES: Sequence[tuple[Path, str | None, Mapping[str, Callable[[Catalog], str]]]] = (
-    (PAGE, None, TABLES), (AUDIT, "published", {"published": published, "couplings": couplings}))
+    (PAGE, None, TABLES),
+    (AUDIT, "published", {"published": published, "couplings": couplings}),
+)
 """Each page, the catalog of its tables, and what makes them."""
 
 

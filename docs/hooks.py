@@ -22,13 +22,34 @@ import pictures
 
 ROOT = lessons.ROOT
 PACKAGE = ROOT / "src" / "hrsynth"
-LINKS = {"docs/pictures/": "pictures/", "docs/pages/": "", "CONTRIBUTING.md": "contributing.md",
-         "CHANGELOG.md": "changelog.md", "notebooks/README.md": "notebooks/index.md", "robots/README.md": "robots.md"}
+LINKS = {
+    "docs/pictures/": "pictures/",
+    "docs/pages/": "",
+    "CONTRIBUTING.md": "contributing.md",
+    "CHANGELOG.md": "changelog.md",
+    "notebooks/README.md": "notebooks/index.md",
+    "robots/README.md": "robots.md",
+}
 """Where what the README links to lies in the site."""
 QUICK = "HRSYNTH_DOCS_QUICK"
 """Environment variable: notebooks of which no executed copy is kept are shown without outputs."""
-FOLDERS = ("geometry", "mechanism", "description", "linting", "families", "kinematics", "closed_forms", "batch",
-           "rewrite", "constraints", "analysis", "simulation", "selection", "present", "catalog")
+FOLDERS = (
+    "geometry",
+    "mechanism",
+    "description",
+    "linting",
+    "families",
+    "kinematics",
+    "closed_forms",
+    "batch",
+    "rewrite",
+    "constraints",
+    "analysis",
+    "simulation",
+    "selection",
+    "present",
+    "catalog",
+)
 
 
 def on_files(files: Any, config: Any) -> Any:
@@ -42,8 +63,12 @@ def on_files(files: Any, config: Any) -> Any:
 
 def made() -> Iterator[tuple[str, str | bytes]]:
     """Name and content of each page and picture that is made."""
-    for name, source in (("readme.md", "README.md"), ("contributing.md", "CONTRIBUTING.md"),
-                         ("changelog.md", "CHANGELOG.md"), ("robots.md", "robots/README.md")):
+    for name, source in (
+        ("readme.md", "README.md"),
+        ("contributing.md", "CONTRIBUTING.md"),
+        ("changelog.md", "CHANGELOG.md"),
+        ("robots.md", "robots/README.md"),
+    ):
         yield name, relinked((ROOT / source).read_text(encoding="utf-8"))
     overview = (lessons.FOLDER / "README.md").read_text(encoding="utf-8")
     yield "notebooks/index.md", underlined(overview.replace(".ipynb)", ".md)"))
@@ -68,8 +93,12 @@ def typeset(markdown: str) -> str:
     """Formulas between dollars as drawings, outside of code: ``$$…$$`` on lines of their own, ``$…$`` in a line."""
     parts = re.split(r"(^ *```.*?^ *```$|`[^`\n]*`|<pre>.*?</pre>)", markdown, flags=re.MULTILINE | re.DOTALL)
     for place in range(0, len(parts), 2):
-        found = re.sub(r"^\$\$\s*(.+?)\s*\$\$$", lambda m: f'<p class="formula">{drawn(m[1])}</p>', parts[place],
-                       flags=re.MULTILINE | re.DOTALL)
+        found = re.sub(
+            r"^\$\$\s*(.+?)\s*\$\$$",
+            lambda m: f'<p class="formula">{drawn(m[1])}</p>',
+            parts[place],
+            flags=re.MULTILINE | re.DOTALL,
+        )
         parts[place] = re.sub(r"(?<![\\$\w])\$(?! )([^$\n]+?)(?<! )\$(?![\d$])", lambda m: drawn(m[1]), found)
     return "".join(parts)
 
@@ -83,29 +112,38 @@ def drawn(formula: str) -> str:
     with rc_context({"mathtext.fontset": "stix", "svg.fonttype": "path", "svg.hashsalt": formula}):
         depth = mathtext.math_to_image(f"${' '.join(formula.split())}$", stream, format="svg", dpi=72)
     text = stream.getvalue()
-    text = re.sub(r"<metadata>.*?</metadata>|<!--.*?-->|<style.*?</style>|<path[^>]*fill: #ffffff[^>]*/>", "",
-                  text[text.index("<svg"):], flags=re.DOTALL)
+    text = re.sub(
+        r"<metadata>.*?</metadata>|<!--.*?-->|<style.*?</style>|<path[^>]*fill: #ffffff[^>]*/>",
+        "",
+        text[text.index("<svg") :],
+        flags=re.DOTALL,
+    )
     prefix = f"f{hashlib.sha256(formula.encode()).hexdigest()[:8]}"
     text = re.sub(r'(id="|href="#|url\(#)', rf"\1{prefix}", text)
     width, height = (float(value) / 10 for value in re.findall(r'(?:width|height)="([0-9.]+)pt"', text)[:2])
     text = re.sub(r'width="[0-9.]+pt"', f'width="{width:.3f}em"', text, count=1)
     text = re.sub(r'height="[0-9.]+pt"', f'height="{height:.3f}em"', text, count=1)
     said = html.escape(formula, quote=True)
-    text = text.replace("<svg ", f'<svg class="math" role="img" aria-label="{said}" '
-                                 f'style="vertical-align: {-depth / 10:.3f}em" ', 1)
+    text = text.replace(
+        "<svg ", f'<svg class="math" role="img" aria-label="{said}" style="vertical-align: {-depth / 10:.3f}em" ', 1
+    )
     return re.sub(r"\s*\n\s*", " ", text).strip()
 
 
 def gallery() -> str:
     """Every picture that is kept, with the command that draws it."""
-    head = ("---\nhide: [toc]\n---\n\n# Gallery\n\nEvery picture is drawn by one command, shown below it; "
-            "`make pictures` draws them all again.\n\n<div class=\"gallery\" markdown>\n")
+    head = (
+        "---\nhide: [toc]\n---\n\n# Gallery\n\nEvery picture is drawn by one command, shown below it; "
+        '`make pictures` draws them all again.\n\n<div class="gallery" markdown>\n'
+    )
     cells = []
     for name in pictures.PICTURES:
         typed = pictures.command(name)
         if (pictures.FOLDER / name).exists():
-            cells.append(f"<figure markdown>\n[![{typed}](pictures/{name})](pictures/{name})\n"
-                         f"<figcaption markdown>`{typed}`</figcaption>\n</figure>\n")
+            cells.append(
+                f"<figure markdown>\n[![{typed}](pictures/{name})](pictures/{name})\n"
+                f"<figcaption markdown>`{typed}`</figcaption>\n</figure>\n"
+            )
     return "\n".join([head, *cells, "</div>\n"])
 
 
@@ -183,15 +221,21 @@ def records() -> str:
 
 def modules(folder: str) -> str:
     """Every module of a folder of the package: first what a user calls, then the modules, those first that hold it."""
-    names = [".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts) for path in
-             (PACKAGE / folder).rglob("*.py") if path.name != "__init__.py"]
+    names = [
+        ".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts)
+        for path in (PACKAGE / folder).rglob("*.py")
+        if path.name != "__init__.py"
+    ]
     called: dict[str, list[str]] = {}
     for name, module in homes().items():
         if (module.lstrip(".") + ".").startswith(f"{folder}."):
             called.setdefault(f"hrsynth{module}", []).append(name)
     order = sorted(names, key=lambda name: (name not in called, name))
-    lines = [f"- [`hrsynth.{name}`](index.md#{module}.{name}): {first_line(module, name)}"
-             for module, each in sorted(called.items()) for name in each]
+    lines = [
+        f"- [`hrsynth.{name}`](index.md#{module}.{name}): {first_line(module, name)}"
+        for module, each in sorted(called.items())
+        for name in each
+    ]
     head = "\n".join([f"# {folder}", "", *(["What `import hrsynth` offers of it:", "", *lines, ""] if lines else [])])
     return head + "\n\n" + "\n\n".join(f"::: {name}\n    options:\n      heading_level: 2" for name in order)
 
@@ -200,8 +244,9 @@ def modules(folder: str) -> str:
 def homes() -> dict[str, str]:
     """The module of each public name."""
     tree = ast.parse((PACKAGE / "__init__.py").read_text(encoding="utf-8"))
-    table = next(node.value for node in tree.body
-                 if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "_HOME")
+    table = next(
+        node.value for node in tree.body if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "_HOME"
+    )
     found: dict[str, str] = ast.literal_eval(table)
     return found
 

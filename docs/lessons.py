@@ -30,8 +30,11 @@ def notebook(script: Path) -> Any:
     import jupytext
 
     made = jupytext.reads(script.read_text(encoding="utf-8"), fmt="py:percent")
-    made.metadata = {"jupytext": {"formats": "ipynb,py:percent"}, "kernelspec": dict(KERNEL),
-                     "language_info": {"name": "python"}}
+    made.metadata = {
+        "jupytext": {"formats": "ipynb,py:percent"},
+        "kernelspec": dict(KERNEL),
+        "language_info": {"name": "python"},
+    }
     made.nbformat, made.nbformat_minor = 4, 5
     for number, cell in enumerate(made.cells, 1):
         cell["id"] = f"cell-{number:02d}"
@@ -74,8 +77,14 @@ def executed(script: Path, folder: Path = EXECUTED) -> Any:
         return nbformat.read(file, as_version=4)
     made = notebook(script)
     folder.mkdir(parents=True, exist_ok=True)
-    NotebookClient(made, timeout=TIMEOUT, startup_timeout=TIMEOUT, coalesce_streams=True, kernel_name="python3",
-                   resources={"metadata": {"path": str(folder)}}).execute()
+    NotebookClient(
+        made,
+        timeout=TIMEOUT,
+        startup_timeout=TIMEOUT,
+        coalesce_streams=True,
+        kernel_name="python3",
+        resources={"metadata": {"path": str(folder)}},
+    ).execute()
     for old in folder.glob(f"{script.stem}.*.ipynb"):
         old.unlink(missing_ok=True)
     fresh = file.with_suffix(f".{os.getpid()}")

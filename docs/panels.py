@@ -58,7 +58,8 @@ def meshed(folder: Path) -> Path:
         if name == robot.base or len(ends) < 2:
             continue
         part = trimesh.creation.cylinder(0.012, segment=np.array(ends[:2])) + trimesh.creation.box(
-            (0.05, 0.05, 0.03), trimesh.transformations.translation_matrix(np.mean(ends, axis=0)))
+            (0.05, 0.05, 0.03), trimesh.transformations.translation_matrix(np.mean(ends, axis=0))
+        )
         part.export(folder / f"{name}.stl")
         visual = f'<visual><geometry><mesh filename="{name}.stl"/></geometry></visual>'
         text = text.replace(f'<link name="{name}"/>', f'<link name="{name}">{visual}</link>')
@@ -69,8 +70,13 @@ def meshed(folder: Path) -> Path:
 
 
 ROBOTS: dict[str, Callable[[Path], str | Path]] = {
-    "delta": lambda _: "delta", "quattro": lambda _: "quattro", "3rrr_tilted": lambda folder: tilted("3rrr_m1", folder),
-    "gough_stewart": lambda _: "gough_stewart", "ankle": ankle, "five_bar_meshes": meshed}
+    "delta": lambda _: "delta",
+    "quattro": lambda _: "quattro",
+    "3rrr_tilted": lambda folder: tilted("3rrr_m1", folder),
+    "gough_stewart": lambda _: "gough_stewart",
+    "ankle": ankle,
+    "five_bar_meshes": meshed,
+}
 """What is opened, by the name of its sheet."""
 
 

@@ -53,8 +53,11 @@ def command(name: str) -> str:
     if isinstance(what, SitePage):
         return "make docs"
     if isinstance(what, Page):
-        return f"hrsynth {what.command} {what.option} page.html" if not what.inner else (
-            f"hrsynth {what.command} {what.option} pages")
+        return (
+            f"hrsynth {what.command} {what.option} page.html"
+            if not what.inner
+            else (f"hrsynth {what.command} {what.option} pages")
+        )
     if isinstance(what, Family):
         return f"hrsynth {what.command} {what.robot}.urdf -o {name}"
     if isinstance(what, Panels):
@@ -93,8 +96,9 @@ PICTURES: dict[str, str | Page | SitePage | Family | Panels] = {
     "accuracy_quattro.png": "accuracy quattro --observe 1,4 --cone 0.1deg --plane z=-0.7",
     "atlas_six_poses.png": Family("atlas", "six_poses"),
     "basins_quattro.png": "basins quattro --observe 1,4 --to x=0,y=0,z=-0.7,phi=0 --plane z=-0.7,phi=0",
-    "catalog.png": Page("catalog site --group spatial --base-motors --verdict controllable --motion 3R", "-o", 1250,
-                        1100, "index.html"),
+    "catalog.png": Page(
+        "catalog site --group spatial --base-motors --verdict controllable --motion 3R", "-o", 1250, 1100, "index.html"
+    ),
     "catalog_page.png": Page("catalog site --group planar --legs '3-R*RR'", "-o", 1250, 1100, "p/96081be379a6.html"),
     "derivation_quattro.svg": "quattro 1,4",
     "modes_3rrr.png": "modes 3rrr_m1",
@@ -171,8 +175,10 @@ def made(name: str) -> None:
 
 
 def _take(page: Path, file: Path, what: Page | SitePage) -> None:
-    subprocess.run([sys.executable, str(ROOT / "tests" / "browser.py"), str(page), str(file), str(what.width),
-                    str(what.height)], check=True)
+    subprocess.run(
+        [sys.executable, str(ROOT / "tests" / "browser.py"), str(page), str(file), str(what.width), str(what.height)],
+        check=True,
+    )
 
 
 def _build(what: SitePage, folder: Path) -> None:
@@ -181,8 +187,12 @@ def _build(what: SitePage, folder: Path) -> None:
 
     if what.lesson is not None:
         lessons.executed(lessons.FOLDER / f"{what.lesson}.py")
-    subprocess.run([sys.executable, "-m", "mkdocs", "build", "--quiet", "--site-dir", str(folder)], check=True,
-                   cwd=ROOT, env={**os.environ, "HRSYNTH_DOCS_QUICK": "1", "NO_MKDOCS_2_WARNING": "1"})
+    subprocess.run(
+        [sys.executable, "-m", "mkdocs", "build", "--quiet", "--site-dir", str(folder)],
+        check=True,
+        cwd=ROOT,
+        env={**os.environ, "HRSYNTH_DOCS_QUICK": "1", "NO_MKDOCS_2_WARNING": "1"},
+    )
 
 
 def _run(command: str) -> None:

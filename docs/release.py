@@ -22,10 +22,25 @@ from email import message_from_bytes
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-NEEDED = ("Makefile", "CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "LICENSE", "LICENSE.three.js",
-          "README.md", "SECURITY.md", "mkdocs.yml",
-          "requirements/main.txt", "robots/quattro.urdf", "catalog/mixed.jsonl.gz", "notebooks/1_the_idea.ipynb",
-          "docs/pages/theory.md", "tests/oracle.py", "benchmarks/table.py", "src/hrsynth/claims.toml")
+NEEDED = (
+    "Makefile",
+    "CHANGELOG.md",
+    "CITATION.cff",
+    "CONTRIBUTING.md",
+    "LICENSE",
+    "LICENSE.three.js",
+    "README.md",
+    "SECURITY.md",
+    "mkdocs.yml",
+    "requirements/main.txt",
+    "robots/quattro.urdf",
+    "catalog/mixed.jsonl.gz",
+    "notebooks/1_the_idea.ipynb",
+    "docs/pages/theory.md",
+    "tests/oracle.py",
+    "benchmarks/table.py",
+    "src/hrsynth/claims.toml",
+)
 """What a source archive must hold, of each kind of file something."""
 PACKAGED = ("hrsynth/robots/quattro.urdf", "hrsynth/catalog/shipped/mixed.jsonl.gz")
 """What a wheel must hold besides all files of the package itself: where its links lead."""
@@ -76,9 +91,14 @@ def release_texts(version: str) -> dict[Path, str]:
     return {
         package: code.replace(f'__version__ = "{present}"', f'__version__ = "{version}"'),
         changes: log.replace("## [Unreleased]\n", f"## [Unreleased]\n\n## [{version}] - {today}\n", 1),
-        citation: re.sub(r"^version: .*$", f"version: {version}",
-                         re.sub(r"^date-released: .*$", f"date-released: {today}", cite, flags=re.MULTILINE),
-                         count=1, flags=re.MULTILINE)}
+        citation: re.sub(
+            r"^version: .*$",
+            f"version: {version}",
+            re.sub(r"^date-released: .*$", f"date-released: {today}", cite, flags=re.MULTILINE),
+            count=1,
+            flags=re.MULTILINE,
+        ),
+    }
 
 
 def numbers(version: str) -> tuple[int, ...]:
@@ -91,8 +111,10 @@ def require_addresses() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     told = [*project["urls"].values(), *(author.get("email", "") for author in project["authors"])]
     if any(re.search(r"\.example(/|$)", each) for each in told):
-        raise Refused("pyproject.toml: write the project's own addresses in authors and [project.urls], "
-                      "hrsynth.example is nobody's")
+        raise Refused(
+            "pyproject.toml: write the project's own addresses in authors and [project.urls], "
+            "hrsynth.example is nobody's"
+        )
 
 
 def build(source: Path, target: Path) -> tuple[Path, Path]:
@@ -129,8 +151,11 @@ def wheel_complaints(wheel: Path, version: str) -> Iterator[str]:
         (name,) = (each for each in held if each.endswith(".dist-info/METADATA"))
         told = message_from_bytes(file.read(name))
     source = ROOT / "src"
-    own = [path.relative_to(source).as_posix() for path in sorted((source / "hrsynth").rglob("*"))
-           if path.is_file() and "__pycache__" not in path.parts]
+    own = [
+        path.relative_to(source).as_posix()
+        for path in sorted((source / "hrsynth").rglob("*"))
+        if path.is_file() and "__pycache__" not in path.parts
+    ]
     yield from (f"{wheel.name} lacks {name}" for name in (*PACKAGED, *own) if name not in held)
     yield from (f"{wheel.name} holds {name}" for name in sorted(held) if name.startswith("tests/"))
     text = str(told.get_payload())
@@ -141,8 +166,11 @@ def wheel_complaints(wheel: Path, version: str) -> Iterator[str]:
         yield f"the metadata has version {told['Version']}"
     if told["Description-Content-Type"] != "text/markdown" or "# hrsynth" not in text:
         yield "the metadata has no long description in Markdown"
-    yield from (f"the long description has a link that leads nowhere: {link}"
-                for link in re.findall(r"\]\(([^)]*)\)", text) if not link.startswith(("https://", "#")))
+    yield from (
+        f"the long description has a link that leads nowhere: {link}"
+        for link in re.findall(r"\]\(([^)]*)\)", text)
+        if not link.startswith(("https://", "#"))
+    )
 
 
 def tried(wheel: Path, version: str) -> None:
@@ -159,10 +187,17 @@ def tried(wheel: Path, version: str) -> None:
         environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
         asked = {f"hrsynth {version}": ["--version"], "controllable": ["derive", "quattro", "--observe", "1,4"]}
         for expected, command in asked.items():
-            code = ("import sys; sys.path.insert(0, sys.argv.pop(1)); import hrsynth, hrsynth.cli as cli; "
-                    "assert hrsynth.__file__.startswith(sys.path[0]), hrsynth.__file__; cli.main()")
-            done = subprocess.run([here / "bin" / "python", "-c", code, site, *command], cwd=folder, env=environment,
-                                  capture_output=True, text=True)
+            code = (
+                "import sys; sys.path.insert(0, sys.argv.pop(1)); import hrsynth, hrsynth.cli as cli; "
+                "assert hrsynth.__file__.startswith(sys.path[0]), hrsynth.__file__; cli.main()"
+            )
+            done = subprocess.run(
+                [here / "bin" / "python", "-c", code, site, *command],
+                cwd=folder,
+                env=environment,
+                capture_output=True,
+                text=True,
+            )
             if done.returncode or expected not in done.stdout:
                 raise Refused(f"the installed wheel does not answer to {' '.join(command)}: {done.stderr[-400:]}")
 

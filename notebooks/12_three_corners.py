@@ -26,8 +26,9 @@ CORNERS = np.array([[0.3, 0, 0], [-0.15, 0.25, 0], [-0.15, -0.25, 0]])
 
 def seeing(corners):
     """The free camera, and the corners that it sees."""
-    return hrsynth.observe(hrsynth.load(file), camera="eye=camera",
-                           see=[f"point:world@{x},{y},{z}" for x, y, z in corners])
+    return hrsynth.observe(
+        hrsynth.load(file), camera="eye=camera", see=[f"point:world@{x},{y},{z}" for x, y, z in corners]
+    )
 
 
 three = seeing(CORNERS)
@@ -63,12 +64,15 @@ sides = [np.linalg.norm(CORNERS[i] - CORNERS[i - 1]) for i in range(3)]
 area = np.linalg.norm(np.cross(CORNERS[1] - CORNERS[0], CORNERS[2] - CORNERS[0])) / 2
 radius = np.prod(sides) / (4 * area)
 middle = np.array([0.3 - radius, 0, 0])  # by symmetry
-print("radius", radius.round(4), "m; from the middle to the corners",
-      np.linalg.norm(CORNERS - middle, axis=1).round(4))
+print("radius", radius.round(4), "m; from the middle to the corners", np.linalg.norm(CORNERS - middle, axis=1).round(4))
 
 grid = np.linspace(-0.6, 0.6, 121)
-weakest = np.array([[np.linalg.svd(interaction(np.array([x, y, 0.9]), DOWN, CORNERS), compute_uv=False)[-1]
-                     for x in grid] for y in grid])
+weakest = np.array(
+    [
+        [np.linalg.svd(interaction(np.array([x, y, 0.9]), DOWN, CORNERS), compute_uv=False)[-1] for x in grid]
+        for y in grid
+    ]
+)
 figure, place = plt.subplots(figsize=(4.5, 4))
 drawn = place.pcolormesh(grid, grid, np.log10(weakest), cmap="viridis")
 figure.colorbar(drawn, label="log10 of the smallest singular value")
@@ -123,8 +127,13 @@ rays /= np.linalg.norm(rays, axis=1, keepdims=True)
 poses = four_poses(rays, CORNERS)
 for C, R in poses:
     again = image(C, R, CORNERS)
-    print(C.round(4), "image differs by", max(np.abs(again[0] - x).max(), np.abs(again[1] - y).max()).round(12),
-          "depths", again[2].round(3))
+    print(
+        C.round(4),
+        "image differs by",
+        max(np.abs(again[0] - x).max(), np.abs(again[1] - y).max()).round(12),
+        "depths",
+        again[2].round(3),
+    )
     assert max(np.abs(again[0] - x).max(), np.abs(again[1] - y).max()) < 1e-9
 assert len(poses) == 4
 
@@ -139,8 +148,10 @@ rng = np.random.default_rng(4)
 starts = []
 while len(starts) < 8:
     place, angles = rng.uniform([-0.6, -0.6, 0.6], [0.6, 0.6, 1.4]), rng.uniform([170, -10, -60], [190, 10, 60])
-    starts.append(f"x={place[0]:.3f},y={place[1]:.3f},z={place[2]:.3f},"
-                  f"rpy={angles[0]:.0f}deg/{angles[1]:.0f}deg/{angles[2]:.0f}deg")
+    starts.append(
+        f"x={place[0]:.3f},y={place[1]:.3f},z={place[2]:.3f},"
+        f"rpy={angles[0]:.0f}deg/{angles[1]:.0f}deg/{angles[2]:.0f}deg"
+    )
 by_three = [hrsynth.servo(three, start=start, goal=GOAL) for start in starts]
 for found in by_three:
     C = found.settled.pose("camera")[:3, 3]
@@ -168,16 +179,23 @@ for start in starts[:4]:
     print(by_four)
     assert by_four == "goal"
 on = middle + [0, radius, 0.9]
-least_of = [np.linalg.svd(interaction(on, DOWN, some), compute_uv=False)[-1] for some in (
-    CORNERS, np.vstack([CORNERS, [middle + [radius * np.cos(2), radius * np.sin(2), 0]]]), square)]
+least_of = [
+    np.linalg.svd(interaction(on, DOWN, some), compute_uv=False)[-1]
+    for some in (CORNERS, np.vstack([CORNERS, [middle + [radius * np.cos(2), radius * np.sin(2), 0]]]), square)
+]
 assert least_of[0] < 1e-12
 assert 1e-3 < least_of[1] < least_of[2]
-print("on the cylinder: smallest singular value with three corners",
-      np.linalg.svd(interaction(on, DOWN, CORNERS), compute_uv=False)[-1].round(12), "with four",
-      np.linalg.svd(interaction(on, DOWN, square), compute_uv=False)[-1].round(4))
+print(
+    "on the cylinder: smallest singular value with three corners",
+    np.linalg.svd(interaction(on, DOWN, CORNERS), compute_uv=False)[-1].round(12),
+    "with four",
+    np.linalg.svd(interaction(on, DOWN, square), compute_uv=False)[-1].round(4),
+)
 fourth = middle + [radius * np.cos(2), radius * np.sin(2), 0]
-print("four corners on one circle:",
-      np.linalg.svd(interaction(on, DOWN, np.vstack([CORNERS, [fourth]])), compute_uv=False)[-1].round(12))
+print(
+    "four corners on one circle:",
+    np.linalg.svd(interaction(on, DOWN, np.vstack([CORNERS, [fourth]])), compute_uv=False)[-1].round(12),
+)
 
 # %% [markdown]
 # Four corners give eight numbers for six freedoms: the loop may also rest where the error is not zero but has no
@@ -206,8 +224,9 @@ for name, far in (("on", 1.0), ("off", 1.3)):
         C = middle + [far * radius * np.cos(angle), far * radius * np.sin(angle), height]
         w = rng.uniform(-0.1, 0.1, 3)
         tilt = np.linalg.qr(np.eye(3) + [[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])[0]
-        values.append(np.linalg.svd(interaction(C, DOWN @ (tilt * np.sign(np.diag(tilt))), CORNERS),
-                                    compute_uv=False)[-1])
+        values.append(
+            np.linalg.svd(interaction(C, DOWN @ (tilt * np.sign(np.diag(tilt))), CORNERS), compute_uv=False)[-1]
+        )
     least[name] = (min(values), max(values))
 assert least["on"][1] < 1e-12
 assert least["off"][0] > 1e-3

@@ -298,8 +298,9 @@ def planar_direction(C):
 C = np.array([0.25, 0.2])
 w, normal = planar_direction(C)
 by_hand = (np.eye(2) - np.outer(normal, w) / (w @ normal)) / l_2
-by_steps = np.column_stack([(planar_direction(C + 1e-6 * e)[0] - planar_direction(C - 1e-6 * e)[0]) / 2e-6
-                            for e in np.eye(2)])
+by_steps = np.column_stack(
+    [(planar_direction(C + 1e-6 * e)[0] - planar_direction(C - 1e-6 * e)[0]) / 2e-6 for e in np.eye(2)]
+)
 print("largest difference", np.abs(by_hand - by_steps).max(), " rank", np.linalg.matrix_rank(by_hand, tol=1e-9))
 assert np.abs(by_hand - by_steps).max() < 1e-8
 

@@ -22,7 +22,7 @@ def row(*cells):
     """Cells in columns; the low line under a motor takes no room."""
     widths = (10, 9, 10, 24, 8)
     padded = [f"{cell!s:{w + str(cell).count(chr(0x332))}}" for cell, w in zip(cells, widths, strict=False)]
-    return "  ".join([*padded, *map(str, cells[len(widths):])])
+    return "  ".join([*padded, *map(str, cells[len(widths) :])])
 
 
 derived = {name: hrsynth.derive(hrsynth.load(name)) for name in NAMES}
@@ -32,8 +32,16 @@ for name, found in derived.items():
     listed = found.modes()
     numbers[name] = (len(listed.modes), listed.found.complex)
     count = "a continuum" if listed.found.continuum else f"{len(listed.modes)} of {listed.found.complex}"
-    print(row(name, found.architecture, found.hidden_architecture or "none", found.verdict.verdict,
-              f"{found.verdict.rank} of {found.verdict.dof}", count))
+    print(
+        row(
+            name,
+            found.architecture,
+            found.hidden_architecture or "none",
+            found.verdict.verdict,
+            f"{found.verdict.rank} of {found.verdict.dof}",
+            count,
+        )
+    )
 
 # %% [markdown]
 # The second and third columns are those of the paper's table. All of it is checked here, robot by robot:
@@ -74,8 +82,12 @@ assert derived["3ppr_m1"].verdict.rank == derived["3ppr_m2"].verdict.rank == 0
 
 # %%
 angles = np.radians([93, 208, 329])
-wide = three_rrr(proximal=0.23, distal=0.3, platform=list(zip((0.16, 0.19, 0.13), angles, strict=True)),
-                 home=(0.01, -0.015, np.radians(-17)))
+wide = three_rrr(
+    proximal=0.23,
+    distal=0.3,
+    platform=list(zip((0.16, 0.19, 0.13), angles, strict=True)),
+    home=(0.01, -0.015, np.radians(-17)),
+)
 six = hrsynth.modes(wide)
 print(len(six.modes), "real of", six.found.complex)
 assert numbers["3rrr_m1"] == (2, 6)

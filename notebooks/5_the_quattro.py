@@ -61,8 +61,14 @@ for legs, each in pairs.items():
     found = each.modes(at=GOAL)
     print(f"legs {legs[0]}, {legs[1]}: {len(found.modes)} real modes of {found.found.complex}")
     for number, mode in enumerate(found.modes, 1):
-        print(f"   {number}  {mode.pose!s:52}", "the goal" if mode.goal else "reachable" if mode.reachable
-              else "the real robot cannot be assembled there: legs " + ", ".join(mode.open))
+        print(
+            f"   {number}  {mode.pose!s:52}",
+            "the goal"
+            if mode.goal
+            else "reachable"
+            if mode.reachable
+            else "the real robot cannot be assembled there: legs " + ", ".join(mode.open),
+        )
 beyond = [set(mode.open) for mode in pairs["23"].modes(at=GOAL).modes if not (mode.goal or mode.reachable)]
 assert beyond == [{"1", "4"}, {"1", "4"}]
 hrsynth.draw(pairs["14"].modes(at=GOAL))
@@ -118,8 +124,10 @@ assert abs(-0.909 - second.pose.z) > 0.005
 # found exactly for two legs. A map over the plane z = −0.7 m with φ = 0, as in MMT Figs. 19 and 20:
 
 # %%
-maps = {legs: hrsynth.accuracy(robot, list(legs), cone="0.1deg", grid="x=-0.5:0.5:81,y=-0.5:0.5:81,z=-0.7,phi=0")
-        for legs in ("23", "24")}
+maps = {
+    legs: hrsynth.accuracy(robot, list(legs), cone="0.1deg", grid="x=-0.5:0.5:81,y=-0.5:0.5:81,z=-0.7,phi=0")
+    for legs in ("23", "24")
+}
 for legs, found in maps.items():
     errors = 1e3 * found.field.position[np.isfinite(found.field.position)]
     print(f"legs {legs[0]}, {legs[1]}: median {np.median(errors):.2f} mm over the plane, least {errors.min():.2f} mm")

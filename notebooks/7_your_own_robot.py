@@ -149,8 +149,10 @@ hidden = hrsynth.derive(hrsynth.load("3rrr_m1"))
 for ending in (".urdf", ".xml", ".sdf"):
     lost = hrsynth.save(hidden.hidden, folder / f"hidden{ending}")
     back = hrsynth.load(folder / f"hidden{ending}", platform="platform")
-    print(f"{ending:6}{(folder / f'hidden{ending}').stat().st_size:6} bytes, read back: {back.headline()};",
-          "; ".join(map(str, lost)) or "nothing lost")
+    print(
+        f"{ending:6}{(folder / f'hidden{ending}').stat().st_size:6} bytes, read back: {back.headline()};",
+        "; ".join(map(str, lost)) or "nothing lost",
+    )
 
 # %% [markdown]
 # The hidden robot of a hidden robot? Its motors turn what the camera watches. So watching the same directions changes
@@ -183,8 +185,10 @@ print(repr(hrsynth.derive(hrsynth.load(folder / "turned.urdf"), observe=["2"])))
 
 # %% jupyter={"source_hidden": true} tags=["solution"]
 # 2. the crank's angle is the same in all modes, so its own limits exclude none
-limited = FOUR_BAR.replace('<joint name="a" type="continuous">',
-                           '<joint name="a" type="revolute"> <limit lower="-0.5" upper="0.5" effort="1" velocity="1"/>')
+limited = FOUR_BAR.replace(
+    '<joint name="a" type="continuous">',
+    '<joint name="a" type="revolute"> <limit lower="-0.5" upper="0.5" effort="1" velocity="1"/>',
+)
 (folder / "limited.urdf").write_text(limited)
 for mode in hrsynth.modes(hrsynth.load(folder / "limited.urdf"), ["1"]).modes:
     print(mode)

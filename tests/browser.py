@@ -44,10 +44,16 @@ class Tab:
         tab = cls(page)
         page.on("console", lambda said: said.type == "error" and tab.complaints.append(f"console: {said.text}"))
         page.on("pageerror", lambda error: tab.complaints.append(f"uncaught: {error}"))
-        page.on("requestfailed", lambda asked: asked.failure == LEFT
-                or tab.complaints.append(f"not loaded: {asked.url[:200]}"))
-        page.on("request", lambda asked: asked.url.startswith(LOCAL)
-                or tab.complaints.append(f"asks the network for {asked.url[:200]}"))
+        page.on(
+            "requestfailed",
+            lambda asked: asked.failure == LEFT or tab.complaints.append(f"not loaded: {asked.url[:200]}"),
+        )
+        page.on(
+            "request",
+            lambda asked: (
+                asked.url.startswith(LOCAL) or tab.complaints.append(f"asks the network for {asked.url[:200]}")
+            ),
+        )
         return tab
 
     def open(self, page: str | Path, ready: str | None = None) -> None:

@@ -26,12 +26,14 @@ settings.load_profile("untimed")
 def robots_observed_once() -> None:
     """What a robot was sampled at is kept for all files of a process: of the last 32 a third was drawn again."""
     from hrsynth.analysis import observed
+
     observed._observed_robot = lru_cache(maxsize=300)(observed._observed_robot.__wrapped__)
 
 
 @pytest.fixture(autouse=True)
 def nothing_answered_before():
     from hrsynth.analysis.question import forget_answers
+
     forget_answers()
 
 

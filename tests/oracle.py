@@ -115,8 +115,9 @@ class Rows:
     def __len__(self) -> int:
         return len(self.forces) + len(self.moments)
 
-    def tie(self, i: int, j: int, X_i: Array, X_j: Array, forces: Iterable[int],
-            pairs: Sequence[tuple[int, int]]) -> None:
+    def tie(
+        self, i: int, j: int, X_i: Array, X_j: Array, forces: Iterable[int], pairs: Sequence[tuple[int, int]]
+    ) -> None:
         """Tie the frame X_j of link j to the frame X_i of link i.
 
         ``forces`` numbers the axes of X_i along which the origins stay level, ``pairs`` the axes of X_i and X_j that
@@ -227,7 +228,7 @@ class Oracle:
         if number not in self.moving:
             return np.zeros((6, *velocity.shape[1:]))
         start = 6 * self.moving.index(number)
-        return np.asarray(velocity[start:start + 6])
+        return np.asarray(velocity[start : start + 6])
 
     def residual(self, state: Array) -> Array:
         """All constraints (metres and cosines, forces first); zero where the state is closed."""
@@ -292,8 +293,13 @@ class Oracle:
         found = [R_c.T @ state[link, :3, :3] @ d for link, d in self._observed(observations)]
         return np.array(found).reshape(-1, 3)
 
-    def relation(self, state: Array, observations: Sequence[Observation] | None = None,
-                 unit_length: float | None = None, point_only: bool = False) -> Array:
+    def relation(
+        self,
+        state: Array,
+        observations: Sequence[Observation] | None = None,
+        unit_length: float | None = None,
+        point_only: bool = False,
+    ) -> Array:
         """An orthonormal basis of rho(q): the pairs (t, u_dot) of all velocities; shape (6 + 3 k, dim).
 
         t is the platform frame's twist (v / unit_length, omega) in base axes, or v / unit_length alone (3 rows) with
@@ -360,16 +366,26 @@ class Oracle:
             rows.tie(camera, link, pose(rotation=triad(u)), pose(rotation=triad(d)), (), SQUARE[:2])
         return rows
 
-    def close(self, state: Array, pins: Mapping[str, Array] | None = None,
-              directions: Sequence[Array] | Array | None = None,
-              observations: Sequence[Observation] | None = None, iterations: int = 60) -> Array:
+    def close(
+        self,
+        state: Array,
+        pins: Mapping[str, Array] | None = None,
+        directions: Sequence[Array] | Array | None = None,
+        observations: Sequence[Observation] | None = None,
+        iterations: int = 60,
+    ) -> Array:
         """The closed state near ``state``: Gauss-Newton steps, each the shortest one, damped far from the solution.
 
         ``pins`` maps links to the pose (4, 4), or the position (3,) of the frame, that they must have; ``directions``
         are the values that the observations (the mechanism's own by default) must have. Raises :class:`NotAssembled`.
         """
-        aims = [] if directions is None else [
-            (link, d, np.asarray(u)) for (link, d), u in zip(self._observed(observations), directions, strict=True)]
+        aims = (
+            []
+            if directions is None
+            else [
+                (link, d, np.asarray(u)) for (link, d), u in zip(self._observed(observations), directions, strict=True)
+            ]
+        )
         rows = self.rows + self._aims(pins or {}, aims)
         closed, left = self._settle(rows, state, iterations)
         if left > CLOSED or not rows.stands(closed):
@@ -428,12 +444,19 @@ class Oracle:
 
     def _difference(self, there: Array, here: Array) -> Array:
         """The velocity that leads from one state to the other in a unit of time."""
-        parts = [np.concatenate((there[k, :3, 3] - here[k, :3, 3], logarithm(there[k, :3, :3] @ here[k, :3, :3].T)))
-                 for k in self.moving]
+        parts = [
+            np.concatenate((there[k, :3, 3] - here[k, :3, 3], logarithm(there[k, :3, :3] @ here[k, :3, :3].T)))
+            for k in self.moving
+        ]
         return np.concatenate(parts) if parts else np.zeros(0)
 
-    def assemble(self, platform: Array, directions: Sequence[Array] | Array, start: Array | None = None,
-                 observations: Sequence[Observation] | None = None) -> Array:
+    def assemble(
+        self,
+        platform: Array,
+        directions: Sequence[Array] | Array,
+        start: Array | None = None,
+        observations: Sequence[Observation] | None = None,
+    ) -> Array:
         """The closed state with this platform pose (4, 4), or position (3,), and these observed directions.
 
         Sought from ``start`` (zero by default), first straight away, then led there in ever smaller steps. The start
@@ -449,8 +472,9 @@ class Oracle:
             try:
                 for part in range(1, parts):
                     s = part / parts
-                    aims = [(link, d, _between(a, b, s))
-                            for (link, d), a, b in zip(observed, from_u, targets, strict=True)]
+                    aims = [
+                        (link, d, _between(a, b, s)) for (link, d), a, b in zip(observed, from_u, targets, strict=True)
+                    ]
                     rows = self.rows + self._aims({name: _pose_between(from_X, platform, s)}, aims)
                     there, _ = self._settle(rows, there, 15)
                 return self.close(there, {name: platform}, targets, observations)

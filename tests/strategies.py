@@ -29,6 +29,7 @@ Rng = np.random.Generator
 
 # --- random geometry ---------------------------------------------------------------------------------------------
 
+
 def random_direction(rng: Rng) -> Array:
     """A unit vector, uniform on the sphere."""
     return unit(rng.normal(size=3))
@@ -57,8 +58,18 @@ def _add_link(builder: Builder, rng: Rng, name: str, near: Array) -> None:
     builder.link(name, at=near + rng.normal(scale=0.1, size=3), rotation=random_rotation(rng))
 
 
-def _add_joint(builder: Builder, name: str, letter: str, predecessor: str, successor: str, at: Array,
-               axes: Sequence[Array], *, motor: bool = False, loop: bool = False) -> None:
+def _add_joint(
+    builder: Builder,
+    name: str,
+    letter: str,
+    predecessor: str,
+    successor: str,
+    at: Array,
+    axes: Sequence[Array],
+    *,
+    motor: bool = False,
+    loop: bool = False,
+) -> None:
     axis, axis2 = (*axes, None, None)[:2]
     builder.joint(name, letter, predecessor, successor, at, axis=axis, axis2=axis2, motor=motor, loop=loop)
 
@@ -67,6 +78,7 @@ _SEEDS = st.integers(0, 2**32 - 1).map(np.random.default_rng)
 
 
 # --- chains ------------------------------------------------------------------------------------------------------
+
 
 @st.composite
 def chains(draw: st.DrawFn, types: Sequence[str] = ("R", "P", "U", "S", "C", "E", "F"), longest: int = 5) -> Mechanism:
@@ -82,8 +94,9 @@ def chains(draw: st.DrawFn, types: Sequence[str] = ("R", "P", "U", "S", "C", "E"
         first = random_direction(rng)
         axis = first if JointType(letter).axes else None
         axis2 = random_normal(rng, first) if letter == "U" else None
-        builder.joint(f"joint_{number}", letter, before, name, here, axis=axis, axis2=axis2,
-                      motor=motor and letter != "F")
+        builder.joint(
+            f"joint_{number}", letter, before, name, here, axis=axis, axis2=axis2, motor=motor and letter != "F"
+        )
         here, before = here + rng.uniform(0.3, 1.0) * random_direction(rng), name
     for leg, number in enumerate(sorted({len(word), (len(word) + 1) // 2}), 1):
         builder.observe(str(leg), f"link_{number}", random_direction(rng))
@@ -91,6 +104,7 @@ def chains(draw: st.DrawFn, types: Sequence[str] = ("R", "P", "U", "S", "C", "E"
 
 
 # --- planar robots -----------------------------------------------------------------------------------------------
+
 
 def planar(words: Sequence[str], rng: Rng, motors: Sequence[Collection[int]], point: bool = False) -> Mechanism:
     """A robot with one leg a word in a random plane; ``motors`` numbers (from 0) the driven joints of each leg.
@@ -120,9 +134,16 @@ def planar(words: Sequence[str], rng: Rng, motors: Sequence[Collection[int]], po
         for name, place in zip(links[1:3], points[:2], strict=True):
             _add_link(builder, rng, name, place)
         for k, letter in enumerate(word):
-            builder.joint(f"joint_{number}_{k + 1}", letter, links[k], links[k + 1], points[k],
-                          axis=normal if letter == "R" else slides[k], motor=k in motors[number - 1],
-                          loop=k == 2 and number > 1)
+            builder.joint(
+                f"joint_{number}_{k + 1}",
+                letter,
+                links[k],
+                links[k + 1],
+                points[k],
+                axis=normal if letter == "R" else slides[k],
+                motor=k in motors[number - 1],
+                loop=k == 2 and number > 1,
+            )
         slide = 1 if word[1] == "P" else 2 if word[2] == "P" else None
         builder.observe(str(number), links[2], points[2] - points[1] if slide is None else slides[slide])
     return builder.build(platform="platform")
@@ -146,6 +167,7 @@ def planar_robots(draw: st.DrawFn, words: Sequence[str] = PLANAR_WORDS, point: b
 
 # --- spherical robots ----------------------------------------------------------------------------------------------
 
+
 def spherical(rng: Rng) -> Mechanism:
     """A platform that turns about a point: three legs RRR, all axes through that point, driven at the base."""
     centre = rng.normal(scale=0.3, size=3)
@@ -158,13 +180,22 @@ def spherical(rng: Rng) -> Mechanism:
         for name in links[1:3]:
             _add_link(builder, rng, name, centre)
         for k, axis in enumerate(axes):
-            builder.joint(f"joint_{number}_{k + 1}", "R", links[k], links[k + 1],
-                          centre + rng.uniform(0.3, 1.0) * axis, axis=axis, motor=k == 0, loop=k == 2 and number > 1)
+            builder.joint(
+                f"joint_{number}_{k + 1}",
+                "R",
+                links[k],
+                links[k + 1],
+                centre + rng.uniform(0.3, 1.0) * axis,
+                axis=axis,
+                motor=k == 0,
+                loop=k == 2 and number > 1,
+            )
         builder.observe(str(number), links[2], random_direction(rng))
     return builder.build(platform="platform")
 
 
 # --- n-pods ------------------------------------------------------------------------------------------------------
+
 
 def pods(words: Sequence[str], rng: Rng, square: bool = False) -> Mechanism:
     """A platform on one leg a word (UPS, RPS, UPU, SPS), driven by the P joints, all rods observed.
@@ -202,13 +233,17 @@ def pods(words: Sequence[str], rng: Rng, square: bool = False) -> Mechanism:
 def n_pods(draw: st.DrawFn, words: Sequence[str] = POD_WORDS, fewest: int = 3, most: int = 6) -> Mechanism:
     """Pods with three to six legs, of which at most three constrain the platform."""
     n = draw(st.integers(fewest, most))
-    chosen = draw(st.lists(st.sampled_from(list(words)), min_size=n, max_size=n)
-                  .filter(lambda legs: sum(word in ("RPS", "UPU") for word in legs) <= 3))
+    chosen = draw(
+        st.lists(st.sampled_from(list(words)), min_size=n, max_size=n).filter(
+            lambda legs: sum(word in ("RPS", "UPU") for word in legs) <= 3
+        )
+    )
     square = draw(st.booleans())
     return pods(chosen, draw(_SEEDS), square)
 
 
 # --- delta-like robots -------------------------------------------------------------------------------------------
+
 
 def deltas(bases: Sequence[str], rods: Sequence[str], rng: Rng, aligned: bool) -> Mechanism:
     """A rigid platform on one leg a pair: a driven R or P at the base, then 2-SS, US, UU or SS.
@@ -244,8 +279,10 @@ def deltas(bases: Sequence[str], rods: Sequence[str], rng: Rng, aligned: bool) -
             builder.observe(str(number), first + "a", B - W)
             continue
         _add_link(builder, rng, first, W)
-        for joint, letter, ends, place, loop in (("elbow", rod[0], (arm, first), W, False),
-                                                 ("wrist", rod[1], (first, "platform"), B, closes)):
+        for joint, letter, ends, place, loop in (
+            ("elbow", rod[0], (arm, first), W, False),
+            ("wrist", rod[1], (first, "platform"), B, closes),
+        ):
             outer = hinge if aligned else random_direction(rng)
             inner = unit(np.cross(outer, B - W)) if aligned else random_normal(rng, outer)
             axes = (outer, inner) if joint == "elbow" else (inner, outer)
@@ -255,8 +292,9 @@ def deltas(bases: Sequence[str], rods: Sequence[str], rng: Rng, aligned: bool) -
 
 
 @st.composite
-def delta_like(draw: st.DrawFn, rods: Sequence[str] = DELTA_RODS, bases: Sequence[str] = ("R", "P"),
-               aligned: bool | None = None) -> Mechanism:
+def delta_like(
+    draw: st.DrawFn, rods: Sequence[str] = DELTA_RODS, bases: Sequence[str] = ("R", "P"), aligned: bool | None = None
+) -> Mechanism:
     """Delta-like robots with two to four legs, all alike or mixed, rails and sides special or random."""
     n = draw(st.integers(2, 4))
     alike = draw(st.booleans())
@@ -279,6 +317,7 @@ def mechanisms() -> st.SearchStrategy[Mechanism]:
 
 # --- transformations ---------------------------------------------------------------------------------------------
 
+
 def _turned_in_link(observation: Observation, R: Array) -> Observation:
     if not isinstance(observation, Direction):
         raise TypeError(f"only directions are known, not {observation!r}")
@@ -288,12 +327,17 @@ def _turned_in_link(observation: Observation, R: Array) -> Observation:
 def transformed(mechanism: Mechanism, R: Array, p: Array) -> Mechanism:
     """The whole geometry turned by R, then shifted by p in the base, whose own frame stays where it is."""
     X = pose(p, R)
-    links = {name: link if name == mechanism.base else replace(link, pose=frozen(X @ link.pose))
-             for name, link in mechanism.links.items()}
-    joints = {name: replace(joint, point=R @ joint.point + p, axes=tuple(R @ axis for axis in joint.axes))
-              for name, joint in mechanism.joints.items()}
-    observations = tuple(_turned_in_link(each, R) if each.link == mechanism.base else each
-                         for each in mechanism.observations)
+    links = {
+        name: link if name == mechanism.base else replace(link, pose=frozen(X @ link.pose))
+        for name, link in mechanism.links.items()
+    }
+    joints = {
+        name: replace(joint, point=R @ joint.point + p, axes=tuple(R @ axis for axis in joint.axes))
+        for name, joint in mechanism.joints.items()
+    }
+    observations = tuple(
+        _turned_in_link(each, R) if each.link == mechanism.base else each for each in mechanism.observations
+    )
     return replace(mechanism, links=links, joints=joints, observations=observations)
 
 
@@ -302,29 +346,46 @@ def renamed(mechanism: Mechanism, rng: Rng) -> Mechanism:
     numbers = iter(rng.permutation(10 * (len(mechanism.links) + len(mechanism.joints))))
     new = {name: f"n{next(numbers)}" for name in mechanism.links}
     links = [replace(link, name=new[link.name]) for link in mechanism.links.values()]
-    joints = [replace(joint, name=f"n{next(numbers)}",
-                      predecessor=new[joint.predecessor], successor=new[joint.successor],
-                      motor=joint.motor and replace(joint.motor, name=f"drive_{joint.motor.name[::-1]}"))
-              for joint in mechanism.joints.values()]
+    joints = [
+        replace(
+            joint,
+            name=f"n{next(numbers)}",
+            predecessor=new[joint.predecessor],
+            successor=new[joint.successor],
+            motor=joint.motor and replace(joint.motor, name=f"drive_{joint.motor.name[::-1]}"),
+        )
+        for joint in mechanism.joints.values()
+    ]
     return replace(
-        mechanism, links={link.name: link for link in links}, joints={joint.name: joint for joint in joints},
-        base=new[mechanism.base], platform=new[mechanism.platform],
+        mechanism,
+        links={link.name: link for link in links},
+        joints={joint.name: joint for joint in joints},
+        base=new[mechanism.base],
+        platform=new[mechanism.platform],
         camera=None if mechanism.camera is None else new[mechanism.camera],
         observations=tuple(replace(each, link=new[each.link]) for each in mechanism.observations),
-        couplings=tuple(replace(gear, predecessor=new[gear.predecessor], successor=new[gear.successor])
-                        for gear in mechanism.couplings))
+        couplings=tuple(
+            replace(gear, predecessor=new[gear.predecessor], successor=new[gear.successor])
+            for gear in mechanism.couplings
+        ),
+    )
 
 
 def reordered(mechanism: Mechanism, rng: Rng, legs: bool = True) -> Mechanism:
     """Links, joints and (with ``legs``) observations in another order; the base need not be the first link any more."""
+
     def shuffled(table: dict[str, Link] | dict[str, Joint]) -> dict[str, object]:
         items = list(table.items())
         return dict(items[k] for k in rng.permutation(len(items)))
 
     links, joints = shuffled(dict(mechanism.links)), shuffled(dict(mechanism.joints))
     order = rng.permutation(len(mechanism.observations)) if legs else range(len(mechanism.observations))
-    return replace(mechanism, links=links, joints=joints,  # type: ignore[arg-type]
-                   observations=tuple(mechanism.observations[k] for k in order))
+    return replace(
+        mechanism,
+        links=links,
+        joints=joints,  # type: ignore[arg-type]
+        observations=tuple(mechanism.observations[k] for k in order),
+    )
 
 
 def recut(mechanism: Mechanism, rng: Rng) -> Mechanism:
@@ -362,8 +423,13 @@ def split(mechanism: Mechanism, rng: Rng, kinds: Collection[str] = SPLITS) -> Me
     by a fixed joint. ``coaxial``, to be asked for: an R becomes two on one axis, which adds an idle motion.
     """
     wanted = {"spherical": JointType.SPHERICAL, "universal": JointType.UNIVERSAL, "coaxial": JointType.REVOLUTE}
-    places = [(kind, joint.name) for kind in kinds if kind in wanted
-              for joint in mechanism.joints.values() if joint.type is wanted[kind]]
+    places = [
+        (kind, joint.name)
+        for kind in kinds
+        if kind in wanted
+        for joint in mechanism.joints.values()
+        if joint.type is wanted[kind]
+    ]
     if "link" in kinds:
         places += [("link", name) for name in mechanism.links]
     if not places:
@@ -395,9 +461,19 @@ def serial(mechanism: Mechanism, rng: Rng, joint: Joint, axes: Sequence[Array]) 
     names = [mechanism.fresh(f"{joint.name}__{k + 1}") for k in range(last + 1)]
     middle = [Link(name, pose(joint.point, random_rotation(rng))) for name in names[:last]]
     ends = [joint.predecessor, *names[:last], joint.successor]
-    joints = [Joint(name, JointType.REVOLUTE, ends[k], ends[k + 1], joint.point, (axis,),
-                    motor=joint.motor and Motor(f"{joint.motor.name}__{k + 1}"), in_tree=joint.in_tree or k < last)
-              for k, (name, axis) in enumerate(zip(names, axes, strict=True))]
+    joints = [
+        Joint(
+            name,
+            JointType.REVOLUTE,
+            ends[k],
+            ends[k + 1],
+            joint.point,
+            (axis,),
+            motor=joint.motor and Motor(f"{joint.motor.name}__{k + 1}"),
+            in_tree=joint.in_tree or k < last,
+        )
+        for k, (name, axis) in enumerate(zip(names, axes, strict=True))
+    ]
     return mechanism.changed(remove_joints=[joint.name], links=middle, joints=joints)
 
 
@@ -412,6 +488,10 @@ def _cut(mechanism: Mechanism, rng: Rng, name: str) -> Mechanism:
     weld = Joint(mechanism.fresh(f"{name}_weld"), JointType.FIXED, first, second, half.pose[:3, 3])
     observations = tuple(
         replace(_turned_in_link(each, half.pose[:3, :3].T @ link.pose[:3, :3]), link=half.name)
-        if each.link == name and rng.integers(2) else each for each in mechanism.observations)
-    return mechanism.changed(links=[half], joints=[*(joint.relinked(name, half.name) for joint in taken), weld],
-                             observations=observations)
+        if each.link == name and rng.integers(2)
+        else each
+        for each in mechanism.observations
+    )
+    return mechanism.changed(
+        links=[half], joints=[*(joint.relinked(name, half.name) for joint in taken), weld], observations=observations
+    )

@@ -32,12 +32,15 @@ def test_a_page_is_seen_with_its_canvas(tab: Tab, tmp_path: Path):
     assert (tmp_path / "seen.png").stat().st_size > 0
 
 
-@pytest.mark.parametrize(("body", "heard"), [
-    ("<script>console.error('so it is')</script>", "console: so it is"),
-    ("<script>nothing.at.all</script>", "uncaught: nothing is not defined"),
-    ("<img src=missing.png>", "not loaded: file://"),
-    ("<img src=http://robots.invalid/a.png>", "asks the network for http://robots.invalid/a.png"),
-])
+@pytest.mark.parametrize(
+    ("body", "heard"),
+    [
+        ("<script>console.error('so it is')</script>", "console: so it is"),
+        ("<script>nothing.at.all</script>", "uncaught: nothing is not defined"),
+        ("<img src=missing.png>", "not loaded: file://"),
+        ("<img src=http://robots.invalid/a.png>", "asks the network for http://robots.invalid/a.png"),
+    ],
+)
 def test_what_is_wrong_in_a_page_is_heard(tab: Tab, tmp_path: Path, body: str, heard: str):
     tab.open(write(tmp_path, body), "document.readyState == 'complete'")
     found, tab.complaints[:] = list(tab.complaints), []

@@ -29,8 +29,10 @@ def texts() -> tuple[tuple[str, str], ...]:
     for ending in ("html", "j2", "js"):
         for file in sorted(PACKAGE.rglob(f"*.{ending}")):
             if not file.name.endswith(".min.js"):  # a library of others
-                found += [(f"{file.relative_to(ROOT)}:{number}", line) for number, line in enumerate(
-                    visible(file.read_text("utf-8")).splitlines(), 1)]
+                found += [
+                    (f"{file.relative_to(ROOT)}:{number}", line)
+                    for number, line in enumerate(visible(file.read_text("utf-8")).splitlines(), 1)
+                ]
     return tuple((where, text) for where, text in found if CERTAIN.search(text))
 
 
@@ -46,6 +48,7 @@ def strings(source: str) -> Iterator[tuple[int, str]]:
 
 def visible(page: str) -> str:
     """A template without comments and styles, of its expressions and tags the texts alone, as many lines as before."""
+
     def blank(match: re.Match[str]) -> str:
         return "\n" * match[0].count("\n")
 
@@ -56,7 +59,7 @@ def visible(page: str) -> str:
 
 
 def patterns() -> dict[str, tuple[str, ...]]:
-    return ({claim.phrase: claim.texts for claim in CLAIMS} | {each.why: each.texts for each in NO_CLAIMS})
+    return {claim.phrase: claim.texts for claim in CLAIMS} | {each.why: each.texts for each in NO_CLAIMS}
 
 
 def test_every_word_of_certainty_is_in_the_table():

@@ -24,20 +24,75 @@ from hrsynth.errors import BadRequest
 from hrsynth.present.outputs import OUTPUTS
 
 FIELDS = {
-    "derive": {"observed", "notation", "dof", "mobility", "verdict", "lost", "unchecked_form", "steps", "certificate",
-               "hidden_file", "report_file", "architecture"},
+    "derive": {
+        "observed",
+        "notation",
+        "dof",
+        "mobility",
+        "verdict",
+        "lost",
+        "unchecked_form",
+        "steps",
+        "certificate",
+        "hidden_file",
+        "report_file",
+        "architecture",
+    },
     "legs": {"sets", "minimal"},
     "advise": {"verdict", "rank", "dof", "lost", "nothing_missing", "sets", "size", "tried", "complete"},
     "branch": {"motors", "passive", "held", "box", "tried", "parts"},
     "check": {"characteristic_length", "observed", "camera", "configurations", "redundant", "grid"},
-    "singular": {"measured", "dof", "verdict", "lost", "always", "never", "unexamined", "words", "expression",
-                 "where", "factors",
-                 "characteristic_length", "checked", "examples", "locus", "file"},
-    "modes": {"kind", "at", "observed", "complex", "complete", "proof", "modes", "near_modes", "degenerate",
-              "continuum"},
+    "singular": {
+        "measured",
+        "dof",
+        "verdict",
+        "lost",
+        "always",
+        "never",
+        "unexamined",
+        "words",
+        "expression",
+        "where",
+        "factors",
+        "characteristic_length",
+        "checked",
+        "examples",
+        "locus",
+        "file",
+    },
+    "modes": {
+        "kind",
+        "at",
+        "observed",
+        "complex",
+        "complete",
+        "proof",
+        "modes",
+        "near_modes",
+        "degenerate",
+        "continuum",
+    },
     "path": {"verdict", "certified", "path", "margin", "boxes", "start", "goal", "reason", "value", "point"},
-    "servo": {"observed", "from", "to", "gain", "sense", "noise", "ended", "reason", "pose", "matched_mode", "modes",
-              "type2", "notes", "spread", "error", "times", "poses", "file"},
+    "servo": {
+        "observed",
+        "from",
+        "to",
+        "gain",
+        "sense",
+        "noise",
+        "ended",
+        "reason",
+        "pose",
+        "matched_mode",
+        "modes",
+        "type2",
+        "notes",
+        "spread",
+        "error",
+        "times",
+        "poses",
+        "file",
+    },
     "accuracy": {"observed", "cones", "axes", "fixed", "reached", "position_mm", "orientation_deg", "checked"},
     "select": {"from", "to", "cones", "best", "sets"},
     "view": {"observed", "dof", "shown", "sliders", "modes", "distance", "largest_distance", "notes", "file"},
@@ -47,9 +102,25 @@ FIELDS = {
 VERDICTS = {"controllable", "partially controllable", "uncontrollable"}
 
 # Bad input of the robot files: a sample of the reader's own tests, one a situation.
-BAD = ["malformed", "two root elements", "unknown joint type", "unknown loop type", "joint of a missing child",
-       "loop of a missing link", "zero axis", "zero axis2", "nan", "inf", "two roots", "no platform",
-       "unknown platform", "platform elsewhere", "observe unknown", "unknown motor", "unknown camera"]
+BAD = [
+    "malformed",
+    "two root elements",
+    "unknown joint type",
+    "unknown loop type",
+    "joint of a missing child",
+    "loop of a missing link",
+    "zero axis",
+    "zero axis2",
+    "nan",
+    "inf",
+    "two roots",
+    "no platform",
+    "unknown platform",
+    "platform elsewhere",
+    "observe unknown",
+    "unknown motor",
+    "unknown camera",
+]
 
 
 class Answer:
@@ -94,8 +165,9 @@ def robot(tmp_path: Path):
 
 
 def process(*arguments: str, **keywords) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, "-m", "hrsynth.cli", *arguments], capture_output=True, text=True,
-                          encoding="utf-8", **keywords)
+    return subprocess.run(
+        [sys.executable, "-m", "hrsynth.cli", *arguments], capture_output=True, text=True, encoding="utf-8", **keywords
+    )
 
 
 def check_record(data: dict, command: str, robot: str | None) -> None:
@@ -109,9 +181,15 @@ def check_record(data: dict, command: str, robot: str | None) -> None:
 
 
 @pytest.mark.some(2)
-@pytest.mark.parametrize(("name", "observe", "verdict"), [
-    ("quattro_rigid", "1,4", "controllable"), ("3prp", "all", "partially controllable"),
-    ("3ppr_m1", "all", "uncontrollable"), ("prrrp_parallel", "all", "partially controllable")])
+@pytest.mark.parametrize(
+    ("name", "observe", "verdict"),
+    [
+        ("quattro_rigid", "1,4", "controllable"),
+        ("3prp", "all", "partially controllable"),
+        ("3ppr_m1", "all", "uncontrollable"),
+        ("prrrp_parallel", "all", "partially controllable"),
+    ],
+)
 def test_derive_json_is_the_contract_whatever_the_verdict(run, name: str, observe: str, verdict: str):
     data = run("derive", name, "--observe", observe, "--json").data
     check_record(data, "derive", name)
@@ -174,37 +252,66 @@ def test_a_file_that_cannot_be_written_leaves_nothing(run, tmp_path: Path):
     assert list(tmp_path.iterdir()) == []
 
 
-WRITERS = {"accuracy": ["--cone", "0.1deg", "--grid", "x=0:0.1:2"], "check": ["--grid", "x=0:0.1:2"],
-           "path": ["--start", "x=0", "--goal", "x=0"], "servo": ["--start", "x=0", "--goal", "x=0"],
-           "endings": ["--at", "x=0"], "basins": ["--to", "x=0"]}
-OTHERS = (["import", "3prp", "--yes", "-o", "{}.urdf"], ["convert", "3prp", "{}.xml"], ["convert", "3prp", "{}.yaml"],
-          ["catalog", "show", "Delta", "-o", "{}.urdf"], ["lint", "3prp", "--fix", "-o", "{}.urdf"])
+WRITERS = {
+    "accuracy": ["--cone", "0.1deg", "--grid", "x=0:0.1:2"],
+    "check": ["--grid", "x=0:0.1:2"],
+    "path": ["--start", "x=0", "--goal", "x=0"],
+    "servo": ["--start", "x=0", "--goal", "x=0"],
+    "endings": ["--at", "x=0"],
+    "basins": ["--to", "x=0"],
+}
+OTHERS = (
+    ["import", "3prp", "--yes", "-o", "{}.urdf"],
+    ["convert", "3prp", "{}.xml"],
+    ["convert", "3prp", "{}.yaml"],
+    ["catalog", "show", "Delta", "-o", "{}.urdf"],
+    ["lint", "3prp", "--fix", "-o", "{}.urdf"],
+)
 
 
-@pytest.mark.parametrize("arguments", [
-    [each.name, "3prp", *WRITERS.get(each.name, []), f"--{file.option}", "{}" + next(iter(file.makers), ".urdf")]
-    for each in QUESTIONS for file in OUTPUTS[each.name].files if file.option] + list(OTHERS), ids=" ".join)
-def test_a_file_that_cannot_be_written_is_told_before_any_work(run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-                                                               arguments: list[str]):
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        [each.name, "3prp", *WRITERS.get(each.name, []), f"--{file.option}", "{}" + next(iter(file.makers), ".urdf")]
+        for each in QUESTIONS
+        for file in OUTPUTS[each.name].files
+        if file.option
+    ]
+    + list(OTHERS),
+    ids=" ".join,
+)
+def test_a_file_that_cannot_be_written_is_told_before_any_work(
+    run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str]
+):
     """In one wording, whether its folder is missing, takes no such name, or a folder has its name."""
+
     def worked(*_: object, **__: object) -> None:
         pytest.fail("the work began")
 
-    for module, work in (("cli.questions", "robot_of"), ("cli.files", "robot_of"), ("cli.importing", "_read"),
-                         ("cli.catalog", "_of_word"), ("linting.lint", "LintedFile")):
+    for module, work in (
+        ("cli.questions", "robot_of"),
+        ("cli.files", "robot_of"),
+        ("cli.importing", "_read"),
+        ("cli.catalog", "_of_word"),
+        ("linting.lint", "LintedFile"),
+    ):
         monkeypatch.setattr(import_module(f"hrsynth.{module}"), work, worked)
     *most, file = arguments
     taken = tmp_path / file.format("taken")
     taken.mkdir()
-    for path, reason in ((tmp_path / "none" / file.format("x"), "no such folder"), (taken, "a directory"),
-                         (tmp_path / file.format("x" * 300), "no such file can be made in its folder")):
+    for path, reason in (
+        (tmp_path / "none" / file.format("x"), "no such folder"),
+        (taken, "a directory"),
+        (tmp_path / file.format("x" * 300), "no such file can be made in its folder"),
+    ):
         (line,) = run(*most, path).refused()
         assert line.startswith(f"hrsynth: cannot write the file: {reason}"), line
     assert list(tmp_path.iterdir()) == [taken]
 
 
-def test_all_mended_files_can_be_written_before_the_first_is(run, robot, tmp_path: Path,
-                                                             monkeypatch: pytest.MonkeyPatch):
+def test_all_mended_files_can_be_written_before_the_first_is(
+    run, robot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
     def refuse(path: Path) -> None:
         if path.name == "b.urdf":
             raise BadRequest("cannot write the file", str(path))
@@ -261,32 +368,45 @@ def test_both_forms_are_certified(run):
     assert data["certificate"]["passed"] is True
 
 
-@pytest.mark.parametrize(("arguments", "words"), [
-    (["--observe", "9"], ["'9'", "legs 1, 2, 3"]),
-    (["--observe", "1,,2"], ["empty name", "'1,,2'"]),
-    (["--observe", ""], ["empty name"]),
-    (["--observe", "base"], ["base"]),
-    (["--observe", "platform"], ["platform"]),
-    (["--observe", "1,all"], ["'all'"]),
-    (["--camera", "moon"], ["camera", "'moon'", "platform"]),
-    (["--form", "pretty"], ["'pretty'", "simplified, general"]),
-    (["--seed", "x"], ["seed", "integer"]),
-    (["--seed", "-1"], ["seed", "0"]),
-    (["--nothing"], ["--nothing"]),
-    (["more"], ["more"]),
-])
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--observe", "9"], ["'9'", "legs 1, 2, 3"]),
+        (["--observe", "1,,2"], ["empty name", "'1,,2'"]),
+        (["--observe", ""], ["empty name"]),
+        (["--observe", "base"], ["base"]),
+        (["--observe", "platform"], ["platform"]),
+        (["--observe", "1,all"], ["'all'"]),
+        (["--camera", "moon"], ["camera", "'moon'", "platform"]),
+        (["--form", "pretty"], ["'pretty'", "simplified, general"]),
+        (["--seed", "x"], ["seed", "integer"]),
+        (["--seed", "-1"], ["seed", "0"]),
+        (["--nothing"], ["--nothing"]),
+        (["more"], ["more"]),
+    ],
+)
 def test_arguments_that_do_not_fit(run, arguments: list[str], words: list[str]):
     lines = run("derive", "delta", *arguments).refused()
     assert len(lines) == 1
     assert all(word in lines[0] for word in words), lines
 
 
-@pytest.mark.parametrize("words", [
-    "derive delta --seed ٣", "derive delta --seed 1_0", "accuracy delta --cone ١deg", "accuracy delta --cone 1=０.5deg",
-    "advise delta --price leg=٢", "check delta --at mode:٢", "check delta --grid x=0:1:٣",
-    "servo delta --start z=-0.7 --goal z=-0.75 --noise ١deg",
-    "servo delta --start z=-0.7 --goal z=-0.75 --depth constant:٢",
-    "derive delta --close arm_1@٠,0,0:arm_2@0,0,0", "accuracy delta --plane z=-0.7 -o map.svg --width ٨cm"])
+@pytest.mark.parametrize(
+    "words",
+    [
+        "derive delta --seed ٣",
+        "derive delta --seed 1_0",
+        "accuracy delta --cone ١deg",
+        "accuracy delta --cone 1=０.5deg",
+        "advise delta --price leg=٢",
+        "check delta --at mode:٢",
+        "check delta --grid x=0:1:٣",
+        "servo delta --start z=-0.7 --goal z=-0.75 --noise ١deg",
+        "servo delta --start z=-0.7 --goal z=-0.75 --depth constant:٢",
+        "derive delta --close arm_1@٠,0,0:arm_2@0,0,0",
+        "accuracy delta --plane z=-0.7 -o map.svg --width ٨cm",
+    ],
+)
 def test_numbers_are_in_ascii_digits(run, words: str):
     assert len(run(*words.split()).refused()) == 1
 
@@ -301,8 +421,10 @@ SPHERICAL = """<robot name="spherical">
 </robot>"""
 
 
-@pytest.mark.parametrize(("robot", "word"), [("rrrrr_m1", "PiR*"), ("gough_stewart", "U*PS"),
-                                              ("3rps", "R*PS+2-RPS"), ("prrrp_parallel_point", "PR*R")])
+@pytest.mark.parametrize(
+    ("robot", "word"),
+    [("rrrrr_m1", "PiR*"), ("gough_stewart", "U*PS"), ("3rps", "R*PS+2-RPS"), ("prrrp_parallel_point", "PR*R")],
+)
 def test_a_hidden_robot_of_one_leg_is_a_robot_again(run, tmp_path: Path, robot: str, word: str):
     """Its platform, which is watched, is in no leg then; it turns on one ball; it is a point on one R. What
     was watched is what its file watches."""
@@ -318,14 +440,24 @@ def test_a_hidden_robot_of_one_leg_is_a_robot_again(run, tmp_path: Path, robot: 
             assert again["twist"] == pytest.approx(once["twist"], abs=1e-9)
 
 
-@pytest.mark.parametrize(("arguments", "cure"), [
-    (["nowhere.urdf"], "the path of a file"), (["empty.urdf"], "a robot file"), (["cut.urdf"], "a whole document"),
-    (["/dev/null"], "a robot file"), (["delta", "-o", "nowhere/x.urdf"], "in a folder that is there"),
-    (["delta", "--camera", "arm_1", "--camera", "base"], "others as NAME=LINK@x,y,z"),
-    (["delta", "--unit", ""], "m, mm, cm, in"), (["delta", "--platform", ""], "rod_1a"),
-    (["delta", "more"], "what hrsynth derive -h lists"), (["spherical.urdf"], "--see direction:LINK/dx,dy,dz")])
-def test_a_refusal_says_what_to_do(run, robot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-                                   arguments: list[str], cure: str):
+@pytest.mark.parametrize(
+    ("arguments", "cure"),
+    [
+        (["nowhere.urdf"], "the path of a file"),
+        (["empty.urdf"], "a robot file"),
+        (["cut.urdf"], "a whole document"),
+        (["/dev/null"], "a robot file"),
+        (["delta", "-o", "nowhere/x.urdf"], "in a folder that is there"),
+        (["delta", "--camera", "arm_1", "--camera", "base"], "others as NAME=LINK@x,y,z"),
+        (["delta", "--unit", ""], "m, mm, cm, in"),
+        (["delta", "--platform", ""], "rod_1a"),
+        (["delta", "more"], "what hrsynth derive -h lists"),
+        (["spherical.urdf"], "--see direction:LINK/dx,dy,dz"),
+    ],
+)
+def test_a_refusal_says_what_to_do(
+    run, robot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], cure: str
+):
     monkeypatch.chdir(tmp_path)
     for name, text in (("empty.urdf", ""), ("cut.urdf", FOUR_BAR[:500]), ("spherical.urdf", SPHERICAL)):
         robot(text, name)
@@ -352,8 +484,25 @@ def test_check_json_is_the_contract(run):
     check_record(data, "check", "delta")
     assert [one["leg"] for one in data["observed"]] == ["1", "2"]
     first, second = data["configurations"]
-    assert first.keys() == {"pose", "beyond", "flat_wrists", "mobility", "dof", "rank_M", "gap", "condition", "type1",
-                            "type2", "type3", "classes", "lost", "real", "constraint", "redundant", "distances"}
+    assert first.keys() == {
+        "pose",
+        "beyond",
+        "flat_wrists",
+        "mobility",
+        "dof",
+        "rank_M",
+        "gap",
+        "condition",
+        "type1",
+        "type2",
+        "type3",
+        "classes",
+        "lost",
+        "real",
+        "constraint",
+        "redundant",
+        "distances",
+    }
     assert [first["pose"][name] for name in "xyz"] == pytest.approx([0.02, 0.1, -0.62])
     assert second["pose"]["x"] == pytest.approx(0, abs=1e-8)
     assert first["pose"]["rpy"] == pytest.approx([0, 0, 0], abs=1e-8)
@@ -363,21 +512,34 @@ def test_check_json_is_the_contract(run):
     assert first["classes"] == {"RI": 0, "RO": 0, "II": 0, "IO": 0, "RPM": 0, "IIM": 0}
     assert first["real"].keys() == {"rank", "gap", "type1", "type2", "type3", "classes", "lost"}
     assert first["constraint"] == {"singular": False, "rank_lost": 0, "gained": []}
-    assert first["distances"].keys() == {"type2", "type1", "constraints", "condition", "mm_per_degree",
-                                         "degrees_per_degree"}
+    assert first["distances"].keys() == {
+        "type2",
+        "type1",
+        "constraints",
+        "condition",
+        "mm_per_degree",
+        "degrees_per_degree",
+    }
     assert data["redundant"] == []
     assert data["grid"] is None
     assert run("check", "3rrr_m1", "--json").data["redundant"] == [
-        {"loop": "wrist_2", "rows": 3, "generic": True}, {"loop": "wrist_3", "rows": 3, "generic": True}]
+        {"loop": "wrist_2", "rows": 3, "generic": True},
+        {"loop": "wrist_3", "rows": 3, "generic": True},
+    ]
 
 
 def test_check_text_names_the_singularity(run):
     answer = run("check", "rrrrr_m1", "--at", f"x=0,y={0.16 + 0.03**0.5!r}")
     assert (answer.status, answer.err) == (0, "")
-    for line in (r"^pose +x=0,y=0.333205,", r"^mobility +2, of which 0 idle; the platform has 2 freedoms$",
-                 r"^hidden robot +the directions show 1 of 2: Type 2 singularity ", r"RI 0  RO 1  II 1  IO 0",
-                 r"^not seen +translation along x\b", r"^real robot +the motors determine 2 of 2: regular ",
-                 r"^redundant +the loop end: 3 of its constraints$"):
+    for line in (
+        r"^pose +x=0,y=0.333205,",
+        r"^mobility +2, of which 0 idle; the platform has 2 freedoms$",
+        r"^hidden robot +the directions show 1 of 2: Type 2 singularity ",
+        r"RI 0  RO 1  II 1  IO 0",
+        r"^not seen +translation along x\b",
+        r"^real robot +the motors determine 2 of 2: regular ",
+        r"^redundant +the loop end: 3 of its constraints$",
+    ):
         assert re.search(line, answer.out, re.MULTILINE), answer.out
 
 
@@ -398,26 +560,40 @@ def test_check_writes_a_picture_or_a_table(run, tmp_path: Path):
     assert rows[5][3] == "0.0"
     assert rows[1][3] == ""
     for text in ("x=0:0.1:3", "x=0:0.02:2,y=0.2:0.22:2,z=0"):
-        drawn = run("check", "rrrrr_m1" if "z" not in text else "delta", "--grid", text.replace(",z=0", ",z=-0.6"),
-                    "-o", picture)
+        drawn = run(
+            "check",
+            "rrrrr_m1" if "z" not in text else "delta",
+            "--grid",
+            text.replace(",z=0", ",z=-0.6"),
+            "-o",
+            picture,
+        )
         assert (drawn.status, drawn.err) == (0, "")
     assert run("check", "quattro", "--grid", "x=0:0.02:2,y=0:0.02:2,phi=0:5deg:2", "-o", picture).status == 0
     assert sorted(path.name for path in tmp_path.iterdir()) == ["map.csv", "map.png"]
 
 
 @pytest.mark.some(6)
-@pytest.mark.parametrize(("arguments", "status", "words"), [
-    (["--at", "x=abc"], 2, ["x is not a number", "'abc'"]), (["--at", "w=1"], 2, ["unknown part", "x, y, z, phi, rpy"]),
-    (["--at", ""], 2, ["name=value"]), (["--at", "phi=1deg"], 2, ["cannot change phi", "allowed: x, y, z"]),
-    (["--at", "x=9"], 3, ["x=9", "is not reached", "leg ", " mm", "% of the way"]),
-    (["--grid", "x=0"], 2, ["number of ranges"]), (["--grid", "phi=0:1:3"], 2, ["cannot change phi"]),
-    (["-o", "map.png"], 2, ["--grid"]),
-    (["--grid", "x=0:1:3", "-o", "map.gif"], 2, ["unknown extension", ".png, .pdf, .svg, .csv"]),
-    (["--grid", "x=5:6:2", "-o", "map.png"], 3, ["no pose of the grid x=5:6:2 is reached"]),
-    (["--observe", "9"], 2, ["legs 1, 2, 3"]), (["--camera", "moon"], 2, ["'moon'"]),
-])
-def test_check_refuses_in_one_line_and_writes_nothing(run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-                                                      arguments: list[str], status: int, words: list[str]):
+@pytest.mark.parametrize(
+    ("arguments", "status", "words"),
+    [
+        (["--at", "x=abc"], 2, ["x is not a number", "'abc'"]),
+        (["--at", "w=1"], 2, ["unknown part", "x, y, z, phi, rpy"]),
+        (["--at", ""], 2, ["name=value"]),
+        (["--at", "phi=1deg"], 2, ["cannot change phi", "allowed: x, y, z"]),
+        (["--at", "x=9"], 3, ["x=9", "is not reached", "leg ", " mm", "% of the way"]),
+        (["--grid", "x=0"], 2, ["number of ranges"]),
+        (["--grid", "phi=0:1:3"], 2, ["cannot change phi"]),
+        (["-o", "map.png"], 2, ["--grid"]),
+        (["--grid", "x=0:1:3", "-o", "map.gif"], 2, ["unknown extension", ".png, .pdf, .svg, .csv"]),
+        (["--grid", "x=5:6:2", "-o", "map.png"], 3, ["no pose of the grid x=5:6:2 is reached"]),
+        (["--observe", "9"], 2, ["legs 1, 2, 3"]),
+        (["--camera", "moon"], 2, ["'moon'"]),
+    ],
+)
+def test_check_refuses_in_one_line_and_writes_nothing(
+    run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], status: int, words: list[str]
+):
     monkeypatch.chdir(tmp_path)
     (line,) = run("check", "delta", *arguments).refused(status)
     assert all(word in line for word in words), line
@@ -515,17 +691,31 @@ def test_advise_json_where_nothing_is_missing(run):
     assert run("advise", "quattro", "--observe", "1,4").out.endswith("\nNothing is missing\n")
 
 
-@pytest.mark.parametrize(("arguments", "lines"), [
-    (["uranesx"], [r"^verdict +partially controllable \(rank 2 of 3\)$", r"^lost at zero +translation along z$",
-                   r"^Controllable \(rank 3 of 3\) with one more measurement, 6 ways",
-                   r"^  position of an observed line: any of rod_1a, rod_2a, rod_3a$",
-                   r"^  encoder on a joint: any of guide_1\*, guide_2\*, guide_3\*$", r"^\* a joint with a motor$"]),
-    (["gough_stewart", "--observe", "1"], [r"with 2 more measurements, 10 ways",
-                                           r"^  leg .*: any 2 of 2, 3, 4, 5, 6$"]),
-    (["3prp"], [r"^  position of an observed line and encoder on a joint:$",
-                r"^    \{dist_1, guide_2\*\}  [^:]* more "]),
-    (["3puu", "--observe", "1", "--camera", "platform"], [r"encoder .*\w \(first axis\)"]),
-])
+@pytest.mark.parametrize(
+    ("arguments", "lines"),
+    [
+        (
+            ["uranesx"],
+            [
+                r"^verdict +partially controllable \(rank 2 of 3\)$",
+                r"^lost at zero +translation along z$",
+                r"^Controllable \(rank 3 of 3\) with one more measurement, 6 ways",
+                r"^  position of an observed line: any of rod_1a, rod_2a, rod_3a$",
+                r"^  encoder on a joint: any of guide_1\*, guide_2\*, guide_3\*$",
+                r"^\* a joint with a motor$",
+            ],
+        ),
+        (
+            ["gough_stewart", "--observe", "1"],
+            [r"with 2 more measurements, 10 ways", r"^  leg .*: any 2 of 2, 3, 4, 5, 6$"],
+        ),
+        (
+            ["3prp"],
+            [r"^  position of an observed line and encoder on a joint:$", r"^    \{dist_1, guide_2\*\}  [^:]* more "],
+        ),
+        (["3puu", "--observe", "1", "--camera", "platform"], [r"encoder .*\w \(first axis\)"]),
+    ],
+)
 def test_advise_text_groups_the_cures(run, arguments: list[str], lines: list[str]):
     answer = run("advise", *arguments)
     assert (answer.status, answer.err) == (0, "")
@@ -551,17 +741,24 @@ def test_advise_tries_what_is_offered(run):
 
 def test_advise_names_the_joints_of_the_file(run):
     """Two R that meet count as a U; an encoder is on one of the two, which `--see encoder:NAME` reads as well."""
-    data = run("advise", "example:panda", "--camera", "hand=panda_hand", "--see", "point:world@0.5,0.1,0",
-               "--json").data
+    data = run(
+        "advise", "example:panda", "--camera", "hand=panda_hand", "--see", "point:world@0.5,0.1,0", "--json"
+    ).data
     joints = {m["of"] for each in data["sets"] for m in each["measurements"] if m["kind"] == "encoder"}
     assert joints <= {f"panda_joint{number}" for number in range(1, 8)}
     assert "panda_joint6" in joints
     assert all(m["axis"] is None for each in data["sets"] for m in each["measurements"] if m["kind"] == "encoder")
 
 
-@pytest.mark.parametrize(("arguments", "words"), [
-    (["--observe", "9"], ["'9'", "legs 1, 2, 3"]), (["--observe", ""], ["empty name"]),
-    (["--camera", "moon"], ["camera", "'moon'"]), (["--seed", "-1"], ["seed", "0"])])
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--observe", "9"], ["'9'", "legs 1, 2, 3"]),
+        (["--observe", ""], ["empty name"]),
+        (["--camera", "moon"], ["camera", "'moon'"]),
+        (["--seed", "-1"], ["seed", "0"]),
+    ],
+)
 def test_advise_refuses_what_does_not_fit(run, arguments: list[str], words: list[str]):
     (line,) = run("advise", "delta", *arguments).refused()
     assert all(word in line for word in words), line
@@ -609,16 +806,21 @@ def test_singular_of_the_real_robot(run):
 def test_singular_text(run):
     answer = run("singular", "rrrrr_m1", "--points", "100")
     assert (answer.status, answer.err) == (0, "")
-    for line in (r"^Type 2 +the tangents τ1, τ2 are parallel$", r"^expression +det\(n, tau1, tau2\) = 0$",
-                 r"^checked +100 random poses and \d+ on the locus, 0 disagreements", r"^singular at +x="):
+    for line in (
+        r"^Type 2 +the tangents τ1, τ2 are parallel$",
+        r"^expression +det\(n, tau1, tau2\) = 0$",
+        r"^checked +100 random poses and \d+ on the locus, 0 disagreements",
+        r"^singular at +x=",
+    ):
         assert re.search(line, answer.out, re.MULTILINE), answer.out
 
 
 @pytest.mark.slow
 def test_singular_draws_the_locus(run, tmp_path: Path):
     picture = tmp_path / "locus.png"
-    data = run("singular", "3rrr_m1", "--points", "30", "--plane", "phi=0", "--steps", "9", "-o", picture,
-               "--json").data
+    data = run(
+        "singular", "3rrr_m1", "--points", "30", "--plane", "phi=0", "--steps", "9", "-o", picture, "--json"
+    ).data
     assert picture.read_bytes().startswith(b"\x89PNG")
     assert data["file"] == str(picture)
     assert data["locus"]["axes"].keys() == {"x", "y"}
@@ -628,38 +830,60 @@ def test_singular_draws_the_locus(run, tmp_path: Path):
 
 
 @pytest.mark.some(3)
-@pytest.mark.parametrize(("robot", "arguments", "status", "words"), [
-    ("delta", ["-o", "x.txt"], 2, ["unknown extension", "'x.txt'", ".png"]),
-    ("delta", ["--plane", "z=-0.6"], 2, ["no figure is asked for", "-o FILE.png"]),
-    ("delta", ["--plane", "phi=0", "-o", "x.png"], 2, ["cannot change phi", "x, y, z"]),
-    ("delta", ["--plane", "z=5", "-o", "x.png"], 3, ["no pose of the plane z=5 is reached"]),
-    ("hexaglide", ["-o", "x.png"], 2, ["has no locus"]), ("delta", ["--observe", "9"], 2, ["legs 1, 2, 3"]),
-    ("delta", ["--camera", "moon"], 2, ["'moon'"])])
-def test_singular_refuses_in_one_line_and_writes_nothing(run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-                                                         robot: str, arguments: list[str], status: int,
-                                                         words: list[str]):
+@pytest.mark.parametrize(
+    ("robot", "arguments", "status", "words"),
+    [
+        ("delta", ["-o", "x.txt"], 2, ["unknown extension", "'x.txt'", ".png"]),
+        ("delta", ["--plane", "z=-0.6"], 2, ["no figure is asked for", "-o FILE.png"]),
+        ("delta", ["--plane", "phi=0", "-o", "x.png"], 2, ["cannot change phi", "x, y, z"]),
+        ("delta", ["--plane", "z=5", "-o", "x.png"], 3, ["no pose of the plane z=5 is reached"]),
+        ("hexaglide", ["-o", "x.png"], 2, ["has no locus"]),
+        ("delta", ["--observe", "9"], 2, ["legs 1, 2, 3"]),
+        ("delta", ["--camera", "moon"], 2, ["'moon'"]),
+    ],
+)
+def test_singular_refuses_in_one_line_and_writes_nothing(
+    run,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    robot: str,
+    arguments: list[str],
+    status: int,
+    words: list[str],
+):
     monkeypatch.chdir(tmp_path)
     (line,) = run("singular", robot, "--points", "5", *arguments).refused(status)
     assert all(word in line for word in words), line
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize(("arguments", "status", "words"), [
-    (["--plane", "q=1"], 2, ["unknown part", "'q'"]),
-    (["--plane", "phi=0,x=0"], 2, ["this one leaves y", "fewer parts held", "--grid y=-0.1:0.1:9 of check, accuracy"]),
-    (["--plane", "x=9"], 3, ["no pose of the plane x=9 is reached"]),
-    (["--observe", "1"], 2, ["has no locus", "legs that make it controllable"])])
-def test_singular_refuses_a_plane_before_it_computes(run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-                                                     arguments: list[str], status: int, words: list[str]):
+@pytest.mark.parametrize(
+    ("arguments", "status", "words"),
+    [
+        (["--plane", "q=1"], 2, ["unknown part", "'q'"]),
+        (
+            ["--plane", "phi=0,x=0"],
+            2,
+            ["this one leaves y", "fewer parts held", "--grid y=-0.1:0.1:9 of check, accuracy"],
+        ),
+        (["--plane", "x=9"], 3, ["no pose of the plane x=9 is reached"]),
+        (["--observe", "1"], 2, ["has no locus", "legs that make it controllable"]),
+    ],
+)
+def test_singular_refuses_a_plane_before_it_computes(
+    run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], status: int, words: list[str]
+):
     monkeypatch.setattr(hrsynth, "singular", lambda *_, **__: pytest.fail("computed before the plane was looked at"))
     (line,) = run("singular", "3rrr_m1", *arguments, "-o", tmp_path / "x.png").refused(status)
     assert all(word in line for word in words), line
 
 
-@pytest.mark.parametrize("words", [
-    ["singular", "-o", "x.png"], ["accuracy", "--cone", "1deg", "--plane", "y=0"]], ids=" ".join)
-def test_a_robot_of_one_freedom_has_no_plane(run, robot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-                                             words: list[str]):
+@pytest.mark.parametrize(
+    "words", [["singular", "-o", "x.png"], ["accuracy", "--cone", "1deg", "--plane", "y=0"]], ids=" ".join
+)
+def test_a_robot_of_one_freedom_has_no_plane(
+    run, robot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: list[str]
+):
     """Though its platform moves along x and along z: on a curve."""
     monkeypatch.chdir(tmp_path)
     (line,) = run(words[0], robot(FOUR_BAR), *words[1:]).refused()
@@ -679,11 +903,15 @@ def test_singular_answers_3_where_condition_and_rank_disagree(run, tmp_path: Pat
 # ---- path
 
 
-@pytest.mark.parametrize(("arguments", "verdict"), [
-    (["rrrrr_m1", "--start", "x=0.05", "--goal", "x=-0.01,y=0.03"], "same aspect"),
-    (["3prr_m1", "--start", "x=0,y=0", "--goal", "x=0.0585,y=0.073,phi=-88deg"], "separated"),
-    (["3rrr_m1", "--start", "x=0,y=0", "--goal", "mode:2"], "separated"),
-    (["3rps", "--start", "z=0.5", "--goal", "z=0.51"], "undecided")])
+@pytest.mark.parametrize(
+    ("arguments", "verdict"),
+    [
+        (["rrrrr_m1", "--start", "x=0.05", "--goal", "x=-0.01,y=0.03"], "same aspect"),
+        (["3prr_m1", "--start", "x=0,y=0", "--goal", "x=0.0585,y=0.073,phi=-88deg"], "separated"),
+        (["3rrr_m1", "--start", "x=0,y=0", "--goal", "mode:2"], "separated"),
+        (["3rps", "--start", "z=0.5", "--goal", "z=0.51"], "undecided"),
+    ],
+)
 def test_path_json_is_the_contract_whatever_the_verdict(run, arguments: list[str], verdict: str):
     data = run("path", *arguments, "--json").data
     check_record(data, "path", arguments[0])
@@ -716,13 +944,17 @@ def test_path_text_has_the_verdict_the_path_and_what_is_not_proved(run):
     assert re.search(r"^not proved +collisions", answer.out, re.MULTILINE)
 
 
-@pytest.mark.parametrize(("arguments", "status", "words"), [
-    (["--start", "x=0", "--goal", "x=9"], 3, ["x=9", "is not reached"]),
-    (["--start", "x=0", "--goal", "w=9"], 2, ["unknown part", "'w'"]),
-    (["--start", "x=0", "--goal", "z=0.1"], 2, ["cannot change z"]),
-    (["--start", "x=0", "--goal", "x=0.01", "--observe", "7"], 2, ["no leg or link", "'7'"]),
-    (["--start", "x=0"], 2, ["--goal"]),
-    (["--start", "x=0", "--goal", "x=0", "--as-written", "--tolerance", "1e-3"], 2, ["one of the two"])])
+@pytest.mark.parametrize(
+    ("arguments", "status", "words"),
+    [
+        (["--start", "x=0", "--goal", "x=9"], 3, ["x=9", "is not reached"]),
+        (["--start", "x=0", "--goal", "w=9"], 2, ["unknown part", "'w'"]),
+        (["--start", "x=0", "--goal", "z=0.1"], 2, ["cannot change z"]),
+        (["--start", "x=0", "--goal", "x=0.01", "--observe", "7"], 2, ["no leg or link", "'7'"]),
+        (["--start", "x=0"], 2, ["--goal"]),
+        (["--start", "x=0", "--goal", "x=0", "--as-written", "--tolerance", "1e-3"], 2, ["one of the two"]),
+    ],
+)
 def test_path_refuses_what_does_not_fit(run, arguments: list[str], status: int, words: list[str]):
     (line,) = run("path", "3rrr_m1", *arguments).refused(status)
     assert all(word in line for word in words)
@@ -737,9 +969,15 @@ def test_path_to_where_it_starts_says_so(run):
 # ---- modes
 
 
-@pytest.mark.parametrize(("arguments", "count", "real"), [
-    (["3rrr_m1"], 6, 2), (["3rps"], 8, 8), (["quattro", "--observe", "1,3", "--at", "x=0.05,y=0.1,z=-0.7"], 4, 4),
-    (["3rrr_m1", "--real", "--at", "x=0.02,phi=5deg"], 6, 2)])
+@pytest.mark.parametrize(
+    ("arguments", "count", "real"),
+    [
+        (["3rrr_m1"], 6, 2),
+        (["3rps"], 8, 8),
+        (["quattro", "--observe", "1,3", "--at", "x=0.05,y=0.1,z=-0.7"], 4, 4),
+        (["3rrr_m1", "--real", "--at", "x=0.02,phi=5deg"], 6, 2),
+    ],
+)
 def test_modes_json_is_the_contract(run, arguments: list[str], count: int, real: int):
     data = run("modes", *arguments, "--json").data
     check_record(data, "modes", arguments[0])
@@ -775,12 +1013,16 @@ def test_modes_text_numbers_them_and_says_what_is_proved(run):
     assert answer.out.count("(the pose itself)") == 1
 
 
-@pytest.mark.parametrize(("arguments", "status", "words"), [
-    (["3rrr_m1", "--at", "x=9"], 3, ["x=9", "is not reached"]),
-    (["3rrr_m1", "--at", "w=9"], 2, ["unknown part", "'w'"]),
-    (["3rrr_m1", "--observe", "7"], 2, ["no leg or link", "'7'"]),
-    (["3rrr_m1", "-o", "modes.txt"], 2, ["modes.txt", ".png"]),
-    (["3rrr_m1", "--real", "--observe", "1"], 2, ["motors are held", "one of the two"])])
+@pytest.mark.parametrize(
+    ("arguments", "status", "words"),
+    [
+        (["3rrr_m1", "--at", "x=9"], 3, ["x=9", "is not reached"]),
+        (["3rrr_m1", "--at", "w=9"], 2, ["unknown part", "'w'"]),
+        (["3rrr_m1", "--observe", "7"], 2, ["no leg or link", "'7'"]),
+        (["3rrr_m1", "-o", "modes.txt"], 2, ["modes.txt", ".png"]),
+        (["3rrr_m1", "--real", "--observe", "1"], 2, ["motors are held", "one of the two"]),
+    ],
+)
 def test_modes_refuses_what_does_not_fit(run, arguments: list[str], status: int, words: list[str]):
     (line,) = run("modes", *arguments).refused(status)
     assert all(word in line for word in words)
@@ -805,8 +1047,18 @@ def test_servo_json_is_the_contract(run, tmp_path: Path):
 
 @pytest.mark.slow
 def test_servo_text_names_the_mode_and_how_far_it_is(run):
-    answer = run("servo", "quattro_rigid", "--observe", "1,2", "--start", "x=0.1,y=0.04,z=-0.93", "--goal",
-                 "x=0,y=-0.25,z=-0.7", "--gain", "5")
+    answer = run(
+        "servo",
+        "quattro_rigid",
+        "--observe",
+        "1,2",
+        "--start",
+        "x=0.1,y=0.04,z=-0.93",
+        "--goal",
+        "x=0,y=-0.25,z=-0.7",
+        "--gain",
+        "5",
+    )
     assert (answer.status, answer.err) == (0, "")
     assert re.search(r"^ended +mode after", answer.out, re.MULTILINE)
     assert "its assembly mode 2 of 2" in answer.out
@@ -814,31 +1066,49 @@ def test_servo_text_names_the_mode_and_how_far_it_is(run):
     assert answer.out.count("(the goal)") == 1
 
 
-@pytest.mark.parametrize(("arguments", "words"), [
-    (["--goal", "x=0.1", "--observe", "1"], ["do not see", "hrsynth legs"]),
-    (["--goal", "x=0.1", "--observe", "7"], ["no leg or link", "'7'"]),
-    (["--goal", "x=0.1", "--noise", "90deg"], ["noise", "90deg", "below 90deg"]),
-    (["--goal", "x=0.1", "--noise", "1px"], ["'1px'", "allowed: 0.1deg"]),
-    (["--goal", "x=0.1", "--sense", "edges", "--noise", "1deg"], ["1deg", "pixels"]),
-    (["--goal", "x=0.1", "--sense", "touch"], ["touch", "exact, edges, pictures"]),
-    (["--goal", "x=0.1", "--gain", "0"], ["gain", "positive"]),
-    (["--goal", "x=0.1", "--time", "nan"], ["time", "positive"]),
-    (["--goal", "x=0.1", "-o", "run.txt"], ["run.txt", ".png"])])
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--goal", "x=0.1", "--observe", "1"], ["do not see", "hrsynth legs"]),
+        (["--goal", "x=0.1", "--observe", "7"], ["no leg or link", "'7'"]),
+        (["--goal", "x=0.1", "--noise", "90deg"], ["noise", "90deg", "below 90deg"]),
+        (["--goal", "x=0.1", "--noise", "1px"], ["'1px'", "allowed: 0.1deg"]),
+        (["--goal", "x=0.1", "--sense", "edges", "--noise", "1deg"], ["1deg", "pixels"]),
+        (["--goal", "x=0.1", "--sense", "touch"], ["touch", "exact, edges, pictures"]),
+        (["--goal", "x=0.1", "--gain", "0"], ["gain", "positive"]),
+        (["--goal", "x=0.1", "--time", "nan"], ["time", "positive"]),
+        (["--goal", "x=0.1", "-o", "run.txt"], ["run.txt", ".png"]),
+    ],
+)
 def test_servo_refuses_what_does_not_fit(run, arguments: list[str], words: list[str]):
     (line,) = run("servo", "delta", "--start", "x=0,y=0", *arguments).refused(2)
     assert all(word in line for word in words)
 
 
 @pytest.mark.some(1, 6)
-@pytest.mark.parametrize("arguments", [
-    ["derive", "--at", "x=9"], ["legs", "--at", "x=9"], ["check", "--at", "x=9"], ["check", "--grid", "x=8:9:2"],
-    ["modes", "--at", "x=9"], ["path", "--start", "x=0", "--goal", "x=9"], ["path", "--start", "x=9", "--goal", "x=0"],
-    ["servo", "--start", "x=0", "--goal", "x=9"], ["servo", "--start", "x=9", "--goal", "x=0"],
-    ["accuracy", "--cone", "1deg", "--at", "x=9"], ["accuracy", "--cone", "1deg", "--grid", "x=8:9:2,y=0,z=-0.6"],
-    ["accuracy", "--cone", "1deg", "--plane", "z=9"], ["select", "--start", "x=0", "--goal", "x=9"],
-    ["singular", "--points", "5", "--plane", "z=9", "-o", "locus.png"]], ids=" ".join)
-def test_a_pose_that_is_not_reached_ends_with_3(run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-                                                arguments: list[str]):
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["derive", "--at", "x=9"],
+        ["legs", "--at", "x=9"],
+        ["check", "--at", "x=9"],
+        ["check", "--grid", "x=8:9:2"],
+        ["modes", "--at", "x=9"],
+        ["path", "--start", "x=0", "--goal", "x=9"],
+        ["path", "--start", "x=9", "--goal", "x=0"],
+        ["servo", "--start", "x=0", "--goal", "x=9"],
+        ["servo", "--start", "x=9", "--goal", "x=0"],
+        ["accuracy", "--cone", "1deg", "--at", "x=9"],
+        ["accuracy", "--cone", "1deg", "--grid", "x=8:9:2,y=0,z=-0.6"],
+        ["accuracy", "--cone", "1deg", "--plane", "z=9"],
+        ["select", "--start", "x=0", "--goal", "x=9"],
+        ["singular", "--points", "5", "--plane", "z=9", "-o", "locus.png"],
+    ],
+    ids=" ".join,
+)
+def test_a_pose_that_is_not_reached_ends_with_3(
+    run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str]
+):
     monkeypatch.chdir(tmp_path)
     (line,) = run(arguments[0], "delta", *arguments[1:]).refused(3)
     assert "is reached" in line or "is not reached" in line
@@ -894,9 +1164,14 @@ def test_nothing_is_written_over_the_file_that_is_read(run, robot):
     once = file.read_bytes()
     link = file.with_name("link.urdf")
     link.symlink_to(file)
-    for arguments in (("convert", file, file), ("convert", file, link), ("convert", link, file),
-                      ("convert", file.with_name("..") / file.parent.name / file.name, file),
-                      ("convert", file, file, "--to", "sdf"), ("derive", file, "-o", file)):
+    for arguments in (
+        ("convert", file, file),
+        ("convert", file, link),
+        ("convert", link, file),
+        ("convert", file.with_name("..") / file.parent.name / file.name, file),
+        ("convert", file, file, "--to", "sdf"),
+        ("derive", file, "-o", file),
+    ):
         assert "it is the one being read" in run(*arguments).refused()[0]
     assert file.read_bytes() == once
 
@@ -947,7 +1222,8 @@ def test_no_loop(run, robot):
     file = robot("\n".join(lines[:24] + lines[33:]))
     assert run("derive", file).refused() == [
         f"hrsynth: {file}:1: no loop: not a parallel robot, allowed: a <loop>; for a serial arm or a free body "
-        '<hrsynth serial="true">']
+        '<hrsynth serial="true">'
+    ]
 
 
 def test_a_loop_that_cannot_be_closed_is_named_with_its_residual(run, robot):
@@ -967,11 +1243,14 @@ def with_observes(*observes: tuple[str, str]) -> tuple[str, int]:
     return text[:place] + "\n" + "".join(lines) + text[place:], text.count("\n", 0, place) + 1 + len(lines)
 
 
-@pytest.mark.parametrize("observes", [
-    [("1", "rod_1a"), ("1", "rod_2a")],
-    [("1", "rod_1a"), ("2", "base")],
-    [("1", "rod_1a"), ("2", "platform")],
-])
+@pytest.mark.parametrize(
+    "observes",
+    [
+        [("1", "rod_1a"), ("1", "rod_2a")],
+        [("1", "rod_1a"), ("2", "base")],
+        [("1", "rod_1a"), ("2", "platform")],
+    ],
+)
 def test_observe_elements_that_contradict_the_legs(run, robot, observes: list[tuple[str, str]]):
     text, number = with_observes(*observes)
     file = robot(text)

@@ -20,19 +20,25 @@ from hrsynth.cli.progress import Progress
 from hrsynth.present.outputs import FIGURES, OUTPUTS
 
 GRID = ["--grid", "x=0:0.02:2,y=0.2:0.24:2"]
-DRAWN = {"check": ["check", "rrrrr_m1", *GRID], "modes": ["modes", "3rrr_m1"],
-         "atlas": ["atlas", "3rrr_m1", "--observe", "2,1,3"],
-         "accuracy": ["accuracy", "rrrrr_m1", "--cone", "0.1deg", *GRID],
-         "endings": ["endings", "prrrp_m1", "--at", "mode:1"],
-         "basins": ["basins", "rrrrr_m1", "--to", "x=0.02,y=0.24", "--grid", "x=0.01:0.02:2,y=0.24", "--jobs", "1"],
-         "servo": ["servo", "rrrrr_m1", "--start", "x=0,y=0.2", "--goal", "x=0.02,y=0.22"],
-         "singular": ["singular", "rrrrr_m1", "--points", "5", "--steps", "5"]}
-FILES = {**{name: [([*asked, "-o", f"{name}.svg"], [f"{name}.svg"])] for name, asked in DRAWN.items()},
-         "derive": [(["derive", "3rrr_m1", "-o", "h.urdf"], ["h.urdf"]), (["derive", "3rrr_m1", "-o", "h.yaml"],
-                                                                        ["h.yaml", "h.urdf"])],
-         "convert": [(["convert", "3rrr_m1", "c.xml"], ["c.xml"]), (["convert", "3rrr_m1", "c.yaml"],
-                                                                    ["c.yaml", "c.urdf"])],
-         "catalog show": [(["catalog", "show", "3(Rz*-Rz-Rz)", "-o", "s.urdf"], ["s.urdf"])]}
+DRAWN = {
+    "check": ["check", "rrrrr_m1", *GRID],
+    "modes": ["modes", "3rrr_m1"],
+    "atlas": ["atlas", "3rrr_m1", "--observe", "2,1,3"],
+    "accuracy": ["accuracy", "rrrrr_m1", "--cone", "0.1deg", *GRID],
+    "endings": ["endings", "prrrp_m1", "--at", "mode:1"],
+    "basins": ["basins", "rrrrr_m1", "--to", "x=0.02,y=0.24", "--grid", "x=0.01:0.02:2,y=0.24", "--jobs", "1"],
+    "servo": ["servo", "rrrrr_m1", "--start", "x=0,y=0.2", "--goal", "x=0.02,y=0.22"],
+    "singular": ["singular", "rrrrr_m1", "--points", "5", "--steps", "5"],
+}
+FILES = {
+    **{name: [([*asked, "-o", f"{name}.svg"], [f"{name}.svg"])] for name, asked in DRAWN.items()},
+    "derive": [
+        (["derive", "3rrr_m1", "-o", "h.urdf"], ["h.urdf"]),
+        (["derive", "3rrr_m1", "-o", "h.yaml"], ["h.yaml", "h.urdf"]),
+    ],
+    "convert": [(["convert", "3rrr_m1", "c.xml"], ["c.xml"]), (["convert", "3rrr_m1", "c.yaml"], ["c.yaml", "c.urdf"])],
+    "catalog show": [(["catalog", "show", "3(Rz*-Rz-Rz)", "-o", "s.urdf"], ["s.urdf"])],
+}
 
 
 @pytest.fixture
@@ -46,22 +52,27 @@ def test_every_drawing_command_is_among_them():
 
 
 @pytest.mark.some(1, 4)
-@pytest.mark.parametrize(("arguments", "files"), [each for group in FILES.values() for each in group],
-                         ids=lambda each: " ".join(each))
+@pytest.mark.parametrize(
+    ("arguments", "files"), [each for group in FILES.values() for each in group], ids=lambda each: " ".join(each)
+)
 def test_one_sentence_names_what_is_written(here: Path, capsys, arguments: list[str], files: list[str]):
     assert execute(arguments) == 0
     out = capsys.readouterr().out
     assert sorted(path.name for path in here.iterdir()) == sorted(files)
     sentences = [line for line in out.splitlines() if "is written to" in line]
     assert len(sentences) == 1
-    assert re.fullmatch(rf"[A-Z3][\w\- ()*]+ is written to {re.escape(files[-1])}( and .*)?\.|"
-                        rf".* is written to .*", sentences[0])
+    assert re.fullmatch(
+        rf"[A-Z3][\w\- ()*]+ is written to {re.escape(files[-1])}( and .*)?\.|"
+        rf".* is written to .*",
+        sentences[0],
+    )
     assert all(sentences[0].count(name) == 1 for name in files)
 
 
 @pytest.mark.some(1, 3)
-@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * (name in ("singular", "endings")))
-                                  for name in DRAWN])
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name in ("singular", "endings"))) for name in DRAWN]
+)
 def test_figures_are_written_as_wide_as_asked(here: Path, capsys, name: str):
     widths = {"120mm": 120 / 25.4, "11.5cm": 11.5 / 2.54, "4.5in": 4.5}
     for ending, (width, inches) in zip(FIGURES, widths.items(), strict=True):
@@ -110,14 +121,16 @@ def test_maps_show_the_robot_to_scale(here: Path):
     place = figure.subplots()
     (entry,) = plane.robot(figure, start)
     (strokes,) = place.collections
-    points = {(round(float(x), 6), round(float(y), 6)) for path in strokes.get_paths()
-              for x, y in np.asarray(path.vertices)}
+    points = {
+        (round(float(x), 6), round(float(y), 6)) for path in strokes.get_paths() for x, y in np.asarray(path.vertices)
+    }
     mechanism = start.twin.mechanism
     centres = {(round(float(p[0]), 6), round(float(p[1]), 6)) for p in (j.point for j in mechanism.joints.values())}
     assert points == centres
     assert entry.get_label() == "robot at its zero pose"
-    assert not MapPlane.of((("x", found.grid.grid.axes[0][1]), ("phi", found.grid.grid.axes[0][1])),
-                           found.setting.motion, 0.3, 2.0).robot(figure, start)
+    assert not MapPlane.of(
+        (("x", found.grid.grid.axes[0][1]), ("phi", found.grid.grid.axes[0][1])), found.setting.motion, 0.3, 2.0
+    ).robot(figure, start)
 
 
 def test_a_robot_without_strokes_is_not_in_the_legend(tmp_path: Path):
@@ -130,8 +143,11 @@ def test_a_robot_without_strokes_is_not_in_the_legend(tmp_path: Path):
     file = tmp_path / "free.urdf"
     file.write_text("""<robot name="free"><link name="world"/><link name="body"/>
       <joint name="free" type="floating"><parent link="world"/><child link="body"/></joint></robot>""")
-    setting = hrsynth.observe(hrsynth.load(file), camera="eye=body", see=[
-        f"point:world@{at}" for at in ("0.3,0,1", "-0.15,0.25,1", "-0.15,-0.25,1")])
+    setting = hrsynth.observe(
+        hrsynth.load(file),
+        camera="eye=body",
+        see=[f"point:world@{at}" for at in ("0.3,0,1", "-0.15,0.25,1", "-0.15,-0.25,1")],
+    )
     values = np.array([0.0, 1.0])
     plane = MapPlane.of((("x", values), ("y", values)), setting.motion, 0.3, 2.0)
     figure = Figure()
@@ -140,10 +156,18 @@ def test_a_robot_without_strokes_is_not_in_the_legend(tmp_path: Path):
     assert not place.collections
 
 
-@pytest.mark.parametrize(("arguments", "words"), [
-    (["--width", "88"], ["'88'", "88mm"]), (["--width", "1mm"], ["1in to 40in"]), (["--width", "nanmm"], ["nanmm"]),
-    (["--width", "1e9mm"], ["1e9mm"]), (["--font", "Nonexistent"], ["Nonexistent", "serif"]),
-    (["--font", "400pt"], ["400pt", "40pt"]), (["--width", "40mm", "--font", "12pt"], ["does not fit", "12pt", "mm"])])
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--width", "88"], ["'88'", "88mm"]),
+        (["--width", "1mm"], ["1in to 40in"]),
+        (["--width", "nanmm"], ["nanmm"]),
+        (["--width", "1e9mm"], ["1e9mm"]),
+        (["--font", "Nonexistent"], ["Nonexistent", "serif"]),
+        (["--font", "400pt"], ["400pt", "40pt"]),
+        (["--width", "40mm", "--font", "12pt"], ["does not fit", "12pt", "mm"]),
+    ],
+)
 def test_a_figure_that_cannot_be_is_refused(here: Path, capsys, arguments: list[str], words: list[str]):
     assert execute([*DRAWN["check"], "-o", "map.png", *arguments]) == 2
     (line,) = capsys.readouterr().err.splitlines()
@@ -170,11 +194,14 @@ def parts(terminal: int) -> str:
 def test_a_long_silence_has_its_bar():
     """Work that tells nothing shows a bar after a second all the same, on a terminal; else nothing, but for a line
     now and then of what takes longer still."""
-    code = ("import time\nfrom hrsynth.cli.progress import Progress\n"
-            "with Progress(wait=0.2) as bar:\n    bar.tell('thinking')\n    time.sleep(1.5)\nprint('done')")
+    code = (
+        "import time\nfrom hrsynth.cli.progress import Progress\n"
+        "with Progress(wait=0.2) as bar:\n    bar.tell('thinking')\n    time.sleep(1.5)\nprint('done')"
+    )
     main, end = pty.openpty()
-    done = subprocess.run([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=end, text=True,
-                          env={**os.environ, "TERM": "xterm"})
+    done = subprocess.run(
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=end, text=True, env={**os.environ, "TERM": "xterm"}
+    )
     os.close(end)
     shown = "".join(iter(lambda: parts(main), ""))
     assert done.stdout == "done\n"
@@ -209,6 +236,8 @@ def test_an_output_that_takes_nothing_is_told_in_one_line():
         with open("/dev/full", "w") as full:
             done = subprocess.run(program, stdout=full, stderr=subprocess.PIPE, text=True)
         assert (done.returncode, done.stderr) == (
-            2, "hrsynth: cannot write to standard output: No space left on device\n")
+            2,
+            "hrsynth: cannot write to standard output: No space left on device\n",
+        )
     closed = subprocess.run(["sh", "-c", 'exec "$@" >&-', "sh", *program], stderr=subprocess.PIPE, text=True)
     assert (closed.returncode, closed.stderr) == (0, "")

@@ -53,14 +53,18 @@ def test_closures_parts_and_frozen_joints_from_the_command_line(call, tmp_path: 
     status, out, remarks = call("check", path, "--base", "one", "--platform", "three", "--json")
     assert status == 0
     assert json.loads(out)["configurations"][0]["dof"] == 2
-    assert remarks == ["hrsynth: open: nothing in the file closes a loop: it is read as an open chain",
-                       "hrsynth: ignored: 1 links that are not between 'one' and 'three': base"]
+    assert remarks == [
+        "hrsynth: open: nothing in the file closes a loop: it is read as an open chain",
+        "hrsynth: ignored: 1 links that are not between 'one' and 'three': base",
+    ]
     status, out, _ = call("check", path, "--freeze", "p", "--json")
     assert json.loads(out)["configurations"][0]["dof"] == 2
 
 
-@pytest.mark.parametrize("arguments", [("--platform", "none"), ("--base", "none"), ("--motors", "none"),
-                                       ("--close", "x"), ("--freeze", "none")])
+@pytest.mark.parametrize(
+    "arguments",
+    [("--platform", "none"), ("--base", "none"), ("--motors", "none"), ("--close", "x"), ("--freeze", "none")],
+)
 def test_wrong_names_are_refused_in_one_line(call, arguments: tuple[str, str], tmp_path: Path):
     status, out, lines = call("check", written(tmp_path, FILES["mjcf: connect"]), *arguments)
     assert (status, out, len(lines)) == (2, "", 1)

@@ -26,7 +26,8 @@ from hrsynth.errors import MissingExtra
 
 ROOT: Any = app
 LEAVES = [(name,) for name, each in ROOT.commands.items() if not hasattr(each, "commands")] + [
-    (name, inner) for name, each in ROOT.commands.items() for inner in getattr(each, "commands", {})]
+    (name, inner) for name, each in ROOT.commands.items() for inner in getattr(each, "commands", {})
+]
 
 
 def called(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
@@ -85,53 +86,91 @@ def examples() -> Iterator[tuple[str, ...]]:
 def test_examples_are_commands(arguments: tuple[str, ...]):
     """Every option of an example is read with its type."""
     path = next(path for path in LEAVES if arguments[: len(path)] == path)
-    read = command(path).values(list(arguments[len(path):]))
+    read = command(path).values(list(arguments[len(path) :]))
     assert set(read) == {each.name for each in command(path).options}
 
 
-@pytest.mark.parametrize("words", [
-    ["quattro", "--observe", "1,4", "-o", "a.urdf", "--seed", "3", "--close", "a:b", "--close", "-c:d", "--json"],
-    ["-oa.urdf", "--close=a:b", "--seed=3", "--observe=1,4", "--json", "--close=-c:d", "quattro"],
-    ["-o=a.urdf", "--close=a:b", "--seed=3", "--observe=1,4", "--json", "--close=-c:d", "quattro"],
-    ["--json", "--output=a.urdf", "--close", "a:b", "--seed", "4", "--close=-c:d", "--seed=3", "--observe", "1,4", "--",
-     "quattro"]], ids=" ".join)
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["quattro", "--observe", "1,4", "-o", "a.urdf", "--seed", "3", "--close", "a:b", "--close", "-c:d", "--json"],
+        ["-oa.urdf", "--close=a:b", "--seed=3", "--observe=1,4", "--json", "--close=-c:d", "quattro"],
+        ["-o=a.urdf", "--close=a:b", "--seed=3", "--observe=1,4", "--json", "--close=-c:d", "quattro"],
+        [
+            "--json",
+            "--output=a.urdf",
+            "--close",
+            "a:b",
+            "--seed",
+            "4",
+            "--close=-c:d",
+            "--seed=3",
+            "--observe",
+            "1,4",
+            "--",
+            "quattro",
+        ],
+    ],
+    ids=" ".join,
+)
 def test_options_stand_anywhere_and_their_values_in_any_form(words: list[str]):
     """Of what is given twice the last counts, of what can be repeated all; a value may begin with a dash."""
     read = command(("derive",)).values(words)
-    given = {"robot": "quattro", "observe": "1,4", "output": "a.urdf", "seed": 3, "close": ["a:b", "-c:d"],
-             "json": True}
+    given = {
+        "robot": "quattro",
+        "observe": "1,4",
+        "output": "a.urdf",
+        "seed": 3,
+        "close": ["a:b", "-c:d"],
+        "json": True,
+    }
     assert read == {each.name: each.default for each in command(("derive",)).options} | given
     assert command(("derive",)).values([*words[:-1], "-h"]) is None or "--" in words
 
 
 def test_a_flag_can_be_denied_and_words_that_repeat_are_all_taken():
     assert [command(("view",)).values(["delta", *more])["open_"] for more in ([], ["--no-open"], ["--open"])] == [
-        True, False, True]
+        True,
+        False,
+        True,
+    ]
     assert command(("lint",)).values(["a", "--fix", "b", "--", "-c"])["files"] == ["a", "b", "-c"]
     assert command(("lint",)).values(["--fix", "--", "-c", "--"])["files"] == ["-c", "--"]
-    assert command(("legs",)).values(["a", "--observe", "--", "--camera=--", "--close", "-h"]).items() >= {
-        "observe": "--", "camera": ["--"], "close": ["-h"]}.items()
+    assert (
+        command(("legs",)).values(["a", "--observe", "--", "--camera=--", "--close", "-h"]).items()
+        >= {"observe": "--", "camera": ["--"], "close": ["-h"]}.items()
+    )
 
 
-@pytest.mark.parametrize(("words", "told"), [
-    ("derive", "derive needs ROBOT"), ("accuracy delta", "as --cone 0.1deg, or"),
-    ("catalog site", "catalog site needs -o, --output DIR"),
-    ("derive quattro --observ 1", "no such option, found '--observ', allowed: --observe"),
-    ("derive quattro -x", "derive: no such option, found '-x'"),
-    ("derive quattro --nope", "no such option, found '--nope', allowed: --as-written, --at"),
-    ("-x", "no such option, found '-x', allowed: -h, --help"),
-    ("derive quattro --seed x", "--seed, found 'x', allowed: an integer, at least 0"),
-    ("derive quattro --seed 1.5", "--seed, found '1.5'"), ("derive quattro --seed=-1", "--seed, found '-1'"),
-    ("servo delta --gain 1e9", "--gain, found '1e9', allowed: a number, at most 1e+06"),
-    ("modes delta --effort nan", "--effort, found 'nan'"),
-    ("derive quattro a b", "derive takes no more arguments, found 'a b'"),
-    ("derive quattro --at", "--at: expected one argument, allowed: POSE"),
-    ("derive quattro -o --observe 1,4", "-o needs a value, found '--observe', allowed: FILE, or -o=--observe"),
-    ("legs delta --observe --at 1", "--observe needs a value, found '--at'"),
-    ("derive quattro --observe 1 --observe 4", "--observe is given 2 times, found '1 4', allowed: 1,4"),
-    ("derive quattro --json=3", "--json: ignored explicit argument '3'"),
-    *[(f"derive quattro --seed{between}--", "--seed, found '--', allowed: an integer, at least 0") for between in " ="],
-    ("nope", "no such command, found 'nope', allowed: derive"), ("catalog nope", "no such command, found 'nope'")])
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ("derive", "derive needs ROBOT"),
+        ("accuracy delta", "as --cone 0.1deg, or"),
+        ("catalog site", "catalog site needs -o, --output DIR"),
+        ("derive quattro --observ 1", "no such option, found '--observ', allowed: --observe"),
+        ("derive quattro -x", "derive: no such option, found '-x'"),
+        ("derive quattro --nope", "no such option, found '--nope', allowed: --as-written, --at"),
+        ("-x", "no such option, found '-x', allowed: -h, --help"),
+        ("derive quattro --seed x", "--seed, found 'x', allowed: an integer, at least 0"),
+        ("derive quattro --seed 1.5", "--seed, found '1.5'"),
+        ("derive quattro --seed=-1", "--seed, found '-1'"),
+        ("servo delta --gain 1e9", "--gain, found '1e9', allowed: a number, at most 1e+06"),
+        ("modes delta --effort nan", "--effort, found 'nan'"),
+        ("derive quattro a b", "derive takes no more arguments, found 'a b'"),
+        ("derive quattro --at", "--at: expected one argument, allowed: POSE"),
+        ("derive quattro -o --observe 1,4", "-o needs a value, found '--observe', allowed: FILE, or -o=--observe"),
+        ("legs delta --observe --at 1", "--observe needs a value, found '--at'"),
+        ("derive quattro --observe 1 --observe 4", "--observe is given 2 times, found '1 4', allowed: 1,4"),
+        ("derive quattro --json=3", "--json: ignored explicit argument '3'"),
+        *[
+            (f"derive quattro --seed{between}--", "--seed, found '--', allowed: an integer, at least 0")
+            for between in " ="
+        ],
+        ("nope", "no such command, found 'nope', allowed: derive"),
+        ("catalog nope", "no such command, found 'nope'"),
+    ],
+)
 def test_what_cannot_be_read_is_refused_in_one_line(capsys, words: str, told: str):
     assert execute(words.split()) == 2
     shown = capsys.readouterr()
@@ -141,10 +180,15 @@ def test_what_cannot_be_read_is_refused_in_one_line(capsys, words: str, told: st
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("arguments", [
-    pytest.param(each, marks=[pytest.mark.long] * (each[:2] in LONGEST)) for each in examples()
-    if each[0] not in ("view", "studio", "catalog") and not any(part.endswith(".urdf") for part in each[1:2])],
-    ids=" ".join)
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        pytest.param(each, marks=[pytest.mark.long] * (each[:2] in LONGEST))
+        for each in examples()
+        if each[0] not in ("view", "studio", "catalog") and not any(part.endswith(".urdf") for part in each[1:2])
+    ],
+    ids=" ".join,
+)
 def test_examples_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys, arguments: tuple[str, ...]):
     monkeypatch.chdir(tmp_path)
     if "c.json" in arguments and arguments[0] == "verify":  # the file that the example of modes writes
@@ -156,8 +200,10 @@ def test_examples_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys, a
 
 
 def test_python_m_hrsynth_is_the_command_line():
-    done = [subprocess.run([sys.executable, "-m", module, "-h"], capture_output=True, text=True)
-            for module in ("hrsynth", "hrsynth.cli")]
+    done = [
+        subprocess.run([sys.executable, "-m", module, "-h"], capture_output=True, text=True)
+        for module in ("hrsynth", "hrsynth.cli")
+    ]
     assert [each.returncode for each in done] == [0, 0]
     assert done[0].stdout == done[1].stdout
     assert done[0].stdout.startswith("Usage: hrsynth ")
@@ -168,8 +214,12 @@ def test_the_old_names_of_start_and_goal_are_taken_and_told(capsys):
         given = {"--start": "x=0.05", "--goal": "x=0.01"}
         told = []
         for name in (old, new):
-            arguments = [part for pair in ({**given, name: given[new]} | ({} if name == new else {new: None})).items()
-                         if pair[1] is not None for part in pair]
+            arguments = [
+                part
+                for pair in ({**given, name: given[new]} | ({} if name == new else {new: None})).items()
+                if pair[1] is not None
+                for part in pair
+            ]
             assert execute(["path", "rrrrr_m1", *arguments]) == 0
             told.append(capsys.readouterr())
         assert told[0].out == told[1].out
@@ -177,14 +227,22 @@ def test_the_old_names_of_start_and_goal_are_taken_and_told(capsys):
         assert told[0].err == f"hrsynth: {old} is now called {new}; the old name will be removed in 0.4\n"
 
 
-@pytest.mark.parametrize(("typed", "expected"), [
-    (["der"], ["derive"]), (["catalog", "s"], ["show", "site"]), (["derive", "quattro", "--form", ""],
-                                                                  ["simplified", "general"]),
-    (["derive", "quattro", "--rep"], ["--report"]), (["servo", "delta", "--sense", "e"], ["exact", "edges"]),
-    (["derive", "quattro", "-o", ""], []), (["view", "delta", "--no"], ["--no-open"]), (["--v"], ["--version"]),
-    (["completion", ""], ["bash", "zsh", "fish"]),
-    (["derive", "quattro", "--json", "--observe", "1", "--j"], ["--json"]),
-    (["nothing", "x"], [])])
+@pytest.mark.parametrize(
+    ("typed", "expected"),
+    [
+        (["der"], ["derive"]),
+        (["catalog", "s"], ["show", "site"]),
+        (["derive", "quattro", "--form", ""], ["simplified", "general"]),
+        (["derive", "quattro", "--rep"], ["--report"]),
+        (["servo", "delta", "--sense", "e"], ["exact", "edges"]),
+        (["derive", "quattro", "-o", ""], []),
+        (["view", "delta", "--no"], ["--no-open"]),
+        (["--v"], ["--version"]),
+        (["completion", ""], ["bash", "zsh", "fish"]),
+        (["derive", "quattro", "--json", "--observe", "1", "--j"], ["--json"]),
+        (["nothing", "x"], []),
+    ],
+)
 def test_completion_knows_commands_options_and_words(typed: list[str], expected: list[str]):
     assert candidates(ROOT, typed) == expected
 
@@ -216,15 +274,19 @@ def test_bash_replaces_what_stands_after_the_colon(capsys, tmp_path: Path):
     (tmp_path / "script").write_text(called(capsys, "completion", "bash"))
     line = "hrsynth derive example:cas"
     asked = f'source {tmp_path}/script; COMP_WORDBREAKS=" :="; COMP_LINE="{line}"; COMP_POINT={len(line)}; _hrsynth; '
-    done = subprocess.run(["bash", "-c", asked + 'echo "${COMPREPLY[@]}"'], capture_output=True, text=True,
-                          env={**os.environ, "PATH": f"{tmp_path}:{os.environ['PATH']}"})
+    done = subprocess.run(
+        ["bash", "-c", asked + 'echo "${COMPREPLY[@]}"'],
+        capture_output=True,
+        text=True,
+        env={**os.environ, "PATH": f"{tmp_path}:{os.environ['PATH']}"},
+    )
     assert done.stdout.split() == ["cassie", "cast"], done.stderr
 
 
 INTERACTIVE = {
     "bash": 'source {script}; COMP_LINE="hrsynth derive qua"; COMP_POINT=18; _hrsynth; echo "${{COMPREPLY[@]}}"',
-    "zsh": 'autoload -Uz compinit; compinit -u -D; compadd() {{ print -r -- ${{(P)@[-1]}} }}; _files() {{ : }}; '
-           'source {script}; words=(hrsynth derive qua); CURRENT=3; _hrsynth',
+    "zsh": "autoload -Uz compinit; compinit -u -D; compadd() {{ print -r -- ${{(P)@[-1]}} }}; _files() {{ : }}; "
+    "source {script}; words=(hrsynth derive qua); CURRENT=3; _hrsynth",
     "fish": 'source {script}; complete -C "hrsynth derive qua"',
 }
 
@@ -238,8 +300,12 @@ def test_a_shell_completes_with_its_script(capsys, tmp_path: Path, shell: str):
     program.chmod(0o755)
     script = tmp_path / f"completion.{shell}"
     script.write_text(called(capsys, "completion", shell))
-    done = subprocess.run([shell, "-c", INTERACTIVE[shell].format(script=script)], capture_output=True, text=True,
-                          env={**os.environ, "PATH": f"{tmp_path}:{os.environ['PATH']}", "HOME": str(tmp_path)})
+    done = subprocess.run(
+        [shell, "-c", INTERACTIVE[shell].format(script=script)],
+        capture_output=True,
+        text=True,
+        env={**os.environ, "PATH": f"{tmp_path}:{os.environ['PATH']}", "HOME": str(tmp_path)},
+    )
     assert done.stdout.split() == ["quattro", "quattro_rigid"], done.stderr
 
 
@@ -251,8 +317,12 @@ def test_colour_is_for_terminals_whose_user_wants_it(more: dict[str, str], colou
     assert "\x1b" not in plain
     main, end = pty.openpty()
     env = {name: value for name, value in os.environ.items() if name not in ("NO_COLOR", "TERM")}
-    done = subprocess.run([sys.executable, "-m", "hrsynth", "legs", "3rrr_m1"], stdout=end, stderr=subprocess.DEVNULL,
-                          env={**env, "TERM": "xterm", **more})
+    done = subprocess.run(
+        [sys.executable, "-m", "hrsynth", "legs", "3rrr_m1"],
+        stdout=end,
+        stderr=subprocess.DEVNULL,
+        env={**env, "TERM": "xterm", **more},
+    )
     os.close(end)
     shown = b""
     with contextlib.suppress(OSError):

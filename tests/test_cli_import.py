@@ -27,10 +27,12 @@ SECONDS = 60
 
 def told_of(folder: Path) -> Path:
     """A four-bar as its spanning tree alone, with a frame on either side of the open joint."""
-    text = FOUR_BAR[:FOUR_BAR.index("  <loop")] + "</robot>"
-    frames = "".join(f'<link name="{link}_end"/><joint name="{link}_fix" type="fixed"><parent link="{link}"/>'
-                     f'<child link="{link}_end"/><origin xyz="{at}"/></joint>'
-                     for link, at in (("bar", "2 0 0"), ("rocker", "0 0 1")))
+    text = FOUR_BAR[: FOUR_BAR.index("  <loop")] + "</robot>"
+    frames = "".join(
+        f'<link name="{link}_end"/><joint name="{link}_fix" type="fixed"><parent link="{link}"/>'
+        f'<child link="{link}_end"/><origin xyz="{at}"/></joint>'
+        for link, at in (("bar", "2 0 0"), ("rocker", "0 0 1"))
+    )
     path = folder / "open.urdf"
     path.write_text(text.replace("</robot>", frames + "</robot>"))
     return path
@@ -45,9 +47,16 @@ def at_a_terminal() -> None:
 def talk(folder: Path, arguments: list[str], answers: list[str]) -> tuple[int, str]:
     """What a person at a terminal sees who answers each question (^C interrupts, ^D ends the input)."""
     main, end = pty.openpty()
-    run = subprocess.Popen([sys.executable, "-m", "hrsynth", *arguments], stdin=end, stdout=end, stderr=end, cwd=folder,
-                           env={**os.environ, "TERM": "dumb", "BROWSER": "true"}, start_new_session=True,
-                           preexec_fn=at_a_terminal)
+    run = subprocess.Popen(
+        [sys.executable, "-m", "hrsynth", *arguments],
+        stdin=end,
+        stdout=end,
+        stderr=end,
+        cwd=folder,
+        env={**os.environ, "TERM": "dumb", "BROWSER": "true"},
+        start_new_session=True,
+        preexec_fn=at_a_terminal,
+    )
     os.close(end)
     shown, left, until = b"", list(answers), time.monotonic() + SECONDS
     keys = {"^C": b"\x03", "^D": b"\x04"}
@@ -71,8 +80,9 @@ def repeated(shown: str, folder: Path) -> None:
     """Run the command that was printed."""
     words = shlex.split(shown.rpartition("without questions: ")[2].strip().splitlines()[0])
     assert words[0] == "hrsynth"
-    subprocess.run([sys.executable, "-m", *words], cwd=folder, check=True, capture_output=True,
-                   stdin=subprocess.DEVNULL)
+    subprocess.run(
+        [sys.executable, "-m", *words], cwd=folder, check=True, capture_output=True, stdin=subprocess.DEVNULL
+    )
 
 
 @pytest.mark.slow
@@ -96,8 +106,10 @@ def test_a_dialog_closes_a_loop_and_its_command_writes_the_same_bytes(tmp_path: 
 
 
 @pytest.mark.some(1)
-@pytest.mark.parametrize(("answers", "status"), [(["", "^C"], 130), (["", "^D"], 2), pytest.param(
-    ["", "", "", "", "no"], 0, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("answers", "status"),
+    [(["", "^C"], 130), (["", "^D"], 2), pytest.param(["", "", "", "", "no"], 0, marks=pytest.mark.slow)],
+)
 def test_giving_up_writes_nothing(answers: list[str], status: int, tmp_path: Path):
     save(load("3rps"), tmp_path / "robot.sdf")
     found, shown = talk(tmp_path, ["import", "robot.sdf", "-o", "out.urdf"], answers)
@@ -110,8 +122,25 @@ def test_giving_up_writes_nothing(answers: list[str], status: int, tmp_path: Pat
 @pytest.mark.slow
 def test_the_questions_come_again_where_the_answers_do_not_fit(tmp_path: Path):
     told_of(tmp_path)
-    answers = ["bar_end:crank:fixed", "", "bar", "a", "rocker_end:bar_end", "", "bar", "a", "frog", "crank", "again",
-               "1", "", "bar", "a", "crank", "yes"]
+    answers = [
+        "bar_end:crank:fixed",
+        "",
+        "bar",
+        "a",
+        "rocker_end:bar_end",
+        "",
+        "bar",
+        "a",
+        "frog",
+        "crank",
+        "again",
+        "1",
+        "",
+        "bar",
+        "a",
+        "crank",
+        "yes",
+    ]
     status, shown = talk(tmp_path, ["import", "open.urdf", "-o", "closed.urdf"], answers)
     assert status == 0, shown
     assert "--observe crank" in shown
@@ -143,8 +172,18 @@ def test_a_robot_without_motors_is_told(tmp_path: Path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     told_of(tmp_path)
     for motors, told in (("", True), ("a", False)):
-        asked = ["import", "open.urdf", "--close", "bar_end:rocker_end:revolute", "--platform", "bar", "--yes", "-o",
-                 "out.urdf", *["--motors", motors] * bool(motors)]
+        asked = [
+            "import",
+            "open.urdf",
+            "--close",
+            "bar_end:rocker_end:revolute",
+            "--platform",
+            "bar",
+            "--yes",
+            "-o",
+            "out.urdf",
+            *["--motors", motors] * bool(motors),
+        ]
         assert execute(asked) == 0
         assert ("no joint is driven" in capsys.readouterr().err) is told
         assert execute([*asked, "--json"]) == 0
@@ -154,8 +193,20 @@ def test_a_robot_without_motors_is_told(tmp_path: Path, capsys, monkeypatch):
 def test_its_record_holds_the_command(tmp_path: Path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     path = told_of(tmp_path)
-    asked = ["import", path.name, "--close", "bar_end:rocker_end:revolute", "--platform", "bar", "--motors", "a",
-             "--observe", "crank", "-o", "out.urdf"]
+    asked = [
+        "import",
+        path.name,
+        "--close",
+        "bar_end:rocker_end:revolute",
+        "--platform",
+        "bar",
+        "--motors",
+        "a",
+        "--observe",
+        "crank",
+        "-o",
+        "out.urdf",
+    ]
     assert execute([*asked, "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert (found["base"], found["platform"]["link"], found["motors"]) == ("base", "bar", ["a"])
@@ -163,15 +214,21 @@ def test_its_record_holds_the_command(tmp_path: Path, capsys, monkeypatch):
     assert sorted(shlex.split(found["repeat"])) == sorted(["hrsynth", *asked, "--yes"])
 
 
-@pytest.mark.parametrize(("asked", "said"), [
-    (["import", "3rps", "-o", "out.xml"], ".urdf"), (["import", "nobody", "-o", "out.urdf"], "neither a file"),
-    (["import", "3rps", "-o", "away/out.urdf"], "no such folder"),
-    (["import", "open.urdf", "-o", "open.urdf"], "the one being read"),
-    (["import", "open.urdf", "-o", "out.urdf"], "--platform"),
-    (["import", "open.urdf", "--platform", "x", "-o", "out.urdf"], "no such platform"),
-    (["import", "3rps"], "--output")])
-def test_what_is_refused_is_one_line_and_writes_nothing(asked: list[str], said: str, tmp_path: Path, capsys,
-                                                        monkeypatch):
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        (["import", "3rps", "-o", "out.xml"], ".urdf"),
+        (["import", "nobody", "-o", "out.urdf"], "neither a file"),
+        (["import", "3rps", "-o", "away/out.urdf"], "no such folder"),
+        (["import", "open.urdf", "-o", "open.urdf"], "the one being read"),
+        (["import", "open.urdf", "-o", "out.urdf"], "--platform"),
+        (["import", "open.urdf", "--platform", "x", "-o", "out.urdf"], "no such platform"),
+        (["import", "3rps"], "--output"),
+    ],
+)
+def test_what_is_refused_is_one_line_and_writes_nothing(
+    asked: list[str], said: str, tmp_path: Path, capsys, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
     told_of(tmp_path)
     assert execute(asked) == 2

@@ -37,8 +37,18 @@ def hostile(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return file
 
 
-ASKED = (["check"], ["derive"], ["legs"], ["lint"], ["derive", "--json"], ["modes"], ["check", "--observe", "none"],
-         ["lint", "--format", "github"], ["lint", "--format", "sarif"], ["check", "--platform", f"x{HOSTILE}"])
+ASKED = (
+    ["check"],
+    ["derive"],
+    ["legs"],
+    ["lint"],
+    ["derive", "--json"],
+    ["modes"],
+    ["check", "--observe", "none"],
+    ["lint", "--format", "github"],
+    ["lint", "--format", "sarif"],
+    ["check", "--platform", f"x{HOSTILE}"],
+)
 
 
 @pytest.mark.some(4)
@@ -53,11 +63,13 @@ def test_no_output_steers_a_terminal(asked: list[str], hostile: Path, capsys: py
 
 
 @pytest.mark.some(1)
-@pytest.mark.parametrize("asked", [["view", "--static", "page.html"], ["derive", "--report", "page.html"],
-                                   ["modes", "-o", "page.svg"]], ids=" ".join)
+@pytest.mark.parametrize(
+    "asked",
+    [["view", "--static", "page.html"], ["derive", "--report", "page.html"], ["modes", "-o", "page.svg"]],
+    ids=" ".join,
+)
 @pytest.mark.filterwarnings("ignore:Glyph")
-def test_no_page_is_steered_by_a_name(asked: list[str], hostile: Path, tmp_path: Path,
-                                      monkeypatch: pytest.MonkeyPatch):
+def test_no_page_is_steered_by_a_name(asked: list[str], hostile: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.chdir(tmp_path)
     assert execute([asked[0], str(hostile), *asked[1:]]) == 0
     page = Path(asked[-1]).read_text(encoding="utf-8")
@@ -67,8 +79,12 @@ def test_no_page_is_steered_by_a_name(asked: list[str], hostile: Path, tmp_path:
 
 
 @settings(deadline=None, max_examples=50)
-@given(st.recursive(st.text(st.one_of(st.characters(), st.sampled_from(HOSTILE + "\ud800\x1b\x7f")), max_size=9),
-                    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=2), inner)))
+@given(
+    st.recursive(
+        st.text(st.one_of(st.characters(), st.sampled_from(HOSTILE + "\ud800\x1b\x7f")), max_size=9),
+        lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=2), inner),
+    )
+)
 def test_escaped_json_is_the_same_json_and_pages_name_what_they_are_told(value: object):
     written = json.dumps(value, ensure_ascii=False, indent=2)
     assert not STEERED.search(escape_steering(written))
@@ -94,18 +110,35 @@ def test_the_studio_names_them_and_takes_them_back():
 
 def test_all_output_of_the_command_line_leaves_at_one_place():
     for file in sorted(CLI.glob("*.py")):
-        calls = [ast.unparse(node.func) for node in ast.walk(ast.parse(file.read_text(encoding="utf-8")))
-                 if isinstance(node, ast.Call)]
+        calls = [
+            ast.unparse(node.func)
+            for node in ast.walk(ast.parse(file.read_text(encoding="utf-8")))
+            if isinstance(node, ast.Call)
+        ]
         writes = [each for each in calls if each == "print" or each.endswith(("stdout.write", "stderr.write"))]
         assert bool(writes) == (file.name == "colour.py"), (file.name, writes)
 
 
 GOOD, WRONG = ["robots"], ["robots", "more"]
-STREAMS = [("", GOOD, 0), ("", WRONG, 2), ("2>&-", GOOD, 0), ("2>&-", WRONG, 2), ("2>/dev/full", GOOD, 0),
-           ("2>/dev/full", WRONG, 2), (">&-", GOOD, 0), (">&-", WRONG, 2), (">/dev/full", GOOD, 2),
-           (">/dev/full", WRONG, 2), (">&- 2>&-", GOOD, 0), (">&- 2>&-", WRONG, 2), (">/dev/full 2>/dev/full", GOOD, 2),
-           (">/dev/full 2>&-", WRONG, 2), ("<&- >&- 2>&-", WRONG, 2), ("| true", GOOD, 0),
-           ("2>&1 >/dev/null | true", WRONG, 2)]
+STREAMS = [
+    ("", GOOD, 0),
+    ("", WRONG, 2),
+    ("2>&-", GOOD, 0),
+    ("2>&-", WRONG, 2),
+    ("2>/dev/full", GOOD, 0),
+    ("2>/dev/full", WRONG, 2),
+    (">&-", GOOD, 0),
+    (">&-", WRONG, 2),
+    (">/dev/full", GOOD, 2),
+    (">/dev/full", WRONG, 2),
+    (">&- 2>&-", GOOD, 0),
+    (">&- 2>&-", WRONG, 2),
+    (">/dev/full 2>/dev/full", GOOD, 2),
+    (">/dev/full 2>&-", WRONG, 2),
+    ("<&- >&- 2>&-", WRONG, 2),
+    ("| true", GOOD, 0),
+    ("2>&1 >/dev/null | true", WRONG, 2),
+]
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
@@ -124,8 +157,11 @@ def test_an_exit_status_does_not_depend_on_streams_that_take_nothing(streams: st
 def test_a_file_does_not_take_the_place_of_a_closed_stream(tmp_path: Path):
     """What libraries print goes nowhere, not into the file that is written."""
     for streams in (">&-", "2>&-", ">&- 2>&-"):
-        run = subprocess.run(["bash", "-c", f"{sys.executable} -m hrsynth convert 3rrr_m1 robot.urdf {streams}"],
-                             cwd=tmp_path, check=False)
+        run = subprocess.run(
+            ["bash", "-c", f"{sys.executable} -m hrsynth convert 3rrr_m1 robot.urdf {streams}"],
+            cwd=tmp_path,
+            check=False,
+        )
         assert run.returncode == 0
         assert hrsynth.load(tmp_path / "robot.urdf").differences(hrsynth.load("3rrr_m1")) == []
 
@@ -143,14 +179,29 @@ sys.exit(execute(sys.argv[1:]))
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("asked", "needs"), [
-    (["-h"], None), (["check", "3rrr_m1"], None), (["derive", "3rrr_m1", "-o", "hidden.urdf"], None),
-    (["catalog", "list", "--legs", "3-R*RR"], None), (["view", "3rrr_m1", "--static", "view.html"], None),
-    (["modes", "3rrr_m1"], None), (["catalog", "build", "sensors", "-o", "built", "--limit", "1"], "fcntl"),
-    (["studio", "--no-browser"], "fcntl")], ids=str)
+@pytest.mark.parametrize(
+    ("asked", "needs"),
+    [
+        (["-h"], None),
+        (["check", "3rrr_m1"], None),
+        (["derive", "3rrr_m1", "-o", "hidden.urdf"], None),
+        (["catalog", "list", "--legs", "3-R*RR"], None),
+        (["view", "3rrr_m1", "--static", "view.html"], None),
+        (["modes", "3rrr_m1"], None),
+        (["catalog", "build", "sensors", "-o", "built", "--limit", "1"], "fcntl"),
+        (["studio", "--no-browser"], "fcntl"),
+    ],
+    ids=str,
+)
 def test_without_posix_one_line_names_what_does_not_work(asked: list[str], needs: str | None, tmp_path: Path):
-    run = subprocess.run([sys.executable, "-c", ELSEWHERE, *asked], cwd=tmp_path, capture_output=True, text=True,
-                         check=False, env=os.environ | {"NO_COLOR": "1"})
+    run = subprocess.run(
+        [sys.executable, "-c", ELSEWHERE, *asked],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+        env=os.environ | {"NO_COLOR": "1"},
+    )
     if needs is None:
         assert (run.returncode, run.stderr) == (0, "")
     else:

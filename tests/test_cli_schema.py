@@ -18,25 +18,43 @@ from hrsynth.cli.records import RECORDS
 from hrsynth.cli.schema import page, schema
 
 QUICK = {
-    "derive": ["quattro --observe 1,4", "3ppr_m1", "uranesx --observe 1,2 --form general",
-               "quattro --observe 1,4 -o hidden.urdf"],
+    "derive": [
+        "quattro --observe 1,4",
+        "3ppr_m1",
+        "uranesx --observe 1,2 --form general",
+        "quattro --observe 1,4 -o hidden.urdf",
+    ],
     "legs": ["3rrr_m1", "uranesx"],
-    "check": ["delta --at x=0.02,y=0.1,z=-0.62", "gough_stewart --grid x=0:0.01:2,rpy=0/0/0", "i4l",
-              "rrrrr_m1 --at x=0,y=0.3332050807568877 --grid x=-0.4:0.4:3,y=0.25:0.41:3 -o map.csv"],
+    "check": [
+        "delta --at x=0.02,y=0.1,z=-0.62",
+        "gough_stewart --grid x=0:0.01:2,rpy=0/0/0",
+        "i4l",
+        "rrrrr_m1 --at x=0,y=0.3332050807568877 --grid x=-0.4:0.4:3,y=0.25:0.41:3 -o map.csv",
+    ],
     "singular": ["rrrrr_m1 --points 30", "uranesx --points 5", "hexaglide --points 5"],
     "advise": ["uranesx", "quattro --observe 1,4", "gough_stewart --observe 1", "i4l --observe 1,2"],
     "branch": ["rrrrr_m1 --box shoulder_1=-0.05:0.05,shoulder_2=-0.05:0.05"],
-    "modes": ["3rrr_m1", "delta --observe 1", "3rps", "quattro --observe 1,3 --at x=0.05,y=0.1,z=-0.7,phi=10deg",
-              "3rrr_m1 --real --at x=0.02,phi=5deg"],
+    "modes": [
+        "3rrr_m1",
+        "delta --observe 1",
+        "3rps",
+        "quattro --observe 1,3 --at x=0.05,y=0.1,z=-0.7,phi=10deg",
+        "3rrr_m1 --real --at x=0.02,phi=5deg",
+    ],
     "atlas": ["3rrr_m1 --observe 2,1,3"],
     "path": ["quattro --observe 1,4 --start x=0.05 --goal x=-0.05,phi=20deg", "3rps --start z=0.5 --goal z=0.51"],
     "endings": ["rrrrr_m1 --at x=0,y=0.2", "rprpr_m1 --at x=0 --complete"],
-    "servo": ["rrrrr_m1 --start x=0,y=0.2 --goal x=0.02,y=0.22",
-              "rrrrr_m1 --start x=0,y=0.2 --goal x=0.02,y=0.22 --noise 0.1deg --time 3"],
+    "servo": [
+        "rrrrr_m1 --start x=0,y=0.2 --goal x=0.02,y=0.22",
+        "rrrrr_m1 --start x=0,y=0.2 --goal x=0.02,y=0.22 --noise 0.1deg --time 3",
+    ],
     "basins": ["3rrr_m1 --to x=0,y=0,phi=0 --grid x=-0.01:0.01:2,y=0,phi=0 --jobs 1"],
-    "accuracy": ["delta --cone 0.1deg --at x=0.1", "rrrrr_m1 --cone 0.1deg --at x=0,y=0.3332050807568877",
-                 "rrrrr_m1 --cone 0.1deg --grid x=0:0.02:2,y=0.2:0.22:2 --nonlinear 4",
-                 "3rrr_m1 --cone 0.1deg --grid x=0:0.02:2,y=0:0.02:2 -o sweep.npy"],
+    "accuracy": [
+        "delta --cone 0.1deg --at x=0.1",
+        "rrrrr_m1 --cone 0.1deg --at x=0,y=0.3332050807568877",
+        "rrrrr_m1 --cone 0.1deg --grid x=0:0.02:2,y=0.2:0.22:2 --nonlinear 4",
+        "3rrr_m1 --cone 0.1deg --grid x=0:0.02:2,y=0:0.02:2 -o sweep.npy",
+    ],
     "select": ["rrrrr_m1 --start x=0.05 --goal x=-0.01,y=0.03 --runs 1 --sight auto"],
     "export": ["prrrp_m1 --box guide_1=-0.001:0.001,guide_2=-0.001:0.001 -o code.hpp"],
     "view": ["rrrrr_m1 --static view.html"],
@@ -88,10 +106,13 @@ def test_every_command_with_json_has_a_record():
     root: Any = app
     found = [name for name, each in root.commands.items() if not hasattr(each, "commands")]
     found += [f"{name} {inner}" for name, each in root.commands.items() for inner in getattr(each, "commands", {})]
-    leaves = {name: (root.commands[name] if " " not in name else
-                     root.commands[name.split()[0]].commands[name.split()[1]]) for name in found}
-    assert {name for name, each in leaves.items() if any(o.name == "json" for o in each.options)} == {
-        *RECORDS} == {*QUICK}
+    leaves = {
+        name: (root.commands[name] if " " not in name else root.commands[name.split()[0]].commands[name.split()[1]])
+        for name in found
+    }
+    assert (
+        {name for name, each in leaves.items() if any(o.name == "json" for o in each.options)} == {*RECORDS} == {*QUICK}
+    )
 
 
 def test_a_schema_refuses_what_is_wrong(here: Path, capsys):

@@ -27,13 +27,15 @@ def started(*arguments: str, folder: Path) -> Iterator[tuple[subprocess.Popen[st
     program = [sys.executable, "-m", "hrsynth.cli", "studio", "--no-browser", *arguments]
     ends = {signal.SIGINT: signal.default_int_handler, signal.SIGHUP: signal.SIG_DFL}  # ignored ones are inherited
     before = {number: signal.signal(number, handler) for number, handler in ends.items()}
-    with subprocess.Popen(program, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-                          env={**os.environ, "TMPDIR": str(folder)}) as running:
+    with subprocess.Popen(
+        program, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env={**os.environ, "TMPDIR": str(folder)}
+    ) as running:
         for number, handler in before.items():
             signal.signal(number, handler)
         assert running.stdout is not None
-        told = re.fullmatch(r"The studio is served at (http://127\.0\.0\.1:\d+/\S+/) \(Ctrl-C ends it\)\.\n",
-                            running.stdout.readline())
+        told = re.fullmatch(
+            r"The studio is served at (http://127\.0\.0\.1:\d+/\S+/) \(Ctrl-C ends it\)\.\n", running.stdout.readline()
+        )
         assert told
         try:
             yield running, told[1]
@@ -81,11 +83,18 @@ def test_a_file_that_is_no_robot_file_is_refused(tmp_path: Path, capfd: pytest.C
     assert re.fullmatch(r"hrsynth: .*robot\.urdf:\d: (an empty file|malformed XML), .*\n", err)
 
 
-@pytest.mark.parametrize(("arguments", "words"), [
-    (["nobody"], "neither a file nor a shipped robot"), (["nothing.urdf"], "no such file"),
-    (["--port", "70000"], "65535"), (["--port", "-1"], "at least 0"),
-    (["3rrr_m1", "another"], "another"), (["3rrr_m1", "--observe", "1,,2"], "empty name"),
-    (["/dev/null"], "not a regular file")])
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["nobody"], "neither a file nor a shipped robot"),
+        (["nothing.urdf"], "no such file"),
+        (["--port", "70000"], "65535"),
+        (["--port", "-1"], "at least 0"),
+        (["3rrr_m1", "another"], "another"),
+        (["3rrr_m1", "--observe", "1,,2"], "empty name"),
+        (["/dev/null"], "not a regular file"),
+    ],
+)
 def test_what_cannot_be_done_is_refused_in_one_line(capfd, arguments: list[str], words: str):
     status, out, err = ask(capfd, *arguments)
     assert (status, out) == (2, "")
@@ -98,8 +107,12 @@ def test_a_port_that_is_taken_is_an_error_not_another_port(capfd: pytest.Capture
         taken.listen()
         port = taken.getsockname()[1]
         begin = time.monotonic()
-        assert ask(capfd, "--port", str(port)) == (2, "", "hrsynth: cannot serve the page: Address already in use, "
-                                                   f"found {port}, allowed: a free port, or 0 for any\n")
+        assert ask(capfd, "--port", str(port)) == (
+            2,
+            "",
+            "hrsynth: cannot serve the page: Address already in use, "
+            f"found {port}, allowed: a free port, or 0 for any\n",
+        )
         assert time.monotonic() - begin < 5
 
 

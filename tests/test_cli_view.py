@@ -71,8 +71,9 @@ def test_a_port_that_is_taken_is_refused(capfd: pytest.CaptureFixture[str]):
 
 
 @pytest.mark.slow
-def test_the_page_is_told_what_the_command_line_says(capfd: pytest.CaptureFixture[str], tmp_path: Path,
-                                                     monkeypatch: pytest.MonkeyPatch):
+def test_the_page_is_told_what_the_command_line_says(
+    capfd: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
     """The processes that answer read the same robot, and what the page copies is what was typed."""
     pytest.importorskip("uvicorn")
     from hrsynth.present.studio import server
@@ -96,20 +97,35 @@ def test_the_page_is_told_what_the_command_line_says(capfd: pytest.CaptureFixtur
     assert execute(["convert", "3rrr_m1", file]) == 0
     capfd.readouterr()
     motors = ("shoulder_1", "shoulder_2", "shoulder_3")
-    status, out, err = ask(capfd, file, "--platform", "platform", "--motors", ",".join(motors), "--as-written",
-                           "--observe", "1,dist_2", "--camera", "platform", "--no-open", "--port", "7", "--hidden")
+    status, out, err = ask(
+        capfd,
+        file,
+        "--platform",
+        "platform",
+        "--motors",
+        ",".join(motors),
+        "--as-written",
+        "--observe",
+        "1,dist_2",
+        "--camera",
+        "platform",
+        "--no-open",
+        "--port",
+        "7",
+        "--hidden",
+    )
     assert (status, told[1:]) == (0, ["stopped"]), err
     assert out.endswith("The view is served at http://127.0.0.1:1/x/ (Ctrl-C ends it).\n")
     opening, port = told[0]
     assert port == 7
-    assert opening.given == {"robot": file, "options": {
-        "platform": "platform", "motors": motors, "as_written": True}}
+    assert opening.given == {"robot": file, "options": {"platform": "platform", "motors": motors, "as_written": True}}
     assert opening.first == {"watch": ["dist_1", "dist_2"], "camera": "platform", "hidden": True}
     assert json.loads(opening.message("t"))["panels"] is False
 
 
-def test_without_what_serves_pages_the_extra_is_named_before_the_work(capfd: pytest.CaptureFixture[str], tmp_path: Path,
-                                                                      monkeypatch: pytest.MonkeyPatch):
+def test_without_what_serves_pages_the_extra_is_named_before_the_work(
+    capfd: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
     monkeypatch.setitem(sys.modules, "uvicorn", None)
     monkeypatch.setattr(hrsynth, "view", pytest.fail)
     assert_refused(ask(capfd, "rrrrr_m1", "--no-open"), 3, 'pip install "hrsynth[studio]"')

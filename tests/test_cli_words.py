@@ -31,16 +31,22 @@ def printed(capsys: pytest.CaptureFixture[str]):
     return call
 
 
-ASKED = [("check quattro --observe 1,4 --at x=0.02,{}", 1), ("modes 3rrr_m1 --at x=0.01,{}", 3),
-         ("path 3rrr_m1 --start x=0,y=0,{} --goal x=0.02", 3), ("servo 3rrr_m1 --start {} --goal x=0.02", 3),
-         ("accuracy 3rrr_m1 --cone 0.1deg --at x=0.01,{}", 1), ("select 3rrr_m1 --start {} --goal x=0.02 --runs 0", 2)]
+ASKED = [
+    ("check quattro --observe 1,4 --at x=0.02,{}", 1),
+    ("modes 3rrr_m1 --at x=0.01,{}", 3),
+    ("path 3rrr_m1 --start x=0,y=0,{} --goal x=0.02", 3),
+    ("servo 3rrr_m1 --start {} --goal x=0.02", 3),
+    ("accuracy 3rrr_m1 --cone 0.1deg --at x=0.01,{}", 1),
+    ("select 3rrr_m1 --start {} --goal x=0.02 --runs 0", 2),
+]
 
 
 @pytest.mark.some(1, 6)
 @pytest.mark.parametrize(("command", "least"), ASKED, ids=lambda each: str(each).partition(" ")[0])
 @pytest.mark.parametrize(("typed", "told"), [("phi=5deg", "5"), ("phi=0.1", "5.729578"), ("rpy=0/0/5deg", "5")])
-def test_a_turn_about_one_axis_is_told_in_one_way_however_it_was_typed(printed, command: str, least: int, typed: str,
-                                                                       told: str):
+def test_a_turn_about_one_axis_is_told_in_one_way_however_it_was_typed(
+    printed, command: str, least: int, typed: str, told: str
+):
     text = printed(command.format(typed))
     poses = re.findall(r"x=\S+", text)
     assert len(poses) >= least
@@ -112,23 +118,34 @@ def test_axes_have_one_sense():
 def test_printed_axes_have_that_sense(printed, name: str):
     text = printed(f"legs {name}")
     if name != "gough_stewart":
-        text += printed(f"accuracy {name} --cone 0.1deg") if "controllable" in printed(
-            f"derive {name}").split("verdict")[1].split()[:1] else ""
+        text += (
+            printed(f"accuracy {name} --cone 0.1deg")
+            if "controllable" in printed(f"derive {name}").split("verdict")[1].split()[:1]
+            else ""
+        )
     text = re.sub(r"\s+", " ", text)
     text = re.sub(r"along \([^)]*\) of its frame", "", text)  # what a camera sees of a link has a sense of its own
-    vectors = [tuple(map(float, found)) for found in re.findall(
-        rf"along \(?({NUMBER}) ({NUMBER}) ({NUMBER})", text)]
+    vectors = [tuple(map(float, found)) for found in re.findall(rf"along \(?({NUMBER}) ({NUMBER}) ({NUMBER})", text)]
     assert vectors or "along" not in re.sub("along [xyz]", "", text)
     for vector in vectors:
         assert max(vector) >= 0.999 * max(map(abs, vector)), vector
 
 
-@pytest.mark.parametrize(("command", "said"), [
-    ("check rrrrr_m1 --at x=0,y=0.3332", "one degree of error in the directions: not bounded to first order"),
-    ("accuracy rrrrr_m1 --cone 0.1deg --at x=0,y=0.3332", "position     not bounded to first order"),
-    ("accuracy rrrrr_m1 --cone 0.1deg --grid x=0:0.02:2,y=0.3331:0.3332:2", "; not bounded to first order at 1 poses"),
-    ("accuracy rrrrr_m1 --cone 0.1deg --grid x=0:0.00001:2,y=0.3332:0.33320001:2",
-     "position     not bounded to first order at 4 poses\n")])
+@pytest.mark.parametrize(
+    ("command", "said"),
+    [
+        ("check rrrrr_m1 --at x=0,y=0.3332", "one degree of error in the directions: not bounded to first order"),
+        ("accuracy rrrrr_m1 --cone 0.1deg --at x=0,y=0.3332", "position     not bounded to first order"),
+        (
+            "accuracy rrrrr_m1 --cone 0.1deg --grid x=0:0.02:2,y=0.3331:0.3332:2",
+            "; not bounded to first order at 1 poses",
+        ),
+        (
+            "accuracy rrrrr_m1 --cone 0.1deg --grid x=0:0.00001:2,y=0.3332:0.33320001:2",
+            "position     not bounded to first order at 4 poses\n",
+        ),
+    ],
+)
 def test_numbers_beyond_sense_are_not_printed(printed, command: str, said: str):
     text = printed(command)
     assert said in text
@@ -140,27 +157,39 @@ def test_numbers_with_sense_are_printed(printed):
     assert re.search(r"to first order: 5\.27 mm and 0\.816 degrees", printed("check rrrrr_m1"))
 
 
-@pytest.mark.parametrize(("robot", "grid", "lines"), [
-    ("quattro", "x=-0.1:0.1:3,y=0:0.1:3", ["free, at each pose nearest to the zero configuration: z = -0.7, phi"]),
-    ("quattro", "x=-0.1:0.1:3,z=-0.7", ["held: z=-0.7", "free, at each pose nearest to the zero configuration: y = 0, "
-                                        "phi"]),
-    ("quattro", "x=-0.1:0.1:3,y=0,z=-0.7,phi=10deg", ["held: y=0,z=-0.7,phi=10deg", "no part is free"]),
-    ("gough_stewart", "x=-0.01:0.01:2,y=0,z=0.3,phi=0", ["held: y=0,z=0.3,phi=0", "free, at each pose nearest to the "
-                                                         "zero configuration: orientation but phi"]),
-    ("rrrrr_m1", "x=0:0.02:2,y=0.2:0.22:2", ["no part is free"])])
+@pytest.mark.parametrize(
+    ("robot", "grid", "lines"),
+    [
+        ("quattro", "x=-0.1:0.1:3,y=0:0.1:3", ["free, at each pose nearest to the zero configuration: z = -0.7, phi"]),
+        (
+            "quattro",
+            "x=-0.1:0.1:3,z=-0.7",
+            ["held: z=-0.7", "free, at each pose nearest to the zero configuration: y = 0, phi"],
+        ),
+        ("quattro", "x=-0.1:0.1:3,y=0,z=-0.7,phi=10deg", ["held: y=0,z=-0.7,phi=10deg", "no part is free"]),
+        (
+            "gough_stewart",
+            "x=-0.01:0.01:2,y=0,z=0.3,phi=0",
+            ["held: y=0,z=0.3,phi=0", "free, at each pose nearest to the zero configuration: orientation but phi"],
+        ),
+        ("rrrrr_m1", "x=0:0.02:2,y=0.2:0.22:2", ["no part is free"]),
+    ],
+)
 def test_a_grid_says_what_it_held(printed, robot: str, grid: str, lines: list[str]):
     text = printed(f"check {robot} --grid {grid}")
-    rows = [line.strip() for line in text[text.index("\ngrid "):].splitlines()[2:]]
+    rows = [line.strip() for line in text[text.index("\ngrid ") :].splitlines()[2:]]
     assert rows == lines
 
 
 @pytest.mark.some(2)
-@pytest.mark.parametrize("command", ["legs quattro", "legs example:panda", "advise example:panda",
-                                     "advise quattro --observe 1 --offer point:platform"])
+@pytest.mark.parametrize(
+    "command",
+    ["legs quattro", "legs example:panda", "advise example:panda", "advise quattro --observe 1 --offer point:platform"],
+)
 def test_tables_and_lists_are_not_wider_than_a_hundred_columns(printed, command: str):
     """No word is lost, and vectors stay whole."""
     text = printed(command)
-    lines = text[text.index("\n\n"):].splitlines()
+    lines = text[text.index("\n\n") :].splitlines()
     assert max(map(len, lines)) <= 105
     assert sum(len(line) > 100 for line in lines) <= 1  # the sentence with the smallest gap
     assert not [line for line in lines if re.search(rf"\({NUMBER}( {NUMBER})?$", line)]
@@ -174,14 +203,20 @@ def test_a_wrapped_column_keeps_its_words():
     assert [line[:1] for line in lines[2:]] == ["a", *" " * (len(lines) - 4), "b"]
 
 
-@pytest.mark.parametrize(("command", "told"), [
-    ("check 3rrr_m1 --at phi=10", "--at phi=10: taken as radians, 573 degrees"),
-    ("check 3rrr_m1 --at x=0,phi=0.1 --at phi=-4", "--at phi=-4: taken as radians, -229 degrees"),
-    ("path 3rrr_m1 --start phi=0 --goal phi=5", "--goal phi=5: taken as radians, 286 degrees"),
-    ("check 3rrr_m1 --at phi=3", None), ("check 3rrr_m1 --at x=4,phi=0.2", None),
-    ("check 3rrr_m1 --at phi=10deg", None)])
+@pytest.mark.parametrize(
+    ("command", "told"),
+    [
+        ("check 3rrr_m1 --at phi=10", "--at phi=10: taken as radians, 573 degrees"),
+        ("check 3rrr_m1 --at x=0,phi=0.1 --at phi=-4", "--at phi=-4: taken as radians, -229 degrees"),
+        ("path 3rrr_m1 --start phi=0 --goal phi=5", "--goal phi=5: taken as radians, 286 degrees"),
+        ("check 3rrr_m1 --at phi=3", None),
+        ("check 3rrr_m1 --at x=4,phi=0.2", None),
+        ("check 3rrr_m1 --at phi=10deg", None),
+    ],
+)
 def test_a_turn_of_more_than_half_a_circle_without_a_unit_is_told_in_degrees(
-        command: str, told: str | None, capsys: pytest.CaptureFixture[str]) -> None:
+    command: str, told: str | None, capsys: pytest.CaptureFixture[str]
+) -> None:
     capsys.readouterr()
     execute(command.split())
     said = capsys.readouterr().err
@@ -189,10 +224,13 @@ def test_a_turn_of_more_than_half_a_circle_without_a_unit_is_told_in_degrees(
     assert told is None or told in said
 
 
-@pytest.mark.parametrize(("command", "usual"), [
-    ("basins 3rrr_m1 --goal x=0", "--to"), ("endings 3rrr_m1 --to x=0", "--at"), ("path 3rrr_m1 --at x=0", "--goal")])
+@pytest.mark.parametrize(
+    ("command", "usual"),
+    [("basins 3rrr_m1 --goal x=0", "--to"), ("endings 3rrr_m1 --to x=0", "--at"), ("path 3rrr_m1 --at x=0", "--goal")],
+)
 def test_the_pose_of_a_question_is_named_where_another_name_is_given(
-        command: str, usual: str, capsys: pytest.CaptureFixture[str]) -> None:
+    command: str, usual: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     capsys.readouterr()
     assert execute(command.split()) == 2
     assert f"allowed: {usual} for the pose of this question" in capsys.readouterr().err

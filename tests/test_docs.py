@@ -43,8 +43,13 @@ def test_every_picture_has_its_command_and_is_shown():
     assert [name for name in kept if f"pictures/{name}" not in shown] == []
 
 
-EXAMPLES = sorted({line for page in PAGES
-                   for line in re.findall(r"`hrsynth ([^`]*\bexample:[^`]*)`", page.read_text(encoding="utf-8"))})
+EXAMPLES = sorted(
+    {
+        line
+        for page in PAGES
+        for line in re.findall(r"`hrsynth ([^`]*\bexample:[^`]*)`", page.read_text(encoding="utf-8"))
+    }
+)
 
 
 @pytest.mark.slow
@@ -62,9 +67,14 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The site, its notebooks without outputs where no executed copy is kept."""
     pytest.importorskip("mkdocs")
     folder = tmp_path_factory.mktemp("site")
-    run = subprocess.run([sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(folder)], cwd=ROOT,
-                         capture_output=True, text=True, check=False,
-                         env={**os.environ, "HRSYNTH_DOCS_QUICK": "1", "NO_MKDOCS_2_WARNING": "1"})
+    run = subprocess.run(
+        [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(folder)],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "HRSYNTH_DOCS_QUICK": "1", "NO_MKDOCS_2_WARNING": "1"},
+    )
     assert run.returncode == 0, run.stderr
     return folder
 
@@ -109,8 +119,13 @@ def test_formulas_are_set_and_code_is_left_alone(site: Path):
     assert "<style" not in set_
     assert 'aria-label="x_1^2"' in set_
     assert all(each in set_ for each in ("`$x$`", "$ hrsynth", "$HOME and 3 $ or 4 $"))
-    left = [name for name in site.rglob("*.html") if re.search(r"\$\$|\$\\", re.sub(
-        r"<(pre|code|script).*?</\1>", "", name.read_text(encoding="utf-8"), flags=re.DOTALL))]
+    left = [
+        name
+        for name in site.rglob("*.html")
+        if re.search(
+            r"\$\$|\$\\", re.sub(r"<(pre|code|script).*?</\1>", "", name.read_text(encoding="utf-8"), flags=re.DOTALL)
+        )
+    ]
     assert left == []
 
 

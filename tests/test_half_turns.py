@@ -215,8 +215,9 @@ def selected(case: Case, pose: Pose) -> Answer:
     return reached(case, pose)
 
 
-COMMANDS = {each.__name__: each
-            for each in (reached, led_whole, checked, swept, moded, pathed, exact, mapped, served, selected)}
+COMMANDS = {
+    each.__name__: each for each in (reached, led_whole, checked, swept, moded, pathed, exact, mapped, served, selected)
+}
 SLOW = {"located": located}
 
 
@@ -271,8 +272,9 @@ def test_a_link_that_has_turned_over_does_not_close_its_leg() -> None:
 
 @pytest.fixture(autouse=True)
 def prepared_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    def prepared(robot: Mechanism | ObservedRobot, observe: str | None = None, *_: object, **__: object
-                 ) -> ObservedRobot:
+    def prepared(
+        robot: Mechanism | ObservedRobot, observe: str | None = None, *_: object, **__: object
+    ) -> ObservedRobot:
         return robot if isinstance(robot, ObservedRobot) else sampled(robot, observe)
 
     monkeypatch.setattr(ObservedRobot, "of", prepared)
@@ -282,9 +284,18 @@ QUICK = ("reached", "led_whole", "checked", "swept", "moded")
 
 
 @pytest.mark.some(2)
-@pytest.mark.parametrize(("robot", "command"), [
-    *(("3rpr_m1, tilted", command) for command in COMMANDS), *(("gough_stewart", command) for command in QUICK),
-    *(pytest.param("gough_stewart", command, marks=pytest.mark.slow) for command in COMMANDS if command not in QUICK)])
+@pytest.mark.parametrize(
+    ("robot", "command"),
+    [
+        *(("3rpr_m1, tilted", command) for command in COMMANDS),
+        *(("gough_stewart", command) for command in QUICK),
+        *(
+            pytest.param("gough_stewart", command, marks=pytest.mark.slow)
+            for command in COMMANDS
+            if command not in QUICK
+        ),
+    ],
+)
 def test_an_answer_is_about_the_pose_that_was_wanted(robot: str, command: str) -> None:
     assert answers(robot, command, 3, 0)["answered"] == 3
 

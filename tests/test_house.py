@@ -26,8 +26,8 @@ PACKAGE = ROOT / "src" / "hrsynth"
 
 # A module imports only from its own folder and from those above it here.
 FOLDERS = [
-    {"errors", "tolerances", "budgets", "ranges", "results", "claims", "processes", "progress"} | {
-        "characters", "untrusted", "version"},
+    {"errors", "tolerances", "budgets", "ranges", "results", "claims", "processes", "progress"}
+    | {"characters", "untrusted", "version"},
     {"geometry"},
     {"mechanism"},
     {"description"},
@@ -50,7 +50,14 @@ FOLDERS = [
 LEVEL = {name: level for level, names in enumerate(FOLDERS) for name in names}
 
 ENGINE = {"geometry", "mechanism", "description", "linting", "kinematics", "closed_forms", "batch", "rewrite"} | {
-    "constraints", "analysis", "codegen", "simulation", "selection", "certificates", "present"}
+    "constraints",
+    "analysis",
+    "codegen",
+    "simulation",
+    "selection",
+    "certificates",
+    "present",
+}
 ROBOTS = re.compile(
     r"(?<![a-z])(quattro|delta|orthoglide|gough|stewart|hexaglide|uranesx|i4l|tsai)(?![a-z])", re.IGNORECASE
 )
@@ -60,11 +67,32 @@ SLOW = {"pinocchio": "kinematics"} | dict.fromkeys(
     ["cv2", "dask", "example_robot_data", "flint", "joblib", "matplotlib", "mujoco", "numba", "scipy"]
     + ["starlette", "sympy", "trimesh", "uvicorn", "websockets", "yourdfpy"]
 )
-NOT_FOR_HELP = ["pinocchio", "sympy", "networkx", "scipy", "yourdfpy", "matplotlib", "flint", "mujoco", "starlette",
-                "uvicorn", "websockets"]
+NOT_FOR_HELP = [
+    "pinocchio",
+    "sympy",
+    "networkx",
+    "scipy",
+    "yourdfpy",
+    "matplotlib",
+    "flint",
+    "mujoco",
+    "starlette",
+    "uvicorn",
+    "websockets",
+]
 
 # Spelt apart, so that this file does not hold them.
-NOT_IN_FILES = ["TO" "DO", "FIX" "ME", "/wo" "rk/", "pypi" ".org", "python" "hosted", "--extra-" "index-url"]
+NOT_IN_FILES = [
+    "".join(parts)
+    for parts in [
+        ("TO", "DO"),
+        ("FIX", "ME"),
+        ("/wo", "rk/"),
+        ("pypi", ".org"),
+        ("python", "hosted"),
+        ("--extra-", "index-url"),
+    ]
+]
 
 TYPE_CHECKING = "from typing import TYPE_CHECKING"
 
@@ -118,8 +146,9 @@ def source_of(path: Path) -> Source:
             level = node.level if isinstance(node, ast.ImportFrom) else 0
             base = package[: len(package) - level + 1] if level else []
             base += (node.module or "").split(".") if isinstance(node, ast.ImportFrom) and node.module else []
-            imports += [Import(node.lineno, ".".join([*base, alias.name]), ast.unparse(node), head)
-                        for alias in node.names]
+            imports += [
+                Import(node.lineno, ".".join([*base, alias.name]), ast.unparse(node), head) for alias in node.names
+            ]
         elif isinstance(node, ast.ClassDef):
             classes.append((node.lineno, node.name))
         elif isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda):
@@ -186,8 +215,30 @@ def test_no_module_imports_itself_in_the_end():
 
 
 TABLES = {"tolerances", "budgets"}
-BARE = {"FAR", "FEW", "FINE", "FINER", "FINEST", "FIRST", "HEAVY", "LARGEST", "LEAST", "LONGEST", "LOOSE", "MANY",
-        "MORE", "MOST", "NEAR", "NOTHING", "SHORT", "SHORTEST", "STEADY", "TIGHT", "WIDE", "ZERO"}
+BARE = {
+    "FAR",
+    "FEW",
+    "FINE",
+    "FINER",
+    "FINEST",
+    "FIRST",
+    "HEAVY",
+    "LARGEST",
+    "LEAST",
+    "LONGEST",
+    "LOOSE",
+    "MANY",
+    "MORE",
+    "MOST",
+    "NEAR",
+    "NOTHING",
+    "SHORT",
+    "SHORTEST",
+    "STEADY",
+    "TIGHT",
+    "WIDE",
+    "ZERO",
+}
 """Names that tell no meaning."""
 MEASURED = {"simulation/mockup.py"}
 """Modules whose small numbers are quantities of a body, not tolerances."""
@@ -224,8 +275,11 @@ def test_constants_with_the_same_name_are_not_in_both_tables():
 
 def test_what_stands_in_the_tables_is_used():
     names = {name for table in TABLES for _, name, _ in source_of(PACKAGE / f"{table}.py").constants}
-    words = Counter(word for path in (*MODULES, *(ROOT / "tests").rglob("*.py"))
-                    for word in set(re.findall(r"\b[A-Z][A-Z0-9_]+\b", path.read_text(encoding="utf-8"))))
+    words = Counter(
+        word
+        for path in (*MODULES, *(ROOT / "tests").rglob("*.py"))
+        for word in set(re.findall(r"\b[A-Z][A-Z0-9_]+\b", path.read_text(encoding="utf-8")))
+    )
     assert_none(sorted(name for name in names if words[name] < 2), "a tolerance or limit that nothing uses")
 
 
@@ -235,24 +289,30 @@ def test_class_names_are_unique():
         for line, name in source_of(path).classes:
             homes.setdefault(name, []).append(where(path, line))
     twice = {name: places for name, places in homes.items() if len(places) > 1}
-    assert_none([f"{name}: {', '.join(places)}" for name, places in twice.items()],
-                "two classes of one name")
+    assert_none([f"{name}: {', '.join(places)}" for name, places in twice.items()], "two classes of one name")
 
 
 def test_the_package_itself_imports_nothing_of_its_own():
     own = PACKAGE / "__init__.py"
     assert_none(
-        [where(own, each.line) for each in source_of(own).imports
-         if each.head and each.text not in (TYPE_CHECKING, "from .results import Result",
-                                            "from .version import __version__")],
+        [
+            where(own, each.line)
+            for each in source_of(own).imports
+            if each.head
+            and each.text not in (TYPE_CHECKING, "from .results import Result", "from .version import __version__")
+        ],
         "imports (public names are imported when they are asked for; results are told how to find them)",
     )
 
 
 def test_only_the_command_line_imports_the_package_as_a_whole():
     assert_none(
-        [where(path, line) for path in MODULES for line, name in imports_of(path)
-         if name == "hrsynth" and folder_of(path) != "cli"],
+        [
+            where(path, line)
+            for path in MODULES
+            for line, name in imports_of(path)
+            if name == "hrsynth" and folder_of(path) != "cli"
+        ],
         "what the package is made of imports its public names",
     )
 
@@ -294,11 +354,20 @@ def test_only_what_is_declared_is_imported_by_the_core():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     declared = {re.split(r"[\[><=]", each)[0].lower().replace("-", "_") for each in project["dependencies"]}
     names = {"pinocchio": "pin", "yaml": "pyyaml", "flint": "python_flint"}
-    taken = {(each.name.partition(".")[0], where(path, each.line)) for path in MODULES
-             for each in source_of(path).imports if each.head}
-    assert_none([f"{place}: {name}" for name, place in sorted(taken)
-                 if name not in {*sys.stdlib_module_names, "hrsynth"} and names.get(name, name) not in declared],
-                "imported at the head of a module, and no dependency")
+    taken = {
+        (each.name.partition(".")[0], where(path, each.line))
+        for path in MODULES
+        for each in source_of(path).imports
+        if each.head
+    }
+    assert_none(
+        [
+            f"{place}: {name}"
+            for name, place in sorted(taken)
+            if name not in {*sys.stdlib_module_names, "hrsynth"} and names.get(name, name) not in declared
+        ],
+        "imported at the head of a module, and no dependency",
+    )
 
 
 @pytest.mark.skipif(not list(PACKAGE.glob("cli*")), reason="there is no command line yet")
@@ -334,8 +403,10 @@ def test_every_test_asserts_something(path: Path):
 def test_members_that_stay_in_the_slow_suite_have_values_of_all_parameters():
     """Of 12 robots in 4 dialects a quarter has every robot once and every dialect three times; and is no run of
     neighbours."""
-    members = [SimpleNamespace(callspec=SimpleNamespace(indices={"robot": k // 4, "dialect": k % 4}), number=k)
-               for k in range(48)]
+    members = [
+        SimpleNamespace(callspec=SimpleNamespace(indices={"robot": k // 4, "dialect": k % 4}), number=k)
+        for k in range(48)
+    ]
     kept = diverse(members, 12)
     for name, values in (("robot", 12), ("dialect", 4)):
         assert Counter(each.callspec.indices[name] for each in kept) == {value: 12 // values for value in range(values)}

@@ -29,8 +29,16 @@ def essence(found: Derivation) -> tuple[object, ...]:
     """What may not depend on the way of writing; legs as a multiset."""
     hidden = found.hidden_architecture
     words = None if hidden is None else sorted((word.text(), count) for count, word in hidden.terms)
-    return (words, found.verdict.verdict, found.verdict.rank, found.dof, found.mobility, len(found.verdict.lost),
-            found.certificate.passed, found.unchecked and found.unchecked.equivalent)
+    return (
+        words,
+        found.verdict.verdict,
+        found.verdict.rank,
+        found.dof,
+        found.mobility,
+        len(found.verdict.lost),
+        found.certificate.passed,
+        found.unchecked and found.unchecked.equivalent,
+    )
 
 
 @cache

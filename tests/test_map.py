@@ -80,13 +80,22 @@ def test_any_function_is_asked_and_any_question():
     assert hrsynth.map("check", robots, poses=[]) == []
 
 
-@pytest.mark.parametrize(("question", "robots", "options", "allowed"), [
-    ("chek", "quattro", {}, "its name, such as check"), ("draw", "quattro", {}, "such as check"),
-    (3, "quattro", {}, "such as check"), ("check", "quattro", {"jobs": 0}, "1 or more"),
-    ("check", "quattro", {"jobs": 1.5}, "1 or more"), ("check", "quattro", {"errors": "hide"}, "raise, keep"),
-    ("advise", "quattro", {"poses": [[0, 0, 0]]}, "at or goal"), ("check", ["qattro"], {}, "quattro"),
-    ("check", "quattro", {"poses": [3]}, "4 × 4"), ("check", "quattro", {"legs": [1.5]}, "label"),
-    ("check", [None], {}, "the path of a robot file")])
+@pytest.mark.parametrize(
+    ("question", "robots", "options", "allowed"),
+    [
+        ("chek", "quattro", {}, "its name, such as check"),
+        ("draw", "quattro", {}, "such as check"),
+        (3, "quattro", {}, "such as check"),
+        ("check", "quattro", {"jobs": 0}, "1 or more"),
+        ("check", "quattro", {"jobs": 1.5}, "1 or more"),
+        ("check", "quattro", {"errors": "hide"}, "raise, keep"),
+        ("advise", "quattro", {"poses": [[0, 0, 0]]}, "at or goal"),
+        ("check", ["qattro"], {}, "quattro"),
+        ("check", "quattro", {"poses": [3]}, "4 × 4"),
+        ("check", "quattro", {"legs": [1.5]}, "label"),
+        ("check", [None], {}, "the path of a robot file"),
+    ],
+)
 def test_what_cannot_be_asked_is_refused_before_the_work(question, robots, options, allowed):
     with pytest.raises(BadRequest, match=allowed):
         hrsynth.map(question, robots, **options)
@@ -96,12 +105,18 @@ def test_what_cannot_be_asked_is_refused_before_the_work(question, robots, optio
 def test_a_script_needs_no_guard(tmp_path):
     """Workers do not run the script again."""
     script = tmp_path / "study.py"
-    script.write_text("import hrsynth\n"
-                      "found = hrsynth.map('check', ['3rrr_m1', '3rpr_m1'], poses=[[0.01, 0, 0], [0, 0, 0]], jobs=2)\n"
-                      "print(len(found), *(each.postures[0].hidden.state for each in found))\n")
-    run = subprocess.run([sys.executable, script], capture_output=True, text=True, check=True,
-                         env={"PYTHONPATH": str(Path(hrsynth.__file__).parents[1]), "OMP_NUM_THREADS": "1",
-                              "PATH": "/usr/bin:/bin"})
+    script.write_text(
+        "import hrsynth\n"
+        "found = hrsynth.map('check', ['3rrr_m1', '3rpr_m1'], poses=[[0.01, 0, 0], [0, 0, 0]], jobs=2)\n"
+        "print(len(found), *(each.postures[0].hidden.state for each in found))\n"
+    )
+    run = subprocess.run(
+        [sys.executable, script],
+        capture_output=True,
+        text=True,
+        check=True,
+        env={"PYTHONPATH": str(Path(hrsynth.__file__).parents[1]), "OMP_NUM_THREADS": "1", "PATH": "/usr/bin:/bin"},
+    )
     assert run.stdout.split()[0] == "4"
     assert len(run.stdout.splitlines()) == 1
 
@@ -110,6 +125,7 @@ def test_a_script_needs_no_guard(tmp_path):
 def test_joblib_does_as_well():
     """Questions and answers go to processes and back without this function too."""
     from joblib import Parallel, delayed
+
     poses = [[0.01, 0, 0], [0.02, 0, 0]]
     found = Parallel(n_jobs=2)(delayed(hrsynth.check)("3rrr_m1", at=pose) for pose in poses)
     assert found == [hrsynth.check("3rrr_m1", at=pose) for pose in poses]

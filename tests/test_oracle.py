@@ -35,8 +35,12 @@ from strategies import (
     transformed,
 )
 
-quick = settings(max_examples=12, deadline=None, derandomize=True,
-                 suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
+quick = settings(
+    max_examples=12,
+    deadline=None,
+    derandomize=True,
+    suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large],
+)
 seeds = st.integers(0, 2**32 - 1)
 
 
@@ -47,6 +51,7 @@ def walked(mechanism: Mechanism, seed: int = 1, n: int = 1, size: float = 0.3) -
 
 
 # --- rows --------------------------------------------------------------------------------------------------------
+
 
 def pair(letter: str, rng: np.random.Generator, cosine: float = 0.0) -> Mechanism:
     """Two free links joined by one joint; ``cosine`` of a U's two axes."""
@@ -116,8 +121,10 @@ def test_rows_are_the_wrenches_reciprocal_to_the_freedoms(letter: str) -> None:
 def test_a_skew_universal_joint_keeps_its_angle() -> None:
     oracle, (state,) = walked(pair("U", np.random.default_rng(5), cosine=0.4), size=1.0)
     first, second = oracle.mechanism.joints["tested"].axes
-    turned = [oracle.pose(state, name)[:3, :3] @ oracle.mechanism.links[name].pose[:3, :3].T @ axis
-              for name, axis in (("a", first), ("b", second))]
+    turned = [
+        oracle.pose(state, name)[:3, :3] @ oracle.mechanism.links[name].pose[:3, :3].T @ axis
+        for name, axis in (("a", first), ("b", second))
+    ]
     assert oracle.mobility(state) == 8
     assert turned[0] @ turned[1] == pytest.approx(0.4, abs=1e-10)
 
@@ -139,6 +146,7 @@ def test_an_axis_turned_round_is_not_closed(letter: str) -> None:
 
 # --- mobilities --------------------------------------------------------------------------------------------------
 
+
 def polygon(n: int, rng: np.random.Generator) -> Mechanism:
     """A planar loop of ``n`` bars."""
     builder, tilt = Builder(f"{n}-bar"), random_rotation(rng)
@@ -146,8 +154,15 @@ def polygon(n: int, rng: np.random.Generator) -> Mechanism:
         builder.link(f"bar_{k}", rng.normal(size=3) if k else np.zeros(3), random_rotation(rng) if k else None)
     for k in range(n):
         angle, radius = 2 * np.pi * k / n, rng.uniform(0.7, 1.3)
-        builder.joint(f"pin_{k}", "R", f"bar_{k}", f"bar_{(k + 1) % n}", loop=k == n - 1, axis=tilt[:, 2],
-                      at=tilt @ (radius * np.array([np.cos(angle), np.sin(angle), 0.0])))
+        builder.joint(
+            f"pin_{k}",
+            "R",
+            f"bar_{k}",
+            f"bar_{(k + 1) % n}",
+            loop=k == n - 1,
+            axis=tilt[:, 2],
+            at=tilt @ (radius * np.array([np.cos(angle), np.sin(angle), 0.0])),
+        )
     return builder.build(platform=f"bar_{n // 2}")
 
 
@@ -219,6 +234,7 @@ def test_the_delta_translates_and_its_rods_spin() -> None:
 
 # --- relation ----------------------------------------------------------------------------------------------------
 
+
 def test_the_relation_of_a_pod_is_the_graph_of_the_printed_matrix() -> None:
     """u_dot = (1 - u u^T) (v + omega x b) / r for rods from the base to points b of the platform."""
     oracle, (state,) = walked(pods(["UPS"] * 4, np.random.default_rng(21)))
@@ -250,9 +266,13 @@ def test_finite_motions_follow_the_relation(name: str, camera: str | None) -> No
     for velocity in h * K.T:
         ahead, behind = oracle.step(state, velocity), oracle.step(state, -velocity)
         X_a, X_b = oracle.pose(ahead, "platform"), oracle.pose(behind, "platform")
-        change = np.concatenate((
-            (X_a - X_b)[:3, 3] / oracle.length, logarithm(X_a[:3, :3] @ X_b[:3, :3].T),
-            np.ravel(oracle.directions(ahead, observations) - oracle.directions(behind, observations)))) / (2 * h)
+        change = np.concatenate(
+            (
+                (X_a - X_b)[:3, 3] / oracle.length,
+                logarithm(X_a[:3, :3] @ X_b[:3, :3].T),
+                np.ravel(oracle.directions(ahead, observations) - oracle.directions(behind, observations)),
+            )
+        ) / (2 * h)
         assert np.linalg.norm(change - rho @ (rho.T @ change)) < 1e-5
 
 
@@ -279,6 +299,7 @@ def test_same_relation_is_the_largest_principal_angle() -> None:
 
 # --- assembly ----------------------------------------------------------------------------------------------------
 
+
 def test_closing_reaches_a_pinned_pose() -> None:
     oracle, (state,) = walked(KNOWN["6-UPS"][0](), size=0.5)
     target = oracle.pose(state, "platform")
@@ -291,8 +312,9 @@ def test_closing_reaches_a_pinned_pose() -> None:
         Oracle(classic_delta()).close(Oracle(classic_delta()).zero(), pins={"platform": np.full(3, 10.0)})
 
 
-@pytest.mark.parametrize(("name", "camera"), [("3-RRR", None), ("delta", None), ("3-UPS", "platform"),
-                                             ("rigid quattro", None)])
+@pytest.mark.parametrize(
+    ("name", "camera"), [("3-RRR", None), ("delta", None), ("3-UPS", "platform"), ("rigid quattro", None)]
+)
 def test_the_same_robot_written_otherwise_is_assembled_at_the_same_directions(name: str, camera: str | None) -> None:
     rng = np.random.default_rng(41)
     real = replace(KNOWN[name][0](), camera=camera)
@@ -321,8 +343,10 @@ def lifted(mechanism: Mechanism) -> Mechanism:
         names = [f"virtual_{each.leg}_{k}" for k in range(1, 6)]
         ends = [mechanism.reference, *names[:4], each.link]
         axes = [*((axis,) for axis in np.eye(3)), (random_normal(rng, second), second), (d,)]
-        joints = [Joint(name, JointType(letter), ends[k], ends[k + 1], at, axes[k], in_tree=k < 4)
-                  for k, (name, letter) in enumerate(zip(names, "PPPUR", strict=True))]
+        joints = [
+            Joint(name, JointType(letter), ends[k], ends[k + 1], at, axes[k], in_tree=k < 4)
+            for k, (name, letter) in enumerate(zip(names, "PPPUR", strict=True))
+        ]
         mechanism = mechanism.changed(links=[Link(name, pose(at)) for name in names[:4]], joints=joints)
     return mechanism
 
@@ -348,6 +372,7 @@ def test_directions_that_contradict_the_pose_are_not_assembled() -> None:
 
 
 # --- generated mechanisms ----------------------------------------------------------------------------------------
+
 
 def is_well_cut(mechanism: Mechanism) -> bool:
     """Whether the tree joints span all links and point away from the base."""
@@ -399,8 +424,9 @@ def test_moving_the_geometry_moves_the_relation(mechanism: Mechanism, seed: int)
     twin = Oracle(moved)
     X = np.eye(4)
     X[:3, :3], X[:3, 3] = R, p
-    there = np.array([X_BL if name == mechanism.base else X @ X_BL
-                      for name, X_BL in zip(mechanism.links, state, strict=True)])
+    there = np.array(
+        [X_BL if name == mechanism.base else X @ X_BL for name, X_BL in zip(mechanism.links, state, strict=True)]
+    )
     assert twin.error(there) < CLOSED
     turn = np.kron(np.eye(2), R)
     rho, rho_moved = oracle.relation(state), twin.relation(there)

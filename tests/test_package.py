@@ -41,8 +41,12 @@ def test_a_lock_holds_all_that_its_packages_need(name: str):
             needs = [Requirement(each) for each in metadata.requires(package) or ()]
         except metadata.PackageNotFoundError:
             continue
-        missing |= {f"{package}: {each}" for each in needs if canonicalize_name(each.name) not in pinned
-                    and (each.marker is None or each.marker.evaluate({"extra": ""}))}
+        missing |= {
+            f"{package}: {each}"
+            for each in needs
+            if canonicalize_name(each.name) not in pinned
+            and (each.marker is None or each.marker.evaluate({"extra": ""}))
+        }
     assert len(pinned) > 30
     assert missing == set()
 

@@ -19,7 +19,8 @@ COMMANDS = {
     "basins": ["basins", "rrrrr_m1", "--to", "x=0.02,y=0.24", "--grid", "x=-0.2:0.2:45,y=0.1:0.3:45", "--jobs", "2"],
     "endings": ["endings", "rrrrr_m1", "--at", "x=0.02", "--jobs", "2"],
     "build": ["catalog", "build", "planar", "-o", "built", "--workers", "2"],
-    "site": ["catalog", "site", "--group", "planar", "-o", "site", "--workers", "2"]}
+    "site": ["catalog", "site", "--group", "planar", "-o", "site", "--workers", "2"],
+}
 CLI = """
 import sys
 import hrsynth.simulation.endings.subdivision as boxes
@@ -38,8 +39,10 @@ def processes(mark: str) -> dict[int, str]:
     found = {}
     for folder in Path("/proc").glob("[0-9]*"):
         try:
-            if mark.encode() in (folder / "environ").read_bytes().split(b"\0") and (
-                    folder / "stat").read_text().rpartition(")")[2].split()[0] != "Z":
+            if (
+                mark.encode() in (folder / "environ").read_bytes().split(b"\0")
+                and (folder / "stat").read_text().rpartition(")")[2].split()[0] != "Z"
+            ):
                 found[int(folder.name)] = (folder / "cmdline").read_bytes().replace(b"\0", b" ").decode()
         except OSError:  # it ended meanwhile
             continue
@@ -61,9 +64,14 @@ def test_no_process_outlives_the_command(how: signal.Signals, name: str, tmp_pat
     mark = f"HRSYNTH_TESTED={name} {how.name} {time.monotonic()}"
     before = set(SHARED_MEMORY.iterdir()) if SHARED_MEMORY.is_dir() else set()
     environment = dict([*os.environ.items(), tuple(mark.split("=", 1))])
-    command = subprocess.Popen([sys.executable, "-c", *([MAP] if name == "map" else [CLI, *COMMANDS[name]])],
-                               cwd=tmp_path, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-                               start_new_session=True)
+    command = subprocess.Popen(
+        [sys.executable, "-c", *([MAP] if name == "map" else [CLI, *COMMANDS[name]])],
+        cwd=tmp_path,
+        env=environment,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
     try:
         assert waited_for(lambda: sum("LokyProcess" in each for each in processes(mark).values()) >= 2, 60)
         time.sleep(1.0)  # they are at work

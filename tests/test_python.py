@@ -21,8 +21,9 @@ SLOW = {"atlas", "draw", "select"}
 
 
 @pytest.mark.some(2)
-@pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.slow) if name in SLOW else name
-                                  for name in FUNCTIONS])
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow) if name in SLOW else name for name in FUNCTIONS]
+)
 def test_help_has_an_example_that_works(name: str):
     if name == "examples":
         try:
@@ -36,17 +37,21 @@ def test_help_has_an_example_that_works(name: str):
     assert doctest.DocTestRunner(verbose=False).run(example).failed == 0
 
 
-@pytest.mark.parametrize(("ask", "near"), [
-    (lambda wrong: hrsynth.derive("3rrr_m1", **wrong("observed")), "observe"),
-    (lambda wrong: hrsynth.select("3rrr_m1", start="x=0", goal="x=0", **wrong("run")), "runs"),
-    (lambda wrong: hrsynth.observe("3rrr_m1", **wrong("leg")), "legs"),
-    (lambda wrong: hrsynth.servo("3rrr_m1", start="x=0", goal="x=0", **wrong("gian")), "gain"),
-    (lambda wrong: hrsynth.map("check", ["3rrr_m1"], jobs=1, **wrong("camra")), "camera"),
-    (lambda wrong: hrsynth.draw(hrsynth.modes("rrrrr_m1"), **wrong("widht")), "width"),
-    (lambda wrong: hrsynth.load("3rrr_m1", **wrong("platfrom")), "platform"),
-    (lambda wrong: hrsynth.save("3rrr_m1", "x.xml", **wrong("mesh")), "meshes"),
-    (lambda wrong: hrsynth.lint("3rrr_m1", **wrong("compar")), "compare"),
-    (lambda wrong: hrsynth.lint("3rrr_m1", **wrong("platfrom")), "platform")])
+@pytest.mark.parametrize(
+    ("ask", "near"),
+    [
+        (lambda wrong: hrsynth.derive("3rrr_m1", **wrong("observed")), "observe"),
+        (lambda wrong: hrsynth.select("3rrr_m1", start="x=0", goal="x=0", **wrong("run")), "runs"),
+        (lambda wrong: hrsynth.observe("3rrr_m1", **wrong("leg")), "legs"),
+        (lambda wrong: hrsynth.servo("3rrr_m1", start="x=0", goal="x=0", **wrong("gian")), "gain"),
+        (lambda wrong: hrsynth.map("check", ["3rrr_m1"], jobs=1, **wrong("camra")), "camera"),
+        (lambda wrong: hrsynth.draw(hrsynth.modes("rrrrr_m1"), **wrong("widht")), "width"),
+        (lambda wrong: hrsynth.load("3rrr_m1", **wrong("platfrom")), "platform"),
+        (lambda wrong: hrsynth.save("3rrr_m1", "x.xml", **wrong("mesh")), "meshes"),
+        (lambda wrong: hrsynth.lint("3rrr_m1", **wrong("compar")), "compare"),
+        (lambda wrong: hrsynth.lint("3rrr_m1", **wrong("platfrom")), "platform"),
+    ],
+)
 def test_a_wrong_keyword_is_told_with_the_nearest_and_all(ask: Any, near: str):
     given: list[str] = []
 
@@ -60,47 +65,57 @@ def test_a_wrong_keyword_is_told_with_the_nearest_and_all(ask: Any, near: str):
     assert re.search(rf"has no {given[0]!r}, did you mean {near!r}; it takes .*\b{near}\b", said), said
 
 
-@pytest.mark.parametrize(("ask", "allowed"), [
-    (lambda: hrsynth.load(5), "a path, the name of a shipped robot"),
-    (lambda: hrsynth.lint(5), "a path, the name of a shipped robot"),
-    (lambda: hrsynth.lint(hrsynth.load("3rrr_m1")), "a path, the name of a shipped robot"),
-    (lambda: hrsynth.save("3rrr_m1", "x.xml", meshes="move"), "keep, copy"),
-    (lambda: hrsynth.branch("rrrrr_m1", [1, 2]), "hip=-1:1"),
-    (lambda: hrsynth.branch("rrrrr_m1", "shoulder_1"), "^a box of motors, found 'shoulder_1', allowed: low:high"),
-    (lambda: hrsynth.draw(5), "what a function of hrsynth answers"),
-    (lambda: hrsynth.check("rrrrr_m1", seed="a"), "seed, found 'a', allowed: an integer"),
-    (lambda: hrsynth.check("rrrrr_m1", seed=-1), "at least 0"),
-    (lambda: hrsynth.observe("rrrrr_m1", seed=-1), "at least 0"),
-    (lambda: hrsynth.branch("rrrrr_m1", effort=1.5), "effort, found 1.5, allowed: an integer"),
-    (lambda: hrsynth.modes("rrrrr_m1", real="maybe"), "True or False"),
-    (lambda: hrsynth.modes("rrrrr_m1", effort=True), "effort, found True, allowed: a number"),
-    (lambda: hrsynth.advise("rrrrr_m1", price={"encoder": 1}), "a text"),
-    (lambda: hrsynth.accuracy("rrrrr_m1", cone=[1]), "more than 0 and less than 90deg"),
-    (lambda: hrsynth.accuracy("rrrrr_m1", cone=0.01, noise=3), "a text such as 0.1deg"),
-    (lambda: hrsynth.servo("rrrrr_m1", start="x=0", goal="x=0", gain="x"), "a number"),
-    (lambda: hrsynth.servo("rrrrr_m1", start="x=0", goal="x=0", noise=3), "a text such as 0.1deg"),
-    (lambda: hrsynth.singular("rrrrr_m1", points=0), "points, found 0, allowed: an integer, at least 1"),
-    (lambda: hrsynth.modes("rrrrr_m1", effort=-1), "effort, found -1, allowed: a number, at least 0"),
-    (lambda: hrsynth.modes("rrrrr_m1", effort=math.nan), "effort, found nan, allowed: a number, at least 0"),
-    (lambda: hrsynth.singular("rrrrr_m1", points=10**8), "an integer, at least 1, at most 1e"),
-    (lambda: hrsynth.accuracy("rrrrr_m1", cone=0.01, plane="", steps=1), "^steps, found 1, .* at least 5, at most 300"),
-    (lambda: hrsynth.basins("rrrrr_m1", to="x=0", steps=301), "^steps, found 301, .* at least 2, at most 300"),
-    (lambda: hrsynth.basins("rrrrr_m1", to="x=0", jobs=0), "^jobs, found 0, .* at least 1$"),
-    (lambda: hrsynth.endings("rrrrr_m1", at="x=0", effort=0), "^effort, found 0, .* at least 1$"),
-    (lambda: hrsynth.servo("rrrrr_m1", start="x=0", goal="x=0", gain=1e7), "^gain, .* at most 1e"),
-    (lambda: hrsynth.select("rrrrr_m1", start="x=0", goal="x=0", examine=0), "^examine, found 0, .* at least 1$"),
-    (lambda: hrsynth.draw(hrsynth.singular("rrrrr_m1", points=5), steps=1), "^steps, found 1, .* at least 5"),
-    (lambda: hrsynth.verify(None), "a file, allowed: its path"),
-    (lambda: hrsynth.save("rrrrr_m1", None), "a file, allowed: its path"),
-    (lambda: hrsynth.draw(hrsynth.derive("rrrrr_m1"), 3), "a file, found 3, allowed: its path"),
-    (lambda: hrsynth.accuracy("rrrrr_m1", cone=0.01, grid="x=0:0.1:2,y=0", into=3), "a file, found 3"),
-    (lambda: hrsynth.check("rrrrr_m1", grid={"x": (0, 0.1, 2)}), "^a grid, found .*, allowed: a text such as x=-0.3"),
-    (lambda: hrsynth.accuracy("rrrrr_m1", cone=0.01, grid=["x=0:0.1:2"]), "^a grid, found .*, allowed: a text"),
-    (lambda: hrsynth.load("rrrrr_m1", motors=[1]), "^names, found .*, allowed: texts in"),  # type: ignore[list-item]
-    (lambda: hrsynth.load("rrrrr_m1", motors=1), "^names, found 1, allowed: texts in a list"),
-    (lambda: hrsynth.load("rrrrr_m1", close=[("a", "b")]), "^names, found"),  # type: ignore[list-item]
-    (lambda: hrsynth.load("rrrrr_m1", tolerance="x"), "^tolerance, found 'x', allowed: 1e-11"),
-    (lambda: hrsynth.studio(3, open_=False), "a robot's file, found 3")])
+@pytest.mark.parametrize(
+    ("ask", "allowed"),
+    [
+        (lambda: hrsynth.load(5), "a path, the name of a shipped robot"),
+        (lambda: hrsynth.lint(5), "a path, the name of a shipped robot"),
+        (lambda: hrsynth.lint(hrsynth.load("3rrr_m1")), "a path, the name of a shipped robot"),
+        (lambda: hrsynth.save("3rrr_m1", "x.xml", meshes="move"), "keep, copy"),
+        (lambda: hrsynth.branch("rrrrr_m1", [1, 2]), "hip=-1:1"),
+        (lambda: hrsynth.branch("rrrrr_m1", "shoulder_1"), "^a box of motors, found 'shoulder_1', allowed: low:high"),
+        (lambda: hrsynth.draw(5), "what a function of hrsynth answers"),
+        (lambda: hrsynth.check("rrrrr_m1", seed="a"), "seed, found 'a', allowed: an integer"),
+        (lambda: hrsynth.check("rrrrr_m1", seed=-1), "at least 0"),
+        (lambda: hrsynth.observe("rrrrr_m1", seed=-1), "at least 0"),
+        (lambda: hrsynth.branch("rrrrr_m1", effort=1.5), "effort, found 1.5, allowed: an integer"),
+        (lambda: hrsynth.modes("rrrrr_m1", real="maybe"), "True or False"),
+        (lambda: hrsynth.modes("rrrrr_m1", effort=True), "effort, found True, allowed: a number"),
+        (lambda: hrsynth.advise("rrrrr_m1", price={"encoder": 1}), "a text"),
+        (lambda: hrsynth.accuracy("rrrrr_m1", cone=[1]), "more than 0 and less than 90deg"),
+        (lambda: hrsynth.accuracy("rrrrr_m1", cone=0.01, noise=3), "a text such as 0.1deg"),
+        (lambda: hrsynth.servo("rrrrr_m1", start="x=0", goal="x=0", gain="x"), "a number"),
+        (lambda: hrsynth.servo("rrrrr_m1", start="x=0", goal="x=0", noise=3), "a text such as 0.1deg"),
+        (lambda: hrsynth.singular("rrrrr_m1", points=0), "points, found 0, allowed: an integer, at least 1"),
+        (lambda: hrsynth.modes("rrrrr_m1", effort=-1), "effort, found -1, allowed: a number, at least 0"),
+        (lambda: hrsynth.modes("rrrrr_m1", effort=math.nan), "effort, found nan, allowed: a number, at least 0"),
+        (lambda: hrsynth.singular("rrrrr_m1", points=10**8), "an integer, at least 1, at most 1e"),
+        (
+            lambda: hrsynth.accuracy("rrrrr_m1", cone=0.01, plane="", steps=1),
+            "^steps, found 1, .* at least 5, at most 300",
+        ),
+        (lambda: hrsynth.basins("rrrrr_m1", to="x=0", steps=301), "^steps, found 301, .* at least 2, at most 300"),
+        (lambda: hrsynth.basins("rrrrr_m1", to="x=0", jobs=0), "^jobs, found 0, .* at least 1$"),
+        (lambda: hrsynth.endings("rrrrr_m1", at="x=0", effort=0), "^effort, found 0, .* at least 1$"),
+        (lambda: hrsynth.servo("rrrrr_m1", start="x=0", goal="x=0", gain=1e7), "^gain, .* at most 1e"),
+        (lambda: hrsynth.select("rrrrr_m1", start="x=0", goal="x=0", examine=0), "^examine, found 0, .* at least 1$"),
+        (lambda: hrsynth.draw(hrsynth.singular("rrrrr_m1", points=5), steps=1), "^steps, found 1, .* at least 5"),
+        (lambda: hrsynth.verify(None), "a file, allowed: its path"),
+        (lambda: hrsynth.save("rrrrr_m1", None), "a file, allowed: its path"),
+        (lambda: hrsynth.draw(hrsynth.derive("rrrrr_m1"), 3), "a file, found 3, allowed: its path"),
+        (lambda: hrsynth.accuracy("rrrrr_m1", cone=0.01, grid="x=0:0.1:2,y=0", into=3), "a file, found 3"),
+        (
+            lambda: hrsynth.check("rrrrr_m1", grid={"x": (0, 0.1, 2)}),
+            "^a grid, found .*, allowed: a text such as x=-0.3",
+        ),
+        (lambda: hrsynth.accuracy("rrrrr_m1", cone=0.01, grid=["x=0:0.1:2"]), "^a grid, found .*, allowed: a text"),
+        (lambda: hrsynth.load("rrrrr_m1", motors=[1]), "^names, found .*, allowed: texts in"),  # type: ignore[list-item]
+        (lambda: hrsynth.load("rrrrr_m1", motors=1), "^names, found 1, allowed: texts in a list"),
+        (lambda: hrsynth.load("rrrrr_m1", close=[("a", "b")]), "^names, found"),  # type: ignore[list-item]
+        (lambda: hrsynth.load("rrrrr_m1", tolerance="x"), "^tolerance, found 'x', allowed: 1e-11"),
+        (lambda: hrsynth.studio(3, open_=False), "a robot's file, found 3"),
+    ],
+)
 def test_a_value_of_another_kind_is_told_with_what_is_allowed(ask: Any, allowed: str):
     with pytest.raises(BadRequest, match=allowed):
         ask()
@@ -131,8 +146,9 @@ def test_a_certificate_is_about_its_robot_alone():
 def test_a_family_is_written_with_a_sentence_a_file(tmp_path: Path):
     ask = [sys.executable, "-m", "hrsynth.families", str(tmp_path)]
     done = subprocess.run([*ask, "bennett", "six_poses"], capture_output=True, text=True, check=True)
-    assert done.stdout.splitlines() == [f"The robot {name} is written to {tmp_path}/{name}.urdf."
-                                        for name in ("bennett", "six_poses")]
+    assert done.stdout.splitlines() == [
+        f"The robot {name} is written to {tmp_path}/{name}.urdf." for name in ("bennett", "six_poses")
+    ]
     wrong = subprocess.run([*ask, "nothing"], capture_output=True, text=True)
     assert (wrong.returncode, len(wrong.stderr.splitlines())) == (2, 1)
 

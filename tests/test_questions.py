@@ -19,8 +19,20 @@ from hrsynth.errors import BadRequest, HrsynthError, MissingExtra
 from hrsynth.mechanism.pose import Pose, as_pose, asked_pose, asked_poses
 
 TURNED = "x=0.01,y=0.02,z=-0.75,rpy=0/0/0.2"
-FUNCTIONS = ("accuracy", "advise", "check", "derive", "legs", "modes", "observe", "path", "select", "servo", "singular",
-             "view")
+FUNCTIONS = (
+    "accuracy",
+    "advise",
+    "check",
+    "derive",
+    "legs",
+    "modes",
+    "observe",
+    "path",
+    "select",
+    "servo",
+    "singular",
+    "view",
+)
 
 
 def matrix(pose: Pose) -> np.ndarray:
@@ -32,13 +44,23 @@ def matrix(pose: Pose) -> np.ndarray:
 def test_a_pose_is_taken_in_every_form():
     told = Pose.parse(TURNED)
     X = matrix(told)
-    for given in (told, TURNED, {"x": 0.01, "y": "0.02", "z": -0.75, "rpy": [0, 0, 0.2]}, told.to_dict(),
-                  {"x": 0.01, "y": 0.02, "z": -0.75, "rpy": "0/0/0.2", "phi": None}, [0.01, 0.02, -0.75, 0, 0, 0.2],
-                  np.array([0.01, 0.02, -0.75, 0, 0, 0.2]), X, X.tolist(), pin.SE3(X)):
+    for given in (
+        told,
+        TURNED,
+        {"x": 0.01, "y": "0.02", "z": -0.75, "rpy": [0, 0, 0.2]},
+        told.to_dict(),
+        {"x": 0.01, "y": 0.02, "z": -0.75, "rpy": "0/0/0.2", "phi": None},
+        [0.01, 0.02, -0.75, 0, 0, 0.2],
+        np.array([0.01, 0.02, -0.75, 0, 0, 0.2]),
+        X,
+        X.tolist(),
+        pin.SE3(X),
+    ):
         found = as_pose(given)
         assert list(found.given) == list(told.given)
-        np.testing.assert_allclose(np.hstack(list(found.given.values())), np.hstack(list(told.given.values())),
-                                   atol=1e-15)
+        np.testing.assert_allclose(
+            np.hstack(list(found.given.values())), np.hstack(list(told.given.values())), atol=1e-15
+        )
     assert as_pose({"phi": "10deg"}).phi == pytest.approx(np.radians(10))
     assert as_pose((1, 2, 3)) == Pose(1.0, 2.0, 3.0)
     assert as_pose({"x": np.float64(0.1) + 0.2}).x == 0.1 + 0.2
@@ -52,11 +74,29 @@ def test_any_rotation_is_read_from_its_matrix():
         np.testing.assert_allclose(as_pose(X).rotation, R, atol=1e-12)
 
 
-@pytest.mark.parametrize(("given", "count"), [
-    (None, 0), ((), 0), ("x=0", 1), ("mode:2", 1), ([0, 0, 1], 1), (np.zeros(3), 1), ({"x": 0}, 1), (np.eye(4), 1),
-    (np.eye(4).tolist(), 1), (pin.SE3.Identity(), 1), (["x=0", "mode:3", [0, 0, 1]], 3), (np.zeros((5, 3)), 5),
-    (np.zeros((4, 6)), 4), (np.array([np.eye(4)] * 3), 3), ([pin.SE3.Identity()] * 2, 2), ([{"x": 0}] * 3, 3),
-    ([Pose(x=0.0)] * 3, 3), ((Pose(x=float(k)) for k in range(6)), 6)])
+@pytest.mark.parametrize(
+    ("given", "count"),
+    [
+        (None, 0),
+        ((), 0),
+        ("x=0", 1),
+        ("mode:2", 1),
+        ([0, 0, 1], 1),
+        (np.zeros(3), 1),
+        ({"x": 0}, 1),
+        (np.eye(4), 1),
+        (np.eye(4).tolist(), 1),
+        (pin.SE3.Identity(), 1),
+        (["x=0", "mode:3", [0, 0, 1]], 3),
+        (np.zeros((5, 3)), 5),
+        (np.zeros((4, 6)), 4),
+        (np.array([np.eye(4)] * 3), 3),
+        ([pin.SE3.Identity()] * 2, 2),
+        ([{"x": 0}] * 3, 3),
+        ([Pose(x=0.0)] * 3, 3),
+        ((Pose(x=float(k)) for k in range(6)), 6),
+    ],
+)
 def test_one_pose_and_several_are_told_apart(given, count):
     assert len(asked_poses(given)) == count
 
@@ -64,11 +104,36 @@ def test_one_pose_and_several_are_told_apart(given, count):
 REFLECTED = np.diag([1.0, 1.0, -1.0, 1.0])
 
 
-@pytest.mark.parametrize("given", [3, 1.5, [1, 2], [1, 2, 3, 4], np.zeros((4, 4)), REFLECTED, 2 * np.eye(4), object(),
-                                   {1: 2}, {"x": "wide"}, {"x": [1, 2]}, {"rpy": 3}, {"rpy": [1, 2]}, {}, b"x=0",
-                                   [None], np.zeros((2, 2, 2)), [np.nan, 0, 0], {"x": np.inf}, "x", "mode:0",
-                                   {"x": None},
-                                   {"x": 1, "phi": 0, "rpy": [0, 0, 0]}, np.array("x=0"), {"x": {}}])
+@pytest.mark.parametrize(
+    "given",
+    [
+        3,
+        1.5,
+        [1, 2],
+        [1, 2, 3, 4],
+        np.zeros((4, 4)),
+        REFLECTED,
+        2 * np.eye(4),
+        object(),
+        {1: 2},
+        {"x": "wide"},
+        {"x": [1, 2]},
+        {"rpy": 3},
+        {"rpy": [1, 2]},
+        {},
+        b"x=0",
+        [None],
+        np.zeros((2, 2, 2)),
+        [np.nan, 0, 0],
+        {"x": np.inf},
+        "x",
+        "mode:0",
+        {"x": None},
+        {"x": 1, "phi": 0, "rpy": [0, 0, 0]},
+        np.array("x=0"),
+        {"x": {}},
+    ],
+)
 def test_what_is_no_pose_is_refused_in_one_line(given):
     with pytest.raises(BadRequest) as caught:
         hrsynth.check("3rrr_m1", at=given)
@@ -89,8 +154,9 @@ def test_a_robot_takes_back_the_pose_of_each_of_its_configurations():
             np.testing.assert_allclose(found.configuration.pose(seen.motion.link), X, atol=1e-5)
 
 
-@pytest.mark.parametrize("given", [[1, 4], (1, "4"), "1,4", " 1 , 4", np.array([1, 4]), {4, 1}, ["1", "4"],
-                                   (k for k in (1, 4))])
+@pytest.mark.parametrize(
+    "given", [[1, 4], (1, "4"), "1,4", " 1 , 4", np.array([1, 4]), {4, 1}, ["1", "4"], (k for k in (1, 4))]
+)
 def test_legs_are_taken_in_every_form(given):
     assert hrsynth.observe("quattro", given).labels == ("1", "4")
 
@@ -101,9 +167,20 @@ def test_one_leg_and_all_legs():
     assert hrsynth.observe("quattro", ["rod_1b", 2]).labels == ("1", "2")
 
 
-@pytest.mark.parametrize(("given", "word"), [
-    (1.0, "label"), (True, "label"), ([None], "label"), (7, "legs 1, 2, 3, 4"), ([], "leg labels"), ("", "legs 1"),
-    (object(), "label"), ([[1, 4]], "label"), (b"1", "legs 1")])
+@pytest.mark.parametrize(
+    ("given", "word"),
+    [
+        (1.0, "label"),
+        (True, "label"),
+        ([None], "label"),
+        (7, "legs 1, 2, 3, 4"),
+        ([], "leg labels"),
+        ("", "legs 1"),
+        (object(), "label"),
+        ([[1, 4]], "label"),
+        (b"1", "legs 1"),
+    ],
+)
 def test_what_are_no_legs_is_refused(given, word):
     with pytest.raises(BadRequest, match=f"allowed: .*{word}"):
         hrsynth.observe("quattro", given)
@@ -112,8 +189,10 @@ def test_what_are_no_legs_is_refused(given, word):
 def test_a_robot_is_taken_by_value_name_path_and_as_observed(tmp_path):
     robot = hrsynth.load("3rrr_m1")
     hrsynth.save("3rrr_m1", tmp_path / "mine.urdf")
-    found = [hrsynth.legs(each) for each in (robot, "3rrr_m1", tmp_path / "mine.urdf", str(tmp_path / "mine.urdf"),
-                                             hrsynth.observe("3rrr_m1"))]
+    found = [
+        hrsynth.legs(each)
+        for each in (robot, "3rrr_m1", tmp_path / "mine.urdf", str(tmp_path / "mine.urdf"), hrsynth.observe("3rrr_m1"))
+    ]
     assert all(each == found[0] for each in found)
     assert hrsynth.load(robot) is robot
     with pytest.raises(BadRequest, match="already read"):
@@ -156,6 +235,7 @@ def test_help_shows_every_option(name):
 
 def test_options_have_one_name_in_python_and_on_the_command_line():
     from hrsynth.cli.questions import QUESTIONS
+
     compared = 0
     for command in QUESTIONS:
         known = inspect.signature(getattr(hrsynth, command.name)).parameters
@@ -192,6 +272,7 @@ class TestMemory:
 
     def test_another_robot_of_the_same_name_is_another_question(self):
         from dataclasses import replace
+
         robot = hrsynth.load("3rrr_m1")
         joint = list(robot.joints.values())[-1]
         other = robot.changed(joints=[replace(joint, point=joint.point + [0.01, 0, 0])])
@@ -220,6 +301,7 @@ class TestMemory:
 
     def test_only_so_much_is_kept(self):
         from hrsynth.analysis.question import AnswerMemory
+
         memory = AnswerMemory(3)
         for k in (*range(5), 3):
             memory.answer(k, lambda k=k: object())
@@ -232,13 +314,21 @@ class TestMemory:
 
 
 class TestErrors:
-    @pytest.mark.parametrize("ask", [
-        lambda: hrsynth.check("3rrr_m1", at="x=9"), lambda: hrsynth.check("3rrr_m1", at="z=9"),
-        lambda: hrsynth.load("nothing"), lambda: hrsynth.load(Path(__file__)), lambda: hrsynth.check("3rrr_m1", "9"),
-        lambda: hrsynth.accuracy("3rrr_m1", "1", cone="0.1deg"),
-        lambda: hrsynth.accuracy("3rrr_m1", cone="0.1deg", grid="x=8:9:3,y=0,phi=0")])
+    @pytest.mark.parametrize(
+        "ask",
+        [
+            lambda: hrsynth.check("3rrr_m1", at="x=9"),
+            lambda: hrsynth.check("3rrr_m1", at="z=9"),
+            lambda: hrsynth.load("nothing"),
+            lambda: hrsynth.load(Path(__file__)),
+            lambda: hrsynth.check("3rrr_m1", "9"),
+            lambda: hrsynth.accuracy("3rrr_m1", "1", cone="0.1deg"),
+            lambda: hrsynth.accuracy("3rrr_m1", cone="0.1deg", grid="x=8:9:3,y=0,phi=0"),
+        ],
+    )
     def test_an_error_is_pickled_whole(self, ask):
         import pickle
+
         with pytest.raises(HrsynthError) as caught:
             ask()
         error = caught.value

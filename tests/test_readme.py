@@ -19,8 +19,10 @@ from hrsynth.present.markdown import block, line, replace_between
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = ROOT / "docs" / "pages"
-README, ROBOTS, PAPERS, CATALOG = (file.read_text(encoding="utf-8") for file in (
-    ROOT / "README.md", ROOT / "robots" / "README.md", PAGES / "papers.md", PAGES / "catalog.md"))
+README, ROBOTS, PAPERS, CATALOG = (
+    file.read_text(encoding="utf-8")
+    for file in (ROOT / "README.md", ROOT / "robots" / "README.md", PAGES / "papers.md", PAGES / "catalog.md")
+)
 LONGEST = 8_000
 """Bytes of the README at most."""
 SHOWN = "\n".join(file.read_text(encoding="utf-8") for file in (ROOT / "README.md", *sorted(PAGES.glob("*.md"))))
@@ -94,24 +96,44 @@ def test_the_python_example_runs_and_prints_what_it_says():
 
 
 @pytest.mark.some(1)
-@pytest.mark.parametrize("command", [pytest.param(each, marks=[pytest.mark.long] * each.startswith("basins"))
-                                     for each in dict.fromkeys(re.findall(r"\$ hrsynth (\w.*)", SHOWN))])
-def test_the_commands_print_what_is_shown(command: str, capsys: pytest.CaptureFixture[str], tmp_path: Path,
-                                          monkeypatch: pytest.MonkeyPatch):
+@pytest.mark.parametrize(
+    "command",
+    [
+        pytest.param(each, marks=[pytest.mark.long] * each.startswith("basins"))
+        for each in dict.fromkeys(re.findall(r"\$ hrsynth (\w.*)", SHOWN))
+    ],
+)
+def test_the_commands_print_what_is_shown(
+    command: str, capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
     """Line by line, with its numbers; a page may leave lines out."""
     monkeypatch.chdir(tmp_path)
     assert execute(shlex.split(command)) == 0
     printed = capsys.readouterr().out.splitlines()
     for shown in re.findall(re.escape(f"$ hrsynth {command}\n") + r"(.*?)\n(?:```|\n?\$ )", SHOWN, re.DOTALL):
-        missing = [line for line in shown.splitlines() if line.strip() not in ("", "…")
-                   and not any(_alike(line, other) for other in printed)]
+        missing = [
+            line
+            for line in shown.splitlines()
+            if line.strip() not in ("", "…") and not any(_alike(line, other) for other in printed)
+        ]
         assert missing == []
 
 
-@pytest.mark.parametrize(("shown", "printed", "same"), [
-    ("at 0.0698 m", "at 0.0698 m", True), ("at 0.0698 m", "at 0.0697 m", True), ("at 0.0698 m", "at 0.0688 m", False),
-    ("to 3.5e-13", "to 1.2e-14", True), ("to 3.5e-13", "to 3.5e-05", False), ("gap 7.5e+11", "gap 2.1e+12", True),
-    ("gap 7.5e+11", "gap 7.5e+02", False), ("3 legs", "4 legs", False), ("x  3", "x 3", True), ("x 3", "y 3", False)])
+@pytest.mark.parametrize(
+    ("shown", "printed", "same"),
+    [
+        ("at 0.0698 m", "at 0.0698 m", True),
+        ("at 0.0698 m", "at 0.0697 m", True),
+        ("at 0.0698 m", "at 0.0688 m", False),
+        ("to 3.5e-13", "to 1.2e-14", True),
+        ("to 3.5e-13", "to 3.5e-05", False),
+        ("gap 7.5e+11", "gap 2.1e+12", True),
+        ("gap 7.5e+11", "gap 7.5e+02", False),
+        ("3 legs", "4 legs", False),
+        ("x  3", "x 3", True),
+        ("x 3", "y 3", False),
+    ],
+)
 def test_lines_are_compared_with_their_numbers(shown: str, printed: str, same: bool):
     assert _alike(shown, printed) is same
 

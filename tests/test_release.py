@@ -37,7 +37,7 @@ def test_the_licence_is_that_of_all_that_is_shipped():
     (bundle,) = (ROOT / "src").rglob("*.min.js")
     told = texts["LICENSE.three.js"]
     assert str(bundle.relative_to(ROOT)) in told
-    assert told[told.index("The MIT License"):].strip() in bundle.read_text(encoding="utf-8")
+    assert told[told.index("The MIT License") :].strip() in bundle.read_text(encoding="utf-8")
 
 
 def test_a_defect_of_security_is_reported_to_the_authors():
@@ -47,8 +47,11 @@ def test_a_defect_of_security_is_reported_to_the_authors():
 def test_all_files_of_the_catalog_and_all_robots_are_package_data():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     told = project["tool"]["setuptools"]["package-data"]["hrsynth"]
-    packed = {ROOT / "src" / "hrsynth" / file for pattern in told for file in glob(
-        pattern, root_dir=ROOT / "src" / "hrsynth", recursive=True)}
+    packed = {
+        ROOT / "src" / "hrsynth" / file
+        for pattern in told
+        for file in glob(pattern, root_dir=ROOT / "src" / "hrsynth", recursive=True)
+    }
     shipped = [*(ROOT / "catalog").rglob("*.jsonl*"), *(ROOT / "robots").glob("*.urdf")]
     assert len(shipped) > 30
     assert {file.resolve() for file in shipped if file.suffix != ".part"} <= {file.resolve() for file in packed}
@@ -56,8 +59,11 @@ def test_all_files_of_the_catalog_and_all_robots_are_package_data():
 
 def test_every_extra_that_is_named_is_there_and_all_holds_them():
     extras = PROJECT["optional-dependencies"]
-    named = {extra for path in (ROOT / "src").rglob("*.py")
-             for extra in re.findall(r'MissingExtra\([^()]*?"([a-z]+)"\)', path.read_text(encoding="utf-8"))}
+    named = {
+        extra
+        for path in (ROOT / "src").rglob("*.py")
+        for extra in re.findall(r'MissingExtra\([^()]*?"([a-z]+)"\)', path.read_text(encoding="utf-8"))
+    }
     assert {"plots", "solve", "bench", "examples"} <= named
     assert named <= extras.keys()
     (whole,) = extras["all"]
@@ -95,11 +101,18 @@ def without(packages: str, *arguments: str) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.mark.some(1)
-@pytest.mark.parametrize(("packages", "extra", "arguments"), [
-    ("matplotlib", "plots", ["modes", "3rrr_m1", "-o", "modes.png"]),
-    ("matplotlib", "plots", ["derive", "3rrr_m1", "--report", "report.html"]),
-    ("mujoco", "bench", ["servo", "3rrr_m1", "--start", "x=0,y=0,phi=0", "--goal", "x=0.01,y=0,phi=0", "--physics"]),
-])
+@pytest.mark.parametrize(
+    ("packages", "extra", "arguments"),
+    [
+        ("matplotlib", "plots", ["modes", "3rrr_m1", "-o", "modes.png"]),
+        ("matplotlib", "plots", ["derive", "3rrr_m1", "--report", "report.html"]),
+        (
+            "mujoco",
+            "bench",
+            ["servo", "3rrr_m1", "--start", "x=0,y=0,phi=0", "--goal", "x=0.01,y=0,phi=0", "--physics"],
+        ),
+    ],
+)
 def test_what_needs_a_package_that_is_missing_says_so_in_one_line(packages, extra, arguments, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     run = without(packages, *arguments)
@@ -114,9 +127,13 @@ def test_what_needs_a_package_that_is_missing_says_so_in_one_line(packages, extr
 def test_the_core_answers_without_any_extra(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     every = "matplotlib mujoco cv2 numba jax dask distributed xacro mkdocs nbclient IPython"
-    for arguments in (["derive", "3rrr_m1"], ["check", "3rrr_m1", "--grid", "x=0:0.01:3,y=0,phi=0"],
-                      ["modes", "3rrr_m1"], ["view", "3rrr_m1", "--static", "view.html"],
-                      ["derive", "3rrr_m1", "-o", "hidden.urdf"]):
+    for arguments in (
+        ["derive", "3rrr_m1"],
+        ["check", "3rrr_m1", "--grid", "x=0:0.01:3,y=0,phi=0"],
+        ["modes", "3rrr_m1"],
+        ["view", "3rrr_m1", "--static", "view.html"],
+        ["derive", "3rrr_m1", "-o", "hidden.urdf"],
+    ):
         run = without(every, *arguments)
         assert (run.returncode, run.stderr) == (0, ""), arguments
         assert run.stdout
@@ -124,6 +141,7 @@ def test_the_core_answers_without_any_extra(tmp_path, monkeypatch):
 
 def test_the_long_description_has_no_link_that_needs_the_repository():
     import runpy
+
     text = runpy.run_path(str(ROOT / "setup.py"))["long_description"]()
     links = re.findall(r"\]\(([^)]*)\)", text)
     assert len(links) > 20
@@ -137,8 +155,9 @@ def test_the_long_description_has_no_link_that_needs_the_repository():
 @pytest.fixture
 def checkout(tmp_path, monkeypatch):
     """A clone of the repository as it is, with addresses of its own, for the script to work on."""
-    files = subprocess.run(["git", "ls-files", "-co", "--exclude-standard", "-z"], cwd=ROOT, capture_output=True,
-                           text=True)
+    files = subprocess.run(
+        ["git", "ls-files", "-co", "--exclude-standard", "-z"], cwd=ROOT, capture_output=True, text=True
+    )
     if files.returncode:
         pytest.skip("no repository")
     copy = tmp_path / "copy"
@@ -153,8 +172,10 @@ def checkout(tmp_path, monkeypatch):
     (copy / "pyproject.toml").write_text(told, encoding="utf-8")
     log = copy / "CHANGELOG.md"
     if "- " not in log.read_text(encoding="utf-8").split("## [")[1]:
-        log.write_text(log.read_text(encoding="utf-8").replace("## [Unreleased]\n", "## [Unreleased]\n\n- New.\n"),
-                       encoding="utf-8")
+        log.write_text(
+            log.read_text(encoding="utf-8").replace("## [Unreleased]\n", "## [Unreleased]\n\n- New.\n"),
+            encoding="utf-8",
+        )
     monkeypatch.setattr(release, "ROOT", copy)
     for name in ("AUTHOR", "COMMITTER"):
         monkeypatch.setenv(f"GIT_{name}_NAME", "one")
@@ -169,8 +190,10 @@ def checkout(tmp_path, monkeypatch):
 def test_a_release_is_built_checked_and_tagged(checkout, capsys):
     release.main("99.0.0")
     assert "nothing is uploaded" in capsys.readouterr().out
-    assert {path.name for path in (checkout / "dist").iterdir()} == {"hrsynth-99.0.0.tar.gz",
-                                                                    "hrsynth-99.0.0-py3-none-any.whl"}
+    assert {path.name for path in (checkout / "dist").iterdir()} == {
+        "hrsynth-99.0.0.tar.gz",
+        "hrsynth-99.0.0-py3-none-any.whl",
+    }
     assert release.git("tag") == "v99.0.0"
     assert release.git("log", "-1", "--format=%s") == "Version 99.0.0"
     assert not release.git("status", "--porcelain", "--untracked-files=no")
@@ -206,7 +229,11 @@ def test_a_release_is_refused_with_the_reason(checkout):
     with pytest.raises(Refused, match="addresses"):
         release.main("99.0.0")
     log = checkout / "CHANGELOG.md"
-    log.write_text(re.sub(r"(## \[Unreleased\]\n).*?(?=## \[)", r"\1\n", log.read_text(encoding="utf-8"), count=1,
-                          flags=re.DOTALL), encoding="utf-8")
+    log.write_text(
+        re.sub(
+            r"(## \[Unreleased\]\n).*?(?=## \[)", r"\1\n", log.read_text(encoding="utf-8"), count=1, flags=re.DOTALL
+        ),
+        encoding="utf-8",
+    )
     with pytest.raises(Refused, match="Unreleased"):
         release.main("99.0.0")

@@ -41,8 +41,9 @@ ASKED = {
     "servo": lambda: hrsynth.servo(hrsynth.load("3rrr_m1"), start="x=0.01,y=0,phi=0", goal="x=-0.01,y=0,phi=0.05"),
     "endings": lambda: hrsynth.endings(hrsynth.load("rrrrr_m1"), at="x=0,y=0.25"),
     "basins": lambda: hrsynth.basins("rrrrr_m1", to="x=0,y=0.25", grid="x=-0.01:0.01:2,y=0.25", jobs=1),
-    "select": lambda: hrsynth.select(hrsynth.load("3rrr_m1"), start="x=0.01,y=0,phi=0", goal="x=-0.01,y=0,phi=0.05",
-                                     runs=1, examine=1),
+    "select": lambda: hrsynth.select(
+        hrsynth.load("3rrr_m1"), start="x=0.01,y=0,phi=0", goal="x=-0.01,y=0,phi=0.05", runs=1, examine=1
+    ),
     "export": lambda: hrsynth.export("prrrp_m1", box="guide_1=-0.001:0.001,guide_2=-0.001:0.001"),
     "view": lambda: hrsynth.view(hrsynth.load("3rrr_m1"), hidden=True),
 }
@@ -127,10 +128,17 @@ def test_an_answer_is_read_in_another_process(tmp_path):
     """Nothing in it depends on what was computed in the process that made it."""
     for name in ("singular", "modes", "derive"):
         (tmp_path / name).write_bytes(pickle.dumps(asked(name)))
-    code = ("import pickle, sys; from pathlib import Path\n"
-            "for file in sorted(Path(sys.argv[1]).iterdir()): print(repr(pickle.loads(file.read_bytes())))")
-    run = subprocess.run([sys.executable, "-c", code, tmp_path], capture_output=True, text=True, check=True,
-                         env={"PYTHONPATH": str(Path(hrsynth.__file__).parents[1]), "PYTHONIOENCODING": "utf-8"})
+    code = (
+        "import pickle, sys; from pathlib import Path\n"
+        "for file in sorted(Path(sys.argv[1]).iterdir()): print(repr(pickle.loads(file.read_bytes())))"
+    )
+    run = subprocess.run(
+        [sys.executable, "-c", code, tmp_path],
+        capture_output=True,
+        text=True,
+        check=True,
+        env={"PYTHONPATH": str(Path(hrsynth.__file__).parents[1]), "PYTHONIOENCODING": "utf-8"},
+    )
     assert run.stdout.splitlines() == [repr(asked(name)) for name in ("derive", "modes", "singular")]
 
 
@@ -147,6 +155,7 @@ def test_a_verdict_is_equal_to_its_word():
 
 def test_equal_arrays_of_other_shapes_are_not_equal():
     from hrsynth.results import content
+
     assert content(np.zeros((2, 3))) != content(np.zeros((3, 2)))
     assert content(np.zeros(3)) == content(-np.zeros(3))
 
@@ -175,8 +184,11 @@ def inside(value: object, depth: int, seen: set[int]) -> Iterator[object]:
 @pytest.mark.some(8)
 @pytest.mark.parametrize("name", ASKED)
 def test_whatever_an_answer_holds_is_one_line_at_a_prompt(name):
-    complaints = [f"{type(each).__name__}: {len(repr(each))} characters" for each in inside(asked(name), 5, set())
-                  if len(repr(each)) > LONGEST or "\n" in repr(each)]
+    complaints = [
+        f"{type(each).__name__}: {len(repr(each))} characters"
+        for each in inside(asked(name), 5, set())
+        if len(repr(each)) > LONGEST or "\n" in repr(each)
+    ]
     assert complaints == []
 
 

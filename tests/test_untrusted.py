@@ -40,18 +40,24 @@ from hrsynth.mechanism.model import fresh_name
 
 ROOT = Path(__file__).resolve().parent.parent
 LINKS = '<link name="base"/><link name="crank">{}</link><link name="bar"/><link name="rocker"/>'
-JOINT = ('<joint name="{}" type="continuous"><parent link="{}"/><child link="{}"/><origin xyz="{}"/><axis xyz="0 1 0"/>'
-         "</joint>")
-LOOP = ('<loop name="d" type="revolute"><predecessor link="rocker"><origin xyz="0 0 1"/></predecessor>'
-        '<successor link="bar"><origin xyz="2 0 0"/></successor><axis xyz="0 1 0"/></loop>'
-        '<transmission name="m"><joint name="a"/></transmission><hrsynth><platform link="bar"/></hrsynth>')
+JOINT = (
+    '<joint name="{}" type="continuous"><parent link="{}"/><child link="{}"/><origin xyz="{}"/><axis xyz="0 1 0"/>'
+    "</joint>"
+)
+LOOP = (
+    '<loop name="d" type="revolute"><predecessor link="rocker"><origin xyz="0 0 1"/></predecessor>'
+    '<successor link="bar"><origin xyz="2 0 0"/></successor><axis xyz="0 1 0"/></loop>'
+    '<transmission name="m"><joint name="a"/></transmission><hrsynth><platform link="bar"/></hrsynth>'
+)
 SECONDS, BYTES = 60, 2_000_000_000
 
 
 def robot(mesh: str) -> str:
     visual = f'<visual><geometry><mesh filename="{mesh}"/></geometry></visual>'
-    joints = "".join(JOINT.format(*each) for each in (
-        ("a", "base", "crank", "0 0 0"), ("b", "crank", "bar", "0 0 1"), ("c", "base", "rocker", "2 0 0")))
+    joints = "".join(
+        JOINT.format(*each)
+        for each in (("a", "base", "crank", "0 0 0"), ("b", "crank", "bar", "0 0 1"), ("c", "base", "rocker", "2 0 0"))
+    )
     return f'<robot name="r">{LINKS.format(visual)}{joints}{LOOP}</robot>'
 
 
@@ -66,6 +72,7 @@ class Touch:
 
 
 # What a file unpacks to
+
 
 def test_gzip_is_inflated_up_to_the_limit():
     one = gzip.compress(b"x" * 600)
@@ -93,13 +100,20 @@ def archive(*names: str, size: int | None = None) -> bytes:
     return bytes(data)
 
 
-@pytest.mark.parametrize(("content", "said"), [
-    (archive("a", size=LARGEST_UNPACKED + 1), "unpacks to"),
-    (archive("a", "b", size=LARGEST_UNPACKED // 2 + 1), "unpacks to"),
-    (archive(*map(str, range(MOST_UNPACKED + 1))), "files"), (archive("3D/../../a"), "lead out"),
-    (archive("/a"), "lead out"),
-    (archive("..\\a"), "lead out"), (archive("a")[:-5], "cannot be read"), (archive("a", "b", size=9), None),
-    (b"solid", None)])
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (archive("a", size=LARGEST_UNPACKED + 1), "unpacks to"),
+        (archive("a", "b", size=LARGEST_UNPACKED // 2 + 1), "unpacks to"),
+        (archive(*map(str, range(MOST_UNPACKED + 1))), "files"),
+        (archive("3D/../../a"), "lead out"),
+        (archive("/a"), "lead out"),
+        (archive("..\\a"), "lead out"),
+        (archive("a")[:-5], "cannot be read"),
+        (archive("a", "b", size=9), None),
+        (b"solid", None),
+    ],
+)
 def test_archives_are_judged_by_their_lists(content: bytes, said: str | None):
     found = untrusted.packing_defect(content)
     assert (found is None) is (said is None)
@@ -108,29 +122,45 @@ def test_archives_are_judged_by_their_lists(content: bytes, said: str | None):
 
 def bomb_3mf(path: Path, vertices: int) -> None:
     """Equal vertices, and one triangle."""
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as file, file.open(
-            "3D/3dmodel.model", "w", force_zip64=True) as model:
+    with (
+        zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as file,
+        file.open("3D/3dmodel.model", "w", force_zip64=True) as model,
+    ):
         space = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
-        model.write(f'<model unit="meter" xmlns="{space}"><resources><object id="1" type="model"><mesh><vertices>'
-                    .encode())
+        model.write(
+            f'<model unit="meter" xmlns="{space}"><resources><object id="1" type="model"><mesh><vertices>'.encode()
+        )
         for _ in range(vertices // 10_000):
             model.write(b'<vertex x="0" y="0" z="0"/>' * 10_000)
-        model.write(b'</vertices><triangles><triangle v1="0" v2="1" v3="2"/></triangles></mesh></object></resources>'
-                    b'<build><item objectid="1"/></build></model>')
+        model.write(
+            b'</vertices><triangles><triangle v1="0" v2="1" v3="2"/></triangles></mesh></object></resources>'
+            b'<build><item objectid="1"/></build></model>'
+        )
 
 
 def bomb_glb(path: Path) -> None:
     """A mesh of 60,000 points, which 20,000 nodes hold."""
     points = struct.pack("<9f", 0, 0, 0, 1, 0, 0, 0, 1, 0) * 20_000
-    text = json.dumps({
-        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": list(range(20_000))}],
-        "nodes": [{"mesh": 0}] * 20_000, "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
-        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 60_000, "type": "VEC3"}],
-        "bufferViews": [{"buffer": 0, "byteLength": len(points)}], "buffers": [{"byteLength": len(points)}]}).encode()
+    text = json.dumps(
+        {
+            "asset": {"version": "2.0"},
+            "scene": 0,
+            "scenes": [{"nodes": list(range(20_000))}],
+            "nodes": [{"mesh": 0}] * 20_000,
+            "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+            "accessors": [{"bufferView": 0, "componentType": 5126, "count": 60_000, "type": "VEC3"}],
+            "bufferViews": [{"buffer": 0, "byteLength": len(points)}],
+            "buffers": [{"byteLength": len(points)}],
+        }
+    ).encode()
     text += b" " * (-len(text) % 4)
-    path.write_bytes(struct.pack("<4sII", b"glTF", 2, 28 + len(text) + len(points))
-                     + struct.pack("<I4s", len(text), b"JSON") + text
-                     + struct.pack("<I4s", len(points), b"BIN\0") + points)
+    path.write_bytes(
+        struct.pack("<4sII", b"glTF", 2, 28 + len(text) + len(points))
+        + struct.pack("<I4s", len(text), b"JSON")
+        + text
+        + struct.pack("<I4s", len(points), b"BIN\0")
+        + points
+    )
 
 
 def bomb_catalog(folder: Path, line: bytes, count: int) -> None:
@@ -143,11 +173,14 @@ def bomb_catalog(folder: Path, line: bytes, count: int) -> None:
 
 def run(*arguments: str) -> tuple[int, str, int]:
     """Exit status and standard error of a command, and the largest memory (bytes) of it and the processes it starts."""
-    code = ("import subprocess, sys, resource\nrun = subprocess.run([sys.executable, '-m', 'hrsynth', *sys.argv[1:]], "
-            "capture_output=True, text=True)\nprint(run.returncode, resource.getrusage(resource.RUSAGE_CHILDREN)"
-            ".ru_maxrss, run.stderr, sep='\\n')")
-    told = subprocess.run([sys.executable, "-c", code, *arguments], capture_output=True, text=True, check=True,
-                          timeout=3 * SECONDS).stdout
+    code = (
+        "import subprocess, sys, resource\nrun = subprocess.run([sys.executable, '-m', 'hrsynth', *sys.argv[1:]], "
+        "capture_output=True, text=True)\nprint(run.returncode, resource.getrusage(resource.RUSAGE_CHILDREN)"
+        ".ru_maxrss, run.stderr, sep='\\n')"
+    )
+    told = subprocess.run(
+        [sys.executable, "-c", code, *arguments], capture_output=True, text=True, check=True, timeout=3 * SECONDS
+    ).stdout
     status, memory, errors = told.split("\n", 2)
     return int(status), errors.strip(), int(memory) * 1024
 
@@ -161,8 +194,10 @@ def test_a_mesh_unpacks_to_no_more_than_is_allowed(name: str, command: str, tmp_
     else:
         bomb_glb(tmp_path / name)
     (tmp_path / "robot.urdf").write_text(robot(name))
-    words = [str(tmp_path / {"ROBOT": "robot.urdf"}.get(word, word)) if "." in word or word == "ROBOT" else word
-             for word in command.split()]
+    words = [
+        str(tmp_path / {"ROBOT": "robot.urdf"}.get(word, word)) if "." in word or word == "ROBOT" else word
+        for word in command.split()
+    ]
     start = os.times()
     status, errors, memory = run(*words)
     end = os.times()
@@ -188,11 +223,13 @@ def test_a_catalog_unpacks_to_no_more_than_is_allowed(line: bytes, count: int, c
 
 def test_a_program_that_reads_has_limits(tmp_path: Path):
     program = tmp_path / "program.py"
-    for body, said in (("bytearray(10**10)", "more memory"),
-                       ("import sys; sys.stdout.write('x' * 10**7)", None),
-                       ("import os; os.abort()", "breaks its reader"),
-                       ("while True: pass", "memory or time|did not finish"),
-                       ("from hrsynth.untrusted import refuse; refuse('a\\nb')", "a b")):
+    for body, said in (
+        ("bytearray(10**10)", "more memory"),
+        ("import sys; sys.stdout.write('x' * 10**7)", None),
+        ("import os; os.abort()", "breaks its reader"),
+        ("while True: pass", "memory or time|did not finish"),
+        ("from hrsynth.untrusted import refuse; refuse('a\\nb')", "a b"),
+    ):
         program.write_text(f"def main():\n    {body}\n")
         if said is None:
             assert untrusted.output(program, seconds=1) == b"x" * 10**7
@@ -211,6 +248,7 @@ def test_it_prints_no_more_than_a_file_may_unpack_to(tmp_path: Path, monkeypatch
 
 # What is read
 
+
 def tetrahedron(path: Path) -> Path:
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n")
@@ -228,13 +266,31 @@ def homes(tmp_path: Path) -> Path:
     return tmp_path
 
 
-@pytest.mark.parametrize(("address", "found"), [
-    ("b.obj", True), ("../meshes/a.obj", True), ("package://pkg/meshes/a.obj", True), ("package://other/c.obj", True),
-    ("file://{}/ws/pkg/meshes/a.obj", True), ("model://pkg/urdf/b.obj", True), ("../../other/c.obj", True),
-    ("../../../secret.obj", False), ("{}/secret.obj", False), ("file://{}/secret.obj", False), ("link.obj", False),
-    ("package://pkg/../../secret.obj", False), ("package://plain/d.obj", False), ("../../plain/d.obj", False),
-    ("package://secret.obj", False), ("http://127.0.0.1:9/a.obj", False), ("file:///etc/passwd", False),
-    ("a\0b", False), ("", False), (".", False)])
+@pytest.mark.parametrize(
+    ("address", "found"),
+    [
+        ("b.obj", True),
+        ("../meshes/a.obj", True),
+        ("package://pkg/meshes/a.obj", True),
+        ("package://other/c.obj", True),
+        ("file://{}/ws/pkg/meshes/a.obj", True),
+        ("model://pkg/urdf/b.obj", True),
+        ("../../other/c.obj", True),
+        ("../../../secret.obj", False),
+        ("{}/secret.obj", False),
+        ("file://{}/secret.obj", False),
+        ("link.obj", False),
+        ("package://pkg/../../secret.obj", False),
+        ("package://plain/d.obj", False),
+        ("../../plain/d.obj", False),
+        ("package://secret.obj", False),
+        ("http://127.0.0.1:9/a.obj", False),
+        ("file:///etc/passwd", False),
+        ("a\0b", False),
+        ("", False),
+        (".", False),
+    ],
+)
 def test_a_mesh_is_read_in_the_robots_folders_alone(homes: Path, address: str, found: bool):
     folder = homes / "ws" / "pkg" / "urdf"
     assert (locate_mesh(address.format(homes), folder) is not None) is found
@@ -265,13 +321,26 @@ def test_meshes_open_no_other_files_and_unpickle_nothing(tmp_path: Path):
     points = np.eye(3, dtype=np.float32).tobytes()
     (tmp_path / "out.bin").write_bytes(points)
     (inner / "in.bin").write_bytes(points)
-    for name, uri in (("in.gltf", "in.bin"), ("out.gltf", "../out.bin"), ("file.gltf", f"file://{tmp_path}/out.bin"),
-                      ("remote.gltf", "http://127.0.0.1:9/out.bin")):
-        (inner / name).write_text(json.dumps({
-            "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
-            "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
-            "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
-            "bufferViews": [{"buffer": 0, "byteLength": 36}], "buffers": [{"uri": uri, "byteLength": 36}]}))
+    for name, uri in (
+        ("in.gltf", "in.bin"),
+        ("out.gltf", "../out.bin"),
+        ("file.gltf", f"file://{tmp_path}/out.bin"),
+        ("remote.gltf", "http://127.0.0.1:9/out.bin"),
+    ):
+        (inner / name).write_text(
+            json.dumps(
+                {
+                    "asset": {"version": "2.0"},
+                    "scene": 0,
+                    "scenes": [{"nodes": [0]}],
+                    "nodes": [{"mesh": 0}],
+                    "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+                    "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
+                    "bufferViews": [{"buffer": 0, "byteLength": 36}],
+                    "buffers": [{"uri": uri, "byteLength": 36}],
+                }
+            )
+        )
     hit = tmp_path / "hit"
     os.mkfifo(inner / "pipe.mtl")
     (inner / "pipe.obj").write_text("mtllib pipe.mtl\n" + (inner / "good.obj").read_text())
@@ -294,8 +363,18 @@ CODE = "__import__('pathlib').Path({!r}).write_text('x')"
 
 def doors() -> Iterator[tuple[str, str]]:
     """Every door by which a file comes in, as a command, and what the file is called."""
-    for name in ("robot.urdf", "robot.xml", "robot.sdf", "robot.usda", "robot.usd", "robot.usdz", "robot.yaml",
-                 "robot.zip", "robot.urdf.gz", "robot"):
+    for name in (
+        "robot.urdf",
+        "robot.xml",
+        "robot.sdf",
+        "robot.usda",
+        "robot.usd",
+        "robot.usdz",
+        "robot.yaml",
+        "robot.zip",
+        "robot.urdf.gz",
+        "robot",
+    ):
         yield "check FILE", name
     yield "lint FILE", "robot.urdf"
     yield "verify FILE", "c.json"
@@ -309,16 +388,23 @@ def contents(hit: Path) -> dict[str, bytes]:
     array = io.BytesIO()
     np.save(array, np.array([Touch(hit)], dtype=object), allow_pickle=True)
     return {
-        "pickle": pickle.dumps(Touch(hit)), "array": array.getvalue(),
+        "pickle": pickle.dumps(Touch(hit)),
+        "array": array.getvalue(),
         "python": f"#!/usr/bin/python3\n{code}\n".encode(),
-        "yaml": f"closed_loop: !!python/object/apply:eval [\"{code}\"]\n".encode(), "zip": archive("robot.urdf"),
-        "gzip": gzip.compress(robot("a.stl").encode()), "deep": b"[" * 200_000, "deeper": b'{"word":' * 200_000,
+        "yaml": f'closed_loop: !!python/object/apply:eval ["{code}"]\n'.encode(),
+        "zip": archive("robot.urdf"),
+        "gzip": gzip.compress(robot("a.stl").encode()),
+        "deep": b"[" * 200_000,
+        "deeper": b'{"word":' * 200_000,
         "xinclude": b'<robot name="r" xmlns:xi="http://www.w3.org/2001/XInclude"><xi:include href="/etc/passwd" '
-                    b'parse="text"/></robot>',
+        b'parse="text"/></robot>',
         "external": b'<!DOCTYPE r [<!ENTITY e SYSTEM "file:///etc/passwd">]><robot name="&e;"><link name="a"/></robot>',
         "included": b'<mujoco><include file="/etc/passwd"/></mujoco>',
         "fetched": b'<sdf version="1.9"><include><uri>file:///etc</uri></include></sdf>',
-        "zeros": b"\0" * 5000, "nothing": b"", "number": b'{"format": 1e999999999}'}
+        "zeros": b"\0" * 5000,
+        "nothing": b"",
+        "number": b'{"format": 1e999999999}',
+    }
 
 
 @pytest.mark.some(12)
@@ -353,8 +439,12 @@ def test_names_are_no_code(command: str, tmp_path: Path, capsys, monkeypatch: py
 
 
 ALLOWED = {
-    "batch/sections.py": {"exec"}, "codegen/rounding.py": {"exec"}, "batch/program.py": {"exec_module"},
-    "simulation/endings/subdivision.py": {"loads of pickle"}, "untrusted.py": {"run_path"}}
+    "batch/sections.py": {"exec"},
+    "codegen/rounding.py": {"exec"},
+    "batch/program.py": {"exec_module"},
+    "simulation/endings/subdivision.py": {"loads of pickle"},
+    "untrusted.py": {"run_path"},
+}
 """What runs text or unpickles, of this program's own making: straight-line code of numbers, the state of a search that
 goes to another process, a program of the package."""
 
@@ -369,12 +459,22 @@ def calls(path: Path) -> Iterator[str]:
         name = ast.unparse(node.func)
         last, keys = name.rpartition(".")[2], {each.arg: each.value for each in node.keywords}
         if name in ("eval", "exec", "compile", "__import__", "os.system", "os.popen") or last in (
-                "exec_module", "run_path", "run_module", "parse_expr", "unsafe_load", "full_load"):
+            "exec_module",
+            "run_path",
+            "run_module",
+            "parse_expr",
+            "unsafe_load",
+            "full_load",
+        ):
             yield last
         elif re.fullmatch(r"(pickle|joblib|marshal|shelve|dill|torch)\.(loads?|open)", name):
             yield f"{last} of {name.partition('.')[0]}"
-        elif (last == "sympify" and "strict" not in keys) or "allow_pickle" in keys or "shell" in keys or (
-                name == "yaml.load"):
+        elif (
+            (last == "sympify" and "strict" not in keys)
+            or "allow_pickle" in keys
+            or "shell" in keys
+            or (name == "yaml.load")
+        ):
             yield last
 
 
@@ -387,9 +487,15 @@ def test_nothing_that_runs_text_is_called_but_on_own_text():
 
 # Certificates and catalogs
 
+
 def test_a_number_of_a_certificate_is_short(tmp_path: Path):
-    for text in ('{"format":"hrsynth-certificate-1","claim":"modes","tips":[["1e999999999","0","0"]],"systems":[]}',
-                 '{"claim":"ranks"}', "[]", '{"claim":"path","claim":"modes"}', '{"claim":' + '{"a":' * 9000):
+    for text in (
+        '{"format":"hrsynth-certificate-1","claim":"modes","tips":[["1e999999999","0","0"]],"systems":[]}',
+        '{"claim":"ranks"}',
+        "[]",
+        '{"claim":"path","claim":"modes"}',
+        '{"claim":' + '{"a":' * 9000,
+    ):
         (tmp_path / "c.json").write_text(text)
         with pytest.raises(HrsynthError) as caught:
             verify(tmp_path / "c.json")
@@ -402,18 +508,45 @@ def certificates() -> Iterator[tuple[str, dict[str, Any]]]:
     zero, ways = [["1", "0", "0"]], {"loops": [], "besides": [], "links": [], "others": []}
     for angles, turns in ((300, 1), (30, 1), (12, 12), (10**9, 0)):
         loop = [[["1", "0"], -1, [turns] * (angles if turns else 0)]]
-        yield f"{angles} angles", {"claim": "modes", "systems": [
-            {"kind": "loops", "tips": zero, "angles": angles, "slides": 0, **ways, "loops": [loop], **box}]}
+        yield (
+            f"{angles} angles",
+            {
+                "claim": "modes",
+                "systems": [
+                    {"kind": "loops", "tips": zero, "angles": angles, "slides": 0, **ways, "loops": [loop], **box}
+                ],
+            },
+        )
     for unknowns, joints in ((10**7, 1), (1, 40), (30, 30)):
-        yield f"{unknowns} unknowns", {"claim": "modes", "systems": [{
-            "kind": "chain", "tips": [*zero, ["0", "1", "0"], ["0", "0", "1"]], "unknowns": unknowns, "normals": [],
-            "joints": [["R", ["0", "0", "1"], ["0", "0", "0"]]] * joints, "ends": [[1]], **box}]}
+        yield (
+            f"{unknowns} unknowns",
+            {
+                "claim": "modes",
+                "systems": [
+                    {
+                        "kind": "chain",
+                        "tips": [*zero, ["0", "1", "0"], ["0", "0", "1"]],
+                        "unknowns": unknowns,
+                        "normals": [],
+                        "joints": [["R", ["0", "0", "1"], ["0", "0", "0"]]] * joints,
+                        "ends": [[1]],
+                        **box,
+                    }
+                ],
+            },
+        )
     size = 600
     rows = [[int((i * i + 3 * j * j + i * j) % 7 > 3) for j in range(size)] for i in range(size)]
     stack = {"of": ["A"], "rank": size, "rows": list(range(size)), "columns": list(range(size)), "kernel": []}
     yield "ranks", {"claim": "ranks", "matrices": {"A": rows}, "stacks": [stack]}
-    yield "one row often", {"claim": "ranks", "matrices": {"A": [[1] * 200]}, "stacks": [
-        {**stack, "rows": [0] * 10**5, "columns": list(range(200))}]}
+    yield (
+        "one row often",
+        {
+            "claim": "ranks",
+            "matrices": {"A": [[1] * 200]},
+            "stacks": [{**stack, "rows": [0] * 10**5, "columns": list(range(200))}],
+        },
+    )
 
 
 @pytest.mark.parametrize(("what", "record"), list(certificates()), ids=[name for name, _ in certificates()])
@@ -444,8 +577,9 @@ def test_a_free_name_is_found_without_counting_up_to_it(count: int):
 def test_of_many_frames_that_nearly_meet_some_are_named(tmp_path: Path):
     file, tree = tmp_path / "tree.urdf", []
     for number in range(1, 400):
-        tree.append(f'<link name="l{number}"/>' + JOINT.format(f"j{number}", f"l{(number - 1) // 2}", f"l{number}",
-                                                               "0.1 0 0"))
+        tree.append(
+            f'<link name="l{number}"/>' + JOINT.format(f"j{number}", f"l{(number - 1) // 2}", f"l{number}", "0.1 0 0")
+        )
     file.write_text(f'<robot name="r"><link name="l0"/>{"".join(tree)}</robot>')
     start = time.process_time()
     assert execute(["check", str(file), "--platform", "l9"]) in (2, 3)
@@ -467,8 +601,12 @@ def test_a_certificate_file_is_checked_within_limits(tmp_path: Path, monkeypatch
     file.write_text('{"claim": "ranks"}')
     monkeypatch.setattr(verify_ranks, "__file__", str(checker))
     monkeypatch.setattr(certificates_, "VERIFY_SECONDS", 1)
-    for body, status, said in (("while True: pass", 3, "memory or time"), ("bytearray(10**10)", 3, "more memory"),
-                               ("print('accepted: rank')", 0, "rank"), ("print('refused: a: b')", 3, "a: b")):
+    for body, status, said in (
+        ("while True: pass", 3, "memory or time"),
+        ("bytearray(10**10)", 3, "more memory"),
+        ("print('accepted: rank')", 0, "rank"),
+        ("print('refused: a: b')", 3, "a: b"),
+    ):
         checker.write_text(f"def main(name):\n    {body}\n")
         monkeypatch.setattr(certificates_.ranks, "describe_ranks", lambda record: "")
         assert execute(["verify", str(file)]) == status
@@ -492,9 +630,16 @@ def test_a_number_too_large_for_a_pose_is_one_line(tmp_path: Path, capsys):
         assert "it is not for 3rpr_m1" in line
 
 
-@pytest.mark.parametrize("line", ['{"word":"a","group":"planar"}', '{"word":"a","group":"planar","notation":3}',
-                                  '{"word":"a","a":' + "[" * 100_000, '{"word":"a","a":"' + "x" * 1_100_000 + '"}'],
-                         ids=["bare", "typed", "deep", "long"])
+@pytest.mark.parametrize(
+    "line",
+    [
+        '{"word":"a","group":"planar"}',
+        '{"word":"a","group":"planar","notation":3}',
+        '{"word":"a","a":' + "[" * 100_000,
+        '{"word":"a","a":"' + "x" * 1_100_000 + '"}',
+    ],
+    ids=["bare", "typed", "deep", "long"],
+)
 def test_a_record_that_is_not_whole_is_one_line(line: str, tmp_path: Path, capsys):
     (tmp_path / "planar.jsonl").write_text(f"{head('planar', count=1)}\n{line}\n")
     assert execute(["catalog", "list", "--catalog", str(tmp_path)]) == 2
@@ -502,8 +647,15 @@ def test_a_record_that_is_not_whole_is_one_line(line: str, tmp_path: Path, capsy
     assert "record" in said
 
 
-@pytest.mark.parametrize("field", ['"x":[[],[]]', '"x":{"a":1}', '"choices":[{"joints":[[1]],"rank":1,"x":[]}]',
-                                   '"minimal":[' + '["a"],' * 20_000 + '["a"]]'])
+@pytest.mark.parametrize(
+    "field",
+    [
+        '"x":[[],[]]',
+        '"x":{"a":1}',
+        '"choices":[{"joints":[[1]],"rank":1,"x":[]}]',
+        '"minimal":[' + '["a"],' * 20_000 + '["a"]]',
+    ],
+)
 def test_a_record_holds_no_lists_of_unknown_size(field: str):
     bare = '{"word":"a","group":"planar","refused":"no"'
     assert record(bare + ',"x":1}')["x"] == 1
@@ -527,10 +679,10 @@ def test_records_take_no_more_memory_than_is_allowed(ending: str, tmp_path: Path
 
 PROGRAMS = {
     "a view": "ALTER TABLE versions RENAME TO v; CREATE VIEW versions AS WITH RECURSIVE t(x) AS (SELECT 1 UNION ALL "
-              "SELECT x + 1 FROM t) SELECT max(x) AS format, 1 AS catalog FROM t",
+    "SELECT x + 1 FROM t) SELECT max(x) AS format, 1 AS catalog FROM t",
     "another view": "DROP TABLE lines; CREATE VIEW lines AS SELECT 0 AS record, printf('%.*c', 900000000, 'x') AS line",
     "a computed column": "DROP TABLE lines; CREATE TABLE lines (record INTEGER PRIMARY KEY, line "
-                         "GENERATED ALWAYS AS (printf('%.*c', 9000, 'x'))); INSERT INTO lines VALUES (0)",
+    "GENERATED ALWAYS AS (printf('%.*c', 9000, 'x'))); INSERT INTO lines VALUES (0)",
     "a trigger": "CREATE TRIGGER t AFTER INSERT ON lines BEGIN DELETE FROM lines; END",
     "a virtual table": "CREATE VIRTUAL TABLE t USING fts5(x)",
     "a far row": "UPDATE groups SET count = 2000000000; UPDATE lines SET record = 1999999999",
@@ -555,10 +707,17 @@ def test_a_database_runs_no_program_and_counts_its_rows(what: str, tmp_path: Pat
     assert [each.name for each in tmp_path.iterdir()] == ["c.sqlite"]
 
 
-@pytest.mark.parametrize(("change", "asked", "said"), [
-    ("lines SET line = printf('%.*c', 200000, 'x')", {}, "too big"),
-    ("columns SET letters = zeroblob(1000000), ends = x'40420f00', ends_width = 4 WHERE name = 'dof'", {"dof": 3},
-     "'dof' cannot be read")])
+@pytest.mark.parametrize(
+    ("change", "asked", "said"),
+    [
+        ("lines SET line = printf('%.*c', 200000, 'x')", {}, "too big"),
+        (
+            "columns SET letters = zeroblob(1000000), ends = x'40420f00', ends_width = 4 WHERE name = 'dof'",
+            {"dof": 3},
+            "'dof' cannot be read",
+        ),
+    ],
+)
 def test_a_text_of_a_database_is_short(change: str, asked: dict[str, Any], said: str, tmp_path: Path):
     kept = store(file := tmp_path / "c.sqlite")
     kept.write("planar", ['{"word":"a","group":"planar","refused":"no"}'])
@@ -568,8 +727,9 @@ def test_a_text_of_a_database_is_short(change: str, asked: dict[str, Any], said:
         list(query.load(file, **asked))
 
 
-@pytest.mark.parametrize("command", ["catalog list --catalog FOLDER", "catalog list --catalog FOLDER/p.sqlite",
-                                     "verify FOLDER/p.json"])
+@pytest.mark.parametrize(
+    "command", ["catalog list --catalog FOLDER", "catalog list --catalog FOLDER/p.sqlite", "verify FOLDER/p.json"]
+)
 def test_a_pipe_is_not_waited_for(command: str, tmp_path: Path, capsys):
     for name in ("planar.jsonl", "p.sqlite", "p.json"):
         os.mkfifo(tmp_path / name)
@@ -580,13 +740,16 @@ def test_a_pipe_is_not_waited_for(command: str, tmp_path: Path, capsys):
 
 # Where the program is
 
+
 def test_from_an_archive_it_says_so_in_one_line(tmp_path: Path):
     package = ROOT / "src" / "hrsynth"
     with zipfile.ZipFile(tmp_path / "hrsynth.zip", "w") as file:
         for path in package.rglob("*.py"):
             file.write(path, path.relative_to(package.parent))
-    code = (f"import sys; sys.path.insert(0, {str(tmp_path / 'hrsynth.zip')!r}); from hrsynth.cli import main; "
-            "main(['robots'])")
+    code = (
+        f"import sys; sys.path.insert(0, {str(tmp_path / 'hrsynth.zip')!r}); from hrsynth.cli import main; "
+        "main(['robots'])"
+    )
     told = subprocess.run([sys.executable, "-P", "-c", code], capture_output=True, text=True)
     assert (told.returncode, told.stdout) == (2, "")
     (said,) = told.stderr.splitlines()

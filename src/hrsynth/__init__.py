@@ -44,10 +44,41 @@ if TYPE_CHECKING:
     from .simulation.endings.endings import endings
     from .simulation.servo import servo
 
-__all__ = ["__version__", "accuracy", "advise", "atlas", "basins", "branch", "catalog", "certificate", "check",
-           "derive", "draw", "endings", "examples", "export", "following", "forget", "html", "legs", "lint", "load",
-           "map", "modes", "observe",
-           "path", "save", "select", "servo", "shipped", "singular", "studio", "text", "verify", "view"]
+__all__ = [
+    "__version__",
+    "accuracy",
+    "advise",
+    "atlas",
+    "basins",
+    "branch",
+    "catalog",
+    "certificate",
+    "check",
+    "derive",
+    "draw",
+    "endings",
+    "examples",
+    "export",
+    "following",
+    "forget",
+    "html",
+    "legs",
+    "lint",
+    "load",
+    "map",
+    "modes",
+    "observe",
+    "path",
+    "save",
+    "select",
+    "servo",
+    "shipped",
+    "singular",
+    "studio",
+    "text",
+    "verify",
+    "view",
+]
 
 _HOME = {
     "accuracy": ".analysis.accuracy.accuracy",

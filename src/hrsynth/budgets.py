@@ -229,7 +229,7 @@ LARGEST_JOINT_FORMS = 750
 """The same of conditions on a leg's joints."""
 MOST_INFINITE = 4
 """Powers of q · q that are tried to leave out what are no poses."""
-FINEST_BOX = 2.0 ** -100
+FINEST_BOX = 2.0**-100
 """Radius of the smallest box that is tried around a solution, relative to 1 plus the unknown."""
 LARGEST_RANDOM = 10**9
 """Range of the random whole numbers of exact instances, of either sign: the larger, the smaller the chance of an

@@ -17,10 +17,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-CERTAIN = re.compile(r"\b(prove[ns]?|proved|proofs?|certif\w+|complete\w*|cannot|never|always|exact\w*|enclose[sd]?|"
-                     r"enclosures?|guarantee\w*|impossible|unique\w*|rigorous\w*|isolated|necessarily|separated|"
-                     r"same aspect|only beyond|upper bounds?|controllable|uncontrollable)\b|^(rigid|flexible)$",
-                     re.IGNORECASE)
+CERTAIN = re.compile(
+    r"\b(prove[ns]?|proved|proofs?|certif\w+|complete\w*|cannot|never|always|exact\w*|enclose[sd]?|"
+    r"enclosures?|guarantee\w*|impossible|unique\w*|rigorous\w*|isolated|necessarily|separated|"
+    r"same aspect|only beyond|upper bounds?|controllable|uncontrollable)\b|^(rigid|flexible)$",
+    re.IGNORECASE,
+)
 """The words that make a text a claim."""
 
 
@@ -57,14 +59,26 @@ NO_CLAIMS = tuple(NoClaim(**row) for row in _rows("no_claim"))
 
 def page() -> str:
     """The page of claims, Markdown."""
-    lines = ["# What each word of certainty stands for", "",
-             "Each word of certainty that the program prints stands in this table, which is made from the code's own "
-             "(`src/hrsynth/claims.toml`). A test fails if a text holds such a word and is not listed there. What is "
-             "not in this table is not claimed.", ""]
+    lines = [
+        "# What each word of certainty stands for",
+        "",
+        "Each word of certainty that the program prints stands in this table, which is made from the code's own "
+        "(`src/hrsynth/claims.toml`). A test fails if a text holds such a word and is not listed there. What is "
+        "not in this table is not claimed.",
+        "",
+    ]
     for claim in CLAIMS:
-        lines += [f"## {claim.phrase}", "", f"`{claim.command}`" if " " not in claim.command else claim.command, "",
-                  f"* **Stands for:** {claim.means}.", f"* **Computed by:** {claim.computation}.",
-                  f"* **Assumes:** {claim.assumes}.", f"* **Would fail:** `{claim.test}`.", ""]
+        lines += [
+            f"## {claim.phrase}",
+            "",
+            f"`{claim.command}`" if " " not in claim.command else claim.command,
+            "",
+            f"* **Stands for:** {claim.means}.",
+            f"* **Computed by:** {claim.computation}.",
+            f"* **Assumes:** {claim.assumes}.",
+            f"* **Would fail:** `{claim.test}`.",
+            "",
+        ]
     return "\n".join(lines)
 
 

@@ -144,9 +144,11 @@ class MotorsNotEnough(Unanswered):
 
     def __init__(self, robot: str, joints: Sequence[str]) -> None:
         self.robot, self.joints = robot, tuple(joints)
-        super().__init__(f"{robot}: at the zero configuration the platform can move while all motors are held, through "
-                         f"{shorten_text(', '.join(joints))}: its pose is not a function of the motors; add motors, "
-                         "or choose another zero configuration")
+        super().__init__(
+            f"{robot}: at the zero configuration the platform can move while all motors are held, through "
+            f"{shorten_text(', '.join(joints))}: its pose is not a function of the motors; add motors, "
+            "or choose another zero configuration"
+        )
 
 
 class RankUndecided(Unanswered):
@@ -164,9 +166,11 @@ class HeldByRounding(RankUndecided):
         self.robot, self.directions, self.open_by = robot, directions, open_by
         verb = "holds" if directions == 1 else "hold"
         Unanswered.__init__(
-            self, f"{robot}: its rounded numbers leave the loops open by {open_by:.1g} (characteristic lengths, "
-                  f"radians), and {directions} of their constraints {verb} by no more than that: whether the loops can "
-                  "move that way is undecided; give more decimals")
+            self,
+            f"{robot}: its rounded numbers leave the loops open by {open_by:.1g} (characteristic lengths, "
+            f"radians), and {directions} of their constraints {verb} by no more than that: whether the loops can "
+            "move that way is undecided; give more decimals",
+        )
 
 
 class StructureUndecided(Unanswered):
@@ -174,9 +178,11 @@ class StructureUndecided(Unanswered):
 
     def __init__(self, robot: str, tolerance: float, one: str, other: str) -> None:
         self.robot, self.tolerance, self.one, self.other = robot, tolerance, one, other
-        super().__init__(f"{robot}: the rounded numbers fit two robots to {tolerance:.1g} (characteristic "
-                         f"lengths, radians): one with {one}, one with {other}; give more decimals, another "
-                         "--tolerance, or --as-written")
+        super().__init__(
+            f"{robot}: the rounded numbers fit two robots to {tolerance:.1g} (characteristic "
+            f"lengths, radians): one with {one}, one with {other}; give more decimals, another "
+            "--tolerance, or --as-written"
+        )
 
 
 class NotSampled(Unanswered):
@@ -184,10 +190,12 @@ class NotSampled(Unanswered):
 
     def __init__(self, robot: str, reached: int, wanted: int, tries: int) -> None:
         self.robot, self.reached, self.wanted, self.tries = robot, reached, wanted, tries
-        super().__init__(f"{robot}: of {tries} random walks from the zero configuration only {reached} led to a "
-                         f"configuration that counts, needed: {wanted}; the others came near a singularity or left the "
-                         "branch: start away from it (--at POSE, --keyframe NAME), or give the file's numbers more "
-                         "digits")
+        super().__init__(
+            f"{robot}: of {tries} random walks from the zero configuration only {reached} led to a "
+            f"configuration that counts, needed: {wanted}; the others came near a singularity or left the "
+            "branch: start away from it (--at POSE, --keyframe NAME), or give the file's numbers more "
+            "digits"
+        )
 
 
 class Shaky(Unanswered):
@@ -195,9 +203,11 @@ class Shaky(Unanswered):
 
     def __init__(self, robot: str, allowed: int, done: int) -> None:
         self.robot, self.allowed, self.done = robot, allowed, done
-        super().__init__(f"{robot}: shaky wherever it was tried: to first order its loops have mobility {allowed}, but "
-                         f"it can move on in only {done} way{'s' * (done != 1)}; no verdict is given, since all ranks "
-                         "here are of first order")
+        super().__init__(
+            f"{robot}: shaky wherever it was tried: to first order its loops have mobility {allowed}, but "
+            f"it can move on in only {done} way{'s' * (done != 1)}; no verdict is given, since all ranks "
+            "here are of first order"
+        )
 
 
 class BranchPoint(Unanswered):
@@ -206,8 +216,11 @@ class BranchPoint(Unanswered):
 
     def __init__(self, robot: str, what: str, modes: Iterable[str]) -> None:
         self.robot, self.what, self.modes = robot, what, tuple(modes)
-        super().__init__(f"{robot}: {what}: " + "; ".join(f"({i}) {mode}" for i, mode in enumerate(self.modes, 1))
-                         + "; no verdict is given; start in one of them")
+        super().__init__(
+            f"{robot}: {what}: "
+            + "; ".join(f"({i}) {mode}" for i, mode in enumerate(self.modes, 1))
+            + "; no verdict is given; start in one of them"
+        )
 
 
 class MeaningUndecided(Unanswered):
@@ -215,17 +228,21 @@ class MeaningUndecided(Unanswered):
     in sizes of the mechanism), and how far apart they must be."""
 
     def __init__(self, what: str, largest: float, smallest: float, gap: float) -> None:
-        super().__init__(f"{what} are {largest:.2g} sizes of the mechanism apart, others {smallest:.2g}: not "
-                         f"{gap:g} times as far, so it is not clear which are meant; --as-written takes the "
-                         "numbers as they are")
+        super().__init__(
+            f"{what} are {largest:.2g} sizes of the mechanism apart, others {smallest:.2g}: not "
+            f"{gap:g} times as far, so it is not clear which are meant; --as-written takes the "
+            "numbers as they are"
+        )
 
 
 class NothingProved(Unanswered):
     """A branch of which no cell at all is proved, and why: there is no function to write."""
 
     def __init__(self, robot: str, motors: Iterable[str], reason: str) -> None:
-        super().__init__(f"{robot}: no code is written: around the zero configuration nothing is proved for "
-                         f"{', '.join(motors)}{': ' * bool(reason)}{reason}; try a smaller box (--box)")
+        super().__init__(
+            f"{robot}: no code is written: around the zero configuration nothing is proved for "
+            f"{', '.join(motors)}{': ' * bool(reason)}{reason}; try a smaller box (--box)"
+        )
 
 
 class LegMiss(NamedTuple):
@@ -243,9 +260,18 @@ class PoseNotReached(Unanswered):
     pose; the ``wrist``, a joint that stands for several R, that is near the end of its turns there; ``why`` all legs
     together do not get there, if that is known; or another ``reason`` instead of these."""
 
-    def __init__(self, robot: str, pose: str, came: float, last: str, miss: LegMiss | None = None,
-                 origin: str = "its zero configuration", wrist: str | None = None, why: str | None = None,
-                 reason: str | None = None) -> None:
+    def __init__(
+        self,
+        robot: str,
+        pose: str,
+        came: float,
+        last: str,
+        miss: LegMiss | None = None,
+        origin: str = "its zero configuration",
+        wrist: str | None = None,
+        why: str | None = None,
+        reason: str | None = None,
+    ) -> None:
         self.robot, self.pose, self.came, self.last = robot, pose, came, last
         self.leg = None if miss is None else miss.leg
         self.millimetres = 0.0 if miss is None else 1e3 * miss.length
@@ -256,9 +282,13 @@ class PoseNotReached(Unanswered):
             if wrist is not None:
                 reason = f"joint {wrist}, which stands for several R through one point, is near the end of its turns"
             elif miss is None:
-                reason = "each leg alone can close there, but " + (why or (
-                    "the straight path to it is blocked (all legs together do not reach so far, a leg is at its limit, "
-                    "or it is another working mode)"))
+                reason = "each leg alone can close there, but " + (
+                    why
+                    or (
+                        "the straight path to it is blocked (all legs together do not reach so far, a leg is at its "
+                        "limit, or it is another working mode)"
+                    )
+                )
             else:
                 turn = f" and {self.degrees:.3g} degrees" if self.degrees > 1e-6 else ""
                 least = "at least " * miss.at_least
@@ -293,8 +323,10 @@ class Disagreement(Unanswered):
 
     def __init__(self, robot: str, poses: int, angle: float) -> None:
         self.robot, self.poses, self.angle = robot, poses, angle
-        super().__init__(f"{robot}: the condition and the rank disagree at {poses} poses (a leg's wrenches by up to "
-                         f"{angle:.2g} rad); please report this as a defect of hrsynth")
+        super().__init__(
+            f"{robot}: the condition and the rank disagree at {poses} poses (a leg's wrenches by up to "
+            f"{angle:.2g} rad); please report this as a defect of hrsynth"
+        )
 
 
 class NotConfined(Unanswered):
@@ -347,8 +379,10 @@ class MissingExtra(Unanswered):
 
     def __init__(self, what: str, extra: str) -> None:
         self.what, self.extra = what, extra
-        self.reason = (f'{what} needs an optional package: {sys.executable or "python"} -m pip install '
-                       f'"hrsynth[{extra}]", in a checkout -m pip install ".[{extra}]"')
+        self.reason = (
+            f"{what} needs an optional package: {sys.executable or 'python'} -m pip install "
+            f'"hrsynth[{extra}]", in a checkout -m pip install ".[{extra}]"'
+        )
         MissingExtra.met += 1
         super().__init__(self.reason)
 

@@ -40,9 +40,15 @@ def run_shared(works: Iterable[Callable[[], T]], jobs: int, *, ordered: bool = T
     from joblib.externals.loky.process_executor import BrokenProcessPool, TerminatedWorkerError
 
     # nothing is passed through shared memory, which would be left there
-    pool = Parallel(n_jobs=jobs, batch_size=1, pre_dispatch=2 * jobs, max_nbytes=None,
-                    return_as="generator" if ordered else "generator_unordered",
-                    initializer=_end_with_parent, initargs=(os.getpid(),))
+    pool = Parallel(
+        n_jobs=jobs,
+        batch_size=1,
+        pre_dispatch=2 * jobs,
+        max_nbytes=None,
+        return_as="generator" if ordered else "generator_unordered",
+        initializer=_end_with_parent,
+        initargs=(os.getpid(),),
+    )
     done = pool(delayed(work)() for work in works)
     try:
         yield from done

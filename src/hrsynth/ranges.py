@@ -7,9 +7,19 @@ from typing import Any
 from .errors import BadRequest
 
 RANGES: dict[str, tuple[float | None, float | None]] = {
-    "seed": (0, None), "effort": (1, None), "modes effort": (0, None), "points": (1, 10_000_000), "steps": (5, 300),
-    "basins steps": (2, 300), "jobs": (1, None), "nonlinear": (0, None), "gain": (None, 1e6), "size": (1, None),
-    "runs": (0, None), "endings": (0, None), "examine": (1, None),
+    "seed": (0, None),
+    "effort": (1, None),
+    "modes effort": (0, None),
+    "points": (1, 10_000_000),
+    "steps": (5, 300),
+    "basins steps": (2, 300),
+    "jobs": (1, None),
+    "nonlinear": (0, None),
+    "gain": (None, 1e6),
+    "size": (1, None),
+    "runs": (0, None),
+    "endings": (0, None),
+    "examine": (1, None),
 }
 """The least and the largest value of a number by its name, that of one question by this one's name and its own."""
 

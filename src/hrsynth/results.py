@@ -141,12 +141,15 @@ def require_keywords(function: Callable[..., Any], given: Iterable[str], more: I
     for name in given:
         if name not in known:
             near = difflib.get_close_matches(name, known, 1)
-            raise TypeError(f"{function.__name__} has no {name!r}{f', did you mean {near[0]!r}' if near else ''}; "
-                            f"it takes {', '.join(known)}")
+            raise TypeError(
+                f"{function.__name__} has no {name!r}{f', did you mean {near[0]!r}' if near else ''}; "
+                f"it takes {', '.join(known)}"
+            )
 
 
 def with_spelling(function: Callable[P, R]) -> Callable[P, R]:
     """A function that tells of a wrong keyword which ones it has."""
+
     @wraps(function)
     def called(*args: P.args, **given: P.kwargs) -> R:
         require_keywords(function, given)

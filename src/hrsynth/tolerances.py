@@ -221,7 +221,7 @@ INDEPENDENT_RATES = 1e-6
 """Least singular value of the rates of conditions, of length one each, that count as independent at the goal."""
 RANK_OF_FORMS = 1e-11
 """Pivots, of the largest, that count in the rank of a matrix of multiples of conditions."""
-NUMBER_ROUNDING = 2.0 ** -48
+NUMBER_ROUNDING = 2.0**-48
 """How far the numbers of conditions are from the exact ones, of their size: some ten roundings."""
 NEARLY_REAL_POSE = 1e-9
 """Imaginary parts of a proposed pose below which a real one is looked for there."""
@@ -229,14 +229,14 @@ NO_POSE = 1e-5
 """|q · q| of a quaternion of length one below which it is that of no pose, to what rounding makes of a double one."""
 NEARLY_DOUBLE = 1e-6
 """Distance between two solutions, in their parameters, below which the pose counts as singular."""
-CHAIN_ROUNDING = 16 * 2.0 ** -52
+CHAIN_ROUNDING = 16 * 2.0**-52
 """What thirty-two roundings, those of a chain of joints from the file's decimals on, make of lengths and angles."""
 MOVED = 4.0
 """What an axis that is moved does to points within the robot's extent, at most, as a multiple: a turn carries it to
 both sides, and a tilted one has a lever."""
-TIP_ROUNDING = 2.0 ** -46
+TIP_ROUNDING = 2.0**-46
 """What sixty-four roundings make of a length, relative to the size: poses and tips computed in floats."""
-SHARP_ROOT = 2.0 ** -60
+SHARP_ROOT = 2.0**-60
 """Radius of a ball, relative to 1 plus its middle, above which a solution is sought with more digits."""
 NO_POSE_START = 1e-6
 """How well a start that is no pose satisfies the equations, and how far two of them are apart (each of size one)."""
@@ -251,14 +251,14 @@ SAME_SINGULAR_END = 1e-4
 SINGULAR_END = 1e-5
 """Smallest singular value, of quadrics with coefficients of one size, below which an end counts as singular; a tenth of
 it, as part of the largest, is left out on the way there."""
-BALL_ZERO = 2.0 ** -256
+BALL_ZERO = 2.0**-256
 """Radius of a ball that holds zero at which the number in it counts as zero."""
 
-UNIT_ROUNDOFF = 2.0 ** -53
+UNIT_ROUNDOFF = 2.0**-53
 """What one rounding makes of a number, relative to its size."""
-SINE_ERROR = 2.0 ** -50
+SINE_ERROR = 2.0**-50
 """Error of a sine or cosine in a program that was generated, at most: four units in the last place."""
-AFFINE_ROUNDING = 2.0 ** -46
+AFFINE_ROUNDING = 2.0**-46
 """What sixty-four roundings make of numbers, relative to their size: more than one operation on affine forms has."""
 TOGGLE = 0.03
 """Weakest singular value of the loops, as part of that at zero, below which a way along a branch ends at a toggle."""
@@ -391,7 +391,7 @@ GENERATED_ERROR = 1e-12
 """What its answers may be off (characteristic lengths, radians), its own rounding included."""
 BOUND_WIDER = 1.25
 """Radius over which its steps are bounded, as part of the tube's."""
-BOUND_ROUNDING = 1 + 2.0 ** -40
+BOUND_ROUNDING = 1 + 2.0**-40
 """What bounds of its steps are multiplied by, for the rounding of their own products."""
 FREE_WIDER, FREEST_WIDER = 2.0, 24.0
 """The same where it is not known that the tube holds a zero of the equations that are solved; if that is not enough, as
@@ -425,9 +425,9 @@ ON_LOCUS = 0.2
 is where it vanishes, not where it is infinite."""
 SLIDER_ARRIVED = 1e-6
 """Difference (metres, radians) within which the platform has come to where a slider sent it."""
-NARROWEST_RISING_CONE = 2.0 ** -7
+NARROWEST_RISING_CONE = 2.0**-7
 """Half the width of a cone about a goal, in faces of the cube [-1, 1] to the n, below which it is cut no more."""
-SHORTEST_SLICE = 2.0 ** -9
+SHORTEST_SLICE = 2.0**-9
 """Length of a slice of such a cone, in square roots of twice the error, below which it is cut no more."""
 CERTIFIED_LEVEL = 0.95
 """Part of the error at which a ray is seen to stop rising up to which it is tried to prove that all rays rise."""

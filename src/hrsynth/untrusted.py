@@ -67,14 +67,24 @@ def refuse(what: str) -> None:
 def output(program: Path, *arguments: str, seconds: int, given: str = "") -> bytes:
     """What ``main`` of a program prints, run in a process of its own, of limited time, memory and output, with a text
     on its standard input; raises ``BadRequest`` with what it refuses, or that it came to no end."""
-    command = [sys.executable, "-I", "-c", START.format(__name__), json.dumps(sys.path), str(program), str(seconds),
-               str(LARGEST_UNPACKED), *arguments]
+    command = [
+        sys.executable,
+        "-I",
+        "-c",
+        START.format(__name__),
+        json.dumps(sys.path),
+        str(program),
+        str(seconds),
+        str(LARGEST_UNPACKED),
+        *arguments,
+    ]
     own = {key: value for key, value in os.environ.items() if key != "PXR_AR_DEFAULT_SEARCH_PATH"}
     own |= dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     try:
         with tempfile.TemporaryFile() as told, tempfile.TemporaryFile() as errors:
-            run = subprocess.run(command, input=given.encode(), stdout=told, stderr=errors, timeout=3 * seconds,
-                                 check=False, env=own)
+            run = subprocess.run(
+                command, input=given.encode(), stdout=told, stderr=errors, timeout=3 * seconds, check=False, env=own
+            )
             told.seek(0)
             if run.returncode == 0:
                 return told.read()
@@ -92,8 +102,12 @@ def start(program: str, seconds: str, most: str, *arguments: str) -> None:
     """Run ``main`` of a program within the limits (called in that process)."""
     import resource
 
-    for limit, amount in ((resource.RLIMIT_AS, PROCESS_BYTES), (resource.RLIMIT_CPU, int(seconds)),
-                          (resource.RLIMIT_FSIZE, int(most)), (resource.RLIMIT_CORE, 0)):
+    for limit, amount in (
+        (resource.RLIMIT_AS, PROCESS_BYTES),
+        (resource.RLIMIT_CPU, int(seconds)),
+        (resource.RLIMIT_FSIZE, int(most)),
+        (resource.RLIMIT_CORE, 0),
+    ):
         hard = resource.getrlimit(limit)[1]
         amount = amount if hard == resource.RLIM_INFINITY else min(amount, hard)
         resource.setrlimit(limit, (amount, amount))

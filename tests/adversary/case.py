@@ -188,8 +188,11 @@ def quaternion(R: Array) -> Array:
 
 def rpy_of(R: Array) -> tuple[float, float, float]:
     """Roll, pitch, yaw about fixed axes."""
-    return (float(np.arctan2(R[2, 1], R[2, 2])), float(np.arctan2(-R[2, 0], np.hypot(R[0, 0], R[1, 0]))),
-            float(np.arctan2(R[1, 0], R[0, 0])))
+    return (
+        float(np.arctan2(R[2, 1], R[2, 2])),
+        float(np.arctan2(-R[2, 0], np.hypot(R[0, 0], R[1, 0]))),
+        float(np.arctan2(R[1, 0], R[0, 0])),
+    )
 
 
 def matrix_of(pose: Any) -> tuple[Array, Array | None]:
@@ -198,8 +201,13 @@ def matrix_of(pose: Any) -> tuple[Array, Array | None]:
     if pose.rpy is None:
         return x, None
     (cr, cp, cy), (sr, sp, sy) = np.cos(pose.rpy), np.sin(pose.rpy)
-    return x, np.array([[cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-                        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr], [-sp, cp * sr, cp * cr]])
+    return x, np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
 
 
 def apart(case: Case, pose: Any, at: State) -> float:

@@ -34,11 +34,17 @@ from adversary.search import polished, scattered, solve
 
 FILES = Path(__file__).resolve().parents[2] / "robots"
 ROBOTS: dict[str, tuple[str, str | None, str, float]] = {
-    "3prr": ("3prr_m1", None, "", 0.0), "3prr, sliders": ("3prr_m2", None, "guide", 0.4),
-    "5-bar": ("rrrrr_m1", None, "", 0.0), "5-bar, elbows": ("rrrrr_m2", None, "elbow", 1.2),
-    "3rrr": ("3rrr_m1", None, "", 0.0), "3rrr, elbows": ("3rrr_m1", None, "elbow", 1.2),
-    "3rpr, slides": ("3rpr_m1", None, "slide", 0.2), "rprpr, slides": ("rprpr_m1", None, "slide", 0.2),
-    "hexapod, slides": ("gough_stewart", "1,2,3", "slide", 0.2), "quattro": ("quattro", "1,4", "", 0.0)}
+    "3prr": ("3prr_m1", None, "", 0.0),
+    "3prr, sliders": ("3prr_m2", None, "guide", 0.4),
+    "5-bar": ("rrrrr_m1", None, "", 0.0),
+    "5-bar, elbows": ("rrrrr_m2", None, "elbow", 1.2),
+    "3rrr": ("3rrr_m1", None, "", 0.0),
+    "3rrr, elbows": ("3rrr_m1", None, "elbow", 1.2),
+    "3rpr, slides": ("3rpr_m1", None, "slide", 0.2),
+    "rprpr, slides": ("rprpr_m1", None, "slide", 0.2),
+    "hexapod, slides": ("gough_stewart", "1,2,3", "slide", 0.2),
+    "quattro": ("quattro", "1,4", "", 0.0),
+}
 """Shipped robots: file, legs, and joints, by a part of their names, that keep so near to their zero (rad, m)."""
 BLOCK = 10
 """Pairs of poses of one task."""
@@ -153,8 +159,9 @@ class Search:
         if held:
             (x, R), point = study.poses(at), np.zeros(3) if robot.point is None else robot.point
             axes = [(robot.platform, e, False) for e in np.eye(3) if robot.point is None]
-            rows = robot.held(things(robot, [(robot.platform, point, True), *axes]),
-                              np.concatenate([x[0][None], R[0].T[: len(axes)]]))
+            rows = robot.held(
+                things(robot, [(robot.platform, point, True), *axes]), np.concatenate([x[0][None], R[0].T[: len(axes)]])
+            )
         found = polished(robot, rows, solve(robot, rows, scattered(robot, rng, 96, at))[0])[0]
         F = robot.rows(rows, robot.frames(found), False)[0]
         found = joined(at, found[np.sqrt(np.sum(F * F, 1)) < 1e-9])
@@ -180,7 +187,8 @@ class Search:
                 spots, old = self.spots(at), here.spots[nearest]
                 left = np.linalg.norm(targets - spots, axis=1)
                 good = (np.linalg.norm(spots - old, axis=1) < 2 * STEP) & (
-                    left < np.linalg.norm(targets - old, axis=1) - 1e-4)
+                    left < np.linalg.norm(targets - old, axis=1) - 1e-4
+                )
                 clear = np.zeros(len(at))
                 clear[good] = self.clear(at[good])
                 good = clear > CLEAR
@@ -250,8 +258,12 @@ def attacked(task: tuple[str, int]) -> dict[str, Any]:
         anywhere = joined(known, search.assembled(rng, case.robot.zero(), False))
         while sum(said.values()) - said["refused"] < BLOCK and said["refused"] < 10 * BLOCK:
             one, other = (case.text_of(some[[int(rng.integers(len(some)))]]) for some in (known, anywhere))
-            told = case.asked("path", lambda one=one, other=other: hrsynth.path(
-                case.engine, ROBOTS[name][1], start=one, goal=other, budget=400))
+            told = case.asked(
+                "path",
+                lambda one=one, other=other: hrsynth.path(
+                    case.engine, ROBOTS[name][1], start=one, goal=other, budget=400
+                ),
+            )
             said["refused" if told is None else told.verdict] += 1
             if told is not None and told.verdict == "separated" and detour(case, told) is not None:
                 wrong.append(f"--start {one} --goal {other}")

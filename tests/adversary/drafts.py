@@ -54,8 +54,9 @@ class Made:
     placed: Array = field(default_factory=lambda: np.eye(4))
     """The rigid motion (4, 4) that was made of the whole robot."""
 
-    def joint(self, name: str, kind: str, before: str, after: str, at: ArrayLike, *axes: ArrayLike,
-              motor: bool = False) -> None:
+    def joint(
+        self, name: str, kind: str, before: str, after: str, at: ArrayLike, *axes: ArrayLike, motor: bool = False
+    ) -> None:
         """A joint of type R, P, C, U or S; U: the first axis fixed in ``before``, the second in ``after``."""
         self.joints.append((name, kind, before, after, np.asarray(at, dtype=float), tuple(map(unit, axes)), motor))
 
@@ -76,16 +77,21 @@ class Made:
 
         def origin(R: Array, p: Array) -> str:
             p = p if decimals is None else np.round(p, decimals)
-            rpy = (np.arctan2(R[2, 1], R[2, 2]), np.arctan2(-R[2, 0], np.hypot(R[0, 0], R[1, 0])),
-                   np.arctan2(R[1, 0], R[0, 0]))
+            rpy = (
+                np.arctan2(R[2, 1], R[2, 2]),
+                np.arctan2(-R[2, 0], np.hypot(R[0, 0], R[1, 0])),
+                np.arctan2(R[1, 0], R[0, 0]),
+            )
             return f'<origin xyz="{numbers(p)}" rpy="{numbers(rpy)}"/>'
 
         for name, kind, before, after, at, axes, _ in self.joints:
             R0, p0 = place[before]
             if after in place:
                 R1, p1 = place[after]
-                ends = [f'<predecessor link="{before}">{origin(np.eye(3), R0.T @ (at - p0))}</predecessor>',
-                        f'<successor link="{after}">{origin(R1.T @ R0, R1.T @ (at - p1))}</successor>']
+                ends = [
+                    f'<predecessor link="{before}">{origin(np.eye(3), R0.T @ (at - p0))}</predecessor>',
+                    f'<successor link="{after}">{origin(R1.T @ R0, R1.T @ (at - p1))}</successor>',
+                ]
                 axis = [f'<axis xyz="{numbers(R0.T @ axes[0])}"/>'] if axes else []
                 axis += [f'<axis2 xyz="{numbers(R0.T @ axes[1])}"/>'] if len(axes) > 1 else []
                 loops.append(f'<loop name="{name}" type="{LOOP[kind]}">{"".join(ends + axis)}</loop>')
@@ -101,27 +107,44 @@ class Made:
                 own = name if len(chain) == 1 else f"{name}__{i + 1}"
                 inner.append(f'<link name="{child}"/>')
                 slides = kind == "P"
-                lines.append(f'<joint name="{own}" type="{"prismatic" if slides else "continuous"}">'
-                             f'<parent link="{parent}"/><child link="{child}"/>{X}<axis xyz="{numbers(axis)}"/>'
-                             f"{FREE if slides else ''}</joint>")
+                lines.append(
+                    f'<joint name="{own}" type="{"prismatic" if slides else "continuous"}">'
+                    f'<parent link="{parent}"/><child link="{child}"/>{X}<axis xyz="{numbers(axis)}"/>'
+                    f"{FREE if slides else ''}</joint>"
+                )
                 parent, X = child, ""
             place[after] = R1, at
             if shifted:
                 inner.append(f'<link name="{after}"/>')
-                lines.append(f'<joint name="{name}__tip" type="fixed"><parent link="{last}"/><child link="{after}"/>'
-                             f"{origin(np.eye(3), R1.T @ (self.at - at))}</joint>")
+                lines.append(
+                    f'<joint name="{name}__tip" type="fixed"><parent link="{last}"/><child link="{after}"/>'
+                    f"{origin(np.eye(3), R1.T @ (self.at - at))}</joint>"
+                )
                 place[after] = R1, self.at
         motors = [name for name, *_, motor in self.joints if motor]
-        moved = [f'<transmission name="motor_{n}"><type>transmission_interface/SimpleTransmission</type>'
-                 f'<joint name="{n}"/><actuator name="motor_{n}"/></transmission>' for n in motors]
-        seen = [f'<observe leg="{leg}" link="{link}" axis="{numbers(place[link][0].T @ u)}"/>'
-                for leg, link, u in self.observed]
+        moved = [
+            f'<transmission name="motor_{n}"><type>transmission_interface/SimpleTransmission</type>'
+            f'<joint name="{n}"/><actuator name="motor_{n}"/></transmission>'
+            for n in motors
+        ]
+        seen = [
+            f'<observe leg="{leg}" link="{link}" axis="{numbers(place[link][0].T @ u)}"/>'
+            for leg, link, u in self.observed
+        ]
         own = ["<hrsynth>", f'<platform link="{self.platform}"/>', *seen, "</hrsynth>", "</robot>"]
         return "\n".join([*lines, *inner, *loops, *moved, *own]) + "\n"
 
 
-def parallel_rods(made: Made, name: str, before: str, after: str, start: Array, end: Array, side: Array,
-                  ends: Sequence[str] = ("S", "S")) -> None:
+def parallel_rods(
+    made: Made,
+    name: str,
+    before: str,
+    after: str,
+    start: Array,
+    end: Array,
+    side: Array,
+    ends: Sequence[str] = ("S", "S"),
+) -> None:
     """Two equal rods ``name``a, ``name``b from start to end, ± ``side`` apart: {2-SS}, {2-US} or (R, R) a Π."""
     normal = np.cross(side, end - start)
     axes = {"S": (), "R": (normal,), "U": (side, normal)}

@@ -127,12 +127,28 @@ def offset_u(rng: Rng) -> Made:
     return tilted(rng, made)
 
 
-def planar_leg(made: Made, i: int, letters: str, A: Array, B: Array, rng: Rng, rail: Array | None = None,
-               end: str = "platform", motor: int = 0) -> None:
+def planar_leg(
+    made: Made,
+    i: int,
+    letters: str,
+    A: Array,
+    B: Array,
+    rng: Rng,
+    rail: Array | None = None,
+    end: str = "platform",
+    motor: int = 0,
+) -> None:
     """A leg of three joints R and P in the plane z = 0."""
     C = (A + B) / 2 + 0.6 * np.linalg.norm(B - A) * np.cross(Z, unit(B - A)) * rng.choice([-1, 1]) * rng.uniform(0.4, 1)
-    places = {"RRR": (A, C, B), "PRR": (A, A, B), "RPR": (A, (A + B) / 2, B), "RRP": (A, C, B), "PRP": (A, A, B),
-              "RPP": (A, A, B), "PPR": (A, A, B)}[letters]
+    places = {
+        "RRR": (A, C, B),
+        "PRR": (A, A, B),
+        "RPR": (A, (A + B) / 2, B),
+        "RRP": (A, C, B),
+        "PRP": (A, A, B),
+        "RPP": (A, A, B),
+        "PPR": (A, A, B),
+    }[letters]
     links = ["base", f"a_{i}", f"b_{i}", end]
     for n, (letter, at) in enumerate(zip(letters, places, strict=True)):
         slide = unit(B - A) if letters == "RPR" else unit([*rng.normal(size=2), 0.0])
@@ -177,8 +193,18 @@ def fivebars(rng: Rng) -> Made:
     return tilted(rng, made)
 
 
-def delta_leg(made: Made, i: int, A: Array, C: Array, B: Array, drive: str, axis: Array, side: Array, end: str,
-              ends: tuple[str, str] = ("S", "S")) -> None:
+def delta_leg(
+    made: Made,
+    i: int,
+    A: Array,
+    C: Array,
+    B: Array,
+    drive: str,
+    axis: Array,
+    side: Array,
+    end: str,
+    ends: tuple[str, str] = ("S", "S"),
+) -> None:
     """A leg with a driven R or P at A and two rods from C to B."""
     made.joint(f"drive_{i}", drive, "base", f"arm_{i}", A, axis, motor=True)
     parallel_rods(made, f"rod_{i}", f"arm_{i}", end, C, B, side, ends)
@@ -200,8 +226,9 @@ def deltas(rng: Rng) -> Made:
         if parallel is not None:
             axis = unit(common + parallel * rng.normal(size=3))
         side = 0.05 * T[i]
-        delta_leg(made, i + 1, A[i], C, B[i], drive, axis, side, "platform",
-                  ("S", "S") if rng.random() < 0.7 else ("U", "S"))
+        delta_leg(
+            made, i + 1, A[i], C, B[i], drive, axis, side, "platform", ("S", "S") if rng.random() < 0.7 else ("U", "S")
+        )
     return tilted(rng, made)
 
 
@@ -314,8 +341,11 @@ def schoenflies(rng: Rng) -> Made:
 def four_bars(rng: Rng) -> Made:
     """Planar or tripod robots one or all of whose legs are driven through a four-bar."""
     planar_one = rng.random() < 0.6
-    made = (Made("four-bar, planar", np.array([*0.05 * rng.normal(size=2), 0.0])) if planar_one
-            else above(rng, "four-bar, tripod"))
+    made = (
+        Made("four-bar, planar", np.array([*0.05 * rng.normal(size=2), 0.0]))
+        if planar_one
+        else above(rng, "four-bar, tripod")
+    )
     A, B = ring(rng, 3, 0.4, 0.0, 0.02), ring(rng, 3, 0.15, 0.0, 0.02) + made.at
     if planar_one:
         A[:, 2] = B[:, 2] = 0

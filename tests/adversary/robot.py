@@ -90,8 +90,13 @@ def _vector(element: ElementTree.Element | None, key: str, default: str, kind: t
 
 def _rotation(rpy: Array) -> Array:
     (cr, cp, cy), (sr, sp, sy) = np.cos(rpy), np.sin(rpy)
-    return np.array([[cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-                     [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr], [-sp, cp * sr, cp * cr]])
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
 
 
 def _frame(element: ElementTree.Element, kind: type) -> tuple[Array, Array]:
@@ -153,12 +158,24 @@ class Robot:
         assert own is not None
         platform = own.find("platform")
         assert platform is not None
-        seen = tuple((e.get("leg", ""), e.get("link", ""), _normed(_vector(e, "axis", "1 0 0", kind)))
-                     for e in own.findall("observe"))
+        seen = tuple(
+            (e.get("leg", ""), e.get("link", ""), _normed(_vector(e, "axis", "1 0 0", kind)))
+            for e in own.findall("observe")
+        )
         motors = tuple(j.get("name", "") for t in root.findall("transmission") for j in t.findall("joint"))
         loops = _loops(root, number, kind)
-        robot = cls(root.get("name", ""), tuple(names), tuple(order), loops, motors, platform.get("link", ""), seen,
-                    1.0, kind, rank)
+        robot = cls(
+            root.get("name", ""),
+            tuple(names),
+            tuple(order),
+            loops,
+            motors,
+            platform.get("link", ""),
+            seen,
+            1.0,
+            kind,
+            rank,
+        )
         p = robot.frames(robot.zero())[1][0]
         return replace(robot, length=float(np.mean(np.linalg.norm(np.asarray(p - p.mean(0), dtype=float), axis=1))))
 
@@ -193,8 +210,9 @@ class Robot:
         for joint in self.tree:
             found[joint.before].append(joint.p)
             found[joint.after].append(np.zeros(3, dtype=self.kind))
-        for link, place, point in zip(self.loops.items.links, self.loops.items.local, self.loops.items.point,
-                                      strict=True):
+        for link, place, point in zip(
+            self.loops.items.links, self.loops.items.local, self.loops.items.point, strict=True
+        ):
             if point:
                 found[self.links[link]].append(place)
         return found
@@ -219,10 +237,14 @@ class Robot:
         for i, j in self.loops.same:
             if items.point[i] and {self.links[items.links[i]], self.links[items.links[j]]} & body:
                 at = R0[items.links[i]] @ items.local[i] + p0[items.links[i]]
-                twin = [R0[items.links[a]] @ items.local[a] for a, b in self.loops.same
-                        if not items.point[a] and (items.links[a], items.links[b]) == (items.links[i], items.links[j])]
-                others = any({items.links[a], items.links[b]} == {items.links[i], items.links[j]}
-                             for a, b in self.loops.dots)
+                twin = [
+                    R0[items.links[a]] @ items.local[a]
+                    for a, b in self.loops.same
+                    if not items.point[a] and (items.links[a], items.links[b]) == (items.links[i], items.links[j])
+                ]
+                others = any(
+                    {items.links[a], items.links[b]} == {items.links[i], items.links[j]} for a, b in self.loops.dots
+                )
                 ends.append(("R" if len(twin) == 1 and not others else "?", at, twin[0] if twin else None))
         if any(kind != "R" or axis is None for kind, _, axis in ends) or len(ends) < 2 or len(self.loops.offsets):
             return None
@@ -245,7 +267,7 @@ class Robot:
     def moved(self, at: State, step: Array) -> State:
         """The states after velocities (N, n) for a unit of time."""
         theta = at.theta + step[:, : self.scalars]
-        half = step[:, self.scalars:].reshape(len(at), self.balls, 3) / 2
+        half = step[:, self.scalars :].reshape(len(at), self.balls, 3) / 2
         angle = np.sqrt(np.sum(half * half, axis=-1, keepdims=True))
         sinc = np.where(angle > 1e-9, np.sin(angle) / np.where(angle > 1e-9, angle, 1), 1 - angle**2 / 6)
         w, v = np.cos(angle), half * sinc
@@ -294,7 +316,7 @@ class Robot:
         for joint in self.tree:
             k = self._numbers[joint.after]
             found[k] = found[self._numbers[joint.before]]
-            found[k, joint.place:joint.place + {"R": 1, "P": 1, "S": 3, "F": 0}[joint.kind]] = True
+            found[k, joint.place : joint.place + {"R": 1, "P": 1, "S": 3, "F": 0}[joint.kind]] = True
         return found
 
     def items(self, items: Items, frames: tuple[Array, Array, Array]) -> tuple[Array, Array]:
@@ -307,8 +329,7 @@ class Robot:
         J *= self.carried[items.links][None, :, :, None]
         return arm, J
 
-    def rows(self, rows: Rows, frames: tuple[Array, Array, Array], jacobian: bool = True
-             ) -> tuple[Array, Array | None]:
+    def rows(self, rows: Rows, frames: tuple[Array, Array, Array], jacobian: bool = True) -> tuple[Array, Array | None]:
         """Residuals (N, r) and their Jacobian (N, r, n); lengths in characteristic lengths."""
         x, J = self.items(rows.items, frames)
         scale = np.where(rows.items.point > 0, 1 / self.length, 1.0).astype(self.kind)[None, :, None]
@@ -328,8 +349,9 @@ class Robot:
             i, j, k = rows.offsets.T
             gap = x[:, j] - x[:, i]
             parts.append(np.sum(gap * x[:, k], -1))
-            slopes.append(np.einsum("nkci,nki->nkc", J[:, j] - J[:, i], x[:, k])
-                          + np.einsum("nkci,nki->nkc", J[:, k], gap))
+            slopes.append(
+                np.einsum("nkci,nki->nkc", J[:, j] - J[:, i], x[:, k]) + np.einsum("nkci,nki->nkc", J[:, k], gap)
+            )
         if len(rows.fixed):
             i = rows.fixed
             parts.append((x[:, i] - rows.values * scale[:, i]).reshape(count, -1))
@@ -341,8 +363,11 @@ class Robot:
     def held(self, fixed: Items, values: Array) -> Rows:
         """The closing rows, and points and vectors at given places ((f, 3), or (N, f, 3))."""
         old = self.loops
-        items = Items(np.concatenate([old.items.links, fixed.links]), np.concatenate([old.items.local, fixed.local]),
-                      np.concatenate([old.items.point, fixed.point]))
+        items = Items(
+            np.concatenate([old.items.links, fixed.links]),
+            np.concatenate([old.items.local, fixed.local]),
+            np.concatenate([old.items.point, fixed.point]),
+        )
         return replace(old, items=items, fixed=np.arange(len(fixed.links)) + len(old.items.links), values=values)
 
     def coordinate(self, joint: str) -> list[int] | None:
@@ -354,9 +379,11 @@ class Robot:
 
 def things(robot: Robot, given: list[tuple[str, Array, bool]]) -> Items:
     """Items from (link, local coordinates, is a point)."""
-    return Items(np.array([robot.number(link) for link, _, _ in given], dtype=np.intp),
-                 np.array([v for _, v, _ in given], dtype=robot.kind).reshape(-1, 3),
-                 np.array([float(point) for _, _, point in given], dtype=robot.kind))
+    return Items(
+        np.array([robot.number(link) for link, _, _ in given], dtype=np.intp),
+        np.array([v for _, v, _ in given], dtype=robot.kind).reshape(-1, 3),
+        np.array([float(point) for _, _, point in given], dtype=robot.kind),
+    )
 
 
 def _about(axis: Array, angle: Array) -> Array:
@@ -368,9 +395,14 @@ def _about(axis: Array, angle: Array) -> Array:
 
 def _turned(q: Array) -> Array:
     w, x, y, z = q.T
-    return np.stack([np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)], -1),
-                     np.stack([2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)], -1),
-                     np.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)], -1)], -2)
+    return np.stack(
+        [
+            np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)], -1),
+            np.stack([2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)], -1),
+            np.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)], -1),
+        ],
+        -2,
+    )
 
 
 def _tree(root: ElementTree.Element, kind: type) -> list[TreeJoint]:
@@ -382,8 +414,14 @@ def _tree(root: ElementTree.Element, kind: type) -> list[TreeJoint]:
         assert parent is not None
         assert child is not None
         axis = _normed(_vector(e.find("axis"), "xyz", "1 0 0", kind))
-        found[e.get("name", "")] = TreeJoint(e.get("name", ""), kinds[e.get("type", "")], parent.get("link", ""),
-                                             child.get("link", ""), *_frame(e, kind), axis)
+        found[e.get("name", "")] = TreeJoint(
+            e.get("name", ""),
+            kinds[e.get("type", "")],
+            parent.get("link", ""),
+            child.get("link", ""),
+            *_frame(e, kind),
+            axis,
+        )
     for name in [name for name in found if name.endswith("__3")]:
         parts = [found.get(f"{name[:-3]}__{i}") for i in (1, 2, 3)]
         if all(part is not None and part.kind == "R" for part in parts):
@@ -436,8 +474,14 @@ def _loops(root: ElementTree.Element, number: dict[str, int], kind: type) -> Row
         if kind_of == "universal":
             other = _normed(_vector(e.find("axis2"), "xyz", "0 1 0", kind))
             dots.append((item(i, Ri @ axis, False), item(j, Rj @ other, False)))
-    items = Items(np.array(links, dtype=np.intp), np.array(local, dtype=kind).reshape(-1, 3),
-                  np.array(point, dtype=kind))
-    return Rows(items, np.array(same, dtype=np.intp).reshape(-1, 2), np.array(dots, dtype=np.intp).reshape(-1, 2),
-                np.array(offsets, dtype=np.intp).reshape(-1, 3), np.zeros(0, dtype=np.intp),
-                np.zeros((0, 3), dtype=kind))
+    items = Items(
+        np.array(links, dtype=np.intp), np.array(local, dtype=kind).reshape(-1, 3), np.array(point, dtype=kind)
+    )
+    return Rows(
+        items,
+        np.array(same, dtype=np.intp).reshape(-1, 2),
+        np.array(dots, dtype=np.intp).reshape(-1, 2),
+        np.array(offsets, dtype=np.intp).reshape(-1, 3),
+        np.zeros(0, dtype=np.intp),
+        np.zeros((0, 3), dtype=kind),
+    )

@@ -58,8 +58,13 @@ def attacked(kind: str, seed: int, folder: Path | None = None, only: Sequence[st
             begin = time.process_time()
             check(case)
             spent[name] = round(time.process_time() - begin, 3)
-    return {"kind": kind, "seed": seed, "seconds": round(time.process_time() - start, 3), "spent": spent,
-            "said": [[s.claim, s.outcome, s.detail] for s in case.found]}
+    return {
+        "kind": kind,
+        "seed": seed,
+        "seconds": round(time.process_time() - start, 3),
+        "spent": spent,
+        "said": [[s.claim, s.outcome, s.detail] for s in case.found],
+    }
 
 
 def code() -> str:
@@ -78,8 +83,13 @@ def _task(task: tuple[str, int]) -> dict[str, Any]:
     except Exception as error:  # a defect of the adversary itself: told, not hidden
         import traceback
 
-        return {"kind": task[0], "seed": task[1], "seconds": 0.0, "spent": {},
-                "said": [["adversary", WRONG, f"{type(error).__name__}: {error} {traceback.format_exc()[-600:]}"]]}
+        return {
+            "kind": task[0],
+            "seed": task[1],
+            "seconds": 0.0,
+            "spent": {},
+            "said": [["adversary", WRONG, f"{type(error).__name__}: {error} {traceback.format_exc()[-600:]}"]],
+        }
 
 
 def table(records: Iterable[dict[str, Any]]) -> str:
@@ -92,24 +102,36 @@ def table(records: Iterable[dict[str, Any]]) -> str:
         if not own:
             continue
         counts = Counter((claim, outcome) for record in own for claim, outcome, _ in record["said"])
-        cells = [f"{counts[claim, 'held']}" + (f" ({counts[claim, 'unclear']})" if counts[claim, "unclear"] else "")
-                 + (f" WRONG {counts[claim, WRONG]}" if counts[claim, WRONG] else "") for claim in claims]
+        cells = [
+            f"{counts[claim, 'held']}"
+            + (f" ({counts[claim, 'unclear']})" if counts[claim, "unclear"] else "")
+            + (f" WRONG {counts[claim, WRONG]}" if counts[claim, WRONG] else "")
+            for claim in claims
+        ]
         lines.append(" | ".join([kind, str(len(own)), f"{np.mean([r['seconds'] for r in own]):.2f}", *cells]))
-    refused = Counter(f"{claim}: {detail}" for record in records for claim, outcome, detail in record["said"]
-                      if outcome == "refused")
+    refused = Counter(
+        f"{claim}: {detail}" for record in records for claim, outcome, detail in record["said"] if outcome == "refused"
+    )
     lines += ["", "refused, by reason:", *(f"{count:6d}  {reason}" for reason, count in refused.most_common(40))]
     spent = Counter[str]()
     for record in records:
         spent.update(record["spent"])
-    lines += ["", "seconds a robot: " + ", ".join(f"{name} {value / max(1, len(records)):.3f}"
-                                                  for name, value in spent.most_common())]
+    lines += [
+        "",
+        "seconds a robot: "
+        + ", ".join(f"{name} {value / max(1, len(records)):.3f}" for name, value in spent.most_common()),
+    ]
     return "\n".join(lines)
 
 
 def wrong(records: Iterable[dict[str, Any]]) -> list[str]:
     """What is wrong, a line each."""
-    return [f"{record['kind']} {record['seed']}: {claim}: {detail}" for record in records
-            for claim, outcome, detail in record["said"] if outcome == WRONG]
+    return [
+        f"{record['kind']} {record['seed']}: {claim}: {detail}"
+        for record in records
+        for claim, outcome, detail in record["said"]
+        if outcome == WRONG
+    ]
 
 
 def tasks(count: int, seed: int, kinds: Sequence[str] = ALL) -> list[tuple[str, int]]:

@@ -14,8 +14,9 @@ CLEAR, TINY = 1e-5, 1e-9
 SOLVED = 1e-11
 
 
-def solve(robot: Robot, rows: Rows, at: State, free: NDArray[np.bool_] | None = None, *, steps: int = 60
-          ) -> tuple[State, Array]:
+def solve(
+    robot: Robot, rows: Rows, at: State, free: NDArray[np.bool_] | None = None, *, steps: int = 60
+) -> tuple[State, Array]:
     """Levenberg-Marquardt from every configuration at once; the states and their residuals (N,).
 
     ``free`` says which coordinates may move. Starts that come to rest far from a solution are given up.
@@ -42,8 +43,9 @@ def solve(robot: Robot, rows: Rows, at: State, free: NDArray[np.bool_] | None = 
         move = np.zeros((len(left), robot.size))
         move[:, columns] = -np.linalg.solve(A + 1e-13 * np.eye(len(columns)), g[:, :, None])[:, :, 0]
         # no start leaps farther than half a turn at once
-        move *= np.minimum(1.0, 1.5 / np.maximum(np.abs(np.where(robot.slides, move / robot.length, move)).max(1),
-                                                 1e-9))[:, None]
+        move *= np.minimum(
+            1.0, 1.5 / np.maximum(np.abs(np.where(robot.slides, move / robot.length, move)).max(1), 1e-9)
+        )[:, None]
         tried = robot.moved(State(theta[left], quats[left]), move)
         F2, J2 = _evaluated(robot, rows, tried, left if per_start else None)
         cost2 = np.sum(F2 * F2, 1)
@@ -64,14 +66,16 @@ def solve(robot: Robot, rows: Rows, at: State, free: NDArray[np.bool_] | None = 
 def _evaluated(robot: Robot, rows: Rows, at: State, which: NDArray[np.intp] | None) -> tuple[Array, Array]:
     if which is not None and rows.values.ndim == 3:
         from dataclasses import replace
+
         rows = replace(rows, values=rows.values[which])
     F, J = robot.rows(rows, robot.frames(at))
     assert J is not None
     return F, J
 
 
-def polished(robot: Robot, rows: Rows, at: State, *, free: NDArray[np.bool_] | None = None, steps: int = 4
-             ) -> tuple[State, Array]:
+def polished(
+    robot: Robot, rows: Rows, at: State, *, free: NDArray[np.bool_] | None = None, steps: int = 4
+) -> tuple[State, Array]:
     """A few Gauss-Newton steps of least norm on each configuration (for sums of squares that are zero)."""
     columns = np.arange(robot.size) if free is None else np.flatnonzero(free)
     for _ in range(steps):
@@ -87,8 +91,10 @@ def scattered(robot: Robot, rng: np.random.Generator, count: int, around: State,
     """Random configurations: a third near ``around``, the rest anywhere."""
     scale = np.where(np.arange(count) % 3 == 0, 0.35, 1.0)[:, None]
     span = np.where(robot.slides, 0.8 * robot.length, wide)
-    return robot.moved(State(np.repeat(around.theta[:1], count, 0), np.repeat(around.quats[:1], count, 0)),
-                       scale * span * rng.uniform(-1, 1, (count, robot.size)))
+    return robot.moved(
+        State(np.repeat(around.theta[:1], count, 0), np.repeat(around.quats[:1], count, 0)),
+        scale * span * rng.uniform(-1, 1, (count, robot.size)),
+    )
 
 
 def split(values: Array, scale: float = 1.0) -> tuple[int, bool]:
@@ -126,8 +132,13 @@ class Study:
         self.robot, self.point = robot, point
         rows = robot.loops
         self.loops = rows
-        self.platform = things(robot, [(robot.platform, np.zeros(3) if point is None else point, True),
-                                       *((robot.platform, e, False) for e in np.eye(3))])
+        self.platform = things(
+            robot,
+            [
+                (robot.platform, np.zeros(3) if point is None else point, True),
+                *((robot.platform, e, False) for e in np.eye(3)),
+            ],
+        )
 
     def closed(self, at: State) -> Array:
         """Residuals of the loops (N,)."""
@@ -175,8 +186,9 @@ class Study:
         metric = np.where(self.robot.slides, self.robot.length, 1.0)
         return np.swapaxes(J, 2, 3).reshape(len(at), -1, self.robot.size) * metric
 
-    def walk(self, rng: np.random.Generator, start: State, count: int = 6, steps: int = 12, step: float = 0.04
-             ) -> tuple[State, NDArray[np.bool_]]:
+    def walk(
+        self, rng: np.random.Generator, start: State, count: int = 6, steps: int = 12, step: float = 0.04
+    ) -> tuple[State, NDArray[np.bool_]]:
         """Random walks by small tangent steps, each corrected; the last configurations, and which of them stayed on a
         sheet: steps a small part of the weakest singular value, loops closed, mobility unchanged all the way."""
         robot = self.robot
@@ -201,8 +213,7 @@ class Study:
             at, residual = polished(robot, self.loops, at, steps=3)
             off = ~(residual < 1e-9) | ~good
             good &= ~off
-            at = State(np.where(off[:, None], old.theta, at.theta),
-                       np.where(off[:, None, None], old.quats, at.quats))
+            at = State(np.where(off[:, None], old.theta, at.theta), np.where(off[:, None, None], old.quats, at.quats))
         for k, local in enumerate(self.locals(at)):
             good[k] &= local.clear and local.N.shape[1] == mobility
         return at, good

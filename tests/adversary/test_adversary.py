@@ -70,8 +70,12 @@ def test_a_false_word_about_assembly_is_found():
     off = replace(told.modes[1].pose, x=told.modes[1].pose.x + 0.01)
     lists.judge(case, replace(told, modes=(told.modes[0], replace(told.modes[1], pose=off))), None, False)
     assert WRONG in outcomes(case, "assembled")
-    never = replace(told.modes[1], reachable=False, configuration=None, **(
-        {"assembly": "no"} if hasattr(told.modes[1], "assembly") else {}))
+    never = replace(
+        told.modes[1],
+        reachable=False,
+        configuration=None,
+        **({"assembly": "no"} if hasattr(told.modes[1], "assembly") else {}),
+    )
     lists.judge(case, replace(told, modes=(told.modes[0], never)), None, False)
     assert outcomes(case, "cannot be assembled") == {WRONG}
 
@@ -108,7 +112,6 @@ def test_a_cure_that_does_not_cure_is_found():
     assert outcomes(case, "cure") == {WRONG}
 
 
-
 def test_a_false_error_bound_is_found():
     case = shipped("3rrr_m1")
     told = hrsynth.accuracy(case.engine, cone=errors.PSI)
@@ -130,8 +133,17 @@ def test_an_enclosure_that_misses_is_found():
         told = hrsynth.modes(case.engine, ["1", "3", "5"], at=at)
         case.found.clear()
         for radius, outcome in ((1e-9, HELD), (0.0, WRONG)):
-            moved = [replace(mode, shift=radius, turn=radius, proved=True, rounded=False, pose=replace(
-                mode.pose, x=mode.pose.x + (0.0 if radius else 1e-13))) for mode in told.modes]
+            moved = [
+                replace(
+                    mode,
+                    shift=radius,
+                    turn=radius,
+                    proved=True,
+                    rounded=False,
+                    pose=replace(mode.pose, x=mode.pose.x + (0.0 if radius else 1e-13)),
+                )
+                for mode in told.modes
+            ]
             case.found.clear()
             enclosures.judge(case, replace(told, modes=tuple(moved)), at)
             assert outcomes(case, "enclosure") == {outcome}, (at, radius)
@@ -170,15 +182,21 @@ def test_a_path_through_a_singularity_is_found():
     ways.judge(case, told)
     assert outcomes(case, "path") == {HELD}
     case.found.clear()
-    end = replace(told, ways=told.ways[:-1] if len(told.ways) > 1 else (replace(
-        told.ways[0], shift=0.5 * told.ways[0].shift),))
+    end = replace(
+        told, ways=told.ways[:-1] if len(told.ways) > 1 else (replace(told.ways[0], shift=0.5 * told.ways[0].shift),)
+    )
     ways.judge(case, end)
     assert outcomes(case, "path") == {WRONG}
     # a platform turned until the legs' lines meet in a point, told as one way without singularity
     case.found.clear()
     across = replace(told.ways[0], shift=0 * told.ways[0].shift, turn=np.array([0.0, 0.0, 3.0]))
-    ways.same(case, replace(told, ways=(across,)), case.fitted(told.start.configuration),
-              case.fitted(told.start.configuration), case.directions(told.setting.observed))
+    ways.same(
+        case,
+        replace(told, ways=(across,)),
+        case.fitted(told.start.configuration),
+        case.fitted(told.start.configuration),
+        case.directions(told.setting.observed),
+    )
     assert outcomes(case, "path") == {WRONG}
 
 

@@ -58,20 +58,28 @@ def rate_rows(oracle: Oracle, state: Array, basis: Array, observations: Sequence
     def value(each: Observation, at: Array) -> Array:
         return each.value(oracle.pose(at, each.seen_from or oracle.mechanism.reference), oracle.pose(at, each.link))
 
-    return [np.array([(value(o, a) - value(o, b)) / (2 * STEP) for a, b in zip(ahead, behind, strict=True)])
-            .reshape(-1, o.size).T for o in observations]
+    return [
+        np.array([(value(o, a) - value(o, b)) / (2 * STEP) for a, b in zip(ahead, behind, strict=True)])
+        .reshape(-1, o.size)
+        .T
+        for o in observations
+    ]
 
 
 class Independent:
     """What stays lost with any further measurements, by maximal coordinates in a random walk, or ``at_zero``."""
 
-    def __init__(self, robot: Mechanism, observe: str | None, camera: str | None = None, seed: int = 1, *,
-                 at_zero: bool = False) -> None:
+    def __init__(
+        self, robot: Mechanism, observe: str | None, camera: str | None = None, seed: int = 1, *, at_zero: bool = False
+    ) -> None:
         setting = ObservedRobot.of(robot, observe, camera, samples=1)
         self.everything = candidates(setting)
         oracle = Oracle(setting.mechanism)
-        self.state = np.array([link.pose for link in setting.mechanism.links.values()]) if at_zero else list(
-            oracle.random_walk(np.random.default_rng(seed), 2))[-1]
+        self.state = (
+            np.array([link.pose for link in setting.mechanism.links.values()])
+            if at_zero
+            else list(oracle.random_walk(np.random.default_rng(seed), 2))[-1]
+        )
         basis = oracle.kernel(self.state)[0]
         point = setting.anatomy.point
         twist = oracle.twist(basis, setting.mechanism.platform)
@@ -106,11 +114,26 @@ def sets_of(answer: Advice) -> set[Set]:
 
 
 @pytest.mark.some(2)
-@pytest.mark.parametrize(("robot", "observe", "camera"), [
-    ("uranesx", "all", None), ("i4l", "all", None), ("i4l", "1", "platform"), ("prrrp_parallel", "all", None),
-    ("prrrp_parallel_point", "all", None), ("3prp", "all", None), ("3rrp", "all", None), ("3ppr_m1", "all", None),
-    ("rprpr_m1", "1", None), ("quattro", "1", None), ("quattro", "1,2", None), ("3rps", "1", None),
-    ("3rrr_m1", "1", "platform"), ("hexaglide", "all", None), ("gough_stewart", "1", None)])
+@pytest.mark.parametrize(
+    ("robot", "observe", "camera"),
+    [
+        ("uranesx", "all", None),
+        ("i4l", "all", None),
+        ("i4l", "1", "platform"),
+        ("prrrp_parallel", "all", None),
+        ("prrrp_parallel_point", "all", None),
+        ("3prp", "all", None),
+        ("3rrp", "all", None),
+        ("3ppr_m1", "all", None),
+        ("rprpr_m1", "1", None),
+        ("quattro", "1", None),
+        ("quattro", "1,2", None),
+        ("3rps", "1", None),
+        ("3rrr_m1", "1", "platform"),
+        ("hexaglide", "all", None),
+        ("gough_stewart", "1", None),
+    ],
+)
 def test_all_cures_and_only_those_are_found(robot: str, observe: str, camera: str | None) -> None:
     """Exhaustively: every smallest set that cures by the oracle is found, but for directions that tell what another
     one does; no smaller set cures."""
@@ -197,7 +220,8 @@ def test_blind_planar_robots(robot: str, size: int) -> None:
 def test_a_pod_with_one_leg_observed_needs_two_more() -> None:
     answer = found("gough_stewart", "1")
     assert {frozenset(m.of for m in each.measurements) for each in answer.sets} == set(
-        map(frozenset, combinations("23456", 2)))
+        map(frozenset, combinations("23456", 2))
+    )
     assert kinds(answer) == {("leg", "leg"): 10}
 
 
@@ -214,8 +238,10 @@ def test_the_directions_of_either_part_of_a_telescope_are_one() -> None:
     assert not any(m.kind == "direction" for each in answer.sets for m in each.measurements)
 
 
-@pytest.mark.parametrize(("robot", "observe"), [("quattro", "all"), ("quattro", "1,4"), ("delta", "1,2"),
-                                                ("gough_stewart", "1,3,5"), ("rrrrr_m1", "all")])
+@pytest.mark.parametrize(
+    ("robot", "observe"),
+    [("quattro", "all"), ("quattro", "1,4"), ("delta", "1,2"), ("gough_stewart", "1,3,5"), ("rrrrr_m1", "all")],
+)
 def test_nothing_is_missing(robot: str, observe: str) -> None:
     answer = found(robot, observe)
     assert answer.nothing_missing
@@ -282,8 +308,16 @@ def two_rods(foot: str, charm: bool = False) -> Mechanism:
             builder.link(above, A)
             builder.joint(f"rail_{number}", "P", "base", above, A, axis=(0.3, side, 0.2), motor=True)
         builder.link(f"rod_{number}", A)
-        builder.joint(f"foot_{number}", "U", above, f"rod_{number}", A, axis=first,
-                      axis2=np.cross(first, B - A), motor=foot == "U")
+        builder.joint(
+            f"foot_{number}",
+            "U",
+            above,
+            f"rod_{number}",
+            A,
+            axis=first,
+            axis2=np.cross(first, B - A),
+            motor=foot == "U",
+        )
         builder.joint(f"tip_{number}", "S", f"rod_{number}", "platform", B, loop=number == 2)
     if charm:
         builder.link("charm", (0.1, 0.2, 1.2))
@@ -397,9 +431,16 @@ def test_no_set_that_sees_as_much_is_cheaper(price: str) -> None:
                 assert rank_of("gough_stewart", watched, see) < 6, (legs, points)
 
 
-@pytest.mark.parametrize(("price", "said"), [("thing=2", "kind of measurement"), ("point=0", "a positive number"),
-                                             ("point=1,point=2", "given twice"),
-                                             ("point", "a positive number"), ("leg=nan", "a positive number")])
+@pytest.mark.parametrize(
+    ("price", "said"),
+    [
+        ("thing=2", "kind of measurement"),
+        ("point=0", "a positive number"),
+        ("point=1,point=2", "given twice"),
+        ("point", "a positive number"),
+        ("leg=nan", "a positive number"),
+    ],
+)
 def test_prices_that_are_none_are_refused(price: str, said: str) -> None:
     with pytest.raises(BadRequest, match=said):
         hrsynth.advise("delta", ["1"], price=price)
@@ -407,5 +448,9 @@ def test_prices_that_are_none_are_refused(price: str, said: str) -> None:
 
 def test_offers_are_parted_at_kinds_alone() -> None:
     assert split_offers("point:arm/plate@0.1,0,0,eye=line:plate@1,2,3/0,0,1,inclination,distance:base") == [
-        "point:arm/plate@0.1,0,0", "eye=line:plate@1,2,3/0,0,1", "inclination:plate", "distance:base"]
+        "point:arm/plate@0.1,0,0",
+        "eye=line:plate@1,2,3/0,0,1",
+        "inclination:plate",
+        "distance:base",
+    ]
     assert split_offers("encoder") == ["encoder"]

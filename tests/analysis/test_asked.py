@@ -12,8 +12,12 @@ from hrsynth.errors import BadRequest, PoseNotReached
 from hrsynth.kinematics.configuration import measure
 from hrsynth.mechanism.pose import ModeNumber, Pose, asked_pose
 
-ROBOTS = [("3rrr_m1", None, "x=0.01,y=0.01,phi=5deg"), ("gough_stewart", "1,3,5", "x=0.02,y=0,z=0.31,rpy=0/0.1/0"),
-          ("quattro", "1,4", "x=0.05,y=0.02,z=-0.7"), ("3rps", None, "z=0.65")]
+ROBOTS = [
+    ("3rrr_m1", None, "x=0.01,y=0.01,phi=5deg"),
+    ("gough_stewart", "1,3,5", "x=0.02,y=0,z=0.31,rpy=0/0.1/0"),
+    ("quattro", "1,4", "x=0.05,y=0.02,z=-0.7"),
+    ("3rps", None, "z=0.65"),
+]
 
 
 @pytest.mark.parametrize(("name", "legs", "about"), ROBOTS)
@@ -71,8 +75,15 @@ def test_legs_are_counted_from_a_mode_on():
         hrsynth.derive(robot, at="mode:0")
 
 
-@pytest.mark.parametrize(("text", "match"), [("mode:0", "mode:1, mode:2"), ("mode:", "mode:1, mode:2"),
-                                             ("mode:two", "mode:1, mode:2"), ("mode:9", "mode:1 to mode:2")])
+@pytest.mark.parametrize(
+    ("text", "match"),
+    [
+        ("mode:0", "mode:1, mode:2"),
+        ("mode:", "mode:1, mode:2"),
+        ("mode:two", "mode:1, mode:2"),
+        ("mode:9", "mode:1 to mode:2"),
+    ],
+)
 def test_a_mode_that_there_is_not_is_refused(text: str, match: str):
     with pytest.raises(BadRequest, match=match):
         hrsynth.check(load(shipped()["gough_stewart"]), "1,3,5", at=[text])

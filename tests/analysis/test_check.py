@@ -29,8 +29,12 @@ from kinematics.robots import ROBOTS, setting_of, state_of
 from oracle import Oracle, span
 from strategies import parallel_robots, random_rotation
 
-quick = settings(max_examples=8, deadline=None, derandomize=True,
-                 suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
+quick = settings(
+    max_examples=8,
+    deadline=None,
+    derandomize=True,
+    suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large],
+)
 
 
 @cache
@@ -157,8 +161,9 @@ def test_shipped_robots_are_regular_at_zero(robot: str) -> None:
 
 @pytest.mark.parametrize("robot", ["3rrr_m1", "rrrrr_m1", "3prr_m2"])
 def test_a_planar_loop_repeats_three_constraints(robot: str) -> None:
-    assert [(each.rows, each.generic) for each in at_zero(robot).redundant] == [(3, True)] * (len(
-        load(robot).joints) - len(load(robot).links) + 1)
+    assert [(each.rows, each.generic) for each in at_zero(robot).redundant] == [(3, True)] * (
+        len(load(robot).joints) - len(load(robot).links) + 1
+    )
 
 
 def test_parallel_cranks_are_type_2() -> None:
@@ -199,10 +204,18 @@ def parallelogram(tilt: Array) -> Mechanism:
     builder.link("crank_2")
     builder.link("coupler", tilt @ [0.2 * c, 0.2 * s, 0])
     for number, foot in ((1, 0.0), (2, 0.3)):
-        builder.joint(f"foot_{number}", "R", "base", f"crank_{number}", tilt @ [foot, 0, 0], axis=tilt[:, 2],
-                      motor=number == 1)
-        builder.joint(f"tip_{number}", "R", f"crank_{number}", "coupler", tilt @ [foot + 0.2 * c, 0.2 * s, 0],
-                      axis=tilt[:, 2], loop=number == 2)
+        builder.joint(
+            f"foot_{number}", "R", "base", f"crank_{number}", tilt @ [foot, 0, 0], axis=tilt[:, 2], motor=number == 1
+        )
+        builder.joint(
+            f"tip_{number}",
+            "R",
+            f"crank_{number}",
+            "coupler",
+            tilt @ [foot + 0.2 * c, 0.2 * s, 0],
+            axis=tilt[:, 2],
+            loop=number == 2,
+        )
     return builder.build(platform="coupler")
 
 
@@ -227,6 +240,7 @@ def test_a_flat_parallelogram_is_a_constraint_singularity(tilt: Array) -> None:
 
 def test_gained_freedoms_are_those_beyond_the_usual_ones() -> None:
     """A platform that translates and, at some pose, also turns about z has gained the turn alone."""
+
     def having(columns: list[int]) -> Relation:
         return Relation(np.eye(6)[:, columns], 6, (), len(columns), CLEAN)
 
@@ -274,8 +288,9 @@ def test_a_grid_reaches_whatever_legs_that_stretch_without_limit_reach() -> None
 
 def test_a_pose_beyond_joint_limits_says_so() -> None:
     robot = load("3rpr_m1")
-    made = robot.changed(joints=[replace(joint, limits=Limits(-1e-3, 1e-3)) for joint in robot.joints.values()
-                                 if joint.actuated])
+    made = robot.changed(
+        joints=[replace(joint, limits=Limits(-1e-3, 1e-3)) for joint in robot.joints.values() if joint.actuated]
+    )
     (at,), (home,) = (check(made, at=poses).postures for poses in (["x=0.05,y=0,phi=0"], []))
     assert set(at.to_dict()["beyond"]) == {name for name, joint in robot.joints.items() if joint.actuated}
     assert home.beyond == ()
@@ -299,8 +314,12 @@ def test_fewer_legs_and_a_camera() -> None:
 
 def test_without_motors_nothing_is_said_of_the_real_robot() -> None:
     mechanism = parallelogram(np.eye(3))
-    passive = mechanism.changed(joints=[type(j)(j.name, j.type, j.predecessor, j.successor, j.point, j.axes,
-                                                in_tree=j.in_tree) for j in mechanism.joints.values()])
+    passive = mechanism.changed(
+        joints=[
+            type(j)(j.name, j.type, j.predecessor, j.successor, j.point, j.axes, in_tree=j.in_tree)
+            for j in mechanism.joints.values()
+        ]
+    )
     (found,) = check(passive).postures
     assert found.real is None
     assert found.to_dict()["real"] is None

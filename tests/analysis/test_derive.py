@@ -179,14 +179,17 @@ def test_translations_along_the_slides_are_lost(robot: str) -> None:
 
 # --- some of the legs --------------------------------------------------------------------------------------------
 
+
 def subsets(labels: str, sizes: tuple[int, ...] | None = None) -> list[tuple[str, ...]]:
     return [each for size in sizes or range(1, len(labels) + 1) for each in combinations(labels, size)]
 
 
-SUBSETS = [*(("quattro", each) for each in subsets("1234", (1, 2, 3))),
-           *(("quattro_rigid", each) for each in subsets("1234", (1, 2, 3))),
-           *(("delta", each) for each in subsets("123", (1, 2))),
-           *(("orthoglide", each) for each in subsets("123", (1, 2)))]
+SUBSETS = [
+    *(("quattro", each) for each in subsets("1234", (1, 2, 3))),
+    *(("quattro_rigid", each) for each in subsets("1234", (1, 2, 3))),
+    *(("delta", each) for each in subsets("123", (1, 2))),
+    *(("orthoglide", each) for each in subsets("123", (1, 2))),
+]
 PODS = [("gough_stewart", each) for each in subsets("123456", (2, 3))]
 PAIRS = ("2-Pi-{2-U*U}", "2-P-{2-U*U}")
 RANKS = {"quattro": (2, 4), "quattro_rigid": (2, 3), "delta": (2, 3), "orthoglide": (2, 3)}
@@ -234,15 +237,18 @@ def test_pairs_and_triples_of_a_pod_are_certified(robot: str, legs: tuple[str, .
 
 
 @pytest.mark.some(2)
-@pytest.mark.parametrize(("robot", "legs", "hidden"), [
-    ("gough_stewart", ("1", "2", "3"), "3-U*PS"),
-    ("gough_stewart", ("2", "4", "6"), "3-U*PS"),
-    ("quattro", ("1", "4"), "2-Pi-{2-U*U}"),
-    ("quattro", ("2", "3"), "2-Pi-{2-U*U}"),
-    ("delta", ("1", "3"), "2-Pi-{2-U*U}"),
-    ("linear_delta", ("1", "2"), "2-P-{2-U*U}"),
-    ("orthoglide", ("2", "3"), "2-P-{2-U*U}"),
-])
+@pytest.mark.parametrize(
+    ("robot", "legs", "hidden"),
+    [
+        ("gough_stewart", ("1", "2", "3"), "3-U*PS"),
+        ("gough_stewart", ("2", "4", "6"), "3-U*PS"),
+        ("quattro", ("1", "4"), "2-Pi-{2-U*U}"),
+        ("quattro", ("2", "3"), "2-Pi-{2-U*U}"),
+        ("delta", ("1", "3"), "2-Pi-{2-U*U}"),
+        ("linear_delta", ("1", "2"), "2-P-{2-U*U}"),
+        ("orthoglide", ("2", "3"), "2-P-{2-U*U}"),
+    ],
+)
 def test_architectures_of_the_papers(robot: str, legs: tuple[str, ...], hidden: str) -> None:
     derivation = derived(robot, legs)
     certified(derivation)
@@ -256,15 +262,26 @@ def test_architectures_of_the_papers(robot: str, legs: tuple[str, ...], hidden: 
 
 
 @pytest.mark.some(2)
-@pytest.mark.parametrize(("robot", "legs"), [
-    ("quattro", ("1", "4")), ("3rps", ("1", "2")), ("3rrr_m1", ("1", "2", "3")), ("hexa", ("1", "2", "3")),
-    ("orthoglide", ("2", "3"))])
+@pytest.mark.parametrize(
+    ("robot", "legs"),
+    [
+        ("quattro", ("1", "4")),
+        ("3rps", ("1", "2")),
+        ("3rrr_m1", ("1", "2", "3")),
+        ("hexa", ("1", "2", "3")),
+        ("orthoglide", ("2", "3")),
+    ],
+)
 def test_steps_are_those_that_are_taken_one_by_one(robot: str, legs: tuple[str, ...]) -> None:
     """The result alone is compared while a hidden robot is found; each step's own angle is measured afterwards."""
     found = derived(robot, legs)
     samples = found.setting.samples
-    checked = SIMPLIFIED(Rewriting.of(Evidence(found.setting.anatomy, samples), lambda mechanism, bodies: certify(
-        samples, mechanism, count=STEP_SAMPLES, bodies=bodies, complete=False)))
+    checked = SIMPLIFIED(
+        Rewriting.of(
+            Evidence(found.setting.anatomy, samples),
+            lambda mechanism, bodies: certify(samples, mechanism, count=STEP_SAMPLES, bodies=bodies, complete=False),
+        )
+    )
     assert found.steps == checked.steps
     assert any(step.accepted and step.largest_angle is None and step.rule == "lift" for step in found.taken)
 
@@ -302,7 +319,10 @@ def test_of_proposals_that_were_taken_back_the_first_is_printed() -> None:
     assert all(not step.accepted and "taken back" in step.reason for step in proposals)
     assert sum("taken back: legs remain" in line for line in printed) < len(proposals)
     assert [line.split()[2:4] for line in printed if line.startswith("end change")] == [
-        ["all", "no"], ["all", "no"], ["all", "yes"]]
+        ["all", "no"],
+        ["all", "no"],
+        ["all", "yes"],
+    ]
     assert f"{len(proposals) - 1} more proposals, taken back as well" in " ".join(" ".join(printed).split())
     assert any(line.startswith("keep ") for line in printed)
 
@@ -347,14 +367,18 @@ def test_nothing_is_answered_without_a_certificate(monkeypatch: pytest.MonkeyPat
 
 # --- other segments, other cameras, other forms ------------------------------------------------------------------
 
+
 @pytest.mark.some(1)
-@pytest.mark.parametrize(("robot", "observe", "camera"), [
-    ("gough_stewart", ("1", "2", "3"), "platform"),
-    ("delta", None, "platform"),
-    ("delta", None, "arm_1"),
-    ("delta", ("1", "2"), "rod_3a"),
-    ("3rrr_m1", None, "platform"),
-])
+@pytest.mark.parametrize(
+    ("robot", "observe", "camera"),
+    [
+        ("gough_stewart", ("1", "2", "3"), "platform"),
+        ("delta", None, "platform"),
+        ("delta", None, "arm_1"),
+        ("delta", ("1", "2"), "rod_3a"),
+        ("3rrr_m1", None, "platform"),
+    ],
+)
 def test_a_camera_on_any_link(robot: str, observe: tuple[str, ...] | None, camera: str) -> None:
     derivation = derived(robot, observe, camera)
     certified(derivation)
@@ -365,9 +389,17 @@ def test_a_camera_on_any_link(robot: str, observe: tuple[str, ...] | None, camer
 
 
 @pytest.mark.some(1)
-@pytest.mark.parametrize(("robot", "observe"), [
-    ("delta", ("arm_1", "rod_2a")), ("delta", ("rod_1b", "2")), ("delta", ("arm_1", "arm_2", "arm_3")),
-    ("quattro", ("rod_1a", "rod_1b", "4")), ("3rrr_m1", ("1", "2", "3")), ("delta", ("arm_1", "rod_1a", "2"))])
+@pytest.mark.parametrize(
+    ("robot", "observe"),
+    [
+        ("delta", ("arm_1", "rod_2a")),
+        ("delta", ("rod_1b", "2")),
+        ("delta", ("arm_1", "arm_2", "arm_3")),
+        ("quattro", ("rod_1a", "rod_1b", "4")),
+        ("3rrr_m1", ("1", "2", "3")),
+        ("delta", ("arm_1", "rod_1a", "2")),
+    ],
+)
 def test_other_segments(robot: str, observe: tuple[str, ...]) -> None:
     derivation = derived(robot, observe)
     certified(derivation)
@@ -398,9 +430,16 @@ def test_encoders_made_visible() -> None:
 
 
 @pytest.mark.some(1)
-@pytest.mark.parametrize(("robot", "hidden"), [
-    ("delta", "3-{R-PP}-{2-U*S}"), ("3rrr_m1", "3-{R-PP}-R*R"), ("quattro", "4-{R-PP}-{2-U*S}"), ("3upu", "3-U*PU"),
-    ("orthoglide", "3-P-{2-U*S}")])
+@pytest.mark.parametrize(
+    ("robot", "hidden"),
+    [
+        ("delta", "3-{R-PP}-{2-U*S}"),
+        ("3rrr_m1", "3-{R-PP}-R*R"),
+        ("quattro", "4-{R-PP}-{2-U*S}"),
+        ("3upu", "3-U*PU"),
+        ("orthoglide", "3-P-{2-U*S}"),
+    ],
+)
 def test_the_general_form(robot: str, hidden: str) -> None:
     derivation = derived(robot, None, None, "general")
     certified(derivation)
@@ -436,14 +475,17 @@ def test_progress_is_told() -> None:
     assert {"sampling", "certificate", "the unchecked form"} <= set(told)
 
 
-@pytest.mark.parametrize(("observe", "camera", "form", "value", "allowed"), [
-    (["9"], None, "simplified", "9", "1, 2, 3"),
-    (["1", "nothing"], None, "simplified", "nothing", "rod_1a"),
-    (["base"], None, "simplified", "base", "arm_1"),
-    (["platform"], None, "simplified", "platform", "arm_1"),
-    (None, "nothing", "simplified", "nothing", "platform"),
-    (None, None, "plain", "plain", "simplified, general"),
-])
+@pytest.mark.parametrize(
+    ("observe", "camera", "form", "value", "allowed"),
+    [
+        (["9"], None, "simplified", "9", "1, 2, 3"),
+        (["1", "nothing"], None, "simplified", "nothing", "rod_1a"),
+        (["base"], None, "simplified", "base", "arm_1"),
+        (["platform"], None, "simplified", "platform", "arm_1"),
+        (None, "nothing", "simplified", "nothing", "platform"),
+        (None, None, "plain", "plain", "simplified, general"),
+    ],
+)
 def test_bad_requests(observe: list[str] | None, camera: str | None, form: str, value: str, allowed: str) -> None:
     with pytest.raises(BadRequest) as caught:
         derive(load("delta"), observe, camera, form=form)
@@ -458,8 +500,9 @@ def test_the_record() -> None:
     seen = derived("delta", ("1",)).setting.observed[0]
     assert isinstance(seen, Direction)
     axis = seen.direction.tolist()
-    assert record["observed"] == [{"leg": "1", "link": "rod_1a", "kind": "direction", "camera": None, "at": None,
-                                   "axis": axis}]
+    assert record["observed"] == [
+        {"leg": "1", "link": "rod_1a", "kind": "direction", "camera": None, "at": None, "axis": axis}
+    ]
     assert record["camera"] == "base"
     assert record["verdict"] == PARTIAL
     assert record["dof"] == record["rank"] + len(record["lost"])
@@ -474,8 +517,9 @@ def test_the_record() -> None:
 
 @pytest.mark.some(1)
 @pytest.mark.parametrize(("form", "expected"), [("general", "{R-PP}-R*RR*-{R-PP}"), ("simplified", "PiR*RR*Pi")])
-def test_a_second_attempt_keeps_to_the_form_that_was_asked_for(monkeypatch: pytest.MonkeyPatch, form: str,
-                                                               expected: str) -> None:
+def test_a_second_attempt_keeps_to_the_form_that_was_asked_for(
+    monkeypatch: pytest.MonkeyPatch, form: str, expected: str
+) -> None:
     answers = iter([False])
     monkeypatch.setattr(Rewriting, "virtual_only", property(lambda self: next(answers, True)))
     found = derive(load("rrrrr_m1"), form=form)

@@ -79,9 +79,14 @@ def placed(mechanism: Mechanism, relations: Relations, drawn: Geometry) -> Mecha
     """A mechanism of doubles with the geometry of an instance."""
     centres = np.array([[float(x.p) / float(x.q) for x in point] for point in drawn.centres])
     directions = [unit(doubles(d)) for d in drawn.directions]
-    joints = [replace(joint, point=centres[relations.centres[name]] if name in relations.centres else centres[0],
-                      axes=tuple(directions[c] for c in relations.axes[name]))
-              for name, joint in mechanism.joints.items()]
+    joints = [
+        replace(
+            joint,
+            point=centres[relations.centres[name]] if name in relations.centres else centres[0],
+            axes=tuple(directions[c] for c in relations.axes[name]),
+        )
+        for name, joint in mechanism.joints.items()
+    ]
     found = mechanism.changed(joints=joints)
     platform = found.links[found.platform]
     if relations.point is not None:
@@ -107,9 +112,10 @@ def test_an_instance_is_a_mechanism_of_the_same_kind(robot: str) -> None:
     drawn = draw(generic.relations, random.Random(0))
     exact = generic.instance(0)
     mechanism = placed(setting.mechanism, generic.relations, drawn)
-    observations = [Direction(o.leg, o.link,
-                              mechanism.links[o.link].pose[:3, :3].T @ doubles(observed_direction(sight, drawn)))
-                    for o, sight in zip(generic.observations, generic.relations.sights, strict=True)]
+    observations = [
+        Direction(o.leg, o.link, mechanism.links[o.link].pose[:3, :3].T @ doubles(observed_direction(sight, drawn)))
+        for o, sight in zip(generic.observations, generic.relations.sights, strict=True)
+    ]
     oracle = Oracle(mechanism)
     assert exact.mobility == oracle.mobility(oracle.zero())
     for size in (1, 2, len(observations)):
@@ -140,8 +146,10 @@ def test_an_instance_keeps_all_relations_exactly() -> None:
 
 def test_directions_that_follow_from_axes_and_centres() -> None:
     rng = random.Random(5)
-    drawn = Geometry((instances.random_numbers(3, rng), instances.random_numbers(3, rng)),
-                     np.array([instances.random_numbers(3, rng) for _ in range(2)]))
+    drawn = Geometry(
+        (instances.random_numbers(3, rng), instances.random_numbers(3, rng)),
+        np.array([instances.random_numbers(3, rng) for _ in range(2)]),
+    )
     a, b = drawn.directions
     between = drawn.centres[1] - drawn.centres[0]
     foot = observed_direction(DirectionSource("foot", (0, 1), (0,)), drawn)
@@ -245,8 +253,9 @@ def test_what_some_legs_leave_free_must_be_the_robots_own() -> None:
     generic = architecture(spinning())
     own = generic.relation
     order = [*range(6), *range(9, 12), *range(6, 9), *range(12, 15)]
-    other = ExactArchitecture(generic.mechanism, generic.relations, generic.observations,
-                              replace(own, basis=own.basis[order]))
+    other = ExactArchitecture(
+        generic.mechanism, generic.relations, generic.observations, replace(own, basis=own.basis[order])
+    )
     assert other.verdict(other.observations).exact
     verdict = other.verdict(other.observations[:1])
     checked(verdict)
@@ -261,9 +270,17 @@ def test_many_random_robots(mechanism: Mechanism) -> None:
 
 
 @pytest.mark.some(3)
-@pytest.mark.parametrize(("robot", "observe", "camera"), [
-    ("delta", ("arm_1", "rod_2b"), None), ("delta", None, "platform"), ("gough_stewart", ("1", "2", "3"), "platform"),
-    ("quattro", ("arm_2", "rod_3b"), None), ("3rrr_m1", None, "platform"), ("delta", ("1", "2"), "rod_3a")])
+@pytest.mark.parametrize(
+    ("robot", "observe", "camera"),
+    [
+        ("delta", ("arm_1", "rod_2b"), None),
+        ("delta", None, "platform"),
+        ("gough_stewart", ("1", "2", "3"), "platform"),
+        ("quattro", ("arm_2", "rod_3b"), None),
+        ("3rrr_m1", None, "platform"),
+        ("delta", ("1", "2"), "rod_3a"),
+    ],
+)
 def test_other_segments_and_cameras(robot: str, observe: tuple[str, ...] | None, camera: str | None) -> None:
     setting = setting_of(robot, observe, camera)
     verdict = architecture(setting).verdict(setting.observed)
@@ -273,6 +290,7 @@ def test_other_segments_and_cameras(robot: str, observe: tuple[str, ...] | None,
 
 
 # --- what must not be claimed ------------------------------------------------------------------------------------
+
 
 def check_refused(generic: ExactArchitecture, words: str) -> None:
     verdict = generic.verdict(generic.observations)
@@ -325,8 +343,12 @@ def test_another_dof() -> None:
     generic = architecture(setting_of("3rrr_m1"))
     basis = generic.relation.basis.copy()
     basis[:6] *= 0
-    check_refused(ExactArchitecture(generic.mechanism, generic.relations, generic.observations,
-                                    replace(generic.relation, basis=basis)), "dof is 0, but 3")
+    check_refused(
+        ExactArchitecture(
+            generic.mechanism, generic.relations, generic.observations, replace(generic.relation, basis=basis)
+        ),
+        "dof is 0, but 3",
+    )
 
 
 def test_gears_are_said_to_be_left_out() -> None:
@@ -338,8 +360,9 @@ def test_gears_are_said_to_be_left_out() -> None:
 def test_relations_that_leave_no_direction() -> None:
     generic = architecture(setting_of("rrrrr_m1"))
     crowded = replace(generic.relations, tower=(*generic.relations.tower, (), ((1,),), ((0,), (1,), (2,))))
-    check_refused(ExactArchitecture(generic.mechanism, crowded, generic.observations, generic.relation),
-            "no random direction")
+    check_refused(
+        ExactArchitecture(generic.mechanism, crowded, generic.observations, generic.relation), "no random direction"
+    )
 
 
 def test_what_is_no_direction() -> None:
@@ -363,11 +386,13 @@ def test_a_planar_robot_needs_its_parallel_axes() -> None:
     generic = architecture(setting_of("3rrr_m1"))
     axes = {name: (i,) for i, name in enumerate(generic.relations.axes)}
     relations = replace(generic.relations, axes=axes, tower=((),) * len(axes))
-    check_refused(ExactArchitecture(generic.mechanism, relations, generic.observations, generic.relation),
-            "mobility is 3, but 0")
+    check_refused(
+        ExactArchitecture(generic.mechanism, relations, generic.observations, generic.relation), "mobility is 3, but 0"
+    )
 
 
 # --- an architecture and a robot ---------------------------------------------------------------------------------
+
 
 def collinear() -> Mechanism:
     """A hexapod with three of its tips on one line of the platform."""
@@ -396,12 +421,20 @@ def test_a_robot_may_see_less_than_its_architecture() -> None:
 
 
 @pytest.mark.some(2)
-@pytest.mark.parametrize(("robot", "observe", "verdict", "words"), [
-    ("3rrr_m1", None, CONTROLLABLE, "controllable, proved in exact arithmetic"),
-    ("quattro_rigid", None, CONTROLLABLE,
-     "controllable, proved in exact arithmetic, except for a chance below 1e-16"),
-    ("uranesx", None, PARTIAL, "partially controllable, exact at 5 random instances"),
-    ("3ppr_m1", None, BLIND, "uncontrollable, exact at 5 random instances")])
+@pytest.mark.parametrize(
+    ("robot", "observe", "verdict", "words"),
+    [
+        ("3rrr_m1", None, CONTROLLABLE, "controllable, proved in exact arithmetic"),
+        (
+            "quattro_rigid",
+            None,
+            CONTROLLABLE,
+            "controllable, proved in exact arithmetic, except for a chance below 1e-16",
+        ),
+        ("uranesx", None, PARTIAL, "partially controllable, exact at 5 random instances"),
+        ("3ppr_m1", None, BLIND, "uncontrollable, exact at 5 random instances"),
+    ],
+)
 def test_the_architecture_in_a_derivation(robot: str, observe: None, verdict: str, words: str) -> None:
     found = derive(prepare_robot(robot), observe)
     record = found.to_dict()["architecture"]
@@ -409,8 +442,14 @@ def test_the_architecture_in_a_derivation(robot: str, observe: None, verdict: st
     basis = record.pop("relations")
     assert (basis["kept"] > 0) == (robot in ("quattro_rigid", "uranesx"))
     assert basis["observed"] == []
-    assert record == {"verdict": verdict, "exact": True, "rank": found.verdict.rank, "proved": verdict == CONTROLLABLE,
-                      "instances": 1 if verdict == CONTROLLABLE else 5, "reason": words.split(", ", 1)[1]}
+    assert record == {
+        "verdict": verdict,
+        "exact": True,
+        "rank": found.verdict.rank,
+        "proved": verdict == CONTROLLABLE,
+        "instances": 1 if verdict == CONTROLLABLE else 5,
+        "reason": words.split(", ", 1)[1],
+    }
     (row,) = [row for row in re.split(r"\n(?=\S)", text.derivation(found)) if row.startswith("architecture")]
     line = " ".join(row.split())
     assert line.split(maxsplit=1)[1] == words
@@ -453,8 +492,11 @@ def test_what_is_not_decided_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     printed = text.legs(found)
     assert printed.count("not decided") == 4
     assert "not decided in exact arithmetic: crowded" in printed
-    line = next(line for line in text.derivation(derive(prepare_robot("rrrrr_m1"))).splitlines()
-                if line.startswith("architecture"))
+    line = next(
+        line
+        for line in text.derivation(derive(prepare_robot("rrrrr_m1"))).splitlines()
+        if line.startswith("architecture")
+    )
     assert line.endswith("not decided: crowded")
 
 

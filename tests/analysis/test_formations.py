@@ -115,11 +115,18 @@ def test_generic_ranks_of_complete_formations_are_those_of_the_literature(bodies
 
 
 @pytest.mark.some(1)
-@pytest.mark.parametrize(("bodies", "names"), [
-    pytest.param("position", ["translation along x", "translation along y", "translation along z", "scale"],
-                 marks=pytest.mark.slow),
-    ("yaw", ["translation along x", "translation along y", "translation along z", "common turn about z", "scale"]),
-    ("plane", ["translation along x", "translation along y", "common turn about z", "scale"])])
+@pytest.mark.parametrize(
+    ("bodies", "names"),
+    [
+        pytest.param(
+            "position",
+            ["translation along x", "translation along y", "translation along z", "scale"],
+            marks=pytest.mark.slow,
+        ),
+        ("yaw", ["translation along x", "translation along y", "translation along z", "common turn about z", "scale"]),
+        ("plane", ["translation along x", "translation along y", "common turn about z", "scale"]),
+    ],
+)
 def test_trivial_motions_have_names(bodies: str, names: list[str]):
     rng = np.random.default_rng(1)
     places = rng.normal(size=(3, 3)) * (1, 1, 0 if bodies == "plane" else 1)
@@ -194,13 +201,22 @@ def test_random_graphs_agree_with_the_matrix():
 
 
 @pytest.mark.some(1)
-@pytest.mark.parametrize(("bearings", "distances", "compass", "trivial", "flexes"), [
-    (list(permutations((1, 2, 3), 2)), [(1, 2)], True, 4, 0),  # a distance fixes the scale, a direction leaves one turn
-    ([(1, 2), (1, 3), (2, 1), (2, 3)], [], False, 7, 3),  # the attitude of a body that is only seen
-    pytest.param(list(permutations((1, 2, 3), 2)), [(1, 2)], False, 6, 0, marks=pytest.mark.slow),
-    pytest.param(list(permutations((1, 2, 3), 2)), [], True, 5, 0, marks=pytest.mark.slow),
-    pytest.param([], [(1, 2), (2, 3), (1, 3)], False, 6, 9, marks=pytest.mark.slow),  # points and all attitudes
-])
+@pytest.mark.parametrize(
+    ("bearings", "distances", "compass", "trivial", "flexes"),
+    [
+        (
+            list(permutations((1, 2, 3), 2)),
+            [(1, 2)],
+            True,
+            4,
+            0,
+        ),  # a distance fixes the scale, a direction leaves one turn
+        ([(1, 2), (1, 3), (2, 1), (2, 3)], [], False, 7, 3),  # the attitude of a body that is only seen
+        pytest.param(list(permutations((1, 2, 3), 2)), [(1, 2)], False, 6, 0, marks=pytest.mark.slow),
+        pytest.param(list(permutations((1, 2, 3), 2)), [], True, 5, 0, marks=pytest.mark.slow),
+        pytest.param([], [(1, 2), (2, 3), (1, 3)], False, 6, 9, marks=pytest.mark.slow),  # points and all attitudes
+    ],
+)
 def test_mixed_cases(bearings: Pairs, distances: Pairs, compass: bool, trivial: int, flexes: int):
     made = drawn(3, "free", bearings, distances)[0]
     if compass:
@@ -220,8 +236,11 @@ def test_a_camera_of_the_ground_leaves_a_scale_about_it():
     the ground's camera where it is."""
     made, _places, _frame = drawn(3, "position", list(combinations((1, 2, 3), 2)))
     eye = NamedCamera("eye", "ground", pose((1.0, 2.0, 3.0)))
-    made = replace(made, cameras=(*made.cameras, eye), observations=(
-        *made.observations, ImagePoint("eye", "b1", at=np.zeros(3), camera=eye)))
+    made = replace(
+        made,
+        cameras=(*made.cameras, eye),
+        observations=(*made.observations, ImagePoint("eye", "b1", at=np.zeros(3), camera=eye)),
+    )
     formed = derive(made).verdict.formation
     assert formed is not None
     assert formed.trivial == ("scale about (1 2 3)",)
@@ -276,10 +295,16 @@ def test_smallest_sets_of_bearings_are_those_of_the_matrix():
     for each in found.sets:
         chosen = [pair for pair in pairs if f"{pair[0]}-{pair[1]}" in each.legs]
         assert each.rank == rank(rigidity_matrix(places, frame, "yaw", chosen))
-    smallest = next(size for size in range(1, 7) if any(
-        rank(rigidity_matrix(places, frame, "yaw", chosen)) == whole for chosen in combinations(pairs, size)))
-    expected = {tuple(f"{i}-{j}" for i, j in chosen) for chosen in combinations(pairs, smallest)
-                if rank(rigidity_matrix(places, frame, "yaw", chosen)) == whole}
+    smallest = next(
+        size
+        for size in range(1, 7)
+        if any(rank(rigidity_matrix(places, frame, "yaw", chosen)) == whole for chosen in combinations(pairs, size))
+    )
+    expected = {
+        tuple(f"{i}-{j}" for i, j in chosen)
+        for chosen in combinations(pairs, smallest)
+        if rank(rigidity_matrix(places, frame, "yaw", chosen)) == whole
+    }
     assert set(found.minimal) == expected
 
 
@@ -313,7 +338,8 @@ def test_round_trips(tmp_path, ending: str, bodies: str):
     assert back.formation
     assert back.bodies == made.bodies
     assert [(o.leg, o.link, o.seen_from) for o in back.observations] == [
-        (o.leg, o.link, o.seen_from) for o in made.observations]
+        (o.leg, o.link, o.seen_from) for o in made.observations
+    ]
     for link in made.links.keys() & back.links.keys():
         assert np.allclose(made.links[link].pose, back.links[link].pose, atol=1e-9)
 
@@ -374,12 +400,14 @@ def page() -> str:
 def test_the_record_of_a_body_and_a_fixed_one(tmp_path):
     """Nothing that is observed is a segment, and the fixed link becomes the base: the file's own mobility is 6."""
     file = tmp_path / "two.urdf"
-    file.write_text('<robot name="two"> <link name="ground"/> <link name="b1"/> <link name="b2"/> '
-                    '<joint name="f1" type="floating"> <parent link="ground"/> <child link="b1"/> </joint> '
-                    '<joint name="f2" type="fixed"> <parent link="ground"/> <child link="b2"/> '
-                    '<origin xyz="1 2 0.4"/> </joint> <hrsynth> <camera name="c1" link="b1"/> <camera name="c2" '
-                    'link="b2"/> <observe kind="point" leg="p" camera="c1" link="b2" at="0 0 0"/> '
-                    '<observe kind="position" leg="q" camera="c2" link="b1" at="0 0 0"/> </hrsynth> </robot>')
+    file.write_text(
+        '<robot name="two"> <link name="ground"/> <link name="b1"/> <link name="b2"/> '
+        '<joint name="f1" type="floating"> <parent link="ground"/> <child link="b1"/> </joint> '
+        '<joint name="f2" type="fixed"> <parent link="ground"/> <child link="b2"/> '
+        '<origin xyz="1 2 0.4"/> </joint> <hrsynth> <camera name="c1" link="b1"/> <camera name="c2" '
+        'link="b2"/> <observe kind="point" leg="p" camera="c1" link="b2" at="0 0 0"/> '
+        '<observe kind="position" leg="q" camera="c2" link="b1" at="0 0 0"/> </hrsynth> </robot>'
+    )
     found = derive(file).to_dict()
     assert found["mobility"]["as_written"] == {"total": 6, "idle": 0}
     assert found["rank"] == 5
@@ -398,8 +426,11 @@ def test_the_file_of_the_page_is_a_formation(page: str):
 
 def test_a_file_without_a_platform_must_be_a_formation():
     with pytest.raises(BadRobotFile, match="no formation"):
-        native.parse(MIXED.replace('<observe kind="point" camera="eye" link="drone" at="0 0 0.1"/>', "")
-                     .replace('<camera name="eye" link="hand"/>', ""))
+        native.parse(
+            MIXED.replace('<observe kind="point" camera="eye" link="drone" at="0 0 0.1"/>', "").replace(
+                '<camera name="eye" link="hand"/>', ""
+            )
+        )
 
 
 def test_drones_that_observe_nothing_are_told_what_a_formation_needs(page: str):
@@ -410,8 +441,12 @@ def test_drones_that_observe_nothing_are_told_what_a_formation_needs(page: str):
 def test_poses_of_a_formation_are_refused():
     """They would be those of the first body, while all others stay where they are."""
     made = drawn(3, "position", [(1, 2), (2, 3), (1, 3)])[0]
-    for asked in (lambda: check(made, at=["x=1"]), lambda: check(made, grid="x=0:1:3,y=0:1:3"),
-                  lambda: derive(made, at="x=1"), lambda: legs(made, at="x=1")):
+    for asked in (
+        lambda: check(made, at=["x=1"]),
+        lambda: check(made, grid="x=0:1:3,y=0:1:3"),
+        lambda: derive(made, at="x=1"),
+        lambda: legs(made, at="x=1"),
+    ):
         with pytest.raises(BadRequest, match="a pose belongs to one platform, and this is a formation"):
             asked()
 

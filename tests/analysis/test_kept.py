@@ -91,8 +91,11 @@ def test_what_holds_at_zero_by_accident_is_not_kept(robot: str) -> None:
     persistent = architecture(setting)
     assert len(ties(here.relations)) > len(ties(persistent.relations))
     every = ties(here.relations)
-    answers = are_kept(every, here.relations, instance(here.mechanism, here.relations, here.observations,
-                                                   draw(here.relations, random.Random(0))))
+    answers = are_kept(
+        every,
+        here.relations,
+        instance(here.mechanism, here.relations, here.observations, draw(here.relations, random.Random(0))),
+    )
     assert not all(answers)
     known = carried_by_joints(here.mechanism, here.relations, every)
     assert all(keeps for keeps, holds in zip(answers, known, strict=True) if holds)
@@ -107,8 +110,10 @@ def test_what_holds_at_zero_by_accident_is_not_kept(robot: str) -> None:
 def test_what_is_carried_is_kept(seed: int) -> None:
     """Joints carry it, so do all motions: two ways to one answer."""
     rng = np.random.default_rng(seed)
-    for robot in (deltas(["R"] * 3, ["2-SS", "UU", "2-SS"], rng, True),
-                  deltas(["P"] * 3, ["US", "2-SS", "SS"], rng, False)):
+    for robot in (
+        deltas(["R"] * 3, ["2-SS", "UU", "2-SS"], rng, True),
+        deltas(["P"] * 3, ["US", "2-SS", "SS"], rng, False),
+    ):
         relations = recognised(robot, walked(robot, 0, seed))
         every = ties(relations)
         answers = are_kept(every, relations, one_of(robot, relations))
@@ -125,8 +130,9 @@ def test_the_degree_of_identities_is_bounded(robot: str, monkeypatch: pytest.Mon
     bits = []
     for power in (20, 100):
         monkeypatch.setattr(instances, "LARGEST_RANDOM", 2**power)
-        found = instance(setting.mechanism, relations, architecture(setting).observations,
-                         draw(relations, random.Random(0)))
+        found = instance(
+            setting.mechanism, relations, architecture(setting).observations, draw(relations, random.Random(0))
+        )
         bits.append(max(int(x).bit_length() for twist in found.twists().values() for x in twist.ravel()))
     assert 0 < bits[1] - bits[0] <= 80 * degree(relations, len(found.free))
 
@@ -146,8 +152,9 @@ def test_an_instance_is_no_more_special_than_the_robot() -> None:
 def test_a_special_zero_configuration_proves_nothing_of_what_loops_keep() -> None:
     """Where more can move at zero than elsewhere, no relation is known to hold on the branch because it holds there."""
     generic = architecture(setting_of("delta"))
-    other = ExactArchitecture(generic.mechanism, generic.relations, generic.observations, generic.relation,
-                              generic.relation.mobility + 1)
+    other = ExactArchitecture(
+        generic.mechanism, generic.relations, generic.observations, generic.relation, generic.relation.mobility + 1
+    )
     verdict = other.verdict(other.observations)
     assert (verdict.exact, verdict.proved, verdict.verdict) == (True, False, CONTROLLABLE)
     assert "relations observed at samples" in verdict.reason
@@ -205,6 +212,7 @@ def test_identities_are_tested_at_several_instances() -> None:
 
 # --- operation modes ---------------------------------------------------------------------------------------------
 
+
 @pytest.fixture(scope="module", params=[0, 7, 42])
 def pod(request: pytest.FixtureRequest) -> ObservedRobot:
     """The pod with the catalog's own dimensions and with others, some samples of which may be of another mode."""
@@ -237,12 +245,15 @@ def test_one_sample_of_another_mode_is_seen() -> None:
 
 # --- nearly special geometry -------------------------------------------------------------------------------------
 
+
 def nearly(misses: dict[str, float], seed: int) -> Mechanism:
     """A PRRRP with parallel rails, some turned by an angle, anywhere."""
     robot = load("prrrp_parallel")
     normal = robot.joints["elbow_1"].axis
-    rails = [replace(robot.joints[name], axes=(rotation_about(normal, angle) @ robot.joints[name].axis,))
-             for name, angle in misses.items()]
+    rails = [
+        replace(robot.joints[name], axes=(rotation_about(normal, angle) @ robot.joints[name].axis,))
+        for name, angle in misses.items()
+    ]
     rng = np.random.default_rng(seed)
     return transformed(robot.changed(joints=rails), random_rotation(rng), rng.normal(size=3))
 
@@ -265,8 +276,12 @@ def test_no_verdict_where_held_and_missed_are_close() -> None:
     robot = load("hexaglide")
     rails = [joint for joint in robot.joints.values() if joint.type.value == "P"]
     angles = (3e-8, 3e-6, 0, 0, 0, 0)
-    bent = robot.changed(joints=[replace(rail, axes=(rotation_about((1, 2, 3), angle) @ rail.axis,))
-                                 for rail, angle in zip(rails, angles, strict=True)])
+    bent = robot.changed(
+        joints=[
+            replace(rail, axes=(rotation_about((1, 2, 3), angle) @ rail.axis,))
+            for rail, angle in zip(rails, angles, strict=True)
+        ]
+    )
     setting = ObservedRobot.of(bent, samples=4)
     verdict = architecture(setting).verdict(setting.observed)
     assert not verdict.exact

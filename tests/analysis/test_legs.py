@@ -40,8 +40,22 @@ def table(robot: str) -> dict[tuple[str, ...], Verdict]:
 
 
 @pytest.mark.some(1)
-@pytest.mark.parametrize("robot", ["quattro", "quattro_rigid", "delta", "orthoglide", "gough_stewart", "3rrr_m1", "i4l",
-                                   "hexaglide", "3ppr_m1", "prrrp_parallel_point", "3upu"])
+@pytest.mark.parametrize(
+    "robot",
+    [
+        "quattro",
+        "quattro_rigid",
+        "delta",
+        "orthoglide",
+        "gough_stewart",
+        "3rrr_m1",
+        "i4l",
+        "hexaglide",
+        "3ppr_m1",
+        "prrrp_parallel_point",
+        "3upu",
+    ],
+)
 def test_all_sets_obey(robot: str) -> None:
     """All sets are there, ranks grow with the sets, verdicts follow from ranks, the smallest of the best are listed,
     none where no leg shows anything."""
@@ -63,8 +77,9 @@ def test_all_sets_obey(robot: str) -> None:
             assert len({freedom.name for freedom in verdict.lost}) == len(verdict.lost)
     best = max(each.rank for each in answer.sets)
     size = min(len(each) for each, verdict in sets.items() if verdict.rank == best)
-    assert set(answer.minimal) == {each for each, verdict in sets.items()
-                                   if best and verdict.rank == best and len(each) == size}
+    assert set(answer.minimal) == {
+        each for each, verdict in sets.items() if best and verdict.rank == best and len(each) == size
+    }
 
 
 def lost_by_oracle(setting: ObservedRobot, chosen: tuple[str, ...]) -> Array:
@@ -74,14 +89,24 @@ def lost_by_oracle(setting: ObservedRobot, chosen: tuple[str, ...]) -> Array:
     oracle = Oracle(everything.twin.mechanism)
     basis = oracle.relation(state_of(everything.twin, everything.twin.q0), observations, unit_length=1.0)
     _, values, right = np.linalg.svd(basis[6:])
-    kernel = right[int(np.sum(values > 1e-8)):].T
+    kernel = right[int(np.sum(values > 1e-8)) :].T
     U, values, _ = np.linalg.svd(basis[:6] @ kernel, full_matrices=False)
     return np.asarray(U[:, values > 1e-8])
 
 
 @pytest.mark.some(4)
-@pytest.mark.parametrize(("robot", "size"), [("quattro", 1), ("quattro", 2), ("quattro_rigid", 1), ("delta", 1),
-                                             ("gough_stewart", 1), ("gough_stewart", 2), ("3upu", 1)])
+@pytest.mark.parametrize(
+    ("robot", "size"),
+    [
+        ("quattro", 1),
+        ("quattro", 2),
+        ("quattro_rigid", 1),
+        ("delta", 1),
+        ("gough_stewart", 1),
+        ("gough_stewart", 2),
+        ("3upu", 1),
+    ],
+)
 def test_lost_freedoms_are_those_of_the_oracle(robot: str, size: int) -> None:
     for chosen, verdict in table(robot).items():
         if len(chosen) != size:
@@ -96,10 +121,18 @@ def test_lost_freedoms_are_those_of_the_oracle(robot: str, size: int) -> None:
 DRAWN = np.random.default_rng(7).normal(size=(6, 3))
 
 
-@pytest.mark.parametrize(("robot", "lost"), [
-    ("delta", np.eye(6)[:, :3]), ("delta", DRAWN[:, :2] * np.eye(6)[:, :3].sum(axis=1)[:, None]), ("delta", DRAWN),
-    ("gough_stewart", DRAWN[:, :2]), ("gough_stewart", np.eye(6)), ("3rps", np.column_stack([np.eye(6)[:, 2], DRAWN])),
-    ("gough_stewart", lost_by_oracle(setting_of("gough_stewart"), ("1",)))])
+@pytest.mark.parametrize(
+    ("robot", "lost"),
+    [
+        ("delta", np.eye(6)[:, :3]),
+        ("delta", DRAWN[:, :2] * np.eye(6)[:, :3].sum(axis=1)[:, None]),
+        ("delta", DRAWN),
+        ("gough_stewart", DRAWN[:, :2]),
+        ("gough_stewart", np.eye(6)),
+        ("3rps", np.column_stack([np.eye(6)[:, 2], DRAWN])),
+        ("gough_stewart", lost_by_oracle(setting_of("gough_stewart"), ("1",))),
+    ],
+)
 def test_lost_freedoms_are_named_by_their_space_alone(robot: str, lost: np.ndarray) -> None:
     """Whatever basis rounding gives of it: their twists span it, and are the same for any other basis."""
     anatomy, length = setting_of(robot).anatomy, setting_of(robot).mechanism.length
@@ -181,8 +214,9 @@ def test_a_leg_of_the_delta_does_not_see_its_circle() -> None:
     """With its rod's direction fixed a leg lets the platform follow the elbow: normal to the arm and to the R axis."""
     setting, sets = setting_of("delta"), table("delta")
     for label in "123":
-        shoulder = next(j for n in setting.anatomy.leg(label).joints
-                        if (j := setting.mechanism.joints[n]).predecessor == "base")
+        shoulder = next(
+            j for n in setting.anatomy.leg(label).joints if (j := setting.mechanism.joints[n]).predecessor == "base"
+        )
         elbow = np.mean([j.point for j in setting.mechanism.joints_of(shoulder.successor) if j is not shoulder], axis=0)
         twist = sets[(label,)].lost[0].twist[:3]
         tangent = np.cross(shoulder.axis, elbow - shoulder.point)
@@ -259,9 +293,9 @@ def test_all_that_the_file_watches_of_a_leg_counts_in_its_sets() -> None:
     for chosen in (("1",), ("2",), ("1", "2")):
         seen = [o for o in robot.observations if o.leg in chosen]
         basis = oracle.relation(state, seen, point_only=setting.everything.question.point is not None)
-        twists, rates = basis[:-3 * len(seen)], basis[-3 * len(seen):]
+        twists, rates = basis[: -3 * len(seen)], basis[-3 * len(seen) :]
         _, values, right = np.linalg.svd(rates)
-        unseen = np.linalg.matrix_rank(twists @ right[int(np.sum(values > 1e-8)):].T, tol=1e-8)
+        unseen = np.linalg.matrix_rank(twists @ right[int(np.sum(values > 1e-8)) :].T, tol=1e-8)
         expected = np.linalg.matrix_rank(twists, tol=1e-8) - unseen
         for asked in (robot, ObservedRobot.of(robot, ["2"])):
             (verdict,) = (each for each in legs(asked).sets if each.legs == chosen)
@@ -295,8 +329,11 @@ def test_a_loop_that_holds_nothing_back_has_no_rank(seed: int) -> None:
     assert robot.length == 1
     basis = Oracle(robot).relation(np.array([each.pose for each in robot.links.values()]), robot.observations)
     (verdict,) = (each for each in legs(robot).sets if each.legs == ("1",))
-    assert (verdict.dof, verdict.rank) == (np.linalg.matrix_rank(basis[:6], tol=1e-8),
-                                           np.linalg.matrix_rank(basis[6:], tol=1e-8)) == (2, 1)
+    assert (
+        (verdict.dof, verdict.rank)
+        == (np.linalg.matrix_rank(basis[:6], tol=1e-8), np.linalg.matrix_rank(basis[6:], tol=1e-8))
+        == (2, 1)
+    )
 
 
 def held_plate() -> Mechanism:
@@ -320,7 +357,9 @@ def test_a_platform_without_freedom_is_not_called_controllable() -> None:
     assert (answer.dof, answer.setting.mobility.total) == (0, 1)
     assert {(each.verdict, each.rank) for each in answer.sets} == {(AT_REST, 0)}
     assert {(each.verdict, each.proved, each.chance) for each in answer.exact} <= {
-        (AT_REST, False, 0.0), (None, False, 0.0)}
+        (AT_REST, False, 0.0),
+        (None, False, 0.0),
+    }
     told = hrsynth.derive(held_plate())
     assert told.to_dict()["verdict"] == "nothing to control"
     assert "controllable" not in hrsynth.text(told)

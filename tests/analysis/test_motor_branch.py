@@ -84,9 +84,14 @@ def misses(proof: BranchProof, values) -> np.ndarray:
         if letter == "U":
             found.append((X[:3, :3] @ joint.axes[0]) @ (Y[:3, :3] @ joint.axes[1]))
     for coupling in proof.robot.couplings:
-        one, other = (next(i for i, c in enumerate(system.coordinates)
-                           if c.joint in proof.robot.joints and proof.robot.joints[c.joint].successor == link)
-                      for link in (coupling.predecessor, coupling.successor))
+        one, other = (
+            next(
+                i
+                for i, c in enumerate(system.coordinates)
+                if c.joint in proof.robot.joints and proof.robot.joints[c.joint].successor == link
+            )
+            for link in (coupling.predecessor, coupling.successor)
+        )
         found.append(values[other] - coupling.ratio * values[one])
     return np.array(found)
 
@@ -153,8 +158,10 @@ def test_forms_enclose(seed):
     made = a * b - c * c * a + sine * c - cosine * cosine * 2.0
     for _ in range(100):
         e = rng.choice([-1.0, 1.0, rng.uniform(-1, 1)], size=3)
-        x, y, z = (each.v[0] + np.tensordot(e, each.v[1:], 1) + each.r * rng.choice([-1, 0.3, 1], size=50)
-                   for each in (a, b, c))
+        x, y, z = (
+            each.v[0] + np.tensordot(e, each.v[1:], 1) + each.r * rng.choice([-1, 0.3, 1], size=50)
+            for each in (a, b, c)
+        )
         value = x * y - z * z * x + np.sin(x + y) * z - 2 * np.cos(x + y) ** 2
         assert np.all(np.abs(value - made.v[0] - np.tensordot(e, made.v[1:], 1)) <= made.r)
 
@@ -224,10 +231,19 @@ SLOW = pytest.mark.slow
 
 
 @pytest.mark.some(1, 2)
-@pytest.mark.parametrize(("name", "half"), [
-    ("rrrrr_m1", 0.15), ("3rrr_m1", 0.1), ("3ppr_m1", 0.01), pytest.param("3prr_m1", 0.02, marks=SLOW),
-    pytest.param("delta", 0.04, marks=SLOW), pytest.param("3rps", 0.01, marks=SLOW),
-    pytest.param("gough_stewart", 0.002, marks=SLOW), pytest.param("quattro", 0.001, marks=SLOW)])
+@pytest.mark.parametrize(
+    ("name", "half"),
+    [
+        ("rrrrr_m1", 0.15),
+        ("3rrr_m1", 0.1),
+        ("3ppr_m1", 0.01),
+        pytest.param("3prr_m1", 0.02, marks=SLOW),
+        pytest.param("delta", 0.04, marks=SLOW),
+        pytest.param("3rps", 0.01, marks=SLOW),
+        pytest.param("gough_stewart", 0.002, marks=SLOW),
+        pytest.param("quattro", 0.001, marks=SLOW),
+    ],
+)
 def test_tubes_hold_what_small_steps_find(name, half):
     robot = load(name)
     box = {joint.name: (-half, half) for joint in robot.joints.values() if joint.actuated}
@@ -253,6 +269,7 @@ def test_a_box_much_too_large_is_proved_about_zero(name, least, effort):
 def test_a_lattice_fills_the_box_about_its_start(data, n, most):
     """Equal cells but for those that the box ends, at most so many, and what lies beyond: disjoint, and in all the box,
     in whole numbers; the start is in the first, in its middle where the box does not end it."""
+
     def some(low, high):
         return np.array([data.draw(st.floats(low, high)) for _ in range(n)])
 
@@ -280,10 +297,18 @@ def test_motors_that_do_not_make_a_function_are_refused():
     with pytest.raises(BadRequest, match="depend on each other"):
         branch("quattro_rigid")
     robot = load("rrrrr_m1")
-    idle = Mechanism.of("one", robot.links.values(), [
-        joint if joint.name != "shoulder_2" else type(joint)(joint.name, joint.type, *joint.links, joint.point,
-                                                             joint.axes) for joint in robot.joints.values()],
-        platform=robot.platform, base=robot.base)
+    idle = Mechanism.of(
+        "one",
+        robot.links.values(),
+        [
+            joint
+            if joint.name != "shoulder_2"
+            else type(joint)(joint.name, joint.type, *joint.links, joint.point, joint.axes)
+            for joint in robot.joints.values()
+        ],
+        platform=robot.platform,
+        base=robot.base,
+    )
     with pytest.raises(MotorsNotEnough):
         branch(idle)
     with pytest.raises(BadRequest, match="shoulder_9"):
@@ -301,9 +326,13 @@ def test_motors_that_do_not_make_a_function_are_refused():
 def test_a_motor_may_be_called_anything_but_a_comma():
     """The last sign = parts a motor from its interval."""
     robot = four_bar()
-    named = Mechanism.of("named", robot.links.values(), [
-        replace(joint, name="crank=a:b") if joint.name == "a" else joint for joint in robot.joints.values()],
-        platform=robot.platform, base=robot.base)
+    named = Mechanism.of(
+        "named",
+        robot.links.values(),
+        [replace(joint, name="crank=a:b") if joint.name == "a" else joint for joint in robot.joints.values()],
+        platform=robot.platform,
+        base=robot.base,
+    )
     found = branch(named, "crank=a:b=-0.01:0.02")
     assert np.array(found.parts[0].asked).ravel() == pytest.approx([-0.01, 0.02])
 
@@ -311,12 +340,12 @@ def test_a_motor_may_be_called_anything_but_a_comma():
 def test_limits_that_limit_nothing_are_a_whole_turn():
     """As some exporters write for a joint without limits."""
     robot = four_bar(coupler=5.0, rocker=5.0)
-    wide = robot.changed(joints=[replace(joint, limits=Limits(-1e9, 1e9)) for joint in robot.joints.values()
-                                 if joint.actuated])
+    wide = robot.changed(
+        joints=[replace(joint, limits=Limits(-1e9, 1e9)) for joint in robot.joints.values() if joint.actuated]
+    )
     found = branch(wide, effort=2)
     assert found.box == "a whole turn"
     assert np.array(found.parts[0].asked).ravel() == pytest.approx([-np.pi, np.pi])
-
 
 
 @pytest.mark.slow
@@ -375,10 +404,16 @@ def test_motors_that_a_box_takes_beyond_their_limits_are_in_the_record():
     robot = four_bar()
     limited = replace(robot, joints=robot.joints | {"a": replace(robot.joints["a"], limits=Limits(-0.05, None))})
     found = branch(limited, {"a": (-0.1, 0.1)})
-    low, high = (pick(each) for pick, each in ((min, [cell.low[0] for cell in found.parts[0].cells]),
-                                               (max, [cell.high[0] for cell in found.parts[0].cells])))
+    low, high = (
+        pick(each)
+        for pick, each in (
+            (min, [cell.low[0] for cell in found.parts[0].cells]),
+            (max, [cell.high[0] for cell in found.parts[0].cells]),
+        )
+    )
     assert found.to_dict()["motors_beyond"] == [
-        {"motor": "a", "lower": -0.05, "upper": None, "least": low, "most": high}]
+        {"motor": "a", "lower": -0.05, "upper": None, "least": low, "most": high}
+    ]
     assert branch(robot, {"a": (-0.1, 0.1)}).to_dict()["motors_beyond"] == []
 
 
@@ -407,8 +442,13 @@ def test_the_smallest_singular_value_is_bounded_whatever_the_tubes_widths():
 
 def test_a_thin_box_has_the_bound_of_the_loops_at_its_middle():
     robot = spherical(np.random.default_rng(0))
-    least = [min(cell.weakest for part in branch(robot, box={
-        f"joint_{k}_1": (-w, w) for k, w in enumerate((0.01, *widths), 1)}).parts for cell in part.cells)
-        for widths in ((0.01, 0.01), (1e-9, 1e-9))]
+    least = [
+        min(
+            cell.weakest
+            for part in branch(robot, box={f"joint_{k}_1": (-w, w) for k, w in enumerate((0.01, *widths), 1)}).parts
+            for cell in part.cells
+        )
+        for widths in ((0.01, 0.01), (1e-9, 1e-9))
+    ]
     assert least[0] > 0.1
     assert least[1] >= 0.9 * least[0]

@@ -22,8 +22,12 @@ from hrsynth.errors import BadRequest, NoSegment
 from strategies import spherical
 
 QUESTIONS: dict[str, Callable[..., Any]] = {
-    "derive": derive, "check": check, "advise": advise, "modes": modes,
-    "singular": lambda *asked, **more: singular(*asked, points=20, **more)}
+    "derive": derive,
+    "check": check,
+    "advise": advise,
+    "modes": modes,
+    "singular": lambda *asked, **more: singular(*asked, points=20, **more),
+}
 
 
 @pytest.mark.some(2)

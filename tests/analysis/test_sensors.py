@@ -121,8 +121,9 @@ def test_exact_ranks_are_those_of_samples(robot: str, kind: str) -> None:
     """For a generic camera, point and axis, of one observation and of two; one edge alone is irrational."""
     if (robot, kind) == ("free_body", "encoder"):
         return
-    setting = watched({"free_body": free_body, "arm": arm}[robot]() if robot in ("free_body", "arm") else load(robot),
-                      kind)
+    setting = watched(
+        {"free_body": free_body, "arm": arm}[robot]() if robot in ("free_body", "arm") else load(robot), kind
+    )
     exact = architecture(setting)
     for observed in (setting.observed, setting.observed[:1]):
         found = exact.verdict(observed)
@@ -178,8 +179,11 @@ def eye_in_hand(mechanism: Mechanism, count: int) -> ObservedRobot:
     """Points of the base, seen from a camera on the platform."""
     rng, X = np.random.default_rng(2), mechanism.links[mechanism.platform].pose
     places = [X[:3, 3] + X[:3, :3] @ (np.array([0, 0, 1.0]) + 0.3 * rng.normal(size=3)) for _ in range(count)]
-    return ObservedRobot.of(mechanism, camera=f"hand={mechanism.platform}",
-                            see=["point:world@" + ",".join(map(str, place)) for place in places])
+    return ObservedRobot.of(
+        mechanism,
+        camera=f"hand={mechanism.platform}",
+        see=["point:world@" + ",".join(map(str, place)) for place in places],
+    )
 
 
 def test_three_points_of_a_free_body_are_three_ups() -> None:
@@ -249,8 +253,9 @@ def test_what_always_goes_through_the_camera_s_centre_is_refused(kind: str, seed
     rng = np.random.default_rng(seed)
     mechanism = transformed(load("3rrr_m1"), random_rotation(rng), rng.normal(size=3))
     joint = mechanism.joints["elbow_1"]
-    here, there = (",".join(map(str, transform(np.linalg.inv(mechanism.links[link].pose), joint.point)))
-                   for link in joint.links)
+    here, there = (
+        ",".join(map(str, transform(np.linalg.inv(mechanism.links[link].pose), joint.point))) for link in joint.links
+    )
     see = f"eye={kind}:{joint.links[1]}@{there}" + ("/0.3,0.4,0.5" if kind == "image_line" else "")
     with pytest.raises(NotMeasured, match="camera's centre"):
         ObservedRobot.of(mechanism, camera=[f"eye={joint.links[0]}@{here}"], see=[see])
@@ -286,8 +291,10 @@ def test_three_points_are_singular_on_the_danger_cylinder_and_nowhere_else(seed:
     x = (points[0] - centre) / radius
     turn, height = rng.uniform(0, 2 * np.pi, 2500), rng.uniform(0.3, 2, 2500) * rng.choice([-1, 1], 2500)
     around = np.cos(turn)[:, None] * x + np.sin(turn)[:, None] * np.cross(z, x)
-    on, off = (centre + each * around + height[:, None] * z
-               for each in (radius, radius * rng.choice([0.8, 1.25], 2500)[:, None]))
+    on, off = (
+        centre + each * around + height[:, None] * z
+        for each in (radius, radius * rng.choice([0.8, 1.25], 2500)[:, None])
+    )
     assert smallest(points, on).max() < 1e-12
     assert smallest(points, off).min() > 1e-7
     line = points[0] + np.outer([0.0, 0.4, 1.3], points[1] - points[0])

@@ -18,9 +18,11 @@ from hrsynth.mechanism.pose import Pose
 from hrsynth.mechanism.sensors import defaults_of
 from oracle import Oracle
 
-WHY = {"quattro": "the first of the parallel rods before the platform",
-       "3rrr_m1": "the last segment before the platform",
-       "gough_stewart": "the axis of the slide"}
+WHY = {
+    "quattro": "the first of the parallel rods before the platform",
+    "3rrr_m1": "the last segment before the platform",
+    "gough_stewart": "the axis of the slide",
+}
 
 
 @pytest.mark.parametrize("name", WHY)
@@ -58,11 +60,19 @@ def test_sets_for_a_displacement_are_those_asked_for():
 
 
 def test_mobility_is_that_of_the_normal_form_and_that_of_the_file(tmp_path):
-    text = ('<robot name="arm"><link name="base"/><link name="a"/><link name="b"/><link name="c"/>'
-            + "".join(f'<joint name="{j}" type="continuous"><parent link="{p}"/><child link="{c}"/>'
-                      f'<origin xyz="{x} 0 0"/><axis xyz="{axis}"/></joint>'
-                      for j, p, c, x, axis in (("p", "base", "a", 0, "0 0 1"), ("q", "a", "b", 0, "0 0 1"),
-                                               ("r", "b", "c", 1, "0 1 0"))) + "</robot>")
+    text = (
+        '<robot name="arm"><link name="base"/><link name="a"/><link name="b"/><link name="c"/>'
+        + "".join(
+            f'<joint name="{j}" type="continuous"><parent link="{p}"/><child link="{c}"/>'
+            f'<origin xyz="{x} 0 0"/><axis xyz="{axis}"/></joint>'
+            for j, p, c, x, axis in (
+                ("p", "base", "a", 0, "0 0 1"),
+                ("q", "a", "b", 0, "0 0 1"),
+                ("r", "b", "c", 1, "0 1 0"),
+            )
+        )
+        + "</robot>"
+    )
     (tmp_path / "arm.urdf").write_text(text)
     found = check(load(tmp_path / "arm.urdf", platform="c"))
     oracle = Oracle(found.setting.robot)

@@ -46,8 +46,11 @@ def crank_rockers(rng, sides=(-1, 1)):
         bars = rng.uniform(0.3, 1.5, 4)
         crank = bars[1]
         angle, side = float(rng.uniform(-3, 3)), int(rng.choice(sides))
-        if (crank == bars.min() and crank + bars.max() < bars.sum() - crank - bars.max() - 0.05
-                and abs(dead_points(bars, angle, side)).min() > 0.1):
+        if (
+            crank == bars.min()
+            and crank + bars.max() < bars.sum() - crank - bars.max() - 0.05
+            and abs(dead_points(bars, angle, side)).min() > 0.1
+        ):
             return tuple(bars.tolist()), angle, side
 
 
@@ -82,8 +85,10 @@ def test_on_another_branch_other_motors_in_the_box_give_the_same_pose():
     turned = rocker_angle(bars, angle, 1, q)
     assert np.all(np.diff(turned) > 0) or np.all(np.diff(turned) < 0)
     C = rocker * np.stack([np.cos(turned), np.sin(turned), 0 * turned], axis=-1) + [ground, 0.0, 0.0]
-    others = [np.array([np.arctan2(*circles(np.zeros(3), at, crank, coupler, side)[1::-1]) for at in C]) - angle
-              for side in (1, -1)]
+    others = [
+        np.array([np.arctan2(*circles(np.zeros(3), at, crank, coupler, side)[1::-1]) for at in C]) - angle
+        for side in (1, -1)
+    ]
     away = [np.abs((each - q + np.pi) % (2 * np.pi) - np.pi) for each in others]
     assert np.max(np.minimum(*away)) < 1e-9
     other = np.where(away[0] > away[1], *others)
@@ -122,8 +127,9 @@ def chained(bars, angle, other_bars, other_angle, turn) -> Mechanism:
         b.link(name)
     across = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
     for end, base, (ground, crank, coupler, rocker), start, R, at in (
-            ("", "base", bars, angle, turn, np.zeros(3)),
-            ("2", "rocker", other_bars, other_angle, turn @ across, turn @ np.array([0.4, 0.2, 0.7]))):
+        ("", "base", bars, angle, turn, np.zeros(3)),
+        ("2", "rocker", other_bars, other_angle, turn @ across, turn @ np.array([0.4, 0.2, 0.7])),
+    ):
         B, D = crank * np.array([np.cos(start), np.sin(start), 0]), np.array([ground, 0, 0])
         C = circles(B, D, coupler, rocker, 1)
         b.joint(f"a{end}", "R", base, f"crank{end}", at=R @ np.zeros(3) + at, axis=R @ Z, motor=True)
@@ -152,15 +158,23 @@ def test_a_motor_that_the_platform_does_not_feel_is_not_led_back_to():
     rng = np.random.default_rng(4)
     (bars, angle, _), (others, start, _) = crank_rockers(rng, [1]), crank_rockers(rng, [1])
     robot = chained(bars, angle, others, start, np.eye(3))
-    proof = branch(Mechanism.of("first", robot.links.values(), robot.joints.values(), base="base", platform="rocker"),
-                   "a=-0.1:0.1,a2=-0.1:0.1")
+    proof = branch(
+        Mechanism.of("first", robot.links.values(), robot.joints.values(), base="base", platform="rocker"),
+        "a=-0.1:0.1,a2=-0.1:0.1",
+    )
     assert proof.parts[1].share == 1.0
     assert proof.back is None
     assert not proof.regular
 
 
-@pytest.mark.parametrize(("name", "half"), [("rrrrr_m1", 0.1), pytest.param("delta", 0.04, marks=pytest.mark.long),
-                                            pytest.param("gough_stewart", 0.001, marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    ("name", "half"),
+    [
+        ("rrrrr_m1", 0.1),
+        pytest.param("delta", 0.04, marks=pytest.mark.long),
+        pytest.param("gough_stewart", 0.001, marks=pytest.mark.long),
+    ],
+)
 def test_motors_of_shipped_robots_are_functions_of_the_pose(name, half):
     """Poses of different motors differ, by small steps of plain NumPy."""
     robot = load(name)

@@ -61,8 +61,9 @@ def check_law(setting: ObservedRobot, legs: Sequence[str], count: int, seed: int
     batch = setting.batch
     assert batch is not None
     everything = setting.everything
-    watched = tuple(o for o in everything.question.observations[: setting.defaults]
-                    if isinstance(o, Direction) and o.leg in legs)
+    watched = tuple(
+        o for o in everything.question.observations[: setting.defaults] if isinstance(o, Direction) and o.leg in legs
+    )
     question = replace(everything.question, observations=watched)
     walk = list(random_walk(everything.start, count, seed=seed, steps=4))
     found = batch.evaluate([at.pose(question.platform) for at in walk], [o.leg for o in watched])
@@ -108,8 +109,9 @@ def test_what_legs_forbid_in_closed_form_is_what_their_joints_forbid(robot: str)
     seen = dict(zip(anatomy.labels, setting.segments, strict=True))
     X = np.array([at.pose(mechanism.platform) for at in random_walk(setting.everything.start, 12, seed=5, steps=4)])
     chains = [IterativeLeg.of(mechanism, leg, seen[leg.label], None) for leg in anatomy.legs]  # type: ignore[arg-type]
-    rows = np.concatenate([each.follow_from_zero(batch.coordinates, batch.home, X, batch.span).wrenches()
-                           for each in chains], axis=1)
+    rows = np.concatenate(
+        [each.follow_from_zero(batch.coordinates, batch.home, X, batch.span).wrenches() for each in chains], axis=1
+    )
     basis = np.linalg.pinv(batch.span) @ batch.evaluate(X).twists
     assert np.max(np.abs(basis.swapaxes(1, 2) @ basis - np.eye(batch.coordinates.dof))) < 1e-12
     assert np.max(np.abs(rows @ basis)) < CLOSE
@@ -138,6 +140,7 @@ def test_freedoms_are_normal_to_all_rows_and_never_turn_over() -> None:
 @pytest.mark.parametrize("robot", ["3rps", "rrrrr_m1"])
 def test_other_twists_at_each_pose_cost_no_more_than_three_times_a_constant_platform(robot: str) -> None:
     """Poses a second beside those of a platform on six legs, in turns, the best of three."""
+
     def seconds(batch: Batch) -> float:
         X = np.repeat(batch.home[None], 20_000, axis=0)
         start = process_time()
@@ -192,9 +195,13 @@ def test_numba_and_jax_give_the_same_numbers(robot: str, watched: int, package: 
 
 
 @pytest.mark.some(2)
-@pytest.mark.parametrize(("compiled", "robot"), [
-    *product([False], ["delta", "gough_stewart", "3rrr_m1", "rrrrr_m1"]),
-    *(pytest.param(True, robot, marks=pytest.mark.slow) for robot in ("delta", "gough_stewart", "3rrr_m1"))])
+@pytest.mark.parametrize(
+    ("compiled", "robot"),
+    [
+        *product([False], ["delta", "gough_stewart", "3rrr_m1", "rrrrr_m1"]),
+        *(pytest.param(True, robot, marks=pytest.mark.slow) for robot in ("delta", "gough_stewart", "3rrr_m1")),
+    ],
+)
 def test_a_pose_that_is_not_finite_is_not_reached(robot: str, compiled: bool) -> None:
     if compiled:
         pytest.importorskip("numba")
@@ -210,10 +217,20 @@ def test_a_pose_that_is_not_finite_is_not_reached(robot: str, compiled: bool) ->
         assert np.isfinite(values[24:]).all()
 
 
-@pytest.mark.parametrize(("legs", "cones", "word"), [
-    ("1,4", [0.1, 0.1, 0.1], "how many"), ("1,4", -1.0, "more than 0"), ("1,4", 0.0, "more than 0"),
-    ("1,4", np.pi / 2, "right angle"), ("1,4", np.nan, "right angle"), ("1,4", [0.1, np.inf], "right angle"),
-    (["1", "1"], 0.1, "twice"), ("14", 0.1, "a leg of the batch"), ([], 0.1, "nothing is observed")])
+@pytest.mark.parametrize(
+    ("legs", "cones", "word"),
+    [
+        ("1,4", [0.1, 0.1, 0.1], "how many"),
+        ("1,4", -1.0, "more than 0"),
+        ("1,4", 0.0, "more than 0"),
+        ("1,4", np.pi / 2, "right angle"),
+        ("1,4", np.nan, "right angle"),
+        ("1,4", [0.1, np.inf], "right angle"),
+        (["1", "1"], 0.1, "twice"),
+        ("14", 0.1, "a leg of the batch"),
+        ([], 0.1, "nothing is observed"),
+    ],
+)
 def test_legs_and_cones_that_are_none_are_refused(legs: str | list[str], cones: float | list[float], word: str) -> None:
     _, batch = shipped_batch("quattro")
     with pytest.raises(BadRequest, match=word):
@@ -246,9 +263,16 @@ def sampled_error(M: Array, rows: Array, u: Array, cone: float, rng: np.random.G
 
 
 @pytest.mark.some(2)
-@pytest.mark.parametrize(("robot", "legs"), [("quattro", ("1", "4")), ("orthoglide", ("1", "2", "3")),
-                                             ("gough_stewart", ("1", "2", "3")), ("3rrr_m1", ("1", "2", "3")),
-                                             ("quattro_rigid", ("1", "3"))])
+@pytest.mark.parametrize(
+    ("robot", "legs"),
+    [
+        ("quattro", ("1", "4")),
+        ("orthoglide", ("1", "2", "3")),
+        ("gough_stewart", ("1", "2", "3")),
+        ("3rrr_m1", ("1", "2", "3")),
+        ("quattro_rigid", ("1", "3")),
+    ],
+)
 def test_error_maxima_bound_all_admissible_errors_and_are_nearly_met(robot: str, legs: tuple[str, ...]) -> None:
     _, batch = shipped_batch(robot)
     found = batch.evaluate(poses_near(batch, 12), legs, 0.01)

@@ -19,8 +19,14 @@ from hrsynth.geometry.components import cosine, sine, sqrt
 flint = pytest.importorskip("flint")
 INPUTS = 9
 OPERATIONS: dict[str, Callable[[Any, Any], Any]] = {
-    "+": lambda a, b: a + b, "-": lambda a, b: b - a, "*": lambda a, b: a * b, "/": lambda a, _: 1.0 / a,
-    "sqrt": lambda a, _: sqrt(a), "sin": lambda a, _: sine(a), "cos": lambda a, _: cosine(a)}
+    "+": lambda a, b: a + b,
+    "-": lambda a, b: b - a,
+    "*": lambda a, b: a * b,
+    "/": lambda a, _: 1.0 / a,
+    "sqrt": lambda a, _: sqrt(a),
+    "sin": lambda a, _: sine(a),
+    "cos": lambda a, _: cosine(a),
+}
 
 
 def leaves(draw: Callable[..., Any], y: list[Any], number: Callable[[float], Any]) -> list[Any]:
@@ -40,14 +46,20 @@ def boxes(rng: np.random.Generator, count: int, bend: bool) -> list[AffineForms]
     """Forms about random places: narrow, wide and of no width; the first may have the symbol of its bend."""
     half = rng.uniform(0, 1, (count, INPUTS)) * rng.choice([0.0, 1e-8, 0.01, 1.0], (count, 1))
     eye = np.eye(INPUTS + bend)[:INPUTS]
-    return [affine(rng.uniform(-4, 4, count), half[:, i, None] * eye[i], 1e-15 * half[:, i],
-                   INPUTS + 1 if bend and not i else None) for i in range(INPUTS)]
+    return [
+        affine(
+            rng.uniform(-4, 4, count),
+            half[:, i, None] * eye[i],
+            1e-15 * half[:, i],
+            INPUTS + 1 if bend and not i else None,
+        )
+        for i in range(INPUTS)
+    ]
 
 
 def same(one: AffineForms, other: AffineForms) -> bool:
     """Whether two forms have the same numbers, to the last bit."""
-    return (np.array_equal(one.v, other.v, equal_nan=True)
-            and np.array_equal(one.r, other.r, equal_nan=True))
+    return np.array_equal(one.v, other.v, equal_nan=True) and np.array_equal(one.r, other.r, equal_nan=True)
 
 
 @settings(deadline=None)
@@ -75,9 +87,14 @@ def test_small_work_stays_in_numpy(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @settings(deadline=None)
-@given(st.one_of(st.floats(-10, 10), st.floats(-1e6, 1e6), st.floats(-1e15, 1e15),
-                 st.builds(lambda k, off: k * math.pi / 4 + off, st.integers(-100_000, 100_000),
-                           st.floats(-1e-9, 1e-9))))
+@given(
+    st.one_of(
+        st.floats(-10, 10),
+        st.floats(-1e6, 1e6),
+        st.floats(-1e15, 1e15),
+        st.builds(lambda k, off: k * math.pi / 4 + off, st.integers(-100_000, 100_000), st.floats(-1e-9, 1e-9)),
+    )
+)
 def test_sines_are_those_of_balls(x: float) -> None:
     found, balls = sines(np.array([x])), flint.arb(x).sin_cos()
     for value, ball in zip(found, balls, strict=True):
@@ -95,9 +112,13 @@ def test_sines_of_what_is_no_angle_warn_of_nothing(x: float) -> None:
 @given(st.integers(0, 1000))
 def test_forms_hold_what_balls_say(seed: int) -> None:
     """A formula with all operations, at random places of boxes, in numbers of 200 bits."""
+
     def formula(y: list[Any], number: Callable[[float], Any]) -> list[Any]:
-        return [sine(y[0]) * cosine(y[1]) - y[2] / 3.0, 1.0 / (y[0] * y[0] + 0.5),
-                sqrt(y[1] * y[1] + 0.25) * number(0.3)]
+        return [
+            sine(y[0]) * cosine(y[1]) - y[2] / 3.0,
+            1.0 / (y[0] * y[0] + 0.5),
+            sqrt(y[1] * y[1] + 0.25) * number(0.3),
+        ]
 
     rng = np.random.default_rng(seed)
     forms = boxes(rng, 20, bend=False)
@@ -106,9 +127,13 @@ def test_forms_hold_what_balls_say(seed: int) -> None:
     before, flint.ctx.prec = flint.ctx.prec, 200
     try:
         for k in range(20):
-            a, b, c, *_ = (flint.arb(float(each.v[0, k])) + sum(
-                (flint.arb(float(s)) * float(e) for s, e in zip(each.v[1:, k], noise[k], strict=True)), flint.arb(0))
-                for each in forms)
+            a, b, c, *_ = (
+                flint.arb(float(each.v[0, k]))
+                + sum(
+                    (flint.arb(float(s)) * float(e) for s, e in zip(each.v[1:, k], noise[k], strict=True)), flint.arb(0)
+                )
+                for each in forms
+            )
             exact = [a.sin() * b.cos() - c / 3, 1 / (a * a + 0.5), (b * b + 0.25).sqrt() * 0.3]
             for j, value in enumerate(exact):
                 low, high = (float(getattr(found[..., j], side)[k]) for side in ("low", "high"))

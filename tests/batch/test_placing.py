@@ -72,8 +72,10 @@ def test_what_velocities_do_is_what_pinocchio_says(robot: str) -> None:
         for at, J, V in zip(closed, *rates(twin, {name: X[:, i] for i, name in enumerate(names)}, link), strict=True):
             theirs, (_, moves) = twin.jacobian(at.q), twin.frames(at.q, (link,), whole=0)
             # the rates of a ball are told in one frame or another
-            ours, other = (rows @ (np.eye(twin.nv) - np.linalg.pinv(loops, rcond=1e-9) @ loops) @ rows.T
-                           for rows, loops in ((V, J), (moves[0], theirs)))
+            ours, other = (
+                rows @ (np.eye(twin.nv) - np.linalg.pinv(loops, rcond=1e-9) @ loops) @ rows.T
+                for rows, loops in ((V, J), (moves[0], theirs))
+            )
             np.testing.assert_allclose(ours, other, atol=1e-8)
 
 
@@ -91,9 +93,14 @@ def test_walks_give_as_many_different_configurations_as_asked_for(robot: str) ->
 
 
 @pytest.mark.some(1)
-@pytest.mark.parametrize(("robot", "grid"), [("orthoglide", "x=-0.35:0.35:5,y=-0.3:0.3:5,z=0.04"),
-                                             ("quattro", "x=-0.7:0.7:6,y=-0.1:0.4:4,z=-0.7"),
-                                             ("3rrr_m1", "x=-0.2:0.2:4,y=-0.2:0.2:4,phi=0.3")])
+@pytest.mark.parametrize(
+    ("robot", "grid"),
+    [
+        ("orthoglide", "x=-0.35:0.35:5,y=-0.3:0.3:5,z=0.04"),
+        ("quattro", "x=-0.7:0.7:6,y=-0.1:0.4:4,z=-0.7"),
+        ("3rrr_m1", "x=-0.2:0.2:4,y=-0.2:0.2:4,phi=0.3"),
+    ],
+)
 def test_a_grid_is_the_same_with_and_without_closed_forms(robot: str, grid: str) -> None:
     setting, placer = placer_of(robot)
     everything, cells = setting.everything, Grid.parse(grid)
@@ -110,8 +117,15 @@ def test_a_grid_is_the_same_with_and_without_closed_forms(robot: str, grid: str)
 def test_singular_values_are_pinocchios_also_where_another_working_mode_is_met() -> None:
     setting, placer = placer_of("3rrr_m1")
     everything, question = setting.everything, setting.samples.question
-    walk = [reach(everything.start, everything.question, setting.motion.pose(at.pose(setting.mechanism.platform)),
-                  setting.motion) for at in placer.random_walk(6, seed=1)]
+    walk = [
+        reach(
+            everything.start,
+            everything.question,
+            setting.motion.pose(at.pose(setting.mechanism.platform)),
+            setting.motion,
+        )
+        for at in placer.random_walk(6, seed=1)
+    ]
     other = ObservedRobot.of(load("3rrr_m1"), samples=3, seed=7).everything.members[0].configuration
     quick = Quick.of(placer, question)
     assert quick is not None
@@ -123,7 +137,8 @@ def test_a_batch_that_disagrees_with_pinocchio_is_refused(monkeypatch: pytest.Mo
     setting, placer = placer_of("orthoglide")
     quick = Quick.of(placer, setting.samples.question)
     assert quick is not None
-    monkeypatch.setattr("hrsynth.analysis.singularity.batch_spectrum.interaction_matrix",
-                        lambda found: 1.01 * found.rates)
+    monkeypatch.setattr(
+        "hrsynth.analysis.singularity.batch_spectrum.interaction_matrix", lambda found: 1.01 * found.rates
+    )
     with pytest.raises(Disagreement):
         quick.spectrum([member.configuration for member in setting.everything.members], spectrum)

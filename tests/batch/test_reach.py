@@ -27,8 +27,12 @@ from kinematics.robots import ROBOTS, setting_of, state_of
 from oracle import Oracle, exponential
 from strategies import parallel_robots, planar, random_rotation, transformed
 
-quick = settings(max_examples=8, deadline=None, derandomize=True,
-                 suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
+quick = settings(
+    max_examples=8,
+    deadline=None,
+    derandomize=True,
+    suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large],
+)
 
 
 def motion_of(setting: ObservedRobot) -> PlatformMotion:
@@ -94,10 +98,17 @@ def test_a_pose_of_a_robot_that_stands_aslant_can_be_typed_as_it_is_printed(robo
     check_printed(ObservedRobot.of(transformed(load(robot), random_rotation(rng), rng.normal(size=3)), samples=4))
 
 
-@pytest.mark.parametrize(("robot", "parts"), [
-    ("delta", ("x", "y", "z")), ("quattro", ("x", "y", "z", "phi", "rpy")), ("3rrr_m1", ("x", "y", "phi", "rpy")),
-    ("prrrp_parallel_point", ("x", "y")), ("gough_stewart", ("x", "y", "z", "phi", "rpy")), ("3upu", ("x", "y", "z")),
-])
+@pytest.mark.parametrize(
+    ("robot", "parts"),
+    [
+        ("delta", ("x", "y", "z")),
+        ("quattro", ("x", "y", "z", "phi", "rpy")),
+        ("3rrr_m1", ("x", "y", "phi", "rpy")),
+        ("prrrp_parallel_point", ("x", "y")),
+        ("gough_stewart", ("x", "y", "z", "phi", "rpy")),
+        ("3upu", ("x", "y", "z")),
+    ],
+)
 def test_what_a_platform_can_change(robot: str, parts: tuple[str, ...]) -> None:
     setting = setting_of(robot)
     everything = setting.everything
@@ -123,10 +134,18 @@ def test_a_part_that_never_changes_may_be_given_as_it_is() -> None:
         reach(everything.start, everything.question, Pose.parse("rpy=0.1/0/0"))
 
 
-@pytest.mark.parametrize(("robot", "text"), [
-    ("gough_stewart", "x=0.05"), ("gough_stewart", "phi=20deg"), ("quattro", "x=0.2,y=-0.1"), ("delta", "z=-0.65"),
-    ("3rrr_m1", "x=0.02"), ("rrrrr_m1", "y=0.27"), ("hexa", "rpy=0.1/0.05/0"),
-])
+@pytest.mark.parametrize(
+    ("robot", "text"),
+    [
+        ("gough_stewart", "x=0.05"),
+        ("gough_stewart", "phi=20deg"),
+        ("quattro", "x=0.2,y=-0.1"),
+        ("delta", "z=-0.65"),
+        ("3rrr_m1", "x=0.02"),
+        ("rrrrr_m1", "y=0.27"),
+        ("hexa", "rpy=0.1/0.05/0"),
+    ],
+)
 def test_free_parts_are_nearest_to_zero(robot: str, text: str) -> None:
     """No configuration nearby with the same given parts lies nearer to the zero pose."""
     setting = setting_of(robot)
@@ -250,8 +269,9 @@ FEET, CRANK, ROD = (np.array([-0.1, 0.0]), np.array([0.1, 0.0])), 0.16, 0.2
 
 
 @pytest.mark.some(2)
-@pytest.mark.parametrize(("x", "y", "leg"), [(-0.2, 0.28, "2"), (0.9, 0.1, "1"), (0.2, 0.28, "1"), (0.02, 0.5, "1"),
-                                              (-0.03, 0.6, "2")])
+@pytest.mark.parametrize(
+    ("x", "y", "leg"), [(-0.2, 0.28, "2"), (0.9, 0.1, "1"), (0.2, 0.28, "1"), (0.02, 0.5, "1"), (-0.03, 0.6, "2")]
+)
 def test_the_leg_that_misses_is_named(x: float, y: float, leg: str) -> None:
     everything = setting_of("rrrrr_m1").everything
     misses = {label: np.linalg.norm([x, y] - foot) - (CRANK + ROD) for label, foot in zip("12", FEET, strict=True)}
@@ -282,8 +302,10 @@ def test_the_miss_of_a_leg_whose_platform_only_translates(x: float, y: float, z:
         elbow = np.mean([joint.point for joint in joints if shoulder.successor == joint.predecessor], axis=0)
         tip = np.mean([joint.point for joint in joints if mechanism.platform in joint.links], axis=0)
         wanted = tip + [x, y, z] - mechanism.links[mechanism.platform].pose[:3, 3]
-        circle = [shoulder.point + exponential(a * shoulder.axis) @ (elbow - shoulder.point)
-                  for a in np.linspace(0, 2 * np.pi, 4001)]
+        circle = [
+            shoulder.point + exponential(a * shoulder.axis) @ (elbow - shoulder.point)
+            for a in np.linspace(0, 2 * np.pi, 4001)
+        ]
         distances, rod = np.linalg.norm(np.array(circle) - wanted, axis=1), np.linalg.norm(tip - elbow)
         misses[leg.label] = max(distances.min() - rod, rod - distances.max(), 0.0)
     with pytest.raises(PoseNotReached) as caught:
@@ -308,8 +330,11 @@ def bend(at: ClosedConfiguration, leg: str) -> float:
     joints = at.twin.mechanism.joints
     foot, elbow = joints[f"shoulder_{leg}"].point, at.pose(f"dist_{leg}")[:2, 3]
     tip = at.pose("dist_1")[:2, 3]
-    elbow = (at.pose(f"prox_{leg}") @ np.linalg.inv(at.twin.mechanism.links[f"prox_{leg}"].pose)
-             @ np.append(joints[f"elbow_{leg}"].point, 1))[:2]
+    elbow = (
+        at.pose(f"prox_{leg}")
+        @ np.linalg.inv(at.twin.mechanism.links[f"prox_{leg}"].pose)
+        @ np.append(joints[f"elbow_{leg}"].point, 1)
+    )[:2]
     a, b = elbow - foot[:2], tip - elbow
     return float((a[0] * b[1] - a[1] * b[0]) / (CRANK * ROD))
 
@@ -464,6 +489,7 @@ def test_a_constraint_singularity_on_the_way_is_told() -> None:
 
 def test_a_pose_is_not_reached_though_no_walk_leads_away(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whether parts depend on each other elsewhere is then not known, and not said."""
+
     def none(start: ClosedConfiguration, count: int, *, steps: int) -> Iterator[ClosedConfiguration]:
         raise NotSampled("", 0, count, 10)
         yield start
@@ -482,13 +508,17 @@ def test_a_turn_that_two_others_make_together_is_reached(angles: str, tmp_path: 
     """Turned by a about x and then by b about y, a stem has turned about z by φ, tan(φ/2) = tan(a/2) tan(b/2), and no
     turn about x or y changes φ at zero; the least turns are equal or opposite."""
     file = tmp_path / "stem.urdf"
-    hinges = "".join(f'<joint name="{name}" type="continuous"><parent link="{before}"/><child link="{after}"/>'
-                     f'<axis xyz="{axis}"/></joint>'
-                     for name, before, after, axis in (("a", "base", "cross", "1 0 0"),
-                                                       ("b", "cross", "stem", "0 1 0")))
-    file.write_text('<robot name="stem"><link name="base"/><link name="cross"/><link name="stem"/>' + hinges
-                    + '<hrsynth serial="true"><platform link="stem"/>'
-                      '<observe kind="direction" link="stem" axis="1 2 3"/></hrsynth></robot>')
+    hinges = "".join(
+        f'<joint name="{name}" type="continuous"><parent link="{before}"/><child link="{after}"/>'
+        f'<axis xyz="{axis}"/></joint>'
+        for name, before, after, axis in (("a", "base", "cross", "1 0 0"), ("b", "cross", "stem", "0 1 0"))
+    )
+    file.write_text(
+        '<robot name="stem"><link name="base"/><link name="cross"/><link name="stem"/>'
+        + hinges
+        + '<hrsynth serial="true"><platform link="stem"/>'
+        '<observe kind="direction" link="stem" axis="1 2 3"/></hrsynth></robot>'
+    )
     everything = ObservedRobot.of(str(file)).everything
     grid = Grid.parse(f"phi={angles}")
     for pose, at in zip(grid.poses(), sweep(everything.start, everything.question, grid), strict=True):
@@ -498,5 +528,6 @@ def test_a_turn_that_two_others_make_together_is_reached(angles: str, tmp_path: 
         alone = reach(everything.start, everything.question, pose).pose("stem")[:3, :3]
         least = 2 * np.arctan(np.sqrt(np.tan(abs(pose.phi) / 2)))
         for R in (at.pose("stem")[:3, :3], alone):
-            np.testing.assert_allclose(np.abs([np.arctan2(R[2, 1], R[1, 1]), np.arctan2(R[0, 2], R[0, 0])]), least,
-                                       atol=1e-4)
+            np.testing.assert_allclose(
+                np.abs([np.arctan2(R[2, 1], R[1, 1]), np.arctan2(R[0, 2], R[0, 0])]), least, atol=1e-4
+            )

@@ -36,8 +36,16 @@ def two_bars(rng: np.random.Generator, turned: bool) -> Mechanism:
         for name in links[1:3]:
             builder.link(name, rng.normal(size=3), random_rotation(rng))
         for k, at in enumerate(points):
-            builder.joint(f"joint_{number}_{k}", "R", links[k], links[k + 1], at, axis=normal, motor=k == 0,
-                          loop=k == 2 and number != 1)
+            builder.joint(
+                f"joint_{number}_{k}",
+                "R",
+                links[k],
+                links[k + 1],
+                at,
+                axis=normal,
+                motor=k == 0,
+                loop=k == 2 and number != 1,
+            )
         builder.observe(str(number), links[2], points[2] - points[1])
     ends = ("platform", "bar") if turned else ("bar", "platform")
     builder.joint("guide", "P", *ends, tilt @ np.array([0.1, 0.0, 0.0]), axis=way)
@@ -130,8 +138,12 @@ def test_error_maxima_take_slides_as_unknown() -> None:
 def numbers(batch: Batch, count: int) -> tuple[Array, Array]:
     rng = np.random.default_rng(2)
     X = np.repeat(batch.home[None], count, axis=0)
-    X[:, :3, 3] += 0.02 * batch.length * rng.normal(size=(count, 3)) @ (
-        batch.coordinates.translations @ batch.coordinates.translations.T)
+    X[:, :3, 3] += (
+        0.02
+        * batch.length
+        * rng.normal(size=(count, 3))
+        @ (batch.coordinates.translations @ batch.coordinates.translations.T)
+    )
     return X, 0.02 * batch.length * rng.normal(size=(count, 1))
 
 

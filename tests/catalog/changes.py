@@ -31,28 +31,53 @@ CLEAR = 1e-3
 Record = Mapping[str, Any]
 
 MODE, REFUSED, AGAIN, LISTED, SEEN, HIDDEN, NEVER, DRAWN = REASONS = (
-    "another operation mode", "refused", "refused as before", "modes that were not listed", "other modes seen",
-    "another hidden robot", "another condition", "another choice of dimensions")
-FIELDS = {MODE: ("motion", "minimal"), AGAIN: ("refused",), LISTED: ("modes_bound",), SEEN: ("modes_seen",),
-          HIDDEN: ("hidden",), NEVER: ("condition",), DRAWN: ("attempt",)}
+    "another operation mode",
+    "refused",
+    "refused as before",
+    "modes that were not listed",
+    "other modes seen",
+    "another hidden robot",
+    "another condition",
+    "another choice of dimensions",
+)
+FIELDS = {
+    MODE: ("motion", "minimal"),
+    AGAIN: ("refused",),
+    LISTED: ("modes_bound",),
+    SEEN: ("modes_seen",),
+    HIDDEN: ("hidden",),
+    NEVER: ("condition",),
+    DRAWN: ("attempt",),
+}
 """A record belongs to the first reason of which a field changed."""
 WHY = {
     MODE: "Samples had crossed a constraint singularity, or came from two modes. Every step follows the branch of the "
-          "zero configuration now; kind of motion, legs needed, hidden robot and cure are those of that branch.",
+    "zero configuration now; kind of motion, legs needed, hidden robot and cure are those of that branch.",
     REFUSED: "The verdict at samples is the same. The exact one rests on relations between centres of different legs "
-             "that are seen at samples and not derived from the file, so that it is not called proved.",
+    "that are seen at samples and not derived from the file, so that it is not called proved.",
     AGAIN: "Another reason is given: samples beyond a singular zero configuration are no longer taken.",
     LISTED: "No equations were known for what some leg asks of the platform: an end on a cone, a point of the base "
-            "that is held in the platform's frame, a U-P-U leg that is not watched, rods of a platform that turns. Its "
-            "joints give conditions on the pose now.",
+    "that is held in the platform's frame, a U-P-U leg that is not watched, rods of a platform that turns. Its "
+    "joints give conditions on the pose now.",
     SEEN: "The most real modes at five configurations, which are others now. The bound is the same.",
     HIDDEN: "Rules were chosen at other samples. The verdict is the same.",
     NEVER: "The condition named axes and tangents that must be parallel, which constant axes forbid: it is never met.",
     DRAWN: "Of three choices of dimensions the first that can be studied counts. Walks to samples arrive at the first "
-           "now; of two words they no longer do.",
+    "now; of two words they no longer do.",
 }
-SHOWN = ("verdict", "refused", "motion", "minimal", "hidden", "cure", "motor_rank", "condition", "modes", "attempt",
-         "steps")
+SHOWN = (
+    "verdict",
+    "refused",
+    "motion",
+    "minimal",
+    "hidden",
+    "cure",
+    "motor_rank",
+    "condition",
+    "modes",
+    "attempt",
+    "steps",
+)
 """Fields in the order in which they are told; the others follow from them."""
 
 
@@ -101,13 +126,21 @@ def page(before: Mapping[str, Record], now: Mapping[str, Record]) -> str:
             kinds[reason(before[word], record)].append(word)
     counts = {name: Counter(now[word]["group"] for word in kinds[name]) for name in REASONS}
     heads = ("reason", *sorted(GROUPS), "all")
-    rows = [[name, *(str(counts[name][group] or "–") for group in sorted(GROUPS)), str(counts[name].total())]
-             for name in REASONS]
-    rows += [["all", *(str(sum(each[group] for each in counts.values())) for group in sorted(GROUPS)),
-              str(sum(map(len, kinds.values())))]]
+    rows = [
+        [name, *(str(counts[name][group] or "–") for group in sorted(GROUPS)), str(counts[name].total())]
+        for name in REASONS
+    ]
+    rows += [
+        [
+            "all",
+            *(str(sum(each[group] for each in counts.values())) for group in sorted(GROUPS)),
+            str(sum(map(len, kinds.values()))),
+        ]
+    ]
     return table(heads, rows, 1) + "".join(
         f"\n## {name[0].upper()}{name[1:]}\n\n{WHY[name]}\n\n{''.join(_lines(kinds[name], before, now))}"
-        for name in REASONS)
+        for name in REASONS
+    )
 
 
 def _lines(words: list[str], before: Mapping[str, Record], now: Mapping[str, Record]) -> Iterator[str]:

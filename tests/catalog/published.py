@@ -19,9 +19,15 @@ ROBOTS: Mapping[str, Sequence[str]] = {
     "3T0R": ("P3PRRR1G2P2 S4PRRR1", "P3RRPRR1G1P1 S5RRPRR1"),
     "3T3R": ("P6RRPRRR1G2P1 S6RRPRRR1", "P6RRPRRR1G6P1 S6RRPRRR1"),
 }
-MOTORS = ("sym_2T1R P3RRR1G1P1A1 100 0", "sym_2T1R P3PRP1G1P1A1 100 0", "sym_2T1R P3PRP1G1P1A2 010 0",
-          "sym_3T0R P3PRRR1G2P2A1 1000 1 a", "sym_3T0R P3RRPRR1G1P1A1 00100 0 a", "sym_3T3R P6RRPRRR1G2P1A1 001000 1",
-          "sym_3T3R P6RRPRRR1G6P1A1 001000 0")
+MOTORS = (
+    "sym_2T1R P3RRR1G1P1A1 100 0",
+    "sym_2T1R P3PRP1G1P1A1 100 0",
+    "sym_2T1R P3PRP1G1P1A2 010 0",
+    "sym_3T0R P3PRRR1G2P2A1 1000 1 a",
+    "sym_3T0R P3RRPRR1G1P1A1 00100 0 a",
+    "sym_3T3R P6RRPRRR1G2P1A1 001000 1",
+    "sym_3T3R P6RRPRRR1G6P1A1 001000 0",
+)
 """Choices of motors: those of a leg, the loss of rank, what free angles are. That of P3PRP1G1P1A2 is wrong: the turning
 joints all turn as the platform does. P3RRPRR1G1P1 turns about the vertical too."""
 TRIED = {"2T1R": ("S3RRR1;3;1;1;0;2", "S3PRP1;3;1;1;0;1"), "3T0R": ("S4PRRR1;3;2;2;0;0",)}

@@ -1,6 +1,6 @@
 """A small catalog that is quick to build: words of letters, records with all that a query asks for.
 
-    python -m catalog.stub TARGET [WORKERS]      build it, slowly
+python -m catalog.stub TARGET [WORKERS]      build it, slowly
 """
 
 from __future__ import annotations
@@ -24,16 +24,27 @@ VERDICTS = ("controllable", "partially controllable", "uncontrollable")
 CHAINS = ("R*RR", "RR*R", "UP*S", "P*US", "R*-{2-SS}", "RRR")
 REFUSED = "(c07*)"
 ASKED: dict[str, tuple[Any, ...]] = {
-    "legs": ("*R*", "3-R*", "*-R*R*-*", "?-?R*", "PUS", "*(Rz*", "*", 3), "dof": (3, 2, 9), "motion": ("3T", "2T1R"),
-    "verdict": ("partially controllable", "controllable"), "see": ("3point", "3point'"), "group": ("mixed", "planar"),
-    "base_motors": (True, False), "fewest": (2, 0), "modes": (2, 6),
-    "text": ("takeover", "x", "rrr", "hexaglide", "lift 1", "(Rz", "the lines", "")}
+    "legs": ("*R*", "3-R*", "*-R*R*-*", "?-?R*", "PUS", "*(Rz*", "*", 3),
+    "dof": (3, 2, 9),
+    "motion": ("3T", "2T1R"),
+    "verdict": ("partially controllable", "controllable"),
+    "see": ("3point", "3point'"),
+    "group": ("mixed", "planar"),
+    "base_motors": (True, False),
+    "fewest": (2, 0),
+    "modes": (2, 6),
+    "text": ("takeover", "x", "rrr", "hexaglide", "lift 1", "(Rz", "the lines", ""),
+}
 """What the shipped catalog is asked for by each name."""
 QUESTIONS: tuple[dict[str, Any], ...] = (
-    {}, *({name: value} for name, every in ASKED.items() for value in every),
+    {},
+    *({name: value} for name, every in ASKED.items() for value in every),
     *({name: ASKED[name][0], other: value} for name, other in combinations(ASKED, 2) for value in ASKED[other][:2]),
-    {"legs": 3, "verdict": "controllable"}, {"text": "x", "legs": "*-R*R*-*", "verdict": "partially controllable"},
-    {"legs": ("3-R*", "*S"), "text": ("x", "rrr")}, {"text": "rrr", "legs": "*P*", "base_motors": True})
+    {"legs": 3, "verdict": "controllable"},
+    {"text": "x", "legs": "*-R*R*-*", "verdict": "partially controllable"},
+    {"legs": ("3-R*", "*S"), "text": ("x", "rrr")},
+    {"text": "rrr", "legs": "*P*", "base_motors": True},
+)
 """What it is asked for: by each name alone, by two, and by more."""
 WORKERS = 2 if find_spec("joblib") else 1
 """The extra with joblib may be missing."""
@@ -61,12 +72,29 @@ def entry(word: str) -> dict[str, Any]:
     dof, legs = draw.randint(2, 6), draw.randint(2, 6)
     rank = draw.randint(0, dof)
     verdict = VERDICTS[0 if rank == dof else 2 if rank == 0 else 1]
-    return {"word": word, "notation": f"{legs}-{draw.choice(CHAINS)}", "hidden": None if rank == 0 else "2-U*PS",
-            "legs": legs, "dof": dof, "motion": f"{dof}T" if dof < 4 else f"3T{dof - 3}R", "mobility": dof, "idle": 0,
-            "verdict": verdict, "rank": rank, "exact": True, "instances": 1 if rank == dof else 5,
-            "base_motors": draw.random() < 0.5, "motors": legs, "fewest": min(rank, legs), "minimal": [["1"]],
-            "lost": ["rotation"] if rank < dof else [], "condition": "the lines σ meet",
-            "modes_bound": 2 * rank or None, "modes_seen": rank or None, "driven": draw.random() < 0.5}
+    return {
+        "word": word,
+        "notation": f"{legs}-{draw.choice(CHAINS)}",
+        "hidden": None if rank == 0 else "2-U*PS",
+        "legs": legs,
+        "dof": dof,
+        "motion": f"{dof}T" if dof < 4 else f"3T{dof - 3}R",
+        "mobility": dof,
+        "idle": 0,
+        "verdict": verdict,
+        "rank": rank,
+        "exact": True,
+        "instances": 1 if rank == dof else 5,
+        "base_motors": draw.random() < 0.5,
+        "motors": legs,
+        "fewest": min(rank, legs),
+        "minimal": [["1"]],
+        "lost": ["rotation"] if rank < dof else [],
+        "condition": "the lines σ meet",
+        "modes_bound": 2 * rank or None,
+        "modes_seen": rank or None,
+        "driven": draw.random() < 0.5,
+    }
 
 
 def without_checksum(text: str) -> str:

@@ -62,8 +62,9 @@ def members(group: int) -> list[str]:
     return [pid for found, state, pid in rows if int(found) == group and not state.startswith("Z")]
 
 
-def killed_after(process: subprocess.Popen[bytes], folder: Path, records: int,
-                 kill: Callable[[], None] | None = None) -> None:
+def killed_after(
+    process: subprocess.Popen[bytes], folder: Path, records: int, kill: Callable[[], None] | None = None
+) -> None:
     """Kill a build (and what it started) when its journals have grown by so many lines."""
     end = time.monotonic() + 60
     before = lines_in(list(folder.glob("*.part")))
@@ -81,8 +82,9 @@ def test_a_group_is_one_file_sorted_compact_and_ascii(whole: dict[str, bytes]):
         head, *lines = data.decode("ascii").splitlines()
         crc = zlib.crc32(data.partition(b"\n")[2])
         assert head == f'{{"format":1,"catalog":1,"group":"{group}","count":{len(lines)},"crc32":"{crc:08x}"}}'
-        assert lines == [line({**entry_or_refused(word), "word": word, "group": group})
-                         for word in sorted(source().groups[group]())]
+        assert lines == [
+            line({**entry_or_refused(word), "word": word, "group": group}) for word in sorted(source().groups[group]())
+        ]
         assert b"null" not in data
 
 
@@ -96,8 +98,9 @@ def entry_or_refused(word: str) -> dict:
 def test_what_a_build_says_is_what_it_did(tmp_path: Path):
     told: list[tuple[str, int, int]] = []
     done = build(tmp_path / "new", ["d"], source=source(), tell=lambda *step: told.append(step))
-    assert [each.to_dict() for each in done] == [{"group": "d", "words": 18, "now": 18, "before": 0,
-                                                  "file": str(tmp_path / "new" / "d.jsonl")}]
+    assert [each.to_dict() for each in done] == [
+        {"group": "d", "words": 18, "now": 18, "before": 0, "file": str(tmp_path / "new" / "d.jsonl")}
+    ]
     assert told == [("d", i, 18) for i in range(19)]
 
 
@@ -117,8 +120,9 @@ def test_a_build_killed_again_and_again_gives_the_same_bytes(seed: int, tmp_path
 
 
 @pytest.mark.parametrize("moment", ["writing", "all written", "one journal gone"])
-def test_a_kill_while_groups_are_finished_loses_nothing(moment: str, tmp_path: Path, whole: dict[str, bytes],
-                                                        monkeypatch: pytest.MonkeyPatch):
+def test_a_kill_while_groups_are_finished_loses_nothing(
+    moment: str, tmp_path: Path, whole: dict[str, bytes], monkeypatch: pytest.MonkeyPatch
+):
     """The states that a kill can leave there, set up one by one."""
     removed = Journal.remove
     monkeypatch.setattr(Journal, "remove", lambda journal: None)
@@ -152,18 +156,19 @@ def test_records_in_the_journal_are_not_made_again(tmp_path: Path):
 
 @settings(max_examples=60, deadline=None)
 @given(cut=st.integers(min_value=0, max_value=4000), tail=st.binary(max_size=12), broken=st.integers(0, 12))
-def test_a_torn_journal_is_read_up_to_where_it_is_whole(cut: int, tail: bytes, broken: int,
-                                                        tmp_path_factory: pytest.TempPathFactory):
+def test_a_torn_journal_is_read_up_to_where_it_is_whole(
+    cut: int, tail: bytes, broken: int, tmp_path_factory: pytest.TempPathFactory
+):
     """Cut anywhere, with rubbish at the end or zeros in a line: what is whole is kept, and appended to."""
     path = tmp_path_factory.mktemp("torn") / "x.part"
     lines = [line({**entry(f"(w{i})"), "word": f"(w{i})", "group": "x"}) for i in range(8)]
     with Journal(path, "x") as journal:
         head = path.stat().st_size
         journal.add((f"(w{i})", text) for i, text in enumerate(lines))
-    data = path.read_bytes()[:head + cut]
+    data = path.read_bytes()[: head + cut]
     if 0 < broken < len(data.splitlines()) - 1:
         parts = data.splitlines(keepends=True)
-        data = b"".join([*parts[:broken], b"\0" * (len(parts[broken]) - 1) + b"\n", *parts[broken + 1:]])
+        data = b"".join([*parts[:broken], b"\0" * (len(parts[broken]) - 1) + b"\n", *parts[broken + 1 :]])
     path.write_bytes(data + tail.replace(b"\n", b" "))
     whole = [text for text in lines if f"{seal_line(text)}\n".encode() in data]
     with Journal(path, "x") as journal:
@@ -189,10 +194,12 @@ def test_a_record_is_on_the_disk_before_the_next_is_made(tmp_path: Path, monkeyp
 
 def test_a_journal_of_something_else_is_refused(tmp_path: Path):
     path = tmp_path / "c.jsonl.part"
-    for text, said in [("a list\nof words\n", "a journal without checksums"),
-                       ('{"format":1,"catalog":1,"group":"c"}\n', "a journal without checksums .*removed, or --anew"),
-                       (seal_line("words") + "\n", "not a head"),
-                       (seal_line('{"format":1,"catalog":99}') + "\n", "another version")]:
+    for text, said in [
+        ("a list\nof words\n", "a journal without checksums"),
+        ('{"format":1,"catalog":1,"group":"c"}\n', "a journal without checksums .*removed, or --anew"),
+        (seal_line("words") + "\n", "not a head"),
+        (seal_line('{"format":1,"catalog":99}') + "\n", "another version"),
+    ]:
         path.write_text(text)
         with pytest.raises(BadRequest, match=said):
             build(tmp_path, ["c"], source=source())
@@ -203,8 +210,9 @@ def test_a_journal_of_something_else_is_refused(tmp_path: Path):
 
 @settings(max_examples=30, deadline=None)
 @given(place=st.floats(0, 1, exclude_max=True), bit=st.integers(0, 7))
-def test_a_bit_that_flips_in_a_journal_is_found(place: float, bit: int, whole: dict[str, bytes],
-                                                tmp_path_factory: pytest.TempPathFactory):
+def test_a_bit_that_flips_in_a_journal_is_found(
+    place: float, bit: int, whole: dict[str, bytes], tmp_path_factory: pytest.TempPathFactory
+):
     """Its record is made again; in the first line the journal is refused."""
     folder = tmp_path_factory.mktemp("flipped")
     build(folder, ["c"], source=source(), limit=10)
@@ -223,8 +231,9 @@ def test_a_bit_that_flips_in_a_journal_is_found(place: float, bit: int, whole: d
 
 @settings(max_examples=100, deadline=None)
 @given(place=st.floats(0, 1, exclude_max=True), bit=st.integers(0, 7), packed=st.booleans())
-def test_a_bit_that_flips_in_a_finished_file_is_found(place: float, bit: int, packed: bool, whole: dict[str, bytes],
-                                                      tmp_path_factory: pytest.TempPathFactory):
+def test_a_bit_that_flips_in_a_finished_file_is_found(
+    place: float, bit: int, packed: bool, whole: dict[str, bytes], tmp_path_factory: pytest.TempPathFactory
+):
     """Either the file is refused or its lines are what they were, as after a change of the time in gzip's head."""
     data = whole["c.jsonl"]
     lines = decode_lines(data, "c")
@@ -292,15 +301,16 @@ def test_a_defect_names_its_word_and_loses_nothing(workers: int, tmp_path: Path)
 
 
 @pytest.mark.parametrize("room", [10, 700, 3000])
-def test_a_full_disk_stops_the_build_and_keeps_the_journal(room: int, tmp_path: Path, whole: dict[str, bytes],
-                                                           monkeypatch: pytest.MonkeyPatch):
+def test_a_full_disk_stops_the_build_and_keeps_the_journal(
+    room: int, tmp_path: Path, whole: dict[str, bytes], monkeypatch: pytest.MonkeyPatch
+):
     """Only so many bytes can be written, the last write being cut short."""
     left, write = [room], os.write
 
     def full(file: int, data: bytes) -> int:
         if left[0] == 0:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        done = write(file, data[:left[0]])
+        done = write(file, data[: left[0]])
         left[0] -= done
         return done
 
@@ -333,9 +343,10 @@ def test_a_disk_full_at_the_end_keeps_the_journal(name: str, tmp_path: Path, mon
     assert (done.now, done.before) == (0, 18)
 
 
-@pytest.mark.parametrize(("target", "groups", "said"), [("there", ["nothing"], "unknown group"),
-                                                        ("no/such/folder", [], "cannot write"),
-                                                        ("file", [], "cannot write")])
+@pytest.mark.parametrize(
+    ("target", "groups", "said"),
+    [("there", ["nothing"], "unknown group"), ("no/such/folder", [], "cannot write"), ("file", [], "cannot write")],
+)
 def test_bad_requests_are_one_line_before_any_work(target: str, groups: list[str], said: str, tmp_path: Path):
     (tmp_path / "file").write_text("a file")
     with pytest.raises(BadRequest, match=said) as refused:
@@ -355,8 +366,9 @@ def test_files_round_trip_and_cut_off_ones_are_refused(whole: dict[str, bytes]):
         decode_lines(data.replace(b'"catalog":1', b'"catalog":9', 1), "c")
 
 
-def test_a_large_group_is_packed_and_holds_the_same(tmp_path: Path, whole: dict[str, bytes],
-                                                    monkeypatch: pytest.MonkeyPatch):
+def test_a_large_group_is_packed_and_holds_the_same(
+    tmp_path: Path, whole: dict[str, bytes], monkeypatch: pytest.MonkeyPatch
+):
     """The same lines, whichever of the two files a group had before; a file that is cut off is refused."""
     monkeypatch.setattr("hrsynth.catalog.store.PACKED_ABOVE", 20)
     build(tmp_path, source=source())

@@ -26,8 +26,9 @@ def test_the_oracle_agrees_with_a_record(word: str):
 
 
 @pytest.mark.some(2)
-@pytest.mark.parametrize("false", [
-    {"mobility": 4}, {"dof": 2}, {"rank": 2}, {"motion": "3R"}, {"minimal": [["1", "2"]], "fewest": 2}])
+@pytest.mark.parametrize(
+    "false", [{"mobility": 4}, {"dof": 2}, {"rank": 2}, {"motion": "3R"}, {"minimal": [["1", "2"]], "fewest": 2}]
+)
 def test_the_oracle_finds_a_false_record(false: dict):
     assert list(Witness({**record("3(Rz*-Rz-Rz)"), **false}).complaints())
 

@@ -68,8 +68,15 @@ def test_a_list_reads_only_the_entries_that_it_prints():
 
 def test_why_a_word_is_refused_makes_no_column_wide():
     reason = "the mechanism cannot move " * 8
-    seen = {"word": "a", "notation": "3-RRR", "dof": 3, "motion": "2T1R", "verdict": "controllable", "rank": 3,
-            "fewest": 3}
+    seen = {
+        "word": "a",
+        "notation": "3-RRR",
+        "dof": 3,
+        "motion": "2T1R",
+        "verdict": "controllable",
+        "rank": 3,
+        "fewest": 3,
+    }
     told = entries([seen, {"word": "b", "notation": "3-PPP", "refused": reason}], 2).splitlines()
     assert max(map(len, told)) <= LINE
     assert "refused" in told[3]
@@ -103,12 +110,15 @@ def test_check_tells_what_is_stale_with_status_3(run, folder: Path):
 
 
 def test_list_finds_what_python_finds(run, folder: Path):
-    for options, asked in [([], {}), (["--dof", 3], {"dof": 3}), (["--legs", "?-R*", "--base-motors"],
-                           {"legs": "?-R*", "base_motors": True}), (["--verdict", "controllable", "--moving-motors"],
-                           {"verdict": "controllable", "base_motors": False}),
-                           (["--text", "two lines"], {"text": "two lines"}), (["--legs", "3"], {"legs": 3}),
-                           (["--group", "d", "--fewest", 2, "--motion", "3T"],
-                           {"group": "d", "fewest": 2, "motion": "3T"})]:
+    for options, asked in [
+        ([], {}),
+        (["--dof", 3], {"dof": 3}),
+        (["--legs", "?-R*", "--base-motors"], {"legs": "?-R*", "base_motors": True}),
+        (["--verdict", "controllable", "--moving-motors"], {"verdict": "controllable", "base_motors": False}),
+        (["--text", "two lines"], {"text": "two lines"}),
+        (["--legs", "3"], {"legs": 3}),
+        (["--group", "d", "--fewest", 2, "--motion", "3T"], {"group": "d", "fewest": 2, "motion": "3T"}),
+    ]:
         wanted = load(folder, **asked)
         status, out, err = run("list", "--catalog", folder, *options, "--json")
         data = json.loads(out)
@@ -123,20 +133,43 @@ def test_list_finds_what_python_finds(run, folder: Path):
 def test_show_draws_and_writes_a_robot(run, tmp_path: Path):
     store = tmp_path / "real"
     word = "3(Rz*-Rz-Rz)"
-    facts = {"word": word, "group": "g", "notation": "3-R*RR", "hidden": "3-PiR*R", "legs": 3, "dof": 3,
-             "motion": "2T1R", "mobility": 3, "idle": 0, "verdict": "controllable", "rank": 3,
-             "exact": True, "instances": 1, "motors": 3, "base_motors": True, "fewest": 3,
-             "minimal": [["1", "2", "3"]], "lost": [], "modes_bound": 6, "modes_seen": 2,
-             "condition": "the lines meet in a point"}
+    facts = {
+        "word": word,
+        "group": "g",
+        "notation": "3-R*RR",
+        "hidden": "3-PiR*R",
+        "legs": 3,
+        "dof": 3,
+        "motion": "2T1R",
+        "mobility": 3,
+        "idle": 0,
+        "verdict": "controllable",
+        "rank": 3,
+        "exact": True,
+        "instances": 1,
+        "motors": 3,
+        "base_motors": True,
+        "fewest": 3,
+        "minimal": [["1", "2", "3"]],
+        "lost": [],
+        "modes_bound": 6,
+        "modes_seen": 2,
+        "condition": "the lines meet in a point",
+    }
     build(store, source=hrsynth.catalog.build.WordSource({"g": lambda: [word]}, lambda _: facts))
     file = tmp_path / "robot.urdf"
     status, out, err = run("show", "(Rz*-Rz-Rz)+2(Rz*-Rz-Rz)", "--catalog", store, "-o", file)
     assert (status, err) == (0, "")
-    for line in (r"3\(Rz\*-Rz-Rz\)   3-R\*RR", r"legs 1, 2, 3  base ── Rz\* ── Rz ══ Rz ── platform",
-                 r"dof +3, 2T1R \(mobility 3, of which 0 idle\)", r"verdict +controllable \(rank 3 of 3\)",
-                 r"exact +proved", r"legs needed +\{1, 2, 3\}",
-                 r"modes +2 real seen of 6 complex; near modes not counted",
-                 rf"The robot is written to {re.escape(str(file))}\."):
+    for line in (
+        r"3\(Rz\*-Rz-Rz\)   3-R\*RR",
+        r"legs 1, 2, 3  base ── Rz\* ── Rz ══ Rz ── platform",
+        r"dof +3, 2T1R \(mobility 3, of which 0 idle\)",
+        r"verdict +controllable \(rank 3 of 3\)",
+        r"exact +proved",
+        r"legs needed +\{1, 2, 3\}",
+        r"modes +2 real seen of 6 complex; near modes not counted",
+        rf"The robot is written to {re.escape(str(file))}\.",
+    ):
         assert re.search(f"^{line}$", out, re.MULTILINE), out
     robot = hrsynth.load(file)
     assert len(robot.joints) == 9
@@ -154,8 +187,10 @@ def test_each_smallest_set_has_the_hidden_robot_of_its_legs(run, word: str, tmp_
     """It is what `derive` finds in the robot file; the sets are those of `legs`, none where nothing is observed."""
     file = tmp_path / "robot.urdf"
     data = json.loads(run("show", word, "-o", file, "--json")[1])
-    alone = [(each["legs"], hrsynth.derive(file, observe=each["legs"]).hidden_architecture.ascii)
-             for each in data["smallest"]]
+    alone = [
+        (each["legs"], hrsynth.derive(file, observe=each["legs"]).hidden_architecture.ascii)
+        for each in data["smallest"]
+    ]
     assert [(each["legs"], each["hidden"]) for each in data["smallest"]] == alone
     assert all(each["problem"] is None for each in data["smallest"])
     for each in data["smallest"]:
@@ -186,11 +221,15 @@ def test_show_studies_what_is_not_in_the_catalog(run, folder: Path):
     assert json.loads(out)["note"] == "not in the catalog, studied now"
 
 
-@pytest.mark.parametrize(("word", "legs"), [
-    ("2(Rt*-2SSt)+(Pz*-2SSt)", ["base ── Rt* ══ 2SSt ══ platform", "base ── Pz* ══ 2SSt ══ platform"]),
-    ("3(Rz*!-Rz-Rz)", ["base ── Rz* ══ Rz ── Rz ── platform"]),
-    ("3(Rz-Rz*-Rz)+(Rz-Rz-Rz)", ["base ── Rz ── Rz ══ Rz ── platform", "base ── Rz ── Rz* ══ Rz ── platform"]),
-    ("6(Utn-Pl*-S)", ["base ── Utn ══ Pl* ── S ── platform"])])
+@pytest.mark.parametrize(
+    ("word", "legs"),
+    [
+        ("2(Rt*-2SSt)+(Pz*-2SSt)", ["base ── Rt* ══ 2SSt ══ platform", "base ── Pz* ══ 2SSt ══ platform"]),
+        ("3(Rz*!-Rz-Rz)", ["base ── Rz* ══ Rz ── Rz ── platform"]),
+        ("3(Rz-Rz*-Rz)+(Rz-Rz-Rz)", ["base ── Rz ── Rz ══ Rz ── platform", "base ── Rz ── Rz* ══ Rz ── platform"]),
+        ("6(Utn-Pl*-S)", ["base ── Utn ══ Pl* ── S ── platform"]),
+    ],
+)
 def test_drawings_show_motors_and_watched_links(word: str, legs: list[str]):
     """P joints do not turn what is watched: either side of one is the same direction."""
     drawn = [re.sub(r" ══ Pl\* ── | ── Pl\* ══ ", " ══ Pl* ── ", line) for line in drawing(parse(word)).splitlines()]
@@ -244,8 +283,9 @@ def test_without_a_command_it_tells_which_there_are(run):
     assert all(f"\n  {command}" in out for command in ("build", "list", "show"))
 
 
-def test_the_meter_tells_the_time_left_on_a_terminal(monkeypatch: pytest.MonkeyPatch,
-                                                     capsys: pytest.CaptureFixture[str]):
+def test_the_meter_tells_the_time_left_on_a_terminal(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
     monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
     with Progress(wait=-1.0, counted=True) as meter:
         meter.count("c", 2, 10)
@@ -261,10 +301,10 @@ def test_the_meter_tells_the_time_left_on_a_terminal(monkeypatch: pytest.MonkeyP
 
 
 @pytest.mark.some(1)
-@pytest.mark.parametrize(("option", "value", "allowed"), [("--verdict", "contrlable", "uncontrollable"),
-                                                          ("--group", "foo", "planar")])
-def test_what_no_architecture_has_is_refused(option: str, value: str, allowed: str,
-                                             capsys: pytest.CaptureFixture[str]):
+@pytest.mark.parametrize(
+    ("option", "value", "allowed"), [("--verdict", "contrlable", "uncontrollable"), ("--group", "foo", "planar")]
+)
+def test_what_no_architecture_has_is_refused(option: str, value: str, allowed: str, capsys: pytest.CaptureFixture[str]):
     assert execute(["catalog", "list", option, value]) == 2
     said = capsys.readouterr()
     assert said.out == ""

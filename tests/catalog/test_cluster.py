@@ -29,9 +29,14 @@ def cluster(code: str) -> tuple[subprocess.Popen[str], str]:
     """A process that runs a cluster, and its address."""
     head = "import time; from distributed import LocalCluster\nif __name__ == '__main__':\n    cluster = LocalCluster("
     tail = "dashboard_address=None)\n    print(cluster.scheduler_address, flush=True)\n    time.sleep(300)\n"
-    process = subprocess.Popen([sys.executable, "-c", head + code + tail], stdout=subprocess.PIPE, text=True,
-                               stderr=subprocess.DEVNULL, env=os.environ | {"PYTHONPATH": str(TESTS)},
-                               start_new_session=True)
+    process = subprocess.Popen(
+        [sys.executable, "-c", head + code + tail],
+        stdout=subprocess.PIPE,
+        text=True,
+        stderr=subprocess.DEVNULL,
+        env=os.environ | {"PYTHONPATH": str(TESTS)},
+        start_new_session=True,
+    )
     return process, process.stdout.readline().strip()
 
 
@@ -46,6 +51,7 @@ def two_workers() -> Iterator[tuple[subprocess.Popen[str], str]]:
 
 def meanwhile(folder: Path, act) -> threading.Thread:
     """Do something as soon as the build has written some records."""
+
     def watch() -> None:
         end = time.monotonic() + 60
         while lines_in(list(folder.glob("*.part"))) < 10 and time.monotonic() < end:
@@ -94,12 +100,22 @@ def test_a_cluster_that_dies_stops_the_build_and_keeps_the_journal(two_workers, 
     assert content(tmp_path / "far") == content(tmp_path / "near")
 
 
-@pytest.mark.parametrize(("address", "said", "status"), [
-    ("tcp://127.0.0.1:1", "no cluster answers at tcp://127.0.0.1:1 within", 3),
-    ("smoke://hill", "address of a cluster, found 'smoke://hill'", 2),
-    ("tcp://127.0.0.1:none", "address of a cluster, found", 2)])
-def test_a_dead_or_wrong_address_is_one_line(address: str, said: str, status: int, tmp_path: Path,
-                                             monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]):
+@pytest.mark.parametrize(
+    ("address", "said", "status"),
+    [
+        ("tcp://127.0.0.1:1", "no cluster answers at tcp://127.0.0.1:1 within", 3),
+        ("smoke://hill", "address of a cluster, found 'smoke://hill'", 2),
+        ("tcp://127.0.0.1:none", "address of a cluster, found", 2),
+    ],
+)
+def test_a_dead_or_wrong_address_is_one_line(
+    address: str,
+    said: str,
+    status: int,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+):
     monkeypatch.setattr("hrsynth.catalog.executors.PATIENCE", 1.0)
     with pytest.raises((BuildStopped, BadRequest), match=re.escape(said)) as stopped:
         build(tmp_path, source=source(), cluster=address)

@@ -21,21 +21,45 @@ JOINT = re.compile(r"(2SS|2US|Pi|R|P|C|U|S)[a-z]*([*]?)!?")
 QUESTIONS: dict[str, tuple[str, dict[str, Any], int]] = {
     "3T1R, R motors at the base, two legs observed": (
         "--motion 3T1R --motors R --base-motors --verdict controllable --fewest 2",
-        {"motion": "3T1R", "motors": {"R"}, "base_motors": True, "verdict": "controllable", "fewest": 2}, 17),
+        {"motion": "3T1R", "motors": {"R"}, "base_motors": True, "verdict": "controllable", "fewest": 2},
+        17,
+    ),
     "the same whose motors determine all freedoms, without parallelograms": (
         "--motion 3T1R --motors R --base-motors --verdict controllable --fewest 2 --driven --no-parallelograms",
-        {"motion": "3T1R", "motors": {"R"}, "base_motors": True, "verdict": "controllable", "fewest": 2,
-         "driven": True, "parallelograms": False}, 9),
+        {
+            "motion": "3T1R",
+            "motors": {"R"},
+            "base_motors": True,
+            "verdict": "controllable",
+            "fewest": 2,
+            "driven": True,
+            "parallelograms": False,
+        },
+        9,
+    ),
     "translations by linear motors at the base": (
         "--motion 3T --motors P --base-motors --driven --no-parallelograms --verdict controllable",
-        {"motion": "3T", "motors": {"P"}, "base_motors": True, "driven": True, "parallelograms": False,
-         "verdict": "controllable"}, 401),
+        {
+            "motion": "3T",
+            "motors": {"P"},
+            "base_motors": True,
+            "driven": True,
+            "parallelograms": False,
+            "verdict": "controllable",
+        },
+        401,
+    ),
     "planar robots with moving R motors": (
         "--motion 2T1R --motors R --moving-motors --legs 3 --fewest 3",
-        {"motion": "2T1R", "motors": {"R"}, "base_motors": False, "legs": 3, "fewest": 3}, 2663),
+        {"motion": "2T1R", "motors": {"R"}, "base_motors": False, "legs": 3, "fewest": 3},
+        2663,
+    ),
     "both kinds of motors, parallelograms, not controllable": (
         "--motion 3T --motors P+R --parallelograms --verdict 'partially controllable'",
-        {"motion": "3T", "motors": {"P", "R"}, "parallelograms": True, "verdict": "partially controllable"}, 979)}
+        {"motion": "3T", "motors": {"P", "R"}, "parallelograms": True, "verdict": "partially controllable"},
+        979,
+    ),
+}
 """Options, what they mean of :func:`plain`, and how many there are."""
 
 
@@ -51,10 +75,13 @@ def plain() -> tuple[dict[str, Any], ...]:
 
 def _with_motors(record: dict[str, Any]) -> dict[str, Any]:
     if "choices" not in record:
-        joints = [JOINT.fullmatch(part) for leg in re.findall(r"[(]([^()]*)[)]", record["word"])
-                  for part in leg.split("-")]
-        return record | {"motors": {each[1] for each in joints if each and each[2]},
-                         "parallelograms": any(each is None or each[1] in ("Pi", "2SS", "2US") for each in joints)}
+        joints = [
+            JOINT.fullmatch(part) for leg in re.findall(r"[(]([^()]*)[)]", record["word"]) for part in leg.split("-")
+        ]
+        return record | {
+            "motors": {each[1] for each in joints if each and each[2]},
+            "parallelograms": any(each is None or each[1] in ("Pi", "2SS", "2US") for each in joints),
+        }
     letters = record["word"].lstrip("P").lstrip("0123456789")
     working = [each for each in record["choices"] if each["rank"] == record["dof"]] or record["choices"]
     return record | {"motors": {letters[j - 1] for leg in working[0]["joints"] for j in leg}, "parallelograms": False}
@@ -78,17 +105,31 @@ def test_sqlite_files_answer_as_lines_do(tmp_path: Path):
     file, lines = tmp_path / "some.sqlite", store(ALL)
     for name in groups:
         Database(file).write(name, lines.lines([name], {})[::5])
-    for asked in ({"motors": "R", "driven": True}, {"motors": ("P", "P+R"), "base_motors": False},
-                  {"parallelograms": False, "motion": "3T1R"}, {"driven": False, "parallelograms": True}):
+    for asked in (
+        {"motors": "R", "driven": True},
+        {"motors": ("P", "P+R"), "base_motors": False},
+        {"parallelograms": False, "motion": "3T1R"},
+        {"driven": False, "parallelograms": True},
+    ):
         assert [each["word"] for each in load(file, **asked)] == [each["word"] for each in load(file).where(**asked)]
 
 
-@pytest.mark.parametrize(("option", "value", "known"), [
-    ("--text", "", "a name or a text"), ("--text", "  ", "a name or a text"), ("--motors", "X", "R, P, C, U"),
-    ("--motors", "", "R, P, C, U"), *(pytest.param(*each, marks=pytest.mark.slow) for each in [
-        ("--text", "Quatro", "Quattro"), ("--motion", "SCARA", "3T1R"), ("--modes", "9999", "1, 2, 4")])])
-def test_a_search_that_cannot_be_understood_is_refused(option: str, value: str, known: str,
-                                                       capsys: pytest.CaptureFixture[str]):
+@pytest.mark.parametrize(
+    ("option", "value", "known"),
+    [
+        ("--text", "", "a name or a text"),
+        ("--text", "  ", "a name or a text"),
+        ("--motors", "X", "R, P, C, U"),
+        ("--motors", "", "R, P, C, U"),
+        *(
+            pytest.param(*each, marks=pytest.mark.slow)
+            for each in [("--text", "Quatro", "Quattro"), ("--motion", "SCARA", "3T1R"), ("--modes", "9999", "1, 2, 4")]
+        ),
+    ],
+)
+def test_a_search_that_cannot_be_understood_is_refused(
+    option: str, value: str, known: str, capsys: pytest.CaptureFixture[str]
+):
     assert execute(["catalog", "list", f"{option}={value}"]) == 2
     said = capsys.readouterr()
     assert (said.out, len(said.err.splitlines())) == ("", 1)

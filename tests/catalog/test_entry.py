@@ -22,13 +22,30 @@ from hrsynth.kinematics.relation import relation
 from oracle import Oracle
 
 SHIPPED = {
-    "3rrr_m1": "3(Rz*-Rz-Rz)", "3rrr_m2": "3(Rz-Rz*-Rz)", "3rpr_m1": "3(Rz*-Pl-Rz)", "3rpr_m2": "3(Rz-Pl*-Rz)",
-    "3prr_m1": "3(Ph*-Rz-Rz)", "3prr_m2": "3(Ph-Rz*-Rz)", "3ppr_m1": "3(Ph*-Pj-Rz)", "3ppr_m2": "3(Ph-Pj*-Rz)",
-    "3prp": "3(Ph*-Rz-Pj)", "3rrp": "3(Rz*-Rz-Ph)", "gough_stewart": "6(Utn-Pl*-S)", "3upu": "3(Utn-Pl*-Unt)",
-    "3rps": "3(Rt-Pl*-S)", "delta": "3(Rt*-2SSt)", "quattro_rigid": "4(Rt*-2SSt)",
-    "quattro": "bar:2(Rt*-2SSt)|2(Rt*-2SSt)", "orthoglide": "(Px*-2SSy)+(Py*-2SSz)+(Pz*-2SSx)",
-    "linear_delta": "3(Pk*-2SSt)", "uranesx": "3(Pz*-2SSt)", "i4l": "slide:2(Px*-2SSt)|2(Px*-2SSt)",
-    "3ruu": "3(Rt*-Utn-Unt)", "3puu": "3(Pk*-Utn-Unt)", "hexa": "6(Rt*-Utn-S)", "hexaglide": "6(Px*-Uyn-S)",
+    "3rrr_m1": "3(Rz*-Rz-Rz)",
+    "3rrr_m2": "3(Rz-Rz*-Rz)",
+    "3rpr_m1": "3(Rz*-Pl-Rz)",
+    "3rpr_m2": "3(Rz-Pl*-Rz)",
+    "3prr_m1": "3(Ph*-Rz-Rz)",
+    "3prr_m2": "3(Ph-Rz*-Rz)",
+    "3ppr_m1": "3(Ph*-Pj-Rz)",
+    "3ppr_m2": "3(Ph-Pj*-Rz)",
+    "3prp": "3(Ph*-Rz-Pj)",
+    "3rrp": "3(Rz*-Rz-Ph)",
+    "gough_stewart": "6(Utn-Pl*-S)",
+    "3upu": "3(Utn-Pl*-Unt)",
+    "3rps": "3(Rt-Pl*-S)",
+    "delta": "3(Rt*-2SSt)",
+    "quattro_rigid": "4(Rt*-2SSt)",
+    "quattro": "bar:2(Rt*-2SSt)|2(Rt*-2SSt)",
+    "orthoglide": "(Px*-2SSy)+(Py*-2SSz)+(Pz*-2SSx)",
+    "linear_delta": "3(Pk*-2SSt)",
+    "uranesx": "3(Pz*-2SSt)",
+    "i4l": "slide:2(Px*-2SSt)|2(Px*-2SSt)",
+    "3ruu": "3(Rt*-Utn-Unt)",
+    "3puu": "3(Pk*-Utn-Unt)",
+    "hexa": "6(Rt*-Utn-S)",
+    "hexaglide": "6(Px*-Uyn-S)",
     "6pus": "6(Pk*-Utn-S)",
 }
 """Shipped robots of which every special relation is said by a word."""
@@ -60,8 +77,9 @@ def _symmetric(platform, motors):
         if platform and letters[-1] != "R":
             continue
         for motor in range(motors):
-            leg = LegWord(tuple(joint.__class__(joint.letter, joint.axes, i == motor) for i, joint in
-                            enumerate(chain.joints)))
+            leg = LegWord(
+                tuple(joint.__class__(joint.letter, joint.axes, i == motor) for i, joint in enumerate(chain.joints))
+            )
             table[letters, motor] = entry(str(RobotWord.of([leg] * (2 if platform else 3), platform=platform)))
     return table
 
@@ -75,29 +93,76 @@ def test_table_1_falls_out():
     chosen = set()
     for letters, motor in driven:
         chosen.add(min([(letters, motor), (letters[::-1], 2 - motor)], key=lambda key: (key[1], key[0])))
-    assert {f"{word[:motor + 1]}*{word[motor + 1:]}" for word, motor in chosen} == {
-        "R*RR", "RR*R", "R*PR", "RP*R", "P*RR", "PR*R", "P*PR", "PP*R", "P*RP", "R*RP"}
-    legs = {f"{word[:motor + 1]}*{word[motor + 1:]}": table[word, motor]["hidden"] for word, motor in chosen}
-    assert legs == {"R*RR": "3-PiR*R", "RR*R": "3-PiR*R", "R*PR": "3-R*PR", "RP*R": "3-R*PR", "P*RR": "3-PR*R",
-                    "PR*R": "3-PR*R", "P*PR": None, "PP*R": None, "P*RP": "3-PR*P", "R*RP": "3-PiR*P"}
+    assert {f"{word[: motor + 1]}*{word[motor + 1 :]}" for word, motor in chosen} == {
+        "R*RR",
+        "RR*R",
+        "R*PR",
+        "RP*R",
+        "P*RR",
+        "PR*R",
+        "P*PR",
+        "PP*R",
+        "P*RP",
+        "R*RP",
+    }
+    legs = {f"{word[: motor + 1]}*{word[motor + 1 :]}": table[word, motor]["hidden"] for word, motor in chosen}
+    assert legs == {
+        "R*RR": "3-PiR*R",
+        "RR*R": "3-PiR*R",
+        "R*PR": "3-R*PR",
+        "RP*R": "3-R*PR",
+        "P*RR": "3-PR*R",
+        "PR*R": "3-PR*R",
+        "P*PR": None,
+        "PP*R": None,
+        "P*RP": "3-PR*P",
+        "R*RP": "3-PiR*P",
+    }
 
 
 @pytest.mark.slow
 def test_the_twelve_symmetric_planar_robots_fall_out():
     """MMT 4.1.2: motors on the base or on the second joint, all legs observed at their last segment."""
-    found = {each["notation"] for platform in ("", "point") for (letters, _), each in _symmetric(platform, 2).items()
-             if each["verdict"] == "controllable" and each["driven"]}
-    assert found == {"R*RRRR*", "RR*RR*R", "R*PRPR*", "RP*RP*R", "P*RRRP*", "PR*RR*P",
-                     "3-R*RR", "3-RR*R", "3-R*PR", "3-RP*R", "3-P*RR", "3-PR*R"}
+    found = {
+        each["notation"]
+        for platform in ("", "point")
+        for (letters, _), each in _symmetric(platform, 2).items()
+        if each["verdict"] == "controllable" and each["driven"]
+    }
+    assert found == {
+        "R*RRRR*",
+        "RR*RR*R",
+        "R*PRPR*",
+        "RP*RP*R",
+        "P*RRRP*",
+        "PR*RR*P",
+        "3-R*RR",
+        "3-RR*R",
+        "3-R*PR",
+        "3-RP*R",
+        "3-P*RR",
+        "3-PR*R",
+    }
 
 
 def test_what_is_driven_changes_nothing_else():
     can_be_driven = [text for text in words("planar") if "(Pi" not in text]
     for text in random.Random(1).sample(can_be_driven, 3):
         word = parse(text)
-        other = str(RobotWord.of([LegWord(tuple(joint.__class__(joint.letter, joint.axes, i == 0, joint.watched)
-                                       for i, joint in enumerate(leg.joints))) for leg in word.legs],
-                            platform=word.platform))
+        other = str(
+            RobotWord.of(
+                [
+                    LegWord(
+                        tuple(
+                            joint.__class__(joint.letter, joint.axes, i == 0, joint.watched)
+                            for i, joint in enumerate(leg.joints)
+                        )
+                    )
+                    for leg in word.legs
+                ],
+                platform=word.platform,
+            )
+        )
         one, two = entry(text), entry(other)
         for field in one.keys() - {"word", "notation", "motors", "motor_rank", "driven", "base_motors"}:
             assert one[field] == two[field]
@@ -107,10 +172,13 @@ def test_what_is_driven_changes_nothing_else():
 @pytest.mark.parametrize("part", range(10))
 def test_fifty_entries_are_the_same_in_another_process(part: int):
     chosen = random.Random(11).sample([word for name in GROUPS for word in words(name)], 50)[part::10]
-    code = ("import json, sys; from hrsynth.catalog.entry import entry; "
-            "[print(json.dumps(entry(line.strip()), sort_keys=True)) for line in sys.stdin]")
-    there = subprocess.run([sys.executable, "-c", code], input="\n".join(reversed(chosen)), text=True,
-                           capture_output=True, check=True).stdout.splitlines()
+    code = (
+        "import json, sys; from hrsynth.catalog.entry import entry; "
+        "[print(json.dumps(entry(line.strip()), sort_keys=True)) for line in sys.stdin]"
+    )
+    there = subprocess.run(
+        [sys.executable, "-c", code], input="\n".join(reversed(chosen)), text=True, capture_output=True, check=True
+    ).stdout.splitlines()
     assert there == [json.dumps(entry(word), sort_keys=True) for word in reversed(chosen)]
 
 
@@ -164,7 +232,8 @@ def _rank(rows):
     return int(np.linalg.matrix_rank(rows, tol=1e-8))
 
 
-@pytest.mark.parametrize(("word", "own"), [("3(Rz-Rz*-Rz)", False), ("3(Ra*-Ro-Ro-Ro)", False),
-                                           ("3(Ra-Ro*-Ro-Ro)", True)])
+@pytest.mark.parametrize(
+    ("word", "own"), [("3(Rz-Rz*-Rz)", False), ("3(Ra*-Ro-Ro-Ro)", False), ("3(Ra-Ro*-Ro-Ro)", True)]
+)
 def test_motors_count_where_they_keep_joints_apart(word, own):
     assert str(model(parse(word))) == (word if own else str(parse(word).driven))

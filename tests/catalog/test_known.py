@@ -28,8 +28,7 @@ def records(group: str) -> list[dict[str, object]]:
 
 @pytest.mark.slow
 def test_every_known_robot_is_in_the_catalog_under_its_canonical_word():
-    held = {bare(str(each["word"])) for group in GROUPS
-            for each in records(group) if "!" not in str(each["word"])}
+    held = {bare(str(each["word"])) for group in GROUPS for each in records(group) if "!" not in str(each["word"])}
     assert set(aliases()) <= held
     assert all(str(parse(word)) == word for word in aliases())
 
@@ -44,9 +43,17 @@ def test_names_are_found_without_reading_every_word(group: str):
 
 
 @pytest.mark.some(1, 2)
-@pytest.mark.parametrize(("text", "word"), [
-    ("Delta", "3(Rt*-2SSt)"), ("3-RPS", "3(Rt-Pl*-S)"), ("stewart", "6(S-Pl*-S)"), ("Hexaglide", "6(Px*-Uyn-S)"),
-    ("3-R*RR", "3(Rz*-Rz-Rz)"), ("'3(Rz-Rz*-Rz)'", "3(Rz-Rz*-Rz)")])
+@pytest.mark.parametrize(
+    ("text", "word"),
+    [
+        ("Delta", "3(Rt*-2SSt)"),
+        ("3-RPS", "3(Rt-Pl*-S)"),
+        ("stewart", "6(S-Pl*-S)"),
+        ("Hexaglide", "6(Px*-Uyn-S)"),
+        ("3-R*RR", "3(Rz*-Rz-Rz)"),
+        ("'3(Rz-Rz*-Rz)'", "3(Rz-Rz*-Rz)"),
+    ],
+)
 def test_show_takes_a_name_as_the_search_does(capsys, text: str, word: str):
     assert execute(["catalog", "show", text.strip("'"), "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)
@@ -106,4 +113,5 @@ def test_every_cure_and_every_step_of_the_catalog_is_told_in_sentences(group: st
 def test_a_cure_names_what_is_measured_and_where():
     assert cure({"dof": 3, "cure": "direction link_1_2 and encoder joint_3_1"}) == (
         "Measure the direction of the link after joint 2 of leg 1 (link_1_2) and the encoder of joint 1 of leg 3 "
-        "(joint_3_1) as well: then all 3 freedoms are seen.")
+        "(joint_3_1) as well: then all 3 freedoms are seen."
+    )

@@ -32,7 +32,8 @@ def test_entries_say_what_the_screws_of_the_legs_say(tables: Path):
         assert entry["dof"] == sum(found.motion)
         assert entry["motion"].startswith(f"{found.motion[0]}T")
         assert [each["rank"] for each in entry["choices"]] == [
-            entry["dof"] - found.motors[drive.driven].left for drive in robot.drives]
+            entry["dof"] - found.motors[drive.driven].left for drive in robot.drives
+        ]
         assert entry["driven"] == any(each["rank"] == entry["dof"] for each in entry["choices"])
 
 
@@ -42,8 +43,9 @@ def test_sets_are_all_but_for_turns_of_the_robot(tables: Path):
         n, step = robot.legs, 2 if robot.base in range(5, 9) or robot.platform in range(4, 7) else 1
         turns = range(0, n, step)
         for size in range(1, n + 1):
-            fixed = [sum({(i + by) % n for i in each} == set(each) for each in combinations(range(n), size))
-                     for by in turns]
+            fixed = [
+                sum({(i + by) % n for i in each} == set(each) for each in combinations(range(n), size)) for by in turns
+            ]
             assert len(list(_sets(robot, size))) == sum(fixed) / len(turns)
 
 
@@ -63,12 +65,14 @@ def test_the_command_line(tables: Path, tmp_path: Path, capsys: pytest.CaptureFi
         assert "watched link" not in out
     assert execute(["derive", str(robot), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["verdict"] == "controllable"
-    for arguments, said in ((["show", "P3RRR1G1P1", "--catalog", str(kept), "-o", str(robot)], "--tables FOLDER"),
-                            (["show", "P9", "--tables", str(tables)], "not a robot of these tables"),
-                            (["site", "--catalog", str(kept), "-o", str(tmp_path / "site")], "no pages are made"),
-                            (["build", "--tables", str(tables)], "-o FOLDER"),
-                            (["build", "--tables", str(tmp_path), "-o", str(kept)], "no table of robots"),
-                            (["build", "planar", "--tables", str(tables), "-o", str(kept)], "unknown group")):
+    for arguments, said in (
+        (["show", "P3RRR1G1P1", "--catalog", str(kept), "-o", str(robot)], "--tables FOLDER"),
+        (["show", "P9", "--tables", str(tables)], "not a robot of these tables"),
+        (["site", "--catalog", str(kept), "-o", str(tmp_path / "site")], "no pages are made"),
+        (["build", "--tables", str(tables)], "-o FOLDER"),
+        (["build", "--tables", str(tmp_path), "-o", str(kept)], "no table of robots"),
+        (["build", "planar", "--tables", str(tables), "-o", str(kept)], "unknown group"),
+    ):
         assert execute(["catalog", *arguments]) == 2
         assert said in (err := capsys.readouterr().err)
         assert err.count("\n") == 1

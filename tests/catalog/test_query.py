@@ -29,20 +29,27 @@ from hrsynth.catalog.words import SENSORS, VERSION
 from hrsynth.cli import execute
 from hrsynth.errors import BadRequest
 
-ASKED = st.fixed_dictionaries({}, optional={
-    "group": st.sampled_from(["c", "d", "e", ("c", "d")]),
-    "dof": st.one_of(st.none(), st.integers(1, 7)),
-    "motion": st.sampled_from(["2T", "3T", "3T1R", "3T2R", "6T"]),
-    "verdict": st.sampled_from([*VERDICTS, VERDICTS[:2], "none"]),
-    "base_motors": st.sampled_from([None, True, False]),
-    "driven": st.sampled_from([None, True, False]),
-    "motors": st.sampled_from(["R", "P+R"]),
-    "parallelograms": st.sampled_from([None, True, False]),
-    "fewest": st.integers(0, 6),
-    "modes": st.integers(1, 9),
-    "legs": st.one_of(st.integers(1, 7), st.sampled_from(["3", "?-R*", "*S", "6-UPS", "UPS", "R?R", "(c0?*)", "R-{*"]),
-                      st.sampled_from([f"4-{chain}" for chain in CHAINS])),
-    "text": st.sampled_from(["ROTATION", "σ", "two lines", "(d", "nowhere", "", "['", "1\x1f"])})
+ASKED = st.fixed_dictionaries(
+    {},
+    optional={
+        "group": st.sampled_from(["c", "d", "e", ("c", "d")]),
+        "dof": st.one_of(st.none(), st.integers(1, 7)),
+        "motion": st.sampled_from(["2T", "3T", "3T1R", "3T2R", "6T"]),
+        "verdict": st.sampled_from([*VERDICTS, VERDICTS[:2], "none"]),
+        "base_motors": st.sampled_from([None, True, False]),
+        "driven": st.sampled_from([None, True, False]),
+        "motors": st.sampled_from(["R", "P+R"]),
+        "parallelograms": st.sampled_from([None, True, False]),
+        "fewest": st.integers(0, 6),
+        "modes": st.integers(1, 9),
+        "legs": st.one_of(
+            st.integers(1, 7),
+            st.sampled_from(["3", "?-R*", "*S", "6-UPS", "UPS", "R?R", "(c0?*)", "R-{*"]),
+            st.sampled_from([f"4-{chain}" for chain in CHAINS]),
+        ),
+        "text": st.sampled_from(["ROTATION", "σ", "two lines", "(d", "nowhere", "", "['", "1\x1f"]),
+    },
+)
 
 
 @pytest.fixture(scope="module")
@@ -98,11 +105,17 @@ def test_a_query_finds_what_a_plain_reading_finds(asked: dict[str, Any], stores:
     assert [record["word"] for record in load(big, **asked)] == wanted
 
 
-ANY_FIELD = st.fixed_dictionaries({}, optional={
-    "dof": st.sampled_from([2, 3, 3.0, 7]), "base_motors": st.sampled_from([True, False, 1, 0]),
-    "verdict": st.sampled_from([*VERDICTS, ("controllable", "uncontrollable"), "no"]), "legs": st.sampled_from(
-        [3, "3", "4", "?-R*", "*RP*", (2, "3-*")]), "modes": st.sampled_from([6, "6", None]),
-    "text": st.sampled_from(["hexaglide", "Delta", "RRR", "true", "1", "', '", " 2", "1, 2", "[", "lift 1", "ü"])})
+ANY_FIELD = st.fixed_dictionaries(
+    {},
+    optional={
+        "dof": st.sampled_from([2, 3, 3.0, 7]),
+        "base_motors": st.sampled_from([True, False, 1, 0]),
+        "verdict": st.sampled_from([*VERDICTS, ("controllable", "uncontrollable"), "no"]),
+        "legs": st.sampled_from([3, "3", "4", "?-R*", "*RP*", (2, "3-*")]),
+        "modes": st.sampled_from([6, "6", None]),
+        "text": st.sampled_from(["hexaglide", "Delta", "RRR", "true", "1", "', '", " 2", "1, 2", "[", "lift 1", "ü"]),
+    },
+)
 
 
 @settings(deadline=None)
@@ -146,8 +159,10 @@ def older(layout: str, every: Folder, path: Path) -> Path:
     with contextlib.closing(sqlite3.connect(path)) as file:
         file.execute("CREATE TABLE versions (format INTEGER, catalog INTEGER)")
         file.execute("INSERT INTO versions VALUES (1, 1)")
-        file.execute(f'CREATE TABLE records ("group", word, {", ".join(OLD_COLUMNS[1:])}{kept}, '
-                     f'PRIMARY KEY ("group", word)){rows}')
+        file.execute(
+            f'CREATE TABLE records ("group", word, {", ".join(OLD_COLUMNS[1:])}{kept}, '
+            f'PRIMARY KEY ("group", word)){rows}'
+        )
         if layout == "apart":
             file.execute("CREATE TABLE lines (record INTEGER PRIMARY KEY, line TEXT)")
         for group in every.groups():
@@ -163,8 +178,9 @@ def older(layout: str, every: Folder, path: Path) -> Path:
 
 @pytest.mark.parametrize("asked", [{"legs": "?-R*"}, {"text": "two lines"}, {"modes": 6}, {"dof": 3, "legs": 4}])
 @pytest.mark.parametrize("layout", ["beside", "without rowid", "apart"])
-def test_sqlite_files_of_older_versions_are_read(asked: dict[str, Any], layout: str, stores: tuple[Path, Path],
-                                                 tmp_path: Path):
+def test_sqlite_files_of_older_versions_are_read(
+    asked: dict[str, Any], layout: str, stores: tuple[Path, Path], tmp_path: Path
+):
     file = older(layout, Folder(stores[0]), tmp_path / "older.sqlite")
     assert list(load(file, **asked)) == list(load(stores[0], **asked))
     assert 0 < len(load(file, **asked)) < 100
@@ -181,19 +197,31 @@ def test_values_of_a_field_are_those_of_all_records(name: str, stores: tuple[Pat
 
 
 READ_BY: dict[str, dict[str, Any]] = {
-    **{name: {name: "none"} for name in FIELDS}, "legs": {"legs": 3}, "modes_bound": {"modes": 3},
-    "see": {"see": "point"}, **{name: {"text": ""} for name in TEXTS if name != "steps"},
+    **{name: {name: "none"} for name in FIELDS},
+    "legs": {"legs": 3},
+    "modes_bound": {"modes": 3},
+    "see": {"see": "point"},
+    **{name: {"text": ""} for name in TEXTS if name != "steps"},
     "folded word": {"text": "nowhere"},
-    **{name: {"legs": "?x*"} for name in ("notation as written", "chain", "word", "bare word")}}
+    **{name: {"legs": "?x*"} for name in ("notation as written", "chain", "word", "bare word")},
+}
 """A question for which each column is read; no record here has steps."""
 
 
-@pytest.mark.parametrize("change", ["letters = substr(letters, 2)", "ends = substr(ends, 1 + ends_width)",
-                                    "numbers = x'ffffffff'", "letters_width = 3", "name = 'other'"])
+@pytest.mark.parametrize(
+    "change",
+    [
+        "letters = substr(letters, 2)",
+        "ends = substr(ends, 1 + ends_width)",
+        "numbers = x'ffffffff'",
+        "letters_width = 3",
+        "name = 'other'",
+    ],
+)
 def test_a_file_whose_columns_are_spoilt_is_told(change: str, stores: tuple[Path, Path], tmp_path: Path):
     file = tmp_path / "spoilt.sqlite"
     with contextlib.closing(sqlite3.connect(stores[1])) as whole:
-        assert {name for name, in whole.execute("SELECT name FROM columns")} == {"steps", *READ_BY}
+        assert {name for (name,) in whole.execute("SELECT name FROM columns")} == {"steps", *READ_BY}
     for name, asked in READ_BY.items():
         Database(stores[1]).lines(["c", "d"], asked)
         file.write_bytes(stores[1].read_bytes())
@@ -206,10 +234,29 @@ def test_a_file_whose_columns_are_spoilt_is_told(change: str, stores: tuple[Path
 
 
 ODD = [
-    {"dof": "3"}, {"dof": " 3"}, {"modes": "4"}, {"base_motors": "1"}, {"dof": np.int64(3)}, {"base_motors": np.True_},
-    {"text": "\0"}, {"text": "\0r"}, {"legs": "*\0"}, {"legs": "3-R*\0RR"}, {"dof": 10**19}, {"legs": "9" * 5000},
-    {"modes": 10**5000}, {"text": "\udcff"}, {"motion": "\udcff"}, {"text": "%" * 30_000}, {"legs": "*" * 60_000},
-    {"dof": tuple(range(1100))}, {"dof": [3, 4]}, {"legs": np.int64(3)}, {"text": "strasse"}, {"text": ""}]
+    {"dof": "3"},
+    {"dof": " 3"},
+    {"modes": "4"},
+    {"base_motors": "1"},
+    {"dof": np.int64(3)},
+    {"base_motors": np.True_},
+    {"text": "\0"},
+    {"text": "\0r"},
+    {"legs": "*\0"},
+    {"legs": "3-R*\0RR"},
+    {"dof": 10**19},
+    {"legs": "9" * 5000},
+    {"modes": 10**5000},
+    {"text": "\udcff"},
+    {"motion": "\udcff"},
+    {"text": "%" * 30_000},
+    {"legs": "*" * 60_000},
+    {"dof": tuple(range(1100))},
+    {"dof": [3, 4]},
+    {"legs": np.int64(3)},
+    {"text": "strasse"},
+    {"text": ""},
+]
 """What SQLite takes for something else, or cannot be told."""
 
 
@@ -220,8 +267,19 @@ def test_odd_questions_have_the_same_answer_everywhere(asked: dict[str, Any], st
     assert list(load(big, **asked)) == list(load(lines, **asked)) == fit
 
 
-@pytest.mark.parametrize("asked", [{"legs": 3.5}, {"legs": b"3"}, {"see": 3}, {"text": 3},
-                                   {"see": "9" * 5000 + "point"}, {"motors": "X"}, {"motors": ""}], ids=range(7))
+@pytest.mark.parametrize(
+    "asked",
+    [
+        {"legs": 3.5},
+        {"legs": b"3"},
+        {"see": 3},
+        {"text": 3},
+        {"see": "9" * 5000 + "point"},
+        {"motors": "X"},
+        {"motors": ""},
+    ],
+    ids=range(7),
+)
 def test_what_no_record_can_have_is_refused(asked: dict[str, Any], stores: tuple[Path, Path]):
     for file in stores:
         with pytest.raises(BadRequest):
@@ -243,9 +301,10 @@ OTHERS: tuple[Any, ...] = ("a", 3, 3.5, True, None, [], ["a"], [3], [["a"]], {},
 
 def commands(folder: Path, word: str) -> list[list[str]]:
     """What reads records."""
-    return [["catalog", "list", *asked, "--catalog", str(folder)] for asked in (
-        [], ["--legs", "3"], ["--legs", "*R*"], ["--text", "x"], ["--modes", "1"], ["--motion", "3T"])] + [
-        ["catalog", "show", word, "--catalog", str(folder)]]
+    return [
+        ["catalog", "list", *asked, "--catalog", str(folder)]
+        for asked in ([], ["--legs", "3"], ["--legs", "*R*"], ["--text", "x"], ["--modes", "1"], ["--motion", "3T"])
+    ] + [["catalog", "show", word, "--catalog", str(folder)]]
 
 
 @pytest.mark.some(6)
@@ -258,7 +317,8 @@ def test_a_record_with_a_field_of_another_kind_or_without_it_is_one_line(field: 
         odd = {name: each for name, each in whole.items() if (name, value) != (field, "gone")}
         odd |= {} if value == "gone" else {field: value}
         (tmp_path / "planar.jsonl").write_text(
-            f'{{"format":1,"catalog":{VERSION},"group":"planar","count":1}}\n{json.dumps(odd)}\n')
+            f'{{"format":1,"catalog":{VERSION},"group":"planar","count":1}}\n{json.dumps(odd)}\n'
+        )
         for arguments in commands(tmp_path, word):
             status = execute(arguments)
             said = capsys.readouterr()
@@ -269,9 +329,15 @@ def test_a_record_with_a_field_of_another_kind_or_without_it_is_one_line(field: 
 
 
 ODD_FILES = {
-    "deep": b'{"word":' + 100_000 * b"[" + 100_000 * b"]" + b"}", "deep head": b"", "not UTF-8": b"\xff\xfe{}",
-    "a list": b"[]", "empty line": b"", "a number": b"9" * 5000, "zeros": b"\0" * 40,
-    "a surrogate": b'{"word":"\\ud800","group":"g"}'}
+    "deep": b'{"word":' + 100_000 * b"[" + 100_000 * b"]" + b"}",
+    "deep head": b"",
+    "not UTF-8": b"\xff\xfe{}",
+    "a list": b"[]",
+    "empty line": b"",
+    "a number": b"9" * 5000,
+    "zeros": b"\0" * 40,
+    "a surrogate": b'{"word":"\\ud800","group":"g"}',
+}
 
 
 @pytest.mark.some(5)
@@ -291,9 +357,11 @@ def test_an_odd_file_is_one_line(name: str, tmp_path: Path, capsys):
             file.write_bytes(100_000 * b"[" + b"\n")
         case _:
             file.write_bytes(head + ODD_FILES[name] + b"\n")
-    for arguments in (*commands(tmp_path, "3(Rz*-Rz-Rz)"),
-                      ["catalog", "build", "planar", "--check", "-o", str(tmp_path)], [
-                          "catalog", "site", "--catalog", str(tmp_path), "-o", str(tmp_path / "site")]):
+    for arguments in (
+        *commands(tmp_path, "3(Rz*-Rz-Rz)"),
+        ["catalog", "build", "planar", "--check", "-o", str(tmp_path)],
+        ["catalog", "site", "--catalog", str(tmp_path), "-o", str(tmp_path / "site")],
+    ):
         status = execute(arguments)
         said = capsys.readouterr()
         if "show" not in arguments or status:  # it may be of another group
@@ -303,8 +371,10 @@ def test_an_odd_file_is_one_line(name: str, tmp_path: Path, capsys):
 
 
 def test_a_line_with_other_spaces_or_letters_is_read(tmp_path: Path):
-    one, other = (line({**entry("(c00)"), "word": word, "group": "g", "dof": 3, "verdict": verdict, "cure": cure})
-                  for word, verdict, cure in (("a", "controllable", None), ("b", "no", "Straße")))
+    one, other = (
+        line({**entry("(c00)"), "word": word, "group": "g", "dof": 3, "verdict": verdict, "cure": cure})
+        for word, verdict, cure in (("a", "controllable", None), ("b", "no", "Straße"))
+    )
     assert "Stra\\u00dfe" in other
     one = one.replace('"dof":', ' "dof": ').replace("controllable", "controll\\u0061ble")
     (tmp_path / "g.jsonl").write_text(f'{{"format":1,"catalog":{VERSION},"group":"g","count":2}}\n{one}\n{other}\n')
@@ -400,15 +470,19 @@ def test_a_fresh_catalog_is_not_stale(stores: tuple[Path, Path]):
         assert check(path, source=source((30, 20)), sample=3, workers=WORKERS) == ()
 
 
-@pytest.mark.parametrize(("old", "new", "said"), [
-    ('"idle":0', '"idle":1', "c: 59 of 60 compared with other records today, the first (c00)"),
-    ('"catalog":1', '"catalog":8', "another version"),
-    ('"count":60', '"count":61', "truncated, records, found 60, allowed: 61"),
-    ('{"word":"(c01)"', '{"word":"(b01)"', "c: 1 missing, the first (c01)"),
-    ('{"word":"(c01)"', '{"word":"(b01)"', "c: 1 no longer of the group, the first (b01)"),
-    ('{"word":"(c01)"', '{"word":"(c90)"', "is not sorted"),
-    ('{"word":"(c01)"', '{"words":"(c01)"', "not a record of the catalog"),
-    ('{"word":"(c01)"', '"word":"(c01)"', "not a record of the catalog")])
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('"idle":0', '"idle":1', "c: 59 of 60 compared with other records today, the first (c00)"),
+        ('"catalog":1', '"catalog":8', "another version"),
+        ('"count":60', '"count":61', "truncated, records, found 60, allowed: 61"),
+        ('{"word":"(c01)"', '{"word":"(b01)"', "c: 1 missing, the first (c01)"),
+        ('{"word":"(c01)"', '{"word":"(b01)"', "c: 1 no longer of the group, the first (b01)"),
+        ('{"word":"(c01)"', '{"word":"(c90)"', "is not sorted"),
+        ('{"word":"(c01)"', '{"words":"(c01)"', "not a record of the catalog"),
+        ('{"word":"(c01)"', '"word":"(c01)"', "not a record of the catalog"),
+    ],
+)
 def test_what_is_stale_is_told(old: str, new: str, said: str, stores: tuple[Path, Path], tmp_path: Path):
     for file in stores[0].iterdir():
         text = without_checksum(file.read_text())
@@ -423,6 +497,8 @@ def test_a_missing_group_is_stale(stores: tuple[Path, Path], tmp_path: Path):
     (tmp_path / "c.jsonl").write_bytes((stores[0] / "c.jsonl").read_bytes())
     assert len(check(tmp_path, source=source((30, 20)))) == 1
     assert check(tmp_path, source=source((31, 20)), sample=0) == (
-        "c: 2 missing, the first (c30)", check(tmp_path, ["d"], source=source((30, 20)))[0])
+        "c: 2 missing, the first (c30)",
+        check(tmp_path, ["d"], source=source((30, 20)))[0],
+    )
     build(tmp_path / "one.sqlite", ["c"], source=source((30, 20)))
     assert check(tmp_path / "one.sqlite", source=source((30, 20))) == (f"d: not in {tmp_path / 'one.sqlite'}",)

@@ -51,8 +51,12 @@ def test_every_record_agrees_with_each_rule() -> None:
 
 def _leg(letters: str, after: int, rail: bool) -> LegWord:
     axes = iter("xj" if rail else "hj")
-    return LegWord(tuple(JointSymbol(letter, "z" if letter == "R" else next(axes), watched=i == after)
-                         for i, letter in enumerate(letters)))
+    return LegWord(
+        tuple(
+            JointSymbol(letter, "z" if letter == "R" else next(axes), watched=i == after)
+            for i, letter in enumerate(letters)
+        )
+    )
 
 
 @st.composite
@@ -68,7 +72,7 @@ def left_free(leg: LegWord, rng: np.random.Generator) -> np.ndarray:
         x, y = rng.normal(size=2)
         twists.append([1.0, y, -x] if joint.letter == "R" else [0.0, 1.0, 0.0] if joint.axes == "x" else [0.0, x, y])
     angle = np.array([[float(joint.letter == "R" and i <= leg.observed) for i, joint in enumerate(leg.joints)]])
-    free = np.linalg.svd(angle)[2][np.linalg.matrix_rank(angle):].T
+    free = np.linalg.svd(angle)[2][np.linalg.matrix_rank(angle) :].T
     return np.array(twists).T @ free
 
 
@@ -76,7 +80,7 @@ def left_free(leg: LegWord, rng: np.random.Generator) -> np.ndarray:
 @given(st.lists(planar_legs(), min_size=2, max_size=6), st.integers(0, 2**32 - 1))
 def test_the_theorem_on_planar_robots_is_that_of_their_twists(legs: list[LegWord], seed: int) -> None:
     rng = np.random.default_rng(seed)
-    seen = [np.linalg.svd(basis)[0][:, basis.shape[1]:].T for basis in (left_free(leg, rng) for leg in legs)]
+    seen = [np.linalg.svd(basis)[0][:, basis.shape[1] :].T for basis in (left_free(leg, rng) for leg in legs)]
     assert np.linalg.matrix_rank(np.vstack(seen), tol=1e-7) == says.planar_rank(RobotWord("", (tuple(legs),)))
 
 
@@ -101,8 +105,9 @@ def seen_of_translations(leg: LegWord, rng: np.random.Generator) -> np.ndarray:
         twists.append([*np.cross(rng.normal(size=3), turning[axis]), *turning[axis]] if axis else [*way, 0, 0, 0])
     rates = np.linalg.lstsq(np.array(twists).T, np.eye(6, 3))[0]
     assert np.allclose(np.array(twists).T @ rates, np.eye(6, 3))
-    spin = sum((np.outer(turning[axis], rates[i]) for i, axis in enumerate(axes[: leg.observed + 1]) if axis),
-               np.zeros((3, 3)))
+    spin = sum(
+        (np.outer(turning[axis], rates[i]) for i, axis in enumerate(axes[: leg.observed + 1]) if axis), np.zeros((3, 3))
+    )
     return np.cross(spin, rng.normal(size=3), axis=0)
 
 
@@ -119,8 +124,14 @@ def test_legs_translate_that_leave_all_translations_and_nothing_idle() -> None:
     rng = np.random.default_rng(2)
     for chain in translational():
         turning = {name: rng.normal(size=3) for name in "ab"}
-        T = np.array([[*np.cross(rng.normal(size=3), turning[joint.axes]), *turning[joint.axes]]
-                      if joint.letter == "R" else [*rng.normal(size=3), 0, 0, 0] for joint in chain.joints]).T
+        T = np.array(
+            [
+                [*np.cross(rng.normal(size=3), turning[joint.axes]), *turning[joint.axes]]
+                if joint.letter == "R"
+                else [*rng.normal(size=3), 0, 0, 0]
+                for joint in chain.joints
+            ]
+        ).T
         rank, turns = (np.linalg.matrix_rank(each, tol=1e-9) for each in (T, T[3:]))
         assert translates(chain) == (rank == len(chain.joints) and rank - turns == 3)
 
@@ -132,11 +143,13 @@ def test_the_rule_is_what_derive_finds(word: str) -> None:
     assert hrsynth.derive(robot).verdict.rank == says.planar_rank(parse(word))
 
 
-@pytest.mark.parametrize("word", ["3(Rz*-Rz-Rz)", "3(Ph-Rz*-Pj)", "3(Piz!-Rz*-Rz)", "3(Ra-Ra-Ra-Rb-Rb)", "2(Pk*-2SSt)",
-                                  "3(Ph!-Rz*-Pj)"])
+@pytest.mark.parametrize(
+    "word", ["3(Rz*-Rz-Rz)", "3(Ph-Rz*-Pj)", "3(Piz!-Rz*-Rz)", "3(Ra-Ra-Ra-Rb-Rb)", "2(Pk*-2SSt)", "3(Ph!-Rz*-Pj)"]
+)
 def test_the_observed_link_is_that_of_the_robot(word: str) -> None:
     """The mark of a word whose link is not told is that of the link that is watched."""
     for leg in parse(word).legs:
-        told = LegWord(tuple(JointSymbol(j.letter, j.axes, j.motor, i == says.mark(leg))
-                             for i, j in enumerate(leg.joints)))
+        told = LegWord(
+            tuple(JointSymbol(j.letter, j.axes, j.motor, i == says.mark(leg)) for i, j in enumerate(leg.joints))
+        )
         assert told.canonical == leg.canonical

@@ -58,8 +58,11 @@ def is_a_leg(letters: str, rng: np.random.Generator) -> bool:
         else:
             return False
         rates = np.linalg.lstsq(twists, WAYS, rcond=ZERO)[0]
-        if (np.linalg.matrix_rank(twists, ZERO) < len(letters) or np.abs(twists @ rates - WAYS).max() > ZERO
-                or np.abs(rates).max(axis=1).min() < ZERO):
+        if (
+            np.linalg.matrix_rank(twists, ZERO) < len(letters)
+            or np.abs(twists @ rates - WAYS).max() > ZERO
+            or np.abs(rates).max(axis=1).min() < ZERO
+        ):
             return False
     return True
 

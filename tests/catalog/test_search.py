@@ -45,7 +45,7 @@ def test_texts_beyond_those_that_are_compared_together_are_found(monkeypatch: py
 def test_a_text_is_found_where_it_occurs(every: list[str], text: str, data: st.DataObject):
     if every and data.draw(st.booleans()):
         other = data.draw(st.sampled_from(every))
-        text = other[data.draw(st.integers(0, len(other))):]
+        text = other[data.draw(st.integers(0, len(other))) :]
     assert Texts.of(every).holding(text).tolist() == [text in each for each in every]
 
 

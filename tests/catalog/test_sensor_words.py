@@ -36,9 +36,17 @@ def test_what_is_listed_is_canonical_and_belongs_there():
     assert str(parse("3(Rz*-Rz-Rz)@point+ inclination+point'+2point")) == "3(Rz*-Rz-Rz)@inclination+3point+point'"
 
 
-@pytest.mark.parametrize(("text", "told"), [
-    ("3(Rz*-Rz-Rz)@", "''"), ("3(Rz*-Rz-Rz)@3dot", "3dot"), ("3(Rz*-Rz-Rz)@0point", "0point"),
-    ("3(Rz*!-Rz-Rz)@point", "!"), ("3(Rz*-Rz-Rz)@encoder", "encoder"), ("3(Rz*-Rz-Rz)@99point", "99point")])
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("3(Rz*-Rz-Rz)@", "''"),
+        ("3(Rz*-Rz-Rz)@3dot", "3dot"),
+        ("3(Rz*-Rz-Rz)@0point", "0point"),
+        ("3(Rz*!-Rz-Rz)@point", "!"),
+        ("3(Rz*-Rz-Rz)@encoder", "encoder"),
+        ("3(Rz*-Rz-Rz)@99point", "99point"),
+    ],
+)
 def test_what_is_no_sight_is_refused(text: str, told: str):
     with pytest.raises(BadRequest) as caught:
         parse(text)
@@ -53,8 +61,11 @@ def test_sensors_do_not_change_the_mechanism():
         assert [each for each in seen.differences(plain) if "observ" not in each and "camera" not in each] == []
         assert seen.joints.keys() == plain.joints.keys()
         assert [o.kind for o in seen.observations] == [each.kind for each in word.seen]
-        own = [each.camera.name for each, symbol in zip(seen.observations, word.seen, strict=True)
-               if isinstance(each, CameraObservation) and each.camera is not None and symbol.own]
+        own = [
+            each.camera.name
+            for each, symbol in zip(seen.observations, word.seen, strict=True)
+            if isinstance(each, CameraObservation) and each.camera is not None and symbol.own
+        ]
         assert len(set(own)) == len(own) == sum(symbol.own for symbol in word.seen)
 
 

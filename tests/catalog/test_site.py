@@ -30,8 +30,17 @@ from hrsynth.errors import BadRequest, BuildStopped
 from hrsynth.rewrite.strategy import Step
 
 REFUSED = "3(Ra*!-Rb-Ra-Ph)"
-WORDS = ("3(Rz*-Rz-Rz)", "3(Rz-Rz*-Rz)", "(Rz!-Rz-Rz*)+2(Rz*!-Rz-Rz)", "point:2(Rz*-Rz-Rz)", "2(Rt*-2SSt)",
-         "3(Ro-Ro*-Ro)", "3(Ra*-Ro-Ro-Ro)", "3(Ra-Ro*-Ro-Ro)", REFUSED)
+WORDS = (
+    "3(Rz*-Rz-Rz)",
+    "3(Rz-Rz*-Rz)",
+    "(Rz!-Rz-Rz*)+2(Rz*!-Rz-Rz)",
+    "point:2(Rz*-Rz-Rz)",
+    "2(Rt*-2SSt)",
+    "3(Ro-Ro*-Ro)",
+    "3(Ra*-Ro-Ro-Ro)",
+    "3(Ra-Ro*-Ro-Ro)",
+    REFUSED,
+)
 VOID = {"meta", "link", "br", "input"}
 
 
@@ -43,8 +52,12 @@ def catalog() -> Catalog:
 @pytest.fixture(scope="module")
 def few() -> Catalog:
     """Three structures, four architectures, without derivations: what a folder does with them is quick to see."""
-    return Catalog(tuple({"word": word, "group": "none", "legs": len(parse(word).legs), "refused": "to be quick"}
-                         for word in WORDS[:4]))
+    return Catalog(
+        tuple(
+            {"word": word, "group": "none", "legs": len(parse(word).legs), "refused": "to be quick"}
+            for word in WORDS[:4]
+        )
+    )
 
 
 @pytest.fixture(scope="module")
@@ -154,7 +167,10 @@ def test_the_robot_file_is_what_save_writes_and_derives_as_the_record(made, cata
     derivation = hrsynth.derive(hrsynth.load(file))
     known = catalog[word]
     assert (derivation.architecture.ascii, derivation.verdict.verdict, derivation.verdict.rank) == (
-        known["notation"], known["verdict"], known["rank"])
+        known["notation"],
+        known["verdict"],
+        known["rank"],
+    )
     assert (derivation.hidden_architecture and derivation.hidden_architecture.ascii) == known.get("hidden")
 
 
@@ -198,10 +214,13 @@ def test_structures_part_the_records_and_kin_differ_by_what_is_watched(catalog):
 
 
 def test_motors_that_change_what_is_known_part_a_structure():
-    facts = [{"word": word, "group": "none", "rank": rank} for word, rank in (
-        ("3(Ra*-Ro-Ro-Ro)", 0), ("3(Ra-Ro*-Ro-Ro)", 3))]
+    facts = [
+        {"word": word, "group": "none", "rank": rank} for word, rank in (("3(Ra*-Ro-Ro-Ro)", 0), ("3(Ra-Ro*-Ro-Ro)", 3))
+    ]
     assert [(each.word, each.fact["rank"]) for each in structures(facts)] == [
-        ("3(Ra-Ro*-Ro-Ro)", 3), ("3(Ra-Ro-Ro-Ro)", 0)]
+        ("3(Ra-Ro*-Ro-Ro)", 3),
+        ("3(Ra-Ro-Ro-Ro)", 0),
+    ]
     assert len(structures([{**fact, "rank": 0} for fact in facts])) == 1
 
 
@@ -211,18 +230,34 @@ def test_names_are_stable_and_distinct():
 
 
 def test_steps_that_differ_by_their_leg_alone_are_one_row():
-    steps = [Step("lift", "1", True, "free", 1e-12), Step("lift", "2", True, "free", 3e-12),
-             Step("lift", "3", False, "free", None), Step("takeover", None, True, "free", None)]
+    steps = [
+        Step("lift", "1", True, "free", 1e-12),
+        Step("lift", "2", True, "free", 3e-12),
+        Step("lift", "3", False, "free", None),
+        Step("takeover", None, True, "free", None),
+    ]
     rows = trace(steps)
     assert [(row["rule"], row["legs"], row["accepted"], row["angle"]) for row in rows] == [
-        ("lift", "1, 2", True, "3.0e-12"), ("lift", "3", False, ""), ("takeover", "all", True, "")]
+        ("lift", "1, 2", True, "3.0e-12"),
+        ("lift", "3", False, ""),
+        ("takeover", "all", True, ""),
+    ]
 
 
 def test_what_stands_in_a_page_is_made_safe():
     fact = {"word": "3(S-S)", "group": "none", "refused": "<b>1 < 2 & 'so'"}
-    shown = render("page.html", structure=Structure("3(S-S)", (fact,)), fact=fact,
-                     facts=[("refused", fact["refused"])], differs="<i>", real=None, hidden=None, blind=False, steps=[],
-                     variants=[{"name": "x", "word": "<u>", "notation": "", "motors": "", "joints": [], "file": False}])
+    shown = render(
+        "page.html",
+        structure=Structure("3(S-S)", (fact,)),
+        fact=fact,
+        facts=[("refused", fact["refused"])],
+        differs="<i>",
+        real=None,
+        hidden=None,
+        blind=False,
+        steps=[],
+        variants=[{"name": "x", "word": "<u>", "notation": "", "motors": "", "joints": [], "file": False}],
+    )
     assert not [tag for tag in ("<b>", "<i>", "<u>") if tag in shown]
     assert Page(shown).links[:2] == ["data:,", "../site.css"]
     assert notation("2-Pi-{2-U*U}") == "2-Π-{2-<u>U</u>U}"
@@ -297,8 +332,11 @@ def test_a_full_disk_stops_the_build_and_keeps_the_older_site(few, tmp_path, mon
     site(Catalog(few.records[3:]), target)
     before = everything(target)
     full = OSError(errno.ENOSPC, "No space left on device", "page.html")
-    for place in ("hrsynth.catalog.site.pages._write", "hrsynth.catalog.site.index.write",
-                  "hrsynth.catalog.site.folder._prepare"):
+    for place in (
+        "hrsynth.catalog.site.pages._write",
+        "hrsynth.catalog.site.index.write",
+        "hrsynth.catalog.site.folder._prepare",
+    ):
         with monkeypatch.context() as patched:
             patched.setattr(place, lambda *_: (_ for _ in ()).throw(full))
             with pytest.raises(BuildStopped, match="No space left") as caught:

@@ -98,15 +98,29 @@ def test_twelve_thousand_records_are_filtered_within_a_moment(tab: Tab, target: 
 
 
 def test_a_search_finds_what_is_on_the_screen_and_known_names(tab: Tab, tmp_path: Path):
-    known = {"3(Rt-Pl*-S)": "3-RP*S", "3(Rt*-2SSt)": "3-R*-{2-SS}", "6(Utn-Pl*-S)": "6-UP*S",
-             "(Ph*-Pj-Rz)+2(Rz*-Rz-Rz)": "P*PR+2-R*RR"}
-    facts = [{"word": word, "group": "none", "legs": len(parse(word).legs), "notation": notation}
-             for word, notation in known.items()]
+    known = {
+        "3(Rt-Pl*-S)": "3-RP*S",
+        "3(Rt*-2SSt)": "3-R*-{2-SS}",
+        "6(Utn-Pl*-S)": "6-UP*S",
+        "(Ph*-Pj-Rz)+2(Rz*-Rz-Rz)": "P*PR+2-R*RR",
+    }
+    facts = [
+        {"word": word, "group": "none", "legs": len(parse(word).legs), "notation": notation}
+        for word, notation in known.items()
+    ]
     index.write(tmp_path, structures(facts))
     tab.open(tmp_path / "index.html", f"{LISTED} == 4")
     assert rows(tab)[-1] == "(Ph*-Pj-Rz)+2(Rz*-Rz-Rz)"
-    for asked, found in (("3-RPS", 0), ("delta", 1), ("RPS", 0), ("2-SS", 1), ("3-RP*S", 0), ("refused 6-UPS", 2),
-                         ("Delta", 1), ("Stewart", 2)):
+    for asked, found in (
+        ("3-RPS", 0),
+        ("delta", 1),
+        ("RPS", 0),
+        ("2-SS", 1),
+        ("3-RP*S", 0),
+        ("refused 6-UPS", 2),
+        ("Delta", 1),
+        ("Stewart", 2),
+    ):
         tab.page.get_by_label("Search").fill(asked)
         tab.page.wait_for_function(f"new URLSearchParams(location.hash.slice(1)).get('q') == {asked!r}")
         assert rows(tab) == [facts[found]["word"]], asked

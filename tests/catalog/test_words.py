@@ -44,8 +44,11 @@ def test_what_is_listed_is_canonical_and_belongs_there(name):
 @pytest.mark.parametrize("name", SMALL_FIRST)
 def test_a_motor_changes_no_leg_s_label(name):
     for word in map(parse, listed()[name]):
-        assert tuple(leg.unmoved for leg in word.legs) == word.unmoved.legs == \
-            tuple(leg.unmoved for leg in word.driven.legs)
+        assert (
+            tuple(leg.unmoved for leg in word.legs)
+            == word.unmoved.legs
+            == tuple(leg.unmoved for leg in word.driven.legs)
+        )
 
 
 @pytest.mark.slow
@@ -78,8 +81,12 @@ def test_order_of_legs_and_choice_of_names_do_not_count(text, rng):
 def _renamed(leg, rng):
     for kind in ("hjm", "abc"):
         to = "".join(rng.sample(kind, 3))
-        leg = LegWord(tuple(joint.__class__(joint.letter, joint.axes.translate(str.maketrans(kind, to)), joint.motor,
-                                        joint.watched) for joint in leg.joints))
+        leg = LegWord(
+            tuple(
+                joint.__class__(joint.letter, joint.axes.translate(str.maketrans(kind, to)), joint.motor, joint.watched)
+                for joint in leg.joints
+            )
+        )
     return leg
 
 
@@ -91,8 +98,9 @@ def test_a_mechanism_has_the_joints_of_its_word(name, number):
     drawn = mechanism(word)
     anatomy = decompose(normal_form(drawn).mechanism)
     assert anatomy.labels == tuple(str(k + 1) for k in range(len(word.legs)))
-    assert sum(joint.actuated for joint in drawn.joints.values()) == sum(j.motor for leg in word.legs
-                                                                         for j in leg.joints)
+    assert sum(joint.actuated for joint in drawn.joints.values()) == sum(
+        j.motor for leg in word.legs for j in leg.joints
+    )
     for number, leg in enumerate(word.legs, start=1):
         chain = [drawn.joints[name].type.value for name in drawn.joints if name.startswith(f"joint_{number}_")]
         assert chain == [joint.letter for joint in leg.joints if joint.letter not in COMPOSITE]
@@ -104,13 +112,29 @@ def test_the_same_word_has_the_same_geometry_whatever_is_driven():
     assert mechanism(parse("3(Rz*-Rz-Rz)"), attempt=1).differences(one)
 
 
-@pytest.mark.parametrize(("text", "told"), [
-    ("3(Rz*-Qz-Rz)", "Qz"), ("3(Rz*-Rzz-Rz)", "Rzz"), ("3(Rz*-Rv-Rz)", "v"), ("3(Rz*-S*)", "S*"),
-    ("3(Rz)", "one joint"),
-    ("(Rz*-Rz-Rz)", "number of legs"), ("13(Rz*-Rz-Rz)", "13"), ("ball:3(Rz*-Rz-Rz)", "ball"), ("3Rz", "3Rz"),
-    ("bar:4(Rt*-2SSt)", "bodies"), ("3(Rz!-Rz!-Rz)", "observed"), ("3(Rz-Rz-Rz!)", "platform"), ("", "''"),
-    ("3(Rn*-S)", "Rn"), ("3()", "3()"), ("3(Rz*-2SSt*)", "2SSt*"), ("0(Rz-Rz)+2(Rz-Rz)", "0"), ("3(Pin-Rz-Rz)", "Pin"),
-])
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("3(Rz*-Qz-Rz)", "Qz"),
+        ("3(Rz*-Rzz-Rz)", "Rzz"),
+        ("3(Rz*-Rv-Rz)", "v"),
+        ("3(Rz*-S*)", "S*"),
+        ("3(Rz)", "one joint"),
+        ("(Rz*-Rz-Rz)", "number of legs"),
+        ("13(Rz*-Rz-Rz)", "13"),
+        ("ball:3(Rz*-Rz-Rz)", "ball"),
+        ("3Rz", "3Rz"),
+        ("bar:4(Rt*-2SSt)", "bodies"),
+        ("3(Rz!-Rz!-Rz)", "observed"),
+        ("3(Rz-Rz-Rz!)", "platform"),
+        ("", "''"),
+        ("3(Rn*-S)", "Rn"),
+        ("3()", "3()"),
+        ("3(Rz*-2SSt*)", "2SSt*"),
+        ("0(Rz-Rz)+2(Rz-Rz)", "0"),
+        ("3(Pin-Rz-Rz)", "Pin"),
+    ],
+)
 def test_what_is_no_word_is_refused(text, told):
     with pytest.raises(BadRequest) as caught:
         parse(text)

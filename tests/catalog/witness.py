@@ -55,11 +55,12 @@ class Witness:
 
     def seen(self, state: Array, legs: Sequence[str]) -> tuple[int, int, int]:
         """dof, how many of its turns are independent, and the freedoms that some legs see. Raises ``Undecided``."""
-        relation = self.oracle.relation(state, [self.watched[leg] for leg in legs],
-                                        point_only=parse(self.record["word"]).platform == "point")
+        relation = self.oracle.relation(
+            state, [self.watched[leg] for leg in legs], point_only=parse(self.record["word"]).platform == "point"
+        )
         rows, columns = len(relation) - 3 * len(legs), relation.shape[1]
         _, values, right = np.linalg.svd(np.vstack((relation[rows:], np.zeros((columns, columns)))))
-        blind = right[_believed(values, columns):].T
+        blind = right[_believed(values, columns) :].T
         dof, turns, hidden = map(_rank, (relation[:rows], relation[3:rows], relation[:rows] @ blind))
         return dof, turns, dof - hidden
 
@@ -129,8 +130,11 @@ class Witness:
             chords = []
             for name in (rod, f"{rod[:-1]}b"):
                 upper, lower = (joints[name.replace("rod", end)].point for end in ("upper", "lower"))
-                chords.append(unit(oracle.pose(state, name)[:3, :3] @ oracle.zero()[oracle.index[name], :3, :3].T
-                                   @ (lower - upper)))
+                chords.append(
+                    unit(
+                        oracle.pose(state, name)[:3, :3] @ oracle.zero()[oracle.index[name], :3, :3].T @ (lower - upper)
+                    )
+                )
             if np.linalg.norm(chords[0] - chords[1]) > 1e-6:
                 return False
         return True

@@ -76,8 +76,12 @@ def robot(task: tuple[str, int, int, int]) -> dict[str, Any]:
         if answers[-1].startswith("BadRequest") or answers[-1].startswith("BadMechanism"):
             answers *= seeds
             break
-    return {"word": text, "dimensions": dimensions, "answers": answers[:seeds],
-            "seconds": round(time.process_time() - start, 2)}
+    return {
+        "word": text,
+        "dimensions": dimensions,
+        "answers": answers[:seeds],
+        "seconds": round(time.process_time() - start, 2),
+    }
 
 
 def tasks(asked: argparse.Namespace, known: set[tuple[str, int]]) -> Iterator[tuple[str, int, int, int]]:
@@ -100,13 +104,20 @@ def defect(row: dict[str, Any]) -> str | None:
 
 def summary(rows: list[dict[str, Any]]) -> str:
     """Counts, and the lines that are wrong."""
-    kinds = Counter(defect(row) or ("refused: " + row["answers"][0] if ": " in row["answers"][0] else "same verdicts")
-                    for row in rows)
-    lines = [f"{len(rows)} robots of {len({row['word'] for row in rows})} words, "
-             f"{sum(row['seconds'] for row in rows):.0f} s of processor time"]
+    kinds = Counter(
+        defect(row) or ("refused: " + row["answers"][0] if ": " in row["answers"][0] else "same verdicts")
+        for row in rows
+    )
+    lines = [
+        f"{len(rows)} robots of {len({row['word'] for row in rows})} words, "
+        f"{sum(row['seconds'] for row in rows):.0f} s of processor time"
+    ]
     lines += [f"  {count:6d}  {kind}" for kind, count in kinds.most_common()]
-    lines += [f"{defect(row)}: {row['word']} dimensions {row['dimensions']}: {Counter(row['answers']).most_common()}"
-              for row in rows if defect(row)]
+    lines += [
+        f"{defect(row)}: {row['word']} dimensions {row['dimensions']}: {Counter(row['answers']).most_common()}"
+        for row in rows
+        if defect(row)
+    ]
     return "\n".join(lines)
 
 

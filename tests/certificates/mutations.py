@@ -64,7 +64,7 @@ def wrong_radius(record: Record, rng: random.Random) -> None:
     """No radius, too large, or too small to hold the solution, where that is not the middle itself."""
     _, box = a_box(record, rng)
     exact = all(Fraction(x).denominator == 1 for part in box["middle"] for x in part)
-    box["radius"] = rng.choice(["0", "-1/1208925819614629174706176", "1000", "1000" if exact else f"1/{2 ** 600}"])
+    box["radius"] = rng.choice(["0", "-1/1208925819614629174706176", "1000", "1000" if exact else f"1/{2**600}"])
 
 
 def wrong_inverse(record: Record, rng: random.Random) -> None:
@@ -162,8 +162,8 @@ def other_geometry(record: Record, rng: random.Random) -> None:
         return None
     if system.get("normals"):
         return other_rest(system, rng)
-    reach = rng.choice(system["reaches"][:system.get("square", system.get("unknowns"))])
-    (kind, vectors), = reach.items()
+    reach = rng.choice(system["reaches"][: system.get("square", system.get("unknowns"))])
+    ((kind, vectors),) = reach.items()
     if kind == "circle":
         factor = 1 + amount(rng)
         vectors[1:] = [[str(Fraction(x) * factor) for x in each] for each in vectors[1:]]
@@ -181,7 +181,7 @@ def other_rest(system: Record, rng: random.Random) -> None:
     if rng.random() < 0.3:
         rng.choice(system["normals"])[0] = "1"
         return
-    _, axis, point = rng.choice(system["joints"][system["unknowns"]:])
+    _, axis, point = rng.choice(system["joints"][system["unknowns"] :])
     by = amount(rng)
     if rng.random() < 0.5:
         axis[0] = moved(axis[0], by)
@@ -191,8 +191,11 @@ def other_rest(system: Record, rng: random.Random) -> None:
 
 def other(direction: list[str]) -> list[str]:
     """A vector that is not along a direction."""
-    return ["1" if Fraction(x) == 0 else "0" for x in direction] if any(
-        Fraction(x) == 0 for x in direction) else ["1", *["0"] * (len(direction) - 1)]
+    return (
+        ["1" if Fraction(x) == 0 else "0" for x in direction]
+        if any(Fraction(x) == 0 for x in direction)
+        else ["1", *["0"] * (len(direction) - 1)]
+    )
 
 
 def closed(record: Record) -> list[Record]:
@@ -268,9 +271,28 @@ def wrong_type(record: Record, rng: random.Random) -> None:
 
 
 FALSE: tuple[Callable[[Record, random.Random], None], ...] = (
-    drop_box, double_box, repeat_box, move_box, turn_complex, wrong_radius, wrong_inverse, wrong_count, wrong_pose,
-    uncounted, forget_pose, wrong_caps, other_far, other_geometry, open_joint, lost_link, other_measurement,
-    other_place, other_joint, missing_key, wrong_type)
+    drop_box,
+    double_box,
+    repeat_box,
+    move_box,
+    turn_complex,
+    wrong_radius,
+    wrong_inverse,
+    wrong_count,
+    wrong_pose,
+    uncounted,
+    forget_pose,
+    wrong_caps,
+    other_far,
+    other_geometry,
+    open_joint,
+    lost_link,
+    other_measurement,
+    other_place,
+    other_joint,
+    missing_key,
+    wrong_type,
+)
 
 
 def false(record: Record, rng: random.Random) -> tuple[str, Record]:
@@ -285,7 +307,7 @@ def false(record: Record, rng: random.Random) -> tuple[str, Record]:
 def scribbled(text: str, rng: random.Random) -> str:
     """A certificate's text with one character changed, left out or doubled."""
     k = rng.randrange(len(text))
-    return text[:k] + rng.choice(["", text[k] * 2, rng.choice("0123456789-./{}[]\",x")]) + text[k + 1:]
+    return text[:k] + rng.choice(["", text[k] * 2, rng.choice('0123456789-./{}[]",x')]) + text[k + 1 :]
 
 
 def means_the_same(one: str, other: str) -> bool:

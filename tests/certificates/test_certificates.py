@@ -43,8 +43,16 @@ from hrsynth.mechanism import Mechanism
 from oracle import Oracle
 
 FILE = Path(checker.__file__)
-ROBOTS = {"quattro": ("1", "4"), "gough_stewart": ("1", "3", "5"), "3rrr_m1": ("1", "2", "3"), "delta": ("1", "2"),
-          "quattro_rigid": ("1", "2"), "rrrrr_m1": ("1", "2"), "6pus": ("1", "2", "3", "4"), "3rpr_m1": ("1", "2", "3")}
+ROBOTS = {
+    "quattro": ("1", "4"),
+    "gough_stewart": ("1", "3", "5"),
+    "3rrr_m1": ("1", "2", "3"),
+    "delta": ("1", "2"),
+    "quattro_rigid": ("1", "2"),
+    "rrrrr_m1": ("1", "2"),
+    "6pus": ("1", "2", "3", "4"),
+    "3rpr_m1": ("1", "2", "3"),
+}
 """Platforms that turn, turn in a plane, translate, of two bodies; as many legs as needed, and more."""
 
 
@@ -75,13 +83,20 @@ def test_what_is_listed_is_certified(name, tmp_path):
 
 WITHOUT = {"two bodies, second circle and slide parallel"}
 """Families with a curve of zeros at half-angle tangents i and −i."""
-LONGER = {"spatial, six spheres", "spatial, three planes and three spheres", "spatial, six planes",
-          "spatial, a pivot and three spheres", "spatial, two circles and two spheres",
-          "spatial, a line and four spheres"}
+LONGER = {
+    "spatial, six spheres",
+    "spatial, three planes and three spheres",
+    "spatial, six planes",
+    "spatial, a pivot and three spheres",
+    "spatial, two circles and two spheres",
+    "spatial, a line and four spheres",
+}
 
 
-NEEDED = {name: [mark for mark, names in ((pytest.mark.slow, LONGER), (needs_msolve, SURFACES)) if name in names]
-          for name in sorted(FAMILIES | MEETING | SURFACES)}
+NEEDED = {
+    name: [mark for mark, names in ((pytest.mark.slow, LONGER), (needs_msolve, SURFACES)) if name in names]
+    for name in sorted(FAMILIES | MEETING | SURFACES)
+}
 
 
 @pytest.mark.some(2, 8)
@@ -135,7 +150,7 @@ def test_driven_joints_are_the_same_at_all_modes():
     for row in record["assembly"]["held"]:
         assert len(row[3]) == 3
     held = record["assembly"]["held"][-1]
-    held[3][2] = str(Fraction(held[3][2]) + Fraction(1, 10 ** 6))
+    held[3][2] = str(Fraction(held[3][2]) + Fraction(1, 10**6))
     record["sha256"] = checker.digest(record)
     with pytest.raises(checker.NotAccepted, match="another measurement"):
         checker.verify(record)
@@ -157,8 +172,10 @@ def test_a_certificate_of_the_real_robot_is_about_it(name: str):
 def scaled(name: str) -> Mechanism:
     """A robot that is a hundredth larger."""
     robot = hrsynth.load(name)
-    links = {key: replace(link, pose=np.vstack([np.hstack([link.pose[:3, :3], 1.01 * link.pose[:3, 3:]]),
-                                                link.pose[3:]])) for key, link in robot.links.items()}
+    links = {
+        key: replace(link, pose=np.vstack([np.hstack([link.pose[:3, :3], 1.01 * link.pose[:3, 3:]]), link.pose[3:]]))
+        for key, link in robot.links.items()
+    }
     joints = {key: replace(joint, point=1.01 * joint.point) for key, joint in robot.joints.items()}
     return replace(robot, links=links, joints=joints)
 
@@ -221,9 +238,15 @@ def alone(kinds: str) -> str:
 
 @pytest.mark.some(1)
 @pytest.mark.timeout(3600)
-@pytest.mark.parametrize(("kinds", "count"), [
-    ("2LLC", 40), ("PSSS", 12), pytest.param("CCSS", 20, marks=pytest.mark.long),
-    *(pytest.param(kinds, 500, marks=pytest.mark.long) for kinds in ("CCSS", "EEEEEE", "LLC"))])
+@pytest.mark.parametrize(
+    ("kinds", "count"),
+    [
+        ("2LLC", 40),
+        ("PSSS", 12),
+        pytest.param("CCSS", 20, marks=pytest.mark.long),
+        *(pytest.param(kinds, 500, marks=pytest.mark.long) for kinds in ("CCSS", "EEEEEE", "LLC")),
+    ],
+)
 def test_false_certificates_with_zeros_at_infinity_or_of_poses_are_refused(kinds, count):
     assert sum(attacked(alone(kinds), count, 5).values()) == count
 
@@ -245,10 +268,13 @@ def test_lines_of_a_platform_that_keep_to_points_of_the_base(name):
     found = hrsynth.modes(name, real=True)
     record = json.loads(json.dumps(hrsynth.certificate(found)))
     assert hrsynth.verify(record, name) == (
-        "2 real of 2 complex poses, and no other; the robot closes at 2 of the real ones, to 1e-9")
+        "2 real of 2 complex poses, and no other; the robot closes at 2 of the real ones, to 1e-9"
+    )
     turns = [(mode.bodies["platform"] @ np.linalg.inv(found.goal.pose("platform")))[:2, :2] for mode in found.modes]
-    told = [np.array([[float(Fraction(x)) for x in row[:2]] for row in box["pose"]])
-            for box in record["systems"][0]["boxes"]]
+    told = [
+        np.array([[float(Fraction(x)) for x in row[:2]] for row in box["pose"]])
+        for box in record["systems"][0]["boxes"]
+    ]
     assert np.trace(turns[0] @ turns[1].T) == pytest.approx(np.trace(told[0] @ told[1].T))
     with pytest.raises(CertificateRefused, match="not for"):
         hrsynth.verify(record, scaled(name))
@@ -263,7 +289,9 @@ LOOPS: dict[str, Callable[[], AssemblyModes]] = {
     "two bodies": lambda: hrsynth.modes(linkage(STEPHENSON, LINKS, "c", "j0"), real=True),
     "a tool on a plate on three legs": lambda: hrsynth.modes(on_three_legs(), real=True),
     "a slide on the platform": lambda: hrsynth.modes(
-        mechanism(parse("(Rz!-Rz*-Ph)+(Rz!-Rz-Rz*)+(Rz!-Rz*-Rz)")), real=True)}
+        mechanism(parse("(Rz!-Rz*-Ph)+(Rz!-Rz-Rz*)+(Rz!-Rz*-Rz)")), real=True
+    ),
+}
 
 
 @cache
@@ -297,8 +325,8 @@ CHAINS: dict[str, tuple[Callable[[], AssemblyModes], str]] = {
     "a rod watched": (lambda: hrsynth.modes(ankle("RSU", 1, offset=0.05)[0], "1"), "2 real of 4"),
     "both rods watched": (lambda: hrsynth.modes(ankle("RUS", 1, offset=0.05)[0]), "1 real of 1"),
     "a turn and a slide": (lambda: hrsynth.modes(carried("RP", 1), real=True), "6 real of 6"),
-    **{name: (partial(driven, name), f"{count} real of {count}") for name, count in LISTED.items()
-       if name != "sarrus"}}
+    **{name: (partial(driven, name), f"{count} real of {count}") for name, count in LISTED.items() if name != "sarrus"},
+}
 HEAVY = {"an ankle": [], "bennett": [], "goldberg": [], "myard": [pytest.mark.long]}
 
 
@@ -313,8 +341,7 @@ def chained(name: str) -> str:
 
 
 @pytest.mark.some(1, 3)
-@pytest.mark.parametrize("name", [pytest.param(each, marks=HEAVY.get(each, [pytest.mark.slow]))
-                                  for each in CHAINS])
+@pytest.mark.parametrize("name", [pytest.param(each, marks=HEAVY.get(each, [pytest.mark.slow])) for each in CHAINS])
 def test_platforms_that_a_leg_carries_and_single_loops(name: str):
     """Without loops as many poses as are listed; with them the goal closes exactly, all others fit or miss."""
     found, record = chain_modes(name), json.loads(chained(name))
@@ -334,8 +361,13 @@ def test_normals_are_all_of_those_of_the_rest_of_a_loop():
     """Of one joint along z the six unit vectors but the first and that of k; none less, and no two nearly parallel."""
     unit = np.eye(8, dtype=int)
     normals = text_of(np.delete(unit, (0, 3), 0))
-    system = {"unknowns": 1, "ends": [[1]], "reaches": [], "normals": normals,
-              "joints": [["R", *text_of([[1, 0, 0], [0, 1, 0]])], ["R", *text_of([[0, 0, 1], [0, 0, 0]])]]}
+    system = {
+        "unknowns": 1,
+        "ends": [[1]],
+        "reaches": [],
+        "normals": normals,
+        "joints": [["R", *text_of([[1, 0, 0], [0, 1, 0]])], ["R", *text_of([[0, 0, 1], [0, 0, 0]])]],
+    }
     tips = [[Fraction(int(i == k)) for i in range(3)] for k in range(3)]
     assert len(checker.chain(system, tips)[0]) == 1
     for last in ([], [text_of(1000 * unit[1] + unit[7])], [text_of(unit[3])]):
@@ -361,15 +393,23 @@ def test_a_loop_has_all_of_its_normals_and_is_closed(forged: str):
     else:
         *_, points, _ = checker.chain(system, checker.rational(system["tips"]))
         m = checker.rational(box["middle"])
-        at, *ends = (np.array([float(checker.value(p, m)[0] / checker.value(w, m)[0]) for p in N])
-                     for N, _, w in points[:3])
+        at, *ends = (
+            np.array([float(checker.value(p, m)[0] / checker.value(w, m)[0]) for p in N]) for N, _, w in points[:3]
+        )
         x, y = (end - at for end in ends)
         del box["misses"]
-        box |= {"pose": [[str(Fraction(float(v))) for v in row] for row in np.column_stack([x, y, np.cross(x, y), at])],
-                "within": "1/1000000000"}
+        box |= {
+            "pose": [[str(Fraction(float(v))) for v in row] for row in np.column_stack([x, y, np.cross(x, y), at])],
+            "within": "1/1000000000",
+        }
         record |= {"real": record["real"] + 1, "complex": record["complex"] + 1}
-        system["normals"] = normals[:n] + ([] if forged == "left out" else [
-            [str(int(a) + 10 ** 14 * int(b)) for a, b in zip(each, normals[0], strict=True)] for each in normals[n:]])
+        system["normals"] = normals[:n] + (
+            []
+            if forged == "left out"
+            else [
+                [str(int(a) + 10**14 * int(b)) for a, b in zip(each, normals[0], strict=True)] for each in normals[n:]
+            ]
+        )
     record["sha256"] = checker.digest(record)
     with pytest.raises(checker.NotAccepted, match="normals" if forged != "without links" else "links"):
         checker.verify(record)
@@ -379,12 +419,20 @@ def test_a_chain_of_joints_is_that_of_rotations_and_shifts():
     """The checker's dual quaternions against matrices: a random chain with a slide, its angles and its lengths."""
     rng = np.random.default_rng(1)
     whole = [[Fraction(int(x), 8) for x in row] for row in rng.integers(-8, 8, (6, 3))]
-    axes = [[Fraction(3, 5), Fraction(0), Fraction(4, 5)], [Fraction(0), Fraction(1), Fraction(0)],
-            [Fraction(2, 3), Fraction(1, 3), Fraction(-2, 3)]]
+    axes = [
+        [Fraction(3, 5), Fraction(0), Fraction(4, 5)],
+        [Fraction(0), Fraction(1), Fraction(0)],
+        [Fraction(2, 3), Fraction(1, 3), Fraction(-2, 3)],
+    ]
     joints = list(zip("RPR", axes, whole[:3], strict=True))
     tips = [[Fraction(int(i == k)) for i in range(3)] for k in range(3)]
-    system = {"unknowns": 3, "ends": [[3]], "normals": [], "reaches": [],
-              "joints": [[kind, [str(c) for c in a], [str(c) for c in o]] for kind, a, o in joints]}
+    system = {
+        "unknowns": 3,
+        "ends": [[3]],
+        "normals": [],
+        "reaches": [],
+        "joints": [[kind, [str(c) for c in a], [str(c) for c in o]] for kind, a, o in joints],
+    }
     *_, points, _ = checker.chain(system, tips)
     at = [Fraction(1, 3), Fraction(-2, 5), Fraction(7, 4)]
     values = [[checker.value(p, [[t, 0] for t in at])[0] for p in (*N, Q, w)] for N, Q, w in points[:3]]
@@ -411,8 +459,10 @@ def test_the_degrees_of_a_checker_are_those_of_the_list(seed):
 
     for loop in system["loops"]:
         for sign in (1, -1):
-            terms = [[*((j + a * (sign * e < 0), abs(e)) for j, e in enumerate(turns)), (2 * a + slide, slide >= 0)]
-                     for _, slide, turns in loop]
+            terms = [
+                [*((j + a * (sign * e < 0), abs(e)) for j, e in enumerate(turns)), (2 * a + slide, slide >= 0)]
+                for _, slide, turns in loop
+            ]
             product *= sum(degree(terms, group) * x for group, x in zip(groups, h, strict=True))
     for j in range(a):
         product *= sum(((j in group) + (a + j in group)) * x for group, x in zip(groups, h, strict=True))
@@ -434,8 +484,14 @@ def test_six_legged_pods_whose_rods_share_balls(name):
 @pytest.mark.long
 def test_ten_thousand_false_certificates():
     told: Counter[str] = Counter()
-    for seed, text in enumerate([*map(of, ROBOTS), looped("three turns to two"), looped("six-bar"), *map(chained, (
-            "an ankle", "a rod watched", "bennett", "schatz"))]):
+    for seed, text in enumerate(
+        [
+            *map(of, ROBOTS),
+            looped("three turns to two"),
+            looped("six-bar"),
+            *map(chained, ("an ankle", "a rod watched", "bennett", "schatz")),
+        ]
+    ):
         told += attacked(text, 1000, seed)
     assert sum(told.values()) == 14_000
 
@@ -496,7 +552,8 @@ def test_command_line(tmp_path, capsys):
     assert f"The certificate is written to {path}." in capsys.readouterr().out
     assert execute(["verify", str(path)]) == 0
     assert capsys.readouterr().out == (
-        "accepted: 2 real of 2 complex poses, and no other; the robot closes at 2 of the real ones, to 1e-9\n")
+        "accepted: 2 real of 2 complex poses, and no other; the robot closes at 2 of the real ones, to 1e-9\n"
+    )
     assert execute(["verify", str(path), "--robot", "3rpr_m1", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["accepted"] is True
     assert execute(["verify", str(path), "--robot", "3rrr_m1"]) == 3

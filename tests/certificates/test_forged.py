@@ -32,27 +32,43 @@ def bar(length: object = 1, centre: object = 1, legs: Sequence[tuple[object, Rec
     """A bar from the origin, its end on the circle of radius 1 about (centre, 0); more tips along it, and what they
     reach. Of length 1, centre 1: the bar at ±60°."""
     tips = [*([at, 0, 0] for at, _ in legs), [0, 0, 0], [length, 0, 0]]
-    loop = [[text([length, 0]), -1, [1, 0]], [text([-Fraction(centre), 0]), -1, [0, 0]],  # type: ignore[arg-type]
-            [text([-1, 0]), -1, [0, 1]]]
-    return {"kind": "loops", "angles": 2, "slides": 0, "loops": [loop], "besides": [], "others": [], "tips": text(tips),
-            "links": [[[1, 0], []]] * len(tips), "reaches": [each for _, each in legs],
-            "bound": {"kind": "degrees", "groups": [[0], [1], [2], [3]]}}
+    loop = [
+        [text([length, 0]), -1, [1, 0]],
+        [text([-Fraction(centre), 0]), -1, [0, 0]],  # type: ignore[arg-type]
+        [text([-1, 0]), -1, [0, 1]],
+    ]
+    return {
+        "kind": "loops",
+        "angles": 2,
+        "slides": 0,
+        "loops": [loop],
+        "besides": [],
+        "others": [],
+        "tips": text(tips),
+        "links": [[[1, 0], []]] * len(tips),
+        "reaches": [each for _, each in legs],
+        "bound": {"kind": "degrees", "groups": [[0], [1], [2], [3]]},
+    }
 
 
 def line(height: object, along: object = 1) -> Record:
     return {"line": text([[0, height, 0], [along, 0, 0]])}
 
 
-def boxed(system: Record, *starts: complex, radius: object = Fraction(1, 10 ** 12), off: float = 0.0) -> Record:
+def boxed(system: Record, *starts: complex, radius: object = Fraction(1, 10**12), off: float = 0.0) -> Record:
     """The system with a box for the closing near each angle of the bar, at a middle ``off`` that angle."""
     equations, *_ = checker.loops(system, checker.rational(system["tips"]))
-    scaled = [{e: c / 2 ** max(map(abs, p.values())).bit_length() for e, c in p.items()}
-              for p in map(checker.integral, equations)]
+    scaled = [
+        {e: c / 2 ** max(map(abs, p.values())).bit_length() for e, c in p.items()}
+        for p in map(checker.integral, equations)
+    ]
 
     def at(x: Any) -> tuple[Any, Any]:
         values = np.array([sum(float(c) * np.prod(x ** np.array(e)) for e, c in p.items()) for p in scaled])
-        slopes = [[sum(float(c) * np.prod(x ** np.array(e)) for e, c in checker.slope(p, k).items()) for k in range(4)]
-                  for p in scaled]
+        slopes = [
+            [sum(float(c) * np.prod(x ** np.array(e)) for e, c in checker.slope(p, k).items()) for k in range(4)]
+            for p in scaled
+        ]
         return values, np.array(slopes)
 
     length, centre, radius_ = (float(Fraction(system["loops"][0][k][0][0])) for k in (0, 1, 2))
@@ -64,12 +80,17 @@ def boxed(system: Record, *starts: complex, radius: object = Fraction(1, 10 ** 1
             F, J = at(x)
             x = x - np.linalg.solve(J, F)
         x = x + off * np.array([-x[2], -x[3], x[0], x[1]])
-        boxes.append({"middle": text([[v.real, v.imag] for v in x]), "radius": text(radius),
-                      "inverse": [[text([v.real, v.imag]) for v in row] for row in np.linalg.inv(at(x)[1])]})
+        boxes.append(
+            {
+                "middle": text([[v.real, v.imag] for v in x]),
+                "radius": text(radius),
+                "inverse": [[text([v.real, v.imag]) for v in row] for row in np.linalg.inv(at(x)[1])],
+            }
+        )
     return system | {"boxes": boxes}
 
 
-def posed(system: Record, *angles: object, within: object = Fraction(1, 10 ** 7)) -> Record:
+def posed(system: Record, *angles: object, within: object = Fraction(1, 10**7)) -> Record:
     """The first boxes with the poses at these angles."""
     for box, angle in zip(system["boxes"], angles, strict=False):
         c, s = math.cos(angle), math.sin(angle)  # type: ignore[arg-type]
@@ -78,8 +99,13 @@ def posed(system: Record, *angles: object, within: object = Fraction(1, 10 ** 7)
 
 
 def certificate(real: int, complex_: int, *systems: Record) -> Record:
-    record = {"format": "hrsynth-certificate-1", "claim": "modes", "real": real, "complex": complex_,
-              "systems": list(systems)}
+    record = {
+        "format": "hrsynth-certificate-1",
+        "claim": "modes",
+        "real": real,
+        "complex": complex_,
+        "systems": list(systems),
+    }
     return sealed(record)
 
 
@@ -166,22 +192,43 @@ def one_pose_twice() -> Record:
     (loop,), boxes = bar()["loops"], []
     loops = [[[vector, slide, [0] * k + turns + [0] * (2 - k)] for vector, slide, turns in loop] for k in (0, 2)]
     for one, two in product(sound()["boxes"], repeat=2):
-        middle = [x for k in (0, 2) for each in (one, two) for x in each["middle"][k:k + 2]]
+        middle = [x for k in (0, 2) for each in (one, two) for x in each["middle"][k : k + 2]]
         inverse = [[["0", "0"]] * 8 for _ in range(8)]
         for k, each in enumerate((one, two)):
             places = [2 * k, 2 * k + 1, 4 + 2 * k, 5 + 2 * k]  # of its equations, and of its unknowns
             for (i, row), (j, column) in product(enumerate(places), repeat=2):
                 inverse[row][column] = each["inverse"][i][j]
         boxes.append(one | {"middle": middle, "inverse": inverse})
-    return certificate(4, 4, bar() | {"angles": 4, "loops": loops, "links": [[[1, 0, 0, 0], []]] * 2, "boxes": boxes,
-                                      "bound": {"kind": "degrees", "groups": [[k] for k in range(8)]}})
+    return certificate(
+        4,
+        4,
+        bar()
+        | {
+            "angles": 4,
+            "loops": loops,
+            "links": [[[1, 0, 0, 0], []]] * 2,
+            "boxes": boxes,
+            "bound": {"kind": "degrees", "groups": [[k] for k in range(8)]},
+        },
+    )
 
 
 def a_curve_of_closings() -> Record:
     """A slide that is in no loop: there are no isolated closings, and none is told."""
     loop = [[text([1, 0]), -1, [1]], [text([-1, 0]), -1, [0]]]
-    return certificate(0, 0, bar() | {"angles": 1, "slides": 1, "loops": [loop], "links": [[[1], []]] * 2, "boxes": [],
-                                      "bound": {"kind": "degrees", "groups": [[0], [1], [2]]}})
+    return certificate(
+        0,
+        0,
+        bar()
+        | {
+            "angles": 1,
+            "slides": 1,
+            "loops": [loop],
+            "links": [[[1], []]] * 2,
+            "boxes": [],
+            "bound": {"kind": "degrees", "groups": [[0], [1], [2]]},
+        },
+    )
 
 
 def fewer_than_no_slides() -> Record:
@@ -199,18 +246,21 @@ def short_normal() -> Record:
 def tiny_units() -> Record:
     """A mechanism of size 1e-10 fits to 1e-9 anywhere."""
     system = led()
-    tiny = Fraction(1, 10 ** 10)
+    tiny = Fraction(1, 10**10)
     system["tips"] = [[str(Fraction(x) * tiny) for x in b] for b in system["tips"]]
     system["loops"] = [[[[str(Fraction(x) * tiny) for x in vector], *rest] for vector, *rest in system["loops"][0]]]
-    system["reaches"] = [{kind: [[str(Fraction(x) * tiny) for x in v] for v in vectors]}
-                         for each in system["reaches"] for kind, vectors in each.items()]
+    system["reaches"] = [
+        {kind: [[str(Fraction(x) * tiny) for x in v] for v in vectors]}
+        for each in system["reaches"]
+        for kind, vectors in each.items()
+    ]
     del system["boxes"][1]["misses"]
     return certificate(2, 2, posed(system, SIXTY, -SIXTY))
 
 
 def large_sphere() -> Record:
     """Relative to its radius of 1e9 a circle is missed by little."""
-    circle = {"circle": text([[0, 10 ** 9 + Fraction(1, 2), 0], [0, 10 ** 9, 0], [-10 ** 9, 0, 0]])}
+    circle = {"circle": text([[0, 10**9 + Fraction(1, 2), 0], [0, 10**9, 0], [-(10**9), 0, 0]])}
     return certificate(2, 2, posed(boxed(bar(legs=[(0.5, circle)]), SIXTY, -SIXTY), SIXTY, -SIXTY))
 
 
@@ -239,7 +289,7 @@ def tips_out_of_the_plane() -> Record:
 
 def called_far() -> Record:
     """In units so small that all poses are 10^9 of them away."""
-    large = 10 ** 9
+    large = 10**9
     system = bar(large, large)
     system["loops"][0][2][0] = text([-large, 0])
     return certificate(0, 0, boxed(system, SIXTY, -SIXTY))
@@ -247,15 +297,38 @@ def called_far() -> Record:
 
 def another_name() -> Record:
     """The rank of one number, told as that of a stack of two matrices."""
-    return sealed({"format": "hrsynth-certificate-1", "claim": "ranks", "matrices": {"A; X": [[1]]},
-                   "stacks": [{"of": ["A; X"], "rank": 1, "rows": [0], "columns": [0], "kernel": []}]})
+    return sealed(
+        {
+            "format": "hrsynth-certificate-1",
+            "claim": "ranks",
+            "matrices": {"A; X": [[1]]},
+            "stacks": [{"of": ["A; X"], "rank": 1, "rows": [0], "columns": [0], "kernel": []}],
+        }
+    )
 
 
 FORGED: tuple[Callable[[], Record], ...] = (
-    ignored_tips, no_tips_compared, tips_called_arrows, vague_pose, system_twice, no_system,
-    short_normal, tiny_units, large_sphere, fits_beside_the_solution, complex_poses_forgotten, called_far,
-    one_pose_twice, a_curve_of_closings, fewer_than_no_slides,
-    normal_taken_for_a_direction, tips_out_of_the_plane, another_name, poses_that_miss_a_leg, a_box_with_another_word)
+    ignored_tips,
+    no_tips_compared,
+    tips_called_arrows,
+    vague_pose,
+    system_twice,
+    no_system,
+    short_normal,
+    tiny_units,
+    large_sphere,
+    fits_beside_the_solution,
+    complex_poses_forgotten,
+    called_far,
+    one_pose_twice,
+    a_curve_of_closings,
+    fewer_than_no_slides,
+    normal_taken_for_a_direction,
+    tips_out_of_the_plane,
+    another_name,
+    poses_that_miss_a_leg,
+    a_box_with_another_word,
+)
 
 
 @pytest.mark.parametrize("forged", FORGED, ids=lambda each: each.__name__)
@@ -264,17 +337,22 @@ def test_a_forged_certificate_is_refused(forged):
         print(checker.verify(forged()))
 
 
-@pytest.mark.parametrize("chart", [
-    [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1], [0, 0, 0, 1]],
-    [["1", "2", "0", "0"], ["3/2", "5/2", "0", "0"], ["0", "0", "1", "0"], ["0", "0", "0", "1"]],
-    [[1, 2, 0, 0], [2, 4, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]], [[1, 0, 0, 0, 1], *np.eye(4, dtype=int).tolist()[1:]]])
+@pytest.mark.parametrize(
+    "chart",
+    [
+        [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1], [0, 0, 0, 1]],
+        [["1", "2", "0", "0"], ["3/2", "5/2", "0", "0"], ["0", "0", "1", "0"], ["0", "0", "0", "1"]],
+        [[1, 2, 0, 0], [2, 4, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]],
+        [[1, 0, 0, 0, 1], *np.eye(4, dtype=int).tolist()[1:]],
+    ],
+)
 def test_a_chart_is_four_independent_rows_of_integers(chart):
     record = {"chart": chart, "arrows": 0, "hub": ["0"] * 3, "reaches": [{"point": text([[0, 0, 0]])}]}
     with pytest.raises((checker.NotAccepted, ValueError)):
         checker.pose(record, [[Fraction(0)] * 3])
 
 
-@pytest.mark.parametrize("groups", [[[[k], 12, 0] for k in range(4)], [[[0, 1, 2, 3], 2, 0], *[[[], 1, 0]] * 10 ** 6]])
+@pytest.mark.parametrize("groups", [[[[k], 12, 0] for k in range(4)], [[[0, 1, 2, 3], 2, 0], *[[[], 1, 0]] * 10**6]])
 def test_a_bound_is_found_at_once(groups):
     """Caps of 12 are 28,561 monomials; groups of nothing have no end."""
     with pytest.raises(checker.NotAccepted):
@@ -296,14 +374,22 @@ def test_no_key_is_told_twice(tmp_path):
         hrsynth.verify(path)
     for content in (path.read_text(), "[" * 200_000):
         path.write_text(content)
-        done = subprocess.run([sys.executable, "-I", str(Path(checker.__file__)), str(path)], capture_output=True,
-                              text=True, check=False)
+        done = subprocess.run(
+            [sys.executable, "-I", str(Path(checker.__file__)), str(path)], capture_output=True, text=True, check=False
+        )
         assert (done.returncode, done.stderr, done.stdout[:7]) == (3, "", "refused")
 
 
-@pytest.mark.parametrize("about", [
-    {}, {"at": 3, "observed": []}, {"at": {}, "observed": [["a", "b"]], "kind": "1/0"},
-    {"at": {"up": 1}, "observed": [], "kind": "hidden"}, {"at": {}, "kind": "hidden", "observed": [1]}])
+@pytest.mark.parametrize(
+    "about",
+    [
+        {},
+        {"at": 3, "observed": []},
+        {"at": {}, "observed": [["a", "b"]], "kind": "1/0"},
+        {"at": {"up": 1}, "observed": [], "kind": "hidden"},
+        {"at": {}, "kind": "hidden", "observed": [1]},
+    ],
+)
 def test_a_certificate_about_nothing_is_not_about_a_robot(about):
     record = sealed(copy.deepcopy(certificate(2, 2, sound())) | about)
     with pytest.raises(HrsynthError):

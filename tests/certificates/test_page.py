@@ -18,13 +18,23 @@ import hrsynth
 from hrsynth.certificates.verify_certificate import KINDS
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "pages" / "certificates.md"
-CAMERA = {"camera": "eye=base@0.3,0.1,0",
-          "see": ["point:platform@0.1,0,0", "point:platform@-0.1,0.1,0", "point:platform@0,0.1,0.1"]}
+CAMERA = {
+    "camera": "eye=base@0.3,0.1,0",
+    "see": ["point:platform@0.1,0,0", "point:platform@-0.1,0.1,0", "point:platform@0,0.1,0.1"],
+}
 ASKED: dict[str, tuple[str, str | None, dict[str, Any]]] = {
-    "rrrrr_m1": ("rrrrr_m1", None, {}), "3prr_m1": ("3prr_m1", None, {}), "3rrr_m1": ("3rrr_m1", None, {}),
-    "rprpr_m1": ("rprpr_m1", None, {}), "quattro": ("quattro", "1,4", {}), "delta": ("delta", "1,2", {}),
-    "orthoglide": ("orthoglide", "1,2", {}), "3upu": ("3upu", "1,2", {}), "3rps": ("3rps", None, {}),
-    "gough_stewart": ("gough_stewart", "1,3,5", {}), "three points": ("gough_stewart", None, CAMERA)}
+    "rrrrr_m1": ("rrrrr_m1", None, {}),
+    "3prr_m1": ("3prr_m1", None, {}),
+    "3rrr_m1": ("3rrr_m1", None, {}),
+    "rprpr_m1": ("rprpr_m1", None, {}),
+    "quattro": ("quattro", "1,4", {}),
+    "delta": ("delta", "1,2", {}),
+    "orthoglide": ("orthoglide", "1,2", {}),
+    "3upu": ("3upu", "1,2", {}),
+    "3rps": ("3rps", None, {}),
+    "gough_stewart": ("gough_stewart", "1,3,5", {}),
+    "three points": ("gough_stewart", None, CAMERA),
+}
 
 
 @cache
@@ -54,7 +64,7 @@ def cross(u: Sequence[Any], v: Sequence[Any]) -> list[Any]:
 
 def on_curve(reach: dict[str, Any], t: Any) -> list[Any]:
     """A point of a point, line or circle."""
-    (kind, values), = reach.items()
+    ((kind, values),) = reach.items()
     c, *rest = number(values)
     along = [] if kind == "point" else [t] if kind == "line" else [(1 - t * t) / (1 + t * t), 2 * t / (1 + t * t)]
     return [x + sum(s * v[k] for s, v in zip(along, rest, strict=True)) for k, x in enumerate(c)]
@@ -62,7 +72,7 @@ def on_curve(reach: dict[str, Any], t: Any) -> list[Any]:
 
 def misses(reach: dict[str, Any], x: Sequence[Any]) -> list[Any]:
     """What vanishes where a point is on a curve or surface."""
-    (kind, values), = reach.items()
+    ((kind, values),) = reach.items()
     c, *rest = number(values)
     off = minus(x, c)
     match kind:
@@ -97,18 +107,26 @@ def read(system: dict[str, Any], x: Sequence[Any]) -> tuple[list[Any], list[list
     if kind == "spatial":
         unknowns = iter(x)
         at = [on_curve(each, None if "point" in each else next(unknowns)) for each in reaches[:3]]
-        return [dot(minus(at[i], at[j]), minus(at[i], at[j])) - dot(minus(tips[i], tips[j]), minus(tips[i], tips[j]))
-                for i, j in combinations(range(3), 2)], at
+        return [
+            dot(minus(at[i], at[j]), minus(at[i], at[j])) - dot(minus(tips[i], tips[j]), minus(tips[i], tips[j]))
+            for i, j in combinations(range(3), 2)
+        ], at
     if kind == "shifting":
         slid = on_curve(system["slide"], x[3]) if "slide" in system else [0, 0, 0]
-        at = [[a + b + c * body for a, b, c in zip(x[:3], tip, slid, strict=True)]
-              for tip, body in zip(tips, system["bodies"], strict=True)]
-        return [v for each, p in list(zip(reaches, at, strict=True))[:system["square"]] for v in misses(each, p)], at
+        at = [
+            [a + b + c * body for a, b, c in zip(x[:3], tip, slid, strict=True)]
+            for tip, body in zip(tips, system["bodies"], strict=True)
+        ]
+        return [v for each, p in list(zip(reaches, at, strict=True))[: system["square"]] for v in misses(each, p)], at
     a = system["angles"]
-    at = [[*total([*shift, [b[:2], -1, turns]], a, x), 0]
-          for b, (turns, shift) in zip(system["tips"], system["links"], strict=True)]
-    return [*(v for loop in system["loops"] for v in total(loop, a, x)),
-            *(x[k] ** 2 + x[a + k] ** 2 - 1 for k in range(a))], at
+    at = [
+        [*total([*shift, [b[:2], -1, turns]], a, x), 0]
+        for b, (turns, shift) in zip(system["tips"], system["links"], strict=True)
+    ]
+    return [
+        *(v for loop in system["loops"] for v in total(loop, a, x)),
+        *(x[k] ** 2 + x[a + k] ** 2 - 1 for k in range(a)),
+    ], at
 
 
 def solution(system: dict[str, Any], start: Sequence[Any]) -> list[Any]:
@@ -144,8 +162,11 @@ def test_another_checker_finds_the_solutions_in_their_boxes(name: str):
                     for b, place, body in zip(number(system["tips"]), read(system, x)[1], bodies, strict=False):
                         there = [dot(row[:3], b) + row[3] for row in P]
                         assert body or max(abs(u - v) for u, v in zip(there, place, strict=True)) <= within
-                    for reach, b in list(zip(system["reaches"], number(system["tips"]), strict=False)
-                                         if system["kind"] == "spatial" else ()):
+                    for reach, b in list(
+                        zip(system["reaches"], number(system["tips"]), strict=False)
+                        if system["kind"] == "spatial"
+                        else ()
+                    ):
                         off = misses(reach, [dot(row[:3], b) + row[3] for row in P])
                         assert max(map(abs, off)) < 1e-8
                 if "links" in box:
@@ -170,8 +191,9 @@ def closes(assembly: dict[str, Any], links: dict[str, Any]) -> None:
     for one, other, vector, seen in assembly["held"]:
         D, E, x = number(links[one]), number(links[other]), number(vector)
         there = [dot(row, x) - x[3] * base[3] for row, base in zip(D, E, strict=True)]
-        assert max(map(abs, minus([dot(column, there) for column in list(zip(*E, strict=True))[:3]],
-                                  number(seen)))) < 1e-9
+        assert (
+            max(map(abs, minus([dot(column, there) for column in list(zip(*E, strict=True))[:3]], number(seen)))) < 1e-9
+        )
 
 
 def keys(each: Any) -> Iterator[str]:
@@ -187,7 +209,7 @@ def keys(each: Any) -> Iterator[str]:
 
 def test_the_page_names_all_that_is_in_a_file():
     page = PAGE.read_text(encoding="utf-8")
-    told = page[page.index("### What is in the file"):page.index("## What a certificate of a path proves")]
+    told = page[page.index("### What is in the file") : page.index("## What a certificate of a path proves")]
     words = {word for code in re.findall(r"`([^`]*)`", told.replace("\n", " ")) for word in re.findall(r"\w+", code)}
     needed = {key for name in ("3rrr_m1", "quattro", "3rps") for key in keys(record(name))}
     needed |= {key for _, names in KINDS.values() for key in names.split()} | {"misses", "far"}

@@ -22,11 +22,13 @@ from hrsynth.cli import execute
 from hrsynth.errors import CertificateRefused, NoCertificate
 
 FILE = Path(checker.__file__)
-PATHS = {"3rrr_m1": (None, "x=0,y=0,phi=0", "x=0.02,y=0,phi=5deg"),
-         "gough_stewart": ("1,3,5", "x=0,y=0,z=0.3", "x=0.02,y=0.01,z=0.32,rpy=0.1/0/0"),
-         "quattro": ("1,4", "x=0,y=0,z=-0.7,phi=0", "x=0.05,y=0,z=-0.7,phi=0.1"),
-         "delta": (None, "x=0,y=0,z=-0.4", "x=0.02,y=0.03,z=-0.45"),
-         "orthoglide": (None, "x=0,y=0,z=0", "x=0.02,y=0.03,z=-0.05")}
+PATHS = {
+    "3rrr_m1": (None, "x=0,y=0,phi=0", "x=0.02,y=0,phi=5deg"),
+    "gough_stewart": ("1,3,5", "x=0,y=0,z=0.3", "x=0.02,y=0.01,z=0.32,rpy=0.1/0/0"),
+    "quattro": ("1,4", "x=0,y=0,z=-0.7,phi=0", "x=0.05,y=0,z=-0.7,phi=0.1"),
+    "delta": (None, "x=0,y=0,z=-0.4", "x=0.02,y=0.03,z=-0.45"),
+    "orthoglide": (None, "x=0,y=0,z=0", "x=0.02,y=0.03,z=-0.05"),
+}
 """Cranks, rails and rods that slide; robots that turn in a plane, in space, about an axis and not at all."""
 
 
@@ -46,8 +48,10 @@ def sealed(record):
 
 
 @pytest.mark.some(1)
-@pytest.mark.parametrize("name", [name if name in ("3rrr_m1", "orthoglide") else
-                                  pytest.param(name, marks=pytest.mark.slow) for name in PATHS])
+@pytest.mark.parametrize(
+    "name",
+    [name if name in ("3rrr_m1", "orthoglide") else pytest.param(name, marks=pytest.mark.slow) for name in PATHS],
+)
 def test_what_is_certified_is_accepted(name, tmp_path):
     record = json.loads(of(name))
     assert hrsynth.verify(record, name).startswith("same aspect: ")
@@ -74,8 +78,12 @@ def test_no_path_between_separated_poses_is_accepted():
             t = Fraction(k, count)
             at = [a + t * (b - a) + t * (1 - t) * c for a, b, c in zip(p, r, bent, strict=True)]
             nodes.append([[str(x) for x in at], [str(a + t * (b - a)) for a, b in zip(q, s, strict=True)]])
-        false = record | {"verdict": "same aspect", "modes": record["modes"][:1], "path": nodes,
-                          "ends": [nodes[0], nodes[-1]]}
+        false = record | {
+            "verdict": "same aspect",
+            "modes": record["modes"][:1],
+            "path": nodes,
+            "ends": [nodes[0], nodes[-1]],
+        }
         with pytest.raises(checker.PathNotAccepted):
             checker.verify(sealed(false))
 
@@ -127,14 +135,29 @@ def test_no_float_rounds_a_zero_away(sense, mode):
     node = [["3", "4"], ["1"]]
     leg = {"kind": "slide", "axis": None, "aside": "0", "tip": [True, ["0"] * 3, ["0"] * 3], "centre": ["0"] * 3}
     along = ["dot", "u", "x"]
-    motion = {"origin": ["0"] * 3, "along": [["1", "0", "0"], ["0", "1", "0"]], "home": ["1", "0", "0", "0"],
-              "about": []}
-    false = {"format": "hrsynth-certificate-1", "claim": "path", "verdict": "same aspect", "legs": [leg],
-             "modes": [[mode]], "motion": motion,
-             "vectors": {"u": ["leg", 0, sense, ["0"] * 3], "x": ["point", False, ["0"] * 3, ["1", "0", "0"]],
-                         "o": ["point", False, ["0"] * 3, ["0"] * 3]},
-             "points": ["o"], "path": [node, node], "ends": [node, node],
-             "condition": ["+", ["*", "3", along, along], ["*", "-3", "3/5", along]]}
+    motion = {
+        "origin": ["0"] * 3,
+        "along": [["1", "0", "0"], ["0", "1", "0"]],
+        "home": ["1", "0", "0", "0"],
+        "about": [],
+    }
+    false = {
+        "format": "hrsynth-certificate-1",
+        "claim": "path",
+        "verdict": "same aspect",
+        "legs": [leg],
+        "modes": [[mode]],
+        "motion": motion,
+        "vectors": {
+            "u": ["leg", 0, sense, ["0"] * 3],
+            "x": ["point", False, ["0"] * 3, ["1", "0", "0"]],
+            "o": ["point", False, ["0"] * 3, ["0"] * 3],
+        },
+        "points": ["o"],
+        "path": [node, node],
+        "ends": [node, node],
+        "condition": ["+", ["*", "3", along, along], ["*", "-3", "3/5", along]],
+    }
     with pytest.raises(checker.PathNotAccepted):
         checker.verify(sealed(false))
     false["condition"] = along
@@ -151,9 +174,11 @@ def at(record, *keys):
 
 def put(value, *keys):
     """A change of one part of a record."""
+
     def change(record):
         inside, key = at(record, *keys)
         inside[key] = value
+
     return change
 
 
@@ -211,9 +236,12 @@ FORGERIES = {
     "a working mode for each leg but one": (lambda r: r["modes"][0].pop(), "no certificate"),
     "a working mode of zero": (put(0, "modes", 0, 0), "a working mode"),
     "true as a working mode": (put(True, "modes", 0, 0), "a working mode"),
-    "a float": (put(0.5, *PLACE), NUMBER), "no number": (put(float("nan"), *PLACE), NUMBER),
-    "infinity": (put("1e999", *PLACE), NUMBER), "infinity in words": (put("inf", *PLACE), NUMBER),
-    "a denominator of zero": (put("1/0", *PLACE), "no certificate"), "a long number": (put("9" * 400, *PLACE), NUMBER),
+    "a float": (put(0.5, *PLACE), NUMBER),
+    "no number": (put(float("nan"), *PLACE), NUMBER),
+    "infinity": (put("1e999", *PLACE), NUMBER),
+    "infinity in words": (put("inf", *PLACE), NUMBER),
+    "a denominator of zero": (put("1/0", *PLACE), "no certificate"),
+    "a long number": (put("9" * 400, *PLACE), NUMBER),
     "a large number": (put("9" * 299, "path", 1, 0, 0), "a leg that may not reach"),
     "an axis of zero": (put(["0"] * 3, "legs", 0, "axis"), "may be zero"),
     "a rod of no length": (put("0", "legs", 0, "rod"), "a leg that may not reach"),
@@ -225,14 +253,20 @@ FORGERIES = {
 }
 """What a forger writes into a true record, sealed again, and why it is refused."""
 FOR_ANOTHER = {
-    "a platform that leaves its plane": freed, "half of the path": shortened, "a leg less": dropped,
+    "a platform that leaves its plane": freed,
+    "half of the path": shortened,
+    "a leg less": dropped,
     "another axis of the turn": put(["1/100", "0", "1"], "motion", "about", 0),
-    "another origin": put("1/10", "motion", "origin", 2), "a turned home": put("1/1000", "motion", "home", 3),
+    "another origin": put("1/10", "motion", "origin", 2),
+    "a turned home": put("1/1000", "motion", "home", 3),
     "a condition that holds anywhere": put("1", "condition"),
     "a leg of another length": put("4/5", "legs", 0, "rod"),
-    "another start": put(0.01, "start", "x"), "no start": put(float("nan"), "start", "x"),
-    "another goal": put(0.0, "goal", "x"), "fewer legs": lambda r: r["observed"].pop(),
-    "another question": put(True, "any_mode"), "any question": put("x", "any_mode"),
+    "another start": put(0.01, "start", "x"),
+    "no start": put(float("nan"), "start", "x"),
+    "another goal": put(0.0, "goal", "x"),
+    "fewer legs": lambda r: r["observed"].pop(),
+    "another question": put(True, "any_mode"),
+    "any question": put("x", "any_mode"),
 }
 """What is a certificate, but not of the robot."""
 
@@ -292,8 +326,13 @@ def holds(record):
         if isinstance(each, str):
             return values[each] if each in values else float(Fraction(each))
         parts = [tree(part, values) for part in each[1:]]
-        return {"+": lambda: sum(parts), "*": lambda: math.prod(parts), "dot": lambda: float(np.dot(*parts)),
-                "cross": lambda: np.cross(*parts), "det": lambda: float(np.linalg.det(np.array(parts)))}[each[0]]()
+        return {
+            "+": lambda: sum(parts),
+            "*": lambda: math.prod(parts),
+            "dot": lambda: float(np.dot(*parts)),
+            "cross": lambda: np.cross(*parts),
+            "det": lambda: float(np.linalg.det(np.array(parts))),
+        }[each[0]]()
 
     sides = set()
     for one, other in pairwise(nodes):
@@ -335,9 +374,15 @@ def mutated(name, count):
         inside, key = at(record, *rng.choice(places))
         if isinstance(inside[key], str):
             value = Fraction(inside[key])
-            inside[key] = str(rng.choice((
-                Fraction(rng.randint(-99, 99), 100), value * rng.choice((-1, 0, 2, Fraction(101, 100))),
-                value + Fraction(rng.randint(-9, 9), 10**rng.randint(1, 12)))))
+            inside[key] = str(
+                rng.choice(
+                    (
+                        Fraction(rng.randint(-99, 99), 100),
+                        value * rng.choice((-1, 0, 2, Fraction(101, 100))),
+                        value + Fraction(rng.randint(-9, 9), 10 ** rng.randint(1, 12)),
+                    )
+                )
+            )
         else:
             inside[key] = rng.choice((-inside[key], 1 - inside[key], 2, 0))
         for end, node in enumerate((record["path"][0], record["path"][-1])):
@@ -371,7 +416,7 @@ def spoil(record, rng) -> str:
     node = rng.choice(record["path"])
     match rng.randrange(9):
         case 0:
-            record["ends"][rng.randrange(2)][0][rng.randrange(2)] = str(Fraction(rng.randint(1, 9), 10 ** 6))
+            record["ends"][rng.randrange(2)][0][rng.randrange(2)] = str(Fraction(rng.randint(1, 9), 10**6))
         case 1:
             node[0] = [str(rng.randint(50, 99))] * len(node[0])
         case 2:
@@ -421,17 +466,24 @@ def test_intervals_hold_what_they_are_of():
         (a, b), (c, d) = (sorted(Fraction(rng.randint(-999, 999), rng.randint(1, 99)) for _ in range(2)) for _ in "xy")
         x, y = a + (b - a) * Fraction(rng.randint(0, 9), 9), c + (d - c) * Fraction(rng.randint(0, 9), 9)
         one, other = checker.interval(a, b), checker.interval(c, d)
-        for found, value in ((checker.plus(one, other), x + y), (checker.minus(one, other), x - y),
-                             (checker.times(one, other), x * y), (checker.square(one), x * x)):
+        for found, value in (
+            (checker.plus(one, other), x + y),
+            (checker.minus(one, other), x - y),
+            (checker.times(one, other), x * y),
+            (checker.square(one), x * x),
+        ):
             assert found[0] <= value * checker.ONE <= found[1]
-            assert found[1] - found[0] <= 2 * checker.ONE * (1 + abs(a) + abs(b) + b - a) * (
-                1 + abs(c) + abs(d) + d - c) ** 2 * (1 + b - a) + 4
+            assert (
+                found[1] - found[0]
+                <= 2 * checker.ONE * (1 + abs(a) + abs(b) + b - a) * (1 + abs(c) + abs(d) + d - c) ** 2 * (1 + b - a)
+                + 4
+            )
         if c * d > 0:
             found = checker.over(one, other)
             assert found[0] <= x / y * checker.ONE <= found[1]
         if a > 0:
             low, high = checker.root(one)
-            assert low * low <= x * checker.ONE ** 2 <= high * high
+            assert low * low <= x * checker.ONE**2 <= high * high
             assert math.isqrt(checker.ONE) ** 2 == checker.ONE
 
 
@@ -444,8 +496,10 @@ def test_what_has_no_certificate_says_why():
 
 def test_command_line(tmp_path, capsys):
     path = tmp_path / "c.json"
-    assert execute(["path", "3rrr_m1", "--start", "x=0,y=0,phi=0", "--goal", "x=0.02,y=0", "--certificate", str(path)]
-                   ) == 0
+    assert (
+        execute(["path", "3rrr_m1", "--start", "x=0,y=0,phi=0", "--goal", "x=0.02,y=0", "--certificate", str(path)])
+        == 0
+    )
     assert f"The certificate is written to {path}." in capsys.readouterr().out
     assert execute(["verify", str(path), "--robot", "3rrr_m1"]) == 0
     assert capsys.readouterr().out.startswith("accepted: same aspect: ")

@@ -89,8 +89,12 @@ def geared_five_bar() -> Mechanism:
     b = Builder("geared")
     for name in ("base", "one", "two", "left", "right"):
         b.link(name)
-    for name, near, far, at in (("motor", "base", "one", (0, 0, 0)), ("far", "base", "two", (1, 0, 0)),
-                                ("knee", "one", "left", (-0.3, 0.6, 0)), ("elbow", "two", "right", (1.2, 0.5, 0))):
+    for name, near, far, at in (
+        ("motor", "base", "one", (0, 0, 0)),
+        ("far", "base", "two", (1, 0, 0)),
+        ("knee", "one", "left", (-0.3, 0.6, 0)),
+        ("elbow", "two", "right", (1.2, 0.5, 0)),
+    ):
         b.joint(name, "R", near, far, at, axis=(0, 0, 1), motor=name == "motor")
     b.joint("tip", "R", "left", "right", (0.4, 1.3, 0), axis=(0, 0, 1), loop=True)
     b.coupling("gear", "one", "two", -0.7)
@@ -113,8 +117,11 @@ def screw_lever() -> Mechanism:
 
 def box_of(robot: Mechanism, half: float) -> dict[str, tuple[float, float]]:
     """A box of motors, half as wide as ``half`` rad or half characteristic lengths."""
-    return {name: ((-half, half) if not joint.type.slides else (-half * robot.length, half * robot.length))
-            for name, joint in robot.joints.items() if joint.actuated}
+    return {
+        name: ((-half, half) if not joint.type.slides else (-half * robot.length, half * robot.length))
+        for name, joint in robot.joints.items()
+        if joint.actuated
+    }
 
 
 def inside(found: ExportedCode, count: int, seed: int = 0) -> Array:
@@ -122,8 +129,9 @@ def inside(found: ExportedCode, count: int, seed: int = 0) -> Array:
     rng = np.random.default_rng(seed)
     q = np.zeros((count, len(found.proof.motors)))
     for part in found.proof.parts:
-        q[:, [found.proof.motors.index(name) for name in part.motors]] = rng.uniform(*part.proved, (count,
-                                                                                                    len(part.motors)))
+        q[:, [found.proof.motors.index(name) for name in part.motors]] = rng.uniform(
+            *part.proved, (count, len(part.motors))
+        )
     return q
 
 
@@ -148,8 +156,9 @@ def own_pose(twin: PinocchioModel, motors: Mapping[str, float], steps: int = 6) 
     """The platform's pose (4, 4) by Pinocchio's model of the robot, led from zero in small steps."""
     q = twin.q0
     for s in np.linspace(0, 1, steps + 1)[1:]:
-        q, left = solve(twin, q, Motors({name: s * value for name, value in motors.items()}), tolerance=1e-14,
-                        iterations=60)
+        q, left = solve(
+            twin, q, Motors({name: s * value for name, value in motors.items()}), tolerance=1e-14, iterations=60
+        )
         assert left < 1e-12
     return twin.pose(q, twin.mechanism.platform)
 
@@ -175,8 +184,13 @@ def compiled(folder: Path, code: str, main: str, *flags: str) -> Path:
     include = eigen()
     (folder / "robot.hpp").write_text(code, encoding="utf-8")
     (folder / "main.cpp").write_text(main, encoding="utf-8")
-    done = subprocess.run(["g++", *FLAGS, *flags, f"-isystem{include}", "main.cpp", "-o", "main"], cwd=folder,
-                          capture_output=True, text=True, timeout=300)
+    done = subprocess.run(
+        ["g++", *FLAGS, *flags, f"-isystem{include}", "main.cpp", "-o", "main"],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
     assert done.returncode == 0, done.stderr[:3000]
     return folder / "main"
 

@@ -182,8 +182,9 @@ def test_axes_that_are_parallel_but_for_rounding() -> None:
         axis = axis + 1e-9 * rng.normal(size=3)
         return np.asarray(axis / np.linalg.norm(axis))
 
-    robot = replace(robot, joints={name: replace(joint, axes=tuple(map(off, joint.axes)))
-                                   for name, joint in robot.joints.items()})
+    robot = replace(
+        robot, joints={name: replace(joint, axes=tuple(map(off, joint.axes))) for name, joint in robot.joints.items()}
+    )
     found = export(robot, "numpy", box_of(robot, 0.05))
     assert found.bounds is not None
     assert found.bounds.others == 3

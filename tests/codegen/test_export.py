@@ -66,14 +66,19 @@ def assert_agrees(robot: Mechanism, found: ExportedCode, made: ModuleType, count
         sides = [made.forward(q + sign * step) for sign in (1, -1)]
         good = edge & (sides[0][0] == made.OK) & (sides[1][0] == made.OK)
         assert good.sum() > count // 2
-        np.testing.assert_allclose(rates["passive"][good, :, k], ((sides[0][1] - sides[1][1]) / (2 * h))[good],
-                                   atol=1e-6)
-        np.testing.assert_allclose(rates["platform"][good, :3, k], ((sides[0][3] - sides[1][3]) / (2 * h))[good],
-                                   atol=1e-6)
+        np.testing.assert_allclose(
+            rates["passive"][good, :, k], ((sides[0][1] - sides[1][1]) / (2 * h))[good], atol=1e-6
+        )
+        np.testing.assert_allclose(
+            rates["platform"][good, :3, k], ((sides[0][3] - sides[1][3]) / (2 * h))[good], atol=1e-6
+        )
         turn = ((sides[0][2] - sides[1][2]) / (2 * h)) @ R.transpose(0, 2, 1)
         np.testing.assert_allclose(rates["platform"][good, 3:, k], turn[good][:, [2, 0, 1], [1, 2, 0]], atol=1e-6)
-    np.testing.assert_allclose(rates["motors"] @ rates["platform"], np.broadcast_to(np.eye(made.MOTORS), (
-        count, made.MOTORS, made.MOTORS)), atol=1e-6)
+    np.testing.assert_allclose(
+        rates["motors"] @ rates["platform"],
+        np.broadcast_to(np.eye(made.MOTORS), (count, made.MOTORS, made.MOTORS)),
+        atol=1e-6,
+    )
     led, back = made.inverse(R, p, 0.9 * q)
     assert np.all(led == made.OK)
     again = made.forward(back)
@@ -140,8 +145,12 @@ def test_a_motor_in_no_loop_keeps_to_what_is_asked() -> None:
     for name in ("base", "cart", "crank", "coupler", "rocker", "hand"):
         b.link(name)
     b.joint("rail", "P", "base", "cart", (0, 0, 0), axis=(1, 0, 0), motor=True)
-    for name, near, far, at in (("motor", "cart", "crank", (0, 0, 0)), ("knee", "crank", "coupler", (0.2, 0.5, 0)),
-                                ("pivot", "cart", "rocker", (1, 0, 0)), ("wrist", "rocker", "hand", (1.1, 0.3, 0))):
+    for name, near, far, at in (
+        ("motor", "cart", "crank", (0, 0, 0)),
+        ("knee", "crank", "coupler", (0.2, 0.5, 0)),
+        ("pivot", "cart", "rocker", (1, 0, 0)),
+        ("wrist", "rocker", "hand", (1.1, 0.3, 0)),
+    ):
         b.joint(name, "R", near, far, at, axis=(0, 0, 1), motor=name in ("motor", "wrist"))
     b.joint("tip", "R", "coupler", "rocker", (1.2, 0.9, 0), axis=(0, 0, 1), loop=True)
     robot = b.build(platform="hand")
@@ -172,8 +181,13 @@ def test_a_robot_in_large_numbers_is_answered_as_the_same_in_small_ones(size: fl
     X = np.stack([np.cos(motor) * BARS[1], np.sin(motor) * BARS[1], 0 * q], axis=-1)
     turn = angle - coupler(np.zeros(1))[1]
     R = np.zeros((41, 3, 3))
-    R[:, 0, 0], R[:, 1, 1], R[:, 1, 0], R[:, 0, 1], R[:, 2, 2] = (np.cos(turn), np.cos(turn), np.sin(turn),
-                                                                  -np.sin(turn), 1.0)
+    R[:, 0, 0], R[:, 1, 1], R[:, 1, 0], R[:, 0, 1], R[:, 2, 2] = (
+        np.cos(turn),
+        np.cos(turn),
+        np.sin(turn),
+        -np.sin(turn),
+        1.0,
+    )
     np.testing.assert_allclose(np.linalg.norm(tip - X[:, :2], axis=1), BARS[2])
     made = module_of(large.code)
     assert np.all(made.forward(q[:, None])[0] == made.OK)
@@ -209,13 +223,19 @@ def test_code_tells_where_motors_are_the_only_ones() -> None:
 
 @pytest.mark.slow
 @pytest.mark.some(2)
-@pytest.mark.parametrize(("lower", "upper", "verdict"), [
-    (-0.05, 0.1, "passed"), (-3.0, 3.0, "kept"), (-3.0, None, "kept"), (None, 0.1, "passed")])
+@pytest.mark.parametrize(
+    ("lower", "upper", "verdict"),
+    [(-0.05, 0.1, "passed"), (-3.0, 3.0, "kept"), (-3.0, None, "kept"), (None, 0.1, "passed")],
+)
 def test_limits_of_joints_without_a_motor(lower: float | None, upper: float | None, verdict: str) -> None:
     """Against the knee's angles in small steps of the motor."""
     robot = four_bar()
-    limited = robot.changed(joints=[replace(each, limits=Limits(lower, upper)) if each.name == "knee" else each
-                                    for each in robot.joints.values()])
+    limited = robot.changed(
+        joints=[
+            replace(each, limits=Limits(lower, upper)) if each.name == "knee" else each
+            for each in robot.joints.values()
+        ]
+    )
     found, box = exported(limited, 0.4), box_of(limited, 0.4)
     made = module_of(found.code)
     _, x, _, _ = made.forward(np.linspace(-0.4, 0.4, 2001)[:, None])
@@ -235,8 +255,9 @@ def test_limits_of_joints_without_a_motor(lower: float | None, upper: float | No
 
 def test_motors_that_the_box_takes_beyond_their_limits_are_told() -> None:
     robot = four_bar()
-    limited = robot.changed(joints=[replace(each, limits=Limits(-0.2, 0.3)) if each.actuated else each
-                                    for each in robot.joints.values()])
+    limited = robot.changed(
+        joints=[replace(each, limits=Limits(-0.2, 0.3)) if each.actuated else each for each in robot.joints.values()]
+    )
     wide, within = ({"motor": (-half, half)} for half in (0.25, 0.2))
     assert "motor -0.2 to 0.3 (within -0.25 to 0.25)" in export(limited, box=wide).code
     assert "passed by the box: motor -0.2 to 0.3" in f"{hrsynth.branch(limited, wide)}"
@@ -254,8 +275,12 @@ def test_limits_are_undecided_within_the_tube_alone() -> None:
     radius = [cell.radius[k] for cell in part.cells]
 
     def verdict(upper: float) -> str:
-        limited = robot.changed(joints=[replace(each, limits=Limits(None, upper)) if each.name == "knee" else each
-                                        for each in robot.joints.values()])
+        limited = robot.changed(
+            joints=[
+                replace(each, limits=Limits(None, upper)) if each.name == "knee" else each
+                for each in robot.joints.values()
+            ]
+        )
         (limit,) = hrsynth.branch(limited, box_of(limited, 0.4)).limits
         return limit.verdict
 
@@ -311,8 +336,9 @@ def test_code_in_cpp_neither_allocates_nor_differs(tmp_path: Path) -> None:
     status, x, R, p, rates = made.jacobians(q)
     np.testing.assert_array_equal(rows[:, 0], status)
     good = status == made.OK
-    expected = np.hstack([x, p, R.reshape(-1, 9), rates["platform"].reshape(len(q), -1),
-                          rates["passive"].reshape(len(q), -1), q])
+    expected = np.hstack(
+        [x, p, R.reshape(-1, 9), rates["platform"].reshape(len(q), -1), rates["passive"].reshape(len(q), -1), q]
+    )
     assert good.sum() == 300
     assert np.all(rows[good, 1] == 0)
     np.testing.assert_allclose(rows[good, 2:], expected[good], atol=1e-11)
@@ -321,11 +347,20 @@ def test_code_in_cpp_neither_allocates_nor_differs(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_the_same_bytes_each_time(tmp_path: Path) -> None:
     hrsynth.save(four_bar(), tmp_path / "four_bar.urdf")
-    script = ("import sys; from hrsynth.codegen.export import export; "
-              "sys.stdout.write(export(sys.argv[1], box='motor=-0.1:0.1').code)")
-    texts = {subprocess.run([sys.executable, "-c", script, str(tmp_path / "four_bar.urdf")], capture_output=True,
-                            env={**os.environ, "PYTHONHASHSEED": seed}, text=True, check=True).stdout
-             for seed in ("1", "2")}
+    script = (
+        "import sys; from hrsynth.codegen.export import export; "
+        "sys.stdout.write(export(sys.argv[1], box='motor=-0.1:0.1').code)"
+    )
+    texts = {
+        subprocess.run(
+            [sys.executable, "-c", script, str(tmp_path / "four_bar.urdf")],
+            capture_output=True,
+            env={**os.environ, "PYTHONHASHSEED": seed},
+            text=True,
+            check=True,
+        ).stdout
+        for seed in ("1", "2")
+    }
     assert len(texts) == 1
     (text,) = texts
     assert re.search(r"hrsynth export four_bar.urdf --lang c\+\+ .*--box motor=-0.1:0.1\n", text)
@@ -350,8 +385,10 @@ def test_what_is_watched_is_refused_before_the_proof(monkeypatch: pytest.MonkeyP
 
     monkeypatch.setattr("hrsynth.codegen.export.branch", lambda *_: pytest.fail("the proof has begun"))
     robot = four_bar()
-    for wrong, match in (({"observe": "nine"}, "no leg or link"),
-                         ({"camera": "eye=base"}, "nothing is (seen by|given to see)")):
+    for wrong, match in (
+        ({"observe": "nine"}, "no leg or link"),
+        ({"camera": "eye=base"}, "nothing is (seen by|given to see)"),
+    ):
         with pytest.raises(BadRequest, match=match):
             export(robot, **wrong)
     with pytest.raises(BadRequest, match="directions of segments only, found 'point point_1'"):
@@ -417,19 +454,42 @@ def test_a_compiler_that_drops_checks_or_changes_sums_is_refused(tmp_path: Path)
     header.write_text(exported(four_bar(), 0.4, "c++").code, encoding="utf-8")
     command = ["g++", "-E", f"-isystem{eigen()}", str(header)]
     assert subprocess.run(command, capture_output=True).returncode == 0
-    for flags in ("-ffast-math", "-Ofast", "-ffinite-math-only", "-freciprocal-math", "-funsafe-math-optimizations",
-                  "-fassociative-math -fno-signed-zeros -fno-trapping-math"):
+    for flags in (
+        "-ffast-math",
+        "-Ofast",
+        "-ffinite-math-only",
+        "-freciprocal-math",
+        "-funsafe-math-optimizations",
+        "-fassociative-math -fno-signed-zeros -fno-trapping-math",
+    ):
         done = subprocess.run([*command, *flags.split()], capture_output=True, text=True)
         assert done.returncode != 0, flags
         assert "#error" in done.stderr
 
 
-ODD = {"class": "class_", "9 lives": "_9_lives", "std": "std_", "": "robot", "a-b.é": "a_b__",
-       "NULL": "NULL_",
-       "gamma": "gamma_", "y0": "y0_", "link": "link_", "size_t": "size_t_", "CHAR_BIT": "CHAR_BIT_",
-       "lgamma_r": "lgamma_r_", "pthread_self": "pthread_self_", "sched_yield": "sched_yield_", "rand_r": "rand_r_",
-       "getc_unlocked": "getc_unlocked_", "__linux__": "__linux___", "arm_r": "arm_r",
-       "Motors": "Motors_", "# coding: utf-7": "__coding__utf_7", "r\n#error \\": "r__error__"}
+ODD = {
+    "class": "class_",
+    "9 lives": "_9_lives",
+    "std": "std_",
+    "": "robot",
+    "a-b.é": "a_b__",
+    "NULL": "NULL_",
+    "gamma": "gamma_",
+    "y0": "y0_",
+    "link": "link_",
+    "size_t": "size_t_",
+    "CHAR_BIT": "CHAR_BIT_",
+    "lgamma_r": "lgamma_r_",
+    "pthread_self": "pthread_self_",
+    "sched_yield": "sched_yield_",
+    "rand_r": "rand_r_",
+    "getc_unlocked": "getc_unlocked_",
+    "__linux__": "__linux___",
+    "arm_r": "arm_r",
+    "Motors": "Motors_",
+    "# coding: utf-7": "__coding__utf_7",
+    "r\n#error \\": "r__error__",
+}
 """Names of robots, and their namespaces."""
 
 
@@ -461,8 +521,10 @@ def test_names_are_no_code_in_cpp(name: str, tmp_path: Path) -> None:
     robot = oddly_named(name)
     code = export(robot, "c++", box_of(robot, 0.1)).code
     own = namespace(robot.name)
-    main = (f'#include "robot.hpp"\n#include <cstdio>\nusing namespace {own};\n'
-            "int main() { return int(unique(Motors::Zero())) + std::puts(MOTOR_NAMES[0]) < 0; }")
+    main = (
+        f'#include "robot.hpp"\n#include <cstdio>\nusing namespace {own};\n'
+        "int main() { return int(unique(Motors::Zero())) + std::puts(MOTOR_NAMES[0]) < 0; }"
+    )
     found = subprocess.run([compiled(tmp_path, code, main)], capture_output=True, text=True, check=True)
     assert found.stdout == 'motor "*/ ???/ q\n\\\n'
 
@@ -470,23 +532,47 @@ def test_names_are_no_code_in_cpp(name: str, tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_no_name_of_the_c_library_is_a_namespace(tmp_path: Path) -> None:
     """None of its names, types and macros is what a robot's namespace is called."""
-    names = set(" ".join(path.read_text(encoding="utf-8", errors="replace") for path in (
-        Path("/usr/include/math.h"), Path("/usr/include/stdio.h"), Path("/usr/include/stdlib.h"),
-        Path("/usr/include/unistd.h"), Path("/usr/include/time.h"), Path("/usr/include/string.h"),
-        Path("/usr/include/pthread.h"),
-        Path("/usr/include/sched.h"), Path("/usr/include/signal.h"), Path("/usr/include/wchar.h")) if path.exists()
-    ).replace("(", " ( ").split())
-    names = sorted({each for each in names if re.fullmatch("[a-z][a-z0-9_]*", each)
-                    and not re.search("f[0-9]+x?$", each)} | {
-        "gamma", "y0", "int8_t", "FILE", "INT_MAX", "CHAR_BIT", "FE_INVALID"})
+    names = set(
+        " ".join(
+            path.read_text(encoding="utf-8", errors="replace")
+            for path in (
+                Path("/usr/include/math.h"),
+                Path("/usr/include/stdio.h"),
+                Path("/usr/include/stdlib.h"),
+                Path("/usr/include/unistd.h"),
+                Path("/usr/include/time.h"),
+                Path("/usr/include/string.h"),
+                Path("/usr/include/pthread.h"),
+                Path("/usr/include/sched.h"),
+                Path("/usr/include/signal.h"),
+                Path("/usr/include/wchar.h"),
+            )
+            if path.exists()
+        )
+        .replace("(", " ( ")
+        .split()
+    )
+    names = sorted(
+        {each for each in names if re.fullmatch("[a-z][a-z0-9_]*", each) and not re.search("f[0-9]+x?$", each)}
+        | {"gamma", "y0", "int8_t", "FILE", "INT_MAX", "CHAR_BIT", "FE_INVALID"}
+    )
     lines = [f"namespace {namespace(each)} {{}}" for each in names]
-    (tmp_path / "main.cpp").write_text("\n".join(["#include <Eigen/Core>", "#include <cstdio>", "#include <ctime>",
-                                                  "#include <iostream>", *lines]))
-    done = subprocess.run(["g++", "-std=c++17", "-fsyntax-only", f"-isystem{eigen()}", "main.cpp"], cwd=tmp_path,
-                          capture_output=True, text=True)
+    (tmp_path / "main.cpp").write_text(
+        "\n".join(["#include <Eigen/Core>", "#include <cstdio>", "#include <ctime>", "#include <iostream>", *lines])
+    )
+    done = subprocess.run(
+        ["g++", "-std=c++17", "-fsyntax-only", f"-isystem{eigen()}", "main.cpp"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+    )
     assert done.returncode == 0, done.stderr[:2000]
     assert [namespace(each) for each in ("delta", "MYROBOT", "EXO_2", "irb_140t")] == [
-        "delta", "MYROBOT", "EXO_2", "irb_140t"]
+        "delta",
+        "MYROBOT",
+        "EXO_2",
+        "irb_140t",
+    ]
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, 1e308])
@@ -501,9 +587,15 @@ def test_poses_that_are_none_are_answered_without_a_warning(value: float) -> Non
 
 def test_why_nothing_is_proved_is_said_once_with_the_nearest_place():
     proof = hrsynth.branch("rrrrr_m1", "shoulder_1=-0.01:0.01,shoulder_2=-0.01:0.01")
-    part, = proof.parts
-    ends = tuple(Toggle(np.array(q), (), (), reason) for q, reason in (
-        ([2.0, 0.0], "it toggles"), ([0.0, 0.5], "it toggles"), ([1.0, 1.0], "it is too small")))
-    with pytest.raises(NothingProved, match=re.escape(
-            "it toggles (at shoulder_1=0, shoulder_2=0.5); it is too small (at shoulder_1=1, shoulder_2=1); try")):
+    (part,) = proof.parts
+    ends = tuple(
+        Toggle(np.array(q), (), (), reason)
+        for q, reason in (([2.0, 0.0], "it toggles"), ([0.0, 0.5], "it toggles"), ([1.0, 1.0], "it is too small"))
+    )
+    with pytest.raises(
+        NothingProved,
+        match=re.escape(
+            "it toggles (at shoulder_1=0, shoulder_2=0.5); it is too small (at shoulder_1=1, shoulder_2=1); try"
+        ),
+    ):
         TubedBranch.of(replace(proof, parts=(replace(part, cells=(), toggles=ends),)))

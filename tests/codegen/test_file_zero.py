@@ -37,13 +37,17 @@ class FileJoint:
         axis = f'<axis xyz="{" ".join(map(str, AXES[self.axis]))}"/>'
         place = "{0!r} {1!r} {2!r}".format
         if self.closes is not None:
-            return (f'<loop name="{self.name}" type="revolute"><predecessor link="{self.parent}"><origin xyz="'
-                    f'{place(*self.at)}"/></predecessor><successor link="{self.child}"><origin xyz="'
-                    f'{place(*self.closes)}"/></successor>{axis}</loop>')
+            return (
+                f'<loop name="{self.name}" type="revolute"><predecessor link="{self.parent}"><origin xyz="'
+                f'{place(*self.at)}"/></predecessor><successor link="{self.child}"><origin xyz="'
+                f'{place(*self.closes)}"/></successor>{axis}</loop>'
+            )
         limit = "" if "<limit" in self.extra else '<limit lower="-2" upper="2" effort="1" velocity="1"/>'
-        return (f'<joint name="{self.name}" type="{"prismatic" if self.slides else "revolute"}"><parent link="'
-                f'{self.parent}"/><child link="{self.child}"/><origin xyz="{place(*self.at)}"/>{axis}{limit}'
-                f"{self.extra}</joint>")
+        return (
+            f'<joint name="{self.name}" type="{"prismatic" if self.slides else "revolute"}"><parent link="'
+            f'{self.parent}"/><child link="{self.child}"/><origin xyz="{place(*self.at)}"/>{axis}{limit}'
+            f"{self.extra}</joint>"
+        )
 
     def displacement(self, value: float) -> Array:
         axis = np.array(AXES[self.axis], dtype=float)
@@ -61,8 +65,11 @@ class Case:
     def file(self, folder: Path) -> Path:
         names = dict.fromkeys(link for joint in self.joints for link in (joint.parent, joint.child))
         links = "".join(f'<link name="{name}"/>' for name in names)
-        motors = "".join(f'<transmission name="t_{joint.name}"><joint name="{joint.name}"/></transmission>'
-                         for joint in self.joints if joint.motor)
+        motors = "".join(
+            f'<transmission name="t_{joint.name}"><joint name="{joint.name}"/></transmission>'
+            for joint in self.joints
+            if joint.motor
+        )
         path = folder / "robot.urdf"
         path.write_text(f'<robot name="moved">{links}{"".join(each.text() for each in self.joints)}{motors}</robot>')
         return path
@@ -85,59 +92,94 @@ def follower(seed: int, slides: bool = False) -> Case:
     """An arm whose second joint follows the first with an offset."""
     rng = np.random.default_rng(seed)
     a, b, c = (tuple(each) for each in rng.uniform(0.1, 0.4, (3, 3)).round(3).tolist())
-    return Case((FileJoint("j1", "base", "one", a, "z", motor=True),
-                 FileJoint("j2", "one", "two", b, "y", extra=_mimic("j1", 0.4, 0.25 - 0.1 * seed), slides=slides),
-                 FileJoint("j3", "two", "hand", c, "x", motor=True)), "hand", ((-0.1, 0.1), (-0.1, 0.1)))
+    return Case(
+        (
+            FileJoint("j1", "base", "one", a, "z", motor=True),
+            FileJoint("j2", "one", "two", b, "y", extra=_mimic("j1", 0.4, 0.25 - 0.1 * seed), slides=slides),
+            FileJoint("j3", "two", "hand", c, "x", motor=True),
+        ),
+        "hand",
+        ((-0.1, 0.1), (-0.1, 0.1)),
+    )
 
 
 def open_bars(seed: int) -> Case:
     """A four-bar, all upright at zero: its passive joints close it."""
     sizes = np.random.default_rng(seed).uniform((0.1, 0.4, 0.3, 0.3), (0.14, 0.5, 0.4, 0.4))
     crank, rod, rocker, ground = sizes.tolist()
-    return Case((FileJoint("drive", "base", "crank", (0.0, 0.0, 0.0), "y", motor=True),
-                 FileJoint("knee", "crank", "rod", (0.0, 0.0, crank), "y", extra='<limit lower="-3" upper="3"/>'),
-                 FileJoint("swing", "base", "rocker", (ground, 0.0, 0.0), "y"),
-                 FileJoint("pin", "rod", "rocker", (0.0, 0.0, rod), "y", closes=(0.0, 0.0, rocker))), "rod",
-                ((-0.05, 0.05),))
+    return Case(
+        (
+            FileJoint("drive", "base", "crank", (0.0, 0.0, 0.0), "y", motor=True),
+            FileJoint("knee", "crank", "rod", (0.0, 0.0, crank), "y", extra='<limit lower="-3" upper="3"/>'),
+            FileJoint("swing", "base", "rocker", (ground, 0.0, 0.0), "y"),
+            FileJoint("pin", "rod", "rocker", (0.0, 0.0, rod), "y", closes=(0.0, 0.0, rocker)),
+        ),
+        "rod",
+        ((-0.05, 0.05),),
+    )
 
 
 def limited_knee() -> Case:
     """A four-bar whose knee's limits hold for one of its two assemblies, which takes the crank from its zero."""
-    return Case((FileJoint("drive", "base", "crank", (0.0, 0.0, 0.0), "y", motor=True),
-                 FileJoint("knee", "crank", "rod", (0.0, 0.0, 0.12), "y", extra='<limit lower="-2.9" upper="-0.4"/>'),
-                 FileJoint("swing", "base", "rocker", (0.3, 0.0, 0.0), "y"),
-                 FileJoint("pin", "rod", "rocker", (0.0, 0.0, 0.26), "y", closes=(0.0, 0.0, 0.2))), "rod",
-                ((1.3, 1.5),))
+    return Case(
+        (
+            FileJoint("drive", "base", "crank", (0.0, 0.0, 0.0), "y", motor=True),
+            FileJoint("knee", "crank", "rod", (0.0, 0.0, 0.12), "y", extra='<limit lower="-2.9" upper="-0.4"/>'),
+            FileJoint("swing", "base", "rocker", (0.3, 0.0, 0.0), "y"),
+            FileJoint("pin", "rod", "rocker", (0.0, 0.0, 0.26), "y", closes=(0.0, 0.0, 0.2)),
+        ),
+        "rod",
+        ((1.3, 1.5),),
+    )
 
 
 def flat_bars() -> Case:
     """A four-bar that lies flat at zero, where it is singular."""
-    return Case((FileJoint("drive", "base", "crank", (0.0, 0.0, 0.0), "z", motor=True),
-                 FileJoint("knee", "crank", "rod", (0.5, 0.0, 0.0), "z"),
-                 FileJoint("swing", "base", "rocker", (1.0, 0.0, 0.0), "z"),
-                 FileJoint("pin", "rod", "rocker", (1.0, 0.0, 0.0), "z", closes=(0.5, 0.0, 0.0))), "rod", ())
+    return Case(
+        (
+            FileJoint("drive", "base", "crank", (0.0, 0.0, 0.0), "z", motor=True),
+            FileJoint("knee", "crank", "rod", (0.5, 0.0, 0.0), "z"),
+            FileJoint("swing", "base", "rocker", (1.0, 0.0, 0.0), "z"),
+            FileJoint("pin", "rod", "rocker", (1.0, 0.0, 0.0), "z", closes=(0.5, 0.0, 0.0)),
+        ),
+        "rod",
+        (),
+    )
 
 
 def palletizer(seed: int) -> Case:
     """An arm on a parallelogram that is a rectangle at zero, where the watched forearm sees less than nearby."""
     a, b, c, d = np.random.default_rng(seed).uniform((0.3, 0.7, 0.3, 0.3), (0.5, 0.9, 0.4, 0.5)).round(3).tolist()
     at = (0.2, 0.0, 0.3)
-    return Case((FileJoint("A1", "base", "waist", (0.0, 0.0, a), "z", motor=True),
-                 FileJoint("A2", "waist", "arm", at, "y", motor=True),
-                 FileJoint("A3", "waist", "lever", at, "y", motor=True),
-                 FileJoint("p1", "lever", "strut", (-c, 0.0, 0.0), "y"),
-                 FileJoint("p2", "arm", "fore", (0.0, 0.0, b), "y"),
-                 FileJoint("A4", "fore", "w1", (d, 0.0, 0.1), "x", motor=True),
-                 FileJoint("A5", "w1", "w2", (0.4, 0.0, 0.0), "y", motor=True),
-                 FileJoint("A6", "w2", "flange", (0.1, 0.0, 0.0), "x", motor=True),
-                 FileJoint("p3", "strut", "fore", (0.0, 0.0, b), "y", closes=(-c, 0.0, 0.0))), "flange",
-                ((-0.1, 0.1),) * 6)
+    return Case(
+        (
+            FileJoint("A1", "base", "waist", (0.0, 0.0, a), "z", motor=True),
+            FileJoint("A2", "waist", "arm", at, "y", motor=True),
+            FileJoint("A3", "waist", "lever", at, "y", motor=True),
+            FileJoint("p1", "lever", "strut", (-c, 0.0, 0.0), "y"),
+            FileJoint("p2", "arm", "fore", (0.0, 0.0, b), "y"),
+            FileJoint("A4", "fore", "w1", (d, 0.0, 0.1), "x", motor=True),
+            FileJoint("A5", "w1", "w2", (0.4, 0.0, 0.0), "y", motor=True),
+            FileJoint("A6", "w2", "flange", (0.1, 0.0, 0.0), "x", motor=True),
+            FileJoint("p3", "strut", "fore", (0.0, 0.0, b), "y", closes=(-c, 0.0, 0.0)),
+        ),
+        "flange",
+        ((-0.1, 0.1),) * 6,
+    )
 
 
-CASES = {"follower": follower(1), "follower of a slide": follower(2, slides=True), "third follower": follower(3),
-         "open bars": open_bars(1), "more open bars": open_bars(2), "limited knee": limited_knee(),
-         "flat bars": flat_bars(), "palletizer": palletizer(1), "second palletizer": palletizer(2),
-         "third palletizer": palletizer(3)}
+CASES = {
+    "follower": follower(1),
+    "follower of a slide": follower(2, slides=True),
+    "third follower": follower(3),
+    "open bars": open_bars(1),
+    "more open bars": open_bars(2),
+    "limited knee": limited_knee(),
+    "flat bars": flat_bars(),
+    "palletizer": palletizer(1),
+    "second palletizer": palletizer(2),
+    "third palletizer": palletizer(3),
+}
 
 
 def box_of(case: Case) -> dict[str, tuple[float, float]] | None:
@@ -178,8 +220,9 @@ def test_motors_and_passive_joints_count_from_the_files_zero(name: str, tmp_path
     assert np.all(status[1:] == made.OK)
     assert status[0] == made.OK or name == "flat bars"
     for row in np.flatnonzero(status == made.OK):
-        judged(case, dict(zip([*made.MOTOR_NAMES, *made.PASSIVE_NAMES], [*q[row], *x[row]], strict=True)), p[row],
-               R[row])
+        judged(
+            case, dict(zip([*made.MOTOR_NAMES, *made.PASSIVE_NAMES], [*q[row], *x[row]], strict=True)), p[row], R[row]
+        )
 
 
 @pytest.mark.slow
@@ -221,6 +264,8 @@ def test_the_head_states_the_command_and_the_file(tmp_path: Path):
     path = CASES["follower"].file(tmp_path)
     robot = hrsynth.load(path, platform="hand", motors="j1,j3", keyframe="zero")
     head = hrsynth.export(robot, "numpy", {"j1": (-0.1, 0.1), "j3": (-0.1, 0.1)}).code.splitlines()[:4]
-    assert head[1].endswith("hrsynth export robot.urdf --platform hand --motors j1,j3 --keyframe zero --lang numpy "
-                            "--observe 1 --box j1=-0.1:0.1,j3=-0.1:0.1")
+    assert head[1].endswith(
+        "hrsynth export robot.urdf --platform hand --motors j1,j3 --keyframe zero --lang numpy "
+        "--observe 1 --box j1=-0.1:0.1,j3=-0.1:0.1"
+    )
     assert head[2] == f"# SHA-256 of robot.urdf: {hashlib.sha256(path.read_bytes()).hexdigest()}"

@@ -58,13 +58,44 @@ def made(name: str) -> Mechanism:
     return transformed(own[name](), random_rotation(rng), rng.normal(size=3))
 
 
-FORMS = {"3ppr_m1": 0.01, "3prp": 0.1, "3prr_m1": 0.02, "3puu": 0.05, "3rpr_m1": 0.1, "3rpr_m2": 0.01, "3rps": 0.02,
-         "3rrr_m1": 0.05, "3rrr_m2": 0.05, "3upu": 0.02, "6pus": 0.002, "delta": 0.1, "gough_stewart": 0.001,
-         "prrrp_m2": 0.05, "prrrp_parallel": 0.05, "quattro": 0.0005, "rprpr_m1": 0.05, "rprpr_m2": 0.05,
-         "rrrrr_m1": 0.1, "rrrrr_m2": 0.1}
+FORMS = {
+    "3ppr_m1": 0.01,
+    "3prp": 0.1,
+    "3prr_m1": 0.02,
+    "3puu": 0.05,
+    "3rpr_m1": 0.1,
+    "3rpr_m2": 0.01,
+    "3rps": 0.02,
+    "3rrr_m1": 0.05,
+    "3rrr_m2": 0.05,
+    "3upu": 0.02,
+    "6pus": 0.002,
+    "delta": 0.1,
+    "gough_stewart": 0.001,
+    "prrrp_m2": 0.05,
+    "prrrp_parallel": 0.05,
+    "quattro": 0.0005,
+    "rprpr_m1": 0.05,
+    "rprpr_m2": 0.05,
+    "rrrrr_m1": 0.1,
+    "rrrrr_m2": 0.1,
+}
 """Robots whose motors follow from the pose in closed form, one or more for each form."""
-HALF = {"four_bar": 1.0, "geared": 0.5, "screw": 4.0, "rrrrr_m1": 0.1, "prrrp_m1": 0.05, "3rrr_m1": 0.02, "3rps": 0.01,
-        "delta": 0.1, "quattro": 0.0005, "gough_stewart": 0.001, "3prp": 0.1, "3rpr_m2": 0.01, "rrrrr_m2": 0.1}
+HALF = {
+    "four_bar": 1.0,
+    "geared": 0.5,
+    "screw": 4.0,
+    "rrrrr_m1": 0.1,
+    "prrrp_m1": 0.05,
+    "3rrr_m1": 0.02,
+    "3rps": 0.01,
+    "delta": 0.1,
+    "quattro": 0.0005,
+    "gough_stewart": 0.001,
+    "3prp": 0.1,
+    "3rpr_m2": 0.01,
+    "rrrrr_m2": 0.1,
+}
 """Half the width of each motor's interval (rad, or characteristic lengths)."""
 
 
@@ -90,12 +121,15 @@ def differs(name: str, count: int, folder: Path | None) -> float:
         rows = answered(compiled(folder, code, MAIN, "-DNAME=" + "_" * robot.name[0].isdigit() + robot.name), q[order])
         assert np.all(rows[:, 0] == 0)
         first = 2 + x.shape[1]
-        off = max(off, np.abs(rows[:, first + 3 : first + 12].reshape(-1, 3, 3) - X[order, :3, :3]).max(),
-                  np.abs(rows[:, first : first + 3] - X[order, :3, 3]).max() / robot.length,
-                  np.abs(rows[:, 2:first] - x).max())
+        off = max(
+            off,
+            np.abs(rows[:, first + 3 : first + 12].reshape(-1, 3, 3) - X[order, :3, :3]).max(),
+            np.abs(rows[:, first : first + 3] - X[order, :3, 3]).max() / robot.length,
+            np.abs(rows[:, 2:first] - x).max(),
+        )
         if found.closed:
             assert np.all(rows[:, 1] == 0)
-            off = max(off, np.abs((rows[:, -q.shape[1]:] - q[order]) / units).max())
+            off = max(off, np.abs((rows[:, -q.shape[1] :] - q[order]) / units).max())
     return float(off)
 
 

@@ -34,8 +34,9 @@ def held(kind: str, number: int, eye: str | None) -> LockedLeg:
         return LockedLeg(str(number), "platform", tip, along(f"r{number}"), None, False, 3, eye=centre, virtual=True)
     if kind == "L":
         plane = CrossProduct(f"n{number}", "", along("a"), along("b"))
-        return LockedLeg(str(number), "platform", tip, None, plane, False, 2, upright=along(f"e{number}"), eye=centre,
-                         virtual=True)
+        return LockedLeg(
+            str(number), "platform", tip, None, plane, False, 2, upright=along(f"e{number}"), eye=centre, virtual=True
+        )
     return LockedLeg(str(number), "platform", tip, None, None, False, 1, about=along(f"u{number}"), virtual=True)
 
 
@@ -67,7 +68,7 @@ def determinant(rows: Sequence[Any]) -> Any:
     total = 0
     for column, entry in enumerate(rows[-1]):
         if entry != 0:
-            minor = determinant([[*row[:column], *row[column + 1:]] for row in rows[:-1]])
+            minor = determinant([[*row[:column], *row[column + 1 :]] for row in rows[:-1]])
             total = total + (-1) ** (len(rows) - 1 + column) * entry * minor
     return total
 
@@ -145,8 +146,11 @@ def geometry(kinds: str, rng: np.random.Generator, eyes: int) -> tuple[dict[str,
         axis = unit(B - eye) if kind == "P" else d
         across = np.linalg.svd(axis[:, None])[2][:, 1:]
         values[f"{'r' if kind == 'P' else 'u'}{number}"] = axis
-        blocks.append(np.concatenate([across, np.cross(B[:, None], across)], axis=2) if kind == "P" else
-                      np.concatenate([np.zeros_like(across), across], axis=2))
+        blocks.append(
+            np.concatenate([across, np.cross(B[:, None], across)], axis=2)
+            if kind == "P"
+            else np.concatenate([np.zeros_like(across), across], axis=2)
+        )
     return values, np.concatenate(blocks, axis=1)
 
 
@@ -174,13 +178,18 @@ def test_five_thousand_positions_on_the_danger_cylinder() -> None:
     e = unit(b)
     turn, height, away = rng.uniform(0, 2 * np.pi, COUNT), rng.normal(size=COUNT) * 2, rng.uniform(0.05, 1.0, COUNT)
     rho = R * np.where(np.arange(COUNT) % 2, 1.0, 1 + np.where(rng.random(COUNT) < 0.5, -0.9 * away, away))
-    C = (centre + (rho * np.cos(turn))[:, None] * e + (rho * np.sin(turn))[:, None] * np.cross(n, e)
-         + height[:, None] * n)
+    C = (
+        centre
+        + (rho * np.cos(turn))[:, None] * e
+        + (rho * np.sin(turn))[:, None] * np.cross(n, e)
+        + height[:, None] * n
+    )
     rays = {f"r{i}": unit(values[f"B{i}"] - C) for i in (1, 2, 3)}
     found = np.abs(evaluate(form_of("PPP").expression, {**values, "C": C, **rays}))
     across = [np.linalg.svd(ray[:, None])[2][:, 1:] for ray in rays.values()]
-    wrenches = np.concatenate([np.concatenate([N, np.cross(at[None, None], N)], axis=2)
-                               for N, at in zip(across, B, strict=True)], axis=1)
+    wrenches = np.concatenate(
+        [np.concatenate([N, np.cross(at[None, None], N)], axis=2) for N, at in zip(across, B, strict=True)], axis=1
+    )
     least = np.linalg.svd(wrenches, compute_uv=False)[:, -1]
     on = np.arange(COUNT) % 2 == 1
     assert found[on].max() < 1e-12 < 1e-7 < found[~on].min()
@@ -197,11 +206,15 @@ def test_what_the_factors_of_three_lines_say() -> None:
         on_ray = C + rng.uniform(0.5, 3, size=(3, 1)) * ray
         feet = unit(rng.normal(size=(2, 3)))
         feet = np.vstack([feet, rng.normal(size=2) @ feet])
-        for places, turned, zero, other in ((on_ray, d, first, second),
-                                            (C + feet, unit(np.cross(feet, rng.normal(size=(3, 3)))), second, first)):
+        for places, turned, zero, other in (
+            (on_ray, d, first, second),
+            (C + feet, unit(np.cross(feet, rng.normal(size=(3, 3)))), second, first),
+        ):
             n = unit(np.cross(places - C, turned))
-            values = {**{f"n{i}": n[None, i - 1] for i in (1, 2, 3)},
-                      **{f"e{i}": np.cross(turned, n)[None, i - 1] for i in (1, 2, 3)}}
+            values = {
+                **{f"n{i}": n[None, i - 1] for i in (1, 2, 3)},
+                **{f"e{i}": np.cross(turned, n)[None, i - 1] for i in (1, 2, 3)},
+            }
             assert abs(float(evaluate(zero, values)[0])) < 1e-12
             assert abs(float(evaluate(other, values)[0])) > 1e-9
 

@@ -84,8 +84,9 @@ def turning_on_a_table(turns: tuple[float, ...]) -> Mechanism:
         foot, tip = 0.3 * out, 0.1 * np.array([np.cos(turn + 0.4), np.sin(turn + 0.4), 5.0 + k])
         knee = foot + 0.4 * (np.cos(0.3 + 0.2 * k) * out + np.sin(0.3 + 0.2 * k) * UP)
         made.joint(f"crank_{k}", "R", "base", f"arm_{k}", foot, axis=across, motor=True)
-        made.joint(f"knee_{k}", "U", f"arm_{k}", f"rod_{k}", knee, axis=across,
-                   axis2=unit(np.cross(across, tip - knee)))
+        made.joint(
+            f"knee_{k}", "U", f"arm_{k}", f"rod_{k}", knee, axis=across, axis2=unit(np.cross(across, tip - knee))
+        )
         made.joint(f"end_{k}", "S", f"rod_{k}", "platform", tip, loop=True)
         made.observe(f"rod {k}", f"rod_{k}", tip - knee)
     return made.build("platform")
@@ -95,8 +96,10 @@ def as_printed(answer: Singularity, state: Array, oracle: Oracle) -> float:
     """The determinant of the matrices that the answer says there are, from the places of cranks and tips."""
     robot, where = answer.setting.mechanism, answer.to_dict()["where"]
     assert {where[name] for name in where if name[0] in "JN"} == {
-        text for k in range(2, 2 + len(answer.question.observations))
-        for text in (f"[I, -[B{k}]x]", f"I - tau{k} tau{k}^T")}
+        text
+        for k in range(2, 2 + len(answer.question.observations))
+        for text in (f"[I, -[B{k}]x]", f"I - tau{k} tau{k}^T")
+    }
     values = {}
     for k, each in enumerate(answer.question.observations, 2):
         number = int(each.link[-1])

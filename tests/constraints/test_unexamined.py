@@ -26,10 +26,19 @@ from hrsynth.present.text.poses import singularity
 from oracle import Oracle
 
 ROBOTS = Path(__file__).resolve().parents[2] / "robots"
-TURNED = {"guide_1": -0.32956881178506797, "guide_2": 0.22019586075863637, "guide_3": 0.009321378487941519,
-          "elbow_1__1": 0.3992829854782661, "elbow_2__1": 0.8042627383149855, "elbow_3__1": 0.6056722058486278,
-          "elbow_1__2": 0.007883001322778025, "elbow_2__2": -0.392619284127817, "elbow_3__2": 0.7947630011795785,
-          "wrist_1__1": -1.576940091041292, "wrist_1__2": -0.6610939500964069}
+TURNED = {
+    "guide_1": -0.32956881178506797,
+    "guide_2": 0.22019586075863637,
+    "guide_3": 0.009321378487941519,
+    "elbow_1__1": 0.3992829854782661,
+    "elbow_2__1": 0.8042627383149855,
+    "elbow_3__1": 0.6056722058486278,
+    "elbow_1__2": 0.007883001322778025,
+    "elbow_2__2": -0.392619284127817,
+    "elbow_3__2": 0.7947630011795785,
+    "wrist_1__1": -1.576940091041292,
+    "wrist_1__2": -0.6610939500964069,
+}
 LOST = "x=0.1799995866409783,y=0.3117684294034798,z=1.490904856940507"
 
 
@@ -98,11 +107,13 @@ def sliding_halves() -> str:
     for each in list(root):
         if each.get("name", "").startswith(("hinge_", "side_", "platform")):
             root.remove(each)
-    more = (f'<more><joint name="slide" type="prismatic"><parent link="plate_12"/><child link="plate_34"/>'
-            f'<origin xyz="0 0.086 0"/><axis xyz="1 0 0"/></joint>'
-            f'{joint("foot", "continuous", "plate_12", "tool", foot, Z)}'
-            f'{joint("pin", "continuous", "tool", "tie", pin - foot, Z)}'
-            f'{loop("end", "tie", end + [0, 0.086, 0] - pin, "plate_34", end, Z)}</more>')
+    more = (
+        f'<more><joint name="slide" type="prismatic"><parent link="plate_12"/><child link="plate_34"/>'
+        f'<origin xyz="0 0.086 0"/><axis xyz="1 0 0"/></joint>'
+        f"{joint('foot', 'continuous', 'plate_12', 'tool', foot, Z)}"
+        f"{joint('pin', 'continuous', 'tool', 'tie', pin - foot, Z)}"
+        f"{loop('end', 'tie', end + [0, 0.086, 0] - pin, 'plate_34', end, Z)}</more>"
+    )
     root.extend(ElementTree.fromstring(more))
     next(root.iter("platform")).set("link", "tool")
     return ElementTree.tostring(root, "unicode")
@@ -119,8 +130,11 @@ def test_a_tool_at_the_dead_point_of_its_tie_turns_though_the_halves_rest(tmp_pa
     tool, tie = (np.subtract(*file.centres[link][1::-1]) for link in ("tool", "tie"))
     items, count = file.loops.items, len(file.loops.items.links)
     links, local = [file.number("tool"), file.number("tie")], [unit(tool), unit(tie)]
-    line = replace(file.loops, same=np.vstack([file.loops.same, [count, count + 1]]), items=Items(
-        np.append(items.links, links), np.vstack([items.local, *local]), np.append(items.point, [0, 0])))
+    line = replace(
+        file.loops,
+        same=np.vstack([file.loops.same, [count, count + 1]]),
+        items=Items(np.append(items.links, links), np.vstack([items.local, *local]), np.append(items.point, [0, 0])),
+    )
     robot = answer.setting.mechanism
     oracle, state = Oracle(robot), placed(file, solve(file, line, file.zero())[0], robot)
     assert oracle.error(state) < 1e-9
@@ -139,8 +153,10 @@ def test_nothing_is_left_out_where_the_legs_leave_no_other_motion(robot: str, le
     assert found(robot, legs).unexamined == ()
 
 
-@pytest.mark.parametrize(("robot", "legend"), [("3puu", "(never where examined)"),
-                                               pytest.param("prrrp_m1", "(never)", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("robot", "legend"),
+    [("3puu", "(never where examined)"), pytest.param("prrrp_m1", "(never)", marks=pytest.mark.slow)],
+)
 def test_the_legend_of_a_locus_says_where_never_was_examined(robot: str, legend: str) -> None:
     field = locus(load(robot), steps=5).hidden
     assert _drawn_locus(None, None, field, "hidden robot").get_label().endswith(legend)

@@ -83,8 +83,11 @@ def rotation(rng: np.random.Generator) -> Array:
     R = rotation_about(rng.normal(size=3), rng.uniform(0, 3))
     if rng.random() < 0.25:
         near = rng.choice([0.0, 1e-14, 1e-12, 1e-10, 1e-8, 1e-5, 1e-3])
-        R = (rotation_about((0, 0, 1), rng.uniform(-3, 3)) @ rotation_about((0, 1, 0), np.pi / 2 - near)
-             @ rotation_about((1, 0, 0), rng.uniform(-3, 3)))
+        R = (
+            rotation_about((0, 0, 1), rng.uniform(-3, 3))
+            @ rotation_about((0, 1, 0), np.pi / 2 - near)
+            @ rotation_about((1, 0, 0), rng.uniform(-3, 3))
+        )
     return R
 
 
@@ -97,7 +100,7 @@ def every_joint(tree: Sequence[JointType], loops: Sequence[JointType], seed: int
 
     def joint(name: str, kind: JointType, ends: tuple[str, str], point: Array, in_tree: bool) -> Joint:
         first = unit(rng.normal(size=3))
-        axes = (first, perpendicular(first, rng.normal(size=3)))[:kind.axes]
+        axes = (first, perpendicular(first, rng.normal(size=3)))[: kind.axes]
         driven = kind is not JointType.FIXED and rng.random() < 0.5
         limits = None
         if rng.random() < 0.4:
@@ -121,15 +124,22 @@ def every_joint(tree: Sequence[JointType], loops: Sequence[JointType], seed: int
         joints.append(joint(f"loop_{number}", kind, names, rng.normal(size=3) * scale, False))
     watched = [links[rng.integers(len(links))].name for _ in range(2)]
     observations = tuple(Direction(str(k), link, rng.normal(size=3)) for k, link in enumerate(watched, 1))
-    return Mechanism.of("all_sorts", links, joints, platform=links[-1].name, observations=observations,
-                        camera=links[1].name if rng.random() < 0.5 else None,
-                        xml=("@version=1.0", '<material name="red"><color rgba="1 0 0 1"/></material>'))
+    return Mechanism.of(
+        "all_sorts",
+        links,
+        joints,
+        platform=links[-1].name,
+        observations=observations,
+        camera=links[1].name if rng.random() < 0.5 else None,
+        xml=("@version=1.0", '<material name="red"><color rgba="1 0 0 1"/></material>'),
+    )
 
 
 def moved(mechanism: Mechanism, X: Array) -> Mechanism:
     """The whole geometry, the base link's frame included, seen from another frame."""
     links = {name: replace(link, pose=frozen(X @ link.pose)) for name, link in mechanism.links.items()}
-    joints = {name: replace(each, point=X[:3, :3] @ each.point + X[:3, 3],
-                            axes=tuple(X[:3, :3] @ axis for axis in each.axes))
-              for name, each in mechanism.joints.items()}
+    joints = {
+        name: replace(each, point=X[:3, :3] @ each.point + X[:3, 3], axes=tuple(X[:3, :3] @ axis for axis in each.axes))
+        for name, each in mechanism.joints.items()
+    }
     return replace(mechanism, links=links, joints=joints)

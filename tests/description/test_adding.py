@@ -41,7 +41,8 @@ def test_the_dialect_of_the_page_is_read_and_written(sample: Path):
     assert save(load("3rrr_m1"), sample.with_name("out.bars")) == ()
     back, there = load(sample.with_name("out.bars")), spanning(load("3rrr_m1"))
     assert {name: joint.links for name, joint in back.joints.items()} == {
-        name: joint.links for name, joint in there.joints.items()}
+        name: joint.links for name, joint in there.joints.items()
+    }
     for name, joint in there.joints.items():
         assert back.joints[name].point == pytest.approx(joint.point, abs=1e-12)
 

@@ -43,30 +43,57 @@ def edited(*changes: tuple[str, str] | tuple[int, str]) -> str:
 
 # name: (changes, [(line, words of the message)])
 DEFECTS: dict[str, tuple[list, list[tuple[int, str]]]] = {
-    "malformed": ([(3, '  <link name="crank">')], [
-        (41, "malformed XML, Opening and ending tag mismatch: link line 3 and robot")]),
+    "malformed": (
+        [(3, '  <link name="crank">')],
+        [(41, "malformed XML, Opening and ending tag mismatch: link line 3 and robot")],
+    ),
     "cut off": ([(19, "<joint")], [(20, "malformed XML")]),
     "two root elements": ([(42, "<robot/>")], [(42, "malformed XML")]),
     "other root": ([(1, '<model name="x">'), (41, "</model>")], [(1, "root element, model, robot")]),
     "no name": ([(1, "<robot>")], [(1, "<robot> without name")]),
-    "empty name": ([(3, '<link name=" "/>'), (7, "")], [
-        (3, "<link> without name"), (6, "joint without <parent>, a"), (8, "unknown link, crank"),
-        (14, "unknown link, crank"), (39, "unknown link, crank")]),
+    "empty name": (
+        [(3, '<link name=" "/>'), (7, "")],
+        [
+            (3, "<link> without name"),
+            (6, "joint without <parent>, a"),
+            (8, "unknown link, crank"),
+            (14, "unknown link, crank"),
+            (39, "unknown link, crank"),
+        ],
+    ),
     "unknown joint type": ([(19, '<joint name="c" type="ball">')], [(19, "unknown joint type, ball, revolute, cont")]),
     "no joint type": ([(19, '<joint name="c">')], [(19, "<joint> without type")]),
-    "unknown loop type": ([('<loop name="d" type="revolute">', '<loop name="d" type="screw">')], [
-        (25, "unknown loop type, screw, revolute, continuous, prismatic, cylindrical, universal")]),
-    "joint of a missing parent": ([(14, '<parent link="cranc"/>')], [
-        (14, "joint 'b': unknown link, cranc, an existing name, such as crank")]),
-    "joint of a missing child": ([(15, '<child link="zzz"/>')], [
-        (4, "second root besides 'base': not the child of any joint, bar"), (15, "joint 'b': unknown link, zzz"),
-    ]),
+    "unknown loop type": (
+        [('<loop name="d" type="revolute">', '<loop name="d" type="screw">')],
+        [(25, "unknown loop type, screw, revolute, continuous, prismatic, cylindrical, universal")],
+    ),
+    "joint of a missing parent": (
+        [(14, '<parent link="cranc"/>')],
+        [(14, "joint 'b': unknown link, cranc, an existing name, such as crank")],
+    ),
+    "joint of a missing child": (
+        [(15, '<child link="zzz"/>')],
+        [
+            (4, "second root besides 'base': not the child of any joint, bar"),
+            (15, "joint 'b': unknown link, zzz"),
+        ],
+    ),
     "joint without a child": ([(21, "")], [(5, "second root"), (19, "joint without <child>, c")]),
-    "second origin": ([(18, '</joint><link name="e"/><joint name="g" type="fixed"><parent link="bar"/><child link="e"/>'
-                            '<origin/><origin/></joint>')], [(18, "second <origin> in <joint>, g")]),
+    "second origin": (
+        [
+            (
+                18,
+                '</joint><link name="e"/><joint name="g" type="fixed"><parent link="bar"/><child link="e"/>'
+                "<origin/><origin/></joint>",
+            )
+        ],
+        [(18, "second <origin> in <joint>, g")],
+    ),
     "second link": ([(5, '<link name="rocker"/><link name="base"/>')], [(5, "second link of the same name, base")]),
-    "second joint": ([(19, '<joint name="b" type="continuous">')], [
-        (5, "second root"), (19, "second joint or loop of the same name (joint), b")]),
+    "second joint": (
+        [(19, '<joint name="b" type="continuous">')],
+        [(5, "second root"), (19, "second joint or loop of the same name (joint), b")],
+    ),
     "loop with a joint's name": ([('<loop name="d"', '<loop name="b"')], [(25, "of the same name (loop), b")]),
     "zero axis": ([(10, '<axis xyz="0 0 0"/>')], [(10, "xyz of <axis>, 0 0 0, a non-zero vector")]),
     "tiny axis": ([(10, '<axis xyz="0 0 1e-300"/>')], [(10, "a non-zero vector")]),
@@ -79,23 +106,30 @@ DEFECTS: dict[str, tuple[list, list[tuple[int, str]]]] = {
     "no numbers": ([(16, '<origin xyz=""/>')], [(16, "3 numbers")]),
     "four numbers": ([(17, '<axis xyz="0 1 0 0"/>')], [(17, "xyz of <axis>, 0 1 0 0, 3 numbers")]),
     "two roots": ([(5, '<link name="rocker"/><link name="moon"/>')], [(5, "second root besides 'base'")]),
-    "two parents": ([(18, '</joint><joint name="g" type="fixed"><parent link="rocker"/><child link="bar"/></joint>')],
-                    [(18, "joint 'g': its child already has a parent, through joint 'b' (a loop is written as")]),
-    "ring": ([(7, '<parent link="bar"/>')], [
-        (13, "tree joints that form a cycle (a loop is written as <loop>), a b")]),
-    "ring of all": ([(7, '<parent link="bar"/>'), (20, '<parent link="bar"/>'), (2, "")], [
-        (13, "tree joints that form a cycle")]),
+    "two parents": (
+        [(18, '</joint><joint name="g" type="fixed"><parent link="rocker"/><child link="bar"/></joint>')],
+        [(18, "joint 'g': its child already has a parent, through joint 'b' (a loop is written as")],
+    ),
+    "ring": ([(7, '<parent link="bar"/>')], [(13, "tree joints that form a cycle (a loop is written as <loop>), a b")]),
+    "ring of all": (
+        [(7, '<parent link="bar"/>'), (20, '<parent link="bar"/>'), (2, "")],
+        [(13, "tree joints that form a cycle")],
+    ),
     "joint to itself": ([(20, '<parent link="rocker"/>')], [(5, "second root"), (19, "'c' joins a link to itself")]),
     "no platform": ([(38, "")], [(37, "no <platform>")]),
     "no own element": ([(37, ""), (38, ""), (39, ""), (40, "")], [(1, "no <hrsynth> element")]),
     "two own elements": ([(40, "</hrsynth><hrsynth/>")], [(40, "second <hrsynth>")]),
     "two platforms": ([(39, '<platform link="crank"/>')], [(39, "second <platform>")]),
-    "unknown platform": ([(38, '<platform link="bra"/>')], [
-        (38, "platform: unknown link, bra, an existing name, such as bar")]),
-    "platform without link": ([(38, '<platform/>')], [(38, "<platform> without link")]),
+    "unknown platform": (
+        [(38, '<platform link="bra"/>')],
+        [(38, "platform: unknown link, bra, an existing name, such as bar")],
+    ),
+    "platform without link": ([(38, "<platform/>")], [(38, "<platform> without link")]),
     "platform is the base": ([(38, '<platform link="base"/>')], [(38, "the platform is the base, base")]),
-    "platform elsewhere": ([(5, '<link name="rocker"/><link name="moon"/>'), (38, '<platform link="moon"/>')],
-                           [(5, "second root"), (38, "platform not reachable from the base 'base', moon")]),
+    "platform elsewhere": (
+        [(5, '<link name="rocker"/><link name="moon"/>'), (38, '<platform link="moon"/>')],
+        [(5, "second root"), (38, "platform not reachable from the base 'base', moon")],
+    ),
     "unknown camera": ([(39, '<camera link="eye"/>')], [(39, "camera: unknown link, eye")]),
     "observe unknown": ([(39, '<observe leg="1" link="cramk" axis="0 0 1"/>')], [(39, "observe: unknown link, cramk")]),
     "observe zero": ([(39, '<observe leg="1" link="crank" axis="0 0 0"/>')], [(39, "axis of <observe>, 0 0 0, a non")]),
@@ -106,12 +140,16 @@ DEFECTS: dict[str, tuple[list, list[tuple[int, str]]]] = {
     "motor of nothing": ([(35, "")], [(34, "transmission without <joint>, m")]),
     "motor without a name": ([(34, "<transmission>")], [(34, "<transmission> without name")]),
     "two motors": ([(35, '<joint name="a"/><joint name="a"/>')], [(35, "second transmission of a joint, a")]),
-    "motor of a fixed joint": ([(19, '<joint name="c" type="fixed">'), (35, '<joint name="c"/>')],
-                               [(35, "transmission of a fixed joint, c")]),
+    "motor of a fixed joint": (
+        [(19, '<joint name="c" type="fixed">'), (35, '<joint name="c"/>')],
+        [(35, "transmission of a fixed joint, c")],
+    ),
     "no axis2": ([UNIVERSAL], [(25, "universal loop without <axis2>, d")]),
     "zero axis2": ([UNIVERSAL, (32, '<axis xyz="0 1 0"/><axis2 xyz="0 0 0"/>')], [(32, "xyz of <axis2>, 0 0 0")]),
-    "oblique axis2": ([UNIVERSAL, (32, '<axis xyz="0 1 0"/><axis2 xyz="0 3 4"/>')], [
-        (25, "universal loop 'd': cosine between axis and axis2, 0.6, 0")]),
+    "oblique axis2": (
+        [UNIVERSAL, (32, '<axis xyz="0 1 0"/><axis2 xyz="0 3 4"/>')],
+        [(25, "universal loop 'd': cosine between axis and axis2, 0.6, 0")],
+    ),
     "loop without an end": ([(26, "<!--"), (28, "-->")], [(25, "loop without <predecessor>, d")]),
     "loop of a missing link": ([(29, '<successor link="bier">')], [(29, "loop 'd': unknown link, bier")]),
     "loop to itself": ([(29, '<successor link="rocker">')], [(25, "'d' joins a link to itself, rocker")]),
@@ -119,25 +157,62 @@ DEFECTS: dict[str, tuple[list, list[tuple[int, str]]]] = {
     "negative effort": ([(11, '<limit effort="-2"/>')], [(11, "effort of <limit>, -2")]),
     "crossed limits": ([(11, '<limit lower="1" upper="-1"/>')], [(11, "lower limit, 1, up to -1")]),
     "lower above zero": ([(11, '<limit lower="1"/>')], [(11, "lower limit, 1, up to 0")]),
-    "limit not a number": ([(11, '<limit lower="a" effort="inf"/>')], [
-        (11, "lower of <limit>, a, finite"), (11, "effort of <limit>, inf, finite")]),
-    "gear of a missing link": ([(34, '<coupling name="g"><predecessor link="crank"/><successor link="x"/>'
-                                     '<ratio value="2"/></coupling><transmission name="m">')],
-                               [(34, "successor of a coupling: unknown link, x")]),
-    "gear without a ratio": ([(34, '<coupling name="g"><predecessor link="crank"/><successor link="bar"/></coupling>'
-                                   '<coupling name="g"><predecessor link="crank"/><ratio value="1 2"/></coupling>'
-                                   '<transmission name="m">')],
-                             [(34, "coupling without <ratio>, g"), (34, "second coupling of the same name, g"),
-                              (34, "coupling without <successor>, g"), (34, "value of <ratio>, 1 2, one number")]),
-    "gear of a link with itself": ([(34, '<coupling name="g"><predecessor link="crank"/><successor link="crank"/>'
-                                         '<ratio value="2"/></coupling><transmission name="m">')],
-                                   [(34, "successor of a coupling, coupled with itself, crank, another link")]),
-    "gear that holds": ([(34, '<coupling name="g"><predecessor link="crank"/><successor link="bar"/>'
-                              '<ratio value="-0"/></coupling><transmission name="m">')],
-                        [(34, "ratio of a coupling, which would hold its second joint, -0, a number other than 0")]),
-    "document type": ([(1, '<!DOCTYPE robot [<!ENTITY a "b">]>\n<robot name="&a;">')],
-                      [(1, "a document type declaration")]),
+    "limit not a number": (
+        [(11, '<limit lower="a" effort="inf"/>')],
+        [(11, "lower of <limit>, a, finite"), (11, "effort of <limit>, inf, finite")],
+    ),
+    "gear of a missing link": (
+        [
+            (
+                34,
+                '<coupling name="g"><predecessor link="crank"/><successor link="x"/>'
+                '<ratio value="2"/></coupling><transmission name="m">',
+            )
+        ],
+        [(34, "successor of a coupling: unknown link, x")],
+    ),
+    "gear without a ratio": (
+        [
+            (
+                34,
+                '<coupling name="g"><predecessor link="crank"/><successor link="bar"/></coupling>'
+                '<coupling name="g"><predecessor link="crank"/><ratio value="1 2"/></coupling>'
+                '<transmission name="m">',
+            )
+        ],
+        [
+            (34, "coupling without <ratio>, g"),
+            (34, "second coupling of the same name, g"),
+            (34, "coupling without <successor>, g"),
+            (34, "value of <ratio>, 1 2, one number"),
+        ],
+    ),
+    "gear of a link with itself": (
+        [
+            (
+                34,
+                '<coupling name="g"><predecessor link="crank"/><successor link="crank"/>'
+                '<ratio value="2"/></coupling><transmission name="m">',
+            )
+        ],
+        [(34, "successor of a coupling, coupled with itself, crank, another link")],
+    ),
+    "gear that holds": (
+        [
+            (
+                34,
+                '<coupling name="g"><predecessor link="crank"/><successor link="bar"/>'
+                '<ratio value="-0"/></coupling><transmission name="m">',
+            )
+        ],
+        [(34, "ratio of a coupling, which would hold its second joint, -0, a number other than 0")],
+    ),
+    "document type": (
+        [(1, '<!DOCTYPE robot [<!ENTITY a "b">]>\n<robot name="&a;">')],
+        [(1, "a document type declaration")],
+    ),
 }
+
 
 @pytest.mark.parametrize("name", DEFECTS)
 def test_every_defect_has_its_line(name: str):
@@ -151,13 +226,22 @@ def test_every_defect_has_its_line(name: str):
 def test_no_loop_is_no_parallel_robot():
     lines = FOUR_BAR.split("\n")
     assert defects("\n".join(lines[:24] + lines[33:])) == [
-        (1, "no loop: not a parallel robot, None, a <loop>; for a serial arm or a free body "
-            '<hrsynth serial="true">')]
+        (1, 'no loop: not a parallel robot, None, a <loop>; for a serial arm or a free body <hrsynth serial="true">')
+    ]
 
 
 def test_all_defects_are_reported_at_once_in_the_order_of_their_lines():
-    names = ["second link", "zero axis", "negative velocity", "nan", "unknown joint type", "loop of a missing link",
-             "unknown motor", "unknown platform", "observe zero"]
+    names = [
+        "second link",
+        "zero axis",
+        "negative velocity",
+        "nan",
+        "unknown joint type",
+        "loop of a missing link",
+        "unknown motor",
+        "unknown platform",
+        "observe zero",
+    ]
     changes = [change for name in names for change in DEFECTS[name][0]]
     expected = sorted(line for name in names for line, _ in DEFECTS[name][1])
     assert [line for line, _ in defects(edited(*changes))] == expected
@@ -169,24 +253,37 @@ def test_a_message_is_one_line_with_file_line_value_and_what_is_allowed():
     assert caught.value.lines() == ["robots/x.urdf:10: xyz of <axis>, found 0 0 0, allowed: a non-zero vector"]
 
 
-@pytest.mark.parametrize(("text", "line", "what"), [
-    ("", 1, "an empty file"), (b" \n\n", 1, "an empty file"), (b"\0" * 100, 1, "malformed XML"),
-    (FOUR_BAR.replace("crank", "kurbel-ü").encode("latin-1"), 3, "not UTF-8 text, 0xfc"),
-    (FOUR_BAR.encode("utf-16"), 1, "not UTF-8 text, 0xff"), ("junk", 1, "malformed XML"),
-    ("<robot", 1, "malformed XML"),
-    ('<robot name="x"/>', 1, "no links"), ('<robot xmlns="urn:x" name="x"/>', 1, "root element, {urn:x}robot, robot"),
-    ("<robot name='x'>" + "<a>" * 5000 + "</a>" * 5000 + "</robot>", 1, "malformed XML"),
-    ('<?xml version="1.0" encoding="no-such"?><robot name="x"/>', 1, "malformed XML"),
-])
+@pytest.mark.parametrize(
+    ("text", "line", "what"),
+    [
+        ("", 1, "an empty file"),
+        (b" \n\n", 1, "an empty file"),
+        (b"\0" * 100, 1, "malformed XML"),
+        (FOUR_BAR.replace("crank", "kurbel-ü").encode("latin-1"), 3, "not UTF-8 text, 0xfc"),
+        (FOUR_BAR.encode("utf-16"), 1, "not UTF-8 text, 0xff"),
+        ("junk", 1, "malformed XML"),
+        ("<robot", 1, "malformed XML"),
+        ('<robot name="x"/>', 1, "no links"),
+        ('<robot xmlns="urn:x" name="x"/>', 1, "root element, {urn:x}robot, robot"),
+        ("<robot name='x'>" + "<a>" * 5000 + "</a>" * 5000 + "</robot>", 1, "malformed XML"),
+        ('<?xml version="1.0" encoding="no-such"?><robot name="x"/>', 1, "malformed XML"),
+    ],
+)
 def test_what_is_no_robot_at_all(text: str | bytes, line: int | None, what: str):
     found = defects(text)
     assert (line, True) in [(number, message.startswith(what)) for number, message in found]
 
 
-@pytest.mark.parametrize(("name", "text"), [
-    ("a.urdf", '<robot name="x"/>'), ("a.xml", "<mujoco/>"), ("a.sdf", '<sdf version="1.9"><model name="x"/></sdf>'),
-    ("a.urdf", '<robot name="x"><hrsynth/></robot>'),
-    ("a.xacro", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:macro name="leg" params="i"/></robot>')])
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("a.urdf", '<robot name="x"/>'),
+        ("a.xml", "<mujoco/>"),
+        ("a.sdf", '<sdf version="1.9"><model name="x"/></sdf>'),
+        ("a.urdf", '<robot name="x"><hrsynth/></robot>'),
+        ("a.xacro", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:macro name="leg" params="i"/></robot>'),
+    ],
+)
 def test_a_file_without_links_is_told_what_to_name_instead(tmp_path: Path, name: str, text: str):
     if name.endswith(".xacro"):
         pytest.importorskip("xacro")
@@ -218,13 +315,19 @@ def test_a_name_is_one_line(sign: str):
     assert kept.base == "ba\xa0se"
 
 
-@pytest.mark.parametrize(("changes", "residual"), [
-    ([(30, '<origin xyz="2 0 1"/>')], 1.0),
-    ([(9, '<origin rpy="0 0.1 0"/>')], 0.1),
-    ([UNIVERSAL, (30, '<origin xyz="2 0 1"/>'), (32, '<axis xyz="0 1 0"/><axis2 xyz="0 1 0"/>')], 1.0),
-    ([('<loop name="d" type="revolute">', '<loop name="d" type="prismatic">'), (30, '<origin rpy="3.1 0 0"/>')], 3.1),
-    ([(30, '<origin xyz="2 0 0" rpy="3.14159265358979 0 0"/>')], 3.1416),
-])
+@pytest.mark.parametrize(
+    ("changes", "residual"),
+    [
+        ([(30, '<origin xyz="2 0 1"/>')], 1.0),
+        ([(9, '<origin rpy="0 0.1 0"/>')], 0.1),
+        ([UNIVERSAL, (30, '<origin xyz="2 0 1"/>'), (32, '<axis xyz="0 1 0"/><axis2 xyz="0 1 0"/>')], 1.0),
+        (
+            [('<loop name="d" type="revolute">', '<loop name="d" type="prismatic">'), (30, '<origin rpy="3.1 0 0"/>')],
+            3.1,
+        ),
+        ([(30, '<origin xyz="2 0 0" rpy="3.14159265358979 0 0"/>')], 3.1416),
+    ],
+)
 def test_an_open_loop_is_named_with_its_residual(changes: list, residual: float):
     with pytest.raises(LoopsNotClosed) as caught:
         native.parse(edited(*changes), "robot.urdf")
@@ -235,11 +338,17 @@ def test_an_open_loop_is_named_with_its_residual(changes: list, residual: float)
     assert "--tolerance" not in error.lines()[0]  # no rounding opens a loop so far
 
 
-@pytest.mark.parametrize(("kind", "origin"), [
-    ("prismatic", '<origin xyz="2 7 0"/>'), ("cylindrical", '<origin xyz="2 -3 0" rpy="0 1 0"/>'),
-    ("continuous", '<origin xyz="2 0 0" rpy="0 2 0"/>'), ("spherical", '<origin xyz="2 0 0" rpy="1 2 3"/>'),
-    ("planar", '<origin xyz="9 0 9" rpy="0 2 0"/>'), ("fixed", '<origin xyz="2 0 0"/>'),
-])
+@pytest.mark.parametrize(
+    ("kind", "origin"),
+    [
+        ("prismatic", '<origin xyz="2 7 0"/>'),
+        ("cylindrical", '<origin xyz="2 -3 0" rpy="0 1 0"/>'),
+        ("continuous", '<origin xyz="2 0 0" rpy="0 2 0"/>'),
+        ("spherical", '<origin xyz="2 0 0" rpy="1 2 3"/>'),
+        ("planar", '<origin xyz="9 0 9" rpy="0 2 0"/>'),
+        ("fixed", '<origin xyz="2 0 0"/>'),
+    ],
+)
 def test_a_loop_is_closed_wherever_its_joint_may_be(kind: str, origin: str):
     text = edited(('<loop name="d" type="revolute">', f'<loop name="d" type="{kind}">'), (30, origin))
     assert native.parse(text).joints["d"].in_tree is False
@@ -252,17 +361,21 @@ def test_a_damaged_file_is_read_or_refused_but_never_breaks(data: st.DataObject)
     text = FOUR_BAR
     for _ in range(data.draw(st.integers(1, 4))):
         at = data.draw(st.integers(0, len(text)))
-        text = text[:at] + data.draw(st.sampled_from(words)) + text[at + data.draw(st.integers(0, 8)):]
+        text = text[:at] + data.draw(st.sampled_from(words)) + text[at + data.draw(st.integers(0, 8)) :]
     with contextlib.suppress(BadRobotFile, LoopsNotClosed):
         robot = native.parse(text, "x")
         again = native.parse(native.write(robot))
         assert again.platform == robot.platform
 
 
-@pytest.mark.parametrize(("old", "new", "what"), [
-    ("<observe", "<observ", "no meaning inside <hrsynth>, found <observ>"),
-    ("<platform", '<loop name="z"/><platform', "no meaning inside <hrsynth>, found <loop>"),
-    ("</joint>", '<mimic joint="a"/></joint>', "a <mimic> is a gear")])
+@pytest.mark.parametrize(
+    ("old", "new", "what"),
+    [
+        ("<observe", "<observ", "no meaning inside <hrsynth>, found <observ>"),
+        ("<platform", '<loop name="z"/><platform', "no meaning inside <hrsynth>, found <loop>"),
+        ("</joint>", '<mimic joint="a"/></joint>', "a <mimic> is a gear"),
+    ],
+)
 def test_what_would_change_the_robot_is_not_passed_over(old: str, new: str, what: str) -> None:
     text = FOUR_BAR if old in FOUR_BAR else FOUR_BAR.replace("</hrsynth>", '<observe leg="1" link="bar"/></hrsynth>')
     with pytest.raises(BadRobotFile) as caught:

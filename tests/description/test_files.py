@@ -68,7 +68,8 @@ def test_an_unknown_name_gets_close_matches(tmp_path: Path, monkeypatch: pytest.
         description.load("linkge")
     assert caught.value.lines() == [
         "neither a file nor a shipped robot, found 'linkge', allowed: a file, or a name that `hrsynth robots` lists, "
-        "such as linkage"]
+        "such as linkage"
+    ]
     with pytest.raises(BadRequest, match="such as scissors, linkage, pendulum"):
         description.load("zzz")
     robots["linkage"].write_text(FOUR_BAR)

@@ -11,11 +11,18 @@ from description.samples import every_joint, with_rods
 from hrsynth.description import load, native, shipped, spanning
 from hrsynth.mechanism.model import JointType, Mechanism
 
-ROBOTS = {"rods": with_rods()} | {
-    f"sorts {seed}": every_joint([kind for kind in JointType if kind is not JointType.FREE] * 2,
-                                 [kind for kind in JointType if kind is not JointType.FREE], seed)
-    for seed in range(3)
-} | {"free": every_joint([JointType.FREE, JointType.PRISMATIC], [JointType.SPHERICAL], 5)}
+ROBOTS = (
+    {"rods": with_rods()}
+    | {
+        f"sorts {seed}": every_joint(
+            [kind for kind in JointType if kind is not JointType.FREE] * 2,
+            [kind for kind in JointType if kind is not JointType.FREE],
+            seed,
+        )
+        for seed in range(3)
+    }
+    | {"free": every_joint([JointType.FREE, JointType.PRISMATIC], [JointType.SPHERICAL], 5)}
+)
 ROBOTS |= {name: load(path) for name, path in shipped().items()}
 
 

@@ -53,8 +53,12 @@ def test_a_loop_of_every_type(kind: JointType, seed: int):
 
 @pytest.mark.slow
 @settings(deadline=None, max_examples=150)
-@given(st.lists(st.sampled_from(IN_TREE), min_size=1, max_size=12), st.lists(st.sampled_from(IN_LOOP), max_size=6),
-       SEEDS, st.sampled_from([1.0, 1e-3, 0.99, 500.0]))
+@given(
+    st.lists(st.sampled_from(IN_TREE), min_size=1, max_size=12),
+    st.lists(st.sampled_from(IN_LOOP), max_size=6),
+    SEEDS,
+    st.sampled_from([1.0, 1e-3, 0.99, 500.0]),
+)
 @example(tree=[JointType.REVOLUTE], loops=[JointType.FIXED], seed=222, scale=500.0)  # a platform that cannot move
 def test_any_tree_with_any_loops_at_any_size(tree: list[JointType], loops: list[JointType], seed: int, scale: float):
     mechanism = every_joint(tree, loops, seed, scale)
@@ -99,10 +103,15 @@ def test_a_written_file_is_assembled_at_zero(mechanism: Mechanism):
             poses[joint.find("child").get("link")] = parent @ _pose(joint.find("origin"))
     loops = root.findall("loop")
     for loop in loops:
-        ends = [poses[loop.find(tag).get("link")] @ _pose(loop.find(tag).find("origin"))
-                for tag in ("predecessor", "successor")]
-        axes = [np.array([float(word) for word in loop.find(tag).get("xyz").split()])
-                for tag in ("axis", "axis2") if loop.find(tag) is not None]
+        ends = [
+            poses[loop.find(tag).get("link")] @ _pose(loop.find(tag).find("origin"))
+            for tag in ("predecessor", "successor")
+        ]
+        axes = [
+            np.array([float(word) for word in loop.find(tag).get("xyz").split()])
+            for tag in ("axis", "axis2")
+            if loop.find(tag) is not None
+        ]
         kind = LOOP_TYPES[loop.get("type")]
         spec = JointSpec(loop.get("name"), kind, (FrameSpec("a"), FrameSpec("b")), tuple(axes))
         assert residual(spec, ends[0], ends[1], mechanism.length) <= ASSEMBLED
@@ -112,8 +121,10 @@ def test_a_written_file_is_assembled_at_zero(mechanism: Mechanism):
 
 
 def _pose(origin):
-    numbers = [[float(word) for word in (origin.get(key, "0 0 0") if origin is not None else "0 0 0").split()]
-               for key in ("xyz", "rpy")]
+    numbers = [
+        [float(word) for word in (origin.get(key, "0 0 0") if origin is not None else "0 0 0").split()]
+        for key in ("xyz", "rpy")
+    ]
     return pose(numbers[0], rotation_from_rpy(*numbers[1]))
 
 
@@ -135,8 +146,19 @@ def test_a_written_axis_is_a_unit_vector_and_a_fixed_point(seed: int):
     assert np.linalg.norm(np.cross(read, direction)) < 1e-12 * np.linalg.norm(direction)
 
 
-@pytest.mark.parametrize(("value", "text"), [(-0.0, "0"), (1e-16, "0"), (-1e-14, "0"), (0.1 + 0.2, "0.3"), (2.0, "2"),
-                                             (-0.25, "-0.25"), (1 / 3, "0.3333333333333"), (1e-7, "1e-07")])
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (-0.0, "0"),
+        (1e-16, "0"),
+        (-1e-14, "0"),
+        (0.1 + 0.2, "0.3"),
+        (2.0, "2"),
+        (-0.25, "-0.25"),
+        (1 / 3, "0.3333333333333"),
+        (1e-7, "1e-07"),
+    ],
+)
 def test_numbers_are_short(value: float, text: str):
     assert numerals.decimal(value, 13) == text
 
@@ -183,9 +205,11 @@ def test_two_revolutes_that_one_motor_drives_stay_two():
     driven = both.changed(joints=joints)
     lines = native.write(driven).splitlines()
     start = next(number for number, line in enumerate(lines) if '<transmission name="m__2">' in line)
-    one = native.parse("\n".join(lines[:start] + lines[start + 7:]))
+    one = native.parse("\n".join(lines[:start] + lines[start + 7 :]))
     assert {name: joint.actuated for name, joint in one.joints.items() if joint.in_tree and joint.type.freedoms} == {
-        "tree_0__1": True, "tree_0__2": False}
+        "tree_0__1": True,
+        "tree_0__2": False,
+    }
     check_round_trip(one)
 
 
@@ -193,17 +217,23 @@ def test_two_revolutes_that_one_motor_drives_stay_two():
 def test_two_revolutes_that_are_not_perpendicular_stay_two(bend: float):
     link, end = Link("N__1"), Link("end")
     axis = np.array([np.sin(bend), np.cos(bend), 0])
-    joints = [Joint("N__1", JointType.REVOLUTE, "base", "N__1", np.zeros(3), (np.array([1.0, 0, 0]),)),
-              Joint("N__2", JointType.REVOLUTE, "N__1", "end", np.zeros(3), (axis,))]
+    joints = [
+        Joint("N__1", JointType.REVOLUTE, "base", "N__1", np.zeros(3), (np.array([1.0, 0, 0]),)),
+        Joint("N__2", JointType.REVOLUTE, "N__1", "end", np.zeros(3), (axis,)),
+    ]
     robot = Mechanism.of("bent", [Link("base"), link, end], joints, platform="end")
     assert set(check_round_trip(robot).joints) == {"N__1", "N__2"}
 
 
 def test_a_chain_whose_link_in_between_bears_something_stays_a_chain():
     text = native.write(every_joint([JointType.SPHERICAL], [JointType.REVOLUTE], 2)).replace(
-        '<link name="tree_0__2"/>', '<link name="tree_0__2"><inertial/></link>')
+        '<link name="tree_0__2"/>', '<link name="tree_0__2"><inertial/></link>'
+    )
     assert [name for name in native.parse(text).joints if name.startswith("tree_0__")] == [
-        "tree_0__1", "tree_0__2", "tree_0__3"]
+        "tree_0__1",
+        "tree_0__2",
+        "tree_0__3",
+    ]
     check_round_trip(native.parse(text))
 
 
@@ -220,8 +250,11 @@ INTERFACE = "<hardwareInterface>hardware_interface/VelocityJointInterface</hardw
 
 @pytest.mark.parametrize("interface", ["", INTERFACE])
 def test_a_motor_of_the_usual_form_is_but_a_name(interface: str):
-    text = FOUR_BAR.replace('<joint name="a"/>', f"""<type>transmission_interface/SimpleTransmission</type>
-        <joint name="a">{interface}</joint><actuator name="m"/>""")
+    text = FOUR_BAR.replace(
+        '<joint name="a"/>',
+        f"""<type>transmission_interface/SimpleTransmission</type>
+        <joint name="a">{interface}</joint><actuator name="m"/>""",
+    )
     assert native.parse(text).joints["a"].motor == Motor("m")
     assert "<hardwareInterface>" in native.write(native.parse(text))
 
@@ -246,12 +279,17 @@ KEPT = [
     ('<link name="crank"/>', '<link name="crank" type="x &amp; &quot;y&quot;"><inertial/><collision name="é"/></link>'),
     ('<child link="bar"/>', '<child link="bar"/><calibration rising="0"/><dynamics damping="1"/>'),
     ('<loop name="d" type="revolute">', '<loop name="d" type="revolute" independent="true"><note> two  words </note>'),
-    ('<hrsynth>', '<gazebo reference="bar"><a:b xmlns:a="urn:c=d" a:e="1">text<!-- note --><f/>tail</a:b></gazebo>'
-                  '<hrsynth>'),
-    ('<hrsynth>', '<hrsynth extra="1"><later kind="z"/>'),
-    ('<robot ', '<robot xmlns:xacro="urn:x" version="1.0" xacro:a="b=c" '),
-    ('<joint name="a"/>', '<type>T</type><joint name="a"><hardwareInterface>H</hardwareInterface></joint>'
-                          '<actuator name="z"><mechanicalReduction>50</mechanicalReduction></actuator>'),
+    (
+        "<hrsynth>",
+        '<gazebo reference="bar"><a:b xmlns:a="urn:c=d" a:e="1">text<!-- note --><f/>tail</a:b></gazebo><hrsynth>',
+    ),
+    ("<hrsynth>", '<hrsynth extra="1"><later kind="z"/>'),
+    ("<robot ", '<robot xmlns:xacro="urn:x" version="1.0" xacro:a="b=c" '),
+    (
+        '<joint name="a"/>',
+        '<type>T</type><joint name="a"><hardwareInterface>H</hardwareInterface></joint>'
+        '<actuator name="z"><mechanicalReduction>50</mechanicalReduction></actuator>',
+    ),
     ('<joint name="a"/>', '<joint name="a"/><joint name="c"/><actuator name="both"/>'),
 ]
 
@@ -265,16 +303,45 @@ def test_unknown_elements_and_attributes_are_kept(old: str, new: str):
     assert again.differences(robot) == []
     assert again.xml == robot.xml
     assert [joint.motor for joint in again.joints.values()] == [joint.motor for joint in robot.joints.values()]
-    for word in ("a.stl", "x &amp; &quot;y&quot;", "é", 'multiplier="-1"', " two  words ", 'independent="true"', "text",
-                 "<!-- note -->", "tail", 'a:e="1"', 'extra="1"', 'kind="z"', "b=c", "H</hardware", ">50<", "both"):
+    for word in (
+        "a.stl",
+        "x &amp; &quot;y&quot;",
+        "é",
+        'multiplier="-1"',
+        " two  words ",
+        'independent="true"',
+        "text",
+        "<!-- note -->",
+        "tail",
+        'a:e="1"',
+        'extra="1"',
+        'kind="z"',
+        "b=c",
+        "H</hardware",
+        ">50<",
+        "both",
+    ):
         assert (word in new) == (word in text)
 
 
 LIMITS = [
-    ("R", None), ("R", Limits(-1, 2)), ("R", Limits(lower=-1)), ("R", Limits(upper=1)), ("R", Limits(0, 0, 1, 1)),
-    ("R", Limits(velocity=3)), ("R", Limits(effort=3.3)), ("R", Limits(-1, 2, 3, 4)), ("P", None), ("P", Limits(-1, 2)),
-    ("P", Limits(upper=0.1)), ("P", Limits(velocity=0.0)), ("P", Limits(-1, 2, 3, 4)), ("U", Limits(-1, 1)),
-    ("C", None), ("C", Limits(0, 1, 2)), ("F", Limits(0, 1)),
+    ("R", None),
+    ("R", Limits(-1, 2)),
+    ("R", Limits(lower=-1)),
+    ("R", Limits(upper=1)),
+    ("R", Limits(0, 0, 1, 1)),
+    ("R", Limits(velocity=3)),
+    ("R", Limits(effort=3.3)),
+    ("R", Limits(-1, 2, 3, 4)),
+    ("P", None),
+    ("P", Limits(-1, 2)),
+    ("P", Limits(upper=0.1)),
+    ("P", Limits(velocity=0.0)),
+    ("P", Limits(-1, 2, 3, 4)),
+    ("U", Limits(-1, 1)),
+    ("C", None),
+    ("C", Limits(0, 1, 2)),
+    ("F", Limits(0, 1)),
 ]
 
 
@@ -288,10 +355,15 @@ def test_limits_come_back(letter: str, limits: Limits | None, in_tree: bool):
     assert check_round_trip(robot).joints[name].limits == limits
 
 
-@pytest.mark.parametrize(("attributes", "limits"), [
-    ('lower="-1"', Limits(-1, 0)), ('upper="1"', Limits(0, 1)), ("", None),
-    ('effort="1" velocity="2"', Limits(velocity=2, effort=1)),
-])
+@pytest.mark.parametrize(
+    ("attributes", "limits"),
+    [
+        ('lower="-1"', Limits(-1, 0)),
+        ('upper="1"', Limits(0, 1)),
+        ("", None),
+        ('effort="1" velocity="2"', Limits(velocity=2, effort=1)),
+    ],
+)
 def test_limits_that_urdf_has_defaults_for(attributes: str, limits: Limits | None):
     text = FOUR_BAR.replace('lower="-1" upper="1" effort="5" velocity="2"', attributes)
     assert check_round_trip(native.parse(text)).joints["a"].limits == limits
@@ -308,8 +380,12 @@ class Elsewhere(Observation):
     """An observation that the dialect has no element for."""
 
 
-SERIAL = Mechanism.of("s", [Link("base"), Link("end")],
-                      [Joint("j", JointType.REVOLUTE, "base", "end", np.zeros(3), (np.eye(3)[0],))], platform="end")
+SERIAL = Mechanism.of(
+    "s",
+    [Link("base"), Link("end")],
+    [Joint("j", JointType.REVOLUTE, "base", "end", np.zeros(3), (np.eye(3)[0],))],
+    platform="end",
+)
 
 
 def test_a_mechanism_without_loops_says_so():
@@ -317,19 +393,29 @@ def test_a_mechanism_without_loops_says_so():
     check_round_trip(SERIAL)
 
 
-@pytest.mark.parametrize("robot", [
-    replace(SERIAL, observations=(Elsewhere("1", "end"),)),
-    replace(SERIAL, name="a\0b"),
-    SERIAL.changed(links=[Link("lost")]),
-    SERIAL.changed(links=[Link("end", pose((np.nan, 0, 0)))]),
-    SERIAL.changed(links=[Link("end", pose((1e10, 0, 0)))]),
-    SERIAL.changed(links=[Link("end", xml=("<broken",))]),
-    SERIAL.changed(joints=[Joint(name, JointType.FREE, "base", "end", np.zeros(3)) for name in "fg"]),
-    SERIAL.changed(joints=[Joint("j", JointType.UNIVERSAL, "base", "end", np.zeros(3), (np.eye(3)[0], np.ones(3)))]),
-    SERIAL.changed(links=[Link("j__1", xml=("<inertial/>",))], joints=[
-        Joint("j", JointType.SPHERICAL, "base", "end", np.zeros(3)),
-        Joint("k", JointType.FIXED, "end", "j__1", np.zeros(3))]),
-], ids=["observation", "name", "lost", "nan", "far", "fragment", "free", "universal", "taken"])
+@pytest.mark.parametrize(
+    "robot",
+    [
+        replace(SERIAL, observations=(Elsewhere("1", "end"),)),
+        replace(SERIAL, name="a\0b"),
+        SERIAL.changed(links=[Link("lost")]),
+        SERIAL.changed(links=[Link("end", pose((np.nan, 0, 0)))]),
+        SERIAL.changed(links=[Link("end", pose((1e10, 0, 0)))]),
+        SERIAL.changed(links=[Link("end", xml=("<broken",))]),
+        SERIAL.changed(joints=[Joint(name, JointType.FREE, "base", "end", np.zeros(3)) for name in "fg"]),
+        SERIAL.changed(
+            joints=[Joint("j", JointType.UNIVERSAL, "base", "end", np.zeros(3), (np.eye(3)[0], np.ones(3)))]
+        ),
+        SERIAL.changed(
+            links=[Link("j__1", xml=("<inertial/>",))],
+            joints=[
+                Joint("j", JointType.SPHERICAL, "base", "end", np.zeros(3)),
+                Joint("k", JointType.FIXED, "end", "j__1", np.zeros(3)),
+            ],
+        ),
+    ],
+    ids=["observation", "name", "lost", "nan", "far", "fragment", "free", "universal", "taken"],
+)
 def test_what_the_dialect_cannot_say_is_refused(robot: Mechanism):
     with pytest.raises(BadRequest) as caught:
         native.write(robot)

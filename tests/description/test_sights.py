@@ -42,8 +42,10 @@ def seeing_all(robot: str, rng: np.random.Generator) -> Mechanism:
     """A shipped robot with two cameras, and an observation of every kind by one or the other."""
     mechanism = load(robot)
     links = [link for link in mechanism.links if link != mechanism.base]
-    cameras = [NamedCamera("eye", mechanism.base, pose(rng.normal(size=3), random_rotation(rng)), 812.5, 640),
-               NamedCamera("the hand", mechanism.platform, pose(rng.normal(size=3), random_rotation(rng)))]
+    cameras = [
+        NamedCamera("eye", mechanism.base, pose(rng.normal(size=3), random_rotation(rng)), 812.5, 640),
+        NamedCamera("the hand", mechanism.platform, pose(rng.normal(size=3), random_rotation(rng))),
+    ]
     joint = next(joint.name for joint in mechanism.joints.values() if joint.type in ("R", "P"))
     specs = []
     for word, kind in kinds().items():
@@ -84,8 +86,10 @@ def test_every_kind_survives_in_other_dialects(robot: str, ending: str, tmp_path
     assert [(o.kind, o.leg) for o in read.observations] == [(o.kind, o.leg) for o in mechanism.observations]
     assert [camera.name for camera in read.cameras] == ["eye", "the hand"]
     for mine, theirs in zip(mechanism.observations, read.observations, strict=True):
-        values = [o.value(robot.links[o.seen_from or robot.reference].pose, robot.links[o.link].pose)
-                  for o, robot in ((mine, mechanism), (theirs, read))]
+        values = [
+            o.value(robot.links[o.seen_from or robot.reference].pose, robot.links[o.link].pose)
+            for o, robot in ((mine, mechanism), (theirs, read))
+        ]
         np.testing.assert_allclose(values[1], values[0], atol=1e-9)
 
 
@@ -93,8 +97,10 @@ def test_the_normal_form_sees_the_same() -> None:
     mechanism = seeing_all("delta", np.random.default_rng(3))
     normal = normal_form(mechanism).mechanism
     for mine, theirs in zip(mechanism.observations, normal.observations, strict=True):
-        values = [o.value(robot.links[o.seen_from or robot.reference].pose, robot.links[o.link].pose)
-                  for o, robot in ((mine, mechanism), (theirs, normal))]
+        values = [
+            o.value(robot.links[o.seen_from or robot.reference].pose, robot.links[o.link].pose)
+            for o, robot in ((mine, mechanism), (theirs, normal))
+        ]
         np.testing.assert_allclose(values[1], values[0], atol=1e-12)
 
 
@@ -113,16 +119,19 @@ WRONG = [
     ('<observe kind="encoder" joint="gear"/>', "unknown joint, found gear, allowed: free"),
     ('<observe kind="encoder" joint="free"/>', "the joint 'free', found free, allowed: one with one axis"),
     ('<observe kind="direction" camera="eye" link="object"/>', "observe direction without the attribute, found axis"),
-    ('<observe kind="point" link="object" at="0 0 0" radius="0.1"/>',
-     "observe point with an attribute it does not use, found radius, allowed: link, at"),
-    ('<observe kind="encoder" joint="free" link="object"/>',
-     "observe encoder with an attribute it does not use, found link, allowed: joint"),
+    (
+        '<observe kind="point" link="object" at="0 0 0" radius="0.1"/>',
+        "observe point with an attribute it does not use, found radius, allowed: link, at",
+    ),
+    (
+        '<observe kind="encoder" joint="free" link="object"/>',
+        "observe encoder with an attribute it does not use, found link, allowed: joint",
+    ),
     ('<camera name="eye" link="object"/>', "a second camera of this name, found eye"),
     ('<camera name="ear" link="thing"/>', "camera 'ear': unknown link, found thing"),
     ('<camera name="ear" link="base"> <image focal="-1"/> </camera>', "focal of <image>, found -1, allowed: more"),
     ('<observe kind="point" leg="a,b" link="object" at="0 0 0"/>', "a label that does not fit into a list, found a,b"),
-    (2 * '<observe kind="point" leg="a" link="object" at="0 0 0"/>',
-     "a second one with this label, found a"),
+    (2 * '<observe kind="point" leg="a" link="object" at="0 0 0"/>', "a second one with this label, found a"),
 ]
 
 
@@ -146,12 +155,16 @@ ASKED_WRONG = [
     (["--see", "image_circle:platform@1,2,3/0,0,1/-1"], "radius (m), found -1.0, allowed: more than 0"),
     (["--camera", "eye=base@0,0,0,"], "--camera eye=base@0,0,0,: an empty number"),
     (["--camera", "eye=base@0,0,0"], "a camera to which nothing is given to see, found 'eye', allowed: --see eye="),
-    (["--camera", "eye=base", "--camera", "far=base", "--see", "eye=point:platform@1,2,3"],
-     "a camera to which nothing is given to see, found 'far', allowed: --see far="),
+    (
+        ["--camera", "eye=base", "--camera", "far=base", "--see", "eye=point:platform@1,2,3"],
+        "a camera to which nothing is given to see, found 'far', allowed: --see far=",
+    ),
     (["--see", "line:platform@1,2,3"], "without the attribute, found 'axis'"),
     (["--see", "point:platform@1,2,3/0,0,1"], "more than the kind needs, found '0,0,1', allowed: at"),
-    (["--see", "direction:platform@0,0,0/1,0,0"],
-     "a place, of which the kind direction has none, found '0,0,0', allowed: direction:LINK/dx,dy,dz"),
+    (
+        ["--see", "direction:platform@0,0,0/1,0,0"],
+        "a place, of which the kind direction has none, found '0,0,0', allowed: direction:LINK/dx,dy,dz",
+    ),
     (["--see", "encoder:shoulder_1@0,0,0"], "a place, of which the kind encoder has none, found '0,0,0'"),
     (["--see", "ear=point:platform@1,2,3"], "unknown camera, found 'ear', allowed: none is named"),
     (["--camera", "a=base", "--camera", "a=rod_1", "--see", "point:platform@1,2,3"], "a second camera of this name"),
@@ -166,8 +179,9 @@ ASKED_WRONG = [
 
 
 @pytest.mark.parametrize(("words", "said"), ASKED_WRONG)
-def test_what_is_wrong_on_the_command_line_is_one_line(words: list[str], said: str, capsys: pytest.CaptureFixture[str]
-                                                       ) -> None:
+def test_what_is_wrong_on_the_command_line_is_one_line(
+    words: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert execute(["legs", "gough_stewart", *words]) == 2
     told = capsys.readouterr().err
     assert told.startswith("hrsynth: ")
@@ -176,8 +190,9 @@ def test_what_is_wrong_on_the_command_line_is_one_line(words: list[str], said: s
 
 
 @pytest.mark.parametrize("command", ["servo"])
-def test_commands_that_know_segments_only_say_so(command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-                                                 ) -> None:
+def test_commands_that_know_segments_only_say_so(
+    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     save(with_sights(load("delta"), [parse_see("point:platform@0,0,0.1", [])]), tmp_path / "delta.urdf")
     words = ["--start", "x=0", "--goal", "x=0.01", "--physics"]
     assert execute([command, str(tmp_path / "delta.urdf"), *words]) == 2
@@ -185,8 +200,16 @@ def test_commands_that_know_segments_only_say_so(command: str, tmp_path: Path, c
 
 
 @pytest.mark.some(1)
-@pytest.mark.parametrize("words", ["atlas", "path --start x=0 --goal x=0.01", "accuracy --noise 0.1deg,1mm", "derive",
-                                   "select --start x=0 --goal x=0.01 --noise 0.1deg,1mm --runs 0"])
+@pytest.mark.parametrize(
+    "words",
+    [
+        "atlas",
+        "path --start x=0 --goal x=0.01",
+        "accuracy --noise 0.1deg,1mm",
+        "derive",
+        "select --start x=0 --goal x=0.01 --noise 0.1deg,1mm --runs 0",
+    ],
+)
 def test_commands_read_what_a_file_observes(words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     sights = [parse_see(text, ["eye"]) for text in ("point:platform@0,0,0.1", "distance:platform@0,0,0.1")]
     below = parse_camera("eye=base@0,0,0/180deg,0,0")
@@ -207,8 +230,12 @@ def test_the_command_line_and_python_see_the_same(capsys: pytest.CaptureFixture[
     setting = ObservedRobot.of("gough_stewart", "1", cameras, see=see)
     assert told == [o.to_dict() for o in setting.observed]
     assert [(each["leg"], each["kind"], each["camera"]) for each in told] == [
-        ("1", "direction", None), ("point_1", "point", "eye"), ("point_2", "point", "hand"),
-        ("direction_1", "direction", None), ("encoder_1", "encoder", None)]
+        ("1", "direction", None),
+        ("point_1", "point", "eye"),
+        ("point_2", "point", "hand"),
+        ("direction_1", "direction", None),
+        ("encoder_1", "encoder", None),
+    ]
     point = setting.observed[1]
     assert isinstance(point, CameraObservation)
     assert point.camera is not None
@@ -224,12 +251,14 @@ def test_what_is_no_text_is_refused(asked: dict[str, Any]) -> None:
 def test_names_with_slashes_and_equals_signs_are_asked_for() -> None:
     """As in MJCF that is put together of parts, arm/link: a slash was taken for the start of an axis."""
     name = "arm/left=1/link"
-    for text, link, at, axis in ((f"eye=line:{name}@1,2,3/0,0,1", name, (1, 2, 3), (0, 0, 1)),
-                                 (f"point:{name}@1,2,3", name, (1, 2, 3), None),
-                                 (f"eye=direction:{name}/0,0,1", name, None, (0, 0, 1)),
-                                 (f"inclination:{name}", name, None, None),
-                                 (f"inclination:{name}/0,0,1", name, None, (0, 0, 1)),
-                                 (f"encoder:{name}", name, None, None)):
+    for text, link, at, axis in (
+        (f"eye=line:{name}@1,2,3/0,0,1", name, (1, 2, 3), (0, 0, 1)),
+        (f"point:{name}@1,2,3", name, (1, 2, 3), None),
+        (f"eye=direction:{name}/0,0,1", name, None, (0, 0, 1)),
+        (f"inclination:{name}", name, None, None),
+        (f"inclination:{name}/0,0,1", name, None, (0, 0, 1)),
+        (f"encoder:{name}", name, None, None),
+    ):
         spec = parse_see(text, [])
         assert (spec.link, spec.at, spec.axis, spec.camera) == (link, at, axis, "eye" if "eye" in text else None)
 
@@ -247,8 +276,24 @@ def test_what_a_file_lists_is_watched_and_can_be_chosen(tmp_path: Path) -> None:
 
 def test_every_element_is_documented() -> None:
     text = PAGE.read_text("utf-8")
-    words = ["<camera", "name=", "link=", "<origin", "<image", "focal=", "width=", "height=", "<observe", "kind=",
-             "camera=", "`at`", "`axis`", "`radius`", "`joint`", "`leg`"]
+    words = [
+        "<camera",
+        "name=",
+        "link=",
+        "<origin",
+        "<image",
+        "focal=",
+        "width=",
+        "height=",
+        "<observe",
+        "kind=",
+        "camera=",
+        "`at`",
+        "`axis`",
+        "`radius`",
+        "`joint`",
+        "`leg`",
+    ]
     assert [word for word in words if word not in text.replace("at=", "`at`")] == []
     assert {name.rstrip("?") for kind in kinds().values() for name in kind.needs} == {"at", "axis", "radius", "joint"}
 
@@ -256,4 +301,4 @@ def test_every_element_is_documented() -> None:
 def test_the_help_names_every_kind(capsys: pytest.CaptureFixture[str]) -> None:
     assert execute(["derive", "--help"]) == 0
     told = " ".join(capsys.readouterr().out.split())
-    assert [kind for kind in kinds() if kind not in told[told.index("--see"):]] == []
+    assert [kind for kind in kinds() if kind not in told[told.index("--see") :]] == []

@@ -74,10 +74,11 @@ def test_every_name_of_mujocos_schema_is_known():
     for line in mujoco.mj_printSchema(False, False).splitlines():
         head = re.match(r"( *)(\S+) \([^)]*\)(.*)", line)
         if head is not None:
-            path = [*path[:len(head[1]) // 3], head[2].replace("(world)body", "body")]
+            path = [*path[: len(head[1]) // 3], head[2].replace("(world)body", "body")]
             key = "/".join(path[-2:])
-            read = all(each in rows or f"{above}/{each}" in rows
-                       for above, each in zip(["", *path], path, strict=False))
+            read = all(
+                each in rows or f"{above}/{each}" in rows for above, each in zip(["", *path], path, strict=False)
+            )
             if read:
                 seen.add(key)
                 names = (rows.get(key) or rows[path[-1]]).attributes
@@ -113,19 +114,30 @@ def mistype(data: st.DataObject, name: str) -> str:
     """A name with one edit."""
     kind, at = data.draw(st.sampled_from("idrtc")), data.draw(st.integers(0, len(name) - 1))
     letter = data.draw(st.sampled_from(LETTERS))
-    before, own, after = name[:at], name[at], name[at + 1:]
-    return {"i": before + letter + own + after, "d": before + after, "r": before + letter + after,
-            "t": before + after[:1] + own + after[1:], "c": name.swapcase()}[kind]
+    before, own, after = name[:at], name[at], name[at + 1 :]
+    return {
+        "i": before + letter + own + after,
+        "d": before + after,
+        "r": before + letter + after,
+        "t": before + after[:1] + own + after[1:],
+        "c": name.swapcase(),
+    }[kind]
 
 
 @pytest.mark.parametrize("ending", ENDINGS)
 @pytest.mark.some(4, 20)
 @pytest.mark.parametrize("name", shipped())
-@settings(max_examples=15, deadline=None, derandomize=True, database=None,
-          suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.filter_too_much])
+@settings(
+    max_examples=15,
+    deadline=None,
+    derandomize=True,
+    database=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.filter_too_much],
+)
 @given(data=st.data())
-def test_a_mistyped_attribute_is_refused_or_changes_nothing(name: str, ending: str, data: st.DataObject,
-                                                            tmp_path_factory: pytest.TempPathFactory):
+def test_a_mistyped_attribute_is_refused_or_changes_nothing(
+    name: str, ending: str, data: st.DataObject, tmp_path_factory: pytest.TempPathFactory
+):
     folder = tmp_path_factory.getbasetemp() / f"mistyped{ending}"
     folder.mkdir(exist_ok=True)
     text, places = written(name, ending, folder)
@@ -182,10 +194,24 @@ def test_another_unknown_name_is_said_once_and_names_of_other_programs_are_not(t
     assert said == f"hrsynth: ignored: unknown element in <robot>, found <hydraulics> (line {line}, and more)"
 
 
-@pytest.mark.parametrize(("one", "two", "same"), [
-    ("xyx", "xyz", True), ("xy", "xyz", True), ("xyzz", "xyz", True), ("xzy", "xyz", True), ("XYZ", "xyz", True),
-    ("expressedIn", "expressed_in", True), ("max-velocity", "max_velocity", True), ("x", "xyz", False),
-    ("zyx", "xyz", False), ("zxy", "xyz", False), ("pose", "pos", True), ("", "a", True), ("lower", "upper", False)])
+@pytest.mark.parametrize(
+    ("one", "two", "same"),
+    [
+        ("xyx", "xyz", True),
+        ("xy", "xyz", True),
+        ("xyzz", "xyz", True),
+        ("xzy", "xyz", True),
+        ("XYZ", "xyz", True),
+        ("expressedIn", "expressed_in", True),
+        ("max-velocity", "max_velocity", True),
+        ("x", "xyz", False),
+        ("zyx", "xyz", False),
+        ("zxy", "xyz", False),
+        ("pose", "pos", True),
+        ("", "a", True),
+        ("lower", "upper", False),
+    ],
+)
 def test_one_edit_is_one_edit(one: str, two: str, same: bool):
     assert (misspelt(one, [two]) == (two,)) is same
     assert (misspelt(two, [one]) == (one,)) is same

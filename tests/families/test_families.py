@@ -66,6 +66,7 @@ robots = pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.name)
 
 # --- an instant, seen by the oracle ------------------------------------------------------------------------------
 
+
 def platform_rates(oracle: Oracle, state: Array, velocities: Array) -> Array:
     """t without dimensions; of a point body its velocity alone."""
     t = oracle.twist(velocities, oracle.mechanism.platform)
@@ -87,9 +88,12 @@ def segments(mechanism: Mechanism) -> list[tuple[str, Array]]:
 
 def leg_rates(oracle: Oracle, state: Array, velocities: Array) -> Array:
     """The rates of all default segments' directions."""
-    return np.vstack([
-        np.cross(oracle.twist(velocities, link)[3:], oracle.pose(state, link)[:3, :3] @ d, axisa=0, axisc=0)
-        for link, d in segments(oracle.mechanism)])
+    return np.vstack(
+        [
+            np.cross(oracle.twist(velocities, link)[3:], oracle.pose(state, link)[:3, :3] @ d, axisa=0, axisc=0)
+            for link, d in segments(oracle.mechanism)
+        ]
+    )
 
 
 def motor_rates(oracle: Oracle, state: Array, velocities: Array) -> Array:
@@ -98,8 +102,9 @@ def motor_rates(oracle: Oracle, state: Array, velocities: Array) -> Array:
     for joint in oracle.mechanism.joints.values():
         if joint.actuated:
             assert joint.type in (JointType.REVOLUTE, JointType.PRISMATIC)
-            (X_a, V_a), (X_b, V_b) = ((oracle.pose(state, link), oracle.twist(velocities, link))
-                                      for link in joint.links)
+            (X_a, V_a), (X_b, V_b) = (
+                (oracle.pose(state, link), oracle.twist(velocities, link)) for link in joint.links
+            )
             axis = X_a[:3, :3] @ joint.axis
             at_zero = oracle.pose(oracle.zero(), joint.predecessor)
             point = X_a[:3, 3] + X_a[:3, :3] @ at_zero[:3, :3].T @ (joint.point - at_zero[:3, 3])
@@ -143,6 +148,7 @@ def freedoms(oracle: Oracle, state: Array) -> Freedoms:
 
 # --- the table ---------------------------------------------------------------------------------------------------
 
+
 def test_the_table_is_sorted_and_complete():
     names = [robot.name for robot in ROBOTS]
     assert names == sorted(set(names))
@@ -174,6 +180,7 @@ def test_the_architecture_counts_joints_and_motors(robot: Shipped):
 
 
 # --- freedoms ----------------------------------------------------------------------------------------------------
+
 
 @robots
 def test_zero_is_assembled_and_far_from_singularities(robot: Shipped):
@@ -208,7 +215,7 @@ def test_parallel_rails_hide_the_translation_along_them(name: str):
         velocities, _ = oracle.kernel(state)
         T, Y = platform_rates(oracle, state, velocities), leg_rates(oracle, state, velocities)
         _, values, right = np.linalg.svd(Y)
-        lost = T @ right[int(np.sum(values > 1e-9)):].T
+        lost = T @ right[int(np.sum(values > 1e-9)) :].T
         left, sizes, _ = np.linalg.svd(lost)
         assert np.sum(sizes > 1e-9) == 1
         assert abs(left[:3, 0] @ rail) == pytest.approx(1)
@@ -223,6 +230,7 @@ def test_the_plates_slide_without_the_platform():
 
 
 # --- dimensions of the papers ------------------------------------------------------------------------------------
+
 
 def centre(mechanism: Mechanism, *joints: str) -> Array:
     return np.mean([mechanism.joints[joint].point for joint in joints], axis=0)
@@ -274,8 +282,9 @@ def test_pairs_of_rods_are_equal_and_parallel(robot: Shipped):
     pairs = [name[:-1] for name in mechanism.links if re.fullmatch(r"rod_\da", name)]
     assert bool(pairs) == ("{2-SS}" in robot.architecture)
     for leg in (name[4:] for name in pairs):
-        elbow, wrist = ([mechanism.joints[f"{kind}_{leg}{letter}"].point for letter in "ab"]
-                        for kind in ("elbow", "wrist"))
+        elbow, wrist = (
+            [mechanism.joints[f"{kind}_{leg}{letter}"].point for letter in "ab"] for kind in ("elbow", "wrist")
+        )
         assert wrist[0] - elbow[0] == pytest.approx(wrist[1] - elbow[1], abs=1e-14)
         first = mechanism.joints.get(f"shoulder_{leg}")
         if first is not None:
@@ -296,6 +305,7 @@ def test_inner_and_outer_axes_of_translational_legs_are_parallel(make):
 
 
 # --- constructors ------------------------------------------------------------------------------------------------
+
 
 def test_dimensions_are_parameters():
     small = delta.delta(distal=0.5, home=(0.01, 0.02, -0.45))
@@ -332,6 +342,7 @@ def test_circles_and_lines_meet_spheres():
 
 
 # --- files -------------------------------------------------------------------------------------------------------
+
 
 def test_the_folder_holds_the_table():
     assert sorted(path.stem for path in FOLDER.glob("*.urdf")) == [robot.name for robot in ROBOTS]

@@ -19,17 +19,25 @@ def drawn(name: str, seed: int) -> tuple[Linkage, Array, Array]:
     """A linkage of random dimensions, closed angles, and how its base is turned."""
     rng = np.random.default_rng(seed)
     twists, lengths, offsets = rng.uniform(0.5, 1.2, 3), rng.uniform(0.5, 1.2, 4), rng.uniform(-0.3, 0.3, 3)
-    dimensions = {"bennett": (*twists[:2], 1.0), "goldberg": (*twists, 1.0), "myard": (twists[0], 1.0),
-                  "sarrus": (lengths, twists[0] + 0.3, 0.5), "line_symmetric_bricard": (lengths[:3], twists, offsets),
-                  "plane_symmetric_bricard": (lengths[:3], twists), "schatz": (1.0, 0.2 + abs(offsets[0]))}
+    dimensions = {
+        "bennett": (*twists[:2], 1.0),
+        "goldberg": (*twists, 1.0),
+        "myard": (twists[0], 1.0),
+        "sarrus": (lengths, twists[0] + 0.3, 0.5),
+        "line_symmetric_bricard": (lengths[:3], twists, offsets),
+        "plane_symmetric_bricard": (lengths[:3], twists),
+        "schatz": (1.0, 0.2 + abs(offsets[0])),
+    }
     linkage = LINKAGES[name](*dimensions[name])
     return linkage, linkage.regular(rng), rotation_about(rng.normal(size=3), rng.uniform(0, 3))
 
 
 def closings(linkage: Linkage, seed: int, starts: int, second: float) -> list[Array]:
     """Closed angles (n,) with the second angle held, one for each random start that ends there."""
-    found = (linkage.close(start, second)
-             for start in np.random.default_rng(seed).uniform(-np.pi, np.pi, (starts, len(linkage.lengths))))
+    found = (
+        linkage.close(start, second)
+        for start in np.random.default_rng(seed).uniform(-np.pi, np.pi, (starts, len(linkage.lengths)))
+    )
     return [angles for angles in found if angles is not None]
 
 
@@ -54,8 +62,15 @@ def check_mobility(name: str, seed: int) -> None:
     assert loop in found.setting.mechanism.joints
 
 
-LISTED = {"bennett": 1, "goldberg": 1, "myard": 1, "line_symmetric_bricard": 2, "plane_symmetric_bricard": 2,
-          "sarrus": 4, "schatz": 2}
+LISTED = {
+    "bennett": 1,
+    "goldberg": 1,
+    "myard": 1,
+    "line_symmetric_bricard": 2,
+    "plane_symmetric_bricard": 2,
+    "sarrus": 4,
+    "schatz": 2,
+}
 """How many modes there are with one joint driven, proved to be all."""
 
 
@@ -103,13 +118,15 @@ def test_a_linkage_is_written_by_its_name(tmp_path: Path):
         main(str(tmp_path), "robot")
 
 
-ZERO = {"bennett": [-2.575753, -1.446473, 2.575753, 1.446473],
-        "goldberg": [2.575753, -1.446473, -2.165401, -1.69512, 2.73124],
-        "myard": [0.24382, 2.28192, 1.448886, -1.692706, -2.28192],
-        "sarrus": [-2.01301, -1.446473, -2.823702, -1.000322, 1.749778, -0.749456],
-        "line_symmetric_bricard": [-2.77701, -1.446473, 1.118683, -2.77701, -1.446473, 1.118683],
-        "plane_symmetric_bricard": [-2.899563, -1.446473, -2.121878, -1.321518, -2.121878, -1.446473],
-        "schatz": [2.605633, -0.730875, -1.448371, -1.679842, 2.294982, 0.699726]}
+ZERO = {
+    "bennett": [-2.575753, -1.446473, 2.575753, 1.446473],
+    "goldberg": [2.575753, -1.446473, -2.165401, -1.69512, 2.73124],
+    "myard": [0.24382, 2.28192, 1.448886, -1.692706, -2.28192],
+    "sarrus": [-2.01301, -1.446473, -2.823702, -1.000322, 1.749778, -0.749456],
+    "line_symmetric_bricard": [-2.77701, -1.446473, 1.118683, -2.77701, -1.446473, 1.118683],
+    "plane_symmetric_bricard": [-2.899563, -1.446473, -2.121878, -1.321518, -2.121878, -1.446473],
+    "schatz": [2.605633, -0.730875, -1.448371, -1.679842, 2.294982, 0.699726],
+}
 
 
 @pytest.mark.parametrize("name", LINKAGES)
@@ -152,8 +169,9 @@ def test_many_linkages(name: str):
 
 
 @pytest.mark.some(1)
-@pytest.mark.parametrize(("word", "closing"), [
-    ("RRRR", "S"), ("RRU", "S"), ("RPRR", "S"), ("URR", "S"), ("RRRRR", "U")])
+@pytest.mark.parametrize(
+    ("word", "closing"), [("RRRR", "S"), ("RRU", "S"), ("RPRR", "S"), ("URR", "S"), ("RRRRR", "U")]
+)
 def test_a_loop_that_closes_at_any_joint_is_answered(word: str, closing: str):
     """With joints that are no R and P, or more of them than are bounded, its modes are found."""
     rng, b = np.random.default_rng(len(word)), Builder("loop")

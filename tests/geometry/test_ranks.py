@@ -36,15 +36,18 @@ quick = settings(max_examples=50, deadline=None, derandomize=True)
 seeds = st.integers(0, 2**32 - 1)
 
 
-@pytest.mark.parametrize(("values", "rank", "gap"), [
-    ([3.0, 2.0, 1e-12], 2, 2e12),
-    ([1.0, 1e-3, 1e-8], 2, 1e5),
-    ([1.0, 1e-3, 1e-5], 3, 1e-5 / np.finfo(float).eps),
-    ([5.0, 5.0], 2, CLEAN),
-    ([1.0, 0.0, 0.0], 1, CLEAN),
-    ([0.0, 0.0], 0, CLEAN),
-    ([], 0, CLEAN),
-])
+@pytest.mark.parametrize(
+    ("values", "rank", "gap"),
+    [
+        ([3.0, 2.0, 1e-12], 2, 2e12),
+        ([1.0, 1e-3, 1e-8], 2, 1e5),
+        ([1.0, 1e-3, 1e-5], 3, 1e-5 / np.finfo(float).eps),
+        ([5.0, 5.0], 2, CLEAN),
+        ([1.0, 0.0, 0.0], 1, CLEAN),
+        ([0.0, 0.0], 0, CLEAN),
+        ([], 0, CLEAN),
+    ],
+)
 def test_rank_and_gap(values: list[float], rank: int, gap: float) -> None:
     found = rank_of(np.array(values))
     assert found.value == rank

@@ -23,11 +23,16 @@ from hrsynth.mechanism.pose import Pose, rpy_of
 
 NEAR = 1e-12
 parts = st.floats(-1, 1, allow_subnormal=False)
-axes = (st.tuples(parts, parts, parts).filter(lambda v: np.linalg.norm(v) > 1e-3).map(lambda v: v / np.linalg.norm(v))
-        | st.sampled_from([sign * axis for axis in np.eye(3) for sign in (1, -1)]))
+axes = st.tuples(parts, parts, parts).filter(lambda v: np.linalg.norm(v) > 1e-3).map(
+    lambda v: v / np.linalg.norm(v)
+) | st.sampled_from([sign * axis for axis in np.eye(3) for sign in (1, -1)])
 sizes = st.integers(-16, -1).map(lambda power: 10.0**power)
-angles = (st.floats(0, np.pi) | st.sampled_from([0.0, np.pi / 2, 2 * np.pi / 3, np.pi]) | sizes
-          | sizes.map(lambda less: np.pi - less))
+angles = (
+    st.floats(0, np.pi)
+    | st.sampled_from([0.0, np.pi / 2, 2 * np.pi / 3, np.pi])
+    | sizes
+    | sizes.map(lambda less: np.pi - less)
+)
 
 
 @given(axes, angles)

@@ -66,6 +66,7 @@ def test_the_angle_between_a_vector_and_its_turn(angle: float) -> None:
 def test_an_order_is_that_of_the_rows_whatever_their_last_digits_and_places(rows, random) -> None:
     """Rows of small integers, none twice, have one order."""
     random.shuffle(rows)
-    near = [[value * (1 + 1e-9 * random.uniform(-1, 1)) + 1e-12 * random.uniform(-1, 1) for value in row]
-            for row in rows]
+    near = [
+        [value * (1 + 1e-9 * random.uniform(-1, 1)) + 1e-12 * random.uniform(-1, 1) for value in row] for row in rows
+    ]
     assert [rows[i] for i in steady_order(np.array(near), 1e-6)] == sorted(rows)

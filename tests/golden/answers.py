@@ -25,28 +25,67 @@ from hrsynth.description import shipped
 
 MODELS = Path(os.environ.get("HRSYNTH_MODELS") or Path(__file__).resolve().parents[3] / "shared" / "models")
 ENDINGS = (".urdf", ".sdf", ".xml", ".xacro")
-COMMANDS = ("derive", "legs", "check", "singular", "advise", "branch", "modes", "atlas", "path", "servo", "endings",
-            "basins", "accuracy", "select", "export", "view", "lint", "verify", "robots", "convert", "import", "studio",
-            "schema", "completion", "catalog")
+COMMANDS = (
+    "derive",
+    "legs",
+    "check",
+    "singular",
+    "advise",
+    "branch",
+    "modes",
+    "atlas",
+    "path",
+    "servo",
+    "endings",
+    "basins",
+    "accuracy",
+    "select",
+    "export",
+    "view",
+    "lint",
+    "verify",
+    "robots",
+    "convert",
+    "import",
+    "studio",
+    "schema",
+    "completion",
+    "catalog",
+)
 ABOUT_ROBOTS: dict[str, tuple[str, ...]] = {
-    "derive": (), "legs": (), "check": (), "singular": (), "advise": (), "modes": (), "modes --real": (), "atlas": (),
-    "accuracy": ("--cone", "0.1deg"), "endings": (), "path": ("--start", "{far}", "--goal", "{home}"),
-    "servo": ("--start", "{near}", "--goal", "{home}"), "select": ("--start", "{near}", "--goal", "{home}"),
-    "lint": ()}
+    "derive": (),
+    "legs": (),
+    "check": (),
+    "singular": (),
+    "advise": (),
+    "modes": (),
+    "modes --real": (),
+    "atlas": (),
+    "accuracy": ("--cone", "0.1deg"),
+    "endings": (),
+    "path": ("--start", "{far}", "--goal", "{home}"),
+    "servo": ("--start", "{near}", "--goal", "{home}"),
+    "select": ("--start", "{near}", "--goal", "{home}"),
+    "lint": (),
+}
 """Commands about one robot, with what else they are given: its pose, one beside it, and one at random."""
 FROM_PYTHON = ("derive", "legs", "check", "singular", "advise", "modes", "atlas")
 BRANCHES = {"rrrrr_m1": ("--box", "shoulder_1=-0.1:0.1,shoulder_2=-0.1:0.1")}
 DIALECTS = {"urdf": ".urdf", "mjcf": ".xml", "sdf": ".sdf", "gepetto": ".yaml", "usd": ".usda"}
 PICTURES = {
-    "derive": ("derive", "quattro", "--observe", "1,4"), "check": ("check", "quattro", "--grid", "x=-0.3:0.3:9,z=-0.7"),
+    "derive": ("derive", "quattro", "--observe", "1,4"),
+    "check": ("check", "quattro", "--grid", "x=-0.3:0.3:9,z=-0.7"),
     "singular": ("singular", "quattro", "--observe", "1,4", "--plane", "z=-0.7,phi=0"),
     "singular of a plane": ("singular", "3rrr_m1", "--plane", "phi=0"),
-    "modes": ("modes", "3rrr_m1", "--real"), "modes in space": ("modes", "quattro", "--observe", "1,3"),
-    "atlas": ("atlas", "3rrr_m1"), "servo": ("servo", "delta", "--start", "x=0", "--goal", "x=0.05"),
+    "modes": ("modes", "3rrr_m1", "--real"),
+    "modes in space": ("modes", "quattro", "--observe", "1,3"),
+    "atlas": ("atlas", "3rrr_m1"),
+    "servo": ("servo", "delta", "--start", "x=0", "--goal", "x=0.05"),
     "servo in a plane": ("servo", "3rrr_m1", "--start", "x=0", "--goal", "x=0.03"),
     "endings": ("endings", "3rrr_m1"),
     "basins": ("basins", "rrrrr_m1", "--to", "x=0", "--grid", "x=-0.05:0.05:5,y=0.2"),
-    "accuracy": ("accuracy", "delta", "--cone", "0.1deg", "--plane", "z=-0.6")}
+    "accuracy": ("accuracy", "delta", "--cone", "0.1deg", "--plane", "z=-0.6"),
+}
 ENTRIES, SEED, PIXELS = 500, 7, 48
 
 Json = Any
@@ -70,8 +109,11 @@ def files() -> dict[str, str]:
     """The shipped robots by name, and the files of others that are here by their place in the folder."""
     found = {name: name for name in shipped()}
     if MODELS.is_dir():
-        found |= {str(path.relative_to(MODELS)): str(path) for path in sorted(MODELS.rglob("*"))
-                  if path.suffix in ENDINGS and path.is_file()}
+        found |= {
+            str(path.relative_to(MODELS)): str(path)
+            for path in sorted(MODELS.rglob("*"))
+            if path.suffix in ENDINGS and path.is_file()
+        }
     return found
 
 
@@ -91,8 +133,11 @@ def cases() -> Iterator[Case]:
     for name, rest in BRANCHES.items():
         yield Case("answer", f"branch of {name}", ("branch", name, *rest))
         for language, ending in (("cpp", ".hpp"), ("numpy", ".py")):
-            yield Case("convert", f"code of {name} in {language}",
-                       ("export", name, *rest, "--lang", language, "-o", "{folder}/code" + ending))
+            yield Case(
+                "convert",
+                f"code of {name} in {language}",
+                ("export", name, *rest, "--lang", language, "-o", "{folder}/code" + ending),
+            )
     for name, argv in PICTURES.items():
         yield Case("picture", name, (*argv, "-o", "{folder}/picture.png"))
     words = sorted(each["word"] for each in catalog() if "refused" not in each)
@@ -116,8 +161,14 @@ def poses(file: str) -> dict[str, str]:
         return dict.fromkeys(("home", "near", "far"), "x=0")
     home = setting.motion.pose(setting.robot.links[setting.motion.link].pose)
     far = setting.motion.pose(setting.configurations[0].pose(setting.motion.link))
-    near = next((f"{part}={getattr(home, part) + 0.01!r}" for part in ("x", "z", "phi")
-                 if isinstance(getattr(home, part), float) and getattr(home, part) != getattr(far, part)), str(home))
+    near = next(
+        (
+            f"{part}={getattr(home, part) + 0.01!r}"
+            for part in ("x", "z", "phi")
+            if isinstance(getattr(home, part), float) and getattr(home, part) != getattr(far, part)
+        ),
+        str(home),
+    )
     return {"home": str(home), "near": near, "far": str(far)}
 
 

@@ -43,8 +43,10 @@ def differences(old: Json, new: Json, at: str = "") -> Iterator[str]:
         if isinstance(old, str) and isinstance(new, str):
             before, after = masked(old), masked(new)
             if before != after:
-                line = next((k for k, (a, b) in enumerate(zip(before, after, strict=False)) if a != b),
-                            min(len(before), len(after)))
+                line = next(
+                    (k for k, (a, b) in enumerate(zip(before, after, strict=False)) if a != b),
+                    min(len(before), len(after)),
+                )
                 yield f"{at}: line {line + 1}: {before[line : line + 1]} is now {after[line : line + 1]}"
         elif old != new:
             yield f"{at}: {str(old)[:80]} is now {str(new)[:80]}"

@@ -15,8 +15,9 @@ STEPS = 60
 Screw = tuple[int, bool, np.ndarray, np.ndarray]
 
 
-def miss(mechanism: Mechanism, leg: Leg, D: np.ndarray, point: np.ndarray | None, rng: np.random.Generator,
-         starts: int = 25) -> float:
+def miss(
+    mechanism: Mechanism, leg: Leg, D: np.ndarray, point: np.ndarray | None, rng: np.random.Generator, starts: int = 25
+) -> float:
     """The smallest residual (characteristic lengths, entries of rotations) with which a leg closes that ends displaced
     by D (4, 4) from zero, or whose ``point`` (3,) (at zero) is displaced so."""
     joints = [mechanism.joints[name] for name in leg.joints]
@@ -50,8 +51,9 @@ def miss(mechanism: Mechanism, leg: Leg, D: np.ndarray, point: np.ndarray | None
     return float(np.abs(error).max(axis=1).min())
 
 
-def _ways(link: str, leg: Leg, joints: list[Joint], places: Mapping[str, range], been: frozenset[str]
-          ) -> Iterator[list[Screw]]:
+def _ways(
+    link: str, leg: Leg, joints: list[Joint], places: Mapping[str, range], been: frozenset[str]
+) -> Iterator[list[Screw]]:
     if link == leg.attach:
         yield []
         return

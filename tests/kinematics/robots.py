@@ -23,15 +23,17 @@ ROBOTS = tuple(shipped())
 
 
 @cache
-def setting_of(robot: str, observe: tuple[str, ...] | None = None, camera: str | None = None,
-               samples: int = 2) -> ObservedRobot:
+def setting_of(
+    robot: str, observe: tuple[str, ...] | None = None, camera: str | None = None, samples: int = 2
+) -> ObservedRobot:
     """The setting of a shipped robot with a few samples."""
     return ObservedRobot.of(load(robot), observe, camera, samples=samples)
 
 
 @cache
-def derived(robot: str, observe: tuple[str, ...] | None = None, camera: str | None = None,
-            form: str = "simplified") -> Derivation:
+def derived(
+    robot: str, observe: tuple[str, ...] | None = None, camera: str | None = None, form: str = "simplified"
+) -> Derivation:
     """The derivation of a shipped robot."""
     return derive(load(robot), observe, camera, form=form)
 
@@ -60,7 +62,7 @@ def seen_by_oracle(oracle: Oracle, state: Array, question: Measurement, length: 
     row = question.twist_rows
     for each in question.observations:
         if each in present:
-            blocks.append(basis[row:row + 3])
+            blocks.append(basis[row : row + 3])
             row += 3
         else:
             blocks.append(np.zeros((3, basis.shape[1])))

@@ -108,8 +108,13 @@ def knuckles() -> tuple[Mechanism, np.ndarray, np.ndarray]:
     direction of the first leg."""
     b = Builder("knuckles")
     feet = [np.array([np.cos(a), np.sin(a), 0.0]) for a in 2 * np.pi / 6 * np.arange(6) + np.tile([0.1, -0.2], 3)]
-    for link in ("base", *(f"{part}_{i}" for i in range(6) for part in ("knuckle", "barrel", "rod")), "ring", "cross",
-                 "platform"):
+    for link in (
+        "base",
+        *(f"{part}_{i}" for i in range(6) for part in ("knuckle", "barrel", "rod")),
+        "ring",
+        "cross",
+        "platform",
+    ):
         b.link(link)
     drawn = []
     for i, foot in enumerate(feet):
@@ -134,10 +139,12 @@ def test_limits_of_joints_that_are_joined_are_said_to_be_left_out():
     assert free.to_dict()["unlimited"] == []
     assert "as far as limits" not in str(free)
     asked = "x=0.3,y=0.1,z=1,rpy=0/0/0"
-    for told in (hrsynth.modes(robot.changed(joints=[bent]), ["1", "2", "3"], at=asked),
-                 hrsynth.check(robot.changed(joints=[bent]), at=asked),
-                 hrsynth.accuracy(robot.changed(joints=[bent]), at=asked, cone=1e-3),
-                 hrsynth.select(robot.changed(joints=[bent]), observe=["1"], start=asked, goal=asked, cone=1e-3)):
+    for told in (
+        hrsynth.modes(robot.changed(joints=[bent]), ["1", "2", "3"], at=asked),
+        hrsynth.check(robot.changed(joints=[bent]), at=asked),
+        hrsynth.accuracy(robot.changed(joints=[bent]), at=asked, cone=1e-3),
+        hrsynth.select(robot.changed(joints=[bent]), observe=["1"], start=asked, goal=asked, cone=1e-3),
+    ):
         words = " ".join(str(told).split())
         assert "those of s_ring are not looked at" in words
         assert words.count("assembled there") == words.count("assembled there, as far as limits are looked at")
@@ -165,7 +172,8 @@ def test_limits_of_two_turns_that_are_one_joint_are_kept():
         assert Stops.of(setting.everything.twin, setting.everything.twin.q0).spans == {name: (-0.01, upper)}
         posed = hrsynth.check(bent, at="x=0.3,y=0.4,z=0.1,rpy=0/0/0").postures[0]
         told = [(posed.configuration, posed.beyond)] + [
-            (mode.configuration, mode.beyond) for mode in hrsynth.modes(bent, ["2", "3", "4"]).modes]
+            (mode.configuration, mode.beyond) for mode in hrsynth.modes(bent, ["2", "3", "4"]).modes
+        ]
         for at, beyond in told:
             assert beyond == (() if -0.01 - 1e-7 <= turn(name, at) <= upper + 1e-7 else (name,))
         assert {beyond for _, beyond in told} == {(), (name,)}

@@ -224,8 +224,9 @@ def test_the_verdict_of_a_leg_at_a_dead_point_is_that_of_its_branch(tmp_path: Pa
 
 
 @pytest.mark.some(1)
-@pytest.mark.parametrize(("tilt", "rank", "near"), [
-    (1e-3, 2, False), (1e-6, 2, True), (1e-8, 1, True), (0.0, 1, False)])
+@pytest.mark.parametrize(
+    ("tilt", "rank", "near"), [(1e-3, 2, False), (1e-6, 2, True), (1e-8, 1, True), (0.0, 1, False)]
+)
 def test_the_distance_to_another_verdict_is_told(tilt: float, rank: int, near: bool) -> None:
     """Parallel rails leave a translation unseen; rails that are nearly so show it by as little as they are aslant."""
     robot = load("prrrp_parallel")
@@ -246,14 +247,25 @@ def slider_crank(angle: float) -> Mechanism:
     """A crank of 1 m at an angle from its rail, a rod of 2 m and a slide; the slide carries the platform by a link that
     never turns."""
     tip = np.array([np.cos(angle), 0.0, np.sin(angle)])
-    foot = np.array([tip[0] + np.sqrt(4 - tip[2]**2), 0.0, 0.0])
+    foot = np.array([tip[0] + np.sqrt(4 - tip[2] ** 2), 0.0, 0.0])
     end = foot + [1.0, 0.0, 1.0]
     b = Builder("slider_crank")
-    for link, at in {"base": np.zeros(3), "crank": np.zeros(3), "rod": tip, "slide": foot, "link": foot,
-                     "plate": end}.items():
+    for link, at in {
+        "base": np.zeros(3),
+        "crank": np.zeros(3),
+        "rod": tip,
+        "slide": foot,
+        "link": foot,
+        "plate": end,
+    }.items():
         b.link(link, at=at)
-    for name, ends, at in (("a", "base crank", np.zeros(3)), ("b", "crank rod", tip), ("c", "rod slide", foot),
-                           ("d", "slide link", foot), ("e", "link plate", end)):
+    for name, ends, at in (
+        ("a", "base crank", np.zeros(3)),
+        ("b", "crank rod", tip),
+        ("c", "rod slide", foot),
+        ("d", "slide link", foot),
+        ("e", "link plate", end),
+    ):
         b.joint(name, "R", *ends.split(), at=at, axis=(0, 1, 0), motor=name == "a")
     for name, link, at in (("p", "slide", foot), ("f", "plate", end)):
         b.joint(name, "P", "base", link, at=at, axis=(1, 0, 0), loop=True)
@@ -273,8 +285,11 @@ def test_a_triangle_does_not_move() -> None:
     b = Builder("triangle")
     for link in ("base", "side", "plate"):
         b.link(link)
-    for name, ends, at in (("a", ("base", "side"), (0, 0, 0)), ("b", ("side", "plate"), (0, 0, 1)),
-                           ("c", ("base", "plate"), (1, 0, 0))):
+    for name, ends, at in (
+        ("a", ("base", "side"), (0, 0, 0)),
+        ("b", ("side", "plate"), (0, 0, 1)),
+        ("c", ("base", "plate"), (1, 0, 0)),
+    ):
         b.joint(name, "R", *ends, at=at, axis=(0, 1, 0), loop=name == "c")
     with pytest.raises(BadMechanism, match=r"its loops let no link move"):
         ObservedRobot.of(b.build("plate"), samples=2)
@@ -305,7 +320,7 @@ def test_three_equal_parallel_rods_turn_their_plate(seed: int) -> None:
     radius = float(np.linalg.norm(across[0] - centre))
     angle = 0.5 * length / radius
     R = Rotation.from_rotvec(angle * u).as_matrix()
-    shift = centre - R @ centre + np.sqrt(length**2 - (2 * radius * np.sin(angle / 2))**2) * u
+    shift = centre - R @ centre + np.sqrt(length**2 - (2 * radius * np.sin(angle / 2)) ** 2) * u
     ends = np.linalg.norm(feet @ R.T + shift - feet, axis=1)
     np.testing.assert_allclose(ends[:3], length, rtol=1e-12)
     assert abs(ends[3] - length) > 1e-4 * length
@@ -327,7 +342,7 @@ def test_equal_parallel_rods_do_not_turn_their_plate(rods: int, seed: int) -> No
 
     def misses(pose: Array) -> Array:
         turned = feet @ Rotation.from_rotvec(pose[3:]).as_matrix().T
-        return np.asarray(np.sum((turned + pose[:3] - feet)**2, axis=1) - along @ along)
+        return np.asarray(np.sum((turned + pose[:3] - feet) ** 2, axis=1) - along @ along)
 
     for turn in (0.02, -0.02):
         start = np.r_[along, turn * along / np.linalg.norm(along)]

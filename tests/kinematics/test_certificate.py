@@ -48,9 +48,18 @@ def caught(certificate: Certificate) -> bool:
 
 
 @pytest.mark.some(2)
-@pytest.mark.parametrize(("robot", "legs"), [
-    ("3rrr_m1", ()), ("3rrr_m1", ("1", "2")), ("gough_stewart", ("1", "2", "3")), ("3upu", ()), ("delta", ("1", "2")),
-    ("rrrrr_m1", ()), ("prrrp_parallel_point", ())])
+@pytest.mark.parametrize(
+    ("robot", "legs"),
+    [
+        ("3rrr_m1", ()),
+        ("3rrr_m1", ("1", "2")),
+        ("gough_stewart", ("1", "2", "3")),
+        ("3upu", ()),
+        ("delta", ("1", "2")),
+        ("rrrrr_m1", ()),
+        ("prrrp_parallel_point", ()),
+    ],
+)
 def test_the_right_one_passes(robot: str, legs: tuple[str, ...]) -> None:
     certificate = judged(robot, hidden_of(robot, *legs), *legs)
     assert certificate.passed
@@ -63,16 +72,20 @@ def test_the_right_one_passes(robot: str, legs: tuple[str, ...]) -> None:
 
 
 @pytest.mark.some(2)
-@pytest.mark.parametrize(("robot", "legs"), [
-    ("delta", ()), ("gough_stewart", ("1", "2", "3")), ("3rrr_m1", ()), ("3upu", ())])
+@pytest.mark.parametrize(
+    ("robot", "legs"), [("delta", ()), ("gough_stewart", ("1", "2", "3")), ("3rrr_m1", ()), ("3upu", ())]
+)
 def test_a_longer_rod_is_caught(robot: str, legs: tuple[str, ...]) -> None:
     """The end joint of one observed rod moves away by 1 % of the rod's length, along the rod and across it."""
     hidden = hidden_of(robot, *legs)
     derivation = derived(robot, legs or None)
     observation = derivation.setting.observed[0]
     assert isinstance(observation, Direction)
-    last = next(j for j in hidden.joints_of(derivation.setting.anatomy.leg(observation.leg).attach)
-                if j.name in derivation.setting.anatomy.leg(observation.leg).joints)
+    last = next(
+        j
+        for j in hidden.joints_of(derivation.setting.anatomy.leg(observation.leg).attach)
+        if j.name in derivation.setting.anatomy.leg(observation.leg).joints
+    )
     u = hidden.links[observation.link].pose[:3, :3] @ observation.direction
     side = unit(np.cross(u, [0, 0, 1]))
     for direction in (u, side):
@@ -80,14 +93,17 @@ def test_a_longer_rod_is_caught(robot: str, legs: tuple[str, ...]) -> None:
 
 
 @pytest.mark.some(3)
-@pytest.mark.parametrize(("robot", "legs"), [
-    ("gough_stewart", ("1", "2", "3")), ("3rrr_m1", ()), ("3upu", ()), ("3rps", ()), ("3puu", ())])
+@pytest.mark.parametrize(
+    ("robot", "legs"), [("gough_stewart", ("1", "2", "3")), ("3rrr_m1", ()), ("3upu", ()), ("3rps", ()), ("3puu", ())]
+)
 def test_a_missing_leg_is_caught(robot: str, legs: tuple[str, ...]) -> None:
     hidden = hidden_of(robot, *legs)
     anatomy = derived(robot, legs or None).setting.anatomy
     leg = anatomy.leg(anatomy.labels[0])
-    cut = hidden.changed(remove_links=[n for n in leg.links if n in hidden.links],
-                         remove_joints=[n for n in leg.joints if n in hidden.joints])
+    cut = hidden.changed(
+        remove_links=[n for n in leg.links if n in hidden.links],
+        remove_joints=[n for n in leg.joints if n in hidden.joints],
+    )
     cut = replace(cut, observations=tuple(o for o in cut.observations if o.link in cut.links))
     loose = [n for n in cut.links if n != cut.base and not cut.joints_of(n)]
     assert caught(judged(robot, cut.changed(remove_links=loose), *legs))
@@ -110,8 +126,9 @@ def test_exchanged_axes_of_a_universal_joint_are_caught(robot: str) -> None:
     hidden, samples = hidden_of(robot), derived(robot).setting.samples
     wrong = exchanged(hidden, virtual(hidden)[0])
     right_twin, wrong_twin = (PinocchioModel(each, samples.twin.length) for each in (hidden, wrong))
-    at_zero = [relation(ClosedConfiguration.of(twin, twin.q0), samples.question).basis
-               for twin in (right_twin, wrong_twin)]
+    at_zero = [
+        relation(ClosedConfiguration.of(twin, twin.q0), samples.question).basis for twin in (right_twin, wrong_twin)
+    ]
     assert largest_angle(*at_zero) < SAME_RELATION
     assert caught(judged(robot, wrong))
 
@@ -124,8 +141,9 @@ def test_exchanged_axes_under_a_ball_are_no_mistake() -> None:
 
 
 @pytest.mark.some(2)
-@pytest.mark.parametrize(("robot", "legs"), [
-    ("gough_stewart", ("1", "2", "3")), ("3rrr_m1", ()), ("delta", ("1", "2")), ("rrrrr_m1", ())])
+@pytest.mark.parametrize(
+    ("robot", "legs"), [("gough_stewart", ("1", "2", "3")), ("3rrr_m1", ()), ("delta", ("1", "2")), ("rrrrr_m1", ())]
+)
 def test_a_missing_actuator_is_caught(robot: str, legs: tuple[str, ...]) -> None:
     hidden = hidden_of(robot, *legs)
     certificate = judged(robot, passive(hidden, virtual(hidden)[0]), *legs)

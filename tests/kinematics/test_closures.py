@@ -92,8 +92,11 @@ def closes(mechanism: Mechanism, found: Assembly, D: np.ndarray, attach: str, po
     """Whether all joints hold in the configuration, by their definition, and the platform is where it was asked for."""
     assert found.configuration is not None
     moved = {link: found.configuration.pose(link) @ inverse(mechanism.links[link].pose) for link in mechanism.links}
-    centre = mechanism.links[attach].pose[:3, 3] if point is None else (
-        mechanism.links[mechanism.platform].pose @ np.append(point, 1.0))[:3]
+    centre = (
+        mechanism.links[attach].pose[:3, 3]
+        if point is None
+        else (mechanism.links[mechanism.platform].pose @ np.append(point, 1.0))[:3]
+    )
     errors = [np.abs(_at(moved[attach], centre) - _at(D, centre)).max()]
     errors += [np.abs(moved[attach][:3, :3] - D[:3, :3]).max()] if point is None else []
     return max(*errors, *(violation(joint, moved) for joint in mechanism.joints.values())) < 1e-8
@@ -105,9 +108,11 @@ def violation(joint: Joint, moved: dict[str, np.ndarray]) -> float:
     if joint.type is JointType.PRISMATIC:
         along = one[:3, :3] @ axes[0]
         return float(max(np.abs(gap - along * (along @ gap)).max(), np.abs(one[:3, :3] - two[:3, :3]).max()))
-    turned = {JointType.REVOLUTE: lambda: one[:3, :3] @ axes[0] - two[:3, :3] @ axes[0],
-              JointType.UNIVERSAL: lambda: (one[:3, :3] @ axes[0]) @ (two[:3, :3] @ axes[1]) - axes[0] @ axes[1],
-              JointType.SPHERICAL: lambda: 0.0}[joint.type]()
+    turned = {
+        JointType.REVOLUTE: lambda: one[:3, :3] @ axes[0] - two[:3, :3] @ axes[0],
+        JointType.UNIVERSAL: lambda: (one[:3, :3] @ axes[0]) @ (two[:3, :3] @ axes[1]) - axes[0] @ axes[1],
+        JointType.SPHERICAL: lambda: 0.0,
+    }[joint.type]()
     return float(max(np.abs(gap).max(), np.max(np.abs(turned))))
 
 
@@ -216,9 +221,14 @@ def test_limits_of_turns_count_modulo_whole_turns():
     """A joint's angle at zero is 0, which is 4π too; a range without any of these is refused with proof."""
     mechanism = planar(["RRR"] * 3, np.random.default_rng(2), [{0}] * 3)
     for name in ("joint_1_1", "joint_1_2"):
-        for lower, upper, verdict in ((4 * np.pi - 0.1, 4 * np.pi + 0.1, ASSEMBLED),
-                                      (-8 * np.pi - 0.1, -8 * np.pi + 0.1, ASSEMBLED), (12.0, None, ASSEMBLED),
-                                      (-30.0, 30.0, ASSEMBLED), (6.2, 6.27, BEYOND), (0.001, 0.01, BEYOND)):
+        for lower, upper, verdict in (
+            (4 * np.pi - 0.1, 4 * np.pi + 0.1, ASSEMBLED),
+            (-8 * np.pi - 0.1, -8 * np.pi + 0.1, ASSEMBLED),
+            (12.0, None, ASSEMBLED),
+            (-30.0, 30.0, ASSEMBLED),
+            (6.2, 6.27, BEYOND),
+            (0.001, 0.01, BEYOND),
+        ):
             found = assembled(with_limits(mechanism, name, lower, upper), np.eye(4))
             assert (found.verdict, found.reachable) == (verdict, verdict == ASSEMBLED), (lower, upper)
             assert found.beyond == (() if verdict == ASSEMBLED else (name,))

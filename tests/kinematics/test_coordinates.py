@@ -52,7 +52,8 @@ def test_from_the_edge_of_the_reach_a_coordinate_goes_back(name: str, index: int
     way = here.along(edge, index, (0.1 * start.twin.length, 0.0), 4)
     assert len(way) == 5
     assert [value for value, _ in way] == pytest.approx(
-        here.values[index] - np.linspace(0.1, 0, 5) * start.twin.length, abs=1e-9)
+        here.values[index] - np.linspace(0.1, 0, 5) * start.twin.length, abs=1e-9
+    )
 
 
 @pytest.mark.some(2)
@@ -95,8 +96,9 @@ def test_the_jacobian_is_that_of_the_error(name: str):
     for at in setting.configurations[:3]:
         rows = coordinates.rows(at.twin, at.q)[1]
         for k, direction in enumerate(np.eye(at.twin.nv)):
-            ahead, behind = (coordinates.rows(at.twin, at.twin.integrate(at.q, s * direction))[0]
-                             for s in (step, -step))
+            ahead, behind = (
+                coordinates.rows(at.twin, at.twin.integrate(at.q, s * direction))[0] for s in (step, -step)
+            )
             assert rows[:, k] == pytest.approx((ahead - behind) / (2 * step), abs=1e-7)
 
 

@@ -22,10 +22,21 @@ def stretched() -> Mechanism:
     for k, angle in enumerate(2 * np.pi * np.arange(3) / 3):
         u = np.array([np.cos(angle), np.sin(angle), 0])
         bend = 0.4 * (k > 0) * np.array([-u[1], u[0], 0])
-        for name, near, far, at in ((f"motor{k}", "base", f"crank{k}", u), (f"knee{k}", f"crank{k}", f"rod{k}",
-                                    0.65 * u + bend), (f"tip{k}", f"rod{k}", "plate", 0.3 * u)):
-            b.joint(name, "R", near, far, at, axis=(0, 0, 1), motor=name.startswith("motor"),
-                    loop=k > 0 and name.startswith("tip"))
+        for name, near, far, at in (
+            (f"motor{k}", "base", f"crank{k}", u),
+            (f"knee{k}", f"crank{k}", f"rod{k}", 0.65 * u + bend),
+            (f"tip{k}", f"rod{k}", "plate", 0.3 * u),
+        ):
+            b.joint(
+                name,
+                "R",
+                near,
+                far,
+                at,
+                axis=(0, 0, 1),
+                motor=name.startswith("motor"),
+                loop=k > 0 and name.startswith("tip"),
+            )
     return b.build(platform="plate")
 
 

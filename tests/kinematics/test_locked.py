@@ -64,16 +64,30 @@ def by_oracle(at: ClosedConfiguration, leg: Leg, locks: list[Direction]) -> Arra
         held.append(block)
     units = np.tile([at.twin.length] * 3 + [1.0] * 3, len(links))
     _, values, right = np.linalg.svd(np.vstack(held) * units)
-    kernel = right[int(np.sum(values > 1e-9 * values[0])):].T
-    end = kernel[6 * links.index(leg.attach):][:6].copy()
+    kernel = right[int(np.sum(values > 1e-9 * values[0])) :].T
+    end = kernel[6 * links.index(leg.attach) :][:6].copy()
     end[:3] += hat(at.pose(leg.attach)[:3, 3] / at.twin.length) @ end[3:]
     U, sizes, _ = np.linalg.svd(end)
     return np.asarray(U[:, : int(np.sum(sizes > 1e-8))])
 
 
 @pytest.mark.some(6)
-@pytest.mark.parametrize("robot", ["3rrr_m1", "3prr_m1", "delta", "orthoglide", "3upu", "3rps", "gough_stewart", "hexa",
-                                   "quattro", "quattro_rigid", "3ruu"])
+@pytest.mark.parametrize(
+    "robot",
+    [
+        "3rrr_m1",
+        "3prr_m1",
+        "delta",
+        "orthoglide",
+        "3upu",
+        "3rps",
+        "gough_stewart",
+        "hexa",
+        "quattro",
+        "quattro_rigid",
+        "3ruu",
+    ],
+)
 def test_a_held_leg_allows_what_the_oracle_says(robot: str) -> None:
     setting = setting_of(robot)
     samples = setting.samples
@@ -103,8 +117,10 @@ def system(point: Array, translations: list[Array], rotations: list[Array], scre
     return range_basis(np.column_stack(columns), 1.0)[0]
 
 
-@pytest.mark.parametrize(("translations", "rotations", "screws"), [
-    (1, 3, 0), (2, 1, 0), (0, 2, 0), (1, 0, 0), (3, 3, 0), (0, 3, 0), (0, 0, 1), (1, 1, 1), (0, 1, 1)])
+@pytest.mark.parametrize(
+    ("translations", "rotations", "screws"),
+    [(1, 3, 0), (2, 1, 0), (0, 2, 0), (1, 0, 0), (3, 3, 0), (0, 3, 0), (0, 0, 1), (1, 1, 1), (0, 1, 1)],
+)
 def test_split(translations: int, rotations: int, screws: int) -> None:
     rng = np.random.default_rng(translations + 4 * rotations + 16 * screws)
     point = rng.normal(size=3)

@@ -28,9 +28,13 @@ from kinematics.robots import walked
 def limited(robot: Mechanism, seed: int = 0) -> Mechanism:
     """The robot with limits on each R and P, near enough for random configurations to be beyond some."""
     rng = np.random.default_rng(seed)
-    return robot.changed(joints=[
-        replace(joint, limits=Limits(-float(rng.uniform(0.05, 0.5)), float(rng.uniform(0.05, 0.5))))
-        for joint in robot.joints.values() if joint.type in SINGLE])
+    return robot.changed(
+        joints=[
+            replace(joint, limits=Limits(-float(rng.uniform(0.05, 0.5)), float(rng.uniform(0.05, 0.5))))
+            for joint in robot.joints.values()
+            if joint.type in SINGLE
+        ]
+    )
 
 
 def margins(twin: PinocchioModel, at: ClosedConfiguration) -> dict[str, tuple[float, float]]:
@@ -39,8 +43,9 @@ def margins(twin: PinocchioModel, at: ClosedConfiguration) -> dict[str, tuple[fl
     for name, value in limits.coordinates(twin, at.q).items():
         joint, _, lower, upper = twin.mechanism.stops[name]
         whole = np.inf if twin.mechanism.joints[joint].type.slides else 2 * np.pi
-        found[name] = tuple(float(np.angle(np.exp(1j * x))) if np.isfinite(whole) else x
-                            for x in (value - lower, upper - value))
+        found[name] = tuple(
+            float(np.angle(np.exp(1j * x))) if np.isfinite(whole) else x for x in (value - lower, upper - value)
+        )
     return found
 
 
@@ -74,8 +79,12 @@ def test_what_the_file_counts_is_remembered(name: str):
     once = rezero(first)
     twice = rezero(of_links(PinocchioModel(once, twin.length), second.pose))
     values = LoopAssembly.of(twice).zero()
-    for moved in (once, twice, with_zero_at(twice, LoopAssembly.of(twice), values),
-                  zeroed_at(once, {link: second.pose(link) for link in robot.links})):
+    for moved in (
+        once,
+        twice,
+        with_zero_at(twice, LoopAssembly.of(twice), values),
+        zeroed_at(once, {link: second.pose(link) for link in robot.links}),
+    ):
         assert moved.filed.keys() == robot.filed.keys() == robot.limited.keys()
         for joint, ends in robot.limited.items():
             assert moved.filed[joint] == pytest.approx(ends, abs=1e-9)
@@ -87,8 +96,13 @@ def test_what_the_file_counts_is_remembered(name: str):
             assert back.limited[joint] == pytest.approx(ends, abs=1e-8)
 
 
-POSES = {"3rrr_m1": "x=0.01,phi=4deg", "3prr_m1": "x=0.01", "3rps": "z=0.72", "orthoglide": "x=0.02,y=0.01",
-         "gough_stewart": "x=0.02,rpy=2deg/0/0"}
+POSES = {
+    "3rrr_m1": "x=0.01,phi=4deg",
+    "3prr_m1": "x=0.01",
+    "3rps": "z=0.72",
+    "orthoglide": "x=0.02,y=0.01",
+    "gough_stewart": "x=0.02,rpy=2deg/0/0",
+}
 
 
 def numbers(record: object) -> list[float]:
@@ -111,7 +125,8 @@ def test_answers_are_those_of_the_same_robot(name: str):
     assert numbers(at) == pytest.approx(numbers(zero), rel=1e-5, abs=1e-6)
     found, again = hrsynth.modes(robot, at=pose), hrsynth.modes(moved)
     assert [(mode.beyond, mode.reachable) for mode in found.modes] == [
-        (mode.beyond, mode.reachable) for mode in again.modes]
+        (mode.beyond, mode.reachable) for mode in again.modes
+    ]
     for mode, other in zip(found.modes, again.modes, strict=True):
         assert numbers(mode.to_dict()["pose"]) == pytest.approx(numbers(other.to_dict()["pose"]), abs=1e-6)
     goal = str(hrsynth.observe(robot).motion.pose(robot.links[robot.platform].pose))

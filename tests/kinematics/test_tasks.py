@@ -15,8 +15,10 @@ from hrsynth.tolerances import PASSED_BY, SOLVED
 from kinematics.robots import setting_of
 
 
-@pytest.mark.parametrize(("robot", "see"), [
-    ("quattro", ()), ("orthoglide", ()), ("3rrr_m1", ()), ("gough_stewart", ("c=point:platform@0,0,0",))])
+@pytest.mark.parametrize(
+    ("robot", "see"),
+    [("quattro", ()), ("orthoglide", ()), ("3rrr_m1", ()), ("gough_stewart", ("c=point:platform@0,0,0",))],
+)
 def test_together_every_way_ends_where_it_ends_alone(robot: str, see: tuple[str, ...]) -> None:
     """To the last digit, on the ways of samples; the loop here is the one that solves for a single configuration."""
     setting = observe(robot, camera="c=base@0,0,2/180deg,0,0", see=see, samples=3) if see else setting_of(robot)
@@ -48,9 +50,16 @@ def test_one_that_diverges_leaves_the_others_as_they_are() -> None:
         return at.size < 1e-12
 
     starts = [np.array([3.0]), np.array([0.5]), np.array([1.0])]
-    together = list(descend_together(
-        starts, lambda places: [system(x, wanted[i]) for i, x in places.items()],
-        lambda going: {i: step(*at) for i, at in going.items()}, damping, 40, content))
+    together = list(
+        descend_together(
+            starts,
+            lambda places: [system(x, wanted[i]) for i, x in places.items()],
+            lambda going: {i: step(*at) for i, at in going.items()},
+            damping,
+            40,
+            content,
+        )
+    )
     for i, (start, found) in enumerate(zip(starts, together, strict=True)):
         alone = descend(start, lambda x, a=wanted[i]: system(x, a), step, damping, 40, content)
         assert (found[0], found[1].size) == (alone[0], alone[1].size)

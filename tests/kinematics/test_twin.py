@@ -23,7 +23,13 @@ from strategies import deltas, planar, pods, random_direction, random_normal, ra
 AGREE = 1e-9
 
 CYCLES = {
-    "R": "RRRRRRR", "P": "PPPP", "U": "UUUU", "C": "CCCC", "E": "ERUUR", "S": "SRSR", "F": "RRRRRRR",
+    "R": "RRRRRRR",
+    "P": "PPPP",
+    "U": "UUUU",
+    "C": "CCCC",
+    "E": "ERUUR",
+    "S": "SRSR",
+    "F": "RRRRRRR",
 }
 """Joints of one loop whose last one to be cut is of each type."""
 
@@ -49,8 +55,16 @@ def cycle(letters: str, rng: np.random.Generator, welded: bool = False) -> Mecha
         first = random_direction(rng)
         axis = first if JointType(letter).axes else None
         axis2 = random_normal(rng, first) if letter == "U" else None
-        builder.joint(f"joint_{number}", letter, starts[number], ends[number + 1], 0.7 * rng.normal(size=3), axis=axis,
-                      axis2=axis2, loop=number == len(letters) - 1)
+        builder.joint(
+            f"joint_{number}",
+            letter,
+            starts[number],
+            ends[number + 1],
+            0.7 * rng.normal(size=3),
+            axis=axis,
+            axis2=axis2,
+            loop=number == len(letters) - 1,
+        )
     for leg, link in enumerate((names[1], names[-1]), 1):
         builder.observe(str(leg), link, random_direction(rng))
     return builder.build(platform=names[2])
@@ -115,8 +129,9 @@ def constrained(twin: PinocchioModel, q: Array) -> tuple[Array, Array]:
     for number, joint in enumerate(twin.spanned[1]):
         near, far = model.frames[2 * number + 1], model.frames[2 * number + 2]
         kind = pin.PointAnchorConstraintModel if joint.type is JointType.SPHERICAL else pin.FrameAnchorConstraintModel
-        constraints.append(pin.ConstraintModel(
-            kind(model, near.parentJoint, near.placement, far.parentJoint, far.placement)))
+        constraints.append(
+            pin.ConstraintModel(kind(model, near.parentJoint, near.placement, far.parentJoint, far.placement))
+        )
         datas.append(constraints[number].createData())
     pin.computeJointJacobians(model, data, q)
     for constraint, each in zip(constraints, datas, strict=True):
@@ -129,8 +144,12 @@ def constrained(twin: PinocchioModel, q: Array) -> tuple[Array, Array]:
 def test_loops_are_the_constraints_of_pinocchio(letter: str) -> None:
     """At any configuration, far from closure too, and whichever of two twins was asked last; as do many at once."""
     rng = np.random.default_rng(3)
-    twins = [setting_of(letter).everything.twin if letter in ROBOTS
-             else PinocchioModel(cycle(CYCLES[letter], rng, welded=letter == "F")) for _ in range(2)]
+    twins = [
+        setting_of(letter).everything.twin
+        if letter in ROBOTS
+        else PinocchioModel(cycle(CYCLES[letter], rng, welded=letter == "F"))
+        for _ in range(2)
+    ]
     twins[1] = PinocchioModel(twins[1].mechanism, 0.3)
     for size in (0.0, 0.01, 0.3, 1.0):
         places = [twin.integrate(twin.q0, size * rng.normal(size=twin.nv)) for twin in twins]
@@ -160,9 +179,13 @@ def test_mobility_of_a_loop_is_its_freedoms_less_six(letters: str) -> None:
 def test_random_robots_in_any_cut(kind: str, seed: int) -> None:
     """Which joints a file writes as loops, and where the robot stands, change neither mobility nor agreement."""
     rng = np.random.default_rng(seed)
-    robot = (planar(["RRR", "RPR", "PRR"], rng, [{0}, {1}, {0}]) if kind == "planar"
-             else pods(["UPS", "RPS", "UPS"], rng) if kind == "pods"
-             else deltas(["R", "P", "R"], ["2-SS", "US", "SS"], rng, seed == 0))
+    robot = (
+        planar(["RRR", "RPR", "PRR"], rng, [{0}, {1}, {0}])
+        if kind == "planar"
+        else pods(["UPS", "RPS", "UPS"], rng)
+        if kind == "pods"
+        else deltas(["R", "P", "R"], ["2-SS", "US", "SS"], rng, seed == 0)
+    )
     mobilities = set()
     for each in (robot, recut(robot, rng), transformed(robot, random_rotation(rng), rng.normal(size=3))):
         twin = PinocchioModel(each)
@@ -192,8 +215,9 @@ def test_derivatives_of_residual_pose_and_target(robot: str) -> None:
         step[column] = h
         up, down = twin.integrate(at.q, step), twin.integrate(at.q, -step)
         np.testing.assert_allclose(central(twin.residual(up), twin.residual(down), h), J[:, column], atol=1e-8)
-        np.testing.assert_allclose(central(target.rows(twin, up)[0], target.rows(twin, down)[0], h), rows[:, column],
-                                   atol=1e-8)
+        np.testing.assert_allclose(
+            central(target.rows(twin, up)[0], target.rows(twin, down)[0], h), rows[:, column], atol=1e-8
+        )
         X, Y = twin.pose(up, question.platform), twin.pose(down, question.platform)
         np.testing.assert_allclose(central(X[:3, 3], Y[:3, 3], h) / twin.length, V[:3, column], atol=1e-8)
         spin = central(X[:3, :3], Y[:3, :3], h) @ at.pose(question.platform)[:3, :3].T

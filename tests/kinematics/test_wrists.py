@@ -158,8 +158,11 @@ def test_a_robot_is_assembled_where_its_three_axes_can_turn(seed: int) -> None:
         possible = three_angles(axes, A.T @ B) is not None
         seen.add(possible)
         assert (found.verdict, found.beyond) == ((ASSEMBLED, ()) if possible else (BEYOND, (name,)))
-        for value in (wrist_margins(at.twin, at.q)[name], Stops.of(at.twin, at.q).margins(at.twin, at.q)[name],
-                      at.twin.mechanism.wrists[name].margin()):
+        for value in (
+            wrist_margins(at.twin, at.q)[name],
+            Stops.of(at.twin, at.q).margins(at.twin, at.q)[name],
+            at.twin.mechanism.wrists[name].margin(),
+        ):
             assert (value >= 0) == possible
     assert seen == {True, False}
 

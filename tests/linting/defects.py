@@ -80,6 +80,7 @@ def damaged(text: str, damage: Damage) -> str:
 
 def put(path: str, **attributes: str) -> Damage:
     """Set attributes of the first element on a path."""
+
     def damage(root: Root) -> None:
         element = root.find(path)
         assert element is not None
@@ -91,6 +92,7 @@ def put(path: str, **attributes: str) -> Damage:
 
 def take(path: str) -> Damage:
     """Remove the first element on a path."""
+
     def damage(root: Root) -> None:
         element = root.find(path)
         assert element is not None
@@ -106,6 +108,7 @@ def add(fragment: str, path: str = ".") -> Damage:
 
 def tagged(path: str, tag: str) -> Damage:
     """Misspell the tag of the first element on a path."""
+
     def damage(root: Root) -> None:
         element = root.find(path)
         assert element is not None
@@ -116,6 +119,7 @@ def tagged(path: str, tag: str) -> Damage:
 
 def again(path: str, name: str) -> Damage:
     """Append the first element on a path once more, under another name."""
+
     def damage(root: Root) -> None:
         twin = copy.deepcopy(root.find(path))
         twin.set("name", name)
@@ -131,6 +135,7 @@ def foreign(*more: Damage) -> Damage:
 
 def texts(path: str, text: str) -> Damage:
     """Write another text into the first element on a path."""
+
     def damage(root: Root) -> None:
         root.find(path).text = text
 
@@ -139,6 +144,7 @@ def texts(path: str, text: str) -> Damage:
 
 def both(*damages: Damage) -> Damage:
     """One after the other."""
+
     def damage(root: Root) -> None:
         for each in damages:
             each(root)
@@ -148,6 +154,7 @@ def both(*damages: Damage) -> Damage:
 
 def named(path: str, name: str) -> Damage:
     """Give the first element on a path another name, wherever it is named."""
+
     def damage(root: Root) -> None:
         old = root.find(path).get("name")
         for each in root.iter():
@@ -160,6 +167,7 @@ def named(path: str, name: str) -> Damage:
 
 def scaled(factor: float) -> Damage:
     """All lengths in another unit."""
+
     def damage(root: Root) -> None:
         for origin in root.iter("origin"):
             origin.set("xyz", " ".join(str(factor * float(word)) for word in origin.get("xyz", "0 0 0").split()))
@@ -169,6 +177,7 @@ def scaled(factor: float) -> Damage:
 
 def turned(path: str, yaw: str) -> Damage:
     """Give the first pose of SDFormat on a path another yaw."""
+
     def damage(root: Root) -> None:
         element = root.find(path)
         element.text = " ".join([*(element.text or "").split()[:5], yaw])
@@ -178,6 +187,7 @@ def turned(path: str, yaw: str) -> Damage:
 
 def rounded(decimals: int) -> Damage:
     """All places and axes with so many decimals."""
+
     def damage(root: Root) -> None:
         for each in root.iter("origin", "axis"):
             for key in {"xyz", "rpy"} & set(each.attrib):
@@ -200,8 +210,10 @@ class Case:
     """Whether a mended file has the very geometry of the sound one."""
 
 
-HOLDER = ('<gazebo><plugin name="Holder" filename="holder.so"><one_link>prox_1</one_link><other_link>platform'
-          "</other_link></plugin></gazebo>")
+HOLDER = (
+    '<gazebo><plugin name="Holder" filename="holder.so"><one_link>prox_1</one_link><other_link>platform'
+    "</other_link></plugin></gazebo>"
+)
 LOWER, UPPER = str(radians(-75)), str(radians(85))
 SHOULDER = 'joint[@name="shoulder_1"]'
 CASES = [
@@ -220,19 +232,28 @@ CASES = [
     Case("motor-none", both(*[take("transmission")] * 3)),
     Case("motors-few", take("transmission")),
     Case("motors-many", add('<transmission name="m4"><joint name="elbow_1"/></transmission>'), ("motor-unlimited",)),
-    Case("motor-floating", both(put('joint[@name="wrist_1"]', type="floating"),
-                                add('<transmission name="m4"><joint name="wrist_1"/></transmission>')),
-         ("motors-many",)),
+    Case(
+        "motor-floating",
+        both(
+            put('joint[@name="wrist_1"]', type="floating"),
+            add('<transmission name="m4"><joint name="wrist_1"/></transmission>'),
+        ),
+        ("motors-many",),
+    ),
     Case("name-clash", named("loop", "platform")),
     Case("name-case", again('link[@name="platform"]', "Platform"), ("link-unused", "refused", "guessed")),
     Case("name-reserved", named('link[@name="prox_1"]', "a::b")),
-    Case("motor-name", lambda root: root.findall("transmission")[1].set(
-        "name", root.findall("transmission")[0].get("name") or "")),
+    Case(
+        "motor-name",
+        lambda root: root.findall("transmission")[1].set("name", root.findall("transmission")[0].get("name") or ""),
+    ),
     Case("link-unused", add('<link name="spare"/>'), ("refused", "guessed")),
     Case("reader-drops", both(), reader="mujoco"),
     Case("refused", put("loop", type="helical")),
-    Case("observe-legs", lambda root: root.findall("hrsynth")[0].append(
-        etree.Element("observe", leg="1", link="base", axis="1 0 0"))),
+    Case(
+        "observe-legs",
+        lambda root: root.findall("hrsynth")[0].append(etree.Element("observe", leg="1", link="base", axis="1 0 0")),
+    ),
     Case("unsaid", foreign(), robot="rrrrr_m1"),
     Case("guessed", foreign()),
     Case("closure-unread", foreign(add(HOLDER)), ("guessed",)),
@@ -250,6 +271,10 @@ CASES = [
     Case("mass-negative", texts(".//link/inertial/mass", "-1.5"), ending=".sdf"),
     Case("inertia-triangle", texts(".//link/inertial/inertia/izz", "0.09"), ending=".sdf"),
     Case("unit-angles", turned(".//link/pose", "-360"), ("loop-open",), ".sdf", geometry=False),
-    Case("limits-order", both(texts(".//limit/lower", UPPER), texts(".//limit/upper", LOWER)), ("motor-unlimited",),
-         ".sdf"),
+    Case(
+        "limits-order",
+        both(texts(".//limit/lower", UPPER), texts(".//limit/upper", LOWER)),
+        ("motor-unlimited",),
+        ".sdf",
+    ),
 ]

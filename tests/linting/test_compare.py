@@ -58,9 +58,12 @@ CHANGES: dict[str, tuple[Change, set[str]]] = {
     "axis": (turned_axis, {"differs-geometry"}),
     "type": (joint("wrist_3", type=JointType.SPHERICAL, axes=()), {"differs-type"}),
     "closure": (lambda robot: robot.changed(remove_joints=["wrist_3"]), {"differs-joint"}),
-    "sense": (lambda robot: robot.changed(joints=[replace(robot.joints["shoulder_1"],
-                                                          axes=(-robot.joints["shoulder_1"].axis,))]),
-              {"differs-sense"}),
+    "sense": (
+        lambda robot: robot.changed(
+            joints=[replace(robot.joints["shoulder_1"], axes=(-robot.joints["shoulder_1"].axis,))]
+        ),
+        {"differs-sense"},
+    ),
     "platform": (lambda robot: replace(robot, platform="dist_1"), {"differs-ends"}),
 }
 
@@ -114,8 +117,10 @@ def mirrored(robot: Mechanism, seed: int) -> Mechanism:
     """Its image in any mirror."""
     T = random_rotation(np.random.default_rng(seed))
     S = T @ np.diag([1.0, 1.0, -1.0]) @ T.T
-    joints = {each.name: replace(each, point=S @ each.point, axes=tuple(S @ axis for axis in each.axes))
-              for each in robot.joints.values()}
+    joints = {
+        each.name: replace(each, point=S @ each.point, axes=tuple(S @ axis for axis in each.axes))
+        for each in robot.joints.values()
+    }
     links = {}
     for name, link in robot.links.items():
         X = link.pose.copy()
@@ -124,15 +129,27 @@ def mirrored(robot: Mechanism, seed: int) -> Mechanism:
     return replace(robot, joints=joints, links=links, observations=())
 
 
-@pytest.mark.parametrize(("name", "same"), [("3rrr_m1", True), ("3rpr_m2", True), ("3prr_m1", True), ("3rps", False),
-                                            pytest.param("6pus", False, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("name", "same"),
+    [
+        ("3rrr_m1", True),
+        ("3rpr_m2", True),
+        ("3prr_m1", True),
+        ("3rps", False),
+        pytest.param("6pus", False, marks=pytest.mark.slow),
+    ],
+)
 def test_a_planar_robot_is_its_own_mirror_image(name: str, same: bool):
     """Turned by half a turn about a line in its plane; a robot in space with skew joints on a link is not."""
     robot = load(name)
     if not same:  # shipped ones are symmetric: joints of the platform out of one plane, in no order
         rng = np.random.default_rng(2)
-        robot = robot.changed(joints=[replace(each, point=each.point + 0.1 * robot.length * rng.normal(size=3))
-                                      for each in robot.joints.values()])
+        robot = robot.changed(
+            joints=[
+                replace(each, point=each.point + 0.1 * robot.length * rng.normal(size=3))
+                for each in robot.joints.values()
+            ]
+        )
     else:  # axes weigh more than places where the legs begin near to each other
         robot = robot.changed(joints=[replace(each, point=0.2 * each.point) for each in robot.joints_of(robot.base)])
     for seed in range(5):
@@ -141,10 +158,12 @@ def test_a_planar_robot_is_its_own_mirror_image(name: str, same: bool):
         assert (missed < 1e-7) == same
 
 
-@pytest.mark.parametrize(("first", "second", "told"), [(0.3, 0.0, False), (0.35, -0.05, False), (0.35, 0.0, True),
-                                                       (-0.3, 0.0, False)])
-def test_a_link_farther_along_the_axis_of_a_hinge_is_another_robot(tmp_path: Path, first: float, second: float,
-                                                                   told: bool):
+@pytest.mark.parametrize(
+    ("first", "second", "told"), [(0.3, 0.0, False), (0.35, -0.05, False), (0.35, 0.0, True), (-0.3, 0.0, False)]
+)
+def test_a_link_farther_along_the_axis_of_a_hinge_is_another_robot(
+    tmp_path: Path, first: float, second: float, told: bool
+):
     """Each link fits by itself, as a hinge may have its centre anywhere on its axis: not so both links of it. The
     offset of Denavit and Hartenberg is the sum of both numbers; negative it is the same robot, seen from its back."""
     files = []
@@ -152,7 +171,9 @@ def test_a_link_farther_along_the_axis_of_a_hinge_is_another_robot(tmp_path: Pat
         joints = [("0 0 0", "0 0 1"), (f"{one} 0.05 0.1", "1 0 0"), (f"{two} 0 0.07", "0 1 0"), ("0 0 0.3", "1 0 0")]
         text = "".join(f'<link name="l{number}"/>' for number in range(5)) + "".join(
             f'<joint name="q{number}" type="continuous"><parent link="l{number}"/><child link="l{number + 1}"/>'
-            f'<origin xyz="{place}"/><axis xyz="{axis}"/></joint>' for number, (place, axis) in enumerate(joints))
+            f'<origin xyz="{place}"/><axis xyz="{axis}"/></joint>'
+            for number, (place, axis) in enumerate(joints)
+        )
         files.append(tmp_path / f"{name}.urdf")
         files[-1].write_text(f'<robot name="arm">{text}<hrsynth><platform link="l4"/></hrsynth></robot>')
     assert ("differs-geometry" in differs(*files)) == told
@@ -177,17 +198,27 @@ def test_names_and_frames_do_not_matter(name: str, seed: int):
     """Renamed links and joints, turned link frames: every joint is matched by its place, and what is matched fits."""
     rng = np.random.default_rng(seed)
     robot = load(name)
-    joints = {f"j{number}": replace(each, name=f"j{number}", predecessor=f"l_{each.predecessor}",
-                                    successor=f"l_{each.successor}")
-              for number, each in enumerate(robot.joints.values())}
+    joints = {
+        f"j{number}": replace(
+            each, name=f"j{number}", predecessor=f"l_{each.predecessor}", successor=f"l_{each.successor}"
+        )
+        for number, each in enumerate(robot.joints.values())
+    }
     links = {}
     for link in robot.links.values():
         X = link.pose.copy()
         if link.name != robot.base:
             X[:3, :3] = X[:3, :3] @ random_rotation(rng)
         links[f"l_{link.name}"] = replace(link, name=f"l_{link.name}", pose=X)
-    other = replace(robot, joints=joints, links=links, base=f"l_{robot.base}", platform=f"l_{robot.platform}",
-                    observations=(), couplings=())
+    other = replace(
+        robot,
+        joints=joints,
+        links=links,
+        base=f"l_{robot.base}",
+        platform=f"l_{robot.platform}",
+        observations=(),
+        couplings=(),
+    )
     match = RobotMatch(robot, other)
     numbers = {each: f"j{number}" for number, each in enumerate(robot.joints)}
     assert match.joints == numbers
@@ -209,8 +240,9 @@ def test_a_link_is_fitted_wherever_it_is_and_where_on_its_axes_hinges_have_their
     joints = {}
     for each in robot.joints.values():
         slide = rng.normal() * each.axis if each.type is JointType.REVOLUTE else 0.0
-        joints[each.name] = replace(each, point=R @ (each.point + slide) + p,
-                                    axes=tuple(R @ axis for axis in each.axes))
+        joints[each.name] = replace(
+            each, point=R @ (each.point + slide) + p, axes=tuple(R @ axis for axis in each.axes)
+        )
     other = replace(robot, joints=joints)
     match = RobotMatch(robot, other)
     for link in robot.links:
@@ -225,10 +257,12 @@ def test_a_link_is_fitted_wherever_it_is_and_where_on_its_axes_hinges_have_their
 
 
 def test_gears_are_compared(tmp_path: Path):
-    gear = ('<robot name="g"><link name="a"/><link name="b"/><link name="c"/><joint name="j" type="continuous">'
-            '<parent link="a"/><child link="b"/></joint><joint name="k" type="continuous"><parent link="a"/>'
-            '<child link="c"/><origin xyz="1 0 0"/></joint><coupling name="t"><predecessor link="b"/>'
-            '<successor link="c"/><ratio value="{}"/></coupling></robot>')
+    gear = (
+        '<robot name="g"><link name="a"/><link name="b"/><link name="c"/><joint name="j" type="continuous">'
+        '<parent link="a"/><child link="b"/></joint><joint name="k" type="continuous"><parent link="a"/>'
+        '<child link="c"/><origin xyz="1 0 0"/></joint><coupling name="t"><predecessor link="b"/>'
+        '<successor link="c"/><ratio value="{}"/></coupling></robot>'
+    )
     for name, ratio in (("one", "2"), ("other", "3")):
         (tmp_path / f"{name}.urdf").write_text(gear.format(ratio))
     found = hrsynth.lint(tmp_path / "one.urdf", compare=tmp_path / "other.urdf", platform="c")

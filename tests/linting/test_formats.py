@@ -22,36 +22,120 @@ from linting.defects import CASES, damaged, put, sound
 ROOT = Path(__file__).resolve().parents[2]
 TEXT = {"type": "object", "required": ["text"], "properties": {"text": {"type": "string", "minLength": 1}}}
 LEVEL = {"enum": ["none", "note", "warning", "error"]}
-LOCATIONS = {"type": "array", "items": {
-    "type": "object", "additionalProperties": False, "properties": {"physicalLocation": {
-        "type": "object", "required": ["artifactLocation"], "additionalProperties": False, "properties": {
-            "artifactLocation": {"type": "object", "required": ["uri"], "properties": {
-                "uri": {"type": "string", "pattern": "^(file:///)?[^ \\\\]*$"}}},
-            "region": {"type": "object", "properties": {"startLine": {"type": "integer", "minimum": 1}}}}}}}}
+LOCATIONS = {
+    "type": "array",
+    "items": {
+        "type": "object",
+        "additionalProperties": False,
+        "properties": {
+            "physicalLocation": {
+                "type": "object",
+                "required": ["artifactLocation"],
+                "additionalProperties": False,
+                "properties": {
+                    "artifactLocation": {
+                        "type": "object",
+                        "required": ["uri"],
+                        "properties": {"uri": {"type": "string", "pattern": "^(file:///)?[^ \\\\]*$"}},
+                    },
+                    "region": {"type": "object", "properties": {"startLine": {"type": "integer", "minimum": 1}}},
+                },
+            }
+        },
+    },
+}
 SARIF = {
-    "type": "object", "required": ["version", "runs"], "additionalProperties": False,
-    "properties": {"$schema": {"type": "string", "format": "uri"}, "version": {"const": "2.1.0"}, "runs": {
-        "type": "array", "minItems": 1, "items": {
-            "type": "object", "required": ["tool", "results"], "additionalProperties": False, "properties": {
-                "columnKind": {"enum": ["utf16CodeUnits", "unicodeCodePoints"]},
-                "tool": {"type": "object", "required": ["driver"], "additionalProperties": False, "properties": {
-                    "driver": {"type": "object", "required": ["name"], "additionalProperties": False, "properties": {
-                        "name": {"type": "string"}, "version": {"type": "string"},
-                        "semanticVersion": {"type": "string"}, "rules": {
-                            "type": "array", "uniqueItems": True, "items": {
-                                "type": "object", "required": ["id"], "additionalProperties": False, "properties": {
-                                    "id": {"type": "string"}, "shortDescription": TEXT, "fullDescription": TEXT,
-                                    "help": TEXT, "defaultConfiguration": {
-                                        "type": "object", "properties": {"level": LEVEL}}}}}}}}},
-                "results": {"type": "array", "items": {
-                    "type": "object", "required": ["message"], "additionalProperties": False, "properties": {
-                        "ruleId": {"type": "string"}, "ruleIndex": {"type": "integer", "minimum": -1}, "level": LEVEL,
-                        "message": TEXT, "locations": LOCATIONS}}}, "invocations": {"type": "array", "items": {
-                            "type": "object", "required": ["executionSuccessful"], "additionalProperties": False,
-                            "properties": {"executionSuccessful": {"type": "boolean"}, "toolExecutionNotifications": {
-                                "type": "array", "items": {
-                                    "type": "object", "required": ["message"], "additionalProperties": False,
-                                    "properties": {"message": TEXT, "level": LEVEL, "locations": LOCATIONS}}}}}}}}}}}
+    "type": "object",
+    "required": ["version", "runs"],
+    "additionalProperties": False,
+    "properties": {
+        "$schema": {"type": "string", "format": "uri"},
+        "version": {"const": "2.1.0"},
+        "runs": {
+            "type": "array",
+            "minItems": 1,
+            "items": {
+                "type": "object",
+                "required": ["tool", "results"],
+                "additionalProperties": False,
+                "properties": {
+                    "columnKind": {"enum": ["utf16CodeUnits", "unicodeCodePoints"]},
+                    "tool": {
+                        "type": "object",
+                        "required": ["driver"],
+                        "additionalProperties": False,
+                        "properties": {
+                            "driver": {
+                                "type": "object",
+                                "required": ["name"],
+                                "additionalProperties": False,
+                                "properties": {
+                                    "name": {"type": "string"},
+                                    "version": {"type": "string"},
+                                    "semanticVersion": {"type": "string"},
+                                    "rules": {
+                                        "type": "array",
+                                        "uniqueItems": True,
+                                        "items": {
+                                            "type": "object",
+                                            "required": ["id"],
+                                            "additionalProperties": False,
+                                            "properties": {
+                                                "id": {"type": "string"},
+                                                "shortDescription": TEXT,
+                                                "fullDescription": TEXT,
+                                                "help": TEXT,
+                                                "defaultConfiguration": {
+                                                    "type": "object",
+                                                    "properties": {"level": LEVEL},
+                                                },
+                                            },
+                                        },
+                                    },
+                                },
+                            }
+                        },
+                    },
+                    "results": {
+                        "type": "array",
+                        "items": {
+                            "type": "object",
+                            "required": ["message"],
+                            "additionalProperties": False,
+                            "properties": {
+                                "ruleId": {"type": "string"},
+                                "ruleIndex": {"type": "integer", "minimum": -1},
+                                "level": LEVEL,
+                                "message": TEXT,
+                                "locations": LOCATIONS,
+                            },
+                        },
+                    },
+                    "invocations": {
+                        "type": "array",
+                        "items": {
+                            "type": "object",
+                            "required": ["executionSuccessful"],
+                            "additionalProperties": False,
+                            "properties": {
+                                "executionSuccessful": {"type": "boolean"},
+                                "toolExecutionNotifications": {
+                                    "type": "array",
+                                    "items": {
+                                        "type": "object",
+                                        "required": ["message"],
+                                        "additionalProperties": False,
+                                        "properties": {"message": TEXT, "level": LEVEL, "locations": LOCATIONS},
+                                    },
+                                },
+                            },
+                        },
+                    },
+                },
+            },
+        },
+    },
+}
 """What SARIF 2.1.0 says of the parts that are written."""
 
 
@@ -78,7 +162,8 @@ def test_sarif_is_as_its_schema_says(bad: Path):
         place = result["locations"][0]["physicalLocation"]
         assert place.get("region", {}).get("startLine") == finding.line
     assert run["results"][0]["locations"][0]["physicalLocation"]["artifactLocation"]["uri"] == (
-        "a%20b/robot%3A%20100%25%2C%C3%A9.urdf")
+        "a%20b/robot%3A%20100%25%2C%C3%A9.urdf"
+    )
 
 
 def test_annotations_of_github_are_escaped(bad: Path):
@@ -103,12 +188,23 @@ def test_text_names_place_rule_and_mend(bad: Path):
 
 
 @pytest.mark.some(6)
-@pytest.mark.parametrize(("arguments", "status"), [
-    ([], 1), (["--fail-on", "nothing"], 0), (["--ignore", "limits-order", "--ignore", "refused"], 0),
-    (["--format", "sarif"], 1),
-    (["--format", "xml"], 2), (["--json", "--format", "sarif"], 2), (["--fail-on", "x"], 2),
-    (["--compare", "nothing.urdf"], 2), (["more.urdf"], 2),
-    (["--ignore", "refused", "--fail-on", "note"], 1), (["-o", "x.urdf"], 2), (["--reader", "x"], 2)])
+@pytest.mark.parametrize(
+    ("arguments", "status"),
+    [
+        ([], 1),
+        (["--fail-on", "nothing"], 0),
+        (["--ignore", "limits-order", "--ignore", "refused"], 0),
+        (["--format", "sarif"], 1),
+        (["--format", "xml"], 2),
+        (["--json", "--format", "sarif"], 2),
+        (["--fail-on", "x"], 2),
+        (["--compare", "nothing.urdf"], 2),
+        (["more.urdf"], 2),
+        (["--ignore", "refused", "--fail-on", "note"], 1),
+        (["-o", "x.urdf"], 2),
+        (["--reader", "x"], 2),
+    ],
+)
 def test_the_exit_status_tells(bad: Path, capsys, arguments: list[str], status: int):
     assert execute(["lint", str(bad), *arguments]) == status
     printed = capsys.readouterr()
@@ -141,12 +237,18 @@ def test_a_refusal_in_another_file_on_the_same_line_is_told(tmp_path: Path):
     """An error of one file hides no refusal of a file that it includes."""
     pytest.importorskip("xacro")
     head = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">\n'
-    (tmp_path / "part.xacro").write_text(head + """<link name="tip"/>\n
-        <joint name="b" type="helical"><parent link="arm"/><child link="tip"/><axis xyz="0 0 1"/></joint></robot>""")
-    (tmp_path / "robot.xacro").write_text(head + """<link name="base"/><link name="arm"/>
+    (tmp_path / "part.xacro").write_text(
+        head
+        + """<link name="tip"/>\n
+        <joint name="b" type="helical"><parent link="arm"/><child link="tip"/><axis xyz="0 0 1"/></joint></robot>"""
+    )
+    (tmp_path / "robot.xacro").write_text(
+        head
+        + """<link name="base"/><link name="arm"/>
         <joint name="a" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 0 1"/>
         <limit lower="1" upper="-1" effort="1" velocity="1"/></joint>
-        <xacro:include filename="part.xacro"/></robot>""")
+        <xacro:include filename="part.xacro"/></robot>"""
+    )
     found = {(each.rule, Path(each.file).name, each.line) for each in hrsynth.lint(tmp_path / "robot.xacro").findings}
     assert {("limits-order", "robot.xacro", 4), ("refused", "part.xacro", 4)} <= found
 
@@ -201,8 +303,11 @@ def test_a_mend_of_a_file_that_xacro_made_is_left_to_its_source(tmp_path: Path):
     pytest.importorskip("xacro")
     path = tmp_path / "robot.urdf.xacro"
     text = damaged(sound(), put("link/inertial/mass", value="-1"))
-    path.write_text(text.replace("<robot ", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" ', 1).replace(
-        "</robot>", '<xacro:property name="x" value="1"/></robot>'))
+    path.write_text(
+        text.replace("<robot ", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" ', 1).replace(
+            "</robot>", '<xacro:property name="x" value="1"/></robot>'
+        )
+    )
     found = hrsynth.lint(path, fix=True)
     negative = [each for each in found.findings if each.rule == "mass-negative"]
     (tmp_path / "plain.urdf").write_text(text)

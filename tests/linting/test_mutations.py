@@ -57,10 +57,17 @@ def text_of(robot: Mechanism, seed: int) -> str:
 
 
 @pytest.mark.slow
-@settings(max_examples=6, deadline=None, phases=[Phase.generate],
-          suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much])
-@given(robot=st.one_of(planar_robots(("RRR", "RPR", "PRR", "RRP")), delta_like()), seed=st.integers(0, 99),
-       chosen=st.lists(st.sampled_from(sorted(DEFECTS)), min_size=1, unique=True))
+@settings(
+    max_examples=6,
+    deadline=None,
+    phases=[Phase.generate],
+    suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much],
+)
+@given(
+    robot=st.one_of(planar_robots(("RRR", "RPR", "PRR", "RRP")), delta_like()),
+    seed=st.integers(0, 99),
+    chosen=st.lists(st.sampled_from(sorted(DEFECTS)), min_size=1, unique=True),
+)
 def test_all_defects_of_a_random_robot_are_found_and_mended(robot: Mechanism, seed: int, chosen: list[str]):
     text = text_of(robot, seed)
     order = [name for name in DEFECTS if name in chosen]

@@ -12,17 +12,25 @@ import hrsynth
 from description.foreign.examples import URDF
 from hrsynth.linting.rules.readers import ASKED, CONSTRUCTS, PROGRAMS, READ, REFUSED, SILENT, TOLD
 
-INERTIAL = ('<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>')
-WRITTEN = {"urdf+": "loop", "two joints, one child": "second joint of one child", "gazebo": "gazebo/joint",
-           "constraint": "constraint", "loop_joint": "loop_joint", "onshape": "closing frames"}
+INERTIAL = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+WRITTEN = {
+    "urdf+": "loop",
+    "two joints, one child": "second joint of one child",
+    "gazebo": "gazebo/joint",
+    "constraint": "constraint",
+    "loop_joint": "loop_joint",
+    "onshape": "closing frames",
+}
 MODEL = """<mujoco><compiler angle="radian"/><worldbody><body name="a">
  <inertial mass="1" pos="0 0 0" diaginertia="1 1 1"/><joint name="ja" axis="0 1 0"/>
  <body name="b" pos="0 0 1"><inertial mass="1" pos="0 0 0" diaginertia="1 1 1"/><joint name="jb" axis="0 1 0"/></body>
  <body name="c" pos="1 0 0"><inertial mass="1" pos="0 0 0" diaginertia="1 1 1"/><joint name="jc" axis="0 1 0"/></body>
 </body></worldbody><equality>{}</equality></mujoco>"""
-EQUALITIES = {"equality/connect": '<connect name="x" body1="b" body2="c" anchor="0 0 0.1"/>',
-              "equality/weld": '<weld name="x" body1="b" body2="c"/>',
-              "equality/joint": '<joint name="x" joint1="jb" joint2="jc" polycoef="0 2 0 0 0"/>'}
+EQUALITIES = {
+    "equality/connect": '<connect name="x" body1="b" body2="c" anchor="0 0 0.1"/>',
+    "equality/weld": '<weld name="x" body1="b" body2="c"/>',
+    "equality/joint": '<joint name="x" joint1="jb" joint2="jc" polycoef="0 2 0 0 0"/>',
+}
 
 
 def with_masses(name: str) -> str:
@@ -84,9 +92,11 @@ def test_equalities_of_mjcf_are_read_as_is_said(construct: str, tmp_path: Path):
 def test_mimics_are_read_as_is_said():
     import pinocchio as pin
 
-    text = (f'<robot name="m"><link name="a">{INERTIAL}</link><link name="b">{INERTIAL}</link><link name="c">{INERTIAL}'
-            '</link><joint name="j" type="continuous"><parent link="a"/><child link="b"/></joint>'
-            '<joint name="k" type="continuous"><parent link="a"/><child link="c"/><mimic joint="j"/></joint></robot>')
+    text = (
+        f'<robot name="m"><link name="a">{INERTIAL}</link><link name="b">{INERTIAL}</link><link name="c">{INERTIAL}'
+        '</link><joint name="j" type="continuous"><parent link="a"/><child link="b"/></joint>'
+        '<joint name="k" type="continuous"><parent link="a"/><child link="c"/><mimic joint="j"/></joint></robot>'
+    )
     assert (CONSTRUCTS["mimic"]["pinocchio"], pin.buildModelFromXML(text).nv) == (SILENT, 2)
     mujoco = pytest.importorskip("mujoco")
     assert (CONSTRUCTS["mimic"]["mujoco"], mujoco.MjModel.from_xml_string(text).neq) == (READ, 1)

@@ -96,8 +96,14 @@ def test_what_is_mended_is_the_sound_file_again(case: Case, tmp_path: Path, shel
         assert {name for name in left if name.startswith("differs")} <= {"differs-zero", "differs-limit"}
 
 
-@pytest.mark.parametrize("rule", ["loop-open", pytest.param("constraint-dead", marks=pytest.mark.slow),
-                                  pytest.param("unit-angles", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "rule",
+    [
+        "loop-open",
+        pytest.param("constraint-dead", marks=pytest.mark.slow),
+        pytest.param("unit-angles", marks=pytest.mark.slow),
+    ],
+)
 def test_what_is_mended_hides_the_same_robot(rule: str, tmp_path: Path, shelf: Path):
     case = next(each for each in CASES if each.rule == rule)
     one, two = files(case, tmp_path, shelf)
@@ -109,15 +115,23 @@ def test_what_is_mended_hides_the_same_robot(rule: str, tmp_path: Path, shelf: P
     assert mended.certificate.passed
 
 
-@pytest.mark.parametrize("naming", ['<transmission name="m4"><joint name="wrist_2_again"/></transmission>',
-                                    '<observe kind="encoder" joint="wrist_2_again"/>'])
+@pytest.mark.parametrize(
+    "naming",
+    [
+        '<transmission name="m4"><joint name="wrist_2_again"/></transmission>',
+        '<observe kind="encoder" joint="wrist_2_again"/>',
+    ],
+)
 def test_what_another_element_names_is_not_taken_out(naming: str, tmp_path: Path, shelf: Path):
     """A dead closure with a motor or an encoder was removed, and the mended file was refused: they named nothing."""
     case = next(each for each in CASES if each.rule == "constraint-dead")
     _, two = files(case, tmp_path, shelf)
     text = two.read_text()
-    two.write_text(text.replace("</hrsynth>", f"{naming}</hrsynth>") if "observe" in naming
-                   else text.replace("<hrsynth>", f"{naming}<hrsynth>"))
+    two.write_text(
+        text.replace("</hrsynth>", f"{naming}</hrsynth>")
+        if "observe" in naming
+        else text.replace("<hrsynth>", f"{naming}<hrsynth>")
+    )
     found = hrsynth.lint(two, fix=True, output=tmp_path / "mended.urdf")
     assert "refused" not in {each.rule for each in found.findings}
     assert "constraint-dead" in {each.rule for each in found.findings}
@@ -133,8 +147,10 @@ def test_the_sound_limits_are_counted_from_the_new_zero(tmp_path: Path, shelf: P
     after = load(two)
     for name, joint in before.joints.items():
         if joint.limits is not None and joint.limits.lower is not None:
-            assert np.allclose([after.joints[name].limits.lower, after.joints[name].limits.upper],
-                               [joint.limits.lower, joint.limits.upper])
+            assert np.allclose(
+                [after.joints[name].limits.lower, after.joints[name].limits.upper],
+                [joint.limits.lower, joint.limits.upper],
+            )
 
 
 def test_a_mimic_follows_from_the_new_zero(tmp_path: Path):
@@ -152,7 +168,8 @@ def test_a_mimic_follows_from_the_new_zero(tmp_path: Path):
         <joint name="m" type="continuous"><parent link="rocker"/><child link="led"/><origin xyz="0 0 0.5"/>
         <axis xyz="0 1 0"/><mimic joint="c" multiplier="2" offset="0.3"/></joint>
         <loop name="d" type="revolute"><predecessor link="rocker"><origin xyz="0 0 1"/></predecessor>
-        <successor link="bar"><origin xyz="2 0 0"/></successor><axis xyz="0 1 0"/></loop></robot>""")
+        <successor link="bar"><origin xyz="2 0 0"/></successor><axis xyz="0 1 0"/></loop></robot>"""
+    )
     before = load(path, platform="bar")
     assert [each.rule for each in hrsynth.lint(path, platform="bar", fix=True).mended] == ["loop-open"]
     after = load(path, platform="bar")
@@ -185,9 +202,11 @@ def test_degrees_beside_radians_are_told_and_left(tmp_path: Path, shelf: Path):
 @pytest.mark.parametrize(("other", "mended"), [("0", True), ("1.5", False)])
 def test_small_limits_beside_degrees_are_degrees_where_all_are_whole(tmp_path: Path, other: str, mended: bool):
     path = tmp_path / "robot.urdf"
-    joints = "".join(f"""<link name="l{k}"/><joint name="j{k}" type="revolute"><parent link="base"/><child link="l{k}"/>
+    joints = "".join(
+        f"""<link name="l{k}"/><joint name="j{k}" type="revolute"><parent link="base"/><child link="l{k}"/>
         <limit lower="{low}" upper="{high}" effort="1" velocity="1"/></joint>"""
-                     for k, (low, high) in enumerate([("-5", "5"), ("-90", "45"), (other, "30")]))
+        for k, (low, high) in enumerate([("-5", "5"), ("-90", "45"), (other, "30")])
+    )
     path.write_text(f"""<robot name="r"><link name="base"/>{joints}</robot>""")
     hrsynth.lint(path, fix=True)
     lower, upper = ([float(each.get(end)) for each in etree.parse(path).iter("limit")] for end in ("lower", "upper"))
@@ -211,8 +230,10 @@ def test_an_inertia_is_mended_to_the_nearest_of_a_body(tmp_path: Path, shelf: Pa
     for inertia, lowest in ((before.inertia, -0.05), (after.inertia, 0.0)):
         moments = np.sort(np.linalg.eigvalsh(inertia))
         assert moments[0] + moments[1] - moments[2] == pytest.approx(2 * lowest * 0.4, abs=0.005)
-    kept = [np.sort(np.linalg.eigvalsh(np.trace(each.inertia) / 2 * np.eye(3) - each.inertia))[1:]
-            for each in (before, after)]
+    kept = [
+        np.sort(np.linalg.eigvalsh(np.trace(each.inertia) / 2 * np.eye(3) - each.inertia))[1:]
+        for each in (before, after)
+    ]
     assert kept[1] == pytest.approx(kept[0], rel=1e-5)
 
 
@@ -235,7 +256,8 @@ def test_redundant_constraints_are_named_and_counted(tmp_path: Path):
     """A planar loop closed by a hinge has 3 constraints too many, six balls have none."""
     found = [each for each in hrsynth.lint("3rrr_m1").findings if each.rule == "constraint-redundant"]
     assert [each.message for each in found] == [
-        f"3 of the 5 constraints of 'wrist_{leg}' repeat those of the loops before it" for leg in (2, 3)]
+        f"3 of the 5 constraints of 'wrist_{leg}' repeat those of the loops before it" for leg in (2, 3)
+    ]
     assert rules_in(shipped()["gough_stewart"])["constraint-redundant"] == 0
 
 
@@ -299,19 +321,36 @@ def test_frames_that_nobody_closes_are_told(tmp_path: Path):
 def arm(*joints: str) -> str:
     """A serial arm of joints, each as its type, the place of its frame and its axis."""
     links = "".join(f'<link name="l{number}"/>' for number in range(len(joints) + 1))
-    return f'<robot name="arm">{links}' + "".join(
-        f'<joint name="q{number}" type="{kind}"><parent link="l{number}"/><child link="l{number + 1}"/>'
-        f'<origin xyz="{place}"/><axis xyz="{axis}"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>'
-        for number, (kind, place, axis) in enumerate(each.split("; ") for each in joints)) + "</robot>"
+    return (
+        f'<robot name="arm">{links}'
+        + "".join(
+            f'<joint name="q{number}" type="{kind}"><parent link="l{number}"/><child link="l{number + 1}"/>'
+            f'<origin xyz="{place}"/><axis xyz="{axis}"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>'
+            for number, (kind, place, axis) in enumerate(each.split("; ") for each in joints)
+        )
+        + "</robot>"
+    )
 
 
 SLIDING = ("continuous; 0 0 0.2; 0 0 1", "prismatic; 0 0 0; 0 0 1", "continuous; 0 0 0; 0 1 0")
 
 
-@pytest.mark.parametrize(("joints", "told"), [
-    ((*SLIDING, "continuous; 0.3 0 0; 0 1 0"), False), (SLIDING, False),
-    (("continuous; 0 0 0; 0 1 0", "continuous; 0 0 1; 0 1 0", "continuous; 1 0 0; 0 1 0", "fixed; -1 0 -1; 0 1 0"),
-     True)])
+@pytest.mark.parametrize(
+    ("joints", "told"),
+    [
+        ((*SLIDING, "continuous; 0.3 0 0; 0 1 0"), False),
+        (SLIDING, False),
+        (
+            (
+                "continuous; 0 0 0; 0 1 0",
+                "continuous; 0 0 1; 0 1 0",
+                "continuous; 1 0 0; 0 1 0",
+                "fixed; -1 0 -1; 0 1 0",
+            ),
+            True,
+        ),
+    ],
+)
 def test_frames_of_consecutive_joints_may_coincide(tmp_path: Path, joints: tuple[str, ...], told: bool):
     """A slide at zero brings the joints at its ends together; a four-bar that comes back to its base is told."""
     path = tmp_path / "arm.urdf"
@@ -319,20 +358,36 @@ def test_frames_of_consecutive_joints_may_coincide(tmp_path: Path, joints: tuple
     assert (rules_in(path)["frames-coincide"] > 0) == told
 
 
-@pytest.mark.parametrize(("change", "line", "says", "severity"), [
-    (("<transmission name", "<tranmission name", "</transmission>", "</tranmission>"), "<transmission name",
-     "element in <robot>, found <tranmission>, nearly <transmission>", "error"),
-    (("<transmission name", "<tranmision name", "</transmission>", "</tranmision>"), "<transmission name",
-     "element in <robot>, found <tranmision>, nearly <transmission>", "warning"),
-    (('<axis xyz="0 0 1"', '<axis xzy="0 0 1"'), "<axis", "attribute of <axis>, found xzy, nearly xyz", "error"),
-    (('<axis xyz="0 0 1"', '<Axis xyz="0 0 1"'), "<axis", "nearly <axis>", "error"),
-    (("<predecessor link=\"dist_2\">\n      <origin xyz", "<predecessor link=\"dist_2\">\n      <origin xy"),
-     "<predecessor link=\"dist_2\">", "attribute of <origin>, found xy, nearly xyz", "error"),
-    (("<hrsynth>", "<hydraulics/>\n<hrsynth>"), "<hrsynth>",
-     "element in <robot>, found <hydraulics>", "note"),
-    (("<hrsynth>", '<w:thing xmlns:w="urn:w"/>\n<hrsynth>'), "", "", "")])
-def test_what_a_format_lacks_is_named_with_its_line(tmp_path: Path, change: tuple[str, ...], line: str, says: str,
-                                                    severity: str):
+@pytest.mark.parametrize(
+    ("change", "line", "says", "severity"),
+    [
+        (
+            ("<transmission name", "<tranmission name", "</transmission>", "</tranmission>"),
+            "<transmission name",
+            "element in <robot>, found <tranmission>, nearly <transmission>",
+            "error",
+        ),
+        (
+            ("<transmission name", "<tranmision name", "</transmission>", "</tranmision>"),
+            "<transmission name",
+            "element in <robot>, found <tranmision>, nearly <transmission>",
+            "warning",
+        ),
+        (('<axis xyz="0 0 1"', '<axis xzy="0 0 1"'), "<axis", "attribute of <axis>, found xzy, nearly xyz", "error"),
+        (('<axis xyz="0 0 1"', '<Axis xyz="0 0 1"'), "<axis", "nearly <axis>", "error"),
+        (
+            ('<predecessor link="dist_2">\n      <origin xyz', '<predecessor link="dist_2">\n      <origin xy'),
+            '<predecessor link="dist_2">',
+            "attribute of <origin>, found xy, nearly xyz",
+            "error",
+        ),
+        (("<hrsynth>", "<hydraulics/>\n<hrsynth>"), "<hrsynth>", "element in <robot>, found <hydraulics>", "note"),
+        (("<hrsynth>", '<w:thing xmlns:w="urn:w"/>\n<hrsynth>'), "", "", ""),
+    ],
+)
+def test_what_a_format_lacks_is_named_with_its_line(
+    tmp_path: Path, change: tuple[str, ...], line: str, says: str, severity: str
+):
     text = shipped()["3rrr_m1"].read_text()
     assert rules_in(shipped()["3rrr_m1"])["element-unknown"] == 0
     path = tmp_path / "robot.urdf"
@@ -350,12 +405,17 @@ def test_what_a_format_lacks_is_named_with_its_line(tmp_path: Path, change: tupl
 
 
 def test_a_singular_zero_pose_and_what_is_read_otherwise_are_told(tmp_path: Path):
-    flat = ('<robot name="flat">' + "".join(f'<link name="{name}"/>' for name in ("base", "a", "b", "c")) + "".join(
-        f'<joint name="{name}" type="continuous"><parent link="{one}"/><child link="{two}"/><origin xyz="{x} 0 0"/>'
-        '<axis xyz="0 0 1"/></joint>' for name, one, two, x in (("p", "base", "a", 0), ("q", "a", "b", 1),
-                                                                ("r", "base", "c", 2))) +
-            '<loop name="s" type="spherical"><predecessor link="b"><origin xyz="2 0 0"/></predecessor>'
-            '<successor link="c"><origin xyz="1 0 0"/></successor></loop></robot>')
+    flat = (
+        '<robot name="flat">'
+        + "".join(f'<link name="{name}"/>' for name in ("base", "a", "b", "c"))
+        + "".join(
+            f'<joint name="{name}" type="continuous"><parent link="{one}"/><child link="{two}"/><origin xyz="{x} 0 0"/>'
+            '<axis xyz="0 0 1"/></joint>'
+            for name, one, two, x in (("p", "base", "a", 0), ("q", "a", "b", 1), ("r", "base", "c", 2))
+        )
+        + '<loop name="s" type="spherical"><predecessor link="b"><origin xyz="2 0 0"/></predecessor>'
+        '<successor link="c"><origin xyz="1 0 0"/></successor></loop></robot>'
+    )
     path = tmp_path / "flat.urdf"
     path.write_text(flat)
     found = rules_in(path)
@@ -363,17 +423,25 @@ def test_a_singular_zero_pose_and_what_is_read_otherwise_are_told(tmp_path: Path
     assert found["merged"] >= 1
 
 
-@pytest.mark.parametrize(("robot", "open_on_purpose"), [
-    ('<joint name="f" type="floating"><parent link="base"/><child link="hand"/></joint>', True),
-    ('<joint name="f" type="continuous"><parent link="base"/><child link="hand"/></joint>', False)])
+@pytest.mark.parametrize(
+    ("robot", "open_on_purpose"),
+    [
+        ('<joint name="f" type="floating"><parent link="base"/><child link="hand"/></joint>', True),
+        ('<joint name="f" type="continuous"><parent link="base"/><child link="hand"/></joint>', False),
+    ],
+)
 @pytest.mark.parametrize("seen", [False, True])
 def test_what_is_open_on_purpose_is_not_told_to_close(tmp_path: Path, robot: str, open_on_purpose: bool, seen: bool):
     """A free body, and whatever a camera looks at."""
-    eye = ('<camera name="eye" link="base"><origin xyz="0 0 -1"/></camera>'
-           '<observe kind="point" camera="eye" link="hand" at="0 0 0"/>')
+    eye = (
+        '<camera name="eye" link="base"><origin xyz="0 0 -1"/></camera>'
+        '<observe kind="point" camera="eye" link="hand" at="0 0 0"/>'
+    )
     path = tmp_path / "robot.urdf"
-    path.write_text(f'<robot name="body"><link name="base"/><link name="hand"/>{robot}<hrsynth serial="true">'
-                    f'<platform link="hand"/>{eye * seen}</hrsynth></robot>')
+    path.write_text(
+        f'<robot name="body"><link name="base"/><link name="hand"/>{robot}<hrsynth serial="true">'
+        f'<platform link="hand"/>{eye * seen}</hrsynth></robot>'
+    )
     found = rules_in(path)
     assert found["refused"] == 0
     expected = 0 if open_on_purpose or seen else 1
@@ -437,13 +505,17 @@ def test_all_files_that_cannot_be_opened_are_named(tmp_path: Path):
 
 
 def test_comments_and_unknown_elements_stay_where_something_is_mended(tmp_path: Path):
-    text = ('<?xml version="1.0"?>\n<!-- made by hand -->\n' + damaged(sound(), CASES[0].damage).replace(
-        "<loop", "<!-- here --><vendor key='v'>text</vendor>\n  <loop", 1) + "\n")
+    text = (
+        '<?xml version="1.0"?>\n<!-- made by hand -->\n'
+        + damaged(sound(), CASES[0].damage).replace("<loop", "<!-- here --><vendor key='v'>text</vendor>\n  <loop", 1)
+        + "\n"
+    )
     path = tmp_path / "robot.urdf"
     path.write_text(text)
     hrsynth.lint(path, fix=True)
     after = path.read_text()
     changed = [(one, two) for one, two in zip(text.splitlines(), after.splitlines(), strict=True) if one != two]
     assert [one.replace('"', "'") for one, _ in changed if "limit" not in one] == [
-        two.replace('"', "'") for _, two in changed if "limit" not in two]
+        two.replace('"', "'") for _, two in changed if "limit" not in two
+    ]
     assert len([one for one, _ in changed if "limit" in one]) == 1

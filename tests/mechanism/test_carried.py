@@ -49,8 +49,9 @@ def check(mechanism: Mechanism, seed: int, tries: int) -> int:
     relations = recognised(mechanism, walked(mechanism, 1, seed))
     states = list(scattered(mechanism, tries, seed))
     for tie in by_the_file(mechanism, relations):
-        assert max((miss(tie, mechanism, relations, state) for state in states), default=0.0) < 1e-7, (
-            tie.words(relations))
+        assert max((miss(tie, mechanism, relations, state) for state in states), default=0.0) < 1e-7, tie.words(
+            relations
+        )
     return len(states)
 
 
@@ -96,14 +97,23 @@ def test_a_relation_across_a_joint_that_breaks_it_is_not_carried() -> None:
         for number in range(4):
             builder.link(f"link_{number}", at=(number, 0, 0))
         for number, (letter, axis) in enumerate((("R", (0, 0, 1)), (kind, (0, 1, 0)), ("R", (0, 0, 1)))):
-            builder.joint(f"joint_{number}", letter, f"link_{number}", f"link_{number + 1}", (number, 0, 0),
-                          axis=None if letter == "S" else axis)
+            builder.joint(
+                f"joint_{number}",
+                letter,
+                f"link_{number}",
+                f"link_{number + 1}",
+                (number, 0, 0),
+                axis=None if letter == "S" else axis,
+            )
         builder.observe("1", "link_3", (0.3, 0.4, 0.5))
         robot = builder.build(platform="link_3")
         relations = recognised(robot, walked(robot, 0, seed=0))
         every = ties(relations)
-        same = [(tie, holds) for tie, holds in zip(every, carried_by_joints(robot, relations, every), strict=True)
-                if tie.kind == "same"]
+        same = [
+            (tie, holds)
+            for tie, holds in zip(every, carried_by_joints(robot, relations, every), strict=True)
+            if tie.kind == "same"
+        ]
         across = [known for tie, known in same if {"link_0", "link_3"} & set(tie.links)]
         assert relations.axes["joint_0"] == relations.axes["joint_2"]
         assert across

@@ -29,8 +29,10 @@ def in_sight(rng: Rng, kind: type[Observation], side: int = 1) -> tuple[Observat
     while True:
         seen, X_c, X = far(rng, kind, side)
         value = seen.value(X_c, X)
-        if kind.kind in ("image_line", "edge", "edges") and min(np.hypot(value[0], value[1]),
-                                                                np.hypot(value[-3], value[-2])) < 0.3:
+        if (
+            kind.kind in ("image_line", "edge", "edges")
+            and min(np.hypot(value[0], value[1]), np.hypot(value[-3], value[-2])) < 0.3
+        ):
             continue
         if seen.in_front(X_c, X) > 0.3:
             return seen, X_c, X
@@ -55,8 +57,9 @@ def camera_twists(seen: CameraObservation, X_c: Array) -> Array:
 @pytest.mark.parametrize("kind", CHAINED, ids=lambda kind: kind.kind)
 @settings(max_examples=20, deadline=None)
 @given(rng=SEEDS, side=st.sampled_from([1, -1]))
-def test_rows_of_the_interaction_matrix_are_derivatives_of_the_error(kind: type[Observation], rng: Rng, side: int
-                                                                     ) -> None:
+def test_rows_of_the_interaction_matrix_are_derivatives_of_the_error(
+    kind: type[Observation], rng: Rng, side: int
+) -> None:
     """For any motion of both links, to 1e-8; and errors change their sign where value and wanted value do."""
     seen, X_c, X = in_sight(rng, kind, side)
     wanted = seen.value(moved(X_c, rng.uniform(-0.1, 0.1, size=6), 1), moved(X, rng.uniform(-0.1, 0.1, size=6), 1))
@@ -85,11 +88,15 @@ def test_the_plane_in_which_it_lies_gives_its_rate(kind: type[CameraObservation]
     p, d = camera_frame(seen, X_c, X)
     other, r = plane + 0.3 * random_direction(rng) * np.linalg.norm(plane), np.array([seen.radius or 0.0])
     np.testing.assert_allclose(
-        seen.measurement(*seen.suppose_plane(p, d, r, other), r), seen.measurement(p, d, r), atol=1e-9)
+        seen.measurement(*seen.suppose_plane(p, d, r, other), r), seen.measurement(p, d, r), atol=1e-9
+    )
     turns = camera_twists(seen, X_c)[:, 3:]
     still = np.zeros((6, 3))
-    np.testing.assert_allclose(seen.suppose_plane_rate(other, X_c, X, turns, still), seen.rate(X_c, X, turns, still),
-                               atol=1e-9 * (1 + 1 / np.linalg.norm(other)))
+    np.testing.assert_allclose(
+        seen.suppose_plane_rate(other, X_c, X, turns, still),
+        seen.rate(X_c, X, turns, still),
+        atol=1e-9 * (1 + 1 / np.linalg.norm(other)),
+    )
 
 
 @settings(max_examples=20, deadline=None)
@@ -101,7 +108,8 @@ def test_a_point_has_the_matrix_of_the_textbook(rng: Rng) -> None:
     (x, y), Z = seen.error(seen.value(X_c, X), np.array([0.0, 0, 1])), rng.uniform(0.3, 2)
     V_c = camera_twists(seen, X_c)
     rows = seen.error_slope(seen.value(X_c, X), seen.value(X_c, X)) @ seen.suppose_plane_rate(
-        np.array([0, 0, 1 / Z]), X_c, X, V_c, np.zeros((6, 6)))
+        np.array([0, 0, 1 / Z]), X_c, X, V_c, np.zeros((6, 6))
+    )
     expected = [[-1 / Z, 0, x / Z, x * y, -(1 + x * x), y], [0, -1 / Z, y / Z, 1 + y * y, -x * y, -x]]
     np.testing.assert_allclose(rows, expected, atol=1e-9 * (1 + np.abs(expected).max()))
 
@@ -116,11 +124,14 @@ def test_a_line_has_the_matrix_of_the_textbook(rng: Rng) -> None:
     rho, theta = seen.error(value, np.array([1.0, 0, 0]))
     (a, b, c), d = rng.normal(size=3), -1.0
     rows = seen.error_slope(value, value) @ seen.suppose_plane_rate(
-        np.array([a, b, c]), X_c, X, camera_twists(seen, X_c), np.zeros((6, 6)))
+        np.array([a, b, c]), X_c, X, camera_twists(seen, X_c), np.zeros((6, 6))
+    )
     cos, sin = np.cos(theta), np.sin(theta)
     by_rho, by_theta = (a * rho * cos + b * rho * sin + c) / d, (a * sin - b * cos) / d
-    expected = [[by_rho * cos, by_rho * sin, -by_rho * rho, (1 + rho**2) * sin, -(1 + rho**2) * cos, 0],
-                [by_theta * cos, by_theta * sin, -by_theta * rho, -rho * cos, -rho * sin, -1]]
+    expected = [
+        [by_rho * cos, by_rho * sin, -by_rho * rho, (1 + rho**2) * sin, -(1 + rho**2) * cos, 0],
+        [by_theta * cos, by_theta * sin, -by_theta * rho, -rho * cos, -rho * sin, -1],
+    ]
     np.testing.assert_allclose(rows, expected, atol=1e-9 * (1 + np.abs(expected).max()))
 
 
@@ -136,8 +147,9 @@ def test_what_is_fed_back_is_what_a_picture_shows(rng: Rng) -> None:
         assert x * np.cos(theta) + y * np.sin(theta) == pytest.approx(rho * z, abs=1e-9)
     circle, X_c, X = in_sight(rng, ImageCircle)
     assert isinstance(circle, ImageCircle)
-    found = circle.error(circle.value(X_c, X), ImageCircle.measurement(np.array([0, 0, 1.0]), np.array([0, 0, 1.0]),
-                                                                   np.array([0.5])))
+    found = circle.error(
+        circle.value(X_c, X), ImageCircle.measurement(np.array([0, 0, 1.0]), np.array([0, 0, 1.0]), np.array([0.5]))
+    )
     found = found + [0, 0, 0.0625, 0, 0.0625]
     p, d = camera_frame(circle, X_c, X)
     one = unit(np.cross(d, [0.3, 0.5, 0.8]))
@@ -149,8 +161,10 @@ def test_what_is_fed_back_is_what_a_picture_shows(rng: Rng) -> None:
     centre = [((v[:-1] + v[1:]) * parts).sum() / (6 * area) for v in (x, y)]
     x, y = x - centre[0], y - centre[1]
     parts = x[:-1] * y[1:] - x[1:] * y[:-1]
-    second = [((a[:-1] * b[:-1] + a[1:] * b[1:]) / 12 + (a[:-1] * b[1:] + a[1:] * b[:-1]) / 24) @ parts / area
-              for a, b in ((x, x), (x, y), (y, y))]
+    second = [
+        ((a[:-1] * b[:-1] + a[1:] * b[1:]) / 12 + (a[:-1] * b[1:] + a[1:] * b[:-1]) / 24) @ parts / area
+        for a, b in ((x, x), (x, y), (y, y))
+    ]
     np.testing.assert_allclose(found, [*centre, *second], rtol=1e-5, atol=1e-5 * (1 + np.abs(found).max()))
 
 
@@ -158,9 +172,14 @@ def test_a_camera_sees_what_is_in_front_and_inside_of_its_picture() -> None:
     X_c, R = np.eye(4), np.eye(3)
     wide = NamedCamera("eye", "c")
     small = NamedCamera("eye", "c", focal=800.0, width=640, height=480)
-    for place, ahead, inside in (((0, 0, 1), True, True), ((0, 0, -1), False, False), ((3, 0, 1), True, False),
-                                 ((0.39, 0.29, 1), True, True), ((0.41, 0, 1), True, False), ((0, -0.31, 1), True,
-                                                                                              False)):
+    for place, ahead, inside in (
+        ((0, 0, 1), True, True),
+        ((0, 0, -1), False, False),
+        ((3, 0, 1), True, False),
+        ((0.39, 0.29, 1), True, True),
+        ((0.41, 0, 1), True, False),
+        ((0, -0.31, 1), True, False),
+    ):
         for camera, seen in ((wide, ahead), (small, inside)):
             assert (ImagePoint("p", "l", camera=camera).in_front(X_c, pose(place, R)) > 0) is seen
     circle = ImageCircle("p", "l", axis=np.array([1.0, 0, 0]), radius=0.5, camera=wide)

@@ -39,7 +39,8 @@ def test_distances_and_components(joined, within):
     found = list(graphs.components(ours, within))
     assert sorted(map(sorted, found)) == sorted(map(sorted, nx.connected_components(theirs)))
     assert [min(part, key=NODES.index) for part in found] == sorted(
-        (min(part, key=NODES.index) for part in found), key=NODES.index)
+        (min(part, key=NODES.index) for part in found), key=NODES.index
+    )
 
 
 @given(edges, some)

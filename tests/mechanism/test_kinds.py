@@ -63,8 +63,9 @@ def chain_of(seen: Observation, X_c: Array, X: Array) -> tuple[VirtualJoint, ...
 
 def twists(chain: tuple[VirtualJoint, ...], wanted: Callable[[VirtualJoint], bool] = lambda _: True) -> Array:
     """The twists (6, n) of some joints of a chain, about the base's origin."""
-    screws = [t for joint in chain if wanted(joint)
-              for t in allowed_twists(JointType(joint.letter), joint.at, joint.axes)]
+    screws = [
+        t for joint in chain if wanted(joint) for t in allowed_twists(JointType(joint.letter), joint.at, joint.axes)
+    ]
     return np.array(screws, dtype=float).reshape(-1, 6).T
 
 
@@ -115,8 +116,9 @@ def test_a_chain_constrains_nothing_and_sees_what_the_kind_sees(kind: type[Obser
 @pytest.mark.parametrize("kind", CHAINED, ids=lambda kind: kind.kind)
 @settings(max_examples=20, deadline=None)
 @given(rng=SEEDS, side=st.sampled_from([1, -1]))
-def test_wrenches_are_reciprocal_to_what_moves_when_the_value_is_held(kind: type[Observation], rng: Rng, side: int
-                                                                     ) -> None:
+def test_wrenches_are_reciprocal_to_what_moves_when_the_value_is_held(
+    kind: type[Observation], rng: Rng, side: int
+) -> None:
     """And they are as many as are independent: they span the same space as the rates do."""
     seen, X_c, X = far(rng, kind, side)
     W = np.array(seen.wrenches(seen.sighting(X_c, X)), dtype=float)  # type: ignore[attr-defined]
@@ -147,8 +149,14 @@ def test_values_are_told_in_the_frame_of_the_camera(kind: type[Observation]) -> 
 def test_what_needs_turns_only_is_the_same_whatever_the_points_do(kind: type[Observation]) -> None:
     rng = np.random.default_rng(3)
     if issubclass(kind, Encoder):
-        seen: Observation = kind("p", "l", "j", random_direction(rng), *rng.normal(size=(2, 3)),  # type: ignore[call-arg]
-                                 seen_from="c")
+        seen: Observation = kind(
+            "p",
+            "l",
+            "j",
+            random_direction(rng),
+            *rng.normal(size=(2, 3)),  # type: ignore[call-arg]
+            seen_from="c",
+        )
         X_c, X = random_pose(rng), random_pose(rng)
     else:
         seen, X_c, X = far(rng, kind)
@@ -163,9 +171,19 @@ def test_what_needs_turns_only_is_the_same_whatever_the_points_do(kind: type[Obs
 def test_the_same_is_measured_where_links_become_parts_of_others(kind: type[Observation]) -> None:
     rng = np.random.default_rng(6)
     a = random_direction(rng)
-    seen = (drawn(kind, rng) if not issubclass(kind, Encoder) else
-            kind("p", "l", "j", a, unit(np.cross(a, [1, 2, 3])), unit(np.cross(a, [3, 1, 2])),  # type: ignore[call-arg]
-                 seen_from="c"))
+    seen = (
+        drawn(kind, rng)
+        if not issubclass(kind, Encoder)
+        else kind(
+            "p",
+            "l",
+            "j",
+            a,
+            unit(np.cross(a, [1, 2, 3])),
+            unit(np.cross(a, [3, 1, 2])),  # type: ignore[call-arg]
+            seen_from="c",
+        )
+    )
     poses = {name: random_pose(rng) for name in ("l", "c", "whole", "hand")}
     there = seen.carried_by({"l": "whole", "c": "hand"}, poses)
     assert (there.link, there.seen_from) == ("whole", "hand")
@@ -198,11 +216,19 @@ def test_a_line_through_the_centre_has_a_chain_of_other_motors() -> None:
     assert np.max(np.abs(rates(seen, X_c, X) @ passive)) < 1e-12
 
 
-@pytest.mark.parametrize(("kind", "geometry"), [
-    ("point", {}), ("position", {}), ("distance", {}), ("image_line", {"axis": [0, 0, 1.0]}),
-    ("circle", {"axis": [0, 0, 1.0]}), ("edge", {"axis": [0, 0, 1.0], "radius": 0.2, "at": [0.1, 0, 0]}),
-    ("edges", {"axis": [0, 0, 1.0], "radius": 0.2, "at": [0.1, 0, 0]}),
-    ("image_circle", {"axis": [0, 0, 1.0], "radius": 0.0, "at": [0.1, 0, 0]})])
+@pytest.mark.parametrize(
+    ("kind", "geometry"),
+    [
+        ("point", {}),
+        ("position", {}),
+        ("distance", {}),
+        ("image_line", {"axis": [0, 0, 1.0]}),
+        ("circle", {"axis": [0, 0, 1.0]}),
+        ("edge", {"axis": [0, 0, 1.0], "radius": 0.2, "at": [0.1, 0, 0]}),
+        ("edges", {"axis": [0, 0, 1.0], "radius": 0.2, "at": [0.1, 0, 0]}),
+        ("image_circle", {"axis": [0, 0, 1.0], "radius": 0.0, "at": [0.1, 0, 0]}),
+    ],
+)
 def test_what_has_no_rate_in_the_centre_is_refused(kind: str, geometry: dict[str, object]) -> None:
     seen = kinds()[kind]("p", "l", **geometry)
     with pytest.raises(BadMechanism, match=f"^{kind} 'p'|^circle 'p'"):
@@ -212,5 +238,7 @@ def test_what_has_no_rate_in_the_centre_is_refused(kind: str, geometry: dict[str
 def test_every_file_is_a_kind_of_its_own() -> None:
     found = kinds()
     assert len(found) == 13
-    assert all(word == kind.kind and kind.words and set(kind.needs) <= {"at", "axis", "axis?", "radius", "joint"}
-               for word, kind in found.items())
+    assert all(
+        word == kind.kind and kind.words and set(kind.needs) <= {"at", "axis", "axis?", "radius", "joint"}
+        for word, kind in found.items()
+    )

@@ -23,9 +23,16 @@ def anatomy(name: str) -> LegDecomposition:
     return decompose(normal_form(load(name)).mechanism)
 
 
-@pytest.mark.parametrize(("name", "platform"), [
-    ("quattro", {"platform", "plate_12", "plate_34", "side_bar"}), ("i4l", {"platform", "plate_12"}),
-    ("quattro_rigid", {"platform"}), ("gough_stewart", {"platform"}), ("rrrrr_m1", {"dist_1"})])
+@pytest.mark.parametrize(
+    ("name", "platform"),
+    [
+        ("quattro", {"platform", "plate_12", "plate_34", "side_bar"}),
+        ("i4l", {"platform", "plate_12"}),
+        ("quattro_rigid", {"platform"}),
+        ("gough_stewart", {"platform"}),
+        ("rrrrr_m1", {"dist_1"}),
+    ],
+)
 def test_articulated_platforms_are_found(name: str, platform: set[str]) -> None:
     assert set(anatomy(name).platform) == platform
 
@@ -115,9 +122,15 @@ def watched(*observations: tuple[str, str]) -> Mechanism:
     return replace(robot, observations=tuple(Direction(leg, link, np.array([1.0, 0, 0])) for leg, link in observations))
 
 
-@pytest.mark.parametrize(("observations", "what"), [
-    ([("1", "base")], "not in a leg"), ([("1", "platform")], "not in a leg"),
-    ([("1", "dist_1"), ("1", "dist_2")], "two different legs"), ([("1", "dist_1"), ("2", "prox_1")], "is labelled")])
+@pytest.mark.parametrize(
+    ("observations", "what"),
+    [
+        ([("1", "base")], "not in a leg"),
+        ([("1", "platform")], "not in a leg"),
+        ([("1", "dist_1"), ("1", "dist_2")], "two different legs"),
+        ([("1", "dist_1"), ("2", "prox_1")], "is labelled"),
+    ],
+)
 def test_labels_that_contradict_the_legs_are_refused(observations: list, what: str) -> None:
     with pytest.raises(BadRobotFile, match=what):
         decompose(watched(*observations))
@@ -185,8 +198,10 @@ def bars_below_rods(watch: str) -> Mechanism:
     b.link("plate", at=(0, 0, 1.2))
     for i, angle in enumerate((0.1, 2.2, 4.0)):
         radial, across = np.array([np.cos(angle), np.sin(angle), 0]), np.array([-np.sin(angle), np.cos(angle), 0])
-        points = [0.8 * radial + x * across + np.array([0, 0, z]) for x, z in
-                  ((-0.3, 0), (-0.45, 0.3), (0, 0.6), (0.5, 0.35), (0.3, 0))]
+        points = [
+            0.8 * radial + x * across + np.array([0, 0, z])
+            for x, z in ((-0.3, 0), (-0.45, 0.3), (0, 0.6), (0.5, 0.35), (0.3, 0))
+        ]
         links = ["base", *(f"{part}_{i}" for part in ("left", "tip", "upper", "right"))]
         for link, at in zip(links[1:], points, strict=False):
             b.link(link, at=at)
@@ -212,11 +227,12 @@ def test_what_is_watched_is_in_a_leg_and_not_in_the_platform() -> None:
         found = decompose(robot)
         assert found.platform == ("plate",)
         assert [set(leg.links) for leg in found.legs] == [
-            {f"{part}_{i}" for part in ("left", "tip", "upper", "right", "rod")} for i in range(3)]
+            {f"{part}_{i}" for part in ("left", "tip", "upper", "right", "rod")} for i in range(3)
+        ]
         oracle = Oracle(robot)
         basis = oracle.relation(next(oracle.random_walk(np.random.default_rng(2), 1)))
         _, sizes, right = np.linalg.svd(basis[6:])
-        unseen = basis[:6] @ right[int((sizes > 1e-8).sum()):].T
+        unseen = basis[:6] @ right[int((sizes > 1e-8).sum()) :].T
         lost = int((np.linalg.svd(unseen, compute_uv=False) > 1e-8).sum())
         verdict = derive(robot).verdict
         assert (verdict.dof, len(verdict.lost)) == (6, lost)

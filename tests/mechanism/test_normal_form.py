@@ -34,32 +34,38 @@ def types(mechanism: Mechanism) -> str:
 X, Y, Z, AT = (1.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0), (0.0, 0, 0)
 
 
-@pytest.mark.parametrize(("joints", "expected"), [
-    ([("R", AT, X), ("R", AT, Y)], "U"),
-    ([("R", AT, X), ("R", AT, (1, 1, 0))], "RR"),
-    ([("R", AT, X), ("R", (0, 0, 0.1), Y)], "RR"),
-    ([("R", AT, X), ("R", (0.5, 0, 0), X)], "R"),
-    ([("R", AT, X), ("R", (0, 0.5, 0), X)], "RR"),
-    ([("R", AT, X), ("R", AT, Y), ("R", AT, Z)], "S"),
-    ([("R", AT, X), ("R", AT, (1, 1, 0)), ("R", AT, (1, 1, 1))], "S"),
-    ([("R", AT, X), ("R", AT, Y), ("R", AT, (1, 1, 0))], "RU"),
-    ([("R", AT, X), ("R", AT, Y), ("R", (0.2, 0.1, 0), Z)], "UR"),
-    ([("P", AT, X), ("P", AT, X)], "P"),
-    ([("P", AT, X), ("P", AT, Y)], "PP"),
-    ([("R", AT, X), ("F", (0, 1, 0), ()), ("R", AT, Y)], "U"),
-])
+@pytest.mark.parametrize(
+    ("joints", "expected"),
+    [
+        ([("R", AT, X), ("R", AT, Y)], "U"),
+        ([("R", AT, X), ("R", AT, (1, 1, 0))], "RR"),
+        ([("R", AT, X), ("R", (0, 0, 0.1), Y)], "RR"),
+        ([("R", AT, X), ("R", (0.5, 0, 0), X)], "R"),
+        ([("R", AT, X), ("R", (0, 0.5, 0), X)], "RR"),
+        ([("R", AT, X), ("R", AT, Y), ("R", AT, Z)], "S"),
+        ([("R", AT, X), ("R", AT, (1, 1, 0)), ("R", AT, (1, 1, 1))], "S"),
+        ([("R", AT, X), ("R", AT, Y), ("R", AT, (1, 1, 0))], "RU"),
+        ([("R", AT, X), ("R", AT, Y), ("R", (0.2, 0.1, 0), Z)], "UR"),
+        ([("P", AT, X), ("P", AT, X)], "P"),
+        ([("P", AT, X), ("P", AT, Y)], "PP"),
+        ([("R", AT, X), ("F", (0, 1, 0), ()), ("R", AT, Y)], "U"),
+    ],
+)
 def test_merging_goes_by_geometry(joints: list, expected: str) -> None:
     found = types(chain(*joints))
     assert sorted(found) == sorted(expected)
 
 
-@pytest.mark.parametrize(("joints", "moved"), [
-    ([("R", AT, X), ("R", AT, Y)], 0.0),
-    ([("R", AT, X), ("R", (0, 0, 1e-9), Y)], 1e-9),
-    ([("R", AT, X), ("R", (0.5, 3e-9, 0), X)], 3e-9),
-    ([("R", AT, X), ("R", AT, Y), ("R", (0, 0, 2e-9), Z)], 0.0),
-    ([("R", AT, X), ("R", AT, Y), ("R", (2e-9, 0, 0), Z)], 2e-9),
-])
+@pytest.mark.parametrize(
+    ("joints", "moved"),
+    [
+        ([("R", AT, X), ("R", AT, Y)], 0.0),
+        ([("R", AT, X), ("R", (0, 0, 1e-9), Y)], 1e-9),
+        ([("R", AT, X), ("R", (0.5, 3e-9, 0), X)], 3e-9),
+        ([("R", AT, X), ("R", AT, Y), ("R", (0, 0, 2e-9), Z)], 0.0),
+        ([("R", AT, X), ("R", AT, Y), ("R", (2e-9, 0, 0), Z)], 2e-9),
+    ],
+)
 def test_what_merging_moves_is_told(joints: list, moved: float) -> None:
     """Of a chain about the origin: the sum of how far each axis is from the joint that takes its place."""
     found = normal_form(chain(*joints)).moved

@@ -12,8 +12,20 @@ from hrsynth.mechanism.legs import decompose
 from hrsynth.mechanism.normal import normal_form
 from hrsynth.mechanism.notation import Architecture, Letter, Style, Word, parse
 
-KNOWN = ("4-R*-{2-SS}", "R*RR+2-P*RR", "{RR|Pi-U*R}-S", "2-Pi-{2-U*U}", "{R-PP}-U*U", "3-PiR*R", "PR*RR*P",
-         "2-{R-PP}-{2-U*S}+2-R-{2-SS}", "{RR-PPP}-U*S", "3-UP-{S|RU*}", "C*S", "6-UP*S")
+KNOWN = (
+    "4-R*-{2-SS}",
+    "R*RR+2-P*RR",
+    "{RR|Pi-U*R}-S",
+    "2-Pi-{2-U*U}",
+    "{R-PP}-U*U",
+    "3-PiR*R",
+    "PR*RR*P",
+    "2-{R-PP}-{2-U*S}+2-R-{2-SS}",
+    "{RR-PPP}-U*S",
+    "3-UP-{S|RU*}",
+    "C*S",
+    "6-UP*S",
+)
 
 letters = st.builds(Letter, st.sampled_from(["R", "P", "U", "S", "C", "E", "Pi"]), st.booleans())
 words = st.lists(letters, min_size=1, max_size=6).map(lambda items: Word(tuple(items)))
@@ -45,8 +57,9 @@ def test_a_motor_is_underlined() -> None:
     assert parse("3-PiR*R").text(Style.LATEX) == r"3-\Pi\underline{\mathrm{R}}\mathrm{R}"
 
 
-@pytest.mark.parametrize("text", ["", "3-", "3-Q", "R+", "{RR", "{}", "0-RR", "{2-}", "R**R", "{R}", "RR}", "-", "R 3",
-                                  "{R|}"])
+@pytest.mark.parametrize(
+    "text", ["", "3-", "3-Q", "R+", "{RR", "{}", "0-RR", "{2-}", "R**R", "{R}", "RR}", "-", "R 3", "{R|}"]
+)
 def test_what_is_no_architecture_is_refused_with_its_place(text: str) -> None:
     with pytest.raises(BadRequest, match="cannot be read"):
         parse(text)

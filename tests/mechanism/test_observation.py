@@ -29,10 +29,13 @@ def kinds(rng: np.random.Generator) -> list[Observation]:
     """One observation of each class, with random geometry."""
     (u, a, m), p = (random_direction(rng) for _ in range(3)), rng.normal(size=3)
     start = random_rotation(rng) @ perpendicular(a)
-    return [Direction("1", "l", u), SpaceLine("1", "l", at=p, axis=u),
-            AngleEncoder("1", "l", "j", a, m, rng.normal(size=3), seen_from="c"),
-            AngleEncoder("1", "l", "j", a, perpendicular(a), start, seen_from="c"),
-            SlideEncoder("1", "l", "j", a, p, m, seen_from="c")]
+    return [
+        Direction("1", "l", u),
+        SpaceLine("1", "l", at=p, axis=u),
+        AngleEncoder("1", "l", "j", a, m, rng.normal(size=3), seen_from="c"),
+        AngleEncoder("1", "l", "j", a, perpendicular(a), start, seen_from="c"),
+        SlideEncoder("1", "l", "j", a, p, m, seen_from="c"),
+    ]
 
 
 def random_pose(rng: np.random.Generator) -> Array:
@@ -64,8 +67,9 @@ def test_together_is_one_by_one(seed: int) -> None:
     for pair in zip(kinds(rng), kinds(rng), strict=True):
         values, rates = type(pair[0]).together(pair, X_c, X, V_c, V)
         np.testing.assert_allclose(values, np.concatenate([o.value(X_c, x) for o, x in zip(pair, X, strict=True)]))
-        np.testing.assert_allclose(rates, np.vstack([o.rate(X_c, x, V_c, v)
-                                                     for o, x, v in zip(pair, X, V, strict=True)]))
+        np.testing.assert_allclose(
+            rates, np.vstack([o.rate(X_c, x, V_c, v) for o, x, v in zip(pair, X, V, strict=True)])
+        )
 
 
 def test_every_kind_has_a_key_of_its_own() -> None:
@@ -144,8 +148,9 @@ def test_rates_and_values_of_candidates_have_the_same_units(robot: str) -> None:
         step = q_step.copy()
         step[slides] /= length
         q = twin.integrate(twin.q0, 0.1 * step)
-        ahead, behind = (measure(twin, twin.integrate(q, s * step), mechanism.reference, observations)[2]
-                         for s in (STEP, -STEP))
+        ahead, behind = (
+            measure(twin, twin.integrate(q, s * step), mechanism.reference, observations)[2] for s in (STEP, -STEP)
+        )
         _, _, values, rates = measure(twin, q, mechanism.reference, observations)
         for a, b, rate in zip(ahead, behind, rates, strict=True):
             np.testing.assert_allclose(rate @ step, (a - b) / (2 * STEP), rtol=1e-6, atol=1e-6)

@@ -20,26 +20,49 @@ numbers = st.floats(-5, 5).map(lambda value: round(value, 4) + 0.0)
 angles = st.floats(-3, 3).map(lambda value: round(value, 4) + 0.0)
 
 
-@pytest.mark.parametrize(("text", "wanted"), [
-    ("x=0.02,y=0.1,z=-0.7", Pose(0.02, 0.1, -0.7)),
-    (" z = -.7 , x=2e-2", Pose(x=0.02, z=-0.7)),
-    ("phi=10deg", Pose(phi=radians(10))),
-    ("phi=-0.5", Pose(phi=-0.5)),
-    ("x=1,rpy=0.1/0/-90deg", Pose(x=1, rpy=(0.1, 0.0, -pi / 2))),
-])
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    [
+        ("x=0.02,y=0.1,z=-0.7", Pose(0.02, 0.1, -0.7)),
+        (" z = -.7 , x=2e-2", Pose(x=0.02, z=-0.7)),
+        ("phi=10deg", Pose(phi=radians(10))),
+        ("phi=-0.5", Pose(phi=-0.5)),
+        ("x=1,rpy=0.1/0/-90deg", Pose(x=1, rpy=(0.1, 0.0, -pi / 2))),
+    ],
+)
 def test_what_may_be_written(text: str, wanted: Pose) -> None:
     assert Pose.parse(text) == wanted
 
 
-@pytest.mark.parametrize(("text", "what"), [
-    ("x=0:1:3", "from:to:count is of a grid"),
-    ("", "name=value"), ("x", "name=value"), ("x=", "not a number"), ("w=1", "unknown part"), ("x=1,x=1", "twice"),
-    ("x=abc", "not a number"), ("x=nan", "not finite"), ("y=inf", "not finite"), ("z=-inf", "not finite"),
-    ("x=1deg", "not a number"), ("phi=deg", "not a number"), ("phi=1e999", "not finite"), ("rpy=0/0", "rpy"),
-    ("rpy=0/nan/0", "not finite"), ("rpy=0/0/0deg deg", "not a number"), ("phi=0,rpy=0/0/0", "both phi and rpy"),
-    ("x=0:1:3", "not a number"), ("x=1,,y=2", "name=value"), ("X=1", "unknown part"),
-    ("x=1e300", "too large"), ("z=-1e10", "too large"), ("phi=1e155", "too large"), ("rpy=0/1e300/0", "too large"),
-])
+@pytest.mark.parametrize(
+    ("text", "what"),
+    [
+        ("x=0:1:3", "from:to:count is of a grid"),
+        ("", "name=value"),
+        ("x", "name=value"),
+        ("x=", "not a number"),
+        ("w=1", "unknown part"),
+        ("x=1,x=1", "twice"),
+        ("x=abc", "not a number"),
+        ("x=nan", "not finite"),
+        ("y=inf", "not finite"),
+        ("z=-inf", "not finite"),
+        ("x=1deg", "not a number"),
+        ("phi=deg", "not a number"),
+        ("phi=1e999", "not finite"),
+        ("rpy=0/0", "rpy"),
+        ("rpy=0/nan/0", "not finite"),
+        ("rpy=0/0/0deg deg", "not a number"),
+        ("phi=0,rpy=0/0/0", "both phi and rpy"),
+        ("x=0:1:3", "not a number"),
+        ("x=1,,y=2", "name=value"),
+        ("X=1", "unknown part"),
+        ("x=1e300", "too large"),
+        ("z=-1e10", "too large"),
+        ("phi=1e155", "too large"),
+        ("rpy=0/1e300/0", "too large"),
+    ],
+)
 def test_what_is_refused(text: str, what: str) -> None:
     with pytest.raises(BadRequest) as caught:
         Pose.parse(text)
@@ -48,8 +71,9 @@ def test_what_is_refused(text: str, what: str) -> None:
     assert caught.value.exit_status == 2
 
 
-@given(st.builds(Pose, *[st.none() | numbers] * 3, phi=st.none() | angles),
-       st.none() | st.tuples(angles, angles, angles))
+@given(
+    st.builds(Pose, *[st.none() | numbers] * 3, phi=st.none() | angles), st.none() | st.tuples(angles, angles, angles)
+)
 def test_a_pose_reads_as_it_prints(given_pose: Pose, rpy: tuple[float, float, float] | None) -> None:
     wanted = given_pose if rpy is None else Pose(given_pose.x, given_pose.y, given_pose.z, rpy=rpy)
     if wanted.given:
@@ -59,8 +83,9 @@ def test_a_pose_reads_as_it_prints(given_pose: Pose, rpy: tuple[float, float, fl
     assert record["rpy"] == (None if wanted.rpy is None else list(wanted.rpy))
 
 
-@pytest.mark.parametrize("vector", [*np.eye(3) * 0.3, *np.eye(3) * pi / 2, *-np.eye(3) * pi / 2, [1, 2, -0.5],
-                                    [0, 0, 3]])
+@pytest.mark.parametrize(
+    "vector", [*np.eye(3) * 0.3, *np.eye(3) * pi / 2, *-np.eye(3) * pi / 2, [1, 2, -0.5], [0, 0, 3]]
+)
 def test_back_from_a_matrix(vector: np.ndarray) -> None:
     R = exponential(np.asarray(vector, dtype=float))
     found = Pose.of(pose([0.1, -0.2, 0.3], R))
@@ -80,18 +105,30 @@ def test_a_grid_runs_its_last_axis_fastest() -> None:
     grid = Grid.parse("x=-0.3:0.3:3,z=-0.7,phi=0deg:90deg:2")
     assert grid.names == ("x", "phi")
     assert grid.shape == (3, 2)
-    assert [(p.x, p.phi) for p in grid.poses()] == [(pytest.approx(x), pytest.approx(phi))
-                                                    for x, phi in product((-0.3, 0, 0.3), (0, pi / 2))]
+    assert [(p.x, p.phi) for p in grid.poses()] == [
+        (pytest.approx(x), pytest.approx(phi)) for x, phi in product((-0.3, 0, 0.3), (0, pi / 2))
+    ]
     assert {(p.y, p.z, p.rpy) for p in grid.poses()} == {(None, -0.7, None)}
 
 
-@pytest.mark.parametrize(("text", "what"), [
-    ("x=0,y=1", "number of ranges"), ("x=0:1:1", "count of 2"), ("x=0:1", "from:to:count"), ("x=0:1:2.5", "count"),
-    ("x=0:0:3", "no extent"), ("x=0:inf:3", "not finite"), ("x=0:1:3,x=0", "twice"),
-    ("rpy=0/0/0:1/0/0:3", "range of rpy"),
-    ("x=0:1:2,y=0:1:2,z=0:1:2,phi=0:1:2", "number of ranges"), ("x=0:1:1000,y=0:1:1000", "number of poses"),
-    ("phi=0:1:3,rpy=0/0/0", "both phi and rpy"), ("x=0:1:-3", "count"), ("v=0:1:3", "unknown part"),
-])
+@pytest.mark.parametrize(
+    ("text", "what"),
+    [
+        ("x=0,y=1", "number of ranges"),
+        ("x=0:1:1", "count of 2"),
+        ("x=0:1", "from:to:count"),
+        ("x=0:1:2.5", "count"),
+        ("x=0:0:3", "no extent"),
+        ("x=0:inf:3", "not finite"),
+        ("x=0:1:3,x=0", "twice"),
+        ("rpy=0/0/0:1/0/0:3", "range of rpy"),
+        ("x=0:1:2,y=0:1:2,z=0:1:2,phi=0:1:2", "number of ranges"),
+        ("x=0:1:1000,y=0:1:1000", "number of poses"),
+        ("phi=0:1:3,rpy=0/0/0", "both phi and rpy"),
+        ("x=0:1:-3", "count"),
+        ("v=0:1:3", "unknown part"),
+    ],
+)
 def test_what_is_refused_of_a_grid(text: str, what: str) -> None:
     with pytest.raises(BadRequest) as caught:
         Grid.parse(text)

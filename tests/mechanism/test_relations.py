@@ -96,9 +96,14 @@ def test_the_constraints_in_screws_are_those_of_the_oracle(name: str) -> None:
     oracle, state = Oracle(robot), walked(robot, 1, seed=3)[-1]
     moved = {link: state[i] @ inverse(robot.links[link].pose) for i, link in enumerate(robot.links)}
     place = {link: i for i, link in enumerate(n for n in robot.links if n != robot.base)}
-    A = constraints(list(robot.joints.values()), place, lambda joint: (
-        (moved[joint.predecessor] @ [*joint.point, 1.0])[:3] / robot.length,
-        [moved[link][:3, :3] @ axis for axis, link in zip(joint.axes, joint.links, strict=False)]))
+    A = constraints(
+        list(robot.joints.values()),
+        place,
+        lambda joint: (
+            (moved[joint.predecessor] @ [*joint.point, 1.0])[:3] / robot.length,
+            [moved[link][:3, :3] @ axis for axis, link in zip(joint.axes, joint.links, strict=False)],
+        ),
+    )
     values = np.linalg.svd(A, compute_uv=False)
     assert A.shape[1] - int(np.sum(values > 1e-8 * values[0])) == oracle.mobility(state)
 
@@ -125,10 +130,20 @@ def test_axes_that_meet_in_one_point() -> None:
 
 def lifted(robot: Mechanism, rng: Rng) -> Mechanism:
     """The same robot with every R centre slid along its axis."""
-    joints = [joint if joint.type.value != "R" else
-              type(joint)(joint.name, joint.type, joint.predecessor, joint.successor,
-                          joint.point + rng.uniform(-1, 1) * joint.axis, joint.axes, joint.motor)
-              for joint in robot.joints.values()]
+    joints = [
+        joint
+        if joint.type.value != "R"
+        else type(joint)(
+            joint.name,
+            joint.type,
+            joint.predecessor,
+            joint.successor,
+            joint.point + rng.uniform(-1, 1) * joint.axis,
+            joint.axes,
+            joint.motor,
+        )
+        for joint in robot.joints.values()
+    ]
     return robot.changed(joints=joints)
 
 
@@ -159,7 +174,7 @@ def test_the_axes_of_universal_joints_are_perpendicular(square: bool) -> None:
     relations = recognised(robot, walked(robot, 2, seed=5))
     for number in range(1, 7):
         first, second = relations.axes[f"foot_{number}"]
-        rod, = relations.axes[f"slide_{number}"]
+        (rod,) = relations.axes[f"slide_{number}"]
 
         def meet(a: int, b: int) -> bool:
             return (min(a, b),) in relations.tower[max(a, b)]
@@ -176,8 +191,9 @@ def chain() -> Mechanism:
     builder = Builder("chain")
     for name, at in (("base", 0), ("one", 1), ("two", 2), ("hand", 3)):
         builder.link(name, at=(at, 0, 0))
-    for number, (a, b, axis) in enumerate((("base", "one", (0, 0, 1)), ("one", "two", (0, 1, 0)),
-                                           ("two", "hand", (0, 0, 1)))):
+    for number, (a, b, axis) in enumerate(
+        (("base", "one", (0, 0, 1)), ("one", "two", (0, 1, 0)), ("two", "hand", (0, 0, 1)))
+    ):
         builder.joint(f"turn_{number}", "R", a, b, (number, 0, 0), axis=axis)
     builder.observe("1", "hand", (0.3, 0.4, 0.5))
     return builder.build(platform="hand")
@@ -201,8 +217,10 @@ def test_the_segment_between_skew_axes() -> None:
     robot = chain()
     turn = robot.joints["turn_1"]
     frame = robot.links["one"].pose[:3, :3]
-    robot = robot.changed(joints=[replace(turn, point=turn.point + 0.3 * turn.axis)],
-                          observations=(Direction("1", "one", frame.T @ np.array([1.0, 0.0, 0.0])),))
+    robot = robot.changed(
+        joints=[replace(turn, point=turn.point + 0.3 * turn.axis)],
+        observations=(Direction("1", "one", frame.T @ np.array([1.0, 0.0, 0.0])),),
+    )
     low = replace(robot.joints["turn_0"], point=robot.joints["turn_0"].point + np.array([0, 0, 0.2]))
     found = recognised(robot.changed(joints=[low]), walked(robot, 2, seed=0))
     assert [sight.kind for sight in found.sights] == ["normal"]

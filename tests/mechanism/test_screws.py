@@ -15,8 +15,10 @@ from hrsynth.mechanism.screws import allowed_twists, transmitted_wrenches
 def test_what_a_joint_allows_is_reciprocal_to_all_that_it_transmits(kind: JointType) -> None:
     rng = np.random.default_rng(7)
     point, *axes = (np.array([Fraction(int(x)) for x in rng.integers(-9, 10, 3)], dtype=object) for _ in range(3))
-    twists, wrenches = (np.array(each(kind, point, axes if kind is JointType.UNIVERSAL else axes[:1]), dtype=object)
-                        .reshape(-1, 6) for each in (allowed_twists, transmitted_wrenches))
+    twists, wrenches = (
+        np.array(each(kind, point, axes if kind is JointType.UNIVERSAL else axes[:1]), dtype=object).reshape(-1, 6)
+        for each in (allowed_twists, transmitted_wrenches)
+    )
     assert len(twists) == kind.freedoms == 6 - len(wrenches)
     assert not (twists @ wrenches.T).any()
     for screws in (twists, wrenches):

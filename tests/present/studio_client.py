@@ -87,10 +87,22 @@ def opened(server: StudioServer, origin: str | None = "") -> Iterator[Page]:
 
 def posted(server: StudioServer, tab: str, name: str, body: bytes, *headers: str) -> bytes:
     """What is answered to a file that is dropped in."""
-    sizes = [] if any(each.lower().startswith(("content-length", "transfer-enc")) for each in headers) else [
-        f"Content-Length: {len(body)}"]
-    return said(server, [f"POST /SECRET/upload?tab={tab}&name={name} HTTP/1.1", "Host: 127.0.0.1:PORT",
-                         "Origin: http://127.0.0.1:PORT", *sizes, *headers], body)
+    sizes = (
+        []
+        if any(each.lower().startswith(("content-length", "transfer-enc")) for each in headers)
+        else [f"Content-Length: {len(body)}"]
+    )
+    return said(
+        server,
+        [
+            f"POST /SECRET/upload?tab={tab}&name={name} HTTP/1.1",
+            "Host: 127.0.0.1:PORT",
+            "Origin: http://127.0.0.1:PORT",
+            *sizes,
+            *headers,
+        ],
+        body,
+    )
 
 
 def alive(process: int) -> bool:

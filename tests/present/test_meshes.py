@@ -13,8 +13,10 @@ from hrsynth.present.view.view import View
 
 ROBOT = "3rrr_m1"
 SIZE = np.array([0.03, 0.02, 0.01])
-BOX = ('<visual><origin xyz="0.1 0 0.05" rpy="0 0 1.5707963267948966"/>'
-       '<geometry><box size="0.03 0.02 0.01"/></geometry></visual>')
+BOX = (
+    '<visual><origin xyz="0.1 0 0.05" rpy="0 0 1.5707963267948966"/>'
+    '<geometry><box size="0.03 0.02 0.01"/></geometry></visual>'
+)
 
 
 def with_visuals(folder: Path, hidden: bool = False, **visuals: str) -> View:
@@ -55,9 +57,14 @@ def test_solids_stand_for_the_rods_of_their_links(tmp_path: Path):
     assert joints == set(found.setting.mechanism.joints)
 
 
-@pytest.mark.parametrize("address", [
-    "part.stl", pytest.param("package://some_robot/part.stl", marks=pytest.mark.slow),
-    pytest.param("file://{folder}/part.stl", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "address",
+    [
+        "part.stl",
+        pytest.param("package://some_robot/part.stl", marks=pytest.mark.slow),
+        pytest.param("file://{folder}/part.stl", marks=pytest.mark.slow),
+    ],
+)
 def test_mesh_files_beside_the_robot_are_read(tmp_path: Path, address: str):
     import trimesh
 
@@ -73,8 +80,9 @@ def test_mesh_files_beside_the_robot_are_read(tmp_path: Path, address: str):
 
 
 @pytest.mark.some(0, 1)
-@pytest.mark.parametrize("ending", [
-    ".xml", pytest.param(".sdf", marks=pytest.mark.slow), pytest.param(".usda", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "ending", [".xml", pytest.param(".sdf", marks=pytest.mark.slow), pytest.param(".usda", marks=pytest.mark.slow)]
+)
 def test_other_dialects_show_the_same_meshes(ending: str, tmp_path: Path):
     import trimesh
 
@@ -87,9 +95,14 @@ def test_other_dialects_show_the_same_meshes(ending: str, tmp_path: Path):
         assert np.sort(other, axis=0) == pytest.approx(np.sort(one, axis=0), abs=1e-9)
 
 
-@pytest.mark.parametrize("address", [
-    "missing.stl", pytest.param("package://none/missing.dae", marks=pytest.mark.slow),
-    pytest.param("http://robots.invalid/part.stl", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "address",
+    [
+        "missing.stl",
+        pytest.param("package://none/missing.dae", marks=pytest.mark.slow),
+        pytest.param("http://robots.invalid/part.stl", marks=pytest.mark.slow),
+    ],
+)
 def test_missing_meshes_are_told_once_and_rods_drawn(tmp_path: Path, address: str):
     found = with_visuals(tmp_path, platform=BOX, prox_1=mesh(address), dist_2=mesh(address))
     assert [note for note in found.notes if note.startswith("2 visual shapes cannot be read (prox_1")]
@@ -100,13 +113,19 @@ def test_links_that_a_merged_joint_swallows_are_told(tmp_path: Path):
     """Two hinges that meet are a U in the normal form, which has no link between them to carry a shape."""
     shape = '<visual><geometry><box size="0.1 0.1 0.1"/></geometry></visual>'
     links = "".join(f'<link name="{name}">{shape}</link>' for name in ("base", "yoke", "arm", "hand"))
-    hinges = "".join(f'<joint name="{name}" type="continuous"><parent link="{one}"/><child link="{two}"/>'
-                     f'<origin xyz="{x} 0 0"/><axis xyz="{axis}"/></joint>' for name, one, two, x, axis in
-                     (("pan", "base", "yoke", 0, "0 0 1"), ("tilt", "yoke", "arm", 0, "0 1 0"),
-                      ("elbow", "arm", "hand", 1, "0 1 0")))
+    hinges = "".join(
+        f'<joint name="{name}" type="continuous"><parent link="{one}"/><child link="{two}"/>'
+        f'<origin xyz="{x} 0 0"/><axis xyz="{axis}"/></joint>'
+        for name, one, two, x, axis in (
+            ("pan", "base", "yoke", 0, "0 0 1"),
+            ("tilt", "yoke", "arm", 0, "0 1 0"),
+            ("elbow", "arm", "hand", 1, "0 1 0"),
+        )
+    )
     file = tmp_path / "head.urdf"
-    file.write_text(f'<robot name="head">{links}{hinges}<hrsynth serial="true"><platform link="hand"/></hrsynth>'
-                    '</robot>')
+    file.write_text(
+        f'<robot name="head">{links}{hinges}<hrsynth serial="true"><platform link="hand"/></hrsynth></robot>'
+    )
     found = view(load(file))
     assert "yoke" not in found.setting.mechanism.links
     assert [note for note in found.notes if "merged" in note] == ["links inside merged joints are not drawn: yoke"]
@@ -114,8 +133,9 @@ def test_links_that_a_merged_joint_swallows_are_told(tmp_path: Path):
 
 
 @pytest.mark.some(0, 1)
-@pytest.mark.parametrize("ending", ["xml", pytest.param("sdf", marks=pytest.mark.slow),
-                                    pytest.param("usda", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "ending", ["xml", pytest.param("sdf", marks=pytest.mark.slow), pytest.param("usda", marks=pytest.mark.slow)]
+)
 def test_a_robot_of_another_dialect_is_drawn_with_the_same_shapes(tmp_path: Path, ending: str):
     import trimesh
 

@@ -128,8 +128,9 @@ def test_with_a_server_sliders_move_the_robot_together(address: str, tab: Tab):
     home = known("() => studio.values")
     for number, key in enumerate(("PageUp", "PageDown")):
         push(tab, number, key, 2)
-        assert soon(lambda number=number: known(f"() => studio.moving || studio.values[{number}]")
-                    not in (True, home[number]))
+        assert soon(
+            lambda number=number: known(f"() => studio.moving || studio.values[{number}]") not in (True, home[number])
+        )
     one, other = (b - a for a, b in zip(home, known("() => studio.values"), strict=True))
     assert one > 0 > other
     assert tab.page.get_by_role("tab").count() == 0
@@ -162,8 +163,9 @@ def test_an_interrupt_ends_the_server_quietly():
     command = [sys.executable, "-m", "hrsynth.cli", "view", "rrrrr_m1", "--no-open"]
     # a test run that was put into the background ignores interrupts, and its children with it
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-                               env={**os.environ, "PYTHONUNBUFFERED": "1"})
+    process = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env={**os.environ, "PYTHONUNBUFFERED": "1"}
+    )
     signal.signal(signal.SIGINT, before)
     assert process.stdout is not None
     lines = []

@@ -36,22 +36,28 @@ QUESTIONS: dict[str, Callable[[str], Any]] = {
     "check of a line": lambda _: hrsynth.check("quattro", "1,4", grid="x=-0.3:0.3:11,y=0,z=-0.7,phi=0"),
     "check of a plane": lambda _: hrsynth.check("quattro", "1,4", grid="x=-0.3:0.3:9,y=-0.3:0.3:9,z=-0.7,phi=0"),
     "check of a box": lambda _: hrsynth.check("quattro", "1,4", grid="x=-0.3:0.3:5,y=-0.3:0.3:5,z=-0.8:-0.6:5,phi=0"),
-    "accuracy of a line": lambda _: hrsynth.accuracy("quattro", "1,4", cone="0.1deg",
-                                                     grid="x=-0.3:0.3:11,y=0,z=-0.7,phi=0"),
-    "accuracy of a plane": lambda _: hrsynth.accuracy("quattro", "1,4", cone="0.1deg",
-                                                      grid="x=-0.3:0.3:9,y=-0.3:0.3:9,z=-0.7,phi=0"),
-    "accuracy of a box": lambda _: hrsynth.accuracy("quattro", "1,4", cone="0.1deg",
-                                                    grid="x=-0.3:0.3:5,y=-0.3:0.3:5,z=-0.8:-0.6:3,phi=0"),
+    "accuracy of a line": lambda _: hrsynth.accuracy(
+        "quattro", "1,4", cone="0.1deg", grid="x=-0.3:0.3:11,y=0,z=-0.7,phi=0"
+    ),
+    "accuracy of a plane": lambda _: hrsynth.accuracy(
+        "quattro", "1,4", cone="0.1deg", grid="x=-0.3:0.3:9,y=-0.3:0.3:9,z=-0.7,phi=0"
+    ),
+    "accuracy of a box": lambda _: hrsynth.accuracy(
+        "quattro", "1,4", cone="0.1deg", grid="x=-0.3:0.3:5,y=-0.3:0.3:5,z=-0.8:-0.6:3,phi=0"
+    ),
     "singular": lambda _: hrsynth.singular("3rrr_m1"),
     "modes in the plane": lambda _: hrsynth.modes("3rrr_m1"),
     "modes in space": lambda _: hrsynth.modes("hexa", "1,3,5"),
-    "servo in the plane": lambda _: hrsynth.servo("3rpr_m1", start="x=-0.08,y=-0.06,phi=-10deg",
-                                                  goal="x=0.034,y=0.23,phi=23deg"),
-    "servo in space": lambda _: hrsynth.servo("quattro", "1,4", start="x=0,y=0,z=-0.75,phi=0",
-                                              goal="x=-0.2,y=0,z=-0.56,phi=0"),
+    "servo in the plane": lambda _: hrsynth.servo(
+        "3rpr_m1", start="x=-0.08,y=-0.06,phi=-10deg", goal="x=0.034,y=0.23,phi=23deg"
+    ),
+    "servo in space": lambda _: hrsynth.servo(
+        "quattro", "1,4", start="x=0,y=0,z=-0.75,phi=0", goal="x=-0.2,y=0,z=-0.56,phi=0"
+    ),
     "endings in the plane": lambda _: hrsynth.endings("prrrp_m1", at="mode:1"),
-    "basins of a plane": lambda _: hrsynth.basins("3rpr_m1", to="x=0,y=0,phi=0", grid="x=0:0.3:6,y=0:0.3:7,phi=0",
-                                                  jobs=1),
+    "basins of a plane": lambda _: hrsynth.basins(
+        "3rpr_m1", to="x=0,y=0,phi=0", grid="x=0:0.3:6,y=0:0.3:7,phi=0", jobs=1
+    ),
     "atlas": lambda _: hrsynth.atlas("quattro", "1,4"),
     "atlas with its section": lambda folder: hrsynth.atlas(six_poses(folder)),
 }
@@ -101,8 +107,9 @@ def overlapping(texts: list[Text]) -> Iterator[tuple[str, str]]:
 
 
 @pytest.mark.some(1, 2)
-@pytest.mark.parametrize("name", [name if name == "check of a line" else pytest.param(name, marks=pytest.mark.slow)
-                                  for name in QUESTIONS])
+@pytest.mark.parametrize(
+    "name", [name if name == "check of a line" else pytest.param(name, marks=pytest.mark.slow) for name in QUESTIONS]
+)
 def test_text_is_legible_on_the_page_and_apart_at_any_width(name: str, folder: str):
     found = answer(name, folder)
     for given in ASKED:
@@ -131,7 +138,8 @@ def test_text_is_legible_on_the_page_and_apart_at_any_width(name: str, folder: s
 
 def test_every_drawing_command_is_looked_at():
     assert {name for name, outputs in OUTPUTS.items() if any(file.drawn for file in outputs.files)} == {
-        name.split()[0] for name in QUESTIONS}
+        name.split()[0] for name in QUESTIONS
+    }
 
 
 def test_a_size_alone_scales_the_whole_figure():
@@ -140,8 +148,13 @@ def test_a_size_alone_scales_the_whole_figure():
     assert larger.get_size_inches() == pytest.approx(1.5 * usual.get_size_inches())
 
 
-@pytest.mark.parametrize("whole", ["from x = 0.25 m, y = -0.5 m to x = 0.75 m, y = 0.125 m",
-                                   "with the same directions of legs 1, 2, 3 as at x=0,y=0.5"])
+@pytest.mark.parametrize(
+    "whole",
+    [
+        "from x = 0.25 m, y = -0.5 m to x = 0.75 m, y = 0.125 m",
+        "with the same directions of legs 1, 2, 3 as at x=0,y=0.5",
+    ],
+)
 def test_lines_break_at_spaces_into_like_parts_and_keep_numbers_with_their_units(whole: str):
     from hrsynth.present.plots import empty_figure
 
@@ -167,6 +180,7 @@ def test_names_of_axes_in_space_are_beside_their_scales(extent: tuple[float, flo
         numbers = [tick.label1.get_window_extent() for tick in axis.get_major_ticks()]
         assert (np.abs(name.corners() - figure.bbox.size / 2) < figure.bbox.size / 2).all()
         assert not any(name.shrunk(0.8, 0.8).overlaps(each) for each in numbers)
-        gap = min(np.linalg.norm(np.subtract(*(each.corners().mean(axis=0) for each in (name, other))))
-                  for other in numbers)
+        gap = min(
+            np.linalg.norm(np.subtract(*(each.corners().mean(axis=0) for each in (name, other)))) for other in numbers
+        )
         assert gap < 60 * scale * figure.dpi / 72

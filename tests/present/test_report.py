@@ -27,9 +27,10 @@ from hrsynth.present.report.formulas import collect_symbols, formula, lower_indi
 
 FAST = ("uranesx", None)
 SLOW = [("quattro", "1,4"), ("rrrrr_m1", None), ("3ppr_m1", None)]
-PAGES = pytest.mark.parametrize(("name", "legs"), [
-    pytest.param(*FAST, id="uranesx"),
-    *(pytest.param(*each, id=each[0], marks=pytest.mark.slow) for each in SLOW)])
+PAGES = pytest.mark.parametrize(
+    ("name", "legs"),
+    [pytest.param(*FAST, id="uranesx"), *(pytest.param(*each, id=each[0], marks=pytest.mark.slow) for each in SLOW)],
+)
 CSS = (files("hrsynth.present.report") / "style.css.j2").read_text()
 
 
@@ -153,7 +154,8 @@ def test_sets_that_see_less_at_zero_are_told_in_their_row():
     page = read(report(derive(told.setting)))
     cells = [text_of(row[2]) for row in page.findall(".//table[@class='sets']/tbody/tr")]
     assert sorted({cell for cell in cells if "at the zero" in cell}) == sorted(
-        {f"{each.rank} of {each.dof} ({each.rank_at_zero} at the zero configuration)" for each in fewer})
+        {f"{each.rank} of {each.dof} ({each.rank_at_zero} at the zero configuration)" for each in fewer}
+    )
 
 
 def test_what_is_refused_is_one_sentence():
@@ -162,7 +164,8 @@ def test_what_is_refused_is_one_sentence():
     assert told == [
         "The measurements leave 1 of the platform's freedoms undetermined: a continuum of dimension 1.",
         "There is no accuracy map. The error is infinite at every pose, the legs do not see translation along z (at "
-        "the zero configuration)."]
+        "the zero configuration).",
+    ]
 
 
 def test_a_part_that_fails_leaves_its_reason():
@@ -241,8 +244,10 @@ def test_letters_and_lines_of_drawings_stand_out():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("pairs", "color"), [(list(permutations((1, 2, 3), 2)), "good"),
-                                              pytest.param([(1, 2), (2, 3)], "bad", marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    ("pairs", "color"),
+    [(list(permutations((1, 2, 3), 2)), "good"), pytest.param([(1, 2), (2, 3)], "bad", marks=pytest.mark.long)],
+)
 def test_a_formation_is_as_good_in_the_table_as_in_the_headline(pairs: list[tuple[int, int]], color: str):
     made = formation([(0, 0, 0), (1, 0.1, 0), (0.5, 0.9, 0.2)], pairs, bodies="position")
     root = read(report(derive(made)))
@@ -250,8 +255,10 @@ def test_a_formation_is_as_good_in_the_table_as_in_the_headline(pairs: list[tupl
     assert headline.get("class") == f"verdict {color}"
     cells = root.xpath("//table[@class='sets']//td[1]")
     assert {text_of(cell).split()[0]: cell.get("class") for cell in cells} == {
-        word: f"tight {shown}" for word, shown in (("flexible", "bad"), ("rigid", "good"))
-        if word == "flexible" or color == "good"}
+        word: f"tight {shown}"
+        for word, shown in (("flexible", "bad"), ("rigid", "good"))
+        if word == "flexible" or color == "good"
+    }
     assert text_of(root.xpath("//table[@class='sets']//tr[2]/td[last()]")[0]).split()[1] == "trivial;"
     assert "directions of the legs" not in text_of(root.xpath("//p[@class='lead']")[0])
 
@@ -283,16 +290,20 @@ def test_products_keep_their_brackets():
     dot, cross, _det = products()
     (b1, b2, b3), (r1, r2, r3) = ([vector(f"{name}{i}") for i in (1, 2, 3)] for name in "Br")
     for expression, printed in (
-            (dot(r1, b2 - b1) * dot(r2, b3 - b2) * dot(r3, b1 - b3)
-             - dot(r1, b1 - b3) * dot(r2, b2 - b1) * dot(r3, b3 - b2),
-             "(r1·(-B1+B2))(r2·(-B2+B3))(r3·(B1-B3))-(r1·(B1-B3))(r2·(-B1+B2))(r3·(-B2+B3))=0"),
-            (dot(b1, b2 - r1) ** 2 - dot(b1, cross(r1, b2)), "(B1·(B2-r1))2-B1·(r1×B2)=0")):
+        (
+            dot(r1, b2 - b1) * dot(r2, b3 - b2) * dot(r3, b1 - b3)
+            - dot(r1, b1 - b3) * dot(r2, b2 - b1) * dot(r3, b3 - b2),
+            "(r1·(-B1+B2))(r2·(-B2+B3))(r3·(B1-B3))-(r1·(B1-B3))(r2·(-B1+B2))(r3·(-B2+B3))=0",
+        ),
+        (dot(b1, b2 - r1) ** 2 - dot(b1, cross(r1, b2)), "(B1·(B2-r1))2-B1·(r1×B2)=0"),
+    ):
         assert re.sub("<[^>]*>|\u2062", "", html.unescape(formula(expression, "said"))) == printed
 
 
 def test_names_are_set_as_in_print():
-    assert lower_indices("τ1, B2 and ui of rod_1a <x>") == ("τ<sub>1</sub>, B<sub>2</sub> and u<sub>i</sub> of rod_1a "
-                                                       "&lt;x&gt;")
+    assert lower_indices("τ1, B2 and ui of rod_1a <x>") == (
+        "τ<sub>1</sub>, B<sub>2</sub> and u<sub>i</sub> of rod_1a &lt;x&gt;"
+    )
     assert underline_motors("2-Π-{2-U\u0332U}") == "2-Π-{2-<u>U</u>U}"
 
 
@@ -303,12 +314,20 @@ def test_symbols_that_differ_in_their_index_are_told_once():
 
 def test_an_index_is_not_read_as_a_letter_of_a_name():
     """``tip1, tip2`` are not ``tipi``, nor are the symbols of a formula names."""
-    where = {"B1": "centre of tip1", "B2": "centre of tip2", "N1": "I - u1 u1^T", "N2": "I - u2 u2^T",
-             "u1": "direction watched in leg 1 (knee1a)", "u2": "direction watched in leg 2 (knee2a)"}
+    where = {
+        "B1": "centre of tip1",
+        "B2": "centre of tip2",
+        "N1": "I - u1 u1^T",
+        "N2": "I - u2 u2^T",
+        "u1": "direction watched in leg 1 (knee1a)",
+        "u2": "direction watched in leg 2 (knee2a)",
+    }
     told = [(lower_indices(symbol), lower_indices(meaning)) for symbol, meaning in collect_symbols(where)]
-    assert told == [("B<sub>i</sub>", "centre of tip<sub>i</sub> (i = 1, 2)"),
-                    ("N<sub>i</sub>", "I - u<sub>i</sub> u<sub>i</sub><sup>T</sup> (i = 1, 2)"),
-                    ("u<sub>i</sub>", "direction watched in leg i (knee<sub>i</sub>a) (i = 1, 2)")]
+    assert told == [
+        ("B<sub>i</sub>", "centre of tip<sub>i</sub> (i = 1, 2)"),
+        ("N<sub>i</sub>", "I - u<sub>i</sub> u<sub>i</sub><sup>T</sup> (i = 1, 2)"),
+        ("u<sub>i</sub>", "direction watched in leg i (knee<sub>i</sub>a) (i = 1, 2)"),
+    ]
 
 
 # ---- the command
@@ -323,8 +342,9 @@ def test_the_command_writes_a_page_and_says_so(tmp_path: Path, capsys: pytest.Ca
 
 
 @pytest.mark.parametrize(("file", "words"), [("report.pdf", ".html"), ("none/report.html", "no such folder")])
-def test_a_page_that_cannot_be_written_is_refused_at_once(tmp_path: Path, capsys: pytest.CaptureFixture[str],
-                                                          file: str, words: str):
+def test_a_page_that_cannot_be_written_is_refused_at_once(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], file: str, words: str
+):
     assert execute(["derive", "quattro", "--report", str(tmp_path / file)]) == 2
     said = capsys.readouterr()
     assert said.out == ""
@@ -342,11 +362,29 @@ def test_accuracy_is_about_directions_that_see_everything():
 def test_a_report_speaks_of_what_is_seen_whatever_kind_it_is(tmp_path: Path):
     """A leg and two kinds besides on a planar robot: sets, condition, modes and accuracy are of all three."""
     page = tmp_path / "report.html"
-    assert execute(["derive", "3rrr_m1", "--observe", "1", "--camera", "eye=base@0.1,0.05,-0.4", "--see",
-                    "point:platform@0.05,0,0", "--see", "distance:platform@0,0.1,0", "--report", str(page)]) == 0
+    assert (
+        execute(
+            [
+                "derive",
+                "3rrr_m1",
+                "--observe",
+                "1",
+                "--camera",
+                "eye=base@0.1,0.05,-0.4",
+                "--see",
+                "point:platform@0.05,0,0",
+                "--see",
+                "distance:platform@0,0.1,0",
+                "--report",
+                str(page),
+            ]
+        )
+        == 0
+    )
     said = text_of(read(page.read_text(encoding="utf-8")))
-    asked = legs("3rrr_m1", "eye=base@0.1,0.05,-0.4", observe="1", see=["point:platform@0.05,0,0",
-                                                                         "distance:platform@0,0.1,0"])
+    asked = legs(
+        "3rrr_m1", "eye=base@0.1,0.05,-0.4", observe="1", see=["point:platform@0.05,0,0", "distance:platform@0,0.1,0"]
+    )
     assert asked.minimal == (("1", "point_1"), ("point_1", "distance_1"))
     assert "Fewest observations that show 3 of 3: 1, point_1; point_1, distance_1." in said
     assert "movesB1alongτ1,B4alongr4andB5normaltor5" in said.replace(" ", "")

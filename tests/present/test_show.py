@@ -33,8 +33,10 @@ ASKED = {
     "path": (lambda robot: hrsynth.path(robot, start=GOAL, goal=OTHER), ["--start", GOAL, "--goal", OTHER]),
     "servo": (lambda robot: hrsynth.servo(robot, start=OTHER, goal=GOAL), ["--start", OTHER, "--goal", GOAL]),
     "accuracy": (lambda robot: hrsynth.accuracy(robot, cone="0.1deg", at=[GOAL]), ["--cone", "0.1deg", "--at", GOAL]),
-    "select": (lambda robot: hrsynth.select(robot, start=GOAL, goal=OTHER, runs=0),
-               ["--start", GOAL, "--goal", OTHER, "--runs", "0"]),
+    "select": (
+        lambda robot: hrsynth.select(robot, start=GOAL, goal=OTHER, runs=0),
+        ["--start", GOAL, "--goal", OTHER, "--runs", "0"],
+    ),
 }
 """Each command's function, and the same question on the command line."""
 
@@ -67,8 +69,11 @@ def test_what_makes_an_output_is_there():
 def test_each_option_goes_somewhere(question):
     """To the function of the command, to a file, or to what shows and ends it; nothing is dropped without a word."""
     files = OUTPUTS[question.name].files
-    known = {*signature(getattr(hrsynth, question.name)).parameters, *(file.option for file in files),
-             *(name for file in files for name in file.takes)}
+    known = {
+        *signature(getattr(hrsynth, question.name)).parameters,
+        *(file.option for file in files),
+        *(name for file in files for name in file.takes),
+    }
     for extra in (question.shows, question.after):
         known |= set() if extra is None else set(signature(extra).parameters)
     assert {option.name for option in question.options} <= known
@@ -83,8 +88,9 @@ def test_a_result_is_printed_as_by_the_command_line(command: str, capsys: pytest
     assert str(found) == hrsynth.text(found) == capsys.readouterr().out.rstrip("\n")
 
 
-@pytest.mark.parametrize("command", [pytest.param(each, marks=pytest.mark.slow) if each == "select" else each
-                                     for each in ASKED])
+@pytest.mark.parametrize(
+    "command", [pytest.param(each, marks=pytest.mark.slow) if each == "select" else each for each in ASKED]
+)
 def test_a_result_is_one_line_at_a_prompt_and_marked_up_in_a_notebook(command: str):
     found = answer(command)
     assert repr(found).startswith(f"<{type(found).__name__}: rrrrr_m1")

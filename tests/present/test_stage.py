@@ -21,8 +21,10 @@ SIZE = {"width": 900, "height": 600}
 PANEL = 300
 AT_REST = 700
 """Milliseconds in which a page at rest draws nothing."""
-STILL = ("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => requestAnimationFrame("
-         "() => done(stage.drawn)))))")
+STILL = (
+    "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => requestAnimationFrame("
+    "() => done(stage.drawn)))))"
+)
 
 
 @pytest.fixture
@@ -33,17 +35,22 @@ def open_page(tab: Tab, tmp_path: Path) -> Callable[..., Tab]:
         tab.page.set_viewport_size(size)
         tab.open(file, READY)
         return tab
+
     return opened
 
 
 def on_page(tab: Tab, point: Any) -> tuple[float, float]:
     """Where a point of the base frame is seen (pixels of the page)."""
-    return tuple(tab.page.evaluate("""p => {
+    return tuple(
+        tab.page.evaluate(
+            """p => {
       stage.world.updateMatrixWorld(true);
       const seen = new THREE.Vector3(...p).applyMatrix4(stage.sides.real.matrixWorld).project(stage.sight.camera);
       const box = stage.canvas.getBoundingClientRect();
       return [box.left + (1 + seen.x) / 2 * box.width, box.top + (1 - seen.y) / 2 * box.height]; }""",
-                                   [float(v) for v in point]))
+            [float(v) for v in point],
+        )
+    )
 
 
 def ask(tab: Tab, script: str) -> Any:
@@ -106,8 +113,11 @@ def test_a_finger_picks_a_leg_beside_which_it_comes_down(browser: Any, tmp_path:
 def test_a_mode_that_is_clicked_is_told_by_its_label(open_page):
     tab = open_page("quattro")
     ask(tab, "window.told = []; stage.onghost = (label) => told.push(label); 0")
-    names = ask(tab, """stage.parts.ghosts.children.map((group) => [...group.children].find((each) => each.isSprite))
-                        .map((each) => [each.userData.pick.name, each.position.toArray()])""")
+    names = ask(
+        tab,
+        """stage.parts.ghosts.children.map((group) => [...group.children].find((each) => each.isSprite))
+                        .map((each) => [each.userData.pick.name, each.position.toArray()])""",
+    )
     assert [name for name, _ in names] == [outline.label for outline in seen("quattro").mode_outlines]
     for name, point in names:
         tab.page.mouse.click(*on_page(tab, point))
@@ -155,23 +165,37 @@ def test_an_arrow_of_a_lost_freedom_moves_as_its_twist_says(open_page):
     for twist in (translation, turn, *rng.normal(size=(6, 6))):
         p, x = rng.normal(size=(2, 3))
         h = 1e-5
-        ends = np.array(tab.page.evaluate("""([twist, point, x, h]) => {
+        ends = np.array(
+            tab.page.evaluate(
+                """([twist, point, x, h]) => {
           const motion = new Overlays.Motion({ twist, point }, 1);
           return [-h, h].map((by) => motion.carry(new THREE.Vector3(...x), by).toArray()); }""",
-                                          [twist.tolist(), p.tolist(), x.tolist(), h]))
+                [twist.tolist(), p.tolist(), x.tolist(), h],
+            )
+        )
         found, wanted = (ends[1] - ends[0]) / (2 * h), twist[:3] + np.cross(twist[3:], x - p)
         size = np.linalg.norm(twist[3:]) or np.linalg.norm(twist[:3])
         assert found == pytest.approx(wanted / size, abs=1e-6)
 
 
-@pytest.mark.parametrize(("name", "modes"), [("3rrr_m1", {"translate": 2, "rotate": 1}), ("rrrrr_m1", {"translate": 2}),
-                                             ("delta", {"translate": 3}), ("3rps", {"translate": 1, "rotate": 2}),
-                                             ("gough_stewart", {"translate": 3, "rotate": 3})])
+@pytest.mark.parametrize(
+    ("name", "modes"),
+    [
+        ("3rrr_m1", {"translate": 2, "rotate": 1}),
+        ("rrrrr_m1", {"translate": 2}),
+        ("delta", {"translate": 3}),
+        ("3rps", {"translate": 1, "rotate": 2}),
+        ("gough_stewart", {"translate": 3, "rotate": 3}),
+    ],
+)
 def test_handles_are_those_of_the_platforms_freedoms(open_page, name: str, modes: dict[str, int]):
     tab = open_page(name)
     ask(tab, "stage.gizmo(true)")
-    found = ask(tab, """Object.fromEntries(stage.handles.parts.map(({ mode, controls }) =>
-                        [mode, [controls.showX, controls.showY, controls.showZ].filter(Boolean).length]))""")
+    found = ask(
+        tab,
+        """Object.fromEntries(stage.handles.parts.map(({ mode, controls }) =>
+                        [mode, [controls.showX, controls.showY, controls.showZ].filter(Boolean).length]))""",
+    )
     assert found == modes
     ask(tab, "stage.gizmo(false)")
     assert ask(tab, "stage.handles") is None
@@ -198,26 +222,36 @@ def test_a_platform_that_is_dragged_tells_places_within_its_freedoms(open_page):
     assert np.abs(places[:, 1:3]).max() < 1e-9, "along x alone"
     assert 0.5 * step < places[-1, 0] < 2 * step
     assert ask(tab, "stage.sight.turned") is False, "the view has not turned with it"
-    assert ask(tab, "stage.handles.parts[0].proxy.position.toArray()") == pytest.approx(centre, abs=1e-6), \
+    assert ask(tab, "stage.handles.parts[0].proxy.position.toArray()") == pytest.approx(centre, abs=1e-6), (
         "what was not answered is not kept"
+    )
 
 
 def test_a_ring_turns_the_platform_about_its_point(open_page):
     tab, found = open_page("3rrr_m1"), seen("3rrr_m1")
     mechanism = found.setting.mechanism
     centre = mechanism.links[mechanism.platform].pose[:3, 3]
-    place = np.array(ask(tab, """(() => {
+    place = np.array(
+        ask(
+            tab,
+            """(() => {
       stage.gizmo(true);
       const { proxy, at } = stage.handles.parts.find(({ mode }) => mode === "rotate");
       proxy.quaternion.premultiply(new THREE.Quaternion().setFromAxisAngle(new THREE.Vector3(0, 0, 1), 0.3));
-      return stage.handles.dragged("rotate", proxy, at.turn); })()"""))
+      return stage.handles.dragged("rotate", proxy, at.turn); })()""",
+        )
+    )
     assert moved(place, centre) == pytest.approx(centre, abs=1e-9)
     assert turned(place, np.array([1.0, 0, 0])) == pytest.approx([np.cos(0.3), np.sin(0.3), 0], abs=1e-9)
 
 
-PLANE = {"corners": [[-0.1, -0.1, 0.05], [0.1, -0.1, 0.05], [0.1, 0.1, 0.05], [-0.1, 0.1, 0.05]], "at": 0.05,
-         "values": [[0.5, 2.0, None], [5.0, 20.0, 50.0]], "steps": [1, 3, 10, 30],
-         "locus": [[[-0.1, 0, 0.05], [0, 0.05, 0.05], [0.1, 0, 0.05]]]}
+PLANE = {
+    "corners": [[-0.1, -0.1, 0.05], [0.1, -0.1, 0.05], [0.1, 0.1, 0.05], [-0.1, 0.1, 0.05]],
+    "at": 0.05,
+    "values": [[0.5, 2.0, None], [5.0, 20.0, 50.0]],
+    "steps": [1, 3, 10, 30],
+    "locus": [[[-0.1, 0, 0.05], [0, 0.05, 0.05], [0.1, 0, 0.05]]],
+}
 
 
 def test_a_plane_has_cells_of_the_scales_colours_and_is_drawn_along_its_normal(open_page):
@@ -247,8 +281,13 @@ def test_a_plane_has_cells_of_the_scales_colours_and_is_drawn_along_its_normal(o
 
 def test_a_plane_across_no_direction_has_no_handle_and_a_falling_scale_is_told(open_page):
     tab = open_page("3rrr_m1")
-    record = {**PLANE, "normal": None, "falling": True, "steps": [0.01, 0.03, 0.1, 0.3],
-              "values": [[0.005, 0.02], [0.05, 0.2], [0.5, None]]}
+    record = {
+        **PLANE,
+        "normal": None,
+        "falling": True,
+        "steps": [0.01, 0.03, 0.1, 0.3],
+        "values": [[0.005, 0.02], [0.05, 0.2], [0.5, None]],
+    }
     ask(tab, f"stage.plane({json.dumps(record)})")
     rgba = np.array(ask(tab, "[...stage.sheet.cells().image.data]")).reshape(6, 4)
     shown = ["#" + bytes(row[:3].tolist()).hex() for row in rgba[:5]]
@@ -279,17 +318,30 @@ def test_an_ellipsoid_is_magnified_by_what_the_legend_says(open_page):
 def test_the_legend_holds_all_that_is_drawn_and_no_more(open_page):
     """Every colour of a material that is seen, against the table."""
     tab = open_page("quattro")
-    scripts = ["stage.layout('overlay')", "stage.layout('real')", "stage.layout('hidden')", "stage.layout('beside')",
-               "stage.watch(['1'])", "stage.goal(scene.home)",
-               "stage.lost([{twist: [0, 0, 1, 0, 0, 0], point: [0, 0, 0]}])",
-               "stage.ellipsoid({center: [0, 0, 0], axes: [[0.001, 0, 0], [0, 0.001, 0], [0, 0, 0.001]]})",
-               "stage.ghosts([])", "stage.directions(false)", "stage.layout('none')"]
+    scripts = [
+        "stage.layout('overlay')",
+        "stage.layout('real')",
+        "stage.layout('hidden')",
+        "stage.layout('beside')",
+        "stage.watch(['1'])",
+        "stage.goal(scene.home)",
+        "stage.lost([{twist: [0, 0, 1, 0, 0, 0], point: [0, 0, 0]}])",
+        "stage.ellipsoid({center: [0, 0, 0], axes: [[0.001, 0, 0], [0, 0.001, 0], [0, 0, 0.001]]})",
+        "stage.ghosts([])",
+        "stage.directions(false)",
+        "stage.layout('none')",
+    ]
     for script in scripts:
         ask(tab, script)
-        drawn = set(ask(tab, """(() => { const found = new Set();
+        drawn = set(
+            ask(
+                tab,
+                """(() => { const found = new Set();
           const add = (each) => { if (each.isMesh) found.add("#" + each.material.color.getHexString()); };
           stage.world.traverseVisible(add);
-          return [...found]; })()"""))
+          return [...found]; })()""",
+            )
+        )
         legend = {each["colour"]: each["key"] for each in ask(tab, "stage.legend()")}
         assert drawn <= legend.keys(), script
         extra = {key for colour, key in legend.items() if colour not in drawn}
@@ -313,27 +365,36 @@ def test_the_scale_says_its_thresholds_and_where_the_platform_is(open_page):
 def test_two_robots_beside_each_other_do_not_touch(open_page, size: dict[str, int]):
     tab = open_page("quattro", size)
     ask(tab, "stage.ghosts([]); stage.layout('beside')")
-    boxes = ask(tab, """["real", "hidden"].map((key) => {
+    boxes = ask(
+        tab,
+        """["real", "hidden"].map((key) => {
       const corners = Sight.corners([stage.machines[key].group]), { across, up } = stage.sight;
-      return [Sight.span(corners, across), Sight.span(corners, up)]; })""")
+      return [Sight.span(corners, across), Sight.span(corners, up)]; })""",
+    )
     (wide, high), (wide1, high1) = boxes
     apart = wide[1] < wide1[0] if size is SIZE else high1[1] < high[0]
     assert apart, boxes
     rest(tab)
     box = tab.page.locator("main canvas").bounding_box()
-    inside = ask(tab, """(() => Sight.corners([stage.sides.real, stage.sides.hidden, stage.names])
-      .map((p) => p.project(stage.sight.camera)).every(({ x, y }) => Math.abs(x) < 1 && Math.abs(y) < 1))()""")
+    inside = ask(
+        tab,
+        """(() => Sight.corners([stage.sides.real, stage.sides.hidden, stage.names])
+      .map((p) => p.project(stage.sight.camera)).every(({ x, y }) => Math.abs(x) < 1 && Math.abs(y) < 1))()""",
+    )
     assert inside
     assert box["width"] == size["width"] - (PANEL if size is SIZE else 0)
 
 
 def test_the_picture_is_a_png_as_large_as_the_pane(open_page):
     tab = open_page("3rrr_m1")
-    size, kind, corner = ask(tab, """stage.picture().then(async (blob) => {
+    size, kind, corner = ask(
+        tab,
+        """stage.picture().then(async (blob) => {
       const image = await createImageBitmap(blob), canvas = new OffscreenCanvas(image.width, image.height);
       canvas.getContext("2d").drawImage(image, 0, 0);
       const data = canvas.getContext("2d").getImageData(2, 2, 1, 1).data;
-      return [[image.width, image.height], blob.type, [...data]]; })""")
+      return [[image.width, image.height], blob.type, [...data]]; })""",
+    )
     assert (size, kind, corner) == ([SIZE["width"] - PANEL, SIZE["height"]], "image/png", [245, 247, 250, 255])
 
 
@@ -385,13 +446,16 @@ def test_what_lies_on_the_pane_covers_nothing_of_the_robot(open_page, size: dict
                         return [(1 - Math.max(...seen)) / 2 * height, (1 + Math.min(...seen)) / 2 * height]; })()"""
     top, bottom = ask(tab, edges)
     assert top == pytest.approx(bottom, abs=0.1 * size["height"])
-    ask(tab, """for (const [edge, height] of [["top", 80], ["bottom", 40]]) {
+    ask(
+        tab,
+        """for (const [edge, height] of [["top", 80], ["bottom", 40]]) {
       const bar = document.createElement("div");
       bar.style.cssText = `position: absolute; ${edge}: 0; left: 0; width: 100%; height: ${height}px`;
       stage.parent.append(bar);
       stage.over.push(bar);
     }
-    stage.fit()""")
+    stage.fit()""",
+    )
     top, bottom = ask(tab, edges)
     assert top > 80
     assert bottom > 40

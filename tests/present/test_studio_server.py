@@ -39,15 +39,47 @@ websockets = pytest.importorskip("websockets")
 
 DESK = "present.studio_desk:StandIn"
 HERE, OWN = ["127.0.0.1:PORT"], ["http://127.0.0.1:PORT"]
-ELSEWHERE = ["", "evil.example", "evil.example:PORT", "127.0.0.1", "127.0.0.1:1", "127.0.0.1:PORT.evil.example",
-             "127.0.0.1:PORT@evil.example", "localhost", "localhost.:PORT", "0.0.0.0:PORT", "127.0.0.2:PORT",
-             "[::]:PORT", "127.0.0.1:0PORT", "127.1:PORT", "LOCALHOST.evil:PORT", "127.0.0.1:PORT, 127.0.0.1:PORT",
-             "127.0.0.1:PORT\xff"]
-FOREIGN = ["null", "", "http://evil.example", "https://127.0.0.1:PORT", "http://127.0.0.1", "http://127.0.0.1:1",
-           "http://127.0.0.1:PORT/", "http://127.0.0.1:PORT.evil.example", "http://127.0.0.1:PORT@evil.example",
-           "file://", "127.0.0.1:PORT", "http://evil.example http://127.0.0.1:PORT", "*", "http://localhost:PORT"]
-SOCKET = ["Connection: Upgrade", "Upgrade: websocket", "Sec-WebSocket-Version: 13",
-          "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ=="]
+ELSEWHERE = [
+    "",
+    "evil.example",
+    "evil.example:PORT",
+    "127.0.0.1",
+    "127.0.0.1:1",
+    "127.0.0.1:PORT.evil.example",
+    "127.0.0.1:PORT@evil.example",
+    "localhost",
+    "localhost.:PORT",
+    "0.0.0.0:PORT",
+    "127.0.0.2:PORT",
+    "[::]:PORT",
+    "127.0.0.1:0PORT",
+    "127.1:PORT",
+    "LOCALHOST.evil:PORT",
+    "127.0.0.1:PORT, 127.0.0.1:PORT",
+    "127.0.0.1:PORT\xff",
+]
+FOREIGN = [
+    "null",
+    "",
+    "http://evil.example",
+    "https://127.0.0.1:PORT",
+    "http://127.0.0.1",
+    "http://127.0.0.1:1",
+    "http://127.0.0.1:PORT/",
+    "http://127.0.0.1:PORT.evil.example",
+    "http://127.0.0.1:PORT@evil.example",
+    "file://",
+    "127.0.0.1:PORT",
+    "http://evil.example http://127.0.0.1:PORT",
+    "*",
+    "http://localhost:PORT",
+]
+SOCKET = [
+    "Connection: Upgrade",
+    "Upgrade: websocket",
+    "Sec-WebSocket-Version: 13",
+    "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==",
+]
 
 
 @pytest.fixture(scope="module")
@@ -65,11 +97,23 @@ def page(server: StudioServer) -> Iterator[Page]:
 
 def wanted(server: StudioServer, kind: str, hosts: list[str], origins: list[str]) -> bytes:
     """What is answered to the page, a file of it, a file that is dropped in, the opening of a socket."""
-    heads = {"page": "GET /SECRET/", "file": "GET /SECRET/studio.js", "upload": "POST /SECRET/upload?tab=x&name=a.urdf",
-             "socket": "GET /SECRET/live"}
+    heads = {
+        "page": "GET /SECRET/",
+        "file": "GET /SECRET/studio.js",
+        "upload": "POST /SECRET/upload?tab=x&name=a.urdf",
+        "socket": "GET /SECRET/live",
+    }
     more = {"socket": SOCKET, "upload": ["Content-Length: 2"]}.get(kind, [])
-    return said(server, [f"{heads[kind]} HTTP/1.1", *(f"Host: {each}" for each in hosts),
-                         *(f"Origin: {each}" for each in origins), *more], b"ab" if kind == "upload" else b"")
+    return said(
+        server,
+        [
+            f"{heads[kind]} HTTP/1.1",
+            *(f"Host: {each}" for each in hosts),
+            *(f"Origin: {each}" for each in origins),
+            *more,
+        ],
+        b"ab" if kind == "upload" else b"",
+    )
 
 
 def law_refused(answer: bytes, *statuses: int) -> None:
@@ -105,8 +149,12 @@ def test_a_foreign_host_name_is_refused(server: StudioServer, kind: str):
 def test_another_origins_page_is_refused(server: StudioServer, kind: str):
     for origin in FOREIGN:
         law_refused(wanted(server, kind, HERE, [origin]), 400, 403)
-    for origins in ([] if kind in ("upload", "socket") else ["null"], OWN * 2, [*OWN, "null"],
-                    ["http://evil.example", *OWN]):
+    for origins in (
+        [] if kind in ("upload", "socket") else ["null"],
+        OWN * 2,
+        [*OWN, "null"],
+        ["http://evil.example", *OWN],
+    ):
         law_refused(wanted(server, kind, HERE, origins), 400, 403)
     for method in ("OPTIONS", "PUT", "DELETE", "PATCH", "TRACE", "POST"):
         answer = said(server, [f"{method} /SECRET/ HTTP/1.1", "Host: 127.0.0.1:PORT", "Origin: http://evil.example"])
@@ -115,11 +163,25 @@ def test_another_origins_page_is_refused(server: StudioServer, kind: str):
 
 def test_who_does_not_know_the_secret_is_refused(server: StudioServer):
     secret = server.guard.secret
-    for wrong in ("", secret[:-1], secret + "x", secret.swapcase(), secret[::-1], "x" * 10_000, f"/{secret}",
-                  f"x/../{secret}", f"%{ord(secret[0]):02x}{secret[1:]}", f"{secret}%00"):
+    for wrong in (
+        "",
+        secret[:-1],
+        secret + "x",
+        secret.swapcase(),
+        secret[::-1],
+        "x" * 10_000,
+        f"/{secret}",
+        f"x/../{secret}",
+        f"%{ord(secret[0]):02x}{secret[1:]}",
+        f"{secret}%00",
+    ):
         law_refused(said(server, [f"GET /{wrong}/ HTTP/1.1", "Host: 127.0.0.1:PORT"]), 404)
-        assert status_of(said(server, [f"GET /{wrong}/live HTTP/1.1", "Host: 127.0.0.1:PORT",
-                                       "Origin: http://127.0.0.1:PORT", *SOCKET])) in (0, 404)
+        assert status_of(
+            said(
+                server,
+                [f"GET /{wrong}/live HTTP/1.1", "Host: 127.0.0.1:PORT", "Origin: http://127.0.0.1:PORT", *SOCKET],
+            )
+        ) in (0, 404)
     law_refused(said(server, [f"GET /{secret} HTTP/1.1", "Host: 127.0.0.1:PORT"]), 303)
     assert len(secret) >= 40
     assert secret not in (server.guard.door(), StudioServer.__doc__)
@@ -134,12 +196,35 @@ def test_the_door_for_the_browser_opens_once(server: StudioServer):
     law_refused(said(server, [f"GET /{server.guard.door()}/ HTTP/1.1", "Host: evil.example"]), 403)
 
 
-@pytest.mark.parametrize("path", [
-    "../server.py", "..%2fserver.py", "%2e%2e/server.py", "%2e%2e%2f%2e%2e%2fworker.py", "..\\server.py",
-    "..%5cserver.py", "/etc/passwd", "%2fetc%2fpasswd", "//etc/passwd", "studio.html/../../server.py",
-    "studio.html%00.js", "server.py",
-    ".", "..", "./studio.html", "%2e/studio.html", "file:///etc/passwd", "studio", "STUDIO.HTML.js", "a" * 5000,
-    "%ff%fe", "%", "upload", "live"])
+@pytest.mark.parametrize(
+    "path",
+    [
+        "../server.py",
+        "..%2fserver.py",
+        "%2e%2e/server.py",
+        "%2e%2e%2f%2e%2e%2fworker.py",
+        "..\\server.py",
+        "..%5cserver.py",
+        "/etc/passwd",
+        "%2fetc%2fpasswd",
+        "//etc/passwd",
+        "studio.html/../../server.py",
+        "studio.html%00.js",
+        "server.py",
+        ".",
+        "..",
+        "./studio.html",
+        "%2e/studio.html",
+        "file:///etc/passwd",
+        "studio",
+        "STUDIO.HTML.js",
+        "a" * 5000,
+        "%ff%fe",
+        "%",
+        "upload",
+        "live",
+    ],
+)
 def test_no_path_leads_out_of_the_pages_folder(server: StudioServer, path: str):
     answer = said(server, [f"GET /SECRET/{path} HTTP/1.1", "Host: 127.0.0.1:PORT"])
     assert status_of(answer) in (400, 403, 404, 405)
@@ -167,7 +252,10 @@ def test_every_answer_has_the_strict_policy(server: StudioServer):
         assert policy["frame-ancestors"] == policy["base-uri"] == policy["form-action"] == "'none'"
         assert "unsafe" not in fields["content-security-policy"]
         assert (fields["x-content-type-options"], fields["referrer-policy"], fields["cache-control"]) == (
-            "nosniff", "no-referrer", "no-store")
+            "nosniff",
+            "no-referrer",
+            "no-store",
+        )
         assert "server" not in fields
 
 
@@ -254,7 +342,9 @@ def test_a_question_that_takes_too_long_is_given_up(server: StudioServer, monkey
         for kind in ("busy", "sleep"):
             answer = page.ask(kind, seconds=60)
             assert (answer["kind"], answer["error"]) == (
-                "TooSlow", "that takes longer than 0.3 seconds and was given up")
+                "TooSlow",
+                "that takes longer than 0.3 seconds and was given up",
+            )
         after = page.ask("open")["answer"]["process"]
         assert before != after
         assert soon(lambda: not alive(before))
@@ -263,11 +353,12 @@ def test_a_question_that_takes_too_long_is_given_up(server: StudioServer, monkey
 def test_what_fails_is_one_line_and_the_next_is_answered(page: Page):
     process = page.ask("open")["answer"]["process"]
     for kind, fields, told, name in (
-            ("refuse", {}, "nothing fits, found 7, allowed: less", "BadRequest"),
-            ("defect", {}, "a defect of hrsynth itself, please report it: ZeroDivisionError: by zero", "Defect"),
-            ("nan", {}, "a defect of hrsynth itself", "Defect"),
-            ("eat", {"bytes": 10**11}, "more memory than is allowed (4 GB)", "MemoryError"),
-            ("echo", {"text": "x", "times": 70_000_000}, "bytes, at most", "TooLarge")):
+        ("refuse", {}, "nothing fits, found 7, allowed: less", "BadRequest"),
+        ("defect", {}, "a defect of hrsynth itself, please report it: ZeroDivisionError: by zero", "Defect"),
+        ("nan", {}, "a defect of hrsynth itself", "Defect"),
+        ("eat", {"bytes": 10**11}, "more memory than is allowed (4 GB)", "MemoryError"),
+        ("echo", {"text": "x", "times": 70_000_000}, "bytes, at most", "TooLarge"),
+    ):
         answer = page.ask(kind, **fields)
         assert told in answer["error"]
         assert answer["kind"] == name
@@ -297,16 +388,36 @@ def test_a_process_that_ended_at_rest_is_replaced(page: Page):
         assert page.ask(kind)["answer"]["process"] != process
 
 
-@pytest.mark.parametrize("message", [
-    "", "x", "[]", "7", "null", '"x"', "{}", '{"n": 1}', '{"ask": "open"}', '{"n": "1", "ask": "open"}',
-    '{"n": 1.5, "ask": "open"}', '{"n": 1, "ask": 7}', '{"n": true, "ask": "open"}',
-    '{"n": 1, "ask": "cancel"}', '{"ask": "cancel", "of": "x"}',
-    '{"ask": ["open"], "n": 1}',
-    '{"n": 1, "ask": "open"', "[" * 100_000,
-    '{"n": 1, "ask": "open", "x": ' + '{"a":' * 20_000 + "1" + "}" * 20_001,
-    '{"n": ' + "9" * 5000 + ', "ask": "open"}', '{"n": NaN, "ask": "open"}',
-    '{"n": 1, "ask": "open", "x": Infinity}',
-    b"\x00\x01", '{"n": 1, "ask": "\\ud800"}x'], ids=lambda text: repr(text)[:40])
+@pytest.mark.parametrize(
+    "message",
+    [
+        "",
+        "x",
+        "[]",
+        "7",
+        "null",
+        '"x"',
+        "{}",
+        '{"n": 1}',
+        '{"ask": "open"}',
+        '{"n": "1", "ask": "open"}',
+        '{"n": 1.5, "ask": "open"}',
+        '{"n": 1, "ask": 7}',
+        '{"n": true, "ask": "open"}',
+        '{"n": 1, "ask": "cancel"}',
+        '{"ask": "cancel", "of": "x"}',
+        '{"ask": ["open"], "n": 1}',
+        '{"n": 1, "ask": "open"',
+        "[" * 100_000,
+        '{"n": 1, "ask": "open", "x": ' + '{"a":' * 20_000 + "1" + "}" * 20_001,
+        '{"n": ' + "9" * 5000 + ', "ask": "open"}',
+        '{"n": NaN, "ask": "open"}',
+        '{"n": 1, "ask": "open", "x": Infinity}',
+        b"\x00\x01",
+        '{"n": 1, "ask": "\\ud800"}x',
+    ],
+    ids=lambda text: repr(text)[:40],
+)
 def test_what_is_no_message_is_refused(page: Page, message: str | bytes):
     page.line.send(message)
     answer = page.heard()
@@ -336,10 +447,33 @@ def test_too_many_questions_at_once_are_refused(page: Page, monkeypatch: pytest.
     assert kinds[numbers[0]] is None
 
 
-@pytest.mark.parametrize("name", [
-    "", ".", "..", "../x.urdf", "..%2Fx.urdf", "%2Fetc%2Fpasswd", "a%2Fb.urdf", "a%5Cb.urdf", ".hidden", "-rf",
-    "a%00.urdf", "a%0A.urdf", "x.", "x%20", "~", "a:b", "a%2F..%2F..%2Fb", "%E2%80%AEx.urdf", "%ff",
-    "a" * 201, "%C3%A9" * 101, "a*"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "",
+        ".",
+        "..",
+        "../x.urdf",
+        "..%2Fx.urdf",
+        "%2Fetc%2Fpasswd",
+        "a%2Fb.urdf",
+        "a%5Cb.urdf",
+        ".hidden",
+        "-rf",
+        "a%00.urdf",
+        "a%0A.urdf",
+        "x.",
+        "x%20",
+        "~",
+        "a:b",
+        "a%2F..%2F..%2Fb",
+        "%E2%80%AEx.urdf",
+        "%ff",
+        "a" * 201,
+        "%C3%A9" * 101,
+        "a*",
+    ],
+)
 def test_names_that_lead_elsewhere_are_refused(server: StudioServer, page: Page, name: str):
     answer = posted(server, page.start["tab"], name, b"x")
     assert status_of(answer) == 400
@@ -369,12 +503,15 @@ def test_a_file_of_a_gigabyte_is_refused_before_it_comes(server: StudioServer, p
     assert os.listdir(Path(server.folder.name, page.start["tab"])) == []
 
 
-def test_a_file_without_a_length_is_counted_while_it_comes(server: StudioServer, page: Page,
-                                                           monkeypatch: pytest.MonkeyPatch):
+def test_a_file_without_a_length_is_counted_while_it_comes(
+    server: StudioServer, page: Page, monkeypatch: pytest.MonkeyPatch
+):
     monkeypatch.setattr(uploads, "LARGEST_UPLOAD", 100_000)
     tab, sent = page.start["tab"], 0
-    head = (f"POST /{server.guard.secret}/upload?tab={tab}&name=big.stl HTTP/1.1\r\n"
-            f"Host: 127.0.0.1:{port_of(server)}\r\nOrigin: {origin_of(server)}\r\nTransfer-Encoding: chunked\r\n\r\n")
+    head = (
+        f"POST /{server.guard.secret}/upload?tab={tab}&name=big.stl HTTP/1.1\r\n"
+        f"Host: 127.0.0.1:{port_of(server)}\r\nOrigin: {origin_of(server)}\r\nTransfer-Encoding: chunked\r\n\r\n"
+    )
     with socket.create_connection(("127.0.0.1", port_of(server)), timeout=20) as line:
         line.sendall(head.encode())
         try:
@@ -401,13 +538,16 @@ def test_a_file_that_breaks_off_is_not_kept(server: StudioServer, page: Page):
     assert soon(lambda: os.listdir(Path(server.folder.name, page.start["tab"])) == [])
 
 
-def test_slow_senders_are_given_up(server: StudioServer, page: Page, monkeypatch: pytest.MonkeyPatch,
-                                   capfd: pytest.CaptureFixture[str]):
+def test_slow_senders_are_given_up(
+    server: StudioServer, page: Page, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+):
     for module in (serving, uploads):
         monkeypatch.setattr(module, "SENDER_SECONDS", 0.2)
     tab, port = page.start["tab"], port_of(server)
-    whole = (f"POST /{server.guard.secret}/upload?tab={tab}&name=a.urdf HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n"
-             f"Origin: http://127.0.0.1:{port}\r\nContent-Length: 100\r\n\r\n")
+    whole = (
+        f"POST /{server.guard.secret}/upload?tab={tab}&name=a.urdf HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n"
+        f"Origin: http://127.0.0.1:{port}\r\nContent-Length: 100\r\n\r\n"
+    )
     for text in ("", "GET /", whole[:60], whole + "ab"):
         with socket.create_connection(("127.0.0.1", port), timeout=5) as line:
             line.sendall(text.encode())
@@ -418,10 +558,16 @@ def test_slow_senders_are_given_up(server: StudioServer, page: Page, monkeypatch
 
 
 def test_odd_bytes_are_refused_without_a_word(server: StudioServer, capfd: pytest.CaptureFixture[str]):
-    for text in (b"\x16\x03\x01\x02\x00\x01\x00", b"GET /\xff\xfe HTTP/1.1\r\n\r\n", b"\r\n" * 1000,
-                 b"GET / HTTP/9.9\r\n\r\n", b"GET /" + b"a" * 100_000 + b" HTTP/1.1\r\n\r\n", b"x" * 100_000,
-                 b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n",
-                 b"GET / HTTP/1.1\r\n" + b"A: b\r\n" * 20_000 + b"\r\n"):
+    for text in (
+        b"\x16\x03\x01\x02\x00\x01\x00",
+        b"GET /\xff\xfe HTTP/1.1\r\n\r\n",
+        b"\r\n" * 1000,
+        b"GET / HTTP/9.9\r\n\r\n",
+        b"GET /" + b"a" * 100_000 + b" HTTP/1.1\r\n\r\n",
+        b"x" * 100_000,
+        b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n",
+        b"GET / HTTP/1.1\r\n" + b"A: b\r\n" * 20_000 + b"\r\n",
+    ):
         with socket.create_connection(("127.0.0.1", port_of(server)), timeout=20) as line:
             try:
                 line.sendall(text)
@@ -444,8 +590,13 @@ def test_the_first_message_says_what_was_opened(tmp_path: Path):
     made = StudioServer(Opening(tmp_path, {"robot": "3rrr_m1", "options": {}}, first=first, panels=False), desk=DESK)
     try:
         with opened(made) as page:
-            assert {**page.start, "tab": ""} == {"start": {"source": "given", "options": {}}, "tab": "", **first,
-                                                 "folder": True, "panels": False}
+            assert {**page.start, "tab": ""} == {
+                "start": {"source": "given", "options": {}},
+                "tab": "",
+                **first,
+                "folder": True,
+                "panels": False,
+            }
             found = page.ask("open")["answer"]
             assert (found["folder"], found["given"]) == (str(tmp_path), {"robot": "3rrr_m1", "options": {}})
             assert re.fullmatch(r"<StudioServer: http://127\.0\.0\.1:\d+/[\w-]+/>", repr(made))
@@ -458,6 +609,7 @@ def test_the_first_message_says_what_was_opened(tmp_path: Path):
 @pytest.mark.slow
 def test_thousands_of_questions_and_many_tabs_leave_nothing(server: StudioServer):
     """Memory of the server, of what forks and of what answers; open files."""
+
     def size(process: int | str) -> float:
         found = re.search(r"VmRSS:\s+(\d+)", Path(f"/proc/{process}/status").read_text())
         assert found
@@ -518,7 +670,8 @@ def test_a_browser_keeps_another_pages_script_out(server: StudioServer, page: Pa
     tab = browser.new_page()
     try:
         tab.goto(f"http://127.0.0.1:{other.server_port}/")
-        found = tab.evaluate("""async ([address, tab]) => {
+        found = tab.evaluate(
+            """async ([address, tab]) => {
             const socket = await new Promise((done) => {
                 const line = new WebSocket(address.replace("http", "ws") + "live");
                 line.onopen = () => done("open");
@@ -533,7 +686,9 @@ def test_a_browser_keeps_another_pages_script_out(server: StudioServer, page: Pa
             return [socket, script, await tried(""), await tried("", { mode: "no-cors" }),
                     await tried(`upload?tab=${tab}&name=a.urdf`, { method: "POST", body: "x" }),
                     await tried(`upload?tab=${tab}&name=b.urdf`, { method: "POST", body: "x", mode: "no-cors" })];
-        }""", [server.address, page.start["tab"]])
+        }""",
+            [server.address, page.start["tab"]],
+        )
         assert [each or "refused" for each in found] == ["refused"] * len(found)
         assert os.listdir(Path(server.folder.name, page.start["tab"])) == []
     finally:

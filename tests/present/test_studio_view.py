@@ -34,8 +34,14 @@ def told(page: Page, kind: str, **fields: Any) -> dict[str, Any]:
 def law_closed(found: View, state: dict) -> None:
     mechanism = found.setting.mechanism
     places = dict(zip(mechanism.links, np.array(state["real"]), strict=True))
-    assert max(miss(joint, *(places[link] for link in joint.links)) for joint in mechanism.joints.values()
-               if joint.type is not JointType.FREE) < 1e-6
+    assert (
+        max(
+            miss(joint, *(places[link] for link in joint.links))
+            for joint in mechanism.joints.values()
+            if joint.type is not JointType.FREE
+        )
+        < 1e-6
+    )
 
 
 @pytest.mark.parametrize("name", [FIVE_BAR, "quattro"])
@@ -84,19 +90,26 @@ def test_a_robot_of_no_file_is_served_and_turns_by_the_angle_that_its_slider_sho
     assert not Path(server.folder.name).exists()
 
 
-LAUGHS = ('<?xml version="1.0"?><!DOCTYPE robot [<!ENTITY a "' + "ha" * 500 + '">'
-          + "".join(f'<!ENTITY {b} "{f"&{a};" * 10}">' for a, b in zip("abcdefghi", "bcdefghij", strict=True))
-          + ']><robot name="x"><link name="&j;"/></robot>')
-BOMBS = {"laughs.urdf": LAUGHS, "laughs.xml": LAUGHS.replace("robot", "mujoco"),
-         "outside.urdf": '<?xml version="1.0"?><!DOCTYPE robot [<!ENTITY x SYSTEM "file:///etc/passwd">]>'
-                         '<robot name="&x;"><link name="a"/></robot>',
-         "deep.urdf": '<robot name="x">' + "<a>" * 200_000 + "</a>" * 200_000 + "</robot>",
-         "many.urdf": '<robot name="x">' + '<link name="a"/>' * 400_000 + "</robot>",
-         "laughs.yaml": "a: &a [x,x,x,x,x,x,x,x,x]\n" + "".join(
-             f"{b}: &{b} [{','.join([f'*{a}'] * 9)}]\n" for a, b in zip("abcdefgh", "bcdefghi", strict=True)),
-         "xacro.xacro": '<robot xmlns:xacro="http://ros.org/wiki/xacro" name="x">'
-                        '<xacro:include filename="/etc/passwd"/>'
-                        '<link name="${open(\'/etc/passwd\').read()}"/></robot>'}
+LAUGHS = (
+    '<?xml version="1.0"?><!DOCTYPE robot [<!ENTITY a "'
+    + "ha" * 500
+    + '">'
+    + "".join(f'<!ENTITY {b} "{f"&{a};" * 10}">' for a, b in zip("abcdefghi", "bcdefghij", strict=True))
+    + ']><robot name="x"><link name="&j;"/></robot>'
+)
+BOMBS = {
+    "laughs.urdf": LAUGHS,
+    "laughs.xml": LAUGHS.replace("robot", "mujoco"),
+    "outside.urdf": '<?xml version="1.0"?><!DOCTYPE robot [<!ENTITY x SYSTEM "file:///etc/passwd">]>'
+    '<robot name="&x;"><link name="a"/></robot>',
+    "deep.urdf": '<robot name="x">' + "<a>" * 200_000 + "</a>" * 200_000 + "</robot>",
+    "many.urdf": '<robot name="x">' + '<link name="a"/>' * 400_000 + "</robot>",
+    "laughs.yaml": "a: &a [x,x,x,x,x,x,x,x,x]\n"
+    + "".join(f"{b}: &{b} [{','.join([f'*{a}'] * 9)}]\n" for a, b in zip("abcdefgh", "bcdefghi", strict=True)),
+    "xacro.xacro": '<robot xmlns:xacro="http://ros.org/wiki/xacro" name="x">'
+    '<xacro:include filename="/etc/passwd"/>'
+    "<link name=\"${open('/etc/passwd').read()}\"/></robot>",
+}
 
 
 def test_bombs_in_robot_files_are_refused_in_lines_and_cost_nothing():
@@ -116,8 +129,17 @@ def test_bombs_in_robot_files_are_refused_in_lines_and_cost_nothing():
                 assert "root:" not in str(answer)
                 assert all(len(line) < 1000 for line in str(answer.get("error", "")).splitlines())
             os.symlink("/etc", Path(server.folder.name, page.start["tab"], "link"))
-            for source in ("file:../x", "file:/etc/passwd", "file:link/passwd", "folder:x", "file:",
-                           "file:laughs.urdf", f"file:../{page.start['tab']}/laughs.urdf", "/etc/passwd", "given"):
+            for source in (
+                "file:../x",
+                "file:/etc/passwd",
+                "file:link/passwd",
+                "folder:x",
+                "file:",
+                "file:laughs.urdf",
+                f"file:../{page.start['tab']}/laughs.urdf",
+                "/etc/passwd",
+                "given",
+            ):
                 asked = other if "laughs" in source else page
                 answer = asked.ask("open", robot={"source": source, "options": {}}, watch=None, camera=None)
                 assert answer["kind"] == "BadRequest", (source, answer)

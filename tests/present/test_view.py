@@ -19,8 +19,10 @@ CLOSED, DRAWN = 1e-6, 1e-6
 """Metres, and sines of angles, that joints may be open in the data; that drawn points may be off."""
 QUICK = ("rrrrr_m1", "quattro")
 OTHERS = [name for name in shipped() if name not in QUICK]
-ROBOTS = [*QUICK, *(pytest.param(name, marks=pytest.mark.long if k % 4 else pytest.mark.slow)
-                    for k, name in enumerate(OTHERS))]
+ROBOTS = [
+    *QUICK,
+    *(pytest.param(name, marks=pytest.mark.long if k % 4 else pytest.mark.slow) for k, name in enumerate(OTHERS)),
+]
 """Of the others a quarter is slow, the same in all laws: what is seen of a robot is computed once."""
 
 
@@ -29,14 +31,18 @@ def law_joints_hold(found: View) -> None:
         mechanism, place = mechanism_of(found, machine), {name: i for i, name in enumerate(machine.links)}
         for state in states(found):
             places = state.places[machine.key]
-            worst = max(miss(joint, places[place[joint.predecessor]], places[place[joint.successor]])
-                        for joint in mechanism.joints.values() if joint.type is not JointType.FREE)
+            worst = max(
+                miss(joint, places[place[joint.predecessor]], places[place[joint.successor]])
+                for joint in mechanism.joints.values()
+                if joint.type is not JointType.FREE
+            )
             assert worst < CLOSED, (machine.key, worst)
 
 
 @pytest.mark.some(0, 5)
-@pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.slow) if name == "quattro" else name
-                                  for name in ROBOTS])
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow) if name == "quattro" else name for name in ROBOTS]
+)
 def test_all_loops_are_closed_at_every_position_of_every_slider(name: str):
     found = seen(name)
     assert len(found.sliders) == found.setting.dof
@@ -83,8 +89,10 @@ def test_the_hidden_robot_shows_the_same_directions_and_platform(name: str):
             if not isinstance(seen_by, Direction) or seen_by.link not in hidden:
                 continue
             d = found.setting.mechanism.links[seen_by.link].pose[:3, :3] @ seen_by.direction
-            u, v = (turned(state.places[key][links.index(seen_by.link)], d)
-                    for key, links in (("real", real), ("hidden", hidden)))
+            u, v = (
+                turned(state.places[key][links.index(seen_by.link)], d)
+                for key, links in (("real", real), ("hidden", hidden))
+            )
             assert u == pytest.approx(v, abs=DRAWN)
 
 

@@ -43,8 +43,14 @@ SUBSETS = {
     "prrrp_parallel_point": (("1",),),
 }
 CASES = [*((robot, None) for robot in ROBOTS), *((robot, legs) for robot, sets in SUBSETS.items() for legs in sets)]
-CAMERAS = [("delta", "platform"), ("delta", "arm_1"), ("gough_stewart", "platform"), ("3rrr_m1", "platform"),
-           ("3upu", "platform"), ("quattro", "platform")]
+CAMERAS = [
+    ("delta", "platform"),
+    ("delta", "arm_1"),
+    ("gough_stewart", "platform"),
+    ("3rrr_m1", "platform"),
+    ("3upu", "platform"),
+    ("quattro", "platform"),
+]
 
 
 USERS = (("delta", None), ("gough_stewart", None), ("3rrr_m1", None), ("quattro", ("1", "4")))
@@ -94,8 +100,11 @@ def obeys(setting: ObservedRobot, form: str = "simplified", thorough: bool = Fal
     assert accepted[0].rule == "motors off"
     assert all(step.reason for step in result.steps)
     assert all(step.largest_angle is None or step.largest_angle < SAME_RELATION for step in accepted)
-    assert all("refused, " in step.reason for step in result.steps
-               if not step.accepted and step.largest_angle is not None and "taken back" not in step.reason)
+    assert all(
+        "refused, " in step.reason
+        for step in result.steps
+        if not step.accepted and step.largest_angle is not None and "taken back" not in step.reason
+    )
     assert len(recorder.passed) >= sum(step.largest_angle is not None for step in accepted)
     return result
 
@@ -106,8 +115,12 @@ def name(case: object) -> str:
 
 @cache
 def accepted() -> frozenset[str]:
-    return frozenset(step.rule for robot, legs in USERS for step in rewritten(setting_of(robot, legs, None, 3))[0].steps
-                     if step.accepted)
+    return frozenset(
+        step.rule
+        for robot, legs in USERS
+        for step in rewritten(setting_of(robot, legs, None, 3))[0].steps
+        if step.accepted
+    )
 
 
 @pytest.mark.some(5)
@@ -132,9 +145,19 @@ def test_no_accepted_step_changes_the_relation_seen_from_a_moving_link(robot: st
 
 
 @pytest.mark.some(2)
-@pytest.mark.parametrize(("robot", "legs"), [
-    ("delta", None), ("quattro", ("1", "4")), ("3rrr_m1", None), ("gough_stewart", ("1", "2", "3")), ("3upu", ("1",)),
-    ("prrrp_m1", None), ("hexa", ("1",))], ids=name)
+@pytest.mark.parametrize(
+    ("robot", "legs"),
+    [
+        ("delta", None),
+        ("quattro", ("1", "4")),
+        ("3rrr_m1", None),
+        ("gough_stewart", ("1", "2", "3")),
+        ("3upu", ("1",)),
+        ("prrrp_m1", None),
+        ("hexa", ("1",)),
+    ],
+    ids=name,
+)
 def test_the_general_form_keeps_all_legs(robot: str, legs: tuple[str, ...] | None) -> None:
     setting = setting_of(robot, legs, None, 3)
     result = obeys(setting, "general")

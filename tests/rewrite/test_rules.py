@@ -30,8 +30,9 @@ def oracle_angle(setting: ObservedRobot, mechanism: Mechanism) -> float:
     samples = setting.samples
     real, angle = Oracle(setting.mechanism), 0.0
     for member in samples.members:
-        ours = seen_by_oracle(real, state_of(samples.twin, member.configuration.q), samples.question,
-                              samples.twin.length)
+        ours = seen_by_oracle(
+            real, state_of(samples.twin, member.configuration.q), samples.question, samples.twin.length
+        )
         try:
             oracle, state = led(mechanism, samples.question, member.way)
             theirs = seen_by_oracle(oracle, state, samples.question, samples.twin.length)
@@ -105,14 +106,16 @@ def skew(legs: int, rng: np.random.Generator, pods: int = 0) -> Mechanism:
         builder.link(f"rod_{label}", tip, random_rotation(rng))
         first = np.cross(way, [0, 0, 1]) + 0.3 * random_direction(rng)
         builder.joint(f"shoulder_{label}", "R", "base", f"arm_{label}", foot, axis=first, motor=True)
-        builder.joint(f"elbow_{label}", "R", f"arm_{label}", f"rod_{label}", elbow,
-                      axis=first + 0.8 * random_direction(rng))
+        builder.joint(
+            f"elbow_{label}", "R", f"arm_{label}", f"rod_{label}", elbow, axis=first + 0.8 * random_direction(rng)
+        )
         builder.joint(f"wrist_{label}", "S", f"rod_{label}", "platform", tip, loop=number > 0)
         builder.observe(label, f"rod_{label}", tip - elbow)
     return builder.build(platform="platform")
 
 
 # --- wrong rules -------------------------------------------------------------------------------------------------
+
 
 @pytest.mark.some(1)
 @pytest.mark.parametrize(("legs", "pods", "seed"), [(3, 0, 1), (3, 0, 2), (1, 5, 3), (2, 3, 4)])
@@ -129,8 +132,10 @@ def test_takeover_of_a_skew_elbow_is_caught(legs: int, pods: int, seed: int) -> 
 
 
 @pytest.mark.some(1)
-@pytest.mark.parametrize(("legs", "pods", "seed", "word"), [
-    (3, 0, 1, "3-{RR|Pi-U*R}-S"), (1, 5, 3, "{RR|Pi-U*R}-S"), (2, 3, 4, "2-{RR|Pi-U*R}-S")])
+@pytest.mark.parametrize(
+    ("legs", "pods", "seed", "word"),
+    [(3, 0, 1, "3-{RR|Pi-U*R}-S"), (1, 5, 3, "{RR|Pi-U*R}-S"), (2, 3, 4, "2-{RR|Pi-U*R}-S")],
+)
 def test_legs_with_skew_axes_keep_their_joint(legs: int, pods: int, seed: int, word: str) -> None:
     setting = ObservedRobot.of(skew(legs, np.random.default_rng(seed), pods), samples=3)
     result = simplified(setting)
@@ -179,8 +184,11 @@ def turned_carriers(setting: ObservedRobot, mechanism: Mechanism, state: State) 
 def test_a_parallelogram_with_a_wrong_offset_is_caught(robot: str) -> None:
     """One crank's foot 2 % off: the carrier turns with the arm, and the actuator's angle is not the direction's."""
     setting = setting_of(robot, None, None, 3)
-    before = GENERAL(Rewriting.of(evidence_of(setting), lambda m, bodies: certify(
-        setting.samples, m, count=1, bodies=bodies, complete=False)))
+    before = GENERAL(
+        Rewriting.of(
+            evidence_of(setting), lambda m, bodies: certify(setting.samples, m, count=1, bodies=bodies, complete=False)
+        )
+    )
     offered, _ = proposals(pi_form.RULE.proposals(before.state, evidence_of(setting), "1"))
     state, right = offered[0].state, offered[0].state.mechanism
     is_right(setting, right)
@@ -247,6 +255,7 @@ def test_the_lift_has_virtual_motors_only(robot: str) -> None:
 
 # --- reasons and conditions --------------------------------------------------------------------------------------
 
+
 @pytest.mark.parametrize("robot", ["3rrr_m1", "3prr_m1", "gough_stewart", "3upu", "delta", "hexaglide", "rprpr_m2"])
 def test_every_rule_gives_a_reason(robot: str) -> None:
     setting = setting_of(robot, None, None, 3)
@@ -289,9 +298,17 @@ def test_companions_are_the_other_rods() -> None:
     assert evidence_of(setting_of("hexa", None, None, 3)).parallel_rods("rod_1") == ()
 
 
-@pytest.mark.parametrize(("robot", "joints", "dimension", "translates"), [
-    ("3rrr_m1", 1, 2, False), ("3prr_m1", 1, 1, True), ("gough_stewart", 0, 0, True), ("delta", 1, 2, False),
-    ("hexaglide", 1, 1, True), ("3ruu", 1, 2, False)])
+@pytest.mark.parametrize(
+    ("robot", "joints", "dimension", "translates"),
+    [
+        ("3rrr_m1", 1, 2, False),
+        ("3prr_m1", 1, 1, True),
+        ("gough_stewart", 0, 0, True),
+        ("delta", 1, 2, False),
+        ("hexaglide", 1, 1, True),
+        ("3ruu", 1, 2, False),
+    ],
+)
 def test_the_part_before_the_observed_link(robot: str, joints: int, dimension: int, translates: bool) -> None:
     setting = setting_of(robot, None, None, 3)
     evidence = evidence_of(setting)
@@ -345,8 +362,10 @@ def test_motors_are_counted_one_by_one() -> None:
     mechanism = setting.anatomy.mechanism
     universal = next(joint for joint in mechanism.joints.values() if joint.type == JointType.UNIVERSAL)
     passive = [replace(joint, motor=None) for joint in mechanism.joints.values()]
-    for joints, words in (([replace(universal, motor=Motor("m"))], "5 real motors become passive"),
-                          (passive, "the robot has no motors"),
-                          ([*passive, replace(universal, motor=Motor("m"))], "2 real motors become passive")):
+    for joints, words in (
+        ([replace(universal, motor=Motor("m"))], "5 real motors become passive"),
+        (passive, "the robot has no motors"),
+        ([*passive, replace(universal, motor=Motor("m"))], "2 real motors become passive"),
+    ):
         state = State(setting.anatomy, mechanism.changed(joints=joints))
         assert [match.reason for match in motors_off.find(state, evidence_of(setting), "1")] == [words]

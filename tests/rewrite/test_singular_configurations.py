@@ -49,6 +49,7 @@ class NoCase(Exception):
 
 # --- robots and their configurations, in closed form ----------------------------------------------------------------
 
+
 @dataclass(frozen=True)
 class Case:
     """A robot, what is observed, configurations at which all conditions hold, and one at which a rule's fails."""
@@ -83,8 +84,9 @@ def displaced(robot: Mechanism, by: Mapping[str, Array]) -> Poses:
     return {name: by.get(name, np.eye(4)) @ link.pose for name, link in robot.links.items()}
 
 
-def reached(rng: np.random.Generator, draw: Callable[[np.random.Generator], Poses | None], number: int = 1
-            ) -> list[Poses]:
+def reached(
+    rng: np.random.Generator, draw: Callable[[np.random.Generator], Poses | None], number: int = 1
+) -> list[Poses]:
     """So many random configurations that close; raises ``NoCase`` where they are rare."""
     found = list(islice((at for _ in range(200) if (at := draw(rng)) is not None), number))
     if len(found) < number:
@@ -92,8 +94,12 @@ def reached(rng: np.random.Generator, draw: Callable[[np.random.Generator], Pose
     return found
 
 
-def crossing(rng: np.random.Generator, draw: Callable[[np.random.Generator], Array],
-             at: Callable[[Array], Poses | None], value: Callable[[Array], float]) -> Poses:
+def crossing(
+    rng: np.random.Generator,
+    draw: Callable[[np.random.Generator], Array],
+    at: Callable[[Array], Poses | None],
+    value: Callable[[Array], float],
+) -> Poses:
     """A configuration at which a value vanishes, between two of other signs; raises ``NoCase``."""
     known = [(x, value(x)) for x in (draw(rng) for _ in range(300)) if at(x) is not None]
     for (one, before), (other, after) in combinations(known, 2):
@@ -112,8 +118,9 @@ class Delta:
         joints = self.robot.joints
         self.legs = range(1, legs + 1)
         self.hinge = {k: joints[f"motor_joint_{k}"] for k in self.legs}
-        self.ends = {k: [(joints[f"elbow_{k}{x}"].point, joints[f"wrist_{k}{x}"].point) for x in "ab"]
-                     for k in self.legs}
+        self.ends = {
+            k: [(joints[f"elbow_{k}{x}"].point, joints[f"wrist_{k}{x}"].point) for x in "ab"] for k in self.legs
+        }
 
     def arm(self, k: int) -> Array:
         """The radius of the circle of a rod's elbow at zero."""
@@ -157,8 +164,9 @@ class Delta:
     def random(self, rng: np.random.Generator) -> Poses | None:
         return self.at(self.drawn(rng) / 3)
 
-    def along(self, rng: np.random.Generator, angles: Mapping[int, float], direction: Callable[[], Array]
-              ) -> Poses | None:
+    def along(
+        self, rng: np.random.Generator, angles: Mapping[int, float], direction: Callable[[], Array]
+    ) -> Poses | None:
         """The first of some legs at these angles, its rod along a direction."""
         k = next(iter(angles))
         W, B = self.ends[k][0]
@@ -227,8 +235,9 @@ class Delta:
 
         for _ in range(10):
             start = np.r_[rng.uniform(-1, 1, 2), random_direction(rng)]
-            x = least_squares(lambda x: ends(x)[0] - ends(x)[1], start, xtol=1e-15, ftol=1e-15, gtol=1e-15,
-                              max_nfev=60).x
+            x = least_squares(
+                lambda x: ends(x)[0] - ends(x)[1], start, xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=60
+            ).x
             one, other = ends(x)
             if np.linalg.norm(one - other) < 1e-14 and (at := self.at(one, {1: x[0], 2: x[1]})) is not None:
                 return at
@@ -237,8 +246,7 @@ class Delta:
 
 def delta(rng: np.random.Generator, observe: tuple[str, ...], kind: str) -> Case:
     own = Delta(rng)
-    fails = (crossing(rng, own.drawn, own.at, own.couples) if kind == "couples" else
-             reached(rng, getattr(own, kind))[0])
+    fails = crossing(rng, own.drawn, own.at, own.couples) if kind == "couples" else reached(rng, getattr(own, kind))[0]
     return Case(own.robot, observe, (*reached(rng, own.random, 3), *reached(rng, own.lost)), fails)
 
 
@@ -286,8 +294,9 @@ class Planar:
                 builder.joint("coupling_second", "R", "second", "coupler", plane(A + self.beside), axis=z, loop=True)
                 before = "coupler"
             builder.link(f"rod_{n}", plane(A))
-            builder.joint(f"elbow_{n}", word[1], before, f"rod_{n}", plane(A),
-                          axis=z if word[1] == "R" else plane(self.rod[k]))
+            builder.joint(
+                f"elbow_{n}", word[1], before, f"rod_{n}", plane(A), axis=z if word[1] == "R" else plane(self.rod[k])
+            )
             builder.joint(f"wrist_{n}", "R", f"rod_{n}", "platform", plane(B), axis=z, loop=k > 0)
             builder.observe(n, f"rod_{n}", plane(self.rod[k]))
         self.robot = builder.build(platform="platform")
@@ -341,8 +350,9 @@ class Planar:
         return self.at(np.append(self.foot[k] + c + d - bend(angle) @ self.tip[k], angle), {k: (c, d)})
 
     def rod_of(self, rng: np.random.Generator, k: int) -> Array:
-        return (self.rod[k] * rng.uniform(0.8, 1.2) if self.words[k][1] == "P" else
-                bend(rng.uniform(-1, 1)) @ self.rod[k])
+        return (
+            self.rod[k] * rng.uniform(0.8, 1.2) if self.words[k][1] == "P" else bend(rng.uniform(-1, 1)) @ self.rod[k]
+        )
 
     def flat(self, rng: np.random.Generator) -> Poses | None:
         """Leg 1's crank a quarter turn from zero."""
@@ -444,8 +454,9 @@ def pod(rng: np.random.Generator, kind: str) -> Case:
         fails = own.at(own.pointing(rng, 1, e * np.sign(e @ chain.direction)))
     else:  # the removed leg 4 along the first axis of its U
         e = own.foot[4].axes[0]
-        fails = own.at(own.pointing(rng, 4, e * np.sign(e @ (own.tip[4] - own.foot[4].point))),
-                       {4: rng.uniform(0, 2 * np.pi)})
+        fails = own.at(
+            own.pointing(rng, 4, e * np.sign(e @ (own.tip[4] - own.foot[4].point))), {4: rng.uniform(0, 2 * np.pi)}
+        )
     assert fails is not None
     return Case(own.robot, observe, tuple(holds), fails)
 
@@ -466,8 +477,16 @@ def upu(rng: np.random.Generator) -> Case:
         builder.link(f"upper_{k}", B)
         builder.joint(f"foot_{k}", "U", "base", f"lower_{k}", A, axis=first, axis2=inner)
         builder.joint(f"slide_{k}", "P", f"lower_{k}", f"upper_{k}", A, axis=u, motor=True)
-        builder.joint(f"tip_{k}", "U", f"upper_{k}", "platform", B, axis=unit(above),
-                      axis2=random_normal(rng, unit(above)), loop=k > 1)
+        builder.joint(
+            f"tip_{k}",
+            "U",
+            f"upper_{k}",
+            "platform",
+            B,
+            axis=unit(above),
+            axis2=random_normal(rng, unit(above)),
+            loop=k > 1,
+        )
         builder.observe(str(k), f"upper_{k}", u)
     special = builder.build(platform="platform")
     twin = PinocchioModel(special)
@@ -480,6 +499,7 @@ def upu(rng: np.random.Generator) -> Case:
 
 
 # --- the lift and the simplified robot at a configuration of the real one --------------------------------------------
+
 
 def stand(state: State, real: Mechanism, at: Poses) -> Array:
     """The state of a rewritten mechanism (reference: the base) where the real robot's links are at these poses: T
@@ -564,13 +584,20 @@ def seen(robot: Mechanism, state: Array, setting: ObservedRobot, chains: State |
         raise Undecided(gap)
     kernel = kernel / np.linalg.norm(kernel, axis=0)
     t = oracle.twist(kernel, question.platform)
-    rates = [-hat(oracle.pose(state, o.link)[:3, :3] @ o.direction) @ oracle.twist(kernel, o.link)[3:]
-             if o.link in robot.links else np.zeros((3, kernel.shape[1]))
-             for o in question.observations if isinstance(o, Direction)]
+    rates = [
+        -hat(oracle.pose(state, o.link)[:3, :3] @ o.direction) @ oracle.twist(kernel, o.link)[3:]
+        if o.link in robot.links
+        else np.zeros((3, kernel.shape[1]))
+        for o in question.observations
+        if isinstance(o, Direction)
+    ]
     rows = np.vstack([t[:3] / length, t[3:], *rates])
     drives = [robot.joints[name] for name in sorted(chains.actuators)] if chains else []
-    moved = np.vstack(rates if chains is None else [
-        oracle.twist(kernel, j.successor)[3:] - oracle.twist(kernel, j.predecessor)[3:] for j in drives])
+    moved = np.vstack(
+        rates
+        if chains is None
+        else [oracle.twist(kernel, j.successor)[3:] - oracle.twist(kernel, j.predecessor)[3:] for j in drives]
+    )
     return Seen(span(rows), span(rows @ null(moved)), span(moved @ null(rows)).shape[1])
 
 
@@ -581,6 +608,7 @@ def apart(one: Seen, other: Seen) -> float:
 
 
 # --- the conditions ---------------------------------------------------------------------------------------------------
+
 
 def full_loops(setting: ObservedRobot, hidden: State, at: Poses) -> bool:
     """Whether the real robot has the mobility that it has at its samples."""
@@ -630,8 +658,13 @@ def spanned(setting: ObservedRobot, hidden: State, at: Poses) -> bool:
     allowed = rest.twist(rest.kernel(state)[0], real.platform)
     for label in hidden.removed:
         leg = setting.anatomy.leg(label)
-        part = Mechanism.of("leg", [real.links[n] for n in real.links if n in {*leg.links, real.base, leg.attach}],
-                            [real.joints[n] for n in leg.joints], base=real.base, platform=leg.attach)
+        part = Mechanism.of(
+            "leg",
+            [real.links[n] for n in real.links if n in {*leg.links, real.base, leg.attach}],
+            [real.joints[n] for n in leg.joints],
+            base=real.base,
+            platform=leg.attach,
+        )
         alone = Oracle(part)
         own = alone.twist(alone.kernel(np.array([at[n] for n in part.links]))[0], leg.attach)
         scale = np.repeat([1 / length, 1.0], 3)[:, None]
@@ -641,8 +674,12 @@ def spanned(setting: ObservedRobot, hidden: State, at: Poses) -> bool:
     return True
 
 
-CONDITIONS = {LOOPS: full_loops, AXES: out_of_plane, pi_form.RULE.keeps[0]: not_flat,
-              leg_removal.RULE.keeps[0]: spanned}
+CONDITIONS = {
+    LOOPS: full_loops,
+    AXES: out_of_plane,
+    pi_form.RULE.keeps[0]: not_flat,
+    leg_removal.RULE.keeps[0]: spanned,
+}
 """Each condition in words, and whether it holds for a hidden robot where the real one's links are at some poses."""
 
 
@@ -695,8 +732,9 @@ def test_the_relation_is_kept_where_the_conditions_hold(kind: str, seed: int) ->
     def at(poses: Poses) -> list[float]:
         """How far lift and simplified robot are from the real one."""
         ours = seen(real, np.array([poses[name] for name in real.links]), setting)
-        return [apart(ours, seen(other.mechanism, stand(other, real, poses), setting, other))
-                for other in (lift, hidden)]
+        return [
+            apart(ours, seen(other.mechanism, stand(other, real, poses), setting, other)) for other in (lift, hidden)
+        ]
 
     for poses in case.holds:
         assert all(CONDITIONS[each](setting, hidden, poses) for each in asked)

@@ -17,9 +17,15 @@ LIMIT = 0.05
 def limited(tmp_path: Path) -> Path:
     """A 3-RRR whose first motor turns by so much either way."""
     path = tmp_path / "limited.urdf"
-    path.write_text(shipped()["3rrr_m1"].read_text().replace(
-        '<joint name="shoulder_1" type="continuous">',
-        f'<joint name="shoulder_1" type="revolute"><limit lower="{-LIMIT}" upper="{LIMIT}" effort="1" velocity="1"/>'))
+    path.write_text(
+        shipped()["3rrr_m1"]
+        .read_text()
+        .replace(
+            '<joint name="shoulder_1" type="continuous">',
+            f'<joint name="shoulder_1" type="revolute">'
+            f'<limit lower="{-LIMIT}" upper="{LIMIT}" effort="1" velocity="1"/>',
+        )
+    )
     return path
 
 
@@ -44,7 +50,8 @@ def test_poses_beyond_limits_are_named(limited: Path):
     checked = str(hrsynth.check(limited, grid="x=-0.04:0.04:9,y=0,phi=0"))
     assert f"{sum(beyond)} beyond limits of joints" in checked
     assert "those of shoulder_1 are not checked" in str(
-        hrsynth.accuracy(limited, cone="0.1deg", grid="x=-0.04:0.04:9,y=0,phi=0"))
+        hrsynth.accuracy(limited, cone="0.1deg", grid="x=-0.04:0.04:9,y=0,phi=0")
+    )
     for robot in (limited, "3rrr_m1"):
         assert "limits" not in str(hrsynth.accuracy(robot, cone="0.1deg", at="x=0,y=0,phi=0"))
 

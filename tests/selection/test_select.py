@@ -39,8 +39,15 @@ START, GOAL = "x=0,y=0,z=-0.75,phi=0", "x=-0.2,y=0,z=-0.56,phi=0"
 
 @cache
 def found() -> Selection:
-    return select(load("delta"), start="x=0,y=0,z=-0.6", goal="x=0.1,y=0.05,z=-0.65",
-                  cone="1=0.2deg,2=0.1deg,3=0.1deg", size=2, runs=1, endings=0)
+    return select(
+        load("delta"),
+        start="x=0,y=0,z=-0.6",
+        goal="x=0.1,y=0.05,z=-0.65",
+        cone="1=0.2deg,2=0.1deg,3=0.1deg",
+        size=2,
+        runs=1,
+        endings=0,
+    )
 
 
 @cache
@@ -68,8 +75,9 @@ def test_every_set_is_told_once_the_kept_ones_first_by_accuracy() -> None:
 
 def test_verdicts_are_those_of_legs() -> None:
     known = {each.legs: each.verdict for each in legs(load("delta")).sets}
-    assert {each.legs: each.verdict for each in found().candidates} == {each.legs: known[each.legs]
-                                                                       for each in found().candidates}
+    assert {each.legs: each.verdict for each in found().candidates} == {
+        each.legs: known[each.legs] for each in found().candidates
+    }
     for each in found().candidates:
         assert each.verdict == "controllable" or (each.discarded or "").startswith(each.verdict)
 
@@ -133,8 +141,15 @@ def test_what_is_kept_does_not_depend_on_the_clock(monkeypatch: pytest.MonkeyPat
     """A machine on which an hour passes between two looks at the clock gives the same answer."""
     ticks = itertools.count(step=3600.0)
     monkeypatch.setattr("time.monotonic", lambda: next(ticks))
-    slow = select(load("delta"), start="x=0,y=0,z=-0.6", goal="x=0.1,y=0.05,z=-0.65",
-                  cone="1=0.2deg,2=0.1deg,3=0.1deg", size=2, runs=1, endings=0)
+    slow = select(
+        load("delta"),
+        start="x=0,y=0,z=-0.6",
+        goal="x=0.1,y=0.05,z=-0.65",
+        cone="1=0.2deg,2=0.1deg,3=0.1deg",
+        size=2,
+        runs=1,
+        endings=0,
+    )
     assert told(slow) == told(found())
     assert slow.left is None
 
@@ -143,15 +158,25 @@ def test_what_is_kept_does_not_depend_on_the_clock(monkeypatch: pytest.MonkeyPat
 @pytest.mark.parametrize(("examine", "seconds"), [(1, None), (2, None), (20, 1e-9)])
 def test_what_is_not_examined_is_neither_kept_nor_discarded(examine: int, seconds: float | None) -> None:
     """And nothing else is said of the others than with all examined."""
-    part = select(load("delta"), start="x=0,y=0,z=-0.6", goal="x=0.1,y=0.05,z=-0.65", runs=1, size=2,
-                  cone="1=0.2deg,2=0.1deg,3=0.1deg", examine=examine, seconds=seconds, endings=0)
+    part = select(
+        load("delta"),
+        start="x=0,y=0,z=-0.6",
+        goal="x=0.1,y=0.05,z=-0.65",
+        runs=1,
+        size=2,
+        cone="1=0.2deg,2=0.1deg,3=0.1deg",
+        examine=examine,
+        seconds=seconds,
+        endings=0,
+    )
     begun = 0 if seconds else examine
     whole, left = told(found()), {each.legs for each in part.unexamined}
     assert len(part.kept) == begun
     assert len(left) == len(found().kept) - begun
     assert [each.legs for each in part.kept] == [each.legs for each in found().kept][:begun]
     assert {legs: record for legs, record in told(part).items() if legs not in left} == {
-        legs: record for legs, record in whole.items() if legs not in left}
+        legs: record for legs, record in whole.items() if legs not in left
+    }
     for each in part.unexamined:
         assert (each.discarded, each.start_modes, each.aspect, each.run) == (None, None, None, None)
     assert part.to_dict()["not_examined"]["count"] == len(left)
@@ -183,10 +208,12 @@ def test_why_fewer_legs_are_better() -> None:
     assert fewer_are_better(best, worse) == (
         "fewer legs are better here: with 1, 2 the loop was found to be drawn to no other pose besides the goal, with "
         "1, 2, 3, 4 to 2 critical; the errors of more directions than there are freedoms can balance where they do not "
-        "vanish")
+        "vanish"
+    )
     assert fewer_are_better(best, [(("1", "2", "3"), ends(None, 0.0))]) is None
     assert "the certified radius is 30 mm, with 1, 2, 3 it is 4 mm" in str(
-        fewer_are_better(best, [(("1", "2", "3"), ends((), 0.004))]))
+        fewer_are_better(best, [(("1", "2", "3"), ends((), 0.004))])
+    )
 
 
 @pytest.mark.long
@@ -278,10 +305,20 @@ def test_a_blind_camera_discards_every_set() -> None:
     assert all("camera sees 0 %" in str(each.discarded) for each in controllable)
 
 
-@pytest.mark.parametrize(("options", "word"), [
-    ({"cone": "90deg"}, "half-angle"), ({"cone": "1=0.1deg"}, "no cone"), ({"size": 0}, "size, found 0"),
-    ({"runs": -1}, "runs"), ({"sight": "x=0"}, "camera"), ({"sight": "x=0,y=0,z=0,rpy=0/0/0", "focal": 0.0}, "focal"),
-    ({"seconds": 0.0}, "seconds"), ({"examine": 0}, "examine, found 0"), ({"start": "w=1"}, "unknown part")])
+@pytest.mark.parametrize(
+    ("options", "word"),
+    [
+        ({"cone": "90deg"}, "half-angle"),
+        ({"cone": "1=0.1deg"}, "no cone"),
+        ({"size": 0}, "size, found 0"),
+        ({"runs": -1}, "runs"),
+        ({"sight": "x=0"}, "camera"),
+        ({"sight": "x=0,y=0,z=0,rpy=0/0/0", "focal": 0.0}, "focal"),
+        ({"seconds": 0.0}, "seconds"),
+        ({"examine": 0}, "examine, found 0"),
+        ({"start": "w=1"}, "unknown part"),
+    ],
+)
 def test_bad_requests(options: dict, word: str) -> None:
     with pytest.raises(BadRequest) as caught:
         select(load("quattro"), **{"start": START, "goal": GOAL, **options})
@@ -318,8 +355,10 @@ def test_command_line(capsys: pytest.CaptureFixture[str]) -> None:
     assert len(capsys.readouterr().err.splitlines()) == 1
 
 
-@pytest.mark.parametrize(("options", "word"), [
-    ({"focal": 100.0}, "--sight"), ({"focal": 0.0, "sight": "auto"}, "focal"), ({"sight": "here"}, "not name=value")])
+@pytest.mark.parametrize(
+    ("options", "word"),
+    [({"focal": 100.0}, "--sight"), ({"focal": 0.0, "sight": "auto"}, "focal"), ({"sight": "here"}, "not name=value")],
+)
 def test_cameras_that_are_none(options: dict[str, object], word: str):
     with pytest.raises(BadRequest, match=word):
         select(load("delta"), start="x=0,y=0,z=-0.6", goal="x=0.1,y=0,z=-0.6", size=1, **options)
@@ -343,8 +382,17 @@ def test_sets_of_points_are_ranked_by_what_attracts_their_loops(tmp_path: Path) 
     body = tmp_path / "body.urdf"
     body.write_text(BODY)
     see = [f"point:platform@{at}" for at in ("0.1,0.1,0", "-0.1,0.1,0", "-0.1,-0.1,0", "0.1,-0.1,0", "0,0,0.1")]
-    found = select(body, camera="eye=base@0,0,0", see=see, start="x=0.1,y=0,z=1.2,rpy=0.3/-0.4/0.2",
-                   goal="x=0.1,y=0,z=1.2,rpy=0.3/-0.5/0.2", noise="0.1deg", size=5, runs=0, examine=4)
+    found = select(
+        body,
+        camera="eye=base@0,0,0",
+        see=see,
+        start="x=0.1,y=0,z=1.2,rpy=0.3/-0.4/0.2",
+        goal="x=0.1,y=0,z=1.2,rpy=0.3/-0.5/0.2",
+        noise="0.1deg",
+        size=5,
+        runs=0,
+        examine=4,
+    )
     others = {each.legs: each.ends.others for each in found.kept if each.ends is not None}
     assert [len(kinds or ()) for kinds in others.values()] == [0, 0, 1, 1]
     assert all(("point_5" in legs) is not bool(kinds) for legs, kinds in others.items())

@@ -53,8 +53,9 @@ VANISHED, THERE, CLOSED = 1e-9, 1e-6, 1e-9
 closed loops, by the oracle."""
 
 
-def run_between(name: str, start: ClosedConfiguration, goal: ClosedConfiguration, gain: float = 0.8,
-                watched: Legs | None = None) -> Servo:
+def run_between(
+    name: str, start: ClosedConfiguration, goal: ClosedConfiguration, gain: float = 0.8, watched: Legs | None = None
+) -> Servo:
     """A run between two configurations of a shipped robot, all legs watched or some."""
     found = setting(name, watched)
     law = Law(found.samples.question, found.dof, gain)
@@ -146,8 +147,14 @@ def runs(name: str, watched: Legs | None, seed: int, count: int, known: set[Key]
             found = run_between(name, start, goal, watched=watched)
             member = Listed.of(found, lists, number)
             wrong = [*untrue(found), *untold(found, aspects), *member.untrue(found)]
-            yield {**dict(zip(KEY, key, strict=True)), "start": str(found.start), "goal": str(found.goal),
-                   "ended": found.ended, "untrue": wrong, **member.to_dict()}
+            yield {
+                **dict(zip(KEY, key, strict=True)),
+                "start": str(found.start),
+                "goal": str(found.goal),
+                "ended": found.ended,
+                "untrue": wrong,
+                **member.to_dict(),
+            }
 
 
 def with_random_sets(name: str, count: int, known: set[Key]) -> Iterator[dict[str, Any]]:
@@ -160,10 +167,12 @@ def with_random_sets(name: str, count: int, known: set[Key]) -> Iterator[dict[st
 def same_question(name: str) -> tuple[str, ...]:
     """The controllable robots that differ from one in their names and motors alone: the loop, which commands velocities
     of joints, is the same."""
+
     def still(name: str) -> Mechanism:
         mechanism = load(name)
-        return replace(mechanism, name="", joints={k: replace(joint, motor=None)
-                                                   for k, joint in mechanism.joints.items()})
+        return replace(
+            mechanism, name="", joints={k: replace(joint, motor=None) for k, joint in mechanism.joints.items()}
+        )
 
     return tuple(each for each in CONTROLLABLE if still(each) == still(name))
 
@@ -199,8 +208,11 @@ def main() -> None:
     names = list(dict.fromkeys(same_question(name)[0] for name in asked.names or CONTROLLABLE))
     records = [json.loads(each) for each in asked.log.read_text().splitlines()] if asked.log.exists() else []
     known = {tuple(each[part] for part in KEY) for each in records}
-    ways = [way for name in names for way in (runs(name, None, 4, asked.count, known),
-                                              with_random_sets(name, asked.random, known))]
+    ways = [
+        way
+        for name in names
+        for way in (runs(name, None, 4, asked.count, known), with_random_sets(name, asked.random, known))
+    ]
     with asked.log.open("a", encoding="utf-8") as log:
         while ways:
             # one of each robot in turn: what is broken off has some of all
@@ -220,8 +232,14 @@ def main() -> None:
         for mark, made in found.items():
             text = replace_between(text, made, mark)
         asked.page.write_text(text, encoding="utf-8", newline="\n")
-    sys.exit("\n".join(f"{record['robot']}, {record['watched'] or 'all legs'}, {record['start']} to {record['goal']}: "
-                       f"{each}" for record in records for each in record["untrue"]) or None)
+    sys.exit(
+        "\n".join(
+            f"{record['robot']}, {record['watched'] or 'all legs'}, {record['start']} to {record['goal']}: {each}"
+            for record in records
+            for each in record["untrue"]
+        )
+        or None
+    )
 
 
 if __name__ == "__main__":

@@ -117,14 +117,25 @@ class Lists:
         own = range(first, len(self.every))
         desired = np.array([each.search.desired.ravel() for each in self.every])
         order = [np.argsort(np.linalg.norm(desired - desired[k], axis=1))[1 : NEIGHBOURS + 1] for k in own]
-        pairs = [(q, k) for k, goal in zip(own, goals, strict=True)
-                 for q in (self.every[k].search.system.system.read(goal.pose),
-                           *drawn[self.rng.choice(len(drawn), many, replace=False)])]
+        pairs = [
+            (q, k)
+            for k, goal in zip(own, goals, strict=True)
+            for q in (
+                self.every[k].search.system.system.read(goal.pose),
+                *drawn[self.rng.choice(len(drawn), many, replace=False)],
+            )
+        ]
         self._lead(pairs)
         news = {k: each.points for k, each in enumerate(self.every)}
         while any(news.values()):
-            news = self._lead([(point.q, k) for k, near in zip(own, order, strict=True) for other in near
-                               for point in news.get(int(other), [])])
+            news = self._lead(
+                [
+                    (point.q, k)
+                    for k, near in zip(own, order, strict=True)
+                    for other in near
+                    for point in news.get(int(other), [])
+                ]
+            )
         return self.every[first:]
 
     def _lead(self, pairs: Sequence[tuple[Array, int]]) -> dict[int, list[CriticalPoint]]:
@@ -151,8 +162,9 @@ class Lists:
         return told[:, [True] * bodies + [(o.leg, o.link) in seen for o in every for _ in range(3)]]
 
 
-def descents(systems: Sequence[RestSystem], starts: Sequence[Array], goals: Sequence[int], idle: int
-             ) -> list[tuple[int, CriticalPoint]]:
+def descents(
+    systems: Sequence[RestSystem], starts: Sequence[Array], goals: Sequence[int], idle: int
+) -> list[tuple[int, CriticalPoint]]:
     """The critical points to which starts (n, N) lead that go down all along, each with the number of its system; so
     many at once, whatever their systems, which differ in the desired directions alone."""
     base, found = systems[0], list[tuple[int, CriticalPoint]]()
@@ -166,16 +178,21 @@ def descents(systems: Sequence[RestSystem], starts: Sequence[Array], goals: Sequ
         terms = tuple(replace(each, wanted=w[k]) for each, w in zip(directed[0], wanted, strict=True))
         at = Expansion.of(replace(base, terms=terms), q, idle)
         done = at.residual < AT_ZERO
-        found += [(int(k[i]), CriticalPoint(q[i], at.multipliers[i], float(at.residual[i]), at.curvatures[i],
-                                            float(at.E[i]))) for i in np.flatnonzero(done)]
+        found += [
+            (int(k[i]), CriticalPoint(q[i], at.multipliers[i], float(at.residual[i]), at.curvatures[i], float(at.E[i])))
+            for i in np.flatnonzero(done)
+        ]
         size = np.maximum(np.abs(at.curvatures), CRITICAL_FLAT)
         near = (at.residual < 1e-3) & (np.abs(at.slope / size).max(axis=-1) < 0.05)
         sign = np.where(near[:, None], -np.sign(at.curvatures), -1.0)
         step = (at.directions @ (sign * at.slope / size)[..., None])[..., 0]
         ahead = q + shortened(step) + shortened(at.closing)
         going = ~done & np.isfinite(ahead).all(axis=-1) & (np.abs(ahead).max(axis=-1) < FARTHEST_ENDING)
-        live = [(ahead[i], number, steps + 1) for i, (_, number, steps) in enumerate(live)
-                if going[i] and steps + 1 < ENDING_STEPS]
+        live = [
+            (ahead[i], number, steps + 1)
+            for i, (_, number, steps) in enumerate(live)
+            if going[i] and steps + 1 < ENDING_STEPS
+        ]
     return found
 
 
@@ -206,15 +223,21 @@ class Listed:
         away = np.abs(np.array(own.places).reshape(-1, here.shape[1]) - here).max(axis=1)
         near = int(np.argmin(away)) if len(away) else None
         rest = own.read(near) if near is not None and away[near] < NEAR else None
-        return cls(found.ended, rest, np.inf if near is None else float(away[near]), len(own.points),
-                   end.size > NEAR and any(abs(size - end.size) < NEAR for size, _ in own.continua))
+        return cls(
+            found.ended,
+            rest,
+            np.inf if near is None else float(away[near]),
+            len(own.points),
+            end.size > NEAR and any(abs(size - end.size) < NEAR for size, _ in own.continua),
+        )
 
     @property
     def member(self) -> str:
         """One of ``MEMBER``."""
         if self.nearest is not None:
-            return (BOUNDARY if self.nearest.boundary else self.nearest.kind if self.nearest.singular is None
-                    else SINGULAR)
+            return (
+                BOUNDARY if self.nearest.boundary else self.nearest.kind if self.nearest.singular is None else SINGULAR
+            )
         if self.continuum:
             return CONTINUUM
         return OUTSIDE if self.ended in (GOAL, MODE, ANTIPODAL, MINIMUM) else APART

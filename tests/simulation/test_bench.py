@@ -80,8 +80,15 @@ def test_the_bench_tells_how_far_it_stopped_from_there():
 
 
 def test_noise_goes_through_the_bench_as_well():
-    found = servo(load("delta"), start="x=0,y=0,z=-0.6", goal="x=0.05,y=0.05,z=-0.62", physics=True, gain=4,
-                  noise="0.5deg", time=2.0)
+    found = servo(
+        load("delta"),
+        start="x=0,y=0,z=-0.6",
+        goal="x=0.05,y=0.05,z=-0.62",
+        physics=True,
+        gain=4,
+        noise="0.5deg",
+        time=2.0,
+    )
     assert found.ended == "goal"
     assert found.spread is not None
     assert 1e-5 < found.spread.metres < 0.05

@@ -70,8 +70,9 @@ def test_the_camera_sees_all_rods_and_exact_edges_give_exact_directions(name: st
 def test_a_carried_camera_sees_the_same_directions_from_its_link():
     robot = load("delta")
     carried = robot.platform
-    found = servo(robot, camera=carried, start="x=0,y=0,z=-0.6", goal="x=0.05,y=0,z=-0.6", sense="edges", gain=8,
-                  time=1.0)
+    found = servo(
+        robot, camera=carried, start="x=0,y=0,z=-0.6", goal="x=0.05,y=0,z=-0.6", sense="edges", gain=8, time=1.0
+    )
     assert found.ended == "goal"
     assert found.spread is not None
     assert found.spread.metres < 0.01
@@ -118,9 +119,18 @@ def test_cones_are_filled():
     assert 0.03 < float(np.mean(angles)) < 0.07
 
 
-@pytest.mark.parametrize(("text", "value", "unit"), [("0.1deg", math.radians(0.1), "rad"), ("0.002", 0.002, "rad"),
-                                                     ("0.3px", 0.3, "px"), ("2mm", 0.002, "m"), ("0.1m", 0.1, "m"),
-                                                     ("0.3px, 1mm", 1e-3, "m"), ("0.3px,1mm", 0.3, "px")])
+@pytest.mark.parametrize(
+    ("text", "value", "unit"),
+    [
+        ("0.1deg", math.radians(0.1), "rad"),
+        ("0.002", 0.002, "rad"),
+        ("0.3px", 0.3, "px"),
+        ("2mm", 0.002, "m"),
+        ("0.1m", 0.1, "m"),
+        ("0.3px, 1mm", 1e-3, "m"),
+        ("0.3px,1mm", 0.3, "px"),
+    ],
+)
 def test_amounts(text: str, value: float, unit: str):
     assert Noise.parse(text).of(unit) == pytest.approx(value)
 

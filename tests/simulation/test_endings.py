@@ -25,8 +25,11 @@ LASTS = (30.0, 60.0, 150.0)
 @pytest.mark.slow
 def test_a_leg_that_is_stretched_is_a_boundary_however_long_the_run_may_take() -> None:
     """It was *time* after 75 s, and *boundary* with 400 s; at the fold integrators chatter."""
-    scene = ServoTask.of(ObservedRobot.of(load("quattro_rigid"), "1,3"), start="x=-0.314,y=0.319,z=-0.64",
-                     goal="x=0.342,y=-0.267,z=-0.812")
+    scene = ServoTask.of(
+        ObservedRobot.of(load("quattro_rigid"), "1,3"),
+        start="x=-0.314,y=0.319,z=-0.64",
+        goal="x=0.342,y=-0.267,z=-0.812",
+    )
     found = [scene.result(scene.loop().simulate(scene.start, lasts)) for lasts in (25, 75, 400)]
     assert [each.ended for each in found] == [BOUNDARY] * 3
     assert all("not watched is stretched" in each.ending.reason for each in found)
@@ -34,8 +37,9 @@ def test_a_leg_that_is_stretched_is_a_boundary_however_long_the_run_may_take() -
     assert np.allclose(found[0].way[-1], found[2].way[-1], atol=1e-6)
 
 
-def runs(name: str, start: ClosedConfiguration, goal: ClosedConfiguration,
-         monkeypatch: pytest.MonkeyPatch) -> Iterator[Servo]:
+def runs(
+    name: str, start: ClosedConfiguration, goal: ClosedConfiguration, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[Servo]:
     """The same run with other times and other tolerances of the integrator."""
     for lasts in LASTS:
         monkeypatch.setattr("hrsynth.simulation.servo.LASTS", 0.8 * lasts)

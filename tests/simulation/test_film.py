@@ -27,13 +27,30 @@ def test_unknown_endings_and_folders_are_refused(tmp_path: Path):
 
 
 @pytest.mark.skipif(find_spec("mujoco") is None, reason="the extra bench is not installed")
-def test_what_a_film_does_not_draw_is_refused_before_the_run(tmp_path: Path, capsys: pytest.CaptureFixture[str],
-                                                             monkeypatch: pytest.MonkeyPatch):
+def test_what_a_film_does_not_draw_is_refused_before_the_run(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+):
     monkeypatch.setattr(ServoTask, "run", lambda _: pytest.fail("it runs"))
     see = ("point:platform@0.1,0,0", "point:platform@-0.1,0.1,0", "point:platform@0,-0.1,0")
     told = [word for each in see for word in ("--see", each)]
-    assert execute(["servo", "gough_stewart", "--camera", "eye=base@0.3,0.1,0", *told, "--start", "z=0.3", "--goal",
-                    "z=0.33", "-o", str(tmp_path / "run.gif")]) == 2
+    assert (
+        execute(
+            [
+                "servo",
+                "gough_stewart",
+                "--camera",
+                "eye=base@0.3,0.1,0",
+                *told,
+                "--start",
+                "z=0.3",
+                "--goal",
+                "z=0.33",
+                "-o",
+                str(tmp_path / "run.gif"),
+            ]
+        )
+        == 2
+    )
     (line,) = capsys.readouterr().err.splitlines()
     assert "an animation draws the legs that are watched" in line
     assert ".png" in line

@@ -112,8 +112,11 @@ def test_a_crossing_is_told_where_a_configuration_lies_on_it(kind: str, bend: fl
 
 def five_bar(found, kind, bend, step):
     """The five-bar whose second leg is bent by ``step`` from where it is stretched, or whose cranks make that angle."""
-    A, B, C = np.array([-0.1, 0.1]), np.array([-0.15813199329137 + 0.14906599664569j,
-                                               0.18896249413879 + 0.13298749804626j]), 0.02 + 0.24j
+    A, B, C = (
+        np.array([-0.1, 0.1]),
+        np.array([-0.15813199329137 + 0.14906599664569j, 0.18896249413879 + 0.13298749804626j]),
+        0.02 + 0.24j,
+    )
     (l1, l2), (r1, r2) = abs(B - A), abs(C - B)
     cranks, rods = np.angle(B - A), np.angle(C - B)
     if kind == "type1":
@@ -127,8 +130,13 @@ def five_bar(found, kind, bend, step):
     turned, swung = np.angle(elbows - A) - cranks, np.angle(tip - elbows) - rods
     twin = found.everything.twin
     step = np.zeros(twin.model.nv)
-    for name, value in {"shoulder_1": turned[0], "shoulder_2": turned[1], "elbow_1": swung[0] - turned[0],
-                        "elbow_2": swung[1] - turned[1], "end": swung[1] - swung[0]}.items():
+    for name, value in {
+        "shoulder_1": turned[0],
+        "shoulder_2": turned[1],
+        "elbow_1": swung[0] - turned[0],
+        "elbow_2": swung[1] - turned[1],
+        "end": swung[1] - swung[0],
+    }.items():
         step[twin.coordinates[name][0]] = value
     return ClosedConfiguration.of(twin, twin.q0 + step)
 
@@ -141,11 +149,24 @@ def met(one, far, two, near):
     return two + (along + 1j * np.sqrt(near**2 - along**2)) * (one - two) / apart
 
 
-@pytest.mark.parametrize(("name", "given", "made", "said"), [
-    pytest.param("rrrrr_m1", {"start": "x=0", "goal": "x=0.02"}, {"motor": None},
-                 "motors for 1 of the platform's 2 freedoms", marks=pytest.mark.slow),
-    ("3rpr_m1", {"start": "x=0,y=0,phi=0.1", "goal": "x=0,y=0,phi=0"}, {"limits": Limits(-1e-3, 1e-3)},
-     "the start is beyond the limits of ")])
+@pytest.mark.parametrize(
+    ("name", "given", "made", "said"),
+    [
+        pytest.param(
+            "rrrrr_m1",
+            {"start": "x=0", "goal": "x=0.02"},
+            {"motor": None},
+            "motors for 1 of the platform's 2 freedoms",
+            marks=pytest.mark.slow,
+        ),
+        (
+            "3rpr_m1",
+            {"start": "x=0,y=0,phi=0.1", "goal": "x=0,y=0,phi=0"},
+            {"limits": Limits(-1e-3, 1e-3)},
+            "the start is beyond the limits of ",
+        ),
+    ],
+)
 def test_a_run_says_what_it_leaves_out(name: str, given: dict[str, str], made: dict[str, Any], said: str):
     robot = load(name)
     driven = next(joint for joint in robot.joints.values() if joint.actuated)
@@ -157,8 +178,9 @@ def test_a_run_says_what_it_leaves_out(name: str, given: dict[str, str], made: d
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("legs", "ended", "z"), [
-    ("1,4", MODE, -0.9019), pytest.param("2,3", GOAL, -0.56, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("legs", "ended", "z"), [("1,4", MODE, -0.9019), pytest.param("2,3", GOAL, -0.56, marks=pytest.mark.slow)]
+)
 def test_two_legs_of_the_robot_with_an_articulated_platform(legs: str, ended: str, z: float):
     found = servo(load("quattro"), legs, start="x=0,y=0,z=-0.75,phi=0", goal="x=-0.2,y=0,z=-0.56,phi=0")
     assert (found.ended, found.pose.z) == (ended, pytest.approx(z, abs=1e-4))
@@ -180,8 +202,9 @@ def test_two_legs_of_the_robot_with_a_rigid_platform(legs: str, ended: str, z: f
 @pytest.mark.slow
 def test_noise_keeps_the_platform_about_the_goal_and_more_of_it_further_away():
     def far(noise: str, seed: int = 0) -> float:
-        found = servo(load("rrrrr_m1"), start="x=0.02,y=0.2195", goal="x=0.02,y=0.22", gain=4, noise=noise, time=3.0,
-                      seed=seed)
+        found = servo(
+            load("rrrrr_m1"), start="x=0.02,y=0.2195", goal="x=0.02,y=0.22", gain=4, noise=noise, time=3.0, seed=seed
+        )
         assert found.ended == GOAL
         assert found.spread is not None
         return found.spread.rms_metres
@@ -201,8 +224,10 @@ def test_a_trajectory_is_followed_with_a_small_error():
     assert led.run.times[-1] > 4
 
 
-@pytest.mark.parametrize(("name", "start", "goal"), [
-    ("rrrrr_m1", "x=0.02,y=0.2195", "x=0.03,y=0.23"), ("3rps", "x=0,y=0,z=0.3", "x=0,y=0,z=0.4")])
+@pytest.mark.parametrize(
+    ("name", "start", "goal"),
+    [("rrrrr_m1", "x=0.02,y=0.2195", "x=0.03,y=0.23"), ("3rps", "x=0,y=0,z=0.3", "x=0,y=0,z=0.4")],
+)
 def test_a_trajectory_is_followed_where_parts_of_the_pose_depend_on_each_other(name: str, start: str, goal: str):
     found = servo(load(name), start=start, goal=goal, duration=2.0)
     assert found.ended == GOAL
@@ -217,8 +242,9 @@ def test_a_blocked_trajectory_tells_that_it_began_at_the_start(monkeypatch: pyte
 
 @pytest.mark.slow
 def test_a_bias_holds_the_platform_where_the_measured_directions_are_the_desired_ones():
-    found = servo(load("delta"), start="x=0,y=0,z=-0.6", goal="x=0.1,y=0.05,z=-0.65", noise="1deg", bias=True, gain=4,
-                  time=5.0)
+    found = servo(
+        load("delta"), start="x=0,y=0,z=-0.6", goal="x=0.1,y=0.05,z=-0.65", noise="1deg", bias=True, gain=4, time=5.0
+    )
     last = found.run.commands[-1]
     assert found.ended == GOAL
     assert found.spread is not None
@@ -278,8 +304,15 @@ def test_a_joint_that_starts_beyond_its_limit_hides_no_other():
     # the first joint starts beyond its limit by more than the second one comes beyond its own
     near = one[0] + 0.9 * (one[-1] - one[0])
     assert abs(near - one[0]) > abs(two[-1] - half)
-    found = servo(limited({"shoulder_1": sorted([near, near + one[-1] - one[0]]),
-                           "shoulder_2": sorted([half, half + two[0] - two[-1]])}), **ends)
+    found = servo(
+        limited(
+            {
+                "shoulder_1": sorted([near, near + one[-1] - one[0]]),
+                "shoulder_2": sorted([half, half + two[0] - two[-1]]),
+            }
+        ),
+        **ends,
+    )
     assert (found.ended, found.ending.reason) == (BOUNDARY, "joint shoulder_2 is at its limit")
     assert angles(found.run, "shoulder_2")[-1] == pytest.approx(half, abs=1e-8)
     assert any("beyond the limits of shoulder_1" in each for each in found.notes)
@@ -310,14 +343,27 @@ REFUSED: list[tuple[str, Callable[[], object], type[Exception], str]] = [
     ("wide cone", lambda: servo(load("delta"), start="x=0", goal="x=0.1", noise="90deg"), BadRequest, "90deg"),
     ("no cone", lambda: servo(load("delta"), start="x=0", goal="x=0.1", noise="0deg"), BadRequest, "more than zero"),
     ("pixels of directions", lambda: servo(load("delta"), start="x=0", goal="x=0.1", noise="1px"), BadRequest, "px"),
-    ("edges as wide as pictures", lambda: servo(load("delta"), start="x=0", goal="x=0.1", sense="edges", noise="1e9px"),
-     BadRequest, "50px"),
+    (
+        "edges as wide as pictures",
+        lambda: servo(load("delta"), start="x=0", goal="x=0.1", sense="edges", noise="1e9px"),
+        BadRequest,
+        "50px",
+    ),
     ("a bias of nothing", lambda: servo(load("delta"), start="x=0", goal="x=0.1", bias=True), BadRequest, "bias"),
-    ("endless noise", lambda: servo(load("delta"), start="x=0,y=0,z=-0.6", goal="x=0.1,y=0,z=-0.6", noise="1deg",
-                                    time=1e12), BadRequest, "at most 10000"),
-    ("endless physics", lambda: servo(load("delta"), start="x=0,y=0,z=-0.6", goal="x=0.1,y=0,z=-0.6", physics=True,
-                                      gain=1e-9), BadRequest, "a larger gain"),
-    ("no such sense", lambda: servo(load("delta"), start="x=0", goal="x=0.1", sense="touch"), BadRequest, "touch")]
+    (
+        "endless noise",
+        lambda: servo(load("delta"), start="x=0,y=0,z=-0.6", goal="x=0.1,y=0,z=-0.6", noise="1deg", time=1e12),
+        BadRequest,
+        "at most 10000",
+    ),
+    (
+        "endless physics",
+        lambda: servo(load("delta"), start="x=0,y=0,z=-0.6", goal="x=0.1,y=0,z=-0.6", physics=True, gain=1e-9),
+        BadRequest,
+        "a larger gain",
+    ),
+    ("no such sense", lambda: servo(load("delta"), start="x=0", goal="x=0.1", sense="touch"), BadRequest, "touch"),
+]
 
 
 @pytest.mark.some(5)
@@ -356,7 +402,8 @@ def test_a_run_whose_time_ends_tells_the_rest_it_is_on_its_way_to():
     assert short.ended == "time"
     assert short.ending.reason.endswith(
         "; it was still on its way to a rest that attracts, found at the goal, where the distance left falls by a "
-        "factor of e every 2 s")
+        "factor of e every 2 s"
+    )
     assert servo("3rrr_m1", **asked).ended == "goal"
     far = servo("3rrr_m1", start="x=0.05,y=0", goal="x=0,y=0", time=1.0)
     assert "rest" not in far.ending.reason

@@ -22,8 +22,12 @@ from simulation.scenes import setting
 
 EYE = "eye=base@0,0,-0.6"
 SIZED = f"{EYE}/0,0,0/800"
-POINTS = ("point:platform@0.1,0,0", "point:platform@-0.1,0.1,0", "point:platform@0,-0.1,0",
-          "point:platform@0.1,0.1,0.1")
+POINTS = (
+    "point:platform@0.1,0,0",
+    "point:platform@-0.1,0.1,0",
+    "point:platform@0,-0.1,0",
+    "point:platform@0.1,0.1,0.1",
+)
 START, GOAL = "x=0.02,y=0.01,z=0.01,rpy=0.1/0.05/0.1", "x=0,y=0,z=0.02,rpy=0/0/0"
 CORNERS = np.array([[0.4, 0, 0], [0.55, 0, 0], [0.55, 0.15, 0], [0.4, 0.15, 0]])
 HAND = "hand=wrist_3_link"
@@ -58,22 +62,32 @@ def true(found: Servo, corners: Array = CORNERS) -> bool:
     if found.ended == "local minimum":
         twin, q = found.settled.twin, found.settled.q
         steps = 1e-5 * np.eye(twin.nv)
-        errors = [np.sum((picture(ClosedConfiguration.of(twin, twin.integrate(q, s * step)), corners) - wanted)[:, :2]
-                         ** 2) for step in steps for s in (1, -1)]
+        errors = [
+            np.sum((picture(ClosedConfiguration.of(twin, twin.integrate(q, s * step)), corners) - wanted)[:, :2] ** 2)
+            for step in steps
+            for s in (1, -1)
+        ]
         rising = np.array(errors).reshape(-1, 2)
         return apart > 1e-6 and bool(np.abs(rising[:, 0] - rising[:, 1]).max() < 1e-8)
     return found.ended in ("boundary", "time") and apart > 1e-9
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("see", [
-    POINTS,
-    ("image_line:platform@0.1,0,0/0,1,0", "image_line:platform@-0.1,0.1,0/1,0,0.1",
-     "image_line:platform@0,-0.1,0.1/1,0.3,0"),
-    ("circle:platform@0.1,0,0/0,0.3,1", "distance:platform@0.1,0.1,0"),
-    ("edges:platform@0.1,0,0/0,1,0.2/0.02", "edge:platform@0.1,0.1,0/1,0,0/0.02"),
-    ("inclination:platform", "position:platform@0.1,0,0", "direction:platform/1,0,0"),
-], ids=["points", "lines", "circle and distance", "edges", "inclination, position and direction"])
+@pytest.mark.parametrize(
+    "see",
+    [
+        POINTS,
+        (
+            "image_line:platform@0.1,0,0/0,1,0",
+            "image_line:platform@-0.1,0.1,0/1,0,0.1",
+            "image_line:platform@0,-0.1,0.1/1,0.3,0",
+        ),
+        ("circle:platform@0.1,0,0/0,0.3,1", "distance:platform@0.1,0.1,0"),
+        ("edges:platform@0.1,0,0/0,1,0.2/0.02", "edge:platform@0.1,0.1,0/1,0,0/0.02"),
+        ("inclination:platform", "position:platform@0.1,0,0", "direction:platform/1,0,0"),
+    ],
+    ids=["points", "lines", "circle and distance", "edges", "inclination, position and direction"],
+)
 def test_a_platform_comes_to_its_goal_with_any_sensors(see: tuple[str, ...]) -> None:
     found = platform(see)
     assert found.ended == "goal"
@@ -144,17 +158,26 @@ def test_noise_in_pixels_needs_a_focal_length_and_keeps_the_platform_near_its_go
     assert found.spread is not None
     assert found.ended == "goal"
     assert 0 < found.spread.metres < 0.02
-    worst = max(float(np.linalg.norm(seen[:2] / seen[2] - true[:2] / true[2])) for each in found.run.commands
-                for seen, true in zip(each.seen, each.true, strict=True))
+    worst = max(
+        float(np.linalg.norm(seen[:2] / seen[2] - true[:2] / true[2]))
+        for each in found.run.commands
+        for seen, true in zip(each.seen, each.true, strict=True)
+    )
     assert 0.1 < worst * 800 / 0.3 <= 1 + 1e-9
 
 
 @pytest.mark.some(1)
-@pytest.mark.parametrize(("see", "noise", "words", "unit", "most"), [
-    (POINTS, "0.3px", "image points", "px", 0.3), (POINTS, "0.1deg", "angles", "degrees", 0.1),
-    (tuple(f"position:{each.partition(':')[2]}" for each in POINTS[:3]), "2mm", "lengths", "mm", 2.0)])
-def test_noise_is_told_in_the_unit_in_which_it_is_given(see: tuple[str, ...], noise: str, words: str, unit: str,
-                                                       most: float) -> None:
+@pytest.mark.parametrize(
+    ("see", "noise", "words", "unit", "most"),
+    [
+        (POINTS, "0.3px", "image points", "px", 0.3),
+        (POINTS, "0.1deg", "angles", "degrees", 0.1),
+        (tuple(f"position:{each.partition(':')[2]}" for each in POINTS[:3]), "2mm", "lengths", "mm", 2.0),
+    ],
+)
+def test_noise_is_told_in_the_unit_in_which_it_is_given(
+    see: tuple[str, ...], noise: str, words: str, unit: str, most: float
+) -> None:
     found = hrsynth.servo("gough_stewart", camera=SIZED, see=see, start=GOAL, goal=GOAL, noise=noise, time=0.4)
     (told,) = (each for each in found.notes if "wrong" in each)
     assert told.startswith(f"measured {words} were wrong by ")
@@ -190,8 +213,11 @@ def test_a_run_ends_where_a_camera_loses_sight() -> None:
     between two poses at which it is inside. There the run ends, to the picture's very side."""
     home = hrsynth.observe("3rrr_m1").everything.start.pose("platform")[:3, 3]
     place = ",".join(f"{value:.6f}" for value in (home[0] + 0.5, home[1], home[2] - 0.92))
-    options = {"see": "depth:platform@1,0,0", "start": f"x={home[0]:.6f},y={home[1]:.6f},phi=-0.25",
-               "goal": f"x={home[0]:.6f},y={home[1]:.6f},phi=0.25"}
+    options = {
+        "see": "depth:platform@1,0,0",
+        "start": f"x={home[0]:.6f},y={home[1]:.6f},phi=-0.25",
+        "goal": f"x={home[0]:.6f},y={home[1]:.6f},phi=0.25",
+    }
     found = hrsynth.servo("3rrr_m1", "1,2,3", f"eye=base@{place}/0,0,0/500,530,500", **options)
     assert found.ended == "lost from sight"
     assert "depth_1" in found.ending.reason
@@ -253,15 +279,19 @@ BODY = """<robot name="body"><link name="base"/><link name="platform"/>
 def body(folder: Path, see: list[str], start: str, goal: str, **options: object) -> Servo:
     """A run of a body that nothing holds."""
     (folder / "body.urdf").write_text(BODY)
-    return hrsynth.servo(folder / "body.urdf", start=start, goal=goal, see=see,
-                         camera="eye=base@0,0,0", **options)
+    return hrsynth.servo(folder / "body.urdf", start=start, goal=goal, see=see, camera="eye=base@0,0,0", **options)
 
 
 def test_a_line_that_comes_to_the_cameras_centre_ends_the_run(tmp_path: Path) -> None:
-    found = body(tmp_path, ["line:platform@0.225232,-0.17792,0.224325/0.905356,0.446375,-0.536953",
-                            "point:platform@-0.0454,0.024797,-0.23622"],
-                 "x=0.0761,y=0.0114,z=1.1308,rpy=0.6922/-0.4723/-0.279",
-                 "x=-0.1098,y=-0.0291,z=1.0424,rpy=-0.5704/0.6009/-1.3175")
+    found = body(
+        tmp_path,
+        [
+            "line:platform@0.225232,-0.17792,0.224325/0.905356,0.446375,-0.536953",
+            "point:platform@-0.0454,0.024797,-0.23622",
+        ],
+        "x=0.0761,y=0.0114,z=1.1308,rpy=0.6922/-0.4723/-0.279",
+        "x=-0.1098,y=-0.0291,z=1.0424,rpy=-0.5704/0.6009/-1.3175",
+    )
     assert found.ending.name == "lost from sight"
     assert "has no value there" in found.ending.reason
 
@@ -269,10 +299,17 @@ def test_a_line_that_comes_to_the_cameras_centre_ends_the_run(tmp_path: Path) ->
 @pytest.mark.slow
 def test_supposed_depths_at_which_the_law_loses_rank_are_told(tmp_path: Path) -> None:
     """Three image points are as many numbers as freedoms: no more are measured."""
-    found = body(tmp_path, ["point:platform@-0.094037,-0.078560,-0.075302", "point:platform@0.292467,0.079654,0.104594",
-                            "point:platform@-0.102022,0.107951,-0.226217"],
-                 "x=-0.1345,y=0.1051,z=0.9062,rpy=0.6703/0.4578/1.1408",
-                 "x=-0.1356,y=-0.0878,z=1.4949,rpy=-0.0945/0.1785/-1.5109", depth="constant:1")
+    found = body(
+        tmp_path,
+        [
+            "point:platform@-0.094037,-0.078560,-0.075302",
+            "point:platform@0.292467,0.079654,0.104594",
+            "point:platform@-0.102022,0.107951,-0.226217",
+        ],
+        "x=-0.1345,y=0.1051,z=0.9062,rpy=0.6703/0.4578/1.1408",
+        "x=-0.1356,y=-0.0878,z=1.4949,rpy=-0.0945/0.1785/-1.5109",
+        depth="constant:1",
+    )
     assert found.ending.name == "local minimum"
     assert "the depths that it supposes, lose rank" in found.ending.reason
 

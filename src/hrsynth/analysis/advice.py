@@ -67,8 +67,9 @@ class FurtherMeasurement(Value):
 def candidates(setting: ObservedRobot, offered: Sequence[str] = ()) -> tuple[FurtherMeasurement, ...]:
     """Everything that could be added: legs, directions of other links, positions of observed lines, encoders, and what
     is ``offered``, in the words of ``--see``."""
-    more = [FurtherMeasurement("offered", text, each, each.leg)
-            for text, each in zip(offered, setting.offered, strict=True)]
+    more = [
+        FurtherMeasurement("offered", text, each, each.leg) for text, each in zip(offered, setting.offered, strict=True)
+    ]
     return (*_legs(setting), *_directions(setting), *_lines(setting), *_encoders(setting), *more)
 
 
@@ -89,8 +90,9 @@ def _directions(setting: ObservedRobot) -> Iterator[FurtherMeasurement]:
             if (leg.label, link) in taken:
                 continue
             try:
-                yield FurtherMeasurement("direction", link, named.get((leg.label, link))
-                                         or observation_of(setting.anatomy, link), leg.label)
+                yield FurtherMeasurement(
+                    "direction", link, named.get((leg.label, link)) or observation_of(setting.anatomy, link), leg.label
+                )
             except HrsynthError:
                 continue
 
@@ -147,9 +149,14 @@ class Cure(Value):
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
-        return {"measurements": [each.to_dict() for each in self.measurements], "verdict": self.verdict.verdict,
-                "rank": self.verdict.rank, "gap": self.verdict.gap, "price": self.price,
-                **({} if self.verdict.rank_at_zero is None else {"rank_at_zero": self.verdict.rank_at_zero})}
+        return {
+            "measurements": [each.to_dict() for each in self.measurements],
+            "verdict": self.verdict.verdict,
+            "rank": self.verdict.rank,
+            "gap": self.verdict.gap,
+            "price": self.price,
+            **({} if self.verdict.rank_at_zero is None else {"rank_at_zero": self.verdict.rank_at_zero}),
+        }
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -194,15 +201,33 @@ class Advice(Result, shown_as="advise"):
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
         now = self.now
-        return {**self.setting.to_dict(), "verdict": now.verdict, "rank": now.rank, "dof": now.dof,
-                "lost": [freedom.to_dict() for freedom in now.lost], "nothing_missing": self.nothing_missing,
-                "sets": [each.to_dict() for each in self.sets], "size": self.size, "tried": self.tried,
-                "complete": self.complete, "undecided": self.undecided}
+        return {
+            **self.setting.to_dict(),
+            "verdict": now.verdict,
+            "rank": now.rank,
+            "dof": now.dof,
+            "lost": [freedom.to_dict() for freedom in now.lost],
+            "nothing_missing": self.nothing_missing,
+            "sets": [each.to_dict() for each in self.sets],
+            "size": self.size,
+            "tried": self.tried,
+            "complete": self.complete,
+            "undecided": self.undecided,
+        }
 
 
 @question()
-def advise(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
-           offer: SeeLike = None, price: str = "", most: int | None = None, seed: int = 0) -> Advice:
+def advise(
+    robot: RobotLike,
+    observe: LegsLike = None,
+    camera: CameraLike = None,
+    *,
+    see: SeeLike = None,
+    offer: SeeLike = None,
+    price: str = "",
+    most: int | None = None,
+    seed: int = 0,
+) -> Advice:
     """The cheapest sets of further measurements with which u̇ = 0 forces t = 0 (theory.md 6; MMT 5.3): the smallest,
     unless ``price``, as ``encoder=0.5,point=3``, says what one measurement of a kind costs (default: 1).
 
@@ -231,8 +256,11 @@ def advise(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None
     costs = [prices.get(_kind(each), 1.0) for each in search.useful]
     chosen, complete = search.cheapest(costs)
     tell("verification")
-    sets = _verify(setting, samples, [(tuple(search.useful[i] for i in places), sum(costs[i] for i in places))
-                                        for places in chosen[:most]])
+    sets = _verify(
+        setting,
+        samples,
+        [(tuple(search.useful[i] for i in places), sum(costs[i] for i in places)) for places in chosen[:most]],
+    )
     undecided = len(chosen[:most]) - len(sets)
     best = max((each.verdict.rank for each in sets), default=now.rank)
     kept = tuple(each for each in sets if each.verdict.rank == best)
@@ -263,8 +291,9 @@ def _prices(text: str) -> dict[str, float]:
     return found
 
 
-def _verify(setting: ObservedRobot, samples: Samples,
-              sets: Sequence[tuple[tuple[FurtherMeasurement, ...], float]]) -> list[Cure]:
+def _verify(
+    setting: ObservedRobot, samples: Samples, sets: Sequence[tuple[tuple[FurtherMeasurement, ...], float]]
+) -> list[Cure]:
     """Each set with its price and its verdict at all samples; those whose rank has no clear gap are left out."""
     found = list[Cure]()
     for added, price in sets:
@@ -300,8 +329,10 @@ class Search:
         kept = [i for i in kept if max(float(np.linalg.norm(blocks[i])) for blocks in unseen) > RANK_CUTOFF]
         kept = _without_twins(kept, everything, rates)
         self.useful = tuple(everything[i] for i in kept)
-        self._rows = [np.array([_pad_rows(blocks[i]) for i in kept]).reshape(len(kept), LARGEST_VALUE, twist.shape[1])
-                      for blocks, twist in zip(unseen, self._twists, strict=True)]
+        self._rows = [
+            np.array([_pad_rows(blocks[i]) for i in kept]).reshape(len(kept), LARGEST_VALUE, twist.shape[1])
+            for blocks, twist in zip(unseen, self._twists, strict=True)
+        ]
 
     def count_lost(self, sets: Sequence[Sequence[int]]) -> Array:
         """How many freedoms stay lost with each set, generically: the least over the probes; shape (sets,)."""
@@ -345,16 +376,21 @@ class Search:
         return chosen, False
 
 
-def _without_twins(kept: Sequence[int], everything: Sequence[FurtherMeasurement], rates: Sequence[Sequence[Array]]
-                   ) -> list[int]:
+def _without_twins(
+    kept: Sequence[int], everything: Sequence[FurtherMeasurement], rates: Sequence[Sequence[Array]]
+) -> list[int]:
     """Leave out a link's direction whose rates tell what a direction before it does (links joined by P joints only)."""
-    spans = {i: [range_basis(blocks[i].T, 1.0)[0] for blocks in rates] for i in kept
-             if everything[i].kind in ("leg", "direction")}
+    spans = {
+        i: [range_basis(blocks[i].T, 1.0)[0] for blocks in rates]
+        for i in kept
+        if everything[i].kind in ("leg", "direction")
+    }
     left: list[int] = []
     for i in kept:
         twins = (j for j in left if j in spans) if everything[i].kind == "direction" else ()
-        if not any(all(largest_angle(a, b) < SAME_RELATION for a, b in zip(spans[i], spans[j], strict=True))
-                   for j in twins):
+        if not any(
+            all(largest_angle(a, b) < SAME_RELATION for a, b in zip(spans[i], spans[j], strict=True)) for j in twins
+        ):
             left.append(i)
     return left
 

@@ -22,8 +22,16 @@ if TYPE_CHECKING:
 
 
 @with_spelling
-def observe(robot: RobotLike, legs: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
-            at: PoseLike | None = None, samples: int = SAMPLES, seed: int = 0) -> ObservedRobot:
+def observe(
+    robot: RobotLike,
+    legs: LegsLike = None,
+    camera: CameraLike = None,
+    *,
+    see: SeeLike = None,
+    at: PoseLike | None = None,
+    samples: int = SAMPLES,
+    seed: int = 0,
+) -> ObservedRobot:
     """A robot with what is watched of it, its normal form and samples of its motion: the starting point of every
     question.
 
@@ -49,8 +57,9 @@ def observe(robot: RobotLike, legs: LegsLike = None, camera: CameraLike = None, 
     if at is None:
         return ObservedRobot.of(robot, legs, camera, see=see, samples=samples, seed=seed)
     if isinstance(robot, ObservedRobot):
-        raise BadRequest(f"{robot.headline()}: what is watched is given twice", str(at),
-                         "nothing besides an observed robot")
+        raise BadRequest(
+            f"{robot.headline()}: what is watched is given twice", str(at), "nothing besides an observed robot"
+        )
     require_platform(robot, at)
     asked = asked_pose(at)
     if isinstance(asked, Pose):
@@ -63,9 +72,12 @@ def observe(robot: RobotLike, legs: LegsLike = None, camera: CameraLike = None, 
 def require_platform(robot: Mechanism, where: object) -> None:
     """Refuses the pose or grid ``where`` of a formation: it would be that of its first body, the others staying."""
     if robot.formation:
-        raise BadRequest(f"{robot.name}: a pose belongs to one platform, and this is a formation", str(where),
-                         f"nothing: {', '.join(robot.bodies)} stand where the file has them (--platform LINK makes one "
-                         "the platform)")
+        raise BadRequest(
+            f"{robot.name}: a pose belongs to one platform, and this is a formation",
+            str(where),
+            f"nothing: {', '.join(robot.bodies)} stand where the file has them (--platform LINK makes one "
+            "the platform)",
+        )
 
 
 def _start_at(setting: ObservedRobot, wanted: Pose) -> ClosedConfiguration:
@@ -81,10 +93,10 @@ def _start_at(setting: ObservedRobot, wanted: Pose) -> ClosedConfiguration:
     raise refused
 
 
-def configurations_at(setting: ObservedRobot, poses: Sequence[Pose | ModeNumber], by_modes: bool = False
-                      ) -> list[ClosedConfiguration]:
-    """The robot at each of the poses, as :func:`asked_at`; raises ``PoseNotReached`` for the first that is not reached.
-    """
+def configurations_at(
+    setting: ObservedRobot, poses: Sequence[Pose | ModeNumber], by_modes: bool = False
+) -> list[ClosedConfiguration]:
+    """The robot at each of the poses, as :func:`asked_at`; raises ``PoseNotReached`` for the first not reached."""
     found = asked_at(setting, poses, by_modes)
     for each in found:
         if isinstance(each, PoseNotReached):
@@ -92,8 +104,9 @@ def configurations_at(setting: ObservedRobot, poses: Sequence[Pose | ModeNumber]
     return [each for each in found if isinstance(each, ClosedConfiguration)]
 
 
-def asked_at(setting: ObservedRobot, poses: Sequence[Pose | ModeNumber], by_modes: bool = False
-             ) -> list[ClosedConfiguration | PoseNotReached]:
+def asked_at(
+    setting: ObservedRobot, poses: Sequence[Pose | ModeNumber], by_modes: bool = False
+) -> list[ClosedConfiguration | PoseNotReached]:
     """The robot at each of the poses, or why it does not get there. ``mode:3`` is the third mode, with the directions
     that are watched, of the first pose among these that is given by its parts (of the zero configuration where none
     is), as ``modes`` lists them; with ``by_modes`` of the first that is reached, and a pose to which no small steps
@@ -117,8 +130,9 @@ def asked_at(setting: ObservedRobot, poses: Sequence[Pose | ModeNumber], by_mode
     unreached = {each: at for each, at in found.items() if isinstance(at, PoseNotReached)}
     if isinstance(about, PoseNotReached):
         reason = f"it would be a mode at {about.pose}, which is not reached"
-        return [found.get(each) or PoseNotReached(about.robot, str(each), 0.0, about.last, reason=reason)
-                for each in poses]
+        return [
+            found.get(each) or PoseNotReached(about.robot, str(each), 0.0, about.last, reason=reason) for each in poses
+        ]
     if len(found) < len(set(poses)) or (by_modes and unreached):
         from .modes.modes import at_mode, modes
 
@@ -135,15 +149,18 @@ def asked_at(setting: ObservedRobot, poses: Sequence[Pose | ModeNumber], by_mode
 
 
 def _assembled_mode(listed: AssemblyModes, pose: Pose, refused: PoseNotReached) -> ClosedConfiguration:
-    """The robot at the one mode with this pose at which it was found assembled; raises ``refused`` where there is none.
-    """
+    """The robot at the one mode with this pose at which it was found assembled; raises ``refused`` if there is none."""
     from .modes.modes import at_mode
 
     motion, twin = listed.setting.motion, listed.goal.twin
     wanted = motion.goal(pose, listed.setting.robot.name)
-    met = [number for number, mode in enumerate(listed.modes, 1)
-           if mode.configuration is not None and mode.reachable
-           and wanted.is_met(mode.configuration.pose(motion.link), AS_PRINTED * max(1.0, twin.length))]
+    met = [
+        number
+        for number, mode in enumerate(listed.modes, 1)
+        if mode.configuration is not None
+        and mode.reachable
+        and wanted.is_met(mode.configuration.pose(motion.link), AS_PRINTED * max(1.0, twin.length))
+    ]
     if len(met) != 1:
         raise refused
     return at_mode(listed, ModeNumber(met[0]))

@@ -48,8 +48,12 @@ class GridCheck(Value):
         """The record of the command line: arrays nested in the order of ``axes``."""
         shape = self.grid.shape
         nested = {name: np.array(self.values(name), dtype=object).reshape(shape).tolist() for name in MEASURES}
-        return {**self.grid.to_dict(), "free": list(self.free),
-                "state": np.array(self.states, dtype=object).reshape(shape).tolist(), **nested}
+        return {
+            **self.grid.to_dict(),
+            "free": list(self.free),
+            "state": np.array(self.states, dtype=object).reshape(shape).tolist(),
+            **nested,
+        }
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -85,18 +89,30 @@ class Check(Result, shown_as="check"):
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line, without the command's own fields."""
-        return {"characteristic_length": self.length,
-                **self.setting.to_dict(), "watched": self.setting.watched_dict(),
-                "mobility": self.setting.mobility_dict(),
-                "configurations": [each.to_dict() for each in self.postures],
-                "unreached": [{"pose": each.pose, "reason": each.reason} for each in self.unreached],
-                "redundant": [each.to_dict() for each in self.redundant],
-                "grid": self.grid and self.grid.to_dict(), "unlimited": list(self.setting.unlimited)}
+        return {
+            "characteristic_length": self.length,
+            **self.setting.to_dict(),
+            "watched": self.setting.watched_dict(),
+            "mobility": self.setting.mobility_dict(),
+            "configurations": [each.to_dict() for each in self.postures],
+            "unreached": [{"pose": each.pose, "reason": each.reason} for each in self.unreached],
+            "redundant": [each.to_dict() for each in self.redundant],
+            "grid": self.grid and self.grid.to_dict(),
+            "unlimited": list(self.setting.unlimited),
+        }
 
 
 @question(formations=True)
-def check(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
-          at: PoseLike | Iterable[PoseLike] = (), grid: Grid | str | None = None, seed: int = 0) -> Check:
+def check(
+    robot: RobotLike,
+    observe: LegsLike = None,
+    camera: CameraLike = None,
+    *,
+    see: SeeLike = None,
+    at: PoseLike | Iterable[PoseLike] = (),
+    grid: Grid | str | None = None,
+    seed: int = 0,
+) -> Check:
     """Mobility, ranks with gaps, Type 1, 2, 3, Zlatanov's six numbers, constraint singularities and redundant
     constraints (docs/pages/theory.md, section 7) at the poses ``at`` (default: the zero configuration) and over
     ``grid``.
@@ -132,6 +148,10 @@ def check(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None,
         dependent = None if all(places) else grid_dependence(start, motion, cells)
         if not any(places):
             raise PlaneNotMet(setting.robot.name, f"the grid {cells}", f"none of {len(places)} is", dependent)
-        swept = GridCheck(cells, tuple(None if each is None else examiner.classify(each) for each in places),
-                          motion.free({*cells.names, *cells.fixed.given}), dependent)
+        swept = GridCheck(
+            cells,
+            tuple(None if each is None else examiner.classify(each) for each in places),
+            motion.free({*cells.names, *cells.fixed.given}),
+            dependent,
+        )
     return Check(setting, postures, list_redundant(examiner.redundant, generic=True), swept, unreached)

@@ -64,8 +64,14 @@ class Classes:
     def of(cls, here: Counts, usual: Counts) -> Classes:
         """The counts here against the usual ones."""
         passive = (here.mobility - here.relation) - (usual.mobility - usual.relation)
-        return cls(RI=here.unexplained - usual.unexplained, RO=here.unseen - usual.unseen, II=usual.seen - here.seen,
-                   IO=usual.dof - here.dof, RPM=passive, IIM=here.mobility - usual.mobility)
+        return cls(
+            RI=here.unexplained - usual.unexplained,
+            RO=here.unseen - usual.unseen,
+            II=usual.seen - here.seen,
+            IO=usual.dof - here.dof,
+            RPM=passive,
+            IIM=here.mobility - usual.mobility,
+        )
 
     @property
     def type1(self) -> bool:
@@ -123,8 +129,10 @@ def redundant_rows(at: ClosedConfiguration) -> Rows:
     ranks += [rank_of(np.asarray(np.linalg.svd(J[:end], compute_uv=False)), scale) for end in np.cumsum(sizes)]
     if min(rank.gap for rank in ranks) < RANK_GAP:
         return ()
-    return tuple((name, size - (after.value - before.value))
-                 for name, size, (before, after) in zip(names, sizes, pairwise(ranks), strict=True))
+    return tuple(
+        (name, size - (after.value - before.value))
+        for name, size, (before, after) in zip(names, sizes, pairwise(ranks), strict=True)
+    )
 
 
 def usual_rows(configurations: Iterable[ClosedConfiguration]) -> Rows:

@@ -61,12 +61,20 @@ class Legs(Result, shown_as="legs"):
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
-        return {"robot": self.robot, "architecture_ascii": self.architecture, "dof": self.dof,
-                "sets": [{**each.to_dict(), "exact": exact.exact, "architecture": exact.to_dict()}
-                         for each, exact in zip(self.sets, self.exact, strict=True)], "complete": self.complete,
-                "watched": self.setting.watched_dict(), "minimal": [list(each) for each in self.minimal],
-                "minimal_complete": self.minimal_complete,
-                **self.setting.modes_dict()}
+        return {
+            "robot": self.robot,
+            "architecture_ascii": self.architecture,
+            "dof": self.dof,
+            "sets": [
+                {**each.to_dict(), "exact": exact.exact, "architecture": exact.to_dict()}
+                for each, exact in zip(self.sets, self.exact, strict=True)
+            ],
+            "complete": self.complete,
+            "watched": self.setting.watched_dict(),
+            "minimal": [list(each) for each in self.minimal],
+            "minimal_complete": self.minimal_complete,
+            **self.setting.modes_dict(),
+        }
 
 
 def _smallest(labels: tuple[str, ...], rank: Callable[[tuple[str, ...]], int]) -> tuple[list[tuple[str, ...]], bool]:
@@ -89,16 +97,25 @@ def _smallest(labels: tuple[str, ...], rank: Callable[[tuple[str, ...]], int]) -
         more = size - len(needed)
         if comb(len(others), more) > MOST_TRIED:
             return [kept], False
-        sets = [tuple(label for label in labels if label in needed or label in chosen)
-                for chosen in combinations(others, more)]
+        sets = [
+            tuple(label for label in labels if label in needed or label in chosen)
+            for chosen in combinations(others, more)
+        ]
         if found := [each for each in sets if rank(each) == whole]:
             return found, True
     return [kept], True
 
 
 @question(formations=True)
-def legs(robot: RobotLike, camera: CameraLike = None, *, observe: LegsLike = None, see: SeeLike = None,
-         at: PoseLike | None = None, seed: int = 0) -> Legs:
+def legs(
+    robot: RobotLike,
+    camera: CameraLike = None,
+    *,
+    observe: LegsLike = None,
+    see: SeeLike = None,
+    at: PoseLike | None = None,
+    seed: int = 0,
+) -> Legs:
     """The verdict of every set of legs (theory.md 6), on the branch of the zero configuration or of the pose ``at``
     (``mode:2``: a mode with all legs watched): of all legs at their default segments, or of the labels or links in
     ``observe``, together with what is seen with ``see``; observations count one by one.
@@ -123,8 +140,12 @@ def legs(robot: RobotLike, camera: CameraLike = None, *, observe: LegsLike = Non
     def rank(chosen: tuple[str, ...]) -> int:
         return max(member.relation.rank for member in samples_of(chosen).members)
 
-    tried = [chosen for size in range(1, len(labels) + 1) if complete or size <= few or size == len(labels)
-             for chosen in combinations(labels, size)]
+    tried = [
+        chosen
+        for size in range(1, len(labels) + 1)
+        if complete or size <= few or size == len(labels)
+        for chosen in combinations(labels, size)
+    ]
     known = True
     if not complete:
         found, known = _smallest(labels, rank)
@@ -137,5 +158,15 @@ def legs(robot: RobotLike, camera: CameraLike = None, *, observe: LegsLike = Non
     best = max(each.rank for each in sets)
     smallest = min(len(each.legs) for each in sets if each.rank == best)
     minimal = tuple(each.legs for each in sets if best and each.rank == best and len(each.legs) == smallest)
-    return Legs(setting, setting.robot.name, anatomy.architecture().ascii, setting.dof, tuple(sets), tuple(exact),
-                complete, minimal, known, **({} if at is None else {"where": str(asked_pose(at))}))
+    return Legs(
+        setting,
+        setting.robot.name,
+        anatomy.architecture().ascii,
+        setting.dof,
+        tuple(sets),
+        tuple(exact),
+        complete,
+        minimal,
+        known,
+        **({} if at is None else {"where": str(asked_pose(at))}),
+    )

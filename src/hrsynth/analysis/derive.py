@@ -54,9 +54,14 @@ class UncheckedForm(Value):
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
-        return {"hidden_ascii": self.hidden.ascii, "equivalent": self.equivalent, "largest_angle": self.largest_angle,
-                "gains": [f.to_dict() for f in self.gains], "loses": [f.to_dict() for f in self.loses],
-                "reason": self.reason}
+        return {
+            "hidden_ascii": self.hidden.ascii,
+            "equivalent": self.equivalent,
+            "largest_angle": self.largest_angle,
+            "gains": [f.to_dict() for f in self.gains],
+            "loses": [f.to_dict() for f in self.loses],
+            "reason": self.reason,
+        }
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -102,8 +107,10 @@ class Derivation(Result, shown_as="derive"):
     def headline(self) -> str:
         """The robot, the legs watched, the hidden robot and the verdict."""
         legs = ", ".join(self.setting.labels)
-        return (f"{self.robot.name} {self.architecture}, watching {legs}: "
-                f"hidden robot {self.hidden_architecture or 'none'}, {self.verdict.verdict}")
+        return (
+            f"{self.robot.name} {self.architecture}, watching {legs}: "
+            f"hidden robot {self.hidden_architecture or 'none'}, {self.verdict.verdict}"
+        )
 
     def modes(self, at: PoseLike | None = None, *, real: bool = False) -> AssemblyModes:
         """All poses with the directions (``real``: the motors' coordinates) of the pose ``at``, as ``hrsynth.modes``
@@ -117,15 +124,20 @@ class Derivation(Result, shown_as="derive"):
         hidden = self.hidden_architecture
         return {
             **self.setting.to_dict(),
-            "notation": {"real": self.architecture.unicode, "hidden": hidden and hidden.unicode,
-                         "real_ascii": self.architecture.ascii, "hidden_ascii": hidden and hidden.ascii,
-                         "hidden_latex": hidden and hidden.latex},
+            "notation": {
+                "real": self.architecture.unicode,
+                "hidden": hidden and hidden.unicode,
+                "real_ascii": self.architecture.ascii,
+                "hidden_ascii": hidden and hidden.ascii,
+                "hidden_latex": hidden and hidden.latex,
+            },
             "form": self.form,
             "dof": self.dof,
             "mobility": self.setting.mobility_dict(),
             "verdict": self.verdict.verdict,
             "lost": [freedom.to_dict() for freedom in self.verdict.lost],
-            "rank": self.verdict.rank, "margin": self.verdict.margin,
+            "rank": self.verdict.rank,
+            "margin": self.verdict.margin,
             **({} if self.verdict.rank_at_zero is None else {"rank_at_zero": self.verdict.rank_at_zero}),
             **({} if self.verdict.formation is None else {"formation": self.verdict.formation.to_dict()}),
             "point_platform": self.setting.anatomy.point is not None,
@@ -133,16 +145,34 @@ class Derivation(Result, shown_as="derive"):
             "interaction_matrix": self.verdict.has_interaction_matrix,
             "architecture": self.exact.to_dict(),
             "unchecked_form": self.unchecked and self.unchecked.to_dict(),
-            "steps": [{"rule": s.rule, "leg": s.leg, "accepted": s.accepted, "reason": s.reason,
-                       "largest_angle": s.largest_angle} for s in self.steps],
-            "certificate": self.certificate.to_dict(), "equal_where": list(self.equal_where),
+            "steps": [
+                {
+                    "rule": s.rule,
+                    "leg": s.leg,
+                    "accepted": s.accepted,
+                    "reason": s.reason,
+                    "largest_angle": s.largest_angle,
+                }
+                for s in self.steps
+            ],
+            "certificate": self.certificate.to_dict(),
+            "equal_where": list(self.equal_where),
             **self.setting.modes_dict(),
         }
 
 
 @question(formations=True)
-def derive(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
-           at: PoseLike | None = None, form: str = "simplified", unchecked: bool = True, seed: int = 0) -> Derivation:
+def derive(
+    robot: RobotLike,
+    observe: LegsLike = None,
+    camera: CameraLike = None,
+    *,
+    see: SeeLike = None,
+    at: PoseLike | None = None,
+    form: str = "simplified",
+    unchecked: bool = True,
+    seed: int = 0,
+) -> Derivation:
     """The certified hidden robot of a robot and the legs that are watched (MMT 3.2; docs/pages/theory.md, sections 3 to
     5).
 
@@ -184,8 +214,19 @@ def derive(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None
             without_checks = _unchecked_form(setting, evidence, samples, architecture, certificate)
     elif not certificate.passed:
         raise NotCertified(setting.robot.name, certificate.largest_angle, SAME_RELATION)
-    return Derivation(setting.robot, setting, form, anatomy.architecture(), hidden, architecture, verdict, exact,
-                      result.steps, certificate, without_checks)
+    return Derivation(
+        setting.robot,
+        setting,
+        form,
+        anatomy.architecture(),
+        hidden,
+        architecture,
+        verdict,
+        exact,
+        result.steps,
+        certificate,
+        without_checks,
+    )
 
 
 def _certify(setting: ObservedRobot, state: State, samples: Samples) -> tuple[Mechanism | None, Certificate]:
@@ -203,8 +244,16 @@ def finish_robot(setting: ObservedRobot, state: State) -> Mechanism:
     mechanism = state.mechanism
     observations = tuple(o for o in setting.observed if {o.link, o.seen_from or o.link} <= mechanism.links.keys())
     cameras = tuple(camera for camera in mechanism.cameras if camera.link in mechanism.links)
-    hidden = spanning(replace(mechanism, name=f"{setting.robot.name}_hidden", observations=observations,
-                              cameras=cameras, file=None, formation=False))
+    hidden = spanning(
+        replace(
+            mechanism,
+            name=f"{setting.robot.name}_hidden",
+            observations=observations,
+            cameras=cameras,
+            file=None,
+            formation=False,
+        )
+    )
     return _as_legs(hidden, turns=setting.samples.question.point is None)
 
 
@@ -212,14 +261,17 @@ def _as_legs(hidden: Mechanism, turns: bool) -> Mechanism:
     """A mechanism that says whether its platform ``turns`` where its joints do not, with its observations; a segment
     that is in none of its legs (of a single leg the platform) as a direction of its link. Where no leg ends on the
     base, as of a formation, it stays as it is."""
-    told = tuple(replace(o, seen_from=hidden.reference) if isinstance(o, Direction) and o.by_segment else o
-                 for o in hidden.observations)
+    told = tuple(
+        replace(o, seen_from=hidden.reference) if isinstance(o, Direction) and o.by_segment else o
+        for o in hidden.observations
+    )
     try:
         anatomy = decompose(normal_form(replace(hidden, observations=told, turns=None)).mechanism)
     except BadMechanism:
         return hidden
-    observations = tuple(own if anatomy.leg_of(own.link) else other
-                         for own, other in zip(hidden.observations, told, strict=True))
+    observations = tuple(
+        own if anatomy.leg_of(own.link) else other for own, other in zip(hidden.observations, told, strict=True)
+    )
     return replace(hidden, observations=observations, turns=None if turns == (anatomy.point is None) else turns)
 
 
@@ -228,8 +280,9 @@ def _check(samples: Samples, count: int | None) -> Check:
     return lambda mechanism, bodies: certify(samples, mechanism, count=count, bodies=bodies, complete=False)
 
 
-def _fallback(setting: ObservedRobot, evidence: Evidence, samples: Samples, failed: Certificate,
-              asked: Strategy) -> tuple[Rewriting, Mechanism, Certificate]:
+def _fallback(
+    setting: ObservedRobot, evidence: Evidence, samples: Samples, failed: Certificate, asked: Strategy
+) -> tuple[Rewriting, Mechanism, Certificate]:
     """Where the certificate at all samples sees what three did not: check every step of the form that was asked for at
     all samples, then of the general form."""
     for run in dict.fromkeys((asked, GENERAL)):
@@ -243,16 +296,19 @@ def _fallback(setting: ObservedRobot, evidence: Evidence, samples: Samples, fail
 
 def _blind(samples: Samples) -> Certificate:
     """What is certified where every leg is blind: the directions do not move at all."""
-    angle = max(float(np.linalg.norm(member.relation.rates, 2)) if member.relation.dimension else 0.0
-                for member in samples.members)
+    angle = max(
+        float(np.linalg.norm(member.relation.rates, 2)) if member.relation.dimension else 0.0
+        for member in samples.members
+    )
     gap = min(member.relation.gap for member in samples.members)
     passed = angle <= SAME_RELATION
     reason = "u̇ vanishes: every observed direction is constant" if passed else "an observed direction moves"
     return Certificate(len(samples.members), samples.discarded, angle, gap, 0.0, passed, reason)
 
 
-def _unchecked_form(setting: ObservedRobot, evidence: Evidence, samples: Samples, certified: Architecture,
-                certificate: Certificate) -> UncheckedForm:
+def _unchecked_form(
+    setting: ObservedRobot, evidence: Evidence, samples: Samples, certified: Architecture, certificate: Certificate
+) -> UncheckedForm:
     """Apply the rules without checking their conditions, and compare what they give with the real robot.
 
     The ends of the legs are changed only where the hidden robot would not keep its dof otherwise (MMT 3.2).
@@ -283,8 +339,9 @@ def _planar(samples: Samples) -> bool:
     return range_basis(twists[3:], 1.0)[1].value <= 1 and range_basis(twists[:3], 1.0)[1].value <= 2
 
 
-def _exchanged_freedoms(anatomy: LegDecomposition, found: Certificate
-                        ) -> tuple[tuple[Freedom, ...], tuple[Freedom, ...]]:
+def _exchanged_freedoms(
+    anatomy: LegDecomposition, found: Certificate
+) -> tuple[tuple[Freedom, ...], tuple[Freedom, ...]]:
     """The platform's freedoms that a wrong hidden robot gains and loses, at the configuration where they differ."""
     if found.mismatch is None or found.mismatch.real.twist_rows != 6:
         return (), ()

@@ -74,8 +74,13 @@ class Basis:
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
-        return {"carried": self.carried, "kept": self.kept, "observed": list(self.observed),
-                "largest_defect_held": self.held, "smallest_defect_not_held": self.missed}
+        return {
+            "carried": self.carried,
+            "kept": self.kept,
+            "observed": list(self.observed),
+            "largest_defect_held": self.held,
+            "smallest_defect_not_held": self.missed,
+        }
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -102,10 +107,17 @@ class ExactVerdict(Compared):
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
-        return {"verdict": self.verdict, "exact": self.exact, "rank": self.rank, "instances": self.instances,
-                "reason": self.reason, "proved": self.proved, "chance": self.chance,
-                "relations": self.basis and self.basis.to_dict(),
-                **({} if self.trivial is None else {"trivial": self.trivial})}
+        return {
+            "verdict": self.verdict,
+            "exact": self.exact,
+            "rank": self.rank,
+            "instances": self.instances,
+            "reason": self.reason,
+            "proved": self.proved,
+            "chance": self.chance,
+            "relations": self.basis and self.basis.to_dict(),
+            **({} if self.trivial is None else {"trivial": self.trivial}),
+        }
 
 
 class ExactArchitecture:
@@ -115,8 +127,14 @@ class ExactArchitecture:
     is the mobility at the first configuration of the relations, the zero configuration.
     """
 
-    def __init__(self, mechanism: Mechanism, relations: Relations, observations: Sequence[Observation],
-                 relation: Relation, start: int | None = None) -> None:
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        relations: Relations,
+        observations: Sequence[Observation],
+        relation: Relation,
+        start: int | None = None,
+    ) -> None:
         self.mechanism = mechanism
         self.relations = relations
         self.observations = tuple(observations)
@@ -185,8 +203,12 @@ class ExactArchitecture:
     def _count_similarities(self, found: Instance, places: Sequence[int]) -> int:
         """How many independent similarities take along all that is sensed, at an instance, in motions not seen."""
         draws = [(random_numbers(3, self._random), random_numbers(3, self._random)) for _ in range(PLACES)]
-        parts = [part for i in places if (at := found.sightings[i]) is not None
-                 for part in sense_links(self.observations[i], self.mechanism.reference, at, draws)]
+        parts = [
+            part
+            for i in places
+            if (at := found.sightings[i]) is not None
+            for part in sense_links(self.observations[i], self.mechanism.reference, at, draws)
+        ]
         if not parts:
             return 0
         unseen = kernel(np.vstack([found.rates[i] for i in places]))
@@ -205,8 +227,7 @@ class ExactArchitecture:
         else:
             kept_too, observed = len(left), ()
         missed = self.relations.missed
-        return Basis(len(every) - len(left), kept_too, observed, self.relations.held,
-                     finite(missed))
+        return Basis(len(every) - len(left), kept_too, observed, self.relations.held, finite(missed))
 
     def _regular(self) -> bool:
         """Whether the zero configuration is a regular member of the family, as the instance is; a sample must be."""
@@ -238,26 +259,39 @@ class ExactArchitecture:
     def _spins(self, link: str, places: Sequence[int]) -> bool:
         """Whether a link is a rod between two S joints that can spin unseen."""
         joints = self.mechanism.joints_of(link)
-        if (len(joints) != 2 or {joint.type for joint in joints} != {JointType.SPHERICAL}
-                or link in (self.mechanism.base, self.mechanism.platform, self.mechanism.reference)):
+        if (
+            len(joints) != 2
+            or {joint.type for joint in joints} != {JointType.SPHERICAL}
+            or link in (self.mechanism.base, self.mechanism.platform, self.mechanism.reference)
+        ):
             return False
         others = (self.observations[i] for i in places if not self.observations[i].by_segment)
         if any(link in (o.link, o.seen_from) for o in others):
             return False
         ends = {self.relations.centres[joint.name] for joint in joints}
-        sights = dict(zip((i for i, o in enumerate(self.observations) if isinstance(o, SeenAxis)),
-                          self.relations.sights, strict=False))
-        return all(sights[i].kind == "between" and set(sights[i].points) == ends
-                   for i in places if self.observations[i].link == link)
+        sights = dict(
+            zip(
+                (i for i, o in enumerate(self.observations) if isinstance(o, SeenAxis)),
+                self.relations.sights,
+                strict=False,
+            )
+        )
+        return all(
+            sights[i].kind == "between" and set(sights[i].points) == ends
+            for i in places
+            if self.observations[i].link == link
+        )
 
     def _rank(self, observed: Sequence[Observation]) -> tuple[int, int]:
         """The largest rank seen, and the instances looked at: one that sees everything is enough."""
         unknown = [o for o in observed if o.key not in self._places]
         if unknown:
             odd = unknown[0]
-            raise NotRecognised(f"the measurement of link {odd.link} is not a direction, and not among what is observed"
-                                if has_exact_rates(odd) else
-                                f"what is measured by {odd.kind} {odd.leg} is not rational")
+            raise NotRecognised(
+                f"the measurement of link {odd.link} is not a direction, and not among what is observed"
+                if has_exact_rates(odd)
+                else f"what is measured by {odd.kind} {odd.leg} is not rational"
+            )
         places = [self._places[o.key] for o in observed]
         dimension = select_relation(self.relation, places).dimension
         best = 0
@@ -278,16 +312,18 @@ def architecture(setting: ObservedRobot) -> ExactArchitecture:
     return architecture_of(setting.mechanism, everything.question, at, everything.members[0].relation)
 
 
-def architecture_of(mechanism: Mechanism, question: Measurement, at: Sequence[ClosedConfiguration], relation: Relation
-                    ) -> ExactArchitecture:
+def architecture_of(
+    mechanism: Mechanism, question: Measurement, at: Sequence[ClosedConfiguration], relation: Relation
+) -> ExactArchitecture:
     """The architecture of a mechanism from configurations ``at`` which relations must persist, and ρ at one of them."""
     places = [i for i, o in enumerate(question.observations) if has_exact_rates(o)]
     observed = [question.observations[i] for i in places]
     sensors = SensorPlaces.of(observed, mechanism)
     directions = [*(o for o in observed if isinstance(o, SeenAxis)), *sensors.as_observed()]
     relations = recognise(mechanism, frames_at(at), directions, question.point, sensors.points)
-    return ExactArchitecture(mechanism, relations, observed, select_relation(relation, places),
-                             at[0].kernel()[0].shape[1])
+    return ExactArchitecture(
+        mechanism, relations, observed, select_relation(relation, places), at[0].kernel()[0].shape[1]
+    )
 
 
 def power_above(chance: float) -> str:
@@ -297,5 +333,6 @@ def power_above(chance: float) -> str:
 
 def _same(what: str, here: int, there: int) -> None:
     if here != there:
-        raise NotRecognised(f"its geometry is not recognised: {what} is {there}, but {here} where only what persists "
-                            "in motion is kept")
+        raise NotRecognised(
+            f"its geometry is not recognised: {what} is {there}, but {here} where only what persists in motion is kept"
+        )

@@ -52,15 +52,17 @@ class Sensed:
     rows: Numbers
 
 
-def sense_links(seen: Observation, reference: str, at: Sighting, places: Sequence[tuple[Numbers, Numbers]]
-           ) -> Iterator[Sensed]:
+def sense_links(
+    seen: Observation, reference: str, at: Sighting, places: Sequence[tuple[Numbers, Numbers]]
+) -> Iterator[Sensed]:
     """What an observation senses of its two links; nothing beyond their relative motion where it has no wrenches (an
     encoder). ``places`` are points and directions where the other link might be."""
     if not isinstance(seen, CameraObservation | SeenAxis):
         return
     for link, point, others in (
-            (seen.link, at.B, [replace(at, C=P, z=n) for P, n in places]),
-            (seen.seen_from or reference, at.C, [replace(at, B=P, d=n) for P, n in places])):
+        (seen.link, at.B, [replace(at, C=P, z=n) for P, n in places]),
+        (seen.seen_from or reference, at.C, [replace(at, B=P, d=n) for P, n in places]),
+    ):
         yield Sensed(link, point, np.array([w for each in (at, *others) for w in seen.wrenches(each)]))
 
 
@@ -127,8 +129,9 @@ class Similarities(Value):
     def nearest(self, points: Array, wanted: Array) -> tuple[float, Array, Array]:
         """s, R and t that take points (n, 3) nearest to those that are ``wanted``: means and sizes made equal, then
         the turn of least squares (W. Kabsch, Acta Cryst. A32, 1976, 922)."""
-        one, other = (self.centre + self.shifts @ (self.shifts.T @ (each.mean(axis=0) - self.centre))
-                      for each in (points, wanted))
+        one, other = (
+            self.centre + self.shifts @ (self.shifts.T @ (each.mean(axis=0) - self.centre)) for each in (points, wanted)
+        )
         p, w = points - one, wanted - other
         s = float(np.linalg.norm(w) / np.linalg.norm(p)) if self.scaled else 1.0
         R = np.eye(3)
@@ -166,38 +169,53 @@ class Formation(Value):
 
     def to_dict(self) -> dict[str, object]:
         """The record of the command line."""
-        return {"bodies": list(self.bodies), "trivial": list(self.trivial),
-                "flexes": [each.to_dict() for each in self.flexes], "special": self.special}
+        return {
+            "bodies": list(self.bodies),
+            "trivial": list(self.trivial),
+            "flexes": [each.to_dict() for each in self.flexes],
+            "special": self.special,
+        }
 
 
-def formation_at(at: ClosedConfiguration, question: Measurement, found: Relation, anatomy: LegDecomposition
-                 ) -> Formation:
+def formation_at(
+    at: ClosedConfiguration, question: Measurement, found: Relation, anatomy: LegDecomposition
+) -> Formation:
     """What ``found``, ρ at a configuration, leaves unseen."""
     bodies, length = (question.platform, *question.others), at.twin.length
     told, points = seen_at(at, question)
     centre = points.mean(axis=0) if len(points) else np.zeros(3)
     random = np.random.default_rng(0)
     places = [(AWAY * length * unit(random.normal(size=3)), unit(random.normal(size=3))) for _ in range(PLACES)]
-    parts = [_scale(part, length) for each, place in told for part in sense_links(
-        each, question.reference, replace(place, B=place.B - centre, C=place.C - centre), places)]
+    parts = [
+        _scale(part, length)
+        for each, place in told
+        for part in sense_links(
+            each, question.reference, replace(place, B=place.B - centre, C=place.C - centre), places
+        )
+    ]
     K = found.unobserved_twists
     twists = {}
     for body, twist in zip(bodies, K.reshape(len(bodies), 6, -1), strict=True):
         arm = (at.pose(body)[:3, 3] - centre) / length
         twists[body] = np.vstack([twist[:3] + hat(arm) @ twist[3:], twist[3:]])
     if not parts or not K.shape[1]:
-        return Formation(bodies, (), _flexes(K, K[:, :0], bodies),
-                         group=Similarities.of(np.zeros((7, 0)), centre, length))
+        return Formation(
+            bodies, (), _flexes(K, K[:, :0], bodies), group=Similarities.of(np.zeros((7, 0)), centre, length)
+        )
     motions, common = following(parts, twists)
     inert = kernel_basis(common, 1.0)[0]
     both = kernel_basis(np.hstack([motions, -common]), 1.0)[0]
-    followed = both[K.shape[1]:]
+    followed = both[K.shape[1] :]
     followed = range_basis(followed - inert @ (inert.T @ followed), 1.0)[0]
     idle = kernel_basis(motions, 1.0)[0]
     moved = both[: K.shape[1]] - idle @ (idle.T @ both[: K.shape[1]])
     trivial = range_basis(moved, 1.0)[0]
-    return Formation(bodies, _common_names(followed, points, centre, length, anatomy),
-                     _flexes(K, K @ trivial, bodies), group=Similarities.of(followed, centre, length))
+    return Formation(
+        bodies,
+        _common_names(followed, points, centre, length, anatomy),
+        _flexes(K, K @ trivial, bodies),
+        group=Similarities.of(followed, centre, length),
+    )
 
 
 def seen_at(at: ClosedConfiguration, question: Measurement) -> tuple[list[tuple[Observation, Sighting]], Array]:
@@ -217,8 +235,7 @@ def _scale(part: Sensed, length: float) -> Sensed:
     return replace(part, point=part.point / length, rows=rows / np.where(size > 0, size, 1.0))
 
 
-def _common_names(S: Array, points: Array, centre: Array, length: float, anatomy: LegDecomposition
-                  ) -> tuple[str, ...]:
+def _common_names(S: Array, points: Array, centre: Array, length: float, anatomy: LegDecomposition) -> tuple[str, ...]:
     """Names of similarities (7, k) about ``centre``, characteristic lengths: translations, turns, a scale; where these
     are not about any place of the sensed ``points`` (n, 3), about which."""
     spread = range_basis((points - centre).T / length, 1.0)[0] if len(points) else np.zeros((3, 0))

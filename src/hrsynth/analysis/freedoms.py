@@ -28,8 +28,9 @@ class Freedom(Value):
         return {"twist": [round(float(value), 12) + 0.0 for value in self.twist], "name": self.name}
 
 
-def name_freedoms(twists: Array, anatomy: LegDecomposition, labels: tuple[str, ...] | None = None,
-                  position: Array | None = None) -> tuple[Freedom, ...]:
+def name_freedoms(
+    twists: Array, anatomy: LegDecomposition, labels: tuple[str, ...] | None = None, position: Array | None = None
+) -> tuple[Freedom, ...]:
     """Named twists that span the columns of ``twists`` (6, k), or (3, k) of a point body, in characteristic lengths of
     the mechanism, at the zero configuration.
 
@@ -111,8 +112,11 @@ def direction_name(direction: Array, anatomy: LegDecomposition) -> str:
     for i in range(3):
         if abs(abs(direction[i]) - 1) < NAMED:
             return _AXES[i]
-    along = [j.name for j in anatomy.mechanism.joints.values()
-             if j.type is JointType.PRISMATIC and np.linalg.norm(cross(j.axis, direction)) < NAMED]
+    along = [
+        j.name
+        for j in anatomy.mechanism.joints.values()
+        if j.type is JointType.PRISMATIC and np.linalg.norm(cross(j.axis, direction)) < NAMED
+    ]
     return f"{point_text(direction)}, the axis of {along[0]}" if along else point_text(direction)
 
 
@@ -134,7 +138,7 @@ def _lines(anatomy: LegDecomposition, labels: tuple[str, ...] | None) -> list[tu
     tips = _tips(anatomy, labels)
     lines: list[tuple[Array, Array, str]] = []
     for i, (a, p) in enumerate(tips):
-        for b, q in tips[i + 1:]:
+        for b, q in tips[i + 1 :]:
             if np.linalg.norm(q - p) > NAMED:
                 lines.append((p, unit(q - p), f"the line B{a} B{b}"))
     for axis, name in zip(np.eye(3), _AXES, strict=True):

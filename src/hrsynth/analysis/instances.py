@@ -96,16 +96,21 @@ def draw(relations: Relations, rng: random.Random) -> Geometry:
     n = relations.count
     basis = kernel(_centre_rows(relations, directions))
     centres = np.asarray((basis @ random_numbers(basis.shape[1], rng)).reshape(n, 3))
-    return Geometry(tuple(np.array([fmpq(x) for x in each], dtype=object) for each in directions), centres,
-                    (*ranks, 3 * n - basis.shape[1]))
+    return Geometry(
+        tuple(np.array([fmpq(x) for x in each], dtype=object) for each in directions),
+        centres,
+        (*ranks, 3 * n - basis.shape[1]),
+    )
 
 
 def ranks_at(relations: Relations, place: int) -> tuple[int, ...]:
     """The same ranks as those of ``Geometry``, in floating point, at one of the configurations of the relations; -1
     where the singular values leave no gap."""
     directions = list(relations.directions[:, place])
-    rows = [*(_direction_rows(conditions, directions) for conditions in relations.tower),
-            _centre_rows(relations, directions)]
+    rows = [
+        *(_direction_rows(conditions, directions) for conditions in relations.tower),
+        _centre_rows(relations, directions),
+    ]
     found = []
     for each in rows:
         matrix = each.astype(float)
@@ -115,8 +120,9 @@ def ranks_at(relations: Relations, place: int) -> tuple[int, ...]:
     return tuple(found)
 
 
-def instance(mechanism: Mechanism, relations: Relations, observations: Sequence[Observation], drawn: Geometry
-             ) -> Instance:
+def instance(
+    mechanism: Mechanism, relations: Relations, observations: Sequence[Observation], drawn: Geometry
+) -> Instance:
     """The kinematics of a mechanism with this geometry, from the rates of its joints: whole numbers throughout.
 
     The relations are those for the directions among the observations, and then for what the others rest on.
@@ -133,8 +139,9 @@ def instance(mechanism: Mechanism, relations: Relations, observations: Sequence[
         t = scale * t[:3] + cross(t[3:], point[:, None], axis=-2)
     parts, sightings = [t], list[Sighting | None]()
     for observation in observations:
-        sightings.append(sighting(observation, places, relations, drawn.centres, further, mechanism,
-                                  directions.get(observation.key)))
+        sightings.append(
+            sighting(observation, places, relations, drawn.centres, further, mechanism, directions.get(observation.key))
+        )
         if observation.key in directions:
             turn = velocities[observation.link] - velocities[observation.seen_from or mechanism.reference]
             parts.append(cross(whole_multiple(directions[observation.key])[0][:, None], turn[3:], axis=-2))
@@ -153,13 +160,16 @@ def _screws(joint: Joint, relations: Relations, drawn: Geometry) -> Numbers:
     anywhere = np.array([fmpz(0)] * 3, dtype=object)
     point, scale = (anywhere, 1) if number is None else whole_multiple(drawn.centres[number])
     axes = [whole_multiple(drawn.directions[c])[0] for c in relations.axes[joint.name]]
-    found = [np.concatenate([screw[:3], scale * screw[3:]]) if screw[3:].any() else screw
-             for screw in allowed_twists(joint.type, point, axes)]
+    found = [
+        np.concatenate([screw[:3], scale * screw[3:]]) if screw[3:].any() else screw
+        for screw in allowed_twists(joint.type, point, axes)
+    ]
     return np.array(found, dtype=object).reshape(-1, 6).T
 
 
-def _velocities(mechanism: Mechanism, screws: Mapping[str, Numbers]
-                ) -> tuple[dict[str, Numbers], Numbers, dict[str, slice]]:
+def _velocities(
+    mechanism: Mechanism, screws: Mapping[str, Numbers]
+) -> tuple[dict[str, Numbers], Numbers, dict[str, slice]]:
     """The twists of all links (6, rates) along a tree of joints, and what the other joints ask of the rates (rows,
     rates): that their loops stay closed; the rates of each joint."""
     joints = list(mechanism.joints.values())
@@ -187,8 +197,10 @@ def _directions(relations: Relations, rng: random.Random) -> tuple[tuple[Numbers
     for number, conditions in enumerate(relations.tower):
         basis = kernel(_direction_rows(conditions, found))
         if basis.shape[1] == 0:
-            raise NotRecognised("no random direction fits all that is parallel, perpendicular or in one plane: "
-                                + relations.members(number))
+            raise NotRecognised(
+                "no random direction fits all that is parallel, perpendicular or in one plane: "
+                + relations.members(number)
+            )
         found.append(_whole(basis @ random_numbers(basis.shape[1], rng)))
         ranks.append(3 - basis.shape[1])
     return tuple(found), ranks

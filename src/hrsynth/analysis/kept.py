@@ -41,8 +41,12 @@ def degree(relations: Relations, rates: int) -> int:
     axes: list[int] = []
     for conditions in relations.tower:
         axes.append(1 + sum(sorted(sum(axes[c] for c in by) for by in conditions)[-2:]))
-    rows = [size * axes[c] for each in relations.incidences for c in each.classes
-            for size in ((1, 2) if each.kind == "parallel" else (1,))]
+    rows = [
+        size * axes[c]
+        for each in relations.incidences
+        for c in each.classes
+        for size in ((1, 2) if each.kind == "parallel" else (1,))
+    ]
     centre = 1 + sum(sorted(rows)[-3 * relations.count :])
     return (rates + 5) * (centre + max(axes, default=0))
 
@@ -77,8 +81,9 @@ class _Moving:
         D, dD = [self.D[c] for c in classes], [self.dD[c] for c in classes]
         match alike[0].kind:
             case "same":
-                spin = np.array([self.twists[other][3:] - self.twists[first][3:]
-                                 for first, other in (tie.links for tie in alike)])
+                spin = np.array(
+                    [self.twists[other][3:] - self.twists[first][3:] for first, other in (tie.links for tie in alike)]
+                )
                 return _cross(spin, D[0])
             case "square":
                 return _rate(_dot, D[0], dD[0], D[1], dD[1])

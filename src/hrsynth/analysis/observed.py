@@ -70,8 +70,18 @@ class ObservedRobot(Value):
     """What could be observed besides; among the observations of ``everything`` too."""
 
     @classmethod
-    def of(cls, robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
-           offer: SeeLike = None, samples: int = SAMPLES, seed: int = 0, driven: bool = False) -> ObservedRobot:
+    def of(
+        cls,
+        robot: RobotLike,
+        observe: LegsLike = None,
+        camera: CameraLike = None,
+        *,
+        see: SeeLike = None,
+        offer: SeeLike = None,
+        samples: int = SAMPLES,
+        seed: int = 0,
+        driven: bool = False,
+    ) -> ObservedRobot:
         """What a question is asked of: an observed robot itself, or a robot with what is watched of it, as
         :func:`.asked.observe`, and in the manner of ``see`` what is ``offer``-ed besides. A question about ``driven``
         motors needs no segments: where there are none, the motors' coordinates are observed."""
@@ -79,13 +89,25 @@ class ObservedRobot(Value):
         names = legs_asked(robot, observe, see)
         if isinstance(robot, ObservedRobot):
             if (observe, camera, see, offer) != (None,) * 4:
-                raise BadRequest(f"{robot.headline()}: what is watched is given twice",
-                                 observe or camera or see or offer, "nothing besides an observed robot")
+                raise BadRequest(
+                    f"{robot.headline()}: what is watched is given twice",
+                    observe or camera or see or offer,
+                    "nothing besides an observed robot",
+                )
             return robot
         tell("sampling")
         try:
-            return _observed_robot(robot, (robot.file, robot.notes), names, as_texts(camera), as_texts(see),
-                                   as_texts(offer), samples, seed, driven)
+            return _observed_robot(
+                robot,
+                (robot.file, robot.notes),
+                names,
+                as_texts(camera),
+                as_texts(see),
+                as_texts(offer),
+                samples,
+                seed,
+                driven,
+            )
         except (BadMechanism, NotSampled) as error:
             error.file = robot.file
             raise
@@ -115,9 +137,11 @@ class ObservedRobot(Value):
         mechanism's reference link, which is all that ``what`` knows."""
         for each in self.observed:
             if not each.by_segment:
-                raise BadRequest(f"{self.robot.name}: {what} knows directions of segments only",
-                                 f"{each.kind} {each.leg}",
-                                 "legs to watch by the directions of their segments")
+                raise BadRequest(
+                    f"{self.robot.name}: {what} knows directions of segments only",
+                    f"{each.kind} {each.leg}",
+                    "legs to watch by the directions of their segments",
+                )
         return self
 
     @property
@@ -169,8 +193,10 @@ class ObservedRobot(Value):
         """The other operation modes that were met: what the platform does in each, what legs see there, and where."""
         drawn = self.everything
         labels = [o.leg for o in drawn.question.observations]
-        return tuple(f"{mode.beside(drawn.signature, labels)}, at {Pose.of(mode.at.pose(drawn.question.platform))}"
-                     for mode in drawn.met)
+        return tuple(
+            f"{mode.beside(drawn.signature, labels)}, at {Pose.of(mode.at.pose(drawn.question.platform))}"
+            for mode in drawn.met
+        )
 
     @property
     def dof(self) -> int:
@@ -211,8 +237,9 @@ class ObservedRobot(Value):
         """Mobility of the file's own links and joints."""
         if (len(self.robot.links), len(self.robot.joints)) == (len(self.mechanism.links), len(self.mechanism.joints)):
             return self.mobility
-        question = replace(self.everything.question, observations=tuple(
-            o for o in self.segments if o.link in self.robot.links))
+        question = replace(
+            self.everything.question, observations=tuple(o for o in self.segments if o.link in self.robot.links)
+        )
         written = sample(PinocchioModel(self.robot, self.mechanism.length), question, 3, seed=1)
         total = written.mobility
         return Mobility(total, total - (self.mobility.total - self.mobility.idle))
@@ -228,8 +255,11 @@ class ObservedRobot(Value):
     def mobility_dict(self) -> dict[str, Any]:
         """Mobility in normal form and as written, as the records of the command line have it."""
         own, written = self.mobility, self.mobility_if_written
-        return {"total": own.total, "idle": own.idle,
-                "as_written": written and {"total": written.total, "idle": written.idle}}
+        return {
+            "total": own.total,
+            "idle": own.idle,
+            "as_written": written and {"total": written.total, "idle": written.idle},
+        }
 
     @property
     def unlimited(self) -> tuple[str, ...]:
@@ -245,8 +275,7 @@ class ObservedRobot(Value):
 
     def to_dict(self) -> dict[str, Any]:
         """What is observed, and from which link, as the records of the command line begin."""
-        return {"observed": [o.to_dict() for o in self.observed],
-                "camera": self.mechanism.reference}
+        return {"observed": [o.to_dict() for o in self.observed], "camera": self.mechanism.reference}
 
     def watched(self) -> tuple[tuple[Observation, str], ...]:
         """What is observed, and why it is that."""
@@ -260,11 +289,19 @@ class ObservedRobot(Value):
         """The samples' operation mode and the others that were met, as the records of the command line have them."""
         drawn = self.everything
         own, labels = drawn.signature, [o.leg for o in drawn.question.observations]
-        return {"operation_mode": {"dof": own.dof, "motion": own.motion, "mobility": own.mobility},
-                "other_modes": [
-                    {"dof": mode.signature.dof, "motion": mode.signature.motion, "mobility": mode.signature.mobility,
-                     "words": mode.beside(own, labels),
-                     "pose": Pose.of(mode.at.pose(drawn.question.platform)).to_dict()} for mode in drawn.met]}
+        return {
+            "operation_mode": {"dof": own.dof, "motion": own.motion, "mobility": own.mobility},
+            "other_modes": [
+                {
+                    "dof": mode.signature.dof,
+                    "motion": mode.signature.motion,
+                    "mobility": mode.signature.mobility,
+                    "words": mode.beside(own, labels),
+                    "pose": Pose.of(mode.at.pose(drawn.question.platform)).to_dict(),
+                }
+                for mode in drawn.met
+            ],
+        }
 
 
 CameraLike = str | Iterable[str] | None
@@ -281,8 +318,12 @@ def as_robot(given: RobotLike) -> Mechanism | ObservedRobot:
         return given
     if isinstance(given, str | os.PathLike):
         return load(given)
-    raise BadRequest("a robot", given, "what hrsynth.load or hrsynth.observe gives, the path of a robot file, the name "
-                     "of a shipped robot, example:NAME")
+    raise BadRequest(
+        "a robot",
+        given,
+        "what hrsynth.load or hrsynth.observe gives, the path of a robot file, the name "
+        "of a shipped robot, example:NAME",
+    )
 
 
 def as_names(given: LegsLike) -> tuple[str, ...] | None:
@@ -292,8 +333,11 @@ def as_names(given: LegsLike) -> tuple[str, ...] | None:
     every: Any = given.split(",") if isinstance(given, str) else given if isinstance(given, Iterable) else [given]
     every = sorted(every, key=str) if isinstance(every, set | frozenset) else list(every)
     if not all(isinstance(each, str | Integral) and not isinstance(each, bool) for each in every):
-        raise BadRequest("legs to watch", given, "a label or a link such as 1 or 'rod_1a', several in a list or in a "
-                         "text with commas, or 'all'")
+        raise BadRequest(
+            "legs to watch",
+            given,
+            "a label or a link such as 1 or 'rod_1a', several in a list or in a text with commas, or 'all'",
+        )
     return tuple(str(each).strip() for each in every)
 
 
@@ -306,8 +350,13 @@ def legs_asked(robot: Mechanism | ObservedRobot, observe: LegsLike, see: SeeLike
 
 def as_texts(given: str | Iterable[str] | None) -> tuple[str, ...]:
     """One text or several; raises ``BadRequest`` for what is none."""
-    every = () if given is None else tuple(given) if isinstance(given, Iterable) and not isinstance(given, str) else (
-        given,)
+    every = (
+        ()
+        if given is None
+        else tuple(given)
+        if isinstance(given, Iterable) and not isinstance(given, str)
+        else (given,)
+    )
     if not all(isinstance(each, str) for each in every):
         raise BadRequest("cameras and what they see", given, f"texts such as {SEE}, or {CAMERA}")
     return every
@@ -319,9 +368,17 @@ def forget_robots() -> None:
 
 
 @lru_cache(maxsize=REMEMBERED)
-def _observed_robot(robot: Mechanism, source: Hashable, observe: tuple[str, ...] | None, cameras: tuple[str, ...],
-                    see: tuple[str, ...], offer: tuple[str, ...], samples: int, seed: int,
-                    driven: bool) -> ObservedRobot:
+def _observed_robot(
+    robot: Mechanism,
+    source: Hashable,
+    observe: tuple[str, ...] | None,
+    cameras: tuple[str, ...],
+    see: tuple[str, ...],
+    offer: tuple[str, ...],
+    samples: int,
+    seed: int,
+    driven: bool,
+) -> ObservedRobot:
     """The answer to the same words for the same value of a robot, of one ``source``, is the same value: it is drawn
     once."""
     robot, asked, possible = _seeing(robot, cameras, see, offer)
@@ -330,22 +387,37 @@ def _observed_robot(robot: Mechanism, source: Hashable, observe: tuple[str, ...]
     defaults = defaults_of(anatomy)
     own = tuple(o for o in anatomy.mechanism.observations if o.leg not in asked | possible)
     given = tuple(o for o in own if not o.by_segment)
-    chosen = () if observe is None and asked else own if observe is None and own else (
-        _encoders_of(anatomy) if driven and not defaults else _observations(anatomy, normal, defaults, observe, given))
+    chosen = (
+        ()
+        if observe is None and asked
+        else own
+        if observe is None and own
+        else (
+            _encoders_of(anatomy)
+            if driven and not defaults
+            else _observations(anatomy, normal, defaults, observe, given)
+        )
+    )
     observed = (*chosen, *(o for o in anatomy.mechanism.observations if o.leg in asked))
     offered = tuple(o for o in anatomy.mechanism.observations if o.leg in possible)
     known = {o.key for o in defaults.values()}
     named = tuple(o for o in own if o.by_segment)  # of legs that are not asked for too: another set may hold them
     extra = tuple({o.key: o for o in (*observed, *offered, *named) if o.key not in known}.values())
     first, *others = normal.mechanism.bodies
-    question = Measurement(first, None if others else anatomy.point, normal.mechanism.reference,
-                           (*defaults.values(), *extra), others=tuple(others))
+    question = Measurement(
+        first,
+        None if others else anatomy.point,
+        normal.mechanism.reference,
+        (*defaults.values(), *extra),
+        others=tuple(others),
+    )
     drawn = sample(PinocchioModel(normal.mechanism), question, samples, seed, led_by=observed)
     return ObservedRobot(robot, normal, anatomy, observed, drawn, len(defaults), offered=offered)
 
 
-def _seeing(robot: Mechanism, cameras: tuple[str, ...], see: tuple[str, ...], offer: tuple[str, ...]
-            ) -> tuple[Mechanism, set[str], set[str]]:
+def _seeing(
+    robot: Mechanism, cameras: tuple[str, ...], see: tuple[str, ...], offer: tuple[str, ...]
+) -> tuple[Mechanism, set[str], set[str]]:
     """The robot with cameras and observations that are asked for and offered, and the labels of these."""
     named = [parse_camera(text) for text in cameras if "=" in text]
     links = [text for text in cameras if "=" not in text]
@@ -361,9 +433,12 @@ def _seeing(robot: Mechanism, cameras: tuple[str, ...], see: tuple[str, ...], of
     used = {each.camera for each in specs} & set(eyes)
     for camera in named:
         if camera.name not in used and (used or not specs):  # an inclination or an encoder alone needs none
-            raise BadRequest(f"{robot.name}: a camera to which nothing is given to see", camera.name,
-                             f"--see {camera.name}=KIND:LINK… with it, where a command has that option; --camera LINK "
-                             "for the camera that watches legs")
+            raise BadRequest(
+                f"{robot.name}: a camera to which nothing is given to see",
+                camera.name,
+                f"--see {camera.name}=KIND:LINK… with it, where a command has that option; --camera LINK "
+                "for the camera that watches legs",
+            )
     robot = with_sights(robot, (), named)
     labels: list[set[str]] = [{o.leg for o in robot.observations}]
     for (option, text), spec in zip(every, specs, strict=True):
@@ -382,8 +457,13 @@ def _spec(option: str, text: str, eyes: Sequence[str]) -> SightSpec:
         raise BadRequest(error.what.replace("--see", option, 1), error.value, error.allowed) from None
 
 
-def _observations(anatomy: LegDecomposition, normal: NormalForm, defaults: dict[str, Observation],
-              observe: Sequence[str] | None, given_too: Sequence[Observation]) -> tuple[Observation, ...]:
+def _observations(
+    anatomy: LegDecomposition,
+    normal: NormalForm,
+    defaults: dict[str, Observation],
+    observe: Sequence[str] | None,
+    given_too: Sequence[Observation],
+) -> tuple[Observation, ...]:
     if observe is not None and not observe:
         raise BadRequest("nothing is observed", "no leg", "leg labels, links, or all")
     if observe is None or list(observe) == ["all"]:
@@ -411,9 +491,14 @@ def _observations(anatomy: LegDecomposition, normal: NormalForm, defaults: dict[
             given = next((o for o in anatomy.mechanism.observations if o.link == link and o.by_segment), None)
             observation = given or observation_of(anatomy, link)
         else:
-            raise BadRequest(f"{anatomy.mechanism.name} has no leg or link", name,
-                             "legs " + ", ".join([*anatomy.labels, *labels_of(given_too)]) + "; links "
-                             + ", ".join(n for leg in anatomy.legs for n in leg.links))
+            raise BadRequest(
+                f"{anatomy.mechanism.name} has no leg or link",
+                name,
+                "legs "
+                + ", ".join([*anatomy.labels, *labels_of(given_too)])
+                + "; links "
+                + ", ".join(n for leg in anatomy.legs for n in leg.links),
+            )
         chosen[observation.key] = observation
     return tuple(chosen.values())
 
@@ -441,9 +526,13 @@ def restrict_samples(samples: Samples, observations: Iterable[Observation], *, w
     question = replace(samples.question, observations=tuple(all_of[i] for i in places))
     found = _select_relations([member.relation for member in samples.members], places)
     members = tuple(
-        Sample(m.configuration,
-               tuple(replace(t, measured=tuple(t.measured[i] for i in places)) for t in m.way) if ways else (), each)
-        for m, each in zip(samples.members, found, strict=True))
+        Sample(
+            m.configuration,
+            tuple(replace(t, measured=tuple(t.measured[i] for i in places)) for t in m.way) if ways else (),
+            each,
+        )
+        for m, each in zip(samples.members, found, strict=True)
+    )
     return replace(samples, question=question, members=members)
 
 
@@ -454,6 +543,7 @@ def select_relation(relation: Relation, places: Sequence[int]) -> Relation:
 
 def _select_relations(relations: Sequence[Relation], places: Sequence[int]) -> list[Relation]:
     rows = [np.vstack([each.twist_part, *(each.basis[each.rows_of(place)] for place in places)]) for each in relations]
-    return [Relation(basis, each.twist_rows, tuple(each.sizes[i] for i in places), each.mobility,
-                     min(each.gap, rank.gap))
-            for each, (basis, rank) in zip(relations, range_bases(rows, 1.0), strict=True)]
+    return [
+        Relation(basis, each.twist_rows, tuple(each.sizes[i] for i in places), each.mobility, min(each.gap, rank.gap))
+        for each, (basis, rank) in zip(relations, range_bases(rows, 1.0), strict=True)
+    ]

@@ -58,13 +58,19 @@ class Kinds(Value):
 
     def types(self) -> dict[str, bool | None]:
         """The three types, each null where it is not decided."""
-        return {name: None if self.classes is None else getattr(self.classes, name)
-                for name in ("type1", "type2", "type3")}
+        return {
+            name: None if self.classes is None else getattr(self.classes, name) for name in ("type1", "type2", "type3")
+        }
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
-        return {"rank": self.rank, "gap": self.gap, **self.types(), "classes": self.classes and self.classes.to_dict(),
-                "lost": [freedom.to_dict() for freedom in self.lost]}
+        return {
+            "rank": self.rank,
+            "gap": self.gap,
+            **self.types(),
+            "classes": self.classes and self.classes.to_dict(),
+            "lost": [freedom.to_dict() for freedom in self.lost],
+        }
 
 
 @dataclass(frozen=True)
@@ -87,8 +93,14 @@ class Distances:
 
     def to_dict(self) -> dict[str, float | None]:
         """The record of the command line."""
-        return {"type2": self.type2, "type1": self.type1, "constraints": self.constraints, "condition": self.condition,
-                "mm_per_degree": self.millimetres, "degrees_per_degree": self.degrees}
+        return {
+            "type2": self.type2,
+            "type1": self.type1,
+            "constraints": self.constraints,
+            "condition": self.condition,
+            "mm_per_degree": self.millimetres,
+            "degrees_per_degree": self.degrees,
+        }
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -139,15 +151,25 @@ class Posture(Value):
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
         hidden = self.hidden.to_dict()
-        return {"pose": self.pose.to_dict(), "beyond": list(self.beyond), "flat_wrists": self.flat_wrists,
-                "mobility": {"total": self.mobility.total, "idle": self.mobility.idle}, "dof": self.dof,
-                "rank_M": hidden.pop("rank"), **hidden, "condition": self.distances.condition,
-                "real": self.real and self.real.to_dict(),
-                "constraint": {"singular": self.constraint_singular,
-                               "rank_lost": None if self.hidden.classes is None else self.hidden.classes.IIM,
-                               "gained": [freedom.to_dict() for freedom in self.gained]},
-                "redundant": [each.to_dict() for each in self.redundant], "distances": self.distances.to_dict(),
-                **({} if self.formation is None else {"formation": self.formation.to_dict()})}
+        return {
+            "pose": self.pose.to_dict(),
+            "beyond": list(self.beyond),
+            "flat_wrists": self.flat_wrists,
+            "mobility": {"total": self.mobility.total, "idle": self.mobility.idle},
+            "dof": self.dof,
+            "rank_M": hidden.pop("rank"),
+            **hidden,
+            "condition": self.distances.condition,
+            "real": self.real and self.real.to_dict(),
+            "constraint": {
+                "singular": self.constraint_singular,
+                "rank_lost": None if self.hidden.classes is None else self.hidden.classes.IIM,
+                "gained": [freedom.to_dict() for freedom in self.gained],
+            },
+            "redundant": [each.to_dict() for each in self.redundant],
+            "distances": self.distances.to_dict(),
+            **({} if self.formation is None else {"formation": self.formation.to_dict()}),
+        }
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -192,8 +214,15 @@ class ConfigurationAnalysis(Value):
         told = relation(at, replace(setting.everything.question, observations=setting.telling_idle))
         real = self._kinds(self._real(at), self.usual_real) if at.twin.actuated_indices() else None
         mobility = Mobility(found.mobility, found.mobility - told.dimension)
-        return Posture(at, setting.motion.pose(at.pose(setting.motion.link)), mobility, found.dof.value,
-                       self._kinds(found, self.usual), real, self._distances(at, found))
+        return Posture(
+            at,
+            setting.motion.pose(at.pose(setting.motion.link)),
+            mobility,
+            found.dof.value,
+            self._kinds(found, self.usual),
+            real,
+            self._distances(at, found),
+        )
 
     def examine(self, at: ClosedConfiguration) -> Posture:
         """All that can be said of a configuration."""
@@ -205,8 +234,9 @@ class ConfigurationAnalysis(Value):
             if (special := special_at(at, self.setting.samples.question)) and not self._usually_special:
                 here = replace(here, special=special)
             extra = surplus(redundant_rows(at), self.redundant)
-            return replace(posture, formation=here if hidden.classes else None,
-                           redundant=list_redundant(extra, generic=False))
+            return replace(
+                posture, formation=here if hidden.classes else None, redundant=list_redundant(extra, generic=False)
+            )
         hidden = replace(hidden, lost=self._name_freedoms(at, found.unobserved_twists) if hidden.classes else ())
         if real is not None and real.classes:
             real = replace(real, lost=self._name_freedoms(at, self._real(at).unobserved_twists))
@@ -234,9 +264,14 @@ class ConfigurationAnalysis(Value):
         moved = found.twists @ right[rank - 1] / weakest
         if found.twist_rows > 6 or not all(each.angular for each in self.setting.observed):
             return Distances(weakest, 1 / largest, constraints, largest / weakest, None, None)
-        return Distances(weakest, 1 / largest, constraints, largest / weakest,
-                         1e3 * at.twin.length * float(np.linalg.norm(moved[:3])) * float(np.radians(1)),
-                         float(np.linalg.norm(moved[3:])))
+        return Distances(
+            weakest,
+            1 / largest,
+            constraints,
+            largest / weakest,
+            1e3 * at.twin.length * float(np.linalg.norm(moved[:3])) * float(np.radians(1)),
+            float(np.linalg.norm(moved[3:])),
+        )
 
     def _gained_twists(self, found: Relation) -> Array:
         """The platform's twists that it has only here; all of them where the general ones change from pose to pose."""

@@ -24,8 +24,12 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 
-KINDS: dict[str, tuple[Any, str]] = {"int": (Integral, "an integer"), "float": (Real, "a number"),
-                                     "str": (str, "a text"), "bool": ((bool, np.bool_), "True or False")}
+KINDS: dict[str, tuple[Any, str]] = {
+    "int": (Integral, "an integer"),
+    "float": (Real, "a number"),
+    "str": (str, "a text"),
+    "bool": ((bool, np.bool_), "True or False"),
+}
 """What an argument must be whose annotation is one of these, and in words."""
 
 
@@ -99,8 +103,12 @@ def question(*, formations: bool = False, **old: str) -> Callable[[Callable[P, R
             for name in sorted(old.keys() & given.keys()):
                 if old[name] in given:
                     raise TypeError(f"{function.__name__}: {name} is the old name of {old[name]}, which is given too")
-                warnings.warn(f"{function.__name__}: {name} is now called {old[name]}; the old name will be "
-                              "removed in the next version", DeprecationWarning, stacklevel=2)
+                warnings.warn(
+                    f"{function.__name__}: {name} is now called {old[name]}; the old name will be "
+                    "removed in the next version",
+                    DeprecationWarning,
+                    stacklevel=2,
+                )
                 given[old[name]] = given.pop(name)
             require_keywords(function, given)
             try:
@@ -111,8 +119,11 @@ def question(*, formations: bool = False, **old: str) -> Callable[[Callable[P, R
             robot = bound.arguments["robot"] = as_robot(bound.arguments["robot"])
             source = robot if isinstance(robot, Mechanism) else robot.robot
             if source.formation and not formations:
-                raise BadRequest(f"{source.name}: {function.__name__} is about one platform, and this is a formation",
-                                 ", ".join(source.bodies), "a file with a <platform>, or derive, legs, check")
+                raise BadRequest(
+                    f"{source.name}: {function.__name__} is about one platform, and this is a formation",
+                    ", ".join(source.bodies),
+                    "a file with a <platform>, or derive, legs, check",
+                )
             if any(given.get(name) is not None for name in ("seconds", "into")):
                 return function(*bound.args, **bound.kwargs)
             every = known.bind(*args, **given)
@@ -120,8 +131,7 @@ def question(*, formations: bool = False, **old: str) -> Callable[[Callable[P, R
             if "observe" in every.arguments:
                 every.arguments["observe"] = legs_asked(robot, every.arguments["observe"], every.arguments.get("see"))
             options = [(name, content(value)) for name, value in every.arguments.items() if name != "robot"]
-            key = (function.__qualname__, robot, source.file, source.notes, source.options,
-                   source.sha256, *options)
+            key = (function.__qualname__, robot, source.file, source.notes, source.options, source.sha256, *options)
             try:
                 hash(key)
             except TypeError:

@@ -55,8 +55,15 @@ def has_exact_rates(seen: Observation) -> bool:
     return isinstance(seen, SeenAxis | Encoder) or (isinstance(seen, CameraObservation) and seen.rational)
 
 
-def sighting(seen: Observation, places: SensorPlaces, relations: Relations, centres: Numbers, sights: Sequence[Numbers],
-             mechanism: Mechanism, direction: Numbers | None) -> Sighting | None:
+def sighting(
+    seen: Observation,
+    places: SensorPlaces,
+    relations: Relations,
+    centres: Numbers,
+    sights: Sequence[Numbers],
+    mechanism: Mechanism,
+    direction: Numbers | None,
+) -> Sighting | None:
     """Where camera and link of an observation are at a rational instance; ``centres`` are rational, the ``sights`` the
     directions of ``places``, ``direction`` is that of an observed axis. None of an encoder."""
     from flint import fmpq
@@ -67,14 +74,20 @@ def sighting(seen: Observation, places: SensorPlaces, relations: Relations, cent
         return Sighting(nothing, nothing, nothing, np.array([fmpq(x) for x in direction], dtype=object))
     if not isinstance(seen, CameraObservation):
         return None
-    B, C = (centres[relations.count - len(places.points) + places.points.index(point)]
-            for point in _points(seen, mechanism))
+    B, C = (
+        centres[relations.count - len(places.points) + places.points.index(point)] for point in _points(seen, mechanism)
+    )
     axes = [sights[places.directions.index(axis)] for axis in _directions(seen, mechanism)]
     return Sighting(C, axes[-1] if axes else nothing, B, axes[0] if seen.axis is not None else nothing)
 
 
-def rates(seen: Observation, at: Sighting | None, mechanism: Mechanism, velocities: Mapping[str, Numbers],
-          columns: Mapping[str, slice]) -> Numbers:
+def rates(
+    seen: Observation,
+    at: Sighting | None,
+    mechanism: Mechanism,
+    velocities: Mapping[str, Numbers],
+    columns: Mapping[str, slice],
+) -> Numbers:
     """The rates of an observation for each joint's rate, whole numbers (rows, rates); ``columns`` are those of each
     joint."""
     total = next(iter(velocities.values())).shape[1]

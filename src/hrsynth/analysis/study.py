@@ -27,9 +27,16 @@ Given = dict[str, Any]
 """The arguments of one question."""
 
 
-def map(question: str | Callable[..., Any], robots: RobotLike | Iterable[RobotLike], *,
-        poses: PoseLike | Iterable[PoseLike] | None = None, legs: Iterable[LegsLike] | None = None,
-        jobs: int | None = None, errors: str = RAISE, **options: Any) -> list[Any]:
+def map(
+    question: str | Callable[..., Any],
+    robots: RobotLike | Iterable[RobotLike],
+    *,
+    poses: PoseLike | Iterable[PoseLike] | None = None,
+    legs: Iterable[LegsLike] | None = None,
+    jobs: int | None = None,
+    errors: str = RAISE,
+    **options: Any,
+) -> list[Any]:
     """The answers to one question about each of the ``robots``, with each of the sets of ``legs``, at each of the
     ``poses``: in this order, poses fastest, whichever is finished first.
 
@@ -59,8 +66,9 @@ def map(question: str | Callable[..., Any], robots: RobotLike | Iterable[RobotLi
     size = max(1, ceil(len(asked) / ceil(PARTS_EACH * workers / max(1, len(groups)))))
     parts = [[{**group, **at} for at in asked[k : k + size]] for group in groups for k in range(0, len(asked), size)]
     answers: list[Any] = []
-    with closing(run_shared([partial(_answer_part, function, errors, part) for part in parts], min(workers, len(parts)))
-                 ) as done:
+    with closing(
+        run_shared([partial(_answer_part, function, errors, part) for part in parts], min(workers, len(parts)))
+    ) as done:
         for found in done:
             answers += found
             tell("questions")

@@ -76,12 +76,18 @@ class Verdict(Result, shown_as="verdict"):
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
-        return {"legs": list(self.legs), "verdict": self.verdict, "rank": self.rank,
-                "lost": [freedom.to_dict() for freedom in self.lost], "gap": self.gap,
-                "has_interaction_matrix": self.has_interaction_matrix,
-                "interaction_matrix": self.has_interaction_matrix, "margin": self.margin,
-                **({} if self.rank_at_zero is None else {"rank_at_zero": self.rank_at_zero}),
-                **({} if self.formation is None else {"formation": self.formation.to_dict()})}
+        return {
+            "legs": list(self.legs),
+            "verdict": self.verdict,
+            "rank": self.rank,
+            "lost": [freedom.to_dict() for freedom in self.lost],
+            "gap": self.gap,
+            "has_interaction_matrix": self.has_interaction_matrix,
+            "interaction_matrix": self.has_interaction_matrix,
+            "margin": self.margin,
+            **({} if self.rank_at_zero is None else {"rank_at_zero": self.rank_at_zero}),
+            **({} if self.formation is None else {"formation": self.formation.to_dict()}),
+        }
 
     @property
     def margin(self) -> dict[str, float]:
@@ -115,8 +121,19 @@ def verdict_of(setting: ObservedRobot, legs: Sequence[str], samples: Samples) ->
         lost = _lost_freedoms(setting, samples, start, tuple(legs), dof - rank) if rank < dof else ()
     graph = not any(each.RI for each in found)
     said = word(rank, dof) if formation is None else formation.verdict
-    return Verdict(tuple(legs), said, dof, rank, lost, gap, graph, max(each.seen.weakest for each in found),
-                   min(each.seen.dropped for each in found), formation, at_zero)
+    return Verdict(
+        tuple(legs),
+        said,
+        dof,
+        rank,
+        lost,
+        gap,
+        graph,
+        max(each.seen.weakest for each in found),
+        min(each.seen.dropped for each in found),
+        formation,
+        at_zero,
+    )
 
 
 def _formation(setting: ObservedRobot, samples: Samples, start: Relation, count: int) -> Formation:
@@ -130,8 +147,9 @@ def _formation(setting: ObservedRobot, samples: Samples, start: Relation, count:
     return found if len(found.trivial) == len(usual.trivial) else usual
 
 
-def _lost_freedoms(setting: ObservedRobot, samples: Samples, start: Relation, legs: tuple[str, ...], count: int
-          ) -> tuple[Freedom, ...]:
+def _lost_freedoms(
+    setting: ObservedRobot, samples: Samples, start: Relation, legs: tuple[str, ...], count: int
+) -> tuple[Freedom, ...]:
     """The lost freedoms at the zero configuration (ρ there: ``start``) where it is generic, else at a sample."""
     position = None
     found = start.unobserved_twists

@@ -45,9 +45,18 @@ CODES = "LOAD", "ADD", "SUBTRACT", "MULTIPLY", "SCALE", "COPY", "SHIFT", "NEGATE
 LOAD, ADD, SUBTRACT, MULTIPLY, SCALE, COPY, SHIFT, NEGATE, INVERT, ROOT, SINES, CONSTANT = range(12)
 _NAMES = {"+": ADD, "-": SUBTRACT, "*": MULTIPLY, "sqrt": ROOT}
 _NUMBERS = "AFFINE_ROUNDING", "HALF_PI", "FARTHEST_TURN", "SINE_SERIES", "COSINE_SERIES"
-_FUNCTIONS = (rounded_radius, spread, product_radius, scaled_radius, inverse_line, root_line, line_radius, sine_line,
-              turned_sines)
-_TEXT = '''from __future__ import annotations
+_FUNCTIONS = (
+    rounded_radius,
+    spread,
+    product_radius,
+    scaled_radius,
+    inverse_line,
+    root_line,
+    line_radius,
+    sine_line,
+    turned_sines,
+)
+_TEXT = """from __future__ import annotations
 
 from math import inf, nan
 
@@ -61,7 +70,7 @@ LANES = {lanes}
 
 
 {functions}
-'''
+"""
 
 
 class Work:
@@ -94,8 +103,12 @@ class MachineCode(Value):
     outputs: Places
 
     @classmethod
-    def of(cls, steps: Sequence[tuple[int, str, Sequence[int | Term]]], done: Sequence[Sequence[int]],
-           outputs: Sequence[int | Term]) -> MachineCode:
+    def of(
+        cls,
+        steps: Sequence[tuple[int, str, Sequence[int | Term]]],
+        done: Sequence[Sequence[int]],
+        outputs: Sequence[int | Term],
+    ) -> MachineCode:
         """That of the steps of a formula, where after each some results are needed no more."""
         numbers: list[Term] = []
         code: list[tuple[int, ...]] = []
@@ -141,16 +154,27 @@ class MachineCode(Value):
                     source = at[i]
                 elif name == "-":
                     term = -term[0], term[1]
-                code.append((SCALE if name in "*/" else SHIFT, at[i] if source == at.get(i) else fresh(i), source,
-                             number(term), 0))
+                code.append(
+                    (
+                        SCALE if name in "*/" else SHIFT,
+                        at[i] if source == at.get(i) else fresh(i),
+                        source,
+                        number(term),
+                        0,
+                    )
+                )
             free += [at.pop(each) for each in gone]
         found = []
         for each in outputs:
             if isinstance(each, tuple):
                 code.append((CONSTANT, fresh(each), 0, number(each), 0))
             found.append(at[each])
-        return cls(np.array(code, dtype=np.int64).reshape(-1, 5), np.array(numbers, dtype=float).reshape(-1, 2), count,
-                   np.array(found, dtype=np.int64))
+        return cls(
+            np.array(code, dtype=np.int64).reshape(-1, 5),
+            np.array(numbers, dtype=float).reshape(-1, 2),
+            count,
+            np.array(found, dtype=np.int64),
+        )
 
     def run(self, inputs: Sequence[AffineForms]) -> AffineForms:
         """All that is given out, (boxes, outputs), for inputs of shape (boxes,)."""
@@ -164,14 +188,20 @@ class MachineCode(Value):
         return AffineForms(found[:S], found[S])
 
 
-def machine(code: Places, numbers: Array, places: int, outputs: Places, given: Array, bends: Places, found: Array
-            ) -> None:
+def machine(
+    code: Places, numbers: Array, places: int, outputs: Places, given: Array, bends: Places, found: Array
+) -> None:
     """Run instructions on forms ``given`` (inputs, symbols + 2, boxes), whose angles' bends have the symbols ``bends``
     (0 for none), to what is ``found`` (symbols + 2, boxes, outputs)."""
     rows, boxes = given.shape[1] - 1, given.shape[2]
     m = np.zeros((places, rows + 1, LANES))
-    total, slopes_a, slopes_b, both, shared = (np.zeros(LANES), np.zeros(LANES), np.zeros(LANES), np.zeros(LANES),
-                                               np.zeros(LANES))
+    total, slopes_a, slopes_b, both, shared = (
+        np.zeros(LANES),
+        np.zeros(LANES),
+        np.zeros(LANES),
+        np.zeros(LANES),
+        np.zeros(LANES),
+    )
     for start in range(0, boxes, LANES):
         count = min(LANES, boxes - start)
         for step in range(code.shape[0]):
@@ -212,8 +242,9 @@ def machine(code: Places, numbers: Array, places: int, outputs: Places, given: A
                         to[s, i] = x * b[0, i] + y * a[0, i]
                 for i in range(LANES):
                     to[0, i] = a[0, i] * b[0, i] + 0.5 * both[i]
-                    to[rows, i] = product_radius(a[0, i], slopes_a[i], a[rows, i], b[0, i], slopes_b[i], b[rows, i],
-                                                 shared[i])
+                    to[rows, i] = product_radius(
+                        a[0, i], slopes_a[i], a[rows, i], b[0, i], slopes_b[i], b[rows, i], shared[i]
+                    )
             elif name == SCALE:
                 factor, doubt = numbers[number, 0], numbers[number, 1]
                 sizes(a, 0, rows, total)
@@ -291,8 +322,12 @@ def sizes(form: Array, first: int, rows: int, total: Array) -> None:
 @lru_cache(maxsize=1)
 def _compiled_machine() -> Callable[..., None]:
     """The machine, compiled once for all formulas and kept between runs."""
-    return compiled_module(_TEXT.format(
-        numbers="\n".join(f"{name} = {vars(affine)[name]!r}" for name in _NUMBERS), lanes=LANES,
-        codes=", ".join(CODES), count=len(CODES),
-        functions="\n\n".join(f"@compiled\n{inspect.getsource(each)}" for each in (*_FUNCTIONS, sizes, machine))),
-        ).machine
+    return compiled_module(
+        _TEXT.format(
+            numbers="\n".join(f"{name} = {vars(affine)[name]!r}" for name in _NUMBERS),
+            lanes=LANES,
+            codes=", ".join(CODES),
+            count=len(CODES),
+            functions="\n\n".join(f"@compiled\n{inspect.getsource(each)}" for each in (*_FUNCTIONS, sizes, machine)),
+        ),
+    ).machine

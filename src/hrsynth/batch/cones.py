@@ -92,8 +92,10 @@ def _null_vector(N: Components) -> list[Any]:
     xy, xz, yz = g * h - f * z, f * h - g * y, f * g - h * x
     a, b, c = abs(xx), abs(yy), abs(zz)
     first, second = (a >= b) & (a >= c), b >= c
-    w = [where(first, *pair) for pair in ((xx, where(second, xy, xz)), (xy, where(second, yy, yz)),
-                                          (xz, where(second, yz, zz)))]
+    w = [
+        where(first, *pair)
+        for pair in ((xx, where(second, xy, xz)), (xy, where(second, yy, yz)), (xz, where(second, yz, zz)))
+    ]
     square = dot(w, w)
     size = sqrt(positive(square))
     return [where(square > 0.0, w[0] / size, 1.0), w[1] / size, w[2] / size]
@@ -172,8 +174,9 @@ def _bracket(B: Components, C: Components) -> tuple[Components, Components]:
     return [first / positive(first + second), 0.0, 1.0, first, -second, 0.0], [float("inf")]
 
 
-def _halve(B: Components, C: Components, bracket: Components, least: Components, _: Components
-            ) -> tuple[Components, ...]:
+def _halve(
+    B: Components, C: Components, bracket: Components, least: Components, _: Components
+) -> tuple[Components, ...]:
     """A step to the least bound (1) of two cones: at the weight t where a (1 − t) − b t changes its sign, by the rule
     of false position on a bracket; a and b are the two terms at the eigenvector. Where the largest eigenvalue is double
     there, the sign changes by a jump."""
@@ -189,5 +192,8 @@ def _halve(B: Components, C: Components, bracket: Components, least: Components,
     fixed = a / positive(total)
     straight = low + (high - low) * below / positive(below - above)
     third = (fixed > low) & (fixed < high) & (count < 0.5)
-    return ([where(third, fixed, straight), low, high, below, above, where(count > 1.5, 0.0, count + 1.0)],
-            [where(bound < least[0], bound, least[0])], [where(on, 1.0, 0.0)])
+    return (
+        [where(third, fixed, straight), low, high, below, above, where(count > 1.5, 0.0, count + 1.0)],
+        [where(bound < least[0], bound, least[0])],
+        [where(on, 1.0, 0.0)],
+    )

@@ -16,8 +16,9 @@ from ..closed_forms.legs import ClosedFormLeg, FixedDirection, Number, OnCrank, 
 from ..geometry.components import Components, cross, dot, minus, plus, scale, sqrt, transform_vector
 
 
-def direction_rows(leg: ClosedFormLeg, p: Components, R: Components, twists: Components, number: Number
-                   ) -> tuple[Any, Components, list[Any]]:
+def direction_rows(
+    leg: ClosedFormLeg, p: Components, R: Components, twists: Components, number: Number
+) -> tuple[Any, Components, list[Any]]:
     """Reach margin, u and the rows of Mᵀ (3, d) for twists (6, d) of the platform's point, m and rad."""
     d = len(twists) // 6
     if isinstance(leg, FixedDirection):
@@ -40,8 +41,11 @@ def direction_rows(leg: ClosedFormLeg, p: Components, R: Components, twists: Com
     else:
         u, gain = carried, leg.mode / sqrt(margin)
         slip = scale(gain, u)
-    return margin, u, _by_rows([minus(scale(gain, y), scale(dot(u, y), slip))
-                                for y in (plus(v, cross(w, arm)) for v, w in columns)])
+    return (
+        margin,
+        u,
+        _by_rows([minus(scale(gain, y), scale(dot(u, y), slip)) for y in (plus(v, cross(w, arm)) for v, w in columns)]),
+    )
 
 
 def _by_rows(columns: list[list[Any]]) -> list[Any]:

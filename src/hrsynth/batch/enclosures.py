@@ -66,8 +66,13 @@ class BoxFormula(Value):
                 steps.append((i, name, arguments if name == "load" else [term(a) for a in arguments]))
         given = [term(each.number if isinstance(each, Symbol) else float(each)) for each in outputs]
         kept = {each for each in given if isinstance(each, int)}
-        last = {a: k for k, (_, name, arguments) in enumerate(steps) if name != "load"
-                for a in arguments if isinstance(a, int)}
+        last = {
+            a: k
+            for k, (_, name, arguments) in enumerate(steps)
+            if name != "load"
+            for a in arguments
+            if isinstance(a, int)
+        }
         done: list[list[int]] = [[] for _ in steps]
         for a, k in last.items():
             if a not in kept:

@@ -100,8 +100,13 @@ class Batch(Value):
     """What was traced so far, by the legs that are watched, and whether slides are given."""
 
     @classmethod
-    def of(cls, anatomy: LegDecomposition, observations: Sequence[Observation], motion: PlatformMotion,
-           configurations: Sequence[ClosedConfiguration]) -> Batch | None:
+    def of(
+        cls,
+        anatomy: LegDecomposition,
+        observations: Sequence[Observation],
+        motion: PlatformMotion,
+        configurations: Sequence[ClosedConfiguration],
+    ) -> Batch | None:
         """Compile a mechanism with one direction per leg; None if something else is observed, or not from the base, or
         a wrist cannot make every turn.
 
@@ -109,8 +114,13 @@ class Batch(Value):
         """
         mechanism = anatomy.mechanism
         seen = {o.leg: o for o in observations if isinstance(o, Direction) and o.seen_from is None}
-        if (mechanism.couplings or mechanism.wrists or mechanism.reference != mechanism.base
-                or len(seen) < len(observations) or set(seen) != set(anatomy.labels)):
+        if (
+            mechanism.couplings
+            or mechanism.wrists
+            or mechanism.reference != mechanism.base
+            or len(seen) < len(observations)
+            or set(seen) != set(anatomy.labels)
+        ):
             return None
         frames = frames_at(configurations)
         names = tuple(dict.fromkeys((*anatomy.platform, mechanism.platform)))
@@ -155,8 +165,15 @@ class Batch(Value):
         """Whether one program of closed forms gives everything."""
         return self.coordinates.constant and not self.iterative
 
-    def evaluate(self, X: ArrayLike, legs: Sequence[str] | str | None = None, cones: ArrayLike | None = None, *,
-                 slides: ArrayLike | None = None, compiled: Compiled | None = None) -> Evaluation:
+    def evaluate(
+        self,
+        X: ArrayLike,
+        legs: Sequence[str] | str | None = None,
+        cones: ArrayLike | None = None,
+        *,
+        slides: ArrayLike | None = None,
+        compiled: Compiled | None = None,
+    ) -> Evaluation:
         """Everything at platform poses X (n, 4, 4) with ``legs`` watched (default: all), ``cones`` their half-angles
         (rad; one, or one per leg). ``slides`` (n, m) are the coordinates of the P joints :attr:`slides` (m), by which
         links of the platform slide on it: then the legs on these can be watched as well, and Mᵀ has one more column for
@@ -178,8 +195,11 @@ class Batch(Value):
         twists = self._twists(slid)
         need = 8 * len(X) * (3 * len(watched) * (self.coordinates.dof + slid * len(self.slides) + 1) + 5)
         if need > LARGEST_BATCH:
-            raise BadRequest("the result of a batch takes too much memory (bytes)", need,
-                             f"at most {LARGEST_BATCH}; sweep goes through any number of poses in parts")
+            raise BadRequest(
+                "the result of a batch takes too much memory (bytes)",
+                need,
+                f"at most {LARGEST_BATCH}; sweep goes through any number of poses in parts",
+            )
         k, n = len(watched), len(X)
         quick = self.uses_numba(n, watched, half, slid=slid) if compiled is None else compiled
         if compiled:
@@ -193,8 +213,15 @@ class Batch(Value):
         position, orientation = (None, None) if half is None else bounds_of(M, twists, half, reached, compiled=quick)
         if not reached.all():
             u[..., ~reached], M[..., ~reached] = np.nan, np.nan
-        return Evaluation(reached, u.transpose(2, 0, 1), M.transpose(2, 0, 1), twists, position, orientation,
-                          tuple(self.normals[name] for name in watched))
+        return Evaluation(
+            reached,
+            u.transpose(2, 0, 1),
+            M.transpose(2, 0, 1),
+            twists,
+            position,
+            orientation,
+            tuple(self.normals[name] for name in watched),
+        )
 
     def rows_at(self, X: Array, watched: Sequence[str]) -> tuple[Array, Array, Array]:
         """Of closed forms: the reach margins of all legs (n, legs), 1 of a leg that always reaches; the directions
@@ -210,8 +237,9 @@ class Batch(Value):
         """Where closed forms alone reach the poses X (n, 4, 4), without the rest of ``evaluate``."""
         return np.asarray(self._program(()).run(X, ROWS[:1])[0] > 0)
 
-    def sweep(self, parts: Iterable[Array], legs: Sequence[str] | str | None = None, cones: ArrayLike | None = None
-              ) -> Iterator[Evaluation]:
+    def sweep(
+        self, parts: Iterable[Array], legs: Sequence[str] | str | None = None, cones: ArrayLike | None = None
+    ) -> Iterator[Evaluation]:
         """The evaluations of parts of a sweep, (n, 4, 4) each, one after the other: memory is that of one part."""
         return (self.evaluate(X, legs, cones) for X in parts)
 
@@ -220,8 +248,11 @@ class Batch(Value):
             return None
         s = np.asarray(slides, dtype=float)
         if not self.slides or s.shape != (n, len(self.slides)):
-            raise BadRequest("coordinates of slides of a batch: shape", s.shape,
-                             f"({n}, {len(self.slides)})" if self.slides else "none: nothing slides on the platform")
+            raise BadRequest(
+                "coordinates of slides of a batch: shape",
+                s.shape,
+                f"({n}, {len(self.slides)})" if self.slides else "none: nothing slides on the platform",
+            )
         return s
 
     def _twists(self, slid: bool) -> Array:
@@ -245,22 +276,29 @@ class Batch(Value):
         """The coordinates' twists (m, rad), (6, D)."""
         return _span(self.coordinates, self.length)
 
-    def uses_numba(self, n: int, legs: Sequence[str], cones: Array | None, enough: int = POSES_FOR_NUMBA, *,
-                   slid: bool = False) -> bool:
+    def uses_numba(
+        self, n: int, legs: Sequence[str], cones: Array | None, enough: int = POSES_FOR_NUMBA, *, slid: bool = False
+    ) -> bool:
         """Whether numba is to do n poses by default: its kernels are there already, and they are ``enough``, or they
         are so many that compiling pays."""
         if not self.closed or n < enough or find_spec("numba") is None:
             return False
-        return n >= POSES_FOR_COMPILING or (self._program(legs, slid).is_compiled(ROWS) and (
-            cones is None or bounds_compiled(len(legs), self._twists(slid), cones)))
+        return n >= POSES_FOR_COMPILING or (
+            self._program(legs, slid).is_compiled(ROWS)
+            and (cones is None or bounds_compiled(len(legs), self._twists(slid), cones))
+        )
 
     def _require_compilable(self, by: str) -> None:
         """Raise ``BadRequest`` where a package is not there, or this batch is not for it."""
         if find_spec(by) is None:
             raise BadRequest(f"{by} is not installed", True, f"compiled=False, or the extra {EXTRAS[by]}")
         if not self.closed:
-            raise BadRequest("a batch whose platform has other twists at each pose, or legs that are solved by "
-                             "iteration, is not compiled", True, "compiled=False")
+            raise BadRequest(
+                "a batch whose platform has other twists at each pose, or legs that are solved by "
+                "iteration, is not compiled",
+                True,
+                "compiled=False",
+            )
 
     def _program(self, watched: Sequence[str], slid: bool = False) -> Program:
         """What closed forms say at a pose X, and how far links have ``slid`` on the platform: where it is ``reached``,
@@ -280,12 +318,16 @@ class Batch(Value):
             p = plus([X[3], X[7], X[11]], transform_vector(R, program.number(self.coordinates.point)))
             return {"p": p, "R": R, "finite": [where(abs(whole - whole) <= 0.0, 1.0, 0.0)]}
 
-        def leg_rows(p: Components, R: Components, *s: Components, name: str, leg: ClosedFormLeg,
-                     link: SlidingLink | None = None) -> dict[str, Components]:
+        def leg_rows(
+            p: Components, R: Components, *s: Components, name: str, leg: ClosedFormLeg, link: SlidingLink | None = None
+        ) -> dict[str, Components]:
             moves = program.number(twists)
             if link is not None:  # its point is p + s R a: it moves by v + ω × s R a + ṡ R a
-                way = transform_vector(R, program.number(link.along)) if self.coordinates.rotations.size else (
-                    program.number(self.home[:3, :3] @ link.along))
+                way = (
+                    transform_vector(R, program.number(link.along))
+                    if self.coordinates.rotations.size
+                    else (program.number(self.home[:3, :3] @ link.along))
+                )
                 shift = scale(s[0][0], way)
                 p = plus(p, shift)
                 for j in range(d - len(slides)):
@@ -315,8 +357,9 @@ class Batch(Value):
                 margins.append(f"margin_{name}")
         program.apply(reached, "finite", *margins)
         for name, size in zip(ROWS[1:], (3, 3 * d), strict=True):
-            program.places[name] = [place for leg in watched
-                                    for place in program.places.get(f"{name}_{leg}", [0.0] * size)]
+            program.places[name] = [
+                place for leg in watched for place in program.places.get(f"{name}_{leg}", [0.0] * size)
+            ]
         return program
 
     def _iterate(self, X: Array, watched: Sequence[str], reached: Flags, u: Array, M: Array) -> tuple[Array, Array]:
@@ -339,7 +382,8 @@ class Batch(Value):
                 across, there = self._held_basis(X[here])
                 basis[here], found = across.transpose(2, 0, 1), M[:, :, here].copy()
                 M[:, : self.coordinates.dof, here] = sum(
-                    row[:, None] * column for row, column in zip(found.swapaxes(0, 1), across, strict=True))
+                    row[:, None] * column for row, column in zip(found.swapaxes(0, 1), across, strict=True)
+                )
                 reached[here] &= there
             elif not constant:
                 basis[here], there = self._feasible(list(states.values()))
@@ -386,8 +430,12 @@ def _span(coordinates: PlatformCoordinates, length: float) -> Array:
     return coordinates.twists * np.repeat([length, 1.0], 3)[:, None]
 
 
-def _holds(anatomy: LegDecomposition, coordinates: PlatformCoordinates, legs: Mapping[str, IterativeLeg],
-           frames: Mapping[str, Array]) -> tuple[Hold, ...]:
+def _holds(
+    anatomy: LegDecomposition,
+    coordinates: PlatformCoordinates,
+    legs: Mapping[str, IterativeLeg],
+    frames: Mapping[str, Array],
+) -> tuple[Hold, ...]:
     """What the legs forbid the platform, where that is known in closed form and decides its twists; else nothing."""
     if coordinates.constant or anatomy.point is not None or set(legs) != set(anatomy.labels):
         return ()

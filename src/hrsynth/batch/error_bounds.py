@@ -31,8 +31,9 @@ class ErrorBound:
     lower: Array
 
 
-def bounds_of(M: Array, twists: Array, cones: Array, reached: NDArray[np.bool_] | None = None, *,
-              compiled: Compiled = False) -> tuple[ErrorBound, ErrorBound]:
+def bounds_of(
+    M: Array, twists: Array, cones: Array, reached: NDArray[np.bool_] | None = None, *, compiled: Compiled = False
+) -> tuple[ErrorBound, ErrorBound]:
     """Position and orientation error for Mᵀ (3 k, d, n) on ``twists`` (6, d) or (n, 6, d), and half-angles of k cones
     (rad); the position error is in the unit of the twists' linear rows. NaN where not ``reached``."""
     rows, d, n = M.shape
@@ -66,8 +67,12 @@ def _constant_program(k: int, d: int, twists: bytes, cones: bytes) -> Program:
     """The bounds where twists and cones are the same at all poses."""
     T, half = np.frombuffer(twists), np.frombuffer(cones)
     program = Program.of(M=3 * k * d, reached=1)
-    trace_bounds(program, d, lambda: (program.number(T), program.number(half)),
-                 single=[freedom(part) for part in T.reshape(2, 3, d)])
+    trace_bounds(
+        program,
+        d,
+        lambda: (program.number(T), program.number(half)),
+        single=[freedom(part) for part in T.reshape(2, 3, d)],
+    )
     return program
 
 
@@ -87,8 +92,13 @@ def freedom(rows: Array) -> Array | None:
     return None if len(values) > 1 and values[1] > RANK_CUTOFF * values[0] else left[:, 0]
 
 
-def trace_bounds(program: Program, d: int, constants: Callable[..., tuple[Components, Components]], *reads: str,
-                 single: Sequence[Array | None] = (None, None)) -> None:
+def trace_bounds(
+    program: Program,
+    d: int,
+    constants: Callable[..., tuple[Components, Components]],
+    *reads: str,
+    single: Sequence[Array | None] = (None, None),
+) -> None:
     """Add ``PARTS`` (upper and lower bound each) and ``clear``, where no freedom is lost, at poses where ``reached`` is
     positive, for ``M``; twists (6, d) and cones (k) come from ``reads``."""
 
@@ -122,8 +132,11 @@ def trace_bounds(program: Program, d: int, constants: Callable[..., tuple[Compon
             if only is not None:
                 total = _product(cones, [sqrt(dot(block[0], block[0])) for block in blocks])
                 return {PARTS[part]: [total, total]}
-            return {f"{PARTS[part]}_{i}": [cone * cone * dot(block[a], block[b]) for a, b in ENTRIES]
-                    for i, (cone, block) in enumerate(zip(cones, blocks, strict=True))}
+            return {
+                f"{PARTS[part]}_{i}": [cone * cone * dot(block[a], block[b]) for a, b in ENTRIES]
+                for i, (cone, block) in enumerate(zip(cones, blocks, strict=True))
+            }
+
         return formula
 
     program.apply(factor, "M", "reached", state=["clear"])

@@ -19,16 +19,21 @@ TURNS = 180
 """Values of a free turn that are tried before a pose counts as out of reach."""
 
 
-def ready(placer: Placer, motion: PlatformMotion, goals: Sequence[Goal]
-          ) -> tuple[dict[int, ClosedConfiguration], set[int]]:
+def ready(
+    placer: Placer, motion: PlatformMotion, goals: Sequence[Goal]
+) -> tuple[dict[int, ClosedConfiguration], set[int]]:
     """The configurations at goals whose free parts are as at home, by their place; and the places of goals that no pose
     of the platform reaches in the working mode of the zero configuration."""
     X = np.array([motion.pose_of(goal) for goal in goals])
-    found = {i: at for i, at in enumerate(placer.configurations(X))
-             if at is not None and np.linalg.norm(goals[i].rows(placer.twin, at.q)[0]) <= RANK_CUTOFF}
+    found = {
+        i: at
+        for i, at in enumerate(placer.configurations(X))
+        if at is not None and np.linalg.norm(goals[i].rows(placer.twin, at.q)[0]) <= RANK_CUTOFF
+    }
     missed = [i for i in range(len(goals)) if i not in found]
-    closed, turning = ([i for i in missed if motion.is_placed(goals[i]) and motion.turns_left(goals[i]) == left]
-                       for left in (0, 1))
+    closed, turning = (
+        [i for i in missed if motion.is_placed(goals[i]) and motion.turns_left(goals[i]) == left] for left in (0, 1)
+    )
     some = np.concatenate([placer.batch.reaches(X[closed]), _some_turn(placer, motion, X[turning])])
     return found, {i for i, reached in zip([*closed, *turning], some, strict=True) if not reached}
 

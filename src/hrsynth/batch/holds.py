@@ -59,8 +59,9 @@ def _size(vectors: Array) -> Array:
     return np.sqrt(np.maximum(np.einsum("in,in->n", vectors, vectors), np.finfo(float).tiny))
 
 
-def holds_of_leg(mechanism: Mechanism, leg: Leg, coordinates: PlatformCoordinates, states: IterativeLegStates, p: Array
-         ) -> Sequence[Hold] | None:
+def holds_of_leg(
+    mechanism: Mechanism, leg: Leg, coordinates: PlatformCoordinates, states: IterativeLegStates, p: Array
+) -> Sequence[Hold] | None:
     """The forces by which a leg holds the platform, at states of closed configurations; None where these are others."""
     ranks = range_bases([each.T for each in states.wrenches()], 1.0)
     count = {rank.value for _, rank in ranks}
@@ -94,8 +95,11 @@ def _candidates(mechanism: Mechanism, leg: Leg, coordinates: PlatformCoordinates
     def normals(axes: Sequence[Array]) -> Iterator[Array]:
         for axis in axes:
             yield axis
-            yield from (aside / np.linalg.norm(aside) for aside in np.cross(about, axis)
-                        if np.linalg.norm(aside) > SAME_GEOMETRY)
+            yield from (
+                aside / np.linalg.norm(aside)
+                for aside in np.cross(about, axis)
+                if np.linalg.norm(aside) > SAME_GEOMETRY
+            )
 
     for tip in tips:
         for joint in near:

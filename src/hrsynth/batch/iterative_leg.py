@@ -31,8 +31,13 @@ STRIDE = 0.2
 """Length of the way from one place to the next (characteristic lengths, radians)."""
 
 _FORCES = {"R": (0, 1, 2), "P": (0, 1), "C": (0, 1), "E": (2,), "S": (0, 1, 2), "U": (0, 1, 2), "F": (0, 1, 2)}
-_TURNS = {"R": ((0, 2), (1, 2)), "P": ((0, 2), (1, 2), (0, 1)), "C": ((0, 2), (1, 2)), "E": ((0, 2), (1, 2)),
-          "F": ((0, 2), (1, 2), (0, 1))}
+_TURNS = {
+    "R": ((0, 2), (1, 2)),
+    "P": ((0, 2), (1, 2), (0, 1)),
+    "C": ((0, 2), (1, 2)),
+    "E": ((0, 2), (1, 2)),
+    "F": ((0, 2), (1, 2), (0, 1)),
+}
 """For each type, axis 2 along its own: the axes of its forces, and the pairs of axes (of predecessor and successor)
 that stay perpendicular."""
 
@@ -80,11 +85,14 @@ class Ties(Value):
     @cached_property
     def _stacked(self) -> tuple[list[Any], list[Any]]:
         """Forces and moments, each of their parts of all rows in one array; once all joints are there."""
+
         def stacked(rows: Sequence[tuple[Any, ...]], vectors: int) -> list[Any]:
             columns = list(zip(*rows, strict=True)) or [()] * 5
             shapes = [(-1, 3) if 2 <= k < 2 + vectors else (-1,) for k in range(5)]
-            return [np.array(column, dtype=int if k < 2 else float).reshape(shape)
-                    for k, (column, shape) in enumerate(zip(columns, shapes, strict=True))]
+            return [
+                np.array(column, dtype=int if k < 2 else float).reshape(shape)
+                for k, (column, shape) in enumerate(zip(columns, shapes, strict=True))
+            ]
 
         return stacked(self.forces, 3), stacked(self.moments, 2)
 
@@ -93,8 +101,13 @@ class Ties(Value):
         (i, j, normal, at_i, at_j), (k, m, alpha, beta, level) = self._stacked
         R, o = X[..., :3, :3], X[..., :3, 3]
         way = o[:, j] + times(R[:, j], at_j) - o[:, i] - times(R[:, i], at_i)
-        return np.concatenate([np.sum(times(R[:, i], normal) * way, axis=2),
-                               np.sum(times(R[:, k], alpha) * times(R[:, m], beta), axis=2) - level], axis=1)
+        return np.concatenate(
+            [
+                np.sum(times(R[:, i], normal) * way, axis=2),
+                np.sum(times(R[:, k], alpha) * times(R[:, m], beta), axis=2) - level,
+            ],
+            axis=1,
+        )
 
     def rates(self, X: Array) -> Array:
         """Its derivatives by the twists of all links, (n, rows, links, 6)."""
@@ -147,8 +160,7 @@ class IterativeLeg(Value):
             ties.pin(len(links) - 1, 1, np.zeros(3), point / mechanism.length)
         given = {0, 1} if point is None else {0, len(links) - 1}
         free = np.array([i for i in range(len(links)) if i not in given], dtype=np.int64)
-        return cls(leg.label, links, free, zero, ties, (place[seen.link], np.asarray(seen.direction)),
-                   mechanism.length)
+        return cls(leg.label, links, free, zero, ties, (place[seen.link], np.asarray(seen.direction)), mechanism.length)
 
     def start(self, n: int) -> Array:
         """The zero configuration, n times."""
@@ -195,8 +207,9 @@ class IterativeLeg(Value):
         _, s, right = np.linalg.svd(np.concatenate([wrenches, np.zeros((len(X), 6, 6))], axis=1), full_matrices=False)
         return u, minus @ twists[:, number, 3:], right * (s > RANK_CUTOFF)[:, :, None]
 
-    def follow_from_zero(self, coordinates: PlatformCoordinates, home: Array, X: Array, span: Array
-                         ) -> IterativeLegStates:
+    def follow_from_zero(
+        self, coordinates: PlatformCoordinates, home: Array, X: Array, span: Array
+    ) -> IterativeLegStates:
         """The chain at platform poses X (n, 4, 4), followed from ``home`` in small steps, all poses abreast."""
         p, R = coordinates.place(X)
         (p0,), (R0,) = coordinates.place(home[None])

@@ -21,8 +21,9 @@ Table = dict[int, Any]
 """What stands at each place that is filled, (n,)."""
 
 
-def run(sections: tuple[Section, ...], numbers: Sequence[float], flat: Array, outputs: Sequence[Any], found: Array
-        ) -> None:
+def run(
+    sections: tuple[Section, ...], numbers: Sequence[float], flat: Array, outputs: Sequence[Any], found: Array
+) -> None:
     """Fill the rows of ``found`` (rows, n) for inputs ``flat`` (n, inputs), in double precision."""
     import jax
 
@@ -50,16 +51,20 @@ def _compile(sections: tuple[Section, ...], outputs: tuple[Any, ...]) -> Callabl
                     made = _store(step, table, numbers)
                 else:
                     made = _repeat_step(step.step, step.state, step.open, step.limit, table, numbers, live)
-                table |= {place: value if live is None else jnp.where(live, value, table.get(place, nothing))
-                          for place, value in made.items()}
-        return jnp.stack([table.get(each, nothing) if isinstance(each, int) else jnp.full_like(nothing, each)
-                          for each in outputs])
+                table |= {
+                    place: value if live is None else jnp.where(live, value, table.get(place, nothing))
+                    for place, value in made.items()
+                }
+        return jnp.stack(
+            [table.get(each, nothing) if isinstance(each, int) else jnp.full_like(nothing, each) for each in outputs]
+        )
 
     return jax.jit(rows)
 
 
-def _repeat_step(step: Kernel, state: Sequence[int], flag: int, limit: int, table: Table, numbers: Any, live: Any
-              ) -> Table:
+def _repeat_step(
+    step: Kernel, state: Sequence[int], flag: int, limit: int, table: Table, numbers: Any, live: Any
+) -> Table:
     """The state after a step was repeated where its flag is positive."""
     import jax
     import jax.numpy as jnp
@@ -70,7 +75,8 @@ def _repeat_step(step: Kernel, state: Sequence[int], flag: int, limit: int, tabl
     def again(now: tuple[Any, Table]) -> tuple[Any, Table]:
         made, here = _store(step, table | now[1], numbers), now[1][flag] > 0
         return now[0] + 1, {
-            place: jnp.where(here, made[place], kept) if place in made else kept for place, kept in now[1].items()}
+            place: jnp.where(here, made[place], kept) if place in made else kept for place, kept in now[1].items()
+        }
 
     first = {place: table[place] for place in state}
     if live is not None:

@@ -46,14 +46,16 @@ class Placer(Value):
     legs: Mapping[str, IterativeLeg]
 
     @classmethod
-    def of(cls, batch: Batch, twin: PinocchioModel, anatomy: LegDecomposition,
-           observations: Sequence[Direction]) -> Placer | None:
+    def of(
+        cls, batch: Batch, twin: PinocchioModel, anatomy: LegDecomposition, observations: Sequence[Direction]
+    ) -> Placer | None:
         """None where a leg is no known subproblem, or a link belongs neither to a leg nor to the platform."""
         mechanism = anatomy.mechanism
         placed = {mechanism.base, *batch.coordinates.links, *(name for leg in anatomy.legs for name in leg.links)}
         known = all(isinstance(leg, ClosedFormLeg) for leg in batch.legs.values())
         if not (known and batch.coordinates.constant and placed == set(mechanism.links)) or any(
-                joint.type is JointType.FREE for joint in mechanism.joints.values()):
+            joint.type is JointType.FREE for joint in mechanism.joints.values()
+        ):
             return None
         seen = {o.leg: o for o in observations}
         legs = {leg.label: IterativeLeg.of(mechanism, leg, seen[leg.label], None) for leg in anatomy.legs}
@@ -136,8 +138,9 @@ class Placer(Value):
             frames.update({name: state[:, i] for i, name in enumerate(chain.links) if name in leg.links})
         return frames, reached
 
-    def _guess(self, leg: Leg, form: ClosedFormLeg, frames: Mapping[str, Array], p: Array, R: Array
-               ) -> tuple[dict[str, Array], Flags]:
+    def _guess(
+        self, leg: Leg, form: ClosedFormLeg, frames: Mapping[str, Array], p: Array, R: Array
+    ) -> tuple[dict[str, Array], Flags]:
         """Where the leg's links start: its first link on its circle or line, the others turned as the observed one."""
         mechanism, seen = self.anatomy.mechanism, self.seen[leg.label]
         n = len(p)
@@ -184,8 +187,7 @@ def _outwards(mechanism: Mechanism, leg: Leg, crank: str) -> list[str]:
     rest = [name for name in leg.links if name not in order]
     while rest:
         known = {mechanism.base, leg.attach, *order}
-        chosen = next(name for name in rest
-                      if any(joint.other(name) in known for joint in mechanism.joints_of(name)))
+        chosen = next(name for name in rest if any(joint.other(name) in known for joint in mechanism.joints_of(name)))
         order.append(chosen)
         rest.remove(chosen)
     return order
@@ -228,8 +230,9 @@ def rates(twin: PinocchioModel, frames: Mapping[str, Array], link: str) -> tuple
         if places:
             own = joint if joint.predecessor == parent else joint.turned()
             found[places] = 1.0
-            screws[:, :, places[0] : places[-1] + 1] = _screws(own, moved[parent], moved[joint.other(parent)],
-                                                               twin.length)
+            screws[:, :, places[0] : places[-1] + 1] = _screws(
+                own, moved[parent], moved[joint.other(parent)], twin.length
+            )
         return found
 
     for joint in tree:
@@ -248,15 +251,18 @@ def _screws(joint: Joint, A: Array, B: Array, length: float) -> Array:
     """The twists (n, 6, k) at the base's origin for unit velocities of a joint's coordinates, A and B (n, 4, 4) what
     brought its links from the zero configuration."""
     R, found = A[:, :3, :3], elementary(joint.type, joint.axes, across)
-    slides, turns = (np.array([axis for kind, axis in found if kind is each]).reshape(-1, 3)
-                     for each in (JointType.PRISMATIC, JointType.REVOLUTE))
+    slides, turns = (
+        np.array([axis for kind, axis in found if kind is each]).reshape(-1, 3)
+        for each in (JointType.PRISMATIC, JointType.REVOLUTE)
+    )
     turned = R @ turns.T
     if joint.type is JointType.UNIVERSAL:
         turned[:, :, 1] = B[:, :3, :3] @ turns[1]
     arms = hat(_centre(joint, A) / length) @ turned
     slid = R @ slides.T
-    return np.concatenate([np.concatenate([slid, np.zeros_like(slid)], axis=1),
-                           np.concatenate([arms, turned], axis=1)], axis=2)
+    return np.concatenate(
+        [np.concatenate([slid, np.zeros_like(slid)], axis=1), np.concatenate([arms, turned], axis=1)], axis=2
+    )
 
 
 def _centre(joint: Joint, A: Array) -> Array:
@@ -281,8 +287,10 @@ def _coordinates(joint: Joint, R: Array, shift: Array) -> list[Array]:
         case JointType.SPHERICAL:
             return [quaternions(R)[:, [1, 2, 3, 0]]]
         case _:
-            return [shift @ axis[:, None] if kind is JointType.PRISMATIC else _angle(R, axis)
-                    for kind, axis in elementary(joint.type, joint.axes, across)]
+            return [
+                shift @ axis[:, None] if kind is JointType.PRISMATIC else _angle(R, axis)
+                for kind, axis in elementary(joint.type, joint.axes, across)
+            ]
 
 
 def _angle(R: Array, axis: Array) -> Array:

@@ -100,20 +100,28 @@ class PlatformCoordinates(Value):
         """Those of a platform, and those of the links ``names`` that go with it."""
         X = frames[motion.link]
         p = X[:, :3, 3] + X[:, :3, :3] @ motion.point
-        found = {name: body for name in names if motion.body
-                 and (body := _body(p, X[:, :3, :3], frames[name], length)) is not None}
+        found = {
+            name: body
+            for name in names
+            if motion.body and (body := _body(p, X[:, :3, :3], frames[name], length)) is not None
+        }
         return cls(motion.link, motion.point, motion.translations, motion.rotations, found, motion.dof)
 
 
-def sliding_links(coordinates: PlatformCoordinates, frames: Frames, names: Sequence[str], mechanism: Mechanism
-                  ) -> dict[str, tuple[SlidingLink, Array]]:
+def sliding_links(
+    coordinates: PlatformCoordinates, frames: Frames, names: Sequence[str], mechanism: Mechanism
+) -> dict[str, tuple[SlidingLink, Array]]:
     """The links that slide on one that goes with the platform, and how far they slid in all ``frames`` (m,)."""
     found: dict[str, tuple[SlidingLink, Array]] = {}
     X = frames[mechanism.platform]
     for joint in mechanism.joints.values():
         link, other = joint.links if joint.predecessor not in coordinates.links else joint.links[::-1]
-        if joint.type is not JointType.PRISMATIC or link in coordinates.links or other not in coordinates.links or (
-                link not in names):
+        if (
+            joint.type is not JointType.PRISMATIC
+            or link in coordinates.links
+            or other not in coordinates.links
+            or (link not in names)
+        ):
             continue
         D, base = (frames[each] @ inverse(mechanism.links[each].pose) for each in (link, other))
         axes = (1.0 if link == joint.successor else -1.0) * base[:, :3, :3] @ joint.axis

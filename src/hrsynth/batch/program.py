@@ -90,8 +90,9 @@ class Program:
     def _trace(self, formula: Formula, reads: Sequence[str], state: Sequence[str]) -> Kernel:
         self.tape = tape = Tape(self.numbers)
         self.texts.clear()
-        made = formula(*([tape.load(each) if isinstance(each, int) else each for each in self.places[name]]
-                         for name in reads))
+        made = formula(
+            *([tape.load(each) if isinstance(each, int) else each for each in self.places[name]] for name in reads)
+        )
         stores: list[Store] = []
         for name, values in made.items():
             if name not in self.places:
@@ -102,8 +103,11 @@ class Program:
                     kept.append(self.count if fresh else value if given is None else given)
                     self.count += fresh
                 self.places[name] = kept
-            stores += [(place, value) for place, value in zip(self.places[name], values, strict=True)
-                       if isinstance(place, int) and tape.place(value) != place]
+            stores += [
+                (place, value)
+                for place, value in zip(self.places[name], values, strict=True)
+                if isinstance(place, int) and tape.place(value) != place
+            ]
         return Kernel(tape, stores)
 
     def run(self, inputs: Array, names: Sequence[str], *, compiled: Compiled = False) -> Array:
@@ -171,8 +175,12 @@ class Program:
 
         sweep, numbers = _sweep_of(self.text(outputs)), np.array([*self.numbers, 0.0])
         with ThreadPoolExecutor(threads()) as pool:
-            list(pool.map(lambda start: sweep(flat, numbers, found, start, min(start + CHUNK, len(flat))),
-                          range(0, len(flat), CHUNK)))
+            list(
+                pool.map(
+                    lambda start: sweep(flat, numbers, found, start, min(start + CHUNK, len(flat))),
+                    range(0, len(flat), CHUNK),
+                )
+            )
 
     def text(self, outputs: Sequence[Any]) -> str:
         """The module that numba compiles: the same for all robots of one structure, whose numbers it is given."""
@@ -189,11 +197,20 @@ class Program:
                 body.append(f"if some(m, {LANES * section.flag}):")
             for line in self._calls(section, kernels):
                 body.append(line if section.flag is None else f"    {line}")
-        scatter = [f"o[{row}, start + i] = m[{LANES * place} + i]" for row, place in enumerate(outputs)
-                   if isinstance(place, int)]
+        scatter = [
+            f"o[{row}, start + i] = m[{LANES * place} + i]"
+            for row, place in enumerate(outputs)
+            if isinstance(place, int)
+        ]
         parts = [f"@compiled\ndef kernel_{number}(m, c):\n    {lines}\n" for number, lines in enumerate(kernels)]
-        return _MODULE.format(kernels="\n\n".join(parts), size=LANES * self.count, lanes=LANES, inputs=self.inputs,
-                              body="\n        ".join(body), scatter="\n            ".join(scatter or ["pass"]))
+        return _MODULE.format(
+            kernels="\n\n".join(parts),
+            size=LANES * self.count,
+            lanes=LANES,
+            inputs=self.inputs,
+            body="\n        ".join(body),
+            scatter="\n            ".join(scatter or ["pass"]),
+        )
 
     def _calls(self, section: Section, kernels: list[str]) -> Iterator[str]:
         """The lines that run a section, whose kernels are added."""
@@ -206,8 +223,12 @@ class Program:
             if isinstance(step, Kernel):
                 yield f"{name}(m, c)"
             else:
-                yield from (f"for _ in range({step.limit}):", f"    if not some(m, {LANES * step.open}):",
-                            "        break", f"    {name}(m, c)")
+                yield from (
+                    f"for _ in range({step.limit}):",
+                    f"    if not some(m, {LANES * step.open}):",
+                    "        break",
+                    f"    {name}(m, c)",
+                )
 
 
 def threads() -> int:
@@ -217,7 +238,7 @@ def threads() -> int:
     return int(vars(config)["NUMBA_NUM_THREADS"])
 
 
-_MODULE = '''from math import inf, nan, sqrt
+_MODULE = """from math import inf, nan, sqrt
 
 import numpy as np
 from numba import njit
@@ -248,7 +269,7 @@ def sweep(x, c, o, first, end):
         {body}
         for i in range(count):
             {scatter}
-'''
+"""
 
 
 def _sweep_of(text: str) -> Callable[..., None]:

@@ -34,8 +34,9 @@ def generic_motion(start: ClosedConfiguration, question: Measurement) -> Platfor
     return PlatformMotion.of(random_walk(start, 4, steps=2), question)
 
 
-def reach(start: ClosedConfiguration, question: Measurement, pose: Pose,
-          motion: PlatformMotion | None = None) -> ClosedConfiguration:
+def reach(
+    start: ClosedConfiguration, question: Measurement, pose: Pose, motion: PlatformMotion | None = None
+) -> ClosedConfiguration:
     """The configuration at ``pose`` that small steps lead to from ``start``; free parts are nearest to their values at
     the zero configuration (characteristic lengths, radians).
 
@@ -51,14 +52,18 @@ def reach(start: ClosedConfiguration, question: Measurement, pose: Pose,
         missed = worst_leg(start.twin, motion, goal)
         last = str(motion.pose(here.pose(motion.link)))
         wrist = at_end(here)
-        why = None if missed or wrist else (dependence(start, motion, goal, "this pose", came == 0)
-                                            or _lost_rank(start, here))
+        why = (
+            None
+            if missed or wrist
+            else (dependence(start, motion, goal, "this pose", came == 0) or _lost_rank(start, here))
+        )
         raise PoseNotReached(robot, str(pose), came, last, missed, wrist=wrist, why=why)
     return found
 
 
-def dependence(start: ClosedConfiguration, motion: PlatformMotion, goal: Goal, what: str, stuck: bool = False
-               ) -> str | None:
+def dependence(
+    start: ClosedConfiguration, motion: PlatformMotion, goal: Goal, what: str, stuck: bool = False
+) -> str | None:
     """That parts of wanted poses (``what``) depend on each other, at zero and elsewhere, or where the way is ``stuck``
     at zero, there; None where they do not. A part alone depends on nothing: the platform does not change it."""
     rows = goal.rows(start.twin, start.q)[1]
@@ -69,8 +74,11 @@ def dependence(start: ClosedConfiguration, motion: PlatformMotion, goal: Goal, w
         return None
     freedoms = "1 freedom" if motion.dof == 1 else f"{motion.dof} freedoms"
     where = "at zero and at a random configuration" if there else "at zero, to first order,"
-    why = ("none of them changes this part" if len(rows) == 1 else
-           f"parts of {what} depend on each other" + ": give fewer" * there)
+    why = (
+        "none of them changes this part"
+        if len(rows) == 1
+        else f"parts of {what} depend on each other" + ": give fewer" * there
+    )
     return f"the platform has {freedoms}, and {where} {why}"
 
 
@@ -104,8 +112,13 @@ def _parts_changed(at: ClosedConfiguration, rows: Array) -> int:
     return range_basis(rows @ at.kernel()[0], 1.0)[1].value
 
 
-def _lead_from(here: ClosedConfiguration, beside: Callable[[], Sequence[ClosedConfiguration]], motion: PlatformMotion,
-               goal: Goal, halvings: int = HALVINGS) -> tuple[ClosedConfiguration, float]:
+def _lead_from(
+    here: ClosedConfiguration,
+    beside: Callable[[], Sequence[ClosedConfiguration]],
+    motion: PlatformMotion,
+    goal: Goal,
+    halvings: int = HALVINGS,
+) -> tuple[ClosedConfiguration, float]:
     """Where small steps lead to a goal, as :func:`.steps.track`: from ``here``, or else from the two ``beside`` that
     are nearest to the goal."""
     led = track(here, motion, goal, halvings)
@@ -130,8 +143,13 @@ def _has_arrived(at: ClosedConfiguration, goal: Goal) -> bool:
     return goal.is_met(at.pose(goal.link), AS_PRINTED * max(1.0, at.twin.length)) and not wrists_beyond(at.twin, at.q)
 
 
-def sweep(start: ClosedConfiguration, question: Measurement, grid: Grid, motion: PlatformMotion | None = None,
-          placer: Placer | None = None) -> tuple[ClosedConfiguration | None, ...]:
+def sweep(
+    start: ClosedConfiguration,
+    question: Measurement,
+    grid: Grid,
+    motion: PlatformMotion | None = None,
+    placer: Placer | None = None,
+) -> tuple[ClosedConfiguration | None, ...]:
     """Configurations at the poses of a grid, in its order, each reached from a neighbour; None where that fails from
     every neighbour. The first is the reachable one nearest to ``start``.
 
@@ -142,8 +160,9 @@ def sweep(start: ClosedConfiguration, question: Measurement, grid: Grid, motion:
     home = motion.at_home()
     from .grids import ready
 
-    at_once, hopeless = ({}, beyond_rods(start.twin.mechanism, motion, goals)) if placer is None else (
-        ready(placer, motion, goals))
+    at_once, hopeless = (
+        ({}, beyond_rods(start.twin.mechanism, motion, goals)) if placer is None else (ready(placer, motion, goals))
+    )
 
     beside = cache(lambda: _origins(start, motion, goals[0]))
 
@@ -160,9 +179,13 @@ def sweep(start: ClosedConfiguration, question: Measurement, grid: Grid, motion:
     return spread(start, grid.shape, goals, lead, at_once)
 
 
-def spread(start: ClosedConfiguration, shape: tuple[int, ...], goals: Sequence[Task],
-           lead: Callable[[int, ClosedConfiguration, int], ClosedConfiguration | None], at_once: Container[int] = ()
-           ) -> tuple[ClosedConfiguration | None, ...]:
+def spread(
+    start: ClosedConfiguration,
+    shape: tuple[int, ...],
+    goals: Sequence[Task],
+    lead: Callable[[int, ClosedConfiguration, int], ClosedConfiguration | None],
+    at_once: Container[int] = (),
+) -> tuple[ClosedConfiguration | None, ...]:
     """Configurations at the ``goals`` of a grid's cells, of a ``shape``: ``lead`` gives that of a cell from a
     configuration nearby with so many halvings, None where it does not come there. It begins at the goal nearest to
     ``start``, and at further ones where no neighbour is reached from it, and goes on to neighbours, but not from a

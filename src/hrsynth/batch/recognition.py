@@ -28,8 +28,9 @@ from .platform_coordinates import Frames, PlatformCoordinates
 DRIVING = (JointType.REVOLUTE, JointType.PRISMATIC)
 
 
-def recognise_leg(anatomy: LegDecomposition, leg: Leg, seen: Direction, coordinates: PlatformCoordinates,
-               frames: Frames) -> ClosedFormLeg | None:
+def recognise_leg(
+    anatomy: LegDecomposition, leg: Leg, seen: Direction, coordinates: PlatformCoordinates, frames: Frames
+) -> ClosedFormLeg | None:
     """The closed form of the leg, or None; ``seen`` is the direction observed in it."""
     X = frames[anatomy.mechanism.platform]
     p, R = coordinates.place(X)
@@ -47,8 +48,10 @@ def _holds(form: ClosedFormLeg, p: Array, R: Array, u: Array) -> bool:
     with np.errstate(invalid="ignore", divide="ignore"):
         if not isinstance(form, OnCrank | OnRail):
             found, reached = form.direction(p, R)
-            return bool(np.max(np.abs(u - found)) <= SAME_GEOMETRY * (10 if isinstance(form, SlidingRod) else 1)
-                        and reached.all())
+            return bool(
+                np.max(np.abs(u - found)) <= SAME_GEOMETRY * (10 if isinstance(form, SlidingRod) else 1)
+                and reached.all()
+            )
         errors = []
         for mode in (form.mode, -form.mode):
             found, reached = replace(form, mode=mode).direction(p, R)
@@ -56,8 +59,9 @@ def _holds(form: ClosedFormLeg, p: Array, R: Array, u: Array) -> bool:
     return bool(errors[0][0] <= 10 * SAME_GEOMETRY and np.all(np.min(errors, axis=0) <= 10 * SAME_GEOMETRY))
 
 
-def _candidates(anatomy: LegDecomposition, leg: Leg, coordinates: PlatformCoordinates, frames: Frames, p: Array,
-                R: Array, u: Array) -> Iterator[ClosedFormLeg | None]:
+def _candidates(
+    anatomy: LegDecomposition, leg: Leg, coordinates: PlatformCoordinates, frames: Frames, p: Array, R: Array, u: Array
+) -> Iterator[ClosedFormLeg | None]:
     mechanism = anatomy.mechanism
     joints = [mechanism.joints[name] for name in leg.joints]
     feet = [joint for joint in joints if mechanism.base in joint.links]
@@ -105,8 +109,10 @@ def _tips(anatomy: LegDecomposition, leg: Leg, coordinates: PlatformCoordinates)
     to_body = inverse(mechanism.links[leg.attach].pose)
     for name in leg.joints:
         if leg.attach in mechanism.joints[name].links:
-            yield ((lambda point: body.point(to_body[:3, :3] @ point + to_body[:3, 3])),
-                   partial(_centres, mechanism.joints[name]))
+            yield (
+                (lambda point: body.point(to_body[:3, :3] @ point + to_body[:3, 3])),
+                partial(_centres, mechanism.joints[name]),
+            )
 
 
 def _centres(tip: Joint, other: Joint) -> tuple[Array, Array]:
@@ -118,14 +124,28 @@ def displacement(frames: Frames, mechanism: Mechanism, link: str) -> Array:
     return frames[link][0] @ inverse(mechanism.links[link].pose)
 
 
-def _crossing(anatomy: LegDecomposition, leg: Leg, coordinates: PlatformCoordinates, first: Joint, second: Joint,
-              frames: Frames, R: Array, u: Array) -> PlatformDirection | None:
+def _crossing(
+    anatomy: LegDecomposition,
+    leg: Leg,
+    coordinates: PlatformCoordinates,
+    first: Joint,
+    second: Joint,
+    frames: Frames,
+    R: Array,
+    u: Array,
+) -> PlatformDirection | None:
     """A crank whose end slides along a line of the platform: an R at the base, an R, a P."""
     mechanism, body = anatomy.mechanism, coordinates.links.get(leg.attach)
     kinds = "".join(mechanism.joints[name].type.value for name in leg.joints)
     crank = first.other(mechanism.base)
-    if body is None or sorted(kinds) != ["P", "R", "R"] or first is second or {first.type, second.type} != {
-            JointType.REVOLUTE} or crank not in second.links or not body.turns:
+    if (
+        body is None
+        or sorted(kinds) != ["P", "R", "R"]
+        or first is second
+        or {first.type, second.type} != {JointType.REVOLUTE}
+        or crank not in second.links
+        or not body.turns
+    ):
         return None
 
     def moved(link: str) -> Array:
@@ -138,16 +158,26 @@ def _crossing(anatomy: LegDecomposition, leg: Leg, coordinates: PlatformCoordina
     if np.linalg.norm(np.cross(B - C, u[0])) > SAME_GEOMETRY * mechanism.length:
         return None
     radius = float(np.linalg.norm(second.point - centre))
-    return PlatformDirection(leg.label, tip, _sign(float((B - centre) @ u[0])), axis=R[0].T @ u[0], centre=centre,
-                             pivot=first.axis, radius=radius, crank=crank, place=second.point)
+    return PlatformDirection(
+        leg.label,
+        tip,
+        _sign(float((B - centre) @ u[0])),
+        axis=R[0].T @ u[0],
+        centre=centre,
+        pivot=first.axis,
+        radius=radius,
+        crank=crank,
+        place=second.point,
+    )
 
 
 def _spring(label: str, tip: PlatformPoint, start: Array, p: Array, R: Array, u: Array) -> SlidingRod:
     return SlidingRod(label, tip, _sign(float((tip.value(p, R)[0] - start) @ u[0])), centre=start)
 
 
-def _crank(label: str, tip: PlatformPoint, first: Joint, crank: str, place: Array, moved: Array, C: Array,
-           u: Array) -> OnCrank | OnRail | None:
+def _crank(
+    label: str, tip: PlatformPoint, first: Joint, crank: str, place: Array, moved: Array, C: Array, u: Array
+) -> OnCrank | OnRail | None:
     """The rod to C from the point that was at ``place`` on the link that the leg's first joint carries; C, u and the
     link's displacement are those of the first configuration."""
     B = moved[:3, :3] @ place + moved[:3, 3]
@@ -159,8 +189,18 @@ def _crank(label: str, tip: PlatformPoint, first: Joint, crank: str, place: Arra
         return OnRail(label, tip, mode, centre=place, axis=first.axis, rod=rod, sense=sense, crank=crank, place=place)
     centre = foot(place, first.point, first.axis)
     mode = _sign(float(np.cross(first.axis, C - centre) @ (B - centre)))
-    return OnCrank(label, tip, mode, centre=centre, axis=first.axis, radius=float(np.linalg.norm(place - centre)),
-                   rod=rod, sense=sense, crank=crank, place=place)
+    return OnCrank(
+        label,
+        tip,
+        mode,
+        centre=centre,
+        axis=first.axis,
+        radius=float(np.linalg.norm(place - centre)),
+        rod=rod,
+        sense=sense,
+        crank=crank,
+        place=place,
+    )
 
 
 def _sign(value: float) -> float:

@@ -12,9 +12,20 @@ from typing import Any
 
 LANES = 16
 """Poses that run through compiled code side by side; constant strides let the compiler use vector instructions."""
-UFUNCS = {"+": "add", "-": "subtract", "*": "multiply", "/": "divide", "<": "less", "<=": "less_equal",
-          "&": "logical_and", "sqrt": "sqrt", "abs": "absolute", "sin": "sin", "cos": "cos",
-          "atan2": "arctan2"}
+UFUNCS = {
+    "+": "add",
+    "-": "subtract",
+    "*": "multiply",
+    "/": "divide",
+    "<": "less",
+    "<=": "less_equal",
+    "&": "logical_and",
+    "sqrt": "sqrt",
+    "abs": "absolute",
+    "sin": "sin",
+    "cos": "cos",
+    "atan2": "arctan2",
+}
 LOGICAL = ("<", "<=", "&")
 """Operations whose result is a condition."""
 Store = tuple[int, Any]
@@ -184,8 +195,11 @@ class Tape:
                 if not free:
                     free, count = [f"r[{count}]"], count + 1
                 names.append(result := free.pop())
-                lines += [f"copyto({result}, {inputs[2]})", f"copyto({result}, {inputs[1]}, where={inputs[0]})"] if (
-                    name == "?") else [f"{UFUNCS[name]}({', '.join(inputs)}, {result})"]
+                lines += (
+                    [f"copyto({result}, {inputs[2]})", f"copyto({result}, {inputs[1]}, where={inputs[0]})"]
+                    if (name == "?")
+                    else [f"{UFUNCS[name]}({', '.join(inputs)}, {result})"]
+                )
             free += [names[each] for each in {*earlier} if last.get(each) == number and names[each].startswith("r")]
         values = [names[each.number] if isinstance(each, Symbol) else repr(each) for _, each in stores]
         lines += [f"m[{place}] = {value}" for (place, _), value in zip(stores, values, strict=True)]

@@ -36,8 +36,11 @@ def trace_three(program: Program, forms: list[str], go: str, name: str) -> None:
 
     def start(*given: Components) -> dict[str, Components]:
         B, (on,) = given[:k], given[k:]
-        return {w: largest_eigenvalue(weigh(B, [1.0 / positive(trace_root(each)) for each in B]))[1],
-                best: [1.0, 0.0, 0.0, -1.0], open_: on}
+        return {
+            w: largest_eigenvalue(weigh(B, [1.0 / positive(trace_root(each)) for each in B]))[1],
+            best: [1.0, 0.0, 0.0, -1.0],
+            open_: on,
+        }
 
     def compare(*given: Components) -> dict[str, Components]:
         """Keep the better end with its E."""
@@ -87,8 +90,9 @@ def _ascent(B: tuple[Components, ...], w: Components) -> list[Any]:
     return [where(size > 0.0, x / positive(size), y) for x, y in zip(pull, w, strict=True)]
 
 
-def _round(B: tuple[Components, ...], lower: Any, terms: Components, upper: Components, _: Components
-           ) -> tuple[Components, Components, Components]:
+def _round(
+    B: tuple[Components, ...], lower: Any, terms: Components, upper: Components, _: Components
+) -> tuple[Components, Components, Components]:
     """One round: √tr(B_i Z) of the next Z, the least upper bound so far, 1 where it may become smaller yet."""
     floor = 1e-12 * sum(terms) + 1e-300
     roots = [larger(term, floor) for term in terms]
@@ -99,8 +103,11 @@ def _round(B: tuple[Components, ...], lower: Any, terms: Components, upper: Comp
     here = [root * root for root in roots]
     rise = [dot(w, times(form, w)) - before for form, before in zip(B, here, strict=True)]
     share = _way(here, rise)
-    return ([sqrt(larger(before + share * more, 0.0)) for before, more in zip(here, rise, strict=True)], [bound],
-            [where(bound > lower * (1 + CONES_TIGHT), 1.0, 0.0)])
+    return (
+        [sqrt(larger(before + share * more, 0.0)) for before, more in zip(here, rise, strict=True)],
+        [bound],
+        [where(bound > lower * (1 + CONES_TIGHT), 1.0, 0.0)],
+    )
 
 
 def _way(here: Components, rise: Components) -> Any:

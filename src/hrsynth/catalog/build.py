@@ -104,13 +104,26 @@ class Built:
     file: Path | None
 
     def to_dict(self) -> dict[str, Any]:
-        return {"group": self.group, "words": self.words, "now": self.now, "before": self.before,
-                "file": None if self.file is None else str(self.file)}
+        return {
+            "group": self.group,
+            "words": self.words,
+            "now": self.now,
+            "before": self.before,
+            "file": None if self.file is None else str(self.file),
+        }
 
 
-def build(target: str | Path, groups: Sequence[str] = (), *, source: WordSource | None = None, workers: int = 1,
-          cluster: str | None = None, limit: int | None = None, anew: bool = False, tell: Tell | None = None
-          ) -> tuple[Built, ...]:
+def build(
+    target: str | Path,
+    groups: Sequence[str] = (),
+    *,
+    source: WordSource | None = None,
+    workers: int = 1,
+    cluster: str | None = None,
+    limit: int | None = None,
+    anew: bool = False,
+    tell: Tell | None = None,
+) -> tuple[Built, ...]:
     """Build groups (default: all) into a folder, or a file that ends in ``.sqlite``.
 
     A group is written when it is complete. The journals are removed when all groups are, so an interrupted build
@@ -142,8 +155,16 @@ def build(target: str | Path, groups: Sequence[str] = (), *, source: WordSource 
     return tuple(done)
 
 
-def _group(kept: Store, group: str, words: Sequence[str], source: WordSource, journal: Journal, team: Executor,
-           limit: int | None, tell: Tell) -> Built:
+def _group(
+    kept: Store,
+    group: str,
+    words: Sequence[str],
+    source: WordSource,
+    journal: Journal,
+    team: Executor,
+    limit: int | None,
+    tell: Tell,
+) -> Built:
     wanted = [word for word in words if word not in journal]
     before, now = len(words) - len(wanted), 0
     for part in made_by(team, source, group, wanted[:limit], str(journal.path)):
@@ -163,8 +184,9 @@ def _write(kept: Store, group: str, journal: Journal, words: Sequence[str]) -> N
         raise BuildStopped(stopped.reason, str(journal.path)) from None
 
 
-def made_by(team: Executor, source: WordSource, group: str, words: Sequence[str], kept: str | None = None
-            ) -> Iterator[Made]:
+def made_by(
+    team: Executor, source: WordSource, group: str, words: Sequence[str], kept: str | None = None
+) -> Iterator[Made]:
     """The records of words in parts, in any order; raises ``BuildStopped`` where they cannot be made."""
     try:
         yield from team(partial(make_records, source.entry, group), source.chunks(words, CHUNK))
@@ -172,9 +194,17 @@ def made_by(team: Executor, source: WordSource, group: str, words: Sequence[str]
         raise BuildStopped(str(stopped), kept) from stopped
 
 
-def check(target: str | Path | Store, groups: Sequence[str] = (), *, source: WordSource | None = None, workers: int = 1,
-          cluster: str | None = None, sample: int | None = None, seed: int = 0, tell: Tell | None = None
-          ) -> tuple[str, ...]:
+def check(
+    target: str | Path | Store,
+    groups: Sequence[str] = (),
+    *,
+    source: WordSource | None = None,
+    workers: int = 1,
+    cluster: str | None = None,
+    sample: int | None = None,
+    seed: int = 0,
+    tell: Tell | None = None,
+) -> tuple[str, ...]:
     """What is stale in a stored catalog, one line each; nothing if it is what ``build`` would write.
 
     The words of the groups (default: all) are compared one by one, and the records of all of them or of ``sample``
@@ -183,12 +213,16 @@ def check(target: str | Path | Store, groups: Sequence[str] = (), *, source: Wor
     source = source or architectures()
     kept = store(target) if isinstance(target, str | Path) else target
     team, chosen = executor(workers, cluster), source.choose(groups)
-    return tuple(complaint for group in chosen
-                 for complaint in _stale(kept, group, source, team, sample, seed, tell or (lambda *_: None)))
+    return tuple(
+        complaint
+        for group in chosen
+        for complaint in _stale(kept, group, source, team, sample, seed, tell or (lambda *_: None))
+    )
 
 
-def _stale(kept: Store, group: str, source: WordSource, team: Executor, sample: int | None, seed: int, tell: Tell
-           ) -> Iterator[str]:
+def _stale(
+    kept: Store, group: str, source: WordSource, team: Executor, sample: int | None, seed: int, tell: Tell
+) -> Iterator[str]:
     try:
         lines = kept.lines([group], {})
         stored = {word_of(line, str(kept.file(group))): line for line in lines}
@@ -222,8 +256,9 @@ def _draw_words(words: list[str], count: int | None, seed: int) -> list[str]:
     return random.Random(seed).sample(words, count)
 
 
-def _count_parts(parts: Iterator[list[tuple[str, str]]], group: str, total: int, tell: Tell
-             ) -> Iterator[list[tuple[str, str]]]:
+def _count_parts(
+    parts: Iterator[list[tuple[str, str]]], group: str, total: int, tell: Tell
+) -> Iterator[list[tuple[str, str]]]:
     """The parts, told as they pass."""
     done = 0
     tell(group, done, total)

@@ -131,8 +131,11 @@ class ColumnWriter:
         file.execute(f"CREATE TABLE columns (name TEXT PRIMARY KEY, {parts})")
         for name, known in self._kept.items():
             _write(file, name, known, self._numbers[name])
-        owned = [(chain, i) for i, notation in enumerate(self._kept[NOTATION])
-                 for chain in sorted(chains({"notation": notation}))]
+        owned = [
+            (chain, i)
+            for i, notation in enumerate(self._kept[NOTATION])
+            for chain in sorted(chains({"notation": notation}))
+        ]
         _write(file, CHAIN, (chain for chain, _ in owned), [i for _, i in owned])
         bare = (word.replace("*", "") for word in self._words)
         for name, words in ((WORD, self._words), (BARE, bare), (FOLDED, map(str.casefold, self._words))):
@@ -151,5 +154,7 @@ def _write(file: sqlite3.Connection, name: str, every: Iterable[str], numbers: S
     """A column: texts, and the numbers of those of all rows."""
     found = Texts.of(every)
     parts = (narrow_type(each) for each in (found.letters, found.ends, np.array(numbers, np.int64)))
-    file.execute(f"INSERT INTO columns VALUES (?{', ?' * 2 * len(PARTS)})", (
-        name, *(value for part in parts for value in (part.itemsize, part.tobytes()))))
+    file.execute(
+        f"INSERT INTO columns VALUES (?{', ?' * 2 * len(PARTS)})",
+        (name, *(value for part in parts for value in (part.itemsize, part.tobytes()))),
+    )

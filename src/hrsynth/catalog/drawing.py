@@ -11,11 +11,17 @@ from ..mechanism.sensors import default_observation
 from .geometry import mechanism
 from .words import COMPOSITE, LegWord, RobotWord, count_equal
 
-ENDS = {"": ("platform",), "point": ("platform, a point",), "bar": ("plate 1", "plate 2"),
-        "slide": ("plate", "platform")}
+ENDS = {
+    "": ("platform",),
+    "point": ("platform, a point",),
+    "bar": ("plate 1", "plate 2"),
+    "slide": ("plate", "platform"),
+}
 """On what the legs of each body end."""
-BETWEEN = {"bar": "plate 1 and plate 2 are joined by a bar, the platform, and its parallel twin",
-           "slide": "the plate slides on the platform"}
+BETWEEN = {
+    "bar": "plate 1 and plate 2 are joined by a bar, the platform, and its parallel twin",
+    "slide": "the plate slides on the platform",
+}
 
 
 def drawing(word: RobotWord) -> str:
@@ -29,8 +35,10 @@ def drawing(word: RobotWord) -> str:
             groups.setdefault((body, leg), []).append(number)
     heads = [_head(numbers) for numbers in groups.values()]
     width = max(map(len, heads))
-    lines = [f"{head:<{width}}  {_chain(leg, watched.get(numbers[0]), ENDS[word.platform][body])}"
-             for head, ((body, leg), numbers) in zip(heads, groups.items(), strict=True)]
+    lines = [
+        f"{head:<{width}}  {_chain(leg, watched.get(numbers[0]), ENDS[word.platform][body])}"
+        for head, ((body, leg), numbers) in zip(heads, groups.items(), strict=True)
+    ]
     seen = [f"seen of the platform: {count_equal(word.seen)}"] if word.seen else []
     return "\n".join([*lines, *([BETWEEN[word.platform]] if word.platform in BETWEEN else []), *seen])
 

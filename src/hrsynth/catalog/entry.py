@@ -101,10 +101,15 @@ class ArchitectureStudy:
     def record(self, drawn: Mechanism, motors: Sequence[str]) -> dict[str, Any]:
         """The fields of a record, of a mechanism with motors on these joints."""
         rank = self.motor_rank(motors)
-        return {"notation": decompose(normal_form(drawn).mechanism).architecture().ascii, **self.facts,
-                "attempt": self.attempt or None, "motors": len(motors), "motor_rank": rank,
-                "driven": rank == self.facts["dof"],
-                "base_motors": all(drawn.base in drawn.joints[name].links for name in motors)}
+        return {
+            "notation": decompose(normal_form(drawn).mechanism).architecture().ascii,
+            **self.facts,
+            "attempt": self.attempt or None,
+            "motors": len(motors),
+            "motor_rank": rank,
+            "driven": rank == self.facts["dof"],
+            "base_motors": all(drawn.base in drawn.joints[name].links for name in motors),
+        }
 
 
 @lru_cache(maxsize=128)
@@ -124,8 +129,9 @@ def _study(word: RobotWord, attempt: int) -> ArchitectureStudy:
     return study(mechanism(word, attempt), lambda size: _choices(kinds, size), attempt)
 
 
-def study(drawn: Mechanism, sets: Callable[[int], Iterable[tuple[int, ...]]], attempt: int = 0, *,
-          proved: bool = True) -> ArchitectureStudy:
+def study(
+    drawn: Mechanism, sets: Callable[[int], Iterable[tuple[int, ...]]], attempt: int = 0, *, proved: bool = True
+) -> ArchitectureStudy:
     """What is said of a mechanism whatever is driven. ``sets`` gives the sets of so many legs, by their places, of
     which some may be equal but for the names of legs: the first of these. Raises ``NotConfirmed`` where the verdict is
     not exact, unless it need not be ``proved``.
@@ -140,15 +146,27 @@ def study(drawn: Mechanism, sets: Callable[[int], Iterable[tuple[int, ...]]], at
     fewest = _smallest(setting, exact, sets, derivation.verdict)
     facts = {
         "hidden": derivation.hidden_architecture and derivation.hidden_architecture.ascii,
-        "steps": _steps(derivation.taken), "legs": len(setting.segments), "dof": setting.dof,
+        "steps": _steps(derivation.taken),
+        "legs": len(setting.segments),
+        "dof": setting.dof,
         "motion": _motion(setting),
-        "mobility": setting.mobility.total, "idle": setting.mobility.idle,
-        "verdict": derivation.verdict.verdict, "rank": derivation.verdict.rank, "exact": derivation.exact.exact,
-        "instances": derivation.exact.instances, "confirmed": len(setting.configurations),
+        "mobility": setting.mobility.total,
+        "idle": setting.mobility.idle,
+        "verdict": derivation.verdict.verdict,
+        "rank": derivation.verdict.rank,
+        "exact": derivation.exact.exact,
+        "instances": derivation.exact.instances,
+        "confirmed": len(setting.configurations),
         "lost": [_general(freedom.name) for freedom in derivation.verdict.lost],
-        "minimal": [list(each) for each in fewest], "fewest": len(fewest[0]) if fewest else 0,
-        "condition": None, "modes_legs": None, "modes_bound": None, "modes_seen": None, "modes_proof": None,
-        "cure": None}
+        "minimal": [list(each) for each in fewest],
+        "fewest": len(fewest[0]) if fewest else 0,
+        "condition": None,
+        "modes_legs": None,
+        "modes_bound": None,
+        "modes_seen": None,
+        "modes_proof": None,
+        "cure": None,
+    }
     if derivation.verdict.verdict == CONTROLLABLE:
         facts.update(_singular(setting), **_modes(setting, fewest))
     else:
@@ -184,8 +202,11 @@ def _agree(exact: ExactArchitecture, samples: Samples, found: Verdict) -> None:
     if not generic.exact or (generic.basis and generic.basis.observed) or generic.chance > PROVED_CHANCE:
         raise NotConfirmed(exact.mechanism.name, generic.reason)
     if generic.rank != found.rank:
-        raise NotConfirmed(exact.mechanism.name, f"legs {', '.join(found.legs)} see {generic.rank} of {found.dof} "
-                                                 f"freedoms in exact arithmetic, {found.rank} at samples")
+        raise NotConfirmed(
+            exact.mechanism.name,
+            f"legs {', '.join(found.legs)} see {generic.rank} of {found.dof} "
+            f"freedoms in exact arithmetic, {found.rank} at samples",
+        )
 
 
 def _watch(setting: ObservedRobot) -> tuple[Observation, ...]:
@@ -201,11 +222,16 @@ def _observing(setting: ObservedRobot, legs: Sequence[str]) -> ObservedRobot:
 def _kinds(word: RobotWord) -> list[str]:
     """What each leg is, in the order of the labels: equal legs of one body can be exchanged; or what is seen."""
     return [str(each) for each in word.seen] or [
-        f"{body}{leg}" for body, legs in enumerate(word.bodies) for leg in legs]
+        f"{body}{leg}" for body, legs in enumerate(word.bodies) for leg in legs
+    ]
 
 
-def _smallest(setting: ObservedRobot, exact: ExactArchitecture | None,
-              sets: Callable[[int], Iterable[tuple[int, ...]]], best: Verdict) -> list[tuple[str, ...]]:
+def _smallest(
+    setting: ObservedRobot,
+    exact: ExactArchitecture | None,
+    sets: Callable[[int], Iterable[tuple[int, ...]]],
+    best: Verdict,
+) -> list[tuple[str, ...]]:
     """The smallest sets of legs that see as much as all together, one of those that differ by equal legs; each rank
     confirmed, and exact where that is asked for."""
     if not best.rank:
@@ -238,8 +264,10 @@ def _choices(kinds: Sequence[str], size: int) -> Iterator[tuple[int, ...]]:
 def _steps(steps: Sequence[Step]) -> list[str]:
     """The rules that were applied, in order, each with the legs to which it was in a row: "takeover 1,2,3"."""
     taken = [(step.rule, step.leg) for step in steps if step.accepted]
-    return [" ".join([rule, ",".join(str(leg) for _, leg in part if leg)]).strip()
-            for rule, part in ((rule, list(part)) for rule, part in groupby(taken, key=lambda step: step[0]))]
+    return [
+        " ".join([rule, ",".join(str(leg) for _, leg in part if leg)]).strip()
+        for rule, part in ((rule, list(part)) for rule, part in groupby(taken, key=lambda step: step[0]))
+    ]
 
 
 def _motion(setting: ObservedRobot) -> str:
@@ -274,9 +302,12 @@ def _modes(setting: ObservedRobot, fewest: Sequence[Sequence[str]]) -> dict[str,
         found = [each for each in _lists(robots[k], setting.configurations) if each.complete and not each.continuum]
         bounds = [each.complex for each in found if each.complex is not None]
         if bounds:
-            return {"modes_legs": list(fewest[k]), "modes_bound": max(bounds),
-                    "modes_seen": max(sum(mode.multiplicity for mode in each.modes) for each in found),
-                    "modes_proof": next((each.bound for each in found if each.bound != "resultant"), None)}
+            return {
+                "modes_legs": list(fewest[k]),
+                "modes_bound": max(bounds),
+                "modes_seen": max(sum(mode.multiplicity for mode in each.modes) for each in found),
+                "modes_proof": next((each.bound for each in found if each.bound != "resultant"), None),
+            }
     return {}
 
 
@@ -302,14 +333,18 @@ def _cure(found: Advice) -> str:
     """The first of the smallest sets of further measurements that see what is lost."""
     if not found.sets:
         return "none of up to four measurements"
-    first = " and ".join(f"{each.kind} {each.of}" + (f" ({each.axis})" if each.axis else "")
-                         for each in found.sets[0].measurements)
+    first = " and ".join(
+        f"{each.kind} {each.of}" + (f" ({each.axis})" if each.axis else "") for each in found.sets[0].measurements
+    )
     return first if found.cured else f"not all by {first}"
 
 
 def _encoders(setting: ObservedRobot) -> tuple[Relation, tuple[str, ...]]:
     """What encoders on all joints see at a configuration, and the joint of each."""
-    every = [(joint.name, each) for joint in setting.mechanism.joints.values()
-             for each in encoders(setting.mechanism, joint, "")]
+    every = [
+        (joint.name, each)
+        for joint in setting.mechanism.joints.values()
+        for each in encoders(setting.mechanism, joint, "")
+    ]
     question = replace(setting.everything.question, observations=tuple(each for _, each in every))
     return relation(setting.configurations[0], question), tuple(name for name, _ in every)

@@ -128,8 +128,9 @@ def _result(future: Any) -> Made:
     except KilledWorker:
         raise Stopped("the cluster's workers died one after the other on the same words") from None
     except Exception as error:
-        raise Stopped(f"the cluster cannot do the work, needed there: hrsynth {__version__} "
-                      f"({str(error).splitlines()[0]})") from None
+        raise Stopped(
+            f"the cluster cannot do the work, needed there: hrsynth {__version__} ({str(error).splitlines()[0]})"
+        ) from None
     if version != __version__:
         raise Stopped(f"a worker of the cluster has hrsynth {version}, needed: {__version__}")
     return list(found)

@@ -18,8 +18,21 @@ from .known import is_called, kinds, kinds_called, known_as
 from .search import Flags
 from .words import LONGEST_COUNT, MOVED, count_equal, sights
 
-ASKED = ("group", "dof", "motion", "verdict", "base_motors", "driven", "motors", "parallelograms", "fewest", "see",
-         "modes", "legs", "text")
+ASKED = (
+    "group",
+    "dof",
+    "motion",
+    "verdict",
+    "base_motors",
+    "driven",
+    "motors",
+    "parallelograms",
+    "fewest",
+    "see",
+    "modes",
+    "legs",
+    "text",
+)
 """What can be asked for."""
 TEXTS = ("notation", "hidden", "steps", "others")
 """Columns of a SQLite file in which a text is sought: fields, and all others together but the word, with the names
@@ -66,8 +79,11 @@ class RecordCondition:
 def conditions(asked: Mapping[str, Any]) -> dict[str, RecordCondition]:
     """The condition of each name for which something is asked; of several values in a tuple or list one has to be met.
     Raises ``BadRequest`` for a value that none can have."""
-    return {name: _any_of([_condition(name, each) for each in (value if isinstance(value, tuple | list) else (value,))])
-            for name, value in asked.items() if value is not None}
+    return {
+        name: _any_of([_condition(name, each) for each in (value if isinstance(value, tuple | list) else (value,))])
+        for name, value in asked.items()
+        if value is not None
+    }
 
 
 def fits(asked: Mapping[str, Any]) -> Callable[[Record], bool]:
@@ -87,10 +103,13 @@ def _any_of(every: Sequence[RecordCondition]) -> RecordCondition:
         return every[0]
     lines = [each.line for each in every if each.line]
     rows = [each.rows for each in every if each.rows]
-    return RecordCondition(lambda record: any(each.holds(record) for each in every),
-                           (lambda columns: np.any([told(columns) for told in rows], 0)
-                            ) if 0 < len(rows) == len(every) <= MOST_TOLD else None,
-                           (lambda line: any(told(line) for told in lines)) if len(lines) == len(every) else None)
+    return RecordCondition(
+        lambda record: any(each.holds(record) for each in every),
+        (lambda columns: np.any([told(columns) for told in rows], 0))
+        if 0 < len(rows) == len(every) <= MOST_TOLD
+        else None,
+        (lambda line: any(told(line) for told in lines)) if len(lines) == len(every) else None,
+    )
 
 
 def _condition(name: str, value: Any) -> RecordCondition:
@@ -119,7 +138,8 @@ def _condition_on(name: str, value: Any) -> RecordCondition:
             return RecordCondition(
                 lambda record: has_legs(record["word"], str(record.get("notation", ""))),
                 lambda rows: rows.match(value),
-                lambda line: "\\" in line or has_legs(leading_word(line), written_text(line, "notation")))
+                lambda line: "\\" in line or has_legs(leading_word(line), written_text(line, "notation")),
+            )
         case "text":
             text = value.casefold()
             # lists and quotes are not written as they are read
@@ -127,14 +147,23 @@ def _condition_on(name: str, value: Any) -> RecordCondition:
             return RecordCondition(
                 lambda record: is_called(record, text) or any(text in str(each).casefold() for each in record.values()),
                 None if APART in text else lambda rows: rows.holding(text),
-                (lambda line: text in line.casefold() or (
-                    bool(kinds_called(text)) and kinds(leading_word(line)) in kinds_called(text))) if plain else None)
+                (
+                    lambda line: (
+                        text in line.casefold()
+                        or (bool(kinds_called(text)) and kinds(leading_word(line)) in kinds_called(text))
+                    )
+                )
+                if plain
+                else None,
+            )
         case "motors" | "parallelograms":
             read = driven_kinds if name == "motors" else has_parallelograms
             value = "+".join(_motor_letters(value)) if name == "motors" else value
             return RecordCondition(
-                lambda record: "refused" not in record and read(record) == value, None,
-                lambda line: '"choices":' in line or "\\" in line or read({"word": leading_word(line)}) == value)
+                lambda record: "refused" not in record and read(record) == value,
+                None,
+                lambda line: '"choices":' in line or "\\" in line or read({"word": leading_word(line)}) == value,
+            )
         case "legs":
             value = int(value)
         case "see":
@@ -142,13 +171,15 @@ def _condition_on(name: str, value: Any) -> RecordCondition:
         case "modes":
             name = "modes_bound"
     # 1 is True and 3.0 is 3: these are not so written
-    exact = isinstance(value, str) or (isinstance(value, int) and abs(value) < 2**63 and isinstance(
-        value, bool) == (name in FLAGS))
+    exact = isinstance(value, str) or (
+        isinstance(value, int) and abs(value) < 2**63 and isinstance(value, bool) == (name in FLAGS)
+    )
     part = f"{json.dumps(name)}:{json.dumps(value)}" if exact else ""
     return RecordCondition(
         lambda record: name in record and bool(record[name] == value),
         (lambda rows: rows.having(name, lambda found: bool(found == value))) if name in FIELDS else None,
-        (lambda line: part in line) if exact else None)
+        (lambda line: part in line) if exact else None,
+    )
 
 
 def driven_kinds(record: Record) -> str:

@@ -56,10 +56,17 @@ def _with_sights(drawn: Mechanism, word: RobotWord, attempt: int) -> Mechanism:
             at = centre + [*rng.uniform(-0.3, 0.3, size=2), -rng.uniform(0.5, 0.7)]
             cameras[name] = NamedCamera(name, "base", pose(at, rotation_about(rng.normal(size=3), 0.2)))
         at, axis = 0.12 * rng.normal(size=3), unit(rng.normal(size=3))
-        specs.append(SightSpec(
-            each.kind, "platform", f"{each.kind}_{number}", name if by_camera else None,
-            tuple(at.tolist()) if "at" in kind.needs else None, tuple(axis.tolist()) if "axis" in kind.needs else None,
-            0.03 if "radius" in kind.needs else None))
+        specs.append(
+            SightSpec(
+                each.kind,
+                "platform",
+                f"{each.kind}_{number}",
+                name if by_camera else None,
+                tuple(at.tolist()) if "at" in kind.needs else None,
+                tuple(axis.tolist()) if "axis" in kind.needs else None,
+                0.03 if "radius" in kind.needs else None,
+            )
+        )
     return with_sights(replace(drawn, observations=()), specs, cameras.values())
 
 
@@ -122,8 +129,7 @@ class _Draft:
                 self.places = {"plate": self.centre, "platform": self.centre}
                 b.link("plate", at=self.centre)
                 b.link("platform", at=self.centre)
-                b.joint("slide", "P", "plate", "platform", at=self.centre,
-                        axis=unit([*self.rng.normal(size=2), 0.0]))
+                b.joint("slide", "P", "plate", "platform", at=self.centre, axis=unit([*self.rng.normal(size=2), 0.0]))
                 return "plate", "platform"
             case _:
                 self.places = {"platform": self.centre}
@@ -138,8 +144,11 @@ def _with_segments(drawn: Mechanism, word: RobotWord, chords: Mapping[str, Direc
     found: list[Direction] = []
     for (label, chord), leg, limb in zip(chords.items(), word.legs, anatomy.legs, strict=True):
         try:
-            segment = (default_observation(anatomy, limb, last=True) if leg.observed is None
-                       else observation_of(anatomy, chord.link))
+            segment = (
+                default_observation(anatomy, limb, last=True)
+                if leg.observed is None
+                else observation_of(anatomy, chord.link)
+            )
         except BadRequest:
             found.append(chord)
             continue
@@ -148,8 +157,9 @@ def _with_segments(drawn: Mechanism, word: RobotWord, chords: Mapping[str, Direc
     if not found:
         return drawn
     told = {each.leg: each for each in found}
-    return replace(drawn, observations=tuple(told.get(leg.label) or default_observation(anatomy, leg)
-                                             for leg in anatomy.legs))
+    return replace(
+        drawn, observations=tuple(told.get(leg.label) or default_observation(anatomy, leg) for leg in anatomy.legs)
+    )
 
 
 class _Limb:
@@ -189,9 +199,17 @@ class _Limb:
                 if joint.watched or (marked is None and i >= last - 1):
                     marked = Direction(str(k), inside, ends[i] - starts[i])
             else:
-                b.joint(f"joint_{k}_{i + 1}", joint.letter, before, after, starts[i], axis=axes[0] if axes else None,
-                        axis2=axes[1] if len(axes) > 1 else None, motor=f"motor_{k}_{i + 1}" if joint.motor else False,
-                        loop=loop)
+                b.joint(
+                    f"joint_{k}_{i + 1}",
+                    joint.letter,
+                    before,
+                    after,
+                    starts[i],
+                    axis=axes[0] if axes else None,
+                    axis2=axes[1] if len(axes) > 1 else None,
+                    motor=f"motor_{k}_{i + 1}" if joint.motor else False,
+                    loop=loop,
+                )
                 is_last = i == last - 1 and self.leg.joints[last].letter not in COMPOSITE
                 if joint.watched or (marked is None and is_last):
                     marked = Direction(str(k), after, starts[i + 1] - ends[i])
@@ -208,8 +226,11 @@ class _Limb:
         for step in range(1, gaps):
             aside = self.rng.normal(size=3) * ([1, 1, 0] if self.draft.flat else [1, 1, 1])
             sideways = unit(aside - 0.7 * (aside @ unit(along)) * unit(along))
-            places.append(self.foot + along * (step + self.rng.uniform(-0.2, 0.2)) / gaps
-                          + 0.35 * float(np.linalg.norm(along)) * sideways)
+            places.append(
+                self.foot
+                + along * (step + self.rng.uniform(-0.2, 0.2)) / gaps
+                + 0.35 * float(np.linalg.norm(along)) * sideways
+            )
         places.append(self.tip)
         starts, ends, place = list[Array](), list[Array](), 0
         for joint in joints:
@@ -253,8 +274,11 @@ class _Limb:
             else:
                 found.append(known[name])
         if abs(found[0] @ found[1]) > SQUARE_AXES:
-            raise BadRequest(f"word {str(self.draft.word)!r}: the axes of U{names} are not at right angles",
-                             round(float(found[0] @ found[1]), 6), "n or q for one of them")
+            raise BadRequest(
+                f"word {str(self.draft.word)!r}: the axes of U{names} are not at right angles",
+                round(float(found[0] @ found[1]), 6),
+                "n or q for one of them",
+            )
         return found
 
     def _vector(self, name: str, at: Array) -> Array:
@@ -281,8 +305,9 @@ class _Limb:
             return rotation_about(Z, turn + self.rng.uniform(0, 0.3)) @ self.radius
         return unit(self.rng.normal(size=3) + 0.5 * self.tangent)
 
-    def _rods(self, joint: JointSymbol, i: int, before: str, after: str, start: Array, end: Array, axis: Array,
-              loop: bool) -> str:
+    def _rods(
+        self, joint: JointSymbol, i: int, before: str, after: str, start: Array, end: Array, axis: Array, loop: bool
+    ) -> str:
         """Adds two equal parallel rods, a parallelogram or spatial ones; gives the first."""
         b, k, rod = self.draft.builder, self.number, end - start
         side = 0.06 * (unit(np.cross(axis, rod)) + 0.4 * unit(rod) if joint.letter == "Pi" else axis)
@@ -292,9 +317,18 @@ class _Limb:
         for letter, offset in (("a", side), ("b", -side)):
             name = f"rod_{k}_{i + 1}{letter}"
             b.link(name, at=start + offset)
-            for end_name, kind, links, at in (("upper", upper, (before, name), start + offset),
-                                              ("lower", lower, (name, after), end + offset)):
+            for end_name, kind, links, at in (
+                ("upper", upper, (before, name), start + offset),
+                ("lower", lower, (name, after), end + offset),
+            ):
                 axes = (*along[kind], None, None)[:2]
-                b.joint(f"{end_name}_{k}_{i + 1}{letter}", kind, *links, at, axis=axes[0], axis2=axes[1],
-                        loop=end_name == "lower" and (loop or letter == "b"))
+                b.joint(
+                    f"{end_name}_{k}_{i + 1}{letter}",
+                    kind,
+                    *links,
+                    at,
+                    axis=axes[0],
+                    axis2=axes[1],
+                    loop=end_name == "lower" and (loop or letter == "b"),
+                )
         return f"rod_{k}_{i + 1}a"

@@ -80,8 +80,11 @@ class Journal:
                 text = unseal_line(raw)
                 if self._end == 0:
                     if text is None:
-                        raise BadRequest("a journal without checksums (of an older version) or with a damaged first "
-                                         "line", str(self.path), "that file removed, or --anew")
+                        raise BadRequest(
+                            "a journal without checksums (of an older version) or with a damaged first line",
+                            str(self.path),
+                            "that file removed, or --anew",
+                        )
                     read_head(text, str(self.path), "not the journal of a build", str(self.path))
                 elif text is not None:
                     with contextlib.suppress(BadRequest):

@@ -21,15 +21,52 @@ _LINE_START, _GROUP = '{"word":"', '","group":"'
 FORMAT = 1
 """Version of the lines, the journal and the tables."""
 
-TEXTS = ("word", "group", "notation", "hidden", "motion", "verdict", "condition", "modes_proof", "cure", "see",
-         "refused")
-COUNTS = ("legs", "dof", "mobility", "idle", "rank", "instances", "confirmed", "fewest", "motors", "motor_rank",
-          "attempt", "modes_bound", "modes_seen")
+TEXTS = (
+    "word",
+    "group",
+    "notation",
+    "hidden",
+    "motion",
+    "verdict",
+    "condition",
+    "modes_proof",
+    "cure",
+    "see",
+    "refused",
+)
+COUNTS = (
+    "legs",
+    "dof",
+    "mobility",
+    "idle",
+    "rank",
+    "instances",
+    "confirmed",
+    "fewest",
+    "motors",
+    "motor_rank",
+    "attempt",
+    "modes_bound",
+    "modes_seen",
+)
 FLAGS = ("exact", "driven", "base_motors")
 LISTS = ("lost", "steps", "modes_legs")
 """Fields of a record by the kind of their values: texts, whole numbers, true or false, lists of texts."""
-NEEDED = ("notation", "motion", "verdict", "legs", "dof", "mobility", "idle", "rank", "instances", "fewest", "motors",
-          "exact", "base_motors")
+NEEDED = (
+    "notation",
+    "motion",
+    "verdict",
+    "legs",
+    "dof",
+    "mobility",
+    "idle",
+    "rank",
+    "instances",
+    "fewest",
+    "motors",
+    "exact",
+    "base_motors",
+)
 """Fields of a record that is not refused."""
 
 
@@ -75,8 +112,9 @@ def record(text: str, file: str | None = None) -> Record:
     except ValueError:
         wrong = "an object of JSON with a word"
     if wrong:
-        raise BadRequest("not a record of the catalog" if file is None else f"{file}: not a record of the catalog",
-                         text[:60], wrong)
+        raise BadRequest(
+            "not a record of the catalog" if file is None else f"{file}: not a record of the catalog", text[:60], wrong
+        )
     return dict(found)
 
 
@@ -111,9 +149,13 @@ def _are(values: Any, kind: type) -> bool:
 
 def _is_choice(each: dict[str, Any]) -> bool:
     legs: Any = each.get("joints")
-    return type(each.get("rank")) is int and _are(legs, list) and legs != [] and all(
-        _are(joints, int) for joints in legs) and not any(
-        isinstance(value, list | dict) for name, value in each.items() if name != "joints")
+    return (
+        type(each.get("rank")) is int
+        and _are(legs, list)
+        and legs != []
+        and all(_are(joints, int) for joints in legs)
+        and not any(isinstance(value, list | dict) for name, value in each.items() if name != "joints")
+    )
 
 
 def word_of(text: str, file: str | None = None) -> str:
@@ -129,7 +171,7 @@ def is_written(text: str) -> bool:
 def leading_word(text: str, file: str | None = None) -> str:
     """The word with which a line begins that :func:`line` wrote, else that of its record."""
     end = text.find('"', len(_LINE_START)) if text.startswith(_LINE_START) else -1
-    return text[len(_LINE_START):end] if end > 0 else word_of(text, file)
+    return text[len(_LINE_START) : end] if end > 0 else word_of(text, file)
 
 
 def written_text(text: str, name: str) -> str:
@@ -177,5 +219,8 @@ def decode_lines(content: bytes, file: str) -> list[str]:
 def require_version(found: tuple[object, object], file: str) -> None:
     """Raise ``BadRequest`` where a file is of another version of the format or of the catalog."""
     if found != (FORMAT, VERSION):
-        raise BadRequest(f"{file}: a catalog of another version", "format {}, words {}".format(*found),
-                         f"format {FORMAT}, words {VERSION}; build it again")
+        raise BadRequest(
+            f"{file}: a catalog of another version",
+            "format {}, words {}".format(*found),
+            f"format {FORMAT}, words {VERSION}; build it again",
+        )

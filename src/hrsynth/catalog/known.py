@@ -63,5 +63,11 @@ def order(record: Record) -> tuple[bool, bool, bool, bool, bool, bool]:
     link watched, all motors on the base, controllable."""
     word = record["word"]
     legs = len(set(parse(word).legs))
-    return (alias(word) is None, "refused" in record, legs > 1, "!" in word, not record.get("base_motors"),
-            record.get("verdict") != "controllable")
+    return (
+        alias(word) is None,
+        "refused" in record,
+        legs > 1,
+        "!" in word,
+        not record.get("base_motors"),
+        record.get("verdict") != "controllable",
+    )

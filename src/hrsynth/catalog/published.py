@@ -28,8 +28,9 @@ def published_words(folder: str | Path) -> WordSource:
     groups: dict[str, list[str]] = {}
     for robot in _robots(str(folder)).values():
         groups.setdefault(robot.group, []).append(robot.name)
-    return WordSource({name: partial(list, names) for name, names in sorted(groups.items())},
-                      PublishedEntry(str(folder)))
+    return WordSource(
+        {name: partial(list, names) for name, names in sorted(groups.items())}, PublishedEntry(str(folder))
+    )
 
 
 @dataclass(frozen=True)
@@ -48,8 +49,10 @@ class PublishedEntry:
         driven = _choices(robot)
         ranks = [found.motor_rank(_names(each)) for each in driven]
         best = ranks.index(found.facts["dof"]) if found.facts["dof"] in ranks else 0
-        choices = [{"joints": [[j + 1 for j in leg] for leg in each], "rank": rank}
-                   for each, rank in zip(driven, ranks, strict=True)]
+        choices = [
+            {"joints": [[j + 1 for j in leg] for leg in each], "rank": rank}
+            for each, rank in zip(driven, ranks, strict=True)
+        ]
         return {**found.record(drawn, _names(driven[best])), "choices": choices}
 
 
@@ -87,8 +90,15 @@ def mechanism(robot: PublishedRobot) -> Mechanism:
             after = "platform" if j == m else f"link_{i}_{j}"
             if j < m:
                 b.link(after, at=centres[j - 1])
-            b.joint(f"joint_{i}_{j}", kind, before, after, centres[j - 1], axis=screw[3:] if kind == "R" else screw[:3],
-                    loop=j == m and i < n)
+            b.joint(
+                f"joint_{i}_{j}",
+                kind,
+                before,
+                after,
+                centres[j - 1],
+                axis=screw[3:] if kind == "R" else screw[:3],
+                loop=j == m and i < n,
+            )
             before = after
     return b.build(platform="platform")
 
@@ -96,8 +106,9 @@ def mechanism(robot: PublishedRobot) -> Mechanism:
 def _centres(leg: Array, kinds: str) -> list[Array]:
     """The centres of a leg's joints: of a turning one the point of its axis nearest to the platform's, of a slide that
     of the turning joint before it, or else after it."""
-    found: list[Array | None] = [cross(screw[3:], screw[:3]) if kind == "R" else None
-                                 for screw, kind in zip(leg, kinds, strict=True)]
+    found: list[Array | None] = [
+        cross(screw[3:], screw[:3]) if kind == "R" else None for screw, kind in zip(leg, kinds, strict=True)
+    ]
     for j in [*range(1, len(found)), *range(len(found) - 2, -1, -1)]:
         near = found[j - 1] if j else None
         if found[j] is None:

@@ -49,8 +49,11 @@ class ReadRecords(Sequence[Record]):
             line = self._lines[place]
             self._parts += 3 + sum(map(line.count, "[{,"))
             if self._parts > MOST_READ_PARTS:
-                raise BadRequest(f"{self._source or 'catalog'}: records with more than {MOST_READ_PARTS} parts", None,
-                                 "fewer records, or smaller ones")
+                raise BadRequest(
+                    f"{self._source or 'catalog'}: records with more than {MOST_READ_PARTS} parts",
+                    None,
+                    "fewer records, or smaller ones",
+                )
             found = self._read[place] = record(line, self._source)
         return found
 
@@ -96,12 +99,15 @@ class Catalog(Value):
     @property
     def words(self) -> list[str]:
         """The words of all records, which are not read for that."""
-        return self.records.words() if isinstance(self.records, ReadRecords) else [
-            str(each["word"]) for each in self.records]
+        return (
+            self.records.words()
+            if isinstance(self.records, ReadRecords)
+            else [str(each["word"]) for each in self.records]
+        )
 
     def values(self, name: str) -> list[Any]:
         """The values of a field that records have, sorted."""
-        return sorted(value for value, in self.count(name) if value is not None)
+        return sorted(value for (value,) in self.count(name) if value is not None)
 
     def count(self, *fields: str) -> dict[tuple[Any, ...], int]:
         """How many records have which values of the fields, sorted by these; None where a record has no such field."""
@@ -160,8 +166,11 @@ def values(name: str, path: str | Path | None = None) -> list[Any]:
 def _groups(kept: Store, asked: Mapping[str, Any]) -> list[str]:
     """The groups in which is what is asked for."""
     wanted = asked.get("group")
-    return [name for name in kept.groups() if name in _tuple(wanted) or (
-        wanted is None and (name == SENSORS) == (asked.get("see") is not None))]
+    return [
+        name
+        for name in kept.groups()
+        if name in _tuple(wanted) or (wanted is None and (name == SENSORS) == (asked.get("see") is not None))
+    ]
 
 
 def _tuple(value: object) -> tuple[object, ...]:

@@ -20,7 +20,7 @@ def table(catalog: Catalog | None = None) -> str:
     """The Markdown table of how many architectures of each group have which verdict (default: of what is shipped)."""
     if catalog is None:
         catalog = Catalog((*load(), *load(group=SENSORS))) if shipped_folder().groups() else Catalog(())
-    rows = [_row(str(group), catalog.where(group=group)) for group, in catalog.count("group")]
+    rows = [_row(str(group), catalog.where(group=group)) for (group,) in catalog.count("group")]
     return markdown(HEADS, [*rows, _row("all", catalog)], 1)
 
 

@@ -126,4 +126,4 @@ class Texts:
 def narrow_type(numbers: Whole) -> Whole:
     """The same numbers, none negative, in as few bytes each as hold all."""
     largest = int(numbers.max()) if len(numbers) else 0
-    return numbers.astype(f"<u{next(width for width in WIDTHS if largest < 256 ** width)}")
+    return numbers.astype(f"<u{next(width for width in WIDTHS if largest < 256**width)}")

@@ -85,8 +85,13 @@ class Folder:
         self.path = path
 
     def groups(self) -> list[str]:
-        return sorted({file.name.partition(LINES)[0] for file in self.path.glob(f"*{LINES}*")
-                       if file.name.endswith((LINES, PACKED))})
+        return sorted(
+            {
+                file.name.partition(LINES)[0]
+                for file in self.path.glob(f"*{LINES}*")
+                if file.name.endswith((LINES, PACKED))
+            }
+        )
 
     def lines(self, groups: Sequence[str], asked: Mapping[str, Any]) -> list[str]:
         fits = may_fit(asked)
@@ -122,8 +127,11 @@ class Folder:
         large = PACKED_ABOVE < len(lines) < MOST_RECORDS
         content = encode_lines(group, lines, checksum=not large)
         if len(content) > LARGEST_CATALOG:
-            raise BadRequest(f"{self.path / group}: lines of {len(content)} bytes", None,
-                             f"up to {LARGEST_CATALOG}, or a SQLite file")
+            raise BadRequest(
+                f"{self.path / group}: lines of {len(content)} bytes",
+                None,
+                f"up to {LARGEST_CATALOG}, or a SQLite file",
+            )
         file, other = (packed, plain) if large else (plain, packed)
         with writable(file), replacement(file, sync=True) as draft:
             draft.write_bytes(gzip.compress(content, mtime=0) if large else content)
@@ -164,7 +172,7 @@ class Database:
     def groups(self) -> list[str]:
         with self._read() as file:
             asked = "name FROM groups" if _is_new(file) else 'DISTINCT "group" FROM records'
-            found = [name for name, in file.execute(f"SELECT {asked} ORDER BY 1")]
+            found = [name for (name,) in file.execute(f"SELECT {asked} ORDER BY 1")]
             if not all(isinstance(name, str) for name in found):
                 raise BadRequest(f"{self.path}: not a catalog file: a group without a name")
             return found
@@ -177,8 +185,9 @@ class Database:
                 every = (line for group in sorted(groups) for line in _old_lines(file, group))
                 return [line for line in _limited(every, self.path) if fits(line)]
             counts = self._counts(file)
-            found = np.concatenate([np.full(count, name in groups) for name, count in counts.items()]
-                                   or [np.zeros(0, bool)])
+            found = np.concatenate(
+                [np.full(count, name in groups) for name, count in counts.items()] or [np.zeros(0, bool)]
+            )
             columns, told = Columns(self.path, file, found), conditions(asked)
             for name in ASKED:  # patterns and texts last, of rows that are still there
                 if name in told and (rows := told[name].rows) and found.any():
@@ -202,8 +211,9 @@ class Database:
         return _values(self.lines(self.groups(), {}), name)
 
     def write(self, group: str, lines: Iterable[str]) -> None:
-        kept = {} if not self.path.exists() else {
-            name: self.lines([name], {}) for name in self.groups() if name != group}
+        kept = (
+            {} if not self.path.exists() else {name: self.lines([name], {}) for name in self.groups() if name != group}
+        )
         with writable(self.path), replacement(self.path, sync=True) as draft:
             try:
                 _write_tables(draft, {**kept, group: lines})
@@ -221,10 +231,14 @@ class Database:
     def _counts(self, file: sqlite3.Connection) -> dict[str, int]:
         """How many lines each group has; raises ``BadRequest`` where there are not as many, numbered from 0."""
         counts = dict(file.execute("SELECT name, count FROM groups ORDER BY name"))
-        count, first, last = file.execute("SELECT count(*), ifnull(min(record), 0), ifnull(max(record), -1) FROM "
-                                          "lines").fetchone()
+        count, first, last = file.execute(
+            "SELECT count(*), ifnull(min(record), 0), ifnull(max(record), -1) FROM lines"
+        ).fetchone()
         if not all(type(each) is int and each > 0 for each in counts.values()) or (
-                sum(counts.values()), 0, last + 1) != (count, first, count):
+            sum(counts.values()),
+            0,
+            last + 1,
+        ) != (count, first, count):
             raise BadRequest(f"{self.path}: not a catalog file: its groups and its lines differ in number")
         return counts
 
@@ -273,8 +287,12 @@ class StoredLines(Sequence[str]):
         if part not in self._read:
             wanted = self._numbers[part * READ_AT_ONCE : (part + 1) * READ_AT_ONCE].tolist()
             with _refusing_sqlite_errors(self._path):
-                found = dict(self._file.execute("SELECT record, line FROM lines WHERE record IN "
-                                                "(SELECT value FROM json_each(?))", (json.dumps(wanted),)))
+                found = dict(
+                    self._file.execute(
+                        "SELECT record, line FROM lines WHERE record IN (SELECT value FROM json_each(?))",
+                        (json.dumps(wanted),),
+                    )
+                )
             if not all(isinstance(found.get(number), str) for number in wanted):
                 raise BadRequest(f"{self._path}: not a catalog file: rows without a line")
             self._read[part] = list(_limited((found[number] for number in wanted), self._path, self._size))
@@ -300,8 +318,12 @@ def _old_lines(file: sqlite3.Connection, group: str) -> Iterator[str]:
     """The lines of a group in a file of an older version: in the table of records, or in one of their own."""
     apart = file.execute("SELECT 1 FROM sqlite_master WHERE name = 'lines'").fetchone()
     where = "records JOIN lines ON record = records.rowid" if apart else "records"
-    return (line for line, in file.execute(
-        f"""SELECT ifnull(CAST(line AS TEXT), '') FROM {where} WHERE "group" = ? ORDER BY word""", (group,)))
+    return (
+        line
+        for (line,) in file.execute(
+            f"""SELECT ifnull(CAST(line AS TEXT), '') FROM {where} WHERE "group" = ? ORDER BY word""", (group,)
+        )
+    )
 
 
 def _values(lines: Iterable[str], name: str) -> list[Any]:

@@ -146,8 +146,12 @@ class LegWord:
             inside = self.joints[mark].letter in COMPOSITE and mark + 1 < len(self.joints)
             mark = mark if inside else self._along(mark)
             mark = None if mark == self._default() and not inside else mark
-        return LegWord(tuple(replace(joint, axes=own, watched=i == mark)
-                         for i, (joint, own) in enumerate(zip(self.joints, axes, strict=True))))
+        return LegWord(
+            tuple(
+                replace(joint, axes=own, watched=i == mark)
+                for i, (joint, own) in enumerate(zip(self.joints, axes, strict=True))
+            )
+        )
 
     def _along(self, mark: int) -> int:
         """The last link that turns as this one: P joints do not change a direction."""
@@ -166,8 +170,10 @@ class LegWord:
     @cached_property
     def order(self) -> tuple[tuple[object, ...], ...]:
         """Its place among others: as it is without motors, then by its motors."""
-        return (tuple((joint.letter, joint.axes, False, joint.watched) for joint in self.joints),
-                tuple((joint.letter, joint.axes, joint.motor, joint.watched) for joint in self.joints))
+        return (
+            tuple((joint.letter, joint.axes, False, joint.watched) for joint in self.joints),
+            tuple((joint.letter, joint.axes, joint.motor, joint.watched) for joint in self.joints),
+        )
 
 
 @dataclass(frozen=True, order=True)
@@ -191,12 +197,16 @@ class RobotWord:
     seen: tuple[SightWord, ...] = ()
 
     @classmethod
-    def of(cls, legs: list[LegWord], *more: list[LegWord], platform: str = "", seen: Iterable[SightWord] = ()
-           ) -> RobotWord:
+    def of(
+        cls, legs: list[LegWord], *more: list[LegWord], platform: str = "", seen: Iterable[SightWord] = ()
+    ) -> RobotWord:
         """The canonical word of these legs; ``more``: those of a second body."""
         bodies = (tuple(sorted((leg.canonical for leg in body), key=lambda leg: leg.order)) for body in (legs, *more))
-        return cls(platform, tuple(sorted(bodies, key=lambda body: [*zip(*(leg.order for leg in body), strict=True)])),
-                   tuple(sorted(seen)))
+        return cls(
+            platform,
+            tuple(sorted(bodies, key=lambda body: [*zip(*(leg.order for leg in body), strict=True)])),
+            tuple(sorted(seen)),
+        )
 
     @property
     def legs(self) -> tuple[LegWord, ...]:
@@ -206,14 +216,16 @@ class RobotWord:
     @property
     def unmoved(self) -> RobotWord:
         """The architecture without its motors: what the hidden robot is found from."""
-        return RobotWord.of(*[[leg.unmoved for leg in body] for body in self.bodies], platform=self.platform,
-                            seen=self.seen)
+        return RobotWord.of(
+            *[[leg.unmoved for leg in body] for body in self.bodies], platform=self.platform, seen=self.seen
+        )
 
     @property
     def driven(self) -> RobotWord:
         """The architecture with a motor on the first R or P of each leg: three R that meet in a point are no S then."""
-        return RobotWord.of(*[[leg.driven for leg in body] for body in self.bodies], platform=self.platform,
-                            seen=self.seen)
+        return RobotWord.of(
+            *[[leg.driven for leg in body] for body in self.bodies], platform=self.platform, seen=self.seen
+        )
 
     @property
     def unmarked(self) -> RobotWord:
@@ -244,8 +256,7 @@ def parse(text: str) -> RobotWord:
         raise BadRequest(f"word {text!r}: unknown platform", platform, [name for name in PLATFORMS if name])
     bodies = [_legs(text, part) for part in rest.split("|")]
     if len(bodies) != PLATFORMS[platform]:
-        raise BadRequest(f"word {text!r}: bodies on which legs end", len(bodies),
-                         str(PLATFORMS[platform]))
+        raise BadRequest(f"word {text!r}: bodies on which legs end", len(bodies), str(PLATFORMS[platform]))
     word = RobotWord.of(*bodies, platform=platform, seen=sights(seen) if at else ())
     if at and any(leg.observed is not None for leg in word.legs):
         raise BadRequest(f"word {text!r}: links of legs are not watched", "!", "no ! where something else is seen")
@@ -261,8 +272,11 @@ def sights(text: str) -> tuple[SightWord, ...]:
         match = _SIGHTS.fullmatch(term.strip())
         count = int(match["count"][:LONGEST_COUNT] or 1) if match else 0
         if match is None or match["kind"] not in known or not 1 <= count <= LARGEST_WORD:
-            raise BadRequest(f"what is seen, {text!r}: cannot be read", term,
-                             f"kinds such as 3point, joined by +: {', '.join(known)}; up to {LARGEST_WORD}")
+            raise BadRequest(
+                f"what is seen, {text!r}: cannot be read",
+                term,
+                f"kinds such as 3point, joined by +: {', '.join(known)}; up to {LARGEST_WORD}",
+            )
         found += [SightWord(match["kind"], bool(match["own"]))] * count
     return tuple(sorted(found))
 

@@ -69,8 +69,11 @@ def verify(source: Mapping[str, Any] | str | Path, robot: Mechanism | str | Path
             raise CertificateRefused(name, str(reason)) from None
         except (OSError, ValueError, RecursionError) as error:
             why = getattr(error, "strerror", None) or "it is not JSON"
-            raise BadRequest(f"the certificate cannot be read: {why}", name,
-                             "a file that modes, derive or path wrote with --certificate") from None
+            raise BadRequest(
+                f"the certificate cannot be read: {why}",
+                name,
+                "a file that modes, derive or path wrote with --certificate",
+            ) from None
     try:
         if not isinstance(record, dict):
             raise NotAccepted("it is not an object")
@@ -105,7 +108,8 @@ def _same(one: Any, other: Any) -> bool:
     if isinstance(one, dict) and isinstance(other, dict):
         left_out = {"robot", "boxes", "bound", "sha256", "stacks", "path"}
         return one.keys() - left_out == other.keys() - left_out and all(
-            _same(one[key], other[key]) for key in one.keys() - left_out)
+            _same(one[key], other[key]) for key in one.keys() - left_out
+        )
     if isinstance(one, list) and isinstance(other, list):
         return len(one) == len(other) and all(map(_same, one, other))
     try:

@@ -48,8 +48,10 @@ def bound(record: dict[str, Any], equations: Sequence[Polynomial], halves: Seque
             if worse == PATIENCE:
                 break
         least = min(least, best)
-    raise NotAccepted(f"{count} solutions are enclosed, but " + (f"there may be {least}" if least < math.inf else
-                                                             "no bound of their number is known"))
+    raise NotAccepted(
+        f"{count} solutions are enclosed, but "
+        + (f"there may be {least}" if least < math.inf else "no bound of their number is known")
+    )
 
 
 def _groups(halves: Sequence[bool], most: int) -> Iterator[list[list[Any]]]:
@@ -59,11 +61,15 @@ def _groups(halves: Sequence[bool], most: int) -> Iterator[list[list[Any]]]:
     groups = [*filter(None, [[k for k in range(n) if not halves[k]], *([k] for k in range(n) if halves[k])])]
     choices = [(cap, more) for cap in range(1, CAPS + 1) for more in range(most + 1)]
     for chosen in sorted(product(choices, repeat=len(groups)), key=lambda each: (sum(map(sum, each)), each)):
-        size = math.prod(math.comb(len(group) + cap + more, len(group))
-                         for group, (cap, more) in zip(groups, chosen, strict=True))
+        size = math.prod(
+            math.comb(len(group) + cap + more, len(group)) for group, (cap, more) in zip(groups, chosen, strict=True)
+        )
         above = sum(more for _, more in chosen)
-        if size <= COLUMNS and (above > 0) == (most > 0) and not any(
-                more and halves[group[0]] for group, (_, more) in zip(groups, chosen, strict=True)):
+        if (
+            size <= COLUMNS
+            and (above > 0) == (most > 0)
+            and not any(more and halves[group[0]] for group, (_, more) in zip(groups, chosen, strict=True))
+        ):
             yield [[group, cap, more] for group, (cap, more) in zip(groups, chosen, strict=True)]
 
 

@@ -56,10 +56,24 @@ class ToldChain:
     @classmethod
     def of(cls, record: dict[str, Any], starts: Starts, found: Sequence[Array], home: Array) -> ToldChain:
         """With the list's modes by their coordinates (rad, sizes)."""
-        slides = np.array([kind == "P" for kind, *_ in record["joints"][:record["unknowns"]]])
+        slides = np.array([kind == "P" for kind, *_ in record["joints"][: record["unknowns"]]])
         places = [np.where(slides, np.real(start), 2.0 * np.arctan(np.real(start))) for start, real in starts if real]
-        return cls(record, starts, [next((k for k, x in enumerate(found) if np.abs(np.where(
-            slides, x[:len(q)] - q, np.exp(1j * (x[:len(q)] - q)) - 1.0)).max() < SAME), None) for q in places], home)
+        return cls(
+            record,
+            starts,
+            [
+                next(
+                    (
+                        k
+                        for k, x in enumerate(found)
+                        if np.abs(np.where(slides, x[: len(q)] - q, np.exp(1j * (x[: len(q)] - q)) - 1.0)).max() < SAME
+                    ),
+                    None,
+                )
+                for q in places
+            ],
+            home,
+        )
 
 
 def chains(system: CarriedPlatform, found: Sequence[Array]) -> Iterator[ToldChain]:
@@ -77,8 +91,15 @@ def chains(system: CarriedPlatform, found: Sequence[Array]) -> Iterator[ToldChai
 
 
 def _record(joints: list[Any], n: int, ends: int) -> dict[str, Any]:
-    return {"kind": "chain", "joints": joints, "unknowns": n, "ends": [[ends]], "normals": [], "tips": [*PLATFORM],
-            "reaches": []}
+    return {
+        "kind": "chain",
+        "joints": joints,
+        "unknowns": n,
+        "ends": [[ends]],
+        "normals": [],
+        "tips": [*PLATFORM],
+        "reaches": [],
+    }
 
 
 def _carried_chain(system: CarriedPlatform, found: Sequence[Array]) -> ToldChain:
@@ -87,8 +108,9 @@ def _carried_chain(system: CarriedPlatform, found: Sequence[Array]) -> ToldChain
     n, told, slides = len(system.freedoms_), [*system.square], np.array([each.slides for each in system.freedoms_])
     told += [each for each in system.told if each not in told and _carriers(each)]
     off = np.where(slides, 0.0, FROM * np.arange(1, n + 1))
-    record = _record([_joint(each, *system.transform(off, k)) for k, each in enumerate(system.freedoms_)], n,
-                     system.carrying)
+    record = _record(
+        [_joint(each, *system.transform(off, k)) for k, each in enumerate(system.freedoms_)], n, system.carrying
+    )
     for each in told:
         tip, reach, arrow = _displaced_tip(each, *system.transform(off, each.joints))
         record["tips"].append(tip)
@@ -96,7 +118,7 @@ def _carried_chain(system: CarriedPlatform, found: Sequence[Array]) -> ToldChain
         record["ends"].append([min(_carriers(each)), max(_carriers(each)) + 1, arrow])
     turn, starts = np.exp(-1j * off), Starts()
     for box in enclose_zeros(system, proposals(system, system.most(system.square))):
-        c, s, t = box.middle[:n], box.middle[n:2 * n], box.middle[2 * n:]
+        c, s, t = box.middle[:n], box.middle[n : 2 * n], box.middle[2 * n :]
         c, s = c * turn.real - s * turn.imag, s * turn.real + c * turn.imag
         starts.append((np.where(slides, t, s / (1.0 + c)).tolist(), box.real))
     return ToldChain.of(record, starts, [x - off for x in found], off)
@@ -199,8 +221,10 @@ def _solve_loop(record: dict[str, Any]) -> Starts:
         if len(found) >= most:
             break
     turns = [kind == "R" for kind, *_ in record["joints"][:n]]
-    return [(z.tolist(), None if np.abs(z * z + 1.0)[turns].min(initial=1.0) < SAME else
-             bool(np.abs(z.imag).max() < SAME)) for z in found]
+    return [
+        (z.tolist(), None if np.abs(z * z + 1.0)[turns].min(initial=1.0) < SAME else bool(np.abs(z.imag).max() < SAME))
+        for z in found
+    ]
 
 
 def _float(p: Polynomial, whole: Polynomial | None = None) -> Any:

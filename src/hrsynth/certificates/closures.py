@@ -49,9 +49,15 @@ class ClosedRobot:
         if mechanism.couplings or not held or None in held or JointType.FREE in kinds or found.model is None:
             return None
         length = found.goal.twin.length
-        joints = [[joint.type.value, joint.predecessor, joint.successor,
-                   *write_numbers([[*joint.point / length, 1.0], *([*axis, 0.0] for axis in joint.axes)])]
-                  for joint in mechanism.joints.values()]
+        joints = [
+            [
+                joint.type.value,
+                joint.predecessor,
+                joint.successor,
+                *write_numbers([[*joint.point / length, 1.0], *([*axis, 0.0] for axis in joint.axes)]),
+            ]
+            for joint in mechanism.joints.values()
+        ]
         return cls(found, {"joints": joints, "held": held})
 
     def bodies(self, mode: SystemMode) -> dict[str, Array]:
@@ -61,23 +67,37 @@ class ClosedRobot:
 
     def at(self, bodies: Mapping[str, Array]) -> ClosedConfiguration | None:
         """The configuration with bodies there; None where the robot was not found closed."""
-        return next((each.configuration for each in self.found.modes if each.bodies is not None and all(
-            np.abs(X - each.bodies[body]).max() <= CLOSED for body, X in bodies.items())), None)
+        return next(
+            (
+                each.configuration
+                for each in self.found.modes
+                if each.bodies is not None
+                and all(np.abs(X - each.bodies[body]).max() <= CLOSED for body, X in bodies.items())
+            ),
+            None,
+        )
 
     def links(self, at: ClosedConfiguration) -> dict[str, Any]:
         """The displacements of all links."""
         mechanism = self.found.setting.mechanism
         return {link: write_numbers(displacement(mechanism, at, link)) for link in mechanism.links}
 
-    def places(self, bodies: Sequence[int], frame: WorkingFrame, at: ClosedConfiguration, tips: Sequence[Any],
-               arrows: int, hub: Sequence[Any]) -> dict[str, Any]:
+    def places(
+        self,
+        bodies: Sequence[int],
+        frame: WorkingFrame,
+        at: ClosedConfiguration,
+        tips: Sequence[Any],
+        arrows: int,
+        hub: Sequence[Any],
+    ) -> dict[str, Any]:
         """A system's frame, and its tips as points or, the last, arrows of the robot's links, by where they are at a
         configuration in working coordinates."""
         names = leg_ends(self.found.setting.anatomy) if self.found.confined is None else self.found.confined.bodies
         length, found = at.twin.length, []
         for k, (body, tip) in enumerate(zip(bodies, tips, strict=True)):
             link, point = names[body], float(k < len(tips) - arrows)
-            there = np.array(tip, dtype=float) - (1.0 - point) * np.array(hub, dtype=float)[:len(tip)]
+            there = np.array(tip, dtype=float) - (1.0 - point) * np.array(hub, dtype=float)[: len(tip)]
             D = displacement(self.found.setting.mechanism, at, link)
             v = (point * frame.origin + frame.size * there @ frame.R) / length - point * D[:, 3]
             found.append([link, [*write_numbers(D[:, :3].T @ v), str(int(point))]])

@@ -43,7 +43,7 @@ from .verify_certificate import KINDS, NotAccepted, digest, integral, rational, 
 
 RADIUS = Fraction(1, 1 << 80)
 """Radius of the boxes (unknowns of size one)."""
-WITHIN = tuple(Fraction(1, 10 ** k) for k in range(13, 5, -1))
+WITHIN = tuple(Fraction(1, 10**k) for k in range(13, 5, -1))
 """How far the tips of a pose may be from where its box puts them (sizes): the first that is proved."""
 
 
@@ -52,8 +52,12 @@ def certificate(found: AssemblyModes) -> dict[str, Any]:
     complete or no bound of the checker proves the count."""
     if found.formation is not None:
         raise NoCertificate(found.setting.robot.name, "the checker knows no formations")
-    about = {"robot": found.setting.robot.name, "kind": found.kind, "at": found.pose.to_dict(),
-             "observed": [[o.leg, o.link if o.by_segment else o.leg] for o in found.setting.observed]}
+    about = {
+        "robot": found.setting.robot.name,
+        "kind": found.kind,
+        "at": found.pose.to_dict(),
+        "observed": [[o.leg, o.link if o.by_segment else o.leg] for o in found.setting.observed],
+    }
     if found.found.complete and not found.found.solved and found.confined is not None:  # a copy: solved again
         found = modes(found.setting, at=found.goal, real=found.kind == "real", as_written=found.confined.as_written)
     robot = ClosedRobot.of(found)
@@ -85,8 +89,12 @@ def of_systems(found: SystemModes, about: Mapping[str, Any], robot: ClosedRobot 
     if not found.solved:
         raise NotAccepted("the list is complete by conditions of kinds that the checker does not know")
     proposed = [propose(each, robot) for each in found.solved]
-    return _seal([_system(each, robot) for each in proposed], about, robot,
-                   sum(each.roots.complex if each.part.whole else sum(each.kept) for each in found.solved))
+    return _seal(
+        [_system(each, robot) for each in proposed],
+        about,
+        robot,
+        sum(each.roots.complex if each.part.whole else sum(each.kept) for each in found.solved),
+    )
 
 
 def of_loops(found: AssemblyModes, about: Mapping[str, Any], robot: ClosedRobot | None) -> dict[str, Any]:
@@ -98,8 +106,9 @@ def of_loops(found: AssemblyModes, about: Mapping[str, Any], robot: ClosedRobot 
     return _seal([_system(proposed, robot)], about, robot, found.found.complex or 0)
 
 
-def of_chain(system: CarriedPlatform, found: AssemblyModes, about: Mapping[str, Any], robot: ClosedRobot | None
-             ) -> dict[str, Any]:
+def of_chain(
+    system: CarriedPlatform, found: AssemblyModes, about: Mapping[str, Any], robot: ClosedRobot | None
+) -> dict[str, Any]:
     """The certificate of a platform that a leg carries, or of a single loop; raises ``NotAccepted``."""
     assert found.model is not None
     modes_, why = found.found.modes, "no joint of its loop is between its base and its platform"
@@ -109,8 +118,9 @@ def of_chain(system: CarriedPlatform, found: AssemblyModes, about: Mapping[str, 
         if sum(kept) == len(modes_):
             R, p = system.transform(each.home, system.carrying)
             there = [None if k is None else system.transform(modes_[k].q, system.carrying) for k in each.modes]
-            poses = [np.empty(0) if to is None else np.column_stack([to[0] @ R.T, to[1] - to[0] @ R.T @ p])
-                     for to in there]
+            poses = [
+                np.empty(0) if to is None else np.column_stack([to[0] @ R.T, to[1] - to[0] @ R.T @ p]) for to in there
+            ]
             bodies = [None if k is None else found.model.bodies(modes_[k].q) for k in each.modes]
             try:
                 made = _system(ProposedRecord(each.record, each.starts, poses, kept, bodies, frame), robot)
@@ -122,9 +132,13 @@ def of_chain(system: CarriedPlatform, found: AssemblyModes, about: Mapping[str, 
     raise NotAccepted(why)
 
 
-def _as_chain(found: AssemblyModes, about: Mapping[str, Any], robot: ClosedRobot | None, reason: NotAccepted,
-              *ways: Callable[[MeasuredRobot, ClosedConfiguration, float], tuple[Model, SystemModes]]
-              ) -> dict[str, Any]:
+def _as_chain(
+    found: AssemblyModes,
+    about: Mapping[str, Any],
+    robot: ClosedRobot | None,
+    reason: NotAccepted,
+    *ways: Callable[[MeasuredRobot, ClosedConfiguration, float], tuple[Model, SystemModes]],
+) -> dict[str, Any]:
     """Of a mechanism that is a carried platform, or one loop, besides the way in which its modes were listed; raises
     ``NotAccepted``."""
     assert found.model is not None
@@ -142,12 +156,19 @@ def _measured_robot(found: AssemblyModes) -> MeasuredRobot:
     return MeasuredRobot.of(found.setting, found.kind == "real")
 
 
-def _seal(systems: list[dict[str, Any]], about: Mapping[str, Any], robot: ClosedRobot | None, count: int
-            ) -> dict[str, Any]:
+def _seal(
+    systems: list[dict[str, Any]], about: Mapping[str, Any], robot: ClosedRobot | None, count: int
+) -> dict[str, Any]:
     """A record of systems that have so many complex solutions, accepted."""
-    record = {"format": "hrsynth-certificate-1", "claim": "modes", **about,
-              "real": sum("pose" in box for each in systems for box in each["boxes"]), "complex": count,
-              "systems": systems, **({} if robot is None else {"assembly": robot.record})}
+    record = {
+        "format": "hrsynth-certificate-1",
+        "claim": "modes",
+        **about,
+        "real": sum("pose" in box for each in systems for box in each["boxes"]),
+        "complex": count,
+        "systems": systems,
+        **({} if robot is None else {"assembly": robot.record}),
+    }
     record["sha256"] = digest(record)
     verify(record)
     return record
@@ -155,8 +176,9 @@ def _seal(systems: list[dict[str, Any]], about: Mapping[str, Any], robot: Closed
 
 def again(record: dict[str, Any], robot: Mechanism) -> dict[str, Any]:
     """The certificate of the same question about a robot; raises ``NoCertificate``, and what ``modes`` raises."""
-    parts: dict[str, Any] = {part: tuple(value) if part == "rpy" else value
-                             for part, value in record["at"].items() if value is not None}
+    parts: dict[str, Any] = {
+        part: tuple(value) if part == "rpy" else value for part, value in record["at"].items() if value is not None
+    }
     at = Pose(**parts)
     real = record["kind"] == "real"
     setting = ObservedRobot.of(robot, None if real else [link for _, link in record["observed"]], driven=real)
@@ -183,10 +205,18 @@ def _system(proposed: ProposedRecord, robot: ClosedRobot | None) -> dict[str, An
             if robot is not None and at is not None:
                 box["links"] = robot.links(at)
                 if "places" not in record:
-                    tips = [[value(p, middle)[0] / value(w, middle)[0] for p in N]
-                            for N, _, w in points[:3 if record["kind"] == "chain" else len(record["tips"])]]
-                    record["places"] = robot.places(record.get("bodies", [0] * len(tips)), frame, at, tips,
-                                                    record.get("arrows", 0), rational(record.get("hub", ["0"] * 3)))
+                    tips = [
+                        [value(p, middle)[0] / value(w, middle)[0] for p in N]
+                        for N, _, w in points[: 3 if record["kind"] == "chain" else len(record["tips"])]
+                    ]
+                    record["places"] = robot.places(
+                        record.get("bodies", [0] * len(tips)),
+                        frame,
+                        at,
+                        tips,
+                        record.get("arrows", 0),
+                        rational(record.get("hub", ["0"] * 3)),
+                    )
         elif is_real_ or (legs and is_real_ is not None):
             box["misses"] = _worst_leg(legs, middle)
         record["boxes"].append(box)
@@ -234,5 +264,3 @@ def _no_poses(equations: Sequence[Polynomial], halves: Sequence[bool]) -> list[l
             if new and abs(np.polyval(rows[1][::-1], y)) < NO_POSE_START:
                 found.append(x)
     return found
-
-

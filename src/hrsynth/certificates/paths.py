@@ -48,16 +48,33 @@ def certificate(found: PathAnswer) -> dict[str, Any]:
     assert isinstance(aspects.condition, Named)
     forms, motion = aspects.enclosure(found.start.configuration).forms, WrittenMotions.of(aspects)
     try:
-        record = {"format": "hrsynth-certificate-1", "claim": "path", "robot": name, "verdict": found.verdict,
-                  "observed": [[o.leg, o.link] for o in found.setting.observed], "any_mode": found.any_mode,
-                  "start": found.start.pose.to_dict(), "goal": found.goal.pose.to_dict(), "motion": motion.to_dict(),
-                  "legs": [_leg(limb) for limb in forms.limbs], "modes": [list(map(int, forms.modes))],
-                  "vectors": {symbol: _vector(each) for symbol, each in sorted(forms.vectors.items())},
-                  "points": list(forms.points), "condition": _tree(aspects.condition.expression)}
+        record = {
+            "format": "hrsynth-certificate-1",
+            "claim": "path",
+            "robot": name,
+            "verdict": found.verdict,
+            "observed": [[o.leg, o.link] for o in found.setting.observed],
+            "any_mode": found.any_mode,
+            "start": found.start.pose.to_dict(),
+            "goal": found.goal.pose.to_dict(),
+            "motion": motion.to_dict(),
+            "legs": [_leg(limb) for limb in forms.limbs],
+            "modes": [list(map(int, forms.modes))],
+            "vectors": {symbol: _vector(each) for symbol, each in sorted(forms.vectors.items())},
+            "points": list(forms.points),
+            "condition": _tree(aspects.condition.expression),
+        }
         if found.verdict == SEPARATED:
             used = limbs_of(tuple(forms.vectors.values()))
-            record["modes"] += sorted({modes for known in found.goal_modes for modes in product(*(
-                [int(mode)] if k in used or not found.any_mode else [-1, 1] for k, mode in enumerate(known)))})
+            record["modes"] += sorted(
+                {
+                    modes
+                    for known in found.goal_modes
+                    for modes in product(
+                        *([int(mode)] if k in used or not found.any_mode else [-1, 1] for k, mode in enumerate(known))
+                    )
+                }
+            )
             ends = aspects.pattern.coordinates.of([found.start.configuration, found.goal.configuration])
             record["path"] = [motion.node(p, R, None) for p, R in zip(*ends, strict=True)]
         else:
@@ -130,13 +147,13 @@ def again(record: dict[str, Any], robot: Mechanism) -> dict[str, Any]:
 
 
 def _pose(record: dict[str, Any]) -> Pose:
-    parts: dict[str, Any] = {part: tuple(value) if part == "rpy" else value for part, value in record.items()
-                             if value is not None}
+    parts: dict[str, Any] = {
+        part: tuple(value) if part == "rpy" else value for part, value in record.items() if value is not None
+    }
     return Pose(**parts)
 
 
-def _cut(record: dict[str, Any], motion: WrittenMotions, ways: Sequence[StraightSegment], count: int
-         ) -> list[Node]:
+def _cut(record: dict[str, Any], motion: WrittenMotions, ways: Sequence[StraightSegment], count: int) -> list[Node]:
     """Poses along straight ways, so near to each other that the checker's intervals prove each piece."""
     if not ways or len(ways) < count:
         raise PathNotAccepted("a leg changes its working mode on the way")
@@ -173,13 +190,22 @@ def _leg(limb: ClosedFormLeg) -> dict[str, Any]:
     """A leg without its working mode."""
     found = {"tip": _rule(limb.tip), "centre": write_numbers(limb.centre)}
     if isinstance(limb, OnCrank):
-        return {"kind": "crank", "axis": write_numbers(limb.axis), "radius": write_numbers(float(limb.radius)),
-                "rod": write_numbers(float(limb.rod)), **found}
+        return {
+            "kind": "crank",
+            "axis": write_numbers(limb.axis),
+            "radius": write_numbers(float(limb.radius)),
+            "rod": write_numbers(float(limb.rod)),
+            **found,
+        }
     if isinstance(limb, OnRail):
         return {"kind": "rail", "axis": write_numbers(limb.axis), "rod": write_numbers(float(limb.rod)), **found}
     if isinstance(limb, SlidingRod):
-        return {"kind": "slide", "axis": None if limb.axis is None else write_numbers(limb.axis),
-                "aside": write_numbers(float(limb.aside)), **found}
+        return {
+            "kind": "slide",
+            "axis": None if limb.axis is None else write_numbers(limb.axis),
+            "aside": write_numbers(float(limb.aside)),
+            **found,
+        }
     raise PathNotAccepted("a leg of a kind that the checker does not know")
 
 

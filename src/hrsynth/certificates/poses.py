@@ -96,8 +96,10 @@ class _Moved:
     def at(self, by: Fraction) -> dict[str, Any]:
         """The record, each number moved by so much at most."""
         tips, reaches = (_add(self.record[key], each, by) for key, each in self.along.items())
-        return self.record | {"tips": write_numbers(tips), "reaches": [
-            {kind: write_numbers(vectors)} for each in reaches for kind, vectors in each.items()]}
+        return self.record | {
+            "tips": write_numbers(tips),
+            "reaches": [{kind: write_numbers(vectors)} for each in reaches for kind, vectors in each.items()],
+        }
 
 
 def _alike(x: Any, rng: random.Random) -> Any:
@@ -117,7 +119,7 @@ def _follow_infinity(moved: _Moved, E: Array, most: int, count: int) -> list[lis
 
     They are power series in the root s of the move: each is predicted by the parabola through the last three. Complex
     moves lead around those that are singular."""
-    floats, roots, found, gone, step = _Floats(moved), [complex(FIRST)], [_first(moved.at(FIRST ** 2), E)], 0.0, STEP
+    floats, roots, found, gone, step = _Floats(moved), [complex(FIRST)], [_first(moved.at(FIRST**2), E)], 0.0, STEP
     if len(found[0]) != most:
         return None
     while gone < 1.0:
@@ -137,7 +139,7 @@ def _follow_infinity(moved: _Moved, E: Array, most: int, count: int) -> list[lis
     order = np.argsort(np.abs((e * e).sum(axis=1)) / (np.abs(e) ** 2).sum(axis=1))[:count]
     ends = [[each[k].astype(object) for each in found[-3:]] for k in order]
     for exact in EXACT:
-        refining, s = Refining([integral(p) for p in _equations(moved.at(exact ** 2))]), complex(exact)
+        refining, s = Refining([integral(p) for p in _equations(moved.at(exact**2))]), complex(exact)
         for each in ends:
             each.append(np.array(refining.near(_predict(roots[-3:], each[-3:], s), STEPS), dtype=object))
         roots.append(s)
@@ -160,8 +162,12 @@ def _first(record: dict[str, Any], E: Array) -> Any:
         kind, (c, rest) = reach_of(each)
         a, b = np.array(c, dtype=float), np.array(rest, dtype=float)
         curves.append(Sphere(a, float(np.sqrt(b[0]))) if kind == "sphere" else Plane(a, b / np.linalg.norm(b)))
-    system = Spatial(tuple(curves), np.array(rational(record["tips"]), dtype=float), record["arrows"],
-                     np.array(rational(record["hub"]), dtype=float))
+    system = Spatial(
+        tuple(curves),
+        np.array(rational(record["tips"]), dtype=float),
+        record["arrows"],
+        np.array(rational(record["hub"]), dtype=float),
+    )
     part = PoseSystem(tuple(range(len(curves))), system.chart(0), True)
     found = by_homotopy(part, None)
     assert part.chart.study is not None
@@ -202,7 +208,7 @@ class _Floats:
 
     @staticmethod
     def _step(terms: Sequence[Any], x: Any) -> Any:
-        powers = np.stack([np.ones_like(x), x, x * x, x ** 3, x ** 4, x ** 5, x ** 6], axis=-1)
+        powers = np.stack([np.ones_like(x), x, x * x, x**3, x**4, x**5, x**6], axis=-1)
         F, J = np.zeros(x.shape, dtype=complex), np.zeros((*x.shape, x.shape[1]), dtype=complex)
         k = np.arange(x.shape[1])
         for row, (e, c) in enumerate(terms):
@@ -215,5 +221,3 @@ class _Floats:
             return x - np.linalg.solve(J / scale[:, :, None], (F / scale)[:, :, None])[:, :, 0]
         except np.linalg.LinAlgError:
             return np.full_like(x, np.nan)
-
-

@@ -29,8 +29,10 @@ class ProposedRecord:
 
 def starts_of(roots: Roots) -> tuple[list[list[complex]], list[bool | None]]:
     """About where the solutions are, and which of them are real; None for those that are too far to be poses."""
-    return ([[complex(v) for v in each] for each in (*roots.values, *roots.distant)],
-            [*map(is_real, roots.values), *(None for _ in roots.distant)])
+    return (
+        [[complex(v) for v in each] for each in (*roots.values, *roots.distant)],
+        [*map(is_real, roots.values), *(None for _ in roots.distant)],
+    )
 
 
 def placed_in(X: Array, frame: WorkingFrame, d: int) -> Array:

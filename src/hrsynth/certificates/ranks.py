@@ -32,10 +32,18 @@ def certificate(found: Derivation) -> dict[str, Any]:
         raise NoCertificate(name, "not all that is measured is rational")
     matrices = {"A": at.loops, "X": at.rows[0], "Y": np.vstack([at.rows[1 + i] for i in places])}
     whole = {key: [[int(c) for c in row] for row in rows] for key, rows in matrices.items()}
-    record = {"format": "hrsynth-certificate-1", "claim": "ranks", "robot": name,
-              "observed": [[o.leg, o.link] for o in found.setting.observed], "matrices": whole,
-              "stacks": [_stack(of, whole) for of in (["A"], ["A", "X"], ["A", "Y"], ["A", "Y", "X"])
-                         if any(whole[key] for key in of)]}
+    record = {
+        "format": "hrsynth-certificate-1",
+        "claim": "ranks",
+        "robot": name,
+        "observed": [[o.leg, o.link] for o in found.setting.observed],
+        "matrices": whole,
+        "stacks": [
+            _stack(of, whole)
+            for of in (["A"], ["A", "X"], ["A", "Y"], ["A", "Y", "X"])
+            if any(whole[key] for key in of)
+        ],
+    }
     record["sha256"] = digest(record)
     verify(record)
     return record

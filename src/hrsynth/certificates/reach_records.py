@@ -41,8 +41,11 @@ def _spokes(circle: Circle, frame: WorkingFrame, turn: float) -> list[list[Fract
     if len(a) == 2 or dot(a, b) == 0 == dot(a, a) - dot(b, b):
         return [a, b]
     first, second = unit(given[0].astype(float)), unit(given[1].astype(float))
-    w, x, y, z = (Fraction(round(float(c) * UNIT)) for c in quaternions(np.column_stack(
-        [first, second, cross(first, second)])))
+    w, x, y, z = (
+        Fraction(round(float(c) * UNIT)) for c in quaternions(np.column_stack([first, second, cross(first, second)]))
+    )
     s = round_numbers(circle.radius / frame.size) / (w * w + x * x + y * y + z * z)
-    return [[s * (w * w + x * x - y * y - z * z), 2 * s * (x * y + w * z), 2 * s * (x * z - w * y)],
-            [2 * s * (x * y - w * z), s * (w * w - x * x + y * y - z * z), 2 * s * (y * z + w * x)]]
+    return [
+        [s * (w * w + x * x - y * y - z * z), 2 * s * (x * y + w * z), 2 * s * (x * z - w * y)],
+        [2 * s * (x * y - w * z), s * (w * w - x * x + y * y - z * z), 2 * s * (y * z + w * x)],
+    ]

@@ -33,8 +33,16 @@ class Refining:
         flat = [{e: c * s for e, c in p.items()} for p, s in zip(equations, scales, strict=True)]
         self.degree = max(k for p in flat for e in p for k in e)
         with ctx.workprec(BITS):
-            self.rows = [[[(acb(fmpq(c.numerator, c.denominator)), [(i, k) for i, k in enumerate(e) if k])
-                           for e, c in p.items()] for p in (p, *(slope(p, j) for j in range(n)))] for p in flat]
+            self.rows = [
+                [
+                    [
+                        (acb(fmpq(c.numerator, c.denominator)), [(i, k) for i, k in enumerate(e) if k])
+                        for e, c in p.items()
+                    ]
+                    for p in (p, *(slope(p, j) for j in range(n)))
+                ]
+                for p in flat
+            ]
 
     def step(self, x: Sequence[Any], steps: int) -> tuple[list[Any], Any]:
         """x (n,) after some of Newton's steps, and the derivatives there; raises ``ZeroDivisionError``."""

@@ -29,8 +29,14 @@ def propose(solved: Solved, robot: ClosedRobot | None) -> ProposedRecord:
     record, starts, poses = _write_system(solved)
     frame = solved.part.chart.frame if isinstance(solved.part, PoseSystem) else solved.part.frame
     assert frame is not None
-    return ProposedRecord(record, starts, poses, solved.kept,
-                     [None if robot is None else robot.bodies(mode) for mode in solved.modes], in_space(frame))
+    return ProposedRecord(
+        record,
+        starts,
+        poses,
+        solved.kept,
+        [None if robot is None else robot.bodies(mode) for mode in solved.modes],
+        in_space(frame),
+    )
 
 
 def _write_system(solved: Solved) -> tuple[dict[str, Any], list[tuple[list[complex], bool | None]], list[Array]]:
@@ -49,10 +55,15 @@ def _write_system(solved: Solved) -> tuple[dict[str, Any], list[tuple[list[compl
         legs = [*part.legs, *(k for k in range(len(system.curves)) if k not in part.legs)]
         origins = iter(turns)
         curves = [system.curves[k] for k in legs]
-        record = {"kind": "spatial",
-                  "reaches": [reach_record(each, frame, 0.0 if isinstance(each, Point | Surface) else
-                                                         next(origins, 0.0)) for each in curves],
-                  "tips": write_numbers(round_numbers(system.tips[legs] / frame.size)), "square": len(part.legs)}
+        record = {
+            "kind": "spatial",
+            "reaches": [
+                reach_record(each, frame, 0.0 if isinstance(each, Point | Surface) else next(origins, 0.0))
+                for each in curves
+            ],
+            "tips": write_numbers(round_numbers(system.tips[legs] / frame.size)),
+            "square": len(part.legs),
+        }
         return record, list(zip(values, real, strict=True)), [placed_in(mode.pose, frame, 3) for mode in solved.modes]
     assert isinstance(system, Translating | Articulated)
     if isinstance(system, Translating):
@@ -84,29 +95,47 @@ def _pose_system(solved: Solved) -> tuple[dict[str, Any], list[tuple[list[comple
         raise NotAccepted("tips on surfaces, more than needed")
     frame, (values, real) = part.chart.frame, starts_of(solved.roots)
     if isinstance(system, Spatial) and part.chart.study is not None:
-        record = {"kind": "pose", "reaches": [reach_record(system.curves[k], frame, 0.0) for k in part.legs],
-                  "tips": write_numbers(round_numbers(system.tips[list(part.legs)] / frame.size)),
-                  "arrows": sum(k >= len(system.points) for k in part.legs),
-                  "hub": write_numbers(round_numbers(frame.point(system.hub))),
-                  "chart": [[str(round(x)) for x in row] for row in part.chart.study[:4, :4]]}
+        record = {
+            "kind": "pose",
+            "reaches": [reach_record(system.curves[k], frame, 0.0) for k in part.legs],
+            "tips": write_numbers(round_numbers(system.tips[list(part.legs)] / frame.size)),
+            "arrows": sum(k >= len(system.points) for k in part.legs),
+            "hub": write_numbers(round_numbers(frame.point(system.hub))),
+            "chart": [[str(round(x)) for x in row] for row in part.chart.study[:4, :4]],
+        }
         poses = [placed_in(mode.pose, frame, 3) for mode in solved.modes]
         return *regular(record, list(zip(values, real, strict=True))), poses
     if not isinstance(system, Articulated):
         raise NotAccepted("tips on surfaces of another platform than the checker knows")
     turn = TURNS[0]
-    record = {"kind": "shifting", "reaches": [reach_record(system.paths[k], frame, turn) for k in part.legs],
-              "bodies": [system.bodies[k] for k in part.legs], "square": len(part.legs),
-              "slide": reach_record(system.slide, replace(frame, origin=np.zeros(3)), turn),
-              "tips": [["0"] * 3] * len(part.legs)}
+    record = {
+        "kind": "shifting",
+        "reaches": [reach_record(system.paths[k], frame, turn) for k in part.legs],
+        "bodies": [system.bodies[k] for k in part.legs],
+        "square": len(part.legs),
+        "slide": reach_record(system.slide, replace(frame, origin=np.zeros(3)), turn),
+        "tips": [["0"] * 3] * len(part.legs),
+    }
     c, s = math.cos(turn), math.sin(turn)
-    starts = values if isinstance(system.slide, Line) else [
-        [*x[:3], (x[4] * c - x[3] * s) / (1.0 + x[3] * c + x[4] * s)] for x in values]
-    return (record, list(zip(starts, real, strict=True)),
-            [_shift_pose(mode.pose, frame, frame.origin) for mode in solved.modes])
+    starts = (
+        values
+        if isinstance(system.slide, Line)
+        else [[*x[:3], (x[4] * c - x[3] * s) / (1.0 + x[3] * c + x[4] * s)] for x in values]
+    )
+    return (
+        record,
+        list(zip(starts, real, strict=True)),
+        [_shift_pose(mode.pose, frame, frame.origin) for mode in solved.modes],
+    )
 
 
-def _translating(system: Translating, part: SquareSystem, frame: WorkingFrame, turns: Sequence[float],
-                 values: Sequence[list[complex]]) -> tuple[dict[str, Any], list[list[complex]]]:
+def _translating(
+    system: Translating,
+    part: SquareSystem,
+    frame: WorkingFrame,
+    turns: Sequence[float],
+    values: Sequence[list[complex]],
+) -> tuple[dict[str, Any], list[list[complex]]]:
     """The position of the platform, of which every path is a place: a curve and what it meets, or three surfaces."""
     curve = part.unknowns[0]
     chosen: list[Reach] = [system.paths[k] for k in part.legs]
@@ -116,8 +145,13 @@ def _translating(system: Translating, part: SquareSystem, frame: WorkingFrame, t
     return {"reaches": [reach_record(each, frame, turns[0]) for each in chosen], "bodies": [0] * len(chosen)}, starts
 
 
-def _write_articulated(system: Articulated, part: SquareSystem, frame: WorkingFrame, turns: Sequence[float],
-                 values: Sequence[list[complex]]) -> tuple[dict[str, Any], list[list[complex]]]:
+def _write_articulated(
+    system: Articulated,
+    part: SquareSystem,
+    frame: WorkingFrame,
+    turns: Sequence[float],
+    values: Sequence[list[complex]],
+) -> tuple[dict[str, Any], list[list[complex]]]:
     """The first body's position, counted from the middle of the two paths, and the slide's half-angle tangent."""
     middle = _middle(part, system)
     paths = [shift_reach(system.paths[k], -middle) for k in part.legs]

@@ -16,6 +16,7 @@
   one, poses fit to 1e-9. Systems (branches of legs) are counted one by one. The robot *closes* where places of its
   links are told: its joints fit, tips are in place, and what is measured is as told once for all poses.
 """
+
 import hashlib
 import json
 import math
@@ -24,46 +25,93 @@ from fractions import Fraction
 from itertools import combinations, product
 
 PRIME, FIT, WITHIN, FAR, TERMS, LENGTH = 2147483647, Fraction(1, 10**9), Fraction(1, 10**6), 10**7, 20_000, 5_000_000
+
+
 class NotAccepted(Exception):
     """Why a certificate is not accepted."""
+
+
 def need(true, why):
     if not true:
         raise NotAccepted(why)
+
+
 def add(*terms):  # a sum of polynomials {exponents: coefficient}
     total = {}
     for p in terms:
         for e, c in p.items():
             total[e] = total.get(e, 0) + c
     return {e: c for e, c in total.items() if c}
-def mul(p, q): return need(len(p) * len(q) <= TERMS, f"more than {TERMS} terms") or add(*(
-    {tuple(map(sum, zip(e, f))): c * d for f, d in q.items()} for e, c in p.items()))
-def times(c, p): return {e: c * d for e, d in p.items() if c * d}
-def minus(p, q): return add(p, times(-1, q))
-def term(c, n, k=None): return {tuple(int(i == k) for i in range(n)): Fraction(c)} if c else {}  # c, or c x_k
-def inner(u, v): return add(*(mul(a, b) for a, b in zip(u, v)))
-def dot(u, v): return sum((a * b for a, b in zip(u, v, strict=True)), Fraction(0))
-def sub(u, v): return [a - b for a, b in zip(u, v, strict=True)]
-def size(z): return abs(z[0]) + abs(z[1])  # at least |z|, at most twice that
-def formal(p, w): return dict.fromkeys(w, Fraction(0)) | p  # p times w: w has its degree in half-angle tangents
-def slope(p, k): return {(*e[:k], e[k] - 1, *e[k + 1:]): c * e[k] for e, c in p.items() if e[k]}
+
+
+def mul(p, q):
+    return need(len(p) * len(q) <= TERMS, f"more than {TERMS} terms") or add(
+        *({tuple(map(sum, zip(e, f))): c * d for f, d in q.items()} for e, c in p.items())
+    )
+
+
+def times(c, p):
+    return {e: c * d for e, d in p.items() if c * d}
+
+
+def minus(p, q):
+    return add(p, times(-1, q))
+
+
+def term(c, n, k=None):
+    return {tuple(int(i == k) for i in range(n)): Fraction(c)} if c else {}  # c, or c x_k
+
+
+def inner(u, v):
+    return add(*(mul(a, b) for a, b in zip(u, v)))
+
+
+def dot(u, v):
+    return sum((a * b for a, b in zip(u, v, strict=True)), Fraction(0))
+
+
+def sub(u, v):
+    return [a - b for a, b in zip(u, v, strict=True)]
+
+
+def size(z):
+    return abs(z[0]) + abs(z[1])  # at least |z|, at most twice that
+
+
+def formal(p, w):
+    return dict.fromkeys(w, Fraction(0)) | p  # p times w: w has its degree in half-angle tangents
+
+
+def slope(p, k):
+    return {(*e[:k], e[k] - 1, *e[k + 1 :]): c * e[k] for e, c in p.items() if e[k]}
+
+
 def integral(p):  # with integer coefficients that have no common divisor
     need(any(p.values()), "an equation vanishes")
     common = Fraction(math.gcd(*(c.numerator for c in p.values())), math.lcm(*(c.denominator for c in p.values())))
     return {e: int(c / common) for e, c in p.items()}
+
+
 def cross(u, v, mul=lambda a, b: a * b, minus=lambda a, b: a - b):
     return [minus(mul(u[i], v[j]), mul(u[j], v[i])) for i, j in ((1, 2), (2, 0), (0, 1))]
+
+
 def rational(x):
     short = isinstance(x, str) and len(x) < 300 and not set(x) - set("0123456789/.-")
     need(short or isinstance(x, list), "a number in words")
     return Fraction(x) if short else list(map(rational, x))
+
+
 def reach_of(record):  # a kind, its centre; direction, normal, spokes of a circle, squared radius
-    (kind, values), = record.items()
+    ((kind, values),) = record.items()
     lengths = {"point": [3], "line": [3] * 2, "circle": [3] * 3, "plane": [3] * 2, "sphere": [3, 1]}
     _, *rest = vectors = rational(values)
     need(kind in lengths and [len(v) for v in vectors] == lengths[kind], f"{kind!r} is not a curve or surface")
     need(kind != "circle" or dot(*rest) == 0 == dot(rest[0], rest[0]) - dot(rest[1], rest[1]), "the spokes of a circle")
     need(kind == "point" or (any(rest[0]) and (kind != "sphere" or rest[0][0] > 0)), f"a {kind} without extent")
     return kind, vectors
+
+
 def running(reach, k, n):  # N / w, a curve's point, Q / w its square, at x_k: t of c + t d, or a half-angle tangent
     kind, (c, *rest) = reach
     one, t = term(1, n), term(1, n, k)
@@ -74,28 +122,42 @@ def running(reach, k, n):  # N / w, a curve's point, Q / w its square, at x_k: t
         return N, add(times(dot(c, c) + dot(a, a), w), times(2 * dot(c, a), u), times(4 * dot(c, b), t)), w
     N = [add(term(x, n), times(d, t)) for x, d in zip(c, rest[0] if rest else [0] * len(c))]
     return N, inner(N, N), one
+
+
 def apart(one, other, squared):  # |P1 - P2|^2 = squared
     (N, Q, w), (M, P, v) = one, other
     return formal(add(mul(Q, v), mul(P, w), times(-2, inner(N, M)), times(-squared, mul(w, v))), mul(w, v))
+
+
 def conditions(point, reach):  # planes and spheres that a point is on: (equation, normal or squared radius)
     (N, Q, w), (kind, (c, *rest)) = point, reach
     axes = [[Fraction(int(i == k)) for i in range(3)] for k in range(3)]
     if kind == "sphere":
         return [(add(Q, *(times(-2 * x, p) for x, p in zip(c, N)), times(dot(c, c) - rest[0][0], w)), rest[0])]
     if kind == "circle":
-        return conditions(point, ("plane", [c, cross(*rest)])) + conditions(point, ("sphere", [c, [dot(*rest[:1]*2)]]))
+        return conditions(point, ("plane", [c, cross(*rest)])) + conditions(
+            point, ("sphere", [c, [dot(*rest[:1] * 2)]])
+        )
     if kind == "line":
         rest = [first := cross(rest[0], min(axes, key=lambda axis: abs(dot(rest[0], axis)))), cross(rest[0], first)]
     return [(add(*map(times, n, N), times(-dot(n, c), w)), n) for n in rest or axes]
+
+
 def misfits(equations):  # by how much lengths miss: over a plane's normal, over the squared radius of small spheres
     return [times(1 / (max(map(abs, n)) if len(n) > 1 else min(n[0], Fraction(1))), p) for p, n in equations]
+
+
 def spatial(system, tips):
     """Three tips of a rigid body on curves, their distances; others are b1 + i u + j v + k u x v, u, v between tips."""
     reaches = [reach_of(each) for each in system["reaches"]]
     u, v = sub(tips[1], tips[0]), sub(tips[2], tips[0])
     up = cross(u, v)
-    need(system["square"] == 3 <= len(tips) == len(reaches) and any(up) and {kind for kind, _ in reaches[:3]} <= {
-        "point", "line", "circle"}, "three tips that are not on one line; tips on surfaces need another kind")
+    need(
+        system["square"] == 3 <= len(tips) == len(reaches)
+        and any(up)
+        and {kind for kind, _ in reaches[:3]} <= {"point", "line", "circle"},
+        "three tips that are not on one line; tips on surfaces need another kind",
+    )
     moving = [k for k in range(3) if reaches[k][0] != "point"]  # the tips with an unknown, a half-angle tangent or not
     points = [running(reaches[k], moving.index(k) if k in moving else None, len(moving)) for k in range(3)]
     legs, halves = [], [reaches[k][0] == "circle" for k in moving]
@@ -105,14 +167,19 @@ def spatial(system, tips):
     W, wxy = cross(U, V, mul, minus), mul(mul(w, w), mul(x, y))
     for b, reach in zip((sub(tip, tips[0]) for tip in tips[3:]), reaches[3:]):
         i, j, k = (dot(b, each) / dot(up, up) for each in (cross(v, up), cross(up, u), up))
-        P = [add(mul(a, mul(w, mul(x, y))), times(i, mul(c, mul(w, y))), times(j, mul(d, mul(w, x))), times(k, e))
-             for a, c, d, e in zip(N, U, V, W)]
+        P = [
+            add(mul(a, mul(w, mul(x, y))), times(i, mul(c, mul(w, y))), times(j, mul(d, mul(w, x))), times(k, e))
+            for a, c, d, e in zip(N, U, V, W)
+        ]
         legs.append(misfits(conditions(([mul(p, wxy) for p in P], inner(P, P), mul(wxy, wxy)), reach)))
     return found, halves, points, legs
+
+
 def loops(system, tips):
     """Links in the plane z = 0 that turn by whole multiples of angles: sums of their vectors vanish, some along slides.
     Unknowns: cosines, sines, slides. Of each tip's link it is told how it turns and shifts; also points of others."""
     a, n = system["angles"], 2 * system["angles"] + system["slides"]
+
     def turned(vector, slide, turns):  # times cos + i sin of each angle so often, and a slide where it is not -1
         need(slide in range(-1, n - 2 * a) and len(turns) == a and all(abs(k) < 13 for k in turns), "turns and slides")
         x, y = (mul(term(c, n), term(1, n, 2 * a + slide if slide >= 0 else None)) for c in rational(vector))
@@ -120,7 +187,10 @@ def loops(system, tips):
             c, s = term(1, n, j), term(sign, n, a + j)
             x, y = minus(mul(x, c), mul(y, s)), add(mul(x, s), mul(y, c))
         return x, y
-    def total(vectors): return [add(*parts) for parts in zip(*(turned(*each) for each in vectors))]
+
+    def total(vectors):
+        return [add(*parts) for parts in zip(*(turned(*each) for each in vectors))]
+
     need(2 * a <= n < 25 and len(system["reaches"]) <= len(tips) and not any(b[2] for b in tips), "a plane, n < 25")
     found = [p for loop in system["loops"] for p in total(loop)]
     found += [add(*(mul(x, x) for x in (term(1, n, j), term(1, n, a + j))), term(-1, n)) for j in range(a)]
@@ -128,6 +198,8 @@ def loops(system, tips):
     points = [([*N, {}], inner(N, N), term(1, n)) for N in (*at, *map(total, system["others"]))]
     legs = [misfits(conditions(*each)) for each in zip(points, map(reach_of, system["reaches"]))]
     return found, [False] * n, points, [*map(total, system["besides"]), *legs]
+
+
 def shifting(system, tips):
     """Bodies that translate: x, y, z of the first, the second on ``slide`` about it. Of spheres, and of
     parallel planes, all but the first are replaced by their difference from it."""
@@ -142,29 +214,45 @@ def shifting(system, tips):
         points.append((N, add(mul(inner(p, p), w), *((times(2, inner(p, S)), SS) if body else ())), w))
         all_.append(misfits(conditions(points[-1], reach)))
         for equation, normal in conditions(points[-1], reach) if len(points) <= system["square"] else ():
-            first, n1, w1, other = next((each for each in kept if len(normal) == len(each[1]) and (
-                len(normal) == 1 or not any(cross(normal, each[1])))), ({}, normal, one, 2))
+            first, n1, w1, other = next(
+                (
+                    each
+                    for each in kept
+                    if len(normal) == len(each[1]) and (len(normal) == 1 or not any(cross(normal, each[1])))
+                ),
+                ({}, normal, one, 2),
+            )
             kept = [(equation, normal, w, body)] * (other != body) + kept  # the last body first
             mine, its = (one, one) if w == w1 else (w1, w)
             ratio = dot(normal, n1) / dot(n1, n1) if len(n1) > 1 else 1
             found.append(formal(minus(mul(equation, mine), times(ratio, mul(first, its))), mul(w, mine)))
-    return found, [False] * 3 + [slide[0] == "circle" for _ in range(3, n)], points, all_[system["square"]:]
+    return found, [False] * 3 + [slide[0] == "circle" for _ in range(3, n)], points, all_[system["square"] :]
+
+
 def turned(u, v):  # the product of quaternions
     rest = zip(u[1:], v[1:], cross(u[1:], v[1:], mul, minus))
     return [minus(mul(u[0], v[0]), inner(u[1:], v[1:])), *(add(mul(u[0], y), mul(v[0], x), z) for x, y, z in rest)]
+
+
 def placed(e, g, b, kappa=None):  # |e|^2 R b; |e|^2 tip = that + 2 vec(g e*), its square over |e|^2, and |e|^2
     back, w, gg = [e[0], *(times(-1, p) for p in e[1:])], inner(e, e), minus(inner(g, g), kappa or {})
     arrow = turned(turned(e, [{}, *({tuple(0 * k for k in next(iter(w))): c} for c in b)]), back)[1:]
     Q = add(times(4, gg), *(times(4 * c, p) for c, p in zip(b, turned(back, g)[1:])), times(dot(b, b), w))
     return arrow, ([add(p, times(2, q)) for p, q in zip(arrow, turned(g, back)[1:])], Q, w)
+
+
 def pose(system, tips):
     """Study's coordinates: a quaternion e = E (1, x1, x2, x3), g = E (0, x5, x6, x7), |e|^2 x4 = (e.g)^2. The last
     ``arrows`` of the tips only turn, about ``hub``."""
     n, E, arrows = 7, [[int(c) for c in row] for row in system["chart"]], system["arrows"]
     x, hub = [term(1, n), *(term(1, n, k) for k in range(n))], rational(system["hub"])
     e, g = [add(*map(times, row, x)) for row in E], [add(*map(times, row, ({}, *x[5:]))) for row in E]
-    need([*map(len, E)] == [4] * 4 and modular([[c % PRIME for c in row] for row in E], 4)[1] == 4 == len(hub) + 1
-         and arrows in range(len(tips)), "a chart with dependent rows, no hub, or tips that are all arrows")
+    need(
+        [*map(len, E)] == [4] * 4
+        and modular([[c % PRIME for c in row] for row in E], 4)[1] == 4 == len(hub) + 1
+        and arrows in range(len(tips)),
+        "a chart with dependent rows, no hub, or tips that are all arrows",
+    )
     w, points, found = inner(e, e), [], [minus(mul(x[4], inner(e, e)), mul(inner(e, g), inner(e, g)))]
     for k, (b, reach) in enumerate(zip(tips, map(reach_of, system["reaches"]), strict=True)):
         arrow, point = placed(e, g, b, x[4])
@@ -172,12 +260,15 @@ def pose(system, tips):
         points.append(point if k < len(tips) - arrows else ([add(p, times(c, w)) for p, c in zip(arrow, hub)], {}, w))
         found += [equation for equation, _ in conditions(points[-1], reach)]
     return found, [False] * n, points, []
+
+
 def chain(system, tips):
     """Turns and slides from the base on: dual quaternions 1 + t h, h = a + eps o x a or eps a / 2. Three tips are the
     platform's, behind the first of ``ends``; others are points, or arrows, that some joints carry. ``normals`` are
     all that annul what the rest of a loop, without unknowns, can be, about at right angles to each other."""
     n, joints, ((last,), *ends) = system["unknowns"], [(k, *rational(v)) for k, *v in system["joints"]], system["ends"]
     t, halves, annul = [term(1, n, k) for k in range(n)], [j[0] == "R" for j in joints[:n]], rational(system["normals"])
+
     def carried(start, by):
         e, g = [term(1, n), {}, {}, {}], [{}] * 4
         for (kind, a, o), x in zip(joints[start:], by):
@@ -185,27 +276,45 @@ def chain(system, tips):
             p, q = [term(1, n), *(times(c, x) for c in turn)], [{}, *(times(c, x) for c in slide)]
             e, g = turned(e, p), [*map(add, turned(e, q), turned(g, p))]
         return e, g
-    need(all(kind in ("R", "P") and dot(a, a) == 1 for kind, a, _ in joints) and 0 < last <= n <= len(joints) and any(
-        cross(sub(tips[1], tips[0]), sub(tips[2], tips[0]))), "turns and slides along vectors of length 1, a platform")
-    rest = [[sum(p.values()) * (-1) ** (k % 4 > 0) for k, p in enumerate(p for part in carried(n, by) for p in part)]
-            for by in product(({}, term(1, n)), repeat=len(joints) - n)]
+
+    need(
+        all(kind in ("R", "P") and dot(a, a) == 1 for kind, a, _ in joints)
+        and 0 < last <= n <= len(joints)
+        and any(cross(sub(tips[1], tips[0]), sub(tips[2], tips[0]))),
+        "turns and slides along vectors of length 1, a platform",
+    )
+    rest = [
+        [sum(p.values()) * (-1) ** (k % 4 > 0) for k, p in enumerate(p for part in carried(n, by) for p in part)]
+        for by in product(({}, term(1, n)), repeat=len(joints) - n)
+    ]
     all_ = [[*integral(dict(enumerate(v))).values()] for v in rest + annul if any(v)]
     off = [u for u, v in combinations(annul, 2) if 64 * dot(u, v) ** 2 > dot(u, u) * dot(v, v)] + [
-        v for v in annul for x in rest if dot(v, x)]
+        v for v in annul for x in rest if dot(v, x)
+    ]
     need((len(joints) == n and not annul) or (not off and modular(all_, 0)[1] == 8), "normals of what the rest can be")
     rows = [(add(*map(times, v, [*carried(0, t)[0], *carried(0, t)[1]])), v, {(*map(int, halves),): 1}) for v in annul]
     for b, (start, end, arrow), reach in zip(tips[3:], ends, map(reach_of, system["reaches"]), strict=True):
-        need(0 <= start < end <= n and reach[0] in ("plane", "sphere")[:2 - bool(arrow)], "what a tip is told of")
+        need(0 <= start < end <= n and reach[0] in ("plane", "sphere")[: 2 - bool(arrow)], "what a tip is told of")
         turn, point = placed(*carried(start, t[start:end]), b)
         rows += [(*each, point[2]) for each in conditions((turn, {}, point[2]) if arrow else point, reach)]
     points = [placed(*carried(0, by), b)[1] for by, b in zip([t[:last]] * 3 + [t], tips[:3] + tips[:1])]
     return [formal(p, w) for p, _, w in rows[:n]], halves, points, [misfits([row[:2]]) for row in rows[n:]]
-KINDS = {"spatial": (spatial, "square"), "loops": (loops, "angles slides loops besides links others"),
-         "shifting": (shifting, "square bodies slide"), "pose": (pose, "chart arrows hub"),
-         "chain": (chain, "joints unknowns ends normals")}
+
+
+KINDS = {
+    "spatial": (spatial, "square"),
+    "loops": (loops, "angles slides loops besides links others"),
+    "shifting": (shifting, "square bodies slide"),
+    "pose": (pose, "chart arrows hub"),
+    "chain": (chain, "joints unknowns ends normals"),
+}
+
+
 def whole(x):  # complex numbers, pairs of fractions, as integers, and what they are over
     q = math.lcm(*(u.denominator for z in x for u in z))
     return [[u.numerator * (q // u.denominator) for u in z] for z in x], q
+
+
 def value(p, x):  # at complex numbers, pairs of fractions
     (z, q), d, total = whole(x), max(map(sum, p), default=0), [0, 0]
     below = math.lcm(*(c.denominator for c in p.values()))
@@ -214,20 +323,39 @@ def value(p, x):  # at complex numbers, pairs of fractions
         for u, v in (y for y, k in zip(z, e) for _ in range(k)):
             a, b = a * u - b * v, a * v + b * u
         total = [total[0] + a, total[1] + b]
-    return [Fraction(t, below * q ** d) for t in total]
-def most(p, far): return sum(abs(c) * math.prod(x ** k for x, k in zip(far, e) if k) for e, c in p.items())  # of |p|
+    return [Fraction(t, below * q**d) for t in total]
+
+
+def most(p, far):
+    return sum(abs(c) * math.prod(x**k for x, k in zip(far, e) if k) for e, c in p.items())  # of |p|
+
+
 def change(p, m, r):  # in a box; distances rounded upwards
-    far = [Fraction(1 + int((size(z) + r) * 2 ** 64), 2 ** 64) for z in m]
+    far = [Fraction(1 + int((size(z) + r) * 2**64), 2**64) for z in m]
     return r * sum(most(slope(p, k), far) for k in range(len(m)))
-def most_of(p, m, r): return size(value(p, m)) + change(p, m, r)
-def least(p, m, r): return size(value(p, m)) / 2 - change(p, m, r)  # of |p| in the box
+
+
+def most_of(p, m, r):
+    return size(value(p, m)) + change(p, m, r)
+
+
+def least(p, m, r):
+    return size(value(p, m)) / 2 - change(p, m, r)  # of |p| in the box
+
+
 def differ(p, w, m, r, k, s):  # whether p / w surely has other values in two boxes
-    off = sum(change(f, x, a) * most_of(g, y, b) + most_of(f, x, a) * change(g, y, b)
-              for f, x, a, g, y, b in ((p, m, r, w, k, s), (w, m, r, p, k, s)))
+    off = sum(
+        change(f, x, a) * most_of(g, y, b) + most_of(f, x, a) * change(g, y, b)
+        for f, x, a, g, y, b in ((p, m, r, w, k, s), (w, m, r, p, k, s))
+    )
     return size(sub(along([value(p, m)], [value(w, k)]), along([value(p, k)], [value(w, m)]))) / 2 > off
+
+
 def along(y, z):
     (y, q), (z, s) = whole(y), whole(z)
     return [Fraction(sum(x), q * s) for x in zip(*((a * c - b * d, a * d + b * c) for (a, b), (c, d) in zip(y, z)))]
+
+
 def enclosed(equations, m, r, Y):  # Krawczyk's condition; see above
     n, slopes = len(m), [[slope(p, k) for k in range(len(m))] for p in equations]
     need(r > 0 and len(Y) == n and all(len(row) == n for row in Y), "a box without radius or inverse")
@@ -237,25 +365,45 @@ def enclosed(equations, m, r, Y):  # Krawczyk's condition; see above
         wide = sum(size(sub(along(y, [J[k][j] for k in range(n)]), [int(i == j), 0])) for j in range(n))
         wide += sum(size(z) * h for z, h in zip(y, H))
         need(size(along(y, F)) + wide * r < r, "a box in which no solution is proved")
+
+
 def multiples(equations, halves, groups):  # monomials above, at, below the caps, how many; all multiples within
     need(len(halves) < 5 and sorted(k for group, _, _ in groups for k in group) == [*range(len(halves))], "each once")
-    need(all(group and cap in range(1, 13) and more in range(13) and (not any(halves[k] for k in group) or (
-        len(group) == 1 and more == 0)) for group, cap, more in groups), "caps of 1 to 12, one for each half-angle")
-    below = {e: min(cap - sum(e[k] for k in group) for group, cap, _ in groups) for e in product(
-        range(13), repeat=len(halves)) if all(sum(e[k] for k in group) <= cap + more for group, cap, more in groups)}
+    need(
+        all(
+            group
+            and cap in range(1, 13)
+            and more in range(13)
+            and (not any(halves[k] for k in group) or (len(group) == 1 and more == 0))
+            for group, cap, more in groups
+        ),
+        "caps of 1 to 12, one for each half-angle",
+    )
+    below = {
+        e: min(cap - sum(e[k] for k in group) for group, cap, _ in groups)
+        for e in product(range(13), repeat=len(halves))
+        if all(sum(e[k] for k in group) <= cap + more for group, cap, more in groups)
+    }
     columns = sorted(below, key=lambda e: min(max(below[e], -1), 1))
     need(len(columns) <= 300, "more than 300 monomials")
     moved = [{tuple(map(sum, zip(e, shift))): c for e, c in p.items()} for p in equations for shift in columns]
     rows = [[row.get(e, 0) for e in columns] for row in moved if all(e in below for e in row)]
     return rows, *(sum(below[e] < least for e in columns) for least in (0, 1, 99))
+
+
 def rank(equations, halves, system, ranks_of=None):
     rows, above, edge, every = multiples(equations, halves, system["bound"]["groups"])
     far = [[int(c, 16) for c in v] for v in system["bound"].get("far", ())]
-    need(all(len(v) == above and not any(sum(map(int.__mul__, row, v)) for row in rows) for v in far)
-         and modular(far, 0)[1] == len(far), "vectors above the caps that depend on others, or are not annulled")
+    need(
+        all(len(v) == above and not any(sum(map(int.__mul__, row, v)) for row in rows) for v in far)
+        and modular(far, 0)[1] == len(far),
+        "vectors above the caps that depend on others, or are not annulled",
+    )
     sharp, whole = (ranks_of or modular)(rows, edge)
     need(sharp == edge - len(far), "monomials at the caps are not those of lower ones")
     return every - whole - len(far)
+
+
 def modular(rows, first):  # the ranks modulo the prime of the first columns and of all: where echelons begin
     echelon = {}
     for row in ([c % PRIME for c in row] for row in rows):
@@ -266,24 +414,36 @@ def modular(rows, first):  # the ranks modulo the prime of the first columns and
                 break
             row = [(a - row[k] * b) % PRIME for a, b in zip(row, echelon[k])] if row[k] else row
     return sum(k < first for k in echelon), len(echelon)
+
+
 def poses(equations, halves, system):
     need(system["kind"] == "pose" and len(equations) == 7, "six conditions on a pose")
     reaches, tips = [reach_of(each) for each in system["reaches"]], rational(system["tips"])
     kinds = {kind for kind, _ in reaches}
     together = max(each.count(b) for each in (tips, [v[0] for _, v in reaches]) for b in each)
     return 8 if "point" in kinds or kinds <= {"line", "plane"} else 16 if kinds == {"sphere"} and together > 2 else 40
+
+
 def degrees(equations, halves, system):  # of loops and conjugates in u = cos + i sin, v = cos - i sin; u v = 1
     groups, a, n = system["bound"]["groups"], system["angles"], len(halves)
     need(n < 25 and all(groups) and sorted(k for group in groups for k in group) == [*range(n)], "each unknown once")
     forms = [[[j, a + j]] for j in range(a)]  # the unknowns of each term, u before v before slides
-    forms += [[[j + a * (sign * k < 0) for j, k in enumerate(e) for _ in range(abs(k))] + [2 * a + slide] * (slide >= 0)
-               for _, slide, e in loop] for loop in system["loops"] for sign in (1, -1)]
+    forms += [
+        [
+            [j + a * (sign * k < 0) for j, k in enumerate(e) for _ in range(abs(k))] + [2 * a + slide] * (slide >= 0)
+            for _, slide, e in loop
+        ]
+        for loop in system["loops"]
+        for sign in (1, -1)
+    ]
     total = term(1, len(groups))
     for form in forms:
         high = [max(sum(k in group for k in one) for one in form) for group in groups]
         total = mul(total, add(*(term(c, len(groups), g) for g, c in enumerate(high))))
         total = {e: c for e, c in total.items() if all(k <= len(group) for k, group in zip(e, groups))}
     return sum(total.values()) or None  # no zero at all, or curves
+
+
 def modes(record):
     seen, proofs, real, complex_, closed, apart = [], [], 0, 0, 0, 0
     for system in record["systems"]:
@@ -319,8 +479,13 @@ def modes(record):
                 need(finite and not legs and not system.get("normals"), "a box that may or may not be a pose")
             real, counted = real + ("pose" in each), counted + [(m, r)] * (not away and "misses" not in each)
         own, complex_ = {"loops": points, "chain": points[:3]}.get(system["kind"], []), complex_ + len(counted)
-        need(all(any(differ(p, w, *one, *other) for N, _, w in own for p in N) or not own
-                 for one, other in combinations(counted, 2)), "two closings may be of one pose")
+        need(
+            all(
+                any(differ(p, w, *one, *other) for N, _, w in own for p in N) or not own
+                for one, other in combinations(counted, 2)
+            ),
+            "two closings may be of one pose",
+        )
         for (m, r), (k, s) in combinations(boxes, 2):
             need(any(max(abs(a - c), abs(b - d)) > r + s for (a, b), (c, d) in zip(m, k)), "two boxes touch")
     need(seen and record["real"] == real and record["complex"] == complex_, f"{real} real of {complex_} are proved")
@@ -329,6 +494,8 @@ def modes(record):
     more += f" nearer than 10^7 of its sizes ({apart} solutions are farther)" * (apart > 0)
     more += f"; the robot closes at {closed} of the real ones, to 1e-9" * ("assembly" in record)
     return f"{real} real of {complex_} complex poses, and no other{more}"
+
+
 def fair(system, tips):  # has its kind's keys; lengths in units of about its size (translation along planes: any)
     need(system.keys() <= {*f"kind reaches tips boxes bound places {KINDS[system['kind']][1]}".split()}, "another key")
     need(len(tips) < 50 and all(len(b) == 3 for b in tips), "tips of another dimension, or too many")
@@ -339,28 +506,52 @@ def fair(system, tips):  # has its kind's keys; lengths in units of about its si
     extent = max(abs(x) for span in radii + spans for x in span)
     need(extent > Fraction(1, 1000) or not reaches or (system["kind"] == "shifting" and not radii), "another unit")
     return extent
-def moved(D, x): return [dot(row, x) for row in D]  # a point (x, y, z, 1) or direction (x, y, z, 0) of a link
+
+
+def moved(D, x):
+    return [dot(row, x) for row in D]  # a point (x, y, z, 1) or direction (x, y, z, 0) of a link
+
+
 def turn_of(P):  # the rotation of a pose
     turn = [row[:3] for row in P]
-    need([*map(len, P)] == [4] * 3 and dot(cross(*turn[:2]), turn[2]) > 0 and all(
-        abs(dot(u, v) - (u is v)) < FIT for u in turn for v in turn), "no pose")
+    need(
+        [*map(len, P)] == [4] * 3
+        and dot(cross(*turn[:2]), turn[2]) > 0
+        and all(abs(dot(u, v) - (u is v)) < FIT for u in turn for v in turn),
+        "no pose",
+    )
     return turn
+
+
 def closes(robot, links):  # its joints fit to 1e-9 with links displaced since zero, and what is held is as told
     D, off = {name: rational(rows) for name, rows in links.items()}, []
     turns = {name: turn_of(rows) for name, rows in D.items()}
     for kind, one, other, *vectors in robot["joints"]:  # the point, then axes
         x = rational(vectors)
         (p, *u), (q, *v) = ([moved(D[link], y) for y in x] for link in (one, other))
-        need(len(u) == {"R": 1, "P": 1, "C": 1, "E": 1, "U": 2, "S": 0, "F": 0}[kind] and x[0][3] == 1
-             and all(y[3] == 0 and dot(y, y) > Fraction(1, 2) for y in x[1:]), "a joint of another kind")
+        need(
+            len(u) == {"R": 1, "P": 1, "C": 1, "E": 1, "U": 2, "S": 0, "F": 0}[kind]
+            and x[0][3] == 1
+            and all(y[3] == 0 and dot(y, y) > Fraction(1, 2) for y in x[1:]),
+            "a joint of another kind",
+        )
         off += sub(p, q) if kind in "RUSF" else [dot(sub(p, q), u[0])] if kind == "E" else cross(sub(p, q), u[0])
-        off += (sub(u[0], v[0]) if kind in "RCE" else [dot(u[0], v[1]) - dot(*x[1:])] if kind == "U" else
-                [z for rows in zip(turns[one], turns[other]) for z in sub(*rows)] if kind in "PF" else [])
+        off += (
+            sub(u[0], v[0])
+            if kind in "RCE"
+            else [dot(u[0], v[1]) - dot(*x[1:])]
+            if kind == "U"
+            else [z for rows in zip(turns[one], turns[other]) for z in sub(*rows)]
+            if kind in "PF"
+            else []
+        )
     for one, other, vector, seen in robot["held"]:  # a direction or point of a link, seen from another
         at = sub(moved(D[one], rational(vector)), [row[3] * rational(vector)[3] for row in D[other]])
         off += sub([dot(column, at) for column in zip(*turns[other])], rational(seen))
     need(robot["held"] and robot["joints"] and all(abs(x) < FIT for x in off), "an open joint, or another measurement")
     return True
+
+
 def told(system, each, points, tips, m, r):  # whether the pose puts the tips where the box does
     turn, P, within = turn_of(rational(each["pose"])), rational(each["pose"]), rational(each["within"])
     need(within <= WITHIN and (system["kind"] != "shifting" or all(turn[i][i] == 1 for i in range(3))), "another pose")
@@ -369,18 +560,36 @@ def told(system, each, points, tips, m, r):  # whether the pose puts the tips wh
         start = rational(system["hub"]) if k >= len(tips) - arrows else [row[3] for row in P]
         at = [value(p, m)[0] / value(w, m)[0] for p in N]
         off = max(change(minus(p, times(x, w)), m, r) / least(w, m, r) for p, x in zip(N, at))
-        need(body or all(abs(x - start[i] - dot(turn[i], b)) + off <= within for i, x in enumerate(at)),
-             "a tip that is not where its box is")
+        need(
+            body or all(abs(x - start[i] - dot(turn[i], b)) + off <= within for i, x in enumerate(at)),
+            "a tip that is not where its box is",
+        )
         if "links" in each:
             (origin, *rows, (unit,)), (link, x) = rational(system["places"]["frame"]), system["places"]["tips"][k]
             there = sub(moved(rational(each["links"][link]), rational(x)), [int(x[3]) * c for c in origin])
-            need(x[3] in ("0", "1") and all(abs(dot(u, v) - (u is v)) < FIT for u in rows for v in rows) and all(
-                abs(v - dot(row, there) / unit - (x[3] == "0") * c) + off <= WITHIN
-                for v, row, c in zip(at, rows, start, strict=True)), "a tip that is not on its link")
+            need(
+                x[3] in ("0", "1")
+                and all(abs(dot(u, v) - (u is v)) < FIT for u in rows for v in rows)
+                and all(
+                    abs(v - dot(row, there) / unit - (x[3] == "0") * c) + off <= WITHIN
+                    for v, row, c in zip(at, rows, start, strict=True)
+                ),
+                "a tip that is not on its link",
+            )
+
+
 def digest(record):
-    return hashlib.sha256(json.dumps({key: each for key, each in record.items() if key != "sha256"}, sort_keys=True,
-                                     separators=(",", ":")).encode()).hexdigest()
-def once(pairs): return need(len(dict(pairs)) == len(pairs), "a duplicate key") or dict(pairs)  # of JSON: read as one
+    return hashlib.sha256(
+        json.dumps(
+            {key: each for key, each in record.items() if key != "sha256"}, sort_keys=True, separators=(",", ":")
+        ).encode()
+    ).hexdigest()
+
+
+def once(pairs):
+    return need(len(dict(pairs)) == len(pairs), "a duplicate key") or dict(pairs)  # of JSON: read as one
+
+
 def verify(record):  # what a certificate proves, in words; raises NotAccepted
     try:
         need(isinstance(record, dict) and record.get("format") == "hrsynth-certificate-1", "this is no certificate")
@@ -389,6 +598,8 @@ def verify(record):  # what a certificate proves, in words; raises NotAccepted
         return modes(record)
     except Exception as error:
         raise error if isinstance(error, NotAccepted) else NotAccepted(f"no certificate: {error!r}") from None
+
+
 def main(name):  # prints the answer
     try:
         with open(name, encoding="utf-8") as file:
@@ -396,5 +607,7 @@ def main(name):  # prints the answer
         print("accepted:", verify(json.loads(text, object_pairs_hook=once)))
     except (NotAccepted, OSError, ValueError, RecursionError) as error:
         return print("refused:", error) or 3
+
+
 if __name__ == "__main__":
     sys.exit(main(sys.argv[-1]))

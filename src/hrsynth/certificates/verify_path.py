@@ -267,11 +267,14 @@ def path(record: Any) -> str:
     of = f"(platform: translations {len(motion['along'])}, rotations {len(motion['about'])})"
     if record["verdict"] == "separated":
         need(len(nodes) == 2 and len({tuple(each) for each in modes[1:]}) == len(modes) - 1 > 0, "two poses, and modes")
-        first, *last = (sign(condition(record, each, *place(motion, nodes[k > 0], nodes[k > 0])))
-                        for k, each in enumerate(modes))
+        first, *last = (
+            sign(condition(record, each, *place(motion, nodes[k > 0], nodes[k > 0]))) for k, each in enumerate(modes)
+        )
         need(first not in last, "the condition has one sign at both poses")
-        return (f"separated: the condition has opposite signs at two poses, at the second one in {len(last)} of "
-                f"{2 ** len(record['legs'])} working modes {of}")
+        return (
+            f"separated: the condition has opposite signs at two poses, at the second one in {len(last)} of "
+            f"{2 ** len(record['legs'])} working modes {of}"
+        )
     need(len(modes) == 1, "one set of working modes")
     signs = {sign(condition(record, modes[0], *place(motion, *piece))) for piece in pairwise(nodes)}
     need(len(signs) == 1, "the condition changes its sign")

@@ -9,11 +9,16 @@ import json
 import sys
 
 PRIME, LENGTH, MOST = 2147483647, 5_000_000, 300  # of a file; of rows and columns
+
+
 class RanksNotAccepted(Exception):
     """Why a certificate is not accepted."""
+
+
 def need(true, why):
     if not true:
         raise RanksNotAccepted(why)
+
 
 def modular(rows, first):  # the ranks modulo the prime of the first columns and of all: where echelons begin
     echelon = {}
@@ -25,13 +30,21 @@ def modular(rows, first):  # the ranks modulo the prime of the first columns and
                 break
             row = [(a - row[k] * b) % PRIME for a, b in zip(row, echelon[k], strict=True)] if row[k] else row
     return sum(k < first for k in echelon), len(echelon)
+
+
 def ranks(record):
-    need(0 < len(record["stacks"]) < 8 and record["matrices"].keys() <= {"A", "X", "Y"},
-         "no stack, more than 7, or a matrix of another name")
+    need(
+        0 < len(record["stacks"]) < 8 and record["matrices"].keys() <= {"A", "X", "Y"},
+        "no stack, more than 7, or a matrix of another name",
+    )
     for each in record["stacks"]:
         rows, kernel = [row for name in each["of"] for row in record["matrices"][name]], each["kernel"]
-        need(rows and all(type(c) is int for row in [*rows, *kernel, [each["rank"]]] for c in row)
-             and len(set(each["of"])) == len(each["of"]), "matrices of integers, each once")
+        need(
+            rows
+            and all(type(c) is int for row in [*rows, *kernel, [each["rank"]]] for c in row)
+            and len(set(each["of"])) == len(each["of"]),
+            "matrices of integers, each once",
+        )
         sizes = map(len, (rows, rows[0], kernel, each["rows"], each["columns"]))
         need(max(sizes) <= MOST, f"more than {MOST} rows or columns")
         minor = [[rows[i][j] % PRIME for j in each["columns"]] for i in each["rows"]]
@@ -40,12 +53,18 @@ def ranks(record):
         need({len(row) for row in rows + kernel} == {each["rank"] + len(kernel)}, "too few vectors that are annulled")
         need(modular([[c % PRIME for c in v] for v in kernel], 0)[1] == len(kernel), "vectors that are dependent")
     return "; ".join(f"rank [{'; '.join(each['of'])}] = {each['rank']}" for each in record["stacks"])
+
+
 def digest(record):
     rest = {key: each for key, each in record.items() if key != "sha256"}
     return hashlib.sha256(json.dumps(rest, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
+
+
 def once(pairs):  # an object of JSON; of two keys a reader may see one, Python the other
     need(len(dict(pairs)) == len(pairs), "a duplicate key")
     return dict(pairs)
+
+
 def verify(record):  # what a certificate proves, in words; raises RanksNotAccepted
     try:
         need(isinstance(record, dict) and record.get("format") == "hrsynth-certificate-1", "this is no certificate")
@@ -54,6 +73,8 @@ def verify(record):  # what a certificate proves, in words; raises RanksNotAccep
         return ranks(record)
     except Exception as error:
         raise error if isinstance(error, RanksNotAccepted) else RanksNotAccepted(f"no certificate: {error!r}") from None
+
+
 def main(name):  # prints the answer
     try:
         with open(name, encoding="utf-8") as file:
@@ -61,5 +82,7 @@ def main(name):  # prints the answer
         print("accepted:", verify(json.loads(text, object_pairs_hook=once)))
     except (RanksNotAccepted, OSError, ValueError, RecursionError) as error:
         return print("refused:", error) or 3
+
+
 if __name__ == "__main__":
     sys.exit(main(sys.argv[-1]))

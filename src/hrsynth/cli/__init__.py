@@ -23,8 +23,11 @@ def _version() -> str:
     return __version__
 
 
-app = Group("hrsynth", "Hidden robots of parallel robots that are controlled by watching the directions of their legs.",
-            _version)
+app = Group(
+    "hrsynth",
+    "Hidden robots of parallel robots that are controlled by watching the directions of their legs.",
+    _version,
+)
 for question in QUESTIONS:
     question.add(app)
 lint.add(app)
@@ -51,8 +54,11 @@ def main(arguments: list[str] | None = None) -> None:
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(encoding="utf-8", errors="replace")
     if not os.path.isfile(__file__):
-        say(f"hrsynth: it runs from a folder, not from an archive, found {os.path.dirname(os.path.dirname(__file__))}, "
-            "allowed: a package that pip installs", err=True)
+        say(
+            f"hrsynth: it runs from a folder, not from an archive, found {os.path.dirname(os.path.dirname(__file__))}, "
+            "allowed: a package that pip installs",
+            err=True,
+        )
         sys.exit(2)
     sys.exit(execute(arguments))
 

@@ -28,30 +28,48 @@ if TYPE_CHECKING:
     from ..catalog.build import WordSource
     from ..mechanism import Mechanism
 
-catalog = Group("hrsynth catalog", "The catalog of architectures: what can be controlled by watching legs.",
-                examples=("list --legs 3-R*RR --verdict controllable", "show Delta -o delta.urdf", "list -h"))
+catalog = Group(
+    "hrsynth catalog",
+    "The catalog of architectures: what can be controlled by watching legs.",
+    examples=("list --legs 3-R*RR --verdict controllable", "show Delta -o delta.urdf", "list -h"),
+)
 VERDICTS = ("controllable", "partially controllable", "uncontrollable")
-KEPT = Option("kept", "A folder or SQLite file; or published: the shipped catalog of published robots; or all: this "
-              "and the shipped catalog of words (default: all for list, else that of words).", "PATH",
-              flags=("--catalog",))
+KEPT = Option(
+    "kept",
+    "A folder or SQLite file; or published: the shipped catalog of published robots; or all: this "
+    "and the shipped catalog of words (default: all for list, else that of words).",
+    "PATH",
+    flags=("--catalog",),
+)
 WORKERS = Option("workers", "Processes that share the work.", None, int, 1, low=1)
-TABLES = Option("tables", "Take robots of published tables (their format is on the page 'audit') instead of the words "
-                "listed here.", "FOLDER")
+TABLES = Option(
+    "tables",
+    "Take robots of published tables (their format is on the page 'audit') instead of the words listed here.",
+    "FOLDER",
+)
 ANEW = flag("anew", "Discard the results of an interrupted build.")
 FILTER = (
     Option("legs", "Number of legs, or a pattern of the notation or of one leg's chain: 3-R*, PUS.", "LEGS"),
     Option("dof", "Freedoms of the platform.", kind=int, low=0),
     Option("motion", "Its translations and rotations, such as 3T or 2T1R."),
     Option("verdict", f"{', '.join(VERDICTS)}.", words=VERDICTS),
-    Option("see", "What is seen of the platform instead of legs, such as 3point or 2point+image_line; add ' for one "
-           "camera each.", "KINDS"),
-    Option("group", "planar, mixed, pods, deltas, schoenflies, spatial, sensors; for published tables 3T0R and the "
-           "like."),
+    Option(
+        "see",
+        "What is seen of the platform instead of legs, such as 3point or 2point+image_line; add ' for one camera each.",
+        "KINDS",
+    ),
+    Option(
+        "group", "planar, mixed, pods, deltas, schoenflies, spatial, sensors; for published tables 3T0R and the like."
+    ),
     Option("base_motors", "Whether all motors are on the base.", kind=bool, flags=("--base-motors/--moving-motors",)),
     Option("motors", "Kinds of all driven joints: R, P, U, C, or several joined by +.", "KINDS"),
     Option("driven", "Whether the motors determine all freedoms.", kind=bool, flags=("--driven/--not-driven",)),
-    Option("parallelograms", "Whether a leg has a parallelogram, or two equal parallel rods.", kind=bool,
-           flags=("--parallelograms/--no-parallelograms",)),
+    Option(
+        "parallelograms",
+        "Whether a leg has a parallelogram, or two equal parallel rods.",
+        kind=bool,
+        flags=("--parallelograms/--no-parallelograms",),
+    ),
     Option("fewest", "Number of legs that must be watched.", kind=int, low=0),
     Option("modes", "Number of assembly modes, complex ones too.", kind=int, low=0),
     Option("text", "Text that occurs in any field, or a name: Delta."),
@@ -65,8 +83,19 @@ def _say(command: str, fields: dict[str, Any], text: str, json: bool) -> None:
     say(record(f"catalog {command}", None, fields) if json else text)
 
 
-def build(groups: list[str] | None, output: str | None, tables: str | None, workers: int, cluster: str | None,
-          check: bool, sample: int | None, limit: int | None, anew: bool, json: bool, seed: int) -> None:
+def build(
+    groups: list[str] | None,
+    output: str | None,
+    tables: str | None,
+    workers: int,
+    cluster: str | None,
+    check: bool,
+    sample: int | None,
+    limit: int | None,
+    anew: bool,
+    json: bool,
+    seed: int,
+) -> None:
     """Build the catalog or (``check``) compare what is stored with what would be built."""
     from ..errors import BadRequest, CatalogStale
 
@@ -82,8 +111,16 @@ def build(groups: list[str] | None, output: str | None, tables: str | None, work
         from ..catalog.store import shipped_folder
 
         with Progress(counted=True) as progress:
-            stale = run(output or shipped_folder(), groups or [], source=source, workers=workers, cluster=cluster,
-                        sample=sample, seed=seed, tell=progress.count)
+            stale = run(
+                output or shipped_folder(),
+                groups or [],
+                source=source,
+                workers=workers,
+                cluster=cluster,
+                sample=sample,
+                seed=seed,
+                tell=progress.count,
+            )
         if json or not stale:
             _say("build", {"stale": stale}, "not stale", json)
         if stale:
@@ -94,8 +131,19 @@ def build(groups: list[str] | None, output: str | None, tables: str | None, work
 
     target = _target(output)
     with Progress(counted=True) as progress:
-        done = [each.to_dict() for each in make(target, groups or [], source=source, workers=workers,
-                                                cluster=cluster, limit=limit, anew=anew, tell=progress.count)]
+        done = [
+            each.to_dict()
+            for each in make(
+                target,
+                groups or [],
+                source=source,
+                workers=workers,
+                cluster=cluster,
+                limit=limit,
+                anew=anew,
+                tell=progress.count,
+            )
+        ]
     _say("build", {"groups": done}, describe_built(done), json)
 
 
@@ -107,8 +155,12 @@ def entries(kept: str | None, json: bool, **asked: Any) -> None:
 
     kept = kept or ALL
     found, total, groups = _asked(kept, asked), count(kept, **asked), covered(kept, **asked)
-    _say("list", {"total": total, "groups": groups, "entries": [dict(each) for each in found] if json else []},
-         "" if json else written(found.records, total, groups), json)
+    _say(
+        "list",
+        {"total": total, "groups": groups, "entries": [dict(each) for each in found] if json else []},
+        "" if json else written(found.records, total, groups),
+        json,
+    )
 
 
 def _asked(kept: str | None, asked: dict[str, Any]) -> Catalog:
@@ -139,21 +191,36 @@ def _require_known(kept: str | None, asked: dict[str, Any]) -> None:
 
     groups = groups_of(kept)
     named = {"group": groups, "verdict": VERDICTS}
-    for name, field in (("group", ""), ("verdict", ""), ("motion", "motion"), ("dof", "dof"), ("fewest", "fewest"),
-                        ("modes", "modes_bound")):
+    for name, field in (
+        ("group", ""),
+        ("verdict", ""),
+        ("motion", "motion"),
+        ("dof", "dof"),
+        ("fewest", "fewest"),
+        ("modes", "modes_bound"),
+    ):
         if asked[name] is not None and asked[name] not in (
-                known := named[name] if name in named else values(field, kept)):
-            raise BadRequest(f"no architecture of the catalog has this --{name}", asked[name],
-                             list(map(str, sorted(known))))
+            known := named[name] if name in named else values(field, kept)
+        ):
+            raise BadRequest(
+                f"no architecture of the catalog has this --{name}", asked[name], list(map(str, sorted(known)))
+            )
     if asked["legs"] is not None and not load(kept, group=tuple(groups), legs=asked["legs"]):
-        raise BadRequest("no architecture of the catalog has such legs", asked["legs"], "their number, "
-                         f"{', '.join(map(str, values('legs', kept)))}, or a pattern in which * and ? stand for "
-                         "letters: 3-R*RR, PUS, 6-*")
+        raise BadRequest(
+            "no architecture of the catalog has such legs",
+            asked["legs"],
+            "their number, "
+            f"{', '.join(map(str, values('legs', kept)))}, or a pattern in which * and ? stand for "
+            "letters: 3-R*RR, PUS, 6-*",
+        )
     if asked["text"] is not None and not load(kept, group=tuple(groups), text=asked["text"]):
         near = {name.casefold(): name for names in _names() for name in (names, *names.split())}
         close = get_close_matches(asked["text"].casefold(), near, cutoff=0.5)
-        raise BadRequest("no architecture of the catalog has this --text in a field or a name", asked["text"],
-                         ", ".join([near[name] for name in close] or _names()[:3]) + " …")
+        raise BadRequest(
+            "no architecture of the catalog has this --text in a field or a name",
+            asked["text"],
+            ", ".join([near[name] for name in close] or _names()[:3]) + " …",
+        )
 
 
 def show(word: str, output: str | None, tables: str | None, kept: str | None, json: bool) -> None:
@@ -169,17 +236,29 @@ def show(word: str, output: str | None, tables: str | None, kept: str | None, js
         found = _of_word(word, kept) if tables is None else _of_tables(word, tables, kept)
         if output is not None:
             if "refused" in found.record:
-                raise BadRequest(f"no robot of a refused architecture is written: {found.record['refused']}", word,
-                                 "an architecture with a verdict: hrsynth catalog list")
+                raise BadRequest(
+                    f"no robot of a refused architecture is written: {found.record['refused']}",
+                    word,
+                    "an architecture with a verdict: hrsynth catalog list",
+                )
             robot = found.mechanism()
         smallest = [] if found.studied is None else smallest_sets(found.record, found.studied())
     if output is not None:
         for warning in save(robot, output):
             warn(str(warning))
-    _say("show", {"entry": dict(found.record), "drawing": found.drawn.splitlines(), "note": found.note or None,
-                  "smallest": smallest, "file": output},
-         entry(found.record, found.drawn, found.note, smallest)
-         + ("" if output is None else f"\n\nThe robot is written to {output}."), json)
+    _say(
+        "show",
+        {
+            "entry": dict(found.record),
+            "drawing": found.drawn.splitlines(),
+            "note": found.note or None,
+            "smallest": smallest,
+            "file": output,
+        },
+        entry(found.record, found.drawn, found.note, smallest)
+        + ("" if output is None else f"\n\nThe robot is written to {output}."),
+        json,
+    )
 
 
 @dataclass(frozen=True)
@@ -213,9 +292,13 @@ def _of_word(text: str, kept: str | None) -> _Shown:
     word, others = _word(text, kept)
     architecture = parse(word)
     record, note = _known_record(str(architecture), kept)
-    return _Shown(record, drawing(architecture), "; ".join(each for each in (note, others) if each),
-                  lambda: mechanism(architecture, record.get("attempt", 0)),
-                  lambda: mechanism(model(architecture), record.get("attempt", 0)))
+    return _Shown(
+        record,
+        drawing(architecture),
+        "; ".join(each for each in (note, others) if each),
+        lambda: mechanism(architecture, record.get("attempt", 0)),
+        lambda: mechanism(model(architecture), record.get("attempt", 0)),
+    )
 
 
 def _of_tables(name: str, folder: str, kept: str | None) -> _Shown:
@@ -245,8 +328,10 @@ def site(output: str, workers: int, anew: bool, kept: str | None, json: bool, **
     if all(value is None for value in asked.values()):
         found, every = Catalog([each for each in found if equal_legs(each["word"])]), len(found)
         if len(found) < every:
-            warn(f"{every - len(found):,} architectures with unequal legs get no page; "
-                 "select them, for example by --group")
+            warn(
+                f"{every - len(found):,} architectures with unequal legs get no page; "
+                "select them, for example by --group"
+            )
     if seen := [each["word"] for each in found if "see" in each]:
         raise BadRequest("no pages are made for words with sensors", seen[0], "hrsynth catalog show, list")
     if published := [each["word"] for each in found if "choices" in each]:
@@ -255,8 +340,9 @@ def site(output: str, workers: int, anew: bool, kept: str | None, json: bool, **
         done = run(found, output, workers=workers, anew=anew, tell=progress.count)
     if done.differ:
         word, derived = done.differ[0]
-        warn(f"{len(done.differ)} derivations do not end in what the catalog says, the first: {word}, "
-             f"derived {derived}")
+        warn(
+            f"{len(done.differ)} derivations do not end in what the catalog says, the first: {word}, derived {derived}"
+        )
     _say("site", done.to_dict(), describe_site(done.to_dict()), json)
 
 
@@ -269,8 +355,14 @@ def audit(folder: str, output: str | None, only: str | None, sample: int | None,
     if output is not None and Path(output).suffix != ".jsonl":
         raise BadRequest("records are kept one per line", output, "a file that ends in .jsonl")
     with Progress(counted=True) as progress:
-        found = run(folder, only=only, sample=sample, seed=seed, kept=output,
-                    tell=lambda _, done, total: progress.count("robots", done, total)).to_dict()
+        found = run(
+            folder,
+            only=only,
+            sample=sample,
+            seed=seed,
+            kept=output,
+            tell=lambda _, done, total: progress.count("robots", done, total),
+        ).to_dict()
     for defect in found["defects"]:
         warn(defect)
     _say("audit", {**found, "file": output}, describe_audit(found), json)
@@ -290,9 +382,11 @@ def _word(text: str, kept: str | None) -> tuple[str, str]:
         if not found and "(" in text:
             raise
         if not found:
-            raise BadRequest("no architecture of the catalog has this name or such legs", text,
-                             f"a word such as '3(Rz*-Rz-Rz)'; hrsynth catalog list --text {shlex.quote(text)} searches "
-                             "all fields") from None
+            raise BadRequest(
+                "no architecture of the catalog has this name or such legs",
+                text,
+                f"a word such as '3(Rz*-Rz-Rz)'; hrsynth catalog list --text {shlex.quote(text)} searches all fields",
+            ) from None
     word = found[0]["word"]
     more = [f"{len(found)} have this name: {', '.join(each['word'] for each in found[1:4])} …"] if found[1:] else []
     return word, "; ".join([*filter(None, [alias(word)]), *more])
@@ -338,34 +432,92 @@ def _target(output: str | None) -> Path:
 
 
 COMMANDS = (
-    ("build", "Build the catalog, or continue an interrupted build; the bytes are the same whoever builds it.", build,
-     (Option("groups", "Groups (default: all).", "[GROUP]...", list[str], argument=True),
-      output("A folder, or a file that ends in .sqlite (default: catalog/ of the checkout).", "PATH"), TABLES, WORKERS,
-      Option("cluster", "A dask cluster that shares the work.", "ADDRESS"),
-      flag("check", "Build nothing: compare what is stored (default: what is shipped) with what would be built; exit 3 "
-           "if it is stale."),
-      Option("sample", "With --check: compare only this many records of each group, drawn at random, and all words.",
-             "N", int, low=0),
-      Option("limit", "Stop after this many new records; the same command continues.", "N", int, low=0), ANEW, JSON,
-      Option("seed", "Seed of --sample.", None, int, 0, low=0))),
+    (
+        "build",
+        "Build the catalog, or continue an interrupted build; the bytes are the same whoever builds it.",
+        build,
+        (
+            Option("groups", "Groups (default: all).", "[GROUP]...", list[str], argument=True),
+            output("A folder, or a file that ends in .sqlite (default: catalog/ of the checkout).", "PATH"),
+            TABLES,
+            WORKERS,
+            Option("cluster", "A dask cluster that shares the work.", "ADDRESS"),
+            flag(
+                "check",
+                "Build nothing: compare what is stored (default: what is shipped) with what would be built; exit 3 "
+                "if it is stale.",
+            ),
+            Option(
+                "sample",
+                "With --check: compare only this many records of each group, drawn at random, and all words.",
+                "N",
+                int,
+                low=0,
+            ),
+            Option("limit", "Stop after this many new records; the same command continues.", "N", int, low=0),
+            ANEW,
+            JSON,
+            Option("seed", "Seed of --sample.", None, int, 0, low=0),
+        ),
+    ),
     ("list", "The architectures that fit.", entries, (*FILTER, KEPT, JSON)),
-    ("show", "One architecture, drawn and in full; one that is not in the catalog is analysed on request.", show,
-     (Option("word", "An architecture, such as '3(Rz*-Rz-Rz)', or a name or legs: Delta, 3-RPS; with --tables a robot "
-             "of these.", "WORD", default=NEEDED, argument=True),
-      output("Write a robot of this architecture (.urdf, or another dialect)."), TABLES, KEPT, JSON)),
-    ("site", "Web pages of the architectures that fit: a list with filters, drawings, derivations, robot files; they "
-     "need no server.", site,
-     (output("A new or empty folder, or an older site, which is replaced.", "DIR", NEEDED), *FILTER, WORKERS, ANEW,
-      KEPT, JSON)),
-    ("audit", "Compare published tables of symmetric parallel robots with what is computed: kind of motion, working "
-     "motors, loss of rank.", audit,
-     (Option("folder", "A folder with chains/, robots/ and synthesis/ (their format is on the page 'audit').", "FOLDER",
-             default=NEEDED, argument=True),
-      output("Keep the records, one line per robot, with the instances modulo primes; the same command continues "
-             "there.", "FILE.jsonl"),
-      Option("only", "One group of the tables, such as 3T1R."),
-      Option("sample", "Only this many robots of each group, drawn at random.", "N", int, low=1), JSON,
-      Option("seed", "Seed of --sample and of dimensions and configurations.", None, int, 0, low=0))),
+    (
+        "show",
+        "One architecture, drawn and in full; one that is not in the catalog is analysed on request.",
+        show,
+        (
+            Option(
+                "word",
+                "An architecture, such as '3(Rz*-Rz-Rz)', or a name or legs: Delta, 3-RPS; with --tables a robot "
+                "of these.",
+                "WORD",
+                default=NEEDED,
+                argument=True,
+            ),
+            output("Write a robot of this architecture (.urdf, or another dialect)."),
+            TABLES,
+            KEPT,
+            JSON,
+        ),
+    ),
+    (
+        "site",
+        "Web pages of the architectures that fit: a list with filters, drawings, derivations, robot files; they "
+        "need no server.",
+        site,
+        (
+            output("A new or empty folder, or an older site, which is replaced.", "DIR", NEEDED),
+            *FILTER,
+            WORKERS,
+            ANEW,
+            KEPT,
+            JSON,
+        ),
+    ),
+    (
+        "audit",
+        "Compare published tables of symmetric parallel robots with what is computed: kind of motion, working "
+        "motors, loss of rank.",
+        audit,
+        (
+            Option(
+                "folder",
+                "A folder with chains/, robots/ and synthesis/ (their format is on the page 'audit').",
+                "FOLDER",
+                default=NEEDED,
+                argument=True,
+            ),
+            output(
+                "Keep the records, one line per robot, with the instances modulo primes; the same command continues "
+                "there.",
+                "FILE.jsonl",
+            ),
+            Option("only", "One group of the tables, such as 3T1R."),
+            Option("sample", "Only this many robots of each group, drawn at random.", "N", int, low=1),
+            JSON,
+            Option("seed", "Seed of --sample and of dimensions and configurations.", None, int, 0, low=0),
+        ),
+    ),
 )
 EXAMPLES = {
     "build": ("planar -o mine.sqlite", "--check --sample 20", "3T1R --tables tables -o published.sqlite"),

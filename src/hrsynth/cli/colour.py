@@ -14,8 +14,17 @@ from ..characters import escape_steering
 VERDICTS = {
     "green": ("controllable", "regular", "same aspect", "goal", "passed"),
     "yellow": ("partially controllable", "nothing to control", "not decided", "undecided"),
-    "red": ("uncontrollable", "separated", "FAILED", r"Type [123] singularity", "constraint singularity", "boundary",
-            "local minimum", "antipodal", "lost from sight"),
+    "red": (
+        "uncontrollable",
+        "separated",
+        "FAILED",
+        r"Type [123] singularity",
+        "constraint singularity",
+        "boundary",
+        "local minimum",
+        "antipodal",
+        "lost from sight",
+    ),
 }
 """Words that end a question well, not wholly, badly; they stand first in their row, or as a cell of a table."""
 CODES = {"green": 32, "yellow": 33, "red": 31}
@@ -25,8 +34,7 @@ _TITLE = re.compile(r"^([a-zA-Z][^ ]*(?: [^ ]+){0,3})(  +)(?=\S)", re.MULTILINE)
 
 
 def say(text: str, *, err: bool = False, paint: Callable[[str], str] = str) -> None:
-    """Print a text to standard output, painted, or to standard error: where that takes nothing, nothing is said there.
-    """
+    """Print a text to standard output, painted, or to standard error: if that takes nothing, nothing is said there."""
     if not err:
         print(paint(escape_steering(text)), flush=True)
         return

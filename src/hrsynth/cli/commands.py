@@ -54,8 +54,12 @@ class DeclaredCommand:
         """
         from argparse import SUPPRESS, ArgumentError, ArgumentParser
 
-        flags = {name: (each, told) for each in self.options for names in (*each.names, *each.old)
-                 for name, told in zip(names.split("/"), (True, False), strict=False)}
+        flags = {
+            name: (each, told)
+            for each in self.options
+            for names in (*each.names, *each.old)
+            for name, told in zip(names.split("/"), (True, False), strict=False)
+        }
         parser = ArgumentParser(add_help=False, allow_abbrev=False, exit_on_error=False, argument_default=SUPPRESS)
         for name, (option, told) in flags.items():
             how: dict[str, Any] = {"action": "append_const", "const": told} if option.kind is bool else {}
@@ -83,8 +87,11 @@ class DeclaredCommand:
                 raise BadRequest(f"{self.name}: no such option", name, f"{usual} for the pose of this question")
             if takers := [each.name for each in beside if any(name in option.names for option in each.options)]:
                 raise BadRequest(f"{self.name} has no such option", name, f"it belongs to {', '.join(takers)}")
-            raise BadRequest(f"{self.name}: no such option", name,
-                             get_close_matches(name, flags, cutoff=LIKE_A_FLAG) or sorted(flags))
+            raise BadRequest(
+                f"{self.name}: no such option",
+                name,
+                get_close_matches(name, flags, cutoff=LIKE_A_FLAG) or sorted(flags),
+            )
         for name in (word.partition("=")[0] for word in joined):
             if name in flags and name in flags[name][0].old:
                 warn(f"{name} is now called {flags[name][0].names[0]}; the old name will be removed in 0.4")
@@ -98,22 +105,29 @@ class DeclaredCommand:
         for option in self.options:
             if option.names_several and len(texts := given.get(option.name, ())) > 1:
                 raise BadRequest(f"{option.names[0]} is given {len(texts)} times", " ".join(texts), ",".join(texts))
-        read = {each: [each.read("--" if value == [] else value) for value in given[each.name]]
-                for each in self.options if each.name in given}
+        read = {
+            each: [each.read("--" if value == [] else value) for value in given[each.name]]
+            for each in self.options
+            if each.name in given
+        }
         if plain:
             raise BadRequest(f"{self.name} takes no more arguments", " ".join(plain), f"what {self.path} -h lists")
         missing = [each.shown for each in self.options if each.default is NEEDED and each not in read]
         if missing:
             raise BadRequest(f"{self.name} needs {' and '.join(missing)}")
-        return {each.name: each.default if each not in read else read[each] if each.several else read[each][-1]
-                for each in self.options}
+        return {
+            each.name: each.default if each not in read else read[each] if each.several else read[each][-1]
+            for each in self.options
+        }
 
     def help_text(self) -> str:
         """Usage, what it does, arguments, groups of options, examples."""
         arguments = [each for each in self.options if each.argument]
         needed = [each.shown.split(", ")[-1] for each in self.options if each.default is NEEDED and not each.argument]
-        parts = [*_head(self.path, [*(each.value for each in arguments), *needed, "[OPTIONS]"], self.help),
-                 *_section("Arguments", [(each.value, each.told) for each in arguments])]
+        parts = [
+            *_head(self.path, [*(each.value for each in arguments), *needed, "[OPTIONS]"], self.help),
+            *_section("Arguments", [(each.value, each.told) for each in arguments]),
+        ]
         for group in (OWN, WATCHING, OUTPUT, READING):
             rows = [(each.shown, each.told) for each in self.options if each.group == group and not each.argument]
             parts += _section(group, rows + [HELP_ROW] * (group == OUTPUT))
@@ -151,14 +165,24 @@ class Group:
     def help_text(self) -> str:
         """A row a command."""
         version = [] if self.version is None else [("--version", "Print the version.")]
-        return "\n\n".join([*_head(self.path, ["[OPTIONS]", "COMMAND", "[ARGS]..."], self.help),
-                            *_section("Options", [*version, HELP_ROW]),
-                            *_section("Commands", [(name, each.help) for name, each in self.commands.items()]),
-                            *_examples(self.path, self.examples)])
+        return "\n\n".join(
+            [
+                *_head(self.path, ["[OPTIONS]", "COMMAND", "[ARGS]..."], self.help),
+                *_section("Options", [*version, HELP_ROW]),
+                *_section("Commands", [(name, each.help) for name, each in self.commands.items()]),
+                *_examples(self.path, self.examples),
+            ]
+        )
 
 
-def add_command(group: Group, name: str, help: str, options: Sequence[Option], run: Callable[..., None],
-                examples: Sequence[str] = ()) -> None:
+def add_command(
+    group: Group,
+    name: str,
+    help: str,
+    options: Sequence[Option],
+    run: Callable[..., None],
+    examples: Sequence[str] = (),
+) -> None:
     """Add a command; the examples follow its name in its help."""
     group.commands[name] = DeclaredCommand(f"{group.path} {name}", help, options, run, examples)
 
@@ -174,8 +198,9 @@ def _width() -> int:
 
 
 def _fill_lines(text: str, width: int, first: str, more: str) -> str:
-    return textwrap.fill(text, width, initial_indent=first, subsequent_indent=more, break_on_hyphens=False,
-                         break_long_words=False)
+    return textwrap.fill(
+        text, width, initial_indent=first, subsequent_indent=more, break_on_hyphens=False, break_long_words=False
+    )
 
 
 def _head(path: str, words: Sequence[str], help: str) -> tuple[str, str]:

@@ -78,6 +78,7 @@ def _words(option: Option, last: str) -> Iterable[str]:
 
 def add(app: Group) -> None:
     """Make it a command."""
+
     def completion(shell: str, typed: list[str] | None) -> None:
         """Print a shell's script, or (asked by that) the words that can follow."""
         from ..errors import BadRequest
@@ -90,9 +91,14 @@ def add(app: Group) -> None:
         else:
             raise BadRequest("no completion for the shell", shell, tuple(SCRIPTS))
 
-    add_command(app, "completion", "Completion of commands, options and robots: a script for bash, zsh or fish.",
-                (Option("shell", "bash, zsh or fish.", "SHELL", default=NEEDED, argument=True, words=tuple(SCRIPTS)),
-                 Option("typed", "What was typed so far (used by the scripts).", "[WORD]...", list[str],
-                        argument=True)),
-                completion, ('bash >> ~/.bashrc', 'zsh >> ~/.zshrc',
-                             'fish > ~/.config/fish/completions/hrsynth.fish'))
+    add_command(
+        app,
+        "completion",
+        "Completion of commands, options and robots: a script for bash, zsh or fish.",
+        (
+            Option("shell", "bash, zsh or fish.", "SHELL", default=NEEDED, argument=True, words=tuple(SCRIPTS)),
+            Option("typed", "What was typed so far (used by the scripts).", "[WORD]...", list[str], argument=True),
+        ),
+        completion,
+        ("bash >> ~/.bashrc", "zsh >> ~/.zshrc", "fish > ~/.config/fish/completions/hrsynth.fish"),
+    )

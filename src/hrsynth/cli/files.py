@@ -22,20 +22,42 @@ def robots(examples: bool, json: bool) -> None:
 
     if examples:
         if json:
-            say(record("robots", None, {"robots": [{"name": f"example:{name}", "file": str(file)}
-                                                          for name, file in found().items()]}))
+            say(
+                record(
+                    "robots",
+                    None,
+                    {"robots": [{"name": f"example:{name}", "file": str(file)} for name, file in found().items()]},
+                )
+            )
         else:
-            say(table([(f"example:{name}", file.suffix[1:], file.parts[-3]) for name, file in found().items()],
-                             ("name", "format", "from example-robot-data")))
+            say(
+                table(
+                    [(f"example:{name}", file.suffix[1:], file.parts[-3]) for name, file in found().items()],
+                    ("name", "format", "from example-robot-data"),
+                )
+            )
         return
     files = shipped()
     if json:
-        rows = [{"name": each.name, "file": str(files.get(each.name, "")), "architecture_ascii": each.architecture,
-                 "dof": each.dof, "section": each.section, "dimensions": each.provenance} for each in ROBOTS]
+        rows = [
+            {
+                "name": each.name,
+                "file": str(files.get(each.name, "")),
+                "architecture_ascii": each.architecture,
+                "dof": each.dof,
+                "section": each.section,
+                "dimensions": each.provenance,
+            }
+            for each in ROBOTS
+        ]
         say(record("robots", None, {"robots": rows}))
     else:
-        say(table([(each.name, str(parse(each.architecture)), str(each.dof), each.section) for each in ROBOTS],
-                         ("name", "architecture", "dof", "source")))
+        say(
+            table(
+                [(each.name, str(parse(each.architecture)), str(each.dof), each.section) for each in ROBOTS],
+                ("name", "architecture", "dof", "source"),
+            )
+        )
 
 
 def convert(target: str | None, output: str | None, to: str | None, meshes: str, json: bool, **source: Any) -> None:
@@ -56,11 +78,19 @@ def convert(target: str | None, output: str | None, to: str | None, meshes: str,
         lost = [str(warning) for warning in save(mechanism, target, to, meshes=meshes)]
     for warning in lost:
         warn(warning)
-    fields = {"file": target, "files": files, "links": len(mechanism.links), "joints": len(mechanism.joints),
-              "warnings": lost}
-    say(record("convert", mechanism, fields) if json
-               else f"{mechanism.name} with {fields['links']} links and {fields['joints']} joints, platform "
-                    f"{mechanism.platform_words}, is written to {' and '.join(files)}.")
+    fields = {
+        "file": target,
+        "files": files,
+        "links": len(mechanism.links),
+        "joints": len(mechanism.joints),
+        "warnings": lost,
+    }
+    say(
+        record("convert", mechanism, fields)
+        if json
+        else f"{mechanism.name} with {fields['links']} links and {fields['joints']} joints, platform "
+        f"{mechanism.platform_words}, is written to {' and '.join(files)}."
+    )
 
 
 def verify(certificate: str, robot: str | None, json: bool) -> None:
@@ -72,29 +102,55 @@ def verify(certificate: str, robot: str | None, json: bool) -> None:
     mechanism = None if robot is None else load(robot)
     proved = checked(certificate, mechanism)
     fields = {"file": certificate, "accepted": True, "proved": proved}
-    say(record("verify", mechanism, fields)
-               if json else f"accepted: {proved}")
+    say(record("verify", mechanism, fields) if json else f"accepted: {proved}")
 
 
 def add(app: Group) -> None:
     """Make them commands."""
-    add_command(app, "verify", "Check a certificate of modes, derive or path, using only integers and fractions.",
-                (Option("certificate", "The certificate's file.", "FILE", default=NEEDED, argument=True),
-                 Option("robot", "Check that its geometry is that of this robot.", "ROBOT",
-                        words=options.shipped_names),
-                 JSON), verify,
-                ("c.json", "c.json --robot quattro"))
-    add_command(app, "robots", "The shipped robots.",
-                (flag("examples", "The robots of the package example-robot-data instead: legged robots, arms, hands."),
-                 JSON), robots, ("", "--examples"))
-    add_command(app, "convert", "Read a robot in any dialect and write it in another: .urdf native, .yaml Gepetto, "
-                ".xml MJCF, .sdf SDFormat, .usda, .usd or .usdc USD.",
-                (*SOURCE,
-                 Option("target", "The file to write; its extension selects the dialect.", "[OUT]", argument=True),
-                 output("The file to write, given as an option."),
-                 Option("meshes", "keep: meshes stay where they are, and the new file refers to them; copy: into "
-                        "meshes/ next to it.", default="keep", words=("keep", "copy"), group=OUTPUT),
-                 Option("to", "native, gepetto, mjcf, sdf or usd, whatever the extension.", "DIALECT",
-                                       words=("native", "gepetto", "mjcf", "sdf", "usd")), JSON), convert,
-                ("quattro quattro.xml", "leg.urdf -o robot.usda --meshes copy",
-                 "leg.urdf robot.yaml --to gepetto"))
+    add_command(
+        app,
+        "verify",
+        "Check a certificate of modes, derive or path, using only integers and fractions.",
+        (
+            Option("certificate", "The certificate's file.", "FILE", default=NEEDED, argument=True),
+            Option("robot", "Check that its geometry is that of this robot.", "ROBOT", words=options.shipped_names),
+            JSON,
+        ),
+        verify,
+        ("c.json", "c.json --robot quattro"),
+    )
+    add_command(
+        app,
+        "robots",
+        "The shipped robots.",
+        (flag("examples", "The robots of the package example-robot-data instead: legged robots, arms, hands."), JSON),
+        robots,
+        ("", "--examples"),
+    )
+    add_command(
+        app,
+        "convert",
+        "Read a robot in any dialect and write it in another: .urdf native, .yaml Gepetto, "
+        ".xml MJCF, .sdf SDFormat, .usda, .usd or .usdc USD.",
+        (
+            *SOURCE,
+            Option("target", "The file to write; its extension selects the dialect.", "[OUT]", argument=True),
+            output("The file to write, given as an option."),
+            Option(
+                "meshes",
+                "keep: meshes stay where they are, and the new file refers to them; copy: into meshes/ next to it.",
+                default="keep",
+                words=("keep", "copy"),
+                group=OUTPUT,
+            ),
+            Option(
+                "to",
+                "native, gepetto, mjcf, sdf or usd, whatever the extension.",
+                "DIALECT",
+                words=("native", "gepetto", "mjcf", "sdf", "usd"),
+            ),
+            JSON,
+        ),
+        convert,
+        ("quattro quattro.xml", "leg.urdf -o robot.usda --meshes copy", "leg.urdf robot.yaml --to gepetto"),
+    )

@@ -46,22 +46,33 @@ def importing(target: str, observe: str | None, yes: bool, view: bool, json: boo
     motors = [name for name, joint in mechanism.joints.items() if joint.actuated]
     notes = [str(note) for note in mechanism.notes]
     if not motors:
-        notes.append("open: no joint is driven, so nothing can be said about the real robot's motors "
-                     "(--motors JOINTS names the driven ones)")
+        notes.append(
+            "open: no joint is driven, so nothing can be said about the real robot's motors "
+            "(--motors JOINTS names the driven ones)"
+        )
         if not asking:
             warn(notes[-1])
     for warning in lost:
         warn(warning)
     again = repeat_command(source, observe, target)
     if json:
-        fields = {"file": target, "repeat": again, "links": len(mechanism.links), "joints": len(mechanism.joints),
-                  "base": mechanism.base, "motors": motors,
-                  "observed": {leg: seen.link for leg, seen in _segments(mechanism).items()},
-                  "notes": notes, "warnings": lost}
+        fields = {
+            "file": target,
+            "repeat": again,
+            "links": len(mechanism.links),
+            "joints": len(mechanism.joints),
+            "base": mechanism.base,
+            "motors": motors,
+            "observed": {leg: seen.link for leg, seen in _segments(mechanism).items()},
+            "notes": notes,
+            "warnings": lost,
+        }
         say(record("import", mechanism, fields))
     else:
-        say(f"{mechanism.name} with {len(mechanism.links)} links and {len(mechanism.joints)} joints, platform "
-                   f"{mechanism.platform_words}, is written to {target}.\nThe same without questions: {again}")
+        say(
+            f"{mechanism.name} with {len(mechanism.links)} links and {len(mechanism.joints)} joints, platform "
+            f"{mechanism.platform_words}, is written to {target}.\nThe same without questions: {again}"
+        )
 
 
 def repeat_command(source: dict[str, Any], observe: str | None, target: str) -> str:
@@ -99,8 +110,9 @@ def _segments(mechanism: Mechanism) -> dict[str, Observation]:
         return {}
 
 
-def _ask_all(path: Path, source: dict[str, Any], observe: str | None, target: str, view: bool
-              ) -> tuple[dict[str, Any], str | None]:
+def _ask_all(
+    path: Path, source: dict[str, Any], observe: str | None, target: str, view: bool
+) -> tuple[dict[str, Any], str | None]:
     """The questions, until the answers are confirmed; ends the command where they are given up."""
     status = 0
     try:
@@ -156,9 +168,17 @@ class _Dialog:
 
         given = self.source
         with Progress():
-            return choices(self.path, Overrides(
-                given["base"], None, names(given["motors"]), tuple(given["close"] or ()),
-                tuple(name for name in given["freeze"].split(",") if name), unit=given["unit"]))
+            return choices(
+                self.path,
+                Overrides(
+                    given["base"],
+                    None,
+                    names(given["motors"]),
+                    tuple(given["close"] or ()),
+                    tuple(name for name in given["freeze"].split(",") if name),
+                    unit=given["unit"],
+                ),
+            )
 
     def _mechanism(self) -> Mechanism | None:
         """The robot as answered; what is wrong is said, and there is none."""
@@ -209,23 +229,34 @@ class _Dialog:
 
         self.source["close"] = _answer(
             "Which are to be closed? Numbers, 2:revolute for a hinge about z, A:B[:TYPE] or A@x,y,z:B for others",
-            "none", lambda text: [] if text == "none" else chosen(text))
+            "none",
+            lambda text: [] if text == "none" else chosen(text),
+        )
 
     def _ask_base(self, found: ImportChoices) -> None:
-        say(f"\nBase: {found.bases[0]}" + (f", of {len(found.bases)} that no joint carries"
-                                                  if len(found.bases) > 1 else ""))
+        say(
+            f"\nBase: {found.bases[0]}"
+            + (f", of {len(found.bases)} that no joint carries" if len(found.bases) > 1 else "")
+        )
         if len(found.bases) > 1:
             _list(found.bases)
-        name = _answer("All of the robot, or only what lies between a link and the platform? Its name or number",
-                       "all", lambda text: text if text == "all" else _one(text, found.bases, found.links))
+        name = _answer(
+            "All of the robot, or only what lies between a link and the platform? Its name or number",
+            "all",
+            lambda text: text if text == "all" else _one(text, found.bases, found.links),
+        )
         self.source["base"] = None if name == "all" else name
 
     def _ask_platform(self, found: ImportChoices) -> None:
         why = found.why or "says the file"
         say(f"\nPlatform: {found.platforms[0]}, {why}" if found.told else "\nPlatform: several could be")
         _list(found.platforms)
-        name = _answer("Which link is the platform? A number or a name", found.platforms[0] if found.told else None,
-                       lambda text: _one(text, found.platforms, found.links), self._view)
+        name = _answer(
+            "Which link is the platform? A number or a name",
+            found.platforms[0] if found.told else None,
+            lambda text: _one(text, found.platforms, found.links),
+            self._view,
+        )
         if found.why is not None or name != found.platforms[0]:
             self.source["platform"] = name
 
@@ -240,15 +271,21 @@ class _Dialog:
             return ",".join(dict.fromkeys(_one(word, named, named) for word in _words(text)))
 
         as_told = "as told" if driven else "none"
-        answer = _answer("Which joints are driven? Numbers or names, with commas between", as_told,
-                         lambda text: text if text == as_told else chosen(text), self._view)
+        answer = _answer(
+            "Which joints are driven? Numbers or names, with commas between",
+            as_told,
+            lambda text: text if text == as_told else chosen(text),
+            self._view,
+        )
         self.source["motors"] = None if answer == as_told else answer
 
     def _show_robot(self, mechanism: Mechanism) -> None:
         points = [joint.point for joint in mechanism.joints.values()]
         span = max((float(abs(one - other).max()) for one in points for other in points), default=0.0)
-        say(f"\nRead: {mechanism.headline()}; base {mechanism.base}, platform {mechanism.platform}; its joints "
-                   f"span {span:.4g} m")
+        say(
+            f"\nRead: {mechanism.headline()}; base {mechanism.base}, platform {mechanism.platform}; its joints "
+            f"span {span:.4g} m"
+        )
         for note in mechanism.notes:
             say(f"  {note}")
 
@@ -267,8 +304,13 @@ class _Dialog:
 
     def _ask_segments(self, mechanism: Mechanism) -> str | None:
         segments = _segments(mechanism)
-        say("\nObserved: " + ("; ".join(f"leg {leg} at {seen.link}" for leg, seen in segments.items())
-                                     or "no leg has a segment that could be watched"))
+        say(
+            "\nObserved: "
+            + (
+                "; ".join(f"leg {leg} at {seen.link}" for leg, seen in segments.items())
+                or "no leg has a segment that could be watched"
+            )
+        )
         if not segments:
             return None
         from ..description.overrides import observe_links
@@ -369,13 +411,27 @@ def _word(joint: Any) -> str:
 
 def add(app: Group) -> None:
     """Make it a command."""
-    add_command(app, "import", "A guided reader: shows what a robot's file says and what is guessed, asks for "
-                "closures, base, platform, motors and segments, writes the native file, and prints the command that "
-                "does the same without questions. With --yes, or without a terminal, it accepts and reports guesses.",
-                (*SOURCE,
-                 Option("observe", "Links to watch, at their default segments.", "LINKS", group=WATCHING),
-                 flag("yes", "Ask no questions: accept the guesses."),
-                 flag("view", "Show the robot in the browser before the questions."),
-                 Option("target", "The file to write, in the native dialect.", "FILE", default=NEEDED,
-                        flags=("-o", "--output"), group=output("").group), JSON), importing,
-                ("leg.xml -o leg.urdf", "leg.urdf --close heel:toe:revolute --platform foot --yes -o own.urdf"))
+    add_command(
+        app,
+        "import",
+        "A guided reader: shows what a robot's file says and what is guessed, asks for "
+        "closures, base, platform, motors and segments, writes the native file, and prints the command that "
+        "does the same without questions. With --yes, or without a terminal, it accepts and reports guesses.",
+        (
+            *SOURCE,
+            Option("observe", "Links to watch, at their default segments.", "LINKS", group=WATCHING),
+            flag("yes", "Ask no questions: accept the guesses."),
+            flag("view", "Show the robot in the browser before the questions."),
+            Option(
+                "target",
+                "The file to write, in the native dialect.",
+                "FILE",
+                default=NEEDED,
+                flags=("-o", "--output"),
+                group=output("").group,
+            ),
+            JSON,
+        ),
+        importing,
+        ("leg.xml -o leg.urdf", "leg.urdf --close heel:toe:revolute --platform foot --yes -o own.urdf"),
+    )

@@ -28,8 +28,15 @@ def programs() -> Iterable[str]:
     return PROGRAMS
 
 
-def lint(files: list[str], format: str, fail_on: str, json: bool, reader: list[str] | None, ignore: list[str] | None,
-         **given: Any) -> None:
+def lint(
+    files: list[str],
+    format: str,
+    fail_on: str,
+    json: bool,
+    reader: list[str] | None,
+    ignore: list[str] | None,
+    **given: Any,
+) -> None:
     """Print what is found; exit status 1 where it is bad enough."""
     import hrsynth
 
@@ -61,18 +68,54 @@ def lint(files: list[str], format: str, fail_on: str, json: bool, reader: list[s
 
 def add(app: Group) -> None:
     """Make it a command."""
-    add_command(app, "lint", "What is wrong, doubtful or lost in robot files, by named rules, and how to mend it.",
-                (Option("files", "Robot files in any dialect, or names of shipped robots.", "FILES", list[str], NEEDED,
-                        argument=True, words=shipped_names),
-                 flag("fix", "Mend what can be mended in one way only, and overwrite the file or write to --output."),
-                 Option("compare", "Another file of the same robot: where the two differ.", "OTHER"),
-                 Option("reader", "A program that should read the file (mujoco, gazebo …): a closure that it loses is "
-                        "an error; repeat for more.", "NAME", list[str], words=programs),
-                 Option("ignore", "A rule to leave out; repeat for more.", "RULE", list[str], words=rules),
-                 Option("fail_on", "The mildest severity that makes the exit status 1: error, warning, note, nothing.",
-                        "SEVERITY", default="error", words=FAILING),
-                 Option("format", "text, github (annotations), sarif (2.1.0) or json.", default="text", words=FORMATS,
-                        group=OUTPUT),
-                 output("Where to write the mended file, with --fix and a single file."), JSON, *SOURCE[1:]), lint,
-                ("robot.urdf", "robot.urdf --fix -o mended.urdf", "robot.urdf --compare robot.xml",
-                 "a.urdf b.xml --reader mujoco --format github --fail-on warning"))
+    add_command(
+        app,
+        "lint",
+        "What is wrong, doubtful or lost in robot files, by named rules, and how to mend it.",
+        (
+            Option(
+                "files",
+                "Robot files in any dialect, or names of shipped robots.",
+                "FILES",
+                list[str],
+                NEEDED,
+                argument=True,
+                words=shipped_names,
+            ),
+            flag("fix", "Mend what can be mended in one way only, and overwrite the file or write to --output."),
+            Option("compare", "Another file of the same robot: where the two differ.", "OTHER"),
+            Option(
+                "reader",
+                "A program that should read the file (mujoco, gazebo …): a closure that it loses is "
+                "an error; repeat for more.",
+                "NAME",
+                list[str],
+                words=programs,
+            ),
+            Option("ignore", "A rule to leave out; repeat for more.", "RULE", list[str], words=rules),
+            Option(
+                "fail_on",
+                "The mildest severity that makes the exit status 1: error, warning, note, nothing.",
+                "SEVERITY",
+                default="error",
+                words=FAILING,
+            ),
+            Option(
+                "format",
+                "text, github (annotations), sarif (2.1.0) or json.",
+                default="text",
+                words=FORMATS,
+                group=OUTPUT,
+            ),
+            output("Where to write the mended file, with --fix and a single file."),
+            JSON,
+            *SOURCE[1:],
+        ),
+        lint,
+        (
+            "robot.urdf",
+            "robot.urdf --fix -o mended.urdf",
+            "robot.urdf --compare robot.xml",
+            "a.urdf b.xml --reader mujoco --format github --fail-on warning",
+        ),
+    )

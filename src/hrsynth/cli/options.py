@@ -114,42 +114,81 @@ def shipped_names() -> Iterable[str]:
 
 
 JSON = flag("json", "Print the result as one JSON object; its schema: hrsynth schema COMMAND.", OUTPUT)
-OBSERVE = Option("observe", "Legs to watch (1,4), links, or all (default: what the file observes, else all; none "
-                 "with --see).",
-                 "LEGS", group=WATCHING)
-CAMERA = Option("camera", "The link that carries the camera; or a further camera with a name and its place on a link "
-                "(metres; radians or deg; focal length, width and height in pixels); repeat for more.",
-                "LINK|NAME=LINK@x,y,z/r,p,y/f,w,h", list[str], group=WATCHING)
+OBSERVE = Option(
+    "observe",
+    "Legs to watch (1,4), links, or all (default: what the file observes, else all; none with --see).",
+    "LEGS",
+    group=WATCHING,
+)
+CAMERA = Option(
+    "camera",
+    "The link that carries the camera; or a further camera with a name and its place on a link "
+    "(metres; radians or deg; focal length, width and height in pixels); repeat for more.",
+    "LINK|NAME=LINK@x,y,z/r,p,y/f,w,h",
+    list[str],
+    group=WATCHING,
+)
 WATCHED = (OBSERVE, CAMERA)
-SEE = Option("see", "What else is observed: circle, depth, direction, distance, edge, edges, encoder, image_circle, "
-             "image_line, inclination, line, point or position, with a point, an axis and a radius where the kind "
-             "needs them (world: the base; for an encoder, its joint); repeat for more.",
-             "[CAMERA=]KIND:LINK@x,y,z/dx,dy,dz/radius", list[str], group=WATCHING)
-OFFER = Option("offer", "What could be observed in addition, written as for --see; without a place, such as "
-               "point:plate, several places of that link; separate more by commas, or repeat.",
-               "[CAMERA=]KIND:LINK[@x,y,z/dx,dy,dz/radius]",
-               list[str], group=WATCHING)
+SEE = Option(
+    "see",
+    "What else is observed: circle, depth, direction, distance, edge, edges, encoder, image_circle, "
+    "image_line, inclination, line, point or position, with a point, an axis and a radius where the kind "
+    "needs them (world: the base; for an encoder, its joint); repeat for more.",
+    "[CAMERA=]KIND:LINK@x,y,z/dx,dy,dz/radius",
+    list[str],
+    group=WATCHING,
+)
+OFFER = Option(
+    "offer",
+    "What could be observed in addition, written as for --see; without a place, such as "
+    "point:plate, several places of that link; separate more by commas, or repeat.",
+    "[CAMERA=]KIND:LINK[@x,y,z/dx,dy,dz/radius]",
+    list[str],
+    group=WATCHING,
+)
 SEED = Option("seed", "Seed of the random configurations.", "NUMBER", int, 0)
 SOURCE = (
-    Option("robot", "A robot file in any dialect, a shipped robot's name, or example:NAME.", "ROBOT", default=NEEDED,
-           argument=True, words=shipped_names),
+    Option(
+        "robot",
+        "A robot file in any dialect, a shipped robot's name, or example:NAME.",
+        "ROBOT",
+        default=NEEDED,
+        argument=True,
+        words=shipped_names,
+    ),
     Option("base", "Consider only what lies between this link and the platform.", "LINK", group=READING),
     Option("platform", "The platform, if the file names none.", "LINK", group=READING),
     Option("motors", "The driven joints, if the file names none.", "JOINTS", group=READING),
-    Option("close", "A closure: the frames of two links, or points A@x,y,z in them, meet (default: in a point); "
-           "repeat for more.", "A:B[:TYPE]", kind=list[str], group=READING),
+    Option(
+        "close",
+        "A closure: the frames of two links, or points A@x,y,z in them, meet (default: in a point); repeat for more.",
+        "A:B[:TYPE]",
+        kind=list[str],
+        group=READING,
+    ),
     Option("freeze", "Joints to hold at zero.", "JOINTS", default="", group=READING),
-    Option("keyframe",
-           "Zero pose: a named posture of the file, or of an SRDF file next to it; or FILE.srdf:NAME.",
-           "NAME", group=READING),
-    Option("unit", "The unit of the file's lengths: m, mm, cm or in.", "UNIT", group=READING,
-           words=("m", "mm", "cm", "in")),
-    Option("tolerance", "Deviation up to which axes and centres count as parallel, meeting and so on, and are made so "
-           "(characteristic lengths, radians; default: from the digits of the file's numbers).", None, float,
-           group=READING),
-    flag("as_written",
-         "Take the file's numbers as they are: do not correct what is parallel, or meets, up to rounding.",
-         READING),
+    Option(
+        "keyframe",
+        "Zero pose: a named posture of the file, or of an SRDF file next to it; or FILE.srdf:NAME.",
+        "NAME",
+        group=READING,
+    ),
+    Option(
+        "unit", "The unit of the file's lengths: m, mm, cm or in.", "UNIT", group=READING, words=("m", "mm", "cm", "in")
+    ),
+    Option(
+        "tolerance",
+        "Deviation up to which axes and centres count as parallel, meeting and so on, and are made so "
+        "(characteristic lengths, radians; default: from the digits of the file's numbers).",
+        None,
+        float,
+        group=READING,
+    ),
+    flag(
+        "as_written",
+        "Take the file's numbers as they are: do not correct what is parallel, or meets, up to rounding.",
+        READING,
+    ),
 )
 """A robot as the command line names it, with what its file does not say."""
 
@@ -187,8 +226,10 @@ def told_radians(option: str, text: str | None) -> None:
             continue
         if not angle:
             continue
-        warn(f"--{option} {field.strip()}: taken as radians, {math.degrees(angle):.3g} degrees "
-             f"({field.strip()}deg for degrees)")
+        warn(
+            f"--{option} {field.strip()}: taken as radians, {math.degrees(angle):.3g} degrees "
+            f"({field.strip()}deg for degrees)"
+        )
 
 
 def told_turns(option: str, text: object) -> None:

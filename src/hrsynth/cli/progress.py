@@ -27,8 +27,7 @@ class Progress:
         self._began = time.monotonic()
         self._start = self._began + wait
         self._counted = counted
-        self._timer = self._arm(max(0.0, wait), self._begin) if sys.stderr.isatty() else self._arm(
-            SILENT, self._line)
+        self._timer = self._arm(max(0.0, wait), self._begin) if sys.stderr.isatty() else self._arm(SILENT, self._line)
         self._lock = threading.Lock()
         self._what = "working"
         self._bar: Any = None
@@ -40,8 +39,9 @@ class Progress:
             self._timer.start()
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                 trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         with self._lock:
             self._start = float("inf")
             if self._bar is not None:
@@ -96,8 +96,17 @@ class Progress:
         from rich import progress
         from rich.console import Console
 
-        columns = [progress.MofNCompleteColumn(), progress.TimeRemainingColumn(), progress.TextColumn("left")] if (
-            self._counted) else [progress.TextColumn("step {task.completed:.0f}"), progress.TimeElapsedColumn()]
+        columns = (
+            [progress.MofNCompleteColumn(), progress.TimeRemainingColumn(), progress.TextColumn("left")]
+            if (self._counted)
+            else [progress.TextColumn("step {task.completed:.0f}"), progress.TimeElapsedColumn()]
+        )
         what = progress.TextColumn("{task.description}", markup=False)
-        return progress.Progress(what, progress.BarColumn(), *columns,
-                                 console=Console(stderr=True), transient=True, speed_estimate_period=SPEED_OVER)
+        return progress.Progress(
+            what,
+            progress.BarColumn(),
+            *columns,
+            console=Console(stderr=True),
+            transient=True,
+            speed_estimate_period=SPEED_OVER,
+        )

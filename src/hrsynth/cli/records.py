@@ -591,8 +591,11 @@ class Branch(OfRobot):
     box: str
     tried: int
     parts: list[BranchPartRecord]
-    back: Annotated[Array | None, "low and high of a box of all motors, no two of which give the platform one pose on "
-                                  "the branch (proved); null without a proof"]
+    back: Annotated[
+        Array | None,
+        "low and high of a box of all motors, no two of which give the platform one pose on "
+        "the branch (proved); null without a proof",
+    ]
     regular: Annotated[bool, "whether the proved box has no Type 1 singularity (proved)"]
     limits: list[BranchLimitRecord]
     motors_beyond: list[MotorBeyondRecord]
@@ -638,8 +641,12 @@ class ModeRecord(TypedDict):
     fits: Number
     opposite: list[str]
     behind: list[str] | None
-    places: NotRequired[Annotated[list[PlaceRecord], "of a formation: all bodies, moved by a trivial motion to where "
-                                                     "they are nearest to the file's"]]
+    places: NotRequired[
+        Annotated[
+            list[PlaceRecord],
+            "of a formation: all bodies, moved by a trivial motion to where they are nearest to the file's",
+        ]
+    ]
 
 
 class NearModeRecord(ModeRecord):
@@ -803,8 +810,9 @@ class Exported(OfRobot, WrittenTo):
     inverse: Annotated[Literal["closed form", "Newton's method"], "how the program finds the motors of a pose"]
     steps: Annotated[int | None, "steps of Newton's method that are enough in each part (proved), or null"]
     error: Annotated[float | None, "how far an answer is off at most (rad, 1, characteristic lengths; proved), or null"]
-    back: Annotated[Array | None, "low and high of motors, no two of which give the platform one pose on the branch "
-                    "(proved)"]
+    back: Annotated[
+        Array | None, "low and high of motors, no two of which give the platform one pose on the branch (proved)"
+    ]
     parts: list[ExportedPart]
     limits: list[BranchLimitRecord]
     free: list[FreeMotorRecord]
@@ -846,13 +854,36 @@ class SpreadRecord(TypedDict):
     mean: list[float]
 
 
-Servo = TypedDict("Servo", {
-    "command": str, "version": str, "robot": str,
-    "platform": PlatformRecord, "file": str | None, "observed": list[Watched], "camera": str,
-    "from": PoseRecord, "to": PoseRecord, "gain": float, "depth": str, "sense": Literal["exact", "edges", "pictures"],
-    "noise": str | None, "ended": str, "reason": str, "pose": PoseRecord, "matched_mode": int | None,
-    "modes": list[ModeRecord] | None, "type2": TrackRecord, "notes": list[str], "spread": SpreadRecord | None,
-    "unlimited": list[str], "times": list[float], "error": list[list[float]], "poses": list[PoseRecord]})
+Servo = TypedDict(
+    "Servo",
+    {
+        "command": str,
+        "version": str,
+        "robot": str,
+        "platform": PlatformRecord,
+        "file": str | None,
+        "observed": list[Watched],
+        "camera": str,
+        "from": PoseRecord,
+        "to": PoseRecord,
+        "gain": float,
+        "depth": str,
+        "sense": Literal["exact", "edges", "pictures"],
+        "noise": str | None,
+        "ended": str,
+        "reason": str,
+        "pose": PoseRecord,
+        "matched_mode": int | None,
+        "modes": list[ModeRecord] | None,
+        "type2": TrackRecord,
+        "notes": list[str],
+        "spread": SpreadRecord | None,
+        "unlimited": list[str],
+        "times": list[float],
+        "error": list[list[float]],
+        "poses": list[PoseRecord],
+    },
+)
 Servo.__doc__ = "A servo run: where it ended, and at each time (s) the pose and the error of each direction."
 
 
@@ -1164,11 +1195,26 @@ class UnexaminedRecord(TypedDict):
     reason: str | None
 
 
-Select = TypedDict("Select", {
-    "command": str, "version": str, "robot": str,
-    "platform": PlatformRecord, "from": PoseRecord, "to": PoseRecord, "camera": str,
-    "cones": dict[str, float], "noise": dict[str, float], "sight": dict[str, Any] | None, "best": list[str] | None,
-    "fewer": str | None, "not_examined": UnexaminedRecord, "unlimited": list[str], "sets": list[CandidateRecord]})
+Select = TypedDict(
+    "Select",
+    {
+        "command": str,
+        "version": str,
+        "robot": str,
+        "platform": PlatformRecord,
+        "from": PoseRecord,
+        "to": PoseRecord,
+        "camera": str,
+        "cones": dict[str, float],
+        "noise": dict[str, float],
+        "sight": dict[str, Any] | None,
+        "best": list[str] | None,
+        "fewer": str | None,
+        "not_examined": UnexaminedRecord,
+        "unlimited": list[str],
+        "sets": list[CandidateRecord],
+    },
+)
 Select.__doc__ = "The sets for a displacement, ranked; the cones by leg in degrees, noise by its unit (px, m, rad)."
 
 
@@ -1475,12 +1521,31 @@ class LintAnswer(Head, WrittenTo):
 
 
 RECORDS: dict[str, Any] = {
-    "derive": Derive, "legs": LegsAnswer, "check": CheckAnswer, "singular": Singular, "advise": Advise,
-    "branch": Branch, "modes": AssemblyModesRecord, "atlas": AtlasAnswer, "path": Path, "servo": Servo,
+    "derive": Derive,
+    "legs": LegsAnswer,
+    "check": CheckAnswer,
+    "singular": Singular,
+    "advise": Advise,
+    "branch": Branch,
+    "modes": AssemblyModesRecord,
+    "atlas": AtlasAnswer,
+    "path": Path,
+    "servo": Servo,
     "endings": EndingsAnswer,
     "basins": BasinsAnswer,
-    "accuracy": AccuracyAnswer, "select": Select, "export": Exported, "view": ViewAnswer, "verify": Verify,
-    "robots": Robots, "convert": Convert, "import": Import, "lint": LintAnswer,
-    "catalog build": CatalogBuild, "catalog list": CatalogList, "catalog show": CatalogShow,
-    "catalog site": CatalogSite, "catalog audit": CatalogAudit}
+    "accuracy": AccuracyAnswer,
+    "select": Select,
+    "export": Exported,
+    "view": ViewAnswer,
+    "verify": Verify,
+    "robots": Robots,
+    "convert": Convert,
+    "import": Import,
+    "lint": LintAnswer,
+    "catalog build": CatalogBuild,
+    "catalog list": CatalogList,
+    "catalog show": CatalogShow,
+    "catalog site": CatalogSite,
+    "catalog audit": CatalogAudit,
+}
 """The type of each command's record."""

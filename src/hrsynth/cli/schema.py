@@ -36,10 +36,14 @@ def _of(kind: Any, parts: dict[str, Any]) -> dict[str, Any]:
             parts[kind.__name__] = {}
             fields = get_type_hints(kind, include_extras=True)
             parts[kind.__name__] = {
-                "description": " ".join((kind.__doc__ or "").split()), "type": "object",
+                "description": " ".join((kind.__doc__ or "").split()),
+                "type": "object",
                 "properties": {name: _of(each, parts) for name, each in fields.items()},
-                "required": sorted(name for name, each in fields.items() if kind.__total__
-                                   and get_origin(each) is not NotRequired), "additionalProperties": False}
+                "required": sorted(
+                    name for name, each in fields.items() if kind.__total__ and get_origin(each) is not NotRequired
+                ),
+                "additionalProperties": False,
+            }
         return {"$ref": f"#/$defs/{kind.__name__}"}
     origin = get_origin(kind)
     if origin is Annotated:
@@ -75,6 +79,7 @@ def page() -> str:
 
 def add(app: Group) -> None:
     """Make it a command."""
+
     def told(command: list[str]) -> None:
         """Print a command's schema."""
         from ..errors import BadRequest
@@ -82,11 +87,29 @@ def add(app: Group) -> None:
 
         name = " ".join(command)
         if name not in RECORDS:
-            what = ("this command prints no JSON" if name in app.commands and not isinstance(app.commands[name], Group)
-                    else "no record of the command")
+            what = (
+                "this command prints no JSON"
+                if name in app.commands and not isinstance(app.commands[name], Group)
+                else "no record of the command"
+            )
             raise BadRequest(what, name, tuple(RECORDS))
         say(javascript.dumps(schema(name), ensure_ascii=False, indent=2))
 
-    add_command(app, "schema", "The JSON schema of what a command prints with --json.",
-                (Option("command", "A command, such as derive or catalog list.", "COMMAND", list[str], NEEDED,
-                        argument=True, words=_commands),), told, ("derive", "catalog list"))
+    add_command(
+        app,
+        "schema",
+        "The JSON schema of what a command prints with --json.",
+        (
+            Option(
+                "command",
+                "A command, such as derive or catalog list.",
+                "COMMAND",
+                list[str],
+                NEEDED,
+                argument=True,
+                words=_commands,
+            ),
+        ),
+        told,
+        ("derive", "catalog list"),
+    )

@@ -45,12 +45,24 @@ def serve(server: StudioServer, what: str) -> None:
 
 def add(app: Group) -> None:
     """Make it a command."""
-    add_command(app, "studio", "An interactive page in the browser: a robot, a folder of robots or files that are "
-                "dropped in, with hidden robot, modes, accuracy and runs, live.",
-                (Option("robot", "A robot file in any dialect, a shipped robot's name, example:NAME, or a folder.",
-                        "[ROBOT|FOLDER]", argument=True, words=shipped_names),
-                 Option("observe", "Legs to watch (1,4), links, or all (default: all).", "LEGS",
-                        group=WATCHING),
-                 Option("camera", "The link that carries the camera.", "LINK", group=WATCHING), PORT,
-                 Option("browser", "Open the page in the browser.", None, bool, True, ("--browser/--no-browser",))),
-                studio, ("quattro --observe 1,4", "robots/ --port 8000 --no-browser"))
+    add_command(
+        app,
+        "studio",
+        "An interactive page in the browser: a robot, a folder of robots or files that are "
+        "dropped in, with hidden robot, modes, accuracy and runs, live.",
+        (
+            Option(
+                "robot",
+                "A robot file in any dialect, a shipped robot's name, example:NAME, or a folder.",
+                "[ROBOT|FOLDER]",
+                argument=True,
+                words=shipped_names,
+            ),
+            Option("observe", "Legs to watch (1,4), links, or all (default: all).", "LEGS", group=WATCHING),
+            Option("camera", "The link that carries the camera.", "LINK", group=WATCHING),
+            PORT,
+            Option("browser", "Open the page in the browser.", None, bool, True, ("--browser/--no-browser",)),
+        ),
+        studio,
+        ("quattro --observe 1,4", "robots/ --port 8000 --no-browser"),
+    )

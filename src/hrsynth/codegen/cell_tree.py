@@ -25,8 +25,12 @@ def cell_tree(lower: Array, upper: Array, cells: Sequence[tuple[Array, Array]]) 
             return OUTSIDE
         if len(inside) == 1:
             one, other = cells[inside[0]]
-            open_ = [(k, value, side) for side, (edge, wall) in enumerate(((one, low), (other, high)))
-                     for k, value in enumerate(edge) if value != wall[k]]
+            open_ = [
+                (k, value, side)
+                for side, (edge, wall) in enumerate(((one, low), (other, high)))
+                for k, value in enumerate(edge)
+                if value != wall[k]
+            ]
             if not open_:
                 return ~inside[0]
             axis, value, side = open_[0]

@@ -77,8 +77,11 @@ class BoundedCell(Value):
     def is_of(self, parent: BoundedCell) -> bool:
         """Whether it is proved that there is a closure in its tube, that of the cell of which this is a part."""
         cell, whole = self.cell, parent.cell
-        off = (np.abs(cell.middle - whole.middle - whole.slopes @ (cell.centre - whole.centre))
-               + np.abs(cell.slopes - whole.slopes) @ (cell.upper - cell.centre) + self.inner)
+        off = (
+            np.abs(cell.middle - whole.middle - whole.slopes @ (cell.centre - whole.centre))
+            + np.abs(cell.slopes - whole.slopes) @ (cell.upper - cell.centre)
+            + self.inner
+        )
         inside = np.all(off < whole.radius * (1 - AFFINE_ROUNDING))
         return bool(parent.alone and np.all(self.inner <= cell.radius) and inside)
 
@@ -105,8 +108,14 @@ class BoundedCell(Value):
             x = loops.close(centres, x)[0]
             slopes = loops.slopes(centres, x)
         radius = (cell.radius + AFFINE_ROUNDING * np.abs(x).max(axis=0)) if known else PART_TUBE * cell.radius
-        return _Parts(self, [TubeCell(low, high, middle, rates, radius)
-                             for (low, high), middle, rates in zip(ends, x, slopes, strict=True)], known)
+        return _Parts(
+            self,
+            [
+                TubeCell(low, high, middle, rates, radius)
+                for (low, high), middle, rates in zip(ends, x, slopes, strict=True)
+            ],
+            known,
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,8 +127,14 @@ class _Parts:
     known: bool
 
 
-def bounded_cells(branch: TubedBranch, part: TubePart, solved: Sequence[int], rows: Sequence[int],
-                  equations: TracedFunction, closure: TracedFunction) -> list[BoundedCell]:
+def bounded_cells(
+    branch: TubedBranch,
+    part: TubePart,
+    solved: Sequence[int],
+    rows: Sequence[int],
+    equations: TracedFunction,
+    closure: TracedFunction,
+) -> list[BoundedCell]:
     """The cells of a program that solves equations with places ``solved`` among all, ``rows`` in its closure, by its
     own formulas. Where a cell is too large for a bound it is halved, with thinner tubes inside its own."""
     system = branch.system
@@ -141,8 +156,12 @@ def bounded_cells(branch: TubedBranch, part: TubePart, solved: Sequence[int], ro
                     again.append(parts.whole.split(loops, True))
                     continue
                 for each in made:
-                    if (each.good(code.units) or depth == BOUND_HALVINGS or not each.divisible
-                            or len(smaller) * 2 ** len(part.driven) >= most):
+                    if (
+                        each.good(code.units)
+                        or depth == BOUND_HALVINGS
+                        or not each.divisible
+                        or len(smaller) * 2 ** len(part.driven) >= most
+                    ):
                         found.append(each)
                     else:
                         smaller.append(each.split(loops, False))
@@ -176,8 +195,13 @@ class _Code:
     def bound_parts(self, every: Sequence[_Parts]) -> Iterator[list[BoundedCell]]:
         """All parts with their bounds."""
         pairs = [(cell, each.known) for each in every for cell in each.cells]
-        made = iter([each for k in range(0, len(pairs), CELLS_TOGETHER)
-                     for each in self._together(*map(list, zip(*pairs[k : k + CELLS_TOGETHER], strict=True)))])
+        made = iter(
+            [
+                each
+                for k in range(0, len(pairs), CELLS_TOGETHER)
+                for each in self._together(*map(list, zip(*pairs[k : k + CELLS_TOGETHER], strict=True)))
+            ]
+        )
         return (list(islice(made, len(each.cells))) for each in every)
 
     def _together(self, cells: list[TubeCell], known: list[bool]) -> list[BoundedCell]:
@@ -185,8 +209,10 @@ class _Code:
         found: list[BoundedCell] = []
         for wider in (BOUND_WIDER, *(() if self.part.exact else (FREE_WIDER, FREEST_WIDER))):
             now = _bounds(self, cells, known, wider)
-            found = [old if old.good(self.units) or (old.alone and not new.good(self.units)) else new
-                     for old, new in zip(found or now, now, strict=True)]
+            found = [
+                old if old.good(self.units) or (old.alone and not new.good(self.units)) else new
+                for old, new in zip(found or now, now, strict=True)
+            ]
         return found
 
     @cached_property
@@ -194,8 +220,9 @@ class _Code:
         """What is off of a matrix whose LU factors are taken, relative to its largest row sum (theorem 9.5): a row at
         most doubles whenever another is taken from it, which happens where it can have an entry in the column."""
         p = len(self.rows)
-        pattern = [{place[1] for array, place, _ in self.equations.stores if array == "J" and place[0] == i}
-                   for i in range(p)]
+        pattern = [
+            {place[1] for array, place, _ in self.equations.stores if array == "J" and place[0] == i} for i in range(p)
+        ]
         times = [0] * p
         left = set(range(p))
         for column in range(p):
@@ -216,12 +243,14 @@ class _Code:
         q = [RoundedNumber.of(0.0)] * len(self.branch.motors)
         x = [RoundedNumber.of(0.0)] * len(self.branch.passive)
         for k, i in enumerate(self.part.driven):
-            q[self.branch.motors.index(i)] = RoundedNumber.between(trial.centre[:, k] - trial.half[:, k],
-                                                                   trial.centre[:, k] + trial.half[:, k])
+            q[self.branch.motors.index(i)] = RoundedNumber.between(
+                trial.centre[:, k] - trial.half[:, k], trial.centre[:, k] + trial.half[:, k]
+            )
         reach = (np.abs(trial.slopes) @ trial.half[..., None])[..., 0] + radius
         for k, i in enumerate(self.part.unknowns):
-            x[self.branch.passive.index(i)] = RoundedNumber.between(trial.x[:, k] - reach[:, k],
-                                                                    trial.x[:, k] + reach[:, k])
+            x[self.branch.passive.index(i)] = RoundedNumber.between(
+                trial.x[:, k] - reach[:, k], trial.x[:, k] + reach[:, k]
+            )
         once, again = round_function(self.equations, q, x), round_function(self.closure, q, x)
         solved, sums, doubt = np.zeros((c, p)), np.zeros((c, p)), np.zeros(c)
         for k, row in enumerate(self.rows):
@@ -237,8 +266,9 @@ class _Code:
 
 def _trial(loops: LoopPart, cells: Sequence[TubeCell]) -> TubeTrial:
     """Cells as the enclosures take them."""
-    lower, upper, x, slopes, radius = (np.array([getattr(cell, name) for cell in cells])
-                                       for name in ("lower", "upper", "middle", "slopes", "radius"))
+    lower, upper, x, slopes, radius = (
+        np.array([getattr(cell, name) for cell in cells]) for name in ("lower", "upper", "middle", "slopes", "radius")
+    )
     return TubeTrial(loops, *middles(lower, upper), x, slopes, radius, np.zeros(len(x)), np.ones(len(x), dtype=bool))
 
 
@@ -280,8 +310,11 @@ def _bounds(code: _Code, cells: Sequence[TubeCell], known: Sequence[bool], wider
             first = step(e, e / 2)
             second = step(first, e + first / 2)
             alive &= _within(first, wide - a) & _within(second, wide - a)
-            ends = (_within(e + first, near) & _within(first + second, last)
-                    & np.all(_times(rates, first) + errors <= code.closed, axis=-1))
+            ends = (
+                _within(e + first, near)
+                & _within(first + second, last)
+                & np.all(_times(rates, first) + errors <= code.closed, axis=-1)
+            )
             steps[alive & ends & (steps == 0)] = count
             e = np.maximum(first, second)
         # 4. what an answer is worth: the program's tube is wider by a step that is near
@@ -329,8 +362,9 @@ def platform_error(branch: TubedBranch, ranges: Array, errors: Array, function: 
     q = [RoundedNumber.between(low, high) for low, high in zip(branch.lower, branch.upper, strict=True)]
     x = [RoundedNumber.between(low, high, off) for low, high, off in zip(*ranges, errors, strict=True)]
     made = round_function(function, q, x)
-    rotation, position = (max(float(each.error) for (array, _), each in made.items() if array == name)
-                          for name in ("R", "p"))
+    rotation, position = (
+        max(float(each.error) for (array, _), each in made.items() if array == name) for name in ("R", "p")
+    )
     return rotation, position
 
 

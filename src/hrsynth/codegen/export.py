@@ -56,21 +56,36 @@ class ExportedCode(Result, shown_as="export"):
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line, without the command's own fields."""
-        return {"lang": self.lang, "motors": list(self.proof.motors), "passive": list(self.proof.passive),
-                "held": list(self.proof.held), "legs": list(self.legs), "cells": self.cells,
-                "inverse": "closed form" if self.closed else "Newton's method",
-                "steps": self.bounds.steps if self.bounds else None,
-                "error": self.bounds.error if self.bounds else None,
-                "back": None if self.proof.back is None else [each.tolist() for each in self.proof.back],
-                "parts": [{"motors": list(part.motors), "share": part.share,
-                           "proved": [each.tolist() for each in part.proved]} for part in self.proof.parts],
-                "limits": [each.to_dict() for each in self.proof.limits],
-                "free": [{"motor": name, "lower": low, "upper": high} for name, low, high in self.free]}
+        return {
+            "lang": self.lang,
+            "motors": list(self.proof.motors),
+            "passive": list(self.proof.passive),
+            "held": list(self.proof.held),
+            "legs": list(self.legs),
+            "cells": self.cells,
+            "inverse": "closed form" if self.closed else "Newton's method",
+            "steps": self.bounds.steps if self.bounds else None,
+            "error": self.bounds.error if self.bounds else None,
+            "back": None if self.proof.back is None else [each.tolist() for each in self.proof.back],
+            "parts": [
+                {"motors": list(part.motors), "share": part.share, "proved": [each.tolist() for each in part.proved]}
+                for part in self.proof.parts
+            ],
+            "limits": [each.to_dict() for each in self.proof.limits],
+            "free": [{"motor": name, "lower": low, "upper": high} for name, low, high in self.free],
+        }
 
 
 @question()
-def export(robot: RobotLike, lang: str = "c++", box: BoxLike | None = None, *, observe: LegsLike = None,
-           camera: CameraLike = None, effort: int = BRANCH_CELLS) -> ExportedCode:
+def export(
+    robot: RobotLike,
+    lang: str = "c++",
+    box: BoxLike | None = None,
+    *,
+    observe: LegsLike = None,
+    camera: CameraLike = None,
+    effort: int = BRANCH_CELLS,
+) -> ExportedCode:
     """A program for a controller, in C++ (one header, C++17, Eigen) or NumPy (one module): from the motors' coordinates
     it computes the passive joints and the platform's pose on the branch of the zero configuration, their Jacobians, the
     motors for a pose, and the interaction matrix of the watched directions (``observe``, ``camera`` as for ``derive``).
@@ -94,8 +109,16 @@ def export(robot: RobotLike, lang: str = "c++", box: BoxLike | None = None, *, o
     moved = proof.robot not in (given, getattr(given, "robot", None))
     source = Source.of(branch_, watched, closed_inverse(proof.robot if moved else given, proof, branch_))
     code = program(source, lang, _describe_program(proof, source, lang, box, effort, as_texts(camera)))
-    return ExportedCode(proof, lang, tuple(each.leg for each in watched), bool(source.legs), source.bounds,
-                        sum(len(part.bounded) for part in source.parts), code, _free(proof, branch_))
+    return ExportedCode(
+        proof,
+        lang,
+        tuple(each.leg for each in watched),
+        bool(source.legs),
+        source.bounds,
+        sum(len(part.bounded) for part in source.parts),
+        code,
+        _free(proof, branch_),
+    )
 
 
 def _watched_directions(robot: Any, observe: LegsLike, camera: CameraLike) -> tuple[Direction, ...]:
@@ -113,19 +136,26 @@ def _watched_directions(robot: Any, observe: LegsLike, camera: CameraLike) -> tu
         if camera is not None:
             raise BadRequest("code for directions seen from a moving link", camera, "directions seen from the base")
         return ()
-    return tuple(each for each in observed.observed if isinstance(each, Direction) and each.link in links
-                 and each.seen_from in (None, reference))
+    return tuple(
+        each
+        for each in observed.observed
+        if isinstance(each, Direction) and each.link in links and each.seen_from in (None, reference)
+    )
 
 
 def _free(proof: BranchProof, branch_: TubedBranch) -> tuple[tuple[str, float, float], ...]:
     """The motors in no loop, and where the program answers."""
     moving = {name for part in proof.parts for name in part.motors}
-    return tuple((name, float(low), float(high)) for name, low, high in
-                 zip(proof.motors, branch_.lower, branch_.upper, strict=True) if name not in moving)
+    return tuple(
+        (name, float(low), float(high))
+        for name, low, high in zip(proof.motors, branch_.lower, branch_.upper, strict=True)
+        if name not in moving
+    )
 
 
-def _describe_program(proof: BranchProof, source: Source, lang: str, box: BoxLike | None, effort: int,
-                      camera: tuple[str, ...]) -> list[str]:
+def _describe_program(
+    proof: BranchProof, source: Source, lang: str, box: BoxLike | None, effort: int, camera: tuple[str, ...]
+) -> list[str]:
     """What the program says of itself."""
     from ..version import __version__
 
@@ -135,36 +165,57 @@ def _describe_program(proof: BranchProof, source: Source, lang: str, box: BoxLik
     file = Path(robot.file).name if robot.file else robot.name
     legs = ",".join(each.leg for each in source.observed)
     words = ["hrsynth", "export", file, *robot.options, "--lang", lang]
-    words += [word for name, value in (
-        ("observe", legs), *(("camera", each) for each in camera), ("box", asked),
-        ("effort", "" if effort == BRANCH_CELLS else str(effort))) if value for word in (f"--{name}", value)]
+    words += [
+        word
+        for name, value in (
+            ("observe", legs),
+            *(("camera", each) for each in camera),
+            ("box", asked),
+            ("effort", "" if effort == BRANCH_CELLS else str(effort)),
+        )
+        if value
+        for word in (f"--{name}", value)
+    ]
     held = [f"{name} = {zero:.6g}" if zero else name for name, zero in proof.held_at.items()]
-    lines = [f"Made by hrsynth {__version__}: {shlex.join(words)}",
-             *([f"SHA-256 of {file}: {robot.sha256}"] if robot.sha256 else []),
-             f"Robot {robot.name}: {len(proof.motors)} motors, {len(proof.passive)} passive coordinates; idle, held"
-             f"{'' if any(proof.held_at.values()) else ' at 0'}: {', '.join(held) or 'none'}.",
-             "Motors in order; values outside these ranges are refused:"]
+    lines = [
+        f"Made by hrsynth {__version__}: {shlex.join(words)}",
+        *([f"SHA-256 of {file}: {robot.sha256}"] if robot.sha256 else []),
+        f"Robot {robot.name}: {len(proof.motors)} motors, {len(proof.passive)} passive coordinates; idle, held"
+        f"{'' if any(proof.held_at.values()) else ' at 0'}: {', '.join(held) or 'none'}.",
+        "Motors in order; values outside these ranges are refused:",
+    ]
     rows = zip(proof.motors, branch_.lower.tolist(), branch_.upper.tolist(), branch_.motors, strict=True)
-    lines += [f"  q[{k}] {name}: {low!r} to {high!r} {branch_.unit_name(i)}"
-              for k, (name, low, high, i) in enumerate(rows)]
+    lines += [
+        f"  q[{k}] {name}: {low!r} to {high!r} {branch_.unit_name(i)}" for k, (name, low, high, i) in enumerate(rows)
+    ]
     for part in proof.parts:
         low, high = (each.tolist() for each in part.proved)
-        lines.append(f"{part.in_cells}, {100 * part.share:.4g} % of the box that was asked for; what no cell "
-                     "covers is refused. Fully covered:")
+        lines.append(
+            f"{part.in_cells}, {100 * part.share:.4g} % of the box that was asked for; what no cell "
+            "covers is refused. Fully covered:"
+        )
         lines += [f"  {name}: {a!r} to {b!r}" for name, a, b in zip(part.motors, low, high, strict=True)]
     free = [name for name, _, _ in _free(proof, branch_)]
     lines += [f"Motors in no loop, on which nothing but poses depends: {', '.join(free)}."] * bool(free)
-    lines += [f"An answer is given where the last step of Newton's method is at most {GENERATED_LAST_STEP:g} (rad, or "
-              f"of {robot.length:.6g} m: how",
-              "far the centres of the joints that the file has are from their middle on average), all loops are",
-              f"closed to {GENERATED_CLOSED:g} (cosines, or of {branch_.far:.6g} m), and the joints are in the cell's "
-              "tube, in which the loops have one closure (proved).", *_bounds(source),
-              "The proof takes the robot's numbers as the file has them."]
+    lines += [
+        f"An answer is given where the last step of Newton's method is at most {GENERATED_LAST_STEP:g} (rad, or "
+        f"of {robot.length:.6g} m: how",
+        "far the centres of the joints that the file has are from their middle on average), all loops are",
+        f"closed to {GENERATED_CLOSED:g} (cosines, or of {branch_.far:.6g} m), and the joints are in the cell's "
+        "tube, in which the loops have one closure (proved).",
+        *_bounds(source),
+        "The proof takes the robot's numbers as the file has them.",
+    ]
     used = {branch_.system.coordinates[i].joint for i in (*branch_.motors, *branch_.passive)}
-    if loose := [joint.name for joint in robot.joints.values() if joint.name in used and joint.offset is not None
-                 and joint.offset.ndim > 1]:
-        lines.append("Balls, planar and floating joints that count from the zero configuration, not the file's zero: "
-                     f"{', '.join(loose)}")
+    if loose := [
+        joint.name
+        for joint in robot.joints.values()
+        if joint.name in used and joint.offset is not None and joint.offset.ndim > 1
+    ]:
+        lines.append(
+            "Balls, planar and floating joints that count from the zero configuration, not the file's zero: "
+            f"{', '.join(loose)}"
+        )
     lines += [f"Limits of joints without a motor, {each}" for each in proof.limits_in_words()]
     lines += [f"Limit of a motor that the box passes: {each}" for each in proof.motors_beyond()]
     return lines
@@ -175,8 +226,10 @@ def _bounds(source: Source) -> list[str]:
     if source.bounds is None:
         return ["How many steps are enough, and how far answers can be off, is not proved in all cells."]
     bounds = source.bounds
-    return [f"{bounds.steps} steps of Newton's method are enough in each part, and an answer is within "
-            f"{bounds.joints:.2g} (rad, or of that length) of the",
-            f"closure (the joints that are solved for), the platform within {bounds.rotation:.2g} and "
-            f"{bounds.position:.2g}:", "proved, rounding in double precision included."] + [
-        f"Whether {bounds.more} is checked at run time."] * (bounds.others > 0)
+    return [
+        f"{bounds.steps} steps of Newton's method are enough in each part, and an answer is within "
+        f"{bounds.joints:.2g} (rad, or of that length) of the",
+        f"closure (the joints that are solved for), the platform within {bounds.rotation:.2g} and "
+        f"{bounds.position:.2g}:",
+        "proved, rounding in double precision included.",
+    ] + [f"Whether {bounds.more} is checked at run time."] * (bounds.others > 0)

@@ -36,8 +36,11 @@ def place_frame(system: LoopSystem, values: Sequence[Any], link: str) -> tuple[A
     swept = system.displacement(way, values)
     p = swept.at(X[:3, 3] / system.length)
     R = np.stack([np.broadcast_to(rotate(swept.R, X[:3, k]), (1, 3)) for k in range(3)], axis=-1)
-    return R, p, {i: (swept.rate(place, p), _turn(swept, place)) for place, i in enumerate(way)
-                  if values[i] is not None}
+    return (
+        R,
+        p,
+        {i: (swept.rate(place, p), _turn(swept, place)) for place, i in enumerate(way) if values[i] is not None},
+    )
 
 
 def _turn(swept: Swept, place: int) -> Any:
@@ -61,15 +64,20 @@ def cut_coordinate(system: LoopSystem, values: Sequence[Any], loop: JointLoop, w
     joint: Joint = system.mechanism.joints[loop.name]
     chains = loop.chains if loop.ends == joint.links else loop.chains[::-1]
     one, other = (system.displacement(chain, values) for chain in chains)
-    sides = [(place, i, swept, sign) for chain, swept, sign in zip(chains, (one, other), (-1.0, 1.0), strict=True)
-             for place, i in enumerate(chain) if values[i] is not None]
+    sides = [
+        (place, i, swept, sign)
+        for chain, swept, sign in zip(chains, (one, other), (-1.0, 1.0), strict=True)
+        for place, i in enumerate(chain)
+        if values[i] is not None
+    ]
     axis = rotate(one.R, joint.axis)
     zero = 0.0 if joint.offset is None else float(joint.offset[which])
     if joint.type.slides and which == 0:
         # d/dq n·(B − A) = n·(v_B − v_A'), A' the point of the first body at B: n turns with that body
         A, B = one.at(loop.point), other.at(loop.point)
-        return dot_product(axis, B - A) + zero, {i: dot_product(axis, swept.rate(place, B)) * sign for place, i, swept,
-                                          sign in sides}
+        return dot_product(axis, B - A) + zero, {
+            i: dot_product(axis, swept.rate(place, B)) * sign for place, i, swept, sign in sides
+        }
     if joint.type is JointType.UNIVERSAL:
         first, second = joint.axes
         flat = np.cross(first, second)
@@ -85,4 +93,5 @@ def cut_coordinate(system: LoopSystem, values: Sequence[Any], loop: JointLoop, w
     # d(turn) = axis·(ω_B − ω_A), the other axis of a U being normal to this one
     turn = arctan2(*(np.ravel(dot_product(each, moved))[0] for each in (across, start)))
     return turn + zero if zero else turn, {
-        i: dot_product(axis, _turn(swept, place)) * sign for place, i, swept, sign in sides}
+        i: dot_product(axis, _turn(swept, place)) * sign for place, i, swept, sign in sides
+    }

@@ -56,8 +56,9 @@ class LegMotor(Value):
             if self.reads == "end":
                 margin, found = form.at(tip, _itself, form.mode, *found)
         elif isinstance(form, RailAndLine):
-            margin, found = form.at(tip, _itself, form.mode, *(transform_vector(R, form.normal) if form.turns
-                                                               else form.normal))
+            margin, found = form.at(
+                tip, _itself, form.mode, *(transform_vector(R, form.normal) if form.turns else form.normal)
+            )
         else:
             margin, found = form.at(tip, _itself, form.mode)
         if self.reads == "length":
@@ -93,8 +94,11 @@ def trace_inverse(rules: Sequence[LegMotor]) -> TracedFunction:
     """S, the legs' reach margins, and Q, the motors, of rotation r (9,) and position p (3,)."""
     tape = Tape([])
     pose = [tape.load(k) for k in range(12)]
-    stores = [(array, (k,), value) for k, rule in enumerate(rules)
-              for array, value in zip("SQ", rule.at(pose[9:], pose[:9]), strict=True)]
+    stores = [
+        (array, (k,), value)
+        for k, rule in enumerate(rules)
+        for array, value in zip("SQ", rule.at(pose[9:], pose[:9]), strict=True)
+    ]
     return TracedFunction.of(tape, [*(f"r[{k}]" for k in range(9)), *(f"p[{k}]" for k in range(3))], stores)
 
 
@@ -139,14 +143,16 @@ def _samples(proof: BranchProof, branch: TubedBranch) -> tuple[Array, Array]:
     for part, loops in zip(proof.parts, parts_of(system)[0], strict=True):
         near = [cell.at(row) for row in values[:, loops.driven] if (cell := part.find(row)) is not None]
         units = system.units[list(loops.unknowns)]
-        values[:, loops.unknowns] = units * loops.close(values[:, loops.driven] / system.units[list(loops.driven)],
-                                                        np.array(near) / units)[0]
+        values[:, loops.unknowns] = (
+            units * loops.close(values[:, loops.driven] / system.units[list(loops.driven)], np.array(near) / units)[0]
+        )
     values /= system.units
     return q, np.array([system.pose(system.mechanism.platform, row.tolist()) for row in values])
 
 
-def _forms(observed: ObservedRobot, batch: Batch, mechanism: Mechanism, coordinate: TreeCoordinate
-           ) -> Iterator[tuple[ClosedFormLeg, str]]:
+def _forms(
+    observed: ObservedRobot, batch: Batch, mechanism: Mechanism, coordinate: TreeCoordinate
+) -> Iterator[tuple[ClosedFormLeg, str]]:
     """Forms that may tell a coordinate, and what of them is read."""
     motor = coordinate.joint
     joint = mechanism.joints[motor]
@@ -166,8 +172,15 @@ def _forms(observed: ObservedRobot, batch: Batch, mechanism: Mechanism, coordina
         if isinstance(form, PlatformDirection):
             if mechanism.platform in joint.links:
                 for name in leg.joints:
-                    yield Pinned(motor, _of_platform(batch, mechanism, joint.point), axis=form.axis,
-                                 centre=mechanism.joints[name].point), "bend"
+                    yield (
+                        Pinned(
+                            motor,
+                            _of_platform(batch, mechanism, joint.point),
+                            axis=form.axis,
+                            centre=mechanism.joints[name].point,
+                        ),
+                        "bend",
+                    )
             for name in leg.joints:
                 yield replace(form, centre=mechanism.joints[name].point, radius=0.0), "length"
         if isinstance(form, SlidingRod | PlatformDirection):
@@ -191,12 +204,19 @@ def _on_rail(batch: Batch, mechanism: Mechanism, leg: Leg, coordinate: TreeCoord
     R, normal = mechanism.links[mechanism.platform].pose[:3, :3], cross(slide.axis, turn.axis)
     tip = _of_platform(batch, mechanism, turn.point)
     for turns in (False, True):
-        yield RailAndLine(leg.label, tip, centre=turn.point, axis=coordinate.axis, normal=R.T @ normal if turns
-                          else normal, turns=turns)
+        yield RailAndLine(
+            leg.label,
+            tip,
+            centre=turn.point,
+            axis=coordinate.axis,
+            normal=R.T @ normal if turns else normal,
+            turns=turns,
+        )
 
 
-def _rule(coordinate: TreeCoordinate, form: ClosedFormLeg, reads: str, batch: Batch, X: Array, q: Array
-          ) -> LegMotor | None:
+def _rule(
+    coordinate: TreeCoordinate, form: ClosedFormLeg, reads: str, batch: Batch, X: Array, q: Array
+) -> LegMotor | None:
     """The closed form of a coordinate that gives motors q (n,), the first of them zero, but for whole turns, at their
     poses (n, 4, 4)."""
     position, R = list(X[:, :3, 3].T), list(X[:, :3, :3].reshape(-1, 9).T)

@@ -28,7 +28,10 @@ if TYPE_CHECKING:
 
 TEMPLATES = {"c++": "header.hpp.j2", "numpy": "module.py.j2"}
 """The languages."""
-TAKEN = frozenset(re.findall(r"\w+", """
+TAKEN = frozenset(
+    re.findall(
+        r"\w+",
+        """
     alignas alignof and and_eq asm auto bitand bitor bool break case catch char char16_t char32_t class compl const
     const_cast constexpr continue decltype default delete do double dynamic_cast else enum explicit export extern false
     float for friend goto if inline int long mutable namespace new noexcept not not_eq nullptr operator or or_eq private
@@ -37,11 +40,15 @@ TAKEN = frozenset(re.findall(r"\w+", """
     while xor xor_eq Eigen detail main std
     BUFSIZ EDOM EOF FILE ERANGE HUGE_VAL INFINITY M_E M_PI NAN NDEBUG NULL RAND_MAX errno linux stderr stdin stdout unix
     DIRECTIONS DIRECTION_NAMES Jacobians LOWER MOTORS MOTOR_NAMES Motors PASSIVE PASSIVE_NAMES Passive STEPS Solution
-    Status UPPER forward inverse jacobians unique"""))
+    Status UPPER forward inverse jacobians unique""",
+    )
+)
 """Keywords of C++17, names that something else has where headers are included, macros, and the header's own names
 (ambiguous where the namespace is used)."""
-RESERVED = re.compile(r"[a-z]\w*_t|(CHAR|CLOCK|DBL|EIGEN|FE|FLT|FP|INT\d*|LC|LONG|M|SEEK|SHRT|SIZE|UINT\d*)_[A-Z0-9_]+"
-                      r"|(pthread|sched|posix|fmaximum|fminimum)_\w+|\w+_unlocked|__\w+__|_[A-Z]\w*")
+RESERVED = re.compile(
+    r"[a-z]\w*_t|(CHAR|CLOCK|DBL|EIGEN|FE|FLT|FP|INT\d*|LC|LONG|M|SEEK|SHRT|SIZE|UINT\d*)_[A-Z0-9_]+"
+    r"|(pthread|sched|posix|fmaximum|fminimum)_\w+|\w+_unlocked|__\w+__|_[A-Z]\w*"
+)
 """Types of the C library, its macros and families of functions, and what is the compiler's own (``__linux__``)."""
 
 
@@ -78,27 +85,46 @@ def program(source: Source, language: str, told: Sequence[str]) -> str:
     arguments = "const Motors& q, const Unknowns& x, "
     functions = [("platform", f"{arguments}Eigen::Matrix3d& R, Eigen::Vector3d& p", source.platform)]
     if source.cut:
-        functions += [("cut", f"{arguments}Eigen::Matrix<double, CUT, 1>& O", source.cut_values),
-                      ("cut_slopes", f"{arguments}Eigen::Matrix<double, CUT, MOTORS + UNKNOWNS>& C", source.cut_slopes)]
+        functions += [
+            ("cut", f"{arguments}Eigen::Matrix<double, CUT, 1>& O", source.cut_values),
+            ("cut_slopes", f"{arguments}Eigen::Matrix<double, CUT, MOTORS + UNKNOWNS>& C", source.cut_slopes),
+        ]
     d = len(source.observed)
     moving = "Eigen::Matrix<double, 6, MOTORS + UNKNOWNS>& V"
     if d:
-        moving += (", Eigen::Matrix<double, 3 * DIRECTIONS, 1>& u, "
-                   "Eigen::Matrix<double, 3 * DIRECTIONS, MOTORS + UNKNOWNS>& W")
+        moving += (
+            ", Eigen::Matrix<double, 3 * DIRECTIONS, 1>& u, Eigen::Matrix<double, 3 * DIRECTIONS, MOTORS + UNKNOWNS>& W"
+        )
     functions.append(("rates", arguments + moving, source.rates))
     values: dict[str, Any] = {
-        "robot": mechanism.name, "told": told, "name": namespace(mechanism.name), "source": source,
-        "m": len(branch.motors), "p": len(branch.passive), "c": len(source.cut), "d": d,
+        "robot": mechanism.name,
+        "told": told,
+        "name": namespace(mechanism.name),
+        "source": source,
+        "m": len(branch.motors),
+        "p": len(branch.passive),
+        "c": len(source.cut),
+        "d": d,
         "steps": source.bounds.steps if source.bounds else NEWTON_STEPS_AT_RUN,
-        "inverse": INVERSE_STEPS_AT_RUN, "parts": source.parts, "functions": functions,
-        "lower": [float(x) for x in branch.lower], "upper": [float(x) for x in branch.upper],
+        "inverse": INVERSE_STEPS_AT_RUN,
+        "parts": source.parts,
+        "functions": functions,
+        "lower": [float(x) for x in branch.lower],
+        "upper": [float(x) for x in branch.upper],
         "back": [[float(x) for x in end] for end in branch.back or ()],
-        "motor_names": source.names(branch.motors), "passive_names": [*source.names(branch.passive), *source.cut],
+        "motor_names": source.names(branch.motors),
+        "passive_names": [*source.names(branch.passive), *source.cut],
         "direction_names": [observation.leg for observation in source.observed],
         "turning": [int(not branch.system.coordinates[i].slides) for i in branch.motors],
-        "length": repr(float(mechanism.length)), "near": GENERATED_NEAR, "last_step": GENERATED_LAST_STEP,
-        "legs": source.legs and trace_inverse(source.legs), "far": repr(branch.far), "reached": GENERATED_REACHED,
-        "turn": repr(2 * math.pi), "singular": GENERATED_SINGULAR}
+        "length": repr(float(mechanism.length)),
+        "near": GENERATED_NEAR,
+        "last_step": GENERATED_LAST_STEP,
+        "legs": source.legs and trace_inverse(source.legs),
+        "far": repr(branch.far),
+        "reached": GENERATED_REACHED,
+        "turn": repr(2 * math.pi),
+        "singular": GENERATED_SINGULAR,
+    }
     return name_steering(_templates().get_template(TEMPLATES[language]).render(**values))
 
 
@@ -106,8 +132,9 @@ def program(source: Source, language: str, told: Sequence[str]) -> str:
 def _templates() -> Environment:
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
-    made = Environment(loader=PackageLoader("hrsynth.codegen", ""), undefined=StrictUndefined,
-                       keep_trailing_newline=True)
+    made = Environment(
+        loader=PackageLoader("hrsynth.codegen", ""), undefined=StrictUndefined, keep_trailing_newline=True
+    )
     made.filters["quoted"] = lambda names: ", ".join(json.dumps(name, ensure_ascii=False) for name in names)
     made.filters["comment"] = _comment
     made.filters["unused"] = _unused_arguments

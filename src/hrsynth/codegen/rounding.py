@@ -80,10 +80,13 @@ class RoundedNumber:
         return self.between(np.maximum(middle - half, -1.0), np.minimum(middle + half, 1.0), self.error + SINE_ERROR)
 
 
-def round_function(function: TracedFunction, q: Sequence[RoundedNumber], x: Sequence[RoundedNumber]
-            ) -> Mapping[tuple[str, Place], RoundedNumber]:
+def round_function(
+    function: TracedFunction, q: Sequence[RoundedNumber], x: Sequence[RoundedNumber]
+) -> Mapping[tuple[str, Place], RoundedNumber]:
     """What a function of equations stores, at inputs between bounds."""
     names: dict[str, Any] = {"q": q, "x": x, "sin": RoundedNumber.sin, "cos": RoundedNumber.cos, "__builtins__": {}}
     exec("\n".join(f"{name} = {text}" for name, text in function.statements), names)
-    return {(array, place): RoundedNumber.of(names[value] if value in names else float(value))
-            for array, place, value in function.stores}
+    return {
+        (array, place): RoundedNumber.of(names[value] if value in names else float(value))
+        for array, place, value in function.stores
+    }

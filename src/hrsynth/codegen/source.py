@@ -65,8 +65,11 @@ class ProvedBounds:
     @property
     def more(self) -> str:
         """What is tested, in words."""
-        return "one more equation of the loops holds" if self.others == 1 else (
-            f"each of {self.others} more equations of the loops holds")
+        return (
+            "one more equation of the loops holds"
+            if self.others == 1
+            else (f"each of {self.others} more equations of the loops holds")
+        )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -94,8 +97,18 @@ class Source(Value):
         parts = tuple(_part(branch, tracer, part) for part in branch.parts)
         names, values, slopes = tracer.cut()
         platform = tracer.platform()
-        return cls(branch, parts, platform, tuple(names), values, slopes, tracer.rates(observed),
-                   tuple(observed), tuple(legs), _proved_bounds(branch, parts, platform))
+        return cls(
+            branch,
+            parts,
+            platform,
+            tuple(names),
+            values,
+            slopes,
+            tracer.rates(observed),
+            tuple(observed),
+            tuple(legs),
+            _proved_bounds(branch, parts, platform),
+        )
 
     def names(self, places: Sequence[int]) -> list[str]:
         """The names of coordinates."""
@@ -114,12 +127,27 @@ def _part(branch: TubedBranch, tracer: FormulaTracer, part: TubePart) -> SourceP
     units = np.array([branch.unit(i) for i in part.unknowns])
     tried = [each.trial_cell(units) for each in bounded]
     root, nodes = cell_tree(lower, upper, [(cell.lower, cell.upper) for cell in tried])
-    cells = tuple((tuple(cell.centre), tuple(cell.middle), tuple(cell.slopes.ravel()), tuple(cell.radius))
-                  for cell in tried)
-    return SourcePart(tuple(driven), tuple(unknowns), equations, slopes, closure, tuple(own), len(every),
-                      _floats(tuple(branch.closing_tolerance(every))), root, tuple(nodes), tree_depth(root, nodes),
-                      _floats(cells), _floats(tuple(units)),
-                      tuple(map(float, lower)), tuple(map(float, upper)), tuple(bounded))
+    cells = tuple(
+        (tuple(cell.centre), tuple(cell.middle), tuple(cell.slopes.ravel()), tuple(cell.radius)) for cell in tried
+    )
+    return SourcePart(
+        tuple(driven),
+        tuple(unknowns),
+        equations,
+        slopes,
+        closure,
+        tuple(own),
+        len(every),
+        _floats(tuple(branch.closing_tolerance(every))),
+        root,
+        tuple(nodes),
+        tree_depth(root, nodes),
+        _floats(cells),
+        _floats(tuple(units)),
+        tuple(map(float, lower)),
+        tuple(map(float, upper)),
+        tuple(bounded),
+    )
 
 
 def _proved_bounds(branch: TubedBranch, parts: Sequence[SourcePart], platform: TracedFunction) -> ProvedBounds | None:
@@ -131,16 +159,24 @@ def _proved_bounds(branch: TubedBranch, parts: Sequence[SourcePart], platform: T
     ranges, errors, units = np.zeros((2, count)), np.zeros(count), np.ones(count)
     for part in parts:
         places = list(part.unknowns)
-        reach = [np.abs(each.cell.slopes) @ (each.cell.upper - each.cell.centre) + 2 * np.maximum(
-            each.cell.radius, each.inner) for each in part.bounded]
+        reach = [
+            np.abs(each.cell.slopes) @ (each.cell.upper - each.cell.centre)
+            + 2 * np.maximum(each.cell.radius, each.inner)
+            for each in part.bounded
+        ]
         middles = [each.cell.middle for each in part.bounded]
         ranges[0, places] = np.min(np.subtract(middles, reach), axis=0)
         ranges[1, places] = np.max(np.add(middles, reach), axis=0)
         errors[places] = np.max([each.error for each in part.bounded], axis=0)
         units[places] = part.units
     rotation, position = platform_error(branch, ranges, errors, platform)
-    return ProvedBounds(max(each.steps for each in every), float((errors / units).max()), rotation,
-                        position / branch.system.mechanism.length, sum(part.count - len(part.rows) for part in parts))
+    return ProvedBounds(
+        max(each.steps for each in every),
+        float((errors / units).max()),
+        rotation,
+        position / branch.system.mechanism.length,
+        sum(part.count - len(part.rows) for part in parts),
+    )
 
 
 def _floats(values: Any) -> Any:

@@ -30,13 +30,22 @@ class TracedFunction(Value):
     @classmethod
     def of(cls, tape: Tape, names: Sequence[str], stores: Iterable[tuple[str, Place, Any]]) -> TracedFunction:
         """What some symbols of a tape need; derivatives that are constantly zero are not stored."""
-        single = [(array, place, np.ravel(value)[0] if isinstance(value, np.ndarray) else value)
-                  for array, place, value in stores]
-        kept = [(array, place, value) for array, place, value in single
-                if array in VALUES or isinstance(value, Symbol) or float(value) != 0.0]
-        return cls(tuple(tape.statements([(0, value) for _, _, value in kept], names)),
-                   tuple((array, place, f"t{value.number}" if isinstance(value, Symbol) else repr(float(value)))
-                         for array, place, value in kept))
+        single = [
+            (array, place, np.ravel(value)[0] if isinstance(value, np.ndarray) else value)
+            for array, place, value in stores
+        ]
+        kept = [
+            (array, place, value)
+            for array, place, value in single
+            if array in VALUES or isinstance(value, Symbol) or float(value) != 0.0
+        ]
+        return cls(
+            tuple(tape.statements([(0, value) for _, _, value in kept], names)),
+            tuple(
+                (array, place, f"t{value.number}" if isinstance(value, Symbol) else repr(float(value)))
+                for array, place, value in kept
+            ),
+        )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -60,11 +69,14 @@ class FormulaTracer(Value):
 
     def _values(self, tape: Tape) -> list[Any]:
         places = self.places
-        return [np.array([tape.load(places[i])], dtype=object) if i in places else None
-                for i in range(len(self.system.coordinates))]
+        return [
+            np.array([tape.load(places[i])], dtype=object) if i in places else None
+            for i in range(len(self.system.coordinates))
+        ]
 
-    def loops(self, which: Sequence[int], unknowns: Sequence[int], driven: Sequence[int]
-              ) -> tuple[TracedFunction, TracedFunction]:
+    def loops(
+        self, which: Sequence[int], unknowns: Sequence[int], driven: Sequence[int]
+    ) -> tuple[TracedFunction, TracedFunction]:
         """G with J, its derivatives by ``unknowns``; K, those by ``driven`` coordinates; of some equations."""
         tape = Tape([])
         found = rows(self.system, self._values(tape))
@@ -72,8 +84,14 @@ class FormulaTracer(Value):
         slopes: list[list[tuple[str, Place, Any]]] = []
         for array, columns in (("J", unknowns), ("K", driven)):
             where = {each: k for k, each in enumerate(columns)}
-            slopes.append([(array, (i, where[k]), slope) for i, row in enumerate(which)
-                           for k, slope in found[row][1].items() if k in where])
+            slopes.append(
+                [
+                    (array, (i, where[k]), slope)
+                    for i, row in enumerate(which)
+                    for k, slope in found[row][1].items()
+                    if k in where
+                ]
+            )
         return (TracedFunction.of(tape, self.names, stores + slopes[0]), TracedFunction.of(tape, self.names, slopes[1]))
 
     def closure(self, which: Sequence[int]) -> TracedFunction:
@@ -86,8 +104,9 @@ class FormulaTracer(Value):
         """Rotation R (3, 3) and position p (3,) of the platform's frame."""
         tape = Tape([])
         R, p, _ = place_frame(self.system, self._values(tape), self.system.mechanism.platform)
-        return TracedFunction.of(tape, self.names, [*(("R", divmod(i, 3), each) for i, each in enumerate(R.ravel())),
-                                                    *_three("p", 0, p)])
+        return TracedFunction.of(
+            tape, self.names, [*(("R", divmod(i, 3), each) for i, each in enumerate(R.ravel())), *_three("p", 0, p)]
+        )
 
     def cut(self) -> tuple[list[str], TracedFunction, TracedFunction]:
         """The names of the cut joints' coordinates; O, their values; C, their derivatives by the coordinates of q, then
@@ -95,10 +114,15 @@ class FormulaTracer(Value):
         tape, places, names = Tape([]), self.places, cut(self.system)
         values = self._values(tape)
         found = [cut_coordinate(self.system, values, loop, which) for _, loop, which in names]
-        return ([name for name, _, _ in names],
-                TracedFunction.of(tape, self.names, [("O", (k,), value) for k, (value, _) in enumerate(found)]),
-                TracedFunction.of(tape, self.names, [("C", (k, places[i]), slope) for k, (_, slopes) in enumerate(found)
-                                                     for i, slope in slopes.items()]))
+        return (
+            [name for name, _, _ in names],
+            TracedFunction.of(tape, self.names, [("O", (k,), value) for k, (value, _) in enumerate(found)]),
+            TracedFunction.of(
+                tape,
+                self.names,
+                [("C", (k, places[i]), slope) for k, (_, slopes) in enumerate(found) for i, slope in slopes.items()],
+            ),
+        )
 
     def rates(self, observed: Sequence[Direction]) -> TracedFunction:
         """V (6, n), the velocity of the platform's frame, and W (3 k, n), those of the observed directions u (3 k,), by
@@ -106,14 +130,18 @@ class FormulaTracer(Value):
         tape, places, mechanism = Tape([]), self.places, self.system.mechanism
         values = self._values(tape)
         twists = place_frame(self.system, values, mechanism.platform)[2]
-        stores = [store for k, twist in twists.items() for i in (0, 1)
-                  for store in _three("V", 3 * i, twist[i], places[k])]
+        stores = [
+            store for k, twist in twists.items() for i in (0, 1) for store in _three("V", 3 * i, twist[i], places[k])
+        ]
         for number, observation in enumerate(observed):
             R, _, twists = place_frame(self.system, values, observation.link)
             u = rotate(R, observation.direction)
             stores += _three("u", 3 * number, u)
-            stores += [store for k, (_, w) in twists.items()
-                       for store in _three("W", 3 * number, cross_product(w, u), places[k])]
+            stores += [
+                store
+                for k, (_, w) in twists.items()
+                for store in _three("W", 3 * number, cross_product(w, u), places[k])
+            ]
         return TracedFunction.of(tape, self.names, stores)
 
 

@@ -54,9 +54,15 @@ class TubePart(Value):
     def ordered(self, places: Sequence[int]) -> TubePart:
         """The same with its unknowns in another order."""
         own = list(places)
-        return TubePart(self.driven, tuple(self.unknowns[k] for k in own), tuple(
-            replace(each, middle=each.middle[own], slopes=each.slopes[own], radius=each.radius[own])
-            for each in self.cells), self.solved)
+        return TubePart(
+            self.driven,
+            tuple(self.unknowns[k] for k in own),
+            tuple(
+                replace(each, middle=each.middle[own], slopes=each.slopes[own], radius=each.radius[own])
+                for each in self.cells
+            ),
+            self.solved,
+        )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -151,5 +157,4 @@ def _solved_places(system: LoopSystem, part: LoopPart) -> tuple[int, ...]:
     own = {loop.name for loop in part.loops} | {gear.name for gear in part.gears}
     every = [(loop.name, id(row)) for loop in system.loops for row in loop.rows]
     every += [(gear.name, id(None)) for gear in system.gears]
-    return tuple(k for k, (name, row) in enumerate(every)
-                 if name in own and turned.get(name, (name, row) not in left))
+    return tuple(k for k, (name, row) in enumerate(every) if name in own and turned.get(name, (name, row) not in left))

@@ -130,7 +130,8 @@ def condition(pattern: ConstraintPattern, question: Measurement) -> Condition:
     if pattern.motion == "spatial" and (form := closed_form(pattern.legs)) is not None:
         return _name_condition(pattern, form.words, form.expression, True, parts=form.parts)
     if pattern.motion in TURNING_MOTIONS and any(
-            leg.virtual and (leg.turning is not None or pattern.motion == "planar") for leg in pattern.legs):
+        leg.virtual and (leg.turning is not None or pattern.motion == "planar") for leg in pattern.legs
+    ):
         return _gram(pattern)
     normals = [leg for leg in pattern.legs if leg.normal is not None]
     fixed = [leg for leg in pattern.legs if leg.fixed]
@@ -172,8 +173,11 @@ def _translations(pattern: ConstraintPattern, lines: Sequence[LockedLeg]) -> Con
         expression += sum(dot(first, n) ** 2 for n in normals)
         planes = [leg.normal.symbol for leg in pattern.legs if leg.normal is not None]
         across = f"the plane{'s' * (len(planes) > 1)} normal to {_and(planes)}"
-        words = (f"{symbols[0]} is parallel to {across}" if len(symbols) == 1 else
-                 f"{names} are {'all ' if len(lines) > 2 else ''}parallel, also to {across}")
+        words = (
+            f"{symbols[0]} is parallel to {across}"
+            if len(symbols) == 1
+            else f"{names} are {'all ' if len(lines) > 2 else ''}parallel, also to {across}"
+        )
     if constant and not normals and len(lines) > 1:
         several = "all " if len(lines) > 2 else ""
         never = f"never: {names} are constant and not {several}parallel"
@@ -227,8 +231,10 @@ def _complex(pattern: ConstraintPattern, legs: Sequence[LockedLeg]) -> Condition
     import sympy
 
     lines = [f"({_symbol(leg.normal)}, {leg.tip.symbol} x {_symbol(leg.normal)})" for leg in legs]
-    words = (f"the lines through {', '.join(leg.tip.symbol for leg in legs)} along "
-             f"{', '.join(_symbol(leg.normal) for leg in legs)} belong to one linear complex")
+    words = (
+        f"the lines through {', '.join(leg.tip.symbol for leg in legs)} along "
+        f"{', '.join(_symbol(leg.normal) for leg in legs)} belong to one linear complex"
+    )
     expression = sympy.Determinant(sympy.MatrixSymbol("L", 6, 6))
     return _name_condition(pattern, words, expression, True, matrices={"L": "rows " + ", ".join(lines)})
 
@@ -237,8 +243,10 @@ def _bodies(pattern: ConstraintPattern, lines: Sequence[LockedLeg]) -> Condition
     _, _, det = products()
     slide = vector(_symbol(pattern.slide))
     expression = det(*(vector(_symbol(leg.line)) for leg in lines), slide)
-    words = (f"{_words_of(leg.line for leg in lines)} and the direction {slide}, in which the platform's halves move "
-             "on each other, are parallel to one plane")
+    words = (
+        f"{_words_of(leg.line for leg in lines)} and the direction {slide}, in which the platform's halves move "
+        "on each other, are parallel to one plane"
+    )
     return _name_condition(pattern, words, expression, True)
 
 
@@ -278,8 +286,16 @@ def _gram(pattern: ConstraintPattern) -> Condition:
     return _name_condition(pattern, words, sympy.Determinant(total), False, matrices=dict(matrices))
 
 
-def _name_condition(pattern: ConstraintPattern, words: str, expression: Any, signed: bool, *, never: bool = False,
-           matrices: Mapping[str, str] | None = None, parts: tuple[tuple[Any, str], ...] = ()) -> Named:
+def _name_condition(
+    pattern: ConstraintPattern,
+    words: str,
+    expression: Any,
+    signed: bool,
+    *,
+    never: bool = False,
+    matrices: Mapping[str, str] | None = None,
+    parts: tuple[tuple[Any, str], ...] = (),
+) -> Named:
     """A condition with the meaning of its symbols and the factors that were split off."""
     import sympy
 
@@ -287,8 +303,16 @@ def _name_condition(pattern: ConstraintPattern, words: str, expression: Any, sig
     used = {str(symbol) for each in (expression, *(part for part, _ in parts)) for symbol in each.free_symbols}
     used |= {leg.eye.symbol for leg in pattern.legs if leg.eye is not None}
     named = {f.symbol: f.meaning for f in pattern.features if f.symbol in used or matrices}
-    return Named(words.replace("tau", "τ"), expression, signed, tuple(_lengths(pattern.legs)), never,
-                 {**(matrices or {}), **dict(sorted(named.items()))}, parts, pattern=pattern)
+    return Named(
+        words.replace("tau", "τ"),
+        expression,
+        signed,
+        tuple(_lengths(pattern.legs)),
+        never,
+        {**(matrices or {}), **dict(sorted(named.items()))},
+        parts,
+        pattern=pattern,
+    )
 
 
 def _general(question: Measurement) -> General:
@@ -296,9 +320,12 @@ def _general(question: Measurement) -> General:
 
     size = sympy.Symbol("d", integer=True, positive=True)
     M = sympy.MatrixSymbol("M", sum(question.sizes), size)
-    where = {"M": "rates of what is observed for a basis of the platform's motions: M = Y K (X K)^+",
-             "K": "basis of the links' motions on which no wrench that a joint transmits does work",
-             "X": "twist of the platform", "Y": "rates of what is observed"}
+    where = {
+        "M": "rates of what is observed for a basis of the platform's motions: M = Y K (X K)^+",
+        "K": "basis of the links' motions on which no wrench that a joint transmits does work",
+        "X": "twist of the platform",
+        "Y": "rates of what is observed",
+    }
     words = "the legs, with their measurements held, transmit no wrench against some motion of the platform"
     return General(words, sympy.Determinant(M.T * M), where=where, question=question)
 
@@ -311,8 +338,9 @@ def always(pattern: ConstraintPattern, lost: str) -> str:
         return f"{text}, because {names} are on one line, about which the platform can turn"
     if pattern.motion != "planar" and len(lines) == len(pattern.legs) > 0:
         vectors = [u for leg in lines if (u := pattern.constant(leg.line)) is not None]
-        if len(vectors) == len(lines) > 1 and all(np.linalg.norm(np.cross(u, vectors[0])) < SAME_RELATION
-                                                  for u in vectors):
+        if len(vectors) == len(lines) > 1 and all(
+            np.linalg.norm(np.cross(u, vectors[0])) < SAME_RELATION for u in vectors
+        ):
             return f"{text}, because {_words_of(leg.line for leg in lines)} are parallel"
     return text
 
@@ -335,8 +363,17 @@ def _words_of(features: Iterable[NamedVector | None]) -> str:
     return " and ".join(f"the {kind} {', '.join(names)}" for kind, names in groups.items())
 
 
-_KINDS = {"u": "watched directions", "p": "P axes", "t": "tangents", "a": "axes", "r": "directions", "n": "normals",
-          "z": "z axes", "d": "axes", "e": "directions"}
+_KINDS = {
+    "u": "watched directions",
+    "p": "P axes",
+    "t": "tangents",
+    "a": "axes",
+    "r": "directions",
+    "n": "normals",
+    "z": "z axes",
+    "d": "axes",
+    "e": "directions",
+}
 
 
 def _moves(legs: Sequence[LockedLeg]) -> str:
@@ -351,8 +388,11 @@ def _moves(legs: Sequence[LockedLeg]) -> str:
     elif alike:
         tip, allowed = next(iter(alike))
         parts = [f"moves every tip {tip}i {allowed} (i = {', '.join(leg.tip.symbol[1:] for leg in tips)})"]
-    turns = [f"about {'' if leg.about is not None else 'a normal of '}{_symbol(leg.turning)}" for leg in legs
-             if leg.turning is not None]
+    turns = [
+        f"about {'' if leg.about is not None else 'a normal of '}{_symbol(leg.turning)}"
+        for leg in legs
+        if leg.turning is not None
+    ]
     return " and ".join([*parts, *([f"turns it {_and(turns)}"] if turns else [])])
 
 
@@ -381,8 +421,11 @@ def _kinds(lines: Sequence[LockedLeg], relation: str) -> str:
 
 def _lengths(lines: Sequence[LockedLeg]) -> list[str]:
     """Factors that vanish only where a crank has no length: none for unit vectors that are fixed in a link."""
-    return [f"|{leg.line.meaning.removeprefix('tangent ')}|" for leg in lines
-            if leg.line is not None and not isinstance(leg.line, BodyVector) and not leg.virtual]
+    return [
+        f"|{leg.line.meaning.removeprefix('tangent ')}|"
+        for leg in lines
+        if leg.line is not None and not isinstance(leg.line, BodyVector) and not leg.virtual
+    ]
 
 
 def _symbol(feature: NamedVector | None) -> str:

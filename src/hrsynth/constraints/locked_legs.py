@@ -25,6 +25,7 @@ Sight = CameraObservation | SeenAxis
 Place = tuple[str, tuple[float, ...]]
 """A point (m) in the frame of a link."""
 
+
 @dataclass(frozen=True, eq=False, repr=False)
 class LockedLeg(Value):
     """A leg with its measurements held, or the virtual leg of an observation of the platform.
@@ -94,8 +95,9 @@ def projectors(vectors: Array) -> Array:
     return projector
 
 
-def virtual_legs(seen: Sequence[Sight], reference: str, bodies: Sequence[str], first: int,
-                 samples: Sequence[ClosedConfiguration]) -> tuple[LockedLeg, ...] | None:
+def virtual_legs(
+    seen: Sequence[Sight], reference: str, bodies: Sequence[str], first: int, samples: Sequence[ClosedConfiguration]
+) -> tuple[LockedLeg, ...] | None:
     """The virtual legs of observations of a body of the platform, numbered from ``first``; None where one has wrenches
     that have no name, or that are not those of its rates everywhere."""
     found, eyes = [], _eyes(seen, reference, samples[0].twin.length)
@@ -109,8 +111,14 @@ def virtual_legs(seen: Sequence[Sight], reference: str, bodies: Sequence[str], f
 
 def sights(question: Measurement, base: str, bodies: Sequence[str]) -> tuple[Sight, ...]:
     """The observations between the base and a body of the platform, without the directions that legs have."""
-    return tuple(o for o in question.observations if isinstance(o, CameraObservation | SeenAxis) and not o.by_segment
-                 and (ends := {o.link, o.seen_from or question.reference}) & set(bodies) and base in ends)
+    return tuple(
+        o
+        for o in question.observations
+        if isinstance(o, CameraObservation | SeenAxis)
+        and not o.by_segment
+        and (ends := {o.link, o.seen_from or question.reference}) & set(bodies)
+        and base in ends
+    )
 
 
 def _eyes(seen: Sequence[Sight], reference: str, length: float) -> dict[Place, BodyPoint]:
@@ -120,16 +128,29 @@ def _eyes(seen: Sequence[Sight], reference: str, length: float) -> dict[Place, B
         if isinstance(o, CameraObservation):
             named = f"camera {o.camera.name}" if o.camera else "the camera"
             found.setdefault(_place(o, reference), f"centre of {named}")
-    return {key: BodyPoint("C" if len(found) == 1 else f"C{n}", f"{words}, fixed in {key[0]}", key[0],
-                           frozen(np.array(key[1]) / length)) for n, (key, words) in enumerate(found.items(), 1)}
+    return {
+        key: BodyPoint(
+            "C" if len(found) == 1 else f"C{n}",
+            f"{words}, fixed in {key[0]}",
+            key[0],
+            frozen(np.array(key[1]) / length),
+        )
+        for n, (key, words) in enumerate(found.items(), 1)
+    }
 
 
 def _place(seen: CameraObservation, reference: str) -> Place:
     return seen.seen_from or reference, tuple(seen.view[:3, 3].tolist())
 
 
-def _virtual_leg(seen: Sight, camera: str, bodies: Sequence[str], symbol: str, eyes: Mapping[Place, BodyPoint],
-                 samples: Sequence[ClosedConfiguration]) -> LockedLeg | None:
+def _virtual_leg(
+    seen: Sight,
+    camera: str,
+    bodies: Sequence[str],
+    symbol: str,
+    eyes: Mapping[Place, BodyPoint],
+    samples: Sequence[ClosedConfiguration],
+) -> LockedLeg | None:
     """The leg whose tip and turns are those that the observation's wrenches leave, at all samples."""
     link, reference = seen.link, seen.seen_from or camera
     body, length = link if link in bodies else reference, samples[0].twin.length
@@ -155,27 +176,48 @@ def _virtual_leg(seen: Sight, camera: str, bodies: Sequence[str], symbol: str, e
     def named(normals: Sequence[Array]) -> NamedVector | None:
         """The vector along these (n of (3, 1)), or normal to these (n of (3, 2))."""
         along = np.array([N[:, 0] if N.shape[1] == 1 else np.cross(N[:, 0], N[:, 1]) for N in normals])
-        return next((each for each in candidates
-                     if np.max(np.linalg.norm(np.cross(each.value(places), along), axis=1)) < SAME_RELATION), None)
+        return next(
+            (
+                each
+                for each in candidates
+                if np.max(np.linalg.norm(np.cross(each.value(places), along), axis=1)) < SAME_RELATION
+            ),
+            None,
+        )
 
     held, stopped = forces[0].shape[1], moments[0].shape[1]
     at_tip, turn = (named(forces) if held in (1, 2) else None), (named(moments) if stopped in (1, 2) else None)
     if (held in (1, 2) and at_tip is None) or (stopped in (1, 2) and turn is None) or stopped == 3:
         return None
-    return LockedLeg(seen.leg, body, tip, at_tip if held == 2 else None, at_tip if held == 1 else None, held == 3,
-                     3 - stopped, turn if stopped == 2 else None, turn if stopped == 1 else None, eye, True,
-                     held_by=(seen.leg,))
+    return LockedLeg(
+        seen.leg,
+        body,
+        tip,
+        at_tip if held == 2 else None,
+        at_tip if held == 1 else None,
+        held == 3,
+        3 - stopped,
+        turn if stopped == 2 else None,
+        turn if stopped == 1 else None,
+        eye,
+        True,
+        held_by=(seen.leg,),
+    )
 
 
-def _candidates(seen: Sight, symbol: str, link: str, reference: str, tip: BodyPoint,
-                eye: BodyPoint | None, length: float) -> list[NamedVector]:
+def _candidates(
+    seen: Sight, symbol: str, link: str, reference: str, tip: BodyPoint, eye: BodyPoint | None, length: float
+) -> list[NamedVector]:
     """The ray to the point, the axis, the camera's z axis, the normal n of the plane of both first, and axis × n."""
     found: list[NamedVector] = []
     axis = seen.axis if isinstance(seen, CameraObservation) else seen.direction
     if eye is not None:
-        found += [Ray(f"r{symbol}", f"ray from {eye.symbol} to {tip.symbol}", eye, tip),
-                  BodyVector(f"z{symbol}", f"z axis of {eye.meaning.removeprefix('centre of ')}", reference,
-                             frozen(seen.view[:3, 2]))]
+        found += [
+            Ray(f"r{symbol}", f"ray from {eye.symbol} to {tip.symbol}", eye, tip),
+            BodyVector(
+                f"z{symbol}", f"z axis of {eye.meaning.removeprefix('centre of ')}", reference, frozen(seen.view[:3, 2])
+            ),
+        ]
     if axis is not None:
         d = BodyVector(f"d{symbol}", f"axis of {seen.leg} on {link}", link, axis)
         found.append(d)
@@ -186,6 +228,13 @@ def _candidates(seen: Sight, symbol: str, link: str, reference: str, tip: BodyPo
             foot = "the edge"
             words = f"normal of the plane through {eye.symbol} that touches the cylinder of {seen.leg}"
             plane = TangentNormal(f"n{symbol}", words, eye, tip, d, seen.radius / length)
-        found += [plane, CrossProduct(f"e{symbol}", f"direction from {eye.symbol} to the foot of its perpendicular on "
-                                      f"{foot} of {seen.leg}", d, plane)]
+        found += [
+            plane,
+            CrossProduct(
+                f"e{symbol}",
+                f"direction from {eye.symbol} to the foot of its perpendicular on {foot} of {seen.leg}",
+                d,
+                plane,
+            ),
+        ]
     return found

@@ -32,8 +32,13 @@ def closed_form(legs: Sequence[LockedLeg]) -> ClosedForm | None:
     planes = [leg for leg in legs if leg.normal is not None and leg.upright is not None]
     axes = [leg for leg in legs if leg.free and leg.about is not None]
     known: dict[tuple[int, int, int], Callable[..., ClosedForm]] = {
-        (3, 0, 0): _three_rays, (2, 1, 0): _two_rays_plane, (1, 2, 0): _ray_two_planes,
-        (0, 3, 0): _three_planes, (2, 0, 1): _two_rays_axis, (1, 1, 1): _ray_plane_axis}
+        (3, 0, 0): _three_rays,
+        (2, 1, 0): _two_rays_plane,
+        (1, 2, 0): _ray_two_planes,
+        (0, 3, 0): _three_planes,
+        (2, 0, 1): _two_rays_axis,
+        (1, 1, 1): _ray_plane_axis,
+    }
     if len(legs) != 3 or (form := known.get((len(rays), len(planes), len(axes)))) is None:
         return None
     return form(*rays, *planes, *axes)
@@ -50,8 +55,10 @@ def _three_rays(*rays: LockedLeg) -> ClosedForm:
         return _danger_cylinder(eye, rays, forth - back)
     names = [leg.tip.symbol for leg in rays]
     normals = ", ".join(str(each) for each in line)
-    words = (f"the planes through {', '.join(names)} normal to {normals}, and the plane {''.join(names)}, meet in a "
-             "point (which may lie at infinity)")
+    words = (
+        f"the planes through {', '.join(names)} normal to {normals}, and the plane {''.join(names)}, meet in a "
+        "point (which may lie at infinity)"
+    )
     return ClosedForm(words, forth - back)
 
 
@@ -66,9 +73,11 @@ def _danger_cylinder(eye: str, rays: Sequence[LockedLeg], expression: Any) -> Cl
     square = dot(cross(n, x), cross(n, x)) + dot(b, b) * det(x, n, c) - dot(c, c) * det(x, n, b)
     points = f"{one}, {two}, {three}"
     words = f"{eye} lies on the danger cylinder, the circular cylinder over the circle through {points}"
-    means = (f"|n|² (ρ² - R²), n = {one}{two} × {one}{three}, R the radius of the circle through {points}, ρ the "
-             f"distance of {eye} from its axis: |{eye}{one}| |{eye}{two}| |{eye}{three}| times the expression, "
-             "a proved identity")
+    means = (
+        f"|n|² (ρ² - R²), n = {one}{two} × {one}{three}, R the radius of the circle through {points}, ρ the "
+        f"distance of {eye} from its axis: |{eye}{one}| |{eye}{two}| |{eye}{three}| times the expression, "
+        "a proved identity"
+    )
     return ClosedForm(words, expression, ((square, means),))
 
 
@@ -97,11 +106,16 @@ def _two_rays_plane(one: LockedLeg, two: LockedLeg, plane: LockedLeg) -> ClosedF
     r1, r2, n, e = _name_of(one.line), _name_of(two.line), _name_of(plane.normal), _name_of(plane.upright)
     b, c = _name_of(two.tip) - _name_of(one.tip), _name_of(plane.tip) - _name_of(one.tip)
     turn = dot(r1, b) * det(e, b, r2) - dot(r2, b) * det(e, b, r1)
-    slip = (dot(b, b) * dot(r2, b) * dot(n, r1) + dot(r1, b) * dot(n, cross(cross(b, r2), c))
-            - dot(r2, b) * dot(n, cross(cross(b, r1), c)))
+    slip = (
+        dot(b, b) * dot(r2, b) * dot(n, r1)
+        + dot(r1, b) * dot(n, cross(cross(b, r2), c))
+        - dot(r2, b) * dot(n, cross(cross(b, r1), c))
+    )
     expression = (turn * det(n, b, c) - dot(e, b) * slip) / dot(b, b)
-    words = (f"some motion of the platform moves {one.tip.symbol} along {r1}, {two.tip.symbol} along {r2} and "
-             f"{plane.tip.symbol} normal to {n}, and turns it about a normal of {e}")
+    words = (
+        f"some motion of the platform moves {one.tip.symbol} along {r1}, {two.tip.symbol} along {r2} and "
+        f"{plane.tip.symbol} normal to {n}, and turns it about a normal of {e}"
+    )
     return ClosedForm(words, expression)
 
 
@@ -111,9 +125,11 @@ def _ray_two_planes(ray: LockedLeg, one: LockedLeg, two: LockedLeg) -> ClosedFor
     r, w = _name_of(ray.line), cross(_name_of(one.upright), _name_of(two.upright))
     arms = [det(_name_of(leg.normal), w, _name_of(leg.tip) - _name_of(ray.tip)) for leg in (one, two)]
     expression = dot(_name_of(one.normal), r) * arms[1] - dot(_name_of(two.normal), r) * arms[0]
-    words = (f"some motion of the platform moves {ray.tip.symbol} along {r}, {one.tip.symbol} normal to "
-             f"{_name_of(one.normal)}, {two.tip.symbol} normal to {_name_of(two.normal)}, and turns it about the "
-             f"normal of {_name_of(one.upright)}, {_name_of(two.upright)}")
+    words = (
+        f"some motion of the platform moves {ray.tip.symbol} along {r}, {one.tip.symbol} normal to "
+        f"{_name_of(one.normal)}, {two.tip.symbol} normal to {_name_of(two.normal)}, and turns it about the "
+        f"normal of {_name_of(one.upright)}, {_name_of(two.upright)}"
+    )
     return ClosedForm(words, expression)
 
 
@@ -126,8 +142,10 @@ def _two_rays_axis(one: LockedLeg, two: LockedLeg, axis: LockedLeg) -> ClosedFor
     if eye is None:
         return ClosedForm(f"{r1}, {r2} and {u} × {names} are parallel to one plane", expression)
     words = f"{eye} lies in the plane through {one.tip.symbol}, {two.tip.symbol} that is parallel to {u} × {names}"
-    means = (f"that plane: |{eye}{one.tip.symbol}| |{eye}{two.tip.symbol}| times the expression up to sign, a "
-             "proved identity")
+    means = (
+        f"that plane: |{eye}{one.tip.symbol}| |{eye}{two.tip.symbol}| times the expression up to sign, a "
+        "proved identity"
+    )
     return ClosedForm(words, expression, ((dot(cross(b, cross(u, b)), vector(eye) - _name_of(one.tip)), means),))
 
 

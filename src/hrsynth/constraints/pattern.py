@@ -124,8 +124,9 @@ def placing_links(anatomy: LegDecomposition) -> tuple[str, ...]:
     return leg_ends(anatomy) if anatomy.decided else (*leg_ends(anatomy), anatomy.mechanism.platform)
 
 
-def recognise(anatomy: LegDecomposition, question: Measurement, samples: Sequence[ClosedConfiguration], *,
-              everywhere: bool = True) -> ConstraintPattern:
+def recognise(
+    anatomy: LegDecomposition, question: Measurement, samples: Sequence[ClosedConfiguration], *, everywhere: bool = True
+) -> ConstraintPattern:
     """The pattern at the samples; ``motion`` is ``other`` where it is none of the known ones, or, unless it need not
     hold ``everywhere``, where a held leg may leave its end more at special poses."""
     other = ConstraintPattern("other", anatomy.mechanism.base, leg_ends(anatomy))
@@ -140,8 +141,12 @@ def recognise(anatomy: LegDecomposition, question: Measurement, samples: Sequenc
                 return other
             locks[leg].append(each)
     translating = len(bodies) == 1 and vanishes(motions[:, 3:])
-    held = {leg.label: _locked_leg(anatomy, leg, tuple(locks[leg.label]), question.reference, tuple(samples),
-                             everywhere, translating) for leg in anatomy.legs}
+    held = {
+        leg.label: _locked_leg(
+            anatomy, leg, tuple(locks[leg.label]), question.reference, tuple(samples), everywhere, translating
+        )
+        for leg in anatomy.legs
+    }
     alone = motions.shape[1:] == (6, 6) and not any(locks.values())
     if anatomy.mechanism.couplings and not alone:
         return other
@@ -159,19 +164,37 @@ def recognise(anatomy: LegDecomposition, question: Measurement, samples: Sequenc
         found = _one_body(anatomy, every, legs, motions, samples)
     else:
         found = _two_bodies(anatomy, legs, motions, samples)
-    if found is not None and found.plane is not None and found.motion == "planar" and not all(
-            _turns_about(found.plane, own, leg_twists_together(samples, leg, locks[leg.label], question.reference),
-                         samples)
-            for leg in anatomy.legs if locks[leg.label] and (own := held[leg.label]) is not None and own.turns < 3):
+    if (
+        found is not None
+        and found.plane is not None
+        and found.motion == "planar"
+        and not all(
+            _turns_about(
+                found.plane, own, leg_twists_together(samples, leg, locks[leg.label], question.reference), samples
+            )
+            for leg in anatomy.legs
+            if locks[leg.label] and (own := held[leg.label]) is not None and own.turns < 3
+        )
+    ):
         return other
     # where the turns of all legs are alike, a leg whose tip may move anywhere holds nothing
-    binding = () if found is None else tuple(leg for leg in found.legs if not leg.free or (
-        found.motion in TURNING_MOTIONS and leg.turning is not None) or (found.motion == "oriented" and leg.turns < 3))
+    binding = (
+        ()
+        if found is None
+        else tuple(
+            leg
+            for leg in found.legs
+            if not leg.free
+            or (found.motion in TURNING_MOTIONS and leg.turning is not None)
+            or (found.motion == "oriented" and leg.turns < 3)
+        )
+    )
     return replace(found, legs=binding) if found is not None and binding else other
 
 
-def _turns_about(normal: NamedVector, leg: LockedLeg, systems: Sequence[Array],
-                 samples: Sequence[ClosedConfiguration]) -> bool:
+def _turns_about(
+    normal: NamedVector, leg: LockedLeg, systems: Sequence[Array], samples: Sequence[ClosedConfiguration]
+) -> bool:
     """Whether a held leg, which allows these twists (6, k), lets its end turn about the normal through its tip."""
     poses = poses_at(samples, [*normal.links, *leg.tip.links])
     n, B = normal.value(poses), leg.tip.value(poses)
@@ -187,8 +210,13 @@ def _leg_of(seen: Observation, anatomy: LegDecomposition, question: Measurement)
     return next((leg.label for leg in anatomy.legs if inside and inside <= set(leg.links)), None)
 
 
-def _one_body(anatomy: LegDecomposition, every: tuple[LockedLeg, ...] | None, legs: tuple[LockedLeg, ...],
-              motions: Array, samples: Sequence[ClosedConfiguration]) -> ConstraintPattern | None:
+def _one_body(
+    anatomy: LegDecomposition,
+    every: tuple[LockedLeg, ...] | None,
+    legs: tuple[LockedLeg, ...],
+    motions: Array,
+    samples: Sequence[ClosedConfiguration],
+) -> ConstraintPattern | None:
     """The pattern of one body: of the ``legs`` that are watched, or of ``every`` leg, None where one has none."""
     base, bodies = anatomy.mechanism.base, leg_ends(anatomy)
     own = [leg for leg in legs if not leg.virtual]
@@ -202,8 +230,9 @@ def _one_body(anatomy: LegDecomposition, every: tuple[LockedLeg, ...] | None, le
         return None
     normal = _plane_of(motions)
     if normal is not None and all(leg.line is not None or leg.virtual for leg in legs):
-        flat = all(vanishes(leg.line.value(poses_at(samples, leg.line.links)) @ normal)
-                   for leg in legs if leg.line is not None)
+        flat = all(
+            vanishes(leg.line.value(poses_at(samples, leg.line.links)) @ normal) for leg in legs if leg.line is not None
+        )
         return ConstraintPattern("planar", base, bodies, legs, plane=_normal(anatomy.mechanism, normal), flat=flat)
     if every is not None and all(leg.turns == 1 and leg.normal is None and not leg.virtual for leg in every):
         plane = _common_plane(anatomy.mechanism, every, samples)
@@ -216,8 +245,13 @@ def _one_body(anatomy: LegDecomposition, every: tuple[LockedLeg, ...] | None, le
     return None
 
 
-def _translations(anatomy: LegDecomposition, every: tuple[LockedLeg, ...] | None, legs: tuple[LockedLeg, ...],
-                  motions: Sequence[Array], samples: Sequence[ClosedConfiguration]) -> ConstraintPattern | None:
+def _translations(
+    anatomy: LegDecomposition,
+    every: tuple[LockedLeg, ...] | None,
+    legs: tuple[LockedLeg, ...],
+    motions: Sequence[Array],
+    samples: Sequence[ClosedConfiguration],
+) -> ConstraintPattern | None:
     """The pattern of translations, bases (3, d) of which are given: of the ``legs`` that are watched where these leave
     the tips none but such, else of ``every`` leg, since the others hold as well; None where one of them has none."""
     if len(motions) == len(samples) and all(_within(leg, motions, samples) for leg in legs):
@@ -232,8 +266,9 @@ def _within(leg: LockedLeg, motions: Sequence[Array], samples: Sequence[ClosedCo
     return all(vanishes((np.eye(3) - F @ F.T) @ (np.eye(3) - N)) for F, N in zip(motions, across, strict=True))
 
 
-def _translating(anatomy: LegDecomposition, legs: tuple[LockedLeg, ...],
-                 samples: Sequence[ClosedConfiguration]) -> ConstraintPattern:
+def _translating(
+    anatomy: LegDecomposition, legs: tuple[LockedLeg, ...], samples: Sequence[ClosedConfiguration]
+) -> ConstraintPattern:
     lines = [leg.line for leg in legs if leg.line is not None]
     plane = None
     if lines and len(lines) == sum(not leg.free for leg in legs):
@@ -242,13 +277,16 @@ def _translating(anatomy: LegDecomposition, legs: tuple[LockedLeg, ...],
         if s[1] > SAME_RELATION * s[0] > s[2]:
             plane = _normal(anatomy.mechanism, Vt[2], "direction normal to the lines along which the tips move")
     found = ConstraintPattern("translations", anatomy.mechanism.base, leg_ends(anatomy), legs, plane=plane)
-    turns = {link: X[:, :3, :3] for link, X in poses_at(samples, [link for each in found.features for link in each.links
-                                                                  ]).items()}
+    turns = {
+        link: X[:, :3, :3]
+        for link, X in poses_at(samples, [link for each in found.features for link in each.links]).items()
+    }
     return replace(found, steady={link: frozen(R[0]) for link, R in turns.items() if vanishes(R - R[0])})
 
 
-def _two_bodies(anatomy: LegDecomposition, legs: tuple[LockedLeg, ...], motions: Array,
-                samples: Sequence[ClosedConfiguration]) -> ConstraintPattern | None:
+def _two_bodies(
+    anatomy: LegDecomposition, legs: tuple[LockedLeg, ...], motions: Array, samples: Sequence[ClosedConfiguration]
+) -> ConstraintPattern | None:
     """Two bodies that only translate, the second along one direction relative to the first; with them the controlled
     link must be at rest, which it need not where it hangs on them by loops that have dead points."""
     bodies = leg_ends(anatomy)
@@ -260,8 +298,10 @@ def _two_bodies(anatomy: LegDecomposition, legs: tuple[LockedLeg, ...], motions:
         return None
     directions = np.array([each[:, 0] for each in relative])
     inner = [j for j in anatomy.mechanism.joints.values() if set(j.links) <= set(anatomy.platform)]
-    named = [*(axis_of(anatomy.mechanism, j, "e") for j in inner if j.type is JointType.PRISMATIC),
-             *_tangents(anatomy, [j.name for j in inner], "e")]
+    named = [
+        *(axis_of(anatomy.mechanism, j, "e") for j in inner if j.type is JointType.PRISMATIC),
+        *_tangents(anatomy, [j.name for j in inner], "e"),
+    ]
     slide = next((f for f in named if _along(f, directions, samples)), None)
     if slide is None:
         return None
@@ -278,8 +318,9 @@ def _motions(anatomy: LegDecomposition, question: Measurement, samples: Sequence
     return np.array([basis for basis in bases if basis.shape[1] == most])
 
 
-def moving(anatomy: LegDecomposition, question: Measurement, samples: Sequence[ClosedConfiguration]
-           ) -> tuple[str, Array | None]:
+def moving(
+    anatomy: LegDecomposition, question: Measurement, samples: Sequence[ClosedConfiguration]
+) -> tuple[str, Array | None]:
     """How a platform of one body moves with nothing held: ``translations``, ``planar`` with the normal, or
     ``spatial``."""
     motions = _motions(anatomy, question, samples)
@@ -289,8 +330,9 @@ def moving(anatomy: LegDecomposition, question: Measurement, samples: Sequence[C
     return ("spatial", None) if normal is None else ("planar", normal)
 
 
-def _common_plane(mechanism: Mechanism, legs: Sequence[LockedLeg], samples: Sequence[ClosedConfiguration]
-                  ) -> NamedVector | None:
+def _common_plane(
+    mechanism: Mechanism, legs: Sequence[LockedLeg], samples: Sequence[ClosedConfiguration]
+) -> NamedVector | None:
     """The constant direction about which all legs turn and across which all tips move."""
     joints = [j for j in mechanism.joints.values() if j.type is JointType.REVOLUTE]
     axes = [axis_of(mechanism, joint, "n") for joint in joints]
@@ -321,8 +363,15 @@ def _normal(mechanism: Mechanism, normal: Array, meaning: str = "normal of the p
 
 
 @lru_cache(maxsize=LEGS_HELD)
-def _locked_leg(anatomy: LegDecomposition, leg: Leg, locks: tuple[Observation, ...], reference: str,
-          samples: tuple[ClosedConfiguration, ...], everywhere: bool, translating: bool) -> LockedLeg | None:
+def _locked_leg(
+    anatomy: LegDecomposition,
+    leg: Leg,
+    locks: tuple[Observation, ...],
+    reference: str,
+    samples: tuple[ClosedConfiguration, ...],
+    everywhere: bool,
+    translating: bool,
+) -> LockedLeg | None:
     """The leg's pattern with these observations held, alike at all samples (``everywhere``: all poses), or None."""
     try:
         systems = leg_twists_together(samples, leg, locks, reference)
@@ -347,8 +396,17 @@ def _locked_leg(anatomy: LegDecomposition, leg: Leg, locks: tuple[Observation, .
         more = grows(leg, locks, reference, points, samples, translating) if everywhere else ""
         if more == "tip":
             continue
-        return LockedLeg(leg.label, leg.attach, spot, line, normal, shape[0] == 0, shape[1], spins=bool(more),
-                         held_by=tuple(dict.fromkeys(lock.leg for lock in locks)))
+        return LockedLeg(
+            leg.label,
+            leg.attach,
+            spot,
+            line,
+            normal,
+            shape[0] == 0,
+            shape[1],
+            spins=bool(more),
+            held_by=tuple(dict.fromkeys(lock.leg for lock in locks)),
+        )
     return None
 
 
@@ -366,21 +424,31 @@ def _tips(anatomy: LegDecomposition, leg: Leg, symbol: str, length: float) -> It
             yield centre_of(mechanism, joint, joint.predecessor, f"A{symbol}", length)
 
 
-def _name_vector(anatomy: LegDecomposition, leg: Leg, locks: Sequence[Observation], symbol: str, values: Array,
-           samples: Sequence[ClosedConfiguration]) -> NamedVector | None:
+def _name_vector(
+    anatomy: LegDecomposition,
+    leg: Leg,
+    locks: Sequence[Observation],
+    symbol: str,
+    values: Array,
+    samples: Sequence[ClosedConfiguration],
+) -> NamedVector | None:
     """The first vector with a name that is parallel to ``values`` (n, 3) at all samples."""
     mechanism = anatomy.mechanism
     candidates: list[NamedVector] = []
     for lock in locks:
         if isinstance(lock, Direction):
-            candidates.append(BodyVector(f"u{symbol}", f"direction watched in leg {leg.label} ({lock.link})", lock.link,
-                                      lock.direction))
+            candidates.append(
+                BodyVector(
+                    f"u{symbol}", f"direction watched in leg {leg.label} ({lock.link})", lock.link, lock.direction
+                )
+            )
     joints = [mechanism.joints[name] for name in leg.joints]
     candidates += [axis_of(mechanism, j, f"p{symbol}") for j in joints if j.type.slides]
     candidates += _segments(anatomy, leg.joints, f"r{symbol}")
     candidates += _tangents(anatomy, leg.joints, f"tau{symbol}")
-    candidates += [axis_of(mechanism, j, f"a{symbol}", which) for j in joints if not j.type.slides
-                   for which in range(len(j.axes))]
+    candidates += [
+        axis_of(mechanism, j, f"a{symbol}", which) for j in joints if not j.type.slides for which in range(len(j.axes))
+    ]
     return next((f for f in candidates if _along(f, values, samples)), None)
 
 
@@ -388,14 +456,24 @@ def _tangents(anatomy: LegDecomposition, names: Sequence[str], symbol: str) -> I
     """Tangents of the paths of joint centres about R axes, for some joints; those on one link first."""
     mechanism, length = anatomy.mechanism, anatomy.mechanism.length
     joints = [mechanism.joints[name] for name in names]
-    pairs = [(axis, which, end) for axis in joints if axis.type in TURNING for which in range(len(axis.axes))
-             for end in joints if end is not axis]
+    pairs = [
+        (axis, which, end)
+        for axis in joints
+        if axis.type in TURNING
+        for which in range(len(axis.axes))
+        for end in joints
+        if end is not axis
+    ]
     pairs.sort(key=lambda pair: not set(pair[0].links) & set(pair[2].links))
     for axis, which, end in pairs:
         link = next((link for link in axis.links if link in end.links), end.predecessor)
-        yield Tangent(symbol, f"tangent {axis.name} × ({end.name} − {axis.name})",
-                      axis_of(mechanism, axis, "a", which), centre_of(mechanism, axis, axis.links[which], "P", length),
-                      centre_of(mechanism, end, link, "Q", length))
+        yield Tangent(
+            symbol,
+            f"tangent {axis.name} × ({end.name} − {axis.name})",
+            axis_of(mechanism, axis, "a", which),
+            centre_of(mechanism, axis, axis.links[which], "P", length),
+            centre_of(mechanism, end, link, "Q", length),
+        )
 
 
 def _segments(anatomy: LegDecomposition, names: Sequence[str], symbol: str) -> Iterator[Segment]:
@@ -404,8 +482,12 @@ def _segments(anatomy: LegDecomposition, names: Sequence[str], symbol: str) -> I
     joints = [mechanism.joints[name] for name in names]
     for one, two in combinations(joints, 2):
         for link in sorted(set(one.links) & set(two.links) - {mechanism.base}):
-            yield Segment(symbol, f"direction from {one.name} to {two.name}",
-                          centre_of(mechanism, one, link, "P", length), centre_of(mechanism, two, link, "Q", length))
+            yield Segment(
+                symbol,
+                f"direction from {one.name} to {two.name}",
+                centre_of(mechanism, one, link, "P", length),
+                centre_of(mechanism, two, link, "Q", length),
+            )
 
 
 def _along(feature: NamedVector, values: Array, samples: Sequence[ClosedConfiguration]) -> bool:

@@ -33,8 +33,14 @@ from ..tolerances import SURELY_SOMETHING
 from .named_vectors import BodyVector, poses_at, vanishes
 
 
-def grows(leg: Leg, locks: Sequence[Observation], reference: str, tips: Array, samples: Sequence[ClosedConfiguration],
-          translating: bool) -> str:
+def grows(
+    leg: Leg,
+    locks: Sequence[Observation],
+    reference: str,
+    tips: Array,
+    samples: Sequence[ClosedConfiguration],
+    translating: bool,
+) -> str:
     """What a held leg may leave its end (tips (n, 3), characteristic lengths) at special poses
     alone: nothing more (empty), a ``turn`` through the tip, or motions of the ``tip``.
     Of an end that is ``translating``, motions in which it does not turn."""
@@ -100,8 +106,12 @@ def _grows(held: _Held, way: _Way, lock: SeenAxis) -> str:
     mechanism, samples, tips = held.mechanism, held.samples, held.tips
     if any(joint.type is JointType.SPHERICAL for joint, _ in way.joints):
         return ""
-    lines = [(np.array(centres), np.array(axes)) for joint, link in way.joints if joint.type is not JointType.PRISMATIC
-             for centres, axes in _lines(joint, link, samples)]
+    lines = [
+        (np.array(centres), np.array(axes))
+        for joint, link in way.joints
+        if joint.type is not JointType.PRISMATIC
+        for centres, axes in _lines(joint, link, samples)
+    ]
     if all(vanishes(cross(axes, lines[0][1])) for _, axes in lines[1:]):
         return ""
     watched = BodyVector("u", "", lock.link, lock.direction)
@@ -121,17 +131,24 @@ def _grows(held: _Held, way: _Way, lock: SeenAxis) -> str:
     return "turn" if vanishes(cross(tips - C, u)) else "tip"
 
 
-def _cannot_turn_back(mechanism: Mechanism, leg: Leg, lock: Direction, u: Array, samples: Sequence[ClosedConfiguration]
-                      ) -> bool:
+def _cannot_turn_back(
+    mechanism: Mechanism, leg: Leg, lock: Direction, u: Array, samples: Sequence[ClosedConfiguration]
+) -> bool:
     """Whether the joints from the watched link to the leg's end make no turn about u: they have one direction, which
     lies in that link as u does, and is not along u."""
     beyond = _way(mechanism, leg, lock.link, leg.attach)
     if leg.has_loops or beyond is None or any(joint.type is JointType.SPHERICAL for joint, _ in beyond.joints):
         return False
-    axes = [np.array(each) for joint, link in beyond.joints if joint.type is not JointType.PRISMATIC
-            for _, each in _lines(joint, link, samples)]
-    return not axes or (all(vanishes(cross(each, axes[0])) for each in axes[1:])
-                        and float(np.min(np.linalg.norm(cross(axes[0], u), axis=1))) > SURELY_SOMETHING)
+    axes = [
+        np.array(each)
+        for joint, link in beyond.joints
+        if joint.type is not JointType.PRISMATIC
+        for _, each in _lines(joint, link, samples)
+    ]
+    return not axes or (
+        all(vanishes(cross(each, axes[0])) for each in axes[1:])
+        and float(np.min(np.linalg.norm(cross(axes[0], u), axis=1))) > SURELY_SOMETHING
+    )
 
 
 @dataclass(frozen=True)
@@ -165,8 +182,7 @@ def _way(mechanism: Mechanism, leg: Leg, one: str, other: str) -> _Way | None:
 
 
 def _contract(mechanism: Mechanism, leg: Leg, one: str, other: str) -> _Way:
-    """The same in a leg with loops, not ``free`` where it goes through one that is no parallelogram or parallel rods.
-    """
+    """The same in a leg with loops, not ``free`` if it goes through one that is no parallelogram or parallel rods."""
     tied = _Way((), free=False)
     words = _contraction(mechanism, leg)
     holder = next((edge for edge in words.edges() if other in edge.inside), None)

@@ -26,24 +26,32 @@ from .named_vectors import poses_at, vanishes
 from .pattern import ConstraintPattern
 
 
-def unexamined_poses(anatomy: LegDecomposition, pattern: ConstraintPattern, condition: Condition | None,
-               samples: Sequence[ClosedConfiguration]) -> tuple[str, ...]:
+def unexamined_poses(
+    anatomy: LegDecomposition,
+    pattern: ConstraintPattern,
+    condition: Condition | None,
+    samples: Sequence[ClosedConfiguration],
+) -> tuple[str, ...]:
     """Poses to which a condition does not apply, in words; none of one that the screws of all joints give."""
     if not isinstance(condition, Named):
         return ()
     found = []
     folding = [leg.label for leg in anatomy.legs if leg.has_loops]
     if folding:
-        found.append(f"poses at which a loop inside a leg ({', '.join(folding)}) lies flat, and those behind them, at "
-                     "which it closes another way (crossed rods), are not examined")
+        found.append(
+            f"poses at which a loop inside a leg ({', '.join(folding)}) lies flat, and those behind them, at "
+            "which it closes another way (crossed rods), are not examined"
+        )
     more: tuple[str, ...] = ()
     if pattern.motion in ("translations", "bodies") and may_turn(anatomy, pattern.legs, samples):
         more = ("turn", "turned")
     elif pattern.motion == "planar" and _may_leave_the_plane(anatomy, pattern, samples):
         more = ("leave its plane", "left it")
     if more:
-        found.append(f"poses at which the loops lose rank, so that the platform may {more[0]} (constraint "
-                     f"singularities), and those at which it has {more[1]} are not examined")
+        found.append(
+            f"poses at which the loops lose rank, so that the platform may {more[0]} (constraint "
+            f"singularities), and those at which it has {more[1]} are not examined"
+        )
     return tuple(found)
 
 
@@ -64,18 +72,24 @@ def may_turn(anatomy: LegDecomposition, held: Sequence[LockedLeg], samples: Sequ
     return False
 
 
-def _may_leave_the_plane(anatomy: LegDecomposition, pattern: ConstraintPattern, samples: Sequence[ClosedConfiguration]
-                         ) -> bool:
+def _may_leave_the_plane(
+    anatomy: LegDecomposition, pattern: ConstraintPattern, samples: Sequence[ClosedConfiguration]
+) -> bool:
     """Whether none of the legs, held or not, keeps the platform in its plane."""
     assert pattern.plane is not None
     if pattern.flat and any(leg.turns == 1 and not leg.virtual for leg in pattern.legs):
         return False
     normal = pattern.plane.value(poses_at(samples[:1], pattern.plane.links))[0]
-    return not any(vanishes(normal @ twists[:3]) and vanishes(cross(twists[3:].T, normal))
-                   for twists in _twists(anatomy, pattern.bodies[0], samples))
+    return not any(
+        vanishes(normal @ twists[:3]) and vanishes(cross(twists[3:].T, normal))
+        for twists in _twists(anatomy, pattern.bodies[0], samples)
+    )
 
 
 def _twists(anatomy: LegDecomposition, body: str, samples: Sequence[ClosedConfiguration]) -> list[Array]:
     """Of each leg that ends on a body: what its joints can give its end, over all samples, (6, k)."""
-    return [np.hstack(leg_twists_together(samples, leg, (), anatomy.mechanism.base))
-            for leg in anatomy.legs if leg.attach == body]
+    return [
+        np.hstack(leg_twists_together(samples, leg, (), anatomy.mechanism.base))
+        for leg in anatomy.legs
+        if leg.attach == body
+    ]

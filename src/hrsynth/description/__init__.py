@@ -37,10 +37,20 @@ def shipped() -> dict[str, Path]:
 
 
 @with_spelling
-def load(robot: str | Path | Mechanism, *, base: str | None = None, platform: str | None = None,
-         motors: Iterable[str] | str | None = None, observe: Iterable[str] | str | None = None,
-         close: Iterable[str] | str = (), freeze: Iterable[str] | str = (), keyframe: str | None = None,
-         unit: str | None = None, tolerance: float | None = None, as_written: bool = False) -> Mechanism:
+def load(
+    robot: str | Path | Mechanism,
+    *,
+    base: str | None = None,
+    platform: str | None = None,
+    motors: Iterable[str] | str | None = None,
+    observe: Iterable[str] | str | None = None,
+    close: Iterable[str] | str = (),
+    freeze: Iterable[str] | str = (),
+    keyframe: str | None = None,
+    unit: str | None = None,
+    tolerance: float | None = None,
+    as_written: bool = False,
+) -> Mechanism:
     """The mechanism of a robot file in any dialect, of a shipped robot given by its name, or of one from the package
     example-robot-data (``example:cassie``); a mechanism is returned unchanged.
 
@@ -71,17 +81,33 @@ def load(robot: str | Path | Mechanism, *, base: str | None = None, platform: st
     >>> hrsynth.load("3rrr_m1")
     <Mechanism: 3rrr_m1, 8 links, 9 joints, 3 motors>
     """
-    overrides = Overrides.said(base=base, platform=platform, motors=motors, close=close, freeze=freeze, observe=observe,
-                               keyframe=keyframe, unit=unit, tolerance=tolerance, as_written=as_written)
+    overrides = Overrides.said(
+        base=base,
+        platform=platform,
+        motors=motors,
+        close=close,
+        freeze=freeze,
+        observe=observe,
+        keyframe=keyframe,
+        unit=unit,
+        tolerance=tolerance,
+        as_written=as_written,
+    )
     if isinstance(robot, Mechanism):
         if overrides.any or tolerance is not None or base is not None or observe is not None:
-            raise BadRequest("options that fill in a robot file are given for a robot that is already read",
-                             robot.name, "the file of a robot, or its name")
+            raise BadRequest(
+                "options that fill in a robot file are given for a robot that is already read",
+                robot.name,
+                "the file of a robot, or its name",
+            )
         return robot
     found = read(file_of(robot), overrides)
     if found.choice is not None and found.choice.chosen == "guess":
-        warn_caller(f"{found.name}: the platform is link {found.platform!r}, {found.choice} "
-                    f"(platform={found.platform!r} to say so)", GuessedPlatform)
+        warn_caller(
+            f"{found.name}: the platform is link {found.platform!r}, {found.choice} "
+            f"(platform={found.platform!r} to say so)",
+            GuessedPlatform,
+        )
     return found
 
 
@@ -91,8 +117,9 @@ def file_of(robot: str | Path) -> Path:
         raise BadRequest("a robot's file", robot, "a path, the name of a shipped robot, example:NAME")
     path = Path(robot)
     if isinstance(robot, str) and robot.startswith(PREFIX) and not os.path.exists(robot):
-        return _file_by_name(robot.removeprefix(PREFIX), examples(), "not a robot of example-robot-data",
-                             "robots --examples")
+        return _file_by_name(
+            robot.removeprefix(PREFIX), examples(), "not a robot of example-robot-data", "robots --examples"
+        )
     if isinstance(robot, str) and not path.suffix and len(path.parts) == 1:
         robots = shipped()
         with contextlib.suppress(OSError, ValueError):
@@ -108,8 +135,7 @@ def _file_by_name(name: str, files: dict[str, Path], what: str, command: str) ->
     if name in files:
         return files[name]
     close = difflib.get_close_matches(name, files, n=5) or list(files)
-    raise BadRequest(what, name,
-                     f"a file, or a name that `hrsynth {command}` lists, such as " + ", ".join(close[:12]))
+    raise BadRequest(what, name, f"a file, or a name that `hrsynth {command}` lists, such as " + ", ".join(close[:12]))
 
 
 def targets(path: str | Path, dialect: str | None = None) -> tuple[Path, ...]:
@@ -122,8 +148,9 @@ def targets(path: str | Path, dialect: str | None = None) -> tuple[Path, ...]:
 
 
 @with_spelling
-def save(mechanism: Mechanism | str | Path, path: str | Path, dialect: str | None = None, *, meshes: str = "keep"
-         ) -> tuple[Note, ...]:
+def save(
+    mechanism: Mechanism | str | Path, path: str | Path, dialect: str | None = None, *, meshes: str = "keep"
+) -> tuple[Note, ...]:
     """Write a robot file, completely or not at all, of a mechanism or of a robot given by its file or name; what the
     dialect cannot express is returned as warnings.
 
@@ -170,16 +197,22 @@ def _require_whole(file: Path, others: Iterable[Path]) -> None:
     written = set(map(os.path.realpath, others))
     for partner in filter(None, partners):
         if os.path.realpath(partner) not in written:
-            raise BadRequest(f"cannot write the file: {partner.name} next to it would be read with it", str(file),
-                             f"another name, or {partner.name} moved away")
+            raise BadRequest(
+                f"cannot write the file: {partner.name} next to it would be read with it",
+                str(file),
+                f"another name, or {partner.name} moved away",
+            )
 
 
 def _dialect(target: Path, name: str | None) -> Dialect:
     dialects = formats.writable()
     endings = {ending: each.name for each in dialects for ending in each.endings}
     if name is None and target.suffix.lower() not in endings:
-        raise BadRequest("cannot write the file: its extension is not that of a known dialect", str(target),
-                         ", ".join(sorted(endings)) + "; or the dialect given")
+        raise BadRequest(
+            "cannot write the file: its extension is not that of a known dialect",
+            str(target),
+            ", ".join(sorted(endings)) + "; or the dialect given",
+        )
     wanted = name or endings[target.suffix.lower()]
     found = next((each for each in dialects if each.name == wanted), None)
     if found is None:

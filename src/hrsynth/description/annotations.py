@@ -39,8 +39,9 @@ def drop_world(graph: JointGraph) -> JointGraph:
     graph.base = weld.links[1 - here]
     X_BW = weld.ends[1 - here].X @ inverse(weld.ends[here].X)
     for joint in floating:
-        one, two = (FrameSpec(graph.base, frozen(X_BW @ end.X), end.line) if end.link == world else end
-                    for end in joint.ends)
+        one, two = (
+            FrameSpec(graph.base, frozen(X_BW @ end.X), end.line) if end.link == world else end for end in joint.ends
+        )
         graph.joints[joint.name] = replace(joint, ends=(one, two))
     return graph
 

@@ -50,8 +50,11 @@ def part_names(name: str, count: int) -> list[str]:
 def require_free(name: str, joint: Joint, *taken: Container[str]) -> None:
     """Raise ``BadRequest`` where what a joint is written as would take the name of another part."""
     if any(name in each for each in taken):
-        raise BadRequest(f"a part of joint {joint.name!r}, as it is written, would take the name of another", name,
-                         "another name of that one")
+        raise BadRequest(
+            f"a part of joint {joint.name!r}, as it is written, would take the name of another",
+            name,
+            "another name of that one",
+        )
 
 
 def merge(mechanism: Mechanism) -> Mechanism:
@@ -73,8 +76,15 @@ def merge(mechanism: Mechanism) -> Mechanism:
     for name in [name for name in joints if name.endswith(TIP)]:
         fixed = joints[name]
         stem = name.removesuffix(TIP)
-        if (fixed.type is JointType.FIXED and fixed.in_tree and fixed.predecessor == name and bare(links.get(name))
-                and not fixed.xml and fixed.limits is None and fixed.motor is None):
+        if (
+            fixed.type is JointType.FIXED
+            and fixed.in_tree
+            and fixed.predecessor == name
+            and bare(links.get(name))
+            and not fixed.xml
+            and fixed.limits is None
+            and fixed.motor is None
+        ):
             last = carrier.get(name)
             if last is not None and re.fullmatch(re.escape(stem) + r"(__[123])?", last):
                 joints[last] = replace(joints[last], successor=fixed.successor)
@@ -86,8 +96,11 @@ def merge(mechanism: Mechanism) -> Mechanism:
     for match in [match for name in joints if (match := _FIRST.fullmatch(name))]:
         name = match["name"]
         chain = [joints[each] for number in (1, 2, 3) if (each := part(name, number)) in joints]
-        if name in joints or len(chain) < 2 or [joint.name for joint in chain] != [
-                part(name, number + 1) for number in range(len(chain))]:
+        if (
+            name in joints
+            or len(chain) < 2
+            or [joint.name for joint in chain] != [part(name, number + 1) for number in range(len(chain))]
+        ):
             continue
         between = [links.get(joint.successor) for joint in chain[:-1]]
         whole = _whole(name, chain, between, mechanism.length) if all(map(bare, between)) else None
@@ -107,9 +120,14 @@ def _whole(name: str, chain: list[Joint], between: list[Link | None], length: fl
         own = part(name, number)
         if before.successor != after.predecessor or before.successor not in (own, own + BODY):
             return None
-    if any(not joint.in_tree or np.linalg.norm(joint.point - first.point) > SAME_POINT * length
-           or joint.limits != first.limits or joint.actuated != first.actuated or (joint.xml and joint is not first)
-           for joint in chain):
+    if any(
+        not joint.in_tree
+        or np.linalg.norm(joint.point - first.point) > SAME_POINT * length
+        or joint.limits != first.limits
+        or joint.actuated != first.actuated
+        or (joint.xml and joint is not first)
+        for joint in chain
+    ):
         return None
     kind = WHOLES.get("".join(joint.type for joint in chain))
     if kind is None:
@@ -129,8 +147,15 @@ def _whole(name: str, chain: list[Joint], between: list[Link | None], length: fl
             axes = axes if kind is JointType.UNIVERSAL else axes[2:]
     if not same:
         return None
-    return replace(first, name=name, type=kind, successor=chain[-1].successor, axes=tuple(axes), motor=_motor(chain),
-                   offset=_offset(kind, chain))
+    return replace(
+        first,
+        name=name,
+        type=kind,
+        successor=chain[-1].successor,
+        axes=tuple(axes),
+        motor=_motor(chain),
+        offset=_offset(kind, chain),
+    )
 
 
 def _offset(kind: JointType, chain: list[Joint]) -> Array | None:

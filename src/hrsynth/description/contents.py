@@ -16,8 +16,13 @@ from ..mechanism.model import Link, Mechanism, Note
 from . import numerals, xml
 from .jointgraph import ORIGIN, comma_list
 
-SIZES = {"box": ("size",), "sphere": ("radius",), "cylinder": ("radius", "length"), "capsule": ("radius", "length"),
-         "mesh": ()}
+SIZES = {
+    "box": ("size",),
+    "sphere": ("radius",),
+    "cylinder": ("radius", "length"),
+    "capsule": ("radius", "length"),
+    "mesh": (),
+}
 """The attributes of each kind of shape; cylinders and capsules lie along z, a capsule's length is without its caps."""
 SHAPES = ("visual", "collision")
 INERTIA = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
@@ -80,8 +85,13 @@ def content_of(link: Link, robot: Mechanism) -> Content:
     """What a link of a robot holds; a colour may be named by a ``<material>`` of the robot."""
     if not link.xml:
         return Content()
-    colours = {name: colour for fragment in robot.xml if fragment.startswith("<material")
-               for name, colour in [_material(xml.parse_fragment(fragment), {})] if name and colour}
+    colours = {
+        name: colour
+        for fragment in robot.xml
+        if fragment.startswith("<material")
+        for name, colour in [_material(xml.parse_fragment(fragment), {})]
+        if name and colour
+    }
     inertial, solids, rest = None, [], []
     for fragment in link.xml:
         element = None if fragment.startswith("@") else xml.parse_fragment(fragment)
@@ -118,8 +128,9 @@ def _inertial(element: xml.Element) -> Inertial:
     return Inertial(float(mass), _pose(element), frozen([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
 
 
-def _material(element: xml.Element | None, known: Mapping[str, tuple[float, ...]]
-              ) -> tuple[str, tuple[float, ...] | None]:
+def _material(
+    element: xml.Element | None, known: Mapping[str, tuple[float, ...]]
+) -> tuple[str, tuple[float, ...] | None]:
     if element is None:
         return "", None
     name, colour = element.get("name", ""), element.find("color")
@@ -228,8 +239,7 @@ def unsaid(robot: Mechanism, kinds: Collection[str], *, dialect: str) -> list[No
         links = [name for name, content in contents.items() if any(solid.kind == kind for solid in content.solids)]
         if links:
             found.append(f"the {kind} shapes of {comma_list(links)}")
-    return [Note("warning", f"{dialect} has no place for these, which are lost: {'; '.join(found)}")] if found \
-        else []
+    return [Note("warning", f"{dialect} has no place for these, which are lost: {'; '.join(found)}")] if found else []
 
 
 def _tag(fragment: str) -> str:

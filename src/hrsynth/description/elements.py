@@ -48,8 +48,12 @@ class XmlReader:
     def require_some(self, found: Collection[object], what: str, element: xml.Element) -> None:
         """Record that a file holds no links."""
         if not found:
-            self.defect(xml.line(element), f"no {what}", None,
-                        f"{what} and joints; where this file is a part or holds macros, the file that uses it")
+            self.defect(
+                xml.line(element),
+                f"no {what}",
+                None,
+                f"{what} and joints; where this file is a part or holds macros, the file that uses it",
+            )
 
     def attribute(self, element: xml.Element, name: str) -> str | None:
         """An attribute that must be there and not be empty."""
@@ -105,8 +109,13 @@ class XmlReader:
 
     def direction(self, element: xml.Element, name: str, default: Iterable[float]) -> Array:
         """The unit vector that an attribute gives."""
-        return self.unit(self.numbers(element, name, default), xml.line(element), f"{name} of <{element.tag}>",
-                         element.get(name), np.array([1.0, 0.0, 0.0]))
+        return self.unit(
+            self.numbers(element, name, default),
+            xml.line(element),
+            f"{name} of <{element.tag}>",
+            element.get(name),
+            np.array([1.0, 0.0, 0.0]),
+        )
 
     def rotation(self, element: xml.Element, quaternion: Array) -> Array:
         """The rotation (3, 3) of a quaternion w x y z of any length but zero."""
@@ -120,7 +129,7 @@ class XmlReader:
     def axes(self, element: xml.Element, type_: JointType | None) -> tuple[Array, ...]:
         """The axes that the type needs, unit vectors; axes of types that need none are not looked at."""
         axes = []
-        for tag in ("axis", "axis2")[:0 if type_ is None else type_.axes]:
+        for tag in ("axis", "axis2")[: 0 if type_ is None else type_.axes]:
             axis = self.only(element, tag)
             if axis is None and tag == "axis2":
                 self.defect(xml.line(element), "universal loop without <axis2>", element.get("name"))

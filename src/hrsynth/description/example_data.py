@@ -27,6 +27,8 @@ def examples() -> dict[str, Path]:
         raise MissingExtra("the examples of " + PACKAGE, "examples") from None
     files = [path for ending in ("urdf", "sdf") for path in folder.glob(f"*/*/*.{ending}")]
     count = Counter(path.stem for path in files)
-    named = {path.stem if count[path.stem] == 1 else f"{path.parts[-3].removesuffix('_description')}-{path.stem}": path
-             for path in files}
+    named = {
+        path.stem if count[path.stem] == 1 else f"{path.parts[-3].removesuffix('_description')}-{path.stem}": path
+        for path in files
+    }
     return dict(sorted(named.items()))

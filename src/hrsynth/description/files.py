@@ -69,8 +69,11 @@ def require_same(path: Path, content: bytes) -> None:
     except (OSError, ValueError) as error:
         raise _unwritten(_reason(error), path) from None
     if not same:
-        raise BadRequest("cannot write the file that goes with it: it already exists, with other content", str(path),
-                         "another name, or that file moved away")
+        raise BadRequest(
+            "cannot write the file that goes with it: it already exists, with other content",
+            str(path),
+            "another name, or that file moved away",
+        )
 
 
 def write_whole(path: str | Path, content: bytes | Iterable[bytes]) -> None:
@@ -94,8 +97,11 @@ def replaceable(path: str | Path) -> Path:
 
 
 def _unwritten(reason: str, path: str | Path) -> BadRequest:
-    return BadRequest(f"cannot write the file: {reason}", str(path),
-                      "a file, new or old, in a folder that is there and can be written to")
+    return BadRequest(
+        f"cannot write the file: {reason}",
+        str(path),
+        "a file, new or old, in a folder that is there and can be written to",
+    )
 
 
 def _reason(error: OSError | ValueError) -> str:

@@ -21,14 +21,27 @@ from .sights import SightSpec
 ORIGIN = frozen(np.eye(4))
 Z = frozen([0.0, 0.0, 1.0])
 LOOP_TYPES = {
-    "revolute": JointType.REVOLUTE, "continuous": JointType.REVOLUTE, "prismatic": JointType.PRISMATIC,
-    "cylindrical": JointType.CYLINDRICAL, "universal": JointType.UNIVERSAL, "spherical": JointType.SPHERICAL,
-    "planar": JointType.PLANAR, "fixed": JointType.FIXED,
+    "revolute": JointType.REVOLUTE,
+    "continuous": JointType.REVOLUTE,
+    "prismatic": JointType.PRISMATIC,
+    "cylindrical": JointType.CYLINDRICAL,
+    "universal": JointType.UNIVERSAL,
+    "spherical": JointType.SPHERICAL,
+    "planar": JointType.PLANAR,
+    "fixed": JointType.FIXED,
 }
 """The names that a ``<loop>`` has for joint types."""
 
-_COST = {JointType.FIXED: 0, JointType.REVOLUTE: 1, JointType.PRISMATIC: 1, JointType.UNIVERSAL: 2,
-         JointType.CYLINDRICAL: 2, JointType.PLANAR: 3, JointType.SPHERICAL: 3, JointType.FREE: 5}
+_COST = {
+    JointType.FIXED: 0,
+    JointType.REVOLUTE: 1,
+    JointType.PRISMATIC: 1,
+    JointType.UNIVERSAL: 2,
+    JointType.CYLINDRICAL: 2,
+    JointType.PLANAR: 3,
+    JointType.SPHERICAL: 3,
+    JointType.FREE: 5,
+}
 _OUTSIDE = 20
 """Added to the cost of a joint that the file does not write as part of its tree."""
 
@@ -70,8 +83,10 @@ class JointSpec:
     @cached_property
     def parts(self) -> list[tuple[Array, Array | None]]:
         """Of each one-freedom joint that it is a chain of the axis a, and [a]ₓ where it turns about that."""
-        return [(axis, None if kind is JointType.PRISMATIC else hat(unit(axis)))
-                for kind, axis in elementary(self.kind, self.axes)]
+        return [
+            (axis, None if kind is JointType.PRISMATIC else hat(unit(axis)))
+            for kind, axis in elementary(self.kind, self.axes)
+        ]
 
     @cached_property
     def across(self) -> Array:
@@ -100,8 +115,9 @@ Posture = Mapping[str, Array]
 """The values of some joints, by name, as :mod:`.jointmotion` has them; all others are at zero."""
 
 
-def first_body(links: Iterable[str], joined: Iterable[tuple[str, str]], base: str, told: Iterable[str]
-               ) -> tuple[str | None, int]:
+def first_body(
+    links: Iterable[str], joined: Iterable[tuple[str, str]], base: str, told: Iterable[str]
+) -> tuple[str | None, int]:
     """The first body of a formation: of the links ``told`` to be observed or to observe, where two or more of the parts
     that nothing but the base joins have some; and the number of such parts."""
     some = set(told) - {base}
@@ -167,8 +183,15 @@ class JointGraph:
         seen = {each.link for each in self.sights}
         return links | seen, joints | (seen - self.links.keys())
 
-    def close(self, name: str, kind: JointType, ends: tuple[FrameSpec, FrameSpec], axes: Sequence[Array] = (Z,),
-              line: int | None = None, motor: Motor | None = None) -> None:
+    def close(
+        self,
+        name: str,
+        kind: JointType,
+        ends: tuple[FrameSpec, FrameSpec],
+        axes: Sequence[Array] = (Z,),
+        line: int | None = None,
+        motor: Motor | None = None,
+    ) -> None:
         """Add a joint that closes a loop; of ``axes`` it takes as many as its type has."""
         self.joints[name] = JointSpec(name, kind, ends, tuple(axes[: kind.axes]), None, (), line, motor, in_tree=False)
 
@@ -189,25 +212,43 @@ class JointGraph:
             one, two = (FrameSpec(end.link, scale_pose(end.X, factor), end.line) for end in joint.ends)
             limits = joint.limits
             if limits is not None and name in slides:
-                lower, upper, velocity = (None if value is None else factor * value
-                                          for value in (limits.lower, limits.upper, limits.velocity))
+                lower, upper, velocity = (
+                    None if value is None else factor * value for value in (limits.lower, limits.upper, limits.velocity)
+                )
                 limits = replace(limits, lower=lower, upper=upper, velocity=velocity)
             self.joints[name] = replace(joint, ends=(one, two), limits=limits)
-        self.sights = [replace(each, at=each.at and (factor * each.at[0], factor * each.at[1], factor * each.at[2]),
-                               radius=each.radius and factor * each.radius) for each in self.sights]
+        self.sights = [
+            replace(
+                each,
+                at=each.at and (factor * each.at[0], factor * each.at[1], factor * each.at[2]),
+                radius=each.radius and factor * each.radius,
+            )
+            for each in self.sights
+        ]
         self.cameras = [replace(each, pose=scale_pose(each.pose, factor)) for each in self.cameras]
         units = {name: factor if name in slides else 1.0 for name in self.joints}
-        self.gears = [replace(gear, ratio=gear.ratio * units[gear.driven] / units[gear.driver],
-                              offset=gear.offset * units[gear.driven]) for gear in self.gears]
+        self.gears = [
+            replace(
+                gear,
+                ratio=gear.ratio * units[gear.driven] / units[gear.driver],
+                offset=gear.offset * units[gear.driven],
+            )
+            for gear in self.gears
+        ]
 
     def in_metres(self, posture: Posture) -> Posture:
         """A posture of the file with its lengths in metres."""
         if self.unit == 1:
             return posture
         slides = (JointType.PRISMATIC, JointType.FREE)
-        return {name: scale_pose(value, self.unit) if value.ndim == 2 else self.unit * value
-                if name in self.joints and self.joints[name].type in slides else value
-                for name, value in posture.items()}
+        return {
+            name: scale_pose(value, self.unit)
+            if value.ndim == 2
+            else self.unit * value
+            if name in self.joints and self.joints[name].type in slides
+            else value
+            for name, value in posture.items()
+        }
 
     def prune(self, base: str) -> None:
         """Leave out what no chain of joints joins to ``base``, and record it."""

@@ -121,8 +121,13 @@ def require_closed(robot: str, loops: Sequence[tuple[JointSpec, Array, Array]], 
         worst = int(np.argmax(misses))
         joint = loops[worst][0]
         where = robot if joint.line is None else f"{robot}:{joint.line}"
-        raise LoopsNotClosed(where, misses[worst], SAME_GEOMETRY, joint.name,
-                             "; ".join(filter(None, [cure(misses[worst]), "hrsynth lint looks for where it closes"])))
+        raise LoopsNotClosed(
+            where,
+            misses[worst],
+            SAME_GEOMETRY,
+            joint.name,
+            "; ".join(filter(None, [cure(misses[worst]), "hrsynth lint looks for where it closes"])),
+        )
 
 
 def cure(opening: float) -> str:

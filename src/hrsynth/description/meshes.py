@@ -63,15 +63,19 @@ def _candidates(name: str, folder: Path) -> Iterator[Path]:
     try:
         paths = [folder / name] if not rest else [Path(rest)] if scheme == "file" else []
         if scheme in ("package", "model") and (rest := rest.lstrip("/")):
-            paths = [path for parent in (folder, *folder.resolve().parents)
-                     for path in (parent / rest, parent / Path(*Path(rest).parts[1:]))]
+            paths = [
+                path
+                for parent in (folder, *folder.resolve().parents)
+                for path in (parent / rest, parent / Path(*Path(rest).parts[1:]))
+            ]
         yield from (path for path in paths if path.is_file())
     except (OSError, ValueError):
         return
 
 
-def triangles(names: Iterable[str], robot: str | None, within: Path | None = None
-              ) -> dict[str, tuple[Array, Any] | None]:
+def triangles(
+    names: Iterable[str], robot: str | None, within: Path | None = None
+) -> dict[str, tuple[Array, Any] | None]:
     """The points (n, 3) and triangles (m, 3) of meshes that the file of a robot names; None for those that cannot be
     read. With ``within`` only files of that folder are read, also those that lie flat in it. Raises ``BadRequest`` for
     what unpacks to too much."""
@@ -84,8 +88,10 @@ def triangles(names: Iterable[str], robot: str | None, within: Path | None = Non
             path = _within_folder(path or within / Path(name).name, within)
         if path is not None and path.suffix.lower() in KNOWN:
             files[name] = str(path.resolve()), None
-    files |= {name: (f"{name}.obj", text) for name, text in _inner([
-        name for name in found if name not in files], folder, within).items()}
+    files |= {
+        name: (f"{name}.obj", text)
+        for name, text in _inner([name for name in found if name not in files], folder, within).items()
+    }
     if not files:
         return found
     try:
@@ -94,8 +100,10 @@ def triangles(names: Iterable[str], robot: str | None, within: Path | None = Non
         raise BadRequest(f"the robot's meshes: {error}") from None
     for name in files:
         if (counts := json.loads(told.readline())) is not None:
-            points, faces = (np.frombuffer(told.read(24 * count), kind).reshape(-1, 3)
-                             for count, kind in zip(counts, (float, np.int64), strict=True))
+            points, faces = (
+                np.frombuffer(told.read(24 * count), kind).reshape(-1, 3)
+                for count, kind in zip(counts, (float, np.int64), strict=True)
+            )
             found[name] = points, faces
     return found
 
@@ -123,12 +131,16 @@ def _inner(names: Iterable[str], folder: Path, within: Path | None = None) -> di
     from .formats.usd.stage import meshes
 
     found = meshes({path: [*prims.values()] for path, prims in asked.items()})
-    return {name: text for prims, texts in zip(asked.values(), found, strict=True)
-            for name, text in zip(prims, texts, strict=True)}
+    return {
+        name: text
+        for prims, texts in zip(asked.values(), found, strict=True)
+        for name, text in zip(prims, texts, strict=True)
+    }
 
 
-def carry_meshes(robot: Mechanism, target: Path, endings: tuple[str, ...] | None, *, copy: bool
-            ) -> tuple[Mechanism, dict[Path, Callable[[], bytes]], list[Note]]:
+def carry_meshes(
+    robot: Mechanism, target: Path, endings: tuple[str, ...] | None, *, copy: bool
+) -> tuple[Mechanism, dict[Path, Callable[[], bytes]], list[Note]]:
     """A robot whose meshes are named from the folder of ``target``; what has to be written there for it (``copy``: all
     meshes, into ``meshes/``); and notes.
 
@@ -177,8 +189,12 @@ def carry_meshes(robot: Mechanism, target: Path, endings: tuple[str, ...] | None
             copied[one] = f"meshes/{new.name}"
             return copied[one]
         there = path if path is not None else inner
-        if locate_mesh(file, folder) is not None and there is not None and endings is None and os.path.samefile(
-                str(locate_mesh(file, folder)), there):
+        if (
+            locate_mesh(file, folder) is not None
+            and there is not None
+            and endings is None
+            and os.path.samefile(str(locate_mesh(file, folder)), there)
+        ):
             return name
         if inner is not None:
             inside.append(name)
@@ -199,11 +215,13 @@ def carry_meshes(robot: Mechanism, target: Path, endings: tuple[str, ...] | None
                 kept.append(fragment if element is None else xml.canonical(element))
         links[title] = replace(link, xml=tuple(kept))
     notes = []
-    for names, what in ((missing, "missing meshes" + (" are not written" if endings else "")),
-                        (outside, "meshes outside of the robot's folders are left alone"),
-                        (foreign, f"meshes are not written, as only binary files {', '.join(endings or ())} can be"),
-                        (strange, "files whose names are not those of meshes are not copied"),
-                        (inside, "meshes lie in the USD file (--meshes copy makes files of them)")):
+    for names, what in (
+        (missing, "missing meshes" + (" are not written" if endings else "")),
+        (outside, "meshes outside of the robot's folders are left alone"),
+        (foreign, f"meshes are not written, as only binary files {', '.join(endings or ())} can be"),
+        (strange, "files whose names are not those of meshes are not copied"),
+        (inside, "meshes lie in the USD file (--meshes copy makes files of them)"),
+    ):
         if names:
             notes.append(Note("warning", f"{what}: {comma_list(names, 4)}"))
     return replace(robot, links=links, file=str(target)), files, notes

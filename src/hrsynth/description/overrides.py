@@ -47,31 +47,57 @@ class Overrides:
     as_written: bool = False
 
     @classmethod
-    def said(cls, *, motors: str | Iterable[str] | None = None, close: str | Iterable[str] = (),
-             freeze: str | Iterable[str] = (), observe: str | Iterable[str] | None = None,
-             tolerance: float | None = None, as_written: bool = False, **more: str | None) -> Overrides:
+    def said(
+        cls,
+        *,
+        motors: str | Iterable[str] | None = None,
+        close: str | Iterable[str] = (),
+        freeze: str | Iterable[str] = (),
+        observe: str | Iterable[str] | None = None,
+        tolerance: float | None = None,
+        as_written: bool = False,
+        **more: str | None,
+    ) -> Overrides:
         """What a user says, lists also as texts with commas."""
         if tolerance is not None and as_written:
-            raise BadRequest("--as-written keeps the numbers, --tolerance says how far they are changed",
-                             f"{tolerance:g}", "one of the two")
+            raise BadRequest(
+                "--as-written keeps the numbers, --tolerance says how far they are changed",
+                f"{tolerance:g}",
+                "one of the two",
+            )
         number = isinstance(tolerance, Real)
         if tolerance is not None and not (number and EXACT < tolerance <= LARGEST_NOISE):
-            raise BadRequest("tolerance", f"{tolerance:g}" if number else tolerance,
-                             f"{EXACT:g} to {LARGEST_NOISE:g} (characteristic lengths, radians)")
-        return cls(motors=names(motors), close=closures(close), freeze=names(freeze or ()) or (),
-                   observe=names(observe), tolerance=tolerance, as_written=as_written, **more)
+            raise BadRequest(
+                "tolerance",
+                f"{tolerance:g}" if number else tolerance,
+                f"{EXACT:g} to {LARGEST_NOISE:g} (characteristic lengths, radians)",
+            )
+        return cls(
+            motors=names(motors),
+            close=closures(close),
+            freeze=names(freeze or ()) or (),
+            observe=names(observe),
+            tolerance=tolerance,
+            as_written=as_written,
+            **more,
+        )
 
     @property
     def any(self) -> bool:
         """Whether anything is given that changes what the file says."""
         return bool(self.close or self.freeze) or any(
-            each is not None for each in (self.platform, self.motors, self.unit, self.keyframe))
+            each is not None for each in (self.platform, self.motors, self.unit, self.keyframe)
+        )
 
     @property
     def named(self) -> tuple[set[str | None], set[str]]:
         """The links and the joints that are named."""
-        ends = [match[end].partition("@")[0] for each in self.close if (match := _CLOSURE.fullmatch(each))
-                for end in ("one", "two")]
+        ends = [
+            match[end].partition("@")[0]
+            for each in self.close
+            if (match := _CLOSURE.fullmatch(each))
+            for end in ("one", "two")
+        ]
         return {self.base, self.platform, *(self.observe or ()), *ends}, {*(self.motors or ()), *self.freeze}
 
     @property
@@ -132,8 +158,11 @@ def _freeze(graph: JointGraph, name: str) -> None:
     for gear in geared:
         other = gear.driven if name == gear.driver else gear.driver
         if gear.offset:
-            raise BadRequest(f"--freeze: joint {name!r} at zero, and with it {other!r} away from zero by the gear "
-                             f"{gear.name!r}", gear.offset, "joints that gears without an offset join")
+            raise BadRequest(
+                f"--freeze: joint {name!r} at zero, and with it {other!r} away from zero by the gear {gear.name!r}",
+                gear.offset,
+                "joints that gears without an offset join",
+            )
         if gear.ratio or other == gear.driven:
             graph.note("merged", f"joint {other!r} is held by the gear {gear.name!r}: {name!r} is frozen")
             _freeze(graph, other)
@@ -146,16 +175,21 @@ def _close(graph: JointGraph, wish: str) -> None:
     match = _CLOSURE.fullmatch(wish)
     kind = None if match is None else CLOSURES.get(match["kind"] or "spherical")
     if match is None or kind is None or kind is JointType.UNIVERSAL:
-        raise BadRequest("--close", wish, "A:B or A:B:TYPE, A and B links or points A@x,y,z in them (metres), TYPE one "
-                         "of " + ", ".join(name for name in CLOSURES if name != "universal"))
+        raise BadRequest(
+            "--close",
+            wish,
+            "A:B or A:B:TYPE, A and B links or points A@x,y,z in them (metres), TYPE one "
+            "of " + ", ".join(name for name in CLOSURES if name != "universal"),
+        )
     ends = []
     for end in (match["one"], match["two"]):
         link, at, point = end.partition("@")
         if link not in graph.links:
             raise BadRequest("--close: no such link", link, comma_list(graph.links, like=link))
         try:
-            ends.append(FrameSpec(link, frozen(pose(numerals.parse(point.replace(",", " "), 3)))) if at
-                        else FrameSpec(link))
+            ends.append(
+                FrameSpec(link, frozen(pose(numerals.parse(point.replace(",", " "), 3)))) if at else FrameSpec(link)
+            )
         except ValueError as error:
             raise BadRequest("--close: a point", end, str(error)) from None
     one, two = ends
@@ -171,7 +205,8 @@ def _same_ends(ends: tuple[FrameSpec, FrameSpec], others: tuple[FrameSpec, Frame
     """Whether two closures join the same two places."""
     table = {end.link: end.X[:3, 3] for end in others}
     return {end.link for end in ends} == set(table) and all(
-        np.array_equal(table[end.link], end.X[:3, 3]) for end in ends)
+        np.array_equal(table[end.link], end.X[:3, 3]) for end in ends
+    )
 
 
 def _drive(graph: JointGraph, wanted: Iterable[str]) -> None:
@@ -195,8 +230,9 @@ def observe_links(mechanism: Mechanism, links: Iterable[str]) -> Mechanism:
     found = []
     for link in links:
         if normal.into.get(link) not in normal.mechanism.links:
-            raise BadRequest(f"{mechanism.name}: no link of a leg to observe", link,
-                             comma_list(normal.mechanism.links, like=link))
+            raise BadRequest(
+                f"{mechanism.name}: no link of a leg to observe", link, comma_list(normal.mechanism.links, like=link)
+            )
         default = observation_of(legs, normal.into[link])
         turn = mechanism.links[link].pose[:3, :3].T @ normal.mechanism.links[default.link].pose[:3, :3]
         found.append(replace(default, link=link, direction=turn @ default.direction))

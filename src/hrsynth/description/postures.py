@@ -53,8 +53,11 @@ def posture(graph: JointGraph, wanted: str) -> Posture:
     name = name if stated.endswith(SRDF) else wanted
     if name not in states:
         known = [*graph.postures, *states]
-        raise BadRequest(f"{graph.file}: no such keyframe", wanted, comma_list(known) if known else
-                         "a file that has keyframes, or FILE.srdf:NAME")
+        raise BadRequest(
+            f"{graph.file}: no such keyframe",
+            wanted,
+            comma_list(known) if known else "a file that has keyframes, or FILE.srdf:NAME",
+        )
     return _of_state(graph, name, states[name])
 
 
@@ -90,8 +93,11 @@ def _of_state(graph: JointGraph, name: str, state: xml.Element) -> Posture:
         else:
             found[title] = value
     if ignored:
-        graph.note("ignored", f"the values that the keyframe {name!r} has for {comma_list(ignored)}: no such joints, "
-                              "or not as many numbers as they have freedoms")
+        graph.note(
+            "ignored",
+            f"the values that the keyframe {name!r} has for {comma_list(ignored)}: no such joints, "
+            "or not as many numbers as they have freedoms",
+        )
     return found
 
 

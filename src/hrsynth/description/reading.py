@@ -45,8 +45,9 @@ def understood(file: RobotFile, overrides: Overrides) -> Mechanism:
         robot = formats.read(replace(file, strict=False))  # rounded: closed as files of other tools are
     if isinstance(robot, JointGraph):
         if len(robot.links) > MOST_LINKS or len(robot.joints) > 2 * MOST_LINKS:
-            raise xml.refusal(file.path, f"{len(robot.links)} links and {len(robot.joints)} joints",
-                              f"up to {MOST_LINKS} links")
+            raise xml.refusal(
+                file.path, f"{len(robot.links)} links and {len(robot.joints)} joints", f"up to {MOST_LINKS} links"
+            )
         from .assembly.build import build
         from .assembly.generic import with_generic_zero
 
@@ -78,15 +79,25 @@ def robot_file(path: Path, given: Overrides = AS_IT_IS, *, strict: bool | None =
     notes: list[Note] = []
     root = xml.document(data, str(path), notes)
     _require_few(path, root)
-    return RobotFile(path, xacro.expand(path) if xacro.is_needed(root) else root, strict, b"", tuple(notes),
-                     given.tolerance, given.as_written)
+    return RobotFile(
+        path,
+        xacro.expand(path) if xacro.is_needed(root) else root,
+        strict,
+        b"",
+        tuple(notes),
+        given.tolerance,
+        given.as_written,
+    )
 
 
 def _require_few(path: Path, root: xml.Element) -> None:
     """Refuse what has too many links, joints, keyframes or observations before any of them is read."""
     links, joints = ("link", "body", "model", "default", "frame"), ("joint", "connect", "weld")
-    for names, most, what in ((links, 2 * MOST_LINKS, "links, bodies and frames"), (joints, 4 * MOST_LINKS, "joints"),
-                              (("key", "observe"), MOST_LINKS, "keyframes and observations")):
+    for names, most, what in (
+        (links, 2 * MOST_LINKS, "links, bodies and frames"),
+        (joints, 4 * MOST_LINKS, "joints"),
+        (("key", "observe"), MOST_LINKS, "keyframes and observations"),
+    ):
         if sum(1 for _ in islice(root.iter(*names), most + 1)) > most:
             allowed = f"{MOST_LINKS} links" if names is links else most
             raise xml.refusal(path, f"more than {most} {what}", f"up to {allowed}")
@@ -95,10 +106,16 @@ def _require_few(path: Path, root: xml.Element) -> None:
 def _in_folder(path: Path) -> Path:
     if (path / "robot.urdf").is_file():
         return path / "robot.urdf"
-    files = sorted(each for pattern in ("*.urdf", "*.sdf", "*.xml", "*.mjcf", "*.xacro", "*.usd", "*.usda", "*.usdc")
-                   for each in path.glob(pattern)
-                   if each.name not in ("package.xml", "model.config"))
+    files = sorted(
+        each
+        for pattern in ("*.urdf", "*.sdf", "*.xml", "*.mjcf", "*.xacro", "*.usd", "*.usda", "*.usdc")
+        for each in path.glob(pattern)
+        if each.name not in ("package.xml", "model.config")
+    )
     if len(files) != 1:
-        raise xml.refusal(path, "a folder with " + (f"{len(files)} robot files" if files else "no robot file"),
-                          "robot.urdf with robot.yaml, or one robot file")
+        raise xml.refusal(
+            path,
+            "a folder with " + (f"{len(files)} robot files" if files else "no robot file"),
+            "robot.urdf with robot.yaml, or one robot file",
+        )
     return files[0]

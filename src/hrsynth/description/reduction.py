@@ -18,8 +18,13 @@ from .chains import CUT, WELD
 from .tree import spanning
 
 
-def reduce(mechanism: Mechanism, tree: Collection[JointType], loops: Collection[JointType],
-           driven: Collection[JointType] = (), body: str = "") -> tuple[Mechanism, tuple[Note, ...]]:
+def reduce(
+    mechanism: Mechanism,
+    tree: Collection[JointType],
+    loops: Collection[JointType],
+    driven: Collection[JointType] = (),
+    body: str = "",
+) -> tuple[Mechanism, tuple[Note, ...]]:
     """The mechanism with tree joints of types ``tree`` and loops of types ``loops`` (with a motor: ``driven``) only;
     and what is lost. ``body`` follows the names of links in between.
 

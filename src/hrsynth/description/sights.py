@@ -28,8 +28,12 @@ from . import numerals
 
 SEE = "[CAMERA=]KIND:LINK[@x,y,z][/dx,dy,dz][/radius]"
 CAMERA = "NAME=LINK[@x,y,z[/roll,pitch,yaw[/focal[,width,height]]]]"
-OFFERED = (((0.5, 0.1, 0.2), (0.0, 0.0, 1.0)), ((-0.3, 0.4, 0.1), (1.0, 0.0, 0.0)),
-           ((-0.1, -0.5, 0.3), (0.0, 1.0, 0.0)), ((0.2, 0.3, -0.4), (0.6, 0.0, 0.8)))
+OFFERED = (
+    ((0.5, 0.1, 0.2), (0.0, 0.0, 1.0)),
+    ((-0.3, 0.4, 0.1), (1.0, 0.0, 0.0)),
+    ((-0.1, -0.5, 0.3), (0.0, 1.0, 0.0)),
+    ((0.2, 0.3, -0.4), (0.6, 0.0, 0.8)),
+)
 """Points of a link (characteristic lengths) and axes, no three points on one line and not four in one plane, that are
 offered where none are given."""
 WORLD = "world"
@@ -76,8 +80,16 @@ def spec_of(attributes: Mapping[str, str], line: int | None = None) -> SightSpec
     if "axis" in numbers and not any(numbers["axis"]):
         raise BadRequest(f"observe {kind}: axis", attributes["axis"], "a non-zero vector")
     radius = numbers["radius"][0] if "radius" in numbers else None
-    return SightSpec(kind, attributes[own], attributes.get("leg"), attributes.get("camera"), numbers.get("at"),
-                     numbers.get("axis"), radius, line)
+    return SightSpec(
+        kind,
+        attributes[own],
+        attributes.get("leg"),
+        attributes.get("camera"),
+        numbers.get("at"),
+        numbers.get("axis"),
+        radius,
+        line,
+    )
 
 
 def attributes_of(seen: Observation, mechanism: Mechanism, decimals: int) -> dict[str, str]:
@@ -125,8 +137,11 @@ def parse_see(text: str, cameras: Sequence[str]) -> SightSpec:
         at = ""
         if where := re.search("@([^@/]*,[^@/]*)$", link):
             form = f"{head}:{'JOINT' if 'joint' in needs else 'LINK'}"
-            raise BadRequest(f"--see {text}: a place, of which the kind {kind} has none", where[1],
-                             form + "/dx,dy,dz" * ("axis" in needs) + "[/dx,dy,dz]" * ("axis?" in needs))
+            raise BadRequest(
+                f"--see {text}: a place, of which the kind {kind} has none",
+                where[1],
+                form + "/dx,dy,dz" * ("axis" in needs) + "[/dx,dy,dz]" * ("axis?" in needs),
+            )
     attributes = {"kind": kind, "joint" if "joint" in needs else "link": link or at}
     if "at" in needs:
         if not link:
@@ -171,8 +186,7 @@ def offers(text: str, length: float) -> list[str]:
     found = []
     for at, axis in OFFERED:
         numbers = ",".join(f"{length * value:.2g}" for value in at)
-        found.append(text + f"@{numbers}" * ("at" in needs)
-                     + "/{:g},{:g},{:g}".format(*axis) * ("axis" in needs))
+        found.append(text + f"@{numbers}" * ("at" in needs) + "/{:g},{:g},{:g}".format(*axis) * ("axis" in needs))
     return found
 
 
@@ -226,18 +240,19 @@ def with_sights(mechanism: Mechanism, specs: Sequence[SightSpec], cameras: Itera
     return mechanism
 
 
-def as_written(mechanism: Mechanism, specs: Sequence[SightSpec], cameras: Sequence[NamedCamera], file: str
-               ) -> Mechanism:
+def as_written(
+    mechanism: Mechanism, specs: Sequence[SightSpec], cameras: Sequence[NamedCamera], file: str
+) -> Mechanism:
     """The same for those of a file; raises ``BadRobotFile`` with all that is wrong with them."""
     defects: list[Defect] = []
     every: list[NamedCamera | SightSpec] = [*cameras, *specs]
     for each in every:
         try:
-            mechanism = (_with_camera(mechanism, each) if isinstance(each, NamedCamera) else
-                         _with_sight(mechanism, each))
+            mechanism = _with_camera(mechanism, each) if isinstance(each, NamedCamera) else _with_sight(mechanism, each)
         except BadRequest as error:
-            defects.append(Defect(file, each.line, error.what, None if error.value is None else str(error.value),
-                                  error.allowed))
+            defects.append(
+                Defect(file, each.line, error.what, None if error.value is None else str(error.value), error.allowed)
+            )
     if defects:
         raise BadRobotFile(defects)
     return mechanism
@@ -270,8 +285,11 @@ def resolve_sight(mechanism: Mechanism, spec: SightSpec) -> tuple[Observation, .
             raise BadRequest("observe encoder: unknown joint", spec.link, sorted(mechanism.joints))
         read = encoders(mechanism, mechanism.joints[spec.link], label)
         if not read:
-            raise BadRequest(f"observe encoder: the joint {spec.link!r}", mechanism.joints[spec.link].type.name.lower(),
-                             "one with one axis or two")
+            raise BadRequest(
+                f"observe encoder: the joint {spec.link!r}",
+                mechanism.joints[spec.link].type.name.lower(),
+                "one with one axis or two",
+            )
         return tuple(replace(each, line=spec.line) for each in read)
     link = _link(mechanism, spec.link, f"observe {spec.kind}: unknown link")
     if issubclass(kind, Inclination):
@@ -287,11 +305,15 @@ def resolve_sight(mechanism: Mechanism, spec: SightSpec) -> tuple[Observation, .
         return (Direction(label, link, frozen(spec.axis or ()), line=spec.line, seen_from=seen_from),)
     assert issubclass(kind, CameraObservation)
     if spec.radius is not None and not (abs(spec.radius) if kind.signed else spec.radius) > 0:
-        raise BadRequest(f"observe {spec}: radius (m)", spec.radius,
-                         "a number other than 0" if kind.signed else "more than 0")
+        raise BadRequest(
+            f"observe {spec}: radius (m)", spec.radius, "a number other than 0" if kind.signed else "more than 0"
+        )
     axis = None if spec.axis is None else frozen(spec.axis)
-    return (kind(label, link, at=frozen(spec.at or (0, 0, 0)), axis=axis, radius=spec.radius, camera=camera,
-                 line=spec.line),)
+    return (
+        kind(
+            label, link, at=frozen(spec.at or (0, 0, 0)), axis=axis, radius=spec.radius, camera=camera, line=spec.line
+        ),
+    )
 
 
 def _camera(mechanism: Mechanism, spec: SightSpec) -> NamedCamera | None:
@@ -300,8 +322,9 @@ def _camera(mechanism: Mechanism, spec: SightSpec) -> NamedCamera | None:
     for camera in mechanism.cameras:
         if camera.name == spec.camera:
             return camera
-    raise BadRequest(f"observe {spec}: unknown camera", spec.camera,
-                     [camera.name for camera in mechanism.cameras] or "none is named")
+    raise BadRequest(
+        f"observe {spec}: unknown camera", spec.camera, [camera.name for camera in mechanism.cameras] or "none is named"
+    )
 
 
 def _link(mechanism: Mechanism, link: str, what: str) -> str:

@@ -13,8 +13,14 @@ from ..mechanism.model import Joint, JointType, Link, Mechanism
 from . import chains
 
 _COST = {
-    JointType.FREE: 0, JointType.FIXED: 2, JointType.REVOLUTE: 4, JointType.PRISMATIC: 4, JointType.UNIVERSAL: 6,
-    JointType.CYLINDRICAL: 8, JointType.PLANAR: 10, JointType.SPHERICAL: 12,
+    JointType.FREE: 0,
+    JointType.FIXED: 2,
+    JointType.REVOLUTE: 4,
+    JointType.PRISMATIC: 4,
+    JointType.UNIVERSAL: 6,
+    JointType.CYLINDRICAL: 8,
+    JointType.PLANAR: 10,
+    JointType.SPHERICAL: 12,
 }
 """Reluctance to have a joint of this type in the tree; a free joint closes no loop, so it is never one."""
 _OUTSIDE = 20
@@ -63,9 +69,14 @@ def _cut(mechanism: Mechanism) -> Mechanism:
         if joint.type is JointType.FREE:
             raise BadMechanism(f"joint {joint.name!r} closes a loop without constraining it", joint.type.value)
     carried = {name: joint.successor for name, joint in tree.items()}
-    couplings = tuple(replace(each, predecessor=carried[mechanism.carrier(each, each.predecessor).name],
-                              successor=carried[mechanism.carrier(each, each.successor).name])
-                      for each in mechanism.couplings)
+    couplings = tuple(
+        replace(
+            each,
+            predecessor=carried[mechanism.carrier(each, each.predecessor).name],
+            successor=carried[mechanism.carrier(each, each.successor).name],
+        )
+        for each in mechanism.couplings
+    )
     return replace(mechanism, links=links, joints=tree | loops, couplings=couplings)
 
 
@@ -105,10 +116,12 @@ def _in_base_frame(mechanism: Mechanism) -> Mechanism:
     links = {name: replace(link, pose=X_BW @ link.pose) for name, link in mechanism.links.items()}
     links[mechanism.base] = replace(links[mechanism.base], pose=np.eye(4))
     joints = {
-        name: replace(joint, point=X_BW[:3, :3] @ joint.point + X_BW[:3, 3],
-                      axes=tuple(X_BW[:3, :3] @ axis for axis in joint.axes),
-                      offset=X_BW @ joint.offset @ X_WB if joint.offset is not None and joint.offset.ndim == 2
-                      else joint.offset)
+        name: replace(
+            joint,
+            point=X_BW[:3, :3] @ joint.point + X_BW[:3, 3],
+            axes=tuple(X_BW[:3, :3] @ axis for axis in joint.axes),
+            offset=X_BW @ joint.offset @ X_WB if joint.offset is not None and joint.offset.ndim == 2 else joint.offset,
+        )
         for name, joint in mechanism.joints.items()
     }
     return replace(mechanism, links=links, joints=joints)  # observations are given in their links' frames

@@ -31,12 +31,14 @@ _ATTRIBUTE = re.compile(r"@(?P<name>(\{[^}]*\})?[^=]*)=(?P<value>.*)", re.DOTALL
 
 
 def _parser() -> etree.XMLParser:
-    return etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False,
-                           remove_comments=False, remove_pis=True)
+    return etree.XMLParser(
+        resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False, remove_comments=False, remove_pis=True
+    )
 
 
-def refusal(file: str | Path, what: str, allowed: str | None = None, *, value: str | None = None,
-            line: int | None = None) -> BadRobotFile:
+def refusal(
+    file: str | Path, what: str, allowed: str | None = None, *, value: str | None = None, line: int | None = None
+) -> BadRobotFile:
     """The error of a file with one defect, or of a file as a whole."""
     return BadRobotFile([Defect(str(file), line, what, value, allowed)])
 
@@ -54,8 +56,9 @@ def content(path: str | Path) -> bytes:
     except FileNotFoundError:
         raise refusal(path, "no such file", "the path of a file that is there") from None
     except (OSError, ValueError) as error:
-        raise refusal(path, "cannot be read", "a file that can be read",
-                      value=getattr(error, "strerror", None) or str(error)) from None
+        raise refusal(
+            path, "cannot be read", "a file that can be read", value=getattr(error, "strerror", None) or str(error)
+        ) from None
     if len(data) > LARGEST_FILE:
         raise refusal(path, "file too large", most, value=f"more than {LARGEST_FILE} bytes")
     return data
@@ -73,15 +76,23 @@ def document(text: bytes | str, file: str, notes: list[Note] | None = None) -> E
     try:
         data.decode("utf-8")
     except UnicodeDecodeError as error:
-        raise refusal(file, "not UTF-8 text", "a file in UTF-8", value=hex(data[error.start]),
-                      line=data.count(b"\n", 0, error.start) + 1) from None
+        raise refusal(
+            file,
+            "not UTF-8 text",
+            "a file in UTF-8",
+            value=hex(data[error.start]),
+            line=data.count(b"\n", 0, error.start) + 1,
+        ) from None
     if (count := data.count(b"<") - data.count(b"</")) > MOST_ELEMENTS:
         raise refusal(file, "too many elements", f"up to {MOST_ELEMENTS}", value=str(count))
     data = _BREAK.sub(b" ", data)
     bare = _without_comments(data, lambda comment: True)
     if declaration := _DECLARATION.search(bare):
-        raise refusal(file, "a document type declaration, which is not allowed",
-                      line=bare.count(b"\n", 0, declaration.start()) + 1)
+        raise refusal(
+            file,
+            "a document type declaration, which is not allowed",
+            line=bare.count(b"\n", 0, declaration.start()) + 1,
+        )
     for _ in range(MOST_PREFIXES):
         try:
             root = etree.fromstring(data, _parser())
@@ -108,8 +119,13 @@ def _require_few_names(root: Element, file: str) -> None:
     for element in root.iter("*"):
         names.add(element.tag)
         if len(element.attrib) > MOST_ATTRIBUTES:
-            raise refusal(file, f"too many attributes of <{element.tag}>", f"up to {MOST_ATTRIBUTES}",
-                          value=str(len(element.attrib)), line=line(element))
+            raise refusal(
+                file,
+                f"too many attributes of <{element.tag}>",
+                f"up to {MOST_ATTRIBUTES}",
+                value=str(len(element.attrib)),
+                line=line(element),
+            )
     if len(names) > MOST_NAMES:
         raise refusal(file, "too many different elements", f"up to {MOST_NAMES}", value=str(len(names)))
 
@@ -118,18 +134,27 @@ def _mend(data: bytes, what: str, notes: list[Note]) -> bytes:
     """A document without what stopped the parser, where that means nothing: its lines stay where they are."""
     prefix, root = _PREFIX.search(what), _ROOT.match(data)
     if prefix is not None and root is not None:
-        notes.append(Note("ignored", f"no xmlns:{prefix['prefix']} declares the prefix {prefix['prefix']!r}; its "
-                                     "elements are read anyway"))
+        notes.append(
+            Note(
+                "ignored",
+                f"no xmlns:{prefix['prefix']} declares the prefix {prefix['prefix']!r}; its elements are read anyway",
+            )
+        )
         declared = f' xmlns:{prefix["prefix"]}="urn:undeclared:{prefix["prefix"]}"'.encode()
-        return data[: root.end()] + declared + data[root.end():]
+        return data[: root.end()] + declared + data[root.end() :]
     if "comment" not in what.lower():
         return data
     wrong = [start for start, end in _comments(data) if _is_wrong(data[start:end])]
     if wrong:
         line = data.count(b"\n", 0, wrong[0]) + 1
-        notes.append(Note("ignored", f"{len(wrong)} comments that hold '--', which XML does not allow, the first in "
-                                     f"line {line}" if wrong[1:] else
-                          f"a comment that holds '--', which XML does not allow, in line {line}"))
+        notes.append(
+            Note(
+                "ignored",
+                f"{len(wrong)} comments that hold '--', which XML does not allow, the first in line {line}"
+                if wrong[1:]
+                else f"a comment that holds '--', which XML does not allow, in line {line}",
+            )
+        )
     return _without_comments(data, _is_wrong)
 
 

@@ -21,7 +21,10 @@ def main(folder: str = "robots", *names: str) -> list[Path]:
     a name that there is not."""
     shipped, target = {robot.name: robot.make for robot in ROBOTS}, Path(folder)
     makers: dict[str, Callable[[], Mechanism]] = {
-        **shipped, **{name: partial(_linkage, name) for name in LINKAGES}, "six_poses": six_poses}
+        **shipped,
+        **{name: partial(_linkage, name) for name in LINKAGES},
+        "six_poses": six_poses,
+    }
     if folder.startswith("-"):
         raise BadRequest("an option", folder, "none: python -m hrsynth.families [FOLDER [NAME …]]")
     for name in names:

@@ -96,8 +96,15 @@ def _of_rods(name: str, home: Array, legs: Sequence[_DrivenLeg], end: str) -> Me
     return b.build(platform="platform")
 
 
-def delta(*, base_radius: float = 0.2, platform_radius: float = 0.06, proximal: float = 0.25, distal: float = 0.6,
-          half_width: float = 0.04, home: ArrayLike = (0.0, 0.0, -0.6)) -> Mechanism:
+def delta(
+    *,
+    base_radius: float = 0.2,
+    platform_radius: float = 0.06,
+    proximal: float = 0.25,
+    distal: float = 0.6,
+    half_width: float = 0.04,
+    home: ArrayLike = (0.0, 0.0, -0.6),
+) -> Mechanism:
     """Clavel's Delta, 3-R̲-{2-SS}: three translations (MMT 4.2.2, reference [38]).
 
     Parameters
@@ -116,9 +123,15 @@ def delta(*, base_radius: float = 0.2, platform_radius: float = 0.06, proximal: 
     return _of_pairs("delta", P, legs, half_width)
 
 
-def quattro_rigid(*, base_radius: float = 0.296, platform_radius: float = 0.102, proximal: float = 0.380,
-                  distal: float = 0.825, half_width: float = 0.05,
-                  home: ArrayLike = (0.0, 0.0, -0.7)) -> Mechanism:
+def quattro_rigid(
+    *,
+    base_radius: float = 0.296,
+    platform_radius: float = 0.102,
+    proximal: float = 0.380,
+    distal: float = 0.825,
+    half_width: float = 0.05,
+    home: ArrayLike = (0.0, 0.0, -0.7),
+) -> Mechanism:
     """The Quattro with a rigid platform, 4-R̲-{2-SS}: three translations, four motors (IROS II-A, IV-A).
 
     l₁, l₂, A_i = 0.296 [cos θ_i, sin θ_i, 0] and PC_i = 0.102 [cos θ_i, sin θ_i, 0] are printed in IROS IV-A; the rods'
@@ -129,9 +142,18 @@ def quattro_rigid(*, base_radius: float = 0.296, platform_radius: float = 0.102,
     return _of_pairs("quattro_rigid", P, legs, half_width)
 
 
-def quattro(*, base_radius: float = 0.275, proximal: float = 0.380, distal: float = 0.825,
-            plate_x: float = 0.066, plate_y: float = 0.048, half_bar: float = 0.043, side_bar_offset: float = 0.057,
-            half_width: float = 0.05, home: ArrayLike = (0.0, 0.0, -0.7)) -> Mechanism:
+def quattro(
+    *,
+    base_radius: float = 0.275,
+    proximal: float = 0.380,
+    distal: float = 0.825,
+    plate_x: float = 0.066,
+    plate_y: float = 0.048,
+    half_bar: float = 0.043,
+    side_bar_offset: float = 0.057,
+    half_width: float = 0.05,
+    home: ArrayLike = (0.0, 0.0, -0.7),
+) -> Mechanism:
     """The Quattro with its articulated platform: three translations and a rotation about z (MMT 4.2.2, Appendix B.1).
 
     The platform link is the bar D1D2, its frame at P, the midpoint; it turns by φ with the bar. At the zero
@@ -152,8 +174,12 @@ def quattro(*, base_radius: float = 0.275, proximal: float = 0.380, distal: floa
     """
     P = np.asarray(home, dtype=float)
     D1, D2 = P - [0, half_bar, 0], P + [0, half_bar, 0]
-    tips = [D1 + [-plate_x, -plate_y, 0], D1 + [plate_x, -plate_y, 0],
-            D2 + [plate_x, plate_y, 0], D2 + [-plate_x, plate_y, 0]]
+    tips = [
+        D1 + [-plate_x, -plate_y, 0],
+        D1 + [plate_x, -plate_y, 0],
+        D2 + [plate_x, plate_y, 0],
+        D2 + [-plate_x, plate_y, 0],
+    ]
     E1, E4 = D1 - [side_bar_offset, 0, 0], D2 - [side_bar_offset, 0, 0]
     b = Builder("quattro")
     b.link("base")
@@ -168,8 +194,13 @@ def quattro(*, base_radius: float = 0.275, proximal: float = 0.380, distal: floa
     return b.build(platform="platform")
 
 
-def orthoglide(*, distal: float = 0.31, platform_radius: float = 0.04, half_width: float = 0.03,
-               home: ArrayLike = (0.03, -0.02, 0.04)) -> Mechanism:
+def orthoglide(
+    *,
+    distal: float = 0.31,
+    platform_radius: float = 0.04,
+    half_width: float = 0.03,
+    home: ArrayLike = (0.03, -0.02, 0.04),
+) -> Mechanism:
     """The Orthoglide, 3-P̲-{2-SS} with orthogonal P axes that meet: three translations (MMT 4.2.2, reference [40]).
 
     Leg i slides along axis i of the base frame; its rods lie on the positive side and are set apart along the next axis
@@ -184,14 +215,22 @@ def orthoglide(*, distal: float = 0.31, platform_radius: float = 0.04, half_widt
         Distance of C_i from P, along axis i.
     """
     P, axes = np.asarray(home, dtype=float), np.eye(3)
-    legs = [_on_rail(np.zeros(3), axis, P + platform_radius * axis, distal, side)
-            for axis, side in zip(axes, np.roll(axes, -1, axis=0), strict=True)]
+    legs = [
+        _on_rail(np.zeros(3), axis, P + platform_radius * axis, distal, side)
+        for axis, side in zip(axes, np.roll(axes, -1, axis=0), strict=True)
+    ]
     return _of_pairs("orthoglide", P, legs, half_width)
 
 
-def linear_delta(*, base_radius: float = 0.15, slope: float = math.radians(20), platform_radius: float = 0.06,
-                 distal: float = 0.5, half_width: float = 0.04,
-                 home: ArrayLike = (0.02, -0.03, -0.4)) -> Mechanism:
+def linear_delta(
+    *,
+    base_radius: float = 0.15,
+    slope: float = math.radians(20),
+    platform_radius: float = 0.06,
+    distal: float = 0.5,
+    half_width: float = 0.04,
+    home: ArrayLike = (0.02, -0.03, -0.4),
+) -> Mechanism:
     """A general linear Delta, 3-P̲-{2-SS} with inclined rails: three translations (MMT 4.2.2).
 
     Rail i starts at A_i on a circle of ``base_radius`` and descends outwards by ``slope`` (rad) below the horizontal.
@@ -202,21 +241,33 @@ def linear_delta(*, base_radius: float = 0.15, slope: float = math.radians(20), 
     return _of_pairs("linear_delta", P, legs, half_width)
 
 
-def uranesx(*, base_radius: float = 0.4, platform_radius: float = 0.08, distal: float = 0.55, half_width: float = 0.04,
-            home: ArrayLike = (0.03, -0.02, -0.4)) -> Mechanism:
+def uranesx(
+    *,
+    base_radius: float = 0.4,
+    platform_radius: float = 0.08,
+    distal: float = 0.55,
+    half_width: float = 0.04,
+    home: ArrayLike = (0.03, -0.02, -0.4),
+) -> Mechanism:
     """The UraneSX, 3-P̲-{2-SS} with parallel rails along z: three translations (MMT 4.3, reference [48]).
 
     The translation along the rails cannot be seen in the legs' directions. Parameters as in :func:`delta`; the rails
     stand on a circle of ``base_radius``.
     """
     P = np.asarray(home, dtype=float)
-    legs = [_on_rail(polar(base_radius, a), Z, P + polar(platform_radius, a), distal, tangent(a))
-            for a in THREE_ANGLES]
+    legs = [_on_rail(polar(base_radius, a), Z, P + polar(platform_radius, a), distal, tangent(a)) for a in THREE_ANGLES]
     return _of_pairs("uranesx", P, legs, half_width)
 
 
-def i4l(*, rail_distance: float = 0.35, plate_x: float = 0.06, plate_y: float = 0.05, distal: float = 0.6,
-        half_width: float = 0.04, home: ArrayLike = (0.02, 0.01, -0.4)) -> Mechanism:
+def i4l(
+    *,
+    rail_distance: float = 0.35,
+    plate_x: float = 0.06,
+    plate_y: float = 0.05,
+    distal: float = 0.6,
+    half_width: float = 0.04,
+    home: ArrayLike = (0.02, 0.01, -0.4),
+) -> Mechanism:
     """The I4L, 4-P̲-{2-SS}: rails along x, a platform of two plates that slide on each other along y (MMT 4.3).
 
     Plate 12 carries legs 1 and 2, which come from the side of negative x, ``platform`` carries legs 3 and 4, from
@@ -236,8 +287,17 @@ def i4l(*, rail_distance: float = 0.35, plate_x: float = 0.06, plate_y: float = 
         As in :func:`delta`.
     """
     P, x = np.asarray(home, dtype=float), np.array([1.0, 0, 0])
-    legs = [_on_rail(np.array([0, sy * rail_distance, 0]), x, P + [sx * plate_x, sy * plate_y, 0], distal,
-                     tangent(math.atan2(sy, sx)), forward=sx > 0) for sx, sy in ((-1, -1), (-1, 1), (1, 1), (1, -1))]
+    legs = [
+        _on_rail(
+            np.array([0, sy * rail_distance, 0]),
+            x,
+            P + [sx * plate_x, sy * plate_y, 0],
+            distal,
+            tangent(math.atan2(sy, sx)),
+            forward=sx > 0,
+        )
+        for sx, sy in ((-1, -1), (-1, 1), (1, 1), (1, -1))
+    ]
     b = Builder("i4l")
     b.link("base")
     _add_pairs(b, legs, half_width, ["plate_12", "plate_12", "platform", "platform"])
@@ -247,8 +307,14 @@ def i4l(*, rail_distance: float = 0.35, plate_x: float = 0.06, plate_y: float = 
     return b.build(platform="platform")
 
 
-def three_ruu(*, base_radius: float = 0.2, platform_radius: float = 0.06, proximal: float = 0.25, distal: float = 0.6,
-              home: ArrayLike = (0.0, 0.0, -0.6)) -> Mechanism:
+def three_ruu(
+    *,
+    base_radius: float = 0.2,
+    platform_radius: float = 0.06,
+    proximal: float = 0.25,
+    distal: float = 0.6,
+    home: ArrayLike = (0.0, 0.0, -0.6),
+) -> Mechanism:
     """Tsai and Joshi's 3-R̲UU: three translations (MMT 4.2.2, reference [45]).
 
     In each leg the first axis of the elbow's U and the last axis of the wrist's U are parallel to the base R, and the
@@ -259,8 +325,14 @@ def three_ruu(*, base_radius: float = 0.2, platform_radius: float = 0.06, proxim
     return _of_rods("3ruu", P, legs, "U")
 
 
-def three_puu(*, base_radius: float = 0.15, slope: float = math.radians(20), platform_radius: float = 0.06,
-              distal: float = 0.5, home: ArrayLike = (0.02, -0.03, -0.4)) -> Mechanism:
+def three_puu(
+    *,
+    base_radius: float = 0.15,
+    slope: float = math.radians(20),
+    platform_radius: float = 0.06,
+    distal: float = 0.5,
+    home: ArrayLike = (0.02, -0.03, -0.4),
+) -> Mechanism:
     """Tsai and Joshi's 3-P̲UU with inclined rails: three translations (MMT 4.2.2, reference [45]).
 
     In each leg the first axis of the elbow's U and the last axis of the wrist's U are parallel (tangential), and so
@@ -271,9 +343,17 @@ def three_puu(*, base_radius: float = 0.15, slope: float = math.radians(20), pla
     return _of_rods("3puu", P, legs, "U")
 
 
-def hexa(*, base_radius: float = 0.25, base_half: float = math.radians(26), platform_radius: float = 0.18,
-         platform_half: float = math.radians(20), proximal: float = 0.25, distal: float = 0.55,
-         home: ArrayLike = (0.02, -0.01, -0.6), twist: float = math.radians(5)) -> Mechanism:
+def hexa(
+    *,
+    base_radius: float = 0.25,
+    base_half: float = math.radians(26),
+    platform_radius: float = 0.18,
+    platform_half: float = math.radians(20),
+    proximal: float = 0.25,
+    distal: float = 0.55,
+    home: ArrayLike = (0.02, -0.01, -0.6),
+    twist: float = math.radians(5),
+) -> Mechanism:
     """The Hexa, 6-R̲US: six freedoms (MMT 4.2.2, reference [46]).
 
     The first axis of each elbow's U is parallel to the base R.
@@ -293,10 +373,16 @@ def hexa(*, base_radius: float = 0.25, base_half: float = math.radians(26), plat
     return _of_rods("hexa", P, legs, "S")
 
 
-def hexaglide(*, rails: Sequence[float] = (-0.12, 0.24, 0.36, 0.12, -0.24, -0.36),
-              ahead: Sequence[bool] = (True, True, False, True, True, False), platform_radius: float = 0.15,
-              platform_half: float = math.radians(15), distal: float = 0.6, home: ArrayLike = (0.0, 0.02, -0.35),
-              twist: float = math.radians(20)) -> Mechanism:
+def hexaglide(
+    *,
+    rails: Sequence[float] = (-0.12, 0.24, 0.36, 0.12, -0.24, -0.36),
+    ahead: Sequence[bool] = (True, True, False, True, True, False),
+    platform_radius: float = 0.15,
+    platform_half: float = math.radians(15),
+    distal: float = 0.6,
+    home: ArrayLike = (0.0, 0.02, -0.35),
+    twist: float = math.radians(20),
+) -> Mechanism:
     """The Hexaglide, 6-P̲US with six parallel rails along x: six freedoms (MMT 4.2.2, reference [47]).
 
     The translation along the rails cannot be seen in the legs' directions. The first axis of each elbow's U is y.
@@ -316,9 +402,17 @@ def hexaglide(*, rails: Sequence[float] = (-0.12, 0.24, 0.36, 0.12, -0.24, -0.36
     return _of_rods("hexaglide", P, legs, "S")
 
 
-def six_pus(*, base_radius: float = 0.15, base_half: float = math.radians(20), slope: float = math.radians(20),
-            platform_radius: float = 0.12, platform_half: float = math.radians(12), distal: float = 0.5,
-            home: ArrayLike = (0.02, -0.01, -0.4), twist: float = math.radians(10)) -> Mechanism:
+def six_pus(
+    *,
+    base_radius: float = 0.15,
+    base_half: float = math.radians(20),
+    slope: float = math.radians(20),
+    platform_radius: float = 0.12,
+    platform_half: float = math.radians(12),
+    distal: float = 0.5,
+    home: ArrayLike = (0.02, -0.01, -0.4),
+    twist: float = math.radians(10),
+) -> Mechanism:
     """A 6-P̲US with inclined rails: six freedoms (MMT 4.2.2).
 
     Rail i starts at A_i and descends outwards by ``slope`` (rad) below the horizontal; the first axis of each elbow's
@@ -326,6 +420,7 @@ def six_pus(*, base_radius: float = 0.15, base_half: float = math.radians(20), s
     """
     P = np.asarray(home, dtype=float)
     tips = six_tips(P, rotation_about(Z, twist), platform_radius, platform_half)
-    legs = [_on_inclined_rail(a, base_radius, slope, C, distal)
-            for a, C in zip(six_angles(base_half), tips, strict=True)]
+    legs = [
+        _on_inclined_rail(a, base_radius, slope, C, distal) for a, C in zip(six_angles(base_half), tips, strict=True)
+    ]
     return _of_rods("6pus", P, legs, "S")

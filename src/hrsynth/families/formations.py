@@ -22,9 +22,16 @@ MOVES = {"free": "6", "yaw": "xyzR", "position": "xyz", "plane": "xyR", "plane p
 about its z axis, or a free joint."""
 
 
-def formation(places: Sequence[ArrayLike], bearings: Iterable[tuple[int, int]] = (),
-              distances: Iterable[tuple[int, int]] = (), *, bodies: str = "free", turns: Sequence[Array] | None = None,
-              frame: Array | None = None, name: str = "formation") -> Mechanism:
+def formation(
+    places: Sequence[ArrayLike],
+    bearings: Iterable[tuple[int, int]] = (),
+    distances: Iterable[tuple[int, int]] = (),
+    *,
+    bodies: str = "free",
+    turns: Sequence[Array] | None = None,
+    frame: Array | None = None,
+    name: str = "formation",
+) -> Mechanism:
     """Bodies b1, b2 … with their frames at ``places`` (n, 3), metres, each with a camera there.
 
     A bearing (i, j) is the direction of body j in the camera's frame on body i, counted from 1; a distance is that of

@@ -52,8 +52,11 @@ def on_circle(centre: Array, x: Array, z: Array, radius: float, target: Array, l
     reach = math.hypot(along, up)
     cosine = (float(rest @ rest) + radius**2 - length**2) / (2 * radius * reach)
     if not abs(cosine) < 1:
-        raise BadRequest("the tip is out of the leg's reach", round(float(np.linalg.norm(rest)), 6),
-                         f"a distance that links of {radius} m and {length} m can bridge")
+        raise BadRequest(
+            "the tip is out of the leg's reach",
+            round(float(np.linalg.norm(rest)), 6),
+            f"a distance that links of {radius} m and {length} m can bridge",
+        )
     angles = [math.atan2(up, along) + sign * math.acos(cosine) for sign in (1, -1)]
     angle = (max if outward else min)(angles, key=math.cos)
     return centre + radius * (math.cos(angle) * x + math.sin(angle) * z)
@@ -69,8 +72,11 @@ def on_line(point: Array, direction: ArrayLike, target: Array, length: float, fo
     foot = float(rest @ d)
     square = length**2 - float(rest @ rest) + foot**2
     if not square > 0:
-        raise BadRequest("the rail does not come near enough to the tip", round(math.sqrt(length**2 - square), 6),
-                         f"a distance below {length} m")
+        raise BadRequest(
+            "the rail does not come near enough to the tip",
+            round(math.sqrt(length**2 - square), 6),
+            f"a distance below {length} m",
+        )
     return point + (foot + (1 if forward else -1) * math.sqrt(square)) * d
 
 

@@ -59,8 +59,13 @@ class Linkage:
         def angles(x: Array) -> Array:
             return x if second is None else np.insert(x, 1, second)
 
-        end = least_squares(lambda x: (self.frames(angles(x))[-1] - np.eye(4))[:3].ravel(),
-                            start if second is None else np.delete(start, 1), xtol=1e-15, ftol=STANDING, gtol=1e-15)
+        end = least_squares(
+            lambda x: (self.frames(angles(x))[-1] - np.eye(4))[:3].ravel(),
+            start if second is None else np.delete(start, 1),
+            xtol=1e-15,
+            ftol=STANDING,
+            gtol=1e-15,
+        )
         return angles(end.x) if np.abs(end.fun).max() < SOLVED else None
 
     def regular(self, rng: np.random.Generator) -> Array:
@@ -99,8 +104,16 @@ class Linkage:
         for link, at in zip(links, frames, strict=False):
             b.link(link, at=turn @ at[:3, 3])
         for k in range(count):
-            b.joint(f"joint_{k + 1}", "R", links[k - 1], links[k], at=turn @ frames[k][:3, 3],
-                    axis=turn @ frames[k][:3, 2], motor=k == 1, loop=k == 0)
+            b.joint(
+                f"joint_{k + 1}",
+                "R",
+                links[k - 1],
+                links[k],
+                at=turn @ frames[k][:3, 3],
+                axis=turn @ frames[k][:3, 2],
+                motor=k == 1,
+                loop=k == 0,
+            )
         return b.build(platform=links[count // 2])
 
 
@@ -125,12 +138,16 @@ def myard(alpha: float = 0.8, b: float = 0.3) -> Linkage:
 def sarrus(lengths: Sequence[float] = (0.2, 0.25, 0.3, 0.22), twist: float = 1.2, offset: float = 0.15) -> Linkage:
     """P. T. Sarrus 1853: three parallel axes, and three other parallel ones; four lengths."""
     one, two, three, four = lengths
-    return Linkage.of([one, two, 0.0, three, four, 0.0], [0.0, 0.0, twist, 0.0, 0.0, -twist],
-                      [0.0, 0.0, offset, 0.0, 0.0, -offset])
+    return Linkage.of(
+        [one, two, 0.0, three, four, 0.0], [0.0, 0.0, twist, 0.0, 0.0, -twist], [0.0, 0.0, offset, 0.0, 0.0, -offset]
+    )
 
 
-def line_symmetric(lengths: Sequence[float] = (0.2, 0.3, 0.25), twists: Sequence[float] = (0.7, 1.1, 0.9),
-                   offsets: Sequence[float] = (0.05, -0.04, 0.02)) -> Linkage:
+def line_symmetric(
+    lengths: Sequence[float] = (0.2, 0.3, 0.25),
+    twists: Sequence[float] = (0.7, 1.1, 0.9),
+    offsets: Sequence[float] = (0.05, -0.04, 0.02),
+) -> Linkage:
     """R. Bricard 1897, symmetric to a line: opposite links are equal; three of each."""
     return Linkage.of([*lengths] * 2, [*twists] * 2, [*offsets] * 2)
 
@@ -143,11 +160,20 @@ def plane_symmetric(lengths: Sequence[float] = (0.2, 0.3, 0.25), twists: Sequenc
 
 def schatz(a: float = 0.2, offset: float = 0.08) -> Linkage:
     """P. Schatz 1929, the linkage of the Turbula mixer."""
-    return Linkage.of([0.0, a, a, a, 0.0, math.sqrt(3.0) * a], [RIGHT, RIGHT, RIGHT, RIGHT, RIGHT, 0.0],
-                      [offset, 0.0, 0.0, 0.0, 0.0, -offset])
+    return Linkage.of(
+        [0.0, a, a, a, 0.0, math.sqrt(3.0) * a],
+        [RIGHT, RIGHT, RIGHT, RIGHT, RIGHT, 0.0],
+        [offset, 0.0, 0.0, 0.0, 0.0, -offset],
+    )
 
 
 LINKAGES: dict[str, Callable[..., Linkage]] = {
-    "bennett": bennett, "goldberg": goldberg, "myard": myard, "sarrus": sarrus,
-    "line_symmetric_bricard": line_symmetric, "plane_symmetric_bricard": plane_symmetric, "schatz": schatz}
+    "bennett": bennett,
+    "goldberg": goldberg,
+    "myard": myard,
+    "sarrus": sarrus,
+    "line_symmetric_bricard": line_symmetric,
+    "plane_symmetric_bricard": plane_symmetric,
+    "schatz": schatz,
+}
 """The linkages by name, each with default dimensions."""

@@ -40,9 +40,16 @@ def _three(base_radius: float, platform_radius: float, P: Array) -> list[tuple[A
     return [(polar(base_radius, a), P + polar(platform_radius, a), tangent(a)) for a in THREE_ANGLES]
 
 
-def gough_stewart(*, base_radius: float = 0.3, base_half: float = math.radians(20), platform_radius: float = 0.2,
-                  platform_half: float = math.radians(20), home: ArrayLike = (0.012, 0.004, 0.3),
-                  twist: float = math.radians(-25), tilt: float = math.radians(2)) -> Mechanism:
+def gough_stewart(
+    *,
+    base_radius: float = 0.3,
+    base_half: float = math.radians(20),
+    platform_radius: float = 0.2,
+    platform_half: float = math.radians(20),
+    home: ArrayLike = (0.012, 0.004, 0.3),
+    twist: float = math.radians(-25),
+    tilt: float = math.radians(2),
+) -> Mechanism:
     """The Gough-Stewart platform, 6-UP̲S on two semi-regular hexagons: six freedoms (MMT 4.2.1, reference [14]).
 
     The first axis of each base U is tangential and fixed in the base, the second is fixed in the cylinder, normal to
@@ -65,8 +72,9 @@ def gough_stewart(*, base_radius: float = 0.3, base_half: float = math.radians(2
     return _n_pod("gough_stewart", P, "U", "S", legs)
 
 
-def three_upu(*, base_radius: float = 0.3, platform_radius: float = 0.12,
-              home: ArrayLike = (0.02, -0.015, 0.35)) -> Mechanism:
+def three_upu(
+    *, base_radius: float = 0.3, platform_radius: float = 0.12, home: ArrayLike = (0.02, -0.015, 0.35)
+) -> Mechanism:
     """Tsai's 3-UP̲U: three translations (MMT 4.2.1, reference [37]).
 
     In each leg the outer axes of the two U, fixed in the base and in the platform, are parallel (tangential), and so

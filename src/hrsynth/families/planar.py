@@ -45,13 +45,22 @@ def _add(b: Builder, leg: int, types: str, geometry: _PlanarLeg, motor: int, fra
     """Adds ``prox_i`` and ``dist_i`` with the first two joints; ``frame``: the origin of ``dist_i``."""
     if motor not in (1, 2):
         raise BadRequest("motor: the actuated joint of each leg", motor, "1 or 2")
-    place = [{"R": turning, "P": sliding}[letter]
-             for turning, sliding, letter in zip(("shoulder", "elbow"), ("guide", "slide"), types, strict=False)]
+    place = [
+        {"R": turning, "P": sliding}[letter]
+        for turning, sliding, letter in zip(("shoulder", "elbow"), ("guide", "slide"), types, strict=False)
+    ]
     for number, (link, parent) in enumerate(((f"prox_{leg}", "base"), (f"dist_{leg}", f"prox_{leg}"))):
         point = geometry.points[number]
         b.link(link, at=point if frame is None or number == 0 else frame)
-        b.joint(f"{place[number]}_{leg}", types[number], parent, link, at=point, axis=geometry.axes[number],
-                motor=f"motor_{leg}" if motor == number + 1 else False)
+        b.joint(
+            f"{place[number]}_{leg}",
+            types[number],
+            parent,
+            link,
+            at=point,
+            axis=geometry.axes[number],
+            motor=f"motor_{leg}" if motor == number + 1 else False,
+        )
 
 
 def _elbow(A: Array, C: Array, proximal: float, distal: float, left: bool) -> Array:
@@ -80,8 +89,15 @@ def _with_platform(b: Builder, kind: str, legs: Sequence[_PlanarLeg], home: Arra
     """The legs' last joints on a platform of its own, which hangs on the first leg."""
     b.link("platform", at=home)
     for number, leg in enumerate(legs, start=1):
-        b.joint(f"{'wrist' if kind == 'R' else 'slide'}_{number}", kind, f"dist_{number}", "platform",
-                at=leg.points[2], axis=leg.axes[2], loop=number != 1)
+        b.joint(
+            f"{'wrist' if kind == 'R' else 'slide'}_{number}",
+            kind,
+            f"dist_{number}",
+            "platform",
+            at=leg.points[2],
+            axis=leg.axes[2],
+            loop=number != 1,
+        )
     return b.build(platform="platform")
 
 
@@ -90,8 +106,14 @@ def _bases(distance: float) -> list[Array]:
     return [np.array([sign * distance / 2, 0.0, 0.0]) for sign in (-1, 1)]
 
 
-def rrrrr(*, motor: int = 1, base_distance: float = 0.2, proximal: float = 0.16, distal: float = 0.2,
-          home: tuple[float, float] = (0.02, 0.24)) -> Mechanism:
+def rrrrr(
+    *,
+    motor: int = 1,
+    base_distance: float = 0.2,
+    proximal: float = 0.16,
+    distal: float = 0.2,
+    home: tuple[float, float] = (0.02, 0.24),
+) -> Mechanism:
     """The five-bar RRRRR: its end joint moves in the plane (MMT 4.1.2, Fig. 5).
 
     Parameters
@@ -106,8 +128,10 @@ def rrrrr(*, motor: int = 1, base_distance: float = 0.2, proximal: float = 0.16,
         The end joint at the zero configuration, x and y.
     """
     P = np.array([*home, 0.0])
-    legs = [_PlanarLeg((A, _elbow(A, P, proximal, distal, left=left), P))
-            for A, left in zip(_bases(base_distance), (True, False), strict=True)]
+    legs = [
+        _PlanarLeg((A, _elbow(A, P, proximal, distal, left=left), P))
+        for A, left in zip(_bases(base_distance), (True, False), strict=True)
+    ]
     return _pair(f"rrrrr_m{motor}", "RRR", legs, motor)
 
 
@@ -121,8 +145,15 @@ def rprpr(*, motor: int = 1, base_distance: float = 0.3, home: tuple[float, floa
     return _pair(f"rprpr_m{motor}", "RPR", legs, motor)
 
 
-def _prrrp(name: str, motor: int, base_distance: float, rails: tuple[float, float], distal: float,
-           home: tuple[float, float], point_body: bool = False) -> Mechanism:
+def _prrrp(
+    name: str,
+    motor: int,
+    base_distance: float,
+    rails: tuple[float, float],
+    distal: float,
+    home: tuple[float, float],
+    point_body: bool = False,
+) -> Mechanism:
     P = np.array([*home, 0.0])
     legs = []
     for A, angle in zip(_bases(base_distance), rails, strict=True):
@@ -131,8 +162,14 @@ def _prrrp(name: str, motor: int, base_distance: float, rails: tuple[float, floa
     return _pair(name, "PRR", legs, motor, point_body)
 
 
-def prrrp(*, motor: int = 1, base_distance: float = 0.4, rails: tuple[float, float] = (math.radians(60),
-          math.radians(105)), distal: float = 0.3, home: tuple[float, float] = (0.02, 0.2)) -> Mechanism:
+def prrrp(
+    *,
+    motor: int = 1,
+    base_distance: float = 0.4,
+    rails: tuple[float, float] = (math.radians(60), math.radians(105)),
+    distal: float = 0.3,
+    home: tuple[float, float] = (0.02, 0.2),
+) -> Mechanism:
     """PRRRP with rails that are not parallel (MMT 4.1.2).
 
     Parameters
@@ -151,8 +188,13 @@ def prrrp(*, motor: int = 1, base_distance: float = 0.4, rails: tuple[float, flo
     return _prrrp(f"prrrp_m{motor}", motor, base_distance, rails, distal, home)
 
 
-def prrrp_parallel(*, base_distance: float = 0.4, distal: float = 0.3, home: tuple[float, float] = (0.03, 0.1),
-                   point_body: bool = False) -> Mechanism:
+def prrrp_parallel(
+    *,
+    base_distance: float = 0.4,
+    distal: float = 0.3,
+    home: tuple[float, float] = (0.03, 0.1),
+    point_body: bool = False,
+) -> Mechanism:
     """P̲RRRP̲ with both rails along y: the translation along them cannot be seen in the legs (MMT 4.3, Fig. 17).
 
     ``point_body``: the platform is a separate link on two coaxial R at the end joint (its spin is idle), instead of
@@ -168,8 +210,10 @@ def prrrp_parallel(*, base_distance: float = 0.4, distal: float = 0.3, home: tup
 def _corners(base: Pairs, platform: Pairs, home: Pose) -> list[tuple[Array, Array]]:
     """A_i and C_i of the three legs in the base frame at the zero configuration."""
     x, y, phi = home
-    return [(polar(*a), np.array([x, y, 0.0]) + polar(radius, angle + phi))
-            for a, (radius, angle) in zip(base, platform, strict=True)]
+    return [
+        (polar(*a), np.array([x, y, 0.0]) + polar(radius, angle + phi))
+        for a, (radius, angle) in zip(base, platform, strict=True)
+    ]
 
 
 def _triple(name: str, types: str, legs: Sequence[_PlanarLeg], motor: int, home: Pose) -> Mechanism:
@@ -181,8 +225,15 @@ def _triple(name: str, types: str, legs: Sequence[_PlanarLeg], motor: int, home:
     return _with_platform(b, types[2], legs, (home[0], home[1], 0.0))
 
 
-def three_rrr(*, motor: int = 1, proximal: float = 0.17, distal: float = 0.16, base: Pairs = BASE,
-              platform: Pairs = PLATFORM, home: Pose = HOME) -> Mechanism:
+def three_rrr(
+    *,
+    motor: int = 1,
+    proximal: float = 0.17,
+    distal: float = 0.16,
+    base: Pairs = BASE,
+    platform: Pairs = PLATFORM,
+    home: Pose = HOME,
+) -> Mechanism:
     """3-RRR: three planar freedoms (MMT 4.1.1, Table 1; Fig. 6).
 
     Parameters
@@ -200,8 +251,12 @@ def three_rrr(*, motor: int = 1, proximal: float = 0.17, distal: float = 0.16, b
     return _triple(f"3rrr_m{motor}", "RRR", legs, motor, home)
 
 
-def six_poses(*, motor: int = 1, rods: Sequence[float] = (0.25, 0.31, 0.25),
-              directions: Sequence[float] = (math.radians(170), math.radians(285), math.radians(100))) -> Mechanism:
+def six_poses(
+    *,
+    motor: int = 1,
+    rods: Sequence[float] = (0.25, 0.31, 0.25),
+    directions: Sequence[float] = (math.radians(170), math.radians(285), math.radians(100)),
+) -> Mechanism:
     """3-RRR that hides the six poses of C. Innocenti and V. Parenti-Castelli's 3-RPR (1992, reprinted in many places).
 
     With the directions of its rods held the corners of the platform, a triangle of 17.04, 16.54 and 20.84 cm, are
@@ -229,8 +284,7 @@ def six_poses(*, motor: int = 1, rods: Sequence[float] = (0.25, 0.31, 0.25),
     return _triple("six_poses", "RRR", legs, motor, (float(x), float(y), 0.0))
 
 
-def three_rpr(*, motor: int = 1, base: Pairs = BASE, platform: Pairs = PLATFORM,
-              home: Pose = HOME) -> Mechanism:
+def three_rpr(*, motor: int = 1, base: Pairs = BASE, platform: Pairs = PLATFORM, home: Pose = HOME) -> Mechanism:
     """3-RPR: three planar freedoms (MMT 4.1.1, Table 1).
 
     ``motor`` 1: 3-R̲PR; 2: 3-RP̲R. Other parameters as in :func:`three_rrr`.
@@ -239,8 +293,15 @@ def three_rpr(*, motor: int = 1, base: Pairs = BASE, platform: Pairs = PLATFORM,
     return _triple(f"3rpr_m{motor}", "RPR", legs, motor, home)
 
 
-def three_prr(*, motor: int = 1, distal: float = 0.2, rail: float = math.radians(50), base: Pairs = BASE,
-              platform: Pairs = PLATFORM, home: Pose = HOME) -> Mechanism:
+def three_prr(
+    *,
+    motor: int = 1,
+    distal: float = 0.2,
+    rail: float = math.radians(50),
+    base: Pairs = BASE,
+    platform: Pairs = PLATFORM,
+    home: Pose = HOME,
+) -> Mechanism:
     """3-PRR: three planar freedoms (MMT 4.1.1, Table 1).
 
     Parameters
@@ -262,16 +323,21 @@ def three_prr(*, motor: int = 1, distal: float = 0.2, rail: float = math.radians
     return _triple(f"3prr_m{motor}", "PRR", legs, motor, home)
 
 
-def _slots(platform: Pairs, home: Pose, reach: float, slot: float
-           ) -> Iterator[tuple[float, Array, Array, Array]]:
+def _slots(platform: Pairs, home: Pose, reach: float, slot: float) -> Iterator[tuple[float, Array, Array, Array]]:
     """For a P on the platform: the angle of C_i's radius, the joint B_i before it, C_i, the P's direction from C_i."""
     for (_, angle), (_, C) in zip(platform, _corners(BASE, platform, home), strict=True):
         along = radial(angle + home[2] + slot)
         yield angle + home[2], C + reach * along, C, along
 
 
-def three_prp(*, reach: float = 0.15, rail: float = math.radians(75), slot: float = math.radians(15),
-              platform: Pairs = PLATFORM, home: Pose = HOME) -> Mechanism:
+def three_prp(
+    *,
+    reach: float = 0.15,
+    rail: float = math.radians(75),
+    slot: float = math.radians(15),
+    platform: Pairs = PLATFORM,
+    home: Pose = HOME,
+) -> Mechanism:
     """3-P̲RP: three planar freedoms, of which the legs show the rotation only (MMT 4.1.1, Table 1).
 
     Parameters
@@ -283,14 +349,22 @@ def three_prp(*, reach: float = 0.15, rail: float = math.radians(75), slot: floa
     platform, home
         As in :func:`three_rrr`.
     """
-    legs = [_PlanarLeg((B, B, C), (radial(angle + rail), Z, -along))
-            for angle, B, C, along in _slots(platform, home, reach, slot)]
+    legs = [
+        _PlanarLeg((B, B, C), (radial(angle + rail), Z, -along))
+        for angle, B, C, along in _slots(platform, home, reach, slot)
+    ]
     return _triple("3prp", "PRP", legs, 1, home)
 
 
-def three_rrp(*, reach: float = 0.15, proximal: float = 0.18, bend: float = math.radians(80),
-              slot: float = math.radians(15), platform: Pairs = PLATFORM,
-              home: Pose = HOME) -> Mechanism:
+def three_rrp(
+    *,
+    reach: float = 0.15,
+    proximal: float = 0.18,
+    bend: float = math.radians(80),
+    slot: float = math.radians(15),
+    platform: Pairs = PLATFORM,
+    home: Pose = HOME,
+) -> Mechanism:
     """3-R̲RP: three planar freedoms, of which the legs show the rotation only (MMT 4.1.1, Table 1).
 
     Parameters
@@ -302,14 +376,22 @@ def three_rrp(*, reach: float = 0.15, proximal: float = 0.18, bend: float = math
     reach, slot, platform, home
         As in :func:`three_prp`.
     """
-    legs = [_PlanarLeg((B + proximal * radial(angle + bend), B, C), (Z, Z, -along))
-            for angle, B, C, along in _slots(platform, home, reach, slot)]
+    legs = [
+        _PlanarLeg((B + proximal * radial(angle + bend), B, C), (Z, Z, -along))
+        for angle, B, C, along in _slots(platform, home, reach, slot)
+    ]
     return _triple("3rrp", "RRP", legs, 1, home)
 
 
-def three_ppr(*, motor: int = 1, first: float = math.radians(50), second: float = math.radians(-40),
-              base: Pairs = BASE, platform: Pairs = PLATFORM,
-              home: Pose = HOME) -> Mechanism:
+def three_ppr(
+    *,
+    motor: int = 1,
+    first: float = math.radians(50),
+    second: float = math.radians(-40),
+    base: Pairs = BASE,
+    platform: Pairs = PLATFORM,
+    home: Pose = HOME,
+) -> Mechanism:
     """3-PPR: three planar freedoms, legs whose last segments never turn: nothing can be seen (MMT 4.1.1, Table 1).
 
     Parameters

@@ -37,27 +37,60 @@ GOAL = "the desired pose itself"
 OFF_PLANE = "at φ = 0 it puts the tip of leg {leg} 88 mm outside the plane of its circle; the second pair has φ = 180°"
 
 CLAIMS = (
-    PrintedClaim("MMT 5.1.3", "quattro", ("1", "4"), (-0.2, 0.0, -0.56), (
-        PrintedMode((-0.2, 0.0, -0.56), GOAL),
-        PrintedMode((-0.2, 0.0, -0.909), "the same mode, with other digits from the printed dimensions"),
-        PrintedMode((-0.138, 0.062, -1.019), OFF_PLANE.format(leg=4)),
-        PrintedMode((-0.138, 0.062, -0.45), OFF_PLANE.format(leg=4)))),
-    PrintedClaim("MMT 5.1.3", "quattro", ("2", "3"), (-0.2, 0.0, -0.56), (
-        PrintedMode((-0.2, 0.0, -0.56), GOAL),
-        PrintedMode((-0.2, 0.0, -0.296), "a mode of the hidden robot with other digits, but legs 1 and 4 do not "
-                    "reach it"),
-        PrintedMode((-0.262, 0.062, -0.694), OFF_PLANE.format(leg=3)),
-        PrintedMode((-0.262, 0.062, -0.161), OFF_PLANE.format(leg=3)))),
-    PrintedClaim("MMT 5.1.3", "quattro", ("1", "2", "3", "4"), (0.03, 0.03, -0.59), (
-        PrintedMode((0.03, 0.03, -0.59), GOAL),
-        PrintedMode((0.03, 0.03, -0.65), "not a mode: the directions of legs 1 and 3 differ by 0.53° and 0.56° from "
-                    "those at the desired pose, and the error is stationary nowhere near it"))),
-    PrintedClaim("IROS V", "quattro_rigid", ("1", "2"), (0.0, -0.25, -0.7), (
-        PrintedMode((0.0, -0.25, -0.7), GOAL),
-        PrintedMode((0.0, -0.25, -0.958), "impossible: the circles' centres would lie 829 mm below the base, "
-                    "deeper than a rod of 825 mm reaches"))),
-    PrintedClaim("IROS V", "quattro_rigid", ("1", "3"), (0.0, -0.25, -0.7), (
-        PrintedMode((0.0, -0.25, -0.7), GOAL),)),
+    PrintedClaim(
+        "MMT 5.1.3",
+        "quattro",
+        ("1", "4"),
+        (-0.2, 0.0, -0.56),
+        (
+            PrintedMode((-0.2, 0.0, -0.56), GOAL),
+            PrintedMode((-0.2, 0.0, -0.909), "the same mode, with other digits from the printed dimensions"),
+            PrintedMode((-0.138, 0.062, -1.019), OFF_PLANE.format(leg=4)),
+            PrintedMode((-0.138, 0.062, -0.45), OFF_PLANE.format(leg=4)),
+        ),
+    ),
+    PrintedClaim(
+        "MMT 5.1.3",
+        "quattro",
+        ("2", "3"),
+        (-0.2, 0.0, -0.56),
+        (
+            PrintedMode((-0.2, 0.0, -0.56), GOAL),
+            PrintedMode(
+                (-0.2, 0.0, -0.296), "a mode of the hidden robot with other digits, but legs 1 and 4 do not reach it"
+            ),
+            PrintedMode((-0.262, 0.062, -0.694), OFF_PLANE.format(leg=3)),
+            PrintedMode((-0.262, 0.062, -0.161), OFF_PLANE.format(leg=3)),
+        ),
+    ),
+    PrintedClaim(
+        "MMT 5.1.3",
+        "quattro",
+        ("1", "2", "3", "4"),
+        (0.03, 0.03, -0.59),
+        (
+            PrintedMode((0.03, 0.03, -0.59), GOAL),
+            PrintedMode(
+                (0.03, 0.03, -0.65),
+                "not a mode: the directions of legs 1 and 3 differ by 0.53° and 0.56° from "
+                "those at the desired pose, and the error is stationary nowhere near it",
+            ),
+        ),
+    ),
+    PrintedClaim(
+        "IROS V",
+        "quattro_rigid",
+        ("1", "2"),
+        (0.0, -0.25, -0.7),
+        (
+            PrintedMode((0.0, -0.25, -0.7), GOAL),
+            PrintedMode(
+                (0.0, -0.25, -0.958),
+                "impossible: the circles' centres would lie 829 mm below the base, deeper than a rod of 825 mm reaches",
+            ),
+        ),
+    ),
+    PrintedClaim("IROS V", "quattro_rigid", ("1", "3"), (0.0, -0.25, -0.7), (PrintedMode((0.0, -0.25, -0.7), GOAL),)),
 )
 """All of them, in the order of the papers."""
 

@@ -169,8 +169,10 @@ def stack(parts: Sequence[Any], axis: int = -1) -> Any:
     if like is None:
         return np.stack(np.broadcast_arrays(*parts), axis=axis)
     every = [like._like(each) for each in parts]
-    return AffineForms(np.stack(np.broadcast_arrays(*(each.v for each in every)), axis=axis),
-                       np.stack(np.broadcast_arrays(*(each.r for each in every)), axis=axis))
+    return AffineForms(
+        np.stack(np.broadcast_arrays(*(each.v for each in every)), axis=axis),
+        np.stack(np.broadcast_arrays(*(each.r for each in every)), axis=axis),
+    )
 
 
 def cross_product(a: Any, b: Any) -> Any:
@@ -216,8 +218,9 @@ def spread(slopes: Numbers, r: Numbers) -> Numbers:
     return (slopes + r) * (1 + AFFINE_ROUNDING)
 
 
-def product_radius(a: Numbers, slopes_a: Numbers, r_a: Numbers, b: Numbers, slopes_b: Numbers, r_b: Numbers,
-                   both: Numbers) -> Numbers:
+def product_radius(
+    a: Numbers, slopes_a: Numbers, r_a: Numbers, b: Numbers, slopes_b: Numbers, r_b: Numbers, both: Numbers
+) -> Numbers:
     """The radius of a product: of centres, sums of slopes' sizes, radii, and the sum of the sizes of products of slopes
     of the same symbol, half of which is in the centre."""
     size_a, size_b = abs(a) + slopes_a, abs(b) + slopes_b
@@ -278,8 +281,10 @@ def turned_sines(x: Numbers) -> tuple[Numbers, Numbers]:
     s, c = y + y * s, 1.0 + z * (COSINE_SERIES[1] + c)
     quarter = k - 4 * np.floor(k / 4)
     odd = quarter - 2 * np.floor(quarter / 2)
-    return ((1 - 2 * np.floor(quarter / 2)) * ((1 - odd) * s + odd * c),
-            (1 - quarter * (3 - quarter)) * ((1 - odd) * c + odd * s))
+    return (
+        (1 - 2 * np.floor(quarter / 2)) * ((1 - odd) * s + odd * c),
+        (1 - quarter * (3 - quarter)) * ((1 - odd) * c + odd * s),
+    )
 
 
 def sines(x: Array) -> tuple[Array, Array]:

@@ -26,8 +26,9 @@ def balls(low: Sequence[float] | Array, high: Sequence[float] | Array) -> Field:
     """Balls that enclose the intervals from ``low`` to ``high``, (n,)."""
     from flint import arb
 
-    return np.array([arb(a).union(arb(b)) for a, b in zip(map(float, low), map(float, high), strict=True)],
-                    dtype=object)
+    return np.array(
+        [arb(a).union(arb(b)) for a, b in zip(map(float, low), map(float, high), strict=True)], dtype=object
+    )
 
 
 def around(x: Array, radius: float) -> Field:

@@ -39,8 +39,10 @@ class Dual:
 
     def __mul__(self, other: Any) -> Dual:
         other = self._like(other)
-        return Dual(self.value * other.value,
-                    [a * other.value + self.value * b for a, b in zip(self.rates, other.rates, strict=True)])
+        return Dual(
+            self.value * other.value,
+            [a * other.value + self.value * b for a, b in zip(self.rates, other.rates, strict=True)],
+        )
 
     __rmul__ = __mul__
 

@@ -37,22 +37,39 @@ class Residual:
         return cls(error, J, math.sqrt(error @ error))
 
 
-def descend(x: X, evaluate: Callable[[X], tuple[Array, Array]], advance: Callable[[X, Residual, float], X | None],
-            damping: Damping, iterations: int, content: Callable[[Residual], bool]) -> tuple[X, Residual]:
+def descend(
+    x: X,
+    evaluate: Callable[[X], tuple[Array, Array]],
+    advance: Callable[[X, Residual, float], X | None],
+    damping: Damping,
+    iterations: int,
+    content: Callable[[Residual], bool],
+) -> tuple[X, Residual]:
     """Where steps lead that make the error smaller, and what is left of it there.
 
     ``evaluate`` gives the error and its Jacobian at a place, ``advance`` where a step with a damping factor leads (or
     None), ``content`` tells whether that is enough.
     """
-    return next(descend_together(
-        [x], lambda places: [evaluate(place) for place in places.values()],
-        lambda at: {0: advance(*at[0])}, damping, iterations, content))
+    return next(
+        descend_together(
+            [x],
+            lambda places: [evaluate(place) for place in places.values()],
+            lambda at: {0: advance(*at[0])},
+            damping,
+            iterations,
+            content,
+        )
+    )
 
 
 def descend_together(
-        starts: Sequence[X], evaluate: Callable[[Mapping[int, X]], Iterable[tuple[Array, Array]]],
-        advance: Callable[[Mapping[int, tuple[X, Residual, float]]], Mapping[int, X | None]],
-        damping: Damping, iterations: int, content: Callable[[Residual], bool]) -> Iterator[tuple[X, Residual]]:
+    starts: Sequence[X],
+    evaluate: Callable[[Mapping[int, X]], Iterable[tuple[Array, Array]]],
+    advance: Callable[[Mapping[int, tuple[X, Residual, float]]], Mapping[int, X | None]],
+    damping: Damping,
+    iterations: int,
+    content: Callable[[Residual], bool],
+) -> Iterator[tuple[X, Residual]]:
     """As :func:`descend`, of several starts that know nothing of each other, in step: ``evaluate`` and ``advance`` are
     given those of each number that still descend."""
     x = dict(enumerate(starts))

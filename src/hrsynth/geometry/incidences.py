@@ -73,13 +73,20 @@ def rows(tuples: Iterable[Sequence[int]], k: int) -> Indices:
     return np.array(list(tuples), dtype=np.intp).reshape(-1, k)
 
 
-def incidences(sieve: Sieve, classes: Array, points: Array, together: NDArray[np.bool_], owns: Sequence[set[int]],
-               slides: Sequence[set[int]]) -> list[Incidence]:
+def incidences(
+    sieve: Sieve,
+    classes: Array,
+    points: Array,
+    together: NDArray[np.bool_],
+    owns: Sequence[set[int]],
+    slides: Sequence[set[int]],
+) -> list[Incidence]:
     """All incidences of ``points`` (n, configurations, 3) towards ``classes`` of directions (m, configurations, 3).
 
     ``together`` (n, n) says which points keep their direction from each other; ``owns`` are the classes of the axes
     through each point, ``slides`` those along which it may be moved without consequence.
     """
+
     def between(c: Indices, s: slice) -> Array:
         return np.asarray(points[c[:, 1], s] - points[c[:, 0], s])
 
@@ -98,15 +105,19 @@ def incidences(sieve: Sieve, classes: Array, points: Array, together: NDArray[np
     lined = {(j, k) for j, k, _ in parallel}
     rest = [(j, k) for j, k in apart if together[j, k] and (j, k) not in lined]
     normal = sieve.keep(rows(((j, k, c) for j, k in rest for c in count), 3), across, SAME_POINT).tolist()
-    return [*(Incidence(((k, 1), (j, -1)), "zero") for j, k in same),
-            *(Incidence(((k, 1), (j, -1)), "parallel", (c,)) for j, k, c in parallel),
-            *(Incidence(((k, 1), (j, -1)), "normal", (c,)) for j, k, c in normal),
-            *_parallelograms(sieve, classes, points, together, slides)]
+    return [
+        *(Incidence(((k, 1), (j, -1)), "zero") for j, k in same),
+        *(Incidence(((k, 1), (j, -1)), "parallel", (c,)) for j, k, c in parallel),
+        *(Incidence(((k, 1), (j, -1)), "normal", (c,)) for j, k, c in normal),
+        *_parallelograms(sieve, classes, points, together, slides),
+    ]
 
 
-def _parallelograms(sieve: Sieve, classes: Array, points: Array, together: NDArray[np.bool_],
-                    slides: Sequence[set[int]]) -> list[Incidence]:
+def _parallelograms(
+    sieve: Sieve, classes: Array, points: Array, together: NDArray[np.bool_], slides: Sequence[set[int]]
+) -> list[Incidence]:
     """P_i − P_j = P_k − P_m, where ij, km, ik and jm are sides on links; up to a slide along an axis all four share."""
+
     def gap(c: Indices, s: slice) -> Array:
         return np.asarray(points[c[:, 0], s] - points[c[:, 1], s] - points[c[:, 2], s] + points[c[:, 3], s])
 
@@ -114,8 +125,13 @@ def _parallelograms(sieve: Sieve, classes: Array, points: Array, together: NDArr
         return cross(gap(c, s), classes[c[:, 4], s])
 
     beside = [set(np.flatnonzero(each).tolist()) - {i} for i, each in enumerate(together)]
-    quads = [(i, j, k, m) for i, near in enumerate(beside) for j, k in combinations(sorted(near), 2)
-             for m in beside[j] & beside[k] if i < min(j, m) and not (together[i, m] and together[j, k])]
+    quads = [
+        (i, j, k, m)
+        for i, near in enumerate(beside)
+        for j, k in combinations(sorted(near), 2)
+        for m in beside[j] & beside[k]
+        if i < min(j, m) and not (together[i, m] and together[j, k])
+    ]
     closed = sieve.keep(rows(quads, 4), gap, SAME_POINT).tolist()
     shared = ((*quad, c) for quad in quads for c in set.intersection(*(slides[i] for i in quad)))
     slid = [each for each in sieve.keep(rows(shared, 5), gap_across, SAME_POINT).tolist() if each[:4] not in closed]
@@ -123,5 +139,7 @@ def _parallelograms(sieve: Sieve, classes: Array, points: Array, together: NDArr
     def terms(quad: list[int]) -> tuple[tuple[int, int], ...]:
         return tuple(zip(quad[:4], (1, -1, -1, 1), strict=True))
 
-    return [*(Incidence(terms(quad), "zero") for quad in closed),
-            *(Incidence(terms(quad), "parallel", (quad[4],)) for quad in slid)]
+    return [
+        *(Incidence(terms(quad), "zero") for quad in closed),
+        *(Incidence(terms(quad), "parallel", (quad[4],)) for quad in slid),
+    ]

@@ -22,8 +22,11 @@ class Jet:
     def variable(cls, value: Any, place: int, count: int) -> Jet:
         """The variable at a place among so many."""
         flat = value * 0.0
-        return cls(value, flat[..., None] * np.zeros(count) + np.eye(count)[place],
-                   flat[..., None, None] * np.zeros((count, count)))
+        return cls(
+            value,
+            flat[..., None] * np.zeros(count) + np.eye(count)[place],
+            flat[..., None, None] * np.zeros((count, count)),
+        )
 
     def __add__(self, other: Jet | float) -> Jet:
         if not isinstance(other, Jet):
@@ -46,8 +49,11 @@ class Jet:
             k = float(other)
             return Jet(self.value * k, self.slope * k, self.bend * k)
         a, b = self.value, other.value
-        return Jet(a * b, self.slope * b[..., None] + other.slope * a[..., None],
-                   self.bend * b[..., None, None] + other.bend * a[..., None, None] + _both(self.slope, other.slope))
+        return Jet(
+            a * b,
+            self.slope * b[..., None] + other.slope * a[..., None],
+            self.bend * b[..., None, None] + other.bend * a[..., None, None] + _both(self.slope, other.slope),
+        )
 
     __rmul__ = __mul__
 
@@ -67,9 +73,11 @@ class Jet:
 
     def _map(self, value: Any, first: Any, second: Any) -> Jet:
         """f of it, where f, f' and f'' are given."""
-        return Jet(value, self.slope * first[..., None],
-                   self.bend * first[..., None, None]
-                   + _tensor(self.slope, self.slope) * second[..., None, None])
+        return Jet(
+            value,
+            self.slope * first[..., None],
+            self.bend * first[..., None, None] + _tensor(self.slope, self.slope) * second[..., None, None],
+        )
 
 
 def turn(s: Jet, c: Jet) -> Jet:
@@ -77,8 +85,12 @@ def turn(s: Jet, c: Jet) -> Jet:
     size = s * s + c * c
     a, b = c / size, s / size
     slope = s.slope * a.value[..., None] - c.slope * b.value[..., None]
-    bend = (s.bend * a.value[..., None, None] - c.bend * b.value[..., None, None]
-            + _tensor(s.slope, a.slope) - _tensor(c.slope, b.slope))
+    bend = (
+        s.bend * a.value[..., None, None]
+        - c.bend * b.value[..., None, None]
+        + _tensor(s.slope, a.slope)
+        - _tensor(c.slope, b.slope)
+    )
     return Jet(angle(s.value, c.value), slope, bend)
 
 

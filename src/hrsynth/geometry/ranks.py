@@ -86,8 +86,10 @@ def range_basis(matrix: Array, scale: float | None = None) -> tuple[Array, Rank]
 def range_bases(matrices: Sequence[Array], scale: float | None = None) -> list[tuple[Array, Rank]]:
     """:func:`range_basis` of several matrices."""
     if any(0 in matrix.shape for matrix in matrices):
-        return [range_basis(matrix, scale) if matrix.size else (np.zeros((matrix.shape[0], 0)), Rank(0, CLEAN))
-                for matrix in matrices]
+        return [
+            range_basis(matrix, scale) if matrix.size else (np.zeros((matrix.shape[0], 0)), Rank(0, CLEAN))
+            for matrix in matrices
+        ]
     ranks = [(U, rank_of(s, scale)) for U, s, _ in decomposed_together(matrices)]
     return [(U[:, : rank.value], rank) for U, rank in ranks]
 
@@ -145,8 +147,10 @@ def spectra(matrices: Sequence[Array], scale: float | None = None) -> list[Spect
         return [spectrum(matrix, scale) for matrix in matrices]
     rows, columns = matrices[0].shape
     if 0 in (rows, columns):
-        return [Spectrum(np.eye(columns), Rank(0, CLEAN), np.zeros(0), np.zeros((rows, 0)), np.zeros((columns, 0)))
-                for _ in matrices]
+        return [
+            Spectrum(np.eye(columns), Rank(0, CLEAN), np.zeros(0), np.zeros((rows, 0)), np.zeros((columns, 0)))
+            for _ in matrices
+        ]
     found = []
     for U, s, Vt in decomposed_together(matrices, full_matrices=rows < columns):
         rank = rank_of(s, scale)

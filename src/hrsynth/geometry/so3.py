@@ -55,7 +55,7 @@ def between(a: Array, b: Array) -> Array:
     sines = np.linalg.norm(across, axis=-1)[..., None]
     # the square of a small sine has no digits left
     scaled = size * np.linalg.norm(across / np.where(size > 0.0, size, 1.0), axis=-1)[..., None]
-    sines = np.where(size > np.finfo(float).tiny**0.25, sines, scaled)
+    sines = np.where(size > np.finfo(float).tiny ** 0.25, sines, scaled)
     cosines = np.sum(a * b, axis=-1)[..., None]
     normals = cross(a, np.eye(3)[np.argmin(np.abs(a), axis=-1)])
     opposite = (sines == 0.0) & (cosines < 0.0)
@@ -85,8 +85,13 @@ def turns_about(axes: Array, R: Array) -> Array:
     if len(axes) < 3:
         # R a₂ is turned by the first alone, Rᵀ a₁ by the second alone
         return np.array([math.atan2(R[2, 1], R[1, 1]), math.atan2(R[0, 2], R[0, 0])])[: len(axes)]
-    return np.array([math.atan2(-R[1, 2], R[2, 2]), math.atan2(R[0, 2], math.hypot(R[1, 2], R[2, 2])),
-                     math.atan2(-R[0, 1], R[0, 0])]) * [1.0, 1.0, np.sign(np.linalg.det(E))]
+    return np.array(
+        [
+            math.atan2(-R[1, 2], R[2, 2]),
+            math.atan2(R[0, 2], math.hypot(R[1, 2], R[2, 2])),
+            math.atan2(-R[0, 1], R[0, 0]),
+        ]
+    ) * [1.0, 1.0, np.sign(np.linalg.det(E))]
 
 
 def _frame(axes: Array) -> tuple[Array, Array, Array]:
@@ -118,9 +123,13 @@ def quaternions(R: Array) -> Array:
 def rotation_of(q: Array) -> Array:
     """The rotation (3, 3) of a unit quaternion (w, x, y, z)."""
     w, x, y, z = q.tolist()
-    return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-                     [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-                     [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]])
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
 
 
 def _quaternion(R: Array) -> tuple[float, float, float, float]:

@@ -86,20 +86,27 @@ class Assembler:
         """The platform alone, floating with the first body on which a leg ends."""
         mechanism, body = self.anatomy.mechanism, self.anatomy.legs[0].attach
         kept = {mechanism.base, *self.anatomy.platform}
-        floats = Joint(mechanism.fresh("floating"), JointType.FREE, mechanism.base, body,
-                       mechanism.links[body].pose[:3, 3])
+        floats = Joint(
+            mechanism.fresh("floating"), JointType.FREE, mechanism.base, body, mechanism.links[body].pose[:3, 3]
+        )
         inside = set(self.anatomy.platform)
         outside = [name for name, joint in mechanism.joints.items() if not set(joint.links) <= inside]
-        return mechanism.changed(remove_links=set(mechanism.links) - kept, remove_joints=outside, joints=[floats],
-                                 observations=(), camera=None)
+        return mechanism.changed(
+            remove_links=set(mechanism.links) - kept,
+            remove_joints=outside,
+            joints=[floats],
+            observations=(),
+            camera=None,
+        )
 
     def platform(self, bodies: Mapping[str, Array]) -> dict[str, Array]:
         """The poses (4, 4) of all links of the platform where the bodies on which legs end have these; raises
         ``LoopsNotClosed`` where its own joints do not allow that."""
         return self._platform_at(bodies)[0]
 
-    def _platform_at(self, bodies: Mapping[str, Array], within: float = 0.0
-                     ) -> tuple[dict[str, Array], list[str], bool]:
+    def _platform_at(
+        self, bodies: Mapping[str, Array], within: float = 0.0
+    ) -> tuple[dict[str, Array], list[str], bool]:
         """The same with its joints that are beyond their limits there, and whether one is that has no other
         value where the bodies are, which is known to ``within``."""
         mechanism, body = self._platform, self.anatomy.legs[0].attach
@@ -112,16 +119,20 @@ class Assembler:
         for start in _starts(twin):
             q, residual = solve(twin, start, target, tolerance=SOLVED, iterations=60)
             if residual <= CLOSED and all(_turned_as(twin.pose(q, body), X) for body, X in bodies.items()):
-                return ({link: twin.pose(q, link) for link in self.anatomy.platform}, limits.outside(twin, q),
-                        self.anatomy.point is None and limits.surely_outside(twin, q, bodies, within))
+                return (
+                    {link: twin.pose(q, link) for link in self.anatomy.platform},
+                    limits.outside(twin, q),
+                    self.anatomy.point is None and limits.surely_outside(twin, q, bodies, within),
+                )
         raise LoopsNotClosed(twin.mechanism.name, residual, CLOSED, "inside the platform")
 
     @cached_property
     def _ways(self) -> dict[str, list[tuple[Part, ...]]]:
         return {leg.label: list(ways(self.anatomy, leg)) for leg in self.anatomy.legs}
 
-    def at(self, bodies: Mapping[str, Array], measured: Sequence[tuple[Observation, Array]], within: float = 0.0
-           ) -> Assembly:
+    def at(
+        self, bodies: Mapping[str, Array], measured: Sequence[tuple[Observation, Array]], within: float = 0.0
+    ) -> Assembly:
         """The robot with the bodies (on which legs end) at these poses (4, 4), known to ``within`` (characteristic
         lengths, radians), and the measured values as given."""
         platform, beyond, held = self._platform_at(bodies, within)
@@ -143,8 +154,12 @@ class Assembler:
         mechanism = self.anatomy.mechanism
         poses[mechanism.base] = mechanism.links[mechanism.base].pose
         while len(poses) < len(mechanism.links):  # what hangs on no leg, as fingers do, is carried along
-            carrier, link = next((one, other) for joint in mechanism.joints.values() for one, other in
-                                 (joint.links, joint.links[::-1]) if one in poses and other not in poses)
+            carrier, link = next(
+                (one, other)
+                for joint in mechanism.joints.values()
+                for one, other in (joint.links, joint.links[::-1])
+                if one in poses and other not in poses
+            )
             poses[link] = poses[carrier] @ mechanism.links[carrier].inverse @ mechanism.links[link].pose
         whole = PinocchioModel(zeroed_at(mechanism, poses), self.length)
         return Assembly(ClosedConfiguration.of(whole, whole.q0), (), tuple(beyond), platform, (), held)
@@ -161,9 +176,10 @@ class Assembler:
         known = leg_closures(self._ways[leg.label], end)
         if known.miss is not None:
             return _Closing(None, known.miss)
-        held = (any(limits.all_excluded(twin.mechanism, joint, values) for joint, values in known.values)
-                or any(limits.never(way, dict(known.values), end.D, within, len(self._ways[leg.label]) == 1)
-                       for way in self._ways[leg.label]))
+        held = any(limits.all_excluded(twin.mechanism, joint, values) for joint, values in known.values) or any(
+            limits.never(way, dict(known.values), end.D, within, len(self._ways[leg.label]) == 1)
+            for way in self._ways[leg.label]
+        )
         for start in () if held and first is not None else _starts(twin, known):
             q = self._close(twin, start, target)
             if q is not None and (held or not limits.outside(twin, q, leg.joints)):
@@ -207,8 +223,15 @@ def _starts(twin: PinocchioModel, known: Closures = UNDECIDED) -> Iterator[Array
     last without values."""
     rng = np.random.default_rng(0)
     joints = [twin.coordinates[joint] for joint, _ in known.values if joint in twin.coordinates]
-    lists = [[float(value.mid()) / (twin.length if twin.mechanism.joints[joint].type.slides else 1.0)
-              for value in values if value.is_finite()] for joint, values in known.values if joint in twin.coordinates]
+    lists = [
+        [
+            float(value.mid()) / (twin.length if twin.mechanism.joints[joint].type.slides else 1.0)
+            for value in values
+            if value.is_finite()
+        ]
+        for joint, values in known.values
+        if joint in twin.coordinates
+    ]
     for combination in (*product(*lists), None):
         for number in range(STARTS):
             step = rng.uniform(-np.pi, np.pi, twin.nv) if number else np.zeros(twin.nv)

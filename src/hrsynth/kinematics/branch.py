@@ -43,8 +43,12 @@ def follows(here: ClosedConfiguration, step: Array, there: ClosedConfiguration) 
         return False
     if not len(kept):
         return True
-    return (_alike(kept, there.strengths) and _same_side(here, there)
-            and turned_little(here.kernel()[0], there.kernel()[0]) and alike_along(here, step))
+    return (
+        _alike(kept, there.strengths)
+        and _same_side(here, there)
+        and turned_little(here.kernel()[0], there.kernel()[0])
+        and alike_along(here, step)
+    )
 
 
 def alike_along(here: ClosedConfiguration, step: Array) -> bool:
@@ -90,8 +94,10 @@ def nears(here: ClosedConfiguration, step: Array, there: ClosedConfiguration) ->
     if np.linalg.norm(T - tangent @ (tangent.T @ T), 2) > np.sin(TURNED):
         return False
     w, n = here.loops.left[:, others], here.loops.right[:, others]
-    middle, end = (float(w @ here.twin.jacobian(here.twin.integrate(here.q, part * step)) @ n) / kept[others]
-                   for part in (0.5, 1.0))
+    middle, end = (
+        float(w @ here.twin.jacobian(here.twin.integrate(here.q, part * step)) @ n) / kept[others]
+        for part in (0.5, 1.0)
+    )
     if not (-NUDGE <= end < 1 and abs(middle - (1 + end) / 2) < EVENLY):
         return False
     if len(ahead) == len(kept) and not _alike(ahead, _values(here, step, len(kept))):
@@ -120,8 +126,11 @@ def turns_of(found: Relation) -> tuple[int, int, int]:
     that may be said to be: singular values above the cutoff, those that surely count, and all but those that surely do
     not."""
     freedoms = found.dof.value
-    values = (np.zeros(0) if found.twist_rows == 3 or not freedoms else
-              singular_values(found.twists.reshape(-1, 6, freedoms)[:, 3:].reshape(1, -1, freedoms)))
+    values = (
+        np.zeros(0)
+        if found.twist_rows == 3 or not freedoms
+        else singular_values(found.twists.reshape(-1, 6, freedoms)[:, 3:].reshape(1, -1, freedoms))
+    )
     rank, least, most = (int(np.sum(values > zero)) for zero in (RANK_CUTOFF, SURELY_SOMETHING, SURELY_ZERO))
     return rank, least, most
 
@@ -151,18 +160,27 @@ class Signature:
         twists = np.broadcast_to(found.twist_part, (len(chosen), *found.twist_part.shape))
         lost = [singular_values(each) for each in (np.concatenate([twists, rates], axis=1), rates)]
         # a set S sees dof − (rank [X; Y_S] − rank Y_S) of the platform's freedoms
-        together, alone = ([np.sum(values > zero, axis=1) for zero in (SURELY_SOMETHING, SURELY_ZERO)]
-                           for values in lost)
+        together, alone = (
+            [np.sum(values > zero, axis=1) for zero in (SURELY_SOMETHING, SURELY_ZERO)] for values in lost
+        )
         dof = found.dof.value
         least, most = dof - (together[1] - alone[0]), dof - (together[0] - alone[1])
-        return cls(found.mobility, found.dimension, dof, turns, (turning[0], turning[1]),
-                   tuple(zip(least.tolist(), most.tolist(), strict=True)))
+        return cls(
+            found.mobility,
+            found.dimension,
+            dof,
+            turns,
+            (turning[0], turning[1]),
+            tuple(zip(least.tolist(), most.tolist(), strict=True)),
+        )
 
     def agrees(self, other: Signature) -> bool:
         """Whether both can be of one operation mode."""
         same = (self.mobility, self.dimension, self.dof) == (other.mobility, other.dimension, other.dof)
-        return same and all(a[0] <= b[1] and b[0] <= a[1] for a, b in zip(
-            (self.turning, *self.seen), (other.turning, *other.seen), strict=True))
+        return same and all(
+            a[0] <= b[1] and b[0] <= a[1]
+            for a, b in zip((self.turning, *self.seen), (other.turning, *other.seen), strict=True)
+        )
 
     @property
     def motion(self) -> str:
@@ -183,8 +201,11 @@ class OperationMode:
         mode of ``other``, or the other way round."""
         own, sets = self.signature, sets_of(len(labels))
         text = f"{own.dof} dof ({own.motion}), mobility {own.mobility}"
-        apart = [(places, a[0]) for places, a, b in zip(sets, own.seen, other.seen, strict=False)
-                 if own.dof != other.dof or a[0] > b[1] or b[0] > a[1]]
+        apart = [
+            (places, a[0])
+            for places, a, b in zip(sets, own.seen, other.seen, strict=False)
+            if own.dof != other.dof or a[0] > b[1] or b[0] > a[1]
+        ]
         if not apart:
             return text
         places, seen = apart[0]

@@ -56,13 +56,25 @@ class Certificate(Result, shown_as="certificate"):
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
-        return {"samples": self.samples, "discarded": self.discarded, "largest_angle": self.largest_angle,
-                "smallest_gap": self.smallest_gap, "residual": self.residual, "passed": self.passed,
-                "reason": self.reason}
+        return {
+            "samples": self.samples,
+            "discarded": self.discarded,
+            "largest_angle": self.largest_angle,
+            "smallest_gap": self.smallest_gap,
+            "residual": self.residual,
+            "passed": self.passed,
+            "reason": self.reason,
+        }
 
 
-def certify(samples: Samples, hidden: Mechanism, *, count: int | None = None, bodies: tuple[str, ...] = (),
-            complete: bool = True) -> Certificate:
+def certify(
+    samples: Samples,
+    hidden: Mechanism,
+    *,
+    count: int | None = None,
+    bodies: tuple[str, ...] = (),
+    complete: bool = True,
+) -> Certificate:
     """Compare ρ of the real robot's samples with ρ of ``hidden`` at the same poses and directions.
 
     ``bodies`` are further links whose twists must agree too. Only the first ``count`` samples are used. Each actuator
@@ -92,8 +104,10 @@ def certify(samples: Samples, hidden: Mechanism, *, count: int | None = None, bo
         worst = start
         angle = np.pi / 2
         return verdict(f"not assembled at the zero configuration (loop {twin.worst_loop(twin.q0)[0]!r} misses)")
-    ways = [[target if not blind else target.of(lambda o: o.link not in blind) for target in member.way]
-            for member in members]
+    ways = [
+        [target if not blind else target.of(lambda o: o.link not in blind) for target in member.way]
+        for member in members
+    ]
     followed = _follow_ways(twin, ways if complete else [way[::-2][::-1] for way in ways])
     start_target = question.target(samples.start).of(lambda o: o.link not in blind)
     for denser in (1, CLOSER):
@@ -107,14 +121,17 @@ def certify(samples: Samples, hidden: Mechanism, *, count: int | None = None, bo
             break
         arrived.append(led[0])
     if kept:
-        arrived = [_at_real_poses(twin, q, member, way[-1], kept)
-                   for q, member, way in zip(arrived, members, ways, strict=False)]
+        arrived = [
+            _at_real_poses(twin, q, member, way[-1], kept)
+            for q, member, way in zip(arrived, members, ways, strict=False)
+        ]
     reached = ClosedConfiguration.several(twin, arrived, FOLLOWED)
     rows = asked.rows_together(reached, blind)
     hidden_relations = relations(reached, asked, rows)
     real = [member.configuration for member in members[: len(reached)]]
-    real_relations = ([member.relation for member in members] if not bodies else
-                      relations(real, asked, asked.rows_together(real)))
+    real_relations = (
+        [member.relation for member in members] if not bodies else relations(real, asked, asked.rows_together(real))
+    )
     driven = _parametrise(reached, [each[asked.twist_rows :] for each in rows], question.sizes, active, complete)
     for number, (member, led) in enumerate(zip(members, followed, strict=True)):
         if isinstance(led, NotMeasured):
@@ -161,10 +178,16 @@ def _as_they_were(samples: Samples, hidden: Mechanism) -> tuple[str, ...]:
     """The links that a hidden robot keeps with all their joints: where the platform's pose and what is observed leave
     them a choice, only their own poses say where they are."""
     real = samples.twin.mechanism
-    same = {name for name, joint in real.joints.items() if name in hidden.joints
-            and (hidden.joints[name].type, hidden.joints[name].links) == (joint.type, joint.links)}
-    return tuple(link for link in real.links if link in hidden.links and link != real.base
-                 and all(joint.name in same for joint in real.joints_of(link)))
+    same = {
+        name
+        for name, joint in real.joints.items()
+        if name in hidden.joints and (hidden.joints[name].type, hidden.joints[name].links) == (joint.type, joint.links)
+    }
+    return tuple(
+        link
+        for link in real.links
+        if link in hidden.links and link != real.base and all(joint.name in same for joint in real.joints_of(link))
+    )
 
 
 def _at_real_poses(twin: PinocchioModel, q: Array, member: Sample, target: Target, kept: tuple[str, ...]) -> Array:
@@ -180,8 +203,9 @@ def _difference(ours: Relation, theirs: Relation, angle: float) -> str:
     return f"ρ turns by {angle:.2g} rad"
 
 
-def _parametrise(at: Sequence[ClosedConfiguration], rows: Sequence[Array], sizes: Sequence[int], active: list[int],
-                 complete: bool) -> list[bool]:
+def _parametrise(
+    at: Sequence[ClosedConfiguration], rows: Sequence[Array], sizes: Sequence[int], active: list[int], complete: bool
+) -> list[bool]:
     """Whether, at each configuration, each actuator's rate follows from the rate of one observation alone, and
     (``complete``) each observation's rate from those of its own actuators; ``rows`` are those of the observations."""
     kernels = [each.kernel()[0] for each in at]
@@ -193,11 +217,15 @@ def _parametrise(at: Sequence[ClosedConfiguration], rows: Sequence[Array], sizes
     for size in sizes if active else ():
         seen = [each[start : start + size] for each in measured]
         start += size
-        own = [np.linalg.norm(motor @ unseen.kernel, axis=1) <= SAME_RELATION
-               for motor, unseen in zip(motors, spectra(seen, 1.0), strict=True)]
+        own = [
+            np.linalg.norm(motor @ unseen.kernel, axis=1) <= SAME_RELATION
+            for motor, unseen in zip(motors, spectra(seen, 1.0), strict=True)
+        ]
         explained = [before | here for before, here in zip(explained, own, strict=True)]
         if complete:
             locked = spectra([motor[here] for motor, here in zip(motors, own, strict=True)], 1.0)
-            found = [good and bool(np.linalg.norm(here @ each.kernel) <= SAME_RELATION)
-                     for good, here, each in zip(found, seen, locked, strict=True)]
+            found = [
+                good and bool(np.linalg.norm(here @ each.kernel) <= SAME_RELATION)
+                for good, here, each in zip(found, seen, locked, strict=True)
+            ]
     return [good and bool(each.all()) for good, each in zip(found, explained, strict=True)]

@@ -100,8 +100,13 @@ def leg_closures(several: Sequence[Sequence[Part]], end: LegEnd) -> Closures:
             gaps = [[_apart(one, other, slides) for other in values] for one in known.get(joint, ())]
             kept = tuple(one for one, row in zip(known.get(joint, ()), gaps, strict=True) if min(row) <= 0)
             if gaps and not kept:
-                return Closures(Miss(f"its rods ask for different values of joint {joint}", min(map(min, gaps)),
-                                     "m" if slides else "rad"))
+                return Closures(
+                    Miss(
+                        f"its rods ask for different values of joint {joint}",
+                        min(map(min, gaps)),
+                        "m" if slides else "rad",
+                    )
+                )
             known[joint] = kept or values
     return Closures(None, tuple(known.items()))
 
@@ -133,13 +138,21 @@ def _closures(way: Sequence[Part], end: LegEnd) -> Closures:
         words = f"the rod from {_name(way[1])} to {_name(last)} is {{sought}} long, {{span}} would do"
         laws = [_distance(first, end.ball(B), T, rod, words) for T, rod in zip(targets, rods, strict=True)]
         # seen from the first part, the rod's far end must be where the U between them can bring it
-        return _solve_laws(laws, None, first, B, targets[0], end, lambda q: _tilt_misses(
-            way[1], end.ball(far[0]), first.moved(targets[0], -q)))
+        return _solve_laws(
+            laws,
+            None,
+            first,
+            B,
+            targets[0],
+            end,
+            lambda q: _tilt_misses(way[1], end.ball(far[0]), first.moved(targets[0], -q)),
+        )
     if last.axis is not None:
         return UNDECIDED
     # two rods between three centres: |AB| − |BC| ≤ |AC| ≤ |AB| + |BC|
-    reach, one, other = (_root(_square(v)) for v in (targets[0] - first.point, end.ball(B) - first.point,
-                                                     end.ball(B) - far[0]))
+    reach, one, other = (
+        _root(_square(v)) for v in (targets[0] - first.point, end.ball(B) - first.point, end.ball(B) - far[0])
+    )
     return Closures(_miss_outside(abs(one - other), one + other, reach, _far(first, last)))
 
 
@@ -234,8 +247,15 @@ def _height(moving: Part | None, x: Field, n: Array, target: Field, words: str, 
     return _Law(_dot(centre - A, n), _dot(v, n), _dot(w, n), wanted, True, False, words)
 
 
-def _solve_laws(laws: Sequence[_Law], first: Part | None, moving: Part | None, x: Array, target: Field, end: LegEnd,
-            more: Callable[[Any], list[Miss]] = lambda q: []) -> Closures:
+def _solve_laws(
+    laws: Sequence[_Law],
+    first: Part | None,
+    moving: Part | None,
+    x: Array,
+    target: Field,
+    end: LegEnd,
+    more: Callable[[Any], list[Miss]] = lambda q: [],
+) -> Closures:
     """All values of the moving part by laws that hold together and by what ``more`` refuses, and of the first part's
     joint with each."""
     misses = [miss for law in laws if (miss := law.miss()) is not None]
@@ -245,8 +265,12 @@ def _solve_laws(laws: Sequence[_Law], first: Part | None, moving: Part | None, x
     if moving is None or not lists:
         return UNDECIDED
     sharpest = min(lists, key=lambda roots: max(float(root.rad()) for root in roots))
-    failed = [[miss for law in laws if (miss := law.prove_miss(law.at(q), law.at(q))) is not None]
-              + _tilt_misses(first, moving.moved(end.ball(x), q), target) + more(q) for q in sharpest]
+    failed = [
+        [miss for law in laws if (miss := law.prove_miss(law.at(q), law.at(q))) is not None]
+        + _tilt_misses(first, moving.moved(end.ball(x), q), target)
+        + more(q)
+        for q in sharpest
+    ]
     values = tuple(q for q, missed in zip(sharpest, failed, strict=True) if not missed)
     if not values:
         worst = [max(missed, key=lambda miss: miss.by) for missed in failed]

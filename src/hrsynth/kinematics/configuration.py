@@ -40,8 +40,9 @@ class ClosedConfiguration(Value):
         return cls(twin, q, residual)
 
     @classmethod
-    def several(cls, twin: PinocchioModel, places: Sequence[Array], tolerance: float = CLOSED
-                ) -> list[ClosedConfiguration]:
+    def several(
+        cls, twin: PinocchioModel, places: Sequence[Array], tolerance: float = CLOSED
+    ) -> list[ClosedConfiguration]:
         """:meth:`of` of several, their constraints taken apart together."""
         found = [cls.of(twin, q, tolerance) for q in places]
         for at, loops in zip(found, spectra([twin.jacobian(at.q) for at in found], LOOPS_SCALE), strict=True):
@@ -71,8 +72,9 @@ class ClosedConfiguration(Value):
         return self.loops.values
 
 
-def measure(twin: PinocchioModel, q: Array, reference: str, observations: Sequence[Observation],
-            links: Sequence[str] = ()) -> tuple[Array, Array, list[Array], list[Array]]:
+def measure(
+    twin: PinocchioModel, q: Array, reference: str, observations: Sequence[Observation], links: Sequence[str] = ()
+) -> tuple[Array, Array, list[Array], list[Array]]:
     """Poses (k, 4, 4) and velocities (k, 6, nv) of ``links``; the value (size,) and the rates (size, nv) of each
     observation, seen from ``reference`` where it names no link of its own, lengths in characteristic lengths. All are
     read-only: what is asked again at the same place, as where one target is reached and the next begins, is kept."""
@@ -105,8 +107,13 @@ def measure(twin: PinocchioModel, q: Array, reference: str, observations: Sequen
     return twin.measured[2]
 
 
-def measure_together(twin: PinocchioModel, places: Sequence[Array], reference: str, observations: Sequence[Observation],
-                     links: Sequence[str] = ()) -> tuple[Array, Array, Array, Array, Array, Array]:
+def measure_together(
+    twin: PinocchioModel,
+    places: Sequence[Array],
+    reference: str,
+    observations: Sequence[Observation],
+    links: Sequence[str] = (),
+) -> tuple[Array, Array, Array, Array, Array, Array]:
     """At several configurations the loops' residuals (n, rows) and Jacobians (n, rows, nv), and what :func:`measure`
     gives there: (n, k, 4, 4), (n, k, 6, nv), all values (n, size) and rates (n, size, nv)."""
     names, whole, groups = _group_links(reference, tuple(observations), tuple(links))
@@ -143,8 +150,9 @@ class _AlikeObservations:
 
 
 @lru_cache(maxsize=512)
-def _group_links(reference: str, observations: tuple[Observation, ...], links: tuple[str, ...]
-             ) -> tuple[tuple[str, ...], int, list[_AlikeObservations]]:
+def _group_links(
+    reference: str, observations: tuple[Observation, ...], links: tuple[str, ...]
+) -> tuple[tuple[str, ...], int, list[_AlikeObservations]]:
     """All links that matter, ``links`` first, how many of them whose points' velocities matter too, and the
     observations that are evaluated together."""
     seen = [o.seen_from or reference for o in observations]

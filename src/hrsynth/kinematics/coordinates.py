@@ -90,8 +90,7 @@ class Coordinates(Value):
         """Error (reached − wanted) in characteristic lengths and radians, and its Jacobian."""
         frames, velocities = twin.frames(q, (self.motion.link,))
         X, V = frames[0], velocities[0]
-        J = np.vstack([point_velocity(V, X[:3, :3] @ self.motion.point / twin.length),
-                       self._turn(X)[1] @ V[3:]])
+        J = np.vstack([point_velocity(V, X[:3, :3] @ self.motion.point / twin.length), self._turn(X)[1] @ V[3:]])
         scale = np.where(np.array(self.places) < 3, twin.length, 1.0)
         return self.apart(X) / scale, J[list(self.places)]
 
@@ -99,22 +98,27 @@ class Coordinates(Value):
         """The coordinates that lie ``fraction`` of the way from the pose X (4, 4) to these."""
         return replace(self, values=self.values + (1 - fraction) * self.apart(X))
 
-    def along(self, start: ClosedConfiguration, index: int, spans: tuple[float, float], count: int
-              ) -> tuple[tuple[float, ClosedConfiguration], ...]:
+    def along(
+        self, start: ClosedConfiguration, index: int, spans: tuple[float, float], count: int
+    ) -> tuple[tuple[float, ClosedConfiguration], ...]:
         """Closed configurations as one coordinate alone changes from ``start``, in the order of its values: ``count``
         on each side, equally spaced as far as small steps lead within ``spans`` (metres, radians)."""
         down, up = (list(self._out(start, index, way, count)) for way in (-spans[0], spans[1]))
         return (*reversed(down), (float(self.values[index]), start), *up)
 
-    def ends(self, start: ClosedConfiguration, index: int, spans: tuple[float, float]
-             ) -> tuple[ClosedConfiguration, ClosedConfiguration]:
+    def ends(
+        self, start: ClosedConfiguration, index: int, spans: tuple[float, float]
+    ) -> tuple[ClosedConfiguration, ClosedConfiguration]:
         """Where the robot comes to as one coordinate alone goes down and up from ``start``, within ``spans``."""
-        down, up = (track(start, self.motion, self._change(index, self.values[index] + span))[0]
-                    for span in (-spans[0], spans[1]))
+        down, up = (
+            track(start, self.motion, self._change(index, self.values[index] + span))[0]
+            for span in (-spans[0], spans[1])
+        )
         return down, up
 
-    def _out(self, start: ClosedConfiguration, index: int, span: float, count: int
-             ) -> Iterator[tuple[float, ClosedConfiguration]]:
+    def _out(
+        self, start: ClosedConfiguration, index: int, span: float, count: int
+    ) -> Iterator[tuple[float, ClosedConfiguration]]:
         end = self._change(index, self.values[index] + span)
         came = track(start, self.motion, end)[1] if span else 0.0
         if came < 1:

@@ -41,16 +41,22 @@ def worst_leg(twin: PinocchioModel, motion: PlatformMotion, goal: Goal) -> LegMi
         anatomy = decompose(twin.mechanism)
     except HrsynthError:
         return None
-    short = max(((float(each[0]), most, label) for label, most, each in rod_misses(anatomy, motion, [goal])),
-                default=(0.0, 0.0, ""))
+    short = max(
+        ((float(each[0]), most, label) for label, most, each in rod_misses(anatomy, motion, [goal])),
+        default=(0.0, 0.0, ""),
+    )
     if short[0] > short[1]:
         return LegMiss(short[2], short[0], 0.0, True)
     misses = []
     for leg in anatomy.legs:
         error = _miss(PinocchioModel(alone(anatomy, leg), twin.length), motion, goal)
         lengths, angles = np.split(error, [goal.lengths])
-        misses.append((float(np.linalg.norm(error)), LegMiss(leg.label, twin.length * float(np.linalg.norm(lengths)),
-                                                             float(np.linalg.norm(angles)))))
+        misses.append(
+            (
+                float(np.linalg.norm(error)),
+                LegMiss(leg.label, twin.length * float(np.linalg.norm(lengths)), float(np.linalg.norm(angles))),
+            )
+        )
     size, worst = max(misses, key=lambda miss: miss[0])
     return worst if size > FOLLOWED else None
 
@@ -64,8 +70,9 @@ def beyond_rods(mechanism: Mechanism, motion: PlatformMotion, goals: Sequence[Go
     return {int(i) for *_, misses in rod_misses(anatomy, motion, goals) for i in np.flatnonzero(misses > 0)}
 
 
-def rod_misses(anatomy: LegDecomposition, motion: PlatformMotion, goals: Sequence[Goal]
-               ) -> Iterator[tuple[str, float, Array]]:
+def rod_misses(
+    anatomy: LegDecomposition, motion: PlatformMotion, goals: Sequence[Goal]
+) -> Iterator[tuple[str, float, Array]]:
     """Of each leg its label, the sum of its rods' lengths to the platform's point, and by how much (n,) it misses goals
     at least, as these lengths tell (m); not positive where they do not.
 
@@ -74,10 +81,13 @@ def rod_misses(anatomy: LegDecomposition, motion: PlatformMotion, goals: Sequenc
     goal leaves no turn free the last centre. Of a point that may move it counts how far it is in wanted directions."""
     point = motion.position(motion.home)
     X = np.array([motion.pose_of(goal) for goal in goals]).reshape(-1, 4, 4)
-    placed, turned = (np.array([told(goal) for goal in goals], dtype=bool) for told in (
-        motion.is_placed, lambda goal: motion.turns_left(goal) == 0))
-    seen = np.array([np.eye(3) if known else goal.directions.T @ goal.directions
-                     for goal, known in zip(goals, placed, strict=True)]).reshape(-1, 3, 3)
+    placed, turned = (
+        np.array([told(goal) for goal in goals], dtype=bool)
+        for told in (motion.is_placed, lambda goal: motion.turns_left(goal) == 0)
+    )
+    seen = np.array(
+        [np.eye(3) if known else goal.directions.T @ goal.directions for goal, known in zip(goals, placed, strict=True)]
+    ).reshape(-1, 3, 3)
     for label, centres in _centres(anatomy, motion):
         last = transform(inverse(motion.home), centres[-1])
         found, lengths = np.full(len(goals), -np.inf), list[float]()
@@ -97,8 +107,11 @@ def _centres(anatomy: LegDecomposition, motion: PlatformMotion) -> Iterator[tupl
     centred = (JointType.REVOLUTE, JointType.UNIVERSAL, JointType.SPHERICAL)
     for leg in anatomy.legs:
         within = {mechanism.base, *anatomy.platform, motion.link, *leg.links}
-        bonds = {frozenset(joint.links): joint for joint in mechanism.joints.values()
-                 if joint.type in centred and within.issuperset(joint.links)}
+        bonds = {
+            frozenset(joint.links): joint
+            for joint in mechanism.joints.values()
+            if joint.type in centred and within.issuperset(joint.links)
+        }
         try:
             links = shortest_path(adjacency(within, bonds), mechanism.base, motion.link)
         except KeyError:
@@ -111,8 +124,9 @@ def alone(anatomy: LegDecomposition, leg: Leg) -> Mechanism:
     mechanism = anatomy.mechanism
     kept = {mechanism.base, *anatomy.platform, *leg.links}
     others = [name for other in anatomy.legs if other is not leg for name in other.joints]
-    return mechanism.changed(remove_links=set(mechanism.links) - kept, remove_joints=others, observations=(),
-                             camera=None)
+    return mechanism.changed(
+        remove_links=set(mechanism.links) - kept, remove_joints=others, observations=(), camera=None
+    )
 
 
 def _miss(twin: PinocchioModel, motion: PlatformMotion, goal: Goal) -> Array:
@@ -134,8 +148,9 @@ def _miss(twin: PinocchioModel, motion: PlatformMotion, goal: Goal) -> Array:
     return least
 
 
-def _approach(at: ClosedConfiguration, goal: Goal, manner: Goal, iterations: int, known: float = np.inf
-                ) -> ClosedConfiguration:
+def _approach(
+    at: ClosedConfiguration, goal: Goal, manner: Goal, iterations: int, known: float = np.inf
+) -> ClosedConfiguration:
     """Minimise a goal's error with the loops closed and ``manner`` kept: damped Gauss-Newton in the tangent space;
     given up where the error will not fall below the one that is ``known``."""
     twin = at.twin
@@ -147,8 +162,9 @@ def _approach(at: ClosedConfiguration, goal: Goal, manner: Goal, iterations: int
         error, rows = goal.rows(twin, here[0].q)
         return error, rows @ here[1]
 
-    def advance(here: tuple[ClosedConfiguration, Array], left: Residual, factor: float
-                ) -> tuple[ClosedConfiguration, Array] | None:
+    def advance(
+        here: tuple[ClosedConfiguration, Array], left: Residual, factor: float
+    ) -> tuple[ClosedConfiguration, Array] | None:
         damped = np.vstack([left.J, np.sqrt(factor) * np.eye(left.J.shape[1])])
         wanted = np.append(-left.error, np.zeros(left.J.shape[1]))
         step = here[1] @ np.linalg.lstsq(damped, wanted, rcond=None)[0]
@@ -162,7 +178,11 @@ def _approach(at: ClosedConfiguration, goal: Goal, manner: Goal, iterations: int
             sizes.append(left.size)
         # far from a goal out of reach the steps become short, as J does not tell how its rows turn
         won = sizes[-1 - SETTLED] - left.size if len(sizes) > SETTLED else np.inf
-        return won <= NO_NEARER * left.size or left.size - known > HOPELESS * won or left.size <= SOLVED or bool(
-            np.linalg.norm(left.J.T @ left.error) <= RANK_CUTOFF * left.size)
+        return (
+            won <= NO_NEARER * left.size
+            or left.size - known > HOPELESS * won
+            or left.size <= SOLVED
+            or bool(np.linalg.norm(left.J.T @ left.error) <= RANK_CUTOFF * left.size)
+        )
 
     return descend(tangent(at), evaluate, advance, DAMPING, iterations, content)[0][0]

@@ -45,14 +45,16 @@ class Stops:
 
     def margins(self, twin: PinocchioModel, q: Array) -> dict[str, float]:
         """How far each joint, and each wrist, is from the nearer limit (m, rad); negative beyond it."""
-        found = {name: min(value - lower, upper - value) for name, value in coordinates(twin, q).items()
-                 for lower, upper in (self.spans[name],)}
+        found = {
+            name: min(value - lower, upper - value)
+            for name, value in coordinates(twin, q).items()
+            for lower, upper in (self.spans[name],)
+        }
         return found | wrist_margins(twin, q)
 
 
 def _about(value: float, lower: float, upper: float) -> tuple[float, float]:
-    """The interval of a turn, shifted by the whole turns that bring it nearest to a value; by none where it holds it.
-    """
+    """The interval of a turn, shifted by the whole turns that bring it nearest to a value; by none if it holds it."""
     if lower - SAME_POINT <= value <= upper + SAME_POINT:
         return lower, upper
     turn = 2 * np.pi
@@ -65,9 +67,11 @@ def _about(value: float, lower: float, upper: float) -> tuple[float, float]:
 def coordinates(twin: PinocchioModel, q: Array) -> dict[str, float]:
     """The coordinate (m, rad) of each R or P that has limits, by the name that it has in the file."""
     step, joints = twin.difference(twin.q0, q), twin.mechanism.joints
-    return {name: float(step[twin.coordinates[joint][place]]) * (twin.length if joints[joint].type.slides else 1.0)
-            for name, (joint, place, *_) in twin.mechanism.stops.items()
-            if joint in twin.coordinates and (joints[joint].type in SINGLE or joints[joint].turns)}
+    return {
+        name: float(step[twin.coordinates[joint][place]]) * (twin.length if joints[joint].type.slides else 1.0)
+        for name, (joint, place, *_) in twin.mechanism.stops.items()
+        if joint in twin.coordinates and (joints[joint].type in SINGLE or joints[joint].turns)
+    }
 
 
 def wrist_margins(twin: PinocchioModel, q: Array) -> dict[str, float]:
@@ -78,15 +82,19 @@ def wrist_margins(twin: PinocchioModel, q: Array) -> dict[str, float]:
 def flat_wrists(twin: PinocchioModel, q: Array) -> dict[str, float]:
     """Spherical joints that stand for several R whose axes nearly lie in a plane, where they turn in two ways only, and
     how far they are from it (rad)."""
-    every = {name: _carried(twin, q, name, joint.wrist).flatness()
-             for name, joint in twin.mechanism.joints.items() if joint.wrist is not None}
+    every = {
+        name: _carried(twin, q, name, joint.wrist).flatness()
+        for name, joint in twin.mechanism.joints.items()
+        if joint.wrist is not None
+    }
     return {name: flatness for name, flatness in every.items() if flatness < AT_END}
 
 
 def _carried(twin: PinocchioModel, q: Array, name: str, wrist: Wrist) -> Wrist:
     mechanism = twin.mechanism
-    return wrist.carried(*(twin.pose(q, link)[:3, :3] @ mechanism.links[link].pose[:3, :3].T
-                           for link in mechanism.joints[name].links))
+    return wrist.carried(
+        *(twin.pose(q, link)[:3, :3] @ mechanism.links[link].pose[:3, :3].T for link in mechanism.joints[name].links)
+    )
 
 
 def wrists_beyond(twin: PinocchioModel, q: Array) -> list[str]:
@@ -99,9 +107,11 @@ def outside(twin: PinocchioModel, q: Array, joints: Sequence[str] | None = None)
     (turns count modulo 2π), and the wrists beyond their intervals."""
     mechanism = twin.mechanism
     joints = [*mechanism.joints] if joints is None else joints
-    return ([name for name in wrists_beyond(twin, q) if name in joints]
-            + [name for name, value in coordinates(twin, q).items()
-               if mechanism.stops[name].joint in joints and is_excluded(mechanism, name, value, value)])
+    return [name for name in wrists_beyond(twin, q) if name in joints] + [
+        name
+        for name, value in coordinates(twin, q).items()
+        if mechanism.stops[name].joint in joints and is_excluded(mechanism, name, value, value)
+    ]
 
 
 def surely_outside(twin: PinocchioModel, q: Array, bodies: Iterable[str], within: float) -> bool:
@@ -116,8 +126,11 @@ def surely_outside(twin: PinocchioModel, q: Array, bodies: Iterable[str], within
         return shift + turn * float(np.linalg.norm(mechanism.links[link].pose[:3, 3] - joint.point))
 
     for link in mechanism.links.keys() - doubts.keys():
-        hinges = [joint for joint in mechanism.joints_of(link)
-                  if joint.type is JointType.REVOLUTE and joint.other(link) in doubts]
+        hinges = [
+            joint
+            for joint in mechanism.joints_of(link)
+            if joint.type is JointType.REVOLUTE and joint.other(link) in doubts
+        ]
         for one, other in combinations(hinges, 2):
             apart = lines.distance(other.point, one.point, one.axis)
             if lines.parallel(one.axis, other.axis) and apart > SAME_POINT * twin.length:
@@ -150,8 +163,10 @@ def is_excluded(mechanism: Mechanism, joint: str, low: float, high: float) -> bo
 
 def all_excluded(mechanism: Mechanism, joint: str, values: Sequence[Any]) -> bool:
     """Whether all values of a list, as balls, are outside a joint's limits."""
-    return all(value.is_finite() and is_excluded(mechanism, joint, float(value.lower()), float(value.upper()))
-               for value in values)
+    return all(
+        value.is_finite() and is_excluded(mechanism, joint, float(value.lower()), float(value.upper()))
+        for value in values
+    )
 
 
 def at_end(at: ClosedConfiguration) -> str | None:
@@ -188,5 +203,7 @@ def _cosine(wrist: Wrist, before: Sequence[Part], after: Sequence[Part], turns: 
 
 def _outside(wrist: Wrist, cosine: Any) -> bool:
     """Whether a wrist is beyond its interval, by a ball of the cosine."""
-    return bool((wrist.upper is not None and cosine < np.cos(wrist.upper) - SAME_POINT)
-                or (wrist.lower is not None and cosine > np.cos(wrist.lower) + SAME_POINT))
+    return bool(
+        (wrist.upper is not None and cosine < np.cos(wrist.upper) - SAME_POINT)
+        or (wrist.lower is not None and cosine > np.cos(wrist.lower) + SAME_POINT)
+    )

@@ -84,8 +84,9 @@ def leg_twists(at: ClosedConfiguration, leg: Leg, locks: Sequence[Observation], 
     return leg_twists_together([at], leg, locks, reference)[0]
 
 
-def leg_twists_together(samples: Sequence[ClosedConfiguration], leg: Leg, locks: Sequence[Observation], reference: str
-                        ) -> list[Array]:
+def leg_twists_together(
+    samples: Sequence[ClosedConfiguration], leg: Leg, locks: Sequence[Observation], reference: str
+) -> list[Array]:
     """:func:`leg_twists` at several configurations."""
     mechanism, rows = samples[0].twin.mechanism, []
     links = (leg.attach, *(link for link in leg.links if link not in (leg.attach, mechanism.base)))
@@ -114,8 +115,9 @@ def interaction(at: ClosedConfiguration, question: Measurement) -> Array:
     return found - hidden @ (hidden.T @ found)
 
 
-def joint_at(at: ClosedConfiguration, joint: Joint, pose: Callable[[str], Array] | None = None
-             ) -> tuple[Array, list[Array]]:
+def joint_at(
+    at: ClosedConfiguration, joint: Joint, pose: Callable[[str], Array] | None = None
+) -> tuple[Array, list[Array]]:
     """Centre (characteristic lengths) and axes of a joint where a configuration, whose links are at these poses, has
     them."""
     point, axes = carry_joint(at.twin.mechanism, joint, pose or at.pose)
@@ -134,8 +136,11 @@ def rezero(at: ClosedConfiguration) -> Mechanism:
     """The same mechanism with ``at`` as its zero configuration."""
     mechanism, twin = at.twin.mechanism, at.twin
     step = twin.difference(twin.q0, at.q)
-    known = {name: float(step[twin.coordinates[name][0]]) * (twin.length if joint.type.slides else 1.0)
-             for name, joint in mechanism.joints.items() if joint.type in SINGLE and name in twin.coordinates}
+    known = {
+        name: float(step[twin.coordinates[name][0]]) * (twin.length if joint.type.slides else 1.0)
+        for name, joint in mechanism.joints.items()
+        if joint.type in SINGLE and name in twin.coordinates
+    }
     return zeroed_at(mechanism, {name: at.pose(name) for name in mechanism.links}, known)
 
 
@@ -156,11 +161,14 @@ def split(twists: Array, point: Array) -> Split:
 
 def split_together(systems: Sequence[Array], points: Sequence[Array]) -> list[Split]:
     """:func:`split` of several systems, each at its own point."""
-    there = [np.vstack([point_velocity(twists, point), twists[3:]])
-             for twists, point in zip(systems, points, strict=True)]
+    there = [
+        np.vstack([point_velocity(twists, point), twists[3:]]) for twists, point in zip(systems, points, strict=True)
+    ]
     parts = []
     for part, other in ((slice(3), slice(3, 6)), (slice(3, 6), slice(3))):
         alone = spectra([twists[other] for twists in there], 1.0)
         parts.append(range_bases([twists[part] @ each.kernel for twists, each in zip(there, alone, strict=True)], 1.0))
-    return [Split(moved, turned, moved.shape[1] + turned.shape[1] == twists.shape[1])
-            for (moved, _), (turned, _), twists in zip(*parts, systems, strict=True)]
+    return [
+        Split(moved, turned, moved.shape[1] + turned.shape[1] == twists.shape[1])
+        for (moved, _), (turned, _), twists in zip(*parts, systems, strict=True)
+    ]

@@ -38,8 +38,9 @@ def numbers(placements: Sequence[pin.SE3]) -> Array:
 class LoopRows:
     """Of loops between two frames of a model, balls or not; ``supports`` says what moves a body (nv,)."""
 
-    def __init__(self, model: pin.Model, data: pin.Data, loops: Sequence[tuple[int, int, bool]],
-                 supports: Callable[[int], Array]) -> None:
+    def __init__(
+        self, model: pin.Model, data: pin.Data, loops: Sequence[tuple[int, int, bool]], supports: Callable[[int], Array]
+    ) -> None:
         self._model, self._data = model, data
         self.sizes = tuple(3 if ball else 6 for _, _, ball in loops)
         self._welds: list[tuple[pin.FrameAnchorConstraintModel, pin.FrameAnchorConstraintData]] = []
@@ -53,8 +54,9 @@ class LoopRows:
             signs[rows] = supports(far.parentJoint) - supports(near.parentJoint)
             blocks += [(first, second, False)] if ball else [(first, first, False), (first, first, True)]
             if not ball:
-                weld = pin.FrameAnchorConstraintModel(model, near.parentJoint, near.placement, far.parentJoint,
-                                                      far.placement)
+                weld = pin.FrameAnchorConstraintModel(
+                    model, near.parentJoint, near.placement, far.parentJoint, far.placement
+                )
                 self._welds.append((weld, weld.createData()))
                 self._missed.append(self._welds[-1][1].constraint_position_error)
                 welded += range(rows.start, rows.stop)
@@ -83,8 +85,7 @@ class LoopRows:
         if len(self._welds) == len(self.sizes):
             return missed
         places = numbers.take(self._errors, axis=-1)
-        errors: Array = np.add.reduce(
-            places[..., 0, :, :] * (places[..., 1, :, :] - places[..., 2, :, :]), axis=-2)
+        errors: Array = np.add.reduce(places[..., 0, :, :] * (places[..., 1, :, :] - places[..., 2, :, :]), axis=-2)
         if self._welds:
             errors[..., self._welded] = missed
         return errors

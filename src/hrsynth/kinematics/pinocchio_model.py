@@ -48,8 +48,9 @@ class PinocchioModel:
         self._gears = self._gear_rows()
         self._geared = len(self._gears) > 0
         if self.model.nv > LARGEST_MODEL:
-            raise BadRequest(f"{mechanism.name}: joints with {self.model.nv} coordinates", None,
-                             f"up to {LARGEST_MODEL}")
+            raise BadRequest(
+                f"{mechanism.name}: joints with {self.model.nv} coordinates", None, f"up to {LARGEST_MODEL}"
+            )
         self.data = self.model.createData()
         self.nv: int = self.model.nv
         self.q0: Array = pin.neutral(self.model)
@@ -77,8 +78,14 @@ class PinocchioModel:
         way: dict[str, frozenset[str]] = {self.mechanism.base: frozenset()}
         for joint, near, far in graphs.outward(self.mechanism.base, tree):
             way[far] = way[near] | {joint.name}
-        rings = {joint.name: [name for name in (joint.name, *sorted(way[joint.predecessor] ^ way[joint.successor]))
-                              if not self.mechanism.joints[name].in_tree] for joint in cuts}
+        rings = {
+            joint.name: [
+                name
+                for name in (joint.name, *sorted(way[joint.predecessor] ^ way[joint.successor]))
+                if not self.mechanism.joints[name].in_tree
+            ]
+            for joint in cuts
+        }
         called: dict[str, str] = {}
 
         def give(name: str, asked: set[str]) -> bool:
@@ -114,8 +121,9 @@ class PinocchioModel:
         used = {joint.name for joint, _ in ordered}
         driven = ", ".join(name for name in mechanism.idle if mechanism.joints[name].actuated)
         if driven:
-            raise BadMechanism(f"{mechanism.name}: a motor on a floating joint whose link other joints hold", driven,
-                               "motors on those")
+            raise BadMechanism(
+                f"{mechanism.name}: a motor on a floating joint whose link other joints hold", driven, "motors on those"
+            )
         return ordered, [joint for joint in joints if joint.name not in used]
 
     def _chain(self, joint: Joint, parent: str) -> list[object]:
@@ -127,9 +135,12 @@ class PinocchioModel:
             case JointType.FREE:
                 return [pin.JointModelFreeFlyer()]
             case _:
-                return [pin.JointModelPrismaticUnaligned(axis) if kind is JointType.PRISMATIC
-                        else pin.JointModelRevoluteUnaligned(axis)
-                        for kind, axis in elementary(joint.type, turned.axes, across)]
+                return [
+                    pin.JointModelPrismaticUnaligned(axis)
+                    if kind is JointType.PRISMATIC
+                    else pin.JointModelRevoluteUnaligned(axis)
+                    for kind, axis in elementary(joint.type, turned.axes, across)
+                ]
 
     def _add(self, joint: Joint, parent: str, suffix: str) -> int:
         """Add the joint models on ``parent``; the last one's index. Its frame sits at the joint's centre."""
@@ -161,9 +172,14 @@ class PinocchioModel:
         if not ball and joint.type is not JointType.FIXED:
             near = self._add(joint, joint.predecessor, "__cut")
         point = joint.point / self.length
-        first, second = (self.model.addFrame(pin.Frame(
-            f"{joint.name}__{end}", body, pin.SE3(_UPRIGHT, point - self._centre[body]), pin.FrameType.OP_FRAME))
-            for end, body in enumerate((near, far)))
+        first, second = (
+            self.model.addFrame(
+                pin.Frame(
+                    f"{joint.name}__{end}", body, pin.SE3(_UPRIGHT, point - self._centre[body]), pin.FrameType.OP_FRAME
+                )
+            )
+            for end, body in enumerate((near, far))
+        )
         return first, second, ball
 
     def _gear_rows(self) -> Array:
@@ -254,8 +270,9 @@ class PinocchioModel:
             first = V[..., :whole, :, :]
             p, turn = X[..., :whole, :3, 3, None] / self.length, first[..., 3:, :]
             # the origin's velocity: ω × p more than that of the base's origin
-            first[..., :3, :] += (turn[..., [1, 2, 0], :] * p[..., [2, 0, 1], :]
-                                  - turn[..., [2, 0, 1], :] * p[..., [1, 2, 0], :])
+            first[..., :3, :] += (
+                turn[..., [1, 2, 0], :] * p[..., [2, 0, 1], :] - turn[..., [2, 0, 1], :] * p[..., [1, 2, 0], :]
+            )
         return V
 
     def poses(self, q: Array, links: tuple[str, ...]) -> Array:
@@ -264,8 +281,9 @@ class PinocchioModel:
         bodies, offsets, _ = self._several.get(links) or self._together(links)
         return self._homogeneous(self._placements.take(bodies, 0)) @ offsets
 
-    def states(self, places: Sequence[Array], links: tuple[str, ...], whole: int | None = None
-               ) -> tuple[Array, Array, Array, Array]:
+    def states(
+        self, places: Sequence[Array], links: tuple[str, ...], whole: int | None = None
+    ) -> tuple[Array, Array, Array, Array]:
         """Of several configurations :meth:`residual` (n, rows), :meth:`jacobian` (n, rows, nv) and :meth:`frames`
         (n, k, 4, 4), (n, k, 6, nv)."""
         bodies = (self._several.get(links) or self._together(links))[0] if links else np.zeros(0, dtype=np.intp)
@@ -328,8 +346,9 @@ class PinocchioModel:
                 case JointType.REVOLUTE | JointType.UNIVERSAL:
                     step[places] = turns_about(np.array(own.axes), R)
                 case JointType.PRISMATIC | JointType.CYLINDRICAL | JointType.PLANAR:
-                    slides = [axis for kind, axis in elementary(own.type, own.axes, across)
-                              if kind is JointType.PRISMATIC]
+                    slides = [
+                        axis for kind, axis in elementary(own.type, own.axes, across) if kind is JointType.PRISMATIC
+                    ]
                     turn = turns_about(own.axis[None], R)[: len(places) - len(slides)]
                     step[places] = [*(axis @ shift for axis in slides), *turn]
         return self.integrate(self.q0, step)

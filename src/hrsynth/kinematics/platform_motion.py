@@ -203,8 +203,11 @@ class PlatformMotion(Value):
             turn, normal = rotation @ self.home[:3, :3].T, self.rotations[:, 0]
             phi, rotation = turn_about(normal, turn)[0], None
             if np.linalg.norm(turn @ normal - normal) > AS_PRINTED:
-                raise BadRequest(f"{robot}: the platform turns about one axis only, rpy is not such a turn", str(pose),
-                                 "phi, or a turn about " + " ".join(f"{x:.4g}" for x in self.rotations[:, 0]))
+                raise BadRequest(
+                    f"{robot}: the platform turns about one axis only, rpy is not such a turn",
+                    str(pose),
+                    "phi, or a turn about " + " ".join(f"{x:.4g}" for x in self.rotations[:, 0]),
+                )
         placed = [i for i, name in enumerate("xyz") if name in pose.given]
         values = np.array([getattr(pose, "xyz"[i]) for i in placed], dtype=float)
         return Goal(self.link, self.point, self.home[:3, :3], np.eye(3)[placed], values, normal, phi, rotation)
@@ -224,8 +227,10 @@ class PlatformMotion(Value):
     def is_placed(self, goal: Goal) -> bool:
         """Whether a goal leaves the point no translation."""
         k = self.translations.shape[1]
-        return not k or (len(goal.values) > 0 and bool(
-            np.linalg.matrix_rank(goal.directions @ self.translations, tol=RANK_CUTOFF) == k))
+        return not k or (
+            len(goal.values) > 0
+            and bool(np.linalg.matrix_rank(goal.directions @ self.translations, tol=RANK_CUTOFF) == k)
+        )
 
     def turns_left(self, goal: Goal) -> int:
         """How many of the platform's turns a goal leaves free."""
@@ -241,8 +246,15 @@ class PlatformMotion(Value):
     def at_home(self) -> Goal:
         """The goal of the whole pose at the zero configuration: what free parts are nearest to."""
         R = self.home[:3, :3]
-        return Goal(self.link, self.point, R, np.eye(3), self.position(self.home), self.normal,
-                    rotation=R if self.body else None)
+        return Goal(
+            self.link,
+            self.point,
+            R,
+            np.eye(3),
+            self.position(self.home),
+            self.normal,
+            rotation=R if self.body else None,
+        )
 
     def whole(self, X: Array) -> Goal:
         """The goal of the whole platform pose X (4, 4), as far as the platform's pose counts."""

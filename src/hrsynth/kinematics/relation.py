@@ -50,17 +50,26 @@ class Measurement(Value):
     def target(self, at: ClosedConfiguration) -> Target:
         """The platform pose and the measured values of a configuration."""
         X, _, values, _ = measure(at.twin, at.q, self.reference, self.observations, (self.platform,))
-        return Target(self.platform, X[0], self.point, self.reference,
-                      tuple(zip(self.observations, values, strict=True)))
+        return Target(
+            self.platform, X[0], self.point, self.reference, tuple(zip(self.observations, values, strict=True))
+        )
 
     def targets(self, at: Sequence[ClosedConfiguration]) -> list[Target]:
         """:meth:`target` of several configurations of one twin."""
-        *_, X, _, values, _ = measure_together(at[0].twin, [each.q for each in at], self.reference, self.observations,
-                                               (self.platform,))
+        *_, X, _, values, _ = measure_together(
+            at[0].twin, [each.q for each in at], self.reference, self.observations, (self.platform,)
+        )
         ends = np.cumsum(self.sizes, dtype=int)
-        return [Target(self.platform, x[0], self.point, self.reference,
-                       tuple(zip(self.observations, np.split(own, ends)[:-1], strict=True)))
-                for x, own in zip(X, values, strict=True)]
+        return [
+            Target(
+                self.platform,
+                x[0],
+                self.point,
+                self.reference,
+                tuple(zip(self.observations, np.split(own, ends)[:-1], strict=True)),
+            )
+            for x, own in zip(X, values, strict=True)
+        ]
 
     def rows(self, at: ClosedConfiguration, *, blind: frozenset[str] = frozenset()) -> Array:
         """The map from joint rates to (t, measured rates, twists of ``bodies``), shape (rows, nv); links in ``blind``
@@ -68,8 +77,7 @@ class Measurement(Value):
         seen = tuple(o for o in self.observations if o.link not in blind)
         X, V, _, rates = measure(at.twin, at.q, self.reference, seen, (self.platform, *self.others, *self.bodies))
         found, own = iter(rates), 1 + len(self.others)
-        parts = ([*V[:own]] if self.point is None else
-                 [point_velocity(V[0], X[0][:3, :3] @ self.point / at.twin.length)])
+        parts = [*V[:own]] if self.point is None else [point_velocity(V[0], X[0][:3, :3] @ self.point / at.twin.length)]
         parts += [np.zeros((o.size, at.twin.nv)) if o.link in blind else next(found) for o in self.observations]
         return np.vstack([*parts, *V[own:]])
 
@@ -81,8 +89,13 @@ class Measurement(Value):
         seen = [o for o in self.observations if o.link not in blind]
         *_, X, V, _, rates = measure_together(twin, [each.q for each in at], self.reference, seen, links)
         own, n = 1 + len(self.others), len(at)
-        t = (V[:, :own].reshape(n, -1, twin.nv) if self.point is None else np.array([
-            point_velocity(v, x[:3, :3] @ self.point / twin.length) for v, x in zip(V[:, 0], X[:, 0], strict=True)]))
+        t = (
+            V[:, :own].reshape(n, -1, twin.nv)
+            if self.point is None
+            else np.array(
+                [point_velocity(v, x[:3, :3] @ self.point / twin.length) for v, x in zip(V[:, 0], X[:, 0], strict=True)]
+            )
+        )
         if len(seen) < len(self.observations):
             shown = np.repeat([o.link not in blind for o in self.observations], self.sizes)
             rates, some = np.zeros((n, len(shown), twin.nv)), rates
@@ -216,9 +229,12 @@ def relation_of(at: ClosedConfiguration, question: Measurement, rows: Array) -> 
     return _relations([at], [np.vstack([twist, rows])], question.twist_rows, (1,) * len(rows))[0]
 
 
-def _relations(at: Sequence[ClosedConfiguration], rows: Sequence[Array], twist_rows: int, sizes: tuple[int, ...]
-               ) -> list[Relation]:
+def _relations(
+    at: Sequence[ClosedConfiguration], rows: Sequence[Array], twist_rows: int, sizes: tuple[int, ...]
+) -> list[Relation]:
     kernels = [each.kernel() for each in at]
     bases = range_bases([moved @ kernel for moved, (kernel, _) in zip(rows, kernels, strict=True)], 1.0)
-    return [Relation(basis, twist_rows, sizes, kernel.shape[1], min(constraints.gap, rank.gap))
-            for (kernel, constraints), (basis, rank) in zip(kernels, bases, strict=True)]
+    return [
+        Relation(basis, twist_rows, sizes, kernel.shape[1], min(constraints.gap, rank.gap))
+        for (kernel, constraints), (basis, rank) in zip(kernels, bases, strict=True)
+    ]

@@ -46,13 +46,15 @@ STEPS = 4
 """Steps from the zero configuration to a sample."""
 
 
-def other_modes(beyond: Sequence[ClosedConfiguration], own: Signature, question: Measurement
-                ) -> tuple[OperationMode, ...]:
+def other_modes(
+    beyond: Sequence[ClosedConfiguration], own: Signature, question: Measurement
+) -> tuple[OperationMode, ...]:
     """The operation modes other than one's own to which configurations belong, each confirmed by walks from there."""
     some = beyond[:: max(1, len(beyond) // ASKED)]
     strange = [at for at in some if (each := mode_at(at, question)) and not each.signature.agrees(own)]
-    found = group_modes([each for at in strange[:MET]
-                     if (far := far_walks(at, BEYOND)) and (each := mode_at(firmest(far), question))])
+    found = group_modes(
+        [each for at in strange[:MET] if (far := far_walks(at, BEYOND)) and (each := mode_at(firmest(far), question))]
+    )
     return tuple(group[0] for group in found if not group[0].signature.agrees(own))
 
 
@@ -67,33 +69,47 @@ def mode_at(at: ClosedConfiguration, question: Measurement) -> OperationMode | N
     return OperationMode(Signature.of(found), at) if found.gap >= RANK_GAP else None
 
 
-def ways_out(start: ClosedConfiguration, question: Measurement, rng: np.random.Generator, *, singular: bool
-             ) -> list[ClosedConfiguration]:
+def ways_out(
+    start: ClosedConfiguration, question: Measurement, rng: np.random.Generator, *, singular: bool
+) -> list[ClosedConfiguration]:
     """Configurations beside a ``singular`` zero configuration, or beside one at which nothing that is asked moves to
     first order (a dead centre); raises ``BranchPoint`` where they are not of one mode, ``BadMechanism`` where nothing
     that is asked moves there either."""
-    found = [each for _ in range(LEAVING)
-             if (beside := step_along(start, any_velocity(start, rng), leaving=singular)) is not None
-             and (each := mode_at(beside, question)) is not None]
+    found = [
+        each
+        for _ in range(LEAVING)
+        if (beside := step_along(start, any_velocity(start, rng), leaving=singular)) is not None
+        and (each := mode_at(beside, question)) is not None
+    ]
     if not found:
         raise NotSampled(start.twin.mechanism.name, 0, 1, LEAVING)
     if all(each.signature.dimension == 0 for each in found):
         _refuse_unmoved([each.at for each in found])
     groups = group_modes(found)
-    require_one(groups, question, "several operation modes meet at the zero configuration (its loops have mobility "
-                                   f"{start.kernel()[0].shape[1]} there)")
+    require_one(
+        groups,
+        question,
+        "several operation modes meet at the zero configuration (its loops have mobility "
+        f"{start.kernel()[0].shape[1]} there)",
+    )
     return [each.at for each in found]
 
 
 def _refuse_unmoved(found: Sequence[ClosedConfiguration]) -> None:
     """Raise ``BadMechanism`` that names the links that do move."""
     mechanism = found[0].twin.mechanism
-    moving = [link for link in mechanism.links
-              if any(np.abs(at.velocity(link) @ at.kernel()[0]).max() > SURELY_SOMETHING for at in found)]
+    moving = [
+        link
+        for link in mechanism.links
+        if any(np.abs(at.velocity(link) @ at.kernel()[0]).max() > SURELY_SOMETHING for at in found)
+    ]
     named = ", ".join(moving[:NAMED]) + (f" and {len(moving) - NAMED} more" if moving[NAMED:] else "")
-    raise BadMechanism(f"{mechanism.name}: neither the platform nor a watched segment moves, but other links do "
-                       f"({named}; mobility {found[0].kernel()[0].shape[1]})", None,
-                       "a platform or a watched segment that moves (--observe LINK)")
+    raise BadMechanism(
+        f"{mechanism.name}: neither the platform nor a watched segment moves, but other links do "
+        f"({named}; mobility {found[0].kernel()[0].shape[1]})",
+        None,
+        "a platform or a watched segment that moves (--observe LINK)",
+    )
 
 
 def require_motions(found: Sequence[ClosedConfiguration]) -> None:
@@ -127,9 +143,14 @@ def require_one(groups: Sequence[Sequence[OperationMode]], question: Measurement
     if len(groups) > 1:
         first, at = groups[0][0].signature, groups[0][0].at
         others = [groups[1][0].signature, *[first] * (len(groups) - 1)]
-        raise BranchPoint(at.twin.mechanism.name, what, [
-            group[0].beside(other, [o.leg for o in question.observations]) for group, other in zip(groups, others,
-                                                                                           strict=True)])
+        raise BranchPoint(
+            at.twin.mechanism.name,
+            what,
+            [
+                group[0].beside(other, [o.leg for o in question.observations])
+                for group, other in zip(groups, others, strict=True)
+            ],
+        )
 
 
 def far_walks(start: ClosedConfiguration, steps: int = STEPS) -> list[ClosedConfiguration]:

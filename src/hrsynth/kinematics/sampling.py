@@ -98,8 +98,14 @@ class Samples(Value):
         return Signature.of(max((member.relation for member in self.members), key=turns_of))
 
 
-def sample(twin: PinocchioModel, question: Measurement, count: int, seed: int = 0, *,
-           led_by: Sequence[Observation] | None = None) -> Samples:
+def sample(
+    twin: PinocchioModel,
+    question: Measurement,
+    count: int,
+    seed: int = 0,
+    *,
+    led_by: Sequence[Observation] | None = None,
+) -> Samples:
     """``count`` random samples of one operation mode; raises ``NotSampled`` where too few can be reached,
     ``BranchPoint`` where the zero configuration belongs to several.
 
@@ -110,8 +116,9 @@ def sample(twin: PinocchioModel, question: Measurement, count: int, seed: int = 
     start = ClosedConfiguration.of(twin, twin.q0)
     moves = relation(start, question).dimension > 0
     if not moves and not start.kernel()[0].shape[1]:
-        raise BadMechanism(f"{twin.mechanism.name}: its loops let no link move", None,
-                           "a mechanism with at least one freedom")
+        raise BadMechanism(
+            f"{twin.mechanism.name}: its loops let no link move", None, "a mechanism with at least one freedom"
+        )
     rng = np.random.default_rng(seed)
     regular = is_regular(start, rng)
     roots = [start] if regular and moves else ways_out(start, question, rng, singular=not regular)
@@ -125,8 +132,9 @@ def sample(twin: PinocchioModel, question: Measurement, count: int, seed: int = 
         if probe is None or all(map(probe.signature.agrees, signatures)):
             break
     require_motions([member.configuration for member in members])
-    groups = group_modes([OperationMode(each, member.configuration)
-                          for each, member in zip(signatures, members, strict=True)])
+    groups = group_modes(
+        [OperationMode(each, member.configuration) for each, member in zip(signatures, members, strict=True)]
+    )
     require_one(groups, question, "the configurations reached differ as only those of several operation modes do")
     own = groups[0][0].signature
     return Samples(question, twin, start, tuple(members), discarded, other_modes(walks.beyond, own, question), led)
@@ -181,8 +189,9 @@ class _Walks:
     """Random walks of one seed, in idle motions too where they go ``freely``; ``beyond`` collects closed configurations
     that too long steps came to."""
 
-    def __init__(self, question: Measurement, leading: set[tuple[str, ...]], rng: np.random.Generator, freely: bool
-                 ) -> None:
+    def __init__(
+        self, question: Measurement, leading: set[tuple[str, ...]], rng: np.random.Generator, freely: bool
+    ) -> None:
         self.question, self.leading, self.rng, self.freely = question, leading, rng, freely
         self.beyond: list[ClosedConfiguration] = []
 
@@ -214,25 +223,35 @@ class _Walks:
         or whose ranks are not clear."""
         question = self.question
         noise = self.rng.normal(size=(len(starts), STEPS + 1, question.size))
-        walkers = [_Walker(start, iter(own), WEAKEST * start.kernel()[1].weakest)
-                   for start, own in zip(starts, noise, strict=True)]
+        walkers = [
+            _Walker(start, iter(own), WEAKEST * start.kernel()[1].weakest)
+            for start, own in zip(starts, noise, strict=True)
+        ]
         for _ in range(STEPS):
             if self.freely:
                 for walker in walkers:
                     idly = 2 * any_velocity(walker.here, self.rng)
-                    walker.here = next((there for part in HALVED
-                                        if (there := step_along(walker.here, idly, part)) is not None), walker.here)
+                    walker.here = next(
+                        (there for part in HALVED if (there := step_along(walker.here, idly, part)) is not None),
+                        walker.here,
+                    )
             walkers = self._step(walkers)
             passed = [(walker, at) for walker in walkers for at in walker.passed]
             targets = _measure_all(question.targets, [at for _, at in passed])
             for (walker, _), target in zip(passed, targets, strict=True):
                 walker.way.append(target)
             walkers = [walker for walker in walkers if None not in walker.way]
-        steady = [(at, [each for each in walker.way if each is not None]) for walker in walkers
-                  if (at := well_closed(walker.here)) is not None]
+        steady = [
+            (at, [each for each in walker.way if each is not None])
+            for walker in walkers
+            if (at := well_closed(walker.here)) is not None
+        ]
         found = _measure_all(lambda at: relations(at, question, question.rows_together(at)), [at for at, _ in steady])
-        return [Sample(at, tuple(way), each) for (at, way), each in zip(steady, found, strict=True)
-                if each is not None and each.gap >= RANK_GAP]
+        return [
+            Sample(at, tuple(way), each)
+            for (at, way), each in zip(steady, found, strict=True)
+            if each is not None and each.gap >= RANK_GAP
+        ]
 
     def _step(self, walkers: Sequence[_Walker]) -> list[_Walker]:
         """One step of each, where it is blocked in another direction; those that were not blocked in all."""
@@ -241,9 +260,14 @@ class _Walks:
             if not left:
                 break
             aims = self._velocities([walker.here for walker in left], [partial(self._aim, walker) for walker in left])
-            ends = self._stride({i: _Stride(walker.here, *aim) for i, (walker, aim)
-                                 in enumerate(zip(left, aims, strict=True)) if aim is not None},
-                                [walker.weakest for walker in left])
+            ends = self._stride(
+                {
+                    i: _Stride(walker.here, *aim)
+                    for i, (walker, aim) in enumerate(zip(left, aims, strict=True))
+                    if aim is not None
+                },
+                [walker.weakest for walker in left],
+            )
             for i, (passed, direction) in ends.items():
                 left[i].here, left[i].wish, left[i].passed = passed[-1], direction, passed
             left = [walker for i, walker in enumerate(left) if i not in ends]
@@ -253,6 +277,7 @@ class _Walks:
 
     def _aim(self, walker: _Walker, basis: Array) -> Array:
         """Where to go next, in this basis of (t, u̇): near where the walk last went, or anywhere."""
+
         def noise() -> Array:
             drawn = next(walker.noise, None)
             return np.asarray(self.rng.normal(size=len(basis))) if drawn is None else drawn
@@ -260,8 +285,9 @@ class _Walks:
         wish = noise() if walker.wish is None else walker.wish
         return np.asarray(basis.T @ (wish + 0.2 * noise() / np.sqrt(basis.shape[1])))
 
-    def _velocities(self, here: Sequence[ClosedConfiguration], aims: Sequence[Callable[[Array], Array]]
-                    ) -> list[tuple[Array, Array] | None]:
+    def _velocities(
+        self, here: Sequence[ClosedConfiguration], aims: Sequence[Callable[[Array], Array]]
+    ) -> list[tuple[Array, Array] | None]:
         """A joint velocity without idle motion at each configuration, whose (t, u̇) is a unit vector, and this vector:
         along what its aim makes of a basis; None where nothing moves so."""
         rows = _measure_all(self.question.rows_together, here)
@@ -275,8 +301,9 @@ class _Walks:
                 found[i] = here[i].kernel()[0] @ np.linalg.lstsq(image, wanted, rcond=INVERTED)[0], wanted
         return found
 
-    def _stride(self, going: dict[int, _Stride], weakest: Sequence[float]
-                ) -> dict[int, tuple[tuple[ClosedConfiguration, ...], Array]]:
+    def _stride(
+        self, going: dict[int, _Stride], weakest: Sequence[float]
+    ) -> dict[int, tuple[tuple[ClosedConfiguration, ...], Array]]:
         """The configurations to which steps along (t, u̇) lead, in parts that follow the branch, and their last
         directions; without those that come too near to a singularity of the loops."""
         ended: dict[int, tuple[tuple[ClosedConfiguration, ...], Array]] = {}
@@ -318,8 +345,9 @@ class _Walks:
         return found
 
 
-def _measure_all(ask: Callable[[list[ClosedConfiguration]], Iterable[X]], places: Sequence[ClosedConfiguration]
-              ) -> list[X | None]:
+def _measure_all(
+    ask: Callable[[list[ClosedConfiguration]], Iterable[X]], places: Sequence[ClosedConfiguration]
+) -> list[X | None]:
     """What is asked of several configurations together; None at those where it cannot be measured."""
     try:
         return list(ask(list(places))) if places else []

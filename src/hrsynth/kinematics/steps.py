@@ -28,8 +28,9 @@ EASING = 30
 """Further steps at a goal's own place where the way to it was not straight."""
 
 
-def track(here: ClosedConfiguration, motion: PlatformMotion, goal: GuidedTask,
-        halvings: int = HALVINGS) -> tuple[ClosedConfiguration, float]:
+def track(
+    here: ClosedConfiguration, motion: PlatformMotion, goal: GuidedTask, halvings: int = HALVINGS
+) -> tuple[ClosedConfiguration, float]:
     """Lead a configuration to a goal by small steps: where it comes to, and the part of the way that it came (1: all of
     it). A goal of more parts than there are freedoms is met where it is missed by no more than printed digits."""
     X = here.pose(motion.link)
@@ -63,8 +64,9 @@ def are_dependent(here: ClosedConfiguration, rows: Array) -> bool:
     return range_basis(rows @ here.kernel()[0], 1.0)[1].value < len(rows)
 
 
-def lead_to(here: ClosedConfiguration, motion: PlatformMotion, goal: Goal, last: bool
-             ) -> tuple[ClosedConfiguration, bool]:
+def lead_to(
+    here: ClosedConfiguration, motion: PlatformMotion, goal: Goal, last: bool
+) -> tuple[ClosedConfiguration, bool]:
     """The configuration at a goal of the whole pose nearby, and whether it was reached: where parts of the pose depend
     on each other the nearest one, which is to be the goal's only at the ``last``."""
     if motion.dof >= motion.translations.shape[1] + motion.rotations.shape[1]:
@@ -80,8 +82,9 @@ def approach(here: ClosedConfiguration, goal: Goal, easing: int = EASING) -> Clo
     return _ease_towards(here, goal, here.pose(goal.link), 1 / max(1, int(np.ceil(error / STRIDE))), easing)
 
 
-def _ease_towards(here: ClosedConfiguration, goal: GuidedTask, X: Array, stride: float, easing: int = EASING
-           ) -> ClosedConfiguration:
+def _ease_towards(
+    here: ClosedConfiguration, goal: GuidedTask, X: Array, stride: float, easing: int = EASING
+) -> ClosedConfiguration:
     """As near as steps with closed loops come to a goal of more parts than the platform has freedoms: the straight way
     from the pose X need not be one that it can go."""
     for fraction in (*np.arange(stride, 1, stride), *[1.0] * easing):
@@ -117,8 +120,10 @@ def _beyond(before: Array, after: Array, last: bool) -> bool:
     turned = bool(np.linalg.slogdet(span.T @ before @ after.T @ span)[0] < 0)
     if turned != last:
         return turned
-    was, is_folded = (bool(np.min(np.linalg.svd(span.T @ rows, compute_uv=False), initial=np.inf) <= NEAR_FOLD)
-                      for rows in (before, after))
+    was, is_folded = (
+        bool(np.min(np.linalg.svd(span.T @ rows, compute_uv=False), initial=np.inf) <= NEAR_FOLD)
+        for rows in (before, after)
+    )
     return not is_folded if last else is_folded and not was
 
 
@@ -147,16 +152,23 @@ def _drawn_home(here: ClosedConfiguration, goal: GuidedTask, home: Goal, iterati
     """Minimise |home's error| with the goal held."""
     for _ in range(iterations):
         size = np.linalg.norm(home.rows(here.twin, here.q)[0]) + SOLVED
-        there = next((each for each in _nearer(here, home, goal, RANK_CUTOFF, STRIDE, NEAREST)
-                      if np.linalg.norm(home.rows(here.twin, each.q)[0]) <= size), None)
+        there = next(
+            (
+                each
+                for each in _nearer(here, home, goal, RANK_CUTOFF, STRIDE, NEAREST)
+                if np.linalg.norm(home.rows(here.twin, each.q)[0]) <= size
+            ),
+            None,
+        )
         if there is None:
             break
         here = there
     return here
 
 
-def _nearer(here: ClosedConfiguration, task: Task, held: GuidedTask | None, cutoff: float, longest: float,
-            least: float = 0.0) -> Iterator[ClosedConfiguration]:
+def _nearer(
+    here: ClosedConfiguration, task: Task, held: GuidedTask | None, cutoff: float, longest: float, least: float = 0.0
+) -> Iterator[ClosedConfiguration]:
     """Where a Gauss-Newton step on a task's error leads, in the tangent space of the loops and of what is ``held``, and
     ever smaller parts of it; nothing where the projected gradient is no more than ``least``."""
     kernel = here.kernel()[0]

@@ -80,7 +80,7 @@ class Target(Value):
         X, V = frames[0], velocities[0]
         block = V if self.point is None else point_velocity(V, X[:3, :3] @ self.point / twin.length)
         apart = (o.apart(value, wanted) for value, (o, wanted) in zip(values, self.measured, strict=True))
-        missed, = self.misses([self], X[None], twin.length)
+        (missed,) = self.misses([self], X[None], twin.length)
         return np.concatenate([missed, *apart]), np.concatenate([block, *rates])
 
     def of(self, chosen: Callable[[Observation], bool]) -> Target:
@@ -94,9 +94,14 @@ class Target(Value):
         pose = other.pose.copy()
         pose[:3, :3] = exponential(fraction * logarithm(other.pose[:3, :3] @ self.pose[:3, :3].T)) @ self.pose[:3, :3]
         pose[:3, 3] = (1 - fraction) * self.pose[:3, 3] + fraction * other.pose[:3, 3]
-        return replace(self, pose=pose, measured=tuple(
-            (o, (1 - fraction) * one + fraction * two)
-            for (o, one), (_, two) in zip(self.measured, other.measured, strict=True)))
+        return replace(
+            self,
+            pose=pose,
+            measured=tuple(
+                (o, (1 - fraction) * one + fraction * two)
+                for (o, one), (_, two) in zip(self.measured, other.measured, strict=True)
+            ),
+        )
 
     @cached_property
     def wanted(self) -> Array:
@@ -109,8 +114,15 @@ class Target(Value):
         radians (n, 6 or 3)."""
         wanted, point = np.array([target.pose for target in targets]), targets[0].point
         if point is not None:
-            return np.array([x[:3, :3] @ point + x[:3, 3] - w[:3, :3] @ point - w[:3, 3]
-                             for x, w in zip(X, wanted, strict=True)]) / length
+            return (
+                np.array(
+                    [
+                        x[:3, :3] @ point + x[:3, 3] - w[:3, :3] @ point - w[:3, 3]
+                        for x, w in zip(X, wanted, strict=True)
+                    ]
+                )
+                / length
+            )
         return pose_errors(X, wanted, length)
 
 
@@ -135,25 +147,32 @@ class LinkPoses:
         return np.concatenate([missed, *error]), np.vstack([*velocities, *rows])
 
 
-def solve(twin: PinocchioModel, q: Array, task: Task | None = None, *, tolerance: float = CLOSED,
-          iterations: int = 30) -> tuple[Array, float]:
+def solve(
+    twin: PinocchioModel, q: Array, task: Task | None = None, *, tolerance: float = CLOSED, iterations: int = 30
+) -> tuple[Array, float]:
     """The configuration that damped Gauss-Newton reaches from ``q``, and the residual left (loops and task).
 
     The damping is the square of the residual: off closure a redundant or idle direction has singular values of the
     residual's own size, which must not be followed; near closure the convergence stays fast.
     """
+
     def advance(q: Array, at: Residual, factor: float) -> Array:
         normal = at.J.T @ at.J
         normal.reshape(-1)[:: twin.nv + 1] += max(factor * at.size**2, 1e-14)
         return twin.integrate(q, shorten_step(_damped_step(normal, -(at.J.T @ at.error)), 0.5))
 
-    q, left = descend(q, lambda q: system(twin, q, task), advance, DAMPING, iterations,
-                      lambda at: at.size <= tolerance)
+    q, left = descend(q, lambda q: system(twin, q, task), advance, DAMPING, iterations, lambda at: at.size <= tolerance)
     return q, left.size
 
 
-def solve_together(places: Places, starts: Sequence[Array], targets: Sequence[Target | None], *,
-                   tolerance: float = CLOSED, iterations: int = 30) -> list[tuple[Array, float]]:
+def solve_together(
+    places: Places,
+    starts: Sequence[Array],
+    targets: Sequence[Target | None],
+    *,
+    tolerance: float = CLOSED,
+    iterations: int = 30,
+) -> list[tuple[Array, float]]:
     """As :func:`solve`, from several configurations in step, each to its own target: the same answers."""
     twin = places.twin
 
@@ -172,11 +191,15 @@ def solve_together(places: Places, starts: Sequence[Array], targets: Sequence[Ta
         except np.linalg.LinAlgError:
             steps = np.array([_damped_step(*each) for each in zip(normal, wanted[:, :, 0], strict=True)])
         longest = np.abs(steps).max(axis=1, initial=0.0).tolist()
-        return {i: twin.integrate(q, step if size <= 0.5 else shorten_step(step, 0.5))
-                for (i, (q, _, _)), step, size in zip(going.items(), steps, longest, strict=True)}
+        return {
+            i: twin.integrate(q, step if size <= 0.5 else shorten_step(step, 0.5))
+            for (i, (q, _, _)), step, size in zip(going.items(), steps, longest, strict=True)
+        }
 
-    return [(q, left.size) for q, left in descend_together(
-        starts, evaluate, advance, DAMPING, iterations, lambda at: at.size <= tolerance)]
+    return [
+        (q, left.size)
+        for q, left in descend_together(starts, evaluate, advance, DAMPING, iterations, lambda at: at.size <= tolerance)
+    ]
 
 
 def _damped_step(normal: Array, wanted: Array) -> Array:
@@ -216,9 +239,17 @@ class Places:
             apart = values - wanted
         else:
             ends = np.cumsum([o.size for o in self.observations])[:-1]
-            apart = np.array([np.concatenate([o.apart(*pair) for o, *pair in zip(
-                self.observations, *(np.split(row, ends) for row in rows), strict=True)])
-                for rows in zip(values, wanted, strict=True)])
+            apart = np.array(
+                [
+                    np.concatenate(
+                        [
+                            o.apart(*pair)
+                            for o, *pair in zip(self.observations, *(np.split(row, ends) for row in rows), strict=True)
+                        ]
+                    )
+                    for rows in zip(values, wanted, strict=True)
+                ]
+            )
         return zip(np.concatenate([loops, missed, apart], axis=1), J, strict=True)
 
     def _measure(self, places: Sequence[Array]) -> tuple[Array, Array, Array, Array]:

@@ -11,8 +11,9 @@ from .pinocchio_model import PinocchioModel
 from .tasks import Places, Target, solve_together
 
 
-def track_paths(twin: PinocchioModel, ways: Sequence[Sequence[Target]], iterations: int = 120
-                ) -> Iterator[tuple[Array, float] | NotMeasured]:
+def track_paths(
+    twin: PinocchioModel, ways: Sequence[Sequence[Target]], iterations: int = 120
+) -> Iterator[tuple[Array, float] | NotMeasured]:
     """The configurations a twin reaches when it is led from its zero configuration along ways, and the residuals, or
     what cannot be measured on a way; all ways in step, or each alone where that is so of one."""
     try:
@@ -26,8 +27,10 @@ def track_paths(twin: PinocchioModel, ways: Sequence[Sequence[Target]], iteratio
 
 def _track_ways(twin: PinocchioModel, ways: Sequence[Sequence[Target]], iterations: int) -> list[tuple[Array, float]]:
     longest = max(map(len, ways))  # a shorter way ends with its last target, again and again
-    found, stages = [(twin.q0, 0.0)] * len(ways), list(zip(*(
-        [*way, *[way[-1]] * (longest - len(way))] for way in ways), strict=True))
+    found, stages = (
+        [(twin.q0, 0.0)] * len(ways),
+        list(zip(*([*way, *[way[-1]] * (longest - len(way))] for way in ways), strict=True)),
+    )
     places = Places(twin, stages[0][0] if stages else None)
     for targets in stages:
         tolerance = SOLVED if targets is stages[-1] else PASSED_BY

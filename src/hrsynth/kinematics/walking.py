@@ -22,8 +22,9 @@ WEAKEST = 0.05
 """Fraction to which the loops' smallest singular value may fall below that of the zero configuration."""
 
 
-def step_along(here: ClosedConfiguration, velocity: Array, part: float = 1.0, *, leaving: bool = False
-           ) -> ClosedConfiguration | None:
+def step_along(
+    here: ClosedConfiguration, velocity: Array, part: float = 1.0, *, leaving: bool = False
+) -> ClosedConfiguration | None:
     """The configuration a ``part`` of a step along ``velocity`` leads to; None where it does not close near its
     prediction, or does not follow the branch. ``leaving`` a singular configuration, any branch will do."""
     step = part * shorten_step(STEP * velocity, 3 * STEP)
@@ -50,8 +51,9 @@ def any_velocity(at: ClosedConfiguration, rng: np.random.Generator) -> Array:
     return np.asarray(velocity / np.linalg.norm(velocity))
 
 
-def random_walk(start: ClosedConfiguration, count: int, seed: int = 0, steps: int = 40
-                ) -> Iterator[ClosedConfiguration]:
+def random_walk(
+    start: ClosedConfiguration, count: int, seed: int = 0, steps: int = 40
+) -> Iterator[ClosedConfiguration]:
     """``count`` random configurations on the component of ``start``: walks of up to ``steps`` small steps in the
     mechanism's own freedoms, each checked as by :func:`.sampling.sample`; one that ends early is begun again."""
     rng = np.random.default_rng(seed)

@@ -147,6 +147,7 @@ def _merge(one: Part, other: Part, tolerance: float) -> Part | None:
             return Part(False, 0.5 * (near + far), None, joints, (one.axis, other.axis))
         return Part(False, one.point, one.axis, (*joints, "")) if sine <= SAME_GEOMETRY else None
     wrist, turn = (one, other) if one.axis is None else (other, one)
-    apart = (np.linalg.norm(wrist.point - turn.point) if turn.axis is None
-             else distance(wrist.point, turn.point, turn.axis))
+    apart = (
+        np.linalg.norm(wrist.point - turn.point) if turn.axis is None else distance(wrist.point, turn.point, turn.axis)
+    )
     return Part(False, wrist.point, None, joints) if apart <= tolerance else None

@@ -172,8 +172,10 @@ def limits(file: LintedFile) -> Iterator[LimitElement]:
             ends = [None if (each := limit.find(tag)) is None else NumberAt(each) for tag in ("lower", "upper")]
         else:
             free = (limit.get("free") or "").split()
-            ends = [NumberAt(limit, key) if limit.get(key) is not None and key not in free else None
-                    for key in ("lower", "upper")]
+            ends = [
+                NumberAt(limit, key) if limit.get(key) is not None and key not in free else None
+                for key in ("lower", "upper")
+            ]
         yield LimitElement(name, kind, joint, limit, ends[0], ends[1])
 
 

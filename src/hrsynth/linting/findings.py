@@ -71,5 +71,12 @@ class Finding(Value):
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
-        return {"rule": self.rule, "severity": self.severity, "file": self.file, "line": self.line,
-                "message": self.message, "fix": self.advice, "mends": self.mends}
+        return {
+            "rule": self.rule,
+            "severity": self.severity,
+            "file": self.file,
+            "line": self.line,
+            "message": self.message,
+            "fix": self.advice,
+            "mends": self.mends,
+        }

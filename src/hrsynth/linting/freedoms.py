@@ -91,8 +91,10 @@ class NearbyFreedoms:
     @property
     def closures(self) -> list[str]:
         """The joints that close loops, and the gears."""
-        return [*(joint.name for joint in self.mechanism.joints.values() if not joint.in_tree),
-                *(gear.name for gear in self.mechanism.couplings)]
+        return [
+            *(joint.name for joint in self.mechanism.joints.values() if not joint.in_tree),
+            *(gear.name for gear in self.mechanism.couplings),
+        ]
 
     def dead(self) -> Iterator[str]:
         """Closures and gears without which the mechanism is as free as with them, the last of the file first; each

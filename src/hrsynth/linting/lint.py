@@ -37,7 +37,8 @@ class Lint(Result, shown_as="lint"):
         found = ", ".join(f"{counts[name]} {name}{'s' * (counts[name] != 1)}" for name in reversed(SEVERITIES))
         unread = len({each.file for each in self.unread})
         return f"{len(self.files)} file{'s' * (len(self.files) != 1)}: {found}" + (
-            f"; {unread} more could not be read" if unread else "")
+            f"; {unread} more could not be read" if unread else ""
+        )
 
     @property
     def counts(self) -> dict[str, int]:
@@ -50,14 +51,26 @@ class Lint(Result, shown_as="lint"):
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
-        return {"files": list(self.files), "findings": [each.to_dict() for each in self.findings],
-                "counts": self.counts, "mended": [each.to_dict() for each in self.mended], "file": self.written,
-                "unread": [{"file": each.file, "line": each.line, "message": each.text} for each in self.unread]}
+        return {
+            "files": list(self.files),
+            "findings": [each.to_dict() for each in self.findings],
+            "counts": self.counts,
+            "mended": [each.to_dict() for each in self.mended],
+            "file": self.written,
+            "unread": [{"file": each.file, "line": each.line, "message": each.text} for each in self.unread],
+        }
 
 
-def lint(files: str | Path | Iterable[str | Path], *, compare: str | Path | None = None,
-         reader: Iterable[str] | str = (), ignore: Iterable[str] | str = (), fix: bool = False,
-         output: str | Path | None = None, **said: Any) -> Lint:
+def lint(
+    files: str | Path | Iterable[str | Path],
+    *,
+    compare: str | Path | None = None,
+    reader: Iterable[str] | str = (),
+    ignore: Iterable[str] | str = (),
+    fix: bool = False,
+    output: str | Path | None = None,
+    **said: Any,
+) -> Lint:
     """Everything that is wrong, doubtful or lost in robot files, by the rules of ``hrsynth.linting.rules``.
 
     ``compare`` is another file of the same robot: differences between the two are reported too. ``reader`` names
@@ -103,16 +116,25 @@ def lint(files: str | Path | Iterable[str | Path], *, compare: str | Path | None
         for target, _ in new:
             require_writable(target)
             if output is None and target not in named and target.is_symlink():
-                raise BadRequest("nothing is mended: a file that was not named is a link", str(target),
-                                 "the file itself, named, or --output")
+                raise BadRequest(
+                    "nothing is mended: a file that was not named is a link",
+                    str(target),
+                    "the file itself, named, or --output",
+                )
         for target, data in new:
             write_whole(target, data)
             written = str(target)
         mended = [each for _, _, gone in every for each in gone]
         opened = [after for _, after, _ in every]
     found = [each for file in opened for each, _ in findings(file, skipped)]
-    return Lint(tuple(file.file for file in opened), tuple(found), tuple(mended), written,
-                tuple(name for name in lint_rules() if name not in skipped), tuple(dict.fromkeys(defects)))
+    return Lint(
+        tuple(file.file for file in opened),
+        tuple(found),
+        tuple(mended),
+        written,
+        tuple(name for name in lint_rules() if name not in skipped),
+        tuple(dict.fromkeys(defects)),
+    )
 
 
 def findings(file: LintedFile, ignore: Sequence[str] = ()) -> list[tuple[Finding, Mend | None]]:
@@ -123,10 +145,25 @@ def findings(file: LintedFile, ignore: Sequence[str] = ()) -> list[tuple[Finding
         for spot in rule.find(file) if rule.name not in ignore else ():
             where, line = getattr(spot.line, "file", file.file), spot.line
             mend = None if file.expanded else spot.mend
-            found.append((Finding(rule.name, spot.severity or rule.severity, where, line, spot.message,
-                                  spot.advice or rule.advice, mend is not None), mend))
-    told = {(each.file, each.line) for each, _ in found
-            if each.rule != "refused" and each.severity == "error" and each.line is not None}
+            found.append(
+                (
+                    Finding(
+                        rule.name,
+                        spot.severity or rule.severity,
+                        where,
+                        line,
+                        spot.message,
+                        spot.advice or rule.advice,
+                        mend is not None,
+                    ),
+                    mend,
+                )
+            )
+    told = {
+        (each.file, each.line)
+        for each, _ in found
+        if each.rule != "refused" and each.severity == "error" and each.line is not None
+    }
     found = [pair for pair in found if pair[0].rule != "refused" or (pair[0].file, pair[0].line) not in told]
     return sorted(found, key=lambda pair: (pair[0].line is None, pair[0].line or 0, -pair[0].rank))
 

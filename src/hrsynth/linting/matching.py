@@ -48,15 +48,20 @@ class RobotMatch:
 
     def _remaining(self, found: Mapping[str, str]) -> tuple[list[Joint], list[Joint]]:
         taken = set(found.values())
-        return ([joint for name, joint in self.one.joints.items() if name not in found],
-                [joint for name, joint in self.other.joints.items() if name not in taken])
+        return (
+            [joint for name, joint in self.one.joints.items() if name not in found],
+            [joint for name, joint in self.other.joints.items() if name not in taken],
+        )
 
     def _match_by_place(self, found: Mapping[str, str]) -> dict[str, str]:
         mine, theirs = self._remaining(found)
         near = {}
         for joint in mine:
-            same = [each.name for each in theirs if each.type is joint.type
-                    and _miss(joint, each, np.eye(4), self.one.length) <= NOISE]
+            same = [
+                each.name
+                for each in theirs
+                if each.type is joint.type and _miss(joint, each, np.eye(4), self.one.length) <= NOISE
+            ]
             if len(same) == 1:
                 near[joint.name] = same[0]
         often = Counter(near.values())
@@ -69,8 +74,11 @@ class RobotMatch:
         b = _colours(self.other, {pair[1]: number for pair, number in pairs.items()})
         often, there = Counter(a.values()), Counter(b.values())
         by_colour = {b[joint.name]: joint.name for joint in theirs}
-        return {joint.name: by_colour[a[joint.name]] for joint in mine
-                if often[a[joint.name]] == 1 == there[a[joint.name]] and a[joint.name] in by_colour}
+        return {
+            joint.name: by_colour[a[joint.name]]
+            for joint in mine
+            if often[a[joint.name]] == 1 == there[a[joint.name]] and a[joint.name] in by_colour
+        }
 
     @cached_property
     def links(self) -> dict[str, str]:
@@ -89,10 +97,13 @@ class RobotMatch:
 
     def _pairs(self, link: str) -> list[tuple[_JointOn, _JointOn]]:
         """The joints of a link in both robots, as it carries them."""
-        return [(_on(joint, link), _on(other, self.links[link])) for joint in self.one.joints_of(link)
-                if joint.name in self.joints
-                and (other := self.other.joints[self.joints[joint.name]]).type is joint.type
-                and self.links.get(link) in other.links]
+        return [
+            (_on(joint, link), _on(other, self.links[link]))
+            for joint in self.one.joints_of(link)
+            if joint.name in self.joints
+            and (other := self.other.joints[self.joints[joint.name]]).type is joint.type
+            and self.links.get(link) in other.links
+        ]
 
     def fit(self, link: str) -> LinkFit | None:
         """How the joints of a link agree in both robots, wherever the link is at zero; None where it has none."""
@@ -129,8 +140,13 @@ class RobotMatch:
             count = sum(len(mine.axes) for mine, _ in pairs)
             ways = product((1.0, -1.0), repeat=count) if count <= MOST_SENSES else [(1.0,) * count]
             mine, their = next(pair for pair in pairs if pair[0].name == hinge)
-            sides.append([float((mine.point - fit.X[:3, :3] @ their.point - fit.X[:3, 3]) @ mine.axis)
-                          for fit in self._fits(pairs, ways) if max(fit.misses.values()) <= SAME_ROBOT])
+            sides.append(
+                [
+                    float((mine.point - fit.X[:3, :3] @ their.point - fit.X[:3, 3]) @ mine.axis)
+                    for fit in self._fits(pairs, ways)
+                    if max(fit.misses.values()) <= SAME_ROBOT
+                ]
+            )
         found = min((abs(a - b) for a, b in product(*sides)), default=0.0) / self.one.length
         return found if found > SAME_ROBOT * gain else 0.0
 
@@ -156,8 +172,11 @@ def _fit(pairs: Sequence[tuple[_JointOn, _JointOn]], length: float, upright: Arr
                 shift[number] = float((mine.point - moved) @ (X[:3, :3] @ their.axis))
         if np.max(np.abs(shift - before)) <= EXACT * length:
             break
-    return LinkFit(X, {mine.name: max(_miss(mine, their, X, length), abs(mine.cosine - their.cosine))
-                       for mine, their in pairs}, only)
+    return LinkFit(
+        X,
+        {mine.name: max(_miss(mine, their, X, length), abs(mine.cosine - their.cosine)) for mine, their in pairs},
+        only,
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,8 +203,9 @@ def _on(joint: Joint, link: str) -> _JointOn:
     return _JointOn(joint.name, joint.type, joint.point, (own,), abs(float(joint.axes[0] @ joint.axes[1])))
 
 
-def _turn_senses(pairs: Sequence[tuple[_JointOn, _JointOn]], signs: Iterable[float]
-            ) -> Iterator[tuple[_JointOn, _JointOn]]:
+def _turn_senses(
+    pairs: Sequence[tuple[_JointOn, _JointOn]], signs: Iterable[float]
+) -> Iterator[tuple[_JointOn, _JointOn]]:
     """The pairs with the other robot's axes in these senses."""
     given = iter(signs)
     for mine, their in pairs:
@@ -197,6 +217,7 @@ def _gain(hinge: str, pairs: Sequence[tuple[_JointOn, _JointOn]], length: float)
     joints do not tell that."""
     rows, asked = [], np.zeros(6)
     for mine, _ in pairs:
+
         def moved(along: Array, point: Array = mine.point) -> Array:
             return np.concatenate([along, np.cross(point / length, along)])
 
@@ -204,7 +225,8 @@ def _gain(hinge: str, pairs: Sequence[tuple[_JointOn, _JointOn]], length: float)
             asked = moved(mine.axis)
         across = np.linalg.svd(mine.axis[None])[2][1:] if mine.axes else np.eye(3)
         points = {JointType.PLANAR: [mine.axis] if mine.axes else []}.get(
-            mine.type, list(across) if mine.type in _LINES else list(np.eye(3)))
+            mine.type, list(across) if mine.type in _LINES else list(np.eye(3))
+        )
         rows += [moved(each) for each in points]
         rows += [np.concatenate([np.zeros(3), each]) for each in across if mine.axes]
     found = np.linalg.lstsq(np.array(rows).T, asked, rcond=TURNING_ARM)[0]
@@ -216,8 +238,9 @@ def _slide(joint: _JointOn) -> Array:
     return np.asarray(joint.axis if joint.type in _LINES else np.zeros(3))
 
 
-def _fit_motion(points: Sequence[tuple[Array, Array]], axes: Sequence[tuple[Array, Array]], length: float,
-            upright: Array | None) -> tuple[Array, bool]:
+def _fit_motion(
+    points: Sequence[tuple[Array, Array]], axes: Sequence[tuple[Array, Array]], length: float, upright: Array | None
+) -> tuple[Array, bool]:
     """The rigid motion that brings the second of each pair nearest to the first (Kabsch); whether no other does. Axes
     have the sense that they have after the turn ``upright``, or their own at first."""
     mine, theirs = (np.array([pair[k] for pair in points]) for k in (0, 1))
@@ -252,10 +275,14 @@ def _colours(robot: Mechanism, known: Mapping[str, int]) -> dict[str, int]:
     colours: dict[str, int] = {name: hash((joint.type, known.get(name))) for name, joint in robot.joints.items()}
     ends = {link: hash((link == robot.base, link == robot.platform)) for link in robot.links}
     for _ in range(len(robot.links)):
-        ends = {link: hash((ends[link], tuple(sorted(colours[joint.name] for joint in robot.joints_of(link)))))
-                for link in robot.links}
-        after = {name: hash((colours[name], tuple(sorted(ends[link] for link in joint.links))))
-                 for name, joint in robot.joints.items()}
+        ends = {
+            link: hash((ends[link], tuple(sorted(colours[joint.name] for joint in robot.joints_of(link)))))
+            for link in robot.links
+        }
+        after = {
+            name: hash((colours[name], tuple(sorted(ends[link] for link in joint.links))))
+            for name, joint in robot.joints.items()
+        }
         done = len(set(after.values())) == len(set(colours.values()))
         colours = after
         if done:

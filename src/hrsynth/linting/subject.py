@@ -35,8 +35,14 @@ class LintedFile:
     Raises ``BadRobotFile`` for what cannot be opened, or is no document.
     """
 
-    def __init__(self, path: str | Path, given: Overrides | None = None, text: bytes | None = None,
-                 readers: tuple[str, ...] = (), other: LintedFile | None = None) -> None:
+    def __init__(
+        self,
+        path: str | Path,
+        given: Overrides | None = None,
+        text: bytes | None = None,
+        readers: tuple[str, ...] = (),
+        other: LintedFile | None = None,
+    ) -> None:
         self.given, self.readers, self.other = given or Overrides(), readers, other
         opened = robot_file(Path(path), strict=False)
         if opened.root is None and isinstance(graph := formats.read(opened), JointGraph):  # settings beside a document
@@ -45,16 +51,18 @@ class LintedFile:
         self.data = xml.content(opened.path) if text is None else text
         self.root = opened.root if text is None else xml.document(text, self.file)
         self._opened = replace(opened, root=self.root)
-        self.expanded = text is None and self.root is not None and xacro.is_needed(
-            xml.document(self.data, self.file, []))
+        self.expanded = (
+            text is None and self.root is not None and xacro.is_needed(xml.document(self.data, self.file, []))
+        )
         """Whether a program made the document of what stands in the file, which no mend can be written to."""
         self._remembered: dict[str, Any] = {}
         self.dialect = None if self.root is None else DIALECTS.get(str(self.root.tag))
 
     def open(self, *, strict: bool = False) -> RobotFile:
         """The file as readers get it, which may change its document."""
-        return replace(self._opened, root=copy.deepcopy(self.root), strict=strict and not self.given.any,
-                       as_spelt=not strict)
+        return replace(
+            self._opened, root=copy.deepcopy(self.root), strict=strict and not self.given.any, as_spelt=not strict
+        )
 
     def graph(self) -> JointGraph:
         """What the file says before anything is put together; raises ``BadRobotFile``."""

@@ -4,5 +4,4 @@ from .model import Coupling, Joint, JointType, Limits, Link, Mechanism, Motor, N
 from .observation import Observation
 from .observations.direction import Direction
 
-__all__ = ["Coupling", "Direction", "Joint", "JointType", "Limits", "Link", "Mechanism", "Motor", "Note",
-           "Observation"]
+__all__ = ["Coupling", "Direction", "Joint", "JointType", "Limits", "Link", "Mechanism", "Motor", "Note", "Observation"]

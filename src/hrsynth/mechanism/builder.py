@@ -30,15 +30,35 @@ class Builder:
         """A link whose frame's origin lies at ``at``, with the axes ``rotation`` (3, 3), at the zero configuration."""
         self._links.append(Link(name, pose(at, rotation)))
 
-    def joint(self, name: str, type: str, predecessor: str, successor: str, at: ArrayLike = (0, 0, 0), *,
-              axis: ArrayLike | None = None, axis2: ArrayLike | None = None, motor: bool | str = False,
-              loop: bool = False) -> None:
+    def joint(
+        self,
+        name: str,
+        type: str,
+        predecessor: str,
+        successor: str,
+        at: ArrayLike = (0, 0, 0),
+        *,
+        axis: ArrayLike | None = None,
+        axis2: ArrayLike | None = None,
+        motor: bool | str = False,
+        loop: bool = False,
+    ) -> None:
         """A joint of type R, P, U, S, C, E (planar) or F with its centre ``at``; ``motor`` names its transmission
         (True: ``motor_NAME``); ``loop`` says that a file writes it as a loop instead of a tree joint."""
         axes = tuple(np.asarray(a, dtype=float) for a in (axis, axis2) if a is not None)
         named = Motor(f"motor_{name}" if motor is True else str(motor)) if motor else None
-        self._joints.append(Joint(name, JointType(type), predecessor, successor, np.asarray(at, dtype=float), axes,
-                                  motor=named, in_tree=not loop))
+        self._joints.append(
+            Joint(
+                name,
+                JointType(type),
+                predecessor,
+                successor,
+                np.asarray(at, dtype=float),
+                axes,
+                motor=named,
+                in_tree=not loop,
+            )
+        )
 
     def observe(self, leg: str, link: str, direction: ArrayLike) -> None:
         """An observed segment: ``direction`` in the base frame at the zero configuration."""
@@ -51,5 +71,11 @@ class Builder:
 
     def build(self, platform: str) -> Mechanism:
         """The frozen mechanism; the first link is the base."""
-        return Mechanism.of(self.name, self._links, self._joints, platform=platform,
-                            observations=tuple(self._observations), couplings=tuple(self._couplings))
+        return Mechanism.of(
+            self.name,
+            self._links,
+            self._joints,
+            platform=platform,
+            observations=tuple(self._observations),
+            couplings=tuple(self._couplings),
+        )

@@ -61,13 +61,20 @@ class Tie:
 
 def ties(relations: Relations) -> tuple[Tie, ...]:
     """All relations, one by one."""
-    found = [Tie("same", (c,), links=(links[0], link)) for c, links in enumerate(relations.fixed)
-             for link in dict.fromkeys(links) if link != links[0]]
+    found = [
+        Tie("same", (c,), links=(links[0], link))
+        for c, links in enumerate(relations.fixed)
+        for link in dict.fromkeys(links)
+        if link != links[0]
+    ]
     for number, conditions in enumerate(relations.tower):
         found += [Tie("square" if len(by) == 1 else "plane", (*by, number)) for by in conditions]
     found += [Tie(each.kind, each.classes, each.terms) for each in relations.incidences]
-    found += [Tie("seen", sight.classes, links=(link,), sight=sight)
-              for link, sight in zip(relations.watched, relations.sights, strict=True) if sight.kind != "class"]
+    found += [
+        Tie("seen", sight.classes, links=(link,), sight=sight)
+        for link, sight in zip(relations.watched, relations.sights, strict=True)
+        if sight.kind != "class"
+    ]
     return tuple(found)
 
 
@@ -83,19 +90,33 @@ class _Carried:
     def __init__(self, mechanism: Mechanism, relations: Relations) -> None:
         self.joints = list(mechanism.joints.values())
         self.axes = relations.axes
-        self.square = {frozenset((number, *by)) for number, conditions in enumerate(relations.tower)
-                       for by in conditions if len(by) == 1}
+        self.square = {
+            frozenset((number, *by))
+            for number, conditions in enumerate(relations.tower)
+            for by in conditions
+            if len(by) == 1
+        }
         number = len(relations.tower)
         self.groups = [self._joined_links(self._carriers(c)) for c in range(number)]
         """For each class the groups of links in which one direction of it is fixed or would be."""
-        self.at_axis = [self._reach(groups, set(links))
-                        for groups, links in zip(self.groups, relations.fixed, strict=True)]
+        self.at_axis = [
+            self._reach(groups, set(links)) for groups, links in zip(self.groups, relations.fixed, strict=True)
+        ]
         """For each class where its directions are fixed."""
-        self.whole = [all(link in groups.get(links[0], links[:1]) for link in links)
-                      for groups, links in zip(self.groups, relations.fixed, strict=True)]
+        self.whole = [
+            all(link in groups.get(links[0], links[:1]) for link in links)
+            for groups, links in zip(self.groups, relations.fixed, strict=True)
+        ]
         """Whether all directions of a class are parallel by the file: else what holds for one may not for another."""
-        slides = [[joint.links for joint in self.joints if joint.type is JointType.FIXED
-                   or (joint.type is JointType.PRISMATIC and self.axes[joint.name] == (c,))] for c in range(number)]
+        slides = [
+            [
+                joint.links
+                for joint in self.joints
+                if joint.type is JointType.FIXED
+                or (joint.type is JointType.PRISMATIC and self.axes[joint.name] == (c,))
+            ]
+            for c in range(number)
+        ]
         self.slides = [self._joined_links(pairs) for pairs in slides]
         self.levels = [self._joined_links([j.links for j in self.joints if self._level(j, c)]) for c in range(number)]
         self.at = [{host} for host in relations.hosts]
@@ -118,8 +139,11 @@ class _Carried:
             if joint.type in RIGID or (joint.type in TURNING and self.axes[joint.name] == (c,)):
                 pairs.append(joint.links)
             elif joint.type is JointType.UNIVERSAL:
-                pairs += [(link, _cross(joint)) for link, axis in zip(joint.links, self.axes[joint.name], strict=True)
-                          if axis == c]
+                pairs += [
+                    (link, _cross(joint))
+                    for link, axis in zip(joint.links, self.axes[joint.name], strict=True)
+                    if axis == c
+                ]
         return pairs
 
     @staticmethod
@@ -134,16 +158,25 @@ class _Carried:
 
     def _is_square(self, a: int, b: int) -> bool:
         """Whether two classes are perpendicular by the file."""
-        return (frozenset((a, b)) in self.square and self.whole[a] and self.whole[b]
-                and not self.at_axis[a].isdisjoint(self.at_axis[b]))
+        return (
+            frozenset((a, b)) in self.square
+            and self.whole[a]
+            and self.whole[b]
+            and not self.at_axis[a].isdisjoint(self.at_axis[b])
+        )
 
     def _spread(self, relations: Relations) -> None:
         """A point on the axis of an R that is fixed in one of its links is fixed in the other."""
-        on = [(number, joint.links) for each in relations.incidences
-              if each.kind == "parallel" and len(each.terms) == 2
-              for number, _ in each.terms for joint in self.joints
-              if joint.type is JointType.REVOLUTE and self.axes[joint.name] == each.classes
-              and relations.centres[joint.name] in {other for other, _ in each.terms} - {number}]
+        on = [
+            (number, joint.links)
+            for each in relations.incidences
+            if each.kind == "parallel" and len(each.terms) == 2
+            for number, _ in each.terms
+            for joint in self.joints
+            if joint.type is JointType.REVOLUTE
+            and self.axes[joint.name] == each.classes
+            and relations.centres[joint.name] in {other for other, _ in each.terms} - {number}
+        ]
         size = -1
         while size != (size := sum(map(len, self.at))):
             for number, links in on:
@@ -162,8 +195,11 @@ class _Carried:
                 return self._is_square(*tie.classes)
             case "plane":
                 together = set.intersection(*(self.at_axis[c] for c in tie.classes))
-                return bool(together) or any(all(self._is_square(n, c) for c in tie.classes)
-                                             for n in range(len(self.at_axis)) if n not in tie.classes)
+                return bool(together) or any(
+                    all(self._is_square(n, c) for c in tie.classes)
+                    for n in range(len(self.at_axis))
+                    if n not in tie.classes
+                )
             case "seen":
                 return self._is_seen(tie)
         if len(tie.terms) != 2:
@@ -173,15 +209,19 @@ class _Carried:
             return not one.isdisjoint(two)
         (c,) = tie.classes
         passing = self.slides[c] if tie.kind == "parallel" else self.levels[c]
-        return any((a == b or b in passing.get(a, ())) and not self.at_axis[c].isdisjoint({a, *passing.get(a, ())})
-                   for a in one for b in two)
+        return any(
+            (a == b or b in passing.get(a, ())) and not self.at_axis[c].isdisjoint({a, *passing.get(a, ())})
+            for a in one
+            for b in two
+        )
 
     def _is_seen(self, tie: Tie) -> bool:
         """Whether all that makes an observed direction is fixed in its link."""
         assert tie.sight is not None
         (link,) = tie.links
-        return (all(link in self.at[number] for number in tie.sight.points)
-                and all(link in self.at_axis[c] for c in tie.sight.classes))
+        return all(link in self.at[number] for number in tie.sight.points) and all(
+            link in self.at_axis[c] for c in tie.sight.classes
+        )
 
 
 def _cross(joint: Joint) -> str:

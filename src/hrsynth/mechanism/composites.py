@@ -146,8 +146,10 @@ class WordGraph:
         """Binary links whose two joints are single joints of the given types, grouped by the pair they join."""
         table: dict[frozenset[str], list[tuple[str, WordEdge, WordEdge]]] = {}
         for link, first, second in self._binary():
-            if all(len(edge.joints) == 1 and self.mechanism.joints[edge.joints[0]].type.value in letters
-                   for edge in (first, second)):
+            if all(
+                len(edge.joints) == 1 and self.mechanism.joints[edge.joints[0]].type.value in letters
+                for edge in (first, second)
+            ):
                 table.setdefault(frozenset((first.other(link), second.other(link))), []).append((link, first, second))
         for members in table.values():
             if len(members) < 2:
@@ -174,8 +176,12 @@ class WordGraph:
                 for other in rods:
                     start, along = self._vector(other)
                     words_match = self._shape(other) == self._shape(rod)
-                    if (other.link != rod.link and words_match and np.linalg.norm(along - vector) <= tolerance
-                            and np.linalg.norm(start - near) > tolerance):
+                    if (
+                        other.link != rod.link
+                        and words_match
+                        and np.linalg.norm(along - vector) <= tolerance
+                        and np.linalg.norm(start - near) > tolerance
+                    ):
                         same.append(other)
                         words.add(self._rod_word(other))
                 if len(same) >= 2:
@@ -186,8 +192,12 @@ class WordGraph:
                     break
 
     def _rod_word(self, rod: BinaryLink) -> Word:
-        return Word(tuple(Letter(self.mechanism.joints[name].type.value, self.mechanism.joints[name].actuated)
-                          for name in (rod.near, rod.far)))
+        return Word(
+            tuple(
+                Letter(self.mechanism.joints[name].type.value, self.mechanism.joints[name].actuated)
+                for name in (rod.near, rod.far)
+            )
+        )
 
     def _shape(self, rod: BinaryLink) -> str:
         return self.mechanism.joints[rod.near].type.value + self.mechanism.joints[rod.far].type.value
@@ -202,9 +212,11 @@ class WordGraph:
                     continue
                 (a, along), (b, beside) = self._vector(one), self._vector(two)
                 flat = np.eye(3) - np.outer(axis, axis)
-                if (np.linalg.norm(flat @ (along - beside)) <= tolerance
-                        and np.linalg.norm(cross(flat @ along, flat @ (b - a))) > tolerance**2
-                        and np.linalg.norm(flat @ along) > tolerance):
+                if (
+                    np.linalg.norm(flat @ (along - beside)) <= tolerance
+                    and np.linalg.norm(cross(flat @ along, flat @ (b - a))) > tolerance**2
+                    and np.linalg.norm(flat @ along) > tolerance
+                ):
                     motor = any(joints[n].actuated for c in (one, two) for n in (c.near, c.far))
                     names = tuple(n for c in (one, two) for n in (c.near, c.far))
                     links = [one.link, two.link]
@@ -216,8 +228,15 @@ class WordGraph:
         for link, first, second in self._binary():
             self._remove_links((link,))
             a, b = first.other(link), second.other(link)
-            self._add(WordEdge(a, b, first.word_from(a) + second.word_from(link), first.joints + second.joints,
-                           (*first.inside, link, *second.inside)))
+            self._add(
+                WordEdge(
+                    a,
+                    b,
+                    first.word_from(a) + second.word_from(link),
+                    first.joints + second.joints,
+                    (*first.inside, link, *second.inside),
+                )
+            )
             found = True
         return found
 
@@ -232,9 +251,15 @@ class WordGraph:
                     word = edge.word_from(tail)
                     bar = word.items[0]
                     branches.extend(bar.branches if isinstance(bar, Bar) and len(word.items) == 1 else (word,))
-                self._add(WordEdge(tail, head, Word((Bar(tuple(branches)),)),
-                               tuple(n for _, edge in edges for n in edge.joints),
-                               tuple(n for _, edge in edges for n in edge.inside)))
+                self._add(
+                    WordEdge(
+                        tail,
+                        head,
+                        Word((Bar(tuple(branches)),)),
+                        tuple(n for _, edge in edges for n in edge.joints),
+                        tuple(n for _, edge in edges for n in edge.inside),
+                    )
+                )
                 return True
         return False
 
@@ -254,12 +279,24 @@ class WordGraph:
                 for other, chain in beside:
                     path = chain.word_from(foot)
                     follower = path.items[-1]
-                    if (len(path.items) >= 2 and isinstance(follower, Letter) and follower.letter in "RS"
-                            and not follower.actuated and len(self.edges_at(link)) >= 3):
+                    if (
+                        len(path.items) >= 2
+                        and isinstance(follower, Letter)
+                        and follower.letter in "RS"
+                        and not follower.actuated
+                        and len(self.edges_at(link)) >= 3
+                    ):
                         self._remove(key, sliders)
                         self._remove(other, chain)
-                        self._carriers.append(WordEdge(foot, link, Word((Carrier(Word(path.items[:-1]), word),)),
-                                                   chain.joints + sliders.joints, chain.inside + sliders.inside))
+                        self._carriers.append(
+                            WordEdge(
+                                foot,
+                                link,
+                                Word((Carrier(Word(path.items[:-1]), word),)),
+                                chain.joints + sliders.joints,
+                                chain.inside + sliders.inside,
+                            )
+                        )
                         self._add(self._carriers[-1])
                         return True
         return False

@@ -120,8 +120,10 @@ def shifted_line(n: Array, shock: Array, by: float) -> Array:
     """The normal (3,) of a line in the image of which two points are found up to ``by`` across it."""
     across = unit(n[:2])
     nearest, along = -n[2] / np.hypot(*n[:2]) * across, np.array([-across[1], across[0]])
-    one, other = (np.array([*(nearest + side * HALF_PICTURE * along + by * error * across), 1.0])
-                  for side, error in ((-1, shock[0]), (1, shock[1])))
+    one, other = (
+        np.array([*(nearest + side * HALF_PICTURE * along + by * error * across), 1.0])
+        for side, error in ((-1, shock[0]), (1, shock[1]))
+    )
     found = unit(cross(one, other))
     return found if found @ n > 0 else -found
 

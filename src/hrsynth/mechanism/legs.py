@@ -49,8 +49,10 @@ class Leg:
         if not self.has_loops:
             return ()
         own = {*self.links, mechanism.base}
-        pairs = [(one if one in own else self.attach, other if other in own else self.attach)
-                 for one, other in (mechanism.joints[name].links for name in self.joints)]
+        pairs = [
+            (one if one in own else self.attach, other if other in own else self.attach)
+            for one, other in (mechanism.joints[name].links for name in self.joints)
+        ]
         return tuple(name for k, name in enumerate(self.joints) if not graphs.is_bridge(pairs, k))
 
 
@@ -94,8 +96,12 @@ class LegDecomposition(Value):
             return None
         if len(joints) == 1 and first.type is JointType.SPHERICAL:
             centre = first.point
-        elif all(j.type is JointType.REVOLUTE and lines.parallel(j.axis, first.axis)
-                 and lines.distance(j.point, first.point, first.axis) <= tolerance for j in joints):
+        elif all(
+            j.type is JointType.REVOLUTE
+            and lines.parallel(j.axis, first.axis)
+            and lines.distance(j.point, first.point, first.axis) <= tolerance
+            for j in joints
+        ):
             centre = lines.foot(frame[:3, 3], first.point, first.axis)
         else:
             return None
@@ -108,9 +114,15 @@ class LegDecomposition(Value):
         mechanism = self.mechanism
         known, waiting = {mechanism.base, *(leg.attach for leg in self.legs)}, set[str]()
         while waiting != (waiting := set(self.platform) - known):
-            known |= {link for link in waiting if any(
-                self._hold(one, other) for one, other in combinations(mechanism.joints_of(link), 2)
-                if {one.other(link), other.other(link)} <= known)}
+            known |= {
+                link
+                for link in waiting
+                if any(
+                    self._hold(one, other)
+                    for one, other in combinations(mechanism.joints_of(link), 2)
+                    if {one.other(link), other.other(link)} <= known
+                )
+            }
         return mechanism.platform in known
 
     def _hold(self, one: Joint, other: Joint) -> bool:
@@ -124,8 +136,9 @@ class LegDecomposition(Value):
 
     def floats(self, leg: Leg) -> bool:
         """Whether a leg is no more than the free joint of a body that nothing holds."""
-        return not leg.links and any(self.mechanism.joints[name].type is JointType.FREE for name in leg.joints
-                                     if name in self.mechanism.joints)
+        return not leg.links and any(
+            self.mechanism.joints[name].type is JointType.FREE for name in leg.joints if name in self.mechanism.joints
+        )
 
     def word(self, leg: Leg) -> Word:
         """The leg's word, from the base to the platform (without the end joint where it takes the platform).
@@ -138,8 +151,11 @@ class LegDecomposition(Value):
         links = {mechanism.base, leg.attach, *leg.links}
         kept = {mechanism.base, leg.attach}
         if mechanism.reference not in links:
-            hung = [j.relinked(mechanism.reference, mechanism.base) for j in mechanism.joints_of(mechanism.reference)
-                    if j.name in leg.joints]
+            hung = [
+                j.relinked(mechanism.reference, mechanism.base)
+                for j in mechanism.joints_of(mechanism.reference)
+                if j.name in leg.joints
+            ]
             mechanism = mechanism.changed(joints=hung)
         graph = WordGraph(mechanism, kept, links)
         graph.keep(leg.joints)
@@ -208,8 +224,11 @@ def decompose(mechanism: Mechanism) -> LegDecomposition:
         if joint.other(mechanism.base) in platform:
             legs.append(Leg("", (), (joint.name,), joint.other(mechanism.base)))
     if not legs:
-        raise BadMechanism(f"{mechanism.name}: no leg joins the base {mechanism.base!r} and the platform",
-                           mechanism.platform, "a platform that is reached through at least one leg")
+        raise BadMechanism(
+            f"{mechanism.name}: no leg joins the base {mechanism.base!r} and the platform",
+            mechanism.platform,
+            "a platform that is reached through at least one leg",
+        )
     legs = _segment_platform(mechanism, platform, legs)
     joint_order = {name: i for i, name in enumerate(mechanism.joints)}
     legs.sort(key=lambda leg: (order[leg.links[0]] if leg.links else order[leg.attach], joint_order[leg.joints[0]]))
@@ -226,8 +245,9 @@ def _parts(mechanism: Mechanism, platform: set[str]) -> list[tuple[set[str], lis
     ends, if it is a leg: joined to the base and to one link of the platform."""
     moving = {name for name in mechanism.links if name != mechanism.base and name not in platform}
     live, found = _live(mechanism), []
-    joined = graphs.adjacency((name for name in mechanism.links if name in moving),
-                              (j.links for j in live if moving.issuperset(j.links)))
+    joined = graphs.adjacency(
+        (name for name in mechanism.links if name in moving), (j.links for j in live if moving.issuperset(j.links))
+    )
     for part in graphs.components(joined):
         joints = [j for j in live if part & set(j.links)]
         ends = {j.other(link) for j in joints for link in j.links if link in part} - part
@@ -246,8 +266,10 @@ def _platform(mechanism: Mechanism, graph: graphs.Adjacency) -> set[str]:
     order = {name: i for i, name in enumerate(mechanism.links)}
     distance = graphs.distances(rest, root)
     reachable = set(distance)
-    branching = sorted((n for n in reachable - {root} if len(rest[n]) >= 3 and n not in contacts),
-                       key=lambda n: (distance[n], order[n]))[:12]
+    branching = sorted(
+        (n for n in reachable - {root} if len(rest[n]) >= 3 and n not in contacts),
+        key=lambda n: (distance[n], order[n]),
+    )[:12]
     watched = {observation.link for observation in mechanism.observations if observation.by_segment} - {base, root}
 
     def legs_of(members: set[str]) -> int:
@@ -265,8 +287,9 @@ def _platform(mechanism: Mechanism, graph: graphs.Adjacency) -> set[str]:
     for size in range(1, min(4, len(branching)) + 1):
         for chosen in combinations(branching, size):
             members = {root, *chosen}
-            members |= {n for n in reachable - members - contacts
-                        if len(rest[n]) == 2 and all(m in members for m in rest[n])}
+            members |= {
+                n for n in reachable - members - contacts if len(rest[n]) == 2 and all(m in members for m in rest[n])
+            }
             if graphs.component(rest, root, members) != members or (found := legs_of(members)) <= score:
                 continue
             if watched <= {link for part, _, end in _parts(mechanism, members) if end is not None for link in part}:
@@ -316,18 +339,47 @@ def _label_legs(anatomy: LegDecomposition) -> LegDecomposition:
         line = getattr(observation, "line", None)
         index = next((i for i, leg in enumerate(anatomy.legs) if anatomy.leg_of(observation.link) == leg), None)
         if index is None:
-            defects.append(Defect(file, line, "observe of a link that is not in a leg", observation.link,
-                                  f"links of the legs: {links}; others as <observe kind=\"direction\">"))
+            defects.append(
+                Defect(
+                    file,
+                    line,
+                    "observe of a link that is not in a leg",
+                    observation.link,
+                    f'links of the legs: {links}; others as <observe kind="direction">',
+                )
+            )
         elif given.setdefault(index, observation.leg) != observation.leg:
-            defects.append(Defect(file, line, f"link {observation.link!r} is in the leg labelled {given[index]!r}, "
-                                  "but is labelled", observation.leg, given[index]))
+            defects.append(
+                Defect(
+                    file,
+                    line,
+                    f"link {observation.link!r} is in the leg labelled {given[index]!r}, but is labelled",
+                    observation.leg,
+                    given[index],
+                )
+            )
         elif any(label == observation.leg and i != index for i, label in given.items()):
-            defects.append(Defect(file, line, "a leg's label used for links of two different legs", observation.leg,
-                                  "one label per leg"))
+            defects.append(
+                Defect(
+                    file,
+                    line,
+                    "a leg's label used for links of two different legs",
+                    observation.leg,
+                    "one label per leg",
+                )
+            )
         elif isinstance(observation, Direction) and not lines.parallel(
-                watched.setdefault(observation.link, observation.direction), observation.direction):
-            defects.append(Defect(file, line, "a second direction of a link", observation.link,
-                                  "one per link; others as <observe kind=\"direction\">"))
+            watched.setdefault(observation.link, observation.direction), observation.direction
+        ):
+            defects.append(
+                Defect(
+                    file,
+                    line,
+                    "a second direction of a link",
+                    observation.link,
+                    'one per link; others as <observe kind="direction">',
+                )
+            )
     if defects:
         raise BadRobotFile(defects)
     numbers = [str(i + 1) for i in range(len(anatomy.legs))]
@@ -341,5 +393,6 @@ def _label_legs(anatomy: LegDecomposition) -> LegDecomposition:
             labels.append(number)
         else:
             labels.append(free.pop(0))
-    return replace(anatomy, legs=tuple(replace(leg, label=label)
-                                       for leg, label in zip(anatomy.legs, labels, strict=True)))
+    return replace(
+        anatomy, legs=tuple(replace(leg, label=label) for leg, label in zip(anatomy.legs, labels, strict=True))
+    )

@@ -129,8 +129,9 @@ class Joint(Value):
         object.__setattr__(self, "type", JointType(self.type))
         object.__setattr__(self, "point", frozen(self.point))
         if len(self.axes) != self.type.axes:
-            raise BadMechanism(f"joint {self.name!r} of type {self.type.value}: number of axes", len(self.axes),
-                               str(self.type.axes))
+            raise BadMechanism(
+                f"joint {self.name!r} of type {self.type.value}: number of axes", len(self.axes), str(self.type.axes)
+            )
         try:
             object.__setattr__(self, "axes", tuple(frozen(unit(axis)) for axis in self.axes))
         except ValueError as error:
@@ -166,8 +167,15 @@ class Joint(Value):
         offset = self.offset
         if offset is not None and self.type is not JointType.CYLINDRICAL:
             offset = offset[::-1] if offset.ndim == 1 else inverse(offset)
-        return replace(self, predecessor=self.successor, successor=self.predecessor, axes=axes, wrist=wrist,
-                       turns=self.turns[::-1], offset=offset)
+        return replace(
+            self,
+            predecessor=self.successor,
+            successor=self.predecessor,
+            axes=axes,
+            wrist=wrist,
+            turns=self.turns[::-1],
+            offset=offset,
+        )
 
     def relinked(self, old: str, new: str) -> Joint:
         """The joint with its end on ``old`` moved to ``new``."""
@@ -348,23 +356,33 @@ class Mechanism(Result, shown_as="robot"):
     @cached_property
     def limited(self) -> dict[str, tuple[float, float]]:
         """The joints whose coordinates are limited: lower and upper limit (m, rad), infinite if there is none."""
-        return {name: (lower, upper) for name, (joint, _, lower, upper) in self.stops.items()
-                if not self.joints[joint].turns}
+        return {
+            name: (lower, upper)
+            for name, (joint, _, lower, upper) in self.stops.items()
+            if not self.joints[joint].turns
+        }
 
     @cached_property
     def stops(self) -> dict[str, Stop]:
         """The same, and each R with limits that is joined with another into a U."""
-        given = {name: (joint.name, place, limits.lower, limits.upper) for joint in self.joints.values()
-                 for place, (name, limits) in enumerate(joint.turns or ((joint.name, joint.limits),))
-                 if limits is not None and (limits.lower, limits.upper) != (None, None)}
-        return {name: Stop(joint, place, -np.inf if lower is None else lower, np.inf if upper is None else upper)
-                for name, (joint, place, lower, upper) in given.items()}
+        given = {
+            name: (joint.name, place, limits.lower, limits.upper)
+            for joint in self.joints.values()
+            for place, (name, limits) in enumerate(joint.turns or ((joint.name, joint.limits),))
+            if limits is not None and (limits.lower, limits.upper) != (None, None)
+        }
+        return {
+            name: Stop(joint, place, -np.inf if lower is None else lower, np.inf if upper is None else upper)
+            for name, (joint, place, lower, upper) in given.items()
+        }
 
     @cached_property
     def filed(self) -> dict[str, tuple[float, float]]:
         """The same as :attr:`limited`, as the file counts."""
-        return {name: (_counted(lower, self.joints[name]), _counted(upper, self.joints[name]))
-                for name, (lower, upper) in self.limited.items()}
+        return {
+            name: (_counted(lower, self.joints[name]), _counted(upper, self.joints[name]))
+            for name, (lower, upper) in self.limited.items()
+        }
 
     @cached_property
     def idle(self) -> tuple[str, ...]:
@@ -377,8 +395,9 @@ class Mechanism(Result, shown_as="robot"):
     @cached_property
     def wrists(self) -> dict[str, Wrist]:
         """The spherical joints that cannot make every turn."""
-        return {name: joint.wrist for name, joint in self.joints.items()
-                if joint.wrist is not None and joint.wrist.limits}
+        return {
+            name: joint.wrist for name, joint in self.joints.items() if joint.wrist is not None and joint.wrist.limits
+        }
 
     @cached_property
     def length(self) -> float:
@@ -402,16 +421,24 @@ class Mechanism(Result, shown_as="robot"):
         """The joints of a link, in the order of the mechanism."""
         return self._joints_of[link]
 
-    def changed(self, *, remove_links: Iterable[str] = (), remove_joints: Iterable[str] = (),
-                links: Iterable[Link] = (), joints: Iterable[Joint] = (), **fields: object) -> Mechanism:
+    def changed(
+        self,
+        *,
+        remove_links: Iterable[str] = (),
+        remove_joints: Iterable[str] = (),
+        links: Iterable[Link] = (),
+        joints: Iterable[Joint] = (),
+        **fields: object,
+    ) -> Mechanism:
         """A new mechanism: links removed with all their joints and couplings, joints removed, links and joints added or
         replaced."""
         gone = set(remove_links)
         new_links = {name: link for name, link in self.links.items() if name not in gone}
         new_links.update({link.name: link for link in links})
         dropped = set(remove_joints)
-        new_joints = {name: joint for name, joint in self.joints.items()
-                      if name not in dropped and not gone & set(joint.links)}
+        new_joints = {
+            name: joint for name, joint in self.joints.items() if name not in dropped and not gone & set(joint.links)
+        }
         new_joints.update({joint.name: joint for joint in joints})
         kept = tuple(c for c in self.couplings if {c.predecessor, c.successor} <= set(new_links))
         fields.setdefault("couplings", kept)
@@ -438,8 +465,9 @@ class Mechanism(Result, shown_as="robot"):
             compare(role, getattr(self, role), getattr(other, role))
         compare("links", set(self.links), set(other.links))
         compare("joints", set(self.joints), set(other.joints))
-        compare("observations", [(o.leg, o.link) for o in self.observations],
-                [(o.leg, o.link) for o in other.observations])
+        compare(
+            "observations", [(o.leg, o.link) for o in self.observations], [(o.leg, o.link) for o in other.observations]
+        )
         for name in self.links.keys() & other.links.keys():
             near(f"pose of link {name}", self.links[name].pose, other.links[name].pose)
             compare(f"content of link {name}", self.links[name].xml, other.links[name].xml)
@@ -450,8 +478,11 @@ class Mechanism(Result, shown_as="robot"):
             near(f"centre of joint {name}", a.point, b.point)
             if len(a.axes) == len(b.axes):
                 near(f"axes of joint {name}", np.ravel(a.axes), np.ravel(b.axes))
-        compare("cameras", [(c.name, c.link, c.focal, c.width, c.height) for c in self.cameras],
-                [(c.name, c.link, c.focal, c.width, c.height) for c in other.cameras])
+        compare(
+            "cameras",
+            [(c.name, c.link, c.focal, c.width, c.height) for c in self.cameras],
+            [(c.name, c.link, c.focal, c.width, c.height) for c in other.cameras],
+        )
         for eye, other_eye in zip(self.cameras, other.cameras, strict=False):
             near(f"pose of camera {eye.name}", eye.pose, other_eye.pose)
         for mine, theirs in zip(self.observations, other.observations, strict=False):

@@ -53,8 +53,12 @@ class Noise:
             except ValueError:
                 raise BadRequest("noise: not a number", text, EXAMPLE) from None
             if not 0 < value < MOST[unit] or unit in found:
-                raise BadRequest("noise", text, "each unit once, more than zero; angles below 90deg (a number alone is "
-                                                f"in radians), below {WIDEST_NOISE:g}px")
+                raise BadRequest(
+                    "noise",
+                    text,
+                    "each unit once, more than zero; angles below 90deg (a number alone is "
+                    f"in radians), below {WIDEST_NOISE:g}px",
+                )
             found[unit] = value
         return cls(tuple(found.items()))
 
@@ -73,15 +77,23 @@ class Noise:
         known = frozenset().union(*(each.found_by for each in observations))
         for unit, _ in self.amounts:
             if unit not in known:
-                raise BadRequest(f"noise: nothing that is observed has errors in {IN_WORDS[unit][0]}", str(self),
-                                 [IN_WORDS[each][1] for each in sorted(known)]
-                                 or "more to observe (--see): directions have cones")
+                raise BadRequest(
+                    f"noise: nothing that is observed has errors in {IN_WORDS[unit][0]}",
+                    str(self),
+                    [IN_WORDS[each][1] for each in sorted(known)] or "more to observe (--see): directions have cones",
+                )
         amounts = dict(self.amounts)
         for each in observations:
-            if "px" in amounts and "px" in each.found_by and not (
-                    isinstance(each, CameraObservation) and each.camera and each.camera.focal):
-                raise BadRequest(f"noise in pixels: the focal length of the camera of {each.kind} {each.leg}", "none",
-                                 "a camera with one (--camera NAME=LINK@x,y,z/r,p,y/FOCAL)")
+            if (
+                "px" in amounts
+                and "px" in each.found_by
+                and not (isinstance(each, CameraObservation) and each.camera and each.camera.focal)
+            ):
+                raise BadRequest(
+                    f"noise in pixels: the focal length of the camera of {each.kind} {each.leg}",
+                    "none",
+                    "a camera with one (--camera NAME=LINK@x,y,z/r,p,y/FOCAL)",
+                )
         return amounts
 
 
@@ -96,8 +108,10 @@ def blurs(seen: Observation, value: Array, amounts: Mapping[str, float]) -> list
     own = {unit: amount for unit, amount in amounts.items() if unit in seen.found_by}
     if not own:
         return []
-    largest = max(seen.pixels(own) if unit == "px" and isinstance(seen, CameraObservation) else amount
-                  for unit, amount in own.items())
+    largest = max(
+        seen.pixels(own) if unit == "px" and isinstance(seen, CameraObservation) else amount
+        for unit, amount in own.items()
+    )
     scale = NOISE_STEP / largest
     small = {unit: scale * amount for unit, amount in own.items()}
     ways = np.eye(6).reshape(6, 2, 3)

@@ -102,10 +102,18 @@ def _without_fixed(mechanism: Mechanism, into: dict[str, str]) -> Mechanism:
             joints[joint.name] = moved
     links = {name: link for name, link in mechanism.links.items() if name not in gone}
     links.update({link.name: link for link in kept_links})
-    couplings = tuple(replace(c, predecessor=into[c.predecessor], successor=into[c.successor])
-                      for c in mechanism.couplings)
-    return replace(mechanism, links=links, joints=joints, observations=observations, couplings=couplings,
-                   camera=None if mechanism.camera is None else into[mechanism.camera], cameras=cameras)
+    couplings = tuple(
+        replace(c, predecessor=into[c.predecessor], successor=into[c.successor]) for c in mechanism.couplings
+    )
+    return replace(
+        mechanism,
+        links=links,
+        joints=joints,
+        observations=observations,
+        couplings=couplings,
+        camera=None if mechanism.camera is None else into[mechanism.camera],
+        cameras=cameras,
+    )
 
 
 def _next_merge(mechanism: Mechanism) -> tuple[list[str], list[Joint], Joint] | None:
@@ -122,8 +130,11 @@ def _next_merge(mechanism: Mechanism) -> tuple[list[str], list[Joint], Joint] | 
         b = second if second.predecessor == x else second.turned()
         merged = _pair(mechanism, a, b)
         if merged is not None:
-            if a.type is b.type is JointType.REVOLUTE and merged.type is JointType.UNIVERSAL and \
-                    np.linalg.norm(b.point - a.point) > SAME_POINT * mechanism.length:
+            if (
+                a.type is b.type is JointType.REVOLUTE
+                and merged.type is JointType.UNIVERSAL
+                and np.linalg.norm(b.point - a.point) > SAME_POINT * mechanism.length
+            ):
                 far = far or ([x], [first, second], merged)
                 continue
             return [x], [first, second], merged
@@ -163,15 +174,31 @@ def _pair(mechanism: Mechanism, a: Joint, b: Joint) -> Joint | None:
     return None
 
 
-def _join(a: Joint, b: Joint, type: JointType | None = None, point: Array | None = None,
-            axes: tuple[Array, ...] = (), wrist: Wrist | None = None, turns: tuple[tuple[str, Limits | None], ...] = ()
-            ) -> Joint:
+def _join(
+    a: Joint,
+    b: Joint,
+    type: JointType | None = None,
+    point: Array | None = None,
+    axes: tuple[Array, ...] = (),
+    wrist: Wrist | None = None,
+    turns: tuple[tuple[str, Limits | None], ...] = (),
+) -> Joint:
     """One joint from a's predecessor to b's successor, without limits of its own: of a's type and place where none is
     given."""
     if type is None or point is None:
         return replace(a, predecessor=a.predecessor, successor=b.successor, limits=None, offset=None)
-    return replace(a, type=type, point=point, axes=axes, predecessor=a.predecessor, successor=b.successor, limits=None,
-                   wrist=wrist, turns=turns, offset=None)
+    return replace(
+        a,
+        type=type,
+        point=point,
+        axes=axes,
+        predecessor=a.predecessor,
+        successor=b.successor,
+        limits=None,
+        wrist=wrist,
+        turns=turns,
+        offset=None,
+    )
 
 
 def _wrist(*joints: Joint) -> Wrist | None:
@@ -215,9 +242,11 @@ def _chains_of_three(mechanism: Mechanism, free: set[str]) -> Iterator[tuple[Joi
             after = next((j for j in mechanism.joints_of(y) if j.name != middle.name), None)
             if after is None or before.other(x) == after.other(y):
                 continue
-            yield (before if before.successor == x else before.turned(),
-                   middle if middle.predecessor == x else middle.turned(),
-                   after if after.predecessor == y else after.turned())
+            yield (
+                before if before.successor == x else before.turned(),
+                middle if middle.predecessor == x else middle.turned(),
+                after if after.predecessor == y else after.turned(),
+            )
 
 
 def _first(mechanism: Mechanism, joints: list[Joint]) -> str:

@@ -129,8 +129,7 @@ class Architecture:
         return cls(tuple((count, word) for word, count in counts.items()))
 
     def text(self, style: Style = Style.UNICODE) -> str:
-        return "+".join(word.text(style) if count == 1 else f"{count}-{word.text(style)}"
-                        for count, word in self.terms)
+        return "+".join(word.text(style) if count == 1 else f"{count}-{word.text(style)}" for count, word in self.terms)
 
     @property
     def unicode(self) -> str:
@@ -156,7 +155,8 @@ def _brace(text: str, style: Style) -> str:
 
 
 _TOKEN = re.compile(
-    r"\s*(?:(?P<number>(?<![^+{\s])[0-9]+)(?=-)|(?P<letter>Pi|Π|[RPUSCEF6])(?P<motor>\*|\u0332|_)?|(?P<sign>[-+{}|]))")
+    r"\s*(?:(?P<number>(?<![^+{\s])[0-9]+)(?=-)|(?P<letter>Pi|Π|[RPUSCEF6])(?P<motor>\*|\u0332|_)?|(?P<sign>[-+{}|]))"
+)
 
 
 def parse(text: str) -> Architecture:
@@ -180,8 +180,11 @@ class _Parser:
         self.place = 0
 
     def _fault(self, rest: str) -> BadRequest:
-        return BadRequest(f"architecture {self.text!r}: cannot be read from {rest!r} on", None,
-                          "letters R P U S C E Pi, * after a motor, counts such as 3-, groups {2-SS}, {a|b}, {R-PP}")
+        return BadRequest(
+            f"architecture {self.text!r}: cannot be read from {rest!r} on",
+            None,
+            "letters R P U S C E Pi, * after a motor, counts such as 3-, groups {2-SS}, {a|b}, {R-PP}",
+        )
 
     def _peek(self) -> str | None:
         if self.place >= len(self.tokens):
@@ -190,7 +193,7 @@ class _Parser:
         return value if kind == "sign" else kind
 
     def _fail(self) -> BadRequest:
-        return self._fault("".join(value for _, value, _ in self.tokens[self.place:]) or "its end")
+        return self._fault("".join(value for _, value, _ in self.tokens[self.place :]) or "its end")
 
     def architecture(self) -> Architecture:
         terms = []
@@ -257,7 +260,7 @@ class _Parser:
         word = self._word()
         dashes, letters = [], 0
         depth = 0
-        for kind, value, _ in self.tokens[start:self.place]:
+        for kind, value, _ in self.tokens[start : self.place]:
             depth += (value == "{") - (value == "}")
             if depth == 0 and kind == "sign" and value == "-":
                 dashes.append(letters)

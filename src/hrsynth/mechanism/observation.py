@@ -108,20 +108,22 @@ class Observation(Value):
         return value
 
     @classmethod
-    def together(cls, observations: Sequence[Observation], X_reference: Array, X_links: Array, V_reference: Array,
-                 V_links: Array) -> tuple[Array, Array]:
+    def together(
+        cls, observations: Sequence[Observation], X_reference: Array, X_links: Array, V_reference: Array, V_links: Array
+    ) -> tuple[Array, Array]:
         """Values and rates of several observations of this class, stacked: (rows,), (rows, n)."""
         values = [o.value(X_reference, X) for o, X in zip(observations, X_links, strict=True)]
-        rates = [o.rate(X_reference, X, V_reference, V)
-                 for o, X, V in zip(observations, X_links, V_links, strict=True)]
+        rates = [o.rate(X_reference, X, V_reference, V) for o, X, V in zip(observations, X_links, V_links, strict=True)]
         return np.concatenate(values), np.concatenate(rates)
 
     @classmethod
-    def abreast(cls, observations: Sequence[Observation], X_reference: Array, X_links: Array, V_reference: Array,
-                V_links: Array) -> tuple[Array, Array]:
+    def abreast(
+        cls, observations: Sequence[Observation], X_reference: Array, X_links: Array, V_reference: Array, V_links: Array
+    ) -> tuple[Array, Array]:
         """The same at several configurations, poses (n, 4, 4) and (n, k, 4, 4): (n, rows), (n, rows, columns)."""
-        found = [cls.together(observations, *each)
-                 for each in zip(X_reference, X_links, V_reference, V_links, strict=True)]
+        found = [
+            cls.together(observations, *each) for each in zip(X_reference, X_links, V_reference, V_links, strict=True)
+        ]
         return np.array([values for values, _ in found]), np.array([rates for _, rates in found])
 
     def carried_by(self, into: Mapping[str, str], poses: Mapping[str, Array]) -> Self:

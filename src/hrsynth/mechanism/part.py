@@ -30,22 +30,43 @@ def between(mechanism: Mechanism, base: str, platform: str) -> Mechanism:
     inside = next(part for part in parts if {base, platform} <= part)
     gone = [link for link in mechanism.links if link not in inside]
     camera = mechanism.camera if mechanism.camera in inside else None
-    observations = tuple(o for o in mechanism.observations
-                         if o.link in inside and (o.seen_from is None or o.seen_from in inside))
+    observations = tuple(
+        o for o in mechanism.observations if o.link in inside and (o.seen_from is None or o.seen_from in inside)
+    )
     own = {name for name, joint in mechanism.joints.items() if inside.issuperset(joint.links)}
-    geared = {each: (mechanism.carrier(each, each.predecessor).name, mechanism.carrier(each, each.successor).name)
-              for each in mechanism.couplings}
+    geared = {
+        each: (mechanism.carrier(each, each.predecessor).name, mechanism.carrier(each, each.successor).name)
+        for each in mechanism.couplings
+    }
     beyond: nx.Graph[str] = nx.Graph(ends for ends in geared.values() if not own.issuperset(ends))
     for chain in nx.connected_components(beyond):
         if len(chain & own) > 1:
-            raise BadRequest(f"{mechanism.name}: gears join joints between {base!r} and {platform!r} through others",
-                             ", ".join(sorted(chain - own)), "a base and a platform with these between them")
+            raise BadRequest(
+                f"{mechanism.name}: gears join joints between {base!r} and {platform!r} through others",
+                ", ".join(sorted(chain - own)),
+                "a base and a platform with these between them",
+            )
     couplings = tuple(each for each, ends in geared.items() if own.issuperset(ends))
     cameras = tuple(each for each in mechanism.cameras if each.link in inside)
     notes = mechanism.notes
     if gone:
-        notes = (*notes, Note("ignored", f"{len(gone)} links that are not between {base!r} and {platform!r}: "
-                                         + ", ".join(gone[:5]) + (" …" if gone[5:] else "")))
-    kept = replace(mechanism, base=base, platform=platform, camera=camera, observations=observations, notes=notes,
-                   cameras=cameras, turns=mechanism.turns if platform == mechanism.platform else None)
+        notes = (
+            *notes,
+            Note(
+                "ignored",
+                f"{len(gone)} links that are not between {base!r} and {platform!r}: "
+                + ", ".join(gone[:5])
+                + (" …" if gone[5:] else ""),
+            ),
+        )
+    kept = replace(
+        mechanism,
+        base=base,
+        platform=platform,
+        camera=camera,
+        observations=observations,
+        notes=notes,
+        cameras=cameras,
+        turns=mechanism.turns if platform == mechanism.platform else None,
+    )
     return kept.changed(remove_links=gone, couplings=couplings)

@@ -53,8 +53,9 @@ class Pose:
     def parse(cls, text: str) -> Pose:
         """The pose written as ``x=0.02,y=0.1,z=-0.7,phi=10deg``; raises ``BadRequest``."""
         parts = _fields(text, "pose")
-        fields: dict[str, Any] = {name: _triple(value, text) if name == "rpy" else _number(value, name, text)
-                                  for name, value in parts}
+        fields: dict[str, Any] = {
+            name: _triple(value, text) if name == "rpy" else _number(value, name, text) for name, value in parts
+        }
         return cls(**fields, shown=",".join(map("=".join, parts)))
 
     @classmethod
@@ -71,7 +72,8 @@ class Pose:
     def given(self) -> dict[str, tuple[float, ...]]:
         """The parts that are given, each with its numbers."""
         parts: dict[str, tuple[float, ...] | None] = {
-            name: None if (value := getattr(self, name)) is None else (value,) for name in SCALARS}
+            name: None if (value := getattr(self, name)) is None else (value,) for name in SCALARS
+        }
         return {name: values for name, values in {**parts, "rpy": self.rpy}.items() if values is not None}
 
     def without(self, names: Iterable[str]) -> Pose:
@@ -86,8 +88,12 @@ class Pose:
 
     def to_dict(self) -> dict[str, Any]:
         """x, y, z and rpy (null where free), phi where it is given."""
-        record: dict[str, Any] = {"x": self.x, "y": self.y, "z": self.z,
-                                  "rpy": None if self.rpy is None else list(self.rpy)}
+        record: dict[str, Any] = {
+            "x": self.x,
+            "y": self.y,
+            "z": self.z,
+            "rpy": None if self.rpy is None else list(self.rpy),
+        }
         return record if self.phi is None else {**record, "phi": self.phi}
 
     def __str__(self) -> str:
@@ -105,8 +111,10 @@ class PoseForm:
     def of(cls, poses: Iterable[Pose | ModeNumber]) -> PoseForm:
         """The form in which these poses are written."""
         typed = [each for each in poses if isinstance(each, Pose)]
-        return cls(any(each.phi is not None or "phi=" in each.shown for each in typed),
-                   any("deg" in each.shown for each in typed))
+        return cls(
+            any(each.phi is not None or "phi=" in each.shown for each in typed),
+            any("deg" in each.shown for each in typed),
+        )
 
 
 RADIANS = PoseForm()
@@ -132,8 +140,10 @@ class RigidTransform(Protocol):
 PoseLike = Pose | ModeNumber | str | Mapping[str, Any] | ArrayLike | RigidTransform
 """A pose as a user gives it: a text, a dict of its parts, x y z (roll pitch yaw), a matrix (4, 4), an SE3 of
 Pinocchio."""
-POSES = (f"a text such as {EXAMPLE}; a dict of these; numbers x, y, z or x, y, z, roll, pitch, yaw; a 4 × 4 matrix; "
-         "a pinocchio.SE3")
+POSES = (
+    f"a text such as {EXAMPLE}; a dict of these; numbers x, y, z or x, y, z, roll, pitch, yaw; a 4 × 4 matrix; "
+    "a pinocchio.SE3"
+)
 
 
 def as_pose(given: PoseLike) -> Pose:
@@ -144,8 +154,9 @@ def as_pose(given: PoseLike) -> Pose:
         return Pose.parse(given)
     try:
         if isinstance(given, Mapping):
-            return Pose.parse(",".join(f"{name}={_as_text(value)}" for name, value in given.items()
-                                       if value is not None))
+            return Pose.parse(
+                ",".join(f"{name}={_as_text(value)}" for name, value in given.items() if value is not None)
+            )
         if isinstance(given, bytes | bytearray):
             raise TypeError
         numbers = np.asarray(getattr(given, "homogeneous", given), dtype=float)
@@ -153,8 +164,11 @@ def as_pose(given: PoseLike) -> Pose:
         raise BadRequest("a pose", given, POSES) from None
     if numbers.shape == (4, 4):
         R = numbers[:3, :3]
-        if not (np.max(np.abs(R @ R.T - np.eye(3))) < AS_PRINTED and np.linalg.det(R) > 0
-                and np.max(np.abs(numbers[3] - np.eye(4)[3])) < AS_PRINTED):
+        if not (
+            np.max(np.abs(R @ R.T - np.eye(3))) < AS_PRINTED
+            and np.linalg.det(R) > 0
+            and np.max(np.abs(numbers[3] - np.eye(4)[3])) < AS_PRINTED
+        ):
             raise BadRequest("a pose: the matrix is not that of a rotation and a translation", numbers.tolist(), POSES)
         return Pose.of(numbers)
     if numbers.shape not in ((3,), (6,)):
@@ -244,8 +258,11 @@ class Grid(Value):
         """The record of what varies and what is held."""
         fixed = {name: values[0] for name, values in self.fixed.given.items() if name in SCALARS}
         rpy = {} if self.fixed.rpy is None else {"rpy": list(self.fixed.rpy)}
-        return {"axes": list(self.names), **{name: values.tolist() for name, values in self.axes},
-                "fixed": {**fixed, **rpy}}
+        return {
+            "axes": list(self.names),
+            **{name: values.tolist() for name, values in self.axes},
+            "fixed": {**fixed, **rpy},
+        }
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -283,8 +300,9 @@ class Grid(Value):
 
     def poses_at(self, cells: Iterable[Sequence[int]]) -> tuple[Pose, ...]:
         """The poses of cells, each given by its place on every axis."""
-        return tuple(self.pose([float(values[i]) for (_, values), i in zip(self.axes, cell, strict=True)])
-                     for cell in cells)
+        return tuple(
+            self.pose([float(values[i]) for (_, values), i in zip(self.axes, cell, strict=True)]) for cell in cells
+        )
 
     def pose(self, values: Sequence[float]) -> Pose:
         """The pose with these values of the parts that vary."""
@@ -309,9 +327,12 @@ def positive_half_turn(angle: float) -> float:
 
 def write_parts(parts: Mapping[str, tuple[float, ...]], degrees: bool = False) -> str:
     """Parts of a pose in one line, angles in radians or ``degrees``."""
-    return ",".join(f"{name}={'/'.join(_write_number(round(math.degrees(v), 6)) + 'deg' for v in values)}"
-                    if degrees and name in ("phi", "rpy") else f"{name}={'/'.join(map(_write_number, values))}"
-                    for name, values in parts.items())
+    return ",".join(
+        f"{name}={'/'.join(_write_number(round(math.degrees(v), 6)) + 'deg' for v in values)}"
+        if degrees and name in ("phi", "rpy")
+        else f"{name}={'/'.join(map(_write_number, values))}"
+        for name, values in parts.items()
+    )
 
 
 def _write_number(value: float) -> str:

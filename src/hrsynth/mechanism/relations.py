@@ -81,8 +81,13 @@ class Relations:
         return "axes of " + ", ".join(joints) if joints else "an observed direction"
 
 
-def recognise(mechanism: Mechanism, poses: Mapping[str, Array], observations: Sequence[SeenAxis] = (),
-              point: Array | None = None, points: Sequence[tuple[str, Sequence[float]]] = ()) -> Relations:
+def recognise(
+    mechanism: Mechanism,
+    poses: Mapping[str, Array],
+    observations: Sequence[SeenAxis] = (),
+    point: Array | None = None,
+    points: Sequence[tuple[str, Sequence[float]]] = (),
+) -> Relations:
     """The relations that hold at all configurations; ``poses`` are X_BL (configurations, 4, 4) of every link.
 
     ``point`` is the platform's point in the platform's frame, for a point body; ``points`` are further ones, with their
@@ -118,8 +123,9 @@ def recognise(mechanism: Mechanism, poses: Mapping[str, Array], observations: Se
         sights.append(sight)
     tower, place = _tower(sieve, classes)
     owns = [set(axes[name]) for name in drawn.centres]
-    slides = [own if mechanism.joints[name].type in AXIAL else set()
-              for name, own in zip(drawn.centres, owns, strict=True)]
+    slides = [
+        own if mechanism.joints[name].type in AXIAL else set() for name, own in zip(drawn.centres, owns, strict=True)
+    ]
     bare = [set[int]()] * (len(centres) - len(owns))
     found = incidences(sieve, classes, centres, drawn.together(), owns + bare, slides + bare)
     order = sorted(place, key=place.__getitem__)
@@ -127,22 +133,36 @@ def recognise(mechanism: Mechanism, poses: Mapping[str, Array], observations: Se
     def placed(numbers: Iterable[int]) -> tuple[int, ...]:
         return tuple(place[i] for i in numbers)
 
-    return Relations({name: placed(numbers) for name, numbers in axes.items()}, tower, drawn.centres,
-                     None if point is None else len(centres) - 1 - further, len(centres),
-                     tuple(replace(each, classes=placed(each.classes)) for each in found),
-                     tuple(replace(each, classes=placed(each.classes)) for each in sights),
-                     tuple(drawn.carriers), tuple(tuple(fixed[i]) for i in order),
-                     tuple(o.link for o in observations), classes[order], _doubt(sieve), sieve.accepted, sieve.rejected)
+    return Relations(
+        {name: placed(numbers) for name, numbers in axes.items()},
+        tower,
+        drawn.centres,
+        None if point is None else len(centres) - 1 - further,
+        len(centres),
+        tuple(replace(each, classes=placed(each.classes)) for each in found),
+        tuple(replace(each, classes=placed(each.classes)) for each in sights),
+        tuple(drawn.carriers),
+        tuple(tuple(fixed[i]) for i in order),
+        tuple(o.link for o in observations),
+        classes[order],
+        _doubt(sieve),
+        sieve.accepted,
+        sieve.rejected,
+    )
 
 
 def _doubt(sieve: Sieve) -> str:
     """Why what a sieve kept is not to be relied on (docs/pages/theory.md, section 12)."""
     if sieve.mixed is not None:
-        return ("the samples are of several operation modes: a relation of its geometry holds at zero and at "
-                "{} of {} of them".format(*sieve.mixed))
+        return (
+            "the samples are of several operation modes: a relation of its geometry holds at zero and at "
+            "{} of {} of them".format(*sieve.mixed)
+        )
     if sieve.rejected < RANK_GAP * sieve.accepted:
-        return (f"its geometry is nearly special: a relation that counts as held misses by {sieve.accepted:.1e}, one "
-                f"that does not by {sieve.rejected:.1e}, needed: {RANK_GAP:.0e} times as much")
+        return (
+            f"its geometry is nearly special: a relation that counts as held misses by {sieve.accepted:.1e}, one "
+            f"that does not by {sieve.rejected:.1e}, needed: {RANK_GAP:.0e} times as much"
+        )
     return ""
 
 
@@ -217,15 +237,24 @@ class _Drawing:
     @cached_property
     def sliding(self) -> list[set[str]]:
         """The sets of links that only slide along each other."""
-        return list(graphs.components(graphs.adjacency(self.mechanism.links, (
-            joint.links for joint in self.mechanism.joints.values() if joint.type is JointType.PRISMATIC))))
+        return list(
+            graphs.components(
+                graphs.adjacency(
+                    self.mechanism.links,
+                    (joint.links for joint in self.mechanism.joints.values() if joint.type is JointType.PRISMATIC),
+                )
+            )
+        )
 
     def planes(self) -> Iterator[tuple[str, Array]]:
         """A link, and the normal (configurations, 3), of each plane in which links slide along each other: it is a
         direction of its own, to which what joins their points is normal."""
         for body in self.sliding:
-            slides = [self.directions[self.axes[joint.name][0]] for joint in self.mechanism.joints.values()
-                      if joint.type is JointType.PRISMATIC and joint.predecessor in body]
+            slides = [
+                self.directions[self.axes[joint.name][0]]
+                for joint in self.mechanism.joints.values()
+                if joint.type is JointType.PRISMATIC and joint.predecessor in body
+            ]
             for u in slides[1:]:
                 normal = cross(slides[0], u)
                 size = np.linalg.norm(normal, axis=1, keepdims=True)
@@ -258,10 +287,8 @@ def _tower(sieve: Sieve, classes: Array) -> tuple[tuple[tuple[tuple[int, ...], .
     The last is the one that lies in the fewest different planes, and so on with the rest.
     """
     n = len(classes)
-    normal = sieve.keep(choices(n, 2), lambda c, s: dot(classes[c[:, 0], s], classes[c[:, 1], s]),
-                        SAME_DIRECTION)
-    planar = sieve.keep(choices(n, 3), lambda c, s: triple(*(classes[c[:, i], s] for i in range(3))),
-                        SAME_DIRECTION)
+    normal = sieve.keep(choices(n, 2), lambda c, s: dot(classes[c[:, 0], s], classes[c[:, 1], s]), SAME_DIRECTION)
+    planar = sieve.keep(choices(n, 3), lambda c, s: triple(*(classes[c[:, i], s] for i in range(3))), SAME_DIRECTION)
     obeyed: list[list[tuple[frozenset[int], int]]] = [[] for _ in range(n)]
     planes: list[list[Array]] = [[] for _ in range(n)]
     for related in (frozenset(each) for each in normal.tolist() + planar.tolist()):
@@ -294,10 +321,12 @@ def _number(normal: Array, known: list[Array]) -> int:
 
 def _sight(u: Array, classes: Array, points: Array, own: Sequence[int], near: Sequence[int]) -> DirectionSource | None:
     """What the observed direction (configurations, 3) is parallel to, of what its link offers."""
+
     def along(vectors: Array) -> bool:
         sizes = np.linalg.norm(vectors, axis=1)
-        return bool(np.min(sizes) > SAME_POINT
-                    and np.max(np.linalg.norm(cross(vectors, u), axis=1) / sizes) < SAME_DIRECTION)
+        return bool(
+            np.min(sizes) > SAME_POINT and np.max(np.linalg.norm(cross(vectors, u), axis=1) / sizes) < SAME_DIRECTION
+        )
 
     for c, direction in enumerate(classes):
         if along(direction):

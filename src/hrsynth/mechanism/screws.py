@@ -17,8 +17,9 @@ Geometry = Callable[[Joint], tuple[Numbers, Sequence[Numbers]]]
 """The centre and the axes of a joint, in base axes, at the configuration in question."""
 
 
-def elementary(kind: JointType, axes: Sequence[Array], across: Callable[[Array], Array] = perpendicular
-               ) -> list[tuple[JointType, Array]]:
+def elementary(
+    kind: JointType, axes: Sequence[Array], across: Callable[[Array], Array] = perpendicular
+) -> list[tuple[JointType, Array]]:
     """The one-freedom joints, type and axis, that a joint is a chain of, one a freedom; ``across`` gives the direction
     in which a planar joint slides first.
 

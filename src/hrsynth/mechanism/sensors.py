@@ -37,8 +37,9 @@ def default_observation(anatomy: LegDecomposition, leg: Leg, last: bool = False)
 def _default(anatomy: LegDecomposition, leg: Leg, last: bool = False) -> tuple[Direction, str]:
     """The default segment of a leg, and why it is that one."""
     if anatomy.floats(leg):
-        raise NoSegment(f"leg {leg.label} has no segment to observe: nothing holds the platform", leg.joints[0],
-                        INSTEAD)
+        raise NoSegment(
+            f"leg {leg.label} has no segment to observe: nothing holds the platform", leg.joints[0], INSTEAD
+        )
     segments = _Segments(anatomy, leg, NOISE)
     path, nodes, base = segments.path, segments.nodes, anatomy.mechanism.base
     for i, edge in enumerate(path):
@@ -100,8 +101,9 @@ def observation_of(anatomy: LegDecomposition, link: str) -> Direction:
     """The segment direction of any link of a leg: centre to centre, or along the axis of its P."""
     leg = anatomy.leg_of(link)
     if leg is None:
-        raise BadRequest(f"{anatomy.mechanism.name}: no leg has the link", link,
-                         [n for each in anatomy.legs for n in each.links])
+        raise BadRequest(
+            f"{anatomy.mechanism.name}: no leg has the link", link, [n for each in anatomy.legs for n in each.links]
+        )
     segments = _Segments(anatomy, leg)
     return segments.at(segments.nodes.index(link)) if link in segments.nodes[1:-1] else segments.binary(link)
 
@@ -133,8 +135,11 @@ class _Segments:
         rounded numbers), where the connector between them has no length. ``beyond`` is the place of the second."""
         end = self._end(self.path[place], link)
         other = self.joint(self.path[beyond]) if 0 <= beyond < len(self.path) else None
-        pair = [each for each in (end, other) if isinstance(each, Joint) and each.type is JointType.REVOLUTE
-                and not each.actuated]
+        pair = [
+            each
+            for each in (end, other)
+            if isinstance(each, Joint) and each.type is JointType.REVOLUTE and not each.actuated
+        ]
         if len(pair) < 2:
             return end
         meeting = lines.meeting_point([(each.point, each.axis) for each in pair], NOISE * self.mechanism.length)
@@ -144,8 +149,11 @@ class _Segments:
         """That of a binary link: from the joint nearer to the base to the other."""
         joints = self.mechanism.joints_of(link)
         if len(joints) != 2:
-            raise BadRequest(f"link {link!r} of leg {self.leg.label} has {len(joints)} joints: it has no direction of "
-                             "its own", None, "an observe element with an axis")
+            raise BadRequest(
+                f"link {link!r} of leg {self.leg.label} has {len(joints)} joints: it has no direction of its own",
+                None,
+                "an observe element with an axis",
+            )
         own = {self.mechanism.base, *self.leg.links} - {link, self.mechanism.platform}
         distance = graphs.distances(self.mechanism.adjacency, self.mechanism.base, own)
         a, b = sorted(joints, key=lambda j: distance.get(j.other(link), len(self.mechanism.links)))
@@ -159,8 +167,11 @@ class _Segments:
         """That along the axis of the P or C at a place of the path, from the base side to the platform side."""
         joints, last = self.mechanism.joints, len(self.path) - 1
         before = joints[self.path[place - 1].joints[0]].point if place else joint.point
-        after = (joints[self.path[place + 1].joints[0]].point if place < last
-                 else self.mechanism.links[self.leg.attach].pose[:3, 3])
+        after = (
+            joints[self.path[place + 1].joints[0]].point
+            if place < last
+            else self.mechanism.links[self.leg.attach].pose[:3, 3]
+        )
         backwards = float(joint.axis @ (after - before)) < -SAME_POINT * self.mechanism.length
         return self._direction(link, -joint.axis if backwards else joint.axis)
 
@@ -175,8 +186,11 @@ class _Segments:
 
     def _direction(self, link: str, vector: Array) -> Direction:
         if np.linalg.norm(vector) <= self.least * self.mechanism.length:
-            raise NoSegment(f"the observed segment {link!r} of leg {self.leg.label} has no length",
-                            float(np.linalg.norm(vector)), f"two joint centres apart from each other; {INSTEAD}")
+            raise NoSegment(
+                f"the observed segment {link!r} of leg {self.leg.label} has no length",
+                float(np.linalg.norm(vector)),
+                f"two joint centres apart from each other; {INSTEAD}",
+            )
         return Direction(self.leg.label, link, self.mechanism.links[link].pose[:3, :3].T @ unit(vector))
 
 
@@ -204,15 +218,28 @@ def encoders(mechanism: Mechanism, joint: Joint, leg: str = "") -> tuple[Encoder
 def _angle(mechanism: Mechanism, joint: Joint, leg: str, mark: Array) -> AngleEncoder:
     """The turn about the first axis, fixed in the predecessor, of a direction ``mark`` fixed in the successor."""
     before, after = (mechanism.links[link].pose[:3, :3].T for link in joint.links)
-    return AngleEncoder(leg, joint.successor, joint.name, frozen(before @ joint.axis), frozen(after @ mark),
-                 frozen(before @ mark), seen_from=joint.predecessor)
+    return AngleEncoder(
+        leg,
+        joint.successor,
+        joint.name,
+        frozen(before @ joint.axis),
+        frozen(after @ mark),
+        frozen(before @ mark),
+        seen_from=joint.predecessor,
+    )
 
 
 def _slide(mechanism: Mechanism, joint: Joint, leg: str) -> SlideEncoder:
     before, after = (mechanism.links[link].pose for link in joint.links)
-    return SlideEncoder(leg, joint.successor, joint.name, frozen(before[:3, :3].T @ joint.axis),
-                 frozen(after[:3, :3].T @ (joint.point - after[:3, 3])),
-                 frozen(before[:3, :3].T @ (joint.point - before[:3, 3])), seen_from=joint.predecessor)
+    return SlideEncoder(
+        leg,
+        joint.successor,
+        joint.name,
+        frozen(before[:3, :3].T @ joint.axis),
+        frozen(after[:3, :3].T @ (joint.point - after[:3, 3])),
+        frozen(before[:3, :3].T @ (joint.point - before[:3, 3])),
+        seen_from=joint.predecessor,
+    )
 
 
 def observed_line(anatomy: LegDecomposition, seen: Direction) -> SpaceLine:
@@ -222,5 +249,10 @@ def observed_line(anatomy: LegDecomposition, seen: Direction) -> SpaceLine:
     link = mechanism.links[seen.link]
     joints = sorted(mechanism.joints_of(seen.link), key=lambda joint: joint.type.slides)
     centre = centre_pair(*joints)[0] if len(joints) == 2 else joints[0].point
-    return SpaceLine(seen.leg, seen.link, at=link.pose[:3, :3].T @ (centre - link.pose[:3, 3]), axis=seen.direction,
-                     seen_from=seen.seen_from)
+    return SpaceLine(
+        seen.leg,
+        seen.link,
+        at=link.pose[:3, :3].T @ (centre - link.pose[:3, 3]),
+        axis=seen.direction,
+        seen_from=seen.seen_from,
+    )

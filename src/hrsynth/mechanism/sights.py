@@ -122,8 +122,12 @@ def gimbal(at: Array, turned: Array, far: Array | None, actuated: bool = False) 
 def across(at: Sighting, normal: Array, out: Array, actuated: int) -> tuple[VirtualJoint, ...]:
     """U-R-P-C to the line (B, d): U at C turns the ``normal`` of a plane through C, R turns in it, P goes along ``out``
     in it, C lies along the line; the first so many of them actuated."""
-    joints = (gimbal(at.C, normal, at.far), VirtualJoint("R", at.C, (normal,)), VirtualJoint("P", at.C, (out,)),
-              VirtualJoint("C", at.foot, (at.d,)))
+    joints = (
+        gimbal(at.C, normal, at.far),
+        VirtualJoint("R", at.C, (normal,)),
+        VirtualJoint("P", at.C, (out,)),
+        VirtualJoint("C", at.foot, (at.d,)),
+    )
     return tuple(replace(joint, actuated=number < actuated) for number, joint in enumerate(joints))
 
 
@@ -312,8 +316,9 @@ class CameraObservation(Observation):
         assert focal is not None
         return noise["px"] / focal
 
-    def suppose_plane_rate(self, plane: Array, X_reference: Array, X_link: Array, V_reference: Array, V_link: Array
-                           ) -> Array:
+    def suppose_plane_rate(
+        self, plane: Array, X_reference: Array, X_link: Array, V_reference: Array, V_link: Array
+    ) -> Array:
         """The rate (size, n) of the value if what is seen lay in the ``plane`` (3,), and moved as the link does."""
         return self._together((self,), X_reference, X_link[None], V_reference, V_link[None], plane[None])[1]
 
@@ -332,13 +337,21 @@ class CameraObservation(Observation):
         return self.together((self,), X_reference, X_link[None], V_reference, V_link[None])[1]
 
     @classmethod
-    def together(cls, observations: Sequence[Observation], X_reference: Array, X_links: Array, V_reference: Array,
-                 V_links: Array) -> tuple[Array, Array]:
+    def together(
+        cls, observations: Sequence[Observation], X_reference: Array, X_links: Array, V_reference: Array, V_links: Array
+    ) -> tuple[Array, Array]:
         return cls._together(observations, X_reference, X_links, V_reference, V_links)
 
     @classmethod
-    def _together(cls, observations: Sequence[Observation], X_reference: Array, X_links: Array, V_reference: Array,
-                  V_links: Array, planes: Array | None = None) -> tuple[Array, Array]:
+    def _together(
+        cls,
+        observations: Sequence[Observation],
+        X_reference: Array,
+        X_links: Array,
+        V_reference: Array,
+        V_links: Array,
+        planes: Array | None = None,
+    ) -> tuple[Array, Array]:
         """The same, where ``planes`` (k, 3) are given of what is supposed to lie in them."""
         at, axes, radii, views = _stack_observations(tuple(observations))
         X = X_reference @ views
@@ -352,8 +365,12 @@ class CameraObservation(Observation):
         turn = V_links[:, 3:] - V_reference[3:]
         rates = np.zeros((len(at), cls.size, V_links.shape[2]))
         if by_p is not None:
-            slip = (V_links[:, :3] - hat(B - X_links[:, :3, 3]) @ V_links[:, 3:]
-                    - V_reference[:3] + hat(B - X_reference[:3, 3]) @ V_reference[3:])
+            slip = (
+                V_links[:, :3]
+                - hat(B - X_links[:, :3, 3]) @ V_links[:, 3:]
+                - V_reference[:3]
+                + hat(B - X_reference[:3, 3]) @ V_reference[3:]
+            )
             rates += (by_p @ seen) @ slip
         if by_d is not None:
             rates -= (by_d @ hat(d) @ seen) @ turn
@@ -361,14 +378,20 @@ class CameraObservation(Observation):
 
     def carried_by(self, into: Mapping[str, str], poses: Mapping[str, Array]) -> Self:
         X = relative_pose(self.link, into, poses)
-        return replace(super().carried_by(into, poses), at=transform(X, self.at),
-                       axis=None if self.axis is None else X[:3, :3] @ self.axis,
-                       camera=self.camera and self.camera.carried_by(into, poses))
+        return replace(
+            super().carried_by(into, poses),
+            at=transform(X, self.at),
+            axis=None if self.axis is None else X[:3, :3] @ self.axis,
+            camera=self.camera and self.camera.carried_by(into, poses),
+        )
 
     def to_dict(self) -> dict[str, Any]:
-        return {**super().to_dict(), "camera": self.camera and self.camera.name,
-                "at": self.at.tolist() if "at" in self.needs else None,
-                "axis": None if self.axis is None else self.axis.tolist()}
+        return {
+            **super().to_dict(),
+            "camera": self.camera and self.camera.name,
+            "at": self.at.tolist() if "at" in self.needs else None,
+            "axis": None if self.axis is None else self.axis.tolist(),
+        }
 
     def differences(self, other: Observation, tolerance: float) -> list[str]:
         if type(self) is not type(other) or (self.leg, self.link) != (other.leg, other.link):
@@ -377,9 +400,11 @@ class CameraObservation(Observation):
         mine, theirs = ((o.camera.name if o.camera else None, o.radius) for o in (self, other))
         found = [] if mine == theirs else [f"{self.kind} {self.leg}: camera and radius {mine} / {theirs}"]
         pairs = (("point", self.at, other.at), ("axis", self.axis, other.axis), ("camera", self.view, other.view))
-        return found + [f"{what} of {self.leg}: {a} / {b}" for what, a, b in pairs
-                        if (a is None) != (b is None) or (a is not None and b is not None
-                                                          and np.max(np.abs(a - b)) > tolerance)]
+        return found + [
+            f"{what} of {self.leg}: {a} / {b}"
+            for what, a, b in pairs
+            if (a is None) != (b is None) or (a is not None and b is not None and np.max(np.abs(a - b)) > tolerance)
+        ]
 
 
 class MetricPoint(CameraObservation):
@@ -398,8 +423,12 @@ def _stack_observations(observations: tuple[Observation, ...]) -> tuple[Array, A
     """Points (k, 3, 1) and axes (k, 3, 1) of observations in their links, radii (k, 1), cameras (k, 4, 4)."""
     sights = [o for o in observations if isinstance(o, CameraObservation)]
     axes = [o.axis if o.axis is not None else np.zeros(3) for o in sights]
-    return (frozen([o.at[:, None] for o in sights]), frozen([axis[:, None] for axis in axes]),
-            frozen([[o.radius or 0.0] for o in sights]), frozen([o.view for o in sights]))
+    return (
+        frozen([o.at[:, None] for o in sights]),
+        frozen([axis[:, None] for axis in axes]),
+        frozen([[o.radius or 0.0] for o in sights]),
+        frozen([o.view for o in sights]),
+    )
 
 
 def normalise_rates(w: Array) -> tuple[Array, Array]:
@@ -407,7 +436,10 @@ def normalise_rates(w: Array) -> tuple[Array, Array]:
     a w vanishes."""
     size = np.linalg.norm(w, axis=-1, keepdims=True)
     if not np.all(size > SAME_POINT):
-        raise NotMeasured("a point or line in the image: distance from the camera's centre (m)", float(size.min()),
-                          f"more than {SAME_POINT:g}")
+        raise NotMeasured(
+            "a point or line in the image: distance from the camera's centre (m)",
+            float(size.min()),
+            f"more than {SAME_POINT:g}",
+        )
     n = w / size
     return n, (np.eye(3) - n[..., :, None] * n[..., None, :]) / size[..., None]

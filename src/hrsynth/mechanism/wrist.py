@@ -63,8 +63,9 @@ class Wrist(Value):
     def margin(self) -> float:
         """How far the angle is from the nearer end (rad); negative beyond it."""
         angle = angle_between(self.first, self.last)
-        return min(np.inf if self.lower is None else angle - self.lower,
-                   np.inf if self.upper is None else self.upper - angle)
+        return min(
+            np.inf if self.lower is None else angle - self.lower, np.inf if self.upper is None else self.upper - angle
+        )
 
     def flatness(self) -> float:
         """How far the angle is from the nearer end at which the axes lie in a plane (rad)."""

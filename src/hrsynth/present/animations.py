@@ -51,8 +51,9 @@ def animation(found: Servo) -> bytes:
     setting, configurations = found.setting, found.run.configurations
     require_legs(setting)
     question = setting.samples.question
-    stage = LegRenderer(setting.mechanism, _camera(found), question.reference,
-                        cylinders(setting.mechanism, question.observations))
+    stage = LegRenderer(
+        setting.mechanism, _camera(found), question.reference, cylinders(setting.mechanism, question.observations)
+    )
     wanted = _lit(stage.picture(found.target.pose))
     paper = np.where(_bare(wanted)[..., None], 1.0, 1.0 - WANTED * (1.0 - wanted))
     sheet = Sheet(found)
@@ -65,8 +66,15 @@ def animation(found: Servo) -> bytes:
         frame[:, : seen.shape[1]] = 255 * np.where(_bare(seen)[..., None], paper, seen)
         frames.append(Image.fromarray(frame).quantize(SHADES, dither=Image.Dither.NONE))
     stream = io.BytesIO()
-    frames[0].save(stream, "GIF", save_all=True, append_images=[*frames[1:], *[frames[-1]] * PAUSE], loop=0,
-                   duration=MILLISECONDS, optimize=True)
+    frames[0].save(
+        stream,
+        "GIF",
+        save_all=True,
+        append_images=[*frames[1:], *[frames[-1]] * PAUSE],
+        loop=0,
+        duration=MILLISECONDS,
+        optimize=True,
+    )
     return stream.getvalue()
 
 
@@ -74,8 +82,11 @@ def require_legs(setting: ObservedRobot, **_: Any) -> None:
     """Raise ``BadRequest`` where something else is observed than legs."""
     for each in setting.observed:
         if not each.by_segment:
-            raise BadRequest(f"{setting.robot.name}: an animation draws the legs that are watched",
-                             f"{each.kind} {each.leg}", "a picture (.png, .pdf, .svg), which draws all kinds")
+            raise BadRequest(
+                f"{setting.robot.name}: an animation draws the legs that are watched",
+                f"{each.kind} {each.leg}",
+                "a picture (.png, .pdf, .svg), which draws all kinds",
+            )
 
 
 def captions(found: Servo, moments: list[int]) -> Iterator[str]:
@@ -92,8 +103,11 @@ def captions(found: Servo, moments: list[int]) -> Iterator[str]:
             turned = f" and {np.degrees(radians):.2g}°" if np.degrees(radians) > LEAST_TURN else ""
             yield f"The end: {ENDS[found.ended]}. The platform is {1e3 * metres:.3g} mm{turned} from the goal."
         elif passed:
-            yield ("A singularity is crossed: for a moment the legs do not show how the platform moves."
-                   if passed[-1].kind == TYPE_2 else "A leg passes its limit.")
+            yield (
+                "A singularity is crossed: for a moment the legs do not show how the platform moves."
+                if passed[-1].kind == TYPE_2
+                else "A leg passes its limit."
+            )
         elif sizes[number] > REST_OF_RUN * sizes.max():
             yield "The controller turns the watched legs towards their desired directions."
         else:
@@ -112,11 +126,19 @@ class Sheet:
         self.words = figure.text(left, 0.79, "", fontsize=14, va="top", linespacing=1.35)
         for k, leg in enumerate(found.setting.labels):
             figure.text(left + 0.075 * (k % 4) + 0.016, 0.53 - 0.035 * (k // 4), f"leg {leg}", fontsize=10, va="center")
-            figure.text(left + 0.075 * (k % 4), 0.53 - 0.035 * (k // 4), "■", fontsize=11, va="center",
-                        color=COLOURS[k % len(COLOURS)])
+            figure.text(
+                left + 0.075 * (k % 4),
+                0.53 - 0.035 * (k // 4),
+                "■",
+                fontsize=11,
+                va="center",
+                color=COLOURS[k % len(COLOURS)],
+            )
         self.marks: list[Any] = []
-        for bottom, values, label in ((0.29, found.errors.max(axis=1), "largest error of a direction"),
-                                      (0.075, found.track.smallest, "distance to the singularity")):
+        for bottom, values, label in (
+            (0.29, found.errors.max(axis=1), "largest error of a direction"),
+            (0.075, found.track.smallest, "distance to the singularity"),
+        ):
             place = figure.add_axes((left + 0.025, bottom, wide - 0.025, 0.135))
             place.plot(self.times, values, color="0.35")
             place.set(xlim=(0, until(found) or 1.0), ylim=(0, None))
@@ -151,8 +173,10 @@ def _camera(found: Servo) -> Camera:
 def _moments(places: Array, errors: Array) -> list[int]:
     """Numbers of configurations that cut the way into equal parts, what moves the platform and what turns the legs
     counted alike."""
-    ways = [np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(values, axis=0), axis=1))])
-            for values in (places, errors)]
+    ways = [
+        np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(values, axis=0), axis=1))])
+        for values in (places, errors)
+    ]
     way = sum(each / each[-1] for each in ways if each[-1] > 0) + np.linspace(0.0, 1e-6, len(places))
     return [int(i) for i in np.searchsorted(way, np.linspace(0.0, way[-1], FRAMES)).clip(0, len(places) - 1)]
 

@@ -61,21 +61,26 @@ def picture(found: Atlas, drawn: DrawnSection, paper: Paper = PNG) -> bytes:
     count = 1 if drawn.found is None else 3
     columns = paper.columns(count, LEAST_PANEL)
     rows = -(-count // columns)
-    figure, axes = panels(rows, columns, 5.4 * columns, 5.4 * rows + 1.2, paper, (0.6 * columns, 0.6 * rows + 1.2),
-                          LEAST_PANEL)
+    figure, axes = panels(
+        rows, columns, 5.4 * columns, 5.4 * rows + 1.2, paper, (0.6 * columns, 0.6 * rows + 1.2), LEAST_PANEL
+    )
     for place in axes[count:]:
         place.set_visible(False)
     _table(axes[0], found)
-    entries = [entry(verdict, linestyle="", marker="s", markersize=10, color=colour, markeredgecolor="0.5")
-               for verdict, (colour, _) in CELLS.items()
-               if any(verdict in row for row in found.table)]
+    entries = [
+        entry(verdict, linestyle="", marker="s", markersize=10, color=colour, markeredgecolor="0.5")
+        for verdict, (colour, _) in CELLS.items()
+        if any(verdict in row for row in found.table)
+    ]
     if drawn.found is not None:
         entries += _curves(axes[1:3], found, *drawn.found)
     plots.legend(figure, entries, paper)
     seen = ", ".join(found.listed.setting.labels)
     told = ", cuspidal" if found.cuspidal else ""
-    figure.suptitle(f"{found.listed.setting.robot.name}, legs {seen} watched\n{found.listed.count}, "
-                    f"aspects: {found.aspects_met}{told}")
+    figure.suptitle(
+        f"{found.listed.setting.robot.name}, legs {seen} watched\n{found.listed.count}, "
+        f"aspects: {found.aspects_met}{told}"
+    )
     return print_figure(figure, paper)
 
 
@@ -115,15 +120,25 @@ def _curves(axes: Any, found: Atlas, drawn: HeldLegSection, modes: dict[int, Cra
     there, here = axes
     ticks = np.linspace(-np.pi, np.pi, COUNTED)
     counts = mode_counts(drawn.robot, drawn.held, ticks + first, ticks + second, PLACES)
-    there.pcolormesh(cell_edges(np.degrees(ticks)), cell_edges(np.degrees(ticks)), counts.T,
-                     cmap=ListedColormap(SHADES), norm=BoundaryNorm([-1, 1, 3, 5, 7], 4), rasterized=True)
+    there.pcolormesh(
+        cell_edges(np.degrees(ticks)),
+        cell_edges(np.degrees(ticks)),
+        counts.T,
+        cmap=ListedColormap(SHADES),
+        norm=BoundaryNorm([-1, 1, 3, 5, 7], 4),
+        rasterized=True,
+    )
     for piece in drawn.curve:
         _line(there, piece[:, 2] - first, piece[:, 3] - second)
         _line(here, piece[:, 0] - crank, piece[:, 1])
     for points, colour, mark in ((drawn.cusps, CUSP, "o"), ([a for a, _ in drawn.nodes], NODE, "s")):
         for point in points:
-            style = {"marker": mark, "color": colour, "markersize": 5,
-                     "markerfacecolor": colour if point.radius is not None else "white"}
+            style = {
+                "marker": mark,
+                "color": colour,
+                "markersize": 5,
+                "markerfacecolor": colour if point.radius is not None else "white",
+            }
             one, other = point.directions
             there.plot(*_degrees(one - first, other - second), zorder=4, **style)
             if mark == "o":
@@ -131,30 +146,44 @@ def _curves(axes: Any, found: Atlas, drawn: HeldLegSection, modes: dict[int, Cra
     there.plot(0, 0, "*", color="gold", markeredgecolor="black", markersize=15, zorder=5)
     for number, at in modes.items():
         x, y = _degrees(float(np.angle(at.cranks[0])) - crank, at.turn)
-        here.plot(x, y, "o", color=_colour(found, number), markeredgecolor="black", markersize=13, zorder=5,
-                  clip_on=False)
+        here.plot(
+            x, y, "o", color=_colour(found, number), markeredgecolor="black", markersize=13, zorder=5, clip_on=False
+        )
         here.text(x, y, str(number), ha="center", va="center", color="white", fontsize=9, fontweight="bold", zorder=6)
-    there.set(xlabel=f"direction of leg {labels[1]} (degrees from the goal's)",
-              ylabel=f"direction of leg {labels[2]} (degrees from the goal's)",
-              title=f"directions, leg {labels[0]} held")
-    here.set(xlabel=f"crank {labels[0]} (degrees from the goal's)", ylabel="φ (degrees from the goal's)",
-             title=f"poses, leg {labels[0]} held")
+    there.set(
+        xlabel=f"direction of leg {labels[1]} (degrees from the goal's)",
+        ylabel=f"direction of leg {labels[2]} (degrees from the goal's)",
+        title=f"directions, leg {labels[0]} held",
+    )
+    here.set(
+        xlabel=f"crank {labels[0]} (degrees from the goal's)",
+        ylabel="φ (degrees from the goal's)",
+        title=f"poses, leg {labels[0]} held",
+    )
     for place, used in ((there, counts > 0), (here, np.ones((COUNTED, COUNTED), dtype=bool))):
         shown = [np.degrees(ticks[np.flatnonzero(used.any(axis=axis))[[0, -1]]]) for axis in (1, 0)]
         place.set(xlim=shown[0], ylim=shown[1], box_aspect=1)
         place.xaxis.set_major_locator(MultipleLocator(30 if np.ptp(shown[0]) < 240 else 60))
         place.yaxis.set_major_locator(MultipleLocator(30 if np.ptp(shown[1]) < 240 else 60))
-    kinds = [entry("Type 2 singularities", color=CURVE, linewidth=1.2),
-             entry("the goal's directions", linestyle="", marker="*", color="gold", markeredgecolor="black",
-                   markersize=11)]
+    kinds = [
+        entry("Type 2 singularities", color=CURVE, linewidth=1.2),
+        entry("the goal's directions", linestyle="", marker="*", color="gold", markeredgecolor="black", markersize=11),
+    ]
     nodes = [place for place, _ in drawn.nodes]
     for points, colour, mark, name in ((drawn.cusps, CUSP, "o", "cusp"), (nodes, NODE, "s", "node")):
         for proved, words in ((True, f"{name}, enclosed"), (False, f"{name}, found")):
             if any((point.radius is not None) == proved for point in points):
-                kinds.append(entry(words, linestyle="", marker=mark, color=colour,
-                                   markerfacecolor=colour if proved else "white"))
-    return [*kinds, *(Patch(facecolor=shade, edgecolor="0.6", label=f"{number} modes")
-                      for shade, number in zip(SHADES, (0, 2, 4, 6), strict=True) if np.any(counts == number))]
+                kinds.append(
+                    entry(words, linestyle="", marker=mark, color=colour, markerfacecolor=colour if proved else "white")
+                )
+    return [
+        *kinds,
+        *(
+            Patch(facecolor=shade, edgecolor="0.6", label=f"{number} modes")
+            for shade, number in zip(SHADES, (0, 2, 4, 6), strict=True)
+            if np.any(counts == number)
+        ),
+    ]
 
 
 def _degrees(*angles: float) -> tuple[float, ...]:

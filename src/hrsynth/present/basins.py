@@ -32,9 +32,16 @@ from .plots import (
 from .runs import ENDS
 from .sketch import axis_label
 
-SHADES = {GOAL: (COLOURS[2], "#7FCEB9"), MODE: (COLOURS[0], COLOURS[5], "#B9DDF3"), ANTIPODAL: (COLOURS[3], "#E8C4D8"),
-          MINIMUM: (COLOURS[4], "#F5D48A"), BOUNDARY: (COLOURS[1], "#EFB48D"), SIGHT: ("#6B4A2B",), TIME: ("0.3",),
-          UNDECIDED: ("0.5",)}
+SHADES = {
+    GOAL: (COLOURS[2], "#7FCEB9"),
+    MODE: (COLOURS[0], COLOURS[5], "#B9DDF3"),
+    ANTIPODAL: (COLOURS[3], "#E8C4D8"),
+    MINIMUM: (COLOURS[4], "#F5D48A"),
+    BOUNDARY: (COLOURS[1], "#EFB48D"),
+    SIGHT: ("#6B4A2B",),
+    TIME: ("0.3",),
+    UNDECIDED: ("0.5",),
+}
 """Colours of the ends of each kind, the largest first."""
 MARKS = {GOAL: "*", MODE: "o", ANTIPODAL: "X", MINIMUM: "v", BOUNDARY: "s", SIGHT: "^", UNDECIDED: "P", TIME: "d"}
 LEAST_MAP = 2.4
@@ -89,30 +96,47 @@ def picture(found: Basins, paper: Paper = PNG) -> bytes:
             drawn |= _ends(place, plane, found, level)
             larger |= _draw_certified(place, plane, found, level)
             plane.finish(place, plane.x, plane.y)
-    entries = [Patch(facecolor=shade, label=_describe_end(letter, each))
-               for letter, each, shade in zip(LETTERS, found.ends, shades, strict=False)]
+    entries = [
+        Patch(facecolor=shade, label=_describe_end(letter, each))
+        for letter, each, shade in zip(LETTERS, found.ends, shades, strict=False)
+    ]
     if found.region is not None and found.certified is not None and grid.ndim == 2:
         told = re.sub(" of ", "\nof ", found.certified.words.removeprefix("from anywhere "))
         told += " ends there" + "\n(drawn larger)" * larger
-        entries.append(entry(f"certified: every start\n{told}", color="white",
-                             linewidth=1.6, path_effects=[Stroke(linewidth=3.4, foreground="black"), Normal()]))
+        entries.append(
+            entry(
+                f"certified: every start\n{told}",
+                color="white",
+                linewidth=1.6,
+                path_effects=[Stroke(linewidth=3.4, foreground="black"), Normal()],
+            )
+        )
     if found.damped.any():
         entries.append(Patch(label="the run comes to a singularity", **DAMPED))
     if (found.cells == NOT_REACHED).any():
         entries.append(missing_entry())
     kinds = dict.fromkeys(each.ending.name for each in found.ends)
-    entries += [entry(ENDS[kind], linestyle="", marker=MARKS[kind], color="black") for kind in kinds
-                if {(kind, True), (kind, False)} & drawn]
+    entries += [
+        entry(ENDS[kind], linestyle="", marker=MARKS[kind], color="black")
+        for kind in kinds
+        if {(kind, True), (kind, False)} & drawn
+    ]
     if any(not inside for _, inside in drawn):
         others = " or ".join("φ" if name == "phi" else name for name in _shared_parts(found, 0.0))
-        entries.append(entry(f"hollow: at another {others}", linestyle="", marker="o", markerfacecolor="none",
-                             color="black"))
+        entries.append(
+            entry(f"hollow: at another {others}", linestyle="", marker="o", markerfacecolor="none", color="black")
+        )
     if grid.ndim > 1:
         entries += MapPlane.of(grid.axes, found.setting.motion, 0.4, 1.6).robot(figure, found.setting.everything.start)
     plots.legend(figure, entries, paper)
     word = "legs " if all(each.by_segment for each in found.setting.observed) else ""
-    heading(figure, f"{found.setting.robot.name}, {word}{', '.join(found.setting.labels)} observed: where each start "
-            f"ends\ngoal {plots.pose_words(found.goal)}", grid.fixed, "; starts: ")
+    heading(
+        figure,
+        f"{found.setting.robot.name}, {word}{', '.join(found.setting.labels)} observed: where each start "
+        f"ends\ngoal {plots.pose_words(found.goal)}",
+        grid.fixed,
+        "; starts: ",
+    )
     return print_figure(figure, paper)
 
 
@@ -138,10 +162,18 @@ def _ends_on_line(place: Any, found: Basins) -> set[tuple[str, bool]]:
         here = None if each.X is None else float(tick_values(name, place_of(found.setting.motion, each.X, (name,)))[0])
         if here is not None and low <= here <= high:
             inside = _inside(found, each, None)
-            place.plot(here, 0.5, MARKS[each.ending.name], markeredgecolor="black", markersize=11, clip_on=False,
-                       markerfacecolor="black" if inside else "none")
-            place.annotate(letter, (here, 0.5), (0, 13), textcoords="offset points", ha="center",
-                           path_effects=outline_strokes())
+            place.plot(
+                here,
+                0.5,
+                MARKS[each.ending.name],
+                markeredgecolor="black",
+                markersize=11,
+                clip_on=False,
+                markerfacecolor="black" if inside else "none",
+            )
+            place.annotate(
+                letter, (here, 0.5), (0, 13), textcoords="offset points", ha="center", path_effects=outline_strokes()
+            )
             drawn.add((each.ending.name, inside))
     return drawn
 
@@ -152,8 +184,15 @@ def _maps(found: Basins, paper: Paper) -> tuple[Any, list[Any]]:
     plane = MapPlane.of(found.grid.axes, found.setting.motion, 0.4, 1.6)
     columns = paper.columns(min(len(ps), 3), LEAST_MAP)
     rows, size = -(-len(ps) // columns), 5.6 if len(ps) == 1 else 3.4
-    figure, axes = panels(rows, columns, size * columns + 1.0, (size * plane.tall + 0.7) * rows + 0.8, paper,
-                          (1.2, 0.8 + 0.7 * rows), LEAST_MAP if columns > 1 else 0.0)
+    figure, axes = panels(
+        rows,
+        columns,
+        size * columns + 1.0,
+        (size * plane.tall + 0.7) * rows + 0.8,
+        paper,
+        (1.2, 0.8 + 0.7 * rows),
+        LEAST_MAP if columns > 1 else 0.0,
+    )
     shape = (*found.grid.shape[:2], -1)
     cells, damped = found.cells.reshape(shape), found.damped.reshape(shape)
     layers = []
@@ -196,8 +235,7 @@ def _layer(place: Any, plane: MapPlane | None, cells: Places, damped: Flags, sha
         if room.max(initial=0.0) >= ROOM:
             i, j = np.unravel_index(np.argmax(room), room.shape)
             u, v = plane.at(plane.x[i], plane.y[j])
-            place.text(u, v, letter, ha="center", va="center", weight="bold",
-                       path_effects=outline_strokes())
+            place.text(u, v, letter, ha="center", va="center", weight="bold", path_effects=outline_strokes())
 
 
 def _draw_certified(place: Any, plane: MapPlane, found: Basins, level: float | None) -> bool:
@@ -209,12 +247,25 @@ def _draw_certified(place: Any, plane: MapPlane, found: Basins, level: float | N
     u, v = plane.at(*np.meshgrid(*(tick_values(name, values) for name, values in near.axes), indexing="ij"))
     for colour, width in (("black", 3.4), ("white", 1.6)):
         place.contour(u, v, inside.astype(float), levels=[0.5], colors=[colour], linewidths=[width], zorder=4)
-    small = max(np.ptp(u[inside]) / np.ptp(plane.at(plane.x, plane.y[0])[0]),
-                np.ptp(v[inside]) / np.ptp(plane.at(plane.x[0], plane.y)[1])) < SEEN
+    small = (
+        max(
+            np.ptp(u[inside]) / np.ptp(plane.at(plane.x, plane.y[0])[0]),
+            np.ptp(v[inside]) / np.ptp(plane.at(plane.x[0], plane.y)[1]),
+        )
+        < SEEN
+    )
     if small:
         for colour, width in (("black", 3.4), ("white", 1.6)):
-            place.plot(u[inside].mean(), v[inside].mean(), "o", markersize=RING, markerfacecolor="none",
-                       markeredgecolor=colour, markeredgewidth=width, zorder=4)
+            place.plot(
+                u[inside].mean(),
+                v[inside].mean(),
+                "o",
+                markersize=RING,
+                markerfacecolor="none",
+                markeredgecolor=colour,
+                markeredgewidth=width,
+                zorder=4,
+            )
     return bool(small)
 
 
@@ -252,16 +303,33 @@ def _ends(place: Any, plane: MapPlane, found: Basins, level: float | None) -> se
             continue
         u, v = plane.spots(values[None])
         inside = _inside(found, each, level)
-        place.plot(u, v, MARKS[each.ending.name], markersize=14 if each.ending.name == GOAL else 8, zorder=5,
-                   markerfacecolor="black" if inside else "none", markeredgecolor="black", markeredgewidth=1.2)
+        place.plot(
+            u,
+            v,
+            MARKS[each.ending.name],
+            markersize=14 if each.ending.name == GOAL else 8,
+            zorder=5,
+            markerfacecolor="black" if inside else "none",
+            markeredgecolor="black",
+            markeredgewidth=1.2,
+        )
         spots.append((float(u[0]), float(v[0]), letter))
         drawn.add((each.ending.name, inside))
     points = place.get_window_extent().width * 72 / place.figure.dpi
     wide = np.ptp(plane.at(cell_edges(plane.x), plane.y[0])[0])
     marks = np.array([spot[:2] for spot in spots]).reshape(-1, 2) * points / wide
     for (x, y, letter), offset in zip(spots, letter_offsets(marks, BESIDE), strict=True):
-        place.annotate(letter, (x, y), offset, textcoords="offset points", fontsize=9, ha="center", va="center",
-                       zorder=6, path_effects=outline_strokes())
+        place.annotate(
+            letter,
+            (x, y),
+            offset,
+            textcoords="offset points",
+            fontsize=9,
+            ha="center",
+            va="center",
+            zorder=6,
+            path_effects=outline_strokes(),
+        )
     return drawn
 
 

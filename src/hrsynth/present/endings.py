@@ -23,10 +23,16 @@ LOOKS: dict[str, dict[str, Any]] = {
     "mode": {"color": COLOURS[0], "marker": "D", "markersize": 8},
     "antipodal": {"color": COLOURS[3], "marker": "s", "markersize": 8},
     "critical": {"color": COLOURS[1], "marker": "o", "markersize": 8},
-    "other": {"color": "0.6", "marker": "x", "markersize": 5}}
+    "other": {"color": "0.6", "marker": "x", "markersize": 5},
+}
 BASE: dict[str, Any] = {"color": "black", "marker": "s", "markersize": 4}
-WORDS = {"goal": "the goal", "mode": "another mode", "antipodal": "antipodal pose",
-         "critical": "pose with an error that attracts", "other": "rest that does not attract"}
+WORDS = {
+    "goal": "the goal",
+    "mode": "another mode",
+    "antipodal": "antipodal pose",
+    "critical": "pose with an error that attracts",
+    "other": "rest that does not attract",
+}
 
 
 @in_style
@@ -40,20 +46,29 @@ def picture(found: Endings, paper: Paper = PNG) -> bytes:
     middle, size = (extent.min(axis=0) + extent.max(axis=0)) / 2, float(np.ptp(extent, axis=0).max())
     drawn = [(each, motion.position(each.configuration.pose(motion.link))) for each in found.rests]
     near = [(each, p) for each, p in drawn if np.abs(p - middle).max() <= WITHIN * size]
-    shapes = [(look(each), [*_outlines(each.configuration, platform), *_sights(found, each.configuration)])
-              for each, _ in near if each.stability == STABLE]
+    shapes = [
+        (look(each), [*_outlines(each.configuration, platform), *_sights(found, each.configuration)])
+        for each, _ in near
+        if each.stability == STABLE
+    ]
     every = np.vstack([extent, *(p for _, p in near), *(stroke for _, some in shapes for stroke in some)])
     figure = empty_figure(paper.wide(WIDE), TALL)
     far = len(drawn) - len(near)
     beyond = f"; {far} more farther away" if far else ""
     word = "legs " if all(each.by_segment for each in found.setting.observed) else ""
-    title = figure.suptitle(f"{found.setting.robot.name}, {word}{', '.join(found.setting.labels)} observed, goal "
-                            f"{pose_words(found.pose)}\n{len(found.attracting)} of {len(found.rests)} rests attract"
-                            f"{beyond}", va="top")
+    title = figure.suptitle(
+        f"{found.setting.robot.name}, {word}{', '.join(found.setting.labels)} observed, goal "
+        f"{pose_words(found.pose)}\n{len(found.attracting)} of {len(found.rests)} rests attract"
+        f"{beyond}",
+        va="top",
+    )
     above = settle_title(figure, title)
     kinds = [kind for kind in WORDS if any(look(each) == kind for each, _ in near)]
-    entries = [entry("robot at the goal", color="0.72"), entry("joints of the base", linestyle="", **BASE),
-               *(entry(WORDS[k], linestyle="", **LOOKS[k]) for k in kinds)]
+    entries = [
+        entry("robot at the goal", color="0.72"),
+        entry("joints of the base", linestyle="", **BASE),
+        *(entry(WORDS[k], linestyle="", **LOOKS[k]) for k in kinds),
+    ]
     if shapes:
         entries.append(entry("platform where it attracts (in its colour)", color="black", linewidth=1.6))
     low = legend_within(figure, entries, figure.get_figwidth(), loc="lower center")
@@ -85,5 +100,9 @@ def _outlines(at: ClosedConfiguration, platform: Any) -> list[Any]:
 def _sights(found: Endings, at: ClosedConfiguration) -> list[Any]:
     """What is observed that is no segment, as lines in space."""
     reference, size = found.setting.mechanism.reference, at.twin.length / 2
-    return [line for each in found.setting.observed if not each.by_segment
-            for line in each.draw(at.pose(each.seen_from or reference), at.pose(each.link), size).lines]
+    return [
+        line
+        for each in found.setting.observed
+        if not each.by_segment
+        for line in each.draw(at.pose(each.seen_from or reference), at.pose(each.link), size).lines
+    ]

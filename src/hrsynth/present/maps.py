@@ -44,8 +44,13 @@ if TYPE_CHECKING:
     from ..kinematics.platform_motion import PlatformMotion
     from ..mechanism.pose import Grid, Pose
 
-MARKS = {"type1": ("^", "Type 1"), "type2": ("o", "Type 2"), "type3": ("D", "Type 3"),
-         CONSTRAINT: ("s", "constraint singularity"), UNDECIDED: ("X", "not decided")}
+MARKS = {
+    "type1": ("^", "Type 1"),
+    "type2": ("o", "Type 2"),
+    "type3": ("D", "Type 3"),
+    CONSTRAINT: ("s", "constraint singularity"),
+    UNDECIDED: ("X", "not decided"),
+}
 """Marks of singular poses by their state."""
 VALUE = "smallest singular value of Mᵀ"
 LOCI = {"hidden robot": ("crimson", "solid", "o"), "real robot": ("royalblue", "dashed", "s")}
@@ -68,30 +73,47 @@ def distance_map(found: Check, paper: Paper = PNG) -> bytes:
     grid = found.grid
     assert grid is not None
     if all(value is None for value in grid.values("type2")):
-        raise BadRequest(f"{found.setting.robot.name}: there is nothing to draw: Mᵀ exists nowhere", None,
-                         "another grid, or a table (.csv)")
+        raise BadRequest(
+            f"{found.setting.robot.name}: there is nothing to draw: Mᵀ exists nowhere",
+            None,
+            "another grid, or a table (.csv)",
+        )
     numbers = np.array([np.nan if value is None else value for value in grid.values("type2")]).reshape(grid.grid.shape)
     states = np.array(grid.states).reshape(grid.grid.shape)
-    figure = (_distance_curve(grid, numbers, states, paper) if grid.grid.ndim == 1
-              else _distance_maps(grid, numbers, states, found.setting.motion, paper))
+    figure = (
+        _distance_curve(grid, numbers, states, paper)
+        if grid.grid.ndim == 1
+        else _distance_maps(grid, numbers, states, found.setting.motion, paper)
+    )
     entries = [missing_entry()] if UNREACHABLE in grid.states else []
     entries += _robot(figure, grid.grid, found.setting)
-    entries += [entry(label, linestyle="", marker=mark, color="red", markeredgecolor="white")
-                for state, (mark, label) in MARKS.items() if state in grid.states]
+    entries += [
+        entry(label, linestyle="", marker=mark, color="red", markeredgecolor="white")
+        for state, (mark, label) in MARKS.items()
+        if state in grid.states
+    ]
     plots.legend(figure, entries, paper)
-    heading(figure, f"{found.setting.robot.name}: distance to Type 2 singularities, legs "
-            f"{', '.join(found.setting.labels)} observed", grid.grid.fixed)
+    heading(
+        figure,
+        f"{found.setting.robot.name}: distance to Type 2 singularities, legs "
+        f"{', '.join(found.setting.labels)} observed",
+        grid.grid.fixed,
+    )
     return print_figure(figure, paper)
 
 
 def _robot(figure: Any, grid: Grid, setting: ObservedRobot) -> list[Any]:
     """Draw the robot in the maps of a grid; its entry in the legend."""
-    return [] if grid.ndim == 1 else MapPlane.of(grid.axes, setting.motion, 0.3, 2.0).robot(
-        figure, setting.everything.start)
+    return (
+        []
+        if grid.ndim == 1
+        else MapPlane.of(grid.axes, setting.motion, 0.3, 2.0).robot(figure, setting.everything.start)
+    )
 
 
-def _distance_maps(grid: GridCheck, numbers: Array, states: NDArray[np.str_], motion: PlatformMotion,
-                   paper: Paper) -> Any:
+def _distance_maps(
+    grid: GridCheck, numbers: Array, states: NDArray[np.str_], motion: PlatformMotion, paper: Paper
+) -> Any:
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import LogNorm
 
@@ -102,8 +124,15 @@ def _distance_maps(grid: GridCheck, numbers: Array, states: NDArray[np.str_], mo
     rows = -(-len(ps) // columns)
     size = 3.6 if columns > 1 else 5.6
     plane = MapPlane.of(grid.grid.axes, motion, 0.3, 2.0)
-    figure, axes = panels(rows, columns, size * columns + 1.4, (size * plane.tall + 0.7) * rows + 0.8, paper,
-                          (1.5 + 0.2 * columns, 0.8 + 0.7 * rows), LEAST_MAP if columns > 1 else 0.0)
+    figure, axes = panels(
+        rows,
+        columns,
+        size * columns + 1.4,
+        (size * plane.tall + 0.7) * rows + 0.8,
+        paper,
+        (1.5 + 0.2 * columns, 0.8 + 0.7 * rows),
+        LEAST_MAP if columns > 1 else 0.0,
+    )
     low, high, ticks = _scale(numbers)
     norm = LogNorm(low, high)
     for k, place in enumerate(axes[: len(ps)]):
@@ -112,7 +141,7 @@ def _distance_maps(grid: GridCheck, numbers: Array, states: NDArray[np.str_], mo
         plots.outer(place, k, columns, len(ps))
         if pname:
             plots.layer_title(place, pname, tick_values(pname, ps)[k])
-    for place in axes[len(ps):]:
+    for place in axes[len(ps) :]:
         place.set_visible(False)
     below = "min" if np.nanmin(numbers) < low else "neither"
     bar = figure.colorbar(ScalarMappable(norm, "viridis"), ax=list(axes), label=f"{VALUE} (logarithmic)", extend=below)
@@ -128,8 +157,9 @@ def _distances(place: Any, plane: MapPlane, numbers: Array, states: NDArray[np.s
     plane.cells(place, np.where(blank, 1.0, np.nan), cmap="gray", vmin=0, vmax=1)
     for state, (mark, _) in MARKS.items():
         i, j = np.nonzero(states == state)
-        place.scatter(*plane.at(plane.x[i], plane.y[j]), marker=mark, s=26, color="red", edgecolor="white",
-                      linewidth=0.6)
+        place.scatter(
+            *plane.at(plane.x[i], plane.y[j]), marker=mark, s=26, color="red", edgecolor="white", linewidth=0.6
+        )
 
 
 def _distance_curve(grid: GridCheck, numbers: Array, states: NDArray[np.str_], paper: Paper) -> Any:
@@ -143,8 +173,16 @@ def _distance_curve(grid: GridCheck, numbers: Array, states: NDArray[np.str_], p
     place.set_yticks(list(ticks), labels=tick_words(ticks))
     for state, (mark, _) in MARKS.items():
         hit = states == state
-        place.scatter(x[hit], np.fmax(numbers[hit], floor), marker=mark, s=36, color="red",
-                      edgecolor="white", linewidth=0.6, zorder=3)
+        place.scatter(
+            x[hit],
+            np.fmax(numbers[hit], floor),
+            marker=mark,
+            s=36,
+            color="red",
+            edgecolor="white",
+            linewidth=0.6,
+            zorder=3,
+        )
     along(place, name, x, states == UNREACHABLE, VALUE)
     return figure
 
@@ -194,8 +232,13 @@ def locus_map(found: Singularity, drawn: Locus, paper: Paper = PNG) -> bytes:
     plane = MapPlane.of(drawn.grid.axes, found.setting.motion, 0.4, 1.6)
     figure, (place,) = panels(1, 1, 7.2, 6.0 * plane.tall + 1.6, paper)
     shade = np.log10(np.maximum(drawn.hidden.type2, DARKEST_DISTANCE))
-    plane.cells(place, np.where(np.isfinite(drawn.hidden.type2), shade, np.nan), cmap="Greys_r",
-                vmin=np.nanmin(shade), vmax=np.nanmax(shade) + 1.0)
+    plane.cells(
+        place,
+        np.where(np.isfinite(drawn.hidden.type2), shade, np.nan),
+        cmap="Greys_r",
+        vmin=np.nanmin(shade),
+        vmax=np.nanmax(shade) + 1.0,
+    )
     borders = _boundary(place, plane, drawn)
     entries: list[Any] = []
     for name, field in (("real robot", drawn.real), ("hidden robot", drawn.hidden)):
@@ -207,8 +250,11 @@ def locus_map(found: Singularity, drawn: Locus, paper: Paper = PNG) -> bytes:
         entries.append(missing_entry())
     entries += plane.robot(figure, found.setting.everything.start)
     plots.legend(figure, entries, paper)
-    heading(figure, f"{found.setting.robot.name}: Type 2 singularities, legs {', '.join(found.setting.labels)} "
-            "observed", drawn.grid.fixed)
+    heading(
+        figure,
+        f"{found.setting.robot.name}: Type 2 singularities, legs {', '.join(found.setting.labels)} observed",
+        drawn.grid.fixed,
+    )
     return print_figure(figure, paper)
 
 
@@ -228,8 +274,7 @@ def _drawn_locus(place: Any, plane: MapPlane, field: SingularityMap, name: str) 
 
 
 def _boundary(place: Any, plane: MapPlane, drawn: Locus) -> list[Any]:
-    """The reached poses next to others that are not, those near a Type 1 singularity in orange; what the legend says.
-    """
+    """The reached poses next to others that are not, those near a Type 1 singularity orange; what the legend says."""
     reached = np.isfinite(drawn.hidden.type2)
     padded = np.pad(reached, 1, mode="edge")
     inside = padded[:-2, 1:-1] & padded[2:, 1:-1] & padded[1:-1, :-2] & padded[1:-1, 2:]
@@ -241,8 +286,10 @@ def _boundary(place: Any, plane: MapPlane, drawn: Locus) -> list[Any]:
             around = [padded[i : i + reached.shape[0], j : j + reached.shape[1]] for i in range(5) for j in range(5)]
             near |= np.min(around, axis=0) < NEAR_TYPE_1 * np.nanmedian(field.type1)
     entries = []
-    for cells, colour, words in ((border & near, "darkorange", "Type 1 boundary"),
-                                 (border & ~near, "black", "other limit of reach")):
+    for cells, colour, words in (
+        (border & near, "darkorange", "Type 1 boundary"),
+        (border & ~near, "black", "other limit of reach"),
+    ):
         i, j = np.nonzero(cells)
         if len(i):
             place.scatter(*plane.at(plane.x[i], plane.y[j]), s=9, color=colour, marker="o", linewidth=0)
@@ -256,13 +303,18 @@ def error_map(found: Accuracy, paper: Paper = PNG) -> bytes:
     what is reached drawn over for a plane, a row of maps for a box, curves for a line (PNG)."""
     field = found.field
     assert field is not None
-    shown = [(1e3 * field.position, "largest position error (mm)"),
-             (np.degrees(field.orientation), "largest orientation error (degrees)")]
+    shown = [
+        (1e3 * field.position, "largest position error (mm)"),
+        (np.degrees(field.orientation), "largest orientation error (degrees)"),
+    ]
     shown = [(values, label) for values, label in shown if np.nanmax(values, initial=0.0) > 0]
     if not shown:
         raise BadRequest("there is nothing to draw", str(field.grid.fixed), "a robot whose platform has errors")
-    figure, locus = (_error_curves(field, shown, paper) if field.grid.ndim == 1
-                     else _error_maps(field, shown, found.setting.motion, paper))
+    figure, locus = (
+        _error_curves(field, shown, paper)
+        if field.grid.ndim == 1
+        else _error_maps(field, shown, found.setting.motion, paper)
+    )
     plots.legend(figure, _error_entries(field, locus) + _robot(figure, field.grid, found.setting), paper)
     legs = ", ".join(f"{o.leg} {found.blur.words(i, o)}" for i, o in enumerate(found.setting.observed))
     what = "observed legs" if all(o.by_segment for o in found.setting.observed) else "observed"
@@ -270,8 +322,9 @@ def error_map(found: Accuracy, paper: Paper = PNG) -> bytes:
     return print_figure(figure, paper)
 
 
-def _error_maps(field: ErrorField, shown: list[tuple[Array, str]], motion: PlatformMotion,
-                paper: Paper) -> tuple[Any, bool]:
+def _error_maps(
+    field: ErrorField, shown: list[tuple[Array, str]], motion: PlatformMotion, paper: Paper
+) -> tuple[Any, bool]:
     """The figure, and whether a place where a freedom is lost is in it."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import LogNorm
@@ -283,16 +336,21 @@ def _error_maps(field: ErrorField, shown: list[tuple[Array, str]], motion: Platf
     columns = paper.columns(len(shown), LEAST_CURVE) if flat else paper.columns(len(ps), LEAST_MAP)
     each = -(-len(ps) // columns)
     rows = -(-len(shown) // columns) if flat else len(shown) * each
-    figure, axes = panels(rows, columns, size * columns + (1.4 * columns if flat else 1.4),
-                          (size * plane.tall + 0.8) * rows + (0.5 if flat else 0.0), paper,
-                          (1.9 * columns if flat else 1.5 + 0.2 * columns, 0.8 * rows + 0.5),
-                          LEAST_CURVE if flat else LEAST_MAP)
+    figure, axes = panels(
+        rows,
+        columns,
+        size * columns + (1.4 * columns if flat else 1.4),
+        (size * plane.tall + 0.8) * rows + (0.5 if flat else 0.0),
+        paper,
+        (1.9 * columns if flat else 1.5 + 0.2 * columns, 0.8 * rows + 0.5),
+        LEAST_CURVE if flat else LEAST_MAP,
+    )
     locus = False
     for number, (values, label) in enumerate(shown):
         low, high = _ends(values)
         norm = LogNorm(low, high)
         places = axes[number : number + 1] if flat else axes[number * each * columns : (number + 1) * each * columns]
-        for place in places[len(ps):]:
+        for place in places[len(ps) :]:
             place.set_visible(False)
         for k, place in enumerate(places[: len(ps)]):
             layer = values if flat else values[..., k]
@@ -306,8 +364,13 @@ def _error_maps(field: ErrorField, shown: list[tuple[Array, str]], motion: Platf
             plots.outer(place, k, columns, len(ps))
             if pname:
                 plots.layer_title(place, pname, tick_values(pname, ps)[k])
-        bar = figure.colorbar(ScalarMappable(norm, ERRORS), ax=list(places), label=f"{label}, logarithmic",
-                              extend="max" if np.nanmax(values) > high else "neither", shrink=0.9)
+        bar = figure.colorbar(
+            ScalarMappable(norm, ERRORS),
+            ax=list(places),
+            label=f"{label}, logarithmic",
+            extend="max" if np.nanmax(values) > high else "neither",
+            shrink=0.9,
+        )
         ticks = round_ticks(low, high) if high > 1.3 * low else np.array([np.nanmin(values)])
         bar.set_ticks(list(ticks), labels=tick_words(ticks))
         bar.minorticks_off()
@@ -333,8 +396,9 @@ def _locus(field: ErrorField, places: Any, plane: MapPlane) -> bool:
         return len(field.curve) > 0
     spots = singular_poses(field)
     for place in places if len(spots) else ():
-        place.plot(*plane.spots(spots), "o", color="white", markeredgecolor="black", markersize=3.2,
-                   markeredgewidth=0.7)
+        place.plot(
+            *plane.spots(spots), "o", color="white", markeredgecolor="black", markersize=3.2, markeredgewidth=0.7
+        )
     return len(spots) > 0
 
 
@@ -372,8 +436,15 @@ def _error_entries(field: ErrorField, locus: bool) -> list[Any]:
         outlined = [Stroke(linewidth=3.4, foreground="black"), Normal()]
         spots = field.determinant is None and field.curve is None
         mark = {"marker": "o", "linestyle": ""} if spots else {"path_effects": outlined}
-        entries.append(entry("Type 2 singularities of the hidden robot", color="white", linewidth=1.6,
-                             markeredgecolor="black", **mark))
+        entries.append(
+            entry(
+                "Type 2 singularities of the hidden robot",
+                color="white",
+                linewidth=1.6,
+                markeredgecolor="black",
+                **mark,
+            )
+        )
     elif field.grid.ndim > 2 and field.determinant is None:
         entries.append(entry("Type 2 singularities are not drawn", linestyle=""))
     if not field.reached.all():
@@ -390,7 +461,10 @@ def error_table(found: Accuracy) -> Iterator[bytes]:
     assert field is not None
     yield ",".join((*field.grid.names, "position_mm", "orientation_deg")).encode() + b"\n"
     columns = 1e3 * field.position.ravel(), np.degrees(field.orientation.ravel())
-    for place, *errors in zip(product(*(values.tolist() for _, values in field.grid.axes)),
-                              *(column.tolist() for column in columns), strict=True):
+    for place, *errors in zip(
+        product(*(values.tolist() for _, values in field.grid.axes)),
+        *(column.tolist() for column in columns),
+        strict=True,
+    ):
         cells = [*map(repr, place), *("" if error != error else repr(error) for error in errors)]
         yield ",".join(cells).encode() + b"\n"

@@ -17,11 +17,27 @@ from .plots import empty_figure, entry, in_style
 from .scenes import CLOSES, GOAL, NEAR, OPEN, UNKNOWN, ModesScene, Placed, scene
 from .sketch import Box, Sketch
 
-MARKS = {GOAL: ("*", 15.0, "the pose itself"), CLOSES: ("o", 8.0, "mode, robot can be assembled"),
-         OPEN: ("X", 9.0, "mode, robot cannot be assembled"),
-         UNKNOWN: ("P", 8.0, "mode, assembly not found"), NEAR: ("D", 7.0, "near mode")}
-COLOURS = ("tab:orange", "tab:green", "tab:red", "tab:purple", "saddlebrown", "deeppink", "darkcyan", "olive", "navy",
-           "goldenrod", "maroon", "black")
+MARKS = {
+    GOAL: ("*", 15.0, "the pose itself"),
+    CLOSES: ("o", 8.0, "mode, robot can be assembled"),
+    OPEN: ("X", 9.0, "mode, robot cannot be assembled"),
+    UNKNOWN: ("P", 8.0, "mode, assembly not found"),
+    NEAR: ("D", 7.0, "near mode"),
+}
+COLOURS = (
+    "tab:orange",
+    "tab:green",
+    "tab:red",
+    "tab:purple",
+    "saddlebrown",
+    "deeppink",
+    "darkcyan",
+    "olive",
+    "navy",
+    "goldenrod",
+    "maroon",
+    "black",
+)
 REACHES = ("black", "tab:brown", "tab:gray", "darkslateblue", "darkolivegreen", "teal")
 MOVING = "cornflowerblue"
 DPI, SHADES = 150, 160
@@ -72,8 +88,14 @@ def drawable(found: AssemblyModes) -> ModesScene:
 
 def description(found: AssemblyModes, drawn: ModesScene) -> dict[str, Any]:
     """What was asked for and what is drawn, in a few numbers: enough to tell whether a picture is out of date."""
-    return {"robot": found.setting.robot.name, "observe": list(found.setting.labels), "real": found.kind == "real",
-            "at": str(found.pose), "complex": found.found.complex, **drawn.to_dict()}
+    return {
+        "robot": found.setting.robot.name,
+        "observe": list(found.setting.labels),
+        "real": found.kind == "real",
+        "at": str(found.pose),
+        "complex": found.found.complex,
+        **drawn.to_dict(),
+    }
 
 
 @in_style
@@ -106,11 +128,23 @@ def figure(found: AssemblyModes, drawn: ModesScene, paper: Paper = PNG) -> Any:
     for k, each in enumerate(placed):
         row, column = divmod(k, columns)
         x, y = start + column * cell, top - (row + 1) * cell
-        words = whole.text((x + cell / 2) / page[0], (y + cell - TITLE / 2) / page[1], f"{each.label}  {each.words}",
-                           ha="center", va="center", fontsize=9 if columns < 3 else 8, color=_colour(k))
+        words = whole.text(
+            (x + cell / 2) / page[0],
+            (y + cell - TITLE / 2) / page[1],
+            f"{each.label}  {each.words}",
+            ha="center",
+            va="center",
+            fontsize=9 if columns < 3 else 8,
+            color=_colour(k),
+        )
         wrap(words, 0.95 * cell)
-        _robot(sketch, sketch.place(whole, _box(page, x, y + 0.1, x + cell, y + cell - TITLE), robots, bare=True),
-               drawn, each, k)
+        _robot(
+            sketch,
+            sketch.place(whole, _box(page, x, y + 0.1, x + cell, y + cell - TITLE), robots, bare=True),
+            drawn,
+            each,
+            k,
+        )
     return whole
 
 
@@ -158,8 +192,17 @@ def _curves(sketch: Sketch, whole: Any, box: Box, drawn: ModesScene) -> None:
 
 def _mark(sketch: Sketch, place: Any, each: Placed, k: int, scale: float) -> None:
     mark, size, _ = MARKS[each.state]
-    sketch.stroke(place, each.at[None], color=_colour(k), marker=mark, markersize=scale * size, linestyle="",
-                  markeredgecolor="black", markeredgewidth=0.7, zorder=6)
+    sketch.stroke(
+        place,
+        each.at[None],
+        color=_colour(k),
+        marker=mark,
+        markersize=scale * size,
+        linestyle="",
+        markeredgecolor="black",
+        markeredgewidth=0.7,
+        zorder=6,
+    )
 
 
 def _robot(sketch: Sketch, place: Any, drawn: ModesScene, each: Placed, k: int) -> None:
@@ -183,8 +226,10 @@ def _heading(whole: Any, found: AssemblyModes, drawn: ModesScene) -> float:
     if drawn.rest:
         many += f"\nof the points where the curves meet, only these fit leg{'s' * (len(drawn.rest) > 1)} "
         many += ", ".join(drawn.rest) + " as well"
-    title = (f"{setting.robot.name}   {setting.anatomy.architecture()}\nassembly modes with the same {held} as at "
-             f"{found.pose}: {many}")
+    title = (
+        f"{setting.robot.name}   {setting.anatomy.architecture()}\nassembly modes with the same {held} as at "
+        f"{found.pose}: {many}"
+    )
     return settle_title(whole, whole.suptitle(title, fontsize=12, va="top"))
 
 
@@ -202,12 +247,17 @@ def _legend(whole: Any, drawn: ModesScene) -> float:
 
     entries: dict[str, Any] = {}
     for trace, colour in zip(drawn.traces, _colours(drawn), strict=True):
-        entries.setdefault(trace.words, Patch(facecolor=colour, alpha=0.4, label=trace.words)
-                           if trace.points.ndim == 3 else entry(trace.words, color=colour, linewidth=1.8))
+        entries.setdefault(
+            trace.words,
+            Patch(facecolor=colour, alpha=0.4, label=trace.words)
+            if trace.points.ndim == 3
+            else entry(trace.words, color=colour, linewidth=1.8),
+        )
     for state in dict.fromkeys(each.state for each in drawn.placed):
         mark, size, words = MARKS[state]
-        entries[words] = entry(words, linestyle="", marker=mark, markersize=0.8 * size, color="0.6",
-                               markeredgecolor="black")
+        entries[words] = entry(
+            words, linestyle="", marker=mark, markersize=0.8 * size, color="0.6", markeredgecolor="black"
+        )
     if any(each.platform for each in drawn.placed):
         entries["platform"] = entry("platform (in the mode's colour)", color=COLOURS[0], linewidth=2.4)
     entries["ground"] = entry("joints of the base", linestyle="", marker="s", color="black", markersize=3.4)

@@ -20,10 +20,21 @@ def table() -> str:
     rows = []
     for word, kind in kinds().items():
         needs = ", ".join(f"`{name.rstrip('?')}`{' (optional)' * name.endswith('?')}" for name in kind.needs)
-        rows.append((f"`{word}`", kind.words, needs, kind.rank, chain_word(word), kind.locked,  # type: ignore[attr-defined]
-                     kind.fed_back))
-    return markdown(("kind", "measured", "attributes", "numbers", "virtual chain", "held, it transmits",
-                     "error in a servo loop"), rows)
+        rows.append(
+            (
+                f"`{word}`",
+                kind.words,
+                needs,
+                kind.rank,
+                chain_word(word),
+                kind.locked,  # type: ignore[attr-defined]
+                kind.fed_back,
+            )
+        )
+    return markdown(
+        ("kind", "measured", "attributes", "numbers", "virtual chain", "held, it transmits", "error in a servo loop"),
+        rows,
+    )
 
 
 def chain_word(word: str) -> str:

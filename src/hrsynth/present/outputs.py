@@ -79,8 +79,11 @@ class File:
                 function("paper:paper_for")(PNG, asked.get("width"), asked.get("font"))
         if path is None:
             if asked.get("plane") is not None and "plane" in self.takes:
-                raise BadRequest("--plane says what a figure shows, and no figure is asked for", asked["plane"],
-                                 "-o FILE.png besides")
+                raise BadRequest(
+                    "--plane says what a figure shows, and no figure is asked for",
+                    asked["plane"],
+                    "-o FILE.png besides",
+                )
             return
         ending = Path(path).suffix.lower()
         if self.needs and all(asked[name] is None for name in self.needs):
@@ -173,8 +176,11 @@ class CodeFile(File):
         super().require(path, asked)
         endings = (".py",) if asked["lang"] == "numpy" else (".hpp", ".h")
         if path is not None and Path(path).suffix.lower() not in endings:
-            raise BadRequest(f"{self.refusal} of --lang {asked['lang']}: extension", path,
-                             f"{', '.join(endings)} (or another --lang)")
+            raise BadRequest(
+                f"{self.refusal} of --lang {asked['lang']}: extension",
+                path,
+                f"{', '.join(endings)} (or another --lang)",
+            )
 
 
 def figures(maker: str) -> dict[str, str]:
@@ -192,66 +198,188 @@ class Outputs:
     inline: str | None = None
 
 
-CERTIFICATE = File("cannot write the certificate", {".json": ".certificates:write_certificate"}, "The certificate",
-                   "Write a certificate (.json), which the command verify, or a single file of plain Python, can "
-                   "check.",
-                   "certificate", "certificate_file")
+CERTIFICATE = File(
+    "cannot write the certificate",
+    {".json": ".certificates:write_certificate"},
+    "The certificate",
+    "Write a certificate (.json), which the command verify, or a single file of plain Python, can check.",
+    "certificate",
+    "certificate_file",
+)
 OUTPUTS = {
-    "accuracy": Outputs("text.runs:accuracy", (
-        File("cannot write the errors", {**figures("maps:error_map"), CSV: "maps:error_table"}, "The map of errors",
-             "Write the plane or grid: map.png, .pdf, .svg; a table, map.csv; or an array, map.npy, part by part: up "
-             "to 10^10 poses, and after an interruption the same command continues.", part="field",
-             needs=("plane", "grid"), words="a plane or a grid", drawn=True, streamed=(".npy", "into")),)),
+    "accuracy": Outputs(
+        "text.runs:accuracy",
+        (
+            File(
+                "cannot write the errors",
+                {**figures("maps:error_map"), CSV: "maps:error_table"},
+                "The map of errors",
+                "Write the plane or grid: map.png, .pdf, .svg; a table, map.csv; or an array, map.npy, part by part: "
+                "up to 10^10 poses, and after an interruption the same command continues.",
+                part="field",
+                needs=("plane", "grid"),
+                words="a plane or a grid",
+                drawn=True,
+                streamed=(".npy", "into"),
+            ),
+        ),
+    ),
     "advise": Outputs("text.robots:advice"),
-    "atlas": Outputs("text.poses:atlas", (
-        File("cannot draw the atlas", figures("atlas:picture"), "The picture of the atlas",
-             "Draw the table and, for three rods on cranks in a plane, the singular curve with the modes: atlas.png, "
-             ".pdf, .svg.", computed="atlas:section", record="section", nothing="atlas:undrawn", drawn=True),)),
-    "basins": Outputs("text.runs:basins", (
-        File("cannot write the basins", {**figures("basins:picture"), CSV: "basins:table"}, "The map of basins",
-             "Draw where each start ends: basins.png, .pdf, .svg, or a table, basins.csv.", drawn=True),)),
+    "atlas": Outputs(
+        "text.poses:atlas",
+        (
+            File(
+                "cannot draw the atlas",
+                figures("atlas:picture"),
+                "The picture of the atlas",
+                "Draw the table and, for three rods on cranks in a plane, the singular curve with the modes: "
+                "atlas.png, .pdf, .svg.",
+                computed="atlas:section",
+                record="section",
+                nothing="atlas:undrawn",
+                drawn=True,
+            ),
+        ),
+    ),
+    "basins": Outputs(
+        "text.runs:basins",
+        (
+            File(
+                "cannot write the basins",
+                {**figures("basins:picture"), CSV: "basins:table"},
+                "The map of basins",
+                "Draw where each start ends: basins.png, .pdf, .svg, or a table, basins.csv.",
+                drawn=True,
+            ),
+        ),
+    ),
     "branch": Outputs("text.branches:branch"),
     "certificate": Outputs("text.robots:certificate"),
-    "check": Outputs("text.poses:check", (
-        File("cannot write the grid", {**figures("maps:distance_map"), CSV: "maps:check_table"}, "The grid",
-             "Write the grid: map.png, .pdf, .svg, or a table, map.csv.", part="grid", needs=("grid",),
-             words="a grid of poses", drawn=True),)),
-    "derive": Outputs("text.robots:derivation", (
-        HiddenFile("cannot write the robot", {}, "The hidden robot", "Write the hidden robot.", field="hidden_file"),
-        File("cannot write the report", dict.fromkeys(HTML, "report.pages:page"), "The report",
-             "Write a page (.html) with drawings, proof, singularities, assembly modes and accuracy.", "report",
-             "report_file", computed="report.parts:parts", plotted=HTML),
-        CERTIFICATE,
-        File("cannot draw the robots", {".svg": "drawings.schematic:derivation_svg"}, option=None, plotted=()))),
-    "endings": Outputs("text.endings:endings", (
-        File("cannot draw the endings", figures("endings:picture"), "The picture of the endings",
-             "Draw the endings: endings.png, .pdf, .svg.", drawn=True),)),
-    "export": Outputs("text.robots:describe_export", (
-        CodeFile("cannot write the code", dict.fromkeys((".hpp", ".h", ".py"), "text.robots:code"), "The code",
-             "Write the code: robot.hpp (C++), robot.py (NumPy).", plotted=()),)),
+    "check": Outputs(
+        "text.poses:check",
+        (
+            File(
+                "cannot write the grid",
+                {**figures("maps:distance_map"), CSV: "maps:check_table"},
+                "The grid",
+                "Write the grid: map.png, .pdf, .svg, or a table, map.csv.",
+                part="grid",
+                needs=("grid",),
+                words="a grid of poses",
+                drawn=True,
+            ),
+        ),
+    ),
+    "derive": Outputs(
+        "text.robots:derivation",
+        (
+            HiddenFile(
+                "cannot write the robot", {}, "The hidden robot", "Write the hidden robot.", field="hidden_file"
+            ),
+            File(
+                "cannot write the report",
+                dict.fromkeys(HTML, "report.pages:page"),
+                "The report",
+                "Write a page (.html) with drawings, proof, singularities, assembly modes and accuracy.",
+                "report",
+                "report_file",
+                computed="report.parts:parts",
+                plotted=HTML,
+            ),
+            CERTIFICATE,
+            File("cannot draw the robots", {".svg": "drawings.schematic:derivation_svg"}, option=None, plotted=()),
+        ),
+    ),
+    "endings": Outputs(
+        "text.endings:endings",
+        (
+            File(
+                "cannot draw the endings",
+                figures("endings:picture"),
+                "The picture of the endings",
+                "Draw the endings: endings.png, .pdf, .svg.",
+                drawn=True,
+            ),
+        ),
+    ),
+    "export": Outputs(
+        "text.robots:describe_export",
+        (
+            CodeFile(
+                "cannot write the code",
+                dict.fromkeys((".hpp", ".h", ".py"), "text.robots:code"),
+                "The code",
+                "Write the code: robot.hpp (C++), robot.py (NumPy).",
+                plotted=(),
+            ),
+        ),
+    ),
     "legs": Outputs("text.robots:legs"),
     "lint": Outputs("text.lint:lint"),
-    "modes": Outputs("text.poses:modes", (
-        File("cannot draw the modes", figures("modes:picture"), "The picture of the modes",
-             "Draw the modes: modes.png, .pdf, .svg.", nothing="modes:why_undrawn", drawn=True),
-        CERTIFICATE)),
+    "modes": Outputs(
+        "text.poses:modes",
+        (
+            File(
+                "cannot draw the modes",
+                figures("modes:picture"),
+                "The picture of the modes",
+                "Draw the modes: modes.png, .pdf, .svg.",
+                nothing="modes:why_undrawn",
+                drawn=True,
+            ),
+            CERTIFICATE,
+        ),
+    ),
     "path": Outputs("text.poses:path", (CERTIFICATE,)),
     "robot": Outputs("text.robots:robot"),
     "select": Outputs("text.runs:selection"),
-    "servo": Outputs("text.runs:servo", (
-        File("cannot draw the run", {**figures("runs:picture"), ".gif": "animations:animation"},
-             "The picture of the run", "Draw the run: curves (run.png, .pdf, .svg) or an animation (run.gif).",
-             allowed=".png, .pdf, .svg (curves) or .gif (camera view)", drawn=True,
-             installed=(".gif", ".simulation.pictures:drawing"),
-             limited=((".gif",), "animations:require_legs"), plotted=(*FIGURES, ".gif")),)),
-    "singular": Outputs("text.poses:singularity", (
-        File("cannot draw the locus", figures("maps:locus_map"), "The locus", "Draw the locus: locus.png, .pdf, .svg.",
-             computed="maps:locus", takes=("plane", "steps"), record="locus", drawn=True,
-             limited=(FIGURES, "maps:require_plane")),)),
+    "servo": Outputs(
+        "text.runs:servo",
+        (
+            File(
+                "cannot draw the run",
+                {**figures("runs:picture"), ".gif": "animations:animation"},
+                "The picture of the run",
+                "Draw the run: curves (run.png, .pdf, .svg) or an animation (run.gif).",
+                allowed=".png, .pdf, .svg (curves) or .gif (camera view)",
+                drawn=True,
+                installed=(".gif", ".simulation.pictures:drawing"),
+                limited=((".gif",), "animations:require_legs"),
+                plotted=(*FIGURES, ".gif"),
+            ),
+        ),
+    ),
+    "singular": Outputs(
+        "text.poses:singularity",
+        (
+            File(
+                "cannot draw the locus",
+                figures("maps:locus_map"),
+                "The locus",
+                "Draw the locus: locus.png, .pdf, .svg.",
+                computed="maps:locus",
+                takes=("plane", "steps"),
+                record="locus",
+                drawn=True,
+                limited=(FIGURES, "maps:require_plane"),
+            ),
+        ),
+    ),
     "verdict": Outputs("text.robots:verdict"),
-    "view": Outputs("text.robots:view", (
-        File("cannot write the view", dict.fromkeys(HTML, "view.page:static"), "The view",
-             "Write a page that needs no server (.html).", "static", allowed=".html"),), inline="view.page:inline"),
+    "view": Outputs(
+        "text.robots:view",
+        (
+            File(
+                "cannot write the view",
+                dict.fromkeys(HTML, "view.page:static"),
+                "The view",
+                "Write a page that needs no server (.html).",
+                "static",
+                allowed=".html",
+            ),
+        ),
+        inline="view.page:inline",
+    ),
 }
 """The outputs by the name under which a result is shown (:attr:`hrsynth.results.Result.shown_as`): that of its
 command, or of its kind where it is a part of an answer."""

@@ -98,8 +98,11 @@ def paper_for(ending: str, width: str | None, font: str | None) -> Paper:
     if inches is not None and made.room < LEAST:
         points = size or PRINTED
         most, least = np.floor(10 * inches * USUAL / LEAST) / 10, np.ceil(25.4 * LEAST * points / USUAL)
-        raise BadRequest(f"text does not fit a figure {width} wide", f"{points:g}pt",
-                         f"--font of up to {most:g}pt, or a width of {least:.0f}mm and more")
+        raise BadRequest(
+            f"text does not fit a figure {width} wide",
+            f"{points:g}pt",
+            f"--font of up to {most:g}pt, or a width of {least:.0f}mm and more",
+        )
     return made
 
 
@@ -156,6 +159,7 @@ def settle_title(figure: Any, title: Any) -> float:
 def wrap(text: Any, width: float) -> None:
     """Break the lines of a text of a figure at spaces, but for those of units and of lists of numbers, so that none is
     longer than ``width`` inches, and all that come of one are about as long."""
+
     def length(line: str) -> float:
         text.set_text(line)
         box = text.get_window_extent()

@@ -47,6 +47,7 @@ def library() -> None:
 
 def in_style(draw: Callable[Asked, Given]) -> Callable[Asked, Given]:
     """A function that draws, in the style of all plots: names as they are, a ``$`` in them too."""
+
     @wraps(draw)
     def drawn(*given: Asked.args, **named: Asked.kwargs) -> Given:
         library()
@@ -69,8 +70,15 @@ def empty_figure(width: float, height: float, **style: Any) -> Any:
     return figure
 
 
-def panels(rows: int, columns: int, width: float, height: float, paper: Paper = PNG,
-           around: tuple[float, float] = (1.2, 1.2), least: float = 0.0) -> tuple[Any, Any]:
+def panels(
+    rows: int,
+    columns: int,
+    width: float,
+    height: float,
+    paper: Paper = PNG,
+    around: tuple[float, float] = (1.2, 1.2),
+    least: float = 0.0,
+) -> tuple[Any, Any]:
     """A figure and its axes, row by row: ``width``, ``height`` (inches) where the paper has room, and else narrower
     with axes of the same shape; ``around`` is what is not axes, ``least`` the width that each needs."""
     wide = paper.axes(width, least * columns)
@@ -109,8 +117,12 @@ def round_ticks(low: float, high: float) -> Array:
 
 def tick_words(ticks: Array) -> list[str]:
     """Round numbers as they are written."""
-    return [np.format_float_positional(value, 3, fractional=False, trim="-") if 1e-4 <= abs(value) < 1e5 or value == 0
-            else f"{value:.3g}" for value in ticks]
+    return [
+        np.format_float_positional(value, 3, fractional=False, trim="-")
+        if 1e-4 <= abs(value) < 1e5 or value == 0
+        else f"{value:.3g}"
+        for value in ticks
+    ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,8 +146,9 @@ class MapPlane:
     def of(cls, axes: Sequence[tuple[str, Array]], motion: PlatformMotion, least: float, most: float) -> MapPlane:
         """The first two axes of a grid; height over width between ``least`` and ``most``."""
         (xname, xs), (yname, ys) = axes[:2]
-        made = cls((xname, yname), tick_values(xname, xs), tick_values(yname, ys), 0.8,
-                   *_own_axes((xname, yname), motion))
+        made = cls(
+            (xname, yname), tick_values(xname, xs), tick_values(yname, ys), 0.8, *_own_axes((xname, yname), motion)
+        )
         if not {xname, yname} <= set("xyz"):
             return made
         u, v = made.at(*np.meshgrid(made.x, made.y, indexing="ij"))
@@ -177,8 +190,14 @@ class MapPlane:
 
     def contour(self, place: Any, values: Array, level: float, colour: str, width: float, style: str = "solid") -> None:
         """Draw where values are at a level."""
-        place.contour(*self.at(*np.meshgrid(self.x, self.y, indexing="ij")), np.ma.masked_invalid(values),
-                      levels=[level], colors=[colour], linestyles=[style], linewidths=[width])
+        place.contour(
+            *self.at(*np.meshgrid(self.x, self.y, indexing="ij")),
+            np.ma.masked_invalid(values),
+            levels=[level],
+            colors=[colour],
+            linestyles=[style],
+            linewidths=[width],
+        )
 
     def sign_change(self, place: Any, values: Array, colour: str, width: float, style: str = "solid") -> bool:
         """Draw where values change their sign; whether they do."""

@@ -50,12 +50,17 @@ class Portrait:
     @classmethod
     def of(cls, setting: ObservedRobot) -> Portrait:
         """An observed robot."""
-        return cls.draw(setting.mechanism, setting.anatomy.platform, {each.link for each in setting.observed},
-                        plane_normal(setting.motion))
+        return cls.draw(
+            setting.mechanism,
+            setting.anatomy.platform,
+            {each.link for each in setting.observed},
+            plane_normal(setting.motion),
+        )
 
     @classmethod
-    def draw(cls, mechanism: Mechanism, platform: Collection[str], observed: Collection[str],
-             normal: Array | None) -> Portrait:
+    def draw(
+        cls, mechanism: Mechanism, platform: Collection[str], observed: Collection[str], normal: Array | None
+    ) -> Portrait:
         """A mechanism at its zero configuration."""
         drawer = Drawer(mechanism, mechanism, platform, RADIUS * mechanism.length)
         way = TRAVEL * mechanism.length
@@ -93,8 +98,13 @@ class Portrait:
         room = np.array([width, height]) - 22.0 * thin
         scale = float(np.min(room / np.maximum(high - low, 1e-9)))
         middle = (low + high) / 2
-        order = sorted(range(len(seen)), key=lambda i: (self.marks[i].kind != "area", float(np.mean(seen[i][:, 2]))
-                                                        + (0.02 if self.marks[i].kind in ("dot", "sleeve") else 0.0)))
+        order = sorted(
+            range(len(seen)),
+            key=lambda i: (
+                self.marks[i].kind != "area",
+                float(np.mean(seen[i][:, 2])) + (0.02 if self.marks[i].kind in ("dot", "sleeve") else 0.0),
+            ),
+        )
         parts = []
         for i in order:
             at = (seen[i][:, :2] - middle) * [scale, -scale] + [width / 2, height / 2]
@@ -105,34 +115,50 @@ class Portrait:
         """The drawing in a sentence."""
         legs = sum(mark.role == SEEN for mark in self.marks)
         motors = sum(mark.role == MOTOR for mark in self.marks)
-        return (f"{self.name} at its zero configuration, the platform blue, {motors} motors dark"
-                + (", the watched segments orange" if legs else "") + ".")
+        return (
+            f"{self.name} at its zero configuration, the platform blue, {motors} motors dark"
+            + (", the watched segments orange" if legs else "")
+            + "."
+        )
 
     def scene(self) -> dict[str, Any]:
         """What a page is given that turns it: marks about the middle, inside a sphere of diameter one."""
         every = np.vstack([mark.points for mark in self.marks])
         middle = (every.min(axis=0) + every.max(axis=0)) / 2
         size = 2 * float(np.max(np.linalg.norm(every - middle, axis=1))) or 1.0
-        return {"axes": np.round(self.axes, DIGITS).tolist(), "marks": [
-            [mark.kind, mark.role, (np.round((mark.points - middle) / size, DIGITS) + 0.0).tolist(), mark.joint]
-            for mark in self.marks]}
+        return {
+            "axes": np.round(self.axes, DIGITS).tolist(),
+            "marks": [
+                [mark.kind, mark.role, (np.round((mark.points - middle) / size, DIGITS) + 0.0).tolist(), mark.joint]
+                for mark in self.marks
+            ],
+        }
 
 
 def _draw_mark(mark: Mark, at: list[svg.Place], thin: float) -> str:
     """A mark on the page, a pale line about strokes so that what is nearer stands out."""
     if mark.kind == "area":
         colour, wide = STROKES[mark.role]
-        return svg.element("path", d=svg.lines([at]) + "Z", fill=FILLS.get(mark.role, "#fff"), stroke=colour,
-                           stroke_width=wide * thin, stroke_linejoin="round", fill_opacity="0.75")
+        return svg.element(
+            "path",
+            d=svg.lines([at]) + "Z",
+            fill=FILLS.get(mark.role, "#fff"),
+            stroke=colour,
+            stroke_width=wide * thin,
+            stroke_linejoin="round",
+            fill_opacity="0.75",
+        )
     if mark.kind == "line":
         colour, wide = STROKES[mark.role]
         way = svg.lines([at])
-        return (svg.element("path", d=way, stroke="#fff", stroke_width=(wide + 3) * thin)
-                + svg.element("path", d=way, stroke=colour, stroke_width=wide * thin, stroke_linecap="round"))
+        return svg.element("path", d=way, stroke="#fff", stroke_width=(wide + 3) * thin) + svg.element(
+            "path", d=way, stroke=colour, stroke_width=wide * thin, stroke_linecap="round"
+        )
     fill = svg.INK if mark.role == MOTOR else "#fff"
     if mark.kind == "sleeve":
         way = svg.lines([at])
-        return (svg.element("path", d=way, stroke=svg.INK, stroke_width=13 * thin)
-                + svg.element("path", d=way, stroke=fill, stroke_width=10 * thin))
+        return svg.element("path", d=way, stroke=svg.INK, stroke_width=13 * thin) + svg.element(
+            "path", d=way, stroke=fill, stroke_width=10 * thin
+        )
     (x, y), radius = at[0], (5.5 if mark.role == MOTOR else 3.6) * thin
     return svg.element("circle", cx=x, cy=y, r=radius, fill=fill, stroke=svg.INK, stroke_width=1.4 * thin)

@@ -29,8 +29,15 @@ def form_row(form: PrintedForm) -> tuple[str, ...]:
     """One printed form's row."""
     found = str(derive(load(shipped()[form.robot]), form.legs, unchecked=False).hidden_architecture)
     same = any(found in (each, f"{found.partition('-')[0]}-{each}") for each in form.hidden)
-    return (form.source, form.real, " or ".join(form.hidden), f"`{form.robot}`",
-            ", ".join(form.legs) if form.legs else "all", found, "yes" if same else "no")
+    return (
+        form.source,
+        form.real,
+        " or ".join(form.hidden),
+        f"`{form.robot}`",
+        ", ".join(form.legs) if form.legs else "all",
+        found,
+        "yes" if same else "no",
+    )
 
 
 @cache

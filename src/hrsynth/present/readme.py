@@ -14,8 +14,17 @@ from .markdown import rewrite
 from .markdown import table as markdown
 
 START = "<!-- generated: robots -->"
-HEADS = ("robot", "architecture", "dof", "hidden robot, all legs watched", "verdict", "exact", "lost",
-         "smallest leg sets", "Type 2 singularities, all legs watched")
+HEADS = (
+    "robot",
+    "architecture",
+    "dof",
+    "hidden robot, all legs watched",
+    "verdict",
+    "exact",
+    "lost",
+    "smallest leg sets",
+    "Type 2 singularities, all legs watched",
+)
 POINTS = 200
 """Random poses at which the condition in words is checked before it is printed."""
 
@@ -29,13 +38,25 @@ def row(name: str) -> tuple[str, ...]:
     hidden = found.hidden_architecture
     lost = "; ".join(freedom.name for freedom in found.verdict.lost)
     smallest = "–" if hidden is None else _smallest(sets.minimal)
-    exact = "not decided" if not found.exact.exact else (
-        "proved" if found.exact.proved else f"{found.exact.instances} instances")
+    exact = (
+        "not decided"
+        if not found.exact.exact
+        else ("proved" if found.exact.proved else f"{found.exact.instances} instances")
+    )
     words = singular(mechanism, points=POINTS).words
     if words.startswith("always"):
         words = "always" + "".join(words.partition(", because")[1:])
-    return (f"`{name}`", str(found.architecture), str(found.dof), str(hidden) if hidden else "none",
-            found.verdict.verdict, exact, lost or "–", smallest, words)
+    return (
+        f"`{name}`",
+        str(found.architecture),
+        str(found.dof),
+        str(hidden) if hidden else "none",
+        found.verdict.verdict,
+        exact,
+        lost or "–",
+        smallest,
+        words,
+    )
 
 
 def table(names: Iterable[str] | None = None) -> str:
@@ -53,5 +74,11 @@ def _smallest(sets: Sequence[Sequence[str]]) -> str:
 
 if __name__ == "__main__":
     for argument in sys.argv[1:]:
-        rewrite(argument, {START: table, printed.FORMS_START: printed.forms_table, **{each.START: each.table
-                                            for each in (printed, replays, lint_rules, observation_kinds)}})
+        rewrite(
+            argument,
+            {
+                START: table,
+                printed.FORMS_START: printed.forms_table,
+                **{each.START: each.table for each in (printed, replays, lint_rules, observation_kinds)},
+            },
+        )

@@ -17,8 +17,18 @@ from ..simulation.servo import servo
 from .markdown import table as markdown
 
 START = "<!-- generated: replays -->"
-HEADS = ("source", "robot", "legs", "noise", "printed", "computed", "same ending?", "printed : computed", "bound",
-         "word")
+HEADS = (
+    "source",
+    "robot",
+    "legs",
+    "noise",
+    "printed",
+    "computed",
+    "same ending?",
+    "printed : computed",
+    "bound",
+    "word",
+)
 BENCH_LASTS = 8.0
 """Time constants 1 / λ of a run on the physics bench."""
 DRAWS = 4
@@ -31,9 +41,17 @@ ALIKE = 1.5
 @cache
 def compute_run(replay: Replay, seed: int = 0) -> Servo:
     """The run with one draw of the noise."""
-    return servo(load(shipped()[replay.robot]), replay.legs, start=replay.way[0], goal=replay.way[1], gain=replay.gain,
-                 noise=replay.noise, physics=replay.physics,
-                 time=BENCH_LASTS / replay.gain if replay.physics else None, seed=seed)
+    return servo(
+        load(shipped()[replay.robot]),
+        replay.legs,
+        start=replay.way[0],
+        goal=replay.way[1],
+        gain=replay.gain,
+        noise=replay.noise,
+        physics=replay.physics,
+        time=BENCH_LASTS / replay.gain if replay.physics else None,
+        seed=seed,
+    )
 
 
 def table(replays: Sequence[Replay] = REPLAYS) -> str:
@@ -56,8 +74,18 @@ def row(replay: Replay) -> tuple[str, ...]:
         here += f" {_place(found.pose)}"
     noise = "–" if replay.noise is None else replay.noise if "deg" in replay.noise else f"{replay.noise} rad, bench"
     same = "yes" if found.ended == replay.ended else "no"
-    return (replay.source, f"`{replay.robot}`", ", ".join(replay.legs), noise, f"{replay.ended} {replay.said}",
-            here, same, _figures(replay, found), _bound(replay), replay.remark)
+    return (
+        replay.source,
+        f"`{replay.robot}`",
+        ", ".join(replay.legs),
+        noise,
+        f"{replay.ended} {replay.said}",
+        here,
+        same,
+        _figures(replay, found),
+        _bound(replay),
+        replay.remark,
+    )
 
 
 def _figures(replay: Replay, found: Servo) -> str:
@@ -66,8 +94,11 @@ def _figures(replay: Replay, found: Servo) -> str:
         printed = [float(v) for v in replay.said.strip("()").replace("−", "-").split(",")]
         apart = math.dist(printed, [v or 0.0 for v in (found.pose.x, found.pose.y, found.pose.z)])
         return f"{1e3 * apart:.0f} mm apart"
-    ratios = [f"{theirs / mine:.2g} ({unit})" for theirs, mine, unit in zip(
-        replay.printed, _error(replay), ("position", "orientation"), strict=True) if theirs is not None]
+    ratios = [
+        f"{theirs / mine:.2g} ({unit})"
+        for theirs, mine, unit in zip(replay.printed, _error(replay), ("position", "orientation"), strict=True)
+        if theirs is not None
+    ]
     if replay.order:
         ratios.append(f"order {'as printed' if _in_order(replay) else 'differs'}")
     return ", ".join(ratios) or "–"
@@ -102,7 +133,7 @@ def _error(replay: Replay) -> tuple[float, float]:
     """The root mean square error of all draws together (m, rad)."""
     draws = DRAWS if replay.order and not replay.physics else 1
     spreads = [compute_run(replay, seed).spread for seed in range(draws)]
-    squares = [(each.rms_metres ** 2, each.rms_radians ** 2) for each in spreads if each is not None]
+    squares = [(each.rms_metres**2, each.rms_radians**2) for each in spreads if each is not None]
     metres, radians = np.sqrt(np.mean(squares, axis=0))
     return float(metres), float(radians)
 

@@ -37,10 +37,16 @@ PICTURE = 2.2
 """Height of a camera's picture over that of a curve."""
 LEAST_TURN = 0.01
 """Turns below this (degrees) are not drawn."""
-ENDS = {"goal": "the goal", "mode": "another assembly mode", "antipodal": "an antipodal pose",
-        "local minimum": "a local minimum", "boundary": "a boundary of the workspace",
-        "lost from sight": "a place from which a camera does not see all", "time": "the end of its time",
-        "undecided": "a place that is not decided"}
+ENDS = {
+    "goal": "the goal",
+    "mode": "another assembly mode",
+    "antipodal": "an antipodal pose",
+    "local minimum": "a local minimum",
+    "boundary": "a boundary of the workspace",
+    "lost from sight": "a place from which a camera does not see all",
+    "time": "the end of its time",
+    "undecided": "a place that is not decided",
+}
 """Endings in words."""
 
 
@@ -51,15 +57,19 @@ def picture(found: Servo, paper: Paper = PNG) -> bytes:
     figure = empty_figure(paper.wide(WIDE), TALL)
     legs = ", ".join(found.setting.labels)
     word = "legs " if all(each.by_segment for each in found.setting.observed) else ""
-    title = figure.suptitle(f"{found.setting.robot.name}, {word}{legs} observed: ended at {ENDS[found.ended]}\n"
-                            f"from {pose_words(found.start)} to {pose_words(found.goal)}", va="top")
+    title = figure.suptitle(
+        f"{found.setting.robot.name}, {word}{legs} observed: ended at {ENDS[found.ended]}\n"
+        f"from {pose_words(found.start)} to {pose_words(found.goal)}",
+        va="top",
+    )
     x, y, wide, tall = _robots(figure, found, settle_title(figure, title), len(panels))
     title.set_y(1 - GAP / 2 / figure.get_figheight())
     pictures = _pictures(found)
     high = PICTURE * len(panels) / (len(panels) + PICTURE * len(pictures)) if pictures else 0.0
     share = tall * high * len(pictures) / len(panels) if pictures else 0.0
-    places = figure.add_gridspec(len(panels), 1, left=x, bottom=y + share, right=x + wide, top=y + tall,
-                                 hspace=HSPACE).subplots(sharex=True)
+    places = figure.add_gridspec(
+        len(panels), 1, left=x, bottom=y + share, right=x + wide, top=y + tall, hspace=HSPACE
+    ).subplots(sharex=True)
     times = found.run.times
     for place, (label, curves, bottom) in zip(np.atleast_1d(places), panels, strict=True):
         for name, values, colour, style in curves:
@@ -89,9 +99,13 @@ def _pictures(found: Servo) -> list[tuple[NamedCamera, Array]]:
 
 
 def _seen_by(found: Servo, eye: NamedCamera) -> list[CameraObservation]:
-    return [o for o in found.setting.observed if isinstance(o, CameraObservation) and o.image(
-        *_poses(found, o, found.target), REACH * found.target.twin.length) and (
-            o.camera.name if o.camera else found.setting.mechanism.reference) == eye.name]
+    return [
+        o
+        for o in found.setting.observed
+        if isinstance(o, CameraObservation)
+        and o.image(*_poses(found, o, found.target), REACH * found.target.twin.length)
+        and (o.camera.name if o.camera else found.setting.mechanism.reference) == eye.name
+    ]
 
 
 def _poses(found: Servo, seen: CameraObservation, at: ClosedConfiguration) -> tuple[Array, Array]:
@@ -104,8 +118,9 @@ def _picture(place: Any, found: Servo, eye: NamedCamera, half: Array) -> None:
     states = [(found.run.configurations[0], START), (found.settled, END), (found.target, GOAL)]
     for number, seen in enumerate(_seen_by(found, eye)):
         ways = [seen.image(*_poses(found, seen, at), size) for at in found.run.configurations]
-        middles = np.array([each[0][:-1].mean(axis=0) if len(each[0]) > 2 else each[0].mean(axis=0)
-                            for each in ways if each])
+        middles = np.array(
+            [each[0][:-1].mean(axis=0) if len(each[0]) > 2 else each[0].mean(axis=0) for each in ways if each]
+        )
         place.plot(*middles.T, color=COLOURS[number % 6], linestyle=STYLES[number % 6], label=seen.leg)
         for at, (colour, style) in states:
             for stroke in seen.image(*_poses(found, seen, at), size):
@@ -157,8 +172,7 @@ Curve = tuple[str, Array, str, str]
 def _panels(found: Servo) -> Iterator[tuple[str, list[Curve], float | None]]:
     """What is drawn against time: its name, its curves, the lower end of its scale."""
     names = [f"leg {each.leg}" if each.by_segment else each.leg for each in found.setting.observed]
-    yield "error ‖eᵢ‖", [(name, found.errors[:, i], COLOURS[i % 6], STYLES[i % 6])
-                         for i, name in enumerate(names)], 0.0
+    yield "error ‖eᵢ‖", [(name, found.errors[:, i], COLOURS[i % 6], STYLES[i % 6]) for i, name in enumerate(names)], 0.0
     path, goal = found.way, found.goal_position
     moved = [i for i in range(3) if np.ptp(path[:, i]) > UNMOVED or abs(path[-1, i] - goal[i]) > UNMOVED] or [0]
     yield "position − goal (m)", [("xyz"[i], path[:, i] - goal[i], COLOURS[i], STYLES[i]) for i in moved], None
@@ -188,21 +202,35 @@ def _robots(figure: Any, found: Servo, above: float, panels: int) -> Box:
     sketch = Sketch.of(plane_normal(found.setting.motion), ground, [])
     entries = [entry("way of the platform", color=COLOURS[0]), entry("joints of the base", **BASE)]
     if any(np.ptp(stroke, axis=0).any() for each, _ in drawn for stroke, _ in each):
-        entries[:0] = [entry("robot at the start", color=START[0]), entry("robot where it ended", color=END[0]),
-                       entry("robot at the goal", color=GOAL[0], linestyle="dashed")]
+        entries[:0] = [
+            entry("robot at the start", color=START[0]),
+            entry("robot where it ended", color=END[0]),
+            entry("robot at the goal", color=GOAL[0], linestyle="dashed"),
+        ]
     inside = others[np.all((others >= every.min(axis=0) - 1e-9) & (others <= every.max(axis=0) + 1e-9), axis=1)]
     marks = [(inside, "D", COLOURS[3], "other modes of the goal"), (path[-1:], "o", COLOURS[1], "")]
-    marks += [(path[each.place][None], "x", "crimson", "crossing a singularity" if each.kind == TYPE_2 else
-               "crossing a limit") for each in found.track.passages or ()]
-    looks = [(points, words, {"marker": mark, "color": colour, "markerfacecolor": "none", "linestyle": ""})
-             for points, mark, colour, words in marks if len(points)]
+    marks += [
+        (
+            path[each.place][None],
+            "x",
+            "crimson",
+            "crossing a singularity" if each.kind == TYPE_2 else "crossing a limit",
+        )
+        for each in found.track.passages or ()
+    ]
+    looks = [
+        (points, words, {"marker": mark, "color": colour, "markerfacecolor": "none", "linestyle": ""})
+        for points, mark, colour, words in marks
+        if len(points)
+    ]
     entries += {words: entry(words, **look) for _, words, look in looks if words}.values()
     robot, curves = _layout(figure, entries, above, panels)
     place = sketch.place(figure, robot, every)
     for number, (each, (colour, style)) in enumerate(drawn):
         for stroke, platform in each:
-            sketch.stroke(place, stroke, color=colour, linestyle=style, linewidth=2.4 if platform else 1.2,
-                          zorder=2 + number)
+            sketch.stroke(
+                place, stroke, color=colour, linestyle=style, linewidth=2.4 if platform else 1.2, zorder=2 + number
+            )
     sketch.stroke(place, ground, zorder=6, **BASE)
     sketch.stroke(place, path, color=COLOURS[0], linewidth=1.6, zorder=7)
     for points, _, look in looks:

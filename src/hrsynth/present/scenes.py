@@ -65,9 +65,17 @@ class ModesScene:
 
     def to_dict(self) -> dict[str, Any]:
         """What the picture says, in a few numbers: each mode's marked point, each trace's middle and spread (m)."""
-        return {"modes": [{"label": each.label, "state": each.state, "at": each.at.tolist()} for each in self.placed],
-                "traces": [{"words": each.words, "middle": each.points.reshape(-1, 3).mean(axis=0).tolist(),
-                            "spread": each.points.reshape(-1, 3).std(axis=0).tolist()} for each in self.traces]}
+        return {
+            "modes": [{"label": each.label, "state": each.state, "at": each.at.tolist()} for each in self.placed],
+            "traces": [
+                {
+                    "words": each.words,
+                    "middle": each.points.reshape(-1, 3).mean(axis=0).tolist(),
+                    "spread": each.points.reshape(-1, 3).std(axis=0).tolist(),
+                }
+                for each in self.traces
+            ],
+        }
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,8 +120,9 @@ def _place(found: AssemblyModes, plot: _Plot, label: str, mode: AssemblyMode) ->
     if mode.goal:
         words = "the pose itself"
     elif mode.left_open:
-        words = f"{said}: " + ", ".join(f"{noun}{'s' * (len(names) > 1)} {', '.join(names)}"
-                                        for noun, names in mode.left_open)
+        words = f"{said}: " + ", ".join(
+            f"{noun}{'s' * (len(names) > 1)} {', '.join(names)}" for noun, names in mode.left_open
+        )
     else:
         words = f"{said}: beyond limits" if mode.beyond else "assembled"
     return Placed(label, state, words, plot.mark(mode), bodies, strokes)
@@ -149,8 +158,11 @@ def _translating(found: AssemblyModes, confined: TipLoci) -> _Plot:
     X = found.goal.pose(plot.body)
     p = transform(X, plot.place)
     curves = [(tip, curve) for tip in confined.tips for curve in (tip.curve, *(each for each, _ in tip.others))]
-    reaches = tuple((shift_reach(curve, p - _at_goal(found, tip)), f"platform on leg {tip.leg}")
-                    for tip, curve in curves if not isinstance(curve, Point))
+    reaches = tuple(
+        (shift_reach(curve, p - _at_goal(found, tip)), f"platform on leg {tip.leg}")
+        for tip, curve in curves
+        if not isinstance(curve, Point)
+    )
     return _Plot(plot.body, plot.place, (), reaches)
 
 
@@ -185,8 +197,7 @@ def _spatial(found: AssemblyModes, confined: TipLoci) -> _Plot:
     last = tips[-1]
     branches = chains(_curve(tips[0]), _curve(tips[1]), float(np.linalg.norm(at[1] - at[0])), COARSE)
     surfaces = (swept(each, at, TURN) for each in branches)
-    traces = tuple(Trace(each[0] if len(each) == 1 else each, _on(last, tips[:-1]), True)
-                   for each in surfaces)
+    traces = tuple(Trace(each[0] if len(each) == 1 else each, _on(last, tips[:-1]), True) for each in surfaces)
     return _Plot(last.body, last.place, traces, ((last.curve, _on(last, (last,))),), tuple(tip.leg for tip in tips))
 
 
@@ -201,12 +212,22 @@ def _bodies(found: AssemblyModes, confined: TipLoci) -> _Plot:
     start = _reach_points(first.curve, _at_goal(found, first)[None], 2 * confined.slide.radius, COARSE)
     around = points(confined.slide, np.linspace(0, 2 * np.pi, TURN))
     dome = (start - arms[0] + arms[1])[:, None] + sign * around
-    return _Plot(last.body, last.place, (Trace(dome, _on(last, (first,)), True),), ((last.curve, _on(last, (last,))),),
-                 (first.leg, last.leg))
+    return _Plot(
+        last.body,
+        last.place,
+        (Trace(dome, _on(last, (first,)), True),),
+        ((last.curve, _on(last, (last,))),),
+        (first.leg, last.leg),
+    )
 
 
 _PLOTS: dict[str, Callable[[AssemblyModes, TipLoci], _Plot]] = {
-    "translations": _translating, "planar": _planar, "spatial": _spatial, "oriented": _spatial, "bodies": _bodies}
+    "translations": _translating,
+    "planar": _planar,
+    "spatial": _spatial,
+    "oriented": _spatial,
+    "bodies": _bodies,
+}
 
 
 def _on(tip: Tip, legs: Sequence[Tip]) -> str:
@@ -219,8 +240,14 @@ def _deciding(found: AssemblyModes, confined: TipLoci, count: int) -> tuple[int,
     tip whose places at the modes are farthest apart. Empty where there are none or legs have several branches."""
     if any(tip.others for tip in confined.tips):
         return ()
-    legs = next((legs for mode in found.found.modes if len(legs := mode.legs) == count
-                 and all(isinstance(confined.tips[k].curve, Curve) for k in legs)), ())
+    legs = next(
+        (
+            legs
+            for mode in found.found.modes
+            if len(legs := mode.legs) == count and all(isinstance(confined.tips[k].curve, Curve) for k in legs)
+        ),
+        (),
+    )
 
     def apart(k: int) -> tuple[bool, float, int]:
         tip = confined.tips[k]

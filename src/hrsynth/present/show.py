@@ -75,8 +75,13 @@ def record(command: str, robot: Mechanism | None, fields: dict[str, Any]) -> str
         chosen = None if robot.choice is None else {"chosen": robot.choice.chosen, "reason": robot.choice.reason}
         head = {"robot": robot.name, "platform": {"link": robot.platform, **(chosen or {})}}
     text = io.StringIO()  # json.dumps keeps all small pieces of the text at once
-    json.dump({**head, "command": command, "version": __version__, **fields}, text, ensure_ascii=False, indent=2,
-              allow_nan=False)
+    json.dump(
+        {**head, "command": command, "version": __version__, **fields},
+        text,
+        ensure_ascii=False,
+        indent=2,
+        allow_nan=False,
+    )
     return text.getvalue()
 
 
@@ -98,8 +103,15 @@ def html(result: Result) -> str:
 
 
 @with_spelling
-def draw(result: Result, file: str | Path | None = None, *, plane: Pose | str | None = None, steps: int = 51,
-         width: str | None = None, font: str | None = None) -> Picture:
+def draw(
+    result: Result,
+    file: str | Path | None = None,
+    *,
+    plane: Pose | str | None = None,
+    steps: int = 51,
+    width: str | None = None,
+    font: str | None = None,
+) -> Picture:
     """A picture of a result, written to ``file`` (.png, .pdf or .svg; for a servo run also .gif) if one is given: the
     kinematic schemes of a derivation's robots (.svg) and, as with ``-o``, assembly modes, an atlas, a servo run,
     checked or accuracy poses over a grid, and where a freedom is lost over a ``plane`` of poses (``steps`` a side).
@@ -129,9 +141,16 @@ def draw(result: Result, file: str | Path | None = None, *, plane: Pose | str | 
         if file is not None:
             picture.save(file)
         return picture
-    raise BadRequest("there is no picture of", repr(result), [
-        f"{name} with {each.words}" if each.words else name for name, outputs in OUTPUTS.items()
-        for each in outputs.files if any(ending in each.makers for ending in PICTURES)])
+    raise BadRequest(
+        "there is no picture of",
+        repr(result),
+        [
+            f"{name} with {each.words}" if each.words else name
+            for name, outputs in OUTPUTS.items()
+            for each in outputs.files
+            if any(ending in each.makers for ending in PICTURES)
+        ],
+    )
 
 
 def _ending(file: str | Path, endings: tuple[str, ...]) -> str:

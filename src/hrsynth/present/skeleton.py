@@ -32,8 +32,9 @@ def _slid(mechanism: Mechanism, moved: dict[str, Array]) -> Iterator[Array]:
     """From a sliding joint's centre on one link to that on the other, there and back."""
     for joint in mechanism.joints.values():
         if joint.type.slides:
-            one, other = (moved[link] @ inverse(mechanism.links[link].pose) @ np.append(joint.point, 1.0)
-                          for link in joint.links)
+            one, other = (
+                moved[link] @ inverse(mechanism.links[link].pose) @ np.append(joint.point, 1.0) for link in joint.links
+            )
             yield np.array([one[:3], other[:3], one[:3]])
 
 

@@ -123,22 +123,42 @@ class Sketch(Value):
     def surface(self, place: Any, points: Array, colour: str) -> None:
         """A translucent surface (m, n, 3) with some of its own lines; in a plane the lines alone."""
         if not self.flat:
-            place.plot_surface(*np.moveaxis(points, -1, 0), rcount=points.shape[0], ccount=points.shape[1],
-                               color=colour, alpha=0.16, linewidth=0, shade=False, clip_on=False, zorder=1)
+            place.plot_surface(
+                *np.moveaxis(points, -1, 0),
+                rcount=points.shape[0],
+                ccount=points.shape[1],
+                color=colour,
+                alpha=0.16,
+                linewidth=0,
+                shade=False,
+                clip_on=False,
+                zorder=1,
+            )
         for across in (points, points.swapaxes(0, 1)):
             for k in np.unique(np.linspace(0, len(across) - 1, WIRES).astype(int)):
                 self.stroke(place, across[k], color=colour, linewidth=0.6, alpha=0.55, zorder=2)
 
-    def numbers(self, place: Any, spots: Array, texts: Sequence[str], colours: Sequence[str],
-                lines: Sequence[Array]) -> None:
+    def numbers(
+        self, place: Any, spots: Array, texts: Sequence[str], colours: Sequence[str], lines: Sequence[Array]
+    ) -> None:
         """Texts beside points (n, 3), each on the side where least is in the way: points, texts, polylines."""
         from matplotlib.patheffects import withStroke
 
         at, near = self._on_page(place, spots), self._on_page(place, np.vstack([*map(_dense, lines), spots]))
         for each, text, colour, where in zip(at, texts, colours, _beside(at, near), strict=True):
-            place.annotate(text, each[2:], xytext=where, textcoords="offset points", ha="center", va="center",
-                           fontsize=12, fontweight="bold", color=colour, zorder=9,
-                           path_effects=[withStroke(linewidth=3, foreground="white")])
+            place.annotate(
+                text,
+                each[2:],
+                xytext=where,
+                textcoords="offset points",
+                ha="center",
+                va="center",
+                fontsize=12,
+                fontweight="bold",
+                color=colour,
+                zorder=9,
+                path_effects=[withStroke(linewidth=3, foreground="white")],
+            )
 
     def _on_page(self, place: Any, points: Array) -> Array:
         """Points (n, 3) as (n, 4): where they are on the page (points), and what ``annotate`` takes."""
@@ -181,10 +201,12 @@ def _beside(at: Array, curves: Array) -> Iterator[tuple[float, float]]:
     around = np.column_stack([np.cos(turns), np.sin(turns)])
     offsets = np.vstack([14.0 * around, 19.0 * around])
     for own in range(len(at)):
+
         def room(offset: Array, own: int = own) -> float:
             text = at[own, :2] + offset
-            others = min((float(np.linalg.norm(text - each)) for k, each in enumerate(taken) if k != own),
-                         default=CLEAR)
+            others = min(
+                (float(np.linalg.norm(text - each)) for k, each in enumerate(taken) if k != own), default=CLEAR
+            )
             curve = float(np.min(np.linalg.norm(curves[:, :2] - text, axis=1), initial=NEAREST))
             return 2.0 * min(others, CLEAR) / CLEAR + curve / NEAREST - 0.002 * float(np.linalg.norm(offset))
 
@@ -211,8 +233,9 @@ def _view(spots: Array, curves: Sequence[Array]) -> tuple[float, float]:
         high = np.array([-np.sin(up) * np.cos(turn), -np.sin(up) * np.sin(turn), np.cos(up)])
         page = np.column_stack([right, high])
         least = min((float(np.linalg.norm(a - b)) for a, b in combinations(spots @ page / size, 2)), default=APART)
-        closed = min((float(np.linalg.svd(v @ page, compute_uv=False)[k]) / spread for v, k, spread in shapes),
-                     default=OPEN)
+        closed = min(
+            (float(np.linalg.svd(v @ page, compute_uv=False)[k]) / spread for v, k, spread in shapes), default=OPEN
+        )
         return min(least, APART) + 0.5 * min(closed, OPEN) - 1e-4 * (abs(view[0] - 22.0) + abs(view[1] + 55.0))
 
     return max(product((22.0, 15.0, 30.0, 38.0), np.arange(-145.0, 31.0, 10.0).tolist()), key=worth)

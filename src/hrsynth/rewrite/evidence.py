@@ -205,13 +205,15 @@ class Evidence:
         return ProximalChain(joints, before, K, anchor, rotations, anchors, self.mechanism.length)
 
 
-def _move_at_random(mechanism: Mechanism, reference: str, nodes: set[str], joints: Sequence[Joint], before: str,
-           anchor: Array) -> tuple[Array, Array]:
+def _move_at_random(
+    mechanism: Mechanism, reference: str, nodes: set[str], joints: Sequence[Joint], before: str, anchor: Array
+) -> tuple[Array, Array]:
     """Orientations of ``before`` and positions of the anchor over random motions of the part alone."""
     if before == reference:
         return np.eye(3)[None], anchor[None]
-    part = Mechanism.of("part", [mechanism.links[n] for n in mechanism.links if n in nodes], joints, base=reference,
-                        platform=before)
+    part = Mechanism.of(
+        "part", [mechanism.links[n] for n in mechanism.links if n in nodes], joints, base=reference, platform=before
+    )
     twin = PinocchioModel(part, mechanism.length)
     rng = np.random.default_rng(1)
     home = part.links[before].pose

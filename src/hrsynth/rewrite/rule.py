@@ -98,8 +98,9 @@ class Rule(Generic[Place, Found]):
     """Where ρ is kept at singular configurations too, of which the certificate has none: sufficient conditions in words
     (docs/pages/theory.md, section 4); none needed where it is empty."""
 
-    def proposals(self, state: State, evidence: Evidence, leg: str = "", *, waive: bool = False
-                  ) -> Iterator[Proposal | Refusal]:
+    def proposals(
+        self, state: State, evidence: Evidence, leg: str = "", *, waive: bool = False
+    ) -> Iterator[Proposal | Refusal]:
         """The leg rewritten at all of its places at once, in order of preference, until a refusal; with ``waive`` side
         conditions are waived: the rule is applied unchecked."""
         silent = True
@@ -109,8 +110,9 @@ class Rule(Generic[Place, Found]):
         if silent and self.otherwise is not None:
             yield Refusal(self.otherwise)
 
-    def _rewritten(self, state: State, evidence: Evidence, places: Sequence[Place], done: tuple[Match[Found], ...],
-                   waive: bool) -> Iterator[Proposal | Refusal]:
+    def _rewritten(
+        self, state: State, evidence: Evidence, places: Sequence[Place], done: tuple[Match[Found], ...], waive: bool
+    ) -> Iterator[Proposal | Refusal]:
         """Proposals that rewrite the other ``places`` as well, after the matches that are ``done``."""
         if not places:
             if done:

@@ -79,13 +79,15 @@ class State(Value):
         """The chains of a leg."""
         return tuple(chain for chain in self.chains if chain.leg == leg)
 
-    def with_chain(self, old: VirtualChain, new: VirtualChain | None, mechanism: Mechanism,
-                   owners: Mapping[str, str] | None = None) -> State:
+    def with_chain(
+        self, old: VirtualChain, new: VirtualChain | None, mechanism: Mechanism, owners: Mapping[str, str] | None = None
+    ) -> State:
         """The state with one chain replaced (or dropped) and another mechanism."""
         chains = tuple(c for each in self.chains for c in ((new,) if each is old else (each,)) if c is not None)
         table = {**self.owners, **(owners or {})}
-        return replace(self, mechanism=mechanism, chains=chains,
-                       owners={k: v for k, v in table.items() if k in mechanism.links})
+        return replace(
+            self, mechanism=mechanism, chains=chains, owners={k: v for k, v in table.items() if k in mechanism.links}
+        )
 
     def observed_labels(self) -> tuple[str, ...]:
         """Labels of the legs that still have a virtual chain, and of what else is observed, in order."""
@@ -130,8 +132,11 @@ class State(Value):
         others.discard(mechanism.reference)
         for joint in mechanism.joints.values():
             touches = set(joint.links)
-            alone = touches == ends and (joint.name in leg.joints or leg.takes_platform or any(
-                c.leg == leg.label and c.actuator == joint.name for c in self.chains))
+            alone = touches == ends and (
+                joint.name in leg.joints
+                or leg.takes_platform
+                or any(c.leg == leg.label and c.actuator == joint.name for c in self.chains)
+            )
             if alone or (touches & links and not (touches - links) & others):
                 names.append(joint.name)
         return names

@@ -89,8 +89,7 @@ class Rewriting:
         """Whether the rules that always hold were accepted, and the virtual actuators are the only motors: then every
         observed leg has one or is blind."""
         driven = {joint.name for joint in self.state.mechanism.joints.values() if joint.actuated}
-        return (all(step.accepted for step in self.steps if step.always)
-                and driven == self.state.actuators)
+        return all(step.accepted for step in self.steps if step.always) and driven == self.state.actuators
 
     def attempt(self, rule: Rule[Any, Any], leg: str | None) -> Rewriting:
         """The first of a rule's proposals that is accepted, if one is."""
@@ -115,8 +114,15 @@ class Rewriting:
         after = self._after(rule, leg, found.passed, reason, found.largest_angle, proposal)
         return replace(after, tried=self.tried + 1)
 
-    def _after(self, rule: Rule[Any, Any], leg: str | None, accepted: bool, reason: str, angle: float | None = None,
-               proposal: Proposal | None = None) -> Rewriting:
+    def _after(
+        self,
+        rule: Rule[Any, Any],
+        leg: str | None,
+        accepted: bool,
+        reason: str,
+        angle: float | None = None,
+        proposal: Proposal | None = None,
+    ) -> Rewriting:
         state, bodies = (proposal.state, proposal.bodies) if accepted and proposal else (None, ())
         step = Step(rule.name, leg, accepted, reason, angle, state, rule.always, rule.keeps, bodies)
         return replace(self, state=state or self.state, steps=(*self.steps, step))
@@ -128,6 +134,7 @@ Strategy = Callable[[Rewriting], Rewriting]
 
 def chain(*strategies: Strategy) -> Strategy:
     """One strategy after the other."""
+
     def run(at: Rewriting) -> Rewriting:
         for strategy in strategies:
             at = strategy(at)
@@ -138,6 +145,7 @@ def chain(*strategies: Strategy) -> Strategy:
 
 def each_leg(legs: Callable[[Rewriting], Iterable[str]], *stages: Stage) -> Strategy:
     """The rules of some stages, each on all legs that have a place for it."""
+
     def run(at: Rewriting) -> Rewriting:
         wanted = list(legs(at))
         for rule in rules(*stages):
@@ -151,6 +159,7 @@ def each_leg(legs: Callable[[Rewriting], Iterable[str]], *stages: Stage) -> Stra
 
 def whole_robot(stage: Stage) -> Strategy:
     """The rules of a stage, each on the robot as a whole."""
+
     def run(at: Rewriting) -> Rewriting:
         for rule in rules(stage):
             at = at.attempt(rule, None)
@@ -162,6 +171,7 @@ def whole_robot(stage: Stage) -> Strategy:
 def best(stage: Stage, after: Strategy, left: Callable[[Rewriting], Iterable[str]]) -> Strategy:
     """The proposal of a stage's rules from which another strategy leaves the fewest legs; none if none leaves fewer
     than there are. The first that leaves nothing ends the search; others are taken back on the trace."""
+
     def run(start: Rewriting) -> Rewriting:
         least, found, trace, tried = len(list(left(start))), start, start.steps, start.tried
         for rule in rules(stage):
@@ -221,7 +231,8 @@ DROPPED = each_leg(unobserved_legs, Stage.LEG)
 SIMPLIFIED = chain(
     GENERAL,
     each_leg(observed_legs, Stage.FORM),
-    unless_blind(chain(DROPPED, best(Stage.ENDS, DROPPED, unobserved_legs), keep_unobserved)))
+    unless_blind(chain(DROPPED, best(Stage.ENDS, DROPPED, unobserved_legs), keep_unobserved)),
+)
 """The simplified form, as far as the certificate goes along with it: where unobserved legs hold the platform, the
 ends of the observed legs are changed; what still does not go is kept."""
 
@@ -236,6 +247,9 @@ def trusting(evidence: Evidence, *, change_ends: bool) -> list[Rewriting]:
     start = chain(GENERAL, each_leg(observed_legs, Stage.FORM))(Rewriting.of(evidence))
     starts = [start]
     for rule in rules(Stage.ENDS) if change_ends else ():
-        starts += [start.judged(rule, None, each) for each in rule.proposals(start.state, evidence, waive=True)
-                   if isinstance(each, Proposal)]
+        starts += [
+            start.judged(rule, None, each)
+            for each in rule.proposals(start.state, evidence, waive=True)
+            if isinstance(each, Proposal)
+        ]
     return [DROPPED(each) for each in starts]

@@ -49,8 +49,10 @@ class LoopEnds(Value):
     def order(self) -> tuple[float, float]:
         """What the best set has least of: poses that attract, and the radius' power of two (m), negative."""
         length = 0.0 if self.radius is None else self.radius.length
-        return (math.inf if self.others is None else len(self.others),
-                -math.floor(math.log2(length)) if length > 0 else math.inf)
+        return (
+            math.inf if self.others is None else len(self.others),
+            -math.floor(math.log2(length)) if length > 0 else math.inf,
+        )
 
     @property
     def length(self) -> float:
@@ -68,28 +70,39 @@ class LoopEnds(Value):
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
         angle = None if self.radius is None else self.radius.angle
-        return {"attracting": None if self.others is None else len(self.others),
-                "kinds": None if self.others is None else list(self.others),
-                "radius_mm": 1e3 * self.length if self.length else None,
-                "radius_deg": None if angle is None or not self.length else float(np.degrees(angle)),
-                "reason": self.why or None}
+        return {
+            "attracting": None if self.others is None else len(self.others),
+            "kinds": None if self.others is None else list(self.others),
+            "radius_mm": 1e3 * self.length if self.length else None,
+            "radius_deg": None if angle is None or not self.length else float(np.degrees(angle)),
+            "reason": self.why or None,
+        }
 
 
-def fewer_are_better(best: tuple[tuple[str, ...], LoopEnds], others: Iterable[tuple[tuple[str, ...], LoopEnds]]
-                     ) -> str | None:
+def fewer_are_better(
+    best: tuple[tuple[str, ...], LoopEnds], others: Iterable[tuple[tuple[str, ...], LoopEnds]]
+) -> str | None:
     """Why a set of legs serves better than the largest that holds all of them and more, in a sentence; None where no
     such set has more poses that attract or a smaller certified radius."""
     legs, ends = best
-    worse = [(each, its) for each, its in others
-             if set(legs) < set(each) and its.others is not None and its.order > ends.order]
+    worse = [
+        (each, its)
+        for each, its in others
+        if set(legs) < set(each) and its.others is not None and its.order > ends.order
+    ]
     if not worse:
         return None
     more, its = max(worse, key=lambda pair: len(pair[0]))
     first = f"fewer legs are better here: with {', '.join(legs)} "
     if its.order[0] > ends.order[0]:
-        why = ("; the errors of more directions than there are freedoms can balance where they do not vanish"
-               if CRITICAL in (its.others or ()) else "")
-        return (f"{first}the loop was found to be drawn to {ends.words} besides the goal, with {', '.join(more)} to "
-                f"{its.words}{why}")
+        why = (
+            "; the errors of more directions than there are freedoms can balance where they do not vanish"
+            if CRITICAL in (its.others or ())
+            else ""
+        )
+        return (
+            f"{first}the loop was found to be drawn to {ends.words} besides the goal, with {', '.join(more)} to "
+            f"{its.words}{why}"
+        )
     found = f"{1e3 * its.length:.3g} mm" if its.length else "undecided"
     return f"{first}the certified radius is {1e3 * ends.length:.3g} mm, with {', '.join(more)} it is {found}"

@@ -50,8 +50,13 @@ CONE = "0.1deg"
 FOCAL = 800.0
 """Focal length of the camera (pixels)."""
 AUTO = "auto"
-TYPES = {"type1": "a Type 1 singularity", "type2": "a Type 2 singularity", "type3": "a Type 3 singularity",
-         "constraint": "a constraint singularity", "undecided": "too close to a singularity to decide"}
+TYPES = {
+    "type1": "a Type 1 singularity",
+    "type2": "a Type 2 singularity",
+    "type3": "a Type 3 singularity",
+    "constraint": "a constraint singularity",
+    "undecided": "too close to a singularity to decide",
+}
 
 
 @dataclass(frozen=True)
@@ -149,17 +154,24 @@ class Candidate(Value):
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
         errors = self.errors
-        return {"legs": list(self.legs), "verdict": self.verdict, "discarded": self.discarded,
-                "examined": self.examined,
-                "position_mm": errors and errors.position.to_dict(1e3)["largest"],
-                "position_gap": errors and errors.position.gap,
-                "orientation_deg": errors and errors.orientation.to_dict(180 / np.pi)["largest"],
-                "orientation_gap": errors and errors.orientation.gap,
-                "seen": None if self.seen is None else dict(self.seen),
-                "modes": {"start": self.start_modes and self.start_modes.to_dict(),
-                          "goal": self.goal_modes and self.goal_modes.to_dict()},
-                "aspect": self.aspect and self.aspect.to_dict(), "endings": self.ends and self.ends.to_dict(),
-                "run": self.run and self.run.to_dict()}
+        return {
+            "legs": list(self.legs),
+            "verdict": self.verdict,
+            "discarded": self.discarded,
+            "examined": self.examined,
+            "position_mm": errors and errors.position.to_dict(1e3)["largest"],
+            "position_gap": errors and errors.position.gap,
+            "orientation_deg": errors and errors.orientation.to_dict(180 / np.pi)["largest"],
+            "orientation_gap": errors and errors.orientation.gap,
+            "seen": None if self.seen is None else dict(self.seen),
+            "modes": {
+                "start": self.start_modes and self.start_modes.to_dict(),
+                "goal": self.goal_modes and self.goal_modes.to_dict(),
+            },
+            "aspect": self.aspect and self.aspect.to_dict(),
+            "endings": self.ends and self.ends.to_dict(),
+            "run": self.run and self.run.to_dict(),
+        }
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -203,23 +215,45 @@ class Selection(Result, shown_as="select"):
         """The record of the command line, without the command's own fields."""
         best = next(iter(self.kept), None)
         eye = self.sight
-        camera = None if eye is None else {"link": eye.reference, "pose": eye.camera.place.tolist(),
-                                           "focal": eye.camera.focal}
-        return {"from": self.start.to_dict(), "to": self.goal.to_dict(), "camera": self.setting.mechanism.reference,
-                "cones": {o.leg: float(np.degrees(cone))
-                          for o, cone in zip(self.setting.observed, self.blur.cones, strict=True) if cone},
-                "noise": self.blur.amounts,
-                "sight": camera, "best": None if best is None else list(best.legs), "fewer": self.fewer,
-                "not_examined": {"count": len(self.unexamined), "reason": self.left},
-                "unlimited": list(self.setting.unlimited),
-                "sets": [each.to_dict() for each in self.candidates]}
+        camera = (
+            None
+            if eye is None
+            else {"link": eye.reference, "pose": eye.camera.place.tolist(), "focal": eye.camera.focal}
+        )
+        return {
+            "from": self.start.to_dict(),
+            "to": self.goal.to_dict(),
+            "camera": self.setting.mechanism.reference,
+            "cones": {
+                o.leg: float(np.degrees(cone))
+                for o, cone in zip(self.setting.observed, self.blur.cones, strict=True)
+                if cone
+            },
+            "noise": self.blur.amounts,
+            "sight": camera,
+            "best": None if best is None else list(best.legs),
+            "fewer": self.fewer,
+            "not_examined": {"count": len(self.unexamined), "reason": self.left},
+            "unlimited": list(self.setting.unlimited),
+            "sets": [each.to_dict() for each in self.candidates],
+        }
 
 
 @question(cones="cone")
 @by_name(Criteria, "criteria")
-def select(robot: RobotLike, camera: CameraLike = None, *, observe: LegsLike = None, see: SeeLike = None,
-           start: PoseLike, goal: PoseLike, cone: Cones | None = None, noise: str | Noise | None = None,
-           criteria: Criteria, seed: int = 0) -> Selection:
+def select(
+    robot: RobotLike,
+    camera: CameraLike = None,
+    *,
+    observe: LegsLike = None,
+    see: SeeLike = None,
+    start: PoseLike,
+    goal: PoseLike,
+    cone: Cones | None = None,
+    noise: str | Noise | None = None,
+    criteria: Criteria,
+    seed: int = 0,
+) -> Selection:
     """All sets of legs, or of what is observed, for the displacement from ``start`` to ``goal``, ranked by how many
     poses besides the goal were found to attract the loop, by the certified radius (radii within one power of two are
     equal), then by the largest position error at the goal for cones about the directions (``cone``: the half-angle for
@@ -247,11 +281,20 @@ def select(robot: RobotLike, camera: CameraLike = None, *, observe: LegsLike = N
     if observe is None and not others:
         setting = replace(setting, observed=setting.all_legs)
     directed = any(isinstance(o, SeenAxis) for o in setting.observed)
-    blur = Blur.of(CONE if cone is None and directed and (noise is None or not others) else cone, noise,
-                   setting.observed)
+    blur = Blur.of(
+        CONE if cone is None and directed and (noise is None or not others) else cone, noise, setting.observed
+    )
     ends = configurations_at(setting, wanted)
-    work = _Work(setting, ends[0], ends[1], blur, _sight(setting, ends, criteria), criteria,
-                 np.inf if criteria.seconds is None else time.monotonic() + criteria.seconds, seed)
+    work = _Work(
+        setting,
+        ends[0],
+        ends[1],
+        blur,
+        _sight(setting, ends, criteria),
+        criteria,
+        np.inf if criteria.seconds is None else time.monotonic() + criteria.seconds,
+        seed,
+    )
     labels = labels_of(setting.observed)
     sets = [legs for count in range(1, min(criteria.size, len(labels)) + 1) for legs in combinations(labels, count)]
     looked = []
@@ -259,8 +302,13 @@ def select(robot: RobotLike, camera: CameraLike = None, *, observe: LegsLike = N
         with part(f"set {number} of {len(sets)}"):
             looked.append(work.first(legs))
     found, left = work.examine(sorted(looked, key=lambda each: each.order))
-    found.sort(key=lambda each: (each.discarded is not None, not each.examined,
-                                 () if each.discarded is not None else each.rank))
+    found.sort(
+        key=lambda each: (
+            each.discarded is not None,
+            not each.examined,
+            () if each.discarded is not None else each.rank,
+        )
+    )
     poses = [setting.motion.pose(at.pose(setting.motion.link)) for at in ends]
     return Selection(setting, poses[0], poses[1], tuple(found), blur, work.sight, left)
 
@@ -270,9 +318,11 @@ def _sight(setting: ObservedRobot, ends: Sequence[ClosedConfiguration], criteria
         return None
     rods = cylinders(setting.mechanism, setting.observed)
     reference = setting.mechanism.reference
-    camera = (place_camera(rods, reference, [at.pose for at in ends], of_focal(criteria.focal))
-              if criteria.sight == AUTO
-              else camera_at(criteria.sight, criteria.focal))
+    camera = (
+        place_camera(rods, reference, [at.pose for at in ends], of_focal(criteria.focal))
+        if criteria.sight == AUTO
+        else camera_at(criteria.sight, criteria.focal)
+    )
     return CameraView(camera, reference, {o.leg: rod for o, rod in zip(setting.observed, rods, strict=True)})
 
 
@@ -308,8 +358,11 @@ class _Work:
             reasons = [f"{o.kind} {o.leg} is not in front of its camera at the {name}" for name, o in behind if o]
             if reasons:
                 return Candidate(legs, verdict.verdict, reasons[0])
-            reasons = [f"the {name} is beyond the limits of {', '.join(joints)}"
-                       for name, at in ends if (joints := outside(at.twin, at.q))]
+            reasons = [
+                f"the {name} is beyond the limits of {', '.join(joints)}"
+                for name, at in ends
+                if (joints := outside(at.twin, at.q))
+            ]
             reasons += [reason for name, at in ends if (reason := _singular_at(name, analysis.classify(at)))]
         except HrsynthError as error:
             return Candidate(legs, "undecided", str(error))
@@ -340,8 +393,11 @@ class _Work:
             aspect = Decision(answer.verdict, answer.reason)
         except HrsynthError as error:
             aspect = Decision("undecided", str(error))
-        why = ("start and goal, with the directions observed at them, lie in different aspects: "
-               f"{aspect.reason}") if aspect.verdict == SEPARATED else None
+        why = (
+            (f"start and goal, with the directions observed at them, lie in different aspects: {aspect.reason}")
+            if aspect.verdict == SEPARATED
+            else None
+        )
         return replace(candidate, start_modes=start_modes, goal_modes=goal_modes, aspect=aspect, discarded=why)
 
     @staticmethod
@@ -364,8 +420,11 @@ class _Work:
                 found.append(candidate)
                 continue
             if left is None and (begun == most or time.monotonic() > self.until):
-                left = f"the {begun} most accurate were" if begun == most else (
-                    f"the time ran out after the {begun} most accurate, on a faster machine there would be more")
+                left = (
+                    f"the {begun} most accurate were"
+                    if begun == most
+                    else (f"the time ran out after the {begun} most accurate, on a faster machine there would be more")
+                )
             if left is not None:
                 found.append(replace(candidate, examined=False))
                 continue
@@ -406,9 +465,11 @@ class _Work:
         start, goal = (motion.pose(at.pose(motion.link)) for at in (self.start, self.goal))
         camera = None if mechanism.reference == mechanism.base else mechanism.reference
         try:
-            found = (servo(self.setting.robot, candidate.legs, camera, start=start, goal=goal, seed=self.seed)
-                     if all(o.by_segment for o in self.setting.observed) else
-                     servo(self.watching(candidate.legs), start=start, goal=goal, seed=self.seed))
+            found = (
+                servo(self.setting.robot, candidate.legs, camera, start=start, goal=goal, seed=self.seed)
+                if all(o.by_segment for o in self.setting.observed)
+                else servo(self.watching(candidate.legs), start=start, goal=goal, seed=self.seed)
+            )
         except HrsynthError as error:
             return replace(candidate, run=Decision("refused", str(error)), discarded=f"the run is refused: {error}")
         run = Decision(found.ended, found.ending.reason)

@@ -81,8 +81,9 @@ def camera_at(text: str, focal: float) -> Camera:
     wanted = Pose.parse(text)
     if None in (wanted.x, wanted.y, wanted.z) or wanted.rotation is None:
         raise BadRequest("pose of the camera: a part is missing", text, "x, y, z and rpy; or auto")
-    return replace(blank, place=pose([float(wanted.x or 0), float(wanted.y or 0), float(wanted.z or 0)],
-                                     wanted.rotation))
+    return replace(
+        blank, place=pose([float(wanted.x or 0), float(wanted.y or 0), float(wanted.z or 0)], wanted.rotation)
+    )
 
 
 def of_focal(focal: float) -> Camera:

@@ -53,8 +53,11 @@ class Bench:
         simulator("the physics bench")
         question = motors(setting)
         if relation(start, question).unobserved_twists.shape[1]:
-            raise BadRequest(f"{setting.robot.name}: its motors do not determine the platform's motion",
-                             str(setting.motion.pose(start.pose(setting.motion.link))), "a robot whose motors do")
+            raise BadRequest(
+                f"{setting.robot.name}: its motors do not determine the platform's motion",
+                str(setting.motion.pose(start.pose(setting.motion.link))),
+                "a robot whose motors do",
+            )
         return cls(setting, start)
 
     @cached_property
@@ -68,8 +71,7 @@ class Bench:
 
     @cached_property
     def _names(self) -> list[str]:
-        return [name for joint in self.mechanism.joints.values() if joint.actuated
-                for name, _, _ in coordinates(joint)]
+        return [name for joint in self.mechanism.joints.values() if joint.actuated for name, _, _ in coordinates(joint)]
 
     def run(self, loop: Loop, horizon: float) -> tuple[Run, Array]:
         """Run until the error is below ``BENCH_SETTLED`` or ``horizon`` (s); also the displacement of the platform
@@ -81,8 +83,9 @@ class Bench:
         mujoco.mj_kinematics(model, data)
         twin = self.start.twin
         driven = twin.actuated_indices()
-        scale = np.array([twin.length if model.joint(name).type[0] == mujoco.mjtJoint.mjJNT_SLIDE else 1.0
-                          for name in self._names])
+        scale = np.array(
+            [twin.length if model.joint(name).type[0] == mujoco.mjtJoint.mjJNT_SLIDE else 1.0 for name in self._names]
+        )
         at, time, stopped = self.start, 0.0, TIME
         times: list[float] = []
         states: list[tuple[ClosedConfiguration, Command]] = []
@@ -133,8 +136,9 @@ class Bench:
         return replace(command, error=true, true=tuple(seen))
 
 
-def read_encoders(start: ClosedConfiguration, at: ClosedConfiguration, places: list[int], moved: Array
-            ) -> ClosedConfiguration | None:
+def read_encoders(
+    start: ClosedConfiguration, at: ClosedConfiguration, places: list[int], moved: Array
+) -> ClosedConfiguration | None:
     """The configuration next to ``at`` to which these motors have moved since the start; None where there is none. What
     more motors say than how they can move together is left out."""
     free, _ = range_basis(at.kernel()[0][places], 1.0)

@@ -71,8 +71,11 @@ def edges(ends: Array, radius: float) -> tuple[Array, Array]:
     moment = np.cross(ends[0], u)
     distance = float(np.linalg.norm(moment))
     if distance <= radius:
-        raise BadRequest("the camera is inside a leg or looks along it, distance from its axis (m)", distance,
-                         f"more than its radius {radius:.4g}")
+        raise BadRequest(
+            "the camera is inside a leg or looks along it, distance from its axis (m)",
+            distance,
+            f"more than its radius {radius:.4g}",
+        )
     h = moment / distance
     sine = radius / distance
     cosine = np.sqrt(1 - sine**2)
@@ -118,8 +121,10 @@ class Edges(Value):
         found = []
         for number, rod in enumerate(self.rods):
             ends = self.camera.project(poses(self.reference), poses, rod)
-            normals = [_move_edge(normal, ends, shock[2 * number + side])
-                       for side, normal in enumerate(edges(ends, rod.radius))]
+            normals = [
+                _move_edge(normal, ends, shock[2 * number + side])
+                for side, normal in enumerate(edges(ends, rod.radius))
+            ]
             found.append(self.camera.place[:3, :3] @ rebuilt(*normals))
         return np.array(found)
 
@@ -136,8 +141,9 @@ def _move_edge(normal: Array, ends: Array, shift: Array) -> Array:
     return found if found @ normal > 0 else -found
 
 
-def place_camera(rods: Sequence[Cylinder], reference: str, poses: Sequence[Poses],
-                 blank: Camera | None = None) -> Camera:
+def place_camera(
+    rods: Sequence[Cylinder], reference: str, poses: Sequence[Poses], blank: Camera | None = None
+) -> Camera:
     """A camera on the reference link from which all rods lie in the picture at all given poses, where the rebuilt
     directions suffer least from errors of pixels: among places on a sphere of directions around them."""
     ends = np.array([rods_in_frame(rods, reference, X) for X in poses])

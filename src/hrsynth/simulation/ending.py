@@ -58,23 +58,31 @@ class EndingClassifier(Value):
         if run.stopped == UNSEEN:
             return Ending(SIGHT, f"{self._unseen(run.last)}: the loop has nothing to act on")
         if run.stopped == UNMEASURED:
-            return Ending(SIGHT, "a point or line comes to the camera's centre, or the camera into a cylinder: what is "
-                                 "measured has no value there")
+            return Ending(
+                SIGHT,
+                "a point or line comes to the camera's centre, or the camera into a cylinder: what is "
+                "measured has no value there",
+            )
         if run.stopped == OPEN:
             return Ending(BOUNDARY, "the loops lose their rank here, and the integrator could not continue")
         if run.stopped == LOST:
             return Ending(UNDECIDED, "the integrator could not continue, which says nothing about the robot")
         if run.stopped == AWAY:
             return Ending(BOUNDARY, "the platform runs away, nothing limits its slides")
-        over = (f"more than {RUN_EVALUATIONS:,} configurations would be needed" if run.stopped == EFFORT
-                else "the time ran out")
+        over = (
+            f"more than {RUN_EVALUATIONS:,} configurations would be needed"
+            if run.stopped == EFFORT
+            else "the time ran out"
+        )
         way = ""
         if run.ahead is not None:
             there, slow = run.ahead
             goal = self.same_pose(there, self.goal.pose(self.setting.motion.link))
             pose = "the goal" if goal else str(self.setting.motion.pose(there.pose(self.setting.motion.link)))
-            way = (f"; it was still on its way to a rest that attracts, found at {pose}, where the distance left falls "
-                   f"by a factor of e every {slow:.3g} s")
+            way = (
+                f"; it was still on its way to a rest that attracts, found at {pose}, where the distance left falls "
+                f"by a factor of e every {slow:.3g} s"
+            )
         return Ending(TIME, f"{over}, with ‖e‖ = {last.size:.3g}{way}")
 
     def _near(self, at: ClosedConfiguration, size: float) -> str:
@@ -84,10 +92,18 @@ class EndingClassifier(Value):
             listed = modes(self.setting, at=motion.pose(self.goal.pose(motion.link))) if size < NEAR_MODE else None
         except HrsynthError:
             return ""
-        return next((f"; it is near mode {k} of the goal: what is measured differs {mode.differs}"
-                     for k, mode in enumerate(() if listed is None else listed.near, 1)
-                     if mode.bodies and all(pose_difference(at.pose(body), X, at.twin.length) <= SAME_NEAR_POSE
-                                            for body, X in mode.bodies.items())), "")
+        return next(
+            (
+                f"; it is near mode {k} of the goal: what is measured differs {mode.differs}"
+                for k, mode in enumerate(() if listed is None else listed.near, 1)
+                if mode.bodies
+                and all(
+                    pose_difference(at.pose(body), X, at.twin.length) <= SAME_NEAR_POSE
+                    for body, X in mode.bodies.items()
+                )
+            ),
+            "",
+        )
 
     def _unseen(self, at: ClosedConfiguration) -> str:
         """What a camera has lost."""
@@ -96,13 +112,19 @@ class EndingClassifier(Value):
         return f"{first.kind} {first.leg} leaves the camera's sight"
 
     def _serve(self, at: ClosedConfiguration, values: Measures) -> Ending:
-        opposite = [float(value @ wanted) < 0 for o, value, wanted in
-                    zip(self.setting.observed, values, self.wanted, strict=True) if isinstance(o, SeenAxis)]
+        opposite = [
+            float(value @ wanted) < 0
+            for o, value, wanted in zip(self.setting.observed, values, self.wanted, strict=True)
+            if isinstance(o, SeenAxis)
+        ]
         word = "directions" if len(opposite) == len(self.setting.observed) else "measurements"
         if any(opposite):
             there = "; the pose is the goal's" if self.same_pose(at, self.goal.pose(self.setting.motion.link)) else ""
-            return Ending(ANTIPODAL, f"{sum(opposite)} of {len(opposite)} directions end opposite to the desired "
-                                     f"ones, where the error vanishes as well{there}")
+            return Ending(
+                ANTIPODAL,
+                f"{sum(opposite)} of {len(opposite)} directions end opposite to the desired "
+                f"ones, where the error vanishes as well{there}",
+            )
         if self.same_pose(at, self.goal.pose(self.setting.motion.link)):
             return Ending(GOAL, f"the {word} and the pose are those of the goal")
         try:
@@ -113,10 +135,15 @@ class EndingClassifier(Value):
         for number, mode in enumerate(listed.modes, 1):
             bodies = mode.bodies or {}
             if bodies and all(self._alike(at.pose(body), X, None) for body, X in bodies.items()):
-                return Ending(MODE, f"the {word} are the goal's, the pose is its assembly mode {number} of "
-                                    f"{len(listed.modes)}", number, listed)
-        return Ending(MODE, f"the {word} are the goal's, the pose is none of the assembly modes that were listed",
-                      None, listed)
+                return Ending(
+                    MODE,
+                    f"the {word} are the goal's, the pose is its assembly mode {number} of {len(listed.modes)}",
+                    number,
+                    listed,
+                )
+        return Ending(
+            MODE, f"the {word} are the goal's, the pose is none of the assembly modes that were listed", None, listed
+        )
 
     def same_pose(self, at: ClosedConfiguration, X: Array) -> bool:
         """Whether the platform of a configuration is at X (4, 4), to ``SAME_RELATION``."""
@@ -135,8 +162,11 @@ def rest(setting: ObservedRobot, at: ClosedConfiguration, last: Command) -> Endi
     shifted = at.velocity(setting.motion.link) @ last.weak
     if weak and float(np.linalg.norm(shifted)) < DAMPED:
         tree = len(at.twin.mechanism.joints) < len(at.twin.mechanism.links)
-        why = ("the arm is at a singularity of its own, as where it is stretched" if tree else
-               "a leg that is not watched is stretched to its limit")
+        why = (
+            "the arm is at a singularity of its own, as where it is stretched"
+            if tree
+            else "a leg that is not watched is stretched to its limit"
+        )
         return Ending(BOUNDARY, f"{where}: {why}")
     far = posture.distances
     if weak and far.type2 is not None and far.type2 < DAMPED:
@@ -144,8 +174,10 @@ def rest(setting: ObservedRobot, at: ClosedConfiguration, last: Command) -> Endi
     if (far.type1 is not None and far.type1 < DAMPED) or far.type2 is None:
         return Ending(MINIMUM, f"{where} at a Type 1 singularity of the hidden robot")
     if weak and any(isinstance(each, SeenAxis) for each in setting.observed):
-        return Ending(MINIMUM, f"{where} off the singularities of the hidden robot: a direction is perpendicular "
-                               "to the desired one")
+        return Ending(
+            MINIMUM,
+            f"{where} off the singularities of the hidden robot: a direction is perpendicular to the desired one",
+        )
     off = f"{where} off the singularities of the hidden robot"
     if weak:
         return Ending(MINIMUM, f"{off}: the law's own rows, with the depths that it supposes, lose rank there")

@@ -84,8 +84,13 @@ class Law(Value):
     gain: float
     planes: tuple[Array | None, ...] | None = None
 
-    def at(self, configuration: ClosedConfiguration, desired: tuple[Measures, Measures], sensed: Sense | None = None,
-           time: float = 0.0) -> Command:
+    def at(
+        self,
+        configuration: ClosedConfiguration,
+        desired: tuple[Measures, Measures],
+        sensed: Sense | None = None,
+        time: float = 0.0,
+    ) -> Command:
         """The command at a configuration (of the joint velocities of its twin)."""
         every = self.question.observations
         y, exact = measure_all(configuration, self.question)
@@ -99,8 +104,10 @@ class Law(Value):
         rows = rows @ kernel
         left, values, right = np.linalg.svd(rows, full_matrices=False)
         left, values, right = left[:, : self.dof], values[: self.dof], right[: self.dof]
-        drift = [o.error_slope(w, s) @ m if m.any() else 0 * e
-                 for o, s, w, m, e in zip(every, seen, wanted, moving, error, strict=True)]
+        drift = [
+            o.error_slope(w, s) @ m if m.any() else 0 * e
+            for o, s, w, m, e in zip(every, seen, wanted, moving, error, strict=True)
+        ]
         e = np.concatenate(error)
         asked = self.gain * e - np.concatenate(drift)
         velocity = -kernel @ (right.T @ (damped_inverses(values) * (left.T @ asked)))
@@ -124,8 +131,13 @@ class Law(Value):
 
     def in_front(self, at: ClosedConfiguration) -> float:
         """The least of :meth:`Observation.in_front`."""
-        return min((o.in_front(at.pose(o.seen_from or self.question.reference), at.pose(o.link))
-                    for o in self.question.observations), default=np.inf)
+        return min(
+            (
+                o.in_front(at.pose(o.seen_from or self.question.reference), at.pose(o.link))
+                for o in self.question.observations
+            ),
+            default=np.inf,
+        )
 
 
 def supposed_planes(text: str, goal: ClosedConfiguration, question: Measurement) -> tuple[Array | None, ...] | None:
@@ -147,8 +159,11 @@ def supposed_planes(text: str, goal: ClosedConfiguration, question: Measurement)
             plane = seen.plane_at(goal.pose(seen.seen_from or question.reference), goal.pose(seen.link))
         found.append(plane if plane is None or depth is None else depth_plane(np.array([depth])))
     if not any(plane is not None for plane in found):
-        raise BadRequest("--depth: nothing that is observed needs a depth", text,
-                         "none, or --see of what is seen in an image: point, image_line, edge …")
+        raise BadRequest(
+            "--depth: nothing that is observed needs a depth",
+            text,
+            "none, or --see of what is seen in an image: point, image_line, edge …",
+        )
     return tuple(found)
 
 
@@ -217,8 +232,9 @@ class Trajectory(Value):
         return np.split(rows, np.cumsum(self.sizes)[:-1])
 
 
-def straight(start: ClosedConfiguration, motion: PlatformMotion, goal: Goal, question: Measurement,
-             duration: float) -> tuple[Trajectory, ClosedConfiguration]:
+def straight(
+    start: ClosedConfiguration, motion: PlatformMotion, goal: Goal, question: Measurement, duration: float
+) -> tuple[Trajectory, ClosedConfiguration]:
     """The trajectory of the values on the straight way from ``start`` to a goal of the whole pose (where parts of
     the pose depend on each other, along the poses nearest to it), and the configuration at its end; raises
     ``PoseNotReached`` where the way is blocked."""
@@ -229,8 +245,13 @@ def straight(start: ClosedConfiguration, motion: PlatformMotion, goal: Goal, que
         here, came = lead_to(here, motion, goal.towards(X, float(fraction)), last=fraction == 1)
         if not came:
             at = motion.pose(here.pose(motion.link))
-            raise PoseNotReached(start.twin.mechanism.name, str(motion.pose(goal_pose(goal))), float(fraction), str(at),
-                                 origin="the start")
+            raise PoseNotReached(
+                start.twin.mechanism.name,
+                str(motion.pose(goal_pose(goal))),
+                float(fraction),
+                str(at),
+                origin="the start",
+            )
         # an angle goes on where it passes half a turn
         now = measure_all(here, question)[0]
         marks.append(tuple(last + o.apart(value, last) for o, value, last in zip(every, now, marks[-1], strict=True)))

@@ -60,8 +60,15 @@ def mockup(mechanism: Mechanism) -> str:
     made = Mockup(mechanism)
     root = made.root
     root.set("model", mechanism.name)
-    Xml.SubElement(root, "option", timestep=str(STEP), gravity=f"0 0 {-GRAVITY}", integrator="implicitfast",
-                   iterations="100", tolerance="1e-12")
+    Xml.SubElement(
+        root,
+        "option",
+        timestep=str(STEP),
+        gravity=f"0 0 {-GRAVITY}",
+        integrator="implicitfast",
+        iterations="100",
+        tolerance="1e-12",
+    )
     Xml.SubElement(root, "compiler", angle="radian", autolimits="false", inertiafromgeom="true")
     Xml.SubElement(Xml.SubElement(root, "default"), "geom", contype="0", conaffinity="0", density=str(DENSITY))
     world = Xml.SubElement(root, "worldbody")
@@ -101,31 +108,43 @@ def coordinates(joint: Joint) -> Iterator[tuple[str, str, Array]]:
         return
     found = elementary(joint.type, joint.axes, across)
     for number, (kind, axis) in enumerate(found):
-        yield (f"{joint.name}__{number}" if len(found) > 1 else joint.name,
-               "slide" if kind is JointType.PRISMATIC else "hinge", axis)
+        yield (
+            f"{joint.name}__{number}" if len(found) > 1 else joint.name,
+            "slide" if kind is JointType.PRISMATIC else "hinge",
+            axis,
+        )
 
 
 def _joints(made: Mockup, body: Xml.Element, joint: Joint, extra: float = 0.0) -> None:
     for name, kind, axis in coordinates(joint):
         inertia = _inertia(made.mechanism, kind)
-        moving = {"armature": (ROTOR if joint.actuated else extra) * inertia,
-                  "damping": 0.0 if joint.actuated else DAMPING * inertia}
-        Xml.SubElement(body, "joint", {name: f"{value:.9g}" for name, value in moving.items()}, name=name, type=kind,
-                       pos=_text(joint.point), axis=_text(axis))
+        moving = {
+            "armature": (ROTOR if joint.actuated else extra) * inertia,
+            "damping": 0.0 if joint.actuated else DAMPING * inertia,
+        }
+        Xml.SubElement(
+            body,
+            "joint",
+            {name: f"{value:.9g}" for name, value in moving.items()},
+            name=name,
+            type=kind,
+            pos=_text(joint.point),
+            axis=_text(axis),
+        )
 
 
 def _loop(made: Mockup, bodies: Mapping[str, Xml.Element], equality: Xml.Element, joint: Joint) -> None:
     """Close a loop: a ball by its centre, any other joint by a light body on one link that is welded to the other."""
     a, b = joint.links
     if joint.type is JointType.SPHERICAL:
-        Xml.SubElement(equality, "connect", STIFF, body1=_name(made, a), body2=_name(made, b),
-                       anchor=_text(joint.point))
+        Xml.SubElement(
+            equality, "connect", STIFF, body1=_name(made, a), body2=_name(made, b), anchor=_text(joint.point)
+        )
         return
     half = _body(bodies[a], f"{joint.name}__cut")
     _joints(made, half, joint, CUT)
     Xml.SubElement(half, "geom", type="sphere", size=_text([made.radius / 2]), pos=_text(joint.point), group="3")
-    Xml.SubElement(equality, "weld", STIFF, body1=f"{joint.name}__cut", body2=_name(made, b),
-                   anchor=_text(joint.point))
+    Xml.SubElement(equality, "weld", STIFF, body1=f"{joint.name}__cut", body2=_name(made, b), anchor=_text(joint.point))
 
 
 def _drive(made: Mockup, actuator: Xml.Element, tree: list[Joint]) -> None:
@@ -137,10 +156,11 @@ def _drive(made: Mockup, actuator: Xml.Element, tree: list[Joint]) -> None:
 
 def _gears(mechanism: Mechanism, equality: Xml.Element, tree: list[Joint]) -> None:
     for coupling in mechanism.couplings:
-        names = [next(j.name for j in tree if j.successor == link and j.in_tree and j.type.freedoms == 1)
-                 for link in (coupling.successor, coupling.predecessor)]
-        Xml.SubElement(equality, "joint", STIFF, joint1=names[0], joint2=names[1],
-                       polycoef=f"0 {coupling.ratio} 0 0 0")
+        names = [
+            next(j.name for j in tree if j.successor == link and j.in_tree and j.type.freedoms == 1)
+            for link in (coupling.successor, coupling.predecessor)
+        ]
+        Xml.SubElement(equality, "joint", STIFF, joint1=names[0], joint2=names[1], polycoef=f"0 {coupling.ratio} 0 0 0")
 
 
 def _body(parent: Xml.Element, name: str) -> Xml.Element:

@@ -70,8 +70,12 @@ class LegRenderer:
         root = Xml.Element("mujoco")
         fov = np.degrees(2 * np.arctan(camera.height / 2 / camera.focal))
         visual = Xml.SubElement(root, "visual")
-        Xml.SubElement(visual, "global", offwidth=str(PICTURE_OVERSAMPLING * camera.width),
-                       offheight=str(PICTURE_OVERSAMPLING * camera.height))
+        Xml.SubElement(
+            visual,
+            "global",
+            offwidth=str(PICTURE_OVERSAMPLING * camera.width),
+            offheight=str(PICTURE_OVERSAMPLING * camera.height),
+        )
         Xml.SubElement(visual, "map", znear=str(0.02))
         Xml.SubElement(visual, "quality", offsamples="8")
         Xml.SubElement(visual, "headlight", ambient="1 1 1", diffuse="0 0 0", specular="0 0 0")
@@ -79,22 +83,33 @@ class LegRenderer:
         for link in self._links:
             body = Xml.SubElement(world, "body", name=link, mocap="true")
             X = inverse(self.mechanism.links[link].pose)
-            drawn = [(ends @ X[:3, :3].T + X[:3, 3], GREY * np.ones(3))
-                     for ends in map(np.array, rods(self.mechanism, link))]
+            drawn = [
+                (ends @ X[:3, :3].T + X[:3, 3], GREY * np.ones(3)) for ends in map(np.array, rods(self.mechanism, link))
+            ]
             watched = [(rod.ends, COLOURS[i % len(COLOURS)]) for i, rod in enumerate(self.rods) if rod.link == link]
             for ends, colour in watched or drawn:
-                Xml.SubElement(body, "geom", type="cylinder", size=f"{radius}", contype="0", conaffinity="0",
-                               fromto=_text(ends), rgba=_text([*colour, 1]))
-        Xml.SubElement(Xml.SubElement(world, "body", name="camera__", mocap="true"), "camera", name="camera__",
-                       fovy=str(fov))
+                Xml.SubElement(
+                    body,
+                    "geom",
+                    type="cylinder",
+                    size=f"{radius}",
+                    contype="0",
+                    conaffinity="0",
+                    fromto=_text(ends),
+                    rgba=_text([*colour, 1]),
+                )
+        Xml.SubElement(
+            Xml.SubElement(world, "body", name="camera__", mocap="true"), "camera", name="camera__", fovy=str(fov)
+        )
         return drawing().MjModel.from_xml_string(Xml.tostring(root, encoding="unicode"))
 
     @cached_property
     def _renderer(self) -> Any:
         mujoco = drawing()
         try:
-            renderer = mujoco.Renderer(self._model, self.fineness * self.camera.height,
-                                       self.fineness * self.camera.width)
+            renderer = mujoco.Renderer(
+                self._model, self.fineness * self.camera.height, self.fineness * self.camera.width
+            )
         except (mujoco.FatalError, RuntimeError, AttributeError) as error:
             raise NotRendered(str(error)) from None
         return mujoco.MjData(self._model), renderer

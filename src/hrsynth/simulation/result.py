@@ -45,9 +45,14 @@ class Scatter:
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
-        return {"position_mm": 1e3 * self.metres, "orientation_deg": math.degrees(self.radians),
-                "rms_position_mm": 1e3 * self.rms_metres, "rms_orientation_deg": math.degrees(self.rms_radians),
-                "offset_mm": 1e3 * self.offset, "mean": list(self.mean)}
+        return {
+            "position_mm": 1e3 * self.metres,
+            "orientation_deg": math.degrees(self.radians),
+            "rms_position_mm": 1e3 * self.rms_metres,
+            "rms_orientation_deg": math.degrees(self.rms_radians),
+            "offset_mm": 1e3 * self.offset,
+            "mean": list(self.mean),
+        }
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -132,12 +137,24 @@ class Servo(Result, shown_as="servo"):
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line, without the command's own fields."""
         found = self.ending
-        return {**self.setting.to_dict(), "from": self.start.to_dict(), "to": self.goal.to_dict(), "gain": self.gain,
-                "depth": self.depth, "sense": self.sense, "noise": None if self.noise is None else str(self.noise),
-                "ended": self.ended, "reason": found.reason, "pose": self.pose.to_dict(), "matched_mode": found.matched,
-                "modes": None if found.modes is None else [each.to_dict() for each in found.modes.modes],
-                "type2": self.track.to_dict(self.run.times.tolist()),
-                "notes": list(self.notes), "spread": None if self.spread is None else self.spread.to_dict(),
-                "unlimited": list(self.setting.unlimited),
-                "times": self.run.times.tolist(), "error": self.errors.tolist(),
-                "poses": [self.pose_of(at).to_dict() for at in self.run.configurations]}
+        return {
+            **self.setting.to_dict(),
+            "from": self.start.to_dict(),
+            "to": self.goal.to_dict(),
+            "gain": self.gain,
+            "depth": self.depth,
+            "sense": self.sense,
+            "noise": None if self.noise is None else str(self.noise),
+            "ended": self.ended,
+            "reason": found.reason,
+            "pose": self.pose.to_dict(),
+            "matched_mode": found.matched,
+            "modes": None if found.modes is None else [each.to_dict() for each in found.modes.modes],
+            "type2": self.track.to_dict(self.run.times.tolist()),
+            "notes": list(self.notes),
+            "spread": None if self.spread is None else self.spread.to_dict(),
+            "unlimited": list(self.setting.unlimited),
+            "times": self.run.times.tolist(),
+            "error": self.errors.tolist(),
+            "poses": [self.pose_of(at).to_dict() for at in self.run.configurations],
+        }

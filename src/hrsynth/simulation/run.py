@@ -97,8 +97,9 @@ class Loop(Value):
         patience, stops = Patience(1 / self.law.gain, 0.0, found[0][1].size), Stops.of(start.twin, start.q)
         joint = None
         while stopped is None:
-            stretch = _Stretch(self, TangentChart.around(found[-1][0], self.moving), found[-1][0], left, patience,
-                               stops)
+            stretch = _Stretch(
+                self, TangentChart.around(found[-1][0], self.moving), found[-1][0], left, patience, stops
+            )
             reached, states, stopped = stretch.integrate(times[-1], horizon, longest)
             left, joint = stretch.left, stretch.beyond
             times += reached
@@ -146,8 +147,9 @@ class Loop(Value):
 class _Stretch:
     """One stretch of a run, in one chart; configurations are remembered while the integrator works around them."""
 
-    def __init__(self, loop: Loop, chart: TangentChart, start: ClosedConfiguration, left: int, patience: Patience,
-                 stops: Stops) -> None:
+    def __init__(
+        self, loop: Loop, chart: TangentChart, start: ClosedConfiguration, left: int, patience: Patience, stops: Stops
+    ) -> None:
         self.loop, self.chart, self.near, self.left, self.patience = loop, chart, start.q, left, patience
         self.stops = stops
         self.least = {name: min(0.0, margin) for name, margin in stops.margins(start.twin, start.q).items()}
@@ -169,8 +171,7 @@ class _Stretch:
         at, command = self.state(time, y)
         return self.chart.slope(at.q) @ command.velocity
 
-    def integrate(self, start: float, horizon: float, longest: float
-                  ) -> tuple[list[float], list[State], str | None]:
+    def integrate(self, start: float, horizon: float, longest: float) -> tuple[list[float], list[State], str | None]:
         """Times and states after ``start``, in steps of up to ``longest`` (s), and why the run stopped (None: only the
         stretch is at its end)."""
         from scipy.integrate import LSODA, RK23
@@ -187,8 +188,11 @@ class _Stretch:
         states: list[State] = []
         try:
             y = np.zeros(self.chart.basis.shape[1])
-            solver = (LSODA(self.rate, start, y, until, max_step=longest, **tolerances) if loop.smooth
-                      else RK23(self.rate, start, y, until, max_step=min(PERIOD, longest), **tolerances))
+            solver = (
+                LSODA(self.rate, start, y, until, max_step=longest, **tolerances)
+                if loop.smooth
+                else RK23(self.rate, start, y, until, max_step=min(PERIOD, longest), **tolerances)
+            )
             while solver.status == "running":
                 tell("run")
                 solver.step()

@@ -47,8 +47,11 @@ SETTLED = 0.5
 OVER = (LIMIT, UNSEEN, UNMEASURED, AWAY)
 """What ends a run for good: no loop without noise goes on from there."""
 EXACT, EDGES, PICTURES = "exact", "edges", "pictures"
-ALLOWED_NOISE = {EXACT: "an angle, such as 0.1deg", EDGES: "pixels, such as 0.3px",
-                 PICTURES: "none: the pictures have their own"}
+ALLOWED_NOISE = {
+    EXACT: "an angle, such as 0.1deg",
+    EDGES: "pixels, such as 0.3px",
+    PICTURES: "none: the pictures have their own",
+}
 """How directions are measured, and the noise of each."""
 DIRECTIONS, ANGLES, PIXELS = ("directions", " degrees"), ("angles", " degrees"), ("image points", " px")
 LENGTHS, VALUES = ("lengths", " mm"), ("values", "")
@@ -103,8 +106,11 @@ class Conditions:
         if self.time is not None and not 0 < self.time < math.inf:
             raise BadRequest("time", self.time, "a positive number of seconds")
         if self.horizon > LONGEST_RUN and (self.noisy or self.physics):
-            raise BadRequest("seconds of a run with noise or physics", self.horizon,
-                             f"at most {LONGEST_RUN:g}: a shorter time, a larger gain")
+            raise BadRequest(
+                "seconds of a run with noise or physics",
+                self.horizon,
+                f"at most {LONGEST_RUN:g}: a shorter time, a larger gain",
+            )
 
     @property
     def amount(self) -> Noise | None:
@@ -126,8 +132,17 @@ class Conditions:
 
 @question()
 @by_name(Conditions, "conditions")
-def servo(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
-          start: PoseLike, goal: PoseLike, conditions: Conditions, seed: int = 0) -> Servo:
+def servo(
+    robot: RobotLike,
+    observe: LegsLike = None,
+    camera: CameraLike = None,
+    *,
+    see: SeeLike = None,
+    start: PoseLike,
+    goal: PoseLike,
+    conditions: Conditions,
+    seed: int = 0,
+) -> Servo:
     """The servo loop of MMT 2.3 from the pose ``start`` towards what is measured at ``goal``.
 
     ``observe``, ``camera`` and ``see`` are as for ``derive``; each kind of observation has its error. The fields of
@@ -161,8 +176,15 @@ class ServoTask:
     seed: int = 0
 
     @classmethod
-    def of(cls, setting: ObservedRobot, *, start: PoseLike, goal: PoseLike, conditions: Conditions = Conditions(),
-           seed: int = 0) -> ServoTask:
+    def of(
+        cls,
+        setting: ObservedRobot,
+        *,
+        start: PoseLike,
+        goal: PoseLike,
+        conditions: Conditions = Conditions(),
+        seed: int = 0,
+    ) -> ServoTask:
         """The task of a request; raises what :func:`servo` raises."""
         wanted = [asked_pose(each) for each in (start, goal)]
         setting = setting.telling(wanted)
@@ -171,8 +193,14 @@ class ServoTask:
         return cls.between(setting, first, last, conditions, seed)
 
     @classmethod
-    def between(cls, setting: ObservedRobot, start: ClosedConfiguration, goal: ClosedConfiguration,
-                conditions: Conditions = Conditions(), seed: int = 0) -> ServoTask:
+    def between(
+        cls,
+        setting: ObservedRobot,
+        start: ClosedConfiguration,
+        goal: ClosedConfiguration,
+        conditions: Conditions = Conditions(),
+        seed: int = 0,
+    ) -> ServoTask:
         """The same between two configurations."""
         require_seen(setting)
         motion, ends = setting.motion, [start, goal]
@@ -210,8 +238,9 @@ class ServoTask:
 
     def loop(self, sensed: Sense | None = None, smooth: bool = True) -> Loop:
         """The closed loop with what is sensed, smoothly or not."""
-        return Loop(self.law, self.setting.everything.question, self.desired, self.conditions.duration or 0.0, sensed,
-                    smooth)
+        return Loop(
+            self.law, self.setting.everything.question, self.desired, self.conditions.duration or 0.0, sensed, smooth
+        )
 
     def sense(self) -> Sense:
         """What measures, and how wrong."""
@@ -238,14 +267,28 @@ class ServoTask:
         if (given.noisy or simulated is not None) and not over:
             # where the loop without noise and dynamics goes on to: its ending is the one that is told
             still = Loop(self.law, setting.everything.question, FixedDirections(self.wanted)).simulate(
-                run.last, LASTS / self.law.gain)
+                run.last, LASTS / self.law.gain
+            )
         classifier = EndingClassifier(setting, self.goal, self.wanted)
         ending = classifier.classify(still, measure_all(still.last, self.law.question)[0])
         track = track_run(run.configurations, self.law.question, setting.everything.question, setting.dof)
-        return Servo(setting, motion.pose(self.start.pose(motion.link)), motion.pose(self.goal.pose(motion.link)),
-                     self.wanted, self.law.gain, given.sense, given.amount, run, track, ending, given.depth,
-                     still.last, self.goal, self._scatter(run, still.last) if given.noisy and not over else None,
-                     tuple(self._notes(run, still, simulated)))
+        return Servo(
+            setting,
+            motion.pose(self.start.pose(motion.link)),
+            motion.pose(self.goal.pose(motion.link)),
+            self.wanted,
+            self.law.gain,
+            given.sense,
+            given.amount,
+            run,
+            track,
+            ending,
+            given.depth,
+            still.last,
+            self.goal,
+            self._scatter(run, still.last) if given.noisy and not over else None,
+            tuple(self._notes(run, still, simulated)),
+        )
 
     def _notes(self, run: Run, still: Run, simulated: Array | None) -> Iterator[str]:
         """What the run leaves out, and what was measured on the benches."""
@@ -254,8 +297,10 @@ class ServoTask:
             if beyond := outside(twin, at.q):
                 yield f"the {name} is beyond the limits of {', '.join(beyond)}"
         if self.setting.segments and (motors := len(twin.actuated_indices())) < self.setting.dof:
-            yield (f"motors for {motors} of the platform's {self.setting.dof} freedoms: "
-                   "fewer than the motion that is commanded needs")
+            yield (
+                f"motors for {motors} of the platform's {self.setting.dof} freedoms: "
+                "fewer than the motion that is commanded needs"
+            )
         if run.stopped == EFFORT:
             yield f"the run was stopped after {RUN_EVALUATIONS:,} configurations, at {run.times[-1]:.3g} s"
         if self.conditions.noisy:
@@ -267,14 +312,14 @@ class ServoTask:
             yield f"the simulated platform stopped {apart:.2g} mm from there"
 
     def _wrong(self, run: Run) -> Iterator[str]:
-        """By how much measured values were wrong, in units in which noise is given; of lines and circles their errors.
-        """
+        """By how much measured values were wrong, in units of the noise; of lines and circles their errors."""
         every, amount = self.setting.observed, self.conditions.amount
         units = [_unit(o, None if amount is None else dict(amount.amounts).keys()) for o in every]
         for kind in dict.fromkeys(unit for unit in units if unit is not None):
             chosen = [i for i, unit in enumerate(units) if unit == kind]
-            off = np.array([[_off(kind, every[i], each.seen[i], each.true[i]) for i in chosen]
-                            for each in run.commands]) * (self.goal.twin.length if kind == LENGTHS else 1.0)
+            off = np.array(
+                [[_off(kind, every[i], each.seen[i], each.true[i]) for i in chosen] for each in run.commands]
+            ) * (self.goal.twin.length if kind == LENGTHS else 1.0)
             rms = ", ".join(f"{value:.2g}" for value in np.sqrt(np.mean(off**2, axis=0)))
             word, unit = kind
             yield f"measured {word} were wrong by {rms}{unit} root mean square, at most {off.max():.2g}{unit}"
@@ -282,23 +327,34 @@ class ServoTask:
     def _scatter(self, run: Run, settled: ClosedConfiguration) -> Scatter:
         motion = self.setting.motion
         X = settled.pose(motion.link)
-        late = [at.pose(motion.link) for time, at in zip(run.times, run.configurations, strict=True)
-                if time >= SETTLED * run.times[-1]]
+        late = [
+            at.pose(motion.link)
+            for time, at in zip(run.times, run.configurations, strict=True)
+            if time >= SETTLED * run.times[-1]
+        ]
         moved = np.array([motion.position(each) for each in late]) - motion.position(X)
         lengths, middle = np.linalg.norm(moved, axis=1), moved.mean(axis=0)
         x, y, z = map(float, motion.position(X) + middle)
-        turns = np.array([angle_of(each[:3, :3] @ X[:3, :3].T) if motion.body else 0.0
-                          for each in late])
-        return Scatter(float(lengths.max()), float(turns.max()), float(np.sqrt(np.mean(lengths**2))),
-                       float(np.sqrt(np.mean(turns**2))), (x, y, z), float(np.linalg.norm(middle)))
+        turns = np.array([angle_of(each[:3, :3] @ X[:3, :3].T) if motion.body else 0.0 for each in late])
+        return Scatter(
+            float(lengths.max()),
+            float(turns.max()),
+            float(np.sqrt(np.mean(lengths**2))),
+            float(np.sqrt(np.mean(turns**2))),
+            (x, y, z),
+            float(np.linalg.norm(middle)),
+        )
 
 
 def require_seen(setting: ObservedRobot) -> None:
     """Raise ``BadRequest`` where the observed legs do not see all of the platform's freedoms."""
     sees_all(setting, "")
     if any(member.relation.RI for member in setting.samples.members):
-        raise BadRequest(f"{setting.robot.name}: observed links move while the platform rests, there is no interaction "
-                         "matrix", ", ".join(setting.labels), "other legs")
+        raise BadRequest(
+            f"{setting.robot.name}: observed links move while the platform rests, there is no interaction matrix",
+            ", ".join(setting.labels),
+            "other legs",
+        )
 
 
 def _unit(seen: Observation, noise: Set[str] | None) -> tuple[str, str] | None:
@@ -328,7 +384,7 @@ def _off(kind: tuple[str, str], seen: Observation, value: Array, true: Array) ->
 
 def _name_ends(ends: Sequence[ClosedConfiguration]) -> list[tuple[str, ClosedConfiguration]]:
     """The start and the goal with their names; the goal alone where both are one."""
-    return list(zip(("start", "goal"), ends, strict=True))[ends[0] is ends[1]:]
+    return list(zip(("start", "goal"), ends, strict=True))[ends[0] is ends[1] :]
 
 
 def require_sight(setting: ObservedRobot, law: Law, name: str, at: ClosedConfiguration) -> None:
@@ -337,8 +393,11 @@ def require_sight(setting: ObservedRobot, law: Law, name: str, at: ClosedConfigu
         X = at.pose(seen.seen_from or law.question.reference)
         if seen.in_front(X, at.pose(seen.link)) < SEEN_ABOVE:
             pose = setting.motion.pose(at.pose(setting.motion.link))
-            raise BadRequest(f"{setting.robot.name}: {seen.kind} {seen.leg} is not in front of its camera at the "
-                             f"{name}", str(pose), IN_SIGHT)
+            raise BadRequest(
+                f"{setting.robot.name}: {seen.kind} {seen.leg} is not in front of its camera at the {name}",
+                str(pose),
+                IN_SIGHT,
+            )
 
 
 def require_regular(analysis: ConfigurationAnalysis, name: str, at: ClosedConfiguration) -> None:

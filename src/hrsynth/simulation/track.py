@@ -53,10 +53,13 @@ class Track(Value):
         """The record of the command line."""
         seen = np.isfinite(self.smallest)
         least = int(np.nanargmin(self.smallest)) if seen.any() else None
-        return {"smallest": None if least is None else float(self.smallest[least]),
-                "at": None if least is None else times[least],
-                "crossings": None if self.passages is None else [
-                    {"kind": each.kind, "time": times[each.place]} for each in self.passages]}
+        return {
+            "smallest": None if least is None else float(self.smallest[least]),
+            "at": None if least is None else times[least],
+            "crossings": None
+            if self.passages is None
+            else [{"kind": each.kind, "time": times[each.place]} for each in self.passages],
+        }
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,8 +77,9 @@ class _Mark:
     @cached_property
     def least(self) -> Array:
         """The smallest singular values (3,) of rates, twists and loops (a part of the largest)."""
-        return np.array([*(np.linalg.svd(each, compute_uv=False)[-1] for each in (self.rates, self.twists)),
-                         self.weakest])
+        return np.array(
+            [*(np.linalg.svd(each, compute_uv=False)[-1] for each in (self.rates, self.twists)), self.weakest]
+        )
 
     @property
     def clear(self) -> bool:
@@ -91,8 +95,9 @@ class _Mark:
         return float(np.linalg.svd(self.rates @ inverse, compute_uv=False)[dof - 1])
 
 
-def track_run(configurations: Sequence[ClosedConfiguration], question: Measurement, moving: Measurement,
-            dof: int) -> Track:
+def track_run(
+    configurations: Sequence[ClosedConfiguration], question: Measurement, moving: Measurement, dof: int
+) -> Track:
     """The track of a run; ``question`` holds what is observed, ``moving`` everything that counts as motion."""
     marks = [_mark(at, question, moving) for at in configurations]
     smallest = np.array([mark.smallest(dof) for mark in marks])
@@ -114,8 +119,12 @@ def track_run(configurations: Sequence[ClosedConfiguration], question: Measureme
             if loops:
                 passages.append(Passage(CONSTRAINT, int(last[2])))
             if rates or twists:
-                passages.append(Passage(LIMIT if rates and twists else TYPE_2 if rates else TYPE_1,
-                                        int(np.where(here != before, last, 0)[:2].max())))
+                passages.append(
+                    Passage(
+                        LIMIT if rates and twists else TYPE_2 if rates else TYPE_1,
+                        int(np.where(here != before, last, 0)[:2].max()),
+                    )
+                )
             before = here.copy()
     return Track(smallest, tuple(passages))
 
@@ -124,15 +133,22 @@ def _mark(at: ClosedConfiguration, question: Measurement, moving: Measurement) -
     basis = TangentChart.around(at, moving).basis
     rows = question.rows(at) @ basis
     loops = at.twin.jacobian(at.q)
-    return _Mark(basis, rows[question.twist_rows :], rows[: question.twist_rows], loops, range_basis(loops)[0],
-                 at.kernel()[1].weakest)
+    return _Mark(
+        basis,
+        rows[question.twist_rows :],
+        rows[: question.twist_rows],
+        loops,
+        range_basis(loops)[0],
+        at.kernel()[1].weakest,
+    )
 
 
 def _turned_maps(a: _Mark, b: _Mark) -> Array:
     """−1 for each of the three maps whose orientation changes between two configurations, else 1: of rates and twists
     up to the turn of the tangent space."""
-    return np.array([_sign(a.rates.T @ b.rates), _sign(a.twists.T @ b.twists),
-                     _sign(a.span.T @ a.loops @ b.loops.T @ a.span)])
+    return np.array(
+        [_sign(a.rates.T @ b.rates), _sign(a.twists.T @ b.twists), _sign(a.span.T @ a.loops @ b.loops.T @ a.span)]
+    )
 
 
 def _sign(matrix: Array) -> float:

@@ -62,8 +62,10 @@ def misses(case: Case, exact: Robot, mode: Any, found: tuple[State, float] | Non
     slack, size = ROUNDING + sharp, max(case.robot.length, float(np.max(np.abs(matrix_of(mode.pose)[0]))))
     for name, (shift, turn) in distances(case, exact, mode, at).items():
         if shift > mode.shift + slack * size or turn > mode.turn + slack:
-            return (f"{name} at {mode.pose}: within {mode.shift:.2e} m, {mode.turn:.2e} rad told, "
-                    f"the mode is {shift:.2e} m, {turn:.2e} rad away")
+            return (
+                f"{name} at {mode.pose}: within {mode.shift:.2e} m, {mode.turn:.2e} rad told, "
+                f"the mode is {shift:.2e} m, {turn:.2e} rad away"
+            )
     return ""
 
 
@@ -122,5 +124,10 @@ def _off(shift: Array, turned: Array) -> tuple[float, float]:
 
 def _matrix(rpy: Array) -> Array:
     (cr, cp, cy), (sr, sp, sy) = np.cos(rpy), np.sin(rpy)
-    return np.array([[cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-                     [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr], [-sp, cp * sr, cp * cr]])
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )

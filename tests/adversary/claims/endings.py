@@ -41,8 +41,11 @@ def judge(case: Case, told: Any) -> None:
         case.say("ending", UNCLEAR, "the own run comes near a singularity")
         return
     away = apart(case, told.pose, found)
-    case.say("ending", HELD if away < 1e-4 else WRONG,
-             "" if away < 1e-4 else f"{told.ended} at {told.pose}, the own run ends {away:.1e} from there")
+    case.say(
+        "ending",
+        HELD if away < 1e-4 else WRONG,
+        "" if away < 1e-4 else f"{told.ended} at {told.pose}, the own run ends {away:.1e} from there",
+    )
 
 
 def run(case: Case, items: Items, start: State, desired: Array, gain: float) -> State | None:
@@ -78,8 +81,9 @@ def run(case: Case, items: Items, start: State, desired: Array, gain: float) -> 
         half = q[m:].reshape(robot.balls, 3) / 2
         quats = at.quats[0]
         w, v = quats[:, :1], quats[:, 1:]
-        return np.concatenate([q[:m], np.concatenate([-np.sum(v * half, 1, keepdims=True),
-                                                      w * half + np.cross(v, half)], 1).ravel()])
+        return np.concatenate(
+            [q[:m], np.concatenate([-np.sum(v * half, 1, keepdims=True), w * half + np.cross(v, half)], 1).ravel()]
+        )
 
     def served(time: float, y: Array) -> float:
         return float(np.linalg.norm(error(state(y)))) - 1e-6

@@ -44,8 +44,11 @@ def judge(case: Case, told: Any) -> None:
         # of one cone and two the maxima are exact, else the gap says how far the bound may be above
         under = own < extent.largest * (1 - extent.gap) - near
         under |= len(u) <= 2 and own < extent.largest - near
-        case.say("error bound", WRONG if over or under else HELD,
-                 f"{name}: {extent.largest!r} told (gap {extent.gap:.1e}), {own!r} found" if over or under else "")
+        case.say(
+            "error bound",
+            WRONG if over or under else HELD,
+            f"{name}: {extent.largest!r} told (gap {extent.gap:.1e}), {own!r} found" if over or under else "",
+        )
 
 
 def largest(A: Array, rng: np.random.Generator) -> float:

@@ -33,7 +33,7 @@ def sees_least(case: Case, items: Items, at: State) -> Array:
         dof = int(np.sum(s > 1e-7))
         U = np.asarray(rates, dtype=float) @ local.N
         _, shown, held = np.linalg.svd(U)
-        still = local.T @ held[int(np.sum(shown > 1e-7)):].T
+        still = local.T @ held[int(np.sum(shown > 1e-7)) :].T
         if still.size and float(np.linalg.norm(still, 2)) > 1e-6:
             found.append(0.0)
             continue

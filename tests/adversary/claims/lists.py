@@ -190,14 +190,18 @@ class Search:
 def complete(case: Case, told: Any, search: Search, found: State) -> None:
     """Whether a list that is called complete has every pose that was found."""
     kind = "real modes" if told.kind == "real" else "hidden modes"
-    missing = [k for k in range(len(found))
-               if not any(apart(case, mode.pose, found[[k]]) < 1e-4 for mode in told.modes)]
+    missing = [
+        k for k in range(len(found)) if not any(apart(case, mode.pose, found[[k]]) < 1e-4 for mode in told.modes)
+    ]
     if not told.found.complete:
         case.say(kind, SILENT, f"not called complete, and {'some missing' if missing else 'all there'}")
     elif missing:
         x, R = (each[missing[0]] for each in case.study.poses(found))
-        case.say(kind, WRONG, f"{len(told.modes)} told as complete at {told.pose}, {len(found)} exist; "
-                              f"missing {x.tolist()} {R.tolist()}")
+        case.say(
+            kind,
+            WRONG,
+            f"{len(told.modes)} told as complete at {told.pose}, {len(found)} exist; missing {x.tolist()} {R.tolist()}",
+        )
     else:
         case.say(kind, HELD)
 
@@ -214,16 +218,20 @@ def assembled(case: Case, told: Any, mode: Any, search: Search, found: State) ->
         case.say("assembled", HELD if good else WRONG, "" if good else off)
     elif word == "no" and not mode.beyond:
         x, R = matrix_of(mode.pose)
-        there = (any(apart(case, mode.pose, found[[k]]) < 1e-5 for k in range(len(found)))
-                 or len(search.at_pose(x, R)) > 0)
+        there = (
+            any(apart(case, mode.pose, found[[k]]) < 1e-5 for k in range(len(found))) or len(search.at_pose(x, R)) > 0
+        )
         case.say("cannot be assembled", WRONG if there else HELD, f"{mode.pose} can be" if there else "")
     else:
         case.say("assembled", SILENT, word)
 
 
 def _both(one: Items, other: Items) -> Items:
-    return Items(np.concatenate([one.links, other.links]), np.concatenate([one.local, other.local]),
-                 np.concatenate([one.point, other.point]))
+    return Items(
+        np.concatenate([one.links, other.links]),
+        np.concatenate([one.local, other.local]),
+        np.concatenate([one.point, other.point]),
+    )
 
 
 def _rod(centres: list[Array]) -> Array:

@@ -28,8 +28,11 @@ def judge(case: Case, told: Any) -> None:
     for each in told.examples:
         at = case.fitted(each.configuration)
         value = np.inf if at is None else float(sees_least(case, items, at)[0])
-        case.say("singular pose", HELD if value < 1e-5 else WRONG,
-                 "" if value < 1e-5 else f"{each.pose}: smallest singular value {value:.1e}")
+        case.say(
+            "singular pose",
+            HELD if value < 1e-5 else WRONG,
+            "" if value < 1e-5 else f"{each.pose}: smallest singular value {value:.1e}",
+        )
     walked, _ = case.walked
     values = sees_least(case, items, walked) if len(walked) else np.zeros(0)
     if told.always:

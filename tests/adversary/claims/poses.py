@@ -21,8 +21,11 @@ def poses(case: Case) -> None:
         return
     chosen = at[[int(case.rng.integers(len(at)))]]
     for asked in (case.text_of(chosen), half_turned(case)):
-        told = None if asked is None else case.asked("asked pose", lambda asked=asked: hrsynth.check(
-            case.engine, case.observe(), at=[asked]))
+        told = (
+            None
+            if asked is None
+            else case.asked("asked pose", lambda asked=asked: hrsynth.check(case.engine, case.observe(), at=[asked]))
+        )
         if told is not None:
             judge(case, told, asked)
 
@@ -43,8 +46,11 @@ def half_turned(case: Case) -> str | None:
     if free == 3 and case.rng.random() < 0.5:
         axis = across(case.rng.normal(size=3), case.rng) if case.rng.random() < 0.5 else np.eye(3)[case.rng.integers(3)]
     turned = turn(axis, np.pi) @ R
-    return ",".join(f"{n}={float(v)!r}" for n, v in zip("xyz", x, strict=True)) + ",rpy=" + "/".join(
-        repr(a) for a in rpy_of(turned))
+    return (
+        ",".join(f"{n}={float(v)!r}" for n, v in zip("xyz", x, strict=True))
+        + ",rpy="
+        + "/".join(repr(a) for a in rpy_of(turned))
+    )
 
 
 def judge(case: Case, told: Any, asked: str) -> None:

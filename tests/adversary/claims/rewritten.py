@@ -25,8 +25,11 @@ def rewritten(case: Case) -> None:
     own = generic(case, case.directions(told.setting.observed))
     if not isinstance(own, str):
         good = own == (told.dof, told.verdict.rank)
-        case.say("verdict", HELD if good else WRONG,
-                 "" if good else f"derive: rank {told.verdict.rank} of {told.dof}, by small steps {own}")
+        case.say(
+            "verdict",
+            HELD if good else WRONG,
+            "" if good else f"derive: rank {told.verdict.rank} of {told.dof}, by small steps {own}",
+        )
     if told.hidden is not None:
         path = case.path.with_suffix(".hidden.urdf")
         hrsynth.save(told.hidden, path)
@@ -63,10 +66,18 @@ def judge(case: Case, told: Any, path: Path) -> None:
         if one is None or other is None:
             case.say("hidden robot", UNCLEAR, "singular values near the cutoff")
             continue
-        angle = 1.0 if one.shape[1] != other.shape[1] else float(
-            np.linalg.norm(other - one @ (one.T @ other), 2)) if one.shape[1] else 0.0
-        case.say("hidden robot", HELD if angle < SAME else WRONG,
-                 "" if angle < SAME else f"relations of dimension {one.shape[1]}, {other.shape[1]}, angle {angle:.1e}")
+        angle = (
+            1.0
+            if one.shape[1] != other.shape[1]
+            else float(np.linalg.norm(other - one @ (one.T @ other), 2))
+            if one.shape[1]
+            else 0.0
+        )
+        case.say(
+            "hidden robot",
+            HELD if angle < SAME else WRONG,
+            "" if angle < SAME else f"relations of dimension {one.shape[1]}, {other.shape[1]}, angle {angle:.1e}",
+        )
 
 
 def follow(case: Case, hidden: Robot, study: Study, items: Any, mine: Any, at: State) -> State | None:
@@ -77,8 +88,12 @@ def follow(case: Case, hidden: Robot, study: Study, items: Any, mine: Any, at: S
     given = [*zip(np.array(hidden.links)[items.links], items.local, strict=True)]
     point = np.zeros(3) if study.point is None else study.point
     frame = [] if study.point is not None else list(np.eye(3))
-    held = things(hidden, [(str(link), v, False) for link, v in given] + [(hidden.platform, point, True)]
-                  + [(hidden.platform, e, False) for e in frame])
+    held = things(
+        hidden,
+        [(str(link), v, False) for link, v in given]
+        + [(hidden.platform, point, True)]
+        + [(hidden.platform, e, False) for e in frame],
+    )
     here = hidden.zero()
     for part in (0.0, 0.25, 0.5, 0.75, 1.0):
         values = [*(u0 + part * (u - u0)), x0 + part * (x - x0), *((R0 + part * (R - R0)).T if frame else ())]
@@ -97,8 +112,12 @@ def relation(study: Study, robot: Robot, items: Any, at: State) -> Array | None:
     local = study.locals(at)[0]
     if not local.clear:
         return None
-    both = np.vstack([local.T * (np.array([robot.length] * 3 + [1.0] * (len(local.T) - 3)))[:, None],
-                      np.asarray(study.rates(items, at)[0], dtype=float) @ local.N])
+    both = np.vstack(
+        [
+            local.T * (np.array([robot.length] * 3 + [1.0] * (len(local.T) - 3)))[:, None],
+            np.asarray(study.rates(items, at)[0], dtype=float) @ local.N,
+        ]
+    )
     left, s, _ = np.linalg.svd(both, full_matrices=False)
     if np.any((s > 1e-8) & (s < 1e-5)):
         return None

@@ -100,8 +100,11 @@ def judge_cures(case: Case, told: object, sets: Iterable[object]) -> None:
         if isinstance(own, str):
             case.say("cure", UNCLEAR, own)
         else:
-            case.say("cure", HELD if own[1] == rank else WRONG,
-                     "" if own[1] == rank else f"{names}: rank {rank} told, by small steps {own[1]} of {own[0]}")
+            case.say(
+                "cure",
+                HELD if own[1] == rank else WRONG,
+                "" if own[1] == rank else f"{names}: rank {rank} told, by small steps {own[1]} of {own[0]}",
+            )
 
 
 def rows_of(case: Case, measured: object, at: object) -> np.ndarray | None:
@@ -117,8 +120,16 @@ def rows_of(case: Case, measured: object, at: object) -> np.ndarray | None:
     if kind == "Direction":
         return case.study.rates(things(robot, [(link, measured.direction, False)]), at)  # type: ignore[attr-defined,arg-type]
     if kind == "SpaceLine":
-        x, J = robot.items(things(robot, [(link, measured.at, True),  # type: ignore[attr-defined]
-                                          (link, measured.axis, False)]), frames)  # type: ignore[attr-defined]
+        x, J = robot.items(
+            things(
+                robot,
+                [
+                    (link, measured.at, True),  # type: ignore[attr-defined]
+                    (link, measured.axis, False),
+                ],
+            ),
+            frames,
+        )  # type: ignore[attr-defined]
         rate = np.cross(J[:, 0], x[:, 1, None]) + np.cross(x[:, 0, None], J[:, 1])
         return np.swapaxes(np.concatenate([J[:, 1], rate / robot.length], axis=2), 1, 2) * metric
     axis = np.asarray(measured.axis)  # type: ignore[attr-defined]

@@ -104,12 +104,16 @@ def separated(case: Case, start: State, goal: State, items: Items) -> None:
     u, v = (case.robot.items(items, each)[0] for each in (frames, other))
     there = float(np.max(np.abs(u - v))) < 1e-6
     wrong = there and least > 1e-2
-    case.say("separated", WRONG if wrong else HELD,
-             f"the straight way has no singularity, smallest value {least:.1e}" if wrong else "")
+    case.say(
+        "separated",
+        WRONG if wrong else HELD,
+        f"the straight way has no singularity, smallest value {least:.1e}" if wrong else "",
+    )
 
 
-def follow(case: Case, at: State, items: Items, link: str, point: Array, place: Place, turning: bool
-           ) -> tuple[State, float] | None:
+def follow(
+    case: Case, at: State, items: Items, link: str, point: Array, place: Place, turning: bool
+) -> tuple[State, float] | None:
     """The configuration at the end of a way, and the smallest singular value of Mᵀ on it; None where it is lost."""
     robot = case.robot
     held = things(robot, [(link, point, True), *((link, e, False) for e in np.eye(3) if turning)])

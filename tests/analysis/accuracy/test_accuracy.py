@@ -145,8 +145,10 @@ def test_a_bound_that_may_be_too_large_is_told_to_be_one(cones: str) -> None:
     lines = runs.accuracy(found).splitlines()
     rates, twists = reading(found.setting.everything.start, found.setting.samples.question)
     J = twists @ np.linalg.pinv(rates, rcond=1e-7)
-    for word, extent, rows in (("position", found.poses[0].position, J[:3]),
-                               ("orientation", found.poses[0].orientation, J[3:])):
+    for word, extent, rows in (
+        ("position", found.poses[0].position, J[:3]),
+        ("orientation", found.poses[0].orientation, J[3:]),
+    ):
         assert extent.errors is not None
         over = extent.largest / float(np.linalg.norm(rows @ extent.errors.ravel())) - 1
         k = next(k for k, line in enumerate(lines) if line.startswith(word))
@@ -192,8 +194,10 @@ def test_near_a_singularity_samples_do_not_follow_the_linear_law() -> None:
 
 def test_cones_of_their_own_scale_their_legs() -> None:
     robot = load("quattro_rigid")
-    one, two, both = (accuracy(robot, "1,3", cone=cones).poses[0].position.largest
-                      for cones in (f"{CONE}", f"{2 * CONE}", f"1={CONE},3={2 * CONE}"))
+    one, two, both = (
+        accuracy(robot, "1,3", cone=cones).poses[0].position.largest
+        for cones in (f"{CONE}", f"{2 * CONE}", f"1={CONE},3={2 * CONE}")
+    )
     assert two == pytest.approx(2 * one, rel=1e-12)
     assert one < both < two
 
@@ -229,8 +233,9 @@ def test_a_plane_of_a_robot_whose_legs_are_iterated() -> None:
 
 
 @pytest.mark.some(1, 1)
-@pytest.mark.parametrize(("name", "grid"), [
-    ("3rps", "x=0:0.004:2,y=0"), ("gough_stewart", "x=0:0.004:2,y=0,z=0.3,rpy=0/0/0")])
+@pytest.mark.parametrize(
+    ("name", "grid"), [("3rps", "x=0:0.004:2,y=0"), ("gough_stewart", "x=0:0.004:2,y=0,z=0.3,rpy=0/0/0")]
+)
 def test_a_grid_says_that_its_bounds_may_be_too_large(name: str, grid: str) -> None:
     """Found one by one or by the batch: what an ascent attains is below each error of the grid, by its gap at most."""
     found = accuracy(name, cone=CONE, grid=grid)
@@ -282,10 +287,16 @@ def test_a_box_without_a_determinant_says_that_nothing_is_drawn() -> None:
     assert "Type 2 singularities are not drawn" in legend(found)
 
 
-@pytest.mark.parametrize(("robot", "grid"), [
-    ("quattro", "x=0.1:0.2:2,z=-0.7"), ("gough_stewart", "x=0.03:0.04:2,phi=10deg"),
-    ("gough_stewart", "y=0.03:0.04:2,rpy=5deg/0/0"), ("3rrr_m1", "x=0.05:0.06:2,phi=0.1:0.2:2"),
-    ("prrrp_m1", "x=0.01:0.02:2")])
+@pytest.mark.parametrize(
+    ("robot", "grid"),
+    [
+        ("quattro", "x=0.1:0.2:2,z=-0.7"),
+        ("gough_stewart", "x=0.03:0.04:2,phi=10deg"),
+        ("gough_stewart", "y=0.03:0.04:2,rpy=5deg/0/0"),
+        ("3rrr_m1", "x=0.05:0.06:2,phi=0.1:0.2:2"),
+        ("prrrp_m1", "x=0.01:0.02:2"),
+    ],
+)
 def test_the_pose_that_a_grid_holds_is_told_whole(robot: str, grid: str) -> None:
     """Asked at what varies and what is told to be held, the error is that of the grid's first pose."""
     found = accuracy(load(robot), cone=CONE, grid=grid)
@@ -309,24 +320,27 @@ def legend(found: Accuracy) -> list[str]:
     return [each.get_label() for each in _error_entries(found.field, drawn)]
 
 
-@pytest.mark.parametrize(("legs", "cones", "options", "word"), [
-    ("1", "0.1deg", {}, "infinite"),
-    ("1,4", "0", {}, "half-angle"),
-    ("1,4", "90deg", {}, "half-angle"),
-    ("1,4", "-1deg", {}, "half-angle"),
-    ("1,4", True, {}, "half-angle"),
-    ("1,4", "wide", {}, "not a number"),
-    ("1,4", "nan", {}, "half-angle"),
-    ("1,4", "1=0.1deg", {}, "leg 4 has no cone"),
-    ("1,4", "1=0.1deg,2=0.1deg", {}, "that is not observed"),
-    ("1,4", "1=0.1deg,1=0.1deg", {}, "twice"),
-    ("1,4", "0.1deg,0.2deg", {}, "not leg=angle"),
-    ("1,9", "0.1deg", {}, "no leg or link"),
-    ("1,4", "0.1deg", {"plane": "z=-0.7", "grid": "x=0:1:2"}, "both"),
-    ("1,4", "0.1deg", {"steps": 5}, "poses a side"),
-    ("1,4", "0.1deg", {"nonlinear": -1}, "nonlinear"),
-    ("1,4", "0.1deg", {"plane": "w=1"}, "unknown part"),
-])
+@pytest.mark.parametrize(
+    ("legs", "cones", "options", "word"),
+    [
+        ("1", "0.1deg", {}, "infinite"),
+        ("1,4", "0", {}, "half-angle"),
+        ("1,4", "90deg", {}, "half-angle"),
+        ("1,4", "-1deg", {}, "half-angle"),
+        ("1,4", True, {}, "half-angle"),
+        ("1,4", "wide", {}, "not a number"),
+        ("1,4", "nan", {}, "half-angle"),
+        ("1,4", "1=0.1deg", {}, "leg 4 has no cone"),
+        ("1,4", "1=0.1deg,2=0.1deg", {}, "that is not observed"),
+        ("1,4", "1=0.1deg,1=0.1deg", {}, "twice"),
+        ("1,4", "0.1deg,0.2deg", {}, "not leg=angle"),
+        ("1,9", "0.1deg", {}, "no leg or link"),
+        ("1,4", "0.1deg", {"plane": "z=-0.7", "grid": "x=0:1:2"}, "both"),
+        ("1,4", "0.1deg", {"steps": 5}, "poses a side"),
+        ("1,4", "0.1deg", {"nonlinear": -1}, "nonlinear"),
+        ("1,4", "0.1deg", {"plane": "w=1"}, "unknown part"),
+    ],
+)
 def test_bad_requests(legs: str, cones: str | bool, options: dict, word: str) -> None:
     with pytest.raises(BadRequest) as caught:
         accuracy(load("quattro"), legs, cone=cones, **options)
@@ -356,8 +370,11 @@ def test_the_least_error_is_the_least_of_many_directions() -> None:
     rng = np.random.default_rng(0)
     for _ in range(40):
         k, d = int(rng.integers(1, 6)), int(rng.integers(2, 4))
-        blocks = rng.normal(size=(k, 3, d)) @ np.diag(10.0 ** rng.uniform(-3, 0, d)) @ np.linalg.qr(
-            rng.normal(size=(d, d)))[0]
+        blocks = (
+            rng.normal(size=(k, 3, d))
+            @ np.diag(10.0 ** rng.uniform(-3, 0, d))
+            @ np.linalg.qr(rng.normal(size=(d, d)))[0]
+        )
         U, s, Vt = np.linalg.svd(blocks, full_matrices=False)
         s[:, -1] *= rng.choice([0, 1e-3, 1], size=k)
         blocks = U * s[:, None] @ Vt

@@ -92,9 +92,13 @@ def ways(setting: ObservedRobot, at: ClosedConfiguration, cone: float, count: in
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("legs", "at", "chosen"), [
-    ("1,2", "x=0.1,y=0.1,z=-0.7", [0, 1, 20]),
-    pytest.param("3,4", "x=0.15,y=0.2,z=-0.75", [2, 13, 24, 29], marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("legs", "at", "chosen"),
+    [
+        ("1,2", "x=0.1,y=0.1,z=-0.7", [0, 1, 20]),
+        pytest.param("3,4", "x=0.15,y=0.2,z=-0.75", [2, 13, 24, 29], marks=pytest.mark.slow),
+    ],
+)
 def test_best_fits_are_those_of_the_closed_form(legs: str, at: str, chosen: list[int]) -> None:
     """Among the ways of the samples above; where no curve of best fits goes on (13, 29), the minimiser jumps."""
     setting = ObservedRobot.of(load("quattro_rigid"), legs)
@@ -174,10 +178,13 @@ def test_an_arm_that_hardly_sees_one_of_its_turns_is_followed_to_the_whole_error
     for k, (centre, axis) in enumerate(zip(centres, axes, strict=True), 1):
         b.link(f"l{k}", at=centre)
         b.joint(f"q{k}", "R", "base" if k == 1 else f"l{k - 1}", f"l{k}", at=centre, axis=axis, motor=True)
-    sights = [f"{kind}:world@{','.join(map(repr, map(float, point)))}"
-              for kind, point in zip(("point", "point", "point", "depth"), points, strict=True)]
-    found = accuracy(b.build(platform="l6"), camera="hand=l6@0,0,0/0,0,0/800", see=sights, noise="0.3px,1mm",
-                     nonlinear=4)
+    sights = [
+        f"{kind}:world@{','.join(map(repr, map(float, point)))}"
+        for kind, point in zip(("point", "point", "point", "depth"), points, strict=True)
+    ]
+    found = accuracy(
+        b.build(platform="l6"), camera="hand=l6@0,0,0/0,0,0/800", see=sights, noise="0.3px,1mm", nonlinear=4
+    )
     (linear,), (true,), length = found.poses, found.sampled, found.setting.mechanism.length
 
     def displaced(q: Array) -> Array:
@@ -198,8 +205,9 @@ def test_an_arm_that_hardly_sees_one_of_its_turns_is_followed_to_the_whole_error
     moves = np.array([(displaced(d) - displaced(-d)) @ [*centres[-1], 1] / 2e-6 for d in 1e-6 * np.eye(6)])[:, :3].T
     d = linear.position.direction
     worst = (moves @ np.linalg.pinv(rates(np.zeros(6)))).T @ d
-    e = np.concatenate([*(0.3 / 800 * unit(worst[2 * k:2 * k + 2]) for k in range(3)),
-                        [0.001 / length * np.sign(worst[6])]])
+    e = np.concatenate(
+        [*(0.3 / 800 * unit(worst[2 * k : 2 * k + 2]) for k in range(3)), [0.001 / length * np.sign(worst[6])]]
+    )
     far = []
     for sign in (1, -1):
         q = np.zeros(6)
@@ -211,10 +219,12 @@ def test_an_arm_that_hardly_sees_one_of_its_turns_is_followed_to_the_whole_error
     assert max(far) == pytest.approx(true.position, rel=1e-2)
 
 
-@pytest.mark.parametrize(("share", "not_found", "told"), [
-    (1.0, 0, False), (0.2, 0, True), (0.2, 3, False), (1.5, 3, True), (1.5, 0, True)])
-def test_samples_that_were_lost_on_the_way_do_not_speak_against_the_linear_law(share: float, not_found: int,
-                                                                                told: bool):
+@pytest.mark.parametrize(
+    ("share", "not_found", "told"), [(1.0, 0, False), (0.2, 0, True), (0.2, 3, False), (1.5, 3, True), (1.5, 0, True)]
+)
+def test_samples_that_were_lost_on_the_way_do_not_speak_against_the_linear_law(
+    share: float, not_found: int, told: bool
+):
     """A smaller error of samples that were not followed to their end says nothing, a larger one does."""
     found = accuracy("rrrrr_m1", cone="0.06deg", nonlinear=4)
     (linear,), (true,) = found.poses, found.sampled

@@ -31,15 +31,22 @@ MORE = {
     "point": POINTS,
     "position": [f"position:platform@{at}" for at in SPOTS[:3]],
     "line": ["line:platform@0.1,0,0/1,0.2,0.1", "line:platform@0,0.1,0/0.1,1,0.3"],
-    "image_line": [f"image_line:platform@{at}/{axis}" for at, axis in zip(
-        SPOTS, ("1,0.2,0.1", "0.1,1,0.3", "0.3,0.1,1", "1,1,0.2"), strict=True)],
-    "edge": [f"edge:platform@{at}/{axis}/0.02" for at, axis in zip(
-        SPOTS, ("1,0.2,0.1", "0.1,1,0.3", "0.3,0.1,1", "1,1,0.2"), strict=True)],
+    "image_line": [
+        f"image_line:platform@{at}/{axis}"
+        for at, axis in zip(SPOTS, ("1,0.2,0.1", "0.1,1,0.3", "0.3,0.1,1", "1,1,0.2"), strict=True)
+    ],
+    "edge": [
+        f"edge:platform@{at}/{axis}/0.02"
+        for at, axis in zip(SPOTS, ("1,0.2,0.1", "0.1,1,0.3", "0.3,0.1,1", "1,1,0.2"), strict=True)
+    ],
     "edges": ["edges:platform@0.1,0,0/1,0.2,0.1/0.02", "edges:platform@0,0.1,0/0.1,1,0.3/0.02"],
     "circle": ["circle:platform@0.1,0,0/0.2,0.3,1", "point:platform@0,0.2,0"],
     "image_circle": ["image_circle:platform@0.1,0,0/0.6,0.3,1/0.1", "point:platform@0,0.2,0"],
-    "depth, distance": [*(f"depth:platform@{at}" for at in SPOTS[:3]), *(f"distance:platform@{at}" for at in SPOTS[:3]),
-                        "inclination:platform"],
+    "depth, distance": [
+        *(f"depth:platform@{at}" for at in SPOTS[:3]),
+        *(f"distance:platform@{at}" for at in SPOTS[:3]),
+        "inclination:platform",
+    ],
     "direction": [*(f"direction:platform/{axis}" for axis in ("1,0,0", "0,1,0.2")), "position:platform@0.1,0,0"],
 }
 MORE["mixture"] = [each[0] for each in MORE.values()]
@@ -49,11 +56,16 @@ def robot(name: str, folder: Path) -> ObservedRobot:
     """An arm with a camera in its hand, robots of fewer freedoms, a body that nothing holds, with a set of ``MORE``."""
     if name == "arm":
         spots = ("0.5,0.1,0", "0.6,0.1,0.1", "0.5,0.3,0.1", "0.4,0.1,0.2")
-        return ObservedRobot.of("example:panda", camera="hand=panda_hand@0,0,-0.3/0,0,0/800", samples=3,
-                                see=[*(f"point:world@{at}" for at in spots), "distance:world@0.5,0.1,0"])
+        return ObservedRobot.of(
+            "example:panda",
+            camera="hand=panda_hand@0,0,-0.3/0,0,0/800",
+            samples=3,
+            see=[*(f"point:world@{at}" for at in spots), "distance:world@0.5,0.1,0"],
+        )
     if name == "delta":
-        return ObservedRobot.of("delta", "1", EYE.replace("-0.4/", "-1.5/"), samples=3,
-                                see=[POINTS[0], "depth:platform@0.1,0,0"])
+        return ObservedRobot.of(
+            "delta", "1", EYE.replace("-0.4/", "-1.5/"), samples=3, see=[POINTS[0], "depth:platform@0.1,0,0"]
+        )
     if name == "encoders":
         return ObservedRobot.of("3rrr_m1", "1", samples=3, see=["encoder:shoulder_1", "encoder:shoulder_2"])
     (folder / "body.urdf").write_text(BODY)
@@ -114,8 +126,10 @@ SLOW = pytest.mark.slow
 
 
 @pytest.mark.some(1, 4)
-@pytest.mark.parametrize("name", [
-    *(pytest.param(name, marks=SLOW) for name in (*MORE, "delta", "arm") if name != "point"), "point", "encoders"])
+@pytest.mark.parametrize(
+    "name",
+    [*(pytest.param(name, marks=SLOW) for name in (*MORE, "delta", "arm") if name != "point"), "point", "encoders"],
+)
 def test_no_wrong_measurement_does_worse_and_the_told_one_does_it(name: str, tmp_path: Path) -> None:
     """The law: to first order the largest error over all noise is the told one, between its bounds."""
     setting = robot(name, tmp_path)
@@ -169,11 +183,15 @@ def test_samples_of_true_errors_approach_the_maxima(tmp_path: Path) -> None:
 
 def test_cones_of_directions_are_their_noise(tmp_path: Path) -> None:
     """Said in two ways; and besides other kinds, whose amounts they leave alone."""
-    assert (hrsynth.accuracy("quattro", "1,4", cone="0.1deg").to_dict()
-            == hrsynth.accuracy("quattro", "1,4", noise="0.1deg").to_dict())
+    assert (
+        hrsynth.accuracy("quattro", "1,4", cone="0.1deg").to_dict()
+        == hrsynth.accuracy("quattro", "1,4", noise="0.1deg").to_dict()
+    )
     setting = robot("direction", tmp_path)
-    one, other = (hrsynth.accuracy(setting, **given).poses[0] for given in (
-        {"noise": "1mm,0.1deg"}, {"noise": "1mm", "cone": "0.1deg"}))
+    one, other = (
+        hrsynth.accuracy(setting, **given).poses[0]
+        for given in ({"noise": "1mm,0.1deg"}, {"noise": "1mm", "cone": "0.1deg"})
+    )
     assert one.position.to_dict(1) == other.position.to_dict(1)
     assert one.orientation.to_dict(1) == other.orientation.to_dict(1)
 
@@ -189,11 +207,16 @@ def test_a_grid_is_its_single_poses_and_leaves_out_what_is_behind_the_camera(tmp
         hrsynth.accuracy(setting, noise="0.3px", at="z=-1")
 
 
-@pytest.mark.parametrize(("name", "given", "word"), [
-    ("point", {}, "how wrong the observations may be"), ("point", {"cone": "0.1deg"}, "cones apply to directions only"),
-    ("direction", {"cone": "0.1deg"}, "not to position"), ("point", {"noise": "1mm"}, "in lengths"),
-    ("point", {"noise": "0.3km"}, "not a number"),
-])
+@pytest.mark.parametrize(
+    ("name", "given", "word"),
+    [
+        ("point", {}, "how wrong the observations may be"),
+        ("point", {"cone": "0.1deg"}, "cones apply to directions only"),
+        ("direction", {"cone": "0.1deg"}, "not to position"),
+        ("point", {"noise": "1mm"}, "in lengths"),
+        ("point", {"noise": "0.3km"}, "not a number"),
+    ],
+)
 def test_what_is_no_amount_is_refused_in_a_line(name: str, given: dict[str, str], word: str, tmp_path: Path) -> None:
     with pytest.raises(BadRequest, match=word) as caught:
         hrsynth.accuracy(robot(name, tmp_path), **given)
@@ -204,8 +227,9 @@ def test_what_is_no_amount_is_refused_in_a_line(name: str, given: dict[str, str]
 @pytest.mark.parametrize("kind", sorted(set(kinds()) - {"encoder"}))
 def test_what_a_sensor_makes_of_noise_to_first_order(kind: str, tmp_path: Path) -> None:
     """The images of the unit balls are what the simulated sensor gives, but for the square of the noise."""
-    setting = next(robot(name, tmp_path) for name, see in MORE.items() if any(
-        each.startswith(f"{kind}:") for each in see))
+    setting = next(
+        robot(name, tmp_path) for name, see in MORE.items() if any(each.startswith(f"{kind}:") for each in see)
+    )
     at, rng = setting.everything.start, np.random.default_rng(1)
     amounts = {"px": 0.3, "m": 1e-3, "rad": 1e-3}
     seen = next(o for o in setting.observed if o.kind == kind)
@@ -214,8 +238,13 @@ def test_what_a_sensor_makes_of_noise_to_first_order(kind: str, tmp_path: Path) 
     for _ in range(20):
         given = rng.normal(size=(2, 3))
         given /= np.linalg.norm(given, axis=1, keepdims=True)
-        off = [np.linalg.norm(seen.sense(value, part * given, own) - value
-                              - sum(A @ (part * s) for A, s in zip(blurs(seen, value, own), given, strict=False)))
-               for part in (1.0, 0.1)]
+        off = [
+            np.linalg.norm(
+                seen.sense(value, part * given, own)
+                - value
+                - sum(A @ (part * s) for A, s in zip(blurs(seen, value, own), given, strict=False))
+            )
+            for part in (1.0, 0.1)
+        ]
         assert off[0] < 1e-4
         assert off[1] < 0.011 * off[0] + 1e-11

@@ -21,8 +21,11 @@ def closed(directions: Array) -> Array:
 
     def error(v: Array) -> Array:
         R = np.array([[np.cos(v[2]), -np.sin(v[2])], [np.sin(v[2]), np.cos(v[2])]])
-        ends = base + cranks[:, None] * np.stack([np.cos(v[3:]), np.sin(v[3:])], axis=1) + rods[:, None] * np.stack(
-            [np.cos(directions), np.sin(directions)], axis=1)
+        ends = (
+            base
+            + cranks[:, None] * np.stack([np.cos(v[3:]), np.sin(v[3:])], axis=1)
+            + rods[:, None] * np.stack([np.cos(directions), np.sin(directions)], axis=1)
+        )
         return np.ravel(ends - (v[:2] + tips @ R.T))
 
     for _ in range(30):
@@ -45,6 +48,8 @@ def test_errors_at_a_stretched_leg() -> None:
     assert "at the pose there is no Mᵀ" in text
     assert "inf" not in text.replace("infinite", "")
     assert np.degrees(np.abs(poses[:, 2]).max()) == pytest.approx(
-        float(text.partition("orientation")[2].split()[0]), rel=0.02)
+        float(text.partition("orientation")[2].split()[0]), rel=0.02
+    )
     assert 1e3 * np.linalg.norm(poses[:, :2], axis=1).max() == pytest.approx(
-        float(text.partition("position")[2].split()[0]), rel=0.02)
+        float(text.partition("position")[2].split()[0]), rel=0.02
+    )

@@ -101,8 +101,9 @@ def test_a_lost_part_is_made_again(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 
 
 @pytest.mark.parametrize("other", [{"cone": "0.2deg"}, {"grid": "x=-0.9:0.9:9,y=-0.9:0.9:7,z=-0.8:-0.5:3"}])
-def test_another_question_does_not_go_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, other: dict[str, str]
-                                         ) -> None:
+def test_another_question_does_not_go_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, other: dict[str, str]
+) -> None:
     part, journal = broken_off(tmp_path / "s.npy", monkeypatch)
     before = part.read_bytes(), journal.read_bytes()
     with pytest.raises(BadRequest, match="another sweep to this file was interrupted"):
@@ -138,9 +139,15 @@ def test_a_full_disk_is_told_and_nothing_is_lost(tmp_path: Path, monkeypatch: py
     assert swept_to(target, 50, monkeypatch).before == 150
 
 
-@pytest.mark.parametrize(("into", "asked", "word"), [
-    ("s.txt", {}, "ends in .npy"), ("nowhere/s.npy", {}, "no such folder"), ("s.npy", {"grid": None}, "or a grid"),
-    ("s.npy", {"nonlinear": 4}, "worst poses of a file")])
+@pytest.mark.parametrize(
+    ("into", "asked", "word"),
+    [
+        ("s.txt", {}, "ends in .npy"),
+        ("nowhere/s.npy", {}, "no such folder"),
+        ("s.npy", {"grid": None}, "or a grid"),
+        ("s.npy", {"nonlinear": 4}, "worst poses of a file"),
+    ],
+)
 def test_refusals(tmp_path: Path, into: str, asked: dict[str, Any], word: str) -> None:
     with pytest.raises(BadRequest, match=word):
         accuracy("quattro_rigid", "1,2,3", into=tmp_path / into, **{**ASKED, **asked})

@@ -37,8 +37,13 @@ def followed(aspects: Aspects, answer: PathAnswer, points: int) -> list[ClosedCo
             X = np.eye(4)
             X[:3, 3] = carriage.length * place - carriage.motion.point
             point = None if carriage.turning else carriage.motion.point
-            target = Target(carriage.motion.link, carriage.frame(place, turn) if carriage.turning else X, point,
-                            question.reference, measured)
+            target = Target(
+                carriage.motion.link,
+                carriage.frame(place, turn) if carriage.turning else X,
+                point,
+                question.reference,
+                measured,
+            )
             q, residual = solve(here.twin, here.q, target, tolerance=1e-12)
             assert residual <= CLOSED, "a leg does not reach"
             here = ClosedConfiguration.of(here.twin, q)
@@ -54,7 +59,8 @@ def check_certified(aspects: Aspects, answer: PathAnswer, points: int) -> None:
     assert answer.margin > 0
     way = followed(aspects, answer, points)
     end = way[-1].pose(aspects.setting.mechanism.platform) - answer.goal.configuration.pose(
-        aspects.setting.mechanism.platform)
+        aspects.setting.mechanism.platform
+    )
     assert np.max(np.abs(end)) < 1e-7
     scene = aspects.structure.values_at(way)
     condition: Condition = aspects.condition

@@ -87,8 +87,10 @@ def circles(robot: Mechanism) -> Planar:
     n = normal(robot)
     x = unit(knees[0] - feet[0])
     X = pose(tips[0], np.column_stack([x, np.cross(n, x), n]))
-    curves = tuple(Circle(foot + tip - knee, n, float(np.linalg.norm(knee - foot)))
-                   for foot, knee, tip in zip(feet, knees, tips, strict=True))
+    curves = tuple(
+        Circle(foot + tip - knee, n, float(np.linalg.norm(knee - foot)))
+        for foot, knee, tip in zip(feet, knees, tips, strict=True)
+    )
     return Planar(curves, np.array([(tip - tips[0]) @ X[:3, :2] for tip in tips]), X)
 
 
@@ -105,8 +107,10 @@ def crossings(system: Planar) -> int:
     aside = np.sqrt(np.maximum(reserve, 0))
     # beyond its reach the second tip has no place; at the two limits its two ways meet
     total, there = 0, reserve > 0
-    ways = [np.abs(first + away * (share + sign * 1j * aside) / np.abs(away) ** 2 * (w - p) / (q - p) - c) > t
-            for sign in (1, -1)]
+    ways = [
+        np.abs(first + away * (share + sign * 1j * aside) / np.abs(away) ** 2 * (w - p) / (q - p) - c) > t
+        for sign in (1, -1)
+    ]
     for way in ways:
         total += int(np.count_nonzero((way[1:] != way[:-1]) & there[1:] & there[:-1]))
     limits = np.flatnonzero(there[1:] != there[:-1])

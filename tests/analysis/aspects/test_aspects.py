@@ -32,10 +32,24 @@ from hrsynth.kinematics.walking import random_walk
 from strategies import planar
 
 # Robots whose legs can be closed by hand: planar, five bars, translating, with six freedoms, with two halves.
-SIGNED = [("3rrr_m1", None), ("3rpr_m1", None), ("3prr_m1", None), ("rrrrr_m1", None), ("rprpr_m1", None),
-          ("gough_stewart", "1,2,3"), ("quattro", "1,4"), ("quattro_rigid", "1,3")]
-UNSIGNED = [("quattro_rigid", None), ("delta", None), ("quattro", None), ("hexa", None),
-            ("gough_stewart", None), ("prrrp_m1", None)]
+SIGNED = [
+    ("3rrr_m1", None),
+    ("3rpr_m1", None),
+    ("3prr_m1", None),
+    ("rrrrr_m1", None),
+    ("rprpr_m1", None),
+    ("gough_stewart", "1,2,3"),
+    ("quattro", "1,4"),
+    ("quattro_rigid", "1,3"),
+]
+UNSIGNED = [
+    ("quattro_rigid", None),
+    ("delta", None),
+    ("quattro", None),
+    ("hexa", None),
+    ("gough_stewart", None),
+    ("prrrp_m1", None),
+]
 KNOWN = SIGNED + UNSIGNED
 
 
@@ -81,8 +95,7 @@ def test_a_certified_path_is_free_of_singularities_and_within_reach(robot: str, 
 @pytest.mark.parametrize(("robot", "observe"), KNOWN)
 def test_a_thousand_points_of_each_certified_path(robot: str, observe: str | None):
     aspects = aspects_of(robot, observe)
-    joined = [answer for pair in pairs(robot, observe, 10, seed=1)
-              if (answer := aspects.join(*pair)).verdict == SAME]
+    joined = [answer for pair in pairs(robot, observe, 10, seed=1) if (answer := aspects.join(*pair)).verdict == SAME]
     assert joined
     for answer in joined:
         check_certified(aspects, answer, 1000)
@@ -119,8 +132,11 @@ def test_poses_decide_the_values_that_configurations_have(robot: str, observe: s
     for at in walk(robot, observe)[:6]:
         reached, value = aspects.enclosure(at).at(*aspects.pattern.coordinates.of([at]))
         scene = aspects.structure.values_at([at])
-        exact = aspects.condition.evaluate(scene) if aspects.condition.signed else smallest_of(
-            aspects.condition.rows(scene))
+        exact = (
+            aspects.condition.evaluate(scene)
+            if aspects.condition.signed
+            else smallest_of(aspects.condition.rows(scene))
+        )
         assert reached.all()
         assert value == pytest.approx(exact, abs=1e-8)
 
@@ -151,9 +167,24 @@ def test_separated_poses_are_so_in_all_working_modes(robot: str, observe: str | 
             continue
         forms = aspects.enclosure(pair[1]).forms
         p, R = aspects.pattern.coordinates.of([pair[1]])
-        found = {float(np.sign(evaluate(aspects.condition.expression, replace(forms, limbs=tuple(
-            replace(limb, mode=mode) for limb, mode in zip(forms.limbs, modes, strict=True))).at(p, R).values)[0]))
-            for modes in product((1.0, -1.0), repeat=len(forms.limbs))}
+        found = {
+            float(
+                np.sign(
+                    evaluate(
+                        aspects.condition.expression,
+                        replace(
+                            forms,
+                            limbs=tuple(
+                                replace(limb, mode=mode) for limb, mode in zip(forms.limbs, modes, strict=True)
+                            ),
+                        )
+                        .at(p, R)
+                        .values,
+                    )[0]
+                )
+            )
+            for modes in product((1.0, -1.0), repeat=len(forms.limbs))
+        }
         met += 1
         answer = aspects.join(*pair, any_mode=True, budget=20)
         assert (answer.verdict == SEPARATED) is (found == {sides[1]})
@@ -161,9 +192,13 @@ def test_separated_poses_are_so_in_all_working_modes(robot: str, observe: str | 
     assert met or robot == "quattro_rigid"
 
 
-@pytest.mark.parametrize(("start", "goal", "leg"), [
-    ("x=0.01,y=-0.015,phi=0", "x=-0.1073,y=-0.0315,phi=5.58deg", "3"),
-    ("x=0,y=0", "x=-0.091,y=-0.053,phi=0.1", "1, 2")])
+@pytest.mark.parametrize(
+    ("start", "goal", "leg"),
+    [
+        ("x=0.01,y=-0.015,phi=0", "x=-0.1073,y=-0.0315,phi=5.58deg", "3"),
+        ("x=0,y=0", "x=-0.091,y=-0.053,phi=0.1", "1, 2"),
+    ],
+)
 def test_a_goal_on_the_other_side_is_reached_through_a_fold(start: str, goal: str, leg: str):
     answer = path(load("3rrr_m1"), start=start, goal=goal)
     assert (answer.verdict, answer.certified) == (SAME, True)
@@ -181,9 +216,17 @@ def test_nine_of_ten_pairs_on_one_side_are_joined():
 
 
 @pytest.mark.some(1)
-@pytest.mark.parametrize(("robot", "observe"), [
-    ("3rrr_m1", None), ("3rpr_m1", None), ("rrrrr_m1", None), ("gough_stewart", "1,2,3"), ("quattro", "1,4"),
-    ("quattro_rigid", None)])
+@pytest.mark.parametrize(
+    ("robot", "observe"),
+    [
+        ("3rrr_m1", None),
+        ("3rpr_m1", None),
+        ("rrrrr_m1", None),
+        ("gough_stewart", "1,2,3"),
+        ("quattro", "1,4"),
+        ("quattro_rigid", None),
+    ],
+)
 def test_poses_anywhere_on_one_side_are_joined(robot: str, observe: str | None):
     aspects, rng = aspects_of(robot, observe), np.random.default_rng(1)
     assert isinstance(aspects.pattern, LegPattern)
@@ -233,8 +276,10 @@ def test_a_way_that_crosses_the_locus_twice_is_led_around_it():
 
 
 @pytest.mark.some(3)
-@pytest.mark.parametrize(("robot", "observe"), [
-    ("rrrrr_m1", None), ("3prr_m1", None), ("quattro_rigid", "1,3"), ("prrrp_m1", None), ("delta", None)])
+@pytest.mark.parametrize(
+    ("robot", "observe"),
+    [("rrrrr_m1", None), ("3prr_m1", None), ("quattro_rigid", "1,3"), ("prrrp_m1", None), ("delta", None)],
+)
 def test_a_way_that_leaves_the_workspace_is_never_proved(robot: str, observe: str | None):
     aspects, rng = aspects_of(robot, observe), np.random.default_rng(0)
     assert isinstance(aspects.pattern, LegPattern)
@@ -417,8 +462,10 @@ def test_what_drives_a_crank_may_not_reach_and_is_not_certified(legs, tmp_path):
     """A 3-RRR, or 4-RRR, whose third crank a rocker drives through a coupler: legs reach along the straight way, and
     half way the coupler is 4 mm too long (law of cosines, rotation of the crank). The third rod is watched or not."""
     angle = np.pi / 2 + np.array([0, 2, 4, 1])[:legs] * np.pi / 3
-    A, B = (size * np.stack([np.cos(angle + turn), np.sin(angle + turn), 0 * angle], 1)
-            for size, turn in ((0.5, 0.0), (0.15, 0.2)))
+    A, B = (
+        size * np.stack([np.cos(angle + turn), np.sin(angle + turn), 0 * angle], 1)
+        for size, turn in ((0.5, 0.0), (0.15, 0.2))
+    )
     ways = (B - A) / np.linalg.norm(B - A, axis=1)[:, None]
     E = (A + B) / 2 + 0.18 * np.cross([0, 0, 1], ways)
     crank = (E - A)[2] / np.linalg.norm((E - A)[2])
@@ -429,17 +476,30 @@ def test_what_drives_a_crank_may_not_reach_and_is_not_certified(legs, tmp_path):
     def body(kind: str, name: str, ends: tuple[str, str], *at: Array) -> str:
         names = ("parent", "child") if kind == "joint" else ("predecessor", "successor")
         places = [f'<origin xyz="{" ".join(map(repr, each.tolist()))}"/>' for each in at]
-        inner = (f'<parent link="{ends[0]}"/><child link="{ends[1]}"/>{places[0]}' if kind == "joint" else "".join(
-            f'<{role} link="{end}">{place}</{role}>' for role, end, place in zip(names, ends, places, strict=True)))
+        inner = (
+            f'<parent link="{ends[0]}"/><child link="{ends[1]}"/>{places[0]}'
+            if kind == "joint"
+            else "".join(
+                f'<{role} link="{end}">{place}</{role}>' for role, end, place in zip(names, ends, places, strict=True)
+            )
+        )
         return f'<{kind} name="{name}" type="continuous">{inner}<axis xyz="0 0 1"/></{kind}>'
 
-    parts = [f'<link name="{name}"/>' for name in (
-        "base", "plate", "q", "s", *(f"{kind}{i}" for kind in "cr" for i in range(legs)))]
+    parts = [
+        f'<link name="{name}"/>'
+        for name in ("base", "plate", "q", "s", *(f"{kind}{i}" for kind in "cr" for i in range(legs)))
+    ]
     for i in range(legs):
-        parts += [body("joint", f"a{i}", ("base", f"c{i}"), A[i]),
-                  body("joint", f"e{i}", (f"c{i}", f"r{i}"), E[i] - A[i])]
-    parts += [body("joint", "b0", ("r0", "plate"), B[0] - E[0]), body("joint", "q", ("base", "q"), Q),
-              body("joint", "s", ("q", "s"), S - Q), body("loop", "t", ("s", "c2"), T - S, T - A[2])]
+        parts += [
+            body("joint", f"a{i}", ("base", f"c{i}"), A[i]),
+            body("joint", f"e{i}", (f"c{i}", f"r{i}"), E[i] - A[i]),
+        ]
+    parts += [
+        body("joint", "b0", ("r0", "plate"), B[0] - E[0]),
+        body("joint", "q", ("base", "q"), Q),
+        body("joint", "s", ("q", "s"), S - Q),
+        body("loop", "t", ("s", "c2"), T - S, T - A[2]),
+    ]
     parts += [body("loop", f"b{i}", (f"r{i}", "plate"), B[i] - E[i], B[i] - B[0]) for i in range(1, legs)]
     parts += [f'<transmission name="m{name}"><joint name="{name}"/></transmission>' for name in ("a0", "a1", "q")]
     file = tmp_path / "driven.urdf"

@@ -67,8 +67,9 @@ def test_signs_of_the_determinant_agree_with_the_table(name: str, observe: str |
     if not found.aspects.condition.signed:
         assert not any(SEPARATED in row for row in found.table)
         return
-    signs = np.sign(found.aspects.condition.evaluate(found.aspects.structure.values_at(
-        [found.places[k - 1] for k in numbers])))
+    signs = np.sign(
+        found.aspects.condition.evaluate(found.aspects.structure.values_at([found.places[k - 1] for k in numbers]))
+    )
     for (i, one), (j, other) in combinations(zip(numbers, signs, strict=True), 2):
         assert (found.verdict(i, j) == SEPARATED) == (one != other)
 
@@ -88,8 +89,10 @@ def test_a_cuspidal_robot_goes_from_mode_to_mode_with_the_same_directions():
     for answer in paths:
         check_certified(found.aspects, answer, 200)
         question = found.aspects.setting.samples.question
-        seen = [np.array(measure(end.configuration.twin, end.configuration.q, question.reference,
-                                 question.observations)[2]) for end in (answer.start, answer.goal)]
+        seen = [
+            np.array(measure(end.configuration.twin, end.configuration.q, question.reference, question.observations)[2])
+            for end in (answer.start, answer.goal)
+        ]
         assert np.max(np.abs(seen[0] - seen[1])) < 1e-9
         link = found.aspects.motion.link
         assert np.max(np.abs(answer.start.configuration.pose(link) - answer.goal.configuration.pose(link))) > 0.01

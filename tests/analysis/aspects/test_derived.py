@@ -18,8 +18,23 @@ from hrsynth.geometry.balls import balls
 from hrsynth.kinematics.walking import random_walk
 from strategies import deltas, planar, pods
 
-SHIPPED = ("3rrr_m1", "3rpr_m1", "3prr_m1", "rrrrr_m1", "rprpr_m1", "prrrp_m1", "gough_stewart", "quattro",
-           "quattro_rigid", "delta", "hexa", "3puu", "3ruu", "orthoglide", "uranesx")
+SHIPPED = (
+    "3rrr_m1",
+    "3rpr_m1",
+    "3prr_m1",
+    "rrrrr_m1",
+    "rprpr_m1",
+    "prrrp_m1",
+    "gough_stewart",
+    "quattro",
+    "quattro_rigid",
+    "delta",
+    "hexa",
+    "3puu",
+    "3ruu",
+    "orthoglide",
+    "uranesx",
+)
 RANDOM = ("RRR", "RPR", "PRR", "five-bar", "UPS", "R2-SS")
 
 

@@ -53,8 +53,9 @@ def misses(drawn: HeldLegSection, place: SectionPoint) -> np.ndarray:
     return max(found, key=lambda each: each[0])[1]
 
 
-def _misses(robot: ThreeCranks, centres: np.ndarray, tips: np.ndarray, turn: float, order: tuple[int, ...]
-            ) -> tuple[float, np.ndarray]:
+def _misses(
+    robot: ThreeCranks, centres: np.ndarray, tips: np.ndarray, turn: float, order: tuple[int, ...]
+) -> tuple[float, np.ndarray]:
     i, j, k = order
     a = centres[i] + (tips[i] - centres[i]) * np.exp(1j * STEP * np.arange(-3, 4))
     away, arm = centres[j] - a, robot.corners[j] - robot.corners[i]
@@ -147,8 +148,9 @@ def test_modes_are_counted_where_the_second_corner_just_reaches_its_circle():
     rng = np.random.default_rng(3)
     feet = np.array([0, 2, 1 + 1.7j]) + 0.3 * (rng.normal(size=3) + 1j * rng.normal(size=3))
     cranks, rods = rng.uniform(0.6, 1.4, (2, 3))
-    robot = ThreeCranks(("1", "2", "3"), feet, cranks, rods,
-                        np.array([0, rng.uniform(0.5, 1), rng.uniform(0.3, 1) * np.exp(1j)]))
+    robot = ThreeCranks(
+        ("1", "2", "3"), feet, cranks, rods, np.array([0, rng.uniform(0.5, 1), rng.uniform(0.3, 1) * np.exp(1j)])
+    )
     first, second = np.linspace(-np.pi, np.pi, 161), np.linspace(-np.pi, np.pi, 16)
     few, many = (mode_counts(robot, 1 + 0j, first, second, steps) for steps in (480, 6000))
     assert set(np.unique(many)) == {0, 2, 4, 6}
@@ -172,9 +174,17 @@ def test_the_turn_of_a_mode_is_counted_as_phi_of_its_pose(axis: str):
 
 
 @pytest.mark.some(2)
-@pytest.mark.parametrize(("name", "observe", "reason"), [
-    ("quattro", "1,4", "plane"), ("3prr_m1", None, "cranks"), ("3rpr_m1", None, "cranks"), ("rrrrr_m1", None, "plane"),
-    ("3rrr_m1", "prox_1,prox_2,prox_3", "rod"), ("3rrr_m1", "1,2,prox_3", "rod")])
+@pytest.mark.parametrize(
+    ("name", "observe", "reason"),
+    [
+        ("quattro", "1,4", "plane"),
+        ("3prr_m1", None, "cranks"),
+        ("3rpr_m1", None, "cranks"),
+        ("rrrrr_m1", None, "plane"),
+        ("3rrr_m1", "prox_1,prox_2,prox_3", "rod"),
+        ("3rrr_m1", "1,2,prox_3", "rod"),
+    ],
+)
 def test_other_robots_have_no_such_section(name: str, observe: str | None, reason: str):
     found = atlas(hrsynth.load(name), observe)
     made = found.section

@@ -20,8 +20,17 @@ from hrsynth.kinematics.walking import random_walk
 from hrsynth.mechanism import JointType, Limits, Mechanism
 from strategies import planar
 
-KNOWN = [("3rrr_m1", None), ("3rpr_m1", None), ("3prr_m1", None), ("rrrrr_m1", None), ("gough_stewart", "1,2,3"),
-         ("quattro", "1,4"), ("quattro_rigid", None), ("3puu", None), ("hexa", None)]
+KNOWN = [
+    ("3rrr_m1", None),
+    ("3rpr_m1", None),
+    ("3prr_m1", None),
+    ("rrrrr_m1", None),
+    ("gough_stewart", "1,2,3"),
+    ("quattro", "1,4"),
+    ("quattro_rigid", None),
+    ("3puu", None),
+    ("hexa", None),
+]
 
 
 def with_limits(robot: Mechanism, limits: Mapping[str, Limits]) -> Mechanism:
@@ -46,8 +55,10 @@ def limited(robot: str, observe: str | None) -> Aspects:
     """A robot with limits on all its R and P joints, not in the middle of their zero."""
     mechanism = load(robot)
     rng = np.random.default_rng(0)
-    return Aspects.of(with_limits(mechanism, {name: Limits(*(rng.uniform(0.05, 0.5, 2) * [-1, 1])) for name in single(
-        mechanism)}), observe)
+    return Aspects.of(
+        with_limits(mechanism, {name: Limits(*(rng.uniform(0.05, 0.5, 2) * [-1, 1])) for name in single(mechanism)}),
+        observe,
+    )
 
 
 @pytest.mark.some(1)
@@ -85,9 +96,13 @@ def furthest(path: list[ClosedConfiguration], joints: list[str]) -> tuple[str, f
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("robot", [
-    pytest.param(load("3rrr_m1"), id="3rrr_m1"),
-    pytest.param(planar(["RRR"] * 3, np.random.default_rng(3), [{0}] * 3), id="random")])
+@pytest.mark.parametrize(
+    "robot",
+    [
+        pytest.param(load("3rrr_m1"), id="3rrr_m1"),
+        pytest.param(planar(["RRR"] * 3, np.random.default_rng(3), [{0}] * 3), id="random"),
+    ],
+)
 def test_paths_are_led_around_the_limits_that_others_pass(robot: Mechanism):
     """Limits that a path without them leaves: another path keeps to them, or none is found."""
     free = Aspects.of(robot)
@@ -135,8 +150,11 @@ def test_a_rod_may_pass_length_zero_unless_it_is_limited(room: float | None):
     """Each rod of a 3-RPR turned over changes the sign, so poses are separated only where slides cannot pass zero."""
     robot, slides = load("3rpr_m1"), ("slide_1", "slide_2", "slide_3")
     aspects = Aspects.of(robot if room is None else with_limits(robot, {name: Limits(-room, room) for name in slides}))
-    near = [at for at in random_walk(aspects.setting.samples.start, 150, 1)
-            if all(abs(coordinates(at, name)) < 0.24 for name in slides)]
+    near = [
+        at
+        for at in random_walk(aspects.setting.samples.start, 150, 1)
+        if all(abs(coordinates(at, name)) < 0.24 for name in slides)
+    ]
     values = aspects.condition.evaluate(aspects.structure.values_at(near))
     answer = aspects.join(near[int(np.argmin(values))], near[int(np.argmax(values))], any_mode=True, budget=20)
     assert answer.start.value * answer.goal.value < 0

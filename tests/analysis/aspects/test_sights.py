@@ -33,9 +33,14 @@ POINTS = [f"point:platform@{','.join(map(str, place))}" for place in PLACES]
 AXES = ("1,0.2,0.1", "0.1,1,0.3", "0.3,0.1,1")
 LINES = [f"image_line:platform@{','.join(map(str, place))}/{axis}" for place, axis in zip(PLACES, AXES, strict=True)]
 EDGES = [f"edge{each.removeprefix('image_line')}/{r}" for each, r in zip(LINES, (0.02, -0.03, 0.01), strict=True)]
-SETS = {"points": POINTS, "lines": LINES, "edges": EDGES, "two lines": [POINTS[0], *LINES[1:]],
-        "space": ["line:platform@0.1,0,0/1,0.2,0.1", "point:platform@0,0.2,0"],
-        "mixture": [EDGES[0], POINTS[1], "inclination:platform", "distance:platform@0,0,0.1", "depth:platform@0.1,0,0"]}
+SETS = {
+    "points": POINTS,
+    "lines": LINES,
+    "edges": EDGES,
+    "two lines": [POINTS[0], *LINES[1:]],
+    "space": ["line:platform@0.1,0,0/1,0.2,0.1", "point:platform@0,0.2,0"],
+    "mixture": [EDGES[0], POINTS[1], "inclination:platform", "distance:platform@0,0,0.1", "depth:platform@0.1,0,0"],
+}
 
 
 @cache
@@ -56,16 +61,18 @@ def test_what_is_enclosed_is_the_condition_of_the_configurations(name: str, robo
     assert not aspects.pattern.fitted
     at = aspects.members
     scene = aspects.structure.values_at(at)
-    expected = aspects.condition.evaluate(scene) if aspects.condition.signed else smallest_of(
-        aspects.condition.rows(scene))
+    expected = (
+        aspects.condition.evaluate(scene) if aspects.condition.signed else smallest_of(aspects.condition.rows(scene))
+    )
     p, R = aspects.pattern.coordinates.of(at)
     for i, each in enumerate(at):
         enclosure: ConditionEnclosure = aspects.enclosure(each)
         reached, value = enclosure.at(p[i : i + 1], R[i : i + 1])
         assert reached.all()
         assert value[0] == pytest.approx(expected[i], rel=1e-8, abs=1e-10)
-        sure, wide = enclosure.at(*(np.array([balls([x], [x])[0] for x in part.ravel()]).reshape(1, *part.shape)
-                                    for part in (p[i], R[i])))
+        sure, wide = enclosure.at(
+            *(np.array([balls([x], [x])[0] for x in part.ravel()]).reshape(1, *part.shape) for part in (p[i], R[i]))
+        )
         assert sure.all()
         bound = below(wide)[0]
         assert 0 <= bound <= abs(value[0]) * (1 + 1e-9)
@@ -73,14 +80,18 @@ def test_what_is_enclosed_is_the_condition_of_the_configurations(name: str, robo
 
 
 def camera() -> Array:
-    (found,) = {id(o.camera): o.camera for o in ObservedRobot.of(
-        "gough_stewart", camera=EYE, see=POINTS, samples=3).observed if isinstance(o, CameraObservation)}.values()
+    (found,) = {
+        id(o.camera): o.camera
+        for o in ObservedRobot.of("gough_stewart", camera=EYE, see=POINTS, samples=3).observed
+        if isinstance(o, CameraObservation)
+    }.values()
     assert found is not None
     return found.pose
 
 
 def image_sign(view: Array, X: Array) -> float:
     """The sign of the determinant of the image coordinates' derivatives, on the sphere of rays: Z ≠ 0 apart."""
+
     def seen(step: Array) -> Array:
         turned = X @ pose(step[:3], exponential(step[3:]))
         p = (np.linalg.inv(view) @ turned @ np.hstack([PLACES, np.ones((3, 1))]).T)[:3]
@@ -93,8 +104,12 @@ def image_sign(view: Array, X: Array) -> float:
 
 def wrench_sign(setting: ObservedRobot, X: Array) -> float:
     """The sign of the determinant of the wrenches of lines, which change without jumps."""
-    rows = [wrench for o in setting.observed if isinstance(o, CameraObservation)
-            for wrench in o.wrenches(o.sighting(np.eye(4), X))]
+    rows = [
+        wrench
+        for o in setting.observed
+        if isinstance(o, CameraObservation)
+        for wrench in o.wrenches(o.sighting(np.eye(4), X))
+    ]
     return float(np.sign(np.linalg.det(np.array(rows, dtype=float))))
 
 
@@ -132,8 +147,11 @@ def test_a_second_pose_with_the_same_image_of_three_points_is_reached_without_a_
     for pair in found.pairs:
         if pair.answer is None:
             continue
-        ends = [image_sign(camera(), at.pose("platform")) for at in (found.places[k - 1] for k in pair.numbers)
-                if at is not None]
+        ends = [
+            image_sign(camera(), at.pose("platform"))
+            for at in (found.places[k - 1] for k in pair.numbers)
+            if at is not None
+        ]
         if pair.verdict == "same aspect":
             assert signs_along(pair.answer, camera()) == set(ends)
             assert len(set(ends)) == 1
@@ -161,11 +179,14 @@ def test_opposite_signs_separate(tmp_path: Path) -> None:
 def test_where_nothing_is_enclosed_the_way_is_sampled(tmp_path: Path) -> None:
     """An arm, encoders beside a direction, a conic: undecided, with the smallest singular value of sampled poses."""
     spots = ("0.5,0.1,0", "0.6,0.1,0.1", "0.5,0.3,0.1", "0.4,0.1,0.2")
-    arm = ObservedRobot.of("example:panda", camera="hand=panda_hand@0,0,-0.3", samples=3,
-                           see=[f"point:world@{spot}" for spot in spots])
+    arm = ObservedRobot.of(
+        "example:panda", camera="hand=panda_hand@0,0,-0.3", samples=3, see=[f"point:world@{spot}" for spot in spots]
+    )
     motors = ObservedRobot.of("3rrr_m1", "1", see=["encoder:shoulder_1", "encoder:shoulder_2"], samples=3)
-    for setting, start, goal in ((arm, "x=0.3,y=0.1,z=0.5", "x=0.35,y=0.2,z=0.5"),
-                                 (motors, "x=0,y=0,phi=0", "x=0.02,y=0,phi=0")):
+    for setting, start, goal in (
+        (arm, "x=0.3,y=0.1,z=0.5", "x=0.35,y=0.2,z=0.5"),
+        (motors, "x=0,y=0,phi=0", "x=0.02,y=0,phi=0"),
+    ):
         found = hrsynth.path(setting, start=start, goal=goal)
         assert (found.verdict, found.certified) == ("undecided", False)
         assert found.road is not None

@@ -116,8 +116,10 @@ def test_all_six_modes_have_the_directions_that_are_watched():
     for instance in islice(six_modes(2), 3):
         aspects = Aspects.of(instance.robot)
         question = aspects.setting.samples.question
-        seen = [np.array(measure(at.twin, at.q, question.reference, question.observations)[2])
-                for at in instance.configurations(aspects.setting.samples.twin)]
+        seen = [
+            np.array(measure(at.twin, at.q, question.reference, question.observations)[2])
+            for at in instance.configurations(aspects.setting.samples.twin)
+        ]
         assert np.max(np.abs(np.array(seen) - seen[0])) < 1e-9
         apart = [np.max(np.abs(one - two)) for one, two in combinations(instance.poses, 2)]
         assert min(apart) > 1e-4

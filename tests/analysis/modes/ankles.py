@@ -13,8 +13,9 @@ Rod = tuple[Array, Array]
 """Where a leg with its motor held turns on the shank, and where on the foot, at zero (3,)."""
 
 
-def ankle(kind: str, seed: int, *, two_turns: bool = True, offset: float = 0.0
-          ) -> tuple[Mechanism, tuple[Array, Array, Array, Array], list[Rod]]:
+def ankle(
+    kind: str, seed: int, *, two_turns: bool = True, offset: float = 0.0
+) -> tuple[Mechanism, tuple[Array, Array, Array, Array], list[Rod]]:
     """A random ankle in a tilted base; the U joint's centre and two axes, the second one's point, and both rods.
 
     ``two_turns``: the U joint is written as two R with a connector that has no length, or one of about the length
@@ -37,8 +38,9 @@ def ankle(kind: str, seed: int, *, two_turns: bool = True, offset: float = 0.0
         b.joint("pitch", "R", "shank", "cross", at=centre, axis=first)
         b.joint("roll", "R", "cross", "foot", at=lower, axis=second)
     else:
-        b.joint("ankle", "U", "shank", "foot", at=centre, axis=first, axis2=unit(np.cross(np.cross(first, second),
-                                                                                         first)))
+        b.joint(
+            "ankle", "U", "shank", "foot", at=centre, axis=first, axis2=unit(np.cross(np.cross(first, second), first))
+        )
         second = unit(np.cross(np.cross(first, second), first))
     for leg, side in (("1", 0.06), ("2", -0.06)):
         motor, end = near(-0.05, side, 0.3), near(-0.06, side, -0.04)
@@ -52,8 +54,9 @@ def ankle(kind: str, seed: int, *, two_turns: bool = True, offset: float = 0.0
             b.joint(f"slide_{leg}", "P", f"crank_{leg}", f"rod_{leg}", at=ball, axis=along, motor=True)
             b.joint(f"end_{leg}", "U", f"rod_{leg}", "foot", at=end, loop=True, **axes)
         else:
-            b.joint(f"crank_{leg}", "R", "shank", f"crank_{leg}", at=motor, axis=unit(near(0, 1, 0, by=0.2)),
-                    motor=True)
+            b.joint(
+                f"crank_{leg}", "R", "shank", f"crank_{leg}", at=motor, axis=unit(near(0, 1, 0, by=0.2)), motor=True
+            )
             up, down = ({}, axes) if kind == "RSU" else (axes, {})
             b.joint(f"ball_{leg}", kind[1], f"crank_{leg}", f"rod_{leg}", at=ball, **up)
             b.joint(f"end_{leg}", kind[2], f"rod_{leg}", "foot", at=end, loop=True, **down)
@@ -102,8 +105,13 @@ def counted(joint: tuple[Array, Array, Array, Array], rods: list[Rod]) -> tuple[
     tables = []
     for ball, end in rods:
         angles = 2 * np.pi * np.arange(3) / 3
-        rod = [[centre + rotation_about(a, alpha) @ (lower + rotation_about(c, beta) @ (end - lower) - centre) - ball
-                for beta in angles] for alpha in angles]
+        rod = [
+            [
+                centre + rotation_about(a, alpha) @ (lower + rotation_about(c, beta) @ (end - lower) - centre) - ball
+                for beta in angles
+            ]
+            for alpha in angles
+        ]
         values = np.sum(np.square(rod), axis=2) - np.sum((end - ball) ** 2)
         tables.append(np.roll(np.fft.fft2(values), (1, 1), (0, 1)))  # powers -1, 0, 1 of x and of y
     nodes = np.exp(2j * np.pi * np.arange(16) / 16)
@@ -116,7 +124,9 @@ def counted(joint: tuple[Array, Array, Array, Array], rods: list[Rod]) -> tuple[
     assert np.abs(resultant[9:]).max() < 1e-10 * size
     x = np.roots(resultant[8::-1])
     there = [np.roots((each ** np.arange(3) @ tables[0])[::-1]) for each in x]
-    y = [ys[np.argmin([abs(v ** np.arange(3) @ (each ** np.arange(3) @ tables[1])) for v in ys])]
-         for each, ys in zip(x, there, strict=True)]
+    y = [
+        ys[np.argmin([abs(v ** np.arange(3) @ (each ** np.arange(3) @ tables[1])) for v in ys])]
+        for each, ys in zip(x, there, strict=True)
+    ]
     real = sum(abs(abs(each) - 1) < 1e-6 and abs(abs(v) - 1) < 1e-6 for each, v in zip(x, y, strict=True))
     return int(np.sum((np.abs(x) > 1e-9) & np.isfinite(x))), int(real)

@@ -51,8 +51,12 @@ def seen(name: str, seeds: range) -> Seen:
         first.setdefault(count, seed)
         apart = among(goal, found)
         allowed = max(GOAL, 100 * max((mode.radius for mode in found.modes), default=0.0))
-        flags = {"over": found.complex != FAMILIES[name].count or count > FAMILIES[name].count,
-                 "unproved": not found.complete, "far": apart >= allowed, "ill": GOAL <= apart < allowed}
+        flags = {
+            "over": found.complex != FAMILIES[name].count or count > FAMILIES[name].count,
+            "unproved": not found.complete,
+            "far": apart >= allowed,
+            "ill": GOAL <= apart < allowed,
+        }
         for key, flag in flags.items():
             wrong[key] += [seed] if flag else []
     lists = {key: tuple(seeds) for key, seeds in wrong.items()}
@@ -62,13 +66,31 @@ def seen(name: str, seeds: range) -> Seen:
 def row(name: str, result: Seen) -> str:
     """One line of the table."""
     shares = ", ".join(f"{count}: {times}" for count, times in sorted(result.real.items()))
-    cells = (name, FAMILIES[name].count, result.most, result.seed, shares, len(result.over), len(result.unproved),
-             len(result.far), len(result.ill))
+    cells = (
+        name,
+        FAMILIES[name].count,
+        result.most,
+        result.seed,
+        shares,
+        len(result.over),
+        len(result.unproved),
+        len(result.far),
+        len(result.ill),
+    )
     return f"| {' | '.join(map(str, cells))} |"
 
 
-HEADS = ("family", "complex", "most real", "seed", "instances with so many real modes", "other counts", "unproved",
-         "goal missing", "goal ill-conditioned")
+HEADS = (
+    "family",
+    "complex",
+    "most real",
+    "seed",
+    "instances with so many real modes",
+    "other counts",
+    "unproved",
+    "goal missing",
+    "goal ill-conditioned",
+)
 
 if __name__ == "__main__":
     size, names = int(sys.argv[1]), sys.argv[2:] or sorted(FAMILIES)

@@ -112,11 +112,19 @@ def compared(listed: AssemblyModes, starts: int, seed: int = 0) -> Comparison:
             met.add(nearest)
         else:
             missing.append(min(apart, default=np.inf))
-    return Comparison(len(found), len(found) - len(here), frozenset(met), tuple(missing),
-                      tuple(sorted(k for k in met if listed.modes[k].open)))
+    return Comparison(
+        len(found),
+        len(found) - len(here),
+        frozenset(met),
+        tuple(missing),
+        tuple(sorted(k for k in met if listed.modes[k].open)),
+    )
 
 
 def motor_places(mechanism: Mechanism, pose_of: dict[str, Array]) -> list[Array]:
     """The pose of each driven joint's successor in the frame of its predecessor: what an encoder feels."""
-    return [inverse(pose_of[joint.predecessor]) @ pose_of[joint.successor]
-            for joint in mechanism.joints.values() if joint.actuated]
+    return [
+        inverse(pose_of[joint.predecessor]) @ pose_of[joint.successor]
+        for joint in mechanism.joints.values()
+        if joint.actuated
+    ]

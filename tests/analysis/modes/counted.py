@@ -57,6 +57,7 @@ def normals(kind: str, ray: Vector, axis: Vector, ahead: Vector, rng: random.Ran
 
 def held(kinds: Sequence[str], rng: random.Random, cameras: bool) -> tuple[list[Any], list[Any], list[Any]]:
     """Planes n · (R b + p) = h as (n, b, h), angles n · R d = 0 as (n, d), spheres |R b + p − c|² = f as (b, c, f)."""
+
     def some() -> Vector:
         return [rng.randrange(1, PRIME) for _ in range(3)]
 
@@ -91,16 +92,17 @@ def count(kinds: Sequence[str], seed: int, cameras: bool = False) -> int:
     rng = random.Random(seed + 1)
     first, rest = planes[:3], planes[3:]
     rows = [n for n, _, _ in first] + [[rng.randrange(PRIME) for _ in range(3)] for _ in range(3 - len(first))]
-    right = [h * w - dot(n, turned(b)) for n, b, h in first] + [w * s for s in FREE[:3 - len(first)]]
+    right = [h * w - dot(n, turned(b)) for n, b, h in first] + [w * s for s in FREE[: 3 - len(first)]]
     back = sympy.Matrix(rows).inv_mod(PRIME)
     wp = [sympy.expand(dot(list(back.row(k)), right)) for k in range(3)]
     equations = [dot(n, turned(b)) + dot(n, wp) - h * w for n, b, h in rest] + [dot(n, turned(d)) for n, d in angles]
     for b, c, f in spheres:
         v = [u + s - e * w for u, s, e in zip(turned(b), wp, c, strict=True)]
         equations.append(dot(v, v) - f * w * w)
-    unknowns = (INVERSE, *FREE[:3 - len(first)], X, Y, Z)
+    unknowns = (INVERSE, *FREE[: 3 - len(first)], X, Y, Z)
     basis = sympy.groebner([*map(sympy.expand, equations), INVERSE * w - 1], *unknowns, modulus=PRIME, order="grevlex")
     leading = [sympy.Poly(each, *unknowns, modulus=PRIME).monoms(order="grevlex")[0] for each in basis.exprs]
     tops = [min(m[k] for m in leading if sum(m) == m[k] and m[k]) for k in range(len(unknowns))]
-    return sum(not any(all(a >= b for a, b in zip(e, m, strict=True)) for m in leading)
-               for e in product(*map(range, tops)))
+    return sum(
+        not any(all(a >= b for a, b in zip(e, m, strict=True)) for m in leading) for e in product(*map(range, tops))
+    )

@@ -24,13 +24,30 @@ class File:
 
     def __init__(self, path: str) -> None:
         root = Xml.parse(path).getroot()
-        self.joints = [(j.get("name"), link(j, "parent"), link(j, "child"), numbers(j, "origin"), numbers(j, "axis"),
-                        j.get("type")) for j in root.findall("joint")]
+        self.joints = [
+            (
+                j.get("name"),
+                link(j, "parent"),
+                link(j, "child"),
+                numbers(j, "origin"),
+                numbers(j, "axis"),
+                j.get("type"),
+            )
+            for j in root.findall("joint")
+        ]
         children = {child for _, _, child, *_ in self.joints}
         self.base = next(each.get("name") for each in root.findall("link") if each.get("name") not in children)
-        self.loops = [(loop.get("type"), link(loop, "predecessor"), numbers(loop.find("predecessor"), "origin"),
-                       link(loop, "successor"), numbers(loop.find("successor"), "origin"),
-                       [numbers(loop, name) for name in ("axis", "axis2")]) for loop in root.findall("loop")]
+        self.loops = [
+            (
+                loop.get("type"),
+                link(loop, "predecessor"),
+                numbers(loop.find("predecessor"), "origin"),
+                link(loop, "successor"),
+                numbers(loop.find("successor"), "origin"),
+                [numbers(loop, name) for name in ("axis", "axis2")],
+            )
+            for loop in root.findall("loop")
+        ]
         self.joints = self._outward()
         self.moving = [j[0] for j in self.joints if j[5] != "fixed"]
 
@@ -68,8 +85,14 @@ class File:
             def miss(v: Array, before=before, target=target, base=base, names=names) -> Array:
                 return (self._along(before, dict(zip(names, v, strict=True)), base) - target)[:3].ravel()
 
-            tries = (least_squares(miss, rng.uniform(-3, 3, len(names)), xtol=1e-15, ftol=1e-15, gtol=1e-15)
-                     for _ in range(60)) if names and target is not None else ()
+            tries = (
+                (
+                    least_squares(miss, rng.uniform(-3, 3, len(names)), xtol=1e-15, ftol=1e-15, gtol=1e-15)
+                    for _ in range(60)
+                )
+                if names and target is not None
+                else ()
+            )
             best = next((t.x for t in tries if np.abs(t.fun).max() < 1e-7), np.zeros(len(names)))
             q |= dict(zip(names, map(float, best), strict=True))
             at[joint[2]] = self._along(before, q, base)
@@ -102,6 +125,7 @@ class File:
 
     def solved(self, q: Mapping[str, float], extra) -> tuple[dict[str, Any], float]:
         """Newton's method on the loops and ``extra`` rows of the links' poses: coordinates and the residual left."""
+
         def rows(at: Mapping[str, Any]) -> list[Any]:
             return [*self.closes(at), *extra(self.poses(at))]
 
@@ -118,8 +142,10 @@ class File:
                 step = back @ scaled
                 if size == 0 or np.abs(step).max() * size < 1e-45:
                     break
-                at = {name: (at[name] - arb(float(s)) * arb(size)).mid()
-                      for name, s in zip(self.moving, step, strict=True)}
+                at = {
+                    name: (at[name] - arb(float(s)) * arb(size)).mid()
+                    for name, s in zip(self.moving, step, strict=True)
+                }
                 F = rows(at)
             return at, max(float(abs(f)) for f in F)
 

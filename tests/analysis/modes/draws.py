@@ -48,8 +48,9 @@ def planar(rng: Rng, kinds: str) -> Draw:
     X = pose(rng.normal(size=3), random_rotation(rng))
     tips = rng.normal(scale=0.6, size=(len(kinds), 2))
     goal = X @ pose((*rng.normal(size=2), 0.0), rotation_about((0, 0, 1), rng.uniform(-3, 3)))
-    curves = [through(rng, kind, goal[:3, 3] + goal[:3, :2] @ tip, X[:3, 2])
-              for kind, tip in zip(kinds, tips, strict=True)]
+    curves = [
+        through(rng, kind, goal[:3, 3] + goal[:3, :2] @ tip, X[:3, 2]) for kind, tip in zip(kinds, tips, strict=True)
+    ]
     return Draw(Planar(tuple(curves), tips, X), goal)
 
 
@@ -77,8 +78,9 @@ def articulated(rng: Rng, kinds: str, parallel: tuple[int, ...] = ()) -> Draw:
         normals[k] = normals[parallel[0]]
     slide = Circle(rng.normal(scale=0.1, size=3), normals[2], rng.uniform(0.3, 1.5))
     at = [p + tips[0], p + slide.at(rng.uniform(-3, 3)) + tips[1]]
-    curves = [through(rng, kind, tip, n if kind == "C" else None)
-              for kind, tip, n in zip(kinds, at, normals, strict=False)]
+    curves = [
+        through(rng, kind, tip, n if kind == "C" else None) for kind, tip, n in zip(kinds, at, normals, strict=False)
+    ]
     return Draw(Articulated(tuple(curves), tips, (0, 1), slide), pose(p))
 
 
@@ -90,8 +92,9 @@ def on_two_bodies(rng: Rng, kinds: tuple[str, str], straight: bool = False) -> D
     bodies = tuple(body for body in (0, 1) for _ in kinds[body])
     origins = np.array([p, p + slide.at(rng.uniform(-3, 3))])[list(bodies)]
     tips = rng.normal(scale=0.4, size=(len(bodies), 3))
-    curves = [through(rng, kind, origin + tip)
-              for kind, origin, tip in zip(kinds[0] + kinds[1], origins, tips, strict=True)]
+    curves = [
+        through(rng, kind, origin + tip) for kind, origin, tip in zip(kinds[0] + kinds[1], origins, tips, strict=True)
+    ]
     return Draw(Articulated(tuple(curves), tips, bodies, slide), pose(p))
 
 
@@ -158,19 +161,34 @@ def six_rods(rng: Rng, platform: str, base: str, noise: float = 0.0) -> Draw:
     """Six rods between balls; rods with the same letter share one, but for ``noise``."""
     goal = pose(rng.normal(size=3), random_rotation(rng))
     sides = [scale * rng.normal(size=(6, 3)) for scale in (1.0, 2.0)]
-    tips, centres = (np.array([side["ABCDEF".index(letter)] for letter in letters]) + noise * rng.normal(size=(6, 3))
-                     for side, letters in zip(sides, (platform, base), strict=True))
+    tips, centres = (
+        np.array([side["ABCDEF".index(letter)] for letter in letters]) + noise * rng.normal(size=(6, 3))
+        for side, letters in zip(sides, (platform, base), strict=True)
+    )
     at = goal[:3, 3] + tips @ goal[:3, :3].T
     spheres = tuple(Sphere(c, float(np.linalg.norm(tip - c))) for tip, c in zip(at, centres, strict=True))
     return Draw(Spatial(spheres, tips), goal)
 
 
 DIETMAIER = (
-    ((0, 0, 0), (1.107915, 0, 0), (0.549094, 0.756063, 0), (0.735077, -0.223935, 0.525991),
-     (0.514188, -0.526063, -0.368418), (0.590473, 0.094733, -0.205018)),
-    ((0, 0, 0), (0.542805, 0, 0), (0.956919, -0.528915, 0), (0.665885, -0.353482, 1.402538),
-     (0.478359, 1.158742, 0.107672), (-0.137087, -0.235121, 0.353913)),
-    (1, 0.645275, 1.086284, 1.503439, 1.281933, 0.771071))
+    (
+        (0, 0, 0),
+        (1.107915, 0, 0),
+        (0.549094, 0.756063, 0),
+        (0.735077, -0.223935, 0.525991),
+        (0.514188, -0.526063, -0.368418),
+        (0.590473, 0.094733, -0.205018),
+    ),
+    (
+        (0, 0, 0),
+        (0.542805, 0, 0),
+        (0.956919, -0.528915, 0),
+        (0.665885, -0.353482, 1.402538),
+        (0.478359, 1.158742, 0.107672),
+        (-0.137087, -0.235121, 0.353913),
+    ),
+    (1, 0.645275, 1.086284, 1.503439, 1.281933, 0.771071),
+)
 """Balls of the base, of the platform, and lengths (P. Dietmaier, Advances in Robot Kinematics, 1998)."""
 
 

@@ -38,19 +38,24 @@ def closings(ratio: Fraction, points: Array) -> tuple[int, Array]:
     p, q = ratio.numerator, ratio.denominator
     terms = {0: C - B + A - E, q: B - A}
     terms[p] = terms.get(p, 0) - (D - E)
-    total: dict[int, complex] = {0: -abs(C - D) ** 2}
+    total: dict[int, complex] = {0: -(abs(C - D) ** 2)}
     for k, a in terms.items():
         for m, b in terms.items():
             total[k - m] = total.get(k - m, 0) + a * np.conj(b)
     most = max(total)
     roots = np.roots([total.get(k, 0) for k in range(most, -most - 1, -1)])
     real = roots[np.abs(np.abs(roots) - 1.0) < 1e-9]
-    return len(roots), np.array([np.angle(sum(a * z ** k for k, a in terms.items()) / (C - D)) for z in real])
+    return len(roots), np.array([np.angle(sum(a * z**k for k, a in terms.items()) / (C - D)) for z in real])
 
 
-def linkage(points: Sequence[Sequence[float]], links: Mapping[str, Sequence[int]], platform: str, motor: str,
-            slides: Mapping[int, Sequence[float]] | None = None, couplings: Sequence[tuple[str, str, float]] = ()
-            ) -> Mechanism:
+def linkage(
+    points: Sequence[Sequence[float]],
+    links: Mapping[str, Sequence[int]],
+    platform: str,
+    motor: str,
+    slides: Mapping[int, Sequence[float]] | None = None,
+    couplings: Sequence[tuple[str, str, float]] = (),
+) -> Mechanism:
     """Links with the numbers of their joints, R, or P along ``slides``; the first link is the base."""
     b, base = Builder("linkage"), next(iter(links))
     for link, joints in links.items():

@@ -26,7 +26,7 @@ def on_curve(curve: Curve, tip: Batch, plane: Any = None) -> list[Batch]:
         normals = across if plane is None else [np.cross(plane, curve.direction)]
         return [v @ n for n in normals]
     if isinstance(curve, Circle):
-        sphere = (v * v).sum(axis=1) - curve.radius ** 2
+        sphere = (v * v).sum(axis=1) - curve.radius**2
         return [sphere] if plane is not None else [v @ curve.axis, sphere]
     return [v[:, k] for k in range(3)]
 
@@ -54,8 +54,11 @@ def equations(system: System, v: Batch) -> Batch:
         rows.append((v[:, 3:] ** 2).sum(axis=1) - 1)
     elif isinstance(system, Articulated):
         slide = system.slide
-        moved = v[:, :3] + slide.centre + slide.radius * (
-            v[:, 3:4] * slide.start + v[:, 4:] * np.cross(slide.axis, slide.start))
+        moved = (
+            v[:, :3]
+            + slide.centre
+            + slide.radius * (v[:, 3:4] * slide.start + v[:, 4:] * np.cross(slide.axis, slide.start))
+        )
         for curve, b, body in zip(system.curves, system.tips, system.bodies, strict=True):
             rows += on_curve(curve, (moved if body else v[:, :3]) + b)
         rows.append((v[:, 3:] ** 2).sum(axis=1) - 1)

@@ -54,8 +54,16 @@ def pods(words: Sequence[str], seed: int) -> tuple[Mechanism, list[Serial]]:
             axis = unit(near + rng.normal(scale=0.3, size=3))
             second = unit(np.cross(axis, rng.normal(size=3)))
             axes = {"S": {}, "U": {"axis": axis, "axis2": second}}.get(letter, {"axis": axis})
-            b.joint(f"joint_{leg}_{k}", letter, links[k], links[k + 1], at=point, motor=k == 0,
-                    loop=letter == "S" and leg > 1, **axes)
+            b.joint(
+                f"joint_{leg}_{k}",
+                letter,
+                links[k],
+                links[k + 1],
+                at=point,
+                motor=k == 0,
+                loop=letter == "S" and leg > 1,
+                **axes,
+            )
             joints += [("P", axis, point)] * (letter in "PC") + [("R", axis, point)] * (letter in "RUC")
             joints += [("R", second, point)] * (letter == "U")
             direction = axis if letter in "PC" and k == len(word) - 2 else direction
@@ -71,8 +79,11 @@ def displacements(legs: Sequence[Serial], starts: int, seed: int = 0, rounds: in
     """
     rng = np.random.default_rng(seed)
     letters = [letter for leg in legs for letter, _, _ in leg.joints]
-    x = np.where(np.array(letters) == "P", rng.normal(scale=2.0, size=(starts, len(letters))),
-                 rng.uniform(-np.pi, np.pi, (starts, len(letters))))
+    x = np.where(
+        np.array(letters) == "P",
+        rng.normal(scale=2.0, size=(starts, len(letters))),
+        rng.uniform(-np.pi, np.pi, (starts, len(letters))),
+    )
     damping = np.full(starts, 1e-2)
     r, J, tips = _rows(legs, x)
     cost = np.sum(r * r, axis=1)
@@ -144,6 +155,8 @@ def _leg(leg: Serial, x: Array) -> tuple[Array, Array, Array, Array]:
     tip, d = R @ leg.tip + p, np.zeros((n, 3)) if leg.held is None else held_R @ leg.held
     turns = [letter == "R" for letter, _, _ in leg.joints]
     J = np.stack([np.cross(a, tip - q) if t else a for t, a, q in zip(turns, axes, points, strict=True)], axis=-1)
-    D = np.stack([np.cross(a, d) if t and k < leg.before else 0 * a
-                  for k, (t, a) in enumerate(zip(turns, axes, strict=True))], axis=-1)
+    D = np.stack(
+        [np.cross(a, d) if t and k < leg.before else 0 * a for k, (t, a) in enumerate(zip(turns, axes, strict=True))],
+        axis=-1,
+    )
     return tip, J, d - (np.zeros(3) if leg.held is None else leg.held), D

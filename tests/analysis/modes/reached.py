@@ -30,10 +30,14 @@ def three_rrr(drawn: Draw, rng: Rng) -> Mechanism:
         A, E = circle.centre - rod, B - rod
         b.link(f"crank_{leg}", at=A)
         b.link(f"rod_{leg}", at=E)
-        for name, ends, at in (("shoulder", ("base", f"crank_{leg}"), A), ("elbow", (f"crank_{leg}", f"rod_{leg}"), E),
-                               ("wrist", (f"rod_{leg}", "platform"), B)):
-            b.joint(f"{name}_{leg}", "R", *ends, at=at, axis=n, motor=name == "shoulder",
-                    loop=name == "wrist" and leg > 1)
+        for name, ends, at in (
+            ("shoulder", ("base", f"crank_{leg}"), A),
+            ("elbow", (f"crank_{leg}", f"rod_{leg}"), E),
+            ("wrist", (f"rod_{leg}", "platform"), B),
+        ):
+            b.joint(
+                f"{name}_{leg}", "R", *ends, at=at, axis=n, motor=name == "shoulder", loop=name == "wrist" and leg > 1
+            )
         b.observe(str(leg), f"rod_{leg}", rod)
     return b.build(platform="platform")
 
@@ -73,7 +77,8 @@ def two_plates(drawn: Draw, rng: Rng) -> Mechanism:
     b = Builder("two_circles")
     b.link("base")
     legs: list[tuple[int, Array, Array, Array]] = [
-        (k, curve.axis, B, curve.centre) for k, (curve, B) in enumerate(zip(system.curves, tips, strict=True))]
+        (k, curve.axis, B, curve.centre) for k, (curve, B) in enumerate(zip(system.curves, tips, strict=True))
+    ]
     for k in (0, 1):
         axis = unit(rng.normal(size=3))
         B = origins[k] + rng.normal(scale=0.4, size=3)
@@ -82,10 +87,12 @@ def two_plates(drawn: Draw, rng: Rng) -> Mechanism:
         _leg(b, rng, leg, f"plate_{k + 1}", axis, B, centre)
     for name, at in (("plate_1", origins[0]), ("platform", hinge), ("plate_2", origins[1]), ("side", hinge + side)):
         b.link(name, at=at)
-    for name, ends, at, loop in (("hinge_1", ("plate_1", "platform"), hinge, False),
-                                 ("hinge_2", ("platform", "plate_2"), hinge + bar, False),
-                                 ("side_1", ("plate_1", "side"), hinge + side, False),
-                                 ("side_2", ("side", "plate_2"), hinge + side + bar, True)):
+    for name, ends, at, loop in (
+        ("hinge_1", ("plate_1", "platform"), hinge, False),
+        ("hinge_2", ("platform", "plate_2"), hinge + bar, False),
+        ("side_1", ("plate_1", "side"), hinge + side, False),
+        ("side_2", ("side", "plate_2"), hinge + side + bar, True),
+    ):
         b.joint(name, "R", *ends, at=at, axis=slide.axis, loop=loop)
     return b.build(platform="platform")
 
@@ -100,6 +107,12 @@ def _leg(b: Builder, rng: Rng, leg: int, plate: str, axis: Array, B: Array, cent
     for letter, offset in (("a", side), ("b", -side)):
         b.link(f"rod_{leg}{letter}", at=E + offset)
         b.joint(f"elbow_{leg}{letter}", "S", f"arm_{leg}", f"rod_{leg}{letter}", at=E + offset)
-        b.joint(f"wrist_{leg}{letter}", "S", f"rod_{leg}{letter}", plate, at=B + offset,
-                loop=not (letter == "a" and leg == 1))
+        b.joint(
+            f"wrist_{leg}{letter}",
+            "S",
+            f"rod_{leg}{letter}",
+            plate,
+            at=B + offset,
+            loop=not (letter == "a" and leg == 1),
+        )
     b.observe(str(leg), f"rod_{leg}a", rod)

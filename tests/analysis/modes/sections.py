@@ -83,8 +83,9 @@ def poses(equations: Sequence[Sequence[Any]]) -> int:
     assert len(fifth) == N
 
     def times(form: Sequence[int]) -> nmod_mat:
-        return nmod_mat([[sum(form[i] * each[i * N + k] for i in range(LEFT)) % PRIME for each in fifth]
-                         for k in range(N)], PRIME)
+        return nmod_mat(
+            [[sum(form[i] * each[i * N + k] for i in range(LEFT)) % PRIME for each in fifth] for k in range(N)], PRIME
+        )
 
     turned = times([rng.randrange(PRIME) for _ in range(LEFT)]).inv() * times(basis[0].tolist())
     for _ in range(6):
@@ -118,9 +119,11 @@ def _pose(rng: random.Random) -> list[int]:
     a, b, c, d = (rng.randrange(PRIME) for _ in range(4))
     p = [rng.randrange(PRIME) for _ in range(3)]
     h = a * a + b * b + c * c + d * d
-    M = [[a * a + b * b - c * c - d * d, 2 * (b * c - a * d), 2 * (b * d + a * c)],
-         [2 * (b * c + a * d), a * a - b * b + c * c - d * d, 2 * (c * d - a * b)],
-         [2 * (b * d - a * c), 2 * (c * d + a * b), a * a - b * b - c * c + d * d]]
+    M = [
+        [a * a + b * b - c * c - d * d, 2 * (b * c - a * d), 2 * (b * d + a * c)],
+        [2 * (b * c + a * d), a * a - b * b + c * c - d * d, 2 * (c * d - a * b)],
+        [2 * (b * d - a * c), 2 * (c * d + a * b), a * a - b * b - c * c + d * d],
+    ]
     x = [sum(M[i][j] * p[i] for i in range(3)) for j in range(3)]
     return [v % PRIME for v in (h, *M[0], *M[1], *M[2], *x, *(h * v for v in p), h * _dot(p, p))]
 

@@ -20,13 +20,14 @@ def table(rng: np.random.Generator) -> np.ndarray:
 
 
 def polynomial(coefficients: np.ndarray, u: sympy.Symbol, v: sympy.Symbol) -> sympy.Expr:
-    return sum(coefficients[i, j] * u ** i * v ** j for i in range(3) for j in range(3))
+    return sum(coefficients[i, j] * u**i * v**j for i in range(3) for j in range(3))
 
 
 def proportional(found, wanted: sympy.Expr) -> bool:
     ours = sympy.Poly([int(c) for c in reversed(found.coeffs())], x)
     return (ours.primitive()[1] - sympy.Poly(wanted, x).primitive()[1]).is_zero or (
-        ours.primitive()[1] + sympy.Poly(wanted, x).primitive()[1]).is_zero
+        ours.primitive()[1] + sympy.Poly(wanted, x).primitive()[1]
+    ).is_zero
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -49,7 +50,7 @@ def test_the_other_unknowns_solve_all_equations(seed: int):
         for u, _ in roots:
             v, w = eliminant.others(u)
             for t, a, b in ((f, u, v), (g, v, w), (h, w, u)):
-                value = sum(t[i, j] * a ** i * b ** j for i in range(3) for j in range(3))
+                value = sum(t[i, j] * a**i * b**j for i in range(3) for j in range(3))
                 assert value.contains(0)
                 assert float(value.rad()) < 1e-20
 
@@ -92,14 +93,17 @@ def test_points_of_a_curve_do_not_miss_it(curve: Curve):
         assert 0.01 < np.linalg.norm(off) <= 0.1 + 1e-12
 
 
-@pytest.mark.parametrize("bad", [
-    lambda: Circle((0, 0, 0), (0, 0, 1), 0.0),
-    lambda: Circle((0, 0, 0), (0, 0, 0), 1.0),
-    lambda: Line((0, 0, float("nan")), (0, 0, 1)),
-    lambda: Line((0, 0), (0, 0, 1)),
-    lambda: Spatial((Point((0, 0, 0)),), np.zeros((2, 3))),
-    lambda: Planar((Line((0, 0, 0), (0, 0, 1)),), np.zeros((1, 2)), np.eye(4)),
-])
+@pytest.mark.parametrize(
+    "bad",
+    [
+        lambda: Circle((0, 0, 0), (0, 0, 1), 0.0),
+        lambda: Circle((0, 0, 0), (0, 0, 0), 1.0),
+        lambda: Line((0, 0, float("nan")), (0, 0, 1)),
+        lambda: Line((0, 0), (0, 0, 1)),
+        lambda: Spatial((Point((0, 0, 0)),), np.zeros((2, 3))),
+        lambda: Planar((Line((0, 0, 0), (0, 0, 1)),), np.zeros((1, 2)), np.eye(4)),
+    ],
+)
 def test_what_is_no_curve_is_refused(bad):
     with pytest.raises(BadRequest):
         bad()

@@ -99,8 +99,10 @@ def test_a_ball_on_a_joint_of_the_leg_that_carries_halves_them(word: str, end: s
 
 
 @pytest.mark.some(0, 1)
-@pytest.mark.parametrize(("word", "on", "count"), [
-    ("RRR", None, 40), ("RRP", None, 28), ("PRR", None, 28), ("RRR", (0, "foot"), 32), ("RRR", (1, "end"), 32)])
+@pytest.mark.parametrize(
+    ("word", "on", "count"),
+    [("RRR", None, 40), ("RRP", None, 28), ("PRR", None, 28), ("RRR", (0, "foot"), 32), ("RRR", (1, "end"), 32)],
+)
 def test_three_joints_and_three_balls_have_their_number_of_modes(word: str, on: tuple[int, str] | None, count: int):
     """By ranks; a general leg of three R leaves as many as six balls do."""
     for seed in range(2):

@@ -17,8 +17,20 @@ from hrsynth.description import load, shipped
 from hrsynth.mechanism import Mechanism
 from strategies import planar
 
-PLANAR = {"3rrr_m1": 6, "3rrr_m2": 6, "3rpr_m1": 2, "3rpr_m2": 2, "3prr_m1": 2, "3prr_m2": 2, "rrrrr_m1": 2,
-          "rrrrr_m2": 2, "rprpr_m1": 1, "rprpr_m2": 1, "prrrp_m1": 1, "prrrp_m2": 1}
+PLANAR = {
+    "3rrr_m1": 6,
+    "3rrr_m2": 6,
+    "3rpr_m1": 2,
+    "3rpr_m2": 2,
+    "3prr_m1": 2,
+    "3prr_m2": 2,
+    "rrrrr_m1": 2,
+    "rrrrr_m2": 2,
+    "rprpr_m1": 1,
+    "rprpr_m2": 1,
+    "prrrp_m1": 1,
+    "prrrp_m2": 1,
+}
 """Complex modes of the planar hidden robots that decide the pose."""
 UNDECIDED = {"3ppr_m1": 3, "3ppr_m2": 3, "3prp": 2, "3rrp": 2, "prrrp_parallel": 1, "prrrp_parallel_point": 1}
 """Freedoms that the directions leave of the other planar robots."""
@@ -28,11 +40,15 @@ WORDS = {"RRR": 6, "RPR": 2, "PRR": 2}
 
 
 @pytest.mark.some(1)
-@pytest.mark.parametrize(("name", "seed", "count", "robot", "watched"), [
-    ("planar, three circles", 47, 6, three_rrr, "1,2,3"),
-    ("spatial, three lines", 259, 8, six_ups, "1,2,3"),
-    ("two bodies, circles", 2197, 8, two_plates, "1,2"),
-    pytest.param("two bodies, circles parallel", 0, 4, two_plates, "1,2", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("name", "seed", "count", "robot", "watched"),
+    [
+        ("planar, three circles", 47, 6, three_rrr, "1,2,3"),
+        ("spatial, three lines", 259, 8, six_ups, "1,2,3"),
+        ("two bodies, circles", 2197, 8, two_plates, "1,2"),
+        pytest.param("two bodies, circles parallel", 0, 4, two_plates, "1,2", marks=pytest.mark.slow),
+    ],
+)
 def test_a_robot_reaches_the_bound(name: str, seed: int, count: int, robot: Callable[..., Mechanism], watched: str):
     """The curves of a system with that many real modes, carried by a robot that is analysed from its joints alone."""
     drawn: Draw = draw(name, seed)

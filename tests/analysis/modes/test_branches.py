@@ -20,8 +20,14 @@ from strategies import ring
 SAME = 1e-6
 """Distance (m, pure numbers) at which two poses are one."""
 
-KINDS = {("RRPS", "RRPS", "RRPS"): 64, ("PRRS", "PRRS", "PRRS"): 64, ("RPRS", "RPRS", "RUS"): 48,
-         ("UPS", "UPS", "UPS"): 64, ("RRPS", "RUS", "PUS"): 24, ("RRS", "RRS", "RRS"): 1}
+KINDS = {
+    ("RRPS", "RRPS", "RRPS"): 64,
+    ("PRRS", "PRRS", "PRRS"): 64,
+    ("RPRS", "RPRS", "RUS"): 48,
+    ("UPS", "UPS", "UPS"): 64,
+    ("RRPS", "RUS", "PUS"): 24,
+    ("RRS", "RRS", "RRS"): 1,
+}
 """Words of legs, and how many complex modes there are with all of them watched."""
 
 
@@ -102,8 +108,10 @@ def check_driven(drive: str, seed: int, starts: int) -> None:
     robot = driven(drive, seed)
     found = modes(robot, real=True)
     assert (found.found.complex, found.found.complete) == (12, True)
-    met = [min(float(np.abs(X - mode.bodies["platform"]).max()) for mode in found.modes if mode.bodies is not None)
-           for X in closings(robot, starts, seed)]
+    met = [
+        min(float(np.abs(X - mode.bodies["platform"]).max()) for mode in found.modes if mode.bodies is not None)
+        for X in closings(robot, starts, seed)
+    ]
     assert met
     assert max(met) < SAME
 
@@ -121,8 +129,11 @@ def offset_u(offset: float) -> Chain:
     """Two oblique axes that miss each other by an offset, and a slide along the watched direction."""
     a, b, d = unit([0, 0.3, 1]), unit([1, 0.2, -0.1]), unit([0.3, 0.5, 0.8])
     off = offset * unit(np.cross(a, b))
-    bodies = (ChainBody(None, np.zeros(3)), ChainBody(a, np.zeros(3), off),
-              ChainBody(b, off, 0.9 * d, (d,), watched=(d,)))
+    bodies = (
+        ChainBody(None, np.zeros(3)),
+        ChainBody(a, np.zeros(3), off),
+        ChainBody(b, off, 0.9 * d, (d,), watched=(d,)),
+    )
     return Chain(bodies, False, 1.0)
 
 

@@ -47,9 +47,9 @@ def squared(one: Path, other: Path, distance: float, low: int) -> Array:
             table[i + j, 2 * zero] += one[i] @ one[j]
             table[2 * zero, i + j] += other[i] @ other[j]
             table[zero + i, zero + j] -= 2 * one[i] @ other[j]
-    table[2 * zero, 2 * zero] -= distance ** 2
-    assert np.abs(table).sum() == pytest.approx(np.abs(table[zero:zero + 3, zero:zero + 3]).sum())
-    return table[zero:zero + 3, zero:zero + 3]
+    table[2 * zero, 2 * zero] -= distance**2
+    assert np.abs(table).sum() == pytest.approx(np.abs(table[zero : zero + 3, zero : zero + 3]).sum())
+    return table[zero : zero + 3, zero : zero + 3]
 
 
 def powers(x: complex, low: int) -> Array:
@@ -62,13 +62,14 @@ def coefficients(values: Callable[[complex], complex]) -> Array:
     both ends."""
     found = np.fft.fftshift(np.fft.fft([values(np.exp(2j * math.pi * k / SAMPLES)) for k in range(SAMPLES)]))
     large = np.nonzero(np.abs(found) > NEGLIGIBLE * np.abs(found).max())[0]
-    return found[large[0]: large[-1] + 1]
+    return found[large[0] : large[-1] + 1]
 
 
 def spatial_resultant(paths: list[Path], tips: Array, low: int) -> Array:
     """Of three tips of a body in space: the resultant of their three distances."""
-    one, two, three = (squared(paths[i], paths[j], float(np.linalg.norm(tips[i] - tips[j])), low)
-                       for i, j in ((0, 1), (1, 2), (0, 2)))
+    one, two, three = (
+        squared(paths[i], paths[j], float(np.linalg.norm(tips[i] - tips[j])), low) for i, j in ((0, 1), (1, 2), (0, 2))
+    )
 
     def values(x: complex) -> complex:
         second, third = powers(x, low) @ one, powers(x, low) @ three
@@ -147,8 +148,15 @@ def hexa(seed: int) -> tuple[Mechanism, bool, Array]:
         b.link(f"arm_{k}", at=A[k])
         b.link(f"rod_{k}", at=knees[k])
         b.joint(f"shoulder_{k}", "R", "base", f"arm_{k}", at=A[k], axis=axes[k], motor=True)
-        b.joint(f"elbow_{k}", "U", f"arm_{k}", f"rod_{k}", at=knees[k], axis=axes[k],
-                axis2=np.cross(axes[k], tips[k] - knees[k]))
+        b.joint(
+            f"elbow_{k}",
+            "U",
+            f"arm_{k}",
+            f"rod_{k}",
+            at=knees[k],
+            axis=axes[k],
+            axis2=np.cross(axes[k], tips[k] - knees[k]),
+        )
         b.joint(f"ball_{k}", "S", f"rod_{k}", "platform", at=tips[k], loop=k > 0)
     paths = [circle(axes[k], A[k] + tips[k] - knees[k], tips[k]) for k in range(3)]
     return b.build(platform="platform"), False, spatial_resultant(paths, tips, -1)
@@ -171,9 +179,14 @@ def planar(seed: int) -> tuple[Mechanism, bool, Array]:
     return pod(flat(A, tilt), flat(B, tilt), "R", "R", tilt[:, 2]), True, planar_resultant(A, B)
 
 
-CASES = {"three points on lines through one centre": (one_centre, 8), "hidden Hexa": (hexa, 16),
-         "3-RPS": (lambda seed: on_circles("RP", 1, seed), 16), "3-RRS": (lambda seed: on_circles("RR", 0, seed), 16),
-         "3-PRS": (lambda seed: on_circles("PR", 0, seed), 16), "planar six": (planar, 6)}
+CASES = {
+    "three points on lines through one centre": (one_centre, 8),
+    "hidden Hexa": (hexa, 16),
+    "3-RPS": (lambda seed: on_circles("RP", 1, seed), 16),
+    "3-RRS": (lambda seed: on_circles("RR", 0, seed), 16),
+    "3-PRS": (lambda seed: on_circles("PR", 0, seed), 16),
+    "planar six": (planar, 6),
+}
 
 
 def check_count(case: str, seed: int) -> None:

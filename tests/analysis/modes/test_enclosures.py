@@ -20,12 +20,24 @@ from hrsynth.mechanism.observations.direction import Direction
 from hrsynth.mechanism.pose import Pose
 
 OUTSIDE_BEFORE = "x=-0.058,y=0.031,z=0.301,rpy=0/0/0"
-QUICK = [("gough_stewart", ("1", "4", "6"), OUTSIDE_BEFORE),
-         pytest.param("quattro", ("1", "4"), "x=0.03,y=-0.02,z=-0.65", marks=pytest.mark.slow),
-         ("3rrr_m1", None, "x=0.012,y=0.008,phi=0.1")]
-MANY = [("gough_stewart", ("1", "4", "6"), 40), ("quattro", ("1", "4"), 8), ("quattro_rigid", ("1", "3"), 8),
-        ("hexa", ("1", "3", "5"), 6), ("3rps", None, 6), ("delta", None, 8), ("3rrr_m1", None, 12),
-        ("3prr_m1", None, 12), ("6pus", ("1", "3", "5"), 6), ("3upu", None, 6), ("orthoglide", None, 8)]
+QUICK = [
+    ("gough_stewart", ("1", "4", "6"), OUTSIDE_BEFORE),
+    pytest.param("quattro", ("1", "4"), "x=0.03,y=-0.02,z=-0.65", marks=pytest.mark.slow),
+    ("3rrr_m1", None, "x=0.012,y=0.008,phi=0.1"),
+]
+MANY = [
+    ("gough_stewart", ("1", "4", "6"), 40),
+    ("quattro", ("1", "4"), 8),
+    ("quattro_rigid", ("1", "3"), 8),
+    ("hexa", ("1", "3", "5"), 6),
+    ("3rps", None, 6),
+    ("delta", None, 8),
+    ("3rrr_m1", None, 12),
+    ("3prr_m1", None, 12),
+    ("6pus", ("1", "3", "5"), 6),
+    ("3upu", None, 6),
+    ("orthoglide", None, 8),
+]
 
 Decimals = dict[str, tuple[str, ...]]
 
@@ -37,6 +49,7 @@ def decimals(at: str) -> Decimals:
 
 def wanted(setting: ObservedRobot, at: Decimals) -> Callable[[Any], list[Any]]:
     """What a platform's pose misses of the numbers given."""
+
     def rows(poses: Any) -> list[Any]:
         R, p = poses[setting.motion.link]
         found = [p["xyz".index(name), 0] - arb(at[name][0]) for name in at if name in "xyz"]
@@ -47,6 +60,7 @@ def wanted(setting: ObservedRobot, at: Decimals) -> Callable[[Any], list[Any]]:
             home = arb_mat(setting.motion.home[:3, :3].tolist())
             found += (R - turned([arb(float(v)) for v in setting.motion.normal], arb(at["phi"][0])) * home).entries()
         return found
+
     return rows
 
 
@@ -62,18 +76,22 @@ def missed(name: str, setting: ObservedRobot, at: Decimals, found: AssemblyModes
     assert left < 1e-13
     with ctx.workprec(BITS):
         goal = file.poses(q)
-        watched = [(o.link, column([arb(float(v)) for v in o.direction]))
-                   for o in setting.observed if isinstance(o, Direction)]
+        watched = [
+            (o.link, column([arb(float(v)) for v in o.direction])) for o in setting.observed if isinstance(o, Direction)
+        ]
         held = [(link, d, goal[link][0] * d) for link, d in watched]
     parts = []
     for mode in found.modes:
         if mode.configuration is None or not mode.proved:
             continue
-        q, left = file.solved(start(mode.configuration),
-                              lambda poses: [e for link, d, u in held for e in (poses[link][0] * d - u).entries()])
+        q, left = file.solved(
+            start(mode.configuration),
+            lambda poses: [e for link, d, u in held for e in (poses[link][0] * d - u).entries()],
+        )
         assert left < 1e-13
-        told = {link: mode.bodies[link] for link in mode.enclosed} or {setting.motion.link: pose(
-            (mode.pose.x, mode.pose.y, mode.pose.z), mode.pose.rotation)}
+        told = {link: mode.bodies[link] for link in mode.enclosed} or {
+            setting.motion.link: pose((mode.pose.x, mode.pose.y, mode.pose.z), mode.pose.rotation)
+        }
         with ctx.workprec(BITS):
             exact = file.poses(q)
             for link, X in told.items():
@@ -116,11 +134,17 @@ def goal_near_home(setting: ObservedRobot, rng: np.random.Generator) -> str:
     """A pose with a few digits, of as many parts as there are freedoms."""
     motion = setting.motion
     home, length = motion.position(motion.home), setting.mechanism.length
-    given = [f"{name}={home['xyz'.index(name)] + length * rng.uniform(-0.1, 0.1):.3f}"
-             for name in motion.parts if name in "xyz"]
+    given = [
+        f"{name}={home['xyz'.index(name)] + length * rng.uniform(-0.1, 0.1):.3f}"
+        for name in motion.parts
+        if name in "xyz"
+    ]
     if motion.dof > 3:
-        given.append("rpy=" + "/".join(f"{v:.2f}" for v in rng.uniform(-0.3, 0.3, 3)) if motion.rotations.shape[1] == 3
-                     else f"phi={rng.uniform(-0.3, 0.3):.2f}")
+        given.append(
+            "rpy=" + "/".join(f"{v:.2f}" for v in rng.uniform(-0.3, 0.3, 3))
+            if motion.rotations.shape[1] == 3
+            else f"phi={rng.uniform(-0.3, 0.3):.2f}"
+        )
     elif motion.planar:
         given.append(f"phi={rng.uniform(-0.3, 0.3):.2f}")
     return ",".join(given)

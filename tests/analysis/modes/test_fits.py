@@ -22,10 +22,14 @@ from strategies import random_rotation
 MORE: dict[str, Callable[[Rng], Draw]] = {
     **{f"planar {kinds}": lambda rng, kinds=kinds: planar(rng, kinds) for kinds in ("CCCC", "CLLL", "PCC", "PP")},
     **{f"spatial {kinds}": lambda rng, kinds=kinds: spatial(rng, kinds) for kinds in ("CCLL", "LLLL", "PLC", "PPP")},
-    **{f"translating {kinds}": lambda rng, kinds=kinds: translating(rng, kinds)
-       for kinds in ("CC", "LL", "SSSS", "PC")},
-    **{f"two bodies {'+'.join(kinds)}": lambda rng, kinds=kinds: on_two_bodies(rng, kinds)
-       for kinds in (("CC", "C"), ("LL", "CC"))}}
+    **{
+        f"translating {kinds}": lambda rng, kinds=kinds: translating(rng, kinds) for kinds in ("CC", "LL", "SSSS", "PC")
+    },
+    **{
+        f"two bodies {'+'.join(kinds)}": lambda rng, kinds=kinds: on_two_bodies(rng, kinds)
+        for kinds in (("CC", "C"), ("LL", "CC"))
+    },
+}
 """Platforms with more legs than needed, through a pose that is a mode."""
 
 
@@ -109,7 +113,9 @@ def test_a_second_mode_by_symmetry_is_neither_proved_nor_excluded(seed: int):
     found = solve(system, goal=goal)
     assert found.complete
     assert [(mode.proved, mode.fits) for mode in sorted(found.modes, key=lambda mode: not mode.proved)] == [
-        (True, False), (False, True)]
+        (True, False),
+        (False, True),
+    ]
     assert np.abs(next(mode.q for mode in found.modes if mode.proved) - goal).max() < 1e-12
 
 
@@ -122,11 +128,18 @@ def test_tips_at_rest_that_are_torn_apart_leave_no_mode():
 
 
 @pytest.mark.some(2)
-@pytest.mark.parametrize(("name", "observe", "at", "expected"), [
-    ("quattro_rigid", ("1", "2"), None, 2), ("delta", None, None, 2), ("delta", None, "x=0.05,y=0.02,z=-0.6", 1),
-    ("quattro", None, None, 2)])
+@pytest.mark.parametrize(
+    ("name", "observe", "at", "expected"),
+    [
+        ("quattro_rigid", ("1", "2"), None, 2),
+        ("delta", None, None, 2),
+        ("delta", None, "x=0.05,y=0.02,z=-0.6", 1),
+        ("quattro", None, None, 2),
+    ],
+)
 def test_robots_with_more_legs_than_needed_do_not_prove_the_mirrored_mode(
-        name: str, observe: tuple[str, ...] | None, at: str | None, expected: int):
+    name: str, observe: tuple[str, ...] | None, at: str | None, expected: int
+):
     found = modes(load(shipped()[name]), observe, at=at)
     assert found.found.complete, found.found.proof
     assert len(found.modes) == expected

@@ -43,15 +43,19 @@ def require_modes(found: AssemblyModes, bearings: Pairs, distances: Pairs) -> No
     volumes tell them apart."""
     places, turns = places_of(found.modes[0])
     for each in found.modes:
-        assert np.allclose(measured(*places_of(each), bearings, distances),
-                           measured(places, turns, bearings, distances), atol=1e-8)
+        assert np.allclose(
+            measured(*places_of(each), bearings, distances), measured(places, turns, bearings, distances), atol=1e-8
+        )
     pairs, fours = list(combinations(range(len(places)), 2)), list(combinations(range(len(places)), 4))
     flat = np.ptp(places[:, 2]) == 0.0
     invariants = []
     for P, _ in map(places_of, found.modes):
         arms = [P[j] - P[i] for i, j in pairs]
-        turned = [np.cross(P[j] - P[0], P[k] - P[0])[2] for j, k in combinations(range(1, len(P)), 2)] if flat else [
-            np.linalg.det(P[[b, c, d]] - P[a]) for a, b, c, d in fours]
+        turned = (
+            [np.cross(P[j] - P[0], P[k] - P[0])[2] for j, k in combinations(range(1, len(P)), 2)]
+            if flat
+            else [np.linalg.det(P[[b, c, d]] - P[a]) for a, b, c, d in fours]
+        )
         invariants.append(np.array([*map(np.linalg.norm, arms), *turned]) / np.linalg.norm(arms[0]))
     assert all(np.abs(a - b).max() > 1e-5 for a, b in combinations(invariants, 2))
 
@@ -93,9 +97,13 @@ def test_a_distance_leaves_the_opposite_of_all_bearings():
 
 
 @pytest.mark.some(1)
-@pytest.mark.parametrize(("places", "bearings", "flexes"), [
-    (np.random.default_rng(2).normal(size=(5, 3)), RING, 1),
-    (np.array([[0.1, 0.2, 0.3], [0.2, 0.4, 0.6], [0.3, 0.6, 0.9]]), [(1, 2), (2, 3), (1, 3)], 1)])
+@pytest.mark.parametrize(
+    ("places", "bearings", "flexes"),
+    [
+        (np.random.default_rng(2).normal(size=(5, 3)), RING, 1),
+        (np.array([[0.1, 0.2, 0.3], [0.2, 0.4, 0.6], [0.3, 0.6, 0.9]]), [(1, 2), (2, 3), (1, 3)], 1),
+    ],
+)
 def test_a_flexible_formation_has_a_continuum_with_its_flexes(places: Array, bearings: Pairs, flexes: int):
     """A ring; and three on one line, whose decimals are not on one line as binary numbers."""
     found = modes(formation(places, bearings, bodies="position"))
@@ -107,11 +115,19 @@ def test_a_flexible_formation_has_a_continuum_with_its_flexes(places: Array, bea
 
 KNOWN = [
     pytest.param("plane position", 3, [], [(1, 2), (2, 3), (1, 3)], 2, id="triangle and mirror image"),
-    pytest.param("plane position", 5, [], LAMAN, 8, id="each of three bodies on either side of two", marks=[
-        pytest.mark.slow]),
+    pytest.param(
+        "plane position", 5, [], LAMAN, 8, id="each of three bodies on either side of two", marks=[pytest.mark.slow]
+    ),
     pytest.param("position", 4, [], list(combinations(range(1, 5), 2)), 2, id="tetrahedron and mirror image"),
-    pytest.param("plane", 3, [(1, 2), (2, 3), (3, 1)], [(1, 2), (2, 3), (1, 3)], 2, id="cameras that turn with it",
-                 marks=pytest.mark.slow),
+    pytest.param(
+        "plane",
+        3,
+        [(1, 2), (2, 3), (3, 1)],
+        [(1, 2), (2, 3), (1, 3)],
+        2,
+        id="cameras that turn with it",
+        marks=pytest.mark.slow,
+    ),
     pytest.param("yaw", 3, list(permutations((1, 2, 3), 2)), [], 1, id="all see all", marks=pytest.mark.slow),
     pytest.param("free", 3, list(permutations((1, 2, 3), 2)), [(1, 2)], 1, id="turns in space", marks=pytest.mark.slow),
 ]
@@ -140,6 +156,7 @@ def placings(base: Array, platform: Array, rods: Array) -> int:
 
     |p + R b_k - a_k|² = r_k²; differences are linear in p, and with p from two of them the first is left.
     """
+
     def value(z: complex) -> complex:
         def turned(v: Array) -> Array:
             c, s = (z + 1 / z) / 2, (z - 1 / z) / 2j
@@ -184,8 +201,11 @@ def test_what_is_moved_along_is_no_other_mode(seed: int):
     two modes are alike but for one."""
     rng = np.random.default_rng(seed)
     made = formation(rng.normal(size=(2, 3)), distances=[(1, 2)] * 6, bodies="position", frame=random_rotation(rng))
-    seen = tuple(replace(each, leg=f"d{k}", at=frozen(rng.normal(size=3))) for k, each in enumerate(made.observations)
-                 if isinstance(each, PointDistance))
+    seen = tuple(
+        replace(each, leg=f"d{k}", at=frozen(rng.normal(size=3)))
+        for k, each in enumerate(made.observations)
+        if isinstance(each, PointDistance)
+    )
     found = modes(replace(made, observations=seen))
     assert found.formation is not None
     assert (len(found.formation.trivial), found.formation.count) == (3, 0)

@@ -122,8 +122,12 @@ def proposed(points: Array, rng: np.random.Generator, count: int) -> list[Array]
     found: list[Array] = []
     for _ in range(4000):
         chart = rng.normal(size=4) + 1j * rng.normal(size=4)
-        x = np.concatenate([rng.normal(size=4) + 1j * rng.normal(size=4),
-                            size * 10 ** rng.uniform(-1, 2) * (rng.normal(size=3) + 1j * rng.normal(size=3))])
+        x = np.concatenate(
+            [
+                rng.normal(size=4) + 1j * rng.normal(size=4),
+                size * 10 ** rng.uniform(-1, 2) * (rng.normal(size=3) + 1j * rng.normal(size=3)),
+            ]
+        )
         for _ in range(60):
             values = np.einsum("ikm,m->ik", M, np.concatenate([[1], x[4:]]))
             F = np.concatenate([values @ x[:4], [chart @ x[:4] - 1]])
@@ -160,8 +164,10 @@ def places(seed: int) -> tuple[list[Array], int]:
                 real.append(points[0] - p)
             else:
                 assert any(not v.imag.contains(0) for v in box)
-        apart = [any(not (acb(v) - acb(w)).contains(0) for v, w in zip(one, other, strict=True))
-                 for one, other in combinations(boxes, 2)]
+        apart = [
+            any(not (acb(v) - acb(w)).contains(0) for v, w in zip(one, other, strict=True))
+            for one, other in combinations(boxes, 2)
+        ]
     assert all(apart)
     away = [C for C in real if np.linalg.norm(points - C, axis=1).min() > 1e-6]
     assert len(real) - len(away) == 4

@@ -17,21 +17,32 @@ from hrsynth.errors import MeaningUndecided
 from hrsynth.geometry.vectors import Array
 from strategies import random_rotation
 
-CLASSES = [("AAABBC", "ABCDEF", 8), ("AAABCD", "ABCDEF", 16), ("AABBCC", "ABBCCA", 16), ("AABBCC", "ABCDEF", 16),
-           ("ABCDEF", "AAABCD", 16), ("AABCDE", "ABCCDE", 24), ("AABBCD", "ABCDEF", 32), ("AABCDE", "ABCDEF", 40)]
+CLASSES = [
+    ("AAABBC", "ABCDEF", 8),
+    ("AAABCD", "ABCDEF", 16),
+    ("AABBCC", "ABBCCA", 16),
+    ("AABBCC", "ABCDEF", 16),
+    ("ABCDEF", "AAABCD", 16),
+    ("AABCDE", "ABCCDE", 24),
+    ("AABBCD", "ABCDEF", 32),
+    ("AABCDE", "ABCDEF", 40),
+]
 """Which rods share balls of the platform and of the base, and the complex modes (J.-C. Faugère, D. Lazard, Mech. Mach.
 Theory 30, 1995)."""
 
 
 @needs_msolve
-@pytest.mark.parametrize(("platform", "base", "count"), [
-    case if case[2] == 8 else pytest.param(*case, marks=pytest.mark.slow) for case in CLASSES])
+@pytest.mark.parametrize(
+    ("platform", "base", "count"),
+    [case if case[2] == 8 else pytest.param(*case, marks=pytest.mark.slow) for case in CLASSES],
+)
 def test_balls_that_coincide_to_rounding_count_as_one(platform: str, base: str, count: int):
     system, goal = six_rods(np.random.default_rng(3), platform, base, 1e-15)
     found = solve(system)
     assert found.complex == count
     assert {frozenset(each.legs) for each in found.meant if each.where == "platform"} == {
-        frozenset(k for k in range(6) if platform[k] == letter) for letter in "ABC" if platform.count(letter) > 1}
+        frozenset(k for k in range(6) if platform[k] == letter) for letter in "ABC" if platform.count(letter) > 1
+    }
     assert all(0 < each.defect < 1e-13 for each in found.meant)
     assert among(goal, found) < 1e-10
     assert all(mode.proved for mode in found.modes)
@@ -50,13 +61,16 @@ def test_newton_from_complex_starts_finds_as_many(platform: str, base: str, coun
 def by_newton(system: Spatial, starts: int, rng: np.random.Generator) -> list[Array]:
     """Distinct complex poses (p, quaternion of unit square) found by Newton's method from random starts."""
     b, c = system.tips, np.array([curve.centre for curve in system.curves])
-    squares = np.array([curve.radius ** 2 for curve in system.curves])
+    squares = np.array([curve.radius**2 for curve in system.curves])
 
     def equations(v: Array) -> Array:
         p, w, u = v[:, :3], v[:, 3], v[:, 4:]
         q = (u * u).sum(axis=1)
-        turned = ((w * w - q)[:, None, None] * b + 2 * (u @ b.T)[:, :, None] * u[:, None]
-                  + 2 * w[:, None, None] * np.cross(u[:, None], b))
+        turned = (
+            (w * w - q)[:, None, None] * b
+            + 2 * (u @ b.T)[:, :, None] * u[:, None]
+            + 2 * w[:, None, None] * np.cross(u[:, None], b)
+        )
         away = p[:, None] + turned - c
         return np.hstack([(away * away).sum(axis=2) - squares, (w * w + q - 1)[:, None]])
 
@@ -114,7 +128,9 @@ def test_what_is_meant_is_made_exact_and_its_error_is_kept(defect: float):
 
 
 def test_what_is_far_apart_or_exact_is_left_as_it_is():
-    for system in (six_rods(np.random.default_rng(1), "ABCDEF", "ABCDEF").system,
-                   six_rods(np.random.default_rng(1), "AABCDE", "ABCDEF").system,
-                   spatial(np.random.default_rng(0), "LLL").system):
+    for system in (
+        six_rods(np.random.default_rng(1), "ABCDEF", "ABCDEF").system,
+        six_rods(np.random.default_rng(1), "AABCDE", "ABCDEF").system,
+        spatial(np.random.default_rng(0), "LLL").system,
+    ):
         assert as_meant(system) == (system, ())

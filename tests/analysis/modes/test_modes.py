@@ -18,8 +18,12 @@ from hrsynth.geometry.vectors import Array, pose, rotation_about, unit
 from strategies import random_rotation
 
 ALL = sorted(FAMILIES)
-MOST = {"planar, three circles": (47, 6), "spatial, three lines": (259, 8), "two bodies, circles": (2197, 8),
-        "spatial, three circles": (1130, 12)}
+MOST = {
+    "planar, three circles": (47, 6),
+    "spatial, three lines": (259, 8),
+    "two bodies, circles": (2197, 8),
+    "spatial, three circles": (1130, 12),
+}
 """Seeds at which many modes are real, and how many."""
 
 
@@ -82,23 +86,28 @@ def test_newton_on_the_pose_finds_the_same_solutions_everywhere(name: str, seed:
 def planar_by_sympy(centres: list[tuple[int, int]], radii: list[int], tips: list[tuple[int, int]]) -> sympy.Poly:
     """Three circles, by the pose: x and y from differences of equations, then a polynomial in T = tan(φ/2)."""
     x, y, T = sympy.symbols("x y T")
-    c, s = (1 - T ** 2) / (1 + T ** 2), 2 * T / (1 + T ** 2)
-    f = [sympy.expand((x + c * b - s * d - u) ** 2 + (y + s * b + c * d - v) ** 2 - r ** 2)
-         for (u, v), r, (b, d) in zip(centres, radii, tips, strict=True)]
+    c, s = (1 - T**2) / (1 + T**2), 2 * T / (1 + T**2)
+    f = [
+        sympy.expand((x + c * b - s * d - u) ** 2 + (y + s * b + c * d - v) ** 2 - r**2)
+        for (u, v), r, (b, d) in zip(centres, radii, tips, strict=True)
+    ]
     at = sympy.solve([sympy.expand(f[1] - f[0]), sympy.expand(f[2] - f[0])], [x, y], dict=True)[0]
     numerator = sympy.numer(sympy.together(f[0].subs(at)))
     polynomial = sympy.Poly(numerator, T)
-    while polynomial.rem(sympy.Poly(1 + T ** 2, T)).is_zero:
-        polynomial = polynomial.quo(sympy.Poly(1 + T ** 2, T))
+    while polynomial.rem(sympy.Poly(1 + T**2, T)).is_zero:
+        polynomial = polynomial.quo(sympy.Poly(1 + T**2, T))
     return polynomial
 
 
 @pytest.mark.some(2)
-@pytest.mark.parametrize(("centres", "radii", "tips"), [
-    ([(0, 0), (5, 1), (2, 6)], [2, 3, 2], [(0, 0), (3, 0), (1, 2)]),
-    ([(0, 0), (4, 0), (1, 5)], [3, 2, 3], [(0, 1), (2, 0), (0, 3)]),
-    ([(0, 0), (9, 1), (2, 8)], [1, 2, 1], [(0, 0), (2, 0), (1, 2)]),
-])
+@pytest.mark.parametrize(
+    ("centres", "radii", "tips"),
+    [
+        ([(0, 0), (5, 1), (2, 6)], [2, 3, 2], [(0, 0), (3, 0), (1, 2)]),
+        ([(0, 0), (4, 0), (1, 5)], [3, 2, 3], [(0, 1), (2, 0), (0, 3)]),
+        ([(0, 0), (9, 1), (2, 8)], [1, 2, 1], [(0, 0), (2, 0), (1, 2)]),
+    ],
+)
 def test_an_elimination_in_the_pose_by_sympy_agrees(centres, radii, tips):
     polynomial = planar_by_sympy(centres, radii, tips)
     curves = tuple(Circle((*c, 0), (0, 0, 1), r) for c, r in zip(centres, radii, strict=True))
@@ -144,8 +153,13 @@ def test_enclosures_hold_for_inputs_that_differ_in_the_last_bit():
     rng = np.random.default_rng(3)
     for seed in range(10):
         system, _ = spatial(np.random.default_rng(seed), "LLL")
-        moved = Spatial(tuple(Line(np.nextafter(line.centre, line.centre + rng.choice([-1, 1], 3)), line.direction)
-                              for line in system.curves), system.tips)
+        moved = Spatial(
+            tuple(
+                Line(np.nextafter(line.centre, line.centre + rng.choice([-1, 1], 3)), line.direction)
+                for line in system.curves
+            ),
+            system.tips,
+        )
         one, other = solve(system).modes, solve(moved).modes
         assert len(one) == len(other)
         pairs = zip(*(sorted(each, key=lambda m: m.parameters) for each in (one, other)), strict=True)
@@ -230,7 +244,8 @@ def test_a_continuum_is_said_and_not_listed(kind: str):
         curves: dict[str, list[Curve]] = {
             "equal arms": [Circle(point + 0.7 * e, n, 0.7) for point in at],
             "parallel lines": [Line(point, e) for point in at],
-            "one centre": [Circle(centre, n, float(np.linalg.norm(point - centre))) for point in at]}
+            "one centre": [Circle(centre, n, float(np.linalg.norm(point - centre))) for point in at],
+        }
         modes = solve(Planar(tuple(curves[kind]), tips, X))
         assert (modes.continuum, modes.complete, modes.modes) == (1, False, ())
         assert "continuum of dimension 1" in str(modes.degenerate)
@@ -284,8 +299,11 @@ def singular(kind: str, rng: np.random.Generator) -> SystemModes:
     for tip in tips:
         n = np.array([*unit(centre - tip), 0.0])
         at = np.array([*tip, 0.0])
-        curves.append(Line(at, np.cross(n, (0, 0, 1))) if kind == "L" else
-                      Circle(at - n * (r := rng.uniform(0.4, 1.4)), (0, 0, 1), r))
+        curves.append(
+            Line(at, np.cross(n, (0, 0, 1)))
+            if kind == "L"
+            else Circle(at - n * (r := rng.uniform(0.4, 1.4)), (0, 0, 1), r)
+        )
     return solve(Planar(tuple(curves), tips, np.eye(4)))
 
 

@@ -92,8 +92,10 @@ def test_equal_parallel_legs_carry_a_congruent_platform_on_a_circle(seed: int):
     assert (motion.goal, motion.dimension, motion.returns, motion.turn) == (True, 1, True, 0.0)
     assert motion.shift == pytest.approx(2 * math.pi * r, rel=0.01)
     assert np.abs(platforms(motion)[:, :3, :3] - np.eye(3)).max() < 1e-8
-    told = sorted(math.acos((np.trace((mode.bodies["platform"] @ np.linalg.inv(
-        found.goal.pose("platform")))[:3, :3]) - 1) / 2) for mode in found.modes)
+    told = sorted(
+        math.acos((np.trace((mode.bodies["platform"] @ np.linalg.inv(found.goal.pose("platform")))[:3, :3]) - 1) / 2)
+        for mode in found.modes
+    )
     assert told == pytest.approx([2 * math.asin(r / (2 * 0.5))] * 2, abs=1e-6)
 
 
@@ -199,8 +201,10 @@ def test_a_singular_pose_is_no_self_motion():
 
 
 @pytest.mark.some(1)
-@pytest.mark.parametrize(("name", "observe"), [
-    ("i4l", "1"), ("3rrp", "1"), ("hexaglide", "1"), ("quattro", "1"), ("prrrp_parallel_point", None), ("3prp", None)])
+@pytest.mark.parametrize(
+    ("name", "observe"),
+    [("i4l", "1"), ("3rrp", "1"), ("hexaglide", "1"), ("quattro", "1"), ("prrrp_parallel_point", None), ("3prp", None)],
+)
 def test_freedoms_that_are_never_seen_are_moved(name: str, observe: str | None):
     """As many ways to move as the rank at other configurations leaves."""
     found = hrsynth.modes(load(shipped()[name]), observe)

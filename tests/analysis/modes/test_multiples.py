@@ -33,7 +33,7 @@ def sphere(centre, squared):
 @pytest.mark.parametrize("n", [1, 2, 3])
 @pytest.mark.parametrize("seed", range(3))
 def test_products_of_planes_meet_in_as_many_points_as_can_be_picked(n, seed):
-    assert most_zeros(pairs_of_planes(np.random.default_rng(seed), n), 2 ** n) == 2 ** n
+    assert most_zeros(pairs_of_planes(np.random.default_rng(seed), n), 2**n) == 2**n
 
 
 @pytest.mark.parametrize("n", [2, 3])
@@ -64,8 +64,15 @@ def test_combinations_have_the_same_zeros():
 
 @pytest.mark.some(1)
 @needs_msolve
-@pytest.mark.parametrize(("name", "count", "seed"), [("quattro", 4, None), ("i4l", 2, 1), pytest.param(
-    "quattro", 4, 2, marks=pytest.mark.slow), pytest.param("quattro", 4, 1, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("name", "count", "seed"),
+    [
+        ("quattro", 4, None),
+        ("i4l", 2, 1),
+        pytest.param("quattro", 4, 2, marks=pytest.mark.slow),
+        pytest.param("quattro", 4, 1, marks=pytest.mark.slow),
+    ],
+)
 def test_motors_of_two_bodies_that_translate_have_a_proved_list(name, count, seed):
     """Their arms are symmetric: solutions lie at infinity, or far away but for rounding in a turned base."""
     robot = load(shipped()[name])

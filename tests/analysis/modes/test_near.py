@@ -32,11 +32,18 @@ TILT = pose((0.123, -0.377, 0.219), rotation_about(unit([1.0, 2.0, 0.5]), 0.7))
 
 def tilted(robot: Mechanism) -> Mechanism:
     """The same robot, its base turned so that no number of it has few digits."""
-    links = {name: replace(link, pose=link.pose if name == robot.base else TILT @ link.pose)
-             for name, link in robot.links.items()}
-    joints = {name: replace(joint, point=TILT[:3, :3] @ joint.point + TILT[:3, 3],
-                            axes=tuple(TILT[:3, :3] @ axis for axis in joint.axes))
-              for name, joint in robot.joints.items()}
+    links = {
+        name: replace(link, pose=link.pose if name == robot.base else TILT @ link.pose)
+        for name, link in robot.links.items()
+    }
+    joints = {
+        name: replace(
+            joint,
+            point=TILT[:3, :3] @ joint.point + TILT[:3, 3],
+            axes=tuple(TILT[:3, :3] @ axis for axis in joint.axes),
+        )
+        for name, joint in robot.joints.items()
+    }
     return replace(robot, links=links, joints=joints)
 
 
@@ -63,8 +70,9 @@ def cad(tmp_path_factory: pytest.TempPathFactory) -> Mechanism:
 
 @pytest.mark.some(6, 60)
 @pytest.mark.parametrize("digits", [6, 9, 7, 5])
-@pytest.mark.parametrize("name", ["delta", "quattro", "3ruu", *(each for each in shipped()
-                                                                if each not in ("delta", "quattro", "3ruu"))])
+@pytest.mark.parametrize(
+    "name", ["delta", "quattro", "3ruu", *(each for each in shipped() if each not in ("delta", "quattro", "3ruu"))]
+)
 def test_a_rounded_robot_has_as_many_poses_that_look_the_same(name: str, digits: int, tmp_path: Path):
     robot = load(name)
     assert how_many(hrsynth.modes(rounded(robot, tmp_path / "robot.sdf", digits))) == how_many(hrsynth.modes(robot))
@@ -74,8 +82,9 @@ def test_what_is_told_of_a_near_mode_is_so(cad: Mechanism):
     found = hrsynth.modes(cad)
     (near,) = found.near
     at = near.configuration
-    seen = [measure(each.twin, each.q, found.setting.mechanism.base, found.setting.observed)[2]
-            for each in (found.goal, at)]
+    seen = [
+        measure(each.twin, each.q, found.setting.mechanism.base, found.setting.observed)[2] for each in (found.goal, at)
+    ]
     angles = [angle_between(one, other) for one, other in zip(*seen, strict=True)]
     assert 0 < near.angle < np.radians(1e-3)
     assert max(angles) == pytest.approx(near.angle, rel=1e-3, abs=1e-8)
@@ -144,8 +153,12 @@ def test_a_stationary_difference_is_a_near_mode_only_where_it_is_least():
     def at(z: float) -> ClosedConfiguration:
         return configurations_at(setting, [Pose(x=0.0, y=0.0, z=z)])[0]
 
-    top = minimize_scalar(lambda z: -np.linalg.norm(held.rows(goal.twin, at(z).q)[0]), bounds=(low, high),
-                          method="bounded", options={"xatol": 1e-8}).x
+    top = minimize_scalar(
+        lambda z: -np.linalg.norm(held.rows(goal.twin, at(z).q)[0]),
+        bounds=(low, high),
+        method="bounded",
+        options={"xatol": 1e-8},
+    ).x
     for z, least in ((low + 0.02, True), (top, False), (high - 0.02, True)):
         found = descend(at(z), question, held, np.radians(0.1))
         assert found is not None

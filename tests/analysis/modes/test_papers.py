@@ -74,7 +74,7 @@ def solutions(robot: str, legs: tuple[str, ...], goal: Array, tips: Tips | None 
 
     rng, found = np.random.default_rng(0), list[Array]()
     for _ in range(starts):
-        start = goal + rng.uniform(-1, 1, len(goal)) * [0.6, 0.6, 0.6, np.pi][:len(goal)]
+        start = goal + rng.uniform(-1, 1, len(goal)) * [0.6, 0.6, 0.6, np.pi][: len(goal)]
         result = least_squares(missed, start, xtol=1e-15, ftol=1e-15, gtol=1e-15)
         q = np.array(result.x)
         q[3:] = (q[3:] + 1e-6) % (2 * np.pi) - 1e-6
@@ -93,7 +93,7 @@ listed = table.compute_modes
 
 
 def goal_of(claim: PrintedClaim) -> Array:
-    return np.array([*claim.goal, 0.0][:4 if claim.robot == "quattro" else 3])
+    return np.array([*claim.goal, 0.0][: 4 if claim.robot == "quattro" else 3])
 
 
 def spoken(claim: PrintedClaim) -> str:
@@ -112,8 +112,11 @@ def test_the_closed_form_has_the_modes_that_are_listed(claim: PrintedClaim):
 
 
 @pytest.mark.some(5)
-@pytest.mark.parametrize(("claim", "mode"), list(printed_poses()), ids=lambda each: (
-    spoken(each) if isinstance(each, PrintedClaim) else "/".join(map(str, each.place))))
+@pytest.mark.parametrize(
+    ("claim", "mode"),
+    list(printed_poses()),
+    ids=lambda each: spoken(each) if isinstance(each, PrintedClaim) else "/".join(map(str, each.place)),
+)
 def test_only_the_desired_poses_are_printed_as_they_are(claim: PrintedClaim, mode: PrintedMode):
     nearest = table.nearest(mode.place, listed(claim))
     apart = math.dist(mode.place, (nearest.pose.x, nearest.pose.y, nearest.pose.z))
@@ -122,8 +125,9 @@ def test_only_the_desired_poses_are_printed_as_they_are(claim: PrintedClaim, mod
     assert apart < 1e-9 or apart > 5e-3
 
 
-@pytest.mark.parametrize(("legs", "z", "printed_z", "reachable"), [
-    (("1", "4"), -0.9019, -0.909, True), (("2", "3"), -0.3478, -0.296, False)])
+@pytest.mark.parametrize(
+    ("legs", "z", "printed_z", "reachable"), [(("1", "4"), -0.9019, -0.909, True), (("2", "3"), -0.3478, -0.296, False)]
+)
 def test_the_second_modes_have_other_digits_than_printed(legs, z, printed_z, reachable):
     """The pose keeps x and y, so it is the goal's mirror image about the height of the circles' centres."""
     claim = next(c for c in CLAIMS if c.legs == legs and c.robot == "quattro")
@@ -169,8 +173,9 @@ def test_the_error_of_all_legs_is_stationary_at_the_goal_alone():
     goal = np.array([0.03, 0.03, -0.59, 0])
     wanted = rods("quattro", goal)
     for start in ((0.03, 0.03, -0.65, 0), (0.0345, 0.0345, -0.65, 0), (0.035, 0.035, -0.67, 0.02)):
-        result = least_squares(lambda q: (rods("quattro", q) - wanted).ravel(), start, xtol=1e-15, ftol=1e-15,
-                               gtol=1e-15)
+        result = least_squares(
+            lambda q: (rods("quattro", q) - wanted).ravel(), start, xtol=1e-15, ftol=1e-15, gtol=1e-15
+        )
         assert np.allclose(result.x, goal, atol=1e-6)
     assert listed(next(c for c in CLAIMS if len(c.legs) == 4)).near == ()
 

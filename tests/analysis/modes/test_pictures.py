@@ -32,9 +32,18 @@ from strategies import random_rotation, transformed
 ROOT = Path(__file__).resolve().parents[3]
 PICTURES = sorted((ROOT / "docs" / "pictures").iterdir())
 KEPT = [file for file in PICTURES if file.name.startswith("modes_")]
-ROBOTS = [("rrrrr_m1", None, False), ("3rrr_m1", None, False), ("3prr_m1", None, False), ("3ppr_m1", None, True),
-          ("gough_stewart", "1,3,5", False), ("quattro", "1,4", False), ("delta", None, False), ("3rps", None, True),
-          ("prrrp_m1", None, True), ("linear_delta", None, False)]
+ROBOTS = [
+    ("rrrrr_m1", None, False),
+    ("3rrr_m1", None, False),
+    ("3prr_m1", None, False),
+    ("3ppr_m1", None, True),
+    ("gough_stewart", "1,3,5", False),
+    ("quattro", "1,4", False),
+    ("delta", None, False),
+    ("3rps", None, True),
+    ("prrrp_m1", None, True),
+    ("linear_delta", None, False),
+]
 MANY = pytest.mark.parametrize(("name", "observe", "real"), ROBOTS)
 rng_of = np.random.default_rng
 
@@ -96,9 +105,14 @@ def test_strokes_keep_their_lengths_and_the_base_its_place(name: str, observe: s
     """Links are rigid: each polygon is congruent at all modes; each leg begins at the base."""
     result, view = found(name, observe, real), drawn(name, observe, real)
     slides = sum(joint.type.slides for joint in result.goal.twin.mechanism.joints.values())
-    shapes = [sorted(round(float(np.linalg.norm(np.diff(ring, axis=0), axis=1).sum()), 6)
-                     for ring in (*placed.platform, *placed.strokes[: len(placed.strokes) - slides]))
-              for placed in view.placed if placed.strokes]
+    shapes = [
+        sorted(
+            round(float(np.linalg.norm(np.diff(ring, axis=0), axis=1).sum()), 6)
+            for ring in (*placed.platform, *placed.strokes[: len(placed.strokes) - slides])
+        )
+        for placed in view.placed
+        if placed.strokes
+    ]
     for shape in shapes if not slides else ():
         assert shape == pytest.approx(shapes[0], abs=1e-6)
     for placed in view.placed:
@@ -154,7 +168,9 @@ def test_a_bar_keeps_its_length_and_its_ends_their_curves(kinds: str, seed: int)
     rng = rng_of(seed)
     made: dict[str, Any] = {
         "C": lambda: Circle(rng.normal(size=3), rng.normal(size=3), rng.uniform(0.3, 1.5)),
-        "L": lambda: Line(rng.normal(size=3), rng.normal(size=3)), "P": lambda: Point(rng.normal(size=3))}
+        "L": lambda: Line(rng.normal(size=3), rng.normal(size=3)),
+        "P": lambda: Point(rng.normal(size=3)),
+    }
     curves = [made[kind]() for kind in kinds]
     ends = [curve.at(rng.uniform(-2, 2)) for curve in curves]
     length = float(np.linalg.norm(ends[1] - ends[0]))
@@ -186,8 +202,15 @@ def test_a_traced_point_keeps_its_triangle():
 
 
 @pytest.mark.some(1)
-@pytest.mark.parametrize(("name", "observe"), [("3rrr_m1", None), ("gough_stewart", "1,3,5"), ("quattro", "1,4"),
-                                               pytest.param("hexa", "1,3,5", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("name", "observe"),
+    [
+        ("3rrr_m1", None),
+        ("gough_stewart", "1,3,5"),
+        ("quattro", "1,4"),
+        pytest.param("hexa", "1,3,5", marks=pytest.mark.slow),
+    ],
+)
 def test_numbers_do_not_cover_each_other_and_nothing_leaves_the_page(name: str, observe: str | None):
     result = found(name, observe)
     page = figure(result, drawn(name, observe))
@@ -197,13 +220,18 @@ def test_numbers_do_not_cover_each_other_and_nothing_leaves_the_page(name: str, 
     assert [label.get_text() for label in main.texts] == [each.label for each in drawn(name, observe).placed]
     assert not [1 for i, one in enumerate(boxes) for other in boxes[:i] if one.overlaps(other)]
     whole = page.bbox
-    parts = [*boxes, *(label.get_window_extent() for label in page.texts), page.legends[0].get_window_extent(),
-             page._suptitle.get_window_extent(), main.xaxis.label.get_window_extent(),
-             main.yaxis.label.get_window_extent()]
+    parts = [
+        *boxes,
+        *(label.get_window_extent() for label in page.texts),
+        page.legends[0].get_window_extent(),
+        page._suptitle.get_window_extent(),
+        main.xaxis.label.get_window_extent(),
+        main.yaxis.label.get_window_extent(),
+    ]
     for box in parts:
         assert whole.x0 <= box.x0 <= box.x1 <= whole.x1, box
         assert whole.y0 <= box.y0 <= box.y1 <= whole.y1, box
-    cells = [label.get_window_extent() for label in page.texts[:len(page.axes) - 1]]
+    cells = [label.get_window_extent() for label in page.texts[: len(page.axes) - 1]]
     assert not [1 for i, one in enumerate(cells) for other in cells[:i] if one.overlaps(other)]
 
 
@@ -241,8 +269,9 @@ def test_scales_are_equal(name: str, observe: str | None):
 
 
 @pytest.mark.parametrize("path", ["x.tiff", "x", "nowhere/x.png"])
-def test_bad_files_are_refused_before_any_work(path: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-                                               capsys: pytest.CaptureFixture[str]):
+def test_bad_files_are_refused_before_any_work(
+    path: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(ObservedRobot, "of", lambda *a, **k: pytest.fail("work was begun"))
     assert execute(["modes", "rrrrr_m1", "-o", path]) == 2
@@ -300,11 +329,17 @@ def words(record: object) -> object:
 
 def commands() -> dict[str, str]:
     """The table of ``docs/pictures.py``."""
-    table = next(node.value for node in ast.parse((ROOT / "docs" / "pictures.py").read_text("utf-8")).body
-                 if isinstance(node, ast.AnnAssign) and ast.unparse(node.target) == "PICTURES")
+    table = next(
+        node.value
+        for node in ast.parse((ROOT / "docs" / "pictures.py").read_text("utf-8")).body
+        if isinstance(node, ast.AnnAssign) and ast.unparse(node.target) == "PICTURES"
+    )
     assert isinstance(table, ast.Dict)
-    return {ast.literal_eval(name): ast.literal_eval(what) for name, what in zip(table.keys, table.values, strict=True)
-            if isinstance(what, ast.Constant)}
+    return {
+        ast.literal_eval(name): ast.literal_eval(what)
+        for name, what in zip(table.keys, table.values, strict=True)
+        if isinstance(what, ast.Constant)
+    }
 
 
 def test_there_are_kept_pictures():
@@ -312,8 +347,10 @@ def test_there_are_kept_pictures():
 
 
 @pytest.mark.some(3)
-@pytest.mark.parametrize("file", [
-    pytest.param(file, id=file.stem, marks=[pytest.mark.slow] if file.stem == "modes_hexa" else []) for file in KEPT])
+@pytest.mark.parametrize(
+    "file",
+    [pytest.param(file, id=file.stem, marks=[pytest.mark.slow] if file.stem == "modes_hexa" else []) for file in KEPT],
+)
 def test_kept_pictures_are_fresh_and_small(file: Path):
     """Drawn again with its own command, the picture would hold the same numbers."""
     _, robot, *options = shlex.split(commands()[file.name])

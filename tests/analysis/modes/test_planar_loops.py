@@ -38,8 +38,10 @@ def planar() -> list[str]:
     for name, path in shipped().items():
         joints = load(path).joints.values()
         axes = [joint.axis for joint in joints if joint.type.value == "R"]
-        if axes and all(joint.type.value in "RP" and abs(abs(joint.axis @ axes[0]) - (joint.type.value == "R")) < 1e-9
-                        for joint in joints):
+        if axes and all(
+            joint.type.value in "RP" and abs(abs(joint.axis @ axes[0]) - (joint.type.value == "R")) < 1e-9
+            for joint in joints
+        ):
             found.append(name)
     return found
 
@@ -50,8 +52,9 @@ def measured(found: AssemblyModes) -> MeasuredRobot:
 
 @pytest.mark.some(2)
 @pytest.mark.parametrize("real", [False, True])
-@pytest.mark.parametrize("name", [pytest.param(name, marks=[] if name in QUICK else [pytest.mark.slow])
-                                  for name in planar()])
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[] if name in QUICK else [pytest.mark.slow]) for name in planar()]
+)
 def test_loops_and_tips_agree(name: str, real: bool):
     """The general way shares neither unknowns nor solver with the others."""
     listed = hrsynth.modes(name, real=real)
@@ -67,8 +70,16 @@ def test_loops_and_tips_agree(name: str, real: bool):
     length = listed.goal.twin.length
     for mode in listed.modes:
         assert mode.bodies is not None
-        assert min(max(pose_difference(X, made.bodies(each.q)[body], length, listed.setting.anatomy.point)
-                       for body, X in mode.bodies.items()) for each in found.modes) < 1e-9
+        assert (
+            min(
+                max(
+                    pose_difference(X, made.bodies(each.q)[body], length, listed.setting.anatomy.point)
+                    for body, X in mode.bodies.items()
+                )
+                for each in found.modes
+            )
+            < 1e-9
+        )
 
 
 def test_there_are_planar_robots():
@@ -107,8 +118,14 @@ def test_a_search_finds_only_closings_that_are_listed(ratio: float):
     found = search(listed.goal, measured(listed).question, leg_ends(listed.setting.anatomy))
     assert len(found.modes) > 1
     for mode in found.modes:
-        assert min(max(np.abs(X - each.bodies[body]).max() for body, X in mode.bodies.items())
-                   for each in listed.modes if each.bodies) < 1e-6
+        assert (
+            min(
+                max(np.abs(X - each.bodies[body]).max() for body, X in mode.bodies.items())
+                for each in listed.modes
+                if each.bodies
+            )
+            < 1e-6
+        )
 
 
 def test_more_than_needed_is_measured():
@@ -124,8 +141,10 @@ LINKS = {"base": [0, 3, 6], "a": [0, 1], "coupler": [1, 2, 4], "b": [2, 3], "c":
 
 
 @pytest.mark.some(2)
-@pytest.mark.parametrize(("motor", "platform", "count", "loops"), [
-    ("j0", "coupler", 2, 1), ("j6", "coupler", 6, 2), ("j3", "coupler", 2, 1), ("j0", "c", 4, 2)])
+@pytest.mark.parametrize(
+    ("motor", "platform", "count", "loops"),
+    [("j0", "coupler", 2, 1), ("j6", "coupler", 6, 2), ("j3", "coupler", 2, 1), ("j0", "c", 4, 2)],
+)
 def test_a_six_bar_of_two_loops(motor: str, platform: str, count: int, loops: int):
     """Stephenson's: with the motor in the four-bar that has two closings, whatever the other loop, with it in the other
     one, coupler curve and circle meet in six; the last bar has two places for each of the four-bar's."""
@@ -139,23 +158,32 @@ def test_a_six_bar_of_two_loops(motor: str, platform: str, count: int, loops: in
 
 
 @pytest.mark.some(1)
-@pytest.mark.parametrize(("word", "count"), [
-    ("(Rz!-Rz*-Ph)+(Rz!-Rz-Rz*)+(Rz!-Rz*-Rz)", 6), ("(Ph*-Rz-Pj)+(Ph-Rz-Rz*)+(Rz-Ph*-Pj)", 4)])
+@pytest.mark.parametrize(
+    ("word", "count"), [("(Rz!-Rz*-Ph)+(Rz!-Rz-Rz*)+(Rz!-Rz*-Rz)", 6), ("(Ph*-Rz-Pj)+(Ph-Rz-Rz*)+(Rz-Ph*-Pj)", 4)]
+)
 def test_loops_are_told_so_that_their_degrees_are_low(word: str, count: int):
     """A tip on a line of the platform, two on circles: 6, as a coupler curve meets a circle; lines alone leave 4."""
     found = hrsynth.modes(mechanism(parse(word)), real=True)
     assert (found.found.complete, found.found.complex) == (True, count)
     others = search(found.goal, measured(found).question, leg_ends(found.setting.anatomy))
     for mode in others.modes:
-        assert min(max(np.abs(X - each.bodies[body]).max() for body, X in mode.bodies.items())
-                   for each in found.modes if each.bodies) < 1e-6
+        assert (
+            min(
+                max(np.abs(X - each.bodies[body]).max() for body, X in mode.bodies.items())
+                for each in found.modes
+                if each.bodies
+            )
+            < 1e-6
+        )
 
 
 def test_slides_that_are_coupled():
     """Two carriages on one rail, the second twice as fast, joined by two bars: with a bar's direction held their
     distance is what it was, and so is all else; with both held by the motor the bars have two closings."""
-    points, links = [(0, 0), (1.5, 0), (0, 0.2), (1.5, 0.2), (0.6, 1.1)], {
-        "base": [0, 1], "left": [0, 2], "right": [1, 3], "one": [2, 4], "other": [3, 4]}
+    points, links = (
+        [(0, 0), (1.5, 0), (0, 0.2), (1.5, 0.2), (0.6, 1.1)],
+        {"base": [0, 1], "left": [0, 2], "right": [1, 3], "one": [2, 4], "other": [3, 4]},
+    )
     mechanism = linkage(points, links, "other", "j0", {0: (1, 0), 1: (1, 0)}, [("left", "right", 2.0)])
     found = hrsynth.modes(mechanism, real=True)
     assert (found.found.complete, found.found.complex, len(found.modes)) == (True, 2, 2)
@@ -197,8 +225,9 @@ def test_whole_vectors_that_are_annulled(seed: int):
     assert B.rank() == len(basis)
     minors = [B[:, list(columns)].det() for columns in combinations(range(4), len(basis))]
     assert gcd_list(minors) == 1
-    torsion = gcd_list([M[list(r), list(c)].det() for r in combinations(range(2), M.rank())
-                        for c in combinations(range(4), M.rank())])
+    torsion = gcd_list(
+        [M[list(r), list(c)].det() for r in combinations(range(2), M.rank()) for c in combinations(range(4), M.rank())]
+    )
     if M.rank() == 2:
         assert (whole_kernel(rows, whole=True) is None) == (torsion != 1)
 
@@ -220,9 +249,16 @@ def test_degrees_in_groups_bound_what_ranks_bound():
 def carried(platform: str) -> Mechanism:
     """A four-bar whose coupler carries a tool by two cranks of its own, the first one driven."""
     b = Builder("carried")
-    joints = {"a": ("base", "one", (0, 0)), "b": ("one", "bar", (0.1, 0.5)), "c": ("base", "two", (0.7, 0.05)),
-              "d": ("two", "bar", (0.62, 0.48)), "e": ("bar", "first", (0.3, 0.6)), "f": ("bar", "second", (0.5, 0.62)),
-              "g": ("first", "tool", (0.35, 0.9)), "h": ("second", "tool", (0.58, 0.83))}
+    joints = {
+        "a": ("base", "one", (0, 0)),
+        "b": ("one", "bar", (0.1, 0.5)),
+        "c": ("base", "two", (0.7, 0.05)),
+        "d": ("two", "bar", (0.62, 0.48)),
+        "e": ("bar", "first", (0.3, 0.6)),
+        "f": ("bar", "second", (0.5, 0.62)),
+        "g": ("first", "tool", (0.35, 0.9)),
+        "h": ("second", "tool", (0.58, 0.83)),
+    }
     b.link("base")
     for name, (one, other, at) in joints.items():
         if name not in "dh":
@@ -242,8 +278,13 @@ def test_a_tool_that_cranks_on_the_platform_carry_has_both_its_places():
         assert mode.configuration is not None
         bar = mode.configuration.pose("bar")
         F, G = (bar @ [*point, 0, 1] for point in ([0.4, 0.12], [0.25, 0.4]))
-        H = np.array([[*(there.pose("tool") @ [0.23, -0.07, 0, 1])] for there in at
-                      if there is not None and pose_difference(there.pose("bar"), bar, 1.0) < 1e-9])
+        H = np.array(
+            [
+                [*(there.pose("tool") @ [0.23, -0.07, 0, 1])]
+                for there in at
+                if there is not None and pose_difference(there.pose("bar"), bar, 1.0) < 1e-9
+            ]
+        )
         assert len(H) == 2
         along = (G - F) / np.linalg.norm(G - F)
         assert H[1] == pytest.approx(2 * (F + (H[0] - F) @ along * along) - H[0], abs=1e-9)
@@ -253,18 +294,32 @@ def test_a_tool_that_cranks_on_the_platform_carry_has_both_its_places():
 def on_three_legs() -> Mechanism:
     """A plate on three RRR legs carries a tool by two cranks, the first of which is driven as the legs' are."""
     b = Builder("on_three_legs")
-    legs = [((0, 0), (0.02, 0.35), (0.35, 0.3)), ((1, 0.02), (1.03, 0.38), (0.66, 0.33)),
-            ((0.48, 0.97), (0.75, 0.93), (0.5, 0.6))]
+    legs = [
+        ((0, 0), (0.02, 0.35), (0.35, 0.3)),
+        ((1, 0.02), (1.03, 0.38), (0.66, 0.33)),
+        ((0.48, 0.97), (0.75, 0.93), (0.5, 0.6)),
+    ]
     b.link("base")
     for k, (A, M, B) in enumerate(legs, 1):
         b.link(f"prox_{k}", at=(*A, 0))
         b.link(f"dist_{k}", at=(*M, 0))
         if k == 1:
             b.link("plate", at=(*B, 0))
-        for name, one, other, at in (("a", "base", f"prox_{k}", A), ("m", f"prox_{k}", f"dist_{k}", M),
-                                     ("b", f"dist_{k}", "plate", B)):
-            b.joint(f"{name}_{k}", "R", one, other, at=(*at, 0), axis=(0, 0, 1), motor=name == "a",
-                    loop=name == "b" and k > 1)
+        for name, one, other, at in (
+            ("a", "base", f"prox_{k}", A),
+            ("m", f"prox_{k}", f"dist_{k}", M),
+            ("b", f"dist_{k}", "plate", B),
+        ):
+            b.joint(
+                f"{name}_{k}",
+                "R",
+                one,
+                other,
+                at=(*at, 0),
+                axis=(0, 0, 1),
+                motor=name == "a",
+                loop=name == "b" and k > 1,
+            )
     for name, F, G in (("first", (0.4, 0.4), (0.42, 0.72)), ("second", (0.6, 0.42), (0.68, 0.7))):
         b.link(name, at=(*F, 0))
         if name == "first":
@@ -292,8 +347,14 @@ def test_measurements_of_one_freedom_hold_it_once():
     found = search(listed.goal, measured(listed).question, placing_links(listed.setting.anatomy))
     assert len(found.modes) == 2
     for one in found.modes:
-        assert min(pose_difference(one.bodies["tool"], each.configuration.pose("tool"), 1.0)
-                   for each in listed.modes if each.configuration) < 1e-6
+        assert (
+            min(
+                pose_difference(one.bodies["tool"], each.configuration.pose("tool"), 1.0)
+                for each in listed.modes
+                if each.configuration
+            )
+            < 1e-6
+        )
 
 
 @pytest.mark.slow
@@ -305,15 +366,30 @@ def test_a_tool_rests_at_both_its_places():
 def two_segments() -> Mechanism:
     """A crank carries the platform by two unequal bars, both named as segments of their leg; a slide holds it too."""
     b = Builder("two_segments")
-    joints = {"a": ("base", "crank", (0, 0)), "b": ("crank", "one", (0, 0.4)), "c": ("crank", "two", (0.15, 0.38)),
-              "d": ("one", "plate", (0.3, 0.75)), "e": ("two", "plate", (0.47, 0.68)),
-              "f": ("base", "tube", (0.9, 0.05)), "g": ("tube", "rod", (0.8, 0.3)), "h": ("rod", "plate", (0.6, 0.7))}
+    joints = {
+        "a": ("base", "crank", (0, 0)),
+        "b": ("crank", "one", (0, 0.4)),
+        "c": ("crank", "two", (0.15, 0.38)),
+        "d": ("one", "plate", (0.3, 0.75)),
+        "e": ("two", "plate", (0.47, 0.68)),
+        "f": ("base", "tube", (0.9, 0.05)),
+        "g": ("tube", "rod", (0.8, 0.3)),
+        "h": ("rod", "plate", (0.6, 0.7)),
+    }
     b.link("base")
     for name, (one, other, at) in joints.items():
         if name not in "eh":
             b.link(other, at=(*at, 0))
-        b.joint(name, "P" if name == "g" else "R", one, other, at=(*at, 0), motor=name in "ag", loop=name in "eh",
-                axis=(-0.3, 0.65, 0) if name == "g" else (0, 0, 1))
+        b.joint(
+            name,
+            "P" if name == "g" else "R",
+            one,
+            other,
+            at=(*at, 0),
+            motor=name in "ag",
+            loop=name in "eh",
+            axis=(-0.3, 0.65, 0) if name == "g" else (0, 0, 1),
+        )
     for leg, link, along in (("1", "one", (0.3, 0.35)), ("1", "two", (0.32, 0.3)), ("2", "rod", (-0.3, 0.65))):
         b.observe(leg, link, (*along, 0))
     return b.build(platform="plate")
@@ -337,8 +413,10 @@ def test_one_segment_of_two_has_other_modes(link: str):
 
 def test_a_platform_that_all_conditions_hold_linearly_has_one_place():
     """A parallelogram whose crank is held: the platform only translates, and its point is told outright."""
-    corners, links = [(0, 0), (0.2, 0.6), (1.2, 0.6), (1.0, 0)], {
-        "base": [0, 3], "a": [0, 1], "platform": [1, 2], "b": [2, 3]}
+    corners, links = (
+        [(0, 0), (0.2, 0.6), (1.2, 0.6), (1.0, 0)],
+        {"base": [0, 3], "a": [0, 1], "platform": [1, 2], "b": [2, 3]},
+    )
     found = hrsynth.modes(linkage(corners, links, "platform", "j0"), real=True)
     assert len(found.modes) == 1
     assert "at most 1 pose by conditions that are all linear, 1 enclosed" in found.found.proof
@@ -347,17 +425,33 @@ def test_a_platform_that_all_conditions_hold_linearly_has_one_place():
 def test_a_platform_on_the_crank_that_a_four_bar_turns_has_four_places():
     """The crank AB is held, and the platform hangs on it at H. A slide through H leads to G on the rocker: for each of
     the two places of the four-bar's coupler the platform points to G or away from it."""
-    b, (A, B, C, D, H, G) = Builder("on_the_crank"), np.array(
-        [(0.73, -0.05), (0.0, 0.0), (-2.24, -0.08), (0.26, -2.18), (-1.48, 1.42), (1.86, 1.87)])
-    joints = {"a": ("R", "base", "crank", A), "b": ("R", "crank", "coupler", B), "c": ("R", "coupler", "rocker", C),
-              "d": ("R", "rocker", "base", D), "e": ("R", "rocker", "tube", G),
-              "f": ("P", "tube", "plate", (G + H) / 2), "g": ("R", "plate", "crank", H)}
+    b, (A, B, C, D, H, G) = (
+        Builder("on_the_crank"),
+        np.array([(0.73, -0.05), (0.0, 0.0), (-2.24, -0.08), (0.26, -2.18), (-1.48, 1.42), (1.86, 1.87)]),
+    )
+    joints = {
+        "a": ("R", "base", "crank", A),
+        "b": ("R", "crank", "coupler", B),
+        "c": ("R", "coupler", "rocker", C),
+        "d": ("R", "rocker", "base", D),
+        "e": ("R", "rocker", "tube", G),
+        "f": ("P", "tube", "plate", (G + H) / 2),
+        "g": ("R", "plate", "crank", H),
+    }
     b.link("base")
     for name, (kind, one, other, at) in joints.items():
         if name not in "dg":
             b.link(other, at=(*at, 0))
-        b.joint(name, kind, one, other, at=(*at, 0), axis=(0, 0, 1) if kind == "R" else (*(H - G), 0),
-                motor=name == "a", loop=name in "dg")
+        b.joint(
+            name,
+            kind,
+            one,
+            other,
+            at=(*at, 0),
+            axis=(0, 0, 1) if kind == "R" else (*(H - G), 0),
+            motor=name == "a",
+            loop=name in "dg",
+        )
     found = hrsynth.modes(b.build(platform="plate"), real=True)
     along = (D - B) / np.linalg.norm(D - B)
     mirrored = B + 2 * (C - B) @ along * along - (C - B)  # the other place of C; G is carried by the rocker CD

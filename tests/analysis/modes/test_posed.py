@@ -72,8 +72,9 @@ SLOW = [
 
 
 @pytest.mark.some(1, 4)
-@pytest.mark.parametrize(("word", "legs", "count"),
-                         [*KINDS, *(pytest.param(*each, marks=pytest.mark.slow) for each in SLOW)])
+@pytest.mark.parametrize(
+    ("word", "legs", "count"), [*KINDS, *(pytest.param(*each, marks=pytest.mark.slow) for each in SLOW)]
+)
 def test_what_random_starts_find_is_listed(word, legs, count):
     robot = measured(word, legs)
     at = robot.setting.configurations[1]
@@ -87,9 +88,16 @@ def test_what_random_starts_find_is_listed(word, legs, count):
 
 
 @pytest.mark.some(5)
-@pytest.mark.parametrize(("word", "legs"), [
-    ("3(Utn-Pl*-S)", "123"), ("3(Rz*-Rz-Rz)", "123"), ("(Rz*-Pl-Rz)+2(Rz*-Rz-Rz)", "123"), ("3(Rt*-Pl-S)", "123"),
-    ("(Ph*-Rz-Rz)+2(Rz*-Rz-Rz)", "123")])
+@pytest.mark.parametrize(
+    ("word", "legs"),
+    [
+        ("3(Utn-Pl*-S)", "123"),
+        ("3(Rz*-Rz-Rz)", "123"),
+        ("(Rz*-Pl-Rz)+2(Rz*-Rz-Rz)", "123"),
+        ("3(Rt*-Pl-S)", "123"),
+        ("(Ph*-Rz-Rz)+2(Rz*-Rz-Rz)", "123"),
+    ],
+)
 @pytest.mark.parametrize("seed", [0, 1])
 def test_the_known_ways_list_the_same(word, legs, seed):
     robot = measured(word, legs, seed)
@@ -158,8 +166,9 @@ def random_conditions(rng, kinds):
     return found
 
 
-@pytest.mark.parametrize("kind", [OnPlane, AtAngle, OnRevolution, OnMovingRevolution, OnMovingPlane, Coplanar,
-                                  OnCylinder, OnTwoCircles])
+@pytest.mark.parametrize(
+    "kind", [OnPlane, AtAngle, OnRevolution, OnMovingRevolution, OnMovingPlane, Coplanar, OnCylinder, OnTwoCircles]
+)
 def test_slopes_are_the_derivatives(kind):
     rng = np.random.default_rng(3)
     (condition,) = random_conditions(rng, [kind])
@@ -176,18 +185,30 @@ THREE = [OnPlane] * 3
 
 
 @pytest.mark.some(1)
-@pytest.mark.parametrize(("kinds", "count"), [
-    (THREE + [OnPlane] * 3, 8), (THREE + [AtAngle] * 3, 8), (THREE + [OnPlane, OnPlane, OnRevolution], 16),
-    (THREE + [OnPlane, Coplanar, Coplanar], 32)])
+@pytest.mark.parametrize(
+    ("kinds", "count"),
+    [
+        (THREE + [OnPlane] * 3, 8),
+        (THREE + [AtAngle] * 3, 8),
+        (THREE + [OnPlane, OnPlane, OnRevolution], 16),
+        (THREE + [OnPlane, Coplanar, Coplanar], 32),
+    ],
+)
 def test_ranks_give_the_product_of_degrees_of_general_conditions(kinds, count):
     forms = SquareForms.of(random_conditions(np.random.default_rng(1), kinds), Poses.spatial())
     assert forms.most == count == bound(forms)[0]
 
 
 @pytest.mark.some(2)
-@pytest.mark.parametrize("kinds", [
-    THREE + [OnPlane] * 3, THREE + [AtAngle] * 3, THREE + [AtAngle, OnPlane, OnRevolution],
-    [OnPlane, OnPlane, AtAngle, AtAngle, OnRevolution, OnPlane]])
+@pytest.mark.parametrize(
+    "kinds",
+    [
+        THREE + [OnPlane] * 3,
+        THREE + [AtAngle] * 3,
+        THREE + [AtAngle, OnPlane, OnRevolution],
+        [OnPlane, OnPlane, AtAngle, AtAngle, OnRevolution, OnPlane],
+    ],
+)
 def test_ranks_modulo_one_condition_are_those_modulo_all(kinds, monkeypatch):
     """On points of a quadric, and on any: also where the forms are of too low a degree to give the zeros."""
     forms = SquareForms.of(random_conditions(np.random.default_rng(3), kinds), Poses.spatial())
@@ -228,8 +249,14 @@ def test_a_body_that_turns_about_a_point_has_eight_modes(seed: int):
     assert (found.found.complete, found.found.complex) == (True, 8)
     others = search(found.goal, MeasuredRobot.of_motors(found.setting).question, leg_ends(found.setting.anatomy))
     for mode in others.modes:
-        assert min(max(np.abs(X - each.bodies[body]).max() for body, X in mode.bodies.items())
-                   for each in found.modes if each.bodies) < 1e-6
+        assert (
+            min(
+                max(np.abs(X - each.bodies[body]).max() for body, X in mode.bodies.items())
+                for each in found.modes
+                if each.bodies
+            )
+            < 1e-6
+        )
 
 
 @pytest.mark.slow

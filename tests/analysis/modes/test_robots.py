@@ -46,8 +46,15 @@ from oracle import Oracle
 from strategies import PLANAR_WORDS, POD_WORDS, deltas, planar, pods, random_rotation, reordered, transformed
 
 Legs = tuple[str, ...]
-FAST = [("3rrr_m1", None, False), ("3rps", None, False), ("3rpr_m2", None, True), ("quattro", ("1", "4"), False),
-        ("gough_stewart", ("1", "3", "5"), False), ("rrrrr_m1", None, True), ("3prp", None, True)]
+FAST = [
+    ("3rrr_m1", None, False),
+    ("3rps", None, False),
+    ("3rpr_m2", None, True),
+    ("quattro", ("1", "4"), False),
+    ("gough_stewart", ("1", "3", "5"), False),
+    ("rrrrr_m1", None, True),
+    ("3prp", None, True),
+]
 FEW, MANY = 40, 100
 """Random starts of a whole robot."""
 
@@ -95,8 +102,9 @@ def check_modes(found: AssemblyModes) -> None:
             u, wanted = (oracle.directions(each, asked(found).observations) for each in (state, start))
             assert np.abs(u - wanted).max() < 1e-8
         else:
-            places = [motor_places(mechanism, {link: c.pose(link) for link in mechanism.links})
-                      for c in (at, found.goal)]
+            places = [
+                motor_places(mechanism, {link: c.pose(link) for link in mechanism.links}) for c in (at, found.goal)
+            ]
             assert max(np.abs(one - other).max() for one, other in zip(*places, strict=True)) < 1e-8
 
 
@@ -198,8 +206,11 @@ def same_modes(one: AssemblyModes, other: AssemblyModes, X: Array | None = None)
     assert len(one.modes) == len(other.modes)
     X = np.eye(4) if X is None else X
     for mode in one.modes:
-        twins = [each for each in other.modes
-                 if all(np.abs(X @ Y - each.bodies[body]).max() < 1e-7 for body, Y in mode.bodies.items())]
+        twins = [
+            each
+            for each in other.modes
+            if all(np.abs(X @ Y - each.bodies[body]).max() < 1e-7 for body, Y in mode.bodies.items())
+        ]
         assert len(twins) == 1
         assert (twins[0].goal, twins[0].reachable) == (mode.goal, mode.reachable)
         assert len(twins[0].open) == len(mode.open)
@@ -227,8 +238,9 @@ def test_the_order_of_legs_and_links_does_not_matter(name: str, observe: Legs | 
     same_modes(found, modes(reordered(mechanism, np.random.default_rng(2)), observe))
 
 
-@pytest.mark.parametrize(("name", "observe"), [
-    ("3rrr_m1", None), pytest.param("quattro", ("1", "4"), marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("name", "observe"), [("3rrr_m1", None), pytest.param("quattro", ("1", "4"), marks=pytest.mark.slow)]
+)
 def test_from_another_mode_the_list_is_the_same(name: str, observe: Legs | None):
     """A servo loop cannot tell the modes apart, so no list may depend on which of them is the goal."""
     found = listed(name, observe, False)
@@ -245,8 +257,10 @@ def test_from_another_mode_the_list_is_the_same(name: str, observe: Legs | None)
             reached.append(mode)
             assert len(other.modes) == len(found.modes)
             for each in found.modes:
-                assert any(all(np.abs(X - twin.bodies[body]).max() < 1e-6 for body, X in each.bodies.items())
-                           for twin in other.modes)
+                assert any(
+                    all(np.abs(X - twin.bodies[body]).max() < 1e-6 for body, X in each.bodies.items())
+                    for twin in other.modes
+                )
     assert reached or len(found.modes) == 1
 
 
@@ -257,9 +271,18 @@ def asked_directions(found: AssemblyModes) -> Array:
 
 
 @pytest.mark.some(1)
-@pytest.mark.parametrize(("name", "observe", "size"), [
-    ("3rrr_m1", ("1",), 2), ("gough_stewart", ("1", "2"), 2), ("quattro", ("1",), 2), ("prrrp_parallel", None, 1),
-    ("3ppr_m1", None, 3), ("3prp", None, 2), ("uranesx", None, 1)])
+@pytest.mark.parametrize(
+    ("name", "observe", "size"),
+    [
+        ("3rrr_m1", ("1",), 2),
+        ("gough_stewart", ("1", "2"), 2),
+        ("quattro", ("1",), 2),
+        ("prrrp_parallel", None, 1),
+        ("3ppr_m1", None, 3),
+        ("3prp", None, 2),
+        ("uranesx", None, 1),
+    ],
+)
 def test_a_pose_that_is_left_undetermined_is_a_continuum(name: str, observe: Legs | None, size: int):
     found = listed(name, observe, False)
     assert not isinstance(found, str), found
@@ -268,8 +291,17 @@ def test_a_pose_that_is_left_undetermined_is_a_continuum(name: str, observe: Leg
     assert found.to_dict()["continuum"] == size
 
 
-@pytest.mark.parametrize("arguments", [{"observe": ["7"]}, {"observe": []}, {"at": "phi=3deg,rpy=0/0/0"},
-                                       {"at": "nonsense"}, {"at": Pose(rpy=(0.1, 0.2, 0.3))}, {"camera": "nowhere"}])
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        {"observe": ["7"]},
+        {"observe": []},
+        {"at": "phi=3deg,rpy=0/0/0"},
+        {"at": "nonsense"},
+        {"at": Pose(rpy=(0.1, 0.2, 0.3))},
+        {"camera": "nowhere"},
+    ],
+)
 def test_what_is_asked_wrongly_is_refused_in_one_line(arguments):
     with pytest.raises(BadRequest) as caught:
         modes(load(shipped()["quattro"]), **arguments)
@@ -295,8 +327,9 @@ def test_a_four_bar_has_two_modes_with_one_link_watched_and_one_with_both(seed: 
     built = Builder("four_bar")
     for name, corner in (("base", corners[0]), ("crank", corners[0]), ("coupler", corners[1]), ("rocker", corners[3])):
         built.link(name, corner)
-    for number, (one, other) in enumerate([("base", "crank"), ("crank", "coupler"), ("coupler", "rocker"),
-                                           ("rocker", "base")]):
+    for number, (one, other) in enumerate(
+        [("base", "crank"), ("crank", "coupler"), ("coupler", "rocker"), ("rocker", "base")]
+    ):
         built.joint(f"hinge_{number}", "R", one, other, corners[number], axis=(0, 1, 0), motor=number == 0)
     robot = built.build("coupler")
     for observe, count in ((["1"], 2), (["2"], 2), (None, 1)):
@@ -307,17 +340,25 @@ def test_a_four_bar_has_two_modes_with_one_link_watched_and_one_with_both(seed: 
 
 
 @pytest.mark.some(1)
-@pytest.mark.parametrize(("name", "one", "other", "ratio", "real"), [
-    ("delta", "shoulder_1", "shoulder_2", -0.5, False), ("3rps", "slide_1", "slide_3", 2.0, True),
-    ("3rps", "slide_2", "slide_1", 1.0, False), ("gough_stewart", "slide_1", "slide_4", 1.0, False),
-    pytest.param("gough_stewart", "slide_1", "slide_2", -1.0, True, marks=pytest.mark.slow),
-    pytest.param("hexa", "shoulder_2", "shoulder_5", 0.5, True, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("name", "one", "other", "ratio", "real"),
+    [
+        ("delta", "shoulder_1", "shoulder_2", -0.5, False),
+        ("3rps", "slide_1", "slide_3", 2.0, True),
+        ("3rps", "slide_2", "slide_1", 1.0, False),
+        ("gough_stewart", "slide_1", "slide_4", 1.0, False),
+        pytest.param("gough_stewart", "slide_1", "slide_2", -1.0, True, marks=pytest.mark.slow),
+        pytest.param("hexa", "shoulder_2", "shoulder_5", 0.5, True, marks=pytest.mark.slow),
+    ],
+)
 def test_couplings_in_space_rule_poses_out(name: str, one: str, other: str, ratio: float, real: bool):
     """Lists are those of the robot without them, with the tied motor held; closings with them are among these."""
     robot = load(shipped()[name])
     ends = [robot.joints[joint] for joint in (one, other)]
-    coupled = robot.changed(joints=[replace(ends[1], motor=None)], couplings=(
-        Coupling("gear", ends[0].successor, ends[1].successor, ratio),))
+    coupled = robot.changed(
+        joints=[replace(ends[1], motor=None)],
+        couplings=(Coupling("gear", ends[0].successor, ends[1].successor, ratio),),
+    )
     found, free = modes(coupled, real=real), modes(robot, real=real)
     assert found.found.complex == free.found.complex
     assert found.found.proof == f"without couplings, which can only rule poses out: {free.found.proof}"
@@ -342,8 +383,9 @@ def test_a_coupling_that_is_left_open_is_named():
     """Legs that close where a coupling does not are no legs that are left open."""
     robot = load(shipped()["3rps"])
     ends = [robot.joints[joint] for joint in ("slide_2", "slide_1")]
-    coupled = robot.changed(joints=[replace(ends[1], motor=None)], couplings=(
-        Coupling("gear", ends[0].successor, ends[1].successor, 1.0),))
+    coupled = robot.changed(
+        joints=[replace(ends[1], motor=None)], couplings=(Coupling("gear", ends[0].successor, ends[1].successor, 1.0),)
+    )
     found, free = modes(coupled), modes(robot)
     assert any(mode.gears for mode in found.modes)
     for mode, of_free in zip(found.modes, free.modes, strict=True):
@@ -355,8 +397,9 @@ def test_a_coupling_that_is_left_open_is_named():
 def test_there_is_no_matrix_at_a_stretched_leg():
     """Arm and rod of leg 1 lie in a line: they bend while the platform rests, as the law of cosines says to first
     order, so no twist of the platform gives the rod's rate."""
-    corners = np.array([[-1, 0], [1, 0], [0, 2.5], [-0.4, 0.8], [1.1, 0.9], [-0.5, 2.0], [0.2, 1.6], [0.5, 1.5],
-                        [0.3, 1.9]])
+    corners = np.array(
+        [[-1, 0], [1, 0], [0, 2.5], [-0.4, 0.8], [1.1, 0.9], [-0.5, 2.0], [0.2, 1.6], [0.5, 1.5], [0.3, 1.9]]
+    )
     feet, knees, tips = np.column_stack([corners, np.zeros(9)]).reshape(3, 3, 3)
     b = Builder("stretched")
     b.link("base")
@@ -384,9 +427,11 @@ def test_a_joint_that_a_coupling_holds_apart_from_another_is_no_joint_without_it
     robot = load(shipped()["3rps"])
     slide, stage = robot.joints["slide_1"], "stage"
     inner = replace(slide, name="inner", predecessor=stage)
-    coupled = robot.changed(links=[replace(robot.links[slide.successor], name=stage)],
-                            joints=[replace(slide, successor=stage), inner],
-                            couplings=(Coupling("belt", stage, slide.successor, 1.0),))
+    coupled = robot.changed(
+        links=[replace(robot.links[slide.successor], name=stage)],
+        joints=[replace(slide, successor=stage), inner],
+        couplings=(Coupling("belt", stage, slide.successor, 1.0),),
+    )
     setting = watched(coupled)
     assert stage in setting.mechanism.links
     assert without_couplings(MeasuredRobot.of_motors(setting), setting.everything.start) is None
@@ -405,8 +450,13 @@ def moved_since_zero(found: AssemblyModes, at: ClosedConfiguration, joint: Joint
     return float(np.arctan2(axis @ [across[2, 1], across[0, 2], across[1, 0]], np.trace(D[:3, :3]) - 1.0))
 
 
-WAYS = {"tips": partial(solve_tips, as_written=False, effort=EFFORT), "conditions": solve_posed,
-        "loops": solve_loops, "carrier": solve_carried, "single": solve_loop}
+WAYS = {
+    "tips": partial(solve_tips, as_written=False, effort=EFFORT),
+    "conditions": solve_posed,
+    "loops": solve_loops,
+    "carrier": solve_carried,
+    "single": solve_loop,
+}
 
 
 @pytest.mark.some(1, 5)
@@ -436,5 +486,13 @@ def test_all_ways_list_the_same(name: str):
             assert len(found.modes) == len(one.modes), observe
             for mode in found.modes:
                 bodies = made.bodies(mode.q)
-                assert min(max(pose_difference(X, first.bodies(each.q)[body], goal.twin.length)
-                               for body, X in bodies.items()) for each in one.modes) < 1e-7, observe
+                assert (
+                    min(
+                        max(
+                            pose_difference(X, first.bodies(each.q)[body], goal.twin.length)
+                            for body, X in bodies.items()
+                        )
+                        for each in one.modes
+                    )
+                    < 1e-7
+                ), observe

@@ -21,8 +21,13 @@ from hrsynth.constraints.pattern import leg_ends
 from hrsynth.description import load, shipped
 from hrsynth.mechanism import Mechanism
 
-LISTED = [("3rrr_m1", None, False), ("3rps", None, False), ("gough_stewart", "1,3,5", False), ("quattro", "1,4", False),
-          ("delta", None, True)]
+LISTED = [
+    ("3rrr_m1", None, False),
+    ("3rps", None, False),
+    ("gough_stewart", "1,3,5", False),
+    ("quattro", "1,4", False),
+    ("delta", None, True),
+]
 WORDS = ["(Pk*-Rt-S)+(Rt*-Rt-S)+(S-Rt*-Rt)", "3(Ra!-Ra*-Ph-Rb-Ra)", "3(Ph*-Rz-Piz)"]
 """Robots of which no system of equations is known."""
 
@@ -41,8 +46,14 @@ def check_agreement(listed: AssemblyModes) -> None:
     assert found.loose == 0
     for mode in found.modes:
         if not other_branch(listed, mode.configuration):
-            assert min(max(np.abs(X - each.bodies[body]).max() for body, X in mode.bodies.items())
-                       for each in listed.modes if each.bodies) < 1e-6
+            assert (
+                min(
+                    max(np.abs(X - each.bodies[body]).max() for body, X in mode.bodies.items())
+                    for each in listed.modes
+                    if each.bodies
+                )
+                < 1e-6
+            )
     assert sum(mode.met for mode in found.modes) == found.closed + 1
 
 

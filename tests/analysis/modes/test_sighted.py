@@ -42,8 +42,10 @@ def table() -> dict[tuple[str, ...], tuple[int, int]]:
     text = PAGE.read_text().split("<!-- counts -->")[1].split("<!-- end -->")[0]
     rows = re.findall(r"^\| (.*?) \| (\d+) \| (\d+) \|", text, re.MULTILINE)
     pairs = [([word.split() for word in words.split(", ")], int(one), int(each)) for words, one, each in rows]
-    return {tuple(kind.strip("`") for number, kind in words for _ in range(int(number))): (one, each)
-            for words, one, each in pairs}
+    return {
+        tuple(kind.strip("`") for number, kind in words for _ in range(int(number))): (one, each)
+        for words, one, each in pairs
+    }
 
 
 OPEN = (("line", "distance", "distance"), True)
@@ -127,8 +129,12 @@ def three_points(at: Array, seed: int) -> AssemblyModes:
 def test_three_points_have_eight_modes_of_which_at_most_four_are_in_front(seed: int) -> None:
     """In pairs, mirrored at the camera's centre; those in front are the solutions of the cosine laws."""
     rng = np.random.default_rng(100 + seed)
-    at = np.round(rng.uniform(-0.5, 0.5, (3, 3)) if seed else 0.7 * np.array(
-        [[1, 0, 0], [-0.5, 0.86, 0.02], [-0.52, -0.87, -0.01]]), 6)
+    at = np.round(
+        rng.uniform(-0.5, 0.5, (3, 3))
+        if seed
+        else 0.7 * np.array([[1, 0, 0], [-0.5, 0.86, 0.02], [-0.52, -0.87, -0.01]]),
+        6,
+    )
     found = three_points(at, seed)
     points = [found.goal.pose("platform") @ [*b, 1.0] for b in at]
     assert (found.found.complex, found.found.complete) == (8, True)
@@ -162,23 +168,29 @@ ROBOTS = {
     "seen from the base": lambda: observe("gough_stewart", camera="eye=base@0.3,0.1,0", see=GOUGH),
     "camera on the platform": lambda: observe("gough_stewart", camera="eye=platform@0.3,0.1,0", see=BASE),
     "cameras on both": lambda: observe(
-        "gough_stewart", camera=["eye=base@0.3,0.1,0", "hand=platform@0.03,0.01,-0.1"],
-        see=["eye=" + GOUGH[0], "hand=" + BASE[0], "eye=" + GOUGH[1]]),
+        "gough_stewart",
+        camera=["eye=base@0.3,0.1,0", "hand=platform@0.03,0.01,-0.1"],
+        see=["eye=" + GOUGH[0], "hand=" + BASE[0], "eye=" + GOUGH[1]],
+    ),
     "beside legs": lambda: observe("gough_stewart", "1,3", camera="eye=base@0.3,0.1,0", see=GOUGH[:1]),
-    "beside legs, from the platform": lambda: observe("gough_stewart", "1,3", camera="eye=platform@0.3,0.1,0",
-                                                      see=BASE[:1]),
+    "beside legs, from the platform": lambda: observe(
+        "gough_stewart", "1,3", camera="eye=platform@0.3,0.1,0", see=BASE[:1]
+    ),
     "an arm": lambda: observe(arm(), camera="eye=platform@0.02,0.01,0.1", see=BASE),
-    "translations": lambda: observe("delta", camera="eye=platform@0.1,0.1,0.2",
-                                    see=["point:base@0.1,0.3,0", "distance:base@0.3,0,0.2"]),
-    "a plane": lambda: observe("3rrr_m1", camera="eye=platform@0.1,0.05,-0.3",
-                               see=["point:base@0.1,0.3,0", "distance:base@0.3,0,0.2"]),
+    "translations": lambda: observe(
+        "delta", camera="eye=platform@0.1,0.1,0.2", see=["point:base@0.1,0.3,0", "distance:base@0.3,0,0.2"]
+    ),
+    "a plane": lambda: observe(
+        "3rrr_m1", camera="eye=platform@0.1,0.05,-0.3", see=["point:base@0.1,0.3,0", "distance:base@0.3,0,0.2"]
+    ),
 }
 QUICKLY = ("a plane",)
 
 
 @pytest.mark.some(1, 2)
-@pytest.mark.parametrize("name", [pytest.param(name, marks=() if name in QUICKLY else pytest.mark.slow)
-                                  for name in ROBOTS])
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=() if name in QUICKLY else pytest.mark.slow) for name in ROBOTS]
+)
 def test_what_random_starts_of_the_whole_robot_find_is_listed(name: str) -> None:
     setting: ObservedRobot = ROBOTS[name]()
     found = modes(setting, at=setting.configurations[0])
@@ -191,17 +203,24 @@ def test_what_random_starts_of_the_whole_robot_find_is_listed(name: str) -> None
     assert distance(met, listed, found.goal.twin.length) < SAME
     for mode in found.modes:
         if mode.configuration is not None:
-            values = [o.value(mode.configuration.pose(o.seen_from or setting.mechanism.reference),
-                              mode.configuration.pose(o.link)) for o in setting.observed]
-            held = [o.value(found.goal.pose(o.seen_from or setting.mechanism.reference), found.goal.pose(o.link))
-                    for o in setting.observed]
+            values = [
+                o.value(
+                    mode.configuration.pose(o.seen_from or setting.mechanism.reference), mode.configuration.pose(o.link)
+                )
+                for o in setting.observed
+            ]
+            held = [
+                o.value(found.goal.pose(o.seen_from or setting.mechanism.reference), found.goal.pose(o.link))
+                for o in setting.observed
+            ]
             assert max(np.abs(a - b).max() for a, b in zip(values, held, strict=True)) < SAME
 
 
 def test_a_leg_that_restricts_turns_counts_too() -> None:
     """A 3-RPS moves with three freedoms; its legs' planes are conditions beside what is seen."""
-    setting = observe("3rps", camera="eye=base@0.3,0.1,0",
-                      see=["point:platform@0.1,0,0", "distance:platform@-0.1,0.1,0"])
+    setting = observe(
+        "3rps", camera="eye=base@0.3,0.1,0", see=["point:platform@0.1,0,0", "distance:platform@-0.1,0.1,0"]
+    )
     found = modes(setting, at=setting.configurations[0])
     assert (found.found.complex, found.found.complete) == (16, True)
 
@@ -223,8 +242,9 @@ def test_a_certificate_of_what_is_seen_is_accepted() -> None:
     assert record["real"] == len(found.modes) + len(found.antipodal)
     assert hrsynth.verify(record)
     with pytest.raises(NoCertificate):
-        hrsynth.certificate(modes("gough_stewart", camera="eye=base@0.3,0.1,0", see=[*GOUGH[:2], "image_line:"
-                                  "platform@0,0.1,0.1/1,0,0"]))
+        hrsynth.certificate(
+            modes("gough_stewart", camera="eye=base@0.3,0.1,0", see=[*GOUGH[:2], "image_line:platform@0,0.1,0.1/1,0,0"])
+        )
 
 
 def refined(goal: Array, there: Array, C: Array) -> Array:
@@ -235,8 +255,10 @@ def refined(goal: Array, there: Array, C: Array) -> Array:
         pairs, points = [(0, 1), (1, 2), (2, 0)], [mpmath.matrix(list(map(mpmath.mpf, b))) for b in goal]
 
         def off(*x: Any) -> list[Any]:
-            return [sum((x[i] * rays[i][k] - x[j] * rays[j][k]) ** 2 - (points[i][k] - points[j][k]) ** 2
-                        for k in range(3)) for i, j in pairs]
+            return [
+                sum((x[i] * rays[i][k] - x[j] * rays[j][k]) ** 2 - (points[i][k] - points[j][k]) ** 2 for k in range(3))
+                for i, j in pairs
+            ]
 
         start = [float((there[k] - C) @ (goal[k] - C) / ((goal[k] - C) @ (goal[k] - C))) for k in range(3)]
         x = mpmath.findroot(off, start, tol=1e-80, maxsteps=60)
@@ -245,8 +267,7 @@ def refined(goal: Array, there: Array, C: Array) -> Array:
 
 @pytest.mark.parametrize("back", [False, True])
 def test_the_exact_pose_is_within_the_radius(back: bool) -> None:
-    """The places of the three points at each mode, from the cosine laws to 40 digits, are as near as the radius says.
-    """
+    """The places of the three points at each mode, by the cosine laws to 40 digits, are as near as the radius says."""
     camera, see = ("eye=platform@0.3,0.1,0", BASE) if back else ("eye=base@0.3,0.1,0", GOUGH)
     found = modes("gough_stewart", camera=camera, see=see)
     points = np.array([[float(x) for x in text.split("@")[1].split(",")] for text in see])

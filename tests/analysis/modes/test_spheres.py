@@ -30,14 +30,17 @@ MIXED = {"SSSSSS": 40, "CSSSS": 40, "EEESSS": 40, "CCSS": 32, "CEESS": 40, "CCES
 
 NAMED: dict[str, tuple[Callable[[Rng], Draw], int]] = {
     **{kinds: (lambda rng, kinds=kinds: spatial(rng, kinds), count) for kinds, count in MIXED.items()},
-    **{f"{platform} on {base}": (lambda rng, both=(platform, base): six_rods(rng, *both), count)
-       for platform, base, count in CLASSES},
+    **{
+        f"{platform} on {base}": (lambda rng, both=(platform, base): six_rods(rng, *both), count)
+        for platform, base, count in CLASSES
+    },
 }
 """How to draw a member, and how many poses it has; in ``AABBCC on ABBCCA``, Rusin's octahedral platform, rods 1 and 2
 share a ball of the platform, rods 2 and 3 one of the base."""
 
 CURVED = {"AAABBC on ABCDEF"}
 """Classes with a curve of solutions at infinity, which the count modulo a prime does not cover."""
+
 
 def check(name: str, seed: int) -> SystemModes:
     """All poses proved, the goal among them, all tips in place."""
@@ -58,8 +61,9 @@ def test_named_classes_are_proved(name: str):
 
 
 @pytest.mark.some(1)
-@pytest.mark.parametrize(("platform", "base", "count"), [("AABBCD", "ABABCD", 16), ("AABBCC", "ABABCD", 8),
-                                                          ("AAABCD", "ABCDDE", 8)])
+@pytest.mark.parametrize(
+    ("platform", "base", "count"), [("AABBCD", "ABABCD", 16), ("AABBCC", "ABABCD", 8), ("AAABCD", "ABCDDE", 8)]
+)
 def test_rods_that_share_balls_have_bounds_of_their_own(platform: str, base: str, count: int):
     for seed in range(3):
         found = solve(six_rods(np.random.default_rng(seed), platform, base).system, near=False)
@@ -113,8 +117,9 @@ def test_they_move_with_the_base_whose_legs_are_counted_in_any_order():
     system = dietmaier()
     R, t = rotation_about((1, 2, -1), 0.7), np.array([0.3, -1.0, 2.0])
     order = [4, 0, 5, 2, 1, 3]
-    moved = Spatial(tuple(Sphere(R @ system.curves[k].centre + t, system.curves[k].radius) for k in order),
-                    system.tips[order])
+    moved = Spatial(
+        tuple(Sphere(R @ system.curves[k].centre + t, system.curves[k].radius) for k in order), system.tips[order]
+    )
     after = solve(moved)
     assert after.complete
     for mode in solve(system).modes:
@@ -208,8 +213,10 @@ def test_parallel_circles_and_planes_keep_their_bounds():
     n = unit(rng.normal(size=3))
     circles = tuple(Circle(p - 0.7 * unit(np.cross(n, rng.normal(size=3))), n, 0.7) for p in at[:2])
     spheres = tuple(Sphere(p + rng.normal(size=3), 1.0) for p in at[2:])
-    curves = (*circles, *(replace(s, radius=float(np.linalg.norm(s.centre - p)))
-                          for s, p in zip(spheres, at[2:], strict=True)))
+    curves = (
+        *circles,
+        *(replace(s, radius=float(np.linalg.norm(s.centre - p))) for s, p in zip(spheres, at[2:], strict=True)),
+    )
     system = Spatial(curves, tips)
     found = solve(system, near=False)
     assert found.complex == sections.poses(sections.rows(system))
@@ -258,5 +265,3 @@ def test_planes_alone_leave_eight_and_double_points_count_none():
     assert all(isinstance(curve, Plane) for curve in system.curves)
     assert solve(system, near=False).complex == 8
     assert degree_bound(system, range(6)).most == 40
-
-

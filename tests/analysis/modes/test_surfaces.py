@@ -26,9 +26,15 @@ from hrsynth.errors import BadRequest, MissingExtra, Unsolved
 from hrsynth.geometry.vectors import rotation_about, unit
 from strategies import random_rotation
 
-SLOWEST = {"spatial, six spheres", "spatial, three planes and three spheres", "spatial, two circles and two spheres",
-           "spatial, a line and four spheres", "spatial, three circles", "spatial, two circles and a line",
-           "spatial, two lines and a circle"}
+SLOWEST = {
+    "spatial, six spheres",
+    "spatial, three planes and three spheres",
+    "spatial, two circles and two spheres",
+    "spatial, a line and four spheres",
+    "spatial, three circles",
+    "spatial, two circles and a line",
+    "spatial, two lines and a circle",
+}
 """Families of which msolve takes a second or more for each member."""
 
 QUICK = sorted(set(FAMILIES | MEETING | SURFACES) - SLOWEST)
@@ -75,8 +81,14 @@ def test_tips_on_surfaces_have_their_number_of_poses_at_many_instances(name: str
 
 @pytest.mark.some(2)
 @needs_msolve
-@pytest.mark.parametrize("draw", [lambda rng: spatial(rng, "EEEEEEE"), lambda rng: spatial(rng, "PSSSS"),
-                                  lambda rng: on_two_bodies(rng, ("SSS", "SS"))])
+@pytest.mark.parametrize(
+    "draw",
+    [
+        lambda rng: spatial(rng, "EEEEEEE"),
+        lambda rng: spatial(rng, "PSSSS"),
+        lambda rng: on_two_bodies(rng, ("SSS", "SS")),
+    ],
+)
 def test_more_surfaces_than_needed_leave_the_goal(draw):
     system, goal = draw(np.random.default_rng(5))
     modes = solve(system)
@@ -116,7 +128,8 @@ def test_a_continuum_of_places_is_said(kind: str):
         "one plane": ([Plane(p + R[:, :2] @ rng.normal(size=2), R[:, 2]) for _ in range(3)], 2),
         "one sphere": ([Sphere(p, 0.8)] * 3, 2),
         "one axis": ([Sphere(c, float(np.linalg.norm(c - p - 0.7 * R[:, 0]))) for c in along], 1),
-        "planes of one line": ([Plane(c, unit(np.cross(R[:, 2], rng.normal(size=3)))) for c in along], 1)}
+        "planes of one line": ([Plane(c, unit(np.cross(R[:, 2], rng.normal(size=3)))) for c in along], 1),
+    }
     curves, dimension = reaches[kind]
     modes = solve(Translating(tuple(curves), np.zeros((3, 3))))
     assert (modes.continuum, modes.complete, modes.modes) == (dimension, False, ())
@@ -127,8 +140,10 @@ def test_places_move_with_the_base(name: str):
     for seed in range(5):
         system, _ = draw(name, seed)
         R, t = rotation_about((1, 2, -1), 0.7), np.array([0.3, -1.0, 2.0])
-        moved: list[Reach] = [Sphere(R @ c.centre + t, c.radius) if isinstance(c, Sphere) else
-                              Plane(R @ c.centre + t, R @ c.normal) for c in system.curves]
+        moved: list[Reach] = [
+            Sphere(R @ c.centre + t, c.radius) if isinstance(c, Sphere) else Plane(R @ c.centre + t, R @ c.normal)
+            for c in system.curves
+        ]
         after = solve(Translating(tuple(moved), system.tips @ R.T))
         assert after.complete
         for mode in solve(system).modes:
@@ -141,13 +156,17 @@ def test_a_tip_misses_a_surface_by_its_distance(surface: Reach):
     for tip in rng.normal(size=(20, 3)):
         off = surface.miss(tip)
         assert np.linalg.norm(surface.miss(tip - off)) < 1e-14
-        assert all(np.linalg.norm(off) <= np.linalg.norm(tip - (each - surface.miss(each))) + 1e-12
-                   for each in rng.normal(size=(20, 3)))
+        assert all(
+            np.linalg.norm(off) <= np.linalg.norm(tip - (each - surface.miss(each))) + 1e-12
+            for each in rng.normal(size=(20, 3))
+        )
     assert np.linalg.norm(surface.miss(surface.centre)) == pytest.approx(getattr(surface, "radius", 0.0))
 
 
-@pytest.mark.parametrize("family", ["two bodies, planes and spheres", "three spheres", "two bodies, circles",
-                                    "planar, two circles and a line"])
+@pytest.mark.parametrize(
+    "family",
+    ["two bodies, planes and spheres", "three spheres", "two bodies, circles", "planar, two circles and a line"],
+)
 def test_the_goal_satisfies_the_quadrics(family: str):
     system, goal = draw(family, 3)
     for part in wholes(system, number=2):
@@ -169,8 +188,13 @@ def coordinates(system: System, chart, goal: np.ndarray) -> list[float]:
         away = (system.pose(chart.place(x)) - goal).ravel()
         return np.concatenate([away, [float(each.value(x)) for each in own], system.misses(chart.place(x)).ravel()])
 
-    found = min((least_squares(errors, np.random.default_rng(k).normal(size=chart.count), xtol=1e-15, ftol=1e-15,
-                               gtol=1e-15) for k in range(6)), key=lambda each: each.cost)
+    found = min(
+        (
+            least_squares(errors, np.random.default_rng(k).normal(size=chart.count), xtol=1e-15, ftol=1e-15, gtol=1e-15)
+            for k in range(6)
+        ),
+        key=lambda each: each.cost,
+    )
     return list(found.x)
 
 
@@ -217,12 +241,15 @@ def test_too_few_surfaces_leave_a_continuum():
     assert solve_by_msolve(spatial(rng, "LL").system).continuum == 2
 
 
-@pytest.mark.parametrize("bad", [
-    lambda: Sphere((0, 0, 0), -1.0),
-    lambda: Plane((0, 0, 0), (0, 0, 0)),
-    lambda: Planar((Sphere((0, 0, 0), 1.0),), np.zeros((1, 2)), np.eye(4)),
-    lambda: Articulated((Sphere((0, 0, 0), 1.0),), np.zeros((1, 3)), (2,), Circle((0, 0, 0), (0, 0, 1), 1.0)),
-])
+@pytest.mark.parametrize(
+    "bad",
+    [
+        lambda: Sphere((0, 0, 0), -1.0),
+        lambda: Plane((0, 0, 0), (0, 0, 0)),
+        lambda: Planar((Sphere((0, 0, 0), 1.0),), np.zeros((1, 2)), np.eye(4)),
+        lambda: Articulated((Sphere((0, 0, 0), 1.0),), np.zeros((1, 3)), (2,), Circle((0, 0, 0), (0, 0, 1), 1.0)),
+    ],
+)
 def test_what_is_no_surface_is_refused(bad):
     with pytest.raises(BadRequest):
         bad()

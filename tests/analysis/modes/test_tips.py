@@ -17,12 +17,39 @@ from hrsynth.errors import NotConfined
 from hrsynth.kinematics.locked import joint_at
 from hrsynth.mechanism.legs import decompose
 
-HIDDEN = {"3rrr_m1": Circle, "3rpr_m2": Line, "3prr_m1": Line, "gough_stewart": Line, "hexa": Circle, "6pus": Line,
-          "delta": Circle, "orthoglide": Line, "quattro": Circle, "quattro_rigid": Circle, "3rps": Line, "3upu": Line,
-          "rrrrr_m1": Circle, "rprpr_m1": Line, "prrrp_m1": Line}
+HIDDEN = {
+    "3rrr_m1": Circle,
+    "3rpr_m2": Line,
+    "3prr_m1": Line,
+    "gough_stewart": Line,
+    "hexa": Circle,
+    "6pus": Line,
+    "delta": Circle,
+    "orthoglide": Line,
+    "quattro": Circle,
+    "quattro_rigid": Circle,
+    "3rps": Line,
+    "3upu": Line,
+    "rrrrr_m1": Circle,
+    "rprpr_m1": Line,
+    "prrrp_m1": Line,
+}
 REAL = {"3rrr_m1": {Circle}, "3rpr_m2": {Circle}, "3rps": {Circle}, "rrrrr_m1": {Point, Circle}}
-RODS = ("delta", "linear_delta", "orthoglide", "uranesx", "3upu", "3puu", "3ruu", "quattro", "quattro_rigid",
-        "gough_stewart", "hexa", "hexaglide", "6pus")
+RODS = (
+    "delta",
+    "linear_delta",
+    "orthoglide",
+    "uranesx",
+    "3upu",
+    "3puu",
+    "3ruu",
+    "quattro",
+    "quattro_rigid",
+    "gough_stewart",
+    "hexa",
+    "hexaglide",
+    "6pus",
+)
 """Real robots whose tips stay on spheres with the motors held."""
 
 
@@ -116,7 +143,6 @@ def check_real_robot(name: str, complex_count: int) -> None:
 
 
 @needs_msolve
-@pytest.mark.parametrize(("name", "complex_count"), [
-    ("quattro", 8), pytest.param("hexa", 40, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("name", "complex_count"), [("quattro", 8), pytest.param("hexa", 40, marks=pytest.mark.slow)])
 def test_real_robots_with_rods_have_their_known_number_of_modes(name: str, complex_count: int):
     check_real_robot(name, complex_count)

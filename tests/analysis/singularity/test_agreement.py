@@ -51,9 +51,13 @@ def check(answer: Singularity, points: int) -> None:
 
 
 @pytest.mark.some(1, 8)
-@pytest.mark.parametrize(("robot", "legs", "real"), [
-    pytest.param(*case, marks=pytest.mark.slow if case[0] in HEAVY and case[1:] == (None, False) else ())
-    for case in CASES])
+@pytest.mark.parametrize(
+    ("robot", "legs", "real"),
+    [
+        pytest.param(*case, marks=pytest.mark.slow if case[0] in HEAVY and case[1:] == (None, False) else ())
+        for case in CASES
+    ],
+)
 def test_shipped_robots(robot: str, legs: str | None, real: bool) -> None:
     check(found(robot, legs, real=real), 100)
 
@@ -77,9 +81,17 @@ def test_a_zero_of_the_expression_where_the_platform_has_fewer_freedoms_is_no_di
 
 
 @pytest.mark.some(2)
-@pytest.mark.parametrize(("robot", "legs", "real"), [
-    ("3rrr_m1", None, False), ("rrrrr_m1", None, False), ("gough_stewart", "1,2,3", False), ("quattro", "1,4", False),
-    ("3rrr_m2", None, True), ("rrrrr_m1", None, True)])
+@pytest.mark.parametrize(
+    ("robot", "legs", "real"),
+    [
+        ("3rrr_m1", None, False),
+        ("rrrrr_m1", None, False),
+        ("gough_stewart", "1,2,3", False),
+        ("quattro", "1,4", False),
+        ("3rrr_m2", None, True),
+        ("rrrrr_m1", None, True),
+    ],
+)
 def test_a_condition_whose_sign_changes_has_poses_on_its_locus(robot: str, legs: str | None, real: bool) -> None:
     answer = singular(load(robot), legs, real=real, points=500)
     assert answer.condition.signed
@@ -88,8 +100,11 @@ def test_a_condition_whose_sign_changes_has_poses_on_its_locus(robot: str, legs:
 
 
 @pytest.mark.slow
-@given(robot=st.one_of(strategies.planar_robots(point=None), strategies.delta_like(), strategies.parallel_robots()),
-       seed=st.integers(0, 2**31), real=st.booleans())
+@given(
+    robot=st.one_of(strategies.planar_robots(point=None), strategies.delta_like(), strategies.parallel_robots()),
+    seed=st.integers(0, 2**31),
+    real=st.booleans(),
+)
 @settings(max_examples=3, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
 def test_random_robots(robot: Mechanism, seed: int, real: bool) -> None:
     check_random_robot(robot, seed, real, 12)
@@ -151,8 +166,9 @@ def test_another_tip_is_told(robot: Sequence[str]) -> None:
 
 
 @pytest.mark.some(2)
-@pytest.mark.parametrize("robot", [("3rrr_m1",), ("delta",), ("orthoglide",), ("gough_stewart", "1,2,3"),
-                                   ("quattro", "1,4"), ("rrrrr_m1",)])
+@pytest.mark.parametrize(
+    "robot", [("3rrr_m1",), ("delta",), ("orthoglide",), ("gough_stewart", "1,2,3"), ("quattro", "1,4"), ("rrrrr_m1",)]
+)
 def test_another_line_is_told(robot: Sequence[str]) -> None:
     answer = found(*robot)
     wrong = with_leg(answer.pattern, of_another(answer))
@@ -184,11 +200,21 @@ class Never(Condition):
 
 
 @pytest.mark.some(2)
-@pytest.mark.parametrize(("robot", "legs", "real"), [
-    ("3rrr_m1", None, False), ("3rps", None, False), ("3rpr_m1", None, True), ("gough_stewart", None, True),
-    ("3prr_m1", None, True), ("orthoglide", None, True), ("prrrp_parallel", None, True)])
-def test_a_false_never_is_told_though_no_pose_that_was_drawn_is_singular(robot: str, legs: str | None, real: bool
-                                                                          ) -> None:
+@pytest.mark.parametrize(
+    ("robot", "legs", "real"),
+    [
+        ("3rrr_m1", None, False),
+        ("3rps", None, False),
+        ("3rpr_m1", None, True),
+        ("gough_stewart", None, True),
+        ("3prr_m1", None, True),
+        ("orthoglide", None, True),
+        ("prrrp_parallel", None, True),
+    ],
+)
+def test_a_false_never_is_told_though_no_pose_that_was_drawn_is_singular(
+    robot: str, legs: str | None, real: bool
+) -> None:
     answer = found(robot, legs, real=real)
     assert answer.checked.smallest > RANK_CUTOFF * RANK_GAP
     with pytest.raises(Disagreement) as caught:
@@ -198,14 +224,20 @@ def test_a_false_never_is_told_though_no_pose_that_was_drawn_is_singular(robot: 
 
 
 @pytest.mark.some(1)
-@pytest.mark.parametrize(("robot", "legs", "real"), [
-    ("3rrr_m1", None, False), ("3rpr_m1", None, False), ("3rps", None, True), ("gough_stewart", None, True)])
+@pytest.mark.parametrize(
+    ("robot", "legs", "real"),
+    [("3rrr_m1", None, False), ("3rpr_m1", None, False), ("3rps", None, True), ("gough_stewart", None, True)],
+)
 def test_where_the_rank_is_led_to_zero_the_expression_vanishes(robot: str, legs: str | None, real: bool) -> None:
     """The descent knows the relation alone, the expression names alone."""
     answer = found(robot, legs, real=real)
     start = answer.setting.samples.start
-    ends = [at for drawn in random_walk(start, 40, 3, steps=8) if (at := lose(drawn, answer.question)) is not None
-            and at.kernel()[1].weakest > 0.05 * start.kernel()[1].weakest]
+    ends = [
+        at
+        for drawn in random_walk(start, 40, 3, steps=8)
+        if (at := lose(drawn, answer.question)) is not None
+        and at.kernel()[1].weakest > 0.05 * start.kernel()[1].weakest
+    ]
     assert len(ends) > 4
     for at in ends:
         assert weakest(at, answer.question) < RANK_CUTOFF

@@ -22,8 +22,11 @@ from hrsynth.present.show import text
 def planar(kind: str) -> tuple[str, str, str]:
     names = [f"{kind}{i}" for i in "123"]
     a, b, c = ("tau" + name[1:] if kind == "τ" else name for name in names)
-    return ("planar", f"the lines through B1, B2, B3, normal to {', '.join(names)}, meet in a point or are parallel",
-            f"det(n, {a}, {b})*dot(B3, {c}) - det(n, {a}, {c})*dot(B2, {b}) + det(n, {b}, {c})*dot(B1, {a})")
+    return (
+        "planar",
+        f"the lines through B1, B2, B3, normal to {', '.join(names)}, meet in a point or are parallel",
+        f"det(n, {a}, {b})*dot(B3, {c}) - det(n, {a}, {c})*dot(B2, {b}) + det(n, {b}, {c})*dot(B1, {a})",
+    )
 
 
 def spatial(kind: str, tip: str = "B") -> tuple[str, str, str]:
@@ -32,14 +35,16 @@ def spatial(kind: str, tip: str = "B") -> tuple[str, str, str]:
     P, Q, R = (f"{tip}{i}" for i in "123")
     forth = f"dot({a}, -{P} + {Q})*dot({b}, -{Q} + {R})*dot({c}, {P} - {R})"
     back = f"dot({a}, {P} - {R})*dot({b}, -{P} + {Q})*dot({c}, -{Q} + {R})"
-    words = (f"the planes through {P}, {Q}, {R} normal to {', '.join(names)}, and the plane {P}{Q}{R}, "
-             "meet in a point (which may lie at infinity)")
+    words = (
+        f"the planes through {P}, {Q}, {R} normal to {', '.join(names)}, and the plane {P}{Q}{R}, "
+        "meet in a point (which may lie at infinity)"
+    )
     return "spatial", words, f"{forth} - {back}"
 
 
 def parallel(kind: str, legs: str, words: str) -> tuple[str, str, str]:
     names = [("tau" if kind == "τ" else kind) + i for i in legs]
-    pairs = [f"cross({a}, {b})" for i, a in enumerate(names) for b in names[i + 1:]]
+    pairs = [f"cross({a}, {b})" for i, a in enumerate(names) for b in names[i + 1 :]]
     return "translations", words, " + ".join(f"dot({pair}, {pair})" for pair in pairs)
 
 
@@ -50,8 +55,14 @@ def lines(kind: str, legs: str) -> str:
 def always(motion: str, freedoms: str, dof: int, because: str = "") -> tuple[str, str, str]:
     count = freedoms.count(";") + 1
     reason = f", because the P axes {because} are parallel" if because else ""
-    return motion, (f"always: {count} of {dof} freedoms {'is' if count == 1 else 'are'} never seen: {freedoms} (at the "
-                    f"zero configuration){reason}"), "0"
+    return (
+        motion,
+        (
+            f"always: {count} of {dof} freedoms {'is' if count == 1 else 'are'} never seen: {freedoms} (at the "
+            f"zero configuration){reason}"
+        ),
+        "0",
+    )
 
 
 def gram(motion: str, words: str, legs: str) -> tuple[str, str, str]:
@@ -72,55 +83,90 @@ SIX = "some motion of the platform moves every tip Bi along {}i (i = 1, 2, 3, 4,
 HALVES = "the platform's halves can translate, one along e relative to the other, and move every tip Bi along τi"
 
 WHOLE = {
-    "3ppr_m1": BLIND, "3ppr_m2": BLIND, "3prp": PLANE, "3rrp": PLANE,
-    "3prr_m1": planar("p"), "3prr_m2": planar("p"), "3rpr_m1": planar("u"), "3rpr_m2": planar("u"),
-    "3rrr_m1": planar("τ"), "3rrr_m2": planar("τ"),
-    "3puu": RAILS, "linear_delta": RAILS, "orthoglide": RAILS, "delta": TANGENTS, "3ruu": TANGENTS,
+    "3ppr_m1": BLIND,
+    "3ppr_m2": BLIND,
+    "3prp": PLANE,
+    "3rrp": PLANE,
+    "3prr_m1": planar("p"),
+    "3prr_m2": planar("p"),
+    "3rpr_m1": planar("u"),
+    "3rpr_m2": planar("u"),
+    "3rrr_m1": planar("τ"),
+    "3rrr_m2": planar("τ"),
+    "3puu": RAILS,
+    "linear_delta": RAILS,
+    "orthoglide": RAILS,
+    "delta": TANGENTS,
+    "3ruu": TANGENTS,
     "3upu": parallel("u", "123", "the watched directions u1, u2, u3 are all parallel"),
     "3rps": spatial("u"),
-    "6pus": gram("spatial", SIX.format("p"), "123456"), "hexa": gram("spatial", SIX.format("τ"), "123456"),
+    "6pus": gram("spatial", SIX.format("p"), "123456"),
+    "hexa": gram("spatial", SIX.format("τ"), "123456"),
     "gough_stewart": gram("spatial", SIX.format("u"), "123456"),
     "hexaglide": always("spatial", "translation along x", 6, lines("p", "123456")),
     "i4l": always("bodies", "translation along x", 3, lines("p", "1234")),
     "uranesx": always("translations", "translation along z", 3, lines("p", "123")),
     "prrrp_parallel": always("translations", "translation along y", 2, lines("p", "12")),
     "prrrp_parallel_point": always("translations", "translation along y", 2, lines("p", "12")),
-    "prrrp_m1": TWO_RAILS, "prrrp_m2": TWO_RAILS,
+    "prrrp_m1": TWO_RAILS,
+    "prrrp_m2": TWO_RAILS,
     "quattro": gram("bodies", f"{HALVES} (i = 1, 2, 3, 4)", "1234"),
     "quattro_rigid": parallel("τ", "1234", "the tangents τ1, τ2, τ3, τ4 are all parallel"),
-    "rprpr_m1": flat("u", "watched directions"), "rprpr_m2": flat("u", "watched directions"),
-    "rrrrr_m1": flat("τ", "tangents"), "rrrrr_m2": flat("τ", "tangents"),
+    "rprpr_m1": flat("u", "watched directions"),
+    "rprpr_m2": flat("u", "watched directions"),
+    "rrrrr_m1": flat("τ", "tangents"),
+    "rrrrr_m2": flat("τ", "tangents"),
 }
 
 
 def split_platform(i: str, j: str) -> tuple[str, str, str]:
-    words = (f"the tangents τ{i}, τ{j} and the direction e, in which the platform's halves move on each other, are "
-             "parallel to one plane")
+    words = (
+        f"the tangents τ{i}, τ{j} and the direction e, in which the platform's halves move on each other, are "
+        "parallel to one plane"
+    )
     return "bodies", words, f"det(e, tau{i}, tau{j})"
 
 
 SOME = {
-    ("gough_stewart", "1,2,3"): spatial("u"), ("hexa", "1,2,3"): spatial("τ"), ("6pus", "1,2,3"): spatial("p"),
+    ("gough_stewart", "1,2,3"): spatial("u"),
+    ("hexa", "1,2,3"): spatial("τ"),
+    ("6pus", "1,2,3"): spatial("p"),
     ("hexaglide", "1,2,3"): always("spatial", "translation along x", 6, lines("p", "123")),
     ("delta", "1,2"): parallel("τ", "12", "the tangents τ1, τ2 are parallel"),
-    ("quattro", "1,4"): split_platform("1", "4"), ("quattro", "1,3"): split_platform("1", "3"),
-    **{("quattro_rigid", f"{i},{j}"): parallel("τ", i + j, f"the tangents τ{i}, τ{j} are parallel")
-       for i, j in ("12", "14", "23", "34")},
-    **{("quattro_rigid", f"{i},{j}"): ("translations", f"the tangents τ{i}, τ{j} are parallel",
-                                       f"det(n, tau{i}, tau{j})") for i, j in ("13", "24")},
+    ("quattro", "1,4"): split_platform("1", "4"),
+    ("quattro", "1,3"): split_platform("1", "3"),
+    **{
+        ("quattro_rigid", f"{i},{j}"): parallel("τ", i + j, f"the tangents τ{i}, τ{j} are parallel")
+        for i, j in ("12", "14", "23", "34")
+    },
+    **{
+        ("quattro_rigid", f"{i},{j}"): (
+            "translations",
+            f"the tangents τ{i}, τ{j} are parallel",
+            f"det(n, tau{i}, tau{j})",
+        )
+        for i, j in ("13", "24")
+    },
 }
 
 REAL = {
-    "3rrr_m1": planar("τ"), "3rrr_m2": planar("τ"), "3rps": spatial("τ"),
+    "3rrr_m1": planar("τ"),
+    "3rrr_m2": planar("τ"),
+    "3rps": spatial("τ"),
     "delta": ("translations", "the directions r1, r2, r3 are parallel to one plane", "det(r1, r2, r3)"),
     "rrrrr_m1": ("planar", "the line B1B2 is normal to τ2", "dot(tau2, -B1 + B2)"),
-    "gough_stewart": ("spatial", f"the lines through {lines('B', '123456')} along {lines('p', '123456')} belong "
-                      "to one linear complex", "Determinant(L)"),
+    "gough_stewart": (
+        "spatial",
+        f"the lines through {lines('B', '123456')} along {lines('p', '123456')} belong to one linear complex",
+        "Determinant(L)",
+    ),
 }
 
-CASES = {**{(name, None, False): each for name, each in WHOLE.items()},
-         **{(name, legs, False): each for (name, legs), each in SOME.items()},
-         **{(name, None, True): each for name, each in REAL.items()}}
+CASES = {
+    **{(name, None, False): each for name, each in WHOLE.items()},
+    **{(name, legs, False): each for (name, legs), each in SOME.items()},
+    **{(name, None, True): each for name, each in REAL.items()},
+}
 HEAVY = {"6pus", "hexa", "gough_stewart", "quattro"}
 """Many watched legs: seconds of search for a singular pose."""
 
@@ -130,9 +176,13 @@ def test_the_table_has_every_shipped_robot() -> None:
 
 
 @pytest.mark.some(2, 6)
-@pytest.mark.parametrize(("robot", "legs", "real"), [
-    pytest.param(*case, marks=pytest.mark.slow if case[0] in HEAVY and case[1:] == (None, False) else ())
-    for case in CASES])
+@pytest.mark.parametrize(
+    ("robot", "legs", "real"),
+    [
+        pytest.param(*case, marks=pytest.mark.slow if case[0] in HEAVY and case[1:] == (None, False) else ())
+        for case in CASES
+    ],
+)
 def test_words_and_expression(robot: str, legs: str | None, real: bool) -> None:
     motion, words, expression = CASES[robot, legs, real]
     answer = found(robot, legs, real=real)
@@ -192,8 +242,10 @@ def test_a_line_and_a_plane_are_told_by_their_vectors():
 
 
 @pytest.mark.some(2, 2)
-@pytest.mark.parametrize(("robot", "legs", "moves"), [
-    ("3rrr_m1", "1,2", True), ("uranesx", "1,2", False), ("3rps", "1,2", True), ("delta", "1", True)])
+@pytest.mark.parametrize(
+    ("robot", "legs", "moves"),
+    [("3rrr_m1", "1,2", True), ("uranesx", "1,2", False), ("3rps", "1,2", True), ("delta", "1", True)],
+)
 def test_as_many_freedoms_are_lost_everywhere_but_not_the_named_ones(robot: str, legs: str, moves: bool) -> None:
     """At configurations of another walk: what is named is lost at the zero configuration, where the words put it."""
     answer = found(robot, legs)

@@ -50,8 +50,11 @@ def rational(rng: np.random.Generator, size: int = 3) -> sympy.Matrix:
 
 def at(expression: Any, vectors: Vectors) -> Any:
     """The exact value of an expression."""
-    values = {sympy.Symbol(f"{name}_{axis}"): value for name, v in vectors.items()
-              for axis, value in zip("xyz", v, strict=True)}
+    values = {
+        sympy.Symbol(f"{name}_{axis}"): value
+        for name, v in vectors.items()
+        for axis, value in zip("xyz", v, strict=True)
+    }
     return components(expression).subs(values)
 
 
@@ -65,10 +68,16 @@ def tilted(rng: np.random.Generator) -> sympy.Matrix:
     """A rational rotation; its last column is the normal of a tilted plane."""
     w, x, y, z = (sympy.Integer(int(k)) for k in rng.integers(1, 6, 4))
     size = w**2 + x**2 + y**2 + z**2
-    return sympy.Matrix([
-        [w**2 + x**2 - y**2 - z**2, 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), w**2 - x**2 + y**2 - z**2, 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), w**2 - x**2 - y**2 + z**2]]) / size
+    return (
+        sympy.Matrix(
+            [
+                [w**2 + x**2 - y**2 - z**2, 2 * (x * y - w * z), 2 * (x * z + w * y)],
+                [2 * (x * y + w * z), w**2 - x**2 + y**2 - z**2, 2 * (y * z - w * x)],
+                [2 * (x * z - w * y), 2 * (y * z + w * x), w**2 - x**2 - y**2 + z**2],
+            ]
+        )
+        / size
+    )
 
 
 def hat(a: sympy.Matrix) -> sympy.Matrix:
@@ -173,8 +182,9 @@ def test_a_resting_tip_is_a_determinant_of_four_velocity_equations(seed: int) ->
 
 
 @pytest.mark.some(1)
-@pytest.mark.parametrize(("case", "legs"), [(("delta",), "123"), (("quattro_rigid",), "1234"),
-                                            (("delta", "1,2"), "12")])
+@pytest.mark.parametrize(
+    ("case", "legs"), [(("delta",), "123"), (("quattro_rigid",), "1234"), (("delta", "1,2"), "12")]
+)
 def test_translations_vanish_exactly_where_some_translation_is_allowed(case: tuple[str, ...], legs: str) -> None:
     """τ_i × v = 0 for all legs has a solution exactly where the expression is zero."""
     rng = np.random.default_rng(0)
@@ -210,8 +220,17 @@ def test_six_lines_of_a_complex_are_dependent_wrenches() -> None:
 
 
 @pytest.mark.some(2)
-@pytest.mark.parametrize(("case", "real"), [(("3rrr_m1",), False), (("hexa", "1,2,3"), False), (("delta",), False),
-                                            (("quattro", "1,4"), False), (("delta",), True), (("rrrrr_m1",), True)])
+@pytest.mark.parametrize(
+    ("case", "real"),
+    [
+        (("3rrr_m1",), False),
+        (("hexa", "1,2,3"), False),
+        (("delta",), False),
+        (("quattro", "1,4"), False),
+        (("delta",), True),
+        (("rrrrr_m1",), True),
+    ],
+)
 def test_numbers_and_polynomials_are_the_same(case: tuple[str, ...], real: bool) -> None:
     formula = expression(*case, real=real)
     rng = np.random.default_rng(1)
@@ -238,8 +257,14 @@ def test_the_length_of_a_crank_is_a_factor_and_nothing_more(case: tuple[str, ...
     tangents = [symbol for symbol in formula.free_symbols if symbol.name.startswith("tau")]
     lengths = {tangent: sympy.Symbol(f"length_{tangent}") for tangent in tangents}
     polynomial = sympy.expand(components(formula))
-    longer = polynomial.subs({sympy.Symbol(f"{t}_{axis}"): length * sympy.Symbol(f"{t}_{axis}")
-                              for t, length in lengths.items() for axis in "xyz"}, simultaneous=True)
+    longer = polynomial.subs(
+        {
+            sympy.Symbol(f"{t}_{axis}"): length * sympy.Symbol(f"{t}_{axis}")
+            for t, length in lengths.items()
+            for axis in "xyz"
+        },
+        simultaneous=True,
+    )
     assert sympy.expand(longer - sympy.prod(lengths.values()) * polynomial) == 0
     assert len(found(*case).condition.factors) == len(tangents)
 

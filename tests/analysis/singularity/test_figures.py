@@ -75,7 +75,7 @@ def test_the_oracle_sees_the_same_lost_freedom(case: tuple[str, ...]) -> None:
         assert oracle.error(state) < SHARP
         basis = oracle.relation(state, question.observations, unit_length=1.0)
         _, values, right = np.linalg.svd(basis[6:])
-        idle = right[int(np.sum(values > 1e-7)):].T
+        idle = right[int(np.sum(values > 1e-7)) :].T
         U, sizes, _ = np.linalg.svd(basis[:6] @ idle)
         assert int(np.sum(sizes > 1e-6)) == 1
         assert np.linalg.norm(np.cross(U[:3, 0], unit(the_lost(each))[:3])) < 1e-6

@@ -109,18 +109,30 @@ def test_the_edge_of_the_map_is_no_limit_of_reach() -> None:
 
     locus = planar()
     some = slice(6, 9)
-    part = replace(locus, real=None, grid=replace(locus.grid, axes=tuple((n, v[some]) for n, v in locus.grid.axes)),
-                   hidden=replace(locus.hidden, value=locus.hidden.value[some, some],
-                                  type2=locus.hidden.type2[some, some], type1=locus.hidden.type1[some, some]))
+    part = replace(
+        locus,
+        real=None,
+        grid=replace(locus.grid, axes=tuple((n, v[some]) for n, v in locus.grid.axes)),
+        hidden=replace(
+            locus.hidden,
+            value=locus.hidden.value[some, some],
+            type2=locus.hidden.type2[some, some],
+            type1=locus.hidden.type1[some, some],
+        ),
+    )
     assert part.reached == 9
     for each, marked in ((part, False), (locus, True)):
         plane = MapPlane.of(each.grid.axes, found("3rrr_m1").setting.motion, 0.4, 1.6)
         assert bool(_boundary(Figure().subplots(), plane, each)) == marked
 
 
-@pytest.mark.parametrize(("locus", "words"), [
-    (lambda: drawn(load("linear_delta"), steps=5), "hidden robot: Type 2 (never where examined)"),
-    (planar, "hidden robot: Type 2")])
+@pytest.mark.parametrize(
+    ("locus", "words"),
+    [
+        (lambda: drawn(load("linear_delta"), steps=5), "hidden robot: Type 2 (never where examined)"),
+        (planar, "hidden robot: Type 2"),
+    ],
+)
 def test_what_is_not_met_on_the_grid_is_not_called_never(locus: Callable[[], Locus], words: str) -> None:
     """*Never* where the rails are not parallel at all, whatever is drawn; else of a part without the curve that none
     was found."""
@@ -147,11 +159,18 @@ def test_isolated_singular_poses_are_spots_of_a_plane() -> None:
 
 
 @pytest.mark.some(1)
-@pytest.mark.parametrize(("robot", "legs", "real", "plane"), [
-    ("3rrr_m1", None, False, "phi=0"), ("3rpr_m1", None, True, "phi=10deg"),
-    ("gough_stewart", "1,2,3", False, None), ("3rrr_m1", None, False, "phi=15deg")])
+@pytest.mark.parametrize(
+    ("robot", "legs", "real", "plane"),
+    [
+        ("3rrr_m1", None, False, "phi=0"),
+        ("3rpr_m1", None, True, "phi=10deg"),
+        ("gough_stewart", "1,2,3", False, None),
+        ("3rrr_m1", None, False, "phi=15deg"),
+    ],
+)
 def test_where_the_smallest_value_passes_through_zero_the_expression_does(
-        robot: str, legs: str | None, real: bool, plane: str | None) -> None:
+    robot: str, legs: str | None, real: bool, plane: str | None
+) -> None:
     """The curve knows the relation alone: its crossings of edges are the expression's, and in nine of ten
     cells in which that changes its sign, or beside them, there is one."""
     setting = ObservedRobot.of(robot, legs)
@@ -172,9 +191,12 @@ def test_where_the_smallest_value_passes_through_zero_the_expression_does(
             at = reach(reached[near], setting.samples.question, located.grid.pose(end.tolist()), motion)
             assert abs(measured.condition.evaluate(measured.pattern.values_at([at]))[0]) < 0.03 * size
     cell = np.array([x[1] - x[0], y[1] - y[0]])
-    changes = [(i, j) for i, j in np.ndindex(STEPS - 1, STEPS - 1)
-               if np.isfinite(values[i : i + 2, j : j + 2]).all()
-               and np.min(values[i : i + 2, j : j + 2]) < 0 < np.max(values[i : i + 2, j : j + 2])]
+    changes = [
+        (i, j)
+        for i, j in np.ndindex(STEPS - 1, STEPS - 1)
+        if np.isfinite(values[i : i + 2, j : j + 2]).all()
+        and np.min(values[i : i + 2, j : j + 2]) < 0 < np.max(values[i : i + 2, j : j + 2])
+    ]
     middles = pieces.mean(axis=1)
     missed = [(i, j) for i, j in changes if np.abs((middles - [x[i], y[j]]) / cell - 0.5).max(axis=1).min() > 1]
     assert len(changes) > 2
@@ -198,8 +220,14 @@ def test_thin_tips_are_within_the_window(degrees: int) -> None:
         needle = (along >= 0) & (along <= 1.9 * length) & (np.abs(across) <= along * np.tan(np.radians(10)))
         return needle | (np.linalg.norm(places - centre, axis=1) <= radius)
 
-    grid = frame_plane(setting.everything.start, setting.everything.question, motion, Pose(phi=0.0), 5,
-                  lambda _, cells: inside(cells.places()))
+    grid = frame_plane(
+        setting.everything.start,
+        setting.everything.question,
+        motion,
+        Pose(phi=0.0),
+        5,
+        lambda _, cells: inside(cells.places()),
+    )
     step = 2 * LOCUS_SIDES[0] * length / (COARSE_GRID - 1)
     corners = np.stack([end, centre + radius, centre - radius])
     window = np.array([[values[0], values[-1]] for _, values in grid.axes]).T
@@ -243,10 +271,18 @@ def test_a_plane_whose_poses_depend_on_each_other_says_so() -> None:
         drawn(load("3rps"), plane="phi=0.1", steps=5)
 
 
-@pytest.mark.parametrize(("robot", "plane", "words"), [
-    ("delta", "phi=0.1", "cannot change phi"), ("delta", "x=0,y=0", "this one leaves z"),
-    ("3rrr_m1", "x=0,y=0", "this one leaves phi"), ("delta", "z=abc", "z is not a number"),
-    ("hexaglide", None, "has no locus"), ("3prp", None, "has no locus"), ("3ppr_m1", None, "has no locus")])
+@pytest.mark.parametrize(
+    ("robot", "plane", "words"),
+    [
+        ("delta", "phi=0.1", "cannot change phi"),
+        ("delta", "x=0,y=0", "this one leaves z"),
+        ("3rrr_m1", "x=0,y=0", "this one leaves phi"),
+        ("delta", "z=abc", "z is not a number"),
+        ("hexaglide", None, "has no locus"),
+        ("3prp", None, "has no locus"),
+        ("3ppr_m1", None, "has no locus"),
+    ],
+)
 def test_planes_that_are_none(robot: str, plane: str | None, words: str) -> None:
     with pytest.raises(BadRequest, match=words):
         drawn(load(robot), plane=plane, steps=5)

@@ -126,23 +126,31 @@ def sliding_platform(watched: float) -> tuple[str, Array, list[Array], list[Arra
         b, c, a, rail = sliding_leg(random, k)
         rod, second = c - b, unit(np.cross(a, c - b))
         for kind, name, parent, child, at, axis in (
-                ("prismatic", "g", "base", "s", b, rail), ("continuous", "e{}__1", "s", "h", 0 * b, a),
-                ("continuous", "e{}__2", "h", "r", 0 * b, second)):
-            rows.append(f'<joint name="{name.format(k) if "{" in name else name + str(k)}" type="{kind}">'
-                        f'<parent link="{parent if parent == "base" else parent + str(k)}"/><child link="{child}{k}"/>'
-                        f'<origin xyz="{text(at)}"/><axis xyz="{text(axis)}"/></joint>')
+            ("prismatic", "g", "base", "s", b, rail),
+            ("continuous", "e{}__1", "s", "h", 0 * b, a),
+            ("continuous", "e{}__2", "h", "r", 0 * b, second),
+        ):
+            rows.append(
+                f'<joint name="{name.format(k) if "{" in name else name + str(k)}" type="{kind}">'
+                f'<parent link="{parent if parent == "base" else parent + str(k)}"/><child link="{child}{k}"/>'
+                f'<origin xyz="{text(at)}"/><axis xyz="{text(axis)}"/></joint>'
+            )
         rows += [f'<link name="{each}{k}"/>' for each in "shr"]
         rows.append(f'<transmission name="m{k}"><joint name="g{k}"/></transmission>')
         if k == 0:
             home = c
-            rows.append(f'<link name="w"/><joint name="w__1" type="continuous"><parent link="r0"/><child link="w"/>'
-                        f'<origin xyz="{text(rod)}"/><axis xyz="{text(second)}"/></joint><link name="top"/>'
-                        f'<joint name="w__2" type="continuous"><parent link="w"/><child link="top"/>'
-                        f'<axis xyz="{text(a)}"/></joint>')
+            rows.append(
+                f'<link name="w"/><joint name="w__1" type="continuous"><parent link="r0"/><child link="w"/>'
+                f'<origin xyz="{text(rod)}"/><axis xyz="{text(second)}"/></joint><link name="top"/>'
+                f'<joint name="w__2" type="continuous"><parent link="w"/><child link="top"/>'
+                f'<axis xyz="{text(a)}"/></joint>'
+            )
         else:
-            rows.append(f'<loop name="w{k}" type="universal"><predecessor link="r{k}"><origin xyz="{text(rod)}"/>'
-                        f'</predecessor><successor link="top"><origin xyz="{text(c - home)}"/></successor>'
-                        f'<axis xyz="{text(second)}"/><axis2 xyz="{text(a)}"/></loop>')
+            rows.append(
+                f'<loop name="w{k}" type="universal"><predecessor link="r{k}"><origin xyz="{text(rod)}"/>'
+                f'</predecessor><successor link="top"><origin xyz="{text(c - home)}"/></successor>'
+                f'<axis xyz="{text(second)}"/><axis2 xyz="{text(a)}"/></loop>'
+            )
         rails.append(rail)
         firsts.append(a)
         rods.append(rod)
@@ -238,8 +246,9 @@ def test_constraint_singularities_are_not_named_where_legs_cannot_turn_the_platf
         a, places = unit(np.eye(3)[k] + 0.2 * random.normal(size=3)), random.normal(size=(4, 3))
         bodies = ("base", f"s{k}", f"u{k}", f"d{k}", "platform")
         for n, kind in enumerate("PRRR"):
-            made.joint(f"{kind}{n}_{k}", kind, bodies[n], bodies[n + 1], places[n], axis=a, motor=n == 0,
-                       loop=n == 3 and k > 0)
+            made.joint(
+                f"{kind}{n}_{k}", kind, bodies[n], bodies[n + 1], places[n], axis=a, motor=n == 0, loop=n == 3 and k > 0
+            )
     answer = singular(made.build("platform"), see=["position:platform@0,0,0"], points=60)
     assert answer.condition is not None
     assert answer.condition.never
@@ -267,10 +276,15 @@ def test_a_platform_that_rests_is_refused_in_a_line() -> None:
     made = Builder("truss")
     for link in ("base", "a", "platform", "b", "c", "d"):
         made.link(link)
-    for name, one, other, at in (("1", "base", "a", (0, 0, 0)), ("2", "a", "platform", (0.3, 1, 0)),
-                                 ("3", "platform", "base", (1, 0, 0)), ("4", "a", "b", (-0.5, 1.2, 0)),
-                                 ("5", "b", "c", (-1.3, 1.4, 0)), ("6", "c", "d", (-1.6, 0.5, 0)),
-                                 ("7", "d", "base", (-1.1, 0.1, 0))):
+    for name, one, other, at in (
+        ("1", "base", "a", (0, 0, 0)),
+        ("2", "a", "platform", (0.3, 1, 0)),
+        ("3", "platform", "base", (1, 0, 0)),
+        ("4", "a", "b", (-0.5, 1.2, 0)),
+        ("5", "b", "c", (-1.3, 1.4, 0)),
+        ("6", "c", "d", (-1.6, 0.5, 0)),
+        ("7", "d", "base", (-1.1, 0.1, 0)),
+    ):
         made.joint(name, "R", one, other, at, axis=(0, 0, 1), loop=name in "37")
     made.observe("1", "b", (1, 0, 0))
     robot = made.build("platform")

@@ -16,13 +16,17 @@ from hrsynth.geometry.vectors import Array, unit
 
 
 def joint(name: str, kind: str, parent: str, child: str, at: Array, axis: Array) -> str:
-    return (f'<link name="{child}"/><joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
-            f'<origin xyz="{text(at)}"/><axis xyz="{text(axis)}"/></joint>')
+    return (
+        f'<link name="{child}"/><joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
+        f'<origin xyz="{text(at)}"/><axis xyz="{text(axis)}"/></joint>'
+    )
 
 
 def loop(name: str, one: str, at: Array, two: str, there: Array, axis: Array) -> str:
-    return (f'<loop name="{name}" type="revolute"><predecessor link="{one}"><origin xyz="{text(at)}"/></predecessor>'
-            f'<successor link="{two}"><origin xyz="{text(there)}"/></successor><axis xyz="{text(axis)}"/></loop>')
+    return (
+        f'<loop name="{name}" type="revolute"><predecessor link="{one}"><origin xyz="{text(at)}"/></predecessor>'
+        f'<successor link="{two}"><origin xyz="{text(there)}"/></successor><axis xyz="{text(axis)}"/></loop>'
+    )
 
 
 def parallelograms(watched: float) -> tuple[str, Array, list[Array], list[Array]]:
@@ -34,12 +38,14 @@ def parallelograms(watched: float) -> tuple[str, Array, list[Array], list[Array]
         b, c, a, rail = sliding_leg(random, k)
         rod, second = c - b, unit(np.cross(a, c - b))
         w = 0.06 * a + 0.01 * unit(np.cross(second, a))
-        rows += [joint(f"g{k}", "prismatic", "base", f"s{k}", b, rail),
-                 joint(f"e{k}", "continuous", f"s{k}", f"h{k}", zero, a),
-                 joint(f"p{k}", "continuous", f"h{k}", f"r{k}", w, second),
-                 joint(f"o{k}", "continuous", f"h{k}", f"q{k}", -w, second),
-                 joint(f"n{k}", "continuous", f"r{k}", f"f{k}", rod, second),
-                 loop(f"m{k}", f"q{k}", rod, f"f{k}", -2 * w, second)]
+        rows += [
+            joint(f"g{k}", "prismatic", "base", f"s{k}", b, rail),
+            joint(f"e{k}", "continuous", f"s{k}", f"h{k}", zero, a),
+            joint(f"p{k}", "continuous", f"h{k}", f"r{k}", w, second),
+            joint(f"o{k}", "continuous", f"h{k}", f"q{k}", -w, second),
+            joint(f"n{k}", "continuous", f"r{k}", f"f{k}", rod, second),
+            loop(f"m{k}", f"q{k}", rod, f"f{k}", -2 * w, second),
+        ]
         if k == 0:
             home = c
             rows.append(joint("w0", "continuous", "f0", "top", -w, a))
@@ -50,8 +56,7 @@ def parallelograms(watched: float) -> tuple[str, Array, list[Array], list[Array]
         rods.append(rod)
         ends.append(unit(rod) if k else unit(unit(rod) + watched * a * np.sign(a @ rod)))
     seen = "".join(f'<observe leg="{k + 1}" link="r{k}" axis="{text(u)}"/>' for k, u in enumerate(ends))
-    file = (f'<robot name="pi"><link name="base"/>{"".join(rows)}<hrsynth><platform link="top"/>{seen}</hrsynth>'
-            '</robot>')
+    file = f'<robot name="pi"><link name="base"/>{"".join(rows)}<hrsynth><platform link="top"/>{seen}</hrsynth></robot>'
     return file, ends[0], rails, [firsts[0], rods[0], home]
 
 
@@ -84,17 +89,24 @@ Z = np.array([0.0, 0, 1])
 def four_bar(watched: str) -> str:
     """A point on two rails: on the slide of the first a crank AB moves a rocker DC, which carries the point."""
     zero = np.zeros(3)
-    rows = [joint("g1", "prismatic", "base", "s1", A, np.array([1, 0.2, 0])),
-            joint("a", "continuous", "s1", "crank", zero, Z),
-            joint("b", "continuous", "crank", "bar", B - A, Z), joint("d", "continuous", "s1", "rocker", D - A, Z),
-            loop("c", "bar", C - B, "rocker", C - D, Z), joint("q1", "continuous", "rocker", "top", Q - D, Z),
-            joint("g2", "prismatic", "base", "s2", E, np.array([0.3, 1, 0])),
-            joint("e", "continuous", "s2", "rod", zero, Z), loop("q2", "rod", Q - E, "top", zero, Z)]
-    return (f'<robot name="four"><link name="base"/>{"".join(rows)}'
-            f'<transmission name="t1"><joint name="a"/></transmission>'
-            f'<transmission name="t2"><joint name="e"/></transmission><hrsynth><platform link="top"/>'
-            f'<observe leg="1" link="{watched}" axis="{text(unit(B - A))}"/>'
-            f'<observe leg="2" link="rod" axis="{text(unit(Q - E))}"/></hrsynth></robot>')
+    rows = [
+        joint("g1", "prismatic", "base", "s1", A, np.array([1, 0.2, 0])),
+        joint("a", "continuous", "s1", "crank", zero, Z),
+        joint("b", "continuous", "crank", "bar", B - A, Z),
+        joint("d", "continuous", "s1", "rocker", D - A, Z),
+        loop("c", "bar", C - B, "rocker", C - D, Z),
+        joint("q1", "continuous", "rocker", "top", Q - D, Z),
+        joint("g2", "prismatic", "base", "s2", E, np.array([0.3, 1, 0])),
+        joint("e", "continuous", "s2", "rod", zero, Z),
+        loop("q2", "rod", Q - E, "top", zero, Z),
+    ]
+    return (
+        f'<robot name="four"><link name="base"/>{"".join(rows)}'
+        f'<transmission name="t1"><joint name="a"/></transmission>'
+        f'<transmission name="t2"><joint name="e"/></transmission><hrsynth><platform link="top"/>'
+        f'<observe leg="1" link="{watched}" axis="{text(unit(B - A))}"/>'
+        f'<observe leg="2" link="rod" axis="{text(unit(Q - E))}"/></hrsynth></robot>'
+    )
 
 
 def still_crank() -> float:

@@ -20,10 +20,17 @@ from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.builder import Builder
 
 EYE = "eye=base@0.3,0.1,0"
-POINTS = ["point:platform@0.1,0,0", "point:platform@-0.1,0.1,0", "point:platform@0,0.1,0.1",
-          "point:platform@0.1,0.1,-0.05"]
-LINES = ["image_line:platform@0.1,0.2,0/1,0.2,0.1", "image_line:platform@-0.1,0.1,0.2/0.1,1,0.3",
-         "image_line:platform@0,-0.1,0.1/0.2,0.3,1"]
+POINTS = [
+    "point:platform@0.1,0,0",
+    "point:platform@-0.1,0.1,0",
+    "point:platform@0,0.1,0.1",
+    "point:platform@0.1,0.1,-0.05",
+]
+LINES = [
+    "image_line:platform@0.1,0.2,0/1,0.2,0.1",
+    "image_line:platform@-0.1,0.1,0.2/0.1,1,0.3",
+    "image_line:platform@0,-0.1,0.1/0.2,0.3,1",
+]
 UPRIGHT = "inclination:platform"
 
 
@@ -71,14 +78,22 @@ def test_four_points_are_on_all_danger_cylinders() -> None:
 
 
 @pytest.mark.some(2)
-@pytest.mark.parametrize(("see", "words"), [
-    (LINES, "the normals n4, n5, n6 are parallel to one plane"),
-    ([each.replace("image_line", "line") for each in LINES],
-     "never: the axes d4, d5, d6 are constant and not all parallel"),
-    ([each.partition("/")[0].replace("image_line", "distance") for each in LINES],
-     "the directions r4, r5, r6 are parallel to one plane"),
-    ([LINES[0].replace("image_line", "line"), POINTS[0]], "the axes d4 and the directions r5 are parallel"),
-    (POINTS[:3], "the directions r4, r5, r6 are all parallel")])
+@pytest.mark.parametrize(
+    ("see", "words"),
+    [
+        (LINES, "the normals n4, n5, n6 are parallel to one plane"),
+        (
+            [each.replace("image_line", "line") for each in LINES],
+            "never: the axes d4, d5, d6 are constant and not all parallel",
+        ),
+        (
+            [each.partition("/")[0].replace("image_line", "distance") for each in LINES],
+            "the directions r4, r5, r6 are parallel to one plane",
+        ),
+        ([LINES[0].replace("image_line", "line"), POINTS[0]], "the axes d4 and the directions r5 are parallel"),
+        (POINTS[:3], "the directions r4, r5, r6 are all parallel"),
+    ],
+)
 def test_a_platform_that_translates_has_a_condition_of_all_kinds(see: list[str], words: str) -> None:
     """Three vectors have rank two just there; each is named by what it is."""
     setting = ObservedRobot.of("delta", camera=EYE, see=see)
@@ -91,14 +106,28 @@ def test_points_on_one_line() -> None:
     assert found.words.endswith("because B1, B2, B3 are on one line, about which the platform can turn")
 
 
-@pytest.mark.parametrize(("see", "words", "expression"), [
-    (LINES, "the images of the lines meet in a point, or C and the feet of its perpendiculars on the lines",
-     "det(e1, e2, e3)*det(n1, n2, n3)"),
-    pytest.param([*POINTS[:2], UPRIGHT], "C lies in the plane through B1, B2 that is parallel to d3 × B1B2",
-                 "det(r1, r2, cross(d3, -B1 + B2))", marks=pytest.mark.slow),
-    pytest.param([POINTS[0], LINES[1], UPRIGHT], "the image of point_1 lies on that of image_line_1 (r1 is normal",
-                 "dot(d3, e2)*dot(n2, r1)", marks=pytest.mark.slow),
-])
+@pytest.mark.parametrize(
+    ("see", "words", "expression"),
+    [
+        (
+            LINES,
+            "the images of the lines meet in a point, or C and the feet of its perpendiculars on the lines",
+            "det(e1, e2, e3)*det(n1, n2, n3)",
+        ),
+        pytest.param(
+            [*POINTS[:2], UPRIGHT],
+            "C lies in the plane through B1, B2 that is parallel to d3 × B1B2",
+            "det(r1, r2, cross(d3, -B1 + B2))",
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(
+            [POINTS[0], LINES[1], UPRIGHT],
+            "the image of point_1 lies on that of image_line_1 (r1 is normal",
+            "dot(d3, e2)*dot(n2, r1)",
+            marks=pytest.mark.slow,
+        ),
+    ],
+)
 def test_closed_conditions(see: list[str], words: str, expression: str) -> None:
     found = seen(*see)
     assert words in found.words
@@ -113,29 +142,58 @@ def test_closed_conditions(see: list[str], words: str, expression: str) -> None:
 
 
 @pytest.mark.some(0, 5)
-@pytest.mark.parametrize(("robot", "camera", "see", "words"), [
-    ("gough_stewart", EYE, [*POINTS[:2], LINES[0]], "along r2 and B3 normal to n3, and turns it about a normal of e3"),
-    ("gough_stewart", EYE, [POINTS[0], *LINES[1:]], "and turns it about the normal of e2, e3"),
-    ("gough_stewart", EYE, [x.replace("image_line", "edge") + "/0.005" for x in LINES], "feet of its perpendiculars"),
-    ("gough_stewart", EYE, ["circle:platform@0.1,0,0/1,0,0", POINTS[1]], "leaves B1 at rest and moves B2 along r2"),
-    ("gough_stewart", [EYE, "other=base@-0.3,0.2,-0.2"], [f"{c}={p}" for c, p in zip(("eye", "other", "eye"), POINTS,
-                                                                               strict=False)], "the plane B1B2B3"),
-    ("gough_stewart", "hand=platform@0,0,0.1", ["point:world@0.1,0,0", "point:world@0.3,0.2,0",
-                                                "point:world@-.1,.4,.2"], "danger cylinder"),
-    ("example:panda", "hand=panda_hand", ["point:world@0.5,0.1,0", "point:world@0.6,0.1,0.1",
-                                          "point:world@0.5,0.3,0.1"], "danger cylinder"),
-    ("delta", "eye=base@0.3,0.1,-1", POINTS[:2], "are parallel"),
-    ("3rps", EYE, POINTS[:2], "B3 normal to a3, B4 along r4 and B5 along r5"),
-])
+@pytest.mark.parametrize(
+    ("robot", "camera", "see", "words"),
+    [
+        (
+            "gough_stewart",
+            EYE,
+            [*POINTS[:2], LINES[0]],
+            "along r2 and B3 normal to n3, and turns it about a normal of e3",
+        ),
+        ("gough_stewart", EYE, [POINTS[0], *LINES[1:]], "and turns it about the normal of e2, e3"),
+        (
+            "gough_stewart",
+            EYE,
+            [x.replace("image_line", "edge") + "/0.005" for x in LINES],
+            "feet of its perpendiculars",
+        ),
+        ("gough_stewart", EYE, ["circle:platform@0.1,0,0/1,0,0", POINTS[1]], "leaves B1 at rest and moves B2 along r2"),
+        (
+            "gough_stewart",
+            [EYE, "other=base@-0.3,0.2,-0.2"],
+            [f"{c}={p}" for c, p in zip(("eye", "other", "eye"), POINTS, strict=False)],
+            "the plane B1B2B3",
+        ),
+        (
+            "gough_stewart",
+            "hand=platform@0,0,0.1",
+            ["point:world@0.1,0,0", "point:world@0.3,0.2,0", "point:world@-.1,.4,.2"],
+            "danger cylinder",
+        ),
+        (
+            "example:panda",
+            "hand=panda_hand",
+            ["point:world@0.5,0.1,0", "point:world@0.6,0.1,0.1", "point:world@0.5,0.3,0.1"],
+            "danger cylinder",
+        ),
+        ("delta", "eye=base@0.3,0.1,-1", POINTS[:2], "are parallel"),
+        ("3rps", EYE, POINTS[:2], "B3 normal to a3, B4 along r4 and B5 along r5"),
+    ],
+)
 def test_words_expression_and_rank_agree(robot: str, camera: str | list[str], see: list[str], words: str) -> None:
     """``singular`` itself compares them, with Pinocchio's rank and with what each observation leaves."""
     assert words in seen(*see, camera=camera, robot=robot).words
 
 
 @pytest.mark.some(1)
-@pytest.mark.parametrize("see", [["image_circle:platform@0.1,0,0.1/0,1,1/0.05", "point:platform@0,0.1,0"],
-                                 ["line:platform@0.1,0,0.1/0,1,1", "distance:platform@0,0.1,0",
-                                  "depth:platform@0.3,0,0"]])
+@pytest.mark.parametrize(
+    "see",
+    [
+        ["image_circle:platform@0.1,0,0.1/0,1,1/0.05", "point:platform@0,0.1,0"],
+        ["line:platform@0.1,0,0.1/0,1,1", "distance:platform@0,0.1,0", "depth:platform@0.3,0,0"],
+    ],
+)
 @pytest.mark.parametrize("robot", ["gough_stewart", "delta"])
 def test_the_screws_of_all_joints_give_pinocchios_singular_values(robot: str, see: list[str]) -> None:
     """Lengths are in characteristic lengths in both, whatever the robot's size."""
@@ -161,9 +219,15 @@ def slider_crank() -> Mechanism:
 
 @pytest.mark.slow
 @pytest.mark.some(1)
-@pytest.mark.parametrize(("see", "camera"), [
-    ("distance:platform@0,0,0", "eye=base@-0.1,0.2,0"), ("encoder:slide", None), ("direction:rod/1,0,0", None),
-    ("point:platform@0,0,0", "eye=base@0,0,-1")])
+@pytest.mark.parametrize(
+    ("see", "camera"),
+    [
+        ("distance:platform@0,0,0", "eye=base@-0.1,0.2,0"),
+        ("encoder:slide", None),
+        ("direction:rod/1,0,0", None),
+        ("point:platform@0,0,0", "eye=base@0,0,-1"),
+    ],
+)
 def test_legs_that_are_not_watched_hold_as_well(see: str, camera: str | None) -> None:
     """With one freedom the condition of what is seen alone is not the robot's: it is that of all joints."""
     robot = slider_crank()

@@ -1,6 +1,6 @@
 """Mutations of valid files of all dialects: each is read or refused, never anything else. Run as a program for many.
 
-    python tests/description/foreign/fuzz.py --count 100000 --seed 0
+python tests/description/foreign/fuzz.py --count 100000 --seed 0
 """
 
 from __future__ import annotations
@@ -30,10 +30,51 @@ from hrsynth.mechanism import Mechanism  # noqa: E402
 SECONDS = 5
 USD_SHARE = 0.01
 """Of the mutations, those of a USD file: each is opened in a process of its own, as long as a hundred others."""
-WORDS = ["0", "-1", "1e-300", "1e8", "1e9", "nan", "inf", "-", "", "world", "base", "bar", "crank", "rocker", "true",
-         "fixed", "ball", "universal", "revolute2", "screw", "gearbox", "prismatic", "hinge", "free", "slide", "0 0 0",
-         "1 2 3 4", "__model__", "robot.xml", "../x", "d", "a", "3d", "[", "]", "'", '"', "<", "&", "\0", "é", "__cut",
-         "a__1"]
+WORDS = [
+    "0",
+    "-1",
+    "1e-300",
+    "1e8",
+    "1e9",
+    "nan",
+    "inf",
+    "-",
+    "",
+    "world",
+    "base",
+    "bar",
+    "crank",
+    "rocker",
+    "true",
+    "fixed",
+    "ball",
+    "universal",
+    "revolute2",
+    "screw",
+    "gearbox",
+    "prismatic",
+    "hinge",
+    "free",
+    "slide",
+    "0 0 0",
+    "1 2 3 4",
+    "__model__",
+    "robot.xml",
+    "../x",
+    "d",
+    "a",
+    "3d",
+    "[",
+    "]",
+    "'",
+    '"',
+    "<",
+    "&",
+    "\0",
+    "é",
+    "__cut",
+    "a__1",
+]
 _NUMBER = re.compile(r"-?\d+\.?\d*(e-?\d+)?")
 _VALUE = re.compile(r"\"[^\"]*\"|>[^<>]+<")
 
@@ -67,20 +108,20 @@ def mutated(text: str, rng: random.Random) -> str:
         kind = rng.randrange(8)
         at = rng.randrange(len(text) + 1)
         if kind == 0:
-            text = text[:at] + rng.choice(WORDS) + text[at + rng.randrange(8):]
+            text = text[:at] + rng.choice(WORDS) + text[at + rng.randrange(8) :]
         elif kind == 1:
             length = rng.randrange(1, 200)
             start = rng.randrange(len(text) + 1)
             text = text[:at] + text[start : start + length] + text[at:]
         elif kind == 2:
-            text = text[:at] + text[at + rng.randrange(1, 200):]
+            text = text[:at] + text[at + rng.randrange(1, 200) :]
         elif kind in (3, 4):
             found = list((_NUMBER if kind == 3 else _VALUE).finditer(text))
             if found:
                 match = rng.choice(found)
                 word = rng.choice(WORDS) if rng.random() < 0.5 else repr(rng.gauss(0, 1) * 10 ** rng.randrange(-8, 3))
                 word = word if kind == 3 else match[0][0] + word + match[0][-1]
-                text = text[: match.start()] + word + text[match.end():]
+                text = text[: match.start()] + word + text[match.end() :]
         else:
             text = _elements(text, rng, kind)
     return text
@@ -112,8 +153,10 @@ def check_valid(robot: Mechanism) -> None:
     for link in robot.links.values():
         assert np.all(np.isfinite(link.pose))
         assert np.allclose(link.pose[:3, :3] @ link.pose[:3, :3].T, np.eye(3), atol=1e-8)
-    scale = max(float(np.max(np.abs(each))) for each in (*(link.pose for link in robot.links.values()),
-                                                         *(joint.point for joint in robot.joints.values())))
+    scale = max(
+        float(np.max(np.abs(each)))
+        for each in (*(link.pose for link in robot.links.values()), *(joint.point for joint in robot.joints.values()))
+    )
     again = native.parse(native.write(robot))
     assert again.differences(spanning(robot), 1e-6 + 1e-11 * scale) == []
 

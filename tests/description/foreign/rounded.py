@@ -32,20 +32,23 @@ def of_hinges(robot: Mechanism, aligned: bool = False, slid: float = 0.0, apart:
         for number, axis in enumerate(axes):
             last = number == len(axes) - 1
             after = joint.successor if last else f"{joint.name}_cross{number}"
-            point = joint.point + robot.length * (slid * rng.uniform(-1, 1) * axis
-                                                  + apart * number * np.cross(axes[0], axes[1]))
+            point = joint.point + robot.length * (
+                slid * rng.uniform(-1, 1) * axis + apart * number * np.cross(axes[0], axes[1])
+            )
             if not last:
                 links[after] = Link(after, pose(point))
             name = f"{joint.name}_hinge{number}"
             motor = None if joint.motor is None else Motor(f"{joint.motor.name}_{number}")
-            joints[name] = Joint(name, JointType.REVOLUTE, before, after, point, (axis,), motor,
-                                 in_tree=joint.in_tree or not last)
+            joints[name] = Joint(
+                name, JointType.REVOLUTE, before, after, point, (axis,), motor, in_tree=joint.in_tree or not last
+            )
             before = after
     return spanning(replace(robot, links=links, joints=joints))
 
 
 def in_millimetres(robot: Mechanism) -> Mechanism:
     """The same robot, its lengths a thousand times as large."""
+
     def far(X: np.ndarray) -> np.ndarray:
         return pose(1000 * X[:3, 3], X[:3, :3])
 
@@ -56,6 +59,7 @@ def in_millimetres(robot: Mechanism) -> Mechanism:
 
 def round_file(path: Path, decimals: int, significant: bool = False) -> None:
     """Every number of a file with at most so many decimals, or significant digits."""
+
     def short(match: re.Match[bytes]) -> bytes:
         if significant:
             return f"{float(match[0]):.{decimals}g}".encode()

@@ -33,15 +33,19 @@ def chain(rng: np.random.Generator, links: int) -> str:
     text, X = "", np.eye(4)
     for k in range(links):
         angles, shift, axis = rng.uniform(-1, 1, 3), rng.uniform(-1, 1, 3), rng.normal(size=3)
-        text += (f'<link name="k{k + 1}"/><joint name="j{k}" type="continuous"><parent link="k{k}"/>'
-                 f'<child link="k{k + 1}"/><origin xyz="{words(shift)}" rpy="{words(angles)}"/>'
-                 f'<axis xyz="{words(axis)}"/></joint>')
+        text += (
+            f'<link name="k{k + 1}"/><joint name="j{k}" type="continuous"><parent link="k{k}"/>'
+            f'<child link="k{k + 1}"/><origin xyz="{words(shift)}" rpy="{words(angles)}"/>'
+            f'<axis xyz="{words(axis)}"/></joint>'
+        )
         X = X @ pose(shift, rotation_from_rpy(*angles))
     hook = rng.uniform(-1, 1, 3)
     eye = (inverse(X) @ np.append(hook, 1))[:3]
     for name, link, point in (("hook", "k0", hook), ("eye", f"k{links}", eye)):
-        text += (f'<link name="{name}"/><joint name="{name}_fixed" type="fixed"><parent link="{link}"/>'
-                 f'<child link="{name}"/><origin xyz="{words(point)}"/></joint>')
+        text += (
+            f'<link name="{name}"/><joint name="{name}_fixed" type="fixed"><parent link="{link}"/>'
+            f'<child link="{name}"/><origin xyz="{words(point)}"/></joint>'
+        )
     return f'<robot name="chain"><link name="k0"/>{text}</robot>'
 
 
@@ -80,7 +84,7 @@ def test_any_chain_whose_ends_meet_is_found_and_others_are_not(seed: int, tmp_pa
     assert {frozenset(each.links) for each in candidates(tmp_path, text, "k0")} == {frozenset({"hook", "eye"})}
     away = text.replace('<link name="hook"/>', "")
     start = away.index('<joint name="hook_fixed"')
-    away = away[:start] + away[away.index("</joint>", start) + 8:]
+    away = away[:start] + away[away.index("</joint>", start) + 8 :]
     assert candidates(tmp_path, away, "k0") == ()
 
 
@@ -89,8 +93,10 @@ def test_joints_through_one_point_are_no_closure(tmp_path: Path):
     text = TREE.replace('<link name="base"/>', '<link name="base"/><link name="w1"/><link name="w2"/><link name="w3"/>')
     for k, axis in enumerate(("1 0 0", "0 1 0", "0 0 1"), 1):
         parent = "bar" if k == 1 else f"w{k - 1}"
-        text += (f'<joint name="w{k}" type="continuous"><parent link="{parent}"/><child link="w{k}"/>'
-                 f'<origin xyz="{0.3 if k == 1 else 0} 0 0"/><axis xyz="{axis}"/></joint>')
+        text += (
+            f'<joint name="w{k}" type="continuous"><parent link="{parent}"/><child link="w{k}"/>'
+            f'<origin xyz="{0.3 if k == 1 else 0} 0 0"/><axis xyz="{axis}"/></joint>'
+        )
     assert candidates(tmp_path, f'<robot name="wrist">{text}</robot>') == ()
 
 

@@ -24,17 +24,20 @@ def press(folder: Path, seed: int, side: float, wide: float = 0.3, drive: float 
     along = np.arctan2(gap[0], gap[1])
     knee = along + side * np.arccos((rod**2 + far**2 - rocker**2) / (2 * rod * far)) - drive
     knee = float(np.angle(np.exp(1j * knee)))
-    joint = ('<joint name="{}" type="revolute"><parent link="{}"/><child link="{}"/><origin xyz="{}"/>'
-             '<axis xyz="0 1 0"/><limit lower="{:.4f}" upper="{:.4f}" effort="1" velocity="1"/></joint>\n').format
+    joint = (
+        '<joint name="{}" type="revolute"><parent link="{}"/><child link="{}"/><origin xyz="{}"/>'
+        '<axis xyz="0 1 0"/><limit lower="{:.4f}" upper="{:.4f}" effort="1" velocity="1"/></joint>\n'
+    ).format
     path = folder / "press.urdf"
     path.write_text(
         '<robot name="press"><link name="frame"/><link name="crank"/><link name="rod"/><link name="rocker"/>'
-        + joint("drive", "frame", "crank", "0 0 0", -3.1, 3.1) + joint("knee", "crank", "rod", f"0 0 {crank:.9f}",
-                                                                       knee - wide, knee + wide)
+        + joint("drive", "frame", "crank", "0 0 0", -3.1, 3.1)
+        + joint("knee", "crank", "rod", f"0 0 {crank:.9f}", knee - wide, knee + wide)
         + joint("swing", "frame", "rocker", f"{ground:.9f} 0 0", -3.1, 3.1)
         + f'<loop name="pin" type="revolute"><predecessor link="rod"><origin xyz="0 0 {rod:.9f}"/></predecessor>'
         f'<successor link="rocker"><origin xyz="0 0 {rocker:.9f}"/></successor><axis xyz="0 1 0"/></loop>'
-        '\n<transmission name="m"><joint name="drive"/></transmission></robot>')
+        '\n<transmission name="m"><joint name="drive"/></transmission></robot>'
+    )
     return path
 
 
@@ -50,8 +53,12 @@ def test_open_loops_are_closed_within_the_limits(seed: int, side: int, tmp_path:
     path = press(tmp_path, seed, side)
     robot = load(path, platform="rod")
     assert includes_zero(robot)
-    assert robot.filed["knee"] == pytest.approx((robot.limited["knee"][0] + float(robot.joints["knee"].offset[0]),
-                                                 robot.limited["knee"][1] + float(robot.joints["knee"].offset[0])))
+    assert robot.filed["knee"] == pytest.approx(
+        (
+            robot.limited["knee"][0] + float(robot.joints["knee"].offset[0]),
+            robot.limited["knee"][1] + float(robot.joints["knee"].offset[0]),
+        )
+    )
     hrsynth.lint(path, platform="rod", fix=True, output=tmp_path / "mended.urdf")
     mended = load(tmp_path / "mended.urdf", platform="rod")
     assert not any(note.kind == "solved" for note in mended.notes)
@@ -71,7 +78,7 @@ def test_what_no_assembly_allows_is_not_mended(tmp_path: Path):
     path = press(tmp_path, 0, 1)
     text = path.read_text()
     place = text.index('lower="', text.index('name="swing"'))
-    path.write_text(text[:place] + 'lower="1.5" upper="1.7"' + text[text.index(" effort", place):])
+    path.write_text(text[:place] + 'lower="1.5" upper="1.7"' + text[text.index(" effort", place) :])
     assert not includes_zero(load(path, platform="rod"))
     before = path.read_text()
     assert not hrsynth.lint(path, platform="rod", fix=True).mended
@@ -86,22 +93,32 @@ def legged(folder: Path, legs: int) -> Path:
         for side, sign in (("f", 1), ("b", -1)):
             tip = f"{sign * crank * np.cos(0.25):.12f} {k} {-crank * np.sin(0.25):.12f}"
             name, ends = f"{side}{k}", "<parent>{}</parent><child>{}_{}</child>".format
-            text += (f"<link name='crank_{name}'/><link name='shin_{name}'><pose>{tip} 0 0 0</pose></link>"
-                     f"<joint name='m_{name}' type='revolute'>{ends('hip', 'crank', name)}"
-                     f"<axis><xyz>0 1 0</xyz></axis></joint><joint name='knee_{name}' type='universal'>"
-                     f"{ends(f'crank_{name}', 'shin', name)}<axis><xyz>0 1 0</xyz></axis>"
-                     "<axis2><xyz>1 0 0</xyz></axis2></joint>")
+            text += (
+                f"<link name='crank_{name}'/><link name='shin_{name}'><pose>{tip} 0 0 0</pose></link>"
+                f"<joint name='m_{name}' type='revolute'>{ends('hip', 'crank', name)}"
+                f"<axis><xyz>0 1 0</xyz></axis></joint><joint name='knee_{name}' type='universal'>"
+                f"{ends(f'crank_{name}', 'shin', name)}<axis><xyz>0 1 0</xyz></axis>"
+                "<axis2><xyz>1 0 0</xyz></axis2></joint>"
+            )
         toe = f"{-crank * np.cos(0.25):.12f} 0 {shin[1]:.12f}"
-        text += (f"<joint name='toe{k}' type='revolute'><pose>{toe} 0 0 0</pose>"
-                 f"{ends(f'shin_f{k}', 'shin', f'b{k}')}<axis><xyz>0 1 0</xyz></axis></joint>")
+        text += (
+            f"<joint name='toe{k}' type='revolute'><pose>{toe} 0 0 0</pose>"
+            f"{ends(f'shin_f{k}', 'shin', f'b{k}')}<axis><xyz>0 1 0</xyz></axis></joint>"
+        )
     path = folder / "hopper.sdf"
     path.write_text(text + "</model></sdf>")
     return path
 
 
 def moved_by(robot: Mechanism) -> float:
-    return max((float(np.abs(joint.offset).max()) for joint in robot.joints.values()
-                if joint.offset is not None and joint.offset.ndim == 1), default=0.0)
+    return max(
+        (
+            float(np.abs(joint.offset).max())
+            for joint in robot.joints.values()
+            if joint.offset is not None and joint.offset.ndim == 1
+        ),
+        default=0.0,
+    )
 
 
 @pytest.mark.parametrize("legs", [1, 2])

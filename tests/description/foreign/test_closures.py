@@ -35,11 +35,15 @@ from oracle import Oracle
 
 FOUR = sorted(tuple(point + 0.0) for point in (A, B, C, D))
 DRAKE = urdf("").replace("<robot", '<robot xmlns:drake="http://drake.mit.edu"', 1)
-BALL = ('<drake:ball_constraint><drake:ball_constraint_body_A name="rocker"/><drake:ball_constraint_body_B name="bar"/>'
-        f'<drake:ball_constraint_p_AP value="{at("rocker", C)}"/><drake:ball_constraint_p_BQ value="{at("bar", C)}"/>'
-        "</drake:ball_constraint>")
-PIN = (f'<link name="pin"/><joint name="d" type="continuous"><parent link="rocker"/><child link="pin"/>'
-       f'<origin xyz="{at("rocker", C)}"/><axis xyz="{along("rocker")}"/></joint>')
+BALL = (
+    '<drake:ball_constraint><drake:ball_constraint_body_A name="rocker"/><drake:ball_constraint_body_B name="bar"/>'
+    f'<drake:ball_constraint_p_AP value="{at("rocker", C)}"/><drake:ball_constraint_p_BQ value="{at("bar", C)}"/>'
+    "</drake:ball_constraint>"
+)
+PIN = (
+    f'<link name="pin"/><joint name="d" type="continuous"><parent link="rocker"/><child link="pin"/>'
+    f'<origin xyz="{at("rocker", C)}"/><axis xyz="{along("rocker")}"/></joint>'
+)
 
 
 def read(folder: Path, text: str, ending: str = "urdf", **given: object) -> Mechanism:
@@ -72,7 +76,7 @@ def test_a_ball_constraint_of_drake_closes_the_loop(tmp_path: Path):
 def test_a_ball_constraint_in_sdf_does_too_its_prefix_declared_or_not(declared: bool, tmp_path: Path):
     text = SDF["1.7"]
     start = text.index('<joint name="d"')
-    text = text[:start] + text[text.index("</joint>", start) + 8:]
+    text = text[:start] + text[text.index("</joint>", start) + 8 :]
     said = {"body_A": "rocker", "p_AP": at("rocker", C), "body_B": "bar", "p_BQ": at("bar", C)}
     tag = "drake:ball_constraint"
     ball = f"<{tag}>" + "".join(f"<{tag}_{key}>{value}</{tag}_{key}>" for key, value in said.items()) + f"</{tag}>"
@@ -90,11 +94,15 @@ STIFF = {"0 0 0": JointType.SPHERICAL, "9 9 0": JointType.REVOLUTE, "9 9 9": Joi
 @pytest.mark.parametrize("torque", STIFF)
 def test_a_bushing_is_the_joint_that_its_stiffness_leaves(torque: str, tmp_path: Path):
     """The z axes of both frames lie along the hinge."""
-    text = "".join(f'<frame name="f{k}" link="{link}" xyz="{at(link, C)}" rpy="{rpy(link)}"/>'
-                   for k, link in enumerate(("rocker", "bar")))
-    text += (f'<drake:linear_bushing_rpy><drake:bushing_frameA name="f0"/><drake:bushing_frameC name="f1"/>'
-             f'<drake:bushing_torque_stiffness value="{torque}"/><drake:bushing_force_stiffness value="7 7 7"/>'
-             "</drake:linear_bushing_rpy>")
+    text = "".join(
+        f'<frame name="f{k}" link="{link}" xyz="{at(link, C)}" rpy="{rpy(link)}"/>'
+        for k, link in enumerate(("rocker", "bar"))
+    )
+    text += (
+        f'<drake:linear_bushing_rpy><drake:bushing_frameA name="f0"/><drake:bushing_frameC name="f1"/>'
+        f'<drake:bushing_torque_stiffness value="{torque}"/><drake:bushing_force_stiffness value="7 7 7"/>'
+        "</drake:linear_bushing_rpy>"
+    )
     path = tmp_path / "robot.urdf"
     path.write_text(DRAKE.replace("</robot>", text + "</robot>"))
     if STIFF[torque] is JointType.FIXED:
@@ -107,9 +115,11 @@ def test_a_bushing_is_the_joint_that_its_stiffness_leaves(torque: str, tmp_path:
 
 
 def test_a_bushing_that_is_no_joint_of_loops_is_told(tmp_path: Path):
-    text = ('<drake:linear_bushing_rpy><drake:bushing_frameA name="rocker"/><drake:bushing_frameC name="bar"/>'
-            '<drake:bushing_torque_stiffness value="0 0 0"/><drake:bushing_force_stiffness value="0 0 7"/>'
-            "</drake:linear_bushing_rpy>")
+    text = (
+        '<drake:linear_bushing_rpy><drake:bushing_frameA name="rocker"/><drake:bushing_frameC name="bar"/>'
+        '<drake:bushing_torque_stiffness value="0 0 0"/><drake:bushing_force_stiffness value="0 0 7"/>'
+        "</drake:linear_bushing_rpy>"
+    )
     robot = read(tmp_path, DRAKE.replace("</robot>", text + "</robot>"), platform="bar")
     assert any("--close rocker:bar:TYPE" in each for each in notes(robot, "open"))
     assert mobility(robot) == 3
@@ -121,8 +131,10 @@ def rpy(link: str) -> str:
     return words((np.arctan2(R[2, 1], R[2, 2]), -np.arcsin(R[2, 0]), np.arctan2(R[1, 0], R[0, 0])))
 
 
-PLUGIN = ('<plugin filename="libgz-sim-detachable-joint-system.so" name="gz::sim::systems::DetachableJoint">'
-          '<parent_link>{}</parent_link><child_model>{}</child_model><child_link>bar</child_link></plugin>')
+PLUGIN = (
+    '<plugin filename="libgz-sim-detachable-joint-system.so" name="gz::sim::systems::DetachableJoint">'
+    "<parent_link>{}</parent_link><child_model>{}</child_model><child_link>bar</child_link></plugin>"
+)
 
 
 @pytest.mark.parametrize("model", ["four_bar", "", "name_it_was_spawned_with"])
@@ -133,8 +145,10 @@ def test_a_detachable_joint_of_gazebo_holds_links_as_they_lie(model: str, tmp_pa
     if model.startswith("name"):
         assert mobility(robot) == 4
         assert any("--close pin:bar:TYPE" in each for each in notes(robot, "open"))
-        eye = (f'<link name="eye"/><joint name="eye_fixed" type="fixed"><parent link="bar"/><child link="eye"/>'
-               f'<origin xyz="{at("bar", C)}" rpy="{_rpy(X["bar"][:3, :3].T @ X["rocker"][:3, :3])}"/></joint>')
+        eye = (
+            f'<link name="eye"/><joint name="eye_fixed" type="fixed"><parent link="bar"/><child link="eye"/>'
+            f'<origin xyz="{at("bar", C)}" rpy="{_rpy(X["bar"][:3, :3].T @ X["rocker"][:3, :3])}"/></joint>'
+        )
         text = text.replace(PIN, PIN + eye).replace(">bar<", ">eye<")
         robot = read(tmp_path, text)
     assert is_the_four_bar(robot)
@@ -143,8 +157,10 @@ def test_a_detachable_joint_of_gazebo_holds_links_as_they_lie(model: str, tmp_pa
 
 @pytest.mark.parametrize("model", ["four_bar", "__model__"])
 def test_so_does_one_in_sdf(model: str, tmp_path: Path):
-    text = SDF["1.7"].replace('<joint name="d" type="revolute"><parent>rocker</parent><child>bar</child>',
-                              '<joint name="d" type="revolute"><parent>rocker</parent><child>pin</child>')
+    text = SDF["1.7"].replace(
+        '<joint name="d" type="revolute"><parent>rocker</parent><child>bar</child>',
+        '<joint name="d" type="revolute"><parent>rocker</parent><child>pin</child>',
+    )
     pin = f'<link name="pin"><pose>{words(X["bar"][:3, 3])} {_rpy(X["bar"][:3, :3])}</pose></link>'
     text = text.replace("<joint", pin + "<joint", 1).replace("</model>", PLUGIN.format("pin", model) + "</model>")
     assert is_the_four_bar(read(tmp_path, text, "sdf"))
@@ -166,9 +182,14 @@ def test_detachable_joints_to_another_model_and_attachers_are_told(tmp_path: Pat
         assert any("--close rocker:bar:fixed" in each for each in notes(robot, "open"))
 
 
-PAIRS = [("l1_cl1_1", "l1_cl1_2"), ("closedloop1_A_3D", "closedloop1_B_3D"),
-         ("closedloop_knee_1A", "closedloop_knee_1B"), ("left_closure_a", "left_closure_b"),
-         ("loop_closing.1", "loop_closing.2"), ("closing_d_1", "closing_d_2")]
+PAIRS = [
+    ("l1_cl1_1", "l1_cl1_2"),
+    ("closedloop1_A_3D", "closedloop1_B_3D"),
+    ("closedloop_knee_1A", "closedloop_knee_1B"),
+    ("left_closure_a", "left_closure_b"),
+    ("loop_closing.1", "loop_closing.2"),
+    ("closing_d_1", "closing_d_2"),
+]
 
 
 @pytest.mark.parametrize("pair", PAIRS)
@@ -187,9 +208,17 @@ def test_the_name_says_that_frames_are_held_rigidly(tmp_path: Path):
     assert is_the_four_bar(read(tmp_path, text, close="closedloop1_A_6D:closedloop1_B_6D:3d"))
 
 
-@pytest.mark.parametrize("pair", [("hand_1", "hand_2"), ("foot_A", "foot_B"), ("close_1", "close_2"),
-                                  ("clip_1", "clip_2"), ("closure_1_left", "closure_1_right"),
-                                  ("closed_loop1", "closed_loop2")])
+@pytest.mark.parametrize(
+    "pair",
+    [
+        ("hand_1", "hand_2"),
+        ("foot_A", "foot_B"),
+        ("close_1", "close_2"),
+        ("clip_1", "clip_2"),
+        ("closure_1_left", "closure_1_right"),
+        ("closed_loop1", "closed_loop2"),
+    ],
+)
 def test_frames_of_other_names_are_not_held_together(pair: tuple[str, str], tmp_path: Path):
     assert mobility(read(tmp_path, frames(*pair), platform="bar")) == 3
 
@@ -225,9 +254,11 @@ def test_a_yaml_file_of_another_name_gives_the_closures(tmp_path: Path):
 
 @pytest.mark.parametrize("kind", ["revolute", "spherical", "ball"])
 def test_a_loop_joint_with_parent_and_child_is_read(kind: str, tmp_path: Path):
-    text = (f'<loop_joint name="d" type="{kind}"><parent link="rocker"/><child link="bar"/><parent_origin xyz="'
-            f'{at("rocker", C)}"/><child_origin xyz="{at("bar", C)}"/><axis xyz="{along("rocker")}" frame="parent"/>'
-            "</loop_joint>")
+    text = (
+        f'<loop_joint name="d" type="{kind}"><parent link="rocker"/><child link="bar"/><parent_origin xyz="'
+        f'{at("rocker", C)}"/><child_origin xyz="{at("bar", C)}"/><axis xyz="{along("rocker")}" frame="parent"/>'
+        "</loop_joint>"
+    )
     assert is_the_four_bar(read(tmp_path, urdf(text)))
     with pytest.raises(BadRobotFile, match="loop_joint"):
         read(tmp_path, urdf(text.replace('<child link="bar"/>', "")))
@@ -257,22 +288,35 @@ def test_hyphens_in_comments_and_undeclared_prefixes_are_told_and_read(tmp_path:
 
 
 def test_points_of_links_are_closed_by_flag(tmp_path: Path):
-    wish = f'rocker@{at("rocker", C).replace(" ", ",")}:bar@{at("bar", C).replace(" ", ",")}'
+    wish = f"rocker@{at('rocker', C).replace(' ', ',')}:bar@{at('bar', C).replace(' ', ',')}"
     for close in (wish, f"{wish}:spherical", [wish]):
         assert is_the_four_bar(read(tmp_path, urdf(""), close=close))
     both = read(tmp_path, urdf(_frame("hook", "crank", B)), close=f"{wish}, hook:bar@0,0,0")
     assert sum(not joint.in_tree for joint in both.joints.values()) == 2
-    for wrong in ("rocker@1,2:bar", "rocker@1,2,3", "rocker@a,b,c:bar", "rocker@1,2,1e99:bar", "rocker@1,2,3:none",
-                  "rocker@1,2,3:rocker", "rocker@1,2,3:bar:odd", ":", "@", "", "a:b:c:d"):
+    for wrong in (
+        "rocker@1,2:bar",
+        "rocker@1,2,3",
+        "rocker@a,b,c:bar",
+        "rocker@1,2,1e99:bar",
+        "rocker@1,2,3:none",
+        "rocker@1,2,3:rocker",
+        "rocker@1,2,3:bar:odd",
+        ":",
+        "@",
+        "",
+        "a:b:c:d",
+    ):
         with pytest.raises(BadRequest, match="--close"):
             read(tmp_path, urdf(""), close=wrong)
 
 
 def test_names_of_nested_models_are_no_types(tmp_path: Path):
-    text = ('<sdf version="1.9"><model name="m"><link name="g"/>'
-            '<model name="n"><link name="a"/><link name="b"/></model>'
-            '<joint name="i" type="revolute"><parent>g</parent><child>n::a</child></joint>'
-            '<joint name="j" type="revolute"><parent>g</parent><child>n::b</child></joint></model></sdf>')
+    text = (
+        '<sdf version="1.9"><model name="m"><link name="g"/>'
+        '<model name="n"><link name="a"/><link name="b"/></model>'
+        '<joint name="i" type="revolute"><parent>g</parent><child>n::a</child></joint>'
+        '<joint name="j" type="revolute"><parent>g</parent><child>n::b</child></joint></model></sdf>'
+    )
     robot = read(tmp_path, text, "sdf", close="n::a:n::b:fixed", platform="n::b")
     assert [joint.links for joint in robot.joints.values() if not joint.in_tree] == [("n::a", "n::b")]
 
@@ -288,14 +332,18 @@ def spherical(seed: int, points: bool) -> str:
         inner = f'<joint name="j{leg}3" axis="{words(axes[2])}" pos="{words(centre + rng.normal() * axes[2])}"/>'
         last = leg == legs - 1
         tip = f'<body name="ball">{inner}</body>' if last else ""
-        text += (f'<body name="a{leg}"><joint name="j{leg}1" axis="{words(axes[0])}" pos="{words(centre)}"/>'
-                 f'<body name="b{leg}"><joint name="j{leg}2" axis="{words(axes[1])}" pos="{words(centre + axes[1])}"/>'
-                 f"{tip}</body></body>")
+        text += (
+            f'<body name="a{leg}"><joint name="j{leg}1" axis="{words(axes[0])}" pos="{words(centre)}"/>'
+            f'<body name="b{leg}"><joint name="j{leg}2" axis="{words(axes[1])}" pos="{words(centre + axes[1])}"/>'
+            f"{tip}</body></body>"
+        )
         if not last:
             for distance in (0.7,) if points else (0.7, -0.4):
-                closures += (f'<connect name="c{leg}{distance}" body1="b{leg}" body2="ball" '
-                             f'anchor="{words(centre + distance * axes[2])}"/>')
-    return (f'<mujoco><worldbody><body name="base">{text}</body></worldbody><equality>{closures}</equality></mujoco>')
+                closures += (
+                    f'<connect name="c{leg}{distance}" body1="b{leg}" body2="ball" '
+                    f'anchor="{words(centre + distance * axes[2])}"/>'
+                )
+    return f'<mujoco><worldbody><body name="base">{text}</body></worldbody><equality>{closures}</equality></mujoco>'
 
 
 @pytest.mark.some(3)
@@ -318,7 +366,7 @@ def test_a_point_at_the_centre_stays_a_point(tmp_path: Path):
     where = text.index('anchor="')
     rng = np.random.default_rng(0)
     centre = words(rng.uniform(-1, 1, 3))
-    text = text[:where] + f'anchor="{centre}"' + text[text.index('"', where + 8) + 1:]
+    text = text[:where] + f'anchor="{centre}"' + text[text.index('"', where + 8) + 1 :]
     robot = read(tmp_path, text, "xml", platform="ball")
     assert [joint.type for joint in robot.joints.values() if not joint.in_tree] == [JointType.SPHERICAL]
 
@@ -344,8 +392,10 @@ def test_a_free_joint_is_no_bar(tmp_path: Path):
 
 def test_a_base_in_another_component_is_looked_from(tmp_path: Path):
     text = urdf(f'<loop name="d" type="spherical">{ends("predecessor", "rocker")}{ends("successor", "bar")}</loop>')
-    other = ('<link name="table"/><link name="leg"/><joint name="t" type="continuous"><parent link="table"/>'
-             '<child link="leg"/></joint>')
+    other = (
+        '<link name="table"/><link name="leg"/><joint name="t" type="continuous"><parent link="table"/>'
+        '<child link="leg"/></joint>'
+    )
     text = text.replace('<link name="base"/>', other + '<link name="base"/>', 1)
     with pytest.raises(BadRequest, match="no such platform link"):
         read(tmp_path, text, platform="bar")
@@ -357,8 +407,9 @@ def test_a_base_in_another_component_is_looked_from(tmp_path: Path):
 @pytest.mark.parametrize("name", ["urdf+", "constraint", "onshape"])
 def test_millimetres_are_asked_for_and_read(name: str, tmp_path: Path):
     metres = read(tmp_path, URDF[name], platform="bar")
-    large = re.sub(r'xyz="([^"]*)"',
-                   lambda found: f'xyz="{words([1000 * float(x) for x in found[1].split()])}"', URDF[name])
+    large = re.sub(
+        r'xyz="([^"]*)"', lambda found: f'xyz="{words([1000 * float(x) for x in found[1].split()])}"', URDF[name]
+    )
     asked = read(tmp_path, large, platform="bar")
     assert any("--unit mm" in each for each in notes(asked, "open"))
     assert asked.length == pytest.approx(1000 * metres.length)
@@ -371,11 +422,13 @@ def test_millimetres_are_asked_for_and_read(name: str, tmp_path: Path):
 
 
 def test_slides_and_gears_are_scaled_with_the_lengths(tmp_path: Path):
-    text = ('<robot name="r"><link name="g"/><link name="s"/><link name="t"/>'
-            '<joint name="p" type="prismatic"><parent link="g"/><child link="s"/>'
-            '<limit lower="-100" upper="300" velocity="50" effort="7"/></joint>'
-            '<joint name="r" type="continuous"><parent link="g"/><child link="t"/>'
-            '<mimic joint="p" multiplier="0.01"/></joint></robot>')
+    text = (
+        '<robot name="r"><link name="g"/><link name="s"/><link name="t"/>'
+        '<joint name="p" type="prismatic"><parent link="g"/><child link="s"/>'
+        '<limit lower="-100" upper="300" velocity="50" effort="7"/></joint>'
+        '<joint name="r" type="continuous"><parent link="g"/><child link="t"/>'
+        '<mimic joint="p" multiplier="0.01"/></joint></robot>'
+    )
     robot = read(tmp_path, text, platform="t", unit="mm")
     limits = robot.joints["p"].limits
     assert limits is not None
@@ -384,12 +437,18 @@ def test_slides_and_gears_are_scaled_with_the_lengths(tmp_path: Path):
 
 
 def test_shapes_are_scaled_with_the_lengths(tmp_path: Path):
-    shapes = ('<visual><origin xyz="10 0 0" rpy="0 0 1"/><geometry><box size="100 200 300"/></geometry></visual>'
-              '<visual><geometry><mesh filename="a.stl"/></geometry></visual>'
-              '<inertial><origin xyz="5 0 0"/><mass value="2"/>'
-              '<inertia ixx="7" iyy="7" izz="7" ixy="0" ixz="0" iyz="0"/></inertial>')
-    robot = read(tmp_path, URDF["urdf+"].replace('<link name="crank"/>', f'<link name="crank">{shapes}</link>'),
-                 platform="bar", unit="mm")
+    shapes = (
+        '<visual><origin xyz="10 0 0" rpy="0 0 1"/><geometry><box size="100 200 300"/></geometry></visual>'
+        '<visual><geometry><mesh filename="a.stl"/></geometry></visual>'
+        '<inertial><origin xyz="5 0 0"/><mass value="2"/>'
+        '<inertia ixx="7" iyy="7" izz="7" ixy="0" ixz="0" iyz="0"/></inertial>'
+    )
+    robot = read(
+        tmp_path,
+        URDF["urdf+"].replace('<link name="crank"/>', f'<link name="crank">{shapes}</link>'),
+        platform="bar",
+        unit="mm",
+    )
     box, mesh, inertial = robot.links["crank"].xml
     assert 'xyz="0.01 0 0" rpy="0 0 1"' in box
     assert 'size="0.1 0.2 0.3"' in box
@@ -401,8 +460,13 @@ def test_shapes_are_scaled_with_the_lengths(tmp_path: Path):
 
 
 def test_what_was_read_is_written_and_read_back(tmp_path: Path):
-    for number, text in enumerate((DRAKE.replace("</robot>", BALL + "</robot>"), frames("l1_cl1_1", "l1_cl1_2"),
-                                   urdf(f"{PIN}<gazebo>{PLUGIN.format('pin', 'four_bar')}</gazebo>"))):
+    for number, text in enumerate(
+        (
+            DRAKE.replace("</robot>", BALL + "</robot>"),
+            frames("l1_cl1_1", "l1_cl1_2"),
+            urdf(f"{PIN}<gazebo>{PLUGIN.format('pin', 'four_bar')}</gazebo>"),
+        )
+    ):
         robot = read(tmp_path, text)
         for ending in ("urdf", "xml", "sdf", "yaml"):
             save(robot, tmp_path / f"back{number}{ending}.{ending}")

@@ -21,8 +21,11 @@ from hrsynth.mechanism import Mechanism
 
 CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype="<f4")
 FACES = ((0, 2, 1), (0, 3, 2), (0, 1, 3), (1, 2, 3))
-MESH = bytes(80) + (4).to_bytes(4, "little") + b"".join(bytes(12) + CORNERS[list(face)].tobytes() + bytes(2)
-                                                        for face in FACES)
+MESH = (
+    bytes(80)
+    + (4).to_bytes(4, "little")
+    + b"".join(bytes(12) + CORNERS[list(face)].tobytes() + bytes(2) for face in FACES)
+)
 ENDINGS = (".urdf", ".xml", ".sdf", ".yaml", ".usda")
 
 
@@ -38,16 +41,27 @@ def filled(folder: Path, seed: int = 0) -> Mechanism:
         place = f'<origin xyz="{at}" rpy="{turn}"/>'
         A = rng.uniform(-1, 1, (3, 3))
         J = A @ A.T + 2 * np.eye(3)
-        tensor = " ".join(f'{key}="{J[i, j]:.6f}"' for key, i, j in (
-            ("ixx", 0, 0), ("iyy", 1, 1), ("izz", 2, 2), ("ixy", 0, 1), ("ixz", 0, 2), ("iyz", 1, 2)))
-        shape = ('<box size="0.1 0.2 0.3"/>', '<sphere radius="0.25"/>', '<cylinder radius="0.1" length="2"/>',
-                 '<capsule radius="0.1" length="0.5"/>', '<mesh filename="a.stl" scale="0.5 0.5 0.5"/>',
-                 '<mesh filename="parts/b.stl"/>')[number % 6]
-        links[link.name] = replace(link, xml=(
-            f'<inertial>{place}<mass value="{rng.uniform(0.1, 9):.4f}"/><inertia {tensor}/></inertial>',
-            f'<visual name="hull_{number}">{place}<geometry>{shape}</geometry>'
-            '<material name=""><color rgba="1 0.5 0 1"/></material></visual>',
-            f'<collision>{place}<geometry>{shape}</geometry></collision>'))
+        tensor = " ".join(
+            f'{key}="{J[i, j]:.6f}"'
+            for key, i, j in (("ixx", 0, 0), ("iyy", 1, 1), ("izz", 2, 2), ("ixy", 0, 1), ("ixz", 0, 2), ("iyz", 1, 2))
+        )
+        shape = (
+            '<box size="0.1 0.2 0.3"/>',
+            '<sphere radius="0.25"/>',
+            '<cylinder radius="0.1" length="2"/>',
+            '<capsule radius="0.1" length="0.5"/>',
+            '<mesh filename="a.stl" scale="0.5 0.5 0.5"/>',
+            '<mesh filename="parts/b.stl"/>',
+        )[number % 6]
+        links[link.name] = replace(
+            link,
+            xml=(
+                f'<inertial>{place}<mass value="{rng.uniform(0.1, 9):.4f}"/><inertia {tensor}/></inertial>',
+                f'<visual name="hull_{number}">{place}<geometry>{shape}</geometry>'
+                '<material name=""><color rgba="1 0.5 0 1"/></material></visual>',
+                f"<collision>{place}<geometry>{shape}</geometry></collision>",
+            ),
+        )
     save(replace(robot, links=links), folder / "src" / "robot.urdf")
     return load(folder / "src" / "robot.urdf")
 
@@ -61,7 +75,8 @@ def same(mine: Content, theirs: Content, folders: tuple[Path, Path]) -> None:
     assert S @ theirs.inertial.inertia @ S.T == pytest.approx(R @ mine.inertial.inertia @ R.T, abs=1e-9)
     assert theirs.inertial.X[:3, 3] == pytest.approx(mine.inertial.X[:3, 3], abs=1e-9)
     assert [(s.kind, s.role, s.name, s.colour) for s in theirs.solids] == [
-        (s.kind, s.role, s.name, s.colour) for s in mine.solids]
+        (s.kind, s.role, s.name, s.colour) for s in mine.solids
+    ]
     for a, b in zip(mine.solids, theirs.solids, strict=True):
         assert b.sizes == pytest.approx(a.sizes, rel=1e-12)
         assert pytest.approx(a.X, abs=1e-9) == b.X
@@ -73,8 +88,10 @@ def same(mine: Content, theirs: Content, folders: tuple[Path, Path]) -> None:
             assert one.read_bytes() == two.read_bytes()
 
 
-PAIRS = [pytest.param(*pair, marks=[pytest.mark.slow] * (".usda" in pair or ".yaml" in pair))
-         for pair in itertools.permutations(ENDINGS, 2)]
+PAIRS = [
+    pytest.param(*pair, marks=[pytest.mark.slow] * (".usda" in pair or ".yaml" in pair))
+    for pair in itertools.permutations(ENDINGS, 2)
+]
 
 
 @pytest.mark.some(3)
@@ -110,10 +127,14 @@ def test_mujoco_loads_masses_and_meshes_as_they_are(tmp_path: Path):
 def test_what_a_dialect_cannot_hold_is_one_sentence(tmp_path: Path):
     robot = load("3rps")
     platform = robot.links[robot.platform]
-    odd = ('<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="9" ixy="0" ixz="0" iyz="0"/></inertial>',
-           '<visual><geometry><mesh filename="nowhere.dae"/></geometry></visual>', "<gripper/>")
-    full = replace(robot, links={**robot.links, platform.name: replace(platform, xml=odd)},
-                   file=str(tmp_path / "in.urdf"))
+    odd = (
+        '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="9" ixy="0" ixz="0" iyz="0"/></inertial>',
+        '<visual><geometry><mesh filename="nowhere.dae"/></geometry></visual>',
+        "<gripper/>",
+    )
+    full = replace(
+        robot, links={**robot.links, platform.name: replace(platform, xml=odd)}, file=str(tmp_path / "in.urdf")
+    )
     lost = [str(note) for note in save(full, tmp_path / "out.xml")]
     assert len(lost) == 3
     for said in ("no body can have", "nowhere.dae", "<gripper> of links"):
@@ -143,8 +164,11 @@ def test_meshes_are_named_from_the_new_folder_and_never_overwritten(tmp_path: Pa
     assert "other content" in capsys.readouterr().err
     assert sorted(path.name for path in (tmp_path / "far").rglob("*")) == ["away", "b.stl", "meshes", "robot.sdf"]
     assert (tmp_path / "far" / "meshes" / "b.stl").read_text() == "precious"
-    for asked in (["convert", "3rps"], ["convert", "3rps", "a.xml", "-o", "b.xml"],
-                  ["convert", "3rps", "a.xml", "--meshes", "x"]):
+    for asked in (
+        ["convert", "3rps"],
+        ["convert", "3rps", "a.xml", "-o", "b.xml"],
+        ["convert", "3rps", "a.xml", "--meshes", "x"],
+    ):
         assert execute(asked) == 2
 
 
@@ -153,8 +177,9 @@ def test_meshes_in_a_usd_file_become_files(tmp_path: Path):
     pytest.importorskip("pxr")
     save(filled(tmp_path), tmp_path / "robot.usda")
     text = (tmp_path / "robot.usda").read_text()
-    (tmp_path / "robot.usda").write_text("\n".join(line for line in text.splitlines() if "hrsynth:mesh" not in line
-                                                   and "hrsynth:scale" not in line))
+    (tmp_path / "robot.usda").write_text(
+        "\n".join(line for line in text.splitlines() if "hrsynth:mesh" not in line and "hrsynth:scale" not in line)
+    )
     (tmp_path / "out").mkdir()
     (note,) = save(tmp_path / "robot.usda", tmp_path / "out" / "kept.urdf")
     assert "--meshes copy" in note.text
@@ -167,8 +192,10 @@ def test_meshes_in_a_usd_file_become_files(tmp_path: Path):
 @pytest.mark.slow
 def test_all_meshes_in_usd_files_are_read_by_one_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     pytest.importorskip("pxr")
-    prim = ('def Mesh "{}" {{\n  point3f[] points = [(0,0,0), (1,0,0), (0,1,0)]\n  int[] faceVertexCounts = [3]\n'
-            '  int[] faceVertexIndices = [0, 1, 2]\n}}')
+    prim = (
+        'def Mesh "{}" {{\n  point3f[] points = [(0,0,0), (1,0,0), (0,1,0)]\n  int[] faceVertexCounts = [3]\n'
+        "  int[] faceVertexIndices = [0, 1, 2]\n}}"
+    )
     for file in "ab":
         (tmp_path / f"{file}.usda").write_text("#usda 1.0\n" + "\n".join(prim.format(f"p{k}") for k in range(20)))
     runs, run = [], stage.output
@@ -203,12 +230,16 @@ def test_shapes_of_foreign_mjcf(tmp_path: Path):
         '<asset><mesh file="x.stl" scale="2 2 2"/></asset><worldbody><body name="a"><joint name="j"/>'
         '<inertial pos="0 0 1" mass="2" diaginertia="1 2 2" euler="0 0 1"/><geom type="box" size="1 2 3"/>'
         '<geom type="capsule" fromto="0 0 0 2 0 0" size="0.1" group="3"/><geom class="skin" mesh="x"/>'
-        '<geom type="ellipsoid" size="1 2 3"/></body></worldbody></mujoco>')
+        '<geom type="ellipsoid" size="1 2 3"/></body></worldbody></mujoco>'
+    )
     robot = load(tmp_path / "robot.xml")
     found = content_of(robot.links["a"], robot)
     assert [(s.kind, s.role, s.sizes, s.colour) for s in found.solids] == [
-        ("box", "visual", (2, 4, 6), (1, 0, 0, 1)), ("box", "collision", (2, 4, 6), None),
-        ("capsule", "collision", (0.1, 2), None), ("mesh", "visual", (), (1, 0, 0, 1))]
+        ("box", "visual", (2, 4, 6), (1, 0, 0, 1)),
+        ("box", "collision", (2, 4, 6), None),
+        ("capsule", "collision", (0.1, 2), None),
+        ("mesh", "visual", (), (1, 0, 0, 1)),
+    ]
     assert found.solids[2].X[:3, 3] == pytest.approx((1, 0, 0))
     assert np.abs(found.solids[2].X[:3, 2]) == pytest.approx((1, 0, 0))
     assert (found.solids[3].file, found.solids[3].scale) == ("m/x.stl", (2, 2, 2))

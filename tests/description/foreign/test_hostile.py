@@ -46,15 +46,25 @@ ONE = {"urdf": URDF["urdf+"], "mjcf": MJCF["connect"], "sdf": SDF["1.7"]}
 def test_entities_are_not_expanded(dialect: str, tmp_path: Path):
     names = "abcdefghij"
     bomb = "".join(f'<!ENTITY {b} "{f"&{a};" * 10}">' for a, b in pairwise(names))
-    for head in (f'<!DOCTYPE x [<!ENTITY a "ha">{bomb}]>', '<!DOCTYPE x SYSTEM "file:///etc/passwd">',
-                 '<!DOCTYPE x [<!ENTITY a SYSTEM "http://127.0.0.1:9/x">]>'):
-        assert_refused(made(tmp_path, head + ONE[dialect].replace("four_bar", "&a;", 1)),
-                       "a document type declaration", "not allowed")
+    for head in (
+        f'<!DOCTYPE x [<!ENTITY a "ha">{bomb}]>',
+        '<!DOCTYPE x SYSTEM "file:///etc/passwd">',
+        '<!DOCTYPE x [<!ENTITY a SYSTEM "http://127.0.0.1:9/x">]>',
+    ):
+        assert_refused(
+            made(tmp_path, head + ONE[dialect].replace("four_bar", "&a;", 1)),
+            "a document type declaration",
+            "not allowed",
+        )
 
 
-@pytest.mark.parametrize(("dialect", "old", "new", "allowed"), [
-    ("mjcf", r'(body\d=")([^"]+)"', r'\1nobody"', r"world, \w+"),
-    ("sdf", r"(<child>)([^<]+)<", r"\1nobody<", r"\w+, \w+")])
+@pytest.mark.parametrize(
+    ("dialect", "old", "new", "allowed"),
+    [
+        ("mjcf", r'(body\d=")([^"]+)"', r'\1nobody"', r"world, \w+"),
+        ("sdf", r"(<child>)([^<]+)<", r"\1nobody<", r"\w+, \w+"),
+    ],
+)
 def test_an_unknown_name_tells_those_that_there_are(dialect: str, old: str, new: str, allowed: str, tmp_path: Path):
     text, count = re.subn(old, new, ONE[dialect], count=1)
     assert count
@@ -102,12 +112,21 @@ MANY = {
     "mjcf": ("<mujoco><worldbody>{}</worldbody></mujoco>", "<body><joint/></body>", 500_000),
     "sdf": ("<sdf version='1.9'><model name='m'>{}</model></sdf>", LINK, 500_000),
     "joints of one body": ("<mujoco><worldbody><body>{}</body></worldbody></mujoco>", "<joint type='slide'/>", 90_000),
-    "joints of joints": ("<sdf version='1.9'><model name='m'><link name='j-1'/>{}</model></sdf>",
-                         "<joint name='j{0}' type='ball'><parent>world</parent><child>j{1}</child></joint>", 30_000),
-    "keyframes": ("<mujoco><worldbody><body><joint/></body></worldbody><keyframe>{}</keyframe></mujoco>",
-                  "<key qpos='0'/>", 90_000),
-    "defects": ("<mujoco><worldbody><body><joint/></body></worldbody><equality>{}</equality></mujoco>",
-                "<connect body1='l{0}' body2='l{1}'/>", 3_900),
+    "joints of joints": (
+        "<sdf version='1.9'><model name='m'><link name='j-1'/>{}</model></sdf>",
+        "<joint name='j{0}' type='ball'><parent>world</parent><child>j{1}</child></joint>",
+        30_000,
+    ),
+    "keyframes": (
+        "<mujoco><worldbody><body><joint/></body></worldbody><keyframe>{}</keyframe></mujoco>",
+        "<key qpos='0'/>",
+        90_000,
+    ),
+    "defects": (
+        "<mujoco><worldbody><body><joint/></body></worldbody><equality>{}</equality></mujoco>",
+        "<connect body1='l{0}' body2='l{1}'/>",
+        3_900,
+    ),
     "unknown elements": ("<robot name='r'><link name='l'/>{}</robot>", "<a b='1'/>", 1_500_000),
     "just too many unknown ones": ("<robot name='r'><link name='l'/>{}</robot>", "<a b='1'/>", 100_000),
     "just too many": ("<robot name='r'><link name='l-1'/>{}</robot>", CHAIN, 2_001),
@@ -116,18 +135,21 @@ MANY = {
 
 
 @pytest.mark.some(1)
-@pytest.mark.parametrize("name", [pytest.param(each, marks=pytest.mark.slow) if number > 1 else each
-                                  for number, each in enumerate(MANY)])
+@pytest.mark.parametrize(
+    "name", [pytest.param(each, marks=pytest.mark.slow) if number > 1 else each for number, each in enumerate(MANY)]
+)
 def test_a_million_links_are_refused_in_time_and_memory(name: str, tmp_path: Path):
     frame, part, count = MANY[name]
     path = made(tmp_path, frame.format("".join(part.format(i, i - 1) for i in range(count))))
     # VmHWM: ru_maxrss would count the memory of this process too, from which the other one is started
     told = tmp_path / "status"
-    code = (f"import resource; resource.setrlimit(resource.RLIMIT_CPU, ({SECONDS}, {SECONDS}))\n"
-            f"import atexit, pathlib as p\n"
-            f"atexit.register(lambda: p.Path({str(told)!r}).write_text(p.Path('/proc/self/status').read_text()))\n"
-            f"from hrsynth.description import load\nfrom hrsynth.cli import main\n"
-            f"main(['convert', {str(path)!r}, {str(tmp_path / 'out.sdf')!r}])")
+    code = (
+        f"import resource; resource.setrlimit(resource.RLIMIT_CPU, ({SECONDS}, {SECONDS}))\n"
+        f"import atexit, pathlib as p\n"
+        f"atexit.register(lambda: p.Path({str(told)!r}).write_text(p.Path('/proc/self/status').read_text()))\n"
+        f"from hrsynth.description import load\nfrom hrsynth.cli import main\n"
+        f"main(['convert', {str(path)!r}, {str(tmp_path / 'out.sdf')!r}])"
+    )
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     few = name == "just not too many"
     assert run.returncode == (0 if few else 2), run.stderr[-500:]
@@ -145,8 +167,10 @@ TURN = "<origin xyz='0.1 0 0'/><axis xyz='0 0 1'/></joint>"
 def test_a_long_chain_is_refused_in_time_where_its_twin_would_be_too_large(tmp_path: Path):
     links = "".join(CHAIN.replace("fixed", "continuous").format(i, i - 1) for i in range(990)).replace("</joint>", TURN)
     path = made(tmp_path, f"<robot name='r'><link name='l-1'/>{links}</robot>", "robot.urdf")
-    code = (f"import resource; resource.setrlimit(resource.RLIMIT_CPU, ({SECONDS}, {SECONDS}))\n"
-            f"from hrsynth.cli import main\nmain(['check', {str(path)!r}])")
+    code = (
+        f"import resource; resource.setrlimit(resource.RLIMIT_CPU, ({SECONDS}, {SECONDS}))\n"
+        f"from hrsynth.cli import main\nmain(['check', {str(path)!r}])"
+    )
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert run.returncode == 2, run.stderr[-500:]
     assert "joints with 990 coordinates, allowed: up to 256" in run.stderr.splitlines()[-1]
@@ -176,41 +200,86 @@ def test_sdf_includes_are_never_fetched(tmp_path: Path):
     assert_refused(made(tmp_path, text, "robot.sdf"), "other files are not fetched")
 
 
-@pytest.mark.parametrize("frames", ['<frame name="f" attached_to="g"/><frame name="g" attached_to="f"/>',
-                                    '<frame name="f"><pose relative_to="g"/></frame><frame name="g"><pose '
-                                    'relative_to="f"/></frame>', '<frame name="f" attached_to="none"/>'])
+@pytest.mark.parametrize(
+    "frames",
+    [
+        '<frame name="f" attached_to="g"/><frame name="g" attached_to="f"/>',
+        '<frame name="f"><pose relative_to="g"/></frame><frame name="g"><pose relative_to="f"/></frame>',
+        '<frame name="f" attached_to="none"/>',
+    ],
+)
 def test_frames_in_a_ring_or_nowhere(frames: str, tmp_path: Path):
     joint = '<joint name="j" type="revolute"><parent>f</parent><child>crank</child></joint>'
     assert_refused(made(tmp_path, SDF["1.7"].replace("</model>", frames + joint + "</model>"), "robot.sdf"))
 
 
-@pytest.mark.parametrize("yaml", [
-    "a: &a [1]\nclosed_loop: [*a]", "closed_loop: " + "[" * 3000 + "]" * 3000,
-    "closed_loop: !!python/object:os.system x",
-    "closed_loop: 3", "closed_loop: [['one', 'none']]", "closed_loop: [['one', 'one']]", "closed_loop: [[1, 2]]",
-    "name_mot: ['none']", "joint_name: ['a']\njoint_type: ['ODD']", "joint_name: ['a']", "closed_loop: ['one']",
-    "closed_loop: [\x01]", "name_mot: {a: b}"])
+@pytest.mark.parametrize(
+    "yaml",
+    [
+        "a: &a [1]\nclosed_loop: [*a]",
+        "closed_loop: " + "[" * 3000 + "]" * 3000,
+        "closed_loop: !!python/object:os.system x",
+        "closed_loop: 3",
+        "closed_loop: [['one', 'none']]",
+        "closed_loop: [['one', 'one']]",
+        "closed_loop: [[1, 2]]",
+        "name_mot: ['none']",
+        "joint_name: ['a']\njoint_type: ['ODD']",
+        "joint_name: ['a']",
+        "closed_loop: ['one']",
+        "closed_loop: [\x01]",
+        "name_mot: {a: b}",
+    ],
+)
 def test_yaml_is_data(yaml: str, tmp_path: Path):
     files = FILES["gepetto: 3d"]
     (tmp_path / "robot.yaml").write_text(yaml)
     assert_refused(made(tmp_path, files["robot.urdf"], "robot.urdf"))
 
 
-@pytest.mark.parametrize("yaml", [
-    "!!bool x", "!!int ''", "!!float ''", "!!timestamp x", "!!binary 'é'", "!!str a", "! a", "!!set {a}", "!own a",
-    '"\\UFFFFFFFF"', '"\\U00110000"'])
+@pytest.mark.parametrize(
+    "yaml",
+    [
+        "!!bool x",
+        "!!int ''",
+        "!!float ''",
+        "!!timestamp x",
+        "!!binary 'é'",
+        "!!str a",
+        "! a",
+        "!!set {a}",
+        "!own a",
+        '"\\UFFFFFFFF"',
+        '"\\U00110000"',
+    ],
+)
 def test_yaml_has_no_types(yaml: str, tmp_path: Path):
     made(tmp_path, FILES["gepetto: 3d"]["robot.urdf"], "robot.urdf")
     for text in (f"closed_loop: {yaml}", f"closed_loop: [[{yaml}]]", f"{yaml} : 1\ntype: [3d]"):
         assert_refused(made(tmp_path, text, "robot.yaml"), "YAML")
 
 
-@pytest.mark.parametrize("scalar", ["9" * 5000, ":".join("1" * 300_000), "-" + ":".join(["59"] * 3000) + ".5", "0b1",
-                                    "2001-99-99", ".inf", "<<", "=", "yes"])
+@pytest.mark.parametrize(
+    "scalar",
+    [
+        "9" * 5000,
+        ":".join("1" * 300_000),
+        "-" + ":".join(["59"] * 3000) + ".5",
+        "0b1",
+        "2001-99-99",
+        ".inf",
+        "<<",
+        "=",
+        "yes",
+    ],
+)
 def test_a_scalar_of_yaml_is_a_name(scalar: str, tmp_path: Path):
     made(tmp_path, FILES["gepetto: 3d"]["robot.urdf"], "robot.urdf")
-    assert_refused(made(tmp_path, f"name_mot: [{scalar}]", "robot.yaml"),
-                   "name_mot: ", "is no name" if len(scalar) > 200 else "no joint")
+    assert_refused(
+        made(tmp_path, f"name_mot: [{scalar}]", "robot.yaml"),
+        "name_mot: ",
+        "is no name" if len(scalar) > 200 else "no joint",
+    )
 
 
 def test_a_key_of_yaml_without_a_value_has_none(tmp_path: Path):
@@ -251,8 +320,11 @@ def _folder(path: Path) -> Path:
 
 def test_a_xacro_file_without_the_package_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr("hrsynth.description.formats.urdf.xacro.importlib.util.find_spec", lambda name: None)
-    text = ONE["urdf"].replace("<robot", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro"', 1).replace(
-        "</robot>", '<xacro:property name="x" value="1"/></robot>')
+    text = (
+        ONE["urdf"]
+        .replace("<robot", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro"', 1)
+        .replace("</robot>", '<xacro:property name="x" value="1"/></robot>')
+    )
     assert_refused(made(tmp_path, text), "the package xacro is not installed")
 
 
@@ -292,10 +364,14 @@ NAMES = {
     "comments in comments": '<robot name="a">' + "<!-- <? --> ?>" * 40_000 + "<",
     "attributes": "<robot name='a'><link " + " ".join(f"a{k}='1'" for k in range(100_000)) + "/></robot>",
     "elements": "<robot name='a'>" + "".join(f"<lin{k}/>" for k in range(90_000)) + "</robot>",
-    "attributes of many elements": "<robot name='a'><link name='b'/>" + "".join(
-        f"<joint name='j{k}' abc{k}='1'/>" for k in range(40_000)) + "</robot>",
-    "defaults": "<mujoco><default>" + "".join(f"<t{k} a='1'/>" for k in range(900)) + "".join(
-        f"<default class='c{k}'>" + f"<geom a{k}='1'/>" for k in range(200)) + "</default>" * 201 + "</mujoco>",
+    "attributes of many elements": "<robot name='a'><link name='b'/>"
+    + "".join(f"<joint name='j{k}' abc{k}='1'/>" for k in range(40_000))
+    + "</robot>",
+    "defaults": "<mujoco><default>"
+    + "".join(f"<t{k} a='1'/>" for k in range(900))
+    + "".join(f"<default class='c{k}'>" + f"<geom a{k}='1'/>" for k in range(200))
+    + "</default>" * 201
+    + "</mujoco>",
 }
 
 
@@ -305,9 +381,18 @@ def test_what_compares_names_takes_its_time(name: str, tmp_path: Path):
     assert_refused(made(tmp_path, NAMES[name]))
 
 
-@pytest.mark.parametrize("text", [
-    b"<a/>", b"<a><!-- b --></a>", b"<a><!-- <? --><?c <!-- ?></a>", b"<a><!--><b/>--></a>", b"<!-- a",
-    b"<? <!-- ?> -->", b"<a><?b?><!--c--><!---->x<!-- ?> --></a>"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        b"<a/>",
+        b"<a><!-- b --></a>",
+        b"<a><!-- <? --><?c <!-- ?></a>",
+        b"<a><!--><b/>--></a>",
+        b"<!-- a",
+        b"<? <!-- ?> -->",
+        b"<a><?b?><!--c--><!---->x<!-- ?> --></a>",
+    ],
+)
 def test_comments_are_those_of_a_pattern(text: bytes):
     """The pattern takes quadratic time where an end is missing."""
     pattern = re.compile(rb"<!--.*?-->|<\?.*?\?>", re.DOTALL)

@@ -43,8 +43,11 @@ def uneven(folder: Path) -> tuple[Path, float, float]:
 def test_of_a_keyframe(tmp_path: Path):
     path, rocker, bar = uneven(tmp_path)
     values = {"a": 0.3, "b": bar - 0.3, "c": rocker}
-    (tmp_path / "bars.srdf").write_text('<robot name="four_bar"><group_state name="up" group="g">' + "".join(
-        f'<joint name="{name}" value="{value!r}"/>' for name, value in values.items()) + "</group_state></robot>")
+    (tmp_path / "bars.srdf").write_text(
+        '<robot name="four_bar"><group_state name="up" group="g">'
+        + "".join(f'<joint name="{name}" value="{value!r}"/>' for name, value in values.items())
+        + "</group_state></robot>"
+    )
     limits = load(path, keyframe=f"{tmp_path / 'bars.srdf'}:up").joints["d"].limits
     assert limits is not None
     assert (limits.lower, limits.upper) == pytest.approx((-0.3 - (bar - rocker), 0.4 - (bar - rocker)), abs=1e-9)

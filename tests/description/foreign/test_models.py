@@ -15,17 +15,27 @@ from hrsynth.description import load, save
 from hrsynth.mechanism import Mechanism
 
 ROOT = Path(__file__).resolve().parents[3]
-MODELS = Path(os.environ.get("HRSYNTH_MODELS") or next(
-    (str(each) for each in (ROOT.parent / "shared" / "models", ROOT / "shared" / "models") if each.is_dir()), "none"))
+MODELS = Path(
+    os.environ.get("HRSYNTH_MODELS")
+    or next(
+        (str(each) for each in (ROOT.parent / "shared" / "models", ROOT / "shared" / "models") if each.is_dir()), "none"
+    )
+)
 pytestmark = pytest.mark.skipif(not MODELS.is_dir(), reason="the folder of real models is not here")
 
 # file: (mobility, idle, of the normal form; total as written)
 FIGURES = {
-    "gepetto-5bar": (2, 0, 3), "gepetto-5bar-iso3d": (2, 0, 2), "gepetto-wl16-leg": (12, 6, 12),
-    "gepetto-digit-like": (6, 0, 9), "delta-sdf-archirob/model.sdf": (9, 6, 9),
-    "stewart-sdf-ritwik/stewart_sdf.sdf": (12, 6, 12), "drake-fourbar-loop/four_bar_loop.sdf": (1, 0, 1),
-    "urdfplus-fourbar/four_bar.urdf": (1, 0, 1), "urdfplus-planar-leg/planar_leg_linkage.urdf": (2, 0, 2),
-    "urdfplus-sixbar/six_bar.urdf": (3, 0, 3), "closedloop-xacro/closed_loop.urdf.xacro": (1, 0, 1),
+    "gepetto-5bar": (2, 0, 3),
+    "gepetto-5bar-iso3d": (2, 0, 2),
+    "gepetto-wl16-leg": (12, 6, 12),
+    "gepetto-digit-like": (6, 0, 9),
+    "delta-sdf-archirob/model.sdf": (9, 6, 9),
+    "stewart-sdf-ritwik/stewart_sdf.sdf": (12, 6, 12),
+    "drake-fourbar-loop/four_bar_loop.sdf": (1, 0, 1),
+    "urdfplus-fourbar/four_bar.urdf": (1, 0, 1),
+    "urdfplus-planar-leg/planar_leg_linkage.urdf": (2, 0, 2),
+    "urdfplus-sixbar/six_bar.urdf": (3, 0, 3),
+    "closedloop-xacro/closed_loop.urdf.xacro": (1, 0, 1),
 }
 
 
@@ -74,8 +84,9 @@ def test_the_robot_with_rods_hides_what_the_paper_says():
 
 
 @pytest.mark.some(1)
-@pytest.mark.parametrize(("name", "architecture"), [
-    ("gepetto-wl16-leg", "6-SP*S"), ("stewart-sdf-ritwik/stewart_sdf.sdf", "6-RUPUR")])
+@pytest.mark.parametrize(
+    ("name", "architecture"), [("gepetto-wl16-leg", "6-SP*S"), ("stewart-sdf-ritwik/stewart_sdf.sdf", "6-RUPUR")]
+)
 def test_three_observed_legs_control_all_six_freedoms(name: str, architecture: str):
     found = derive(model(name), "1,3,5")
     assert found.architecture.ascii == architecture

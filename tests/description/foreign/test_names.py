@@ -45,8 +45,11 @@ def renamed(texts: dict[str, str], old: str, new: str) -> dict[str, str]:
     return {name: re.sub(rf"(?<!\w){re.escape(old)}(?!\w)", new, text) for name, text in texts.items()}
 
 
-CASES = [pytest.param(dialect, end, id=f"{dialect}{end}", marks=[pytest.mark.slow] * (dialect == "usd"))
-         for dialect in DIALECTS for end in ENDS]
+CASES = [
+    pytest.param(dialect, end, id=f"{dialect}{end}", marks=[pytest.mark.slow] * (dialect == "usd"))
+    for dialect in DIALECTS
+    for end in ENDS
+]
 
 
 @pytest.mark.some(12)
@@ -79,9 +82,11 @@ def test_a_part_of_a_chain_may_lose_its_name(dialect: str, tmp_path: Path):
 
 @pytest.mark.parametrize("name", ["body", "body_fixed", "arm_joint", "plain"])
 def test_a_name_made_up_for_a_part_is_no_name_of_a_later_one(name: str, tmp_path: Path):
-    text = ('<mujoco><worldbody><body name="base"><body name="arm"><joint/><joint pos="0 0 1" axis="1 0 0"/>'
-            '<body><inertial pos="0 0 0" mass="1"/><body name="NAME"><joint name="NAME"/></body></body></body></body>'
-            "</worldbody></mujoco>").replace("NAME", name)
+    text = (
+        '<mujoco><worldbody><body name="base"><body name="arm"><joint/><joint pos="0 0 1" axis="1 0 0"/>'
+        '<body><inertial pos="0 0 0" mass="1"/><body name="NAME"><joint name="NAME"/></body></body></body></body>'
+        "</worldbody></mujoco>"
+    ).replace("NAME", name)
     (tmp_path / "robot.xml").write_text(text)
     assert len(load(tmp_path / "robot.xml", platform=name).joints) == 4
 

@@ -46,7 +46,11 @@ READ: dict[str, tuple[dict[str, str], int, int, int]] = {
     f"{REACHY}/urdf/robot.urdf": ({"platform": "xl_330"}, 15, 6, 5),
     f"{GRBDA}/Benchmarking/urdfs/parallel_chains/Implicit/depth5/loop_size5.urdf": ({"platform": "link_2_5"}, 9, 3, 3),
     f"{GRBDA}/Benchmarking/urdfs/parallel_chains/Implicit/depth10/loop_size9.urdf": (
-        {"platform": "link_2_10"}, 19, 3, 3),
+        {"platform": "link_2_10"},
+        19,
+        3,
+        3,
+    ),
     f"{GRBDA}/Benchmarking/urdfs/variable_four_bar_urdf/four_bar_branch_2_3.urdf": ({"platform": "link_12"}, 6, 3, 2),
     f"{ANKLES}/2_g1_ankle/urdf/23urdf311.xml": ({}, 2, 2, 0),
     f"{ANKLES}/5_tiangong/urdf/TG10-00.xml": ({}, 4, 2, 0),
@@ -54,8 +58,12 @@ READ: dict[str, tuple[dict[str, str], int, int, int]] = {
     f"{CASSIE}/cassiepole.xml": ({"platform": "left-foot"}, 23, 6, 6),
     f"{CASSIE}/cassie_tray_box.xml": ({"platform": "left-foot"}, 28, 6, 6),
 }
-SPHERICAL = ("Rhoban/placo-examples/models/orbita/robot.urdf", "Rhoban/placo-examples/models/spm/robot.urdf",
-             "Rhoban/placo-examples/models/spm/robot.xml", f"{ONSHAPE}/orbita_mujoco/robot.xml")
+SPHERICAL = (
+    "Rhoban/placo-examples/models/orbita/robot.urdf",
+    "Rhoban/placo-examples/models/spm/robot.urdf",
+    "Rhoban/placo-examples/models/spm/robot.xml",
+    f"{ONSHAPE}/orbita_mujoco/robot.xml",
+)
 REFUSED: dict[str, tuple[dict[str, str], type[Exception], str]] = {
     f"{GEPETTO}/disney_robot/robot.urdf": ({}, BadRobotFile, "joint_name 'left_spherical_free_foot'"),
     f"{GEPETTO}/kangaroo_like/robot.urdf": ({"platform": "foot"}, LoopsNotClosed, "is open at"),

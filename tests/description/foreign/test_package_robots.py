@@ -61,11 +61,16 @@ def test_yourdfpy_agrees_on_every_tree(path: Path):
         if edge.axes:
             assert np.linalg.norm(np.cross(edge.axes[0], joint.axis)) < 1e-9 * np.linalg.norm(joint.axis)
             assert edge.axes[0] @ joint.axis > 0
-    gears = {(joint.name, joint.mimic.joint, joint.mimic.multiplier) for joint in theirs.joints
-             if joint.mimic is not None and joint.mimic.joint in ours.joints and joint.type != "fixed"}
+    gears = {
+        (joint.name, joint.mimic.joint, joint.mimic.multiplier)
+        for joint in theirs.joints
+        if joint.mimic is not None and joint.mimic.joint in ours.joints and joint.type != "fixed"
+    }
     assert {(gear.driven, gear.driver, gear.ratio) for gear in ours.gears} == {
-        (driven, driver, 1.0 if ratio is None else ratio) for driven, driver, ratio in gears
-        if ours.joints[driver].type is not JointType.FIXED}
+        (driven, driver, 1.0 if ratio is None else ratio)
+        for driven, driver, ratio in gears
+        if ours.joints[driver].type is not JointType.FIXED
+    }
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
@@ -87,19 +92,27 @@ def test_every_tree_is_a_mechanism(path: Path):
 
 
 # closed loops: freedoms of the whole with its pelvis held, and of one leg between pelvis and foot
-LEGS = {"cassie.sdf": (10, 5), "cassie_v2.sdf": (12, 6), "cassie_simple.sdf": (11, 5), "cassie_reduced.sdf": (11, 5),
-        "cassie_wo_gearbox_spring.sdf": (13, 6)}
+LEGS = {
+    "cassie.sdf": (10, 5),
+    "cassie_v2.sdf": (12, 6),
+    "cassie_simple.sdf": (11, 5),
+    "cassie_reduced.sdf": (11, 5),
+    "cassie_wo_gearbox_spring.sdf": (13, 6),
+}
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [each if each == "cassie.sdf" else pytest.param(each, marks=pytest.mark.slow)
-                                  for each in LEGS])
+@pytest.mark.parametrize(
+    "name", [each if each == "cassie.sdf" else pytest.param(each, marks=pytest.mark.slow) for each in LEGS]
+)
 def test_its_robot_with_closed_loops_has_its_mobility(name: str):
     assert ROBOTS is not None
     path = ROBOTS / "cassie_description" / "robots" / name
     whole, leg = LEGS[name]
-    for freedoms, robot in ((whole, load(path, platform="left-foot")),
-                            (leg, load(path, base="pelvis", platform="left-foot"))):
+    for freedoms, robot in (
+        (whole, load(path, platform="left-foot")),
+        (leg, load(path, base="pelvis", platform="left-foot")),
+    ):
         twin = PinocchioModel(robot)
         kernel, rank = ClosedConfiguration.of(twin, twin.q0).kernel()
         assert kernel.shape[1] == freedoms

@@ -17,8 +17,10 @@ from hrsynth.mechanism import Mechanism
 
 
 def joint(name: str, kind: str, parent: str, child: str, xyz: str = "0 0 0", axis: str = "0 1 0") -> str:
-    return (f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
-            f'<origin xyz="{xyz}"/><axis xyz="{axis}"/><limit lower="-2" upper="2" effort="9" velocity="9"/></joint>')
+    return (
+        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
+        f'<origin xyz="{xyz}"/><axis xyz="{axis}"/><limit lower="-2" upper="2" effort="9" velocity="9"/></joint>'
+    )
 
 
 def robot(*joints: str, loops: str = "") -> str:
@@ -29,16 +31,23 @@ def robot(*joints: str, loops: str = "") -> str:
 
 def ankle(foot: str = "foot", rods: tuple[str, str] = ("rod_l", "rod_r"), kind: str = "spherical") -> str:
     """A leg of three turns whose foot two rods drive, through balls or hinges at their ends."""
-    joints = [joint("hip", "revolute", "torso", "thigh"), joint("knee", "revolute", "thigh", "shank", "0 0 -0.4"),
-              joint("pitch", "revolute", "shank", "cross", "0 0 -0.4"),
-              joint("roll", "revolute", "cross", foot, axis="1 0 0")]
+    joints = [
+        joint("hip", "revolute", "torso", "thigh"),
+        joint("knee", "revolute", "thigh", "shank", "0 0 -0.4"),
+        joint("pitch", "revolute", "shank", "cross", "0 0 -0.4"),
+        joint("roll", "revolute", "cross", foot, axis="1 0 0"),
+    ]
     loops = ""
     for side, rod in zip((0.05, -0.05), rods, strict=True):
-        joints += [joint(f"motor_{rod}", "revolute", "shank", f"lever_{side}", f"0 {side} -0.1"),
-                   joint(f"upper_{rod}", kind, f"lever_{side}", rod, "-0.06 0 0")]
-        loops += (f'<loop name="lower_{rod}" type="{kind}"><predecessor link="{rod}"><origin xyz="0 0 -0.3"/>'
-                  f'</predecessor><successor link="{foot}"><origin xyz="-0.06 {side} 0"/></successor>'
-                  '<axis xyz="0 1 0"/></loop>')
+        joints += [
+            joint(f"motor_{rod}", "revolute", "shank", f"lever_{side}", f"0 {side} -0.1"),
+            joint(f"upper_{rod}", kind, f"lever_{side}", rod, "-0.06 0 0"),
+        ]
+        loops += (
+            f'<loop name="lower_{rod}" type="{kind}"><predecessor link="{rod}"><origin xyz="0 0 -0.3"/>'
+            f'</predecessor><successor link="{foot}"><origin xyz="-0.06 {side} 0"/></successor>'
+            '<axis xyz="0 1 0"/></loop>'
+        )
     return robot(*joints, loops=loops)
 
 
@@ -53,9 +62,13 @@ def read(folder: Path, text: str, **given: str) -> Mechanism:
 NAMES = [("rod_a", "rod_b", "foot"), ("a", "b", "c"), ("foot_rod_l", "foot_rod_r", "y"), ("imu", "x", "y")]
 
 
-@pytest.mark.parametrize(("names", "kind"), [
-    *((names, "spherical") for names in (*permutations(NAMES[0]), *NAMES[1:])),
-    *((names, "revolute") for names in NAMES)])
+@pytest.mark.parametrize(
+    ("names", "kind"),
+    [
+        *((names, "spherical") for names in (*permutations(NAMES[0]), *NAMES[1:])),
+        *((names, "revolute") for names in NAMES),
+    ],
+)
 def test_the_foot_that_two_rods_drive_is_the_platform(tmp_path: Path, names: tuple[str, str, str], kind: str):
     """Three ways lead to it from the shank; rods between balls are told by these, whatever their names."""
     found = read(tmp_path, ankle(names[2], names[:2], kind))
@@ -71,11 +84,16 @@ def test_a_name_that_contradicts_the_structure_is_asked_about(tmp_path: Path):
 
 def test_the_last_linkage_of_a_leg_is_asked_about(tmp_path: Path):
     """One rod and an unnamed foot: nothing tells them apart."""
-    last = ('<loop name="end" type="revolute"><predecessor link="b"><origin xyz="0 0 -0.3"/></predecessor>'
-            '<successor link="a"><origin xyz="-0.06 0 0"/></successor><axis xyz="0 1 0"/></loop>')
-    joints = [joint("hip", "revolute", "torso", "shank"), joint("pitch", "revolute", "shank", "a", "0 0 -0.4"),
-              joint("motor", "revolute", "shank", "lever", "0 0 -0.1"),
-              joint("up", "revolute", "lever", "b", "-0.06 0 0")]
+    last = (
+        '<loop name="end" type="revolute"><predecessor link="b"><origin xyz="0 0 -0.3"/></predecessor>'
+        '<successor link="a"><origin xyz="-0.06 0 0"/></successor><axis xyz="0 1 0"/></loop>'
+    )
+    joints = [
+        joint("hip", "revolute", "torso", "shank"),
+        joint("pitch", "revolute", "shank", "a", "0 0 -0.4"),
+        joint("motor", "revolute", "shank", "lever", "0 0 -0.1"),
+        joint("up", "revolute", "lever", "b", "-0.06 0 0"),
+    ]
     with pytest.raises(BadRequest, match=r"--platform LINK, such as .*a"):
         read(tmp_path, robot(*joints, loops=last))
     named = [each.replace('"a"', '"sole"') for each in joints]
@@ -94,8 +112,10 @@ def floating(order: str, legs: int, driven: str = "", centre: str = "0 0 0") -> 
         joints.append(joint(f"float_{k}", kind, links[k], links[k + 1], at, left[letter].pop()))
     joints.append(joint("fix", "fixed", "trunk", "imu", "0 0 0.1"))
     for leg in range(legs):
-        joints += [joint(f"hip_{leg}", "revolute", "trunk", f"upper_{leg}", f"0 {leg} 0"),
-                   joint(f"knee_{leg}", "revolute", f"upper_{leg}", f"lower_{leg}", "0 0 -0.4")]
+        joints += [
+            joint(f"hip_{leg}", "revolute", "trunk", f"upper_{leg}", f"0 {leg} 0"),
+            joint(f"knee_{leg}", "revolute", f"upper_{leg}", f"lower_{leg}", "0 0 -0.4"),
+        ]
     motor = f'<transmission name="m"><joint name="{driven}"/></transmission>' if driven else ""
     return robot(*joints, loops=motor)
 
@@ -109,9 +129,15 @@ def test_six_freedoms_that_place_a_base_are_no_leg_and_a_sensor_is_no_platform(t
     assert any("'trunk' floats on the joints float_0" in note.text for note in found.notes)
 
 
-@pytest.mark.parametrize("text", [
-    floating("PPPRRR", 2, driven="float_2"), floating("PPPRRR", 2, centre="0 0 0.1"), floating("PPPRRR", 1),
-    floating("PPPRRR", 2).replace('<axis xyz="0 0 1"', '<axis xyz="0 1 0"')])
+@pytest.mark.parametrize(
+    "text",
+    [
+        floating("PPPRRR", 2, driven="float_2"),
+        floating("PPPRRR", 2, centre="0 0 0.1"),
+        floating("PPPRRR", 1),
+        floating("PPPRRR", 2).replace('<axis xyz="0 0 1"', '<axis xyz="0 1 0"'),
+    ],
+)
 def test_a_gantry_is_kept(tmp_path: Path, text: str):
     """Driven, with turns about several points, with one arm, or short of a direction."""
     found = read(tmp_path, text, platform="lower_0")
@@ -126,16 +152,25 @@ def test_a_base_that_is_asked_for_is_kept(tmp_path: Path):
 @pytest.fixture
 def bar(tmp_path: Path) -> Path:
     path = tmp_path / "bar.urdf"
-    loop = ('<loop name="d" type="revolute"><predecessor link="bar"><origin xyz="0.5 0 0"/></predecessor><successor '
-            'link="rocker"><origin xyz="0 0 0.2"/></successor><axis xyz="0 1 0"/></loop>')
-    path.write_text(robot(joint("a", "revolute", "base", "crank"), joint("b", "revolute", "crank", "bar", "0.1 0 0.2"),
-                          joint("c", "revolute", "base", "rocker", "0.6 0 0"), loops=loop))
+    loop = (
+        '<loop name="d" type="revolute"><predecessor link="bar"><origin xyz="0.5 0 0"/></predecessor><successor '
+        'link="rocker"><origin xyz="0 0 0.2"/></successor><axis xyz="0 1 0"/></loop>'
+    )
+    path.write_text(
+        robot(
+            joint("a", "revolute", "base", "crank"),
+            joint("b", "revolute", "crank", "bar", "0.1 0 0.2"),
+            joint("c", "revolute", "base", "rocker", "0.6 0 0"),
+            loops=loop,
+        )
+    )
     return path
 
 
 @pytest.mark.parametrize(("given", "chosen"), [((), "guess"), (("--platform", "bar"), "option"), (None, "file")])
-def test_every_answer_names_the_platform_and_what_chose_it(bar: Path, given: tuple[str, ...] | None, chosen: str,
-                                                           capsys: pytest.CaptureFixture[str], tmp_path: Path):
+def test_every_answer_names_the_platform_and_what_chose_it(
+    bar: Path, given: tuple[str, ...] | None, chosen: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
+):
     robot = [str(bar), *(given or ())]
     if given is None:
         robot = [str(tmp_path / "own.urdf")]

@@ -45,8 +45,11 @@ def variants(robot: Mechanism) -> dict[str, Mechanism]:
     length; in metres and in millimetres."""
     found = {"plain": robot}
     if any(joint.type in (JointType.SPHERICAL, JointType.UNIVERSAL) for joint in robot.joints.values()):
-        found |= {"hinges": of_hinges(robot), "aligned": of_hinges(robot, aligned=True),
-                  "connectors": of_hinges(robot, slid=0.2)}
+        found |= {
+            "hinges": of_hinges(robot),
+            "aligned": of_hinges(robot, aligned=True),
+            "connectors": of_hinges(robot, slid=0.2),
+        }
     return found | {f"{name}, mm": in_millimetres(each) for name, each in found.items()}
 
 
@@ -135,11 +138,16 @@ def test_what_is_not_rounded_stays_as_it_is(name: str):
 def test_a_tilted_robot_of_no_round_numbers_is_the_same(name: str, decimals: int, tmp_path: Path):
     """No axis along a base axis, no length of few digits: nothing is found by its numbers."""
     robot, X = load(name), pose((0.123, -0.377, 0.219), rotation_about(unit([1.0, 2.0, 0.5]), 0.7))
-    moved = {name: replace(link, pose=link.pose if name == robot.base else X @ link.pose)
-             for name, link in robot.links.items()}
-    joints = {name: replace(joint, point=X[:3, :3] @ joint.point + X[:3, 3],
-                            axes=tuple(X[:3, :3] @ axis for axis in joint.axes))
-              for name, joint in robot.joints.items()}
+    moved = {
+        name: replace(link, pose=link.pose if name == robot.base else X @ link.pose)
+        for name, link in robot.links.items()
+    }
+    joints = {
+        name: replace(
+            joint, point=X[:3, :3] @ joint.point + X[:3, 3], axes=tuple(X[:3, :3] @ axis for axis in joint.axes)
+        )
+        for name, joint in robot.joints.items()
+    }
     tilted = of_hinges(replace(robot, links=moved, joints=joints))
     assert answer(again(tilted, tmp_path / "robot.sdf", decimals)) == answer(robot)
 
@@ -267,8 +275,10 @@ def test_a_file_tells_its_last_significant_digit(digits: int, expected: float):
     assert read.last_place == pytest.approx(expected)
 
 
-@pytest.mark.parametrize(("angle", "rounded"), [(np.pi / 2, False), (1.5708, True), (2.0944, True), (0.3, False),
-                                                (1.57, True), (0.0, False), (1.0, False)])
+@pytest.mark.parametrize(
+    ("angle", "rounded"),
+    [(np.pi / 2, False), (1.5708, True), (2.0944, True), (0.3, False), (1.57, True), (0.0, False), (1.0, False)],
+)
 def test_a_file_tells_that_its_angles_are_rounded(angle: float, rounded: bool):
     digits = Digits()
     digits.angles(np.array([0.0, angle, 0.0]))
@@ -278,13 +288,17 @@ def test_a_file_tells_that_its_angles_are_rounded(angle: float, rounded: bool):
 def test_small_features_that_are_typed_stay(tmp_path: Path):
     """A native file of three decimals that closes exactly is not rounded: axes 2 mm apart are meant."""
     text = '<robot name="r"><link name="base"/><link name="a"/><link name="b"/><link name="c"/>'
-    joint = ('<joint name="{}" type="continuous"><parent link="{}"/><child link="{}"/><origin xyz="{}"/>'
-             '<axis xyz="{}"/></joint>').format
+    joint = (
+        '<joint name="{}" type="continuous"><parent link="{}"/><child link="{}"/><origin xyz="{}"/>'
+        '<axis xyz="{}"/></joint>'
+    ).format
     text += joint("p", "base", "a", "0.125 0 0", "0 0 1") + joint("q", "a", "b", "0.002 0.375 0", "0 0 1")
     text += joint("r", "base", "c", "0.625 0.125 0.375", "0 0 1")
-    text += ('<loop name="s" type="revolute"><predecessor link="b"><origin xyz="0.498 -0.125 0"/></predecessor>'
-             '<successor link="c"><origin xyz="0 0.125 -0.375"/></successor><axis xyz="0 0 1"/></loop>'
-             '<hrsynth><platform link="b"/></hrsynth></robot>')
+    text += (
+        '<loop name="s" type="revolute"><predecessor link="b"><origin xyz="0.498 -0.125 0"/></predecessor>'
+        '<successor link="c"><origin xyz="0 0.125 -0.375"/></successor><axis xyz="0 0 1"/></loop>'
+        '<hrsynth><platform link="b"/></hrsynth></robot>'
+    )
     (tmp_path / "typed.urdf").write_text(text)
     robot = load(tmp_path / "typed.urdf")
     assert robot.notes == ()
@@ -299,10 +313,12 @@ def test_a_platform_on_balls_alone_has_no_axes_to_mend(tmp_path: Path):
     tips = [(-0.2, 0.15, 0.6), (0.1, -0.25, 0.55), (0.25, 0.1, 0.62), (-0.05, 0.2, 0.58), (-0.15, -0.1, 0.64)]
     text = '<sdf version="1.9"><model name="five rods"><link name="base"/><link name="hub"/>'
     for i, (foot, tip) in enumerate(zip(feet, tips, strict=True)):
-        text += (f'<link name="rod{i}"><pose>{" ".join(map(str, foot))} 0 0 0</pose></link>'
-                 f'<joint name="a{i}" type="ball"><parent>base</parent><child>rod{i}</child></joint>'
-                 f'<joint name="b{i}" type="ball"><pose>{" ".join(map(str, tip))} 0 0 0</pose><parent>rod{i}</parent>'
-                 "<child>hub</child></joint>")
+        text += (
+            f'<link name="rod{i}"><pose>{" ".join(map(str, foot))} 0 0 0</pose></link>'
+            f'<joint name="a{i}" type="ball"><parent>base</parent><child>rod{i}</child></joint>'
+            f'<joint name="b{i}" type="ball"><pose>{" ".join(map(str, tip))} 0 0 0</pose><parent>rod{i}</parent>'
+            "<child>hub</child></joint>"
+        )
     file = tmp_path / "rods.sdf"
     file.write_text(text + "</model></sdf>")
     found = ObservedRobot.of(load(file, platform="hub"))

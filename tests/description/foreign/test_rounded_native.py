@@ -16,8 +16,24 @@ from hrsynth.errors import LoopsNotClosed
 from hrsynth.mechanism import Mechanism
 from strategies import deltas, planar, pods
 
-WORDS = ("RRR", "RPR", "PRR", "PPR", "PRP", "RRP", "6-UPS", "3-RPS", "3-UPU", "6-SPS", "R 2-SS", "P 2-SS", "R UU",
-         "P UU", "R US", "P US")
+WORDS = (
+    "RRR",
+    "RPR",
+    "PRR",
+    "PPR",
+    "PRP",
+    "RRP",
+    "6-UPS",
+    "3-RPS",
+    "3-UPU",
+    "6-SPS",
+    "R 2-SS",
+    "P 2-SS",
+    "R UU",
+    "P UU",
+    "R US",
+    "P US",
+)
 DECIMALS = (9, 7, 6, 5)
 
 

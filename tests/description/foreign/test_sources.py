@@ -44,7 +44,8 @@ def test_any_source_comes_back_the_same_from_any_dialect(name: str, ending: str,
         assert mobility(back) == mobility(robot)
         assert back.platform == robot.platform
         assert {j.name for j in back.joints.values() if j.actuated} == {
-            j.name for j in robot.joints.values() if j.actuated}
+            j.name for j in robot.joints.values() if j.actuated
+        }
         assert np.allclose(back.links["bar"].pose, robot.links["bar"].pose, atol=1e-12)
 
 
@@ -54,11 +55,13 @@ def test_a_closing_frame_without_partner_is_refused_by_name(lost: str, tmp_path:
     line = refused(written(tmp_path, {"robot.urdf": text}))
     other = {"1": "2", "2": "1"}[lost]
     assert f"closing frame 'closing_d_{other}' without its partner" in line
-    assert f"robot.urdf:{1 + text[:text.index('closing_d_')].count(chr(10))}:" in line
+    assert f"robot.urdf:{1 + text[: text.index('closing_d_')].count(chr(10))}:" in line
 
 
-@pytest.mark.parametrize(("types", "told"), [("['planar']", "of type 'planar'"), ("[]", "without a type"),
-                                             ("['6d']", None), ("['3D']", None)])
+@pytest.mark.parametrize(
+    ("types", "told"),
+    [("['planar']", "of type 'planar'"), ("[]", "without a type"), ("['6d']", None), ("['3D']", None)],
+)
 def test_the_type_of_a_closure_is_never_guessed_in_silence(types: str, told: str | None, tmp_path: Path):
     files = dict(FILES["gepetto: 3d" if told is None and "3" in types else "gepetto: 6d"])
     settings = next(name for name in files if name.endswith(".yaml"))
@@ -86,18 +89,31 @@ def placed(robot: Mechanism, word: list[str], axes: np.ndarray, driven: bool = F
     names = [f"place_{k}" for k in range(len(word))]
     links = {name: Link(name, robot.links[robot.platform].pose) for name in names[:-1]}
     ends = [robot.base, *links, robot.platform]
-    joints = {name: Joint(name, JointType(kind), ends[k], ends[k + 1], point,
-                          (axes[k % 3],) * JointType(kind).axes, Motor("extra") if driven and k == 0 else None)
-              for k, (name, kind) in enumerate(zip(names, word, strict=True))}
-    return dataclasses.replace(robot, links={**robot.links, **links}, joints={**joints, **robot.joints},
-                               observations=())
+    joints = {
+        name: Joint(
+            name,
+            JointType(kind),
+            ends[k],
+            ends[k + 1],
+            point,
+            (axes[k % 3],) * JointType(kind).axes,
+            Motor("extra") if driven and k == 0 else None,
+        )
+        for k, (name, kind) in enumerate(zip(names, word, strict=True))
+    }
+    return dataclasses.replace(
+        robot, links={**robot.links, **links}, joints={**joints, **robot.joints}, observations=()
+    )
 
 
 def foreign(robot: Mechanism, path: Path) -> Path:
     """A file that does not say what our writers add."""
     save(robot, path)
-    text = re.sub(r"\s*<(text name=.hrsynth_platform|text name=.hrsynth_observe|hrsynth:platform|hrsynth:observe).*",
-                  "", path.read_text())
+    text = re.sub(
+        r"\s*<(text name=.hrsynth_platform|text name=.hrsynth_observe|hrsynth:platform|hrsynth:observe).*",
+        "",
+        path.read_text(),
+    )
     assert "platform_1" not in text
     path.write_text(text)
     return path
@@ -105,8 +121,9 @@ def foreign(robot: Mechanism, path: Path) -> Path:
 
 def words(robot: Mechanism) -> list[str]:
     normal = normal_form(robot).mechanism
-    return sorted("".join(sorted(str(normal.joints[name].type) for name in leg.joints))
-                  for leg in decompose(normal).legs)
+    return sorted(
+        "".join(sorted(str(normal.joints[name].type) for name in leg.joints)) for leg in decompose(normal).legs
+    )
 
 
 @pytest.mark.some(1)
@@ -146,8 +163,10 @@ def test_a_chain_that_places_the_platform_in_its_plane_is_no_leg(ending: str, wo
     assert sum("read as no leg" in note.text for note in back.notes) == 1
 
 
-@pytest.mark.parametrize(("name", "word", "driven"), [("3rps", "PPR", False), ("gough_stewart", "PPPS", True),
-                                                      ("gough_stewart", "PPR", False)])
+@pytest.mark.parametrize(
+    ("name", "word", "driven"),
+    [("3rps", "PPR", False), ("gough_stewart", "PPPS", True), ("gough_stewart", "PPR", False)],
+)
 def test_a_chain_that_is_driven_or_forbids_something_stays_a_leg(name: str, word: str, driven: bool, tmp_path: Path):
     robot = load(name)
     chain = placed(robot, list(word), np.eye(3), driven)
@@ -159,9 +178,16 @@ def test_a_chain_that_is_driven_or_forbids_something_stays_a_leg(name: str, word
 def test_legs_that_would_be_coordinates_alone_stay_legs(tmp_path: Path):
     robot = load("3rrr_m1")
     chain = placed(robot, ["P", "P", "R"], np.eye(3))
-    two = {name.replace("place", "other"): dataclasses.replace(
-        joint, name=name.replace("place", "other"), predecessor=joint.predecessor.replace("place", "other"),
-        successor=joint.successor.replace("place", "other")) for name, joint in chain.joints.items() if "place" in name}
+    two = {
+        name.replace("place", "other"): dataclasses.replace(
+            joint,
+            name=name.replace("place", "other"),
+            predecessor=joint.predecessor.replace("place", "other"),
+            successor=joint.successor.replace("place", "other"),
+        )
+        for name, joint in chain.joints.items()
+        if "place" in name
+    }
     links = {f"other_{k}": Link(f"other_{k}", chain.links[f"place_{k}"].pose) for k in (0, 1)}
     both = chain.changed(joints=two.values(), links=links.values())
     back = load(foreign(both, tmp_path / "robot.xml"), platform=robot.platform)
@@ -169,26 +195,48 @@ def test_legs_that_would_be_coordinates_alone_stay_legs(tmp_path: Path):
 
 
 MESSAGES = {
-    "ring": ("urdf", "<robot name='r'><link name='o'/><link name='a'/><link name='b'/>\n"
-             "<joint name='j1' type='continuous'><parent link='a'/><child link='b'/></joint>\n"
-             "<joint name='j2' type='continuous'><parent link='b'/><child link='a'/></joint></robot>",
-             ["robot.urdf:3: joints that form a cycle, found j2, j1, allowed: a tree"]),
-    "gearbox": ("urdf", FILES["urdf: gazebo"]["robot.urdf"].replace("</robot>",
-                "<gazebo><joint name='g' type='gearbox'>"
-                "<parent>rocker</parent><child>bar</child></joint></gazebo></robot>"),
-                ["gearbox 'g': one revolute joint from its reference body, found "]),
-    "second link": ("urdf", "<robot name='r'><link name='a'/><link name='a'/>"
-                    "<joint name='j' type='continuous'><parent link='a'/><child link='b'/></joint></robot>",
-                    ["robot.urdf:1: second link of the same name, found a"]),
-    "second body": ("xml", "<mujoco><worldbody><body name='a'><joint/><body name='a'><joint/></body></body></worldbody>"
-                    "<equality><connect body1='b' body2='a' anchor='0 0 0'/></equality></mujoco>",
-                    ["robot.xml:1: second body of the same name, found a"]),
-    "ring of frames": ("sdf", "<sdf version='1.9'><model name='m'><link name='a'><pose relative_to='b'/></link>"
-                       "<link name='b'><pose relative_to='a'/></link><joint name='j' type='ball'><parent>a</parent>"
-                       "<child>b</child></joint></model></sdf>", None),
-    **{f"version {number}": ("sdf", FILES["sdf: 1.7"]["robot.sdf"].replace('"1.7"', f'"{number}"'),
-                             [f"version of <sdf>, found {number}, allowed: 1.4 to 1.12"])
-       for number in ("1.13", "9.9", "1.3", "abc")},
+    "ring": (
+        "urdf",
+        "<robot name='r'><link name='o'/><link name='a'/><link name='b'/>\n"
+        "<joint name='j1' type='continuous'><parent link='a'/><child link='b'/></joint>\n"
+        "<joint name='j2' type='continuous'><parent link='b'/><child link='a'/></joint></robot>",
+        ["robot.urdf:3: joints that form a cycle, found j2, j1, allowed: a tree"],
+    ),
+    "gearbox": (
+        "urdf",
+        FILES["urdf: gazebo"]["robot.urdf"].replace(
+            "</robot>",
+            "<gazebo><joint name='g' type='gearbox'><parent>rocker</parent><child>bar</child></joint></gazebo></robot>",
+        ),
+        ["gearbox 'g': one revolute joint from its reference body, found "],
+    ),
+    "second link": (
+        "urdf",
+        "<robot name='r'><link name='a'/><link name='a'/>"
+        "<joint name='j' type='continuous'><parent link='a'/><child link='b'/></joint></robot>",
+        ["robot.urdf:1: second link of the same name, found a"],
+    ),
+    "second body": (
+        "xml",
+        "<mujoco><worldbody><body name='a'><joint/><body name='a'><joint/></body></body></worldbody>"
+        "<equality><connect body1='b' body2='a' anchor='0 0 0'/></equality></mujoco>",
+        ["robot.xml:1: second body of the same name, found a"],
+    ),
+    "ring of frames": (
+        "sdf",
+        "<sdf version='1.9'><model name='m'><link name='a'><pose relative_to='b'/></link>"
+        "<link name='b'><pose relative_to='a'/></link><joint name='j' type='ball'><parent>a</parent>"
+        "<child>b</child></joint></model></sdf>",
+        None,
+    ),
+    **{
+        f"version {number}": (
+            "sdf",
+            FILES["sdf: 1.7"]["robot.sdf"].replace('"1.7"', f'"{number}"'),
+            [f"version of <sdf>, found {number}, allowed: 1.4 to 1.12"],
+        )
+        for number in ("1.13", "9.9", "1.3", "abc")
+    },
 }
 
 
@@ -206,13 +254,16 @@ def test_what_is_wrong_is_said_once_and_in_the_words_of_the_file(name: str, tmp_
 
 
 def test_a_defect_of_an_included_file_is_told_with_that_file(tmp_path: Path):
-    (tmp_path / "parts.xml").write_text("<mujocoinclude>\n<equality>\n<connect body1='nix' body2='a' anchor='0 0 0'/>"
-                                        "</equality></mujocoinclude>")
+    (tmp_path / "parts.xml").write_text(
+        "<mujocoinclude>\n<equality>\n<connect body1='nix' body2='a' anchor='0 0 0'/></equality></mujocoinclude>"
+    )
     main = "<mujoco><worldbody><body name='a'><joint/></body></worldbody>\n<include file='{}'/></mujoco>"
     assert refused(written(tmp_path, {"robot.xml": main.format("parts.xml")})).startswith(
-        f"{tmp_path / 'parts.xml'}:3: connect of an unknown body, found nix")
+        f"{tmp_path / 'parts.xml'}:3: connect of an unknown body, found nix"
+    )
     line = refused(written(tmp_path, {"robot.xml": main.format("none.xml")}))
     assert line.startswith(f"{tmp_path / 'robot.xml'}:2: an include of what is no such file, found none.xml")
     (tmp_path / "parts.xml").write_text("<mujocoinclude>\n<include file='none.xml'/></mujocoinclude>")
     assert refused(written(tmp_path, {"robot.xml": main.format("parts.xml")})).startswith(
-        f"{tmp_path / 'parts.xml'}:2: an include of what is no such file")
+        f"{tmp_path / 'parts.xml'}:2: an include of what is no such file"
+    )

@@ -29,9 +29,12 @@ def read(folder: Path, text: str, ending: str = "urdf", **given: object) -> Mech
 
 def bars(lengths: list[tuple[str, str, str, str]], closure: str) -> str:
     """A planar linkage along x at zero: (joint, link, parent, origin and axis), and its closure."""
-    return ('<robot name="bars"><link name="base"/>'
-            + "".join(CHAIN.format(joint, link, parent, "continuous", rest) for joint, link, parent, rest in lengths)
-            + closure + "</robot>")
+    return (
+        '<robot name="bars"><link name="base"/>'
+        + "".join(CHAIN.format(joint, link, parent, "continuous", rest) for joint, link, parent, rest in lengths)
+        + closure
+        + "</robot>"
+    )
 
 
 def origin(x: float, extra: str = "") -> str:
@@ -39,8 +42,10 @@ def origin(x: float, extra: str = "") -> str:
 
 
 def revolute(pred: str, x: float, succ: str, y: float, rpy: str = "") -> str:
-    return (f'<loop name="close" type="revolute"><predecessor link="{pred}"><origin xyz="{x} 0 0"/></predecessor>'
-            f'<successor link="{succ}"><origin xyz="{y} 0 0"{rpy}/></successor><axis xyz="0 0 1"/></loop>')
+    return (
+        f'<loop name="close" type="revolute"><predecessor link="{pred}"><origin xyz="{x} 0 0"/></predecessor>'
+        f'<successor link="{succ}"><origin xyz="{y} 0 0"{rpy}/></successor><axis xyz="0 0 1"/></loop>'
+    )
 
 
 def full_mobility(mechanism: Mechanism) -> int:
@@ -50,16 +55,23 @@ def full_mobility(mechanism: Mechanism) -> int:
 
 
 def test_a_flat_zero_pose_is_left_and_said(tmp_path: Path):
-    flat = bars([("p", "one", "base", origin(0)), ("q", "two", "one", origin(0.5)), ("r", "three", "base", origin(1))],
-                revolute("two", 1.0, "three", 0.5))
+    flat = bars(
+        [("p", "one", "base", origin(0)), ("q", "two", "one", origin(0.5)), ("r", "three", "base", origin(1))],
+        revolute("two", 1.0, "three", 0.5),
+    )
     robot = read(tmp_path, flat)
     assert mobility(robot) == 1
     assert any("singular (its loops have 2 freedoms there, 1 nearby)" in note.text for note in robot.notes)
 
 
 def test_a_collinear_zero_pose_that_is_open_is_pushed_and_solved(tmp_path: Path):
-    lengths = [("p", "one", "base", origin(0)), ("q", "two", "one", origin(0.1)), ("r", "three", "two", origin(0.2)),
-               ("s", "four", "base", origin(0)), ("t", "five", "four", origin(0.4))]
+    lengths = [
+        ("p", "one", "base", origin(0)),
+        ("q", "two", "one", origin(0.1)),
+        ("r", "three", "two", origin(0.2)),
+        ("s", "four", "base", origin(0)),
+        ("t", "five", "four", origin(0.4)),
+    ]
     robot = read(tmp_path, bars(lengths, revolute("three", 0.3, "five", 0.5)))
     assert mobility(robot) == 3
     (solved,) = [note.text for note in robot.notes if note.kind == "solved"]
@@ -69,8 +81,12 @@ def test_a_collinear_zero_pose_that_is_open_is_pushed_and_solved(tmp_path: Path)
 
 def test_an_open_zero_pose_is_solved_with_its_joints_told(tmp_path: Path):
     moved = TREE.replace('<origin xyz="2.2 0.0 0.0"', '<origin xyz="2.4 0.0 0.0"')
-    robot = read(tmp_path, urdf(f'<loop name="d" type="spherical">{ends("predecessor", "rocker")}'
-                                f'{ends("successor", "bar")}</loop>').replace(TREE, moved))
+    robot = read(
+        tmp_path,
+        urdf(
+            f'<loop name="d" type="spherical">{ends("predecessor", "rocker")}{ends("successor", "bar")}</loop>'
+        ).replace(TREE, moved),
+    )
     assert mobility(normal_form(robot).mechanism) == 1
     (told,) = [note.text for note in robot.notes if note.kind == "solved"]
     assert "b = " in told
@@ -86,8 +102,11 @@ def test_what_cannot_be_closed_is_refused(tmp_path: Path):
 def noisy(size: float) -> str:
     """A planar four-bar away from flat poses, whose closing axis is tilted by ``size``."""
     rest = ' rpy="0 0 {}"'.format
-    lengths = [("p", "one", "base", origin(0, rest(1.2))), ("q", "two", "one", origin(1, rest(-1.2))),
-               ("r", "three", "base", origin(2, rest(1.2)))]
+    lengths = [
+        ("p", "one", "base", origin(0, rest(1.2))),
+        ("q", "two", "one", origin(1, rest(-1.2))),
+        ("r", "three", "base", origin(2, rest(1.2))),
+    ]
     return bars(lengths, revolute("two", 2.0, "three", 1.0, f' rpy="{size} 0 0"'))
 
 
@@ -118,9 +137,14 @@ def test_rods_and_axes_of_six_digits_are_equal_and_parallel(tmp_path: Path):
     from hrsynth.description.formats.sdf.write import write
 
     rng, robot = np.random.default_rng(3), replace(with_rods(), observations=())
-    joints = {name: replace(joint, point=joint.point + 2e-6 * rng.uniform(-1, 1, 3),
-                            axes=tuple(axis + 2e-6 * rng.uniform(-1, 1, 3) for axis in joint.axes))
-              for name, joint in robot.joints.items()}
+    joints = {
+        name: replace(
+            joint,
+            point=joint.point + 2e-6 * rng.uniform(-1, 1, 3),
+            axes=tuple(axis + 2e-6 * rng.uniform(-1, 1, 3) for axis in joint.axes),
+        )
+        for name, joint in robot.joints.items()
+    }
     setting = ObservedRobot.of(read(tmp_path, write(replace(robot, joints=joints)).texts[0], "sdf"), samples=3)
     meant = ObservedRobot.of(robot, samples=3)
     assert setting.anatomy.architecture() == meant.anatomy.architecture()
@@ -145,7 +169,8 @@ def test_a_mimic_is_a_gear_and_no_motor(tmp_path: Path):
 
 def test_a_gear_that_would_hold_its_joint_is_refused_and_the_joint_frozen(tmp_path: Path):
     text = bars([("p", "one", "base", origin(0)), ("q", "two", "one", origin(1))], "").replace(
-        '<child link="two"/>', '<child link="two"/><mimic joint="p" multiplier="0"/>')
+        '<child link="two"/>', '<child link="two"/><mimic joint="p" multiplier="0"/>'
+    )
     told = r"urdf:\d+: coupling 'mimic_q', which would hold joint 'q', found 0.0, .*freeze q"
     with pytest.raises(BadMechanism, match=told):
         read(tmp_path, text, platform="two")
@@ -169,8 +194,10 @@ def test_gears_stay_with_their_joints_whatever_link_is_the_base(tmp_path: Path):
         text = text.replace(f'<child link="{link}"/>', f'<child link="{link}"/><mimic joint="p" multiplier="{ratio}"/>')
     back = read(tmp_path, text, base="tip", platform="base")
     assert full_mobility(back) == 1
-    assert [(c.predecessor, c.successor, c.ratio) for c in back.couplings] == [("base", "one", 0.5),
-                                                                               ("base", "two", -0.7)]
+    assert [(c.predecessor, c.successor, c.ratio) for c in back.couplings] == [
+        ("base", "one", 0.5),
+        ("base", "two", -0.7),
+    ]
     twin = PinocchioModel(back)
     at_zero = ClosedConfiguration.of(twin, twin.q0)
     base, one = (at_zero.velocity(link)[5] @ at_zero.kernel()[0] for link in ("base", "one"))
@@ -182,10 +209,14 @@ def test_gears_stay_with_their_joints_whatever_link_is_the_base(tmp_path: Path):
 
 
 def test_a_screw_of_either_convention_couples_turn_and_travel(tmp_path: Path):
-    text = ('<sdf version="1.10"><model name="m"><link name="base"/><link name="nut"/><joint name="s" type="screw">'
-            '<parent>base</parent><child>nut</child><axis><xyz>0 0 1</xyz></axis>{}</joint></model></sdf>')
-    for pitch, lead in (("<screw_thread_pitch>0.5</screw_thread_pitch>", 0.5), ("<thread_pitch>-4</thread_pitch>",
-                                                                                2 * np.pi / 4)):
+    text = (
+        '<sdf version="1.10"><model name="m"><link name="base"/><link name="nut"/><joint name="s" type="screw">'
+        "<parent>base</parent><child>nut</child><axis><xyz>0 0 1</xyz></axis>{}</joint></model></sdf>"
+    )
+    for pitch, lead in (
+        ("<screw_thread_pitch>0.5</screw_thread_pitch>", 0.5),
+        ("<thread_pitch>-4</thread_pitch>", 2 * np.pi / 4),
+    ):
         robot = read(tmp_path, text.format(pitch), "sdf", platform="nut")
         assert full_mobility(robot) == 1
         twin = PinocchioModel(robot)
@@ -196,8 +227,10 @@ def test_a_screw_of_either_convention_couples_turn_and_travel(tmp_path: Path):
 
 def test_a_gearbox_couples_the_two_joints_on_its_reference_body(tmp_path: Path):
     def joint(name: str, kind: str, parent: str, child: str, extra: str = "") -> str:
-        return (f'<joint name="{name}" type="{kind}"><parent>{parent}</parent><child>{child}</child>'
-                f'<axis><xyz>0 0 1</xyz></axis>{extra}</joint>')
+        return (
+            f'<joint name="{name}" type="{kind}"><parent>{parent}</parent><child>{child}</child>'
+            f"<axis><xyz>0 0 1</xyz></axis>{extra}</joint>"
+        )
 
     gear = "<gearbox_reference_body>base</gearbox_reference_body><gearbox_ratio>0.25</gearbox_ratio>"
     links = "".join(f'<link name="{name}"/>' for name in ("base", "fast", "slow"))
@@ -210,8 +243,9 @@ def test_a_gearbox_couples_the_two_joints_on_its_reference_body(tmp_path: Path):
 
 
 def test_a_mimic_of_sdformat_follows_its_joint_from_a_reference(tmp_path: Path):
-    joint = ('<joint name="{}" type="revolute"><parent>{}</parent><child>{}</child><axis><xyz>0 0 1</xyz>{}</axis>'
-             "</joint>")
+    joint = (
+        '<joint name="{}" type="revolute"><parent>{}</parent><child>{}</child><axis><xyz>0 0 1</xyz>{}</axis></joint>'
+    )
     mimic = '<mimic joint="{}"><multiplier>-2</multiplier><offset>0.5</offset><reference>0.1</reference></mimic>'
     links = "".join(f'<link name="{name}"/>' for name in ("base", "one", "two"))
     joints = joint.format("p", "base", "one", "") + joint.format("q", "one", "two", mimic)
@@ -227,8 +261,10 @@ def test_a_mimic_of_sdformat_follows_its_joint_from_a_reference(tmp_path: Path):
 
 
 def test_missing_second_axes_are_the_default_and_a_guess(tmp_path: Path):
-    text = ('<sdf version="1.5"><model name="m"><link name="base"/><link name="arm"/><joint name="u" type="{}">'
-            '<parent>base</parent><child>arm</child><axis><xyz>{}</xyz></axis></joint></model></sdf>')
+    text = (
+        '<sdf version="1.5"><model name="m"><link name="base"/><link name="arm"/><joint name="u" type="{}">'
+        "<parent>base</parent><child>arm</child><axis><xyz>{}</xyz></axis></joint></model></sdf>"
+    )
     for kind in ("universal", "revolute2"):
         robot = read(tmp_path, text.format(kind, "1 0 0"), "sdf")
         (joint,) = robot.joints.values()
@@ -240,10 +276,12 @@ def test_missing_second_axes_are_the_default_and_a_guess(tmp_path: Path):
 
 
 def test_frames_that_do_not_coincide_are_brought_together(tmp_path: Path):
-    text = ('<sdf version="1.7"><model name="m"><frame name="hook" attached_to="world"><pose>0 0 3 0 0 0</pose></frame>'
-            '<link name="arm"/><link name="hand"><pose>1 0 0 0 0 0</pose></link>'
-            '<joint name="j" type="revolute"><parent>hook</parent><child>arm</child></joint>'
-            '<joint name="k" type="revolute"><parent>arm</parent><child>hand</child></joint></model></sdf>')
+    text = (
+        '<sdf version="1.7"><model name="m"><frame name="hook" attached_to="world"><pose>0 0 3 0 0 0</pose></frame>'
+        '<link name="arm"/><link name="hand"><pose>1 0 0 0 0 0</pose></link>'
+        '<joint name="j" type="revolute"><parent>hook</parent><child>arm</child></joint>'
+        '<joint name="k" type="revolute"><parent>arm</parent><child>hand</child></joint></model></sdf>'
+    )
     robot = read(tmp_path, text, "sdf")
     assert np.allclose(robot.links["arm"].pose[:3, 3], [0, 0, 3])
     assert np.allclose(robot.joints["k"].point, [1, 0, 3])
@@ -278,29 +316,44 @@ def test_euler_angles_follow_their_sequence(R: str, tmp_path: Path):
     assert np.allclose(radians.links["b"].pose[:3, :3], expected)
 
 
-@pytest.mark.parametrize(("given", "matrix"), [
-    ('quat="0 0 0 2"', [[-1, 0, 0], [0, -1, 0], [0, 0, 1]]),
-    ('axisangle="0 0 3 90"', [[0, -1, 0], [1, 0, 0], [0, 0, 1]]),
-    ('xyaxes="0 1 0 -1 0 0"', [[0, -1, 0], [1, 0, 0], [0, 0, 1]]),
-    ('zaxis="1 0 0"', [[0, 0, 1], [0, 1, 0], [-1, 0, 0]])])
+@pytest.mark.parametrize(
+    ("given", "matrix"),
+    [
+        ('quat="0 0 0 2"', [[-1, 0, 0], [0, -1, 0], [0, 0, 1]]),
+        ('axisangle="0 0 3 90"', [[0, -1, 0], [1, 0, 0], [0, 0, 1]]),
+        ('xyaxes="0 1 0 -1 0 0"', [[0, -1, 0], [1, 0, 0], [0, 0, 1]]),
+        ('zaxis="1 0 0"', [[0, 0, 1], [0, 1, 0], [-1, 0, 0]]),
+    ],
+)
 def test_orientations_of_mjcf(given: str, matrix: list, tmp_path: Path):
     robot = read(tmp_path, f'<mujoco><worldbody><body name="b" {given}><joint/></body></worldbody></mujoco>', "xml")
     assert np.allclose(robot.links["b"].pose[:3, :3], matrix)
 
 
 def test_default_classes_are_inherited_and_overridden(tmp_path: Path):
-    head = ('<default><joint axis="0 1 0"/><default class="s"><joint type="slide"/><default class="t">'
-            '<joint axis="1 0 0"/></default></default></default>')
-    body = ('<worldbody><body name="p"><joint name="h"/><body name="q" childclass="s"><joint name="i"/><body name="r">'
-            '<joint name="j" class="t"/></body></body></body></worldbody>')
+    head = (
+        '<default><joint axis="0 1 0"/><default class="s"><joint type="slide"/><default class="t">'
+        '<joint axis="1 0 0"/></default></default></default>'
+    )
+    body = (
+        '<worldbody><body name="p"><joint name="h"/><body name="q" childclass="s"><joint name="i"/><body name="r">'
+        '<joint name="j" class="t"/></body></body></body></worldbody>'
+    )
     joints = read(tmp_path, f"<mujoco>{head}{body}</mujoco>", "xml").joints
     assert [(joint.type.value, tuple(joint.axis)) for joint in joints.values()] == [
-        ("R", (0, 1, 0)), ("P", (0, 1, 0)), ("P", (1, 0, 0))]
+        ("R", (0, 1, 0)),
+        ("P", (0, 1, 0)),
+        ("P", (1, 0, 0)),
+    ]
 
 
 def test_unnamed_bodies_several_joints_and_the_free_world(tmp_path: Path):
-    robot = read(tmp_path, '<mujoco><worldbody><body><freejoint/><body><joint type="slide" axis="1 0 0"/>'
-                 '<joint type="hinge" pos="0 0 1"/><joint axis="0 1 0"/></body></body></worldbody></mujoco>', "xml")
+    robot = read(
+        tmp_path,
+        '<mujoco><worldbody><body><freejoint/><body><joint type="slide" axis="1 0 0"/>'
+        '<joint type="hinge" pos="0 0 1"/><joint axis="0 1 0"/></body></body></worldbody></mujoco>',
+        "xml",
+    )
     assert [joint.type.value for joint in robot.joints.values()] == ["6", "P", "R", "R"]
     assert full_mobility(robot) == 9
     assert robot.base == "world"
@@ -327,16 +380,26 @@ def test_actuators_on_passive_joints_are_told(tmp_path: Path):
 
 
 def test_joint_types_of_the_yaml_replace_those_of_the_urdf(tmp_path: Path):
-    (tmp_path / "robot.yaml").write_text("joint_name: ['q', 'r']\njoint_type: ['SPHERICAL', 'UJOINT_XY']\n"
-                                         "closed_loop: []\n")
-    robot = read(tmp_path, bars([("p", "one", "base", origin(0)), ("q", "two", "one", origin(1)),
-                                 ("r", "three", "two", origin(1))], ""))
+    (tmp_path / "robot.yaml").write_text(
+        "joint_name: ['q', 'r']\njoint_type: ['SPHERICAL', 'UJOINT_XY']\nclosed_loop: []\n"
+    )
+    robot = read(
+        tmp_path,
+        bars([("p", "one", "base", origin(0)), ("q", "two", "one", origin(1)), ("r", "three", "two", origin(1))], ""),
+    )
     assert [joint.type.value for joint in robot.joints.values()] == ["R", "S", "U"]
     assert np.allclose(robot.joints["r"].axes, [[1, 0, 0], [0, 1, 0]])
 
 
-@pytest.mark.parametrize(("wish", "kind"), [("rocker_tip:bar_tip", "R"), ("rocker_tip:bar_tip:spherical", "R"),
-                                            ("rocker_tip:bar_tip:revolute", "R"), ("rocker_tip:bar_tip:fixed", None)])
+@pytest.mark.parametrize(
+    ("wish", "kind"),
+    [
+        ("rocker_tip:bar_tip", "R"),
+        ("rocker_tip:bar_tip:spherical", "R"),
+        ("rocker_tip:bar_tip:revolute", "R"),
+        ("rocker_tip:bar_tip:fixed", None),
+    ],
+)
 def test_a_closure_may_be_given(wish: str, kind: str | None, tmp_path: Path):
     from description.foreign.examples import _frame
 
@@ -360,9 +423,18 @@ def test_motors_platform_freeze_and_observed_links_may_be_given(tmp_path: Path):
     direction = robot.links["crank"].pose[:3, :3] @ seen.direction
     assert np.allclose(direction, (B - A) / np.linalg.norm(B - A))
     assert mobility(read(tmp_path, text, platform="bar", freeze=["a"])) == 0
-    for wrong in ({"platform": "none"}, {"base": "none"}, {"motors": "none"}, {"freeze": ["none"]}, {"observe": "none"},
-                  {"close": ["bar"]}, {"close": ["bar:none"]}, {"close": ["bar:bar"]}, {"close": ["bar:base:odd"]},
-                  {"platform": "base"}):
+    for wrong in (
+        {"platform": "none"},
+        {"base": "none"},
+        {"motors": "none"},
+        {"freeze": ["none"]},
+        {"observe": "none"},
+        {"close": ["bar"]},
+        {"close": ["bar:none"]},
+        {"close": ["bar:bar"]},
+        {"close": ["bar:base:odd"]},
+        {"platform": "base"},
+    ):
         with pytest.raises(BadRequest):
             read(tmp_path, text, **wrong)
 
@@ -374,8 +446,9 @@ def test_a_tool_on_a_fixed_joint_may_be_the_platform(tmp_path: Path):
     from hrsynth.description import native
 
     tool = '<link name="tool"/><joint name="tool_frame" type="fixed"><parent link="bar"/><child link="tool"/></joint>'
-    named = FOUR_BAR.replace('<platform link="bar"/>', '<platform link="tool"/>').replace("<transmission", tool
-                                                                                          + "<transmission", 1)
+    named = FOUR_BAR.replace('<platform link="bar"/>', '<platform link="tool"/>').replace(
+        "<transmission", tool + "<transmission", 1
+    )
     assert normal_form(native.parse(named)).mechanism.platform == "tool"
     assert check(native.parse(named)).postures[0].dof == 1
     text = FILES["urdf: urdf+"]["robot.urdf"].replace("</robot>", _frame("tool", "bar", B) + "</robot>")
@@ -384,8 +457,11 @@ def test_a_tool_on_a_fixed_joint_may_be_the_platform(tmp_path: Path):
 
 
 def test_the_way_between_two_links_is_all_that_counts(tmp_path: Path):
-    limbs = CHAIN.format("arm", "arm", "bar", "continuous", origin(1)) + CHAIN.format(
-        "hand", "hand", "arm", "continuous", origin(1)) + CHAIN.format("tail", "tail", "base", "continuous", origin(0))
+    limbs = (
+        CHAIN.format("arm", "arm", "bar", "continuous", origin(1))
+        + CHAIN.format("hand", "hand", "arm", "continuous", origin(1))
+        + CHAIN.format("tail", "tail", "base", "continuous", origin(0))
+    )
     text = FILES["urdf: urdf+"]["robot.urdf"].replace("</robot>", limbs + "</robot>")
     whole = read(tmp_path, text, platform="bar")
     part = read(tmp_path, text, platform="bar", base="base")
@@ -429,12 +505,18 @@ def test_loops_that_rounding_may_hold_are_refused_as_such(tmp_path: Path):
 def test_the_free_joint_of_a_platform_is_no_way_to_the_base(tmp_path: Path):
     legs, closures, sites = "", "", ""
     for k, (x, y) in enumerate([(0.3, 0.1), (-0.3, 0.0), (0.1, -0.3)], 1):
-        legs += (f'<body name="crank{k}" pos="{x} {y} 0"><joint type="hinge" axis="0 0 1"/>'
-                 f'<body name="rod{k}" pos="0.02 0.1 0"><joint type="hinge" axis="0 0 1"/>'
-                 f'<site name="tip{k}" pos="{-0.7 * x} {-0.7 * y} 0"/></body></body>')
+        legs += (
+            f'<body name="crank{k}" pos="{x} {y} 0"><joint type="hinge" axis="0 0 1"/>'
+            f'<body name="rod{k}" pos="0.02 0.1 0"><joint type="hinge" axis="0 0 1"/>'
+            f'<site name="tip{k}" pos="{-0.7 * x} {-0.7 * y} 0"/></body></body>'
+        )
         sites += f'<site name="at{k}" pos="{0.3 * x + 0.02} {0.3 * y + 0.1} 0"/>'
         closures += f'<connect site1="tip{k}" site2="at{k}"/>'
-    robot = read(tmp_path, f'<mujoco><worldbody>{legs}<body name="plate"><freejoint/>{sites}</body></worldbody>'
-                           f'<equality>{closures}</equality></mujoco>', "xml")
+    robot = read(
+        tmp_path,
+        f'<mujoco><worldbody>{legs}<body name="plate"><freejoint/>{sites}</body></worldbody>'
+        f"<equality>{closures}</equality></mujoco>",
+        "xml",
+    )
     assert robot.platform == "plate"
     assert "the platform is link 'plate', which 3 ways connect to the base" in "".join(map(str, robot.notes))

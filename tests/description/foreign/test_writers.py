@@ -64,7 +64,8 @@ def test_joints_of_every_type_come_back(seed: int, ending: str, tmp_path: Path):
 
 def test_gears_are_written_where_the_dialect_has_them(tmp_path: Path):
     text = bars([("p", "one", "base", origin(0)), ("q", "two", "one", origin(1))], "").replace(
-        '<child link="two"/>', '<child link="two"/><mimic joint="p" multiplier="-2"/>')
+        '<child link="two"/>', '<child link="two"/><mimic joint="p" multiplier="-2"/>'
+    )
     robot = read(tmp_path, text)
     for ending in ENDINGS:
         assert save(robot, tmp_path / f"out{ending}") == ()
@@ -99,8 +100,10 @@ def test_an_unknown_dialect_is_refused_and_the_given_one_counts(tmp_path: Path):
 @pytest.mark.parametrize(("tree", "loops"), [("a", "a"), ("tree", "loops"), ("robot", "robot")])
 def test_of_two_files_that_are_read_together_none_is_replaced_alone(tmp_path: Path, tree: str, loops: str):
     save(load("3rrr_m1"), tmp_path / "a.yaml")
-    pair = [(tmp_path / "a.urdf").rename(tmp_path / f"{tree}.urdf"),
-            (tmp_path / "a.yaml").rename(tmp_path / f"{loops}.yaml")]
+    pair = [
+        (tmp_path / "a.urdf").rename(tmp_path / f"{tree}.urdf"),
+        (tmp_path / "a.yaml").rename(tmp_path / f"{loops}.yaml"),
+    ]
     before = [each.read_bytes() for each in pair]
     assert load(pair[1]).differences(load("3rrr_m1")) == []
     for path, other in (pair, pair[::-1]):

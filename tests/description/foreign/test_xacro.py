@@ -19,7 +19,9 @@ from hrsynth.errors import BadRobotFile, HrsynthError
 xacro = pytest.importorskip("xacro")
 
 HEAD = '<robot name="arms" xmlns:xacro="http://www.ros.org/wiki/xacro">\n'
-PARTS = HEAD + """  <xacro:property name="crank" value="0.4"/>
+PARTS = (
+    HEAD
+    + """  <xacro:property name="crank" value="0.4"/>
   <xacro:macro name="leg" params="n x *axis">
     <link name="prox_${n}"/>
     <link name="dist_${n}"/>
@@ -33,7 +35,10 @@ PARTS = HEAD + """  <xacro:property name="crank" value="0.4"/>
   </xacro:macro>
 </robot>
 """
-MAIN = HEAD + """  <xacro:include filename="parts.xacro"/>
+)
+MAIN = (
+    HEAD
+    + """  <xacro:include filename="parts.xacro"/>
   <xacro:arg name="wide" default="0.3"/>
   <xacro:property name="w" value="$(arg wide)"/>
   <xacro:property name="tip" value="${sqrt(0.36)}"/>
@@ -51,6 +56,7 @@ MAIN = HEAD + """  <xacro:include filename="parts.xacro"/>
   <hrsynth> <platform link="dist_1"/> </hrsynth>
 </robot>
 """
+)
 
 
 def written(folder: Path, old: str = "", new: str = "") -> Path:
@@ -85,24 +91,30 @@ def test_expressions_alone_are_expanded(tmp_path: Path):
     """A file without a macro or property that declares the prefix."""
     plain = native.write(load(written(tmp_path)))
     assert 'xyz="-0.3 0 0"' in plain
-    (tmp_path / "robot.urdf.xacro").write_text(plain.replace('xyz="-0.3 0 0"', 'xyz="${-0.6 / 2} 0 0"', 1).replace(
-        "<robot ", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" ', 1))
+    (tmp_path / "robot.urdf.xacro").write_text(
+        plain.replace('xyz="-0.3 0 0"', 'xyz="${-0.6 / 2} 0 0"', 1).replace(
+            "<robot ", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" ', 1
+        )
+    )
     (tmp_path / "plain.urdf").write_text(plain)
     assert load(tmp_path / "robot.urdf.xacro").differences(load(tmp_path / "plain.urdf")) == []
 
 
-@pytest.mark.parametrize(("old", "new", "place", "words"), [
-    ('parent link="base"', 'parent link="bass"', "<joint name=\"shoulder", "unknown link, found bass"),
-    ('xyz="${x} 0 0"', 'xyz="${x} 0"', 'xyz="${x} 0"', "allowed: 3 numbers"),
-    ('xyz="${1.5', 'xyz="a ${1.5', "<predecessor", "finite numbers"),
-    ("${x / 2}", "${x / nothing}", "x / nothing", "name 'nothing' is not defined"),
-    ("sqrt(0.36)", "sqrt(0.36", "<predecessor", "'(' was never closed"),
-    ("sqrt(0.36)", "root(0.36)", "<predecessor", "name 'root' is not defined"),
-    ('n="2" x="${w}"', 'n="2"', 'leg n="2"', "Undefined parameters [x] (in macro 'leg')"),
-    ('"parts.xacro"', '"part.xacro"', "part.xacro", "No such file"),
-    ('<link name="prox_${n}"/>', '<link name="prox_${n}">', "</xacro:macro>", "mismatched tag"),
-    ("${w > 0}", "${w > 0", "<xacro:if", "xacro refuses it"),
-])
+@pytest.mark.parametrize(
+    ("old", "new", "place", "words"),
+    [
+        ('parent link="base"', 'parent link="bass"', '<joint name="shoulder', "unknown link, found bass"),
+        ('xyz="${x} 0 0"', 'xyz="${x} 0"', 'xyz="${x} 0"', "allowed: 3 numbers"),
+        ('xyz="${1.5', 'xyz="a ${1.5', "<predecessor", "finite numbers"),
+        ("${x / 2}", "${x / nothing}", "x / nothing", "name 'nothing' is not defined"),
+        ("sqrt(0.36)", "sqrt(0.36", "<predecessor", "'(' was never closed"),
+        ("sqrt(0.36)", "root(0.36)", "<predecessor", "name 'root' is not defined"),
+        ('n="2" x="${w}"', 'n="2"', 'leg n="2"', "Undefined parameters [x] (in macro 'leg')"),
+        ('"parts.xacro"', '"part.xacro"', "part.xacro", "No such file"),
+        ('<link name="prox_${n}"/>', '<link name="prox_${n}">', "</xacro:macro>", "mismatched tag"),
+        ("${w > 0}", "${w > 0", "<xacro:if", "xacro refuses it"),
+    ],
+)
 def test_a_mistake_is_told_where_it_is(old: str, new: str, place: str, words: str, tmp_path: Path):
     path = written(tmp_path, old, new)
     with pytest.raises(BadRobotFile) as refused:
@@ -123,7 +135,8 @@ def test_an_open_loop_is_told_where_it_is(tmp_path: Path):
 def test_lint_tells_lines(tmp_path: Path):
     found = hrsynth.lint(written(tmp_path, 'parent link="base"', 'parent link="bass"')).findings
     assert {f"{each.file}:{each.line}" for each in found if "unknown link" in each.message} == {
-        place_of(tmp_path, '<joint name="shoulder')}
+        place_of(tmp_path, '<joint name="shoulder')
+    }
 
 
 NAMES = {**CONSTANTS, "x": 0.25, "n": 3, "side": "left", "legs": {"a": {"length": 2}, "b": [1, 2.5]}, "none": None}
@@ -133,11 +146,15 @@ NUMBER = st.recursive(
     lambda part: st.one_of(
         st.tuples(part, st.sampled_from(["+", "-", "*", "/", "//", "%"]), part).map(lambda each: f"({' '.join(each)})"),
         st.tuples(part, st.sampled_from(["<", "<=", "==", "!="]), part, part, part).map(
-            lambda each: f"({each[3]} if {each[0]} {each[1]} {each[2]} else {each[4]})"),
+            lambda each: f"({each[3]} if {each[0]} {each[1]} {each[2]} else {each[4]})"
+        ),
         st.tuples(part, st.sampled_from(["and", "or"]), part).map(lambda each: f"({' '.join(each)})"),
         st.tuples(st.sampled_from(["cos", "abs", "float", "not"]), part).map(lambda each: f"({each[0]} ({each[1]}))"),
         st.tuples(part, part).map(lambda each: f"max({each[0]}, {each[1]})"),
-        part.map(lambda each: f"[{each}, 1, {each}][-1]")), max_leaves=8)
+        part.map(lambda each: f"[{each}, 1, {each}][-1]"),
+    ),
+    max_leaves=8,
+)
 
 
 def outcome(call, text: str):
@@ -154,12 +171,23 @@ def test_expressions_have_the_value_that_python_gives(text: str):
     assert repr(mine) == repr(outcome(lambda each: eval(each, {**FUNCTIONS, **NAMES, "math": math}), text))
 
 
-@pytest.mark.parametrize(("text", "value"), [
-    ("'leg_' + side", "leg_left"), ("'%s_%d' % (side, n)", "left_3"), ("side == 'left' and n in [1, 3]", True),
-    ("legs.a.length", 2), ("side.upper()[0:2]", "LE"), ("math.sqrt(math.pi ** 2)", math.pi), ("1 < n < 4", True),
-    ("none is None", True), ("'a,b'.split(',')[1]", "b"), ("dict(k=n)['k']", 3), ("list(range(2))", [0, 1]),
-    ("2 ** 3 ** 2", 512),
-])
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("'leg_' + side", "leg_left"),
+        ("'%s_%d' % (side, n)", "left_3"),
+        ("side == 'left' and n in [1, 3]", True),
+        ("legs.a.length", 2),
+        ("side.upper()[0:2]", "LE"),
+        ("math.sqrt(math.pi ** 2)", math.pi),
+        ("1 < n < 4", True),
+        ("none is None", True),
+        ("'a,b'.split(',')[1]", "b"),
+        ("dict(k=n)['k']", 3),
+        ("list(range(2))", [0, 1]),
+        ("2 ** 3 ** 2", 512),
+    ],
+)
 def test_expressions_of_robot_files_are_evaluated(text: str, value: object):
     assert Expression(NAMES, FUNCTIONS).evaluate(text) == value
 
@@ -167,17 +195,31 @@ def test_expressions_of_robot_files_are_evaluated(text: str, value: object):
 OBJECTS = "python.vars(python.type(python.type(0)))['__getattribute__'](python.type(0), '__base__')"
 ESCAPES = {
     "an inner code object": "(lambda: [c for c in ().__class__.__base__.__subclasses__() if c.__name__ == "
-                            "'_wrap_close'][0].__init__.__globals__['system']('touch MADE'))()",
+    "'_wrap_close'][0].__init__.__globals__['system']('touch MADE'))()",
     "vars of a type": f"python.vars({OBJECTS})['__getattribute__'](xacro.load_yaml, '__globals__')['os']"
-                      ".system('touch MADE')",
+    ".system('touch MADE')",
     "a format": "'{0.__class__.__init__.__globals__}'.format(legs)",
     "a function as a value": "[xacro.load_yaml][0]('x')",
-    "a type": "python.type(0)", "vars": "vars(math)", "a module": "math", "a namespace": "xacro", "hash": "python.hash",
-    "a comprehension": "[c for c in 'ab']", "a lambda": "(lambda: 0)", "a walrus": "(a := 1)",
-    "an f-string": "f'{side!r}'", "a starred": "max(*[1, 2])", "double stars": "dict(**legs)",
-    "bytes": "b'a'", "a dunder": "side.__class__",
-    "a generator": "sum(i for i in [1])", "await": "await side", "an item of a text": "side.real",
-    "import": "__import__('os')", "eval": "eval('1')", "open": "open('MADE', 'w')", "getattr": "getattr(side, 'upper')",
+    "a type": "python.type(0)",
+    "vars": "vars(math)",
+    "a module": "math",
+    "a namespace": "xacro",
+    "hash": "python.hash",
+    "a comprehension": "[c for c in 'ab']",
+    "a lambda": "(lambda: 0)",
+    "a walrus": "(a := 1)",
+    "an f-string": "f'{side!r}'",
+    "a starred": "max(*[1, 2])",
+    "double stars": "dict(**legs)",
+    "bytes": "b'a'",
+    "a dunder": "side.__class__",
+    "a generator": "sum(i for i in [1])",
+    "await": "await side",
+    "an item of a text": "side.real",
+    "import": "__import__('os')",
+    "eval": "eval('1')",
+    "open": "open('MADE', 'w')",
+    "getattr": "getattr(side, 'upper')",
 }
 
 
@@ -204,10 +246,19 @@ def test_opening_a_file_runs_nothing(name: str, form: str, tmp_path: Path, monke
 ATOMS = st.sampled_from(["x", "legs", "side", "math", "max", "str", "1", "''", "None"])
 
 
-@given(st.recursive(ATOMS, lambda part: st.one_of(
-    part.map(lambda each: f"({each}).upper"), st.tuples(part, part).map(lambda each: f"{each[0]}[{each[1]}]"),
-    st.tuples(part, part).map(lambda each: f"{each[0]}({each[1]})"), part.map(lambda each: f"{each}.__class__"),
-    st.tuples(part, part).map(lambda each: f"({each[0]} + {each[1]})"), part.map(lambda each: f"dict(k={each})"))))
+@given(
+    st.recursive(
+        ATOMS,
+        lambda part: st.one_of(
+            part.map(lambda each: f"({each}).upper"),
+            st.tuples(part, part).map(lambda each: f"{each[0]}[{each[1]}]"),
+            st.tuples(part, part).map(lambda each: f"{each[0]}({each[1]})"),
+            part.map(lambda each: f"{each}.__class__"),
+            st.tuples(part, part).map(lambda each: f"({each[0]} + {each[1]})"),
+            part.map(lambda each: f"dict(k={each})"),
+        ),
+    )
+)
 def test_no_expression_has_an_object_of_python_as_its_value(text: str):
     try:
         found = Expression(NAMES, FUNCTIONS).evaluate(text)
@@ -224,10 +275,16 @@ def test_no_expression_has_an_object_of_python_as_its_value(text: str):
 
 
 LARGE = {
-    "a power": "${9 ** 9 ** 9}", "a text": "${'a' * 10 ** 12}", "a list": "${list(range(10 ** 12))}",
-    "a width": "${'%999999999999d' % 1}", "a factorial": "${factorial(10 ** 9)}", "a long name": "${'a' * 10 ** 8}",
-    "signs": "${" + "-" * 5000 + "1}", "parentheses": "${" + "(" * 5000 + "1" + ")" * 5000 + "}",
-    "another file": "${xacro.load_yaml('/etc/passwd')}", "a file above": "${xacro.load_yaml('../settings.yaml')}",
+    "a power": "${9 ** 9 ** 9}",
+    "a text": "${'a' * 10 ** 12}",
+    "a list": "${list(range(10 ** 12))}",
+    "a width": "${'%999999999999d' % 1}",
+    "a factorial": "${factorial(10 ** 9)}",
+    "a long name": "${'a' * 10 ** 8}",
+    "signs": "${" + "-" * 5000 + "1}",
+    "parentheses": "${" + "(" * 5000 + "1" + ")" * 5000 + "}",
+    "another file": "${xacro.load_yaml('/etc/passwd')}",
+    "a file above": "${xacro.load_yaml('../settings.yaml')}",
 }
 
 
@@ -248,7 +305,8 @@ def test_large_values_and_other_files_are_refused_in_time(name: str, tmp_path: P
 def test_the_environment_is_not_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("HRSYNTH_SECRET", "secret")
     (tmp_path / "robot.urdf").write_text(
-        HEAD + '<link name="a$(optenv HRSYNTH_SECRET none)b$(env HRSYNTH_SECRET)"/></robot>')
+        HEAD + '<link name="a$(optenv HRSYNTH_SECRET none)b$(env HRSYNTH_SECRET)"/></robot>'
+    )
     assert expand(tmp_path / "robot.urdf")[0].get("name") == "anoneb"
 
 
@@ -277,7 +335,7 @@ def test_a_package_ends_where_it_says_so(tmp_path: Path):
     (inner / "linked").symlink_to(tmp_path / "outer")
 
     def reads(spec: str) -> bool:
-        path.write_text(HEAD + f'<link name="a${{load_yaml(\'{spec}\').name}}"/></robot>')
+        path.write_text(HEAD + f"<link name=\"a${{load_yaml('{spec}').name}}\"/></robot>")
         try:
             return expand(path)[0].get("name") != ""
         except BadRobotFile:
@@ -292,7 +350,9 @@ def test_a_package_ends_where_it_says_so(tmp_path: Path):
 def test_what_the_package_warns_of_is_not_collected(tmp_path: Path):
     name = "n" * 200_000
     path = tmp_path / "robot.urdf"
-    path.write_text(HEAD + f'<xacro:macro name="{name}" params="k"><xacro:property name="pi" value="1"/>'
-                    f'<xacro:if value="${{k}}"><xacro:{name} k="${{k - 1}}"/></xacro:if></xacro:macro>'
-                    f'<xacro:{name} k="20"/><link name="a"/></robot>')
+    path.write_text(
+        HEAD + f'<xacro:macro name="{name}" params="k"><xacro:property name="pi" value="1"/>'
+        f'<xacro:if value="${{k}}"><xacro:{name} k="${{k - 1}}"/></xacro:if></xacro:macro>'
+        f'<xacro:{name} k="20"/><link name="a"/></robot>'
+    )
     assert expand(path)[0].get("name") == "a"

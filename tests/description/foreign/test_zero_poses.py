@@ -28,8 +28,11 @@ def leg(seed: int, crank: float = 0.0, hips: int = 0) -> str:
     rng = np.random.default_rng(seed)
     turned = numbers(*quaternions(exponential(rng.normal(size=3))))
     a, b, c, d = rng.uniform([0.3, 0.35, 0.05, 0.2], [0.5, 0.5, 0.08, 0.3])
-    joints = "".join(f'<body name="hip{k}" pos="{numbers(*rng.uniform(-0.1, 0.1, 3))}">'
-                     f'<joint name="hip{k}" axis="{numbers(*rng.normal(size=3))}"/>' for k in range(hips))
+    joints = "".join(
+        f'<body name="hip{k}" pos="{numbers(*rng.uniform(-0.1, 0.1, 3))}">'
+        f'<joint name="hip{k}" axis="{numbers(*rng.normal(size=3))}"/>'
+        for k in range(hips)
+    )
     pin = np.array([c * np.cos(crank), c * np.sin(crank)])
     end = pin + [d, 0.0]  # where the foot's rod ends, in the shin
     pivot = end - [0.02, c]
@@ -61,7 +64,7 @@ def seen(robot: Mechanism, walk: np.random.Generator) -> dict[tuple[str, ...], i
         rho = oracle.relation(state, observed)
         t, u = rho[:6], rho[6:]
         _, s, right = np.linalg.svd(u)
-        still = right[int(np.sum(s > 1e-7)):].T
+        still = right[int(np.sum(s > 1e-7)) :].T
         found[labels] = span(t).shape[1] - (span(t @ still).shape[1] if still.size else 0)
     return found
 
@@ -123,8 +126,13 @@ def test_keyframes_place_all_links_as_mujoco_does(unit: str, tmp_path: Path):
     rng = np.random.default_rng(3)
     scale = 1.0 if unit == "radian" else 180 / np.pi
     poses = rng.uniform(-0.8, 0.8, (2, 14))
-    text = TREE.format(unit=unit, euler=numbers(*(scale * rng.normal(size=3))), ref=numbers(0.4 * scale),
-                       qpos=numbers(*poses[0]), other=numbers(*poses[1]))
+    text = TREE.format(
+        unit=unit,
+        euler=numbers(*(scale * rng.normal(size=3))),
+        ref=numbers(0.4 * scale),
+        qpos=numbers(*poses[0]),
+        other=numbers(*poses[1]),
+    )
     sound = text.replace('<key name="short" qpos="1 2"/>', "")
     model = mujoco.MjModel.from_xml_string(sound)
     for number, name in enumerate(("crouch", "1")):
@@ -142,9 +150,18 @@ def test_keyframes_place_all_links_as_mujoco_does(unit: str, tmp_path: Path):
 
 
 def test_a_keyframe_that_is_open_is_closed_beside_itself(tmp_path: Path):
-    robot = read(tmp_path, leg(1).replace("</mujoco>", """<keyframe><key name="home" qpos="0.99 0 0.1 0.1
-                 0.2 -0.1 0.1 0.9 -0.9 0.05"/></keyframe></mujoco>"""), "xml", base="pelvis", platform="foot",
-                 keyframe="home")
+    robot = read(
+        tmp_path,
+        leg(1).replace(
+            "</mujoco>",
+            """<keyframe><key name="home" qpos="0.99 0 0.1 0.1
+                 0.2 -0.1 0.1 0.9 -0.9 0.05"/></keyframe></mujoco>""",
+        ),
+        "xml",
+        base="pelvis",
+        platform="foot",
+        keyframe="home",
+    )
     (note,) = [note.text for note in robot.notes if note.kind == "solved"]
     assert note.startswith("at the keyframe 'home' the loop")
     oracle = Oracle(robot)
@@ -177,8 +194,11 @@ def test_postures_of_srdf_and_sdf(tmp_path: Path):
     (tmp_path / "urdf").mkdir()
     elsewhere = tmp_path / "urdf" / "arm.urdf"
     elsewhere.write_text(ARM)
-    robots = [read(tmp_path, ARM, keyframe="ready"), read(tmp_path, WORLD, "sdf", keyframe="ready"),
-              load(elsewhere, keyframe=f"{tmp_path / 'robot.srdf'}:ready")]
+    robots = [
+        read(tmp_path, ARM, keyframe="ready"),
+        read(tmp_path, WORLD, "sdf", keyframe="ready"),
+        load(elsewhere, keyframe=f"{tmp_path / 'robot.srdf'}:ready"),
+    ]
     (tmp_path / "srdf").mkdir()
     (tmp_path / "robot.srdf").rename(tmp_path / "srdf" / "arm.srdf")
     robots.append(load(elsewhere, keyframe="ready"))
@@ -212,8 +232,9 @@ RAIL = '<joint name="rail" type="slide" axis="0 0 1"/>'
 
 
 @pytest.mark.some(1)
-@pytest.mark.parametrize("bearer", [RAIL, "<freejoint name='rail'/>",
-                                    RAIL + '<joint name="up" type="slide" axis="0 1 0"/>'])
+@pytest.mark.parametrize(
+    "bearer", [RAIL, "<freejoint name='rail'/>", RAIL + '<joint name="up" type="slide" axis="0 1 0"/>']
+)
 def test_what_bears_the_base_is_no_leg(bearer: str, tmp_path: Path):
     robot = read(tmp_path, five_bar(bearer), "xml", platform="b2")
     assert robot.base == "carriage"
@@ -228,10 +249,12 @@ def test_a_rail_is_kept_where_it_is_asked_for_or_a_part_of_a_loop(tmp_path: Path
     kept = read(tmp_path, five_bar(RAIL), "xml", platform="b2", base="stand")
     assert ("rail" in kept.joints, legs(kept).dof) == (True, 3)
     held = five_bar(RAIL, more='<body name="strut"><joint name="s" axis="1 0 0"/></body>').replace(
-        "<equality>", '<equality><connect body1="strut" body2="carriage" anchor="0 0.1 0"/>')
+        "<equality>", '<equality><connect body1="strut" body2="carriage" anchor="0 0.1 0"/>'
+    )
     assert "rail" in read(tmp_path, held, "xml", platform="b2").joints
-    carried = five_bar("").replace('<body name="stand"', '<body name="stage"><joint name="rail" type="slide"/></body>'
-                                                         '<body name="stand"')
+    carried = five_bar("").replace(
+        '<body name="stand"', '<body name="stage"><joint name="rail" type="slide"/></body><body name="stand"'
+    )
     assert read(tmp_path, carried, "xml", platform="b2", base="carriage").base == "carriage"
 
 
@@ -240,8 +263,15 @@ def test_feet_are_offered_as_platforms(tmp_path: Path):
     body, closures = text.partition("  <body")[1:][0] + text.partition("  <body")[2], text.partition("<equality>")[2]
     body, closures = body.partition("</body></worldbody>")[0], closures.partition("</equality>")[0]
     sides = [[re.sub(r'\b(name|body1|body2)="', rf'\1="{side}_', part) for part in (body, closures)] for side in "lr"]
-    walker = ('<mujoco><compiler angle="radian"/><worldbody><body name="pelvis"><freejoint/>' + sides[0][0]
-              + sides[1][0] + "</body></worldbody><equality>" + sides[0][1] + sides[1][1] + "</equality></mujoco>")
+    walker = (
+        '<mujoco><compiler angle="radian"/><worldbody><body name="pelvis"><freejoint/>'
+        + sides[0][0]
+        + sides[1][0]
+        + "</body></worldbody><equality>"
+        + sides[0][1]
+        + sides[1][1]
+        + "</equality></mujoco>"
+    )
     with pytest.raises(BadRequest) as caught:
         read(tmp_path, walker, "xml")
     offered = str(caught.value).partition("such as ")[2].split(", ")

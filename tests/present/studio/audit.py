@@ -5,8 +5,22 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-CONTROLS = {"button", "checkbox", "radio", "slider", "combobox", "listbox", "tab", "link", "textbox", "spinbutton",
-            "DisclosureTriangle", "tablist", "tabpanel", "radiogroup"}
+CONTROLS = {
+    "button",
+    "checkbox",
+    "radio",
+    "slider",
+    "combobox",
+    "listbox",
+    "tab",
+    "link",
+    "textbox",
+    "spinbutton",
+    "DisclosureTriangle",
+    "tablist",
+    "tabpanel",
+    "radiogroup",
+}
 """Roles that need a name, as Chromium's tree of accessibility calls them."""
 ENOUGH, ENOUGH_LARGE = 4.5, 3.0
 """Contrast of text, and of large text (WCAG 2.2, AA)."""
@@ -18,14 +32,22 @@ def nameless(page: Any) -> list[str]:
     session = page.context.new_cdp_session(page)
     nodes = session.send("Accessibility.getFullAXTree")["nodes"]
     session.detach()
-    return [str(node["role"]["value"]) for node in nodes if not node.get("ignored")
-            and node["role"]["value"] in CONTROLS and not node.get("name", {}).get("value", "").strip()]
+    return [
+        str(node["role"]["value"])
+        for node in nodes
+        if not node.get("ignored")
+        and node["role"]["value"] in CONTROLS
+        and not node.get("name", {}).get("value", "").strip()
+    ]
 
 
 def faint(page: Any) -> list[str]:
     """Texts whose contrast to what lies behind them is too small."""
-    return [f"{words}: {ratio:.2f}" for words, ratio, large in page.evaluate(WORDS)
-            if ratio < (ENOUGH_LARGE if large else ENOUGH)]
+    return [
+        f"{words}: {ratio:.2f}"
+        for words, ratio, large in page.evaluate(WORDS)
+        if ratio < (ENOUGH_LARGE if large else ENOUGH)
+    ]
 
 
 def beyond(page: Any) -> list[str]:

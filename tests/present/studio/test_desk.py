@@ -38,8 +38,9 @@ def test_the_gallery_has_every_shipped_robot_with_a_picture():
     assert found["files"] == []
 
 
-@pytest.mark.parametrize("robot", [
-    "rrrrr_m1", *(pytest.param(name, marks=pytest.mark.slow) for name in ("3rps", "quattro"))])
+@pytest.mark.parametrize(
+    "robot", ["rrrrr_m1", *(pytest.param(name, marks=pytest.mark.slow) for name in ("3rps", "quattro"))]
+)
 def test_every_slider_moves_its_own_coordinate_with_closed_loops(robot: str):
     scene = ask("open", robot)
     assert len(scene["sliders"]) == observe(load(robot)).dof
@@ -77,7 +78,11 @@ def test_what_no_leg_stands_for_is_asked_for_by_its_link():
     """A link named when the robot was opened stays the one that is watched, whatever legs are ticked."""
     legs = {leg["name"]: leg for leg in ask("open", "quattro", watch=["rod_1b", "2"])["legs"]}
     assert [(leg["ask"], leg["link"], leg["watched"]) for leg in legs.values()] == [
-        ("rod_1b", "rod_1b", True), ("2", "rod_2a", True), ("3", "rod_3a", False), ("4", "rod_4a", False)]
+        ("rod_1b", "rod_1b", True),
+        ("2", "rod_2a", True),
+        ("3", "rod_3a", False),
+        ("4", "rod_4a", False),
+    ]
 
 
 def test_what_is_watched_is_what_check_says():
@@ -89,24 +94,51 @@ def test_what_is_watched_is_what_check_says():
     assert (found["error"]["mm"], found["error"]["step"]) == (None, 4)
 
 
-@pytest.mark.parametrize("asked", [
-    None, [], "open", {"ask": 3}, {"ask": "nothing"}, {"ask": "../move"}, {"ask": "open"},
-    {"ask": "open", "robot": "delta"}, {"ask": "open", "robot": {"source": 3}},
-    {"ask": "open", "robot": {"source": "file:/etc/passwd"}}, {"ask": "open", "robot": {"source": "folder:../x"}},
-    {"ask": "open", "robot": {"source": "given"}}, {"ask": "open", "robot": {"source": "shipped:../delta"}},
-])
+@pytest.mark.parametrize(
+    "asked",
+    [
+        None,
+        [],
+        "open",
+        {"ask": 3},
+        {"ask": "nothing"},
+        {"ask": "../move"},
+        {"ask": "open"},
+        {"ask": "open", "robot": "delta"},
+        {"ask": "open", "robot": {"source": 3}},
+        {"ask": "open", "robot": {"source": "file:/etc/passwd"}},
+        {"ask": "open", "robot": {"source": "folder:../x"}},
+        {"ask": "open", "robot": {"source": "given"}},
+        {"ask": "open", "robot": {"source": "shipped:../delta"}},
+    ],
+)
 def test_what_is_no_question_is_refused_in_a_line(asked: Any):
     with pytest.raises(BadRequest) as refused:
         DESK.answer(asked)
     assert len(refused.value.lines()) == 1
 
 
-@pytest.mark.parametrize("fields", [
-    {"here": 3}, {"here": {"q": [1.0]}}, {"here": {"q": None}}, {"values": [1.0]}, {"values": [1e400, 0.0]},
-    {"values": ["0", 0.0]}, {"values": [0.0, 0.0], "platform": [0.0] * 7}, {"platform": [0.0] * 7},
-    {"watch": "1"}, {"watch": ["9"]}, {"watch": [1]}, {"camera": "none"}, {"camera": 4}, {"hidden": "yes"},
-    {"values": [1e8, 0.0]}, {"platform": [1e8, 0, 0, 0, 0, 0, 1]},
-])
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"here": 3},
+        {"here": {"q": [1.0]}},
+        {"here": {"q": None}},
+        {"values": [1.0]},
+        {"values": [1e400, 0.0]},
+        {"values": ["0", 0.0]},
+        {"values": [0.0, 0.0], "platform": [0.0] * 7},
+        {"platform": [0.0] * 7},
+        {"watch": "1"},
+        {"watch": ["9"]},
+        {"watch": [1]},
+        {"camera": "none"},
+        {"camera": 4},
+        {"hidden": "yes"},
+        {"values": [1e8, 0.0]},
+        {"platform": [1e8, 0, 0, 0, 0, 0, 1]},
+    ],
+)
 def test_a_wrong_field_is_refused(fields: dict[str, Any]):
     with pytest.raises(BadRequest) as refused:
         ask("move", "rrrrr_m1", **fields)
@@ -147,8 +179,7 @@ def test_a_mode_is_flown_to_and_has_the_same_directions():
     twin = setting.everything.start.twin
     for each in setting.observed:
         assert isinstance(each, Direction)
-        one, other = (twin.pose(np.array(q), each.link)[:3, :3] @ each.direction
-                      for q in (twin.q0, there["here"]["q"]))
+        one, other = (twin.pose(np.array(q), each.link)[:3, :3] @ each.direction for q in (twin.q0, there["here"]["q"]))
         assert one == pytest.approx(other, abs=1e-9)
 
 
@@ -234,8 +265,10 @@ def test_the_plain_answer_agrees_with_legs_and_modes(robot: str):
         assert ("No other pose" in found["sentences"][2]) == (not others)
 
 
-@pytest.mark.parametrize("kind", ["robot", "figure", pytest.param("page", marks=pytest.mark.slow),
-                                  pytest.param("report", marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    "kind",
+    ["robot", "figure", pytest.param("page", marks=pytest.mark.slow), pytest.param("report", marks=pytest.mark.long)],
+)
 def test_what_is_exported_is_the_file_that_its_name_says(kind: str, tmp_path: Path):
     found = ask("export", "rrrrr_m1", kind=kind)
     file = tmp_path / found["name"]
@@ -247,16 +280,22 @@ def test_what_is_exported_is_the_file_that_its_name_says(kind: str, tmp_path: Pa
 
 
 @pytest.mark.some(1)
-@pytest.mark.parametrize(("what", "robot", "fields"), [
-    ("open", "rrrrr_m1", {}), ("watch", "prrrp_parallel", {"watch": ["1"]}),
-    ("modes", "rrrrr_m1", {"watch": ["2", "1"]}), ("aspects", "rrrrr_m1", {}),
-    ("plane", "3upu", {"of": "xy", "size": 4}),
-    pytest.param("plane", "3upu", {"of": "xz", "size": 3, "kind": "distance"}, marks=pytest.mark.slow),
-    ("answer", "rrrrr_m1", {}),
-    pytest.param("servo", "rrrrr_m1", {"goal": [0.03, 0.24]}, marks=pytest.mark.slow),
-])
-def test_the_command_and_the_line_of_python_give_what_the_panel_shows(what: str, robot: str, fields: dict[str, Any],
-                                                                      capsys: pytest.CaptureFixture[str]):
+@pytest.mark.parametrize(
+    ("what", "robot", "fields"),
+    [
+        ("open", "rrrrr_m1", {}),
+        ("watch", "prrrp_parallel", {"watch": ["1"]}),
+        ("modes", "rrrrr_m1", {"watch": ["2", "1"]}),
+        ("aspects", "rrrrr_m1", {}),
+        ("plane", "3upu", {"of": "xy", "size": 4}),
+        pytest.param("plane", "3upu", {"of": "xz", "size": 3, "kind": "distance"}, marks=pytest.mark.slow),
+        ("answer", "rrrrr_m1", {}),
+        pytest.param("servo", "rrrrr_m1", {"goal": [0.03, 0.24]}, marks=pytest.mark.slow),
+    ],
+)
+def test_the_command_and_the_line_of_python_give_what_the_panel_shows(
+    what: str, robot: str, fields: dict[str, Any], capsys: pytest.CaptureFixture[str]
+):
     found = ask(what, robot, **fields)
     ran = run(found["command"], capsys)
     same = json.loads(json.dumps(eval(found["python"], {"hrsynth": hrsynth}).to_dict()))
@@ -324,10 +363,17 @@ def test_a_smallest_set_that_sees_less_at_zero_is_told_as_by_legs(tmp_path: Path
     save(told.setting.robot, tmp_path / "singular.urdf")
     found = Desk(folder=tmp_path).answer({"ask": "watch", "robot": {"source": "folder:singular.urdf"}})
     assert [(each.legs, each.rank_at_zero) for each in told.sets if each.legs in told.minimal] == [(("1", "2"), 1)]
-    (told_once,) = [line for line in " ".join(hrsynth.text(hrsynth.derive(told.setting)).split()).split("at zero")
-                    if "freedoms seen" in line]
-    assert found["sets"] == [{"legs": ["1", "2"], "words": "controllable; only 1 of 2 freedoms seen: the zero "
-                                                            "configuration is a Type 2 singularity"}]
+    (told_once,) = [
+        line
+        for line in " ".join(hrsynth.text(hrsynth.derive(told.setting)).split()).split("at zero")
+        if "freedoms seen" in line
+    ]
+    assert found["sets"] == [
+        {
+            "legs": ["1", "2"],
+            "words": "controllable; only 1 of 2 freedoms seen: the zero configuration is a Type 2 singularity",
+        }
+    ]
     assert found["sets"][0]["words"].removeprefix("controllable; ") in told_once
     assert ask("watch", "rrrrr_m1")["sets"] == [{"legs": ["1", "2"], "words": "controllable"}]
 
@@ -340,8 +386,7 @@ def test_what_was_guessed_of_a_foreign_file_is_told_and_can_be_changed(tmp_path:
     guesses = {each["name"]: each for each in found["guesses"]}
     assert all(each["found"] == each["candidates"][0] for each in guesses.values())
     other = guesses["unit"]["candidates"].index("mm")
-    small = desk.answer({"ask": "open", "robot": {**source, "options": {
-        "unit": guesses["unit"]["candidates"][other]}}})
+    small = desk.answer({"ask": "open", "robot": {**source, "options": {"unit": guesses["unit"]["candidates"][other]}}})
     assert small["length"] == pytest.approx(found["length"] / 1000, rel=1e-6)
     wrong = next(each for each in guesses["platform"]["candidates"][1:])
     changed = desk.answer({"ask": "open", "robot": {**source, "options": {"platform": wrong}}})
@@ -357,8 +402,9 @@ def test_along_every_slider_the_loops_stay_closed(robot: str):
         values, here = [*scene["values"]], None
         for _ in range(10):
             values[number] += (slider["max"] - slider["home"]) / 30
-            moved = DESK.answer({"ask": "move", "robot": {"source": f"shipped:{robot}"}, "values": values,
-                                 "here": here, "hidden": True})
+            moved = DESK.answer(
+                {"ask": "move", "robot": {"source": f"shipped:{robot}"}, "values": values, "here": here, "hidden": True}
+            )
             here = moved["here"]
             assert moved["residual"] < CLOSED
 
@@ -400,6 +446,11 @@ def test_meshes_of_a_dropped_file_are_those_that_were_dropped_with_it(tmp_path: 
         return sum(shape["kind"] == "mesh" for shape in scene["machines"][0]["shapes"])
 
     assert [drawn(name) for name in ("part.stl", "meshes/part.stl", "package://arm/meshes/part.stl")] == [1, 1, 1]
-    outside = (str(elsewhere / "secret.stl"), f"file://{elsewhere}/secret.stl", "../elsewhere/secret.stl", "link.stl",
-               "package://elsewhere/secret.stl")
+    outside = (
+        str(elsewhere / "secret.stl"),
+        f"file://{elsewhere}/secret.stl",
+        "../elsewhere/secret.stl",
+        "link.stl",
+        "package://elsewhere/secret.stl",
+    )
     assert [drawn(name) for name in outside] == [0] * len(outside)

@@ -15,14 +15,55 @@ from hrsynth.present.studio.desk import Desk, names
 
 ROBOT = "rrrrr_m1"
 JUNK: list[Any] = [
-    None, True, False, 0, -1, 2.5, float("nan"), float("inf"), -1e308, 10**400, "", "1", "x" * 1000, "\0", "../x", [],
-    [None], [[]], ["1"], ["1", "1"], ["1", 2], [0.0] * 2, [0.0] * 7, [1e308] * 2, [float("nan")] * 2, {}, {"q": []},
-    {"q": {}}, {"q": [0.0] * 50, "hidden": None}, {"q": None, "hidden": 3}, "mode:2", "page", "accuracy", "xy", "phi"]
-FIELDS = {"open": ("watch", "camera", "here", "robot"), "move": ("values", "platform", "hidden", "here", "watch"),
-          "watch": ("watch", "camera", "here"), "play": ("lost", "hidden", "here", "watch"), "answer": ("camera",),
-          "modes": ("here", "watch", "camera"), "aspects": ("here", "watch"),
-          "plane": ("kind", "of", "at", "here", "watch"),
-          "servo": ("goal", "end", "here", "watch"), "export": ("kind", "watch"), "gallery": ("robot",)}
+    None,
+    True,
+    False,
+    0,
+    -1,
+    2.5,
+    float("nan"),
+    float("inf"),
+    -1e308,
+    10**400,
+    "",
+    "1",
+    "x" * 1000,
+    "\0",
+    "../x",
+    [],
+    [None],
+    [[]],
+    ["1"],
+    ["1", "1"],
+    ["1", 2],
+    [0.0] * 2,
+    [0.0] * 7,
+    [1e308] * 2,
+    [float("nan")] * 2,
+    {},
+    {"q": []},
+    {"q": {}},
+    {"q": [0.0] * 50, "hidden": None},
+    {"q": None, "hidden": 3},
+    "mode:2",
+    "page",
+    "accuracy",
+    "xy",
+    "phi",
+]
+FIELDS = {
+    "open": ("watch", "camera", "here", "robot"),
+    "move": ("values", "platform", "hidden", "here", "watch"),
+    "watch": ("watch", "camera", "here"),
+    "play": ("lost", "hidden", "here", "watch"),
+    "answer": ("camera",),
+    "modes": ("here", "watch", "camera"),
+    "aspects": ("here", "watch"),
+    "plane": ("kind", "of", "at", "here", "watch"),
+    "servo": ("goal", "end", "here", "watch"),
+    "export": ("kind", "watch"),
+    "gallery": ("robot",),
+}
 QUICK: dict[str, dict[str, Any]] = {"plane": {"size": 2}, "export": {"kind": "robot"}}
 LONG = ("aspects", "plane", "servo", "export", "open")
 OPTIONS = ("base", "platform", "motors", "close", "freeze", "keyframe", "unit", "tolerance", "as_written", "observe")
@@ -48,8 +89,9 @@ def test_the_fuzz_knows_every_question():
 
 
 @pytest.mark.some(1, 4)
-@pytest.mark.parametrize("what", [pytest.param(what, marks=pytest.mark.slow) if what in LONG else what
-                                  for what in sorted(FIELDS)])
+@pytest.mark.parametrize(
+    "what", [pytest.param(what, marks=pytest.mark.slow) if what in LONG else what for what in sorted(FIELDS)]
+)
 def test_no_field_of_any_question_is_trusted(what: str):
     desk = Desk()
     base: dict[str, Any] = {"ask": what, "robot": {"source": f"shipped:{ROBOT}"}, **QUICK.get(what, {})}
@@ -100,8 +142,18 @@ def test_nothing_outside_of_the_folder_is_read(tree: Path, kind: str):
     desk = Desk(**{"folder" if kind == "folder" else "uploads": tree})
     for name in ("own.urdf", "deep/below.urdf"):
         assert desk.answer({"ask": "open", "robot": {"source": f"{kind}:{name}"}})["name"] == ROBOT
-    for name in ("../other.urdf", "link.urdf", "loop", "", ".", "..", "deep/../../other.urdf",
-                 str(tree / "../other.urdf"), "/etc/passwd", "none.urdf"):
+    for name in (
+        "../other.urdf",
+        "link.urdf",
+        "loop",
+        "",
+        ".",
+        "..",
+        "deep/../../other.urdf",
+        str(tree / "../other.urdf"),
+        "/etc/passwd",
+        "none.urdf",
+    ):
         with pytest.raises(BadRequest, match="no such file"):
             desk.answer({"ask": "open", "robot": {"source": f"{kind}:{name}"}})
     if kind == "folder":

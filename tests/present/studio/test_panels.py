@@ -196,8 +196,9 @@ def test_an_answer_for_other_legs_is_not_shown(tab: Tab, address: str):
 
     def between(route: Any) -> None:
         server = route.connect_to_server()
-        route.on_message(lambda message: held.append((server, message)) if '"modes"' in message
-                         else server.send(message))
+        route.on_message(
+            lambda message: held.append((server, message)) if '"modes"' in message else server.send(message)
+        )
         server.on_message(route.send)
 
     tab.page.route_web_socket(re.compile("/live$"), between)
@@ -378,13 +379,18 @@ def test_each_tab_has_a_robot_of_its_own(tab: Tab, address: str, browser: Any):
 def drop(page: Any, **files: str) -> None:
     """Choose files in the page."""
     page.locator("input[type=file]").set_input_files(
-        [{"name": name.replace("__", "."), "mimeType": "text/xml", "buffer": text.encode()}
-         for name, text in files.items()])
+        [
+            {"name": name.replace("__", "."), "mimeType": "text/xml", "buffer": text.encode()}
+            for name, text in files.items()
+        ]
+    )
 
 
-DIALECTS = {**{f"urdf_{k}": (f"four_{i}.urdf", text) for i, (k, text) in enumerate(URDF.items())},
-            **{f"mjcf_{k}": (f"four_{i}.xml", text) for i, (k, text) in enumerate(MJCF.items())},
-            **{f"sdf_{k}": (f"four_{i}.sdf", text) for i, (k, text) in enumerate(SDF.items())}}
+DIALECTS = {
+    **{f"urdf_{k}": (f"four_{i}.urdf", text) for i, (k, text) in enumerate(URDF.items())},
+    **{f"mjcf_{k}": (f"four_{i}.xml", text) for i, (k, text) in enumerate(MJCF.items())},
+    **{f"sdf_{k}": (f"four_{i}.sdf", text) for i, (k, text) in enumerate(SDF.items())},
+}
 
 
 def test_files_of_all_dialects_are_dropped_in(tab: Tab, address: str):
@@ -433,8 +439,10 @@ def test_a_file_is_named_as_it_is_called_and_long_words_are_in_sight(tab: Tab, a
     show(page, "legs")
     answered(page)
     assert page.locator("#panel-legs .same code").first.text_content().startswith(f"hrsynth derive '{name}'")
-    page.evaluate("() => studio.draw({ ...studio.state, beyond: ['a_joint_of_a_long_name', 'another_one'].concat("
-                  "Array(6).fill('and_one_more_joint')) })")
+    page.evaluate(
+        "() => studio.draw({ ...studio.state, beyond: ['a_joint_of_a_long_name', 'another_one'].concat("
+        "Array(6).fill('and_one_more_joint')) })"
+    )
     told, legend = (page.locator(each).bounding_box() for each in ("#now", "#legend ul"))
     assert told["y"] + told["height"] <= legend["y"] + 1
 
@@ -462,8 +470,11 @@ def test_a_slow_ask_says_so_and_is_cancelled_and_a_newer_one_replaces_it(tab: Ta
 
     def between(route: Any) -> None:
         server = route.connect_to_server()
-        route.on_message(lambda message: held.append(message) if '"modes"' in message or '"cancel"' in message
-                         else server.send(message))
+        route.on_message(
+            lambda message: (
+                held.append(message) if '"modes"' in message or '"cancel"' in message else server.send(message)
+            )
+        )
         server.on_message(route.send)
 
     tab.page.route_web_socket(re.compile("/live$"), between)

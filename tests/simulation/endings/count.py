@@ -49,8 +49,17 @@ class Descent:
         self.oracle = Oracle(setting.mechanism)
         every = list(zip(setting.samples.question.observations, found.desired, strict=True))
         self.seen = [(self.oracle.index[o.link], o.direction, w) for o, w in every if isinstance(o, Direction)]
-        self.points = [(self.oracle.index[o.link], o.at, self.oracle.index[o.seen_from or setting.mechanism.reference],
-                        o.view, w[:2] / w[2]) for o, w in every if isinstance(o, ImagePoint)]
+        self.points = [
+            (
+                self.oracle.index[o.link],
+                o.at,
+                self.oracle.index[o.seen_from or setting.mechanism.reference],
+                o.view,
+                w[:2] / w[2],
+            )
+            for o, w in every
+            if isinstance(o, ImagePoint)
+        ]
         assert len(self.seen) + len(self.points) == len(every)
         self.place = {number: 6 * k for k, number in enumerate(self.oracle.moving)}
         self.size = 6 * len(self.place)
@@ -189,8 +198,9 @@ class Descent:
     def told(self, state: Array) -> Array:
         """What a rest is known by: the platform's pose and the directions."""
         X = state[self.oracle.index[self.oracle.mechanism.platform]]
-        return np.concatenate([X[:3, 3] / self.oracle.length, X[:3, :3].ravel(),
-                               *(state[link, :3, :3] @ d for link, d, _ in self.seen)])
+        return np.concatenate(
+            [X[:3, 3] / self.oracle.length, X[:3, :3].ravel(), *(state[link, :3, :3] @ d for link, d, _ in self.seen)]
+        )
 
 
 def counted(found: Endings, starts: int, seed: int = 1) -> Counted:
@@ -198,8 +208,9 @@ def counted(found: Endings, starts: int, seed: int = 1) -> Counted:
     scene, rng = Descent(found), np.random.default_rng(seed)
     home = scene.oracle.zero()
     usual = scene.manner(home, rng)
-    members = np.array([scene.told(np.array([each.configuration.pose(link) for link in scene.oracle.index]))
-                        for each in found.rests])
+    members = np.array(
+        [scene.told(np.array([each.configuration.pose(link) for link in scene.oracle.index])) for each in found.rests]
+    )
     result, state, known = Counted(starts), home, {}
     for number in range(starts):
         state = scene.start(home if number % 20 == 0 else state, rng)
@@ -216,8 +227,13 @@ def counted(found: Endings, starts: int, seed: int = 1) -> Counted:
                 continue
             key = tuple(np.round(told, 3) + 0.0)
             if key not in known:
-                known[key] = ("another mode" if scene.manner(end, rng) != usual else
-                              "not isolated" if scene.flat(end, rng) else "stranger")
+                known[key] = (
+                    "another mode"
+                    if scene.manner(end, rng) != usual
+                    else "not isolated"
+                    if scene.flat(end, rng)
+                    else "stranger"
+                )
             result.ends[method, known[key]] += 1
             if known[key] == "stranger":
                 X = end[scene.oracle.index[scene.oracle.mechanism.platform]]
@@ -232,9 +248,14 @@ def main() -> None:
         found = endings(robot, legs or None, at=GOALS[robot])
         listed = time.time()
         result = counted(found, int(sys.argv[1]))
-        print(name, f"listed {len(found.rests)} ({len(found.attracting)} stable) in {listed - began:.0f} s; "
-              f"{result.starts} starts in {time.time() - listed:.0f} s:", dict(result.ends),
-              f"met {len(result.met)} of the list; strangers: {len(result.strangers)}", flush=True)
+        print(
+            name,
+            f"listed {len(found.rests)} ({len(found.attracting)} stable) in {listed - began:.0f} s; "
+            f"{result.starts} starts in {time.time() - listed:.0f} s:",
+            dict(result.ends),
+            f"met {len(result.met)} of the list; strangers: {len(result.strangers)}",
+            flush=True,
+        )
         for each in sorted(set(result.strangers))[:20]:
             print("   ", each)
 

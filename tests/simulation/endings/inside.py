@@ -65,7 +65,7 @@ class Inside:
         """A box that holds all poses that random ones show to be reached, some wider."""
         d = self.shifts + self.turns
         low, high = np.full(d, -3.0), np.full(d, 3.0)
-        low[self.shifts:], high[self.shifts:] = -np.pi, np.pi
+        low[self.shifts :], high[self.shifts :] = -np.pi, np.pi
         for _ in range(3):
             y = self.rng.uniform(low, high, (200_000, d))
             home = np.repeat(self.flow.batch.home[None], len(y), axis=0)
@@ -108,9 +108,11 @@ def main(cases: list[str]) -> None:
         basin = room * inside.ending_there(whole) / len(whole)
         for radius in (found.length / length, found.undamped):
             X = inside.within(10_000, radius)
-            said.append(f"{inside.ending_there(X)} of {len(X)} within {1e3 * length * radius:.3g} mm, "
-                        f"{np.degrees(radius) if inside.turns else 0:.2g}°, "
-                        f"smallest value {inside.weakest(X[:1000]):.2g}, share {inside.volume(radius) / basin:.2g}")
+            said.append(
+                f"{inside.ending_there(X)} of {len(X)} within {1e3 * length * radius:.3g} mm, "
+                f"{np.degrees(radius) if inside.turns else 0:.2g}°, "
+                f"smallest value {inside.weakest(X[:1000]):.2g}, share {inside.volume(radius) / basin:.2g}"
+            )
         print(f"{case}: {'; '.join(said)}; {time.process_time() - began:.0f} s", flush=True)
 
 

@@ -25,16 +25,30 @@ from hrsynth.simulation.endings.rests import Endings
 from oracle import exponential
 from simulation.scenes import GOALS
 
-COUNTS = (("3rpr_m1", None), ("rrrrr_m1", None), ("3rrr_m1", None), ("quattro", "1,4"), ("quattro", "2,3"),
-          ("quattro", None), ("quattro_rigid", None), ("gough_stewart", "1,3,5"), ("3rps", None))
+COUNTS = (
+    ("3rpr_m1", None),
+    ("rrrrr_m1", None),
+    ("3rrr_m1", None),
+    ("quattro", "1,4"),
+    ("quattro", "2,3"),
+    ("quattro", None),
+    ("quattro_rigid", None),
+    ("gough_stewart", "1,3,5"),
+    ("3rps", None),
+)
 WHOLE = (("3rpr_m1", None), ("rrrrr_m1", None), ("3rrr_m1", None), ("quattro", "1,4"), ("quattro", "2,3"))
 """The robots and legs whose lists hold all ends that were seen."""
 MEMBER, CONTINUUM, MODE, NONE, OUTSIDE = "member", "of a continuum", "another mode", "no rest", "outside"
 X, Y, Z = np.eye(3)
 MOTIONS: dict[str, tuple[Array, Array]] = {
-    "3rpr_m1": (np.array([X, Y]), Z[None]), "rrrrr_m1": (np.array([X, Y]), np.zeros((0, 3))),
-    "3rrr_m1": (np.array([X, Y]), Z[None]), "quattro": (np.eye(3), Z[None]),
-    "quattro_rigid": (np.eye(3), np.zeros((0, 3))), "gough_stewart": (np.eye(3), np.eye(3)), "3rps": (np.eye(3),) * 2}
+    "3rpr_m1": (np.array([X, Y]), Z[None]),
+    "rrrrr_m1": (np.array([X, Y]), np.zeros((0, 3))),
+    "3rrr_m1": (np.array([X, Y]), Z[None]),
+    "quattro": (np.eye(3), Z[None]),
+    "quattro_rigid": (np.eye(3), np.zeros((0, 3))),
+    "gough_stewart": (np.eye(3), np.eye(3)),
+    "3rps": (np.eye(3),) * 2,
+}
 """How the platform of each robot moves: shifts and turns."""
 FOUND, SAME, FLAT, FAR = 1e-9, 1e-4, 1e-5, 40.0
 
@@ -109,10 +123,21 @@ def legs_of(setting: ObservedRobot, name: str) -> tuple[Array, list[Leg]]:
         axes = mechanism.joints["shoulder_" + number].axes
         rod = joints[wrist] - elbow
         body = mechanism.joints[wrist].links[1]
-        found.append(Leg(shoulder, elbow - shoulder, float(np.linalg.norm(rod)), rod / np.linalg.norm(rod),
-                         carried - origin, joints[wrist] - carried, None if strut else np.asarray(axes[0]),
-                         Z if planar else np.asarray(axes[0]) if name == "3rps" else None, link,
-                         (body, joints[wrist]), link in watched))
+        found.append(
+            Leg(
+                shoulder,
+                elbow - shoulder,
+                float(np.linalg.norm(rod)),
+                rod / np.linalg.norm(rod),
+                carried - origin,
+                joints[wrist] - carried,
+                None if strut else np.asarray(axes[0]),
+                Z if planar else np.asarray(axes[0]) if name == "3rps" else None,
+                link,
+                (body, joints[wrist]),
+                link in watched,
+            )
+        )
     return origin, found
 
 
@@ -139,8 +164,9 @@ class Many:
         for leg in self.legs:
             D = self.moved(found, leg.tip[0])
             parts.append(D[:3, :3] @ leg.tip[1] + D[:3, 3] / self.length)
-        return np.concatenate([*parts, *(self.moved(found, leg.link)[:3, :3] @ leg.u for leg in self.legs
-                                         if leg.watched)])
+        return np.concatenate(
+            [*parts, *(self.moved(found, leg.link)[:3, :3] @ leg.u for leg in self.legs if leg.watched)]
+        )
 
     def known(self, at: State) -> Array:
         """The same of states (n, …)."""
@@ -149,14 +175,22 @@ class Many:
 
     def home(self, n: int) -> State:
         ones = np.ones((n, 1))
-        return State(ones * self.origin, np.broadcast_to(np.eye(3), (n, 3, 3)).copy(), np.zeros((n, len(self.legs))),
-                     ones * [leg.s for leg in self.legs], ones[..., None] * [leg.u for leg in self.legs])
+        return State(
+            ones * self.origin,
+            np.broadcast_to(np.eye(3), (n, 3, 3)).copy(),
+            np.zeros((n, len(self.legs))),
+            ones * [leg.s for leg in self.legs],
+            ones[..., None] * [leg.u for leg in self.legs],
+        )
 
     def crank(self, at: State, i: int) -> Array:
         """c turned by θ, (n, 3)."""
         leg = self.legs[i]
-        return np.broadcast_to(leg.c, at.p.shape) if leg.axis is None else (
-            exponential(at.turn[:, i, None] * leg.axis) @ leg.c)
+        return (
+            np.broadcast_to(leg.c, at.p.shape)
+            if leg.axis is None
+            else (exponential(at.turn[:, i, None] * leg.axis) @ leg.c)
+        )
 
     def basis(self, at: State) -> Array:
         """What the unknowns do to (p, ω, and of each leg θ, s, δ), (n, 6 + 5 l, N)."""
@@ -188,8 +222,13 @@ class Many:
 
     def closing(self, at: State) -> Array:
         """What is left of the legs' equations, (n, 3 l)."""
-        return np.concatenate([at.p + at.R @ leg.h + leg.k - leg.A - self.crank(at, i) - at.s[:, i, None] * at.u[:, i]
-                               for i, leg in enumerate(self.legs)], axis=1)
+        return np.concatenate(
+            [
+                at.p + at.R @ leg.h + leg.k - leg.A - self.crank(at, i) - at.s[:, i, None] * at.u[:, i]
+                for i, leg in enumerate(self.legs)
+            ],
+            axis=1,
+        )
 
     def rates(self, at: State, B: Array) -> Array:
         """Their derivatives, (n, 3 l, N)."""
@@ -239,8 +278,13 @@ class Many:
         """States after a step x (n, N)."""
         raw = np.einsum("nrk,nk->nr", B, x)
         legs = raw[:, 6:].reshape(len(x), -1, 5)
-        return State(at.p + raw[:, :3], exponential(raw[:, 3:6]) @ at.R, at.turn + legs[..., 0],
-                     at.s + legs[..., 1], np.einsum("nlab,nlb->nla", exponential(legs[..., 2:]), at.u))
+        return State(
+            at.p + raw[:, :3],
+            exponential(raw[:, 3:6]) @ at.R,
+            at.turn + legs[..., 0],
+            at.s + legs[..., 1],
+            np.einsum("nlab,nlb->nla", exponential(legs[..., 2:]), at.u),
+        )
 
     def closed(self, at: State, steps: int = 6) -> State:
         """Gauss–Newton steps, each the shortest one."""
@@ -258,16 +302,22 @@ class Many:
         half = n // 2
         for _ in range(12):
             B = self.basis(kept)
-            there = self.closed(self.stepped(kept, B, limited(along(self.rates(kept, B), rng.normal(
-                size=(n, B.shape[2]))), rng.uniform(0.1, 0.5, n))))
+            there = self.closed(
+                self.stepped(
+                    kept,
+                    B,
+                    limited(along(self.rates(kept, B), rng.normal(size=(n, B.shape[2]))), rng.uniform(0.1, 0.5, n)),
+                )
+            )
             good = np.abs(self.closing(there)).max(axis=1) < 1e-9
             kept.put(good, there.some(good))
         tries = self.home(4 * n)
         B = self.basis(tries)
         tries = self.stepped(tries, B, rng.normal(size=(4 * n, B.shape[2])) * 1.5)
         tries = self.closed(tries, 40)
-        good = np.flatnonzero((np.abs(self.closing(tries)).max(axis=1) < 1e-9)
-                              & (np.abs(tries.p - self.origin).max(axis=1) < 4))[:half]
+        good = np.flatnonzero(
+            (np.abs(self.closing(tries)).max(axis=1) < 1e-9) & (np.abs(tries.p - self.origin).max(axis=1) < 4)
+        )[:half]
         kept.put(slice(0, len(good)), tries.some(good))
         return kept
 
@@ -284,8 +334,12 @@ class Many:
             there = self.closed(self.stepped(at, B, step), 4)
             good = (np.abs(self.closing(there)).max(axis=1) < 1e-9) & (self.error(there) <= self.error(at) + 1e-14)
             C = self.basis(there)
-            turned = np.einsum("nrk,nr->nk", B, np.einsum("nrk,nk->nr", C, along(
-                self.rates(there, C), self.slope(there, C)))) - g
+            turned = (
+                np.einsum(
+                    "nrk,nr->nk", B, np.einsum("nrk,nk->nr", C, along(self.rates(there, C), self.slope(there, C)))
+                )
+                - g
+            )
             best = np.einsum("nk,nk->n", step, step) / np.maximum(np.abs(np.einsum("nk,nk->n", step, turned)), 1e-300)
             length = np.where(good, np.clip(best, 1e-3, 1e3), length / 4)
             at.put(good, there.some(good))
@@ -304,8 +358,9 @@ class Many:
             lost = sizes < 1e-7
             rank = int(np.median((~lost).sum(axis=1)))
             inverse = np.where(np.arange(sizes.shape[1]) < rank, 1 / np.maximum(sizes, 1e-9), 0)
-            mu = -np.einsum("nrk,nk->nr", U[..., : sizes.shape[1]], inverse * np.einsum(
-                "nki,ni->nk", V[:, : sizes.shape[1]], g))
+            mu = -np.einsum(
+                "nrk,nk->nr", U[..., : sizes.shape[1]], inverse * np.einsum("nki,ni->nk", V[:, : sizes.shape[1]], g)
+            )
             T = np.swapaxes(V[:, rank:], 1, 2)
             slope = np.einsum("nkf,nk->nf", T, g)
             H = np.swapaxes(T, 1, 2) @ self.hessian(here, mu, B) @ T
@@ -328,10 +383,10 @@ class Many:
         return at, left, values
 
     def other_mode(self, at: State) -> Array:
-        """Where a platform that is held by three planes is turned by π about a level axis and one across them: q₀ = 0.
-        """
-        return (np.trace(at.R, axis1=1, axis2=2) + 1 < 1e-6) & (self.name == "3rps") & (
-            np.abs(at.R[:, 2, 2] - 1) > 1e-6)
+        """Where a platform held by three planes is turned by π about a level axis and one across them: q₀ = 0."""
+        return (
+            (np.trace(at.R, axis1=1, axis2=2) + 1 < 1e-6) & (self.name == "3rps") & (np.abs(at.R[:, 2, 2] - 1) > 1e-6)
+        )
 
 
 def hat(v: Array) -> Array:
@@ -407,11 +462,15 @@ def main() -> None:
         found = listed(name, legs)
         between = time.process_time()
         result = counted(found, int(sys.argv[1]))
-        ends = {each: [result.ends[method, each] for method in ("descent", "newton")]
-                for each in (MEMBER, CONTINUUM, MODE, NONE, OUTSIDE)}
-        print(f"{name} {legs or 'all'}: {len(found.rests)} ({len(found.attracting)}), continua {len(found.continua)}, "
-              f"met {len(result.met)}, {ends}, {between - began:.1f} s, {time.process_time() - between:.1f} s",
-              flush=True)
+        ends = {
+            each: [result.ends[method, each] for method in ("descent", "newton")]
+            for each in (MEMBER, CONTINUUM, MODE, NONE, OUTSIDE)
+        }
+        print(
+            f"{name} {legs or 'all'}: {len(found.rests)} ({len(found.attracting)}), continua {len(found.continua)}, "
+            f"met {len(result.met)}, {ends}, {between - began:.1f} s, {time.process_time() - between:.1f} s",
+            flush=True,
+        )
         for method, E, curved in sorted(result.outside, key=lambda each: each[:2])[:12]:
             print("   ", method, f"E = {E:.8g}", np.array2string(curved, precision=3))
 

@@ -18,8 +18,10 @@ from oracle import exponential
 
 SQUARE = np.array([[0.4, 0, 0], [0.55, 0, 0], [0.55, 0.15, 0], [0.4, 0.15, 0]])
 SPREAD = np.array([[0.5, 0.1, 0], [0.6, 0.1, 0.1], [0.5, 0.3, 0.1], [0.6, 0.3, 0]])
-ARMS = {"panda": ("panda_hand", SPREAD, "x=0.5,y=0.2,z=0.5,rpy=180deg/0/0"),
-        "ur5_robot": ("wrist_3_link", SQUARE, "x=0.47,y=0.08,z=0.45,rpy=3.1/0.05/0.1")}
+ARMS = {
+    "panda": ("panda_hand", SPREAD, "x=0.5,y=0.2,z=0.5,rpy=180deg/0/0"),
+    "ur5_robot": ("wrist_3_link", SQUARE, "x=0.47,y=0.08,z=0.45,rpy=3.1/0.05/0.1"),
+}
 
 
 @cache
@@ -100,11 +102,11 @@ def test_rests_of_an_arm_are_rests_and_descents_meet_no_other_that_attracts(name
     met = 0
     while met < 40:
         q = rng.uniform(-np.pi, np.pi, len(arm.axes))
-        if arm.image(arm.placed(q))[2 * len(arm.points):].min() < 0.05:
+        if arm.image(arm.placed(q))[2 * len(arm.points) :].min() < 0.05:
             continue
         way = least_squares(arm.error, q, xtol=1e-14, ftol=1e-14, gtol=1e-14, max_nfev=2000)
         X = arm.placed(way.x)
-        if np.linalg.norm(arm.slope(way.x)) > 1e-9 or arm.image(X)[2 * len(arm.points):].min() <= 0:
+        if np.linalg.norm(arm.slope(way.x)) > 1e-9 or arm.image(X)[2 * len(arm.points) :].min() <= 0:
             continue
         met += 1
         assert min(float(np.abs(X - each).max()) for each in poses) < 1e-5

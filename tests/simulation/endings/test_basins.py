@@ -59,9 +59,16 @@ def none(flow: Flow, n: int) -> np.ndarray:
 
 
 @pytest.mark.some(2)
-@pytest.mark.parametrize(("name", "legs", "singular"), [
-    ("quattro", "1,4", [-0.1757, -0.1931, -0.6481, 0.262]), ("3rpr_m1", None, None), ("gough_stewart", "1,3,5", None),
-    ("delta", "1,2", None), ("hexa", None, None)])
+@pytest.mark.parametrize(
+    ("name", "legs", "singular"),
+    [
+        ("quattro", "1,4", [-0.1757, -0.1931, -0.6481, 0.262]),
+        ("3rpr_m1", None, None),
+        ("gough_stewart", "1,3,5", None),
+        ("delta", "1,2", None),
+        ("hexa", None, None),
+    ],
+)
 def test_the_law_abreast_is_the_law(name: str, legs: str | None, singular: list[float] | None):
     made, flow = task(name, legs)
     X = poses(flow, 6, 1, 0.4)
@@ -73,8 +80,9 @@ def test_the_law_abreast_is_the_law(name: str, legs: str | None, singular: list[
     found = flow.at(X, none(flow, len(X)), none(flow, len(X)), flow.roots(X, none(flow, len(X)))[0])
     assert singular is None or found.weakest[-1] < DAMPED / 10
     motion, length = made.setting.motion, flow.batch.length
-    for pose, at, velocity, size in zip(X, flow.configurations(X, none(flow, len(X))), found.velocity, found.size,
-                                        strict=True):
+    for pose, at, velocity, size in zip(
+        X, flow.configurations(X, none(flow, len(X))), found.velocity, found.size, strict=True
+    ):
         assert at is not None
         command = made.law.at(at, made.desired(0.0))
         twists = at.velocity(motion.link) @ command.velocity / made.law.gain
@@ -118,10 +126,26 @@ def test_runs_abreast_end_where_single_runs_end():
 
 
 @pytest.mark.some(0, 3)
-@pytest.mark.parametrize(("name", "legs"), [
-    ("3prr_m1", None), ("3puu", None), ("3rpr_m2", None), ("3ruu", None), ("3upu", None), ("6pus", None),
-    ("delta", None), ("delta", "1,2"), ("gough_stewart", "1,3,5"), ("linear_delta", None), ("orthoglide", None),
-    ("quattro", None), ("quattro", "1,4"), ("quattro", "2,3"), ("quattro_rigid", "1,2")])
+@pytest.mark.parametrize(
+    ("name", "legs"),
+    [
+        ("3prr_m1", None),
+        ("3puu", None),
+        ("3rpr_m2", None),
+        ("3ruu", None),
+        ("3upu", None),
+        ("6pus", None),
+        ("delta", None),
+        ("delta", "1,2"),
+        ("gough_stewart", "1,3,5"),
+        ("linear_delta", None),
+        ("orthoglide", None),
+        ("quattro", None),
+        ("quattro", "1,4"),
+        ("quattro", "2,3"),
+        ("quattro_rigid", "1,2"),
+    ],
+)
 def test_runs_of_all_robots_abreast_end_where_single_runs_end(name: str, legs: str | None):
     X = poses(task(name, legs)[1], 6, 7, 0.7)
     assert ends_agree(name, legs, X) == len(X) > 2
@@ -279,12 +303,12 @@ def test_every_start_within_the_certified_radius_ends_at_the_goal():
     assert found.certified.length > 0
     goal = found.target.pose(found.setting.motion.link)
     _, flow = task("3rpr_m1")
-    flow = Flow(flow.placer, flow.watched, directions(
-        found.target, found.setting.samples.question)[0])
+    flow = Flow(flow.placer, flow.watched, directions(found.target, found.setting.samples.question)[0])
     rng = np.random.default_rng(0)
     y = rng.uniform(-1, 1, (200, 3)) * [found.certified.length / flow.batch.length] * 2 + [0]
-    X = flow.move(np.repeat(goal[None], 200, axis=0), y * [1, 1, 0] + rng.uniform(-1, 1, (200, 1))
-                  * [0, 0, found.certified.angle])
+    X = flow.move(
+        np.repeat(goal[None], 200, axis=0), y * [1, 1, 0] + rng.uniform(-1, 1, (200, 1)) * [0, 0, found.certified.angle]
+    )
     X = X[[found.certified.holds(each) for each in X]]
     assert len(X) > 20
     np.testing.assert_allclose(runs(flow, X).X, np.broadcast_to(goal, X.shape), atol=1e-8)
@@ -342,9 +366,14 @@ def test_other_robots_are_simulated_one_by_one():
     assert [each.ending.name for each in found.ends] == ["goal"]
 
 
-@pytest.mark.parametrize(("asked", "word"), [
-    ({"plane": "z=-0.7", "grid": "x=0:0.1:2"}, "both"), ({"grid": "x=0:1:400,y=0:1:400"}, "160000"),
-    ({"jobs": 0, "grid": "x=0:0.1:2"}, "jobs")])
+@pytest.mark.parametrize(
+    ("asked", "word"),
+    [
+        ({"plane": "z=-0.7", "grid": "x=0:0.1:2"}, "both"),
+        ({"grid": "x=0:1:400,y=0:1:400"}, "160000"),
+        ({"jobs": 0, "grid": "x=0:0.1:2"}, "jobs"),
+    ],
+)
 def test_what_cannot_be_asked_is_refused(asked: dict[str, str], word: str):
     with pytest.raises(BadRequest, match=word):
         hrsynth.basins("quattro", "1,4", to="z=-0.7", **asked)
@@ -393,9 +422,14 @@ def test_why_runs_are_simulated_one_by_one_is_told():
 
 
 @pytest.mark.some(0, 1)
-@pytest.mark.parametrize(("grid", "hollow"), [("x=-0.02:0.02:2,y=-0.02:0.02:2,phi=0", False),
-                                              ("x=-0.02:0.02:2,y=-0.02:0.02:2,phi=0.1", True),
-                                              ("x=-0.02:0.02:2,y=0,phi=0.1", True)])
+@pytest.mark.parametrize(
+    ("grid", "hollow"),
+    [
+        ("x=-0.02:0.02:2,y=-0.02:0.02:2,phi=0", False),
+        ("x=-0.02:0.02:2,y=-0.02:0.02:2,phi=0.1", True),
+        ("x=-0.02:0.02:2,y=0,phi=0.1", True),
+    ],
+)
 def test_hollow_marks_are_in_the_legend_where_there_is_one(grid: str, hollow: bool):
     found = hrsynth.basins("3rrr_m1", to="x=0,y=0,phi=0", grid=grid, jobs=1)
     drawn = picture(found, replace(PNG, ending=".svg")).decode()

@@ -38,9 +38,15 @@ def levels(error, modes, x):
     of the goal."""
     other = replace(error, limbs=tuple(replace(limb, mode=mode) for limb, mode in zip(error.limbs, modes, strict=True)))
     with np.errstate(all="ignore"):
-        own, there = (np.array([[np.broadcast_to(c, len(x)) for c in each.u] for each in
-                                one.at(list(at.T), [], lambda value: value).seen])
-                      for one, at in ((error, 0 * x), (other, x)))
+        own, there = (
+            np.array(
+                [
+                    [np.broadcast_to(c, len(x)) for c in each.u]
+                    for each in one.at(list(at.T), [], lambda value: value).seen
+                ]
+            )
+            for one, at in ((error, 0 * x), (other, x))
+        )
         reached = np.all([margin > 0 for margin in other.at(list(x.T), [], lambda value: value).margins], axis=0)
     return reached, 0.5 * (1 - (own * there).sum(axis=1) ** 2).sum(axis=0)
 
@@ -58,8 +64,12 @@ def newton(error, modes, x, steps=20):
     """Zeros of ∇E that Newton's method meets from places (n, size)."""
     for _ in range(steps):
         g = slopes(error, modes, x)
-        H = np.array([(slopes(error, modes, x + 1e-4 * axis) - slopes(error, modes, x - 1e-4 * axis)) / 2e-4
-                      for axis in np.eye(error.size)]).transpose(1, 0, 2)
+        H = np.array(
+            [
+                (slopes(error, modes, x + 1e-4 * axis) - slopes(error, modes, x - 1e-4 * axis)) / 2e-4
+                for axis in np.eye(error.size)
+            ]
+        ).transpose(1, 0, 2)
         good = np.isfinite(H).all(axis=(1, 2)) & np.isfinite(g).all(axis=1)
         good[good] = np.abs(np.linalg.det(H[good])) > 1e-9
         x, g, H = x[good], g[good], H[good]
@@ -125,8 +135,9 @@ def test_joints_are_narrowed_to_where_the_legs_close(name):
         a, b = np.concatenate([pose - room, low[n - k :]]), np.concatenate([pose + room, high[n - k :]])
         if half:
             a[n - k :], b[n - k :] = np.sort(rng.uniform(a, b, (2, n)), axis=0)[:, n - k :]
-        forms = [affine(x[None], each[None], np.zeros(1))
-                 for x, each in zip((a + b) / 2, np.diag((b - a) / 2), strict=True)]
+        forms = [
+            affine(x[None], each[None], np.zeros(1)) for x, each in zip((a + b) / 2, np.diag((b - a) / 2), strict=True)
+        ]
         inner, outer = narrow_joints(error, forms, a[None], b[None])
         for i in range(n - k, n):
             for _ in range(3):
@@ -162,8 +173,9 @@ def closed(error, y, P):
     n, k = error.size
     y = y.copy()
     for _ in range(12):
-        told = np.array([each.v[0] for each in error.slopes.at(
-            [affine(x, np.zeros((len(y), 0)), 0 * x) for x in y.T])]).T
+        told = np.array(
+            [each.v[0] for each in error.slopes.at([affine(x, np.zeros((len(y), 0)), 0 * x) for x in y.T])]
+        ).T
         g, M = told[:, :k], told[:, k : k + k * n].reshape(-1, k, n)
         step = np.linalg.pinv(np.take_along_axis(M, P[:, None], 2)) @ g[..., None]
         np.put_along_axis(y, P, np.take_along_axis(y, P, 1) - step[..., 0], 1)
@@ -224,8 +236,10 @@ def test_moments_about_a_tip_are_those_of_the_other_legs(name):
         M = np.array([each.v[0, 0] for each in error.slopes.at(forms)])[k : k + k * n].reshape(k, n)
         p, R = (each[0] for each in error.pose(y))
         for row, (at, rest) in zip(told, error.apart, strict=True):
-            arm, wanted = pose.limbs[at].tip.turned, dict(zip(
-                [each.limb for each in pose.seen], np.array(error.wanted, dtype=float), strict=True))
+            arm, wanted = (
+                pose.limbs[at].tip.turned,
+                dict(zip([each.limb for each in pose.seen], np.array(error.wanted, dtype=float), strict=True)),
+            )
             levels, sides = [], error.directions.at(forms)
             here = np.array([each.v[0, 0] for each in sides]).reshape(-1, 3)
             for angle in (STEP, -STEP):
@@ -257,11 +271,17 @@ def test_no_place_of_a_joint_is_lost(seed):
     x, v = (lambda tip: (tip[0], complex(*tip[1:])))(low + (high - low) * rng.uniform(size=3))
     rod, radius, aside = rng.uniform(0.2, 2.0, 3) * [1, 1, rng.choice([0.0, 0.3, -0.3])]
     z_axis = np.array([0.0, 0.0, 1.0])
-    limbs = [(OnRail("", axis=z_axis, rod=rod), [x - 1, x + 1] if abs(v) > rod else
-              [x + sign * np.sqrt(rod**2 - abs(v) ** 2) for sign in (-1, 1)]),
-             (OnCrank("", axis=z_axis, rod=rod, radius=radius), [
-                 np.conj(v), -(x**2 + abs(v) ** 2 + radius**2 - rod**2) / radius, v]),
-             (SlidingRod("", axis=z_axis, aside=aside), [-np.conj(v), -2j * aside, v])]
+    limbs = [
+        (
+            OnRail("", axis=z_axis, rod=rod),
+            [x - 1, x + 1] if abs(v) > rod else [x + sign * np.sqrt(rod**2 - abs(v) ** 2) for sign in (-1, 1)],
+        ),
+        (
+            OnCrank("", axis=z_axis, rod=rod, radius=radius),
+            [np.conj(v), -(x**2 + abs(v) ** 2 + radius**2 - rod**2) / radius, v],
+        ),
+        (SlidingRod("", axis=z_axis, aside=aside), [-np.conj(v), -2j * aside, v]),
+    ]
     along, one, two = ((low[[i]], high[[i]]) for i in range(3))
     for limb, told in limbs:
         if isinstance(limb, OnRail):
@@ -302,9 +322,14 @@ def test_no_other_critical_point_is_met(name, budget):
 
 
 @pytest.mark.some(0, 1)
-@pytest.mark.parametrize(("name", "number"), [
-    pytest.param("rrrrr_m1", -6, marks=pytest.mark.slow), pytest.param("3prr_m1", 0, marks=pytest.mark.slow),
-    pytest.param("3rrr_m1", 0, marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    ("name", "number"),
+    [
+        pytest.param("rrrrr_m1", -6, marks=pytest.mark.slow),
+        pytest.param("3prr_m1", 0, marks=pytest.mark.slow),
+        pytest.param("3rrr_m1", 0, marks=pytest.mark.long),
+    ],
+)
 def test_kinds_sum_up_to_the_number_of_the_closures(name, number):
     """The five-bar's closures make up a surface of genus 4, as those of an equilateral pentagon; of any that have three
     dimensions the number is 0."""
@@ -327,8 +352,10 @@ def test_the_rests_of_three_sliders_are_all_but_where_they_lock():
     assert len(found.locked) == 6
     limbs = [limb for limb in error.limbs if isinstance(limb, OnRail)]
     for middle, half in found.locked:
-        tips = [error.p + error.shifts @ middle + limb.tip.constant + error.R @ limb.tip.turned - limb.centre
-                for limb in limbs]
+        tips = [
+            error.p + error.shifts @ middle + limb.tip.constant + error.R @ limb.tip.turned - limb.centre
+            for limb in limbs
+        ]
         across = [tip - limb.axis * (limb.axis @ tip) for tip, limb in zip(tips, limbs, strict=True)]
         square = [i for i, limb in enumerate(limbs) if abs(np.linalg.norm(across[i]) - limb.rod) < 1e-3]
         assert len(square) == 2
@@ -338,10 +365,16 @@ def test_the_rests_of_three_sliders_are_all_but_where_they_lock():
 
 @pytest.mark.long
 @pytest.mark.timeout(3600)
-@pytest.mark.parametrize(("name", "at", "kinds"), [
-    ("linear_delta", "x=0.061,y=-0.0337", [2, 14, 20, 8]), ("3puu", "x=0.02,y=-0.03", [2, 14, 18, 8]),
-    ("delta", "x=0.061,y=-0.0337,z=-0.63", [9, 71, 77, 15]), ("delta", "x=0,y=0", [9, 62, 75, 16]),
-    ("quattro_rigid", "x=-0.0652662,y=-0.031127,z=-0.534986", [22, 230, 244, 36])])
+@pytest.mark.parametrize(
+    ("name", "at", "kinds"),
+    [
+        ("linear_delta", "x=0.061,y=-0.0337", [2, 14, 20, 8]),
+        ("3puu", "x=0.02,y=-0.03", [2, 14, 18, 8]),
+        ("delta", "x=0.061,y=-0.0337,z=-0.63", [9, 71, 77, 15]),
+        ("delta", "x=0,y=0", [9, 62, 75, 16]),
+        ("quattro_rigid", "x=-0.0652662,y=-0.031127,z=-0.534986", [22, 230, 244, 36]),
+    ],
+)
 def test_rests_of_platforms_that_translate_are_listed(name, at, kinds):
     """On inclined slides, and on cranks: nothing is left open but the places that lock, and no other rest is met. Half
     an hour for four legs."""
@@ -462,14 +495,18 @@ def test_smallest_boxes_about_a_flat_zero_are_settled():
     assert len(part._open(middle, half)[0]) == 0
     (zero,) = {tuple(np.round(each.x, 5)) for each in part.zeros()}
     modes = [limb.mode for limb in error.limbs]
-    met = [x for mode in product((-1.0, 1.0), repeat=3) for x in newton(
-        error, [own * sign for own, sign in zip(modes, mode, strict=True)], np.array([zero[:3]]) + 1e-4)]
+    met = [
+        x
+        for mode in product((-1.0, 1.0), repeat=3)
+        for x in newton(error, [own * sign for own, sign in zip(modes, mode, strict=True)], np.array([zero[:3]]) + 1e-4)
+    ]
     assert min(np.abs(x - zero[:3]).max() for x in met) < 1e-4
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("p", "falling"), [
-    ((-0.129945, -1.045162, 3.455622), 2), ((-0.168081, -0.870224, -0.598767), 1)])
+@pytest.mark.parametrize(
+    ("p", "falling"), [((-0.129945, -1.045162, 3.455622), 2), ((-0.168081, -0.870224, -0.598767), 1)]
+)
 def test_a_rest_beside_a_place_that_locks_is_one_zero(p: tuple[float, ...], falling: int) -> None:
     """Three or five millimetres from a place at which two rods of a Quattro's plate are parallel, and both square to
     what their cranks do, K has a singular value of 1e-10, and the numbers of the file leave the pose open by 1e-6:
@@ -536,13 +573,15 @@ def differences(level, x):
     bend = mpmath.matrix(n, n)
     for i, one in enumerate(ways):
         for j, two in enumerate(ways[: i + 1]):
-            bend[i, j] = bend[j, i] = (level(x + one + two) - level(x + one - two) - level(x - one + two)
-                                       + level(x - one - two)) / (4 * step**2)
+            bend[i, j] = bend[j, i] = (
+                level(x + one + two) - level(x + one - two) - level(x - one + two) + level(x - one - two)
+            ) / (4 * step**2)
     return slope, bend
 
 
-@pytest.mark.parametrize(("turn", "inside"), [(0.0, True), (2 * np.pi, True), (-2 * np.pi + 0.005, True), (0.1, False),
-                                              (np.pi, False)])
+@pytest.mark.parametrize(
+    ("turn", "inside"), [(0.0, True), (2 * np.pi, True), (-2 * np.pi + 0.005, True), (0.1, False), (np.pi, False)]
+)
 def test_a_place_that_locks_is_at_a_turn(turn: float, inside: bool) -> None:
     """Only at its turn, whatever number of whole turns it is told with, a place excepts what is listed there."""
     error, goal = PoseError.of(scenes.setting("quattro"), scenes.goal("quattro")), scenes.goal("quattro")
@@ -563,8 +602,9 @@ def test_boxes_that_fill_a_long_place_are_cut_finer() -> None:
     size = (high - low)[:4]
 
     def longest() -> float:
-        return max(float(((b - a) / size).max()) for a, b in join_boxes((m[:4] - h[:4], m[:4] + h[:4])
-                                                                       for m, h in part.lost))
+        return max(
+            float(((b - a) / size).max()) for a, b in join_boxes((m[:4] - h[:4], m[:4] + h[:4]) for m, h in part.lost)
+        )
 
     assert part.lost
     assert not part.left
@@ -639,6 +679,7 @@ def test_what_is_not_covered_says_why():
 
 def test_progress_claims_no_more_than_is_settled(monkeypatch: pytest.MonkeyPatch):
     """Each round settles one of two halves: the space left is halved, and the boxes that were looked at are counted."""
+
     class Halved(Subdivision):
         def _open(self, middle: Array, half: Array) -> tuple[Array, Array, Places]:
             return middle[-1:], half[-1:], np.zeros(1, dtype=np.intp)
@@ -649,6 +690,7 @@ def test_progress_claims_no_more_than_is_settled(monkeypatch: pytest.MonkeyPatch
     assert told[:3] == [
         "boxes of search 2 of 3: 0 % of the space settled, 0 looked at of at most 12, 1 waiting",
         "boxes of search 2 of 3: 0 % of the space settled, 1 looked at of at most 12, 2 waiting",
-        "boxes of search 2 of 3: 50 % of the space settled, 3 looked at of at most 12, 2 waiting"]
+        "boxes of search 2 of 3: 50 % of the space settled, 3 looked at of at most 12, 2 waiting",
+    ]
     settled = 100 * (1 - 0.5 ** (len(told) - 2))
     assert told[-1].startswith(f"boxes of search 2 of 3: {int(settled)} % of the space settled")

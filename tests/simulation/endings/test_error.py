@@ -15,8 +15,9 @@ from hrsynth.mechanism.observations.image_circle import ImageCircle
 from hrsynth.simulation.endings.error import RestEquations, RestSystem
 from simulation.scenes import few_first, setting
 
-ROBOTS = few_first(["3prr_m1", "3rpr_m1", "3rps", "3upu", "6pus", "delta", "gough_stewart", "quattro",
-                    "quattro_rigid", "rrrrr_m1"])
+ROBOTS = few_first(
+    ["3prr_m1", "3rpr_m1", "3rps", "3upu", "6pus", "delta", "gough_stewart", "quattro", "quattro_rigid", "rrrrr_m1"]
+)
 STEP = 1e-6
 
 
@@ -31,14 +32,20 @@ def test_error_gradient_and_hessian(name: str, encoders: bool) -> None:
 
 @pytest.mark.some(2)
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("robot", ["free_body", pytest.param("arm", marks=pytest.mark.slow),
-                                   pytest.param("gough_stewart", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "robot",
+    ["free_body", pytest.param("arm", marks=pytest.mark.slow), pytest.param("gough_stewart", marks=pytest.mark.slow)],
+)
 def test_error_of_every_kind(robot: str, kind: str) -> None:
     """The same of each kind, one seen from the base and one from the platform: E is ½ Σ ‖e‖² of the errors that the
     law feeds back."""
     if (robot, kind) != ("free_body", "encoder"):
-        check(watched({"free_body": free_body, "arm": arm}[robot]() if robot in ("free_body", "arm") else load(robot),
-                      kind), wide=1e-9 if kind == "image_circle" else 1e-5)
+        check(
+            watched(
+                {"free_body": free_body, "arm": arm}[robot]() if robot in ("free_body", "arm") else load(robot), kind
+            ),
+            wide=1e-9 if kind == "image_circle" else 1e-5,
+        )
 
 
 def check(found: ObservedRobot, encoders: bool = False, wide: float = 1e-4) -> None:
@@ -55,8 +62,11 @@ def check(found: ObservedRobot, encoders: bool = False, wide: float = 1e-4) -> N
         return float(np.nan_to_num(np.abs(bend), nan=np.inf).max())
 
     def edge_on(at: ClosedConfiguration) -> float:
-        sights = [o.sighting(at.pose(question.reference), at.pose(o.link)) for o in question.observations
-                  if isinstance(o, ImageCircle)]
+        sights = [
+            o.sighting(at.pose(question.reference), at.pose(o.link))
+            for o in question.observations
+            if isinstance(o, ImageCircle)
+        ]
         return max(1 - abs(float(each.ray @ each.d)) for each in sights) if sights else steep(at)
 
     at = found.configurations[1] if wide == 1e-4 else min(found.configurations[1:], key=edge_on)
@@ -70,8 +80,10 @@ def check(found: ObservedRobot, encoders: bool = False, wide: float = 1e-4) -> N
 
     here = equations(q)
     wanted, seen = (measure(each.twin, each.q, question.reference, question.observations)[2] for each in (goal, at))
-    errors = [(np.cross(u, w) if isinstance(o, SeenAxis) else o.error(u, w))
-              for o, u, w in zip(question.observations, seen, wanted, strict=True)]
+    errors = [
+        (np.cross(u, w) if isinstance(o, SeenAxis) else o.error(u, w))
+        for o, u, w in zip(question.observations, seen, wanted, strict=True)
+    ]
     assert here.E[0] == pytest.approx(0.5 * float(np.sum(np.concatenate(errors) ** 2)), abs=1e-10, rel=1e-10)
     assert np.abs(here.G).max(initial=0.0) < 1e-10
     steps = STEP * np.eye(size)
@@ -83,8 +95,12 @@ def check(found: ObservedRobot, encoders: bool = False, wide: float = 1e-4) -> N
     boxes = RestEquations(rest, [affine(np.array([x]), np.zeros((1, 0)), np.full(1, wide)) for x in q])
     held = affine(mu, np.zeros((1, count, 0)), np.zeros((1, count)))
     near = equations(q + wide * rng.uniform(-1, 1, size))
-    for form, value in ((boxes.E, near.E), (boxes.pull(held), near.pull(mu)), (boxes.bend(held), near.bend(mu)),
-                        (boxes.gram(), near.gram())):
+    for form, value in (
+        (boxes.E, near.E),
+        (boxes.pull(held), near.pull(mu)),
+        (boxes.bend(held), near.bend(mu)),
+        (boxes.gram(), near.gram()),
+    ):
         assert np.all(np.abs(form.v[0] - value) <= form.spread)
         assert float(form.spread.max()) < 0.5 * max(1.0, float(np.abs(value).max()))
 

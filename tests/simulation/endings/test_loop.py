@@ -24,8 +24,11 @@ STARTS = 1000
 def subdivided(error, low, high, vanishing=False):
     """The zeros of boxes that all are settled."""
     low, high = error.box(low, high, 1.0)
-    part = (LoopSubdivision(error, low, high) if isinstance(error, LoopError) else
-            Subdivision(error, low, high, vanishing=vanishing))
+    part = (
+        LoopSubdivision(error, low, high)
+        if isinstance(error, LoopError)
+        else Subdivision(error, low, high, vanishing=vanishing)
+    )
     part.run(1_000_000)
     zeros = part.zeros()
     assert not part.left
@@ -67,8 +70,11 @@ def test_in_a_plane_they_are_the_rests_at_which_a_force_closes_the_loop(rail: bo
     over_pose = subdivided(JointError.of(error), low, high)
     wanted = LoopError.about(error).desired
     cosines = np.abs([[u @ w for u, w in zip(each.directions, wanted, strict=True)] for each in over_pose])
-    forced = [each for each, c in zip(over_pose, cosines, strict=True)
-              if np.minimum(c, np.sqrt(1 - np.minimum(c, 1.0) ** 2)).max() > 1e-6]
+    forced = [
+        each
+        for each, c in zip(over_pose, cosines, strict=True)
+        if np.minimum(c, np.sqrt(1 - np.minimum(c, 1.0) ** 2)).max() > 1e-6
+    ]
     own = subdivided(LoopError.about(error), low, high)
     assert 4 < len(own) < len(over_pose)
     one, other = (places(each, 2) for each in (own, forced))
@@ -80,8 +86,12 @@ def test_in_a_plane_they_are_the_rests_at_which_a_force_closes_the_loop(rail: bo
 
 
 ARM, ROD, BAR = 0.38, 0.825, 0.043
-OUT = {"1": np.array([-1.0, -1.0, 0.0]), "2": np.array([1.0, -1.0, 0.0]), "3": np.array([1.0, 1.0, 0.0]),
-       "4": np.array([-1.0, 1.0, 0.0])}
+OUT = {
+    "1": np.array([-1.0, -1.0, 0.0]),
+    "2": np.array([1.0, -1.0, 0.0]),
+    "3": np.array([1.0, 1.0, 0.0]),
+    "4": np.array([-1.0, 1.0, 0.0]),
+}
 OUT = {leg: out / np.sqrt(2) for leg, out in OUT.items()}
 PLATE = {leg: np.array([np.sign(out[0]) * 0.066, np.sign(out[1]) * 0.048, 0.0]) for leg, out in OUT.items()}
 """The Quattro as its file has it, in metres: where legs are, and their wrists on the plates at the ends of the bar."""
@@ -160,8 +170,10 @@ def goal_directions(legs):
     X = scenes.goal("quattro").pose("platform")
     phi = np.array([np.arctan2(X[1, 0], X[0, 0])])
     tips = [X[:3, 3] + wrist(leg, phi)[:, 0] for leg in legs]
-    return [(tip - arm(leg, np.array([min(arms_at(leg, tip), key=abs)]))[:, 0]) / ROD
-            for leg, tip in zip(legs, tips, strict=True)]
+    return [
+        (tip - arm(leg, np.array([min(arms_at(leg, tip), key=abs)]))[:, 0]) / ROD
+        for leg, tip in zip(legs, tips, strict=True)
+    ]
 
 
 @pytest.mark.some(0, 1)
@@ -182,9 +194,13 @@ def test_no_other_rest_is_met_by_hand(legs: str, count: int) -> None:
     for each in forced:
         turn = np.array([np.arctan2(each.R[1, 0], each.R[0, 0])])
         ends = [each.p + wrist(leg, turn)[:, 0] for leg in legs]
-        q = [min(arms_at(leg, tip), key=lambda q, leg=leg, tip=tip, u=u: np.abs(
-            tip - arm(leg, np.array([q]))[:, 0] - ROD * u).max())
-            for leg, tip, u in zip(legs, ends, each.directions, strict=True)]
+        q = [
+            min(
+                arms_at(leg, tip),
+                key=lambda q, leg=leg, tip=tip, u=u: np.abs(tip - arm(leg, np.array([q]))[:, 0] - ROD * u).max(),
+            )
+            for leg, tip, u in zip(legs, ends, each.directions, strict=True)
+        ]
         y = np.concatenate([q, turn, *each.directions, np.zeros(5)])[:, None]
         # the slope is linear in multipliers
         still, J = slope(y)[:, 0], bent(slope, y)[0]
@@ -196,8 +212,14 @@ def test_no_other_rest_is_met_by_hand(legs: str, count: int) -> None:
     y[3:9] /= np.repeat([np.linalg.norm(y[3:6], axis=0), np.linalg.norm(y[6:9], axis=0)], 3, axis=0)
     y = newton(slope, y)
     p = arm(legs[0], y[0]) + ROD * y[3:6] - wrist(legs[0], y[2])
-    y, p = (each[:, np.all([reached(leg, p + wrist(leg, y[2])) for leg in OUT if leg not in legs], axis=0)
-                  & (np.linalg.norm(y[9:12], axis=0) > 1e-6)] for each in (y, p))
+    y, p = (
+        each[
+            :,
+            np.all([reached(leg, p + wrist(leg, y[2])) for leg in OUT if leg not in legs], axis=0)
+            & (np.linalg.norm(y[9:12], axis=0) > 1e-6),
+        ]
+        for each in (y, p)
+    )
     met = np.concatenate([p, y[3:9], np.cos(y[2:3]), np.sin(y[2:3])]).T
     away = np.abs(met[:, None] - np.array(places)).max(axis=2)
     assert away.min(axis=1).max() < 1e-6
@@ -205,10 +227,16 @@ def test_no_other_rest_is_met_by_hand(legs: str, count: int) -> None:
 
 
 @pytest.mark.some(0, 1)
-@pytest.mark.parametrize(("name", "at", "legs", "count", "square"), [
-    ("delta", "x=0.061,y=-0.0337,z=-0.63", "12", 30, 3), ("quattro_rigid", scenes.GOALS["quattro_rigid"], "14", 28, 3)])
+@pytest.mark.parametrize(
+    ("name", "at", "legs", "count", "square"),
+    [
+        ("delta", "x=0.061,y=-0.0337,z=-0.63", "12", 30, 3),
+        ("quattro_rigid", scenes.GOALS["quattro_rigid"], "14", 28, 3),
+    ],
+)
 def test_a_platform_that_translates_rests_also_across_one_direction(
-        name: str, at: str, legs: str, count: int, square: int) -> None:
+    name: str, at: str, legs: str, count: int, square: int
+) -> None:
     """Boxes and the search over all joints list the same rests while the other legs are not stretched, those among them
     at which one direction is along the desired one and the other at right angles."""
     setting = scenes.setting(name, tuple(legs))
@@ -232,8 +260,11 @@ def test_kinds_sum_to_the_euler_number_of_the_loop(legs: str) -> None:
     its maxima on the surface on which both directions are at right angles to the desired ones: the kinds of the other
     rests sum to the difference. The surface's own Euler number is told by the critical points of another function."""
     whole = PoseError.of(scenes.setting("quattro", tuple(legs)), scenes.goal("quattro"))
-    alone = replace(whole, limbs=tuple(whole.limbs[each.limb] for each in whole.seen), seen=tuple(
-        replace(each, limb=k) for k, each in enumerate(whole.seen)))
+    alone = replace(
+        whole,
+        limbs=tuple(whole.limbs[each.limb] for each in whole.seen),
+        seen=tuple(replace(each, limb=k) for k, each in enumerate(whole.seen)),
+    )
     low, high, _ = bounds(alone, 1.0)
     forced = subdivided(LoopError.about(alone), low, high)
     zeros = [each for each in subdivided(JointError.of(alone), low, high, vanishing=True) if each.error[0] == 0]
@@ -245,8 +276,10 @@ def test_kinds_sum_to_the_euler_number_of_the_loop(legs: str) -> None:
         """Between both wrists, by the arms' angles and the bar's turn, and by the angles of rods at right angles."""
         one, two = ((arm(leg, x[k]) - wrist(leg, x[2])) for k, leg in enumerate(legs))
         if len(x) > 3:
-            one, two = (each + np.cos(z) * frame[0] + np.sin(z) * frame[1]
-                        for each, z, frame in zip((one, two), x[3:], frames, strict=True))
+            one, two = (
+                each + np.cos(z) * frame[0] + np.sin(z) * frame[1]
+                for each, z, frame in zip((one, two), x[3:], frames, strict=True)
+            )
         return one - two
 
     rng = np.random.default_rng(7)

@@ -98,8 +98,11 @@ def test_rates_are_those_of_differences():
     those by turns are rates over w."""
     rng = np.random.default_rng(0)
     one, other = (np.linalg.svd(each.span.T)[2][3] for each in families())
-    whole = replace(families()[0], span=np.linalg.qr(rng.normal(size=(4, 4)))[0],
-                    forms=(np.outer(one, other) + np.outer(other, one))[None])
+    whole = replace(
+        families()[0],
+        span=np.linalg.qr(rng.normal(size=(4, 4)))[0],
+        forms=(np.outer(one, other) + np.outer(other, one))[None],
+    )
     for error in (chart for family in (*families(), whole) for chart in family.charts[::5]):
         (n, k), y = error.size, drawn(error, rng)
         told, own = at(error.slopes, y), k - len(error.forms)
@@ -126,8 +129,13 @@ def test_boxes_hold_the_poses_that_are_told():
         for _ in range(20):
             p, R = error.pose(y + rng.uniform(-1, 1, y.shape) * half)
             turn = R @ goal.R.T
-            axis = np.stack([turn[:, 2, 1] - turn[:, 1, 2], turn[:, 0, 2] - turn[:, 2, 0],
-                             turn[:, 1, 0] - turn[:, 0, 1]], axis=1) / 2
+            axis = (
+                np.stack(
+                    [turn[:, 2, 1] - turn[:, 1, 2], turn[:, 0, 2] - turn[:, 2, 0], turn[:, 1, 0] - turn[:, 0, 1]],
+                    axis=1,
+                )
+                / 2
+            )
             x = np.concatenate([(p - goal.p) @ goal.shifts, axis], axis=1)
             assert np.all((low[:, :6] <= x) & (x <= high[:, :6]))
 
@@ -141,7 +149,7 @@ def test_forms_of_rank_two_are_factors():
     assert min(np.abs(a @ span).max() for span, _ in spaces) < 1e-12
     assert min(np.abs(b @ span).max() for span, _ in spaces) < 1e-12
     form = np.diag([1.0, 2.0, -1.0, -0.5])
-    (span, left), = factors(np.eye(4), [form])
+    ((span, left),) = factors(np.eye(4), [form])
     assert span.shape == (4, 4)
     assert left[0] is form
     assert list(factors(np.eye(4), [np.eye(4)])) == []
@@ -178,7 +186,8 @@ def test_where_closures_meet_a_slope_along_one_of_them_is_no_rest():
     home = search.system.system.read(goal.pose)
     pool = home + np.random.default_rng(0).normal(size=(400, len(home)))
     (q,), (done,) = Lift(search.system, search.law.question.observations, family.error)(
-        CriticalPoses(p[None], R[None], u[None], none, none), pool)
+        CriticalPoses(p[None], R[None], u[None], none, none), pool
+    )
     assert done
     point = CriticalPoint(q, np.zeros(search.system.size[1]), 0.0, np.array([0.1, 0.2, 1e4]), 0.04)
     assert ToldApart(search.system, setting).add([point]) == 0
@@ -255,8 +264,10 @@ def test_all_rests_of_the_two_families_are_listed():
 def test_rests_of_a_robot_without_symmetry_are_one_family(tmp_path):
     """A leg of the 3-RPS and its ball moved by 3 and 2 cm: the form of turns is no product; kinds sum up to nothing."""
     text = shipped()["3rps"].read_text()
-    for old, new in (("-0.2 0.34641016151378 0", "-0.17 0.36641016151378 0"),
-                     ("-0.075 0.12990381056767 0", "-0.045 0.14990381056767 0")):
+    for old, new in (
+        ("-0.2 0.34641016151378 0", "-0.17 0.36641016151378 0"),
+        ("-0.075 0.12990381056767 0", "-0.045 0.14990381056767 0"),
+    ):
         assert text.count(f'"{old}"') == 1
         text = text.replace(f'"{old}"', f'"{new}"')
     (tmp_path / "robot.urdf").write_text(text)

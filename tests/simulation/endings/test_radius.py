@@ -139,8 +139,10 @@ def test_boxes_that_lead_inwards_do_so_at_all_their_poses(name, legs):
 
 
 @pytest.mark.some(0, 1)
-@pytest.mark.parametrize(("name", "legs", "least"), [
-    ("quattro", "1,4", 0.017), ("delta", None, 0.11), ("3rrr_m1", None, 0.010), ("gough_stewart", None, 0.0033)])
+@pytest.mark.parametrize(
+    ("name", "legs", "least"),
+    [("quattro", "1,4", 0.017), ("delta", None, 0.11), ("3rrr_m1", None, 0.010), ("gough_stewart", None, 0.0033)],
+)
 def test_the_law_without_damping_leads_inwards(name, legs, least):
     """From all over the ball runs end at the goal, on whose way nothing is damped."""
     setting = ObservedRobot.of(name, legs)
@@ -183,9 +185,14 @@ def test_roots_and_inverses_of_forms_hold_those_of_numbers():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "led"), [
-    ("3rpr_m1", True), pytest.param("rrrrr_m1", False, marks=pytest.mark.long),
-    pytest.param("3rrr_m1", True, marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    ("name", "led"),
+    [
+        ("3rpr_m1", True),
+        pytest.param("rrrrr_m1", False, marks=pytest.mark.long),
+        pytest.param("3rrr_m1", True, marks=pytest.mark.long),
+    ],
+)
 def test_all_starts_within_it_end_at_the_goal(name, led):
     """Also where the base is tilted; of the five-bar, whose pose has parts that depend on each other, it is proved."""
     rng = np.random.default_rng(2)
@@ -213,7 +220,8 @@ def test_a_start_in_another_working_mode_may_end_elsewhere():
     assert found.holds(apart[0].pose(motion.link))
     search = RestSearch.of(setting, goal)
     run = Loop(replace(search.law, gain=0.8), setting.everything.question, FixedDirections(search.desired)).simulate(
-        apart[0], 60.0)
+        apart[0], 60.0
+    )
     assert np.linalg.norm(motion.position(run.last.pose(motion.link)) - place) > 2 * found.length
 
 
@@ -235,9 +243,18 @@ def test_where_joints_have_limits_nothing_is_certified():
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("name", "legs", "least"), [
-    ("quattro", "1,4", 4.5e-3), ("quattro", "2,3", 4.5e-3), ("quattro", None, 7.9e-3), ("quattro_rigid", None, 15e-3),
-    ("3rpr_m1", None, 31e-3), ("delta", None, 38e-3), ("3upu", None, 98e-3)])
+@pytest.mark.parametrize(
+    ("name", "legs", "least"),
+    [
+        ("quattro", "1,4", 4.5e-3),
+        ("quattro", "2,3", 4.5e-3),
+        ("quattro", None, 7.9e-3),
+        ("quattro_rigid", None, 15e-3),
+        ("3rpr_m1", None, 31e-3),
+        ("delta", None, 38e-3),
+        ("3upu", None, 98e-3),
+    ],
+)
 def test_ten_thousand_starts_end_at_the_goal(name, legs, least):
     setting = ObservedRobot.of(name, legs)
     found = certified(setting)

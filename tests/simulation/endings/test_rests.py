@@ -47,6 +47,8 @@ from simulation.endings.count import Descent, counted
 from simulation.scenes import GOALS, Legs, goal, setting
 
 FIVE_BAR, POSE = "rrrrr_m1", "x=0.02,y=0.25"
+
+
 @cache
 def listed(name: str = FIVE_BAR, pose: str = POSE) -> Endings:
     return endings(name, at=pose)
@@ -97,8 +99,9 @@ class OnSlides:
         """The slides and the platform's x axis at each."""
         found = []
         for k, m in ((k, m) for k in range(4) for m in range(4)):
-            ends = [foot + self.turned(rod, turns)
-                    for foot, rod, turns in zip(self.feet, self.rods, (k, m), strict=True)]
+            ends = [
+                foot + self.turned(rod, turns) for foot, rod, turns in zip(self.feet, self.rods, (k, m), strict=True)
+            ]
             slides = np.linalg.solve(np.column_stack([self.axes[0], -self.axes[1]]), ends[1] - ends[0])
             found.append((slides, self.turned(np.array([1.0, 0.0]), k)))
         return found
@@ -155,8 +158,10 @@ def test_the_order_of_rests_is_that_of_what_they_are():
     ordered = _sort(rests, link, length)
     assert [*dict.fromkeys(each.kind for each in ordered)] == ["goal", "mode", "antipodal", "critical"]
     for _ in range(20):
-        other = [replace(rests[i], error=rests[i].error * (1 + 1e-9 * rng.normal()) + 1e-14 * rng.random())
-                 for i in rng.permutation(len(rests))]
+        other = [
+            replace(rests[i], error=rests[i].error * (1 + 1e-9 * rng.normal()) + 1e-14 * rng.random())
+            for i in rng.permutation(len(rests))
+        ]
         assert [each.configuration for each in _sort(other, link, length)] == [each.configuration for each in ordered]
     assert found.endings == tuple(each for each in ordered if each in found.endings)
 
@@ -235,8 +240,10 @@ def test_the_sides_of_rests_are_those_of_the_condition() -> None:
     found = listed()
 
     def sine(at: ClosedConfiguration) -> float:
-        ends = [[joint_at(at, at.twin.mechanism.joints[name])[0] for name in leg.joints[:2]]
-                for leg in found.setting.anatomy.legs]
+        ends = [
+            [joint_at(at, at.twin.mechanism.joints[name])[0] for name in leg.joints[:2]]
+            for leg in found.setting.anatomy.legs
+        ]
         one, other = ((b - a) / np.linalg.norm(b - a) for a, b in ends)
         return float(np.cross(one, other)[2])
 
@@ -266,8 +273,10 @@ def test_eigenvalues_are_enclosed() -> None:
         kept = np.ix_(free > 0, free > 0)
         wanted = np.sort(np.linalg.eigvals(np.linalg.solve(Z.T @ gram[kept] @ Z, Z.T @ K[:size, :size][kept] @ Z)).real)
         assert len(told) == len(wanted) == size - count - (free[0] == 0)
-        assert all(low <= value <= high < low + 1e-2 * max(1, abs(value))
-                   for (low, high), value in zip(told, wanted, strict=True))
+        assert all(
+            low <= value <= high < low + 1e-2 * max(1, abs(value))
+            for (low, high), value in zip(told, wanted, strict=True)
+        )
 
 
 @pytest.mark.slow
@@ -280,26 +289,33 @@ def test_rates_are_those_of_the_law() -> None:
     idle = seen.mobility - seen.dimension
     (q,) = islice(starts(search.system, np.array([search.system.system.read(goal.pose)])), 1)
     ends = [each for each in descend(search.system, q[:60], np.ones(60, dtype=np.intp), idle) if each.value > 1e-3]
-    own = [(box.rates, at) for box, each in zip(enclose_points(search.system, ends, idle), ends, strict=True)
-           if box is not None and box.rates and (at := search._place(each.q)) is not None][:4]
+    own = [
+        (box.rates, at)
+        for box, each in zip(enclose_points(search.system, ends, idle), ends, strict=True)
+        if box is not None and box.rates and (at := search._place(each.q)) is not None
+    ][:4]
     assert own
     for rates, at in own:
         chart = TangentChart.around(at, setting.everything.question)
         back = np.linalg.pinv(chart.basis)
         A = []
         for way in 1e-5 * np.eye(chart.basis.shape[1]):
-            pair = [back @ search.law.at(chart.at(sign * way, at.q), FixedDirections(search.desired)(0.0)).velocity
-                    for sign in (1, -1)]
+            pair = [
+                back @ search.law.at(chart.at(sign * way, at.q), FixedDirections(search.desired)(0.0)).velocity
+                for sign in (1, -1)
+            ]
             A.append((pair[0] - pair[1]) / 2e-5)
         # idle motions are not commanded: as many eigenvalues vanish
         values = np.sort(-np.linalg.eigvals(np.array(A).T).real)
-        values = sorted(sorted(values, key=abs)[len(values) - len(rates):])
+        values = sorted(sorted(values, key=abs)[len(values) - len(rates) :])
         assert values == pytest.approx([(low + high) / 2 for low, high in rates], rel=1e-3, abs=1e-3)
 
 
 @pytest.mark.some(0, 1)
-@pytest.mark.parametrize("name", ["prrrp_m1", pytest.param("rrrrr_m1", marks=pytest.mark.slow),
-                                  pytest.param("3prr_m1", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "name",
+    ["prrrp_m1", pytest.param("rrrrr_m1", marks=pytest.mark.slow), pytest.param("3prr_m1", marks=pytest.mark.slow)],
+)
 def test_what_is_said_to_be_all_is_what_boxes_prove(name: str) -> None:
     """Each proved critical pose is a rest of the list, and each rest one of them; what a shorter list lacks is told
     beside it, of one with a rest more it is not said."""
@@ -313,7 +329,7 @@ def test_what_is_said_to_be_all_is_what_boxes_prove(name: str) -> None:
     assert found.cover.alone == ()
     counted_from = found.cover.cover.error.coordinates
     for k, each in enumerate(found.rests):
-        short = covers.judge([*found.rests[:k], *found.rests[k + 1:]])
+        short = covers.judge([*found.rests[:k], *found.rests[k + 1 :]])
         assert short is not None
         assert short.complete
         (missing,) = short.alone
@@ -369,14 +385,21 @@ def test_what_is_alone_in_its_box_may_share_its_pose() -> None:
     """A rod may point either way at one pose: two rests there, whose boxes of joint coordinates are far apart."""
     found = endings("rprpr_m2", at="x=0.03,y=0.22")
     scale = found.setting.mechanism.length
-    same = [(one, other) for one, other in combinations([each for each in found.rests if each.proved], 2)
-            if all(pose_difference(one.configuration.pose(link), other.configuration.pose(link), scale) < 1e-9
-                   for link in placing_links(found.setting.anatomy))]
+    same = [
+        (one, other)
+        for one, other in combinations([each for each in found.rests if each.proved], 2)
+        if all(
+            pose_difference(one.configuration.pose(link), other.configuration.pose(link), scale) < 1e-9
+            for link in placing_links(found.setting.anatomy)
+        )
+    ]
     assert same
     system = RestSearch.of(found.setting, found.goal).system
     for pair in same:
-        points = [CriticalPoint(system.system.read(each.configuration.pose), np.zeros(system.size[1]), 0.0, np.zeros(2),
-                                0.0) for each in pair]
+        points = [
+            CriticalPoint(system.system.read(each.configuration.pose), np.zeros(system.size[1]), 0.0, np.zeros(2), 0.0)
+            for each in pair
+        ]
         one, other = enclose_points(system, points, 0)
         assert one is not None
         assert other is not None
@@ -386,9 +409,14 @@ def test_what_is_alone_in_its_box_may_share_its_pose() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "turns", "words"), [
-    ("linear_delta", 1, ", with the platform turned as at the goal"),
-    ("3upu", 2, ", in the 2 turns in which the platform translates"), ("3rrr_m1", 1, "")])
+@pytest.mark.parametrize(
+    ("name", "turns", "words"),
+    [
+        ("linear_delta", 1, ", with the platform turned as at the goal"),
+        ("3upu", 2, ", in the 2 turns in which the platform translates"),
+        ("3rrr_m1", 1, ""),
+    ],
+)
 def test_where_a_platform_only_translates_nothing_is_said_of_other_turns(name: str, turns: int, words: str) -> None:
     """Of poses with reversed legs that boxes exclude, and of those that they count where no list does."""
     found, lists = listed(), (SignedModes(("1",), None, 0, turns),)
@@ -420,8 +448,9 @@ def test_a_thousand_starts_at_once_find_no_other() -> None:
     up, here, down = (scene.error(end) + (mu * scene.closing(end)).sum(axis=1) for end in ends)
     slope = scene.slope(at, B) + np.einsum("nrk,nr->nk", scene.rates(at, B), mu)
     assert np.abs((up - down) / 2e-4 - (slope * x).sum(axis=1)).max() < 1e-5
-    assert np.abs((up - 2 * here + down) / 1e-8 - np.einsum("nk,nkl,nl->n", x, scene.hessian(at, mu, B), x)
-                  ).max() < 1e-4
+    assert (
+        np.abs((up - 2 * here + down) / 1e-8 - np.einsum("nk,nkl,nl->n", x, scene.hessian(at, mu, B), x)).max() < 1e-4
+    )
     result = many.counted(listed(), 1000)
     assert not result.outside
     assert result.ends["descent", many.MEMBER] == 1000
@@ -459,13 +488,16 @@ def test_no_loop_is_open_for_the_oracle(name: str, legs: Legs | None) -> None:
     """Equations that follow from the others at samples do not where loops are singular: they hold all the same where
     random closings, walks from there and joints of a pose are led; where they do not, nothing is a rest."""
     found, rng = setting(name, legs), np.random.default_rng(0)
-    search, oracle = RestSearch.of(found, goal(name) if name in GOALS else found.configurations[3]), Oracle(
-        found.mechanism)
+    search, oracle = (
+        RestSearch.of(found, goal(name) if name in GOALS else found.configurations[3]),
+        Oracle(found.mechanism),
+    )
 
     def left(q: np.ndarray) -> np.ndarray:
         poses = [search.system.system.pose(link, q.T) for link in oracle.index]
-        return np.array([oracle.error(state) for state in np.stack(
-            [np.broadcast_to(X, (len(q), 4, 4)) for X in poses], axis=1)])
+        return np.array(
+            [oracle.error(state) for state in np.stack([np.broadcast_to(X, (len(q), 4, 4)) for X in poses], axis=1)]
+        )
 
     closings = anywhere(search.system, rng, 40)
     assert len(closings) > 20
@@ -489,12 +521,17 @@ def test_no_loop_is_open_for_the_oracle(name: str, legs: Legs | None) -> None:
     astray = astray[np.linalg.norm(RestEquations(search.system, list(astray.T)).G, axis=1) < 1e-11]
     open_ = left(astray) > 1e-3
     assert open_.any() == (name != "delta")
-    assert known.add([CriticalPoint(each, np.zeros(search.system.size[1]), 0.0, np.ones(4), 0.0)
-                      for each in astray[open_]]) == 0
+    assert (
+        known.add(
+            [CriticalPoint(each, np.zeros(search.system.size[1]), 0.0, np.ones(4), 0.0) for each in astray[open_]]
+        )
+        == 0
+    )
 
 
-@pytest.mark.parametrize(("name", "legs"), [("quattro", "1,4"), ("3rpr_m1", None), ("gough_stewart", "1,3,5"),
-                                           ("linear_delta", "1")])
+@pytest.mark.parametrize(
+    ("name", "legs"), [("quattro", "1,4"), ("3rpr_m1", None), ("gough_stewart", "1,3,5"), ("linear_delta", "1")]
+)
 def test_equations_over_the_pose_are_what_their_derivatives_say(name: str, legs: str | None) -> None:
     """E and the equations of watched legs and of all that can be held: differences along a line are the gradient and
     the Hessian; at drawn poses the watched legs close, and E is that of the pose."""
@@ -520,7 +557,8 @@ def test_equations_over_the_pose_are_what_their_derivatives_say(name: str, legs:
         slope = at.slope + np.einsum("cm,cmn->cn", mu, at.DG)
         assert (up - down) / 2e-4 == pytest.approx((slope * way).sum(axis=1), rel=1e-5, abs=1e-5)
         assert (up - 2 * here + down) / 1e-8 == pytest.approx(
-            np.einsum("cn,cnm,cm->c", way, at.bend(mu), way), rel=1e-4, abs=1e-4)
+            np.einsum("cn,cnm,cm->c", way, at.bend(mu), way), rel=1e-4, abs=1e-4
+        )
 
 
 @pytest.mark.long
@@ -568,7 +606,11 @@ def test_four_image_points_of_a_tilted_square(tmp_path: Path) -> None:
     p = SQUARE @ poses[0][:3, :3].T + poses[0][:3, 3]
     wanted = p[:, :2] / p[:, 2:]
     assert [(each.kind, each.stability) for each in found.rests] == [
-        ("goal", "stable"), ("critical", "stable"), ("critical", "saddle"), ("critical", "saddle")]
+        ("goal", "stable"),
+        ("critical", "stable"),
+        ("critical", "saddle"),
+        ("critical", "saddle"),
+    ]
     assert all(each.proved and each.decided for each in found.rests)
     for each, X in zip(found.rests, poses, strict=True):
         x = np.append(X[:3, 3], logarithm(X[:3, :3]))
@@ -596,11 +638,15 @@ def test_four_image_points_of_a_tilted_square(tmp_path: Path) -> None:
 
 
 @pytest.mark.some(0, 1)
-@pytest.mark.parametrize("see", [
-    ["circle:platform@0.1,0,0/0,0.3,1", "distance:platform@0.1,0.1,0"],
-    ["edges:platform@0.1,0,0/0,1,0.2/0.02", "edge:platform@0.1,0.1,0/1,0,0/0.02"],
-    ["inclination:platform", "position:platform@0.1,0,0", "direction:platform/1,0,0"],
-], ids=["circle and distance", "edges", "inclination, position and direction"])
+@pytest.mark.parametrize(
+    "see",
+    [
+        ["circle:platform@0.1,0,0/0,0.3,1", "distance:platform@0.1,0.1,0"],
+        ["edges:platform@0.1,0,0/0,1,0.2/0.02", "edge:platform@0.1,0.1,0/1,0,0/0.02"],
+        ["inclination:platform", "position:platform@0.1,0,0", "direction:platform/1,0,0"],
+    ],
+    ids=["circle and distance", "edges", "inclination, position and direction"],
+)
 def test_rests_of_all_kinds_are_those_of_the_law(see: list[str], tmp_path: Path) -> None:
     """The law commands nothing there, and from next to one that attracts a run ends at it."""
     found = body(tmp_path, see, at=TILTED)
@@ -641,17 +687,28 @@ def test_rests_with_supposed_depths_are_those_of_the_law(depth: str, mixed: bool
 
 
 def test_what_cannot_be_asked_of_cameras_is_refused_in_one_line(tmp_path: Path) -> None:
-    for options, said in (({"at": "x=0,y=0,z=-0.5,rpy=0/0/0"}, "not in front of its camera at the goal"),
-                          ({"at": TILTED, "complete": True}, "knows directions of segments only")):
+    for options, said in (
+        ({"at": "x=0,y=0,z=-0.5,rpy=0/0/0"}, "not in front of its camera at the goal"),
+        ({"at": TILTED, "complete": True}, "knows directions of segments only"),
+    ):
         with pytest.raises(BadRequest, match=said):
             body(tmp_path, seen(SQUARE), **options)
     with pytest.raises(BadRequest, match="a camera to which nothing is given to see"):
         endings(FIVE_BAR, camera="eye=base@0,0,0", at=POSE)
 
 
-@pytest.mark.parametrize(("curvatures", "word"), [
-    ([0.1, 2.0], "stable"), ([-0.1, 2.0], "saddle"), ([-2.0, -0.1], "unstable"), ([1e-9, 1.0], "undecided"),
-    ([-1e-9, 1.0], "undecided"), ([-0.1, 1e-9], "unstable"), ([-0.1, 1e-9, 1.0], "saddle")])
+@pytest.mark.parametrize(
+    ("curvatures", "word"),
+    [
+        ([0.1, 2.0], "stable"),
+        ([-0.1, 2.0], "saddle"),
+        ([-2.0, -0.1], "unstable"),
+        ([1e-9, 1.0], "undecided"),
+        ([-1e-9, 1.0], "undecided"),
+        ([-0.1, 1e-9], "unstable"),
+        ([-0.1, 1e-9, 1.0], "saddle"),
+    ],
+)
 def test_a_flat_direction_never_attracts_for_sure(curvatures: list[float], word: str) -> None:
     """Only where all curvatures are surely positive does a rest attract; one that is surely negative is enough that it
     does not."""
@@ -664,8 +721,10 @@ def test_rests_within_the_limits_of_joints_are_counted(reach: float) -> None:
     robot = hrsynth.load(FIVE_BAR)
     motors = [joint for joint in robot.joints.values() if joint.actuated]
     found = endings(robot.changed(joints=[replace(joint, limits=Limits(-reach, reach)) for joint in motors]), at=POSE)
-    turns = [[each.configuration.q[list(each.configuration.twin.coordinates[joint.name])] for joint in motors]
-             for each in found.attracting]
+    turns = [
+        [each.configuration.q[list(each.configuration.twin.coordinates[joint.name])] for joint in motors]
+        for each in found.attracting
+    ]
     inside = sum(bool(np.all(np.abs(each) <= reach)) for each in turns)
     assert 0 < inside < len(turns)
     (told,) = [line.strip() for line in text(found).splitlines() if "within all limits" in line]
@@ -678,8 +737,13 @@ def test_rests_whose_rows_would_be_equal_are_one_row_with_their_number() -> None
     """Where rods may point either way a pose has two rests, with equal rows if working modes are not known."""
     found = hrsynth.endings("rprpr_m2", at="x=0.03,y=0.22")
     told = replace(found, rests=tuple(replace(each, other_legs=None, side=None) for each in found.rests))
-    pairs = [number for number in Counter((str(each.pose), each.stability, each.kind, each.reversed, each.across)
-                                          for each in told.rests).values() if number > 1]
+    pairs = [
+        number
+        for number in Counter(
+            (str(each.pose), each.stability, each.kind, each.reversed, each.across) for each in told.rests
+        ).values()
+        if number > 1
+    ]
     assert pairs
     text = " ".join(str(told).split())
     assert text.count("2 rests, whose links stand differently") == len(pairs)

@@ -31,8 +31,10 @@ def of_robot():
 def random_error(seed):
     """That of three rods between random points, to a random goal."""
     rng, error = np.random.default_rng(seed), of_robot()
-    limbs = [replace(limb, centre=rng.normal(size=3), tip=replace(limb.tip, turned=rng.normal(size=3)))
-             for limb in error.limbs]
+    limbs = [
+        replace(limb, centre=rng.normal(size=3), tip=replace(limb.tip, turned=rng.normal(size=3)))
+        for limb in error.limbs
+    ]
     return replace(error, limbs=tuple(limbs), p=rng.normal(size=3), R=turned(rng.normal(size=3)))
 
 
@@ -77,8 +79,10 @@ def met_by_hand(error, rng, starts, far=4.0):
             J = np.empty((6, 6))
             for k in range(6):
                 step = 1e-6 * np.eye(6)[k]
-                J[:, k] = (slope(error, p + step[:3], turned(step[3:]) @ R)[0]
-                           - slope(error, p - step[:3], turned(-step[3:]) @ R)[0]) / 2e-6
+                J[:, k] = (
+                    slope(error, p + step[:3], turned(step[3:]) @ R)[0]
+                    - slope(error, p - step[:3], turned(-step[3:]) @ R)[0]
+                ) / 2e-6
             try:
                 move = np.linalg.solve(J, -g)
             except np.linalg.LinAlgError:
@@ -89,8 +93,12 @@ def met_by_hand(error, rng, starts, far=4.0):
             p, R = p + move[:3], turned(move[3:]) @ R
             if np.abs(move).max() < 1e-11:
                 g, c, _ = slope(error, p, R)
-                if (np.abs(g).max() < 1e-13 and np.abs(c).min() > 1e-3 and np.abs(p).max() < 30
-                        and np.linalg.matrix_rank(J, tol=1e-6 * np.abs(J).max()) == 6):
+                if (
+                    np.abs(g).max() < 1e-13
+                    and np.abs(c).min() > 1e-3
+                    and np.abs(p).max() < 30
+                    and np.linalg.matrix_rank(J, tol=1e-6 * np.abs(J).max()) == 6
+                ):
                     found.append((p, R))
                 break
     kept = []
@@ -108,8 +116,11 @@ def coordinates(error, p, R):
     m = normal / normal[np.abs(normal).argmax()]
     one = int(np.abs(m).argmax())
     d, n = float(m @ points[0]), m / np.linalg.norm(m)
-    chart = next(each for each in SpringError.about(error).charts if each.one == one
-                 and each.distant == (abs(d) > 2) and each.side == np.sign(normal @ m))
+    chart = next(
+        each
+        for each in SpringError.about(error).charts
+        if each.one == one and each.distant == (abs(d) > 2) and each.side == np.sign(normal @ m)
+    )
     c = slope(error, p, R)[1]
     t = c / np.linalg.norm(points - a, axis=1)
     alpha = np.arctan(t * d if chart.distant else t)
@@ -135,7 +146,7 @@ def test_at_each_rest_the_springs_balance(seed: int) -> None:
         left = np.concatenate([chart.closing.together(forms).v[0, 0], chart.left.together(forms).v[0, 0]])
         assert np.abs(left).max() < 1e-7 * max(1.0, float(np.abs(p).max())) ** 2
         sub = SpringSubdivision(chart, *chart.box(y, y, 1.0))
-        (over, told, _), = sub.over_pose(y[None])
+        ((over, told, _),) = sub.over_pose(y[None])
         q, turn = over.pose(told.together(forms).v[0])
         assert np.abs(turn[0] - R).max() < 1e-6
         assert np.abs(q[0] - p).max() < 1e-6 * max(1.0, float(np.abs(p).max()))
@@ -158,8 +169,11 @@ def test_where_the_springs_balance_the_error_has_no_slope(seed: int) -> None:
         y, F, J = y[good], F[good], J[good]
         move = (np.linalg.pinv(J) @ -F[..., None])[..., 0]
         y = y + move * np.minimum(1.0, 0.5 / np.maximum(np.abs(move).max(axis=1), 1e-300))[:, None]
-    y = y[(np.abs(F).max(axis=1) < 1e-10) & (np.abs(np.cos(y[:, 3:6])).min(axis=1) > 1e-3)
-          & ((np.abs(y[:, 2]) > 1e-2) | (not chart.distant))]
+    y = y[
+        (np.abs(F).max(axis=1) < 1e-10)
+        & (np.abs(np.cos(y[:, 3:6])).min(axis=1) > 1e-3)
+        & ((np.abs(y[:, 2]) > 1e-2) | (not chart.distant))
+    ]
     for over, told, own in SpringSubdivision(chart, low, high).over_pose(y):
         for p, R in zip(*over.pose(told.together(forms_of(y[own], 0 * y[own])).v[0]), strict=True):
             g, c, _ = slope(error, p, R)
@@ -175,8 +189,9 @@ def test_boxes_of_a_chart_hold_what_is_met_there_and_no_more(side: float) -> Non
     """Of the Gough-Stewart platform with three legs watched: in the planes far above or below the base, boxes are left
     open nowhere, and prove the poses that Newton's method meets, and no other."""
     error = of_robot()
-    chart = next(each for each in SpringError.about(error).charts
-                 if each.one == 2 and each.distant and each.side == side)
+    chart = next(
+        each for each in SpringError.about(error).charts if each.one == 2 and each.distant and each.side == side
+    )
     part = SpringSubdivision(chart, *chart.box(np.zeros(3), np.zeros(3), 1.0))
     part.run(8_000_000)
     own = [(each.p / error.length, each.R) for each in part.zeros()]
@@ -224,8 +239,11 @@ def test_rests_half_a_turn_apart_are_two() -> None:
     limbs, R = list(error.limbs), error.R
     for each, arm in zip(error.seen, ([0.3, 0.0, 0.0], [-0.4, 0.0, 0.0], [0.1, 0.5, 0.0]), strict=True):
         limb = limbs[each.limb]
-        limbs[each.limb] = replace(limb, tip=replace(limb.tip, turned=np.array(arm)),
-                                   centre=error.p + R @ [0.1, 1.3, 0.0] if arm[1] else limb.centre)
+        limbs[each.limb] = replace(
+            limb,
+            tip=replace(limb.tip, turned=np.array(arm)),
+            centre=error.p + R @ [0.1, 1.3, 0.0] if arm[1] else limb.centre,
+        )
     error = replace(error, limbs=tuple(limbs))
     for turn in (np.eye(3), np.diag([1.0, -1.0, -1.0])):
         chart, y = coordinates(error, error.p, R @ turn)
@@ -235,7 +253,9 @@ def test_rests_half_a_turn_apart_are_two() -> None:
         assert not part.left
     assert len(boxes) == 2
     assert [[_same(one, other, SpringError.about(error)) for one in boxes] for other in boxes] == [
-        [True, False], [False, True]]
+        [True, False],
+        [False, True],
+    ]
 
 
 def test_words_except_legs_without_a_length() -> None:
@@ -261,8 +281,10 @@ def test_other_watched_legs_are_refused() -> None:
         SpringError.about(PoseError.of(scenes.setting("gough_stewart", ("1", "2", "3", "5")), at))
     error = of_robot()
     first = error.limbs[error.seen[0].limb]
-    same = [replace(limb, centre=first.centre, tip=first.tip) if i == error.seen[1].limb else limb
-            for i, limb in enumerate(error.limbs)]
+    same = [
+        replace(limb, centre=first.centre, tip=first.tip) if i == error.seen[1].limb else limb
+        for i, limb in enumerate(error.limbs)
+    ]
     with pytest.raises(NotEnclosed, match="plane"):
         SpringError.about(replace(error, limbs=tuple(same)))
 
@@ -277,5 +299,7 @@ def test_no_other_rest_is_met_by_hand() -> None:
     assert not found.locked
     for p, R in met_by_hand(error, np.random.default_rng(4), STARTS):
         far = max(1.0, float(np.abs(p).max()))
-        assert any(np.abs(each.p / error.length - p).max() < 1e-5 * far and np.abs(each.R - R).max() < 1e-5
-                   for each in found.found)
+        assert any(
+            np.abs(each.p / error.length - p).max() < 1e-5 * far and np.abs(each.R - R).max() < 1e-5
+            for each in found.found
+        )

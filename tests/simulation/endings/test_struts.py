@@ -65,8 +65,9 @@ def pulled(x, turn):
     force = np.concatenate([-mu.sum(axis=-2, keepdims=True), mu], axis=-2)
     own = -(u * wanted).sum(axis=-1, keepdims=True) * wanted + z[..., 2, None] * force
     slopes = np.stack([(own * by_q).sum(-1), (own * by_angle).sum(-1), (force * u).sum(-1)], axis=-1)
-    return np.concatenate([slopes.reshape(*x.shape[:-1], 9),
-                           (tips[..., 1:, :] - tips[..., :1, :]).reshape(*x.shape[:-1], 6)], axis=-1)
+    return np.concatenate(
+        [slopes.reshape(*x.shape[:-1], 9), (tips[..., 1:, :] - tips[..., :1, :]).reshape(*x.shape[:-1], 6)], axis=-1
+    )
 
 
 def bent(x, turn):
@@ -99,9 +100,17 @@ def joints(each, turn):
     return np.stack([q, angle, d], axis=1).ravel()
 
 
-@pytest.mark.parametrize(("axes", "count"), [
-    (AXES, 2), (AXES[:2], 2), (np.eye(3), 4), (np.eye(3)[:2], 4), (np.eye(3)[[0, 0]], 1),
-    (np.array([[1.0, 0.0, 0.0], [0.6, 0.8, 0.0], [0.0, 0.6, 0.8]]), 1)])
+@pytest.mark.parametrize(
+    ("axes", "count"),
+    [
+        (AXES, 2),
+        (AXES[:2], 2),
+        (np.eye(3), 4),
+        (np.eye(3)[:2], 4),
+        (np.eye(3)[[0, 0]], 1),
+        (np.array([[1.0, 0.0, 0.0], [0.6, 0.8, 0.0], [0.0, 0.6, 0.8]]), 1),
+    ],
+)
 def test_turns_carry_each_axis_along_itself(axes, count):
     """All that do: in a plane the half turn about its normal, of three at right angles three, otherwise none."""
     axes = axes @ random_rotation(np.random.default_rng(0)).T
@@ -130,12 +139,23 @@ def test_on_the_lines_on_which_a_rod_lies_along_its_axis_all_are_found(turn):
             part.run(10_000)
             assert not part.left
             found += [float(AXES[i] @ (each.p - ends(turn)[i])) for each in part.zeros()]
-        (N, Q), (M, P) = ((sum(sympy.Rational(w) * (sympy.Rational(x) + s * sympy.Rational(a)) for w, x, a in zip(
-            wanted[j], ends(turn)[i] - ends(turn)[j], AXES[i], strict=True)),
-            sum((sympy.Rational(x) + s * sympy.Rational(a)) ** 2 for x, a in zip(
-                ends(turn)[i] - ends(turn)[j], AXES[i], strict=True))) for j in range(3) if j != i)
-        slope = sympy.Poly((2 * N.diff(s) * Q - N * Q.diff(s)) * N * P**2 + (
-            2 * M.diff(s) * P - M * P.diff(s)) * M * Q**2, s)
+        (N, Q), (M, P) = (
+            (
+                sum(
+                    sympy.Rational(w) * (sympy.Rational(x) + s * sympy.Rational(a))
+                    for w, x, a in zip(wanted[j], ends(turn)[i] - ends(turn)[j], AXES[i], strict=True)
+                ),
+                sum(
+                    (sympy.Rational(x) + s * sympy.Rational(a)) ** 2
+                    for x, a in zip(ends(turn)[i] - ends(turn)[j], AXES[i], strict=True)
+                ),
+            )
+            for j in range(3)
+            if j != i
+        )
+        slope = sympy.Poly(
+            (2 * N.diff(s) * Q - N * Q.diff(s)) * N * P**2 + (2 * M.diff(s) * P - M * P.diff(s)) * M * Q**2, s
+        )
         found = [x for k, x in enumerate(found) if np.abs(np.array(found[:k]) - x).min(initial=1.0) > 1e-6 * abs(x)]
         assert len(found) == slope.count_roots() > 0
         # lead coefficients that are rounded to zero only would add roots at no finite place
@@ -144,8 +164,13 @@ def test_on_the_lines_on_which_a_rod_lies_along_its_axis_all_are_found(turn):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("turn", [pytest.param(turn, id=name, marks=pytest.mark.long) if name == "as at the goal" else
-                                  pytest.param(turn, id=name) for name, turn in TURNS.items()])
+@pytest.mark.parametrize(
+    "turn",
+    [
+        pytest.param(turn, id=name, marks=pytest.mark.long) if name == "as at the goal" else pytest.param(turn, id=name)
+        for name, turn in TURNS.items()
+    ],
+)
 def test_rests_are_those_of_the_joints_by_hand(turn):
     """At each of 24 points, 11 with the rods as they like, 3 with one of no length, 10 with one along its axis, and
     each choice of reversed rods, the gradient over the joints vanishes; each zero by itself that Newton's method meets
@@ -163,8 +188,10 @@ def test_rests_are_those_of_the_joints_by_hand(turn):
     locked, short = (np.abs(np.sin(angles)) < 1e-9).any(axis=1), (np.abs(d) < 1e-9).any(axis=1)
     assert [int(np.sum(each)) for each in (locked, short, ~locked & ~short)] == [80, 24, 88]
     rng = np.random.default_rng(0)
-    z = np.stack([rng.uniform(-np.pi, np.pi, (600, 3)), rng.uniform(-np.pi, np.pi, (600, 3)),
-                  rng.uniform(-1, 1, (600, 3))], axis=2).reshape(600, 9)
+    z = np.stack(
+        [rng.uniform(-np.pi, np.pi, (600, 3)), rng.uniform(-np.pi, np.pi, (600, 3)), rng.uniform(-1, 1, (600, 3))],
+        axis=2,
+    ).reshape(600, 9)
     z[::3, 1] = rng.normal(0, 0.1, 200)
     z[1::3, 5] = rng.normal(0, 0.1, 200)
     z = newton(np.concatenate([z, rng.normal(0, 0.3, (600, 6))], axis=1), turn)[:, :9].reshape(-1, 3, 3)
@@ -189,8 +216,12 @@ def test_kinds_sum_up_to_nothing_and_turned_platforms_are_farther_away():
     for found in (one, other):
         assert sum((-1) ** each.falling for each in found) == 0
     for each in one:
-        away = [np.abs(0.42 / 0.18 * each.p - twin.p).max() / (1 + np.abs(twin.p).max())
-                + np.abs(each.directions - twin.directions).max() for twin in other if twin.falling == each.falling]
+        away = [
+            np.abs(0.42 / 0.18 * each.p - twin.p).max() / (1 + np.abs(twin.p).max())
+            + np.abs(each.directions - twin.directions).max()
+            for twin in other
+            if twin.falling == each.falling
+        ]
         assert min(away) < 1e-6
     lock = [np.linalg.norm(np.cross(each.directions, AXES), axis=1).min() < 1e-9 for each in covered().found]
     assert 0 < sum(lock) == sum(own and each.falling in (1, 2) for own, each in zip(lock, covered().found, strict=True))

@@ -53,32 +53,67 @@ class Accuracy(Result, shown_as="accuracy"):
     def headline(self) -> str:
         """The robot, and the largest errors at each pose or of the grid."""
         limit = LARGEST_FIRST_ORDER * self.setting.everything.twin.length
-        worst = [(f"{1e3 * each.position.largest:.3g} mm" if each.position.largest <= limit else
-                  "not bounded to first order") + f" at {each.pose}" for each in self.poses]
+        worst = [
+            (
+                f"{1e3 * each.position.largest:.3g} mm"
+                if each.position.largest <= limit
+                else "not bounded to first order"
+            )
+            + f" at {each.pose}"
+            for each in self.poses
+        ]
         reached = ([] if self.field is None else [self.field.reached.sum()]) + (
-            [] if self.swept is None else [self.swept.tally.reached])
+            [] if self.swept is None else [self.swept.tally.reached]
+        )
         grid = [f"{count} poses of a grid" for count in reached]
         return f"{self.setting.headline()}: {'; '.join(worst + grid)}"
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line, without the command's own fields."""
-        poses = [{"pose": each.pose.to_dict(), "position_mm": each.position.to_dict(1e3),
-                  "orientation_deg": each.orientation.to_dict(180 / np.pi), "beyond": list(each.beyond),
-                  "sampled": true and true.to_dict()}
-                 for each, true in zip(self.poses, self.sampled, strict=True)]
-        cones = [{"leg": o.leg, "link": o.link, "cone_deg": float(np.degrees(cone))}
-                 for o, cone in zip(self.setting.observed, self.cones, strict=True) if cone]
+        poses = [
+            {
+                "pose": each.pose.to_dict(),
+                "position_mm": each.position.to_dict(1e3),
+                "orientation_deg": each.orientation.to_dict(180 / np.pi),
+                "beyond": list(each.beyond),
+                "sampled": true and true.to_dict(),
+            }
+            for each, true in zip(self.poses, self.sampled, strict=True)
+        ]
+        cones = [
+            {"leg": o.leg, "link": o.link, "cone_deg": float(np.degrees(cone))}
+            for o, cone in zip(self.setting.observed, self.cones, strict=True)
+            if cone
+        ]
         noise = {"noise": self.blur.amounts, "exact": list(self.blur.exact(self.setting.observed))}
-        return {**self.setting.to_dict(), "cones": cones, **noise, **(self.field.to_dict() if self.field else {}),
-                **(self.swept.to_dict() if self.swept else {}), "poses": poses,
-                "unlimited": list(self.setting.unlimited)}
+        return {
+            **self.setting.to_dict(),
+            "cones": cones,
+            **noise,
+            **(self.field.to_dict() if self.field else {}),
+            **(self.swept.to_dict() if self.swept else {}),
+            "poses": poses,
+            "unlimited": list(self.setting.unlimited),
+        }
 
 
 @question(cones="cone", samples="nonlinear")
-def accuracy(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
-             cone: Cones | None = None, noise: str | Noise | None = None, at: PoseLike | Iterable[PoseLike] = (),
-             plane: PoseLike | None = None, grid: Grid | str | None = None, steps: int | None = None,
-             nonlinear: int = 0, into: str | Path | None = None, seed: int = 0) -> Accuracy:
+def accuracy(
+    robot: RobotLike,
+    observe: LegsLike = None,
+    camera: CameraLike = None,
+    *,
+    see: SeeLike = None,
+    cone: Cones | None = None,
+    noise: str | Noise | None = None,
+    at: PoseLike | Iterable[PoseLike] = (),
+    plane: PoseLike | None = None,
+    grid: Grid | str | None = None,
+    steps: int | None = None,
+    nonlinear: int = 0,
+    into: str | Path | None = None,
+    seed: int = 0,
+) -> Accuracy:
     """The largest position and orientation error of the platform over all errors of what is observed, to first order
     (docs/pages/theory.md, section 10; MMT A.1): max over unit w of Σ ψ_i ‖(J_i P_i)ᵀ w‖, J = M^{T+}.
 
@@ -131,8 +166,10 @@ def accuracy(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = No
         configurations = [start]
     tell("errors")
     poses = tuple(errors_at(setting, blur, each) for each in configurations)
-    true = tuple(true_errors(each, mapper.question, motion, blur, errors, nonlinear, seed)
-                 if nonlinear else None for each, errors in zip(configurations, poses, strict=True))
+    true = tuple(
+        true_errors(each, mapper.question, motion, blur, errors, nonlinear, seed) if nonlinear else None
+        for each, errors in zip(configurations, poses, strict=True)
+    )
     return Accuracy(setting, blur, poses, true, field, swept)
 
 
@@ -141,8 +178,9 @@ def errors_at(setting: ObservedRobot, blur: Blur, at: ClosedConfiguration) -> Po
     motion, question = setting.motion, setting.samples.question
     pose, lost = motion.pose(at.pose(motion.link)), unseen(at, question)
     if lost is not None:
-        raise BadRequest(f"{setting.robot.name}: {lost.kind} {lost.leg} is not in front of its camera", str(pose),
-                         IN_SIGHT)
+        raise BadRequest(
+            f"{setting.robot.name}: {lost.kind} {lost.leg} is not in front of its camera", str(pose), IN_SIGHT
+        )
     return error_maxima(at, question, blur, pose)
 
 
@@ -150,7 +188,13 @@ def sees_all(setting: ObservedRobot, otherwise: str = "the error is infinite at 
     """Raise ``BadRequest`` where the observed legs do not see all of the platform's freedoms, saying what follows."""
     verdict = verdict_of(setting, setting.labels, setting.samples)
     if verdict.lost:
-        what, cure = (("the legs do", "legs that make") if all(each.by_segment for each in setting.observed) else
-                      ("what is observed does", "observations that make"))
-        raise BadRequest(f"{setting.robot.name}: {otherwise}{what} not see {verdict.named}", ", ".join(setting.labels),
-                         f"{cure} it controllable (hrsynth legs lists them, hrsynth advise what else to measure)")
+        what, cure = (
+            ("the legs do", "legs that make")
+            if all(each.by_segment for each in setting.observed)
+            else ("what is observed does", "observations that make")
+        )
+        raise BadRequest(
+            f"{setting.robot.name}: {otherwise}{what} not see {verdict.named}",
+            ", ".join(setting.labels),
+            f"{cure} it controllable (hrsynth legs lists them, hrsynth advise what else to measure)",
+        )

@@ -44,8 +44,11 @@ def half_angles(cones: Cones, observed: Sequence[Observation]) -> Array:
     names = {name for o in observed for name in (o.leg, o.link)}
     unknown = [name for name in given if name not in names]
     if unknown:
-        raise BadRequest("a cone for something that is not observed", unknown[0],
-                         "legs " + ", ".join(dict.fromkeys(o.leg for o in observed)))
+        raise BadRequest(
+            "a cone for something that is not observed",
+            unknown[0],
+            "legs " + ", ".join(dict.fromkeys(o.leg for o in observed)),
+        )
     found = []
     for o in observed:
         value = given.get(o.link, given.get(o.leg))
@@ -126,14 +129,20 @@ class Blur(Value):
         axes = [o for o in observed if isinstance(o, SeenAxis)]
         others = [o for o in observed if not isinstance(o, SeenAxis)]
         if cone is None and amounts is None:
-            raise BadRequest("how wrong the observations may be is not given", None,
-                             "a cone about each direction, as --cone 0.1deg, or errors of what else is observed, as "
-                             "--noise 0.1deg,0.3px,1mm")
+            raise BadRequest(
+                "how wrong the observations may be is not given",
+                None,
+                "a cone about each direction, as --cone 0.1deg, or errors of what else is observed, as "
+                "--noise 0.1deg,0.3px,1mm",
+            )
         if cone is not None and not axes:
             raise BadRequest("cones apply to directions only", ", ".join(o.leg for o in observed), "--noise")
         if others and amounts is None:
-            raise BadRequest(f"cones apply to directions only, not to {others[0].kind} {others[0].leg}", str(cone),
-                             "noise besides, as 0.3px or 1mm: --noise")
+            raise BadRequest(
+                f"cones apply to directions only, not to {others[0].kind} {others[0].leg}",
+                str(cone),
+                "noise besides, as 0.3px or 1mm: --noise",
+            )
         if amounts is not None:
             amounts.amounts_for(others if cone is not None else observed)
         angle = 0.0 if amounts is None else amounts.of("rad")
@@ -194,8 +203,11 @@ class Blur(Value):
         ends = np.cumsum([0, *(len(slope) for slope in slopes)])
         for i, (o, value) in enumerate(zip(every, values, strict=True)):
             unit = at.twin.length ** np.broadcast_to(o.dimension, o.size)
-            own = ([self.cones[i] * np.eye(3)] if isinstance(o, SeenAxis) else
-                   [each / unit[:, None] for each in blurs(o, value * unit, self.own(i, o))])
+            own = (
+                [self.cones[i] * np.eye(3)]
+                if isinstance(o, SeenAxis)
+                else [each / unit[:, None] for each in blurs(o, value * unit, self.own(i, o))]
+            )
             for number, each in enumerate(own):
                 whole = np.zeros((ends[-1], 3))
                 whole[ends[i] : ends[i + 1]] = slopes[i] @ each
@@ -208,8 +220,15 @@ class Blur(Value):
         """In what unit vectors of balls are told: cones in radians, others as parts of the ball."""
         return np.array([self.cones[i] or 1.0 for i, _ in balls])
 
-    def wrong(self, observed: Sequence[Observation], values: Sequence[Array], length: float, balls: ErrorBalls,
-              way: Array, part: float) -> list[Array]:
+    def wrong(
+        self,
+        observed: Sequence[Observation],
+        values: Sequence[Array],
+        length: float,
+        balls: ErrorBalls,
+        way: Array,
+        part: float,
+    ) -> list[Array]:
         """What is measured where values are off by a part of a ``way`` (balls, 3), told by :meth:`radii`."""
         found = list(values)
         shocks = np.zeros((len(observed), 2, 3))
@@ -226,8 +245,12 @@ class Blur(Value):
 
 def tilt(u: Sequence[Array] | Array, way: Array) -> Array:
     """u (k, 3), each turned by the angle ‖way‖ towards its way (k, 3), which is normal to it."""
-    return np.array([rotation_about(np.cross(a, b), float(np.linalg.norm(b))) @ a if np.any(b) else a
-                     for a, b in zip(u, way, strict=True)])
+    return np.array(
+        [
+            rotation_about(np.cross(a, b), float(np.linalg.norm(b))) @ a if np.any(b) else a
+            for a, b in zip(u, way, strict=True)
+        ]
+    )
 
 
 IN_SIGHT = "a pose from which all is seen, or a camera whose z axis points at it"
@@ -235,5 +258,11 @@ IN_SIGHT = "a pose from which all is seen, or a camera whose z axis points at it
 
 def unseen(at: ClosedConfiguration, question: Measurement) -> Observation | None:
     """What is not in front of its camera, or not in its picture, at a configuration."""
-    return next((o for o in question.observations if o.in_front(
-        at.pose(o.seen_from or question.reference), at.pose(o.link)) < SEEN_ABOVE), None)
+    return next(
+        (
+            o
+            for o in question.observations
+            if o.in_front(at.pose(o.seen_from or question.reference), at.pose(o.link)) < SEEN_ABOVE
+        ),
+        None,
+    )

@@ -109,10 +109,14 @@ class ErrorMap(Value):
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line: arrays nested in the order of ``axes``, null where not finite."""
-        return {**self.grid.to_dict(), "reached": self.reached.tolist(),
-                "position_mm": nested_lists(1e3 * self.position),
-                "orientation_deg": nested_lists(np.degrees(self.orientation)),
-                "gap": self.gap, "checked": self.spots and self.spots.to_dict()}
+        return {
+            **self.grid.to_dict(),
+            "reached": self.reached.tolist(),
+            "position_mm": nested_lists(1e3 * self.position),
+            "orientation_deg": nested_lists(np.degrees(self.orientation)),
+            "gap": self.gap,
+            "checked": self.spots and self.spots.to_dict(),
+        }
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -155,11 +159,13 @@ class Mapper(Value):
         of it is reached, ``BadRequest`` where poses have to be found one by one and are too many for that."""
         name = self.setting.robot.name
         if self.batch is None and grid.size > LARGEST_GRID:
-            raise BadRequest(f"{name}: poses are found one by one; number of poses", grid.size,
-                             f"at most {LARGEST_GRID}")
+            raise BadRequest(
+                f"{name}: poses are found one by one; number of poses", grid.size, f"at most {LARGEST_GRID}"
+            )
         seen = self._one_by_one(grid) if self.batch is None else self._together(grid)
-        dependent = None if seen.reached.all() else (
-            grid_dependence(self.setting.everything.start, self.setting.motion, grid))
+        dependent = (
+            None if seen.reached.all() else (grid_dependence(self.setting.everything.start, self.setting.motion, grid))
+        )
         if not seen.reached.any():
             raise PlaneNotMet(name, f"the grid {grid}", f"none of {grid.size} is", dependent)
         spots = smallest_at = None
@@ -167,15 +173,22 @@ class Mapper(Value):
             spots, smallest_at = self.spots(grid, seen, seed, checked), partial(self._smallest, grid)
         shape = grid.shape
         position, orientation = seen.position.reshape(shape), seen.orientation.reshape(shape)
-        return ErrorMap(grid, seen.reached.reshape(shape), position, orientation, seen.gap, seen, spots, smallest_at,
-                        dependent)
+        return ErrorMap(
+            grid, seen.reached.reshape(shape), position, orientation, seen.gap, seen, spots, smallest_at, dependent
+        )
 
     def _together(self, grid: Grid) -> Seen:
         """Poses by the batch; of a part of them no more is kept than their errors."""
         parts = [self.errors(*part) for part in self.parts(grid, self.blur.cones)]
         reached, position, orientation = (np.concatenate([part[i] for part in parts]) for i in range(3))
-        return Seen(reached, position, orientation, partial(self._determinant, grid), partial(self._smallest, grid),
-                    max(part[3] for part in parts))
+        return Seen(
+            reached,
+            position,
+            orientation,
+            partial(self._determinant, grid),
+            partial(self._smallest, grid),
+            max(part[3] for part in parts),
+        )
 
     @staticmethod
     def errors(possible: Flags, part: Evaluation) -> tuple[Flags, Array, Array, float]:
@@ -196,8 +209,12 @@ class Mapper(Value):
 
     def _smallest(self, grid: Grid, places: Array | None = None) -> Array:
         """The smallest singular value of Mᵀ by the batch, of the grid or at other places of it."""
-        return np.concatenate([np.where(possible, part.singular_values[:, -1], np.nan)
-                               for possible, part in self.parts(grid, None, places)])
+        return np.concatenate(
+            [
+                np.where(possible, part.singular_values[:, -1], np.nan)
+                for possible, part in self.parts(grid, None, places)
+            ]
+        )
 
     def parts(self, grid: Grid, cones: Array | None, places: Array | None = None) -> Iterator[tuple[Flags, Evaluation]]:
         """Which poses of each part of a grid (or of other ``places`` of it) the platform can have at all, and what the
@@ -232,11 +249,19 @@ class Mapper(Value):
                 table[:4, i] = maxima(at, self.question, self.blur).ravel()
                 table[4, i] = _weakest(rates, twists, at.twin.length)
         plane = PlaneOfPoses(self.question, self.setting.motion, grid)
-        return Seen(np.isfinite(table[4]), table[0], table[1], lambda: None, lambda: table[4],
-                    _gap(table[:2], table[2:4]), partial(plane.curve, found) if grid.ndim == 2 else None)
+        return Seen(
+            np.isfinite(table[4]),
+            table[0],
+            table[1],
+            lambda: None,
+            lambda: table[4],
+            _gap(table[:2], table[2:4]),
+            partial(plane.curve, found) if grid.ndim == 2 else None,
+        )
 
-    def spots(self, grid: Grid, seen: Seen, seed: int, count: int = SPOTS, cells: NDArray[np.int64] | None = None
-              ) -> Spots:
+    def spots(
+        self, grid: Grid, seen: Seen, seed: int, count: int = SPOTS, cells: NDArray[np.int64] | None = None
+    ) -> Spots:
         """Hold the batch against Pinocchio at random poses of those that are ``seen``, all of a grid or those at some
         ``cells``; raises ``Disagreement``."""
         sizes = [np.where(np.isfinite(each), each, 0.0) for each in (seen.position, seen.orientation)]
@@ -250,8 +275,9 @@ class Mapper(Value):
             if at is None:
                 continue
             met += 1
-            for mine, theirs, all_of in zip((seen.position[i], seen.orientation[i]),
-                                            maxima(at, self.question, self.blur)[0], sizes, strict=True):
+            for mine, theirs, all_of in zip(
+                (seen.position[i], seen.orientation[i]), maxima(at, self.question, self.blur)[0], sizes, strict=True
+            ):
                 scale = max(mine, float(np.median(all_of[all_of > 0])) if (all_of > 0).any() else 1.0)
                 largest = max(largest, abs(mine - theirs) / scale)
         if largest > SAME_RELATION + seen.gap:
@@ -267,8 +293,11 @@ class Mapper(Value):
         found: list[ClosedConfiguration | None] = []
         for each in X:
             try:
-                found.append(reach(setting.everything.start, setting.everything.question, setting.motion.pose(each),
-                                   setting.motion))
+                found.append(
+                    reach(
+                        setting.everything.start, setting.everything.question, setting.motion.pose(each), setting.motion
+                    )
+                )
             except HrsynthError:
                 found.append(None)
         return found

@@ -61,9 +61,14 @@ class ErrorEllipsoid(Value):
 
     def to_dict(self, unit: float) -> dict[str, Any]:
         """The record of the command line, lengths or angles in another unit; null where infinite."""
-        return {"largest": finite(unit * self.largest), "direction": _nested(self.direction),
-                "least": finite(unit * self.least), "least_direction": _nested(self.least_direction),
-                "anisotropy": self.anisotropy, "gap": self.gap}
+        return {
+            "largest": finite(unit * self.largest),
+            "direction": _nested(self.direction),
+            "least": finite(unit * self.least),
+            "least_direction": _nested(self.least_direction),
+            "anisotropy": self.anisotropy,
+            "gap": self.gap,
+        }
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -90,8 +95,13 @@ def reading(at: ClosedConfiguration, question: Measurement) -> tuple[Array, Arra
 def maxima(at: ClosedConfiguration, question: Measurement, blur: Blur) -> Array:
     """Upper and lower bounds (2, 2) of the largest position (m) and orientation error (rad) at a configuration, one in
     each column; infinite where a freedom is lost."""
-    return np.stack([np.full(2, np.inf) if part is None else np.ravel(bounds_of_maps(part.J[None], part.only))
-                     for part in _parts(at, question, blur)], axis=1)
+    return np.stack(
+        [
+            np.full(2, np.inf) if part is None else np.ravel(bounds_of_maps(part.J[None], part.only))
+            for part in _parts(at, question, blur)
+        ],
+        axis=1,
+    )
 
 
 def largest_by_ascent(at: ClosedConfiguration, question: Measurement, blur: Blur) -> tuple[float, float]:
@@ -178,8 +188,15 @@ def _extent(part: ErrorMaps | None) -> ErrorEllipsoid:
     sizes = np.linalg.norm(pulls, axis=1)
     errors = part.radii[:, None] * pulls / np.where(sizes > 0, sizes, 1.0)[:, None]
     lower = max(lower, float(sizes.sum()))
-    return ErrorEllipsoid(largest, w, float(_width(blocks, low[:, None])[0]), low, errors,
-                  max(largest - lower, 0.0) / lower if lower else 0.0, span.shape[1] == 1)
+    return ErrorEllipsoid(
+        largest,
+        w,
+        float(_width(blocks, low[:, None])[0]),
+        low,
+        errors,
+        max(largest - lower, 0.0) / lower if lower else 0.0,
+        span.shape[1] == 1,
+    )
 
 
 def _width(blocks: Array, w: Array) -> Array:

@@ -33,15 +33,24 @@ class ErrorRange(Value):
 
     def with_more(self, other: ErrorRange) -> ErrorRange:
         """The range of both."""
-        lows, highs = ([each for each in both if each is not None]
-                       for both in ((self.least, other.least), (self.largest, other.largest)))
-        return ErrorRange(min(lows, default=None), max(highs, default=None), self.loose + other.loose,
-                          self.infinite + other.infinite, self.moves or other.moves)
+        lows, highs = (
+            [each for each in both if each is not None]
+            for both in ((self.least, other.least), (self.largest, other.largest))
+        )
+        return ErrorRange(
+            min(lows, default=None),
+            max(highs, default=None),
+            self.loose + other.loose,
+            self.infinite + other.infinite,
+            self.moves or other.moves,
+        )
 
     def to_dict(self, unit: float) -> dict[str, Any]:
         """The record of the command line, errors in a unit."""
-        ends = {name: value if value is None else unit * value
-                for name, value in (("least", self.least), ("largest", self.largest))}
+        ends = {
+            name: value if value is None else unit * value
+            for name, value in (("least", self.least), ("largest", self.largest))
+        }
         return {**ends, "loose": self.loose, "infinite": self.infinite}
 
 
@@ -59,9 +68,14 @@ class Tally(Value):
 
     def with_part(self, count: int, reached: int, position: ErrorRange, orientation: ErrorRange, gap: float) -> Tally:
         """With one part more."""
-        return Tally(self.done + count, self.reached + reached, self.position.with_more(position),
-                     self.orientation.with_more(orientation), max(self.gap, gap),
-                     max(self.fullest, (reached, self.done), key=lambda each: each[0]))
+        return Tally(
+            self.done + count,
+            self.reached + reached,
+            self.position.with_more(position),
+            self.orientation.with_more(orientation),
+            max(self.gap, gap),
+            max(self.fullest, (reached, self.done), key=lambda each: each[0]),
+        )
 
     @classmethod
     def parse(cls, line: str) -> Tally:

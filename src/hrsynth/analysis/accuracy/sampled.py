@@ -46,14 +46,26 @@ class Sampled(Value):
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
-        return {"samples": self.count, "position_mm": 1e3 * self.position,
-                "orientation_deg": float(np.degrees(self.orientation)), "ended_at": list(self.ended),
-                "not_found": self.not_found, "smallest_singular_value": finite(self.weakest),
-                "singular_value_at_pose": finite(self.usual)}
+        return {
+            "samples": self.count,
+            "position_mm": 1e3 * self.position,
+            "orientation_deg": float(np.degrees(self.orientation)),
+            "ended_at": list(self.ended),
+            "not_found": self.not_found,
+            "smallest_singular_value": finite(self.weakest),
+            "singular_value_at_pose": finite(self.usual),
+        }
 
 
-def true_errors(at: ClosedConfiguration, question: Measurement, motion: PlatformMotion, blur: Blur, linear: PoseErrors,
-            count: int, seed: int = 0) -> Sampled:
+def true_errors(
+    at: ClosedConfiguration,
+    question: Measurement,
+    motion: PlatformMotion,
+    blur: Blur,
+    linear: PoseErrors,
+    count: int,
+    seed: int = 0,
+) -> Sampled:
     """The true errors at a configuration for ``count`` samples, seeded."""
     values, length = observed_values(at, question)[0], at.twin.length
     balls = blur.at(at, question)

@@ -45,8 +45,12 @@ def _valleys(table: Array, across: list[int], limit: float) -> NDArray[np.int64]
     """Cells (n, 2) no higher than their neighbours along some axes, the deepest first."""
     padded = np.pad(table, 1, constant_values=np.inf)
     nx, ny = table.shape
-    ways = [(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 0)
-            and (0 in across or not i) and (1 in across or not j)]
+    ways = [
+        (i, j)
+        for i in (-1, 0, 1)
+        for j in (-1, 0, 1)
+        if (i, j) != (0, 0) and (0 in across or not i) and (1 in across or not j)
+    ]
     around = np.min([padded[1 + i : 1 + i + nx, 1 + j : 1 + j + ny] for i, j in ways], axis=0)
     cells = np.argwhere((table <= around) & (table < limit))
     return cells[np.argsort(table[tuple(cells.T)], kind="stable")]

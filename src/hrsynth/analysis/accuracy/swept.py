@@ -46,10 +46,18 @@ class SweptErrors(Value):
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
-        return {**self.grid.to_dict(), "gap": self.tally.gap, "checked": self.spots.to_dict(),
-                "swept": {"poses": self.grid.size, "reached": self.tally.reached, "before": self.before,
-                          "position_mm": self.tally.position.to_dict(1e3),
-                          "orientation_deg": self.tally.orientation.to_dict(180 / np.pi)}}
+        return {
+            **self.grid.to_dict(),
+            "gap": self.tally.gap,
+            "checked": self.spots.to_dict(),
+            "swept": {
+                "poses": self.grid.size,
+                "reached": self.tally.reached,
+                "before": self.before,
+                "position_mm": self.tally.position.to_dict(1e3),
+                "orientation_deg": self.tally.orientation.to_dict(180 / np.pi),
+            },
+        }
 
 
 def sweep_to(path: str | Path, mapper: Mapper, grid: Grid, seed: int) -> SweptErrors:
@@ -68,11 +76,13 @@ def sweep_to(path: str | Path, mapper: Mapper, grid: Grid, seed: int) -> SweptEr
     """
     name, target = mapper.setting.robot.name, require_file(path)
     if mapper.batch is None:
-        raise BadRequest(f"{name}: poses are found one by one, not in parts", str(path),
-                         "another file, as map.csv")
+        raise BadRequest(f"{name}: poses are found one by one, not in parts", str(path), "another file, as map.csv")
     cones = mapper.blur.cones
-    asked = hashlib.sha256(repr(content((mapper.setting.mechanism, mapper.setting.observed, mapper.blur, grid,
-                                         SWEEP_PART, __version__))).encode()).hexdigest()
+    asked = hashlib.sha256(
+        repr(
+            content((mapper.setting.mechanism, mapper.setting.observed, mapper.blur, grid, SWEEP_PART, __version__))
+        ).encode()
+    ).hexdigest()
     with _SweepDraft(target, grid, asked, mapper.uses_numba(grid.size, cones)) as draft:
         tally = draft.tally
         limits = [LARGEST_FIRST_ORDER * mapper.setting.everything.twin.length, LARGEST_FIRST_ORDER]
@@ -125,8 +135,9 @@ class _SweepDraft:
         self.target = target
         self.part, self.journal = (target.with_name(target.name + each) for each in (PART, JOURNAL))
         head = io.BytesIO()
-        np.lib.format.write_array_header_1_0(head, {"descr": np.lib.format.dtype_to_descr(ROW), "fortran_order": False,
-                                                    "shape": grid.shape})
+        np.lib.format.write_array_header_1_0(
+            head, {"descr": np.lib.format.dtype_to_descr(ROW), "fortran_order": False, "shape": grid.shape}
+        )
         self._head, self._whole = head.getvalue(), grid.size * ROW.itemsize
         self._files = ExitStack()
         with _stopping(self.journal), ExitStack() as files:
@@ -153,13 +164,17 @@ class _SweepDraft:
         try:
             told = json.loads(first or "")
             if told["asked"] != asked:
-                raise BadRequest("another sweep to this file was interrupted", str(self.journal),
-                                 "the same question, another file, or that journal removed")
+                raise BadRequest(
+                    "another sweep to this file was interrupted",
+                    str(self.journal),
+                    "the same question, another file, or that journal removed",
+                )
             done = next((Tally.parse(each) for each in reversed(parts) if each is not None), Tally())
             there = self.part.stat().st_size if self.part.exists() else 0
         except (ValueError, KeyError, TypeError, RecursionError):
-            raise BadRequest("no journal of a sweep with checksums", str(self.journal),
-                             "another file, or that one removed") from None
+            raise BadRequest(
+                "no journal of a sweep with checksums", str(self.journal), "another file, or that one removed"
+            ) from None
         return told["compiled"], done if there >= self._place(done.done) else Tally()
 
     def _begin(self, asked: str) -> None:
@@ -199,8 +214,9 @@ class _SweepDraft:
     def rows(self, cells: NDArray[np.int64]) -> Array:
         """The rows (n, 2) of some cells."""
         handle = self._rows.fileno()  # a memory map would keep what the system reads ahead
-        return np.frombuffer(b"".join(os.pread(handle, ROW.itemsize, self._place(cell)) for cell in cells.tolist())
-                             ).reshape(-1, 2)
+        return np.frombuffer(
+            b"".join(os.pread(handle, ROW.itemsize, self._place(cell)) for cell in cells.tolist())
+        ).reshape(-1, 2)
 
     def finish(self) -> None:
         """Give the array its name."""

@@ -47,9 +47,14 @@ class ModePair(Value):
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line; ``path`` is null where the verdict follows from others."""
-        return {"modes": list(self.numbers), "verdict": self.verdict, "certified": self.certified,
-                "reason": self.reason, "via": list(self.via),
-                "path": None if self.answer is None else self.answer.to_dict()}
+        return {
+            "modes": list(self.numbers),
+            "verdict": self.verdict,
+            "certified": self.certified,
+            "reason": self.reason,
+            "via": list(self.via),
+            "path": None if self.answer is None else self.answer.to_dict(),
+        }
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -86,8 +91,11 @@ class Atlas(Result, shown_as="atlas"):
         found: list[tuple[int, ...]] = []
         for number in (k for k, at in enumerate(self.places, 1) if at is not None):
             if not any(number in group for group in found):
-                found.append(tuple(k for k, at in enumerate(self.places, 1)
-                                   if at is not None and self.verdict(number, k) == SAME))
+                found.append(
+                    tuple(
+                        k for k, at in enumerate(self.places, 1) if at is not None and self.verdict(number, k) == SAME
+                    )
+                )
         return tuple(found)
 
     @cached_property
@@ -97,8 +105,9 @@ class Atlas(Result, shown_as="atlas"):
 
         apart: nx.Graph = nx.Graph()
         apart.add_nodes_from(range(len(self.groups)))
-        apart.add_edges_from((i, j) for i, j in combinations(apart, 2)
-                             if self.verdict(self.groups[i][0], self.groups[j][0]) == SEPARATED)
+        apart.add_edges_from(
+            (i, j) for i, j in combinations(apart, 2) if self.verdict(self.groups[i][0], self.groups[j][0]) == SEPARATED
+        )
         return max(map(len, nx.find_cliques(apart)), default=0), len(apart)
 
     @property
@@ -124,8 +133,11 @@ class Atlas(Result, shown_as="atlas"):
         """The pairs that show the hidden robot to be cuspidal: two modes, each proved to lie within the tube for which
         the path between them is certified."""
         known = [mode.radius < FOLLOWED and (mode.proved or mode.goal) for mode in self.listed.modes]
-        return tuple(pair for pair in self.pairs
-                     if pair.verdict == SAME and pair.certified and all(known[k - 1] for k in pair.numbers))
+        return tuple(
+            pair
+            for pair in self.pairs
+            if pair.verdict == SAME and pair.certified and all(known[k - 1] for k in pair.numbers)
+        )
 
     @property
     def cuspidal(self) -> bool | None:
@@ -134,14 +146,26 @@ class Atlas(Result, shown_as="atlas"):
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line, without the command's own fields."""
-        return {**self.listed.to_dict(), "table": self.table, "pairs": [pair.to_dict() for pair in self.pairs],
-                "aspects": {"least": self.count[0], "most": self.count[1], "modes": [list(g) for g in self.groups]},
-                "cuspidal": self.cuspidal}
+        return {
+            **self.listed.to_dict(),
+            "table": self.table,
+            "pairs": [pair.to_dict() for pair in self.pairs],
+            "aspects": {"least": self.count[0], "most": self.count[1], "modes": [list(g) for g in self.groups]},
+            "cuspidal": self.cuspidal,
+        }
 
 
 @question()
-def atlas(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
-          at: PoseLike | ClosedConfiguration | None = None, seed: int = 0, budget: int = BUDGET) -> Atlas:
+def atlas(
+    robot: RobotLike,
+    observe: LegsLike = None,
+    camera: CameraLike = None,
+    *,
+    see: SeeLike = None,
+    at: PoseLike | ClosedConfiguration | None = None,
+    seed: int = 0,
+    budget: int = BUDGET,
+) -> Atlas:
     """Which two of all modes with the directions at ``at`` (as for ``modes``) lie in one aspect (as for ``path``), and
     whether that shows the hidden robot to be cuspidal: that it can go from one mode to another, with the same
     directions, without a Type 2 singularity.
@@ -166,8 +190,12 @@ def atlas(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None,
         tell("paths")
         answers[one, other] = aspects.join(start, goal, seed=seed, budget=min(budget, ATLAS_INTERVALS - spent))
         spent += answers[one, other].boxes
-    return Atlas(aspects, listed, places, tuple(
-        _pair(listed, places, answers, numbers) for numbers in combinations(range(1, len(places) + 1), 2)))
+    return Atlas(
+        aspects,
+        listed,
+        places,
+        tuple(_pair(listed, places, answers, numbers) for numbers in combinations(range(1, len(places) + 1), 2)),
+    )
 
 
 def _place(listed: AssemblyModes, number: int) -> ClosedConfiguration | None:
@@ -186,8 +214,10 @@ def _sort_pairs(aspects: Aspects, places: Sequence[ClosedConfiguration | None]) 
                 working[number] = aspects.enclosure(at).forms.modes
             except NoLegForm:
                 working[number] = ()
-    return sorted(combinations(working, 2), key=lambda pair: (
-        sum(a != b for a, b in zip(*(working[number] for number in pair), strict=False)), pair))
+    return sorted(
+        combinations(working, 2),
+        key=lambda pair: (sum(a != b for a, b in zip(*(working[number] for number in pair), strict=False)), pair),
+    )
 
 
 def _chain(answers: dict[tuple[int, int], PathAnswer], one: int, other: int) -> tuple[str, list[int]] | None:
@@ -207,8 +237,12 @@ def _chain(answers: dict[tuple[int, int], PathAnswer], one: int, other: int) -> 
     return None
 
 
-def _pair(listed: AssemblyModes, places: Sequence[ClosedConfiguration | None],
-          answers: dict[tuple[int, int], PathAnswer], numbers: tuple[int, int]) -> ModePair:
+def _pair(
+    listed: AssemblyModes,
+    places: Sequence[ClosedConfiguration | None],
+    answers: dict[tuple[int, int], PathAnswer],
+    numbers: tuple[int, int],
+) -> ModePair:
     """What is known of two modes."""
     answer = answers.get(numbers)
     if answer is not None and answer.verdict != UNDECIDED:
@@ -225,5 +259,9 @@ def _pair(listed: AssemblyModes, places: Sequence[ClosedConfiguration | None],
     if not missing:
         return ModePair(numbers, UNDECIDED, False, "the number of intervals for all paths is used up")
     of_modes = {listed.modes[int(k) - 1].assembly for k in missing}
-    return ModePair(numbers, UNDECIDED, False,
-                    f"assembly of the real robot at mode {' and '.join(missing)}: {', '.join(sorted(of_modes))}")
+    return ModePair(
+        numbers,
+        UNDECIDED,
+        False,
+        f"assembly of the real robot at mode {' and '.join(missing)}: {', '.join(sorted(of_modes))}",
+    )

@@ -55,8 +55,14 @@ class ConditionEnclosure:
         found = self.forms.at(p, R, leading)
         reached = np.asarray(above_zero(found.reach_margins).all(axis=1))
         if p.dtype == object:
-            return reached, np.array([_weakest({name: value[i : i + 1] for name, value in found.values.items()},
-                                               self.condition) if reached[i] else 0.0 for i in range(len(p))])
+            return reached, np.array(
+                [
+                    _weakest({name: value[i : i + 1] for name, value in found.values.items()}, self.condition)
+                    if reached[i]
+                    else 0.0
+                    for i in range(len(p))
+                ]
+            )
         values = np.full(len(p), np.nan)
         blocks = rows(self.condition.pattern, found.values)
         values[reached] = np.linalg.svd(blocks[reached], compute_uv=False)[:, -1]

@@ -64,9 +64,12 @@ class HeldLegSection:
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line, without the curve."""
-        return {"held": self.robot.labels[0], "directions": list(self.robot.labels[1:]),
-                "cusps": [cusp.to_dict() for cusp in self.cusps],
-                "nodes": [[place.to_dict() for place in node] for node in self.nodes]}
+        return {
+            "held": self.robot.labels[0],
+            "directions": list(self.robot.labels[1:]),
+            "cusps": [cusp.to_dict() for cusp in self.cusps],
+            "nodes": [[place.to_dict() for place in node] for node in self.nodes],
+        }
 
 
 def _times(a: Numbers, b: Numbers) -> Any:
@@ -134,10 +137,14 @@ class HeldLeg:
             b, away = robot.corners[k], base - robot.feet[k]
             turned = [c * number(b.real) - s * number(b.imag), s * number(b.real) + c * number(b.imag)]
             r.append(turned)
-            e.append([number(away.real) + w[0][0] + turned[0] - w[k][0],
-                      number(away.imag) + w[0][1] + turned[1] - w[k][1]])
-        lengths = [_square(x[2:4]) - 1, *(_square(w[k]) - number(robot.cranks[k]) ** 2 for k in range(3)),
-                   *(_square(e[k]) - number(robot.rods[k + 1]) ** 2 for k in (0, 1))]
+            e.append(
+                [number(away.real) + w[0][0] + turned[0] - w[k][0], number(away.imag) + w[0][1] + turned[1] - w[k][1]]
+            )
+        lengths = [
+            _square(x[2:4]) - 1,
+            *(_square(w[k]) - number(robot.cranks[k]) ** 2 for k in range(3)),
+            *(_square(e[k]) - number(robot.rods[k + 1]) ** 2 for k in (0, 1)),
+        ]
         return _Place(lengths, w, e, r, [_times(r[k], w[k + 1]) for k in (0, 1)], [_times(w[0], w[k]) for k in (1, 2)])
 
     def curve(self, x: Numbers) -> list[Any]:
@@ -181,16 +188,23 @@ def section(robot: ThreeCranks, held: complex) -> HeldLegSection:
         found = _newton(leg.node, x)
         if found is None or np.linalg.norm(found[:8] - found[8:]) < SAME_SPOT:
             continue
-        if any(min(np.linalg.norm(found - other), np.linalg.norm(np.roll(found, 8) - other)) < SAME_SPOT
-               for other, _ in nodes):
+        if any(
+            min(np.linalg.norm(found - other), np.linalg.norm(np.roll(found, 8) - other)) < SAME_SPOT
+            for other, _ in nodes
+        ):
             continue
         box = krawczyk(_rows(thick.node, 16), list(around(found, 0.0)))
         if box is not None and all(a.overlaps(b) for a, b in zip(box[:8], box[8:], strict=True)):
             box = None
         halves = (None, None) if box is None else (box[:8], box[8:])
         nodes.append((found, (_point(leg, found[:8], halves[0]), _point(leg, found[8:], halves[1]))))
-    return HeldLegSection(robot, held, tuple(trace.shown for trace in traces), tuple(point for _, point in cusps),
-                          tuple(pair for _, pair in nodes))
+    return HeldLegSection(
+        robot,
+        held,
+        tuple(trace.shown for trace in traces),
+        tuple(point for _, point in cusps),
+        tuple(pair for _, pair in nodes),
+    )
 
 
 def _ball(value: float) -> Any:

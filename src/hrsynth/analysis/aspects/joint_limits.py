@@ -82,8 +82,9 @@ def bounds(sight: SampledMechanism, source: Callable[..., VectorExpression]) -> 
             yield found
 
 
-def _bound(sight: SampledMechanism, source: Callable[..., VectorExpression], joint: Joint, middle: float, half: float
-           ) -> JointLimit | None:
+def _bound(
+    sight: SampledMechanism, source: Callable[..., VectorExpression], joint: Joint, middle: float, half: float
+) -> JointLimit | None:
     twin = sight.configurations[0].twin
     (place,) = twin.coordinates[joint.name] if joint.type.freedoms == 1 else (None,)
     if place is None:

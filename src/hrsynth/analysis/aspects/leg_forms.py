@@ -61,8 +61,12 @@ class LegForms:
     def at(self, p: Field, R: Field, leading: tuple[int, Field] | None = None) -> LegStates:
         """What poses (n, 3), (n, 3, 3) decide, for numbers or balls; of a limb that leads, what it carries is given."""
         with np.errstate(invalid="ignore"):
-            solved = [(0 * p[:, 0] + 1.0, leading[1]) if leading is not None and leading[0] == number
-                      else limb.solve(limb.tip.value(p, R), limb.mode) for number, limb in enumerate(self.limbs)]
+            solved = [
+                (0 * p[:, 0] + 1.0, leading[1])
+                if leading is not None and leading[0] == number
+                else limb.solve(limb.tip.value(p, R), limb.mode)
+                for number, limb in enumerate(self.limbs)
+            ]
             carried = [vector for _, vector in solved]
             values = {symbol: value_of(each, p, R, carried) for symbol, each in self.vectors.items()}
             within = [bound.reach_margin(lambda each: value_of(each, p, R, carried)) for bound in self.bounds]
@@ -107,8 +111,12 @@ class LegPattern:
         return LegForms(tuple(limbs), self.vectors, self.points, self.bounds)
 
 
-def pattern(anatomy: LegDecomposition, features: Sequence[NamedVector], coordinates: PathCoordinates,
-            configurations: Sequence[ClosedConfiguration]) -> LegPattern:
+def pattern(
+    anatomy: LegDecomposition,
+    features: Sequence[NamedVector],
+    coordinates: PathCoordinates,
+    configurations: Sequence[ClosedConfiguration],
+) -> LegPattern:
     """The forms of all legs and of the wanted features; raises ``NoLegForm`` where one fits none."""
     rules = JointRules.of(anatomy, coordinates, configurations)
     sight = SampledMechanism(anatomy.mechanism, coordinates, configurations, rules)

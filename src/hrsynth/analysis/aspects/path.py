@@ -63,8 +63,14 @@ class SampledRoad(Value):
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
-        return {"poses": self.count, "least": self.least, "at": self.at.to_dict(), "changes": self.changes,
-                "reached": self.reached, "lost_from_sight": self.lost}
+        return {
+            "poses": self.count,
+            "least": self.least,
+            "at": self.at.to_dict(),
+            "changes": self.changes,
+            "reached": self.reached,
+            "lost_from_sight": self.lost,
+        }
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -137,14 +143,23 @@ class PathAnswer(Result, shown_as="path"):
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
         point = None if self.coordinates is None else self.coordinates.motion.point.tolist()
-        return {"observed": [o.to_dict() for o in self.setting.observed],
-                "verdict": self.verdict, "certified": self.certified, "path": [pose.to_dict() for pose in self.poses],
-                "crossings": [{"leg": leg, "at": place} for leg, place in self.crossings], "point": point,
-                "margin": self.margin, "boxes": self.boxes,
-                "value": "expression" if self.signed else "smallest singular value",
-                "start": self.start.to_dict(), "goal": self.goal.to_dict(), "reason": self.reason,
-                "limits": list(self.limits), "not_considered": self.not_proved,
-                "sampled": self.road and self.road.to_dict()}
+        return {
+            "observed": [o.to_dict() for o in self.setting.observed],
+            "verdict": self.verdict,
+            "certified": self.certified,
+            "path": [pose.to_dict() for pose in self.poses],
+            "crossings": [{"leg": leg, "at": place} for leg, place in self.crossings],
+            "point": point,
+            "margin": self.margin,
+            "boxes": self.boxes,
+            "value": "expression" if self.signed else "smallest singular value",
+            "start": self.start.to_dict(),
+            "goal": self.goal.to_dict(),
+            "reason": self.reason,
+            "limits": list(self.limits),
+            "not_considered": self.not_proved,
+            "sampled": self.road and self.road.to_dict(),
+        }
 
 
 def between(answer: PathAnswer, coordinates: PathCoordinates, ways: Sequence[PathSegment]) -> list[Pose]:
@@ -196,13 +211,21 @@ class Aspects(Value):
     """Freedoms that are never seen, in words; empty where there are none. With them every pose is singular."""
 
     @classmethod
-    def of(cls, robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None,
-           *, see: SeeLike = None, seed: int = 0) -> Aspects:
+    def of(
+        cls,
+        robot: RobotLike,
+        observe: LegsLike = None,
+        camera: CameraLike = None,
+        *,
+        see: SeeLike = None,
+        seed: int = 0,
+    ) -> Aspects:
         """The condition of a robot from random samples of its motion."""
         setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed)
         seen = MeasuredRobot.of_directions(setting)
-        return cls(setting, setting.motion, seen.pattern, seen.condition,
-                   seen.verdict.never if seen.verdict.lost else "")
+        return cls(
+            setting, setting.motion, seen.pattern, seen.condition, seen.verdict.never if seen.verdict.lost else ""
+        )
 
     @property
     def members(self) -> list[ClosedConfiguration]:
@@ -217,8 +240,10 @@ class Aspects(Value):
         used = {str(symbol) for symbol in self.condition.expression.free_symbols}
         features = [f for f in self.structure.features if not sign_of(self.condition) or f.symbol in used]
         many = self.motion.translations.shape[1] + self.motion.rotations.shape[1]
-        reason = (f"the {many} parts of the platform's pose that change depend on each other, {self.setting.dof} are "
-                  "free: ways that move a point straight and turn about one axis do not keep to the others")
+        reason = (
+            f"the {many} parts of the platform's pose that change depend on each other, {self.setting.dof} are "
+            "free: ways that move a point straight and turn about one axis do not keep to the others"
+        )
         if many == self.setting.dof:
             reason = "the platform has other freedoms at the zero configuration than elsewhere"
         question = self.setting.samples.question
@@ -235,16 +260,36 @@ class Aspects(Value):
             raise NoLegForm(str(self.pattern))
         return ConditionEnclosure(self.condition, self.pattern.forms(at))
 
-    def join(self, start: ClosedConfiguration, goal: ClosedConfiguration, *, seed: int = 0, budget: int = BUDGET,
-             any_mode: bool = False) -> PathAnswer:
+    def join(
+        self,
+        start: ClosedConfiguration,
+        goal: ClosedConfiguration,
+        *,
+        seed: int = 0,
+        budget: int = BUDGET,
+        any_mode: bool = False,
+    ) -> PathAnswer:
         """Whether a path without Type 2 singularity leads from a configuration to another, where legs that are not
         observed may be in any working mode; with ``any_mode`` to the other's pose, all legs in any working mode."""
         found, scene = self.condition, self.structure.values_at([start, goal])
         values = found.evaluate(scene) if found.signed else smallest_of(found.rows(scene))
-        ends = [PathEnd(self.motion.pose(at.pose(self.motion.link)), at, float(value))
-                for at, value in zip((start, goal), values, strict=True)]
-        answer = PathAnswer(self.setting, UNDECIDED, False, tuple(end.pose for end in ends), None, 0, ends[0], ends[1],
-                            "", found.signed, any_mode=any_mode)
+        ends = [
+            PathEnd(self.motion.pose(at.pose(self.motion.link)), at, float(value))
+            for at, value in zip((start, goal), values, strict=True)
+        ]
+        answer = PathAnswer(
+            self.setting,
+            UNDECIDED,
+            False,
+            tuple(end.pose for end in ends),
+            None,
+            0,
+            ends[0],
+            ends[1],
+            "",
+            found.signed,
+            any_mode=any_mode,
+        )
         if self.lost:
             return replace(answer, reason=f"every pose is singular, {self.lost}")
         if min(abs(end.value) for end in ends) < CLEAR:
@@ -276,11 +321,18 @@ class Aspects(Value):
         worst = int(np.argmin(np.abs(values)))
         changes = int(np.sum(values[1:] * values[:-1] < 0)) if self.condition.signed else None
         lost = next((f"{o.kind} {o.leg}" for at in way if (o := unseen(at, question)) is not None), None)
-        return SampledRoad(len(way), float(abs(values[worst])), motion.pose(way[worst].pose(motion.link)), changes,
-                           float(fractions[len(way) - 1]), lost)
+        return SampledRoad(
+            len(way),
+            float(abs(values[worst])),
+            motion.pose(way[worst].pose(motion.link)),
+            changes,
+            float(fractions[len(way) - 1]),
+            lost,
+        )
 
-    def _decide(self, answer: PathAnswer, enclosures: Sequence[ConditionEnclosure], seed: int, budget: int
-                ) -> PathAnswer:
+    def _decide(
+        self, answer: PathAnswer, enclosures: Sequence[ConditionEnclosure], seed: int, budget: int
+    ) -> PathAnswer:
         """The verdict where poses decide what the legs do."""
         assert isinstance(self.pattern, LegPattern)
         coordinates = self.pattern.coordinates
@@ -295,17 +347,26 @@ class Aspects(Value):
             seen = () if answer.any_mode else {o.leg for o in self.setting.observed}
             across, others, margin = self._across(enclosures[1], (p[1], R[1]), values, seen)
             if not others:
-                return replace(answer, verdict=SEPARATED, certified=not fitted, margin=margin, boxes=1 + len(across),
-                               goal_modes=across, reason=(
-                    f"the expression is enclosed with opposite signs at the two {_ends(answer.any_mode)}: every path "
-                    f"between them {answer.where}crosses its zeros{forms}"))
+                return replace(
+                    answer,
+                    verdict=SEPARATED,
+                    certified=not fitted,
+                    margin=margin,
+                    boxes=1 + len(across),
+                    goal_modes=across,
+                    reason=(
+                        f"the expression is enclosed with opposite signs at the two {_ends(answer.any_mode)}: every "
+                        f"path between them {answer.where}crosses its zeros{forms}"
+                    ),
+                )
             return self._lead_to_other_modes(answer, enclosures[0], others, (p, R), seed, budget)
         if answer.signed and answer.start.value * answer.goal.value < 0:
             return _pointwise(answer, "its sign is that of a determinant")
         return self._lead(answer, enclosures, (p, R), seed, budget)
 
-    def _across(self, goal: ConditionEnclosure, place: Place, values: Sequence[float], seen: Collection[str]
-                ) -> tuple[tuple[tuple[float, ...], ...], list[ConditionEnclosure], float]:
+    def _across(
+        self, goal: ConditionEnclosure, place: Place, values: Sequence[float], seen: Collection[str]
+    ) -> tuple[tuple[tuple[float, ...], ...], list[ConditionEnclosure], float]:
         """Of the working modes of the goal, of legs that are not ``seen``: those in which the value's sign is proved to
         be opposite to the start's; those in which it is not, nor a joint proved to be beyond its limits, first those
         nearest to the goal's; and the smallest |value| at the start and in the former."""
@@ -322,8 +383,15 @@ class Aspects(Value):
                     others.append(there)
         return tuple(across), others, margin
 
-    def _lead_to_other_modes(self, answer: PathAnswer, start: ConditionEnclosure, others: Sequence[ConditionEnclosure],
-                             poses: tuple[Array, Array], seed: int, budget: int) -> PathAnswer:
+    def _lead_to_other_modes(
+        self,
+        answer: PathAnswer,
+        start: ConditionEnclosure,
+        others: Sequence[ConditionEnclosure],
+        poses: tuple[Array, Array],
+        seed: int,
+        budget: int,
+    ) -> PathAnswer:
         """A path to the goal in a working mode in which its sign is the start's; ``undecided`` if none is found."""
         spent, limbs = 0, self.enclosure(answer.goal.configuration).forms.limbs
         for there in others:
@@ -334,17 +402,36 @@ class Aspects(Value):
                 spent += found.boxes
                 if found.verdict == SAME:
                     value = float(there.at(p[1:2], R[1:2])[1][0])
-                    return replace(found, goal=replace(answer.goal, value=value), boxes=spent, reason=(
-                        f"{found.reason}; at the goal the robot is then {modes}"))
-        able = dict.fromkeys(one.label for there in others for one, other in zip(limbs, there.forms.limbs, strict=True)
-                             if one.mode != other.mode)
-        return replace(answer, boxes=spent, reason=(
-            "the expression has opposite signs at the start and at the goal in the working modes reached, so every "
-            "path between these crosses its zeros; but not in other working modes of leg "
-            f"{', '.join(able)} at the goal, and no path to these was proved"))
+                    return replace(
+                        found,
+                        goal=replace(answer.goal, value=value),
+                        boxes=spent,
+                        reason=(f"{found.reason}; at the goal the robot is then {modes}"),
+                    )
+        able = dict.fromkeys(
+            one.label
+            for there in others
+            for one, other in zip(limbs, there.forms.limbs, strict=True)
+            if one.mode != other.mode
+        )
+        return replace(
+            answer,
+            boxes=spent,
+            reason=(
+                "the expression has opposite signs at the start and at the goal in the working modes reached, so every "
+                "path between these crosses its zeros; but not in other working modes of leg "
+                f"{', '.join(able)} at the goal, and no path to these was proved"
+            ),
+        )
 
-    def _lead(self, answer: PathAnswer, enclosures: Sequence[ConditionEnclosure], poses: tuple[Array, Array], seed: int,
-              budget: int) -> PathAnswer:
+    def _lead(
+        self,
+        answer: PathAnswer,
+        enclosures: Sequence[ConditionEnclosure],
+        poses: tuple[Array, Array],
+        seed: int,
+        budget: int,
+    ) -> PathAnswer:
         """The verdict by a path between the first two poses."""
         assert isinstance(self.pattern, LegPattern)
         (p, R), coordinates, fitted = poses, self.pattern.coordinates, self.pattern.fitted
@@ -361,19 +448,35 @@ class Aspects(Value):
             return replace(answer, reason="no path was proved: what was found does not lead from pose to pose")
         if self.pattern.loose:
             ends = answer.start.configuration, answer.goal.configuration
-            return replace(answer, road=self.road(*ends), reason=(
-                "the condition and the reach of all rods are enclosed along the path, not whether the loops inside leg "
-                f"{', '.join(self.pattern.loose)} close on it"))
+            return replace(
+                answer,
+                road=self.road(*ends),
+                reason=(
+                    "the condition and the reach of all rods are enclosed along the path, not whether the loops inside "
+                    f"leg {', '.join(self.pattern.loose)} close on it"
+                ),
+            )
         forms = f", for forms that are fitted to samples: {', '.join(fitted)}" if fitted else ""
-        return replace(answer, verdict=SAME, certified=not fitted, margin=found.margin, reason=(
-            f"the condition and the reach of all legs are enclosed away from zero along the path{forms}"))
+        return replace(
+            answer,
+            verdict=SAME,
+            certified=not fitted,
+            margin=found.margin,
+            reason=(f"the condition and the reach of all legs are enclosed away from zero along the path{forms}"),
+        )
 
     def _add_ways(self, answer: PathAnswer, found: PlannedPath, known: LegPattern) -> PathAnswer:
         """The answer with a plan's ways, and the joints whose limits these keep."""
         kept = tuple(bound.joint for bound in known.bounds)
-        answer = replace(answer, boxes=found.boxes, limits=kept,
-                         unlimited=(*(name for name in self.setting.robot.limited if name not in kept),
-                                    *self.setting.mechanism.wrists))
+        answer = replace(
+            answer,
+            boxes=found.boxes,
+            limits=kept,
+            unlimited=(
+                *(name for name in self.setting.robot.limited if name not in kept),
+                *self.setting.mechanism.wrists,
+            ),
+        )
         if not found.ways:
             return answer
         poses = answer.start.pose, *between(answer, known.coordinates, found.ways), answer.goal.pose
@@ -381,8 +484,17 @@ class Aspects(Value):
 
 
 @question()
-def path(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
-         start: PoseLike, goal: PoseLike, seed: int = 0, budget: int = BUDGET) -> PathAnswer:
+def path(
+    robot: RobotLike,
+    observe: LegsLike = None,
+    camera: CameraLike = None,
+    *,
+    see: SeeLike = None,
+    start: PoseLike,
+    goal: PoseLike,
+    seed: int = 0,
+    budget: int = BUDGET,
+) -> PathAnswer:
     """Whether a path without Type 2 singularity of the hidden robot joins two poses (docs/pages/theory.md, section 9).
     Its condition is that of the real robot's relation, which is the exact lift's (theory.md 3). The path passes only
     through poses at which everything seen has a value, in front of the camera or not.
@@ -406,8 +518,9 @@ def path(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, 
     return between_poses(setting, wanted, any_mode=not isinstance(wanted[1], ModeNumber), seed=seed, budget=budget)
 
 
-def between_poses(setting: ObservedRobot, wanted: Sequence[Pose | ModeNumber], *, any_mode: bool, seed: int = 0,
-                  budget: int = BUDGET) -> PathAnswer:
+def between_poses(
+    setting: ObservedRobot, wanted: Sequence[Pose | ModeNumber], *, any_mode: bool, seed: int = 0, budget: int = BUDGET
+) -> PathAnswer:
     """What :meth:`Aspects.join` says of the configurations at a start and a goal."""
     aspects = Aspects.of(setting.telling(wanted), seed=seed)
     tell("poses")
@@ -443,16 +556,21 @@ def _why_undecided(found: PlannedPath, enclosures: Sequence[ConditionEnclosure],
 
 def _ends(any_mode: bool) -> str:
     """Which ends of a path are meant."""
-    return "poses, at the goal in each working mode within joint limits" if any_mode else (
-        "configurations, each in the working modes that the observed directions there show")
+    return (
+        "poses, at the goal in each working mode within joint limits"
+        if any_mode
+        else ("configurations, each in the working modes that the observed directions there show")
+    )
 
 
 def _pointwise(answer: PathAnswer, why: str) -> PathAnswer:
     """What the two configurations alone tell: a continuous expression of opposite signs separates them."""
     ends = answer.start.value, answer.goal.value
     if answer.signed and ends[0] * ends[1] < 0:
-        found = ("the expression has opposite signs at the two configurations, every path between them "
-                 f"{answer.where}crosses its zeros; not certified by intervals: {why}")
+        found = (
+            "the expression has opposite signs at the two configurations, every path between them "
+            f"{answer.where}crosses its zeros; not certified by intervals: {why}"
+        )
         if answer.any_mode:
             return replace(answer, reason=f"{found}; the goal was not tested in other working modes")
         return replace(answer, verdict=SEPARATED, margin=min(map(abs, ends)), reason=found)

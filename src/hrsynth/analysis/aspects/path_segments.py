@@ -52,8 +52,9 @@ class PathCoordinates(Value):
         return X
 
 
-def path_coordinates(anatomy: LegDecomposition, question: Measurement, dof: int,
-                     configurations: Sequence[ClosedConfiguration]) -> Iterator[PathCoordinates]:
+def path_coordinates(
+    anatomy: LegDecomposition, question: Measurement, dof: int, configurations: Sequence[ClosedConfiguration]
+) -> Iterator[PathCoordinates]:
     """The whole pose of the platform where its parts are independent, then the positions of joint centres on it that
     have all of the robot's freedoms."""
     mechanism = anatomy.mechanism
@@ -174,8 +175,9 @@ class WorkingModeChange(Value):
         return widen(p, FOLLOWED), widen(R.astype(p.dtype), FOLLOWED), (self.limb, carried)
 
 
-def mode_change(coordinates: PathCoordinates, limb: ClosedFormLeg, number: int, place: Place
-                ) -> WorkingModeChange | None:
+def mode_change(
+    coordinates: PathCoordinates, limb: ClosedFormLeg, number: int, place: Place
+) -> WorkingModeChange | None:
     """The way of limb ``number`` to its other working mode at a pose; None where it has none in the platform's motion.
 
     Where the platform's point moves in a plane only, the crank turns and the rod swings in that plane.

@@ -42,8 +42,7 @@ class PoseRegion:
         shifts = (p - p[0]) @ motion.translations
         turns = logarithm(R @ R[0].T) @ motion.rotations
         middle = p[0] + motion.translations @ ((shifts.max(axis=0) + shifts.min(axis=0)) / 2)
-        exact = cls(coordinates, (middle, R[0]), np.ptp(shifts, axis=0) / 2,
-                    np.max(np.abs(turns), axis=0, initial=0.0))
+        exact = cls(coordinates, (middle, R[0]), np.ptp(shifts, axis=0) / 2, np.max(np.abs(turns), axis=0, initial=0.0))
         return exact.wider(REGION_WIDER)
 
     def wider(self, factor: float) -> PoseRegion:
@@ -98,8 +97,14 @@ class RoadMap:
     crossings: dict[Road, WorkingModeChange] = field(default_factory=dict)
 
     @classmethod
-    def between(cls, enclosures: tuple[ConditionEnclosure, ConditionEnclosure], region: PoseRegion, start: Place,
-                goal: Place, budget: int) -> RoadMap:
+    def between(
+        cls,
+        enclosures: tuple[ConditionEnclosure, ConditionEnclosure],
+        region: PoseRegion,
+        start: Place,
+        goal: Place,
+        budget: int,
+    ) -> RoadMap:
         """A map of two poses in their working modes."""
         same = enclosures[0].forms.modes == enclosures[1].forms.modes
         return cls(region, list(enclosures[: 1 if same else 2]), [start, goal], [0, 0 if same else 1], budget)
@@ -114,8 +119,11 @@ class RoadMap:
         """Add the working modes in which some of these limbs differ from the start's; where they are too many, those in
         which the first of them differ."""
         many = 2 ** len(limbs) > SHEETS
-        chosen = [limbs[:k] for k in range(len(limbs) + 1)] if many else [
-            part for k in range(len(limbs) + 1) for part in combinations(limbs, k)]
+        chosen = (
+            [limbs[:k] for k in range(len(limbs) + 1)]
+            if many
+            else [part for k in range(len(limbs) + 1) for part in combinations(limbs, k)]
+        )
         known = {enclosure.forms.modes for enclosure in self.enclosures}
         for part in chosen:
             chart = self.enclosures[self.modes_of[0]].forms
@@ -159,8 +167,10 @@ class RoadMap:
 
     def _cross(self, place: Place, one: int, two: int, limb: int) -> None:
         enclosure = self.enclosures[one]
-        ways = [mode_change(self.region.coordinates, self.enclosures[mode].forms.limbs[limb], limb, place)
-                for mode in (one, two)]
+        ways = [
+            mode_change(self.region.coordinates, self.enclosures[mode].forms.limbs[limb], limb, place)
+            for mode in (one, two)
+        ]
         if ways[0] is None or ways[1] is None:
             return
         weight = self._weights(np.array([HOP]), *enclosure.at(*ways[0].at(GLANCES)))[0]
@@ -192,8 +202,11 @@ class RoadMap:
             self._survey(np.flatnonzero(modes_of == mode))
         graph: nx.Graph = nx.Graph()
         graph.add_nodes_from(range(len(modes_of)))
-        graph.add_weighted_edges_from((*road, weight) for road, weight in self.weights.items()
-                                      if np.isfinite(weight) and (road not in self.proofs or self.proofs[road].proved))
+        graph.add_weighted_edges_from(
+            (*road, weight)
+            for road, weight in self.weights.items()
+            if np.isfinite(weight) and (road not in self.proofs or self.proofs[road].proved)
+        )
         return graph
 
     def _survey(self, members: NDArray[np.int_]) -> None:
@@ -266,8 +279,11 @@ class RoadMap:
 
         graph: nx.Graph = nx.Graph([road for road, proof in self.proofs.items() if proof.proved])
         graph.add_node(0)
-        reached = {i: way for i, way in nx.single_source_shortest_path(graph, 0).items()
-                   if self.modes_of[i] == self.modes_of[1]}
+        reached = {
+            i: way
+            for i, way in nx.single_source_shortest_path(graph, 0).items()
+            if self.modes_of[i] == self.modes_of[1]
+        }
         if not reached:
             return []
         here = np.array(list(reached))
@@ -305,8 +321,15 @@ class PlannedPath:
         return min(proof.margin for proof in self.proofs)
 
 
-def plan(enclosures: tuple[ConditionEnclosure, ConditionEnclosure], region: PoseRegion, start: Place, goal: Place, *,
-         seed: int, budget: int) -> PlannedPath:
+def plan(
+    enclosures: tuple[ConditionEnclosure, ConditionEnclosure],
+    region: PoseRegion,
+    start: Place,
+    goal: Place,
+    *,
+    seed: int,
+    budget: int,
+) -> PlannedPath:
     """A way between two places in the working modes of two enclosures, with at most ``budget`` intervals.
 
     In the first round only those limbs pass their limits that differ; then any that can.
@@ -317,10 +340,14 @@ def plan(enclosures: tuple[ConditionEnclosure, ConditionEnclosure], region: Pose
         return _plan(roads, [0, 1])
     rng = np.random.default_rng(seed)
     limbs = enclosures[0].forms.limbs
-    crossed = [number for number, (limb, other) in enumerate(zip(limbs, enclosures[1].forms.limbs, strict=True))
-               if limb.mode != other.mode]
-    able = [number for number, limb in enumerate(limbs)
-            if mode_change(region.coordinates, limb, number, start) is not None]
+    crossed = [
+        number
+        for number, (limb, other) in enumerate(zip(limbs, enclosures[1].forms.limbs, strict=True))
+        if limb.mode != other.mode
+    ]
+    able = [
+        number for number, limb in enumerate(limbs) if mode_change(region.coordinates, limb, number, start) is not None
+    ]
     if not set(crossed) <= set(able):
         return PlannedPath((), (), roads.spent)
     for size, factor in ROUNDS:

@@ -61,8 +61,9 @@ def on_crank(leg: str, tip: PlatformPoint, tips: Array, ends: Array, on: Array, 
     return OnCrank(leg, tip, centre=on + height[0] * axis, axis=axis, radius=float(cranks[0]), rod=float(rods[0]))
 
 
-def sliding(leg: str, tip: PlatformPoint, tips: Array, centre: Array, axis: Array | None, directions: Array
-            ) -> SlidingRod | None:
+def sliding(
+    leg: str, tip: PlatformPoint, tips: Array, centre: Array, axis: Array | None, directions: Array
+) -> SlidingRod | None:
     """The rod with directions (n, 3) that slides through tips (n, 3), or None where it does not."""
     D = tips - centre
     if np.max(np.linalg.norm(np.cross(D, directions), axis=1)) < FOLLOWED:
@@ -102,8 +103,9 @@ class SampledMechanism:
         for tip, spot in self.tips(leg):
             for limb, end in self.rods(leg, tip, spot):
                 ends, tips = self.values(end), self.values(spot)
-                if all(max(np.ptp(ends - a, axis=0).max(), np.max(np.abs(ends - a - tips + b))) > FOLLOWED
-                       for a, b in seen):
+                if all(
+                    max(np.ptp(ends - a, axis=0).max(), np.max(np.abs(ends - a - tips + b))) > FOLLOWED for a, b in seen
+                ):
                     seen.append((ends, tips))
                     yield limb, end
         if not seen:
@@ -119,8 +121,7 @@ class SampledMechanism:
                     yield rule, spot
         if not self.coordinates.turning:
             motion = self.coordinates.motion
-            yield (ORIGIN,
-                   BodyPoint("P", "the point", motion.link, motion.point / self.coordinates.length))
+            yield (ORIGIN, BodyPoint("P", "the point", motion.link, motion.point / self.coordinates.length))
 
     def rods(self, leg: Leg, tip: PlatformPoint, spot: BodyPoint) -> Iterator[tuple[ClosedFormLeg, NamedVector]]:
         joints, tips = self.joints(leg), self.values(spot)
@@ -204,10 +205,15 @@ class SampledMechanism:
                 if np.max(np.ptp(offset, axis=0)) < FOLLOWED:
                     yield LegVector(i, sense, np.where(np.abs(offset[0]) < FOLLOWED, 0.0, offset[0]), True)
         if isinstance(feature, CrossProduct | TangentNormal):
-            parts = ((feature.one, feature.other) if isinstance(feature, CrossProduct) else
-                     (feature.start, feature.on_axis, feature.axis))
-            yield SightVector(tuple(self.source(part, carried) for part in parts),
-                              feature.radius if isinstance(feature, TangentNormal) else None)
+            parts = (
+                (feature.one, feature.other)
+                if isinstance(feature, CrossProduct)
+                else (feature.start, feature.on_axis, feature.axis)
+            )
+            yield SightVector(
+                tuple(self.source(part, carried) for part in parts),
+                feature.radius if isinstance(feature, TangentNormal) else None,
+            )
         if isinstance(feature, Ray) or (isinstance(feature, Tangent | Segment) and self.lasting(feature)):
             try:
                 start, end = (self.source(part, carried) for part in (feature.start, feature.end))

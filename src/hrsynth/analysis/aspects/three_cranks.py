@@ -43,8 +43,9 @@ class CrankPlace:
     turn: float
 
 
-def three_cranks(aspects: Aspects, configurations: Sequence[ClosedConfiguration]
-                 ) -> tuple[ThreeCranks, list[CrankPlace]] | str:
+def three_cranks(
+    aspects: Aspects, configurations: Sequence[ClosedConfiguration]
+) -> tuple[ThreeCranks, list[CrankPlace]] | str:
     """The robot in its plane, legs in the order in which they are watched, the first configuration being the goal; and
     where it is at each of them. Or why it is no such robot."""
     setting, pattern = aspects.setting, aspects.pattern

@@ -101,8 +101,9 @@ def limbs_of(each: Any) -> set[int]:
     """The limbs whose vectors an expression, or what is made of expressions, follows from."""
     if isinstance(each, LegVector):
         return {each.limb}
-    parts = each if isinstance(each, tuple) else [getattr(each, f.name) for f in fields(each)] if is_dataclass(
-        each) else []
+    parts = (
+        each if isinstance(each, tuple) else [getattr(each, f.name) for f in fields(each)] if is_dataclass(each) else []
+    )
     return set().union(*map(limbs_of, parts))
 
 
@@ -125,8 +126,9 @@ class JointRules:
     bodies: Mapping[str, CarriedLink]
 
     @classmethod
-    def of(cls, anatomy: LegDecomposition, coordinates: PathCoordinates, configurations: Sequence[ClosedConfiguration]
-           ) -> JointRules:
+    def of(
+        cls, anatomy: LegDecomposition, coordinates: PathCoordinates, configurations: Sequence[ClosedConfiguration]
+    ) -> JointRules:
         """The base, and the platform's links from joint to joint. Which of these turn is seen at configurations; that
         the joints between them allow it follows from the joints."""
         mechanism, length, link = anatomy.mechanism, coordinates.length, coordinates.motion.link
@@ -192,8 +194,11 @@ class JointRules:
 
     def same(self, one: NamedVector, other: NamedVector) -> float:
         """±1 where two points, or directions of this sense, are the same in all configurations; else 0."""
-        if (type(one) is not type(other) or not isinstance(one, BodyPoint | BodyVector)
-                or not isinstance(other, BodyPoint | BodyVector)):
+        if (
+            type(one) is not type(other)
+            or not isinstance(one, BodyPoint | BodyVector)
+            or not isinstance(other, BodyPoint | BodyVector)
+        ):
             return 0.0
         if not set(self.holders(one)) & set(self.holders(other)):
             return 0.0
@@ -226,8 +231,9 @@ def _same_direction(joint: Joint, d: Array) -> bool:
     return along and bool(np.linalg.norm(np.cross(joint.axis, d)) <= EXACT)
 
 
-def _turns(mechanism: Mechanism, link: str, coordinates: PathCoordinates, configurations: Sequence[ClosedConfiguration]
-           ) -> bool | None:
+def _turns(
+    mechanism: Mechanism, link: str, coordinates: PathCoordinates, configurations: Sequence[ClosedConfiguration]
+) -> bool | None:
     zero, platform = mechanism.links[link].pose[:3, :3], mechanism.links[coordinates.motion.link].pose[:3, :3]
     turns = np.array([at.pose(link)[:3, :3] @ zero.T for at in configurations])
     if np.max(np.abs(turns - np.eye(3))) < FOLLOWED:

@@ -50,9 +50,15 @@ class BranchCell(Value):
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
-        return {"low": self.low.tolist(), "high": self.high.tolist(), "centre": self.centre.tolist(),
-                "slopes": self.slopes.tolist(), "radius": self.radius.tolist(), "weakest": self.weakest,
-                "neighbours": list(self.neighbours)}
+        return {
+            "low": self.low.tolist(),
+            "high": self.high.tolist(),
+            "centre": self.centre.tolist(),
+            "slopes": self.slopes.tolist(),
+            "radius": self.radius.tolist(),
+            "weakest": self.weakest,
+            "neighbours": list(self.neighbours),
+        }
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -68,8 +74,12 @@ class Toggle(Value):
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
-        return {"motors": self.q.tolist(), "joints": list(self.joints), "loops": list(self.loops),
-                "reason": self.reason}
+        return {
+            "motors": self.q.tolist(),
+            "joints": list(self.joints),
+            "loops": list(self.loops),
+            "reason": self.reason,
+        }
 
 
 @dataclass(frozen=True)
@@ -93,8 +103,14 @@ class BranchLimit(Value):
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
-        return {"joint": self.joint, "lower": finite(self.lower), "upper": finite(self.upper), "least": self.least,
-                "most": self.most, "verdict": self.verdict}
+        return {
+            "joint": self.joint,
+            "lower": finite(self.lower),
+            "upper": finite(self.upper),
+            "least": self.least,
+            "most": self.most,
+            "verdict": self.verdict,
+        }
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -142,11 +158,21 @@ class BranchPart(Value):
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
-        return {"motors": list(self.motors), "passive": list(self.passive), "q0": self.q0.tolist(),
-                "x0": self.x0.tolist(), "asked": [each.tolist() for each in self.asked],
-                "proved": [each.tolist() for each in self.proved], "share": self.share, "box_share": self.box_share,
-                "cells": [each.to_dict() for each in self.cells], "toggles": [each.to_dict() for each in self.toggles],
-                "turns": dict(self.turns), "closed_to": self.closed_to, "redundant": self.redundant}
+        return {
+            "motors": list(self.motors),
+            "passive": list(self.passive),
+            "q0": self.q0.tolist(),
+            "x0": self.x0.tolist(),
+            "asked": [each.tolist() for each in self.asked],
+            "proved": [each.tolist() for each in self.proved],
+            "share": self.share,
+            "box_share": self.box_share,
+            "cells": [each.to_dict() for each in self.cells],
+            "toggles": [each.to_dict() for each in self.toggles],
+            "turns": dict(self.turns),
+            "closed_to": self.closed_to,
+            "redundant": self.redundant,
+        }
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -197,41 +223,65 @@ class BranchProof(Result, shown_as="branch"):
 
     def limits_in_words(self) -> list[str]:
         """What is known about the limits of joints without a motor."""
-        says = {KEPT: "kept in all proved cells (proved)", PASSED: "passed in the proved cells",
-                OPEN: "not proved to be kept", UNSEEN: "not looked at (balls, and joints at which loops are cut)"}
+        says = {
+            KEPT: "kept in all proved cells (proved)",
+            PASSED: "passed in the proved cells",
+            OPEN: "not proved to be kept",
+            UNSEEN: "not looked at (balls, and joints at which loops are cut)",
+        }
         told = {verdict: [each.words for each in self.limits if each.verdict == verdict] for verdict in says}
         return [f"{says[verdict]}: {', '.join(names)}" for verdict, names in told.items() if names]
 
     def motors_beyond(self) -> list[str]:
         """The motors that the cells take beyond the file's limits, with these."""
-        return [f"{name} {lower:.6g} to {upper:.6g} (within {low:.4g} to {high:.4g})"
-                for name, (lower, upper), (low, high) in self.beyond]
+        return [
+            f"{name} {lower:.6g} to {upper:.6g} (within {low:.4g} to {high:.4g})"
+            for name, (lower, upper), (low, high) in self.beyond
+        ]
 
     @property
     def beyond(self) -> list[tuple[str, tuple[float, float], tuple[float, float]]]:
-        """The motors that the cells take beyond the file's limits: their name, these, and from where to where they go.
-        """
+        """The motors that the cells take beyond the file's limits: their name, these, and from where to where."""
         reach: dict[str, tuple[float, float]] = {}
         for part in (each for each in self.parts if each.cells):
             low = np.min([each.low for each in part.cells], axis=0)
             high = np.max([each.high for each in part.cells], axis=0)
             reach |= dict(zip(part.motors, zip(low.tolist(), high.tolist(), strict=True), strict=True))
         limited = self.robot.filed
-        return [(name, limited[name], (low, high)) for name, (low, high) in reach.items()
-                if name in limited and (low < limited[name][0] or high > limited[name][1])]
+        return [
+            (name, limited[name], (low, high))
+            for name, (low, high) in reach.items()
+            if name in limited and (low < limited[name][0] or high > limited[name][1])
+        ]
 
     def headline(self) -> str:
         """The robot, and how much of the box is proved."""
         return f"{self.robot.name}, {len(self.motors)} motors, {len(self.passive)} passive coordinates: " + "; ".join(
-            f"{', '.join(each.motors)}: {each.percent} % of the box proved, {each.in_cells}"
-            for each in self.parts)
+            f"{', '.join(each.motors)}: {each.percent} % of the box proved, {each.in_cells}" for each in self.parts
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line, without the command's own fields."""
-        return {"motors": list(self.motors), "passive": list(self.passive), "held": list(self.held), "box": self.box,
-                "tried": self.tried, "parts": [each.to_dict() for each in self.parts],
-                "back": None if self.back is None else [each.tolist() for each in self.back], "regular": self.regular,
-                "limits": [each.to_dict() for each in self.limits],
-                "motors_beyond": [{"motor": name, **{key: value if np.isfinite(value) else None for key, value in
-                                                     zip(("lower", "upper"), ends, strict=True)},
-                                   "least": low, "most": high} for name, ends, (low, high) in self.beyond]}
+        return {
+            "motors": list(self.motors),
+            "passive": list(self.passive),
+            "held": list(self.held),
+            "box": self.box,
+            "tried": self.tried,
+            "parts": [each.to_dict() for each in self.parts],
+            "back": None if self.back is None else [each.tolist() for each in self.back],
+            "regular": self.regular,
+            "limits": [each.to_dict() for each in self.limits],
+            "motors_beyond": [
+                {
+                    "motor": name,
+                    **{
+                        key: value if np.isfinite(value) else None
+                        for key, value in zip(("lower", "upper"), ends, strict=True)
+                    },
+                    "least": low,
+                    "most": high,
+                }
+                for name, ends, (low, high) in self.beyond
+            ],
+        }

@@ -33,6 +33,7 @@ from .part import LoopPart
 
 Places = NDArray[np.int64]
 
+
 @dataclass(frozen=True, eq=False)
 class PosedCells:
     """Cells low ≤ q ≤ high (c, n) of all motors that fill a box, with the platform's poses (c, 12) over them and their
@@ -92,8 +93,9 @@ class InjectiveTrial:
         self.tried += 1
         if not all(map(len, own)):
             return False
-        (low, high), (low_, high_) = ((self.cells.ends[0][each].min(axis=0), self.cells.ends[1][each].max(axis=0))
-                                      for each in own)
+        (low, high), (low_, high_) = (
+            (self.cells.ends[0][each].min(axis=0), self.cells.ends[1][each].max(axis=0)) for each in own
+        )
         if np.any(low > high_) or np.any(low_ > high):
             return True
         if self._regular(self.cells.within(np.minimum(one[0], other[0]), np.maximum(one[1], other[1]))):
@@ -133,8 +135,10 @@ def way_back(system: LoopSystem, grown: Sequence[Growth]) -> tuple[tuple[Array, 
     order = [i for growth in grown for i in growth.part.driven]
     if sorted(order) != list(system.driven) or any(not growth.proved for growth in grown):
         return None, False
-    low, high = (np.concatenate(ends) for ends in zip(*(map(growth.grid.point, largest_box(growth))
-                                                        for growth in grown), strict=True))
+    low, high = (
+        np.concatenate(ends)
+        for ends in zip(*(map(growth.grid.point, largest_box(growth)) for growth in grown), strict=True)
+    )
     way = system.way(system.body[system.mechanism.platform])
     firsts = [0, *accumulate(len(growth.q0) for growth in grown)]
     sides = [slice(*pair) for pair in pairwise(firsts)]
@@ -209,9 +213,12 @@ class TubedCells:
     @classmethod
     def of(cls, growth: Growth) -> TubedCells:
         """Those that were grown."""
-        return cls(growth.part, np.array([growth.grid.point(leaf.low) for leaf in growth.proved]),
-                   np.array([growth.grid.point(leaf.high) for leaf in growth.proved]),
-                   [leaf.tube for leaf in growth.proved if leaf.tube is not None])
+        return cls(
+            growth.part,
+            np.array([growth.grid.point(leaf.low) for leaf in growth.proved]),
+            np.array([growth.grid.point(leaf.high) for leaf in growth.proved]),
+            [leaf.tube for leaf in growth.proved if leaf.tube is not None],
+        )
 
     def within(self, low: Array, high: Array) -> TubedCells:
         """Those that have room in common with a box."""
@@ -223,16 +230,25 @@ class TubedCells:
         the cell, so that both hold the same closure; else with a part of that."""
         sides = np.indices([2] * self.low.shape[1]).reshape(self.low.shape[1], -1).T
         middle = (self.low + self.high) / 2
-        low, high = (np.where(sides == side, end[:, None], middle[:, None]).reshape(-1, self.low.shape[1])
-                     for side, end in ((0, self.low), (1, self.high)))
+        low, high = (
+            np.where(sides == side, end[:, None], middle[:, None]).reshape(-1, self.low.shape[1])
+            for side, end in ((0, self.low), (1, self.high))
+        )
         old = [tube for tube in self.tubes for _ in sides]
         centre, half = middles(low, high)
         x = np.array([tube.at(q) for tube, q in zip(old, centre, strict=True)])
         new = prove_all(self.part, centre, half, self.part.close(centre, x)[0])
-        return TubedCells(self.part, low, high, [
-            one if one is not None and one.lies_in(tube) else BranchTube(
-                c, h, at, tube.slopes, tube.radius + AFFINE_ROUNDING * (1 + np.abs(at)), tube.weakest)
-            for one, tube, c, h, at in zip(new, old, centre, half, x, strict=True)])
+        return TubedCells(
+            self.part,
+            low,
+            high,
+            [
+                one
+                if one is not None and one.lies_in(tube)
+                else BranchTube(c, h, at, tube.slopes, tube.radius + AFFINE_ROUNDING * (1 + np.abs(at)), tube.weakest)
+                for one, tube, c, h, at in zip(new, old, centre, half, x, strict=True)
+            ],
+        )
 
 
 def _pose_cells(system: LoopSystem, way: Sequence[int], cells: Sequence[TubedCells]) -> PosedCells:
@@ -240,10 +256,18 @@ def _pose_cells(system: LoopSystem, way: Sequence[int], cells: Sequence[TubedCel
     parts = [SlopedPart.of(each.part, each.tubes) for each in cells]
     places = np.indices([len(each.tubes) for each in cells]).reshape(len(parts), -1)
     found = [_over(system, way, parts, places[:, k : k + AT_ONCE]) for k in range(0, places.shape[1], AT_ONCE)]
-    poses, rates = (AffineForms(np.concatenate([each[k].v for each in found], axis=1),
-                                np.concatenate([each[k].r for each in found])) for k in (0, 1))
-    return PosedCells(np.hstack([each.low[which] for each, which in zip(cells, places, strict=True)]),
-                      np.hstack([each.high[which] for each, which in zip(cells, places, strict=True)]), poses, rates)
+    poses, rates = (
+        AffineForms(
+            np.concatenate([each[k].v for each in found], axis=1), np.concatenate([each[k].r for each in found])
+        )
+        for k in (0, 1)
+    )
+    return PosedCells(
+        np.hstack([each.low[which] for each, which in zip(cells, places, strict=True)]),
+        np.hstack([each.high[which] for each, which in zip(cells, places, strict=True)]),
+        poses,
+        rates,
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -260,11 +284,13 @@ class SlopedPart:
     def of(cls, part: LoopPart, tubes: Sequence[BranchTube]) -> SlopedPart:
         """Those of tubes; infinite bounds where none is found."""
         trial = trial_of(part, tubes)
-        equations = [each for block in part.blocks
-                     for each in (block.equations if block.loop is None else turning(trial, block))]
+        equations = [
+            each for block in part.blocks for each in (block.equations if block.loop is None else turning(trial, block))
+        ]
         at = derivatives(trial, equations, range(len(part.unknowns)), trial.radius)
-        drift = AffineForms(at.along.v / trial.half[:, None, :], (at.along.r + AFFINE_ROUNDING * at.along.size)
-                            / trial.half[:, None, :])
+        drift = AffineForms(
+            at.along.v / trial.half[:, None, :], (at.along.r + AFFINE_ROUNDING * at.along.size) / trial.half[:, None, :]
+        )
         Y = np.linalg.pinv(at.by_own.v[0])
         M, w = (np.eye(Y.shape[-1]) - combine(Y, at.by_own)).size, combine(Y, drift).size
         # A E = −(B + A S): |E| ≤ M |E| + w, so |E| ≤ v for each v > M v + w
@@ -273,8 +299,9 @@ class SlopedPart:
         return cls(trial, at.by_own, drift, np.where(good, v, np.inf))
 
 
-def _over(system: LoopSystem, way: Sequence[int], parts: Sequence[SlopedPart], places: Places
-          ) -> tuple[AffineForms, AffineForms]:
+def _over(
+    system: LoopSystem, way: Sequence[int], parts: Sequence[SlopedPart], places: Places
+) -> tuple[AffineForms, AffineForms]:
     """The platform's poses (c, 12) over cells of all motors, cell ``places`` (parts, c) of each part, and F'
     (c, 12, n); each part has noise symbols of its own."""
     count = places.shape[1]
@@ -317,8 +344,9 @@ def _over(system: LoopSystem, way: Sequence[int], parts: Sequence[SlopedPart], p
         with np.errstate(invalid="ignore"):
             rest = (y_x - combine(K, A)).size @ each.off[places[k]]
         found.append(AffineForms(rate.v, (rate.r + rest) * (1 + AFFINE_ROUNDING)))
-    return pose([p, *columns]), AffineForms(np.concatenate([each.v for each in found], axis=-1),
-                                            np.concatenate([each.r for each in found], axis=-1))
+    return pose([p, *columns]), AffineForms(
+        np.concatenate([each.v for each in found], axis=-1), np.concatenate([each.r for each in found], axis=-1)
+    )
 
 
 def _columns(vectors: Sequence[AffineForms]) -> AffineForms:

@@ -72,9 +72,11 @@ class SweptChains:
         if chain not in self._swept:
             swept, none = self.system.displacement(chain, self.values), np.zeros(3)
             slides = [self.system.coordinates[i].slides for i in chain]
-            rows = [[none if slide else axis for slide, axis in zip(slides, swept.axes, strict=True)],
-                    [none if point is None else point for point in swept.points],
-                    [axis if slide else none for slide, axis in zip(slides, swept.axes, strict=True)]]
+            rows = [
+                [none if slide else axis for slide, axis in zip(slides, swept.axes, strict=True)],
+                [none if point is None else point for point in swept.points],
+                [axis if slide else none for slide, axis in zip(slides, swept.axes, strict=True)],
+            ]
             axes, points, along = (stack(each, -2) if chain else np.zeros((0, 3)) for each in rows)
             self._swept[chain] = swept, axes, points, along
         return self._swept[chain]
@@ -85,8 +87,9 @@ class SweptChains:
         if key not in self._known:
             swept, axes, points, slides = self._chain(chain)
             at = swept.at(p)
-            self._known[key] = CarriedVector(at, _parts(
-                chain, lambda: cross_product(axes, at[..., None, :] - points) + slides, axes))
+            self._known[key] = CarriedVector(
+                at, _parts(chain, lambda: cross_product(axes, at[..., None, :] - points) + slides, axes)
+            )
         return self._known[key]
 
     def direction(self, chain: tuple[int, ...], d: Array) -> CarriedVector:
@@ -105,8 +108,11 @@ def row_product(carrier: SweptChains, loop: JointLoop, row: LoopRow) -> Product:
     if row.kind == "direction":
         assert row.one is not None
         assert row.other is not None
-        return Product(carrier.direction(loop.chains[0], row.one), carrier.direction(loop.chains[1], row.other),
-                       float(row.one @ row.other))
+        return Product(
+            carrier.direction(loop.chains[0], row.one),
+            carrier.direction(loop.chains[1], row.other),
+            float(row.one @ row.other),
+        )
     assert row.one is not None
     k = carrier.direction(loop.chains[0], row.one) if row.carried else CarriedVector(row.one)
     return Product(k, carrier.point(loop.chains[1], loop.point) - carrier.point(loop.chains[0], loop.point))

@@ -65,8 +65,13 @@ class TubeTrial:
 
     def kept(self, which: Any) -> TubeTrial:
         """Some of the cells."""
-        return TubeTrial(self.part, *(each[which] for each in (
-            self.centre, self.half, self.x, self.slopes, self.radius, self.weakest, self.alive)))
+        return TubeTrial(
+            self.part,
+            *(
+                each[which]
+                for each in (self.centre, self.half, self.x, self.slopes, self.radius, self.weakest, self.alive)
+            ),
+        )
 
     @property
     def symbols(self) -> tuple[int, int]:
@@ -93,20 +98,33 @@ class TubeTrial:
 def prove_all(part: LoopPart, centres: Array, halves: Array, xs: Array) -> list[BranchTube | None]:
     """Tubes over cells (c, n) about closed configurations (c, p); None where the proof fails."""
     count, p = xs.shape
-    trial = TubeTrial(part, centres, halves, xs, part.slopes(centres, xs), np.zeros((count, p)),
-                      np.full(count, np.inf), np.ones(count, dtype=bool))
+    trial = TubeTrial(
+        part,
+        centres,
+        halves,
+        xs,
+        part.slopes(centres, xs),
+        np.zeros((count, p)),
+        np.full(count, np.inf),
+        np.ones(count, dtype=bool),
+    )
     for layer in layers(part.blocks):
         _prove_layer(trial, layer)
         if not trial.alive.any():
             break
-    return [BranchTube(centres[k], halves[k], xs[k], trial.slopes[k], trial.radius[k], float(trial.weakest[k]))
-            if trial.alive[k] else None for k in range(count)]
+    return [
+        BranchTube(centres[k], halves[k], xs[k], trial.slopes[k], trial.radius[k], float(trial.weakest[k]))
+        if trial.alive[k]
+        else None
+        for k in range(count)
+    ]
 
 
 def trial_of(part: LoopPart, tubes: Sequence[BranchTube]) -> TubeTrial:
     """Proved tubes together."""
-    centre, half, x, slopes, radius = (np.array([getattr(tube, name) for tube in tubes])
-                                       for name in ("centre", "half", "x", "slopes", "radius"))
+    centre, half, x, slopes, radius = (
+        np.array([getattr(tube, name) for tube in tubes]) for name in ("centre", "half", "x", "slopes", "radius")
+    )
     weakest = np.array([tube.weakest for tube in tubes])
     return TubeTrial(part, centre, half, x, slopes, radius, weakest, np.ones(len(tubes), dtype=bool))
 
@@ -136,8 +154,11 @@ def _prove_block(trial: TubeTrial, block: LoopBlock) -> None:
     A = at.by_own
     Y = inverses(A.v[0])
     # Y G along x̃, as a whole and in mean value form: both hold, the sharper one counts
-    e = (combine(Y, residual(trial, equations)).size + drift(combine(Y, at.along))
-         + times(combine(Y, at.by_others).size, trial.radius))
+    e = (
+        combine(Y, residual(trial, equations)).size
+        + drift(combine(Y, at.along))
+        + times(combine(Y, at.by_others).size, trial.radius)
+    )
     e = np.fmin(e, combine(Y, at.values).size)
     one = np.eye(len(own))
     done = np.zeros(len(e), dtype=bool)
@@ -215,8 +236,9 @@ class TubeDerivatives:
     along: AffineForms
 
 
-def evaluate_equations(part: LoopPart, equations: Sequence[LoopEquation], forms: Sequence[AffineForms | None]
-              ) -> tuple[list[Any], list[dict[int, Any]]]:
+def evaluate_equations(
+    part: LoopPart, equations: Sequence[LoopEquation], forms: Sequence[AffineForms | None]
+) -> tuple[list[Any], list[dict[int, Any]]]:
     """The values of equations, and their derivatives by the coordinates that are not held."""
     values: list[Any] = [0.0] * len(equations)
     slopes: list[dict[int, Any]] = [{} for _ in equations]
@@ -244,12 +266,14 @@ def residual(trial: TubeTrial, equations: Sequence[LoopEquation]) -> AffineForms
     """G(q_c, x_c), (c, k)."""
     still = trial.kept(slice(None))
     still.half = 0.0 * still.half
-    return stack([_zero(trial) + each for each in
-                    evaluate_equations(trial.part, equations, still.forms(0.0 * trial.radius))[0]])
+    return stack(
+        [_zero(trial) + each for each in evaluate_equations(trial.part, equations, still.forms(0.0 * trial.radius))[0]]
+    )
 
 
-def derivatives(trial: TubeTrial, equations: Sequence[LoopEquation], own: Sequence[int], radius: Array
-                ) -> TubeDerivatives:
+def derivatives(
+    trial: TubeTrial, equations: Sequence[LoopEquation], own: Sequence[int], radius: Array
+) -> TubeDerivatives:
     """The derivatives of equations over tubes with radii (c, p)."""
     part = trial.part
     zero = _zero(trial)

@@ -42,8 +42,11 @@ def _toggles(growth: Growth, ends: Sequence[BranchEnd]) -> Iterator[Toggle]:
     for end, q, x, last in zip(ends, *_follow_ways(part, start, x0, goal), strict=True):
         _, strengths, rows = np.linalg.svd(part.closure(q, x)[1])
         if last == 1.0 or strengths[-1] / max(home, 1e-300) > TOGGLE:
-            why = ("not tried: the effort was used up (a smaller --box needs less)" if not end.leaf.failed else
-                   "undecided: the cells would have to be smaller")
+            why = (
+                "not tried: the effort was used up (a smaller --box needs less)"
+                if not end.leaf.failed
+                else "undecided: the cells would have to be smaller"
+            )
             yield Toggle(q * unit, (), (), why)
             continue
         moving = np.abs(rows[-1]) > TOGGLE_JOINT * np.abs(rows[-1]).max()
@@ -83,8 +86,13 @@ def turns(growth: Growth) -> tuple[tuple[str, bool], ...]:
             continue
         first = [leaf for leaf in growth.proved if leaf.low[k] == 0]
         last = [leaf for leaf in growth.proved if leaf.high[k] == growth.whole]
-        same = [_meets(growth, k, one.tube, other.tube, face) for one in last for other in first
-                for face in growth.opposite(k, one, other) if one.tube is not None and other.tube is not None]
+        same = [
+            _meets(growth, k, one.tube, other.tube, face)
+            for one in last
+            for other in first
+            for face in growth.opposite(k, one, other)
+            if one.tube is not None and other.tube is not None
+        ]
         filled = growth.whole_face(k, first) and growth.whole_face(k, last)
         if same and filled and (False in same or all(same)):
             found.append((part.system.names[i], False not in same))
@@ -109,8 +117,9 @@ def _meets(growth: Growth, k: int, one: BranchTube, other: BranchTube, face: Arr
     if np.all(off + doubt < other.radius):
         return True
     # three turns one after the other may be the same orientation with other angles
-    alone = np.array([sum(each.joint == mate.joint and not mate.slides for mate in part.system.coordinates) < 3
-                      for each in own])
+    alone = np.array(
+        [sum(each.joint == mate.joint and not mate.slides for mate in part.system.coordinates) < 3 for each in own]
+    )
     return False if np.any((off - doubt > other.radius) & alone) else None
 
 

@@ -184,8 +184,9 @@ class Growth:
                 found[k] = tube
         return found
 
-    def _join(self, batch: Sequence[tuple[GrownCell, Array, Array]], tubes: Sequence[BranchTube | None]
-              ) -> set[GrownCell]:
+    def _join(
+        self, batch: Sequence[tuple[GrownCell, Array, Array]], tubes: Sequence[BranchTube | None]
+    ) -> set[GrownCell]:
         """Number those cells whose tubes hold the closure at their starts, and agree with every numbered cell beside
         them; these cells."""
         own = [(leaf, q, x, tube) for (leaf, q, x), tube in zip(batch, tubes, strict=True) if tube is not None]
@@ -201,8 +202,9 @@ class Growth:
         pairs = []
         for place, (leaf, *_) in enumerate(own):
             later = {id(each[0]) for each in own[place + 1 :]}
-            pairs += [(leaf, other) for other in self._beside(leaf)
-                      if other.tube is not None and id(other) not in later]
+            pairs += [
+                (leaf, other) for other in self._beside(leaf) if other.tube is not None and id(other) not in later
+            ]
         asked = []
         for one, other in pairs:
             assert one.tube is not None
@@ -234,10 +236,17 @@ class Growth:
         q = np.array([each[0] for each in asked])
         x, good = self.part.close(q, np.array([each[1] for each in asked]))
         points = self._prove(q, np.zeros(q.shape), x, good)
-        return [point is not None and all(
-            each is None or bool(np.all(np.abs(point.x - each.at(point.centre)) + point.radius
-                                        < each.radius * (1 - AFFINE_ROUNDING))) for each in tubes)
-                for point, (_, _, *tubes) in zip(points, asked, strict=True)]
+        return [
+            point is not None
+            and all(
+                each is None
+                or bool(
+                    np.all(np.abs(point.x - each.at(point.centre)) + point.radius < each.radius * (1 - AFFINE_ROUNDING))
+                )
+                for each in tubes
+            )
+            for point, (_, _, *tubes) in zip(points, asked, strict=True)
+        ]
 
     @property
     def whole(self) -> int:
@@ -312,8 +321,7 @@ class Growth:
     def _widest(self, leaf: GrownCell, x: Array, q: Array) -> int:
         """The side of a cell over which the Jacobian changes most, by the slopes at its start."""
         width = self.grid.point(leaf.high) - self.grid.point(leaf.low)
-        slopes = np.abs(self.part.slopes(q, x)).sum(axis=0) + np.array(
-            [1.0] * len(self.part.driven))
+        slopes = np.abs(self.part.slopes(q, x)).sum(axis=0) + np.array([1.0] * len(self.part.driven))
         return int(np.argmax(width * slopes))
 
 

@@ -15,8 +15,9 @@ from ...tolerances import AFFINE_ROUNDING
 from .answer import KEPT, OPEN, PASSED, UNSEEN, BranchLimit, BranchPart
 
 
-def branch_limits(robot: Mechanism, motors: Sequence[str], parts: Sequence[BranchPart], held: Sequence[str]
-                  ) -> Iterator[BranchLimit]:
+def branch_limits(
+    robot: Mechanism, motors: Sequence[str], parts: Sequence[BranchPart], held: Sequence[str]
+) -> Iterator[BranchLimit]:
     """The limits of all joints without a motor, in the order of the file, with what the proved cells say of them."""
     for name in robot.joints:
         if name in robot.wrists:

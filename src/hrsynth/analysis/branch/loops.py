@@ -147,23 +147,35 @@ class LoopSystem(Value):
     @property
     def metric(self) -> LoopSystem:
         """The same in metres; what is zero but for rounding is zero."""
+
         def point(p: Array) -> Array:
             return frozen(_drop_rounding(p * self.length))
 
         def row(each: LoopRow) -> LoopRow:
-            return replace(each, one=None if each.one is None else _drop_rounding(each.one),
-                           other=None if each.other is None else _drop_rounding(each.other))
+            return replace(
+                each,
+                one=None if each.one is None else _drop_rounding(each.one),
+                other=None if each.other is None else _drop_rounding(each.other),
+            )
 
         units = self.units
         return replace(
-            self, length=1.0,
-            coordinates=tuple(replace(each, axis=frozen(_drop_rounding(each.axis)), point=point(each.point),
-                                      zero=each.zero * (self.length if each.slides else 1.0))
-                              for each in self.coordinates),
-            loops=tuple(replace(each, point=point(each.point), rows=tuple(map(row, each.rows)))
-                        for each in self.loops),
-            gears=tuple(replace(each, ratio=float(each.ratio * units[each.second] / units[each.first]))
-                        for each in self.gears))
+            self,
+            length=1.0,
+            coordinates=tuple(
+                replace(
+                    each,
+                    axis=frozen(_drop_rounding(each.axis)),
+                    point=point(each.point),
+                    zero=each.zero * (self.length if each.slides else 1.0),
+                )
+                for each in self.coordinates
+            ),
+            loops=tuple(replace(each, point=point(each.point), rows=tuple(map(row, each.rows))) for each in self.loops),
+            gears=tuple(
+                replace(each, ratio=float(each.ratio * units[each.second] / units[each.first])) for each in self.gears
+            ),
+        )
 
     def way(self, body: int) -> tuple[int, ...]:
         """The coordinates from the base to a body."""
@@ -288,8 +300,9 @@ def _product(R: Any, K: Array) -> Any:
     return (R[..., :, :, None] * K).sum(-2)
 
 
-def residuals(system: LoopSystem, loop: JointLoop, values: Any, rows: Sequence[LoopRow]
-              ) -> tuple[list[Any], list[dict[int, Any]]]:
+def residuals(
+    system: LoopSystem, loop: JointLoop, values: Any, rows: Sequence[LoopRow]
+) -> tuple[list[Any], list[dict[int, Any]]]:
     """The values (…) of some equations of a loop, and of each the derivatives by the coordinates of its chains that are
     not None."""
     one, two = (system.displacement(chain, values) for chain in loop.chains)
@@ -339,8 +352,11 @@ def _distance(system: LoopSystem, loop: JointLoop, values: Any, one: Swept, a: A
     near, far = system.displacement(before, values), system.displacement(after, values)
     A, b = near.at(centre), far.at(loop.point)
     reach, rod = a - A, b - centre
-    for chain, swept, v, p, sign in ((loop.chains[0], one, reach, a, 1), (before, near, reach, A, -1),
-                                     (after, far, rod, b, -1)):
+    for chain, swept, v, p, sign in (
+        (loop.chains[0], one, reach, a, 1),
+        (before, near, reach, A, -1),
+        (after, far, rod, b, -1),
+    ):
         for place, i in enumerate(chain):
             if values[i] is not None:
                 slope[i] = dot_product(swept.rate(place, p), v) * sign
@@ -370,8 +386,11 @@ def loop_system(mechanism: Mechanism, driven: Sequence[str], free: bool = False)
         if own is not joint and joint.type is JointType.UNIVERSAL:
             cut = [(other[0], each[1], each[2]) for other, each in zip(reversed(cut), cut, strict=True)]
         for name, slides, axis in cut:
-            coordinates.append(TreeCoordinate(name, joint.name, slides, frozen(axis), frozen(own.point / length),
-                                              parent, joint.name in driven))
+            coordinates.append(
+                TreeCoordinate(
+                    name, joint.name, slides, frozen(axis), frozen(own.point / length), parent, joint.name in driven
+                )
+            )
             parent = len(coordinates) - 1
         body[far] = parent
     kept = {joint.name for joint in tree}
@@ -379,8 +398,9 @@ def loop_system(mechanism: Mechanism, driven: Sequence[str], free: bool = False)
     if missing:
         raise BadMechanism(f"{mechanism.name}: driven joints that close a loop among themselves", ", ".join(missing))
     system = LoopSystem(mechanism, length, tuple(coordinates), body, (), _gears(mechanism, coordinates, length))
-    loops = [_loop(system, joint, normal) for joint in joints
-             if joint.name not in kept and joint.type is not JointType.FREE]
+    loops = [
+        _loop(system, joint, normal) for joint in joints if joint.name not in kept and joint.type is not JointType.FREE
+    ]
     return replace(system, loops=tuple(_shorten_loop(system, loops, loop) for loop in loops))
 
 
@@ -393,8 +413,9 @@ def plane_of(joints: Sequence[Joint]) -> Array | None:
         return None
     normal = turning[0]
     sliding = [joint.axis for joint in joints if joint.type is JointType.PRISMATIC]
-    planar = (all(lines.parallel(normal, axis) for axis in turning)
-              and all(lines.perpendicular(normal, axis) for axis in sliding))
+    planar = all(lines.parallel(normal, axis) for axis in turning) and all(
+        lines.perpendicular(normal, axis) for axis in sliding
+    )
     return normal if planar else None
 
 
@@ -419,8 +440,10 @@ def _weight(joint: Joint, mechanism: Mechanism, driven: Sequence[str], geared: s
 def parts(joint: Joint) -> list[tuple[str, bool, Array]]:
     """The coordinates of a joint in their order: name, whether it slides, axis."""
     found = elementary(joint.type, joint.axes)
-    return [(f"{joint.name}.{k}" if len(found) > 1 else joint.name, kind is JointType.PRISMATIC, axis)
-            for k, (kind, axis) in enumerate(found, 1)]
+    return [
+        (f"{joint.name}.{k}" if len(found) > 1 else joint.name, kind is JointType.PRISMATIC, axis)
+        for k, (kind, axis) in enumerate(found, 1)
+    ]
 
 
 def _gears(mechanism: Mechanism, coordinates: Sequence[TreeCoordinate], length: float) -> tuple[GearEquation, ...]:
@@ -428,8 +451,9 @@ def _gears(mechanism: Mechanism, coordinates: Sequence[TreeCoordinate], length: 
     for coupling in mechanism.couplings:
         pair = []
         for link in (coupling.predecessor, coupling.successor):
-            carriers = [j.name for j in mechanism.joints.values()
-                        if j.successor == link and j.in_tree and j.type.freedoms == 1]
+            carriers = [
+                j.name for j in mechanism.joints.values() if j.successor == link and j.in_tree and j.type.freedoms == 1
+            ]
             places = [i for i, each in enumerate(coordinates) if carriers and each.joint == carriers[0]]
             if not places:
                 raise BadMechanism(f"coupling {coupling.name!r}: no single joint carries the link", link)
@@ -445,8 +469,14 @@ def _loop(system: LoopSystem, joint: Joint, normal: Array | None) -> JointLoop:
     a, b = (system.way(system.body[link]) for link in joint.links)
     shared = sum(1 for i, k in zip(a, b, strict=False) if i == k)
     point = joint.point / system.length
-    return JointLoop(joint.name, joint.links, (a[shared:], b[shared:]), frozen(point),
-                     tuple(equations(joint)), planar=normal is not None)
+    return JointLoop(
+        joint.name,
+        joint.links,
+        (a[shared:], b[shared:]),
+        frozen(point),
+        tuple(equations(joint)),
+        planar=normal is not None,
+    )
 
 
 def _shorten_loop(system: LoopSystem, loops: Sequence[JointLoop], loop: JointLoop) -> JointLoop:

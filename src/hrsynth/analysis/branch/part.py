@@ -75,8 +75,9 @@ class LoopPart(Value):
     def bent(self) -> tuple[int, ...]:
         """The angles among its motors and the unknowns of its first blocks."""
         first = {i for block in self.blocks if block.loop is None for i in block.unknowns}
-        return tuple(i for i, each in enumerate(self.system.coordinates)
-                     if not each.slides and (i in first or i in self.driven))
+        return tuple(
+            i for i, each in enumerate(self.system.coordinates) if not each.slides and (i in first or i in self.driven)
+        )
 
     def values(self, q: Array, x: Array) -> list[Array | None]:
         """All coordinates, held ones None, for those that drive this part (…, n) and its unknowns (…, p)."""
@@ -130,8 +131,13 @@ def _least_squares(A: Array, B: Array) -> Array:
     return np.asarray(np.linalg.pinv(A, rcond=RANK_CUTOFF) @ B)
 
 
-def whole(system: LoopSystem, loops: Sequence[JointLoop], gears: Sequence[GearEquation], values: Any,
-          shape: tuple[int, ...] = ()) -> tuple[Array, Array]:
+def whole(
+    system: LoopSystem,
+    loops: Sequence[JointLoop],
+    gears: Sequence[GearEquation],
+    values: Any,
+    shape: tuple[int, ...] = (),
+) -> tuple[Array, Array]:
     """All equations of loops and gears (…, m) and their derivatives by all coordinates (…, m, N), at values of a
     ``shape``, None for those at zero."""
     count = sum(len(loop.rows) for loop in loops) + len(gears)
@@ -192,8 +198,11 @@ def _idle(system: LoopSystem) -> set[int]:
     count = sum(system.coordinates[i].driven for i in every)
     dependent = spectrum(rates[:, every]).rank.value - spectrum(rates[:, free]).rank.value
     if dependent:
-        raise BadRequest(f"{system.mechanism.name}: coordinates of motors that depend on each other at the zero "
-                         f"configuration", count, f"{count - dependent}: name fewer of them with --motors")
+        raise BadRequest(
+            f"{system.mechanism.name}: coordinates of motors that depend on each other at the zero configuration",
+            count,
+            f"{count - dependent}: name fewer of them with --motors",
+        )
     while free:
         kernel = spectrum(rates[:, free]).kernel
         if not kernel.shape[1]:
@@ -270,8 +279,7 @@ def _part(system: LoopSystem, group: tuple[list[int], list[JointLoop], list[Gear
     order = qr(rates.T, mode="r", pivoting=True)[1][: len(main)] if main else []
     chosen = [candidates[k] for k in sorted(order)]
     left_out = tuple(each for k, each in enumerate(candidates) if k not in order)
-    blocks = [*_triangular(system, main, chosen),
-              *(LoopBlock(own, (), loops[place]) for place, own in swung.items())]
+    blocks = [*_triangular(system, main, chosen), *(LoopBlock(own, (), loops[place]) for place, own in swung.items())]
     return LoopPart(system, driven, tuple(unknowns), tuple(blocks), tuple(loops), tuple(gears), left_out)
 
 

@@ -69,9 +69,19 @@ def branch(robot: RobotLike, box: BoxLike | None = None, *, effort: int = BRANCH
     units, names = system.units[list(system.driven)], system.names
     passive = tuple(names[i] for part in parts for i in part.unknowns)
     idle = tuple(names[i] for i in held)
-    return BranchProof(mechanism, system, tuple(names[i] for i in system.driven), passive, idle, tuple(found),
-                       None if back is None else (back[0] * units, back[1] * units), regular, source,
-                       sum(growth.tried for growth in grown), tuple(branch_limits(mechanism, motors, found, idle)))
+    return BranchProof(
+        mechanism,
+        system,
+        tuple(names[i] for i in system.driven),
+        passive,
+        idle,
+        tuple(found),
+        None if back is None else (back[0] * units, back[1] * units),
+        regular,
+        source,
+        sum(growth.tried for growth in grown),
+        tuple(branch_limits(mechanism, motors, found, idle)),
+    )
 
 
 Shaped = tuple[LoopSystem, tuple[LoopPart, ...], tuple[int, ...]]
@@ -148,9 +158,12 @@ def _box(system: LoopSystem, box: BoxLike | None) -> tuple[dict[int, tuple[float
             sources.add("a characteristic length either way" if each.slides else "a whole turn")
         zero = round(each.zero * unit, 12)
         if not low <= zero <= high or not 0 < high - low <= WIDEST_BRANCH_BOX * unit:
-            raise BadRequest(f"interval of motor {each.name!r}", f"{low:g}:{high:g}",
-                             f"low < high, with the zero configuration in it (there it is {zero:.6g}), at most "
-                             f"{WIDEST_BRANCH_BOX * unit:.4g} {'m' if each.slides else 'rad'} wide")
+            raise BadRequest(
+                f"interval of motor {each.name!r}",
+                f"{low:g}:{high:g}",
+                f"low < high, with the zero configuration in it (there it is {zero:.6g}), at most "
+                f"{WIDEST_BRANCH_BOX * unit:.4g} {'m' if each.slides else 'rad'} wide",
+            )
         found[i] = low / unit, high / unit
     if given:
         raise BadRequest("motors of the box", ", ".join(sorted(given)), [system.names[i] for i in system.driven])
@@ -168,8 +181,9 @@ def parsed_box(box: BoxLike | None) -> dict[str, tuple[float, float]]:
     if box is None:
         return {}
     if not isinstance(box, Mapping | str):
-        raise BadRequest("a box of motors", box, "a dict such as {'hip': (-1, 1)}, or a text such as "
-                         "hip=-1:1,slide=0:0.2")
+        raise BadRequest(
+            "a box of motors", box, "a dict such as {'hip': (-1, 1)}, or a text such as hip=-1:1,slide=0:0.2"
+        )
     pairs = box.items() if isinstance(box, Mapping) else [each.rpartition("=")[::2] for each in box.split(",")]
     found: dict[str, tuple[float, float]] = {}
     for name, interval in pairs:
@@ -178,8 +192,9 @@ def parsed_box(box: BoxLike | None) -> dict[str, tuple[float, float]]:
         try:
             low, high = (float(v) for v in (interval.split(":") if isinstance(interval, str) else interval))
         except (TypeError, ValueError):
-            raise BadRequest(f"interval of motor {name!r}" if name else "a box of motors", interval,
-                             "low:high, such as hip=-1:1") from None
+            raise BadRequest(
+                f"interval of motor {name!r}" if name else "a box of motors", interval, "low:high, such as hip=-1:1"
+            ) from None
         found[str(name).strip()] = (low, high)
     return found
 
@@ -194,9 +209,17 @@ def _answer(part: LoopPart, growth: Growth) -> BranchPart:
         assert tube is not None
         low, high = growth.grid.point(leaf.low), growth.grid.point(leaf.high)
         middle = (low + high) / 2
-        cells.append(BranchCell(low * unit_q, high * unit_q, tube.at(middle) * unit_x,
-                                tube.slopes * unit_x[:, None] / unit_q, tube.radius * unit_x, tube.weakest,
-                                tuple(sorted(leaf.neighbours))))
+        cells.append(
+            BranchCell(
+                low * unit_q,
+                high * unit_q,
+                tube.at(middle) * unit_x,
+                tube.slopes * unit_x[:, None] / unit_q,
+                tube.radius * unit_x,
+                tube.weakest,
+                tuple(sorted(leaf.neighbours)),
+            )
+        )
     low, high = growth.grid.low, growth.grid.high
     box: tuple[Array, Array] = growth.q0, growth.q0
     if growth.proved:
@@ -207,7 +230,17 @@ def _answer(part: LoopPart, growth: Growth) -> BranchPart:
     tubes = [leaf.tube for leaf in growth.proved if leaf.tube is not None]
     redundant = "" if not part.left_out else GROUPS if not loose else BOUNDED
     return BranchPart(
-        tuple(names[i] for i in part.driven), tuple(names[i] for i in part.unknowns), growth.q0 * unit_q,
-        growth.x0 * unit_x, (low * unit_q, high * unit_q), (box[0] * unit_q, box[1] * unit_q),
-        growth.share, float(np.prod((box[1] - box[0]) / (high - low))), tuple(cells),
-        toggles(growth), turns(growth), closed_to(part, tubes, loose), redundant)
+        tuple(names[i] for i in part.driven),
+        tuple(names[i] for i in part.unknowns),
+        growth.q0 * unit_q,
+        growth.x0 * unit_x,
+        (low * unit_q, high * unit_q),
+        (box[0] * unit_q, box[1] * unit_q),
+        growth.share,
+        float(np.prod((box[1] - box[0]) / (high - low))),
+        tuple(cells),
+        toggles(growth),
+        turns(growth),
+        closed_to(part, tubes, loose),
+        redundant,
+    )

@@ -41,8 +41,13 @@ def group_dimension(system: LoopSystem, loop: JointLoop) -> int:
     lines = [(each.slides, each.axis, each.point) for each in (system.coordinates[i] for i in loop.coordinates)]
     lines += [(slides, axis, loop.point) for _, slides, axis in parts(joint)]
     basis = np.zeros((6, 0))
-    twists = np.array([[*np.zeros(3), *axis] if slides else [*axis, *np.cross(point, axis)]
-                       for slides, axis, point in lines]).reshape(-1, 6).T
+    twists = (
+        np.array(
+            [[*np.zeros(3), *axis] if slides else [*axis, *np.cross(point, axis)] for slides, axis, point in lines]
+        )
+        .reshape(-1, 6)
+        .T
+    )
     while True:
         basis, rank = range_basis(np.hstack([basis, twists]), 1.0)
         brackets = [_bracket(a, b) for a in basis.T for b in basis.T]

@@ -87,27 +87,58 @@ class AssemblyMode:
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
         known = bool(np.isfinite(self.radius))
-        return {"pose": self.pose.to_dict(), "radius": self.radius if known else None,
-                "radius_m": self.shift if known else None, "radius_rad": self.turn if known else None,
-                "bodies": list(self.enclosed),
-                "residual": self.residual, "goal": self.goal, "reachable": self.reachable,
-                "assembly": self.assembly, "open": list(self.open),
-                "open_couplings": list(self.gears), "beyond": list(self.beyond),
-                "reasons": [{"leg": leg, **miss.to_dict()} for leg, miss in self.misses],
-                "type2_distance": self.type2_distance,
-                "multiplicity": self.multiplicity, "proved": self.proved, "rounded": self.rounded,
-                "fits": self.fits, "opposite": list(self.opposite),
-                "behind": None if self.behind is None else list(self.behind)}
+        return {
+            "pose": self.pose.to_dict(),
+            "radius": self.radius if known else None,
+            "radius_m": self.shift if known else None,
+            "radius_rad": self.turn if known else None,
+            "bodies": list(self.enclosed),
+            "residual": self.residual,
+            "goal": self.goal,
+            "reachable": self.reachable,
+            "assembly": self.assembly,
+            "open": list(self.open),
+            "open_couplings": list(self.gears),
+            "beyond": list(self.beyond),
+            "reasons": [{"leg": leg, **miss.to_dict()} for leg, miss in self.misses],
+            "type2_distance": self.type2_distance,
+            "multiplicity": self.multiplicity,
+            "proved": self.proved,
+            "rounded": self.rounded,
+            "fits": self.fits,
+            "opposite": list(self.opposite),
+            "behind": None if self.behind is None else list(self.behind),
+        }
 
 
-def found_mode(setting: ObservedRobot, question: Measurement, at: ClosedConfiguration, bodies: dict[str, Array],
-               residual: float, goal: bool = False) -> AssemblyMode:
+def found_mode(
+    setting: ObservedRobot,
+    question: Measurement,
+    at: ClosedConfiguration,
+    bodies: dict[str, Array],
+    residual: float,
+    goal: bool = False,
+) -> AssemblyMode:
     """A closed configuration that was found, as a mode of which nothing is proved."""
     beyond, X = tuple(outside(at.twin, at.q)), at.pose(setting.motion.link)
     found = Assembly(at, (), beyond)
-    return AssemblyMode(setting.motion.pose(X), np.inf, np.pi, residual, goal, found.reachable, weakest(at, question),
-                        found.verdict, (), beyond, (), at, length=at.twin.length, bodies=bodies,
-                        behind=behind(question.observations, at.pose))
+    return AssemblyMode(
+        setting.motion.pose(X),
+        np.inf,
+        np.pi,
+        residual,
+        goal,
+        found.reachable,
+        weakest(at, question),
+        found.verdict,
+        (),
+        beyond,
+        (),
+        at,
+        length=at.twin.length,
+        bodies=bodies,
+        behind=behind(question.observations, at.pose),
+    )
 
 
 class ModeReader:
@@ -121,8 +152,10 @@ class ModeReader:
 
     def away(self, mode: SystemMode) -> float:
         """How far a mode is from the goal (characteristic lengths, differences of rotation matrices)."""
-        return max(pose_difference(X, self.goal.pose(body), self.goal.twin.length)
-                   for body, X in self.made.bodies(mode.q).items())
+        return max(
+            pose_difference(X, self.goal.pose(body), self.goal.twin.length)
+            for body, X in self.made.bodies(mode.q).items()
+        )
 
     def read(self, mode: SystemMode, nearest: bool) -> AssemblyMode:
         """What a mode is for the robot; of all modes the ``nearest`` to the goal can be it."""
@@ -144,16 +177,38 @@ class ModeReader:
             found = self.assembler.at(bodies, held, 0.0 if near else self.doubt(mode))
         if found.configuration is not None and self.made.closing is None and (gears := self.open(found.configuration)):
             found = Assembly(None, platform=self.assembler.platform(bodies), gears=gears)
-        X = (found.platform[self.motion.link] if found.platform is not None else self.goal.pose(self.motion.link)
-             if found.configuration is None else found.configuration.pose(self.motion.link))
+        X = (
+            found.platform[self.motion.link]
+            if found.platform is not None
+            else self.goal.pose(self.motion.link)
+            if found.configuration is None
+            else found.configuration.pose(self.motion.link)
+        )
         shift, turn = self.radius(mode, bodies, X)
         return AssemblyMode(
-            self.motion.pose(X), shift, turn, mode.residual * scale, at_goal, found.reachable,
+            self.motion.pose(X),
+            shift,
+            turn,
+            mode.residual * scale,
+            at_goal,
+            found.reachable,
             self.distance(found.configuration),
-            found.verdict, found.open, found.beyond, found.misses, found.configuration, mode.multiplicity,
-            mode.proved, mode.rounded, mode.residual * scale if mode.fits else None,
-            () if self.motion.link in bodies else tuple(bodies), size, bodies,
-            antipodal, behind([each.seen for each in self.seen], pose), found.gears)
+            found.verdict,
+            found.open,
+            found.beyond,
+            found.misses,
+            found.configuration,
+            mode.multiplicity,
+            mode.proved,
+            mode.rounded,
+            mode.residual * scale if mode.fits else None,
+            () if self.motion.link in bodies else tuple(bodies),
+            size,
+            bodies,
+            antipodal,
+            behind([each.seen for each in self.seen], pose),
+            found.gears,
+        )
 
     def distance(self, at: ClosedConfiguration | None) -> float | None:
         """The smallest singular value of Mᵀ, where there is one."""
@@ -169,8 +224,10 @@ class ModeReader:
         except LoopsNotClosed:
             pass
         else:
-            if all(pose_difference(whole.pose(link), at.pose(link), at.twin.length) <= SAME_RELATION
-                   for link in at.twin.mechanism.links):
+            if all(
+                pose_difference(whole.pose(link), at.pose(link), at.twin.length) <= SAME_RELATION
+                for link in at.twin.mechanism.links
+            ):
                 return ()
         left = twin.gear_errors(twin.read({link: at.pose(link) for link in twin.mechanism.links}.__getitem__))
         return tuple(name for name, miss in left.items() if abs(miss) > CLOSED) or tuple(left)
@@ -193,5 +250,7 @@ class ModeReader:
         lever = float(np.linalg.norm(told[:3, 3] - first[:3, 3]))
         if self.made.back:  # the base's turn, as the platform sees it, is about a point of the platform
             lever += float(np.linalg.norm(told[:3, 3] - self.goal.pose(self.motion.link)[:3, 3]))
-        return (shift + turn * lever + float(np.linalg.norm(X[:3, 3] - told[:3, 3])),
-                turn + float(np.linalg.norm(X[:3, :3] - told[:3, :3])))
+        return (
+            shift + turn * lever + float(np.linalg.norm(X[:3, 3] - told[:3, 3])),
+            turn + float(np.linalg.norm(X[:3, :3] - told[:3, :3])),
+        )

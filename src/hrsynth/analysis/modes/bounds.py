@@ -109,8 +109,9 @@ def _of_a_body(system: Spatial, legs: Sequence[int]) -> Bound:
     """The least of the bounds that hold for the six conditions of some legs."""
     curves = [system.curves[k] for k in legs]
     if sorted(system.forbids[k] for k in legs) == [1, 2, 3]:
-        return Bound(4, "two places of a tip on its curve, two turns about the line to the tip at rest for each",
-                     "places")
+        return Bound(
+            4, "two places of a tip on its curve, two turns about the line to the tip at rest for each", "places"
+        )
     if any(isinstance(curve, Point) for curve in curves) or all(isinstance(curve, Line | Plane) for curve in curves):
         # with planes p is a linear function of R
         return Bound(8, "three quadrics of the quaternion (Bézout)", "quadrics")
@@ -122,29 +123,42 @@ def _of_a_body(system: Spatial, legs: Sequence[int]) -> Bound:
 def _places(system: Spatial, legs: Sequence[int]) -> Bound | None:
     """Rods that share balls, one after another: three leave a ball two places, and so do two besides a ball whose
     distance is known; four between two and two balls leave these two shapes, which turn about both lines."""
-    balls = [{k: tuple(system.tips[k].tolist()) for k in legs},
-             {k: tuple(system.curves[k].centre.tolist()) for k in legs}]
+    balls = [
+        {k: tuple(system.tips[k].tolist()) for k in legs},
+        {k: tuple(system.curves[k].centre.tolist()) for k in legs},
+    ]
     for side in balls:
         shared = Counter(side.values())
         three = next(([k for k in legs if side[k] == ball] for ball in shared if shared[ball] == 3), None)
         if three is None:
             continue
         if any(len({other[k] for k in legs if k not in three}) == 2 for other in balls):
-            return Bound(8, "two places of a ball with three rods, two of a ball with two more, two turns about their "
-                         "line", "places")
-        return Bound(16, "two places of a ball with three rods, three quadrics of the quaternion for each (Bézout)",
-                     "quadrics")
+            return Bound(
+                8,
+                "two places of a ball with three rods, two of a ball with two more, two turns about their line",
+                "places",
+            )
+        return Bound(
+            16, "two places of a ball with three rods, three quadrics of the quaternion for each (Bézout)", "quadrics"
+        )
     for four in combinations(legs, 4):
-        if all(len({side[k] for k in four}) == 2 for side in balls) and len({(balls[0][k], balls[1][k])
-                                                                             for k in four}) == 4:
+        if (
+            all(len({side[k] for k in four}) == 2 for side in balls)
+            and len({(balls[0][k], balls[1][k]) for k in four}) == 4
+        ):
             rest = [k for k in legs if k not in four]
             if any(len({side[k] for k in rest}) == 1 for side in balls):
                 # the place of the ball that the last two rods share is a linear function of its turn about one line:
                 # the other line's distance is a quadric of that turn
-                return Bound(8, "two shapes of four balls with four rods, a quadric of the turn about a line for each",
-                             "places")
-            return Bound(16, "two shapes of four balls with four rods, two forms of degrees 2 and 2 of the turns about "
-                         "two lines for each (Bézout)", "places")
+                return Bound(
+                    8, "two shapes of four balls with four rods, a quadric of the turn about a line for each", "places"
+                )
+            return Bound(
+                16,
+                "two shapes of four balls with four rods, two forms of degrees 2 and 2 of the turns about "
+                "two lines for each (Bézout)",
+                "places",
+            )
     return None
 
 
@@ -180,13 +194,15 @@ def _conditions(system: Spatial, legs: Sequence[int]) -> Iterator[_Condition]:
             rho = numbers.vector(np.array([reach.radius / frame.size]))[0] / UNIT
             yield _Condition(((1, *reach.centre.tolist()), name), 1, b0, centre, b, rho * rho)
 
+
 def _covers(rows: Sequence[_Condition]) -> Iterator[tuple[_Pair, _Pair]]:
     """Two a's and two b's, not both of either at infinity, such that each condition has one of them, and all needed."""
     sides = [list(dict.fromkeys(row.names[side] for row in rows)) for side in (0, 1)]
     pairs = [[pair for pair in combinations(names, 2) if pair[0][0] or pair[1][0]] for names in sides]
     for a, b in product(*pairs):
-        if ({row.names[0] for row in rows if row.names[1] not in b} == set(a)
-                and {row.names[1] for row in rows if row.names[0] not in a} == set(b)):
+        if {row.names[0] for row in rows if row.names[1] not in b} == set(a) and {
+            row.names[1] for row in rows if row.names[0] not in a
+        } == set(b):
             yield a, b
 
 
@@ -203,8 +219,12 @@ class _Double:
 
     def apart(self, other: _Double) -> bool:
         """Whether two of them are surely not one."""
-        tests = [*np.cross(self.v, other.v), *np.cross(self.u, other.u), other.v @ (self.o - other.o),
-                 other.u @ (self.w - other.w)]
+        tests = [
+            *np.cross(self.v, other.v),
+            *np.cross(self.u, other.u),
+            other.v @ (self.o - other.o),
+            other.u @ (self.w - other.w),
+        ]
         return any(not each.contains(0) for each in tests)
 
     def solves_alone(self, rows: Sequence[_Condition]) -> bool:
@@ -215,12 +235,21 @@ class _Double:
         for row in rows:
             a, b, c = row.moved(self.o, self.w)
             va, na, ub, mb = self.v @ a, self.n @ a, self.u @ b, self.m @ b
-            table.append([-2 * na * ub, -2 * va * mb, 2 * row.a0 * ub, -2 * row.b0 * va, c - 2 * na * mb,
-                          2 * (row.a0 * mb - row.b0 * na), acb(row.a0 * row.b0)])
+            table.append(
+                [
+                    -2 * na * ub,
+                    -2 * va * mb,
+                    2 * row.a0 * ub,
+                    -2 * row.b0 * va,
+                    c - 2 * na * mb,
+                    2 * (row.a0 * mb - row.b0 * na),
+                    acb(row.a0 * row.b0),
+                ]
+            )
         middles = np.array([[complex(each) for each in row] for row in table])
         k = int(np.argmax(np.abs(np.linalg.svd(middles)[2][-1])))
         try:
-            rest = acb_mat([row[:k] + row[k + 1:] for row in table]).solve(acb_mat([[-row[k]] for row in table]))
+            rest = acb_mat([row[:k] + row[k + 1 :] for row in table]).solve(acb_mat([[-row[k]] for row in table]))
         except ZeroDivisionError:
             return False
         left = [rest[i, 0] for i in range(FORMS - 1)]
@@ -230,8 +259,10 @@ class _Double:
 
 def _doubles(rows: Sequence[_Condition], a: _Pair, b: _Pair) -> Iterator[_Double]:
     """The double points of two lines that are proved to be isolated solutions."""
-    base, platform = ([next((row.a, row.b)[side] for row in rows if row.names[side] == name) for name in pair]
-                      for side, pair in enumerate((a, b)))
+    base, platform = (
+        [next((row.a, row.b)[side] for row in rows if row.names[side] == name) for name in pair]
+        for side, pair in enumerate((a, b))
+    )
     (o, n, first), (w, m, second) = _line(a, base), _line(b, platform)
     for sign, other in product((1, -1), repeat=2):
         # v = e₁ + i e₂, n = e₁ × e₂, but u = f₁ − i f₂, m = f₁ × f₂: R is a turn from (f₁, f₂, m) to (e₁, e₂, n)

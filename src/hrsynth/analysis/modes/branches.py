@@ -46,8 +46,9 @@ def model(confined: TipLoci) -> Model:
     curves = tuple(tip.curve for tip in confined.tips)
     model = {"translations": _translating, "bodies": _articulated_model}.get(confined.motion, _rigid)
     made = model(confined, at, curves)
-    return replace(made, confined=confined,
-                   system=replace(made.system, error=confined.error, as_written=confined.as_written))
+    return replace(
+        made, confined=confined, system=replace(made.system, error=confined.error, as_written=confined.as_written)
+    )
 
 
 def _translating(confined: TipLoci, at: dict[str, Array], curves: tuple[Reach, ...]) -> Model:
@@ -69,14 +70,19 @@ def _rigid(confined: TipLoci, at: dict[str, Array], curves: tuple[Reach, ...]) -
     if n is None:
         size = confined.goal.twin.length
         arrows = np.array([size * (at[each.body][:3, :3] @ each.direction) for each in confined.angles]).reshape(-1, 3)
-        planes = tuple(Plane(p + each.axis * float(each.axis @ arrow), each.axis)
-                       for each, arrow in zip(confined.angles, arrows, strict=True))
+        planes = tuple(
+            Plane(p + each.axis * float(each.axis @ arrow), each.axis)
+            for each, arrow in zip(confined.angles, arrows, strict=True)
+        )
         system: Spatial | Planar = Spatial((*curves, *planes), np.vstack([tips, arrows]), len(arrows), p)
     else:
         system = Planar(curves, tips[:, :2], X_goal)
     home = np.array([*p, 0.0, 0.0, 0.0]) if n is None else np.zeros(3)
-    carry = partial(_carried_back, system, X_goal, at) if confined.back else partial(
-        _carried_bodies, system, {body: back @ X for body, X in at.items()})
+    carry = (
+        partial(_carried_back, system, X_goal, at)
+        if confined.back
+        else partial(_carried_bodies, system, {body: back @ X for body, X in at.items()})
+    )
     return Model(system, carry, home, confined.back)
 
 
@@ -87,8 +93,11 @@ def _articulated_model(confined: TipLoci, at: dict[str, Array], curves: tuple[Re
     p = at[one][:3, 3]
     tips = np.array([_point(at[tip.body], tip.place) - at[tip.body][:3, 3] for tip in confined.tips])
     sides = tuple(confined.bodies.index(tip.body) for tip in confined.tips)
-    return Model(Articulated(curves, tips, sides, confined.slide),
-                 partial(_on_circle, at[one], at[other], one, other, confined.slide), np.array([*p, 0.0]))
+    return Model(
+        Articulated(curves, tips, sides, confined.slide),
+        partial(_on_circle, at[one], at[other], one, other, confined.slide),
+        np.array([*p, 0.0]),
+    )
 
 
 def _shift_bodies(at: dict[str, Array], p: Array, q: Array) -> dict[str, Array]:
@@ -127,8 +136,9 @@ def _translate(X: Array, by: Array) -> Array:
 def choices(confined: TipLoci) -> Iterator[TipLoci]:
     """The platform with each tip on one of its reaches, in all combinations, the goal's own first."""
     for chosen in product(*(((tip.curve, 1.0), *tip.others) for tip in confined.tips)):
-        tips = tuple(replace(tip, curve=reach, others=())
-                     for tip, (reach, _) in zip(confined.tips, chosen, strict=True))
+        tips = tuple(
+            replace(tip, curve=reach, others=()) for tip, (reach, _) in zip(confined.tips, chosen, strict=True)
+        )
         yield replace(confined, tips=tips, error=confined.error * max(gain for _, gain in chosen))
 
 
@@ -137,20 +147,25 @@ def solve_all(confined: TipLoci, *, near: bool = True, effort: float = EFFORT) -
     ``effort`` (s, by their size) allows. Raises ``TooLarge`` where it allows none."""
     first = model(next(choices(confined))).system
     if first.seconds > effort:
-        raise TooLarge("a system of equations", f"{len(first.curves)} legs and {first.freedoms} freedoms",
-                       first.seconds, effort)
+        raise TooLarge(
+            "a system of equations", f"{len(first.curves)} legs and {first.freedoms} freedoms", first.seconds, effort
+        )
     most = int(min(BRANCH_CHOICES, effort / first.seconds))
     made = [model(each) for each in islice(choices(confined), most)]
     size = made[0].system.size
-    found = [_rescale(solve(each.system, near=near, goal=None if k else each.home), each.system.size / size)
-             for k, each in enumerate(made)]
+    found = [
+        _rescale(solve(each.system, near=near, goal=None if k else each.home), each.system.size / size)
+        for k, each in enumerate(made)
+    ]
     total = int(np.prod([1 + len(tip.others) for tip in confined.tips]))
     modes = together(found, {tip.leg: 1 + len(tip.others) for tip in confined.tips}, size)
     doubts = [f"leg {tip.leg}: {tip.doubt}" for tip in confined.tips if tip.doubt is not None]
     doubts += [] if confined.doubt is None else [confined.doubt]
     if total > len(made):
-        doubts.append(f"only {len(made)} of {total} choices of the legs' branches were solved: all would need about "
-                      f"{total * first.seconds:g} s, and the effort is {effort:g} s")
+        doubts.append(
+            f"only {len(made)} of {total} choices of the legs' branches were solved: all would need about "
+            f"{total * first.seconds:g} s, and the effort is {effort:g} s"
+        )
     if doubts and modes.continuum is None:
         proof = f"{modes.proof}; there may be other branches ({'; '.join(doubts)})"
         modes = replace(modes, complete=False, bound="none", proof=proof)
@@ -161,8 +176,9 @@ def _rescale(modes: SystemModes, factor: float) -> SystemModes:
     """Radii and residuals in sizes of another system."""
 
     def scaled(each: Sequence[SystemMode]) -> tuple[SystemMode, ...]:
-        return tuple(replace(mode, radius=max(mode.radius * factor, mode.turn), residual=mode.residual * factor)
-                     for mode in each)
+        return tuple(
+            replace(mode, radius=max(mode.radius * factor, mode.turn), residual=mode.residual * factor) for mode in each
+        )
 
     if factor == 1.0:
         return modes
@@ -179,22 +195,36 @@ def together(found: Sequence[SystemModes], branches: Mapping[str, int], size: fl
     if len(found) == 1 or found[0].continuum is not None:
         return found[0]
     modes = _once([mode for each in found for mode in each.modes], size)
-    near = _once([*modes, *(mode for each in found for mode in each.near)], size)[len(modes):]
+    near = _once([*modes, *(mode for each in found for mode in each.near)], size)[len(modes) :]
     unclear = sum(_apart(one, other, size) <= one.radius + other.radius for one, other in combinations(modes, 2))
     twice = sum(len(each.modes) for each in found) - len(modes)
     legs = ", ".join(f"leg {leg}: {count}" for leg, count in branches.items() if count > 1)
     counts = [f"{each} complex in {count}" for each, count in Counter(each.complex for each in found).items()]
     proofs = [f"{count} × ({text})" if count > 1 else text for text, count in Counter(e.proof for e in found).items()]
-    proof = (f"{len(found)} choices of the held legs' branches ({legs}), {', '.join(counts)}"
-             + (f", {twice} in two of them" if twice else "")
-             + (f", {unclear} pairs not distinguished" if unclear else "") + f": {'; '.join(proofs)}")
-    special = found[0].degenerate or next((f"on other branches of the legs: {each.degenerate}" for each in found
-                                           if each.degenerate is not None), None)
+    proof = (
+        f"{len(found)} choices of the held legs' branches ({legs}), {', '.join(counts)}"
+        + (f", {twice} in two of them" if twice else "")
+        + (f", {unclear} pairs not distinguished" if unclear else "")
+        + f": {'; '.join(proofs)}"
+    )
+    special = found[0].degenerate or next(
+        (f"on other branches of the legs: {each.degenerate}" for each in found if each.degenerate is not None), None
+    )
     complete = not unclear and all(each.complete for each in found)
-    return SystemModes(sum(each.complex or 0 for each in found) - twice, modes, complete, proof, near, special, None,
-                 next((each.bound for each in found if each.bound != "resultant"), "resultant"),
-                 all(each.enclosed for each in found), found[0].meant,
-                 tuple(part for each in found for part in each.solved), any(each.open for each in found))
+    return SystemModes(
+        sum(each.complex or 0 for each in found) - twice,
+        modes,
+        complete,
+        proof,
+        near,
+        special,
+        None,
+        next((each.bound for each in found if each.bound != "resultant"), "resultant"),
+        all(each.enclosed for each in found),
+        found[0].meant,
+        tuple(part for each in found for part in each.solved),
+        any(each.open for each in found),
+    )
 
 
 def _once(modes: Sequence[SystemMode], size: float) -> tuple[SystemMode, ...]:

@@ -250,14 +250,16 @@ class CarriedPlatform(System):
         o, a = self.freedoms_[0].point, self.freedoms_[0].axis
         if self.freedoms_[0].slides or one.joints != other.joints or np.any(one.condition.b != other.condition.b):
             return False
-        rows = [c.n if isinstance(c, OnPlane) else c.o - o for c in (one.condition, other.condition)
-                if isinstance(c, OnPlane) or (isinstance(c, OnRevolution) and _sphere(c))]
+        rows = [
+            c.n if isinstance(c, OnPlane) else c.o - o
+            for c in (one.condition, other.condition)
+            if isinstance(c, OnPlane) or (isinstance(c, OnRevolution) and _sphere(c))
+        ]
         return len(rows) == 2 and abs(float(a @ np.cross(rows[0], rows[1]))) > SAME_DIRECTION
 
     @cached_property
     def square(self) -> tuple[Told, ...]:
-        """As many conditions as joints, independent at the goal, with the fewest zeros; none where there are no such.
-        """
+        """As many conditions as joints, independent at the goal, with the fewest zeros; none if there are no such."""
         best: tuple[int, tuple[Told, ...]] | None = None
         for chosen in combinations(self.told, len(self.freedoms_)):
             most = self.most(chosen)
@@ -275,8 +277,9 @@ class CarriedPlatform(System):
     def unknowns(self, q: Array) -> Array:
         """All c, all s and slides t."""
         slides = np.array([each.slides for each in self.freedoms_])
-        return np.concatenate([np.where(slides, 1.0, np.cos(q)), np.where(slides, 0.0, np.sin(q)),
-                               np.where(slides, q, 0.0)])
+        return np.concatenate(
+            [np.where(slides, 1.0, np.cos(q)), np.where(slides, 0.0, np.sin(q)), np.where(slides, q, 0.0)]
+        )
 
 
 def permanent(degrees: Array) -> int:

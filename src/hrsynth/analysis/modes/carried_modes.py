@@ -37,7 +37,7 @@ class _Half(CarriedEquation):
 
     def point_and_arrow(self, x: Sequence[Any]) -> tuple[Any, Any, list[tuple[int, Any, Any]]]:
         R, p, at = self.of(np.eye(3)), self.of(np.zeros(3)), list[tuple[int, Any, Any]]()
-        for k, each in enumerate(self.freedoms[:self.joints]):
+        for k, each in enumerate(self.freedoms[: self.joints]):
             if k in self.idle:
                 continue
             a, o, t = self.of(each.axis), self.of(each.point), x[k]
@@ -47,12 +47,19 @@ class _Half(CarriedEquation):
                 continue
             w = 1 + t * t * (a @ a)
             at.append((k, R @ a * (2 / w), p + R @ o))
-            turn = (np.eye(3, dtype=int) * (2 - w) + np.outer(a, a) * (2 * t * t)
-                    + self.of(hat(each.axis)) * (2 * t)) / w
+            turn = (
+                np.eye(3, dtype=int) * (2 - w) + np.outer(a, a) * (2 * t * t) + self.of(hat(each.axis)) * (2 * t)
+            ) / w
             R, p = R @ turn, p + R @ (o - turn @ o)
         point, arrow = p + R @ self.of(self.condition.b), R @ self.of(self.condition.c)
-        return point, arrow, [(k, place, 0 * arrow) if rate is None else
-                              (k, cross(rate, point - place), cross(rate, arrow)) for k, rate, place in at]
+        return (
+            point,
+            arrow,
+            [
+                (k, place, 0 * arrow) if rate is None else (k, cross(rate, point - place), cross(rate, arrow))
+                for k, rate, place in at
+            ],
+        )
 
 
 @dataclass(frozen=True)
@@ -104,8 +111,7 @@ def polish_zeros(system: CarriedPlatform, q: Array, known: Iterable[Array] = ())
     return np.array(found).reshape(-1, len(slides))
 
 
-def solve_carried(measured: MeasuredRobot, goal: ClosedConfiguration, error: float = 0.0
-                  ) -> tuple[Model, SystemModes]:
+def solve_carried(measured: MeasuredRobot, goal: ClosedConfiguration, error: float = 0.0) -> tuple[Model, SystemModes]:
     """All modes, with the goal known to ``error`` (m). Raises ``NotConfined``, and ``Unsolved`` where not all zeros are
     enclosed that there may be."""
     if not np.isfinite(error):
@@ -129,8 +135,8 @@ def _far(system: CarriedPlatform, proposed: Array, known: Sequence[PoseBox]) -> 
     from flint import acb, ctx
 
     equations: list[Polynomial] = [
-        _Half(each.condition, Poses.spatial(), None, system.freedoms_, each.joints, each.idle)
-        for each in system.square]
+        _Half(each.condition, Poses.spatial(), None, system.freedoms_, each.joints, each.idle) for each in system.square
+    ]
     slides, found = np.array([each.slides for each in system.freedoms_]), list[PoseBox]()
     with ctx.workprec(PRECISION):
         for q in proposed:
@@ -142,9 +148,15 @@ def _far(system: CarriedPlatform, proposed: Array, known: Sequence[PoseBox]) -> 
             if half is None:
                 continue
             squares = [1 + t * t for t in half]
-            box = as_box([*(t * 0 + 1 if slid else 2 / w - 1 for t, w, slid in zip(half, squares, slides, strict=True)),
-                          *(t * 0 if slid else 2 * t / w for t, w, slid in zip(half, squares, slides, strict=True)),
-                          *(t if slid else t * 0 for t, slid in zip(half, slides, strict=True))], False, 0)
+            box = as_box(
+                [
+                    *(t * 0 + 1 if slid else 2 / w - 1 for t, w, slid in zip(half, squares, slides, strict=True)),
+                    *(t * 0 if slid else 2 * t / w for t, w, slid in zip(half, squares, slides, strict=True)),
+                    *(t if slid else t * 0 for t, slid in zip(half, slides, strict=True)),
+                ],
+                False,
+                0,
+            )
             if box is not None and box.apart((*known, *found)):
                 found.append(replace(box, rounded=True))
     return found
@@ -169,22 +181,27 @@ def _judge(system: CarriedPlatform) -> SystemModes:
     if len(boxes) != most or len(at_goal) != 1:
         raise Unsolved("the leg", f"{size}: of {most} closings at most ({why}) {len(boxes)} have boxes")
     bodies = [_body(system, box) for box in boxes]
-    if any(all((a - b).contains(0) for a, b in zip(one, other, strict=True))
-           for k, one in enumerate(bodies) for other in bodies[:k]):
+    if any(
+        all((a - b).contains(0) for a, b in zip(one, other, strict=True))
+        for k, one in enumerate(bodies)
+        for other in bodies[:k]
+    ):
         raise Unsolved("the leg", f"{size}: several of {most} closings have one pose of the platform")
     besides = [system.equation(each) for each in system.told if each not in system.square]
     real = [box for box in boxes if box.real]
     with ctx.workprec(PRECISION):
-        kept = [box for box in real if box is at_goal[0]
-                or not any(not each.value(box.box).contains(0) for each in besides)]
+        kept = [
+            box for box in real if box is at_goal[0] or not any(not each.value(box.box).contains(0) for each in besides)
+        ]
         modes = [as_mode(system, box, not besides or box is at_goal[0]) for box in kept]
-    proof = (f"{size}: at most {most} closings by {why}, {len(boxes)} enclosed apart from each other, complex ones "
-             f"too{told_far(boxes)}, {len(real)} real")
+    proof = (
+        f"{size}: at most {most} closings by {why}, {len(boxes)} enclosed apart from each other, complex ones "
+        f"too{told_far(boxes)}, {len(real)} real"
+    )
     if not besides:
         return SystemModes(len(boxes), tuple(modes), True, proof, bound=bound, enclosed=True)
     out = [as_mode(system, box, False) for box in real if box not in kept]
-    return SystemModes.of_more(modes, out, f"from {n} of {len(system.told)} conditions: {proof}",
-                               bound)
+    return SystemModes.of_more(modes, out, f"from {n} of {len(system.told)} conditions: {proof}", bound)
 
 
 def _body(system: CarriedPlatform, box: PoseBox) -> list[Any]:
@@ -203,13 +220,23 @@ def _body(system: CarriedPlatform, box: PoseBox) -> list[Any]:
 def as_mode(system: CarriedPlatform, box: PoseBox, proved: bool, miss: float | None = None) -> SystemMode:
     """A real box as a mode, or as one that fits; ``miss``: how far it is from meeting all (sizes)."""
     n, x = len(system.freedoms_), box.middle.real
-    q = np.array([x[2 * n + k] if each.slides else np.arctan2(x[n + k], x[k])
-                  for k, each in enumerate(system.freedoms_)])
+    q = np.array(
+        [x[2 * n + k] if each.slides else np.arctan2(x[n + k], x[k]) for k, each in enumerate(system.freedoms_)]
+    )
     spread = [float(v.rad()) for v in _body(system, box)]
     shift, turn = system.size * float(np.linalg.norm(spread[:3])), 2.0 * float(np.linalg.norm(spread[3:]))
     if miss is None:
         values, slopes = system.values(q, system.told)
         misses = np.abs(values) / np.maximum(1.0, np.linalg.norm(slopes, axis=-1))
         miss = float(np.max(misses)) if misses.size else np.inf
-    return SystemMode((), max(shift / system.size, turn), shift, turn, miss, frozen(system.pose(q)), frozen(q),
-                      proved=proved, fits=not proved)
+    return SystemMode(
+        (),
+        max(shift / system.size, turn),
+        shift,
+        turn,
+        miss,
+        frozen(system.pose(q)),
+        frozen(q),
+        proved=proved,
+        fits=not proved,
+    )

@@ -51,8 +51,9 @@ def carried_platform(measured: MeasuredRobot, goal: ClosedConfiguration, error: 
         asked = [Told.of(c, turns[:joints]) for c, (_, joints) in zip(alike, told, strict=True)]
         moved += middle.size * (off + max((each.moved for each in asked), default=0.0))
         error_ = error + MOVED * moved + max([0.0, *(sight.error(error, goal) for sight in seen)])
-        each = CarriedPlatform((), np.zeros((0, 3)), turns, tuple(asked), middle, goal.pose(body), seen=seen,
-                               error=error_, rows=rows)
+        each = CarriedPlatform(
+            (), np.zeros((0, 3)), turns, tuple(asked), middle, goal.pose(body), seen=seen, error=error_, rows=rows
+        )
         off_ = each.values(each.home, asked)[0] if asked and turns else np.zeros(0)
         if turns and np.abs(off_).max(initial=0.0) <= SAME_RELATION and each.square:
             found.append(each)
@@ -63,8 +64,9 @@ def carried_platform(measured: MeasuredRobot, goal: ClosedConfiguration, error: 
     return min(found, key=lambda each: each.most(each.square))
 
 
-def _exactly(freedoms: Sequence[Turn], conditions: Sequence[PoseCondition]
-             ) -> tuple[Array, tuple[Turn, ...], list[PoseCondition], float]:
+def _exactly(
+    freedoms: Sequence[Turn], conditions: Sequence[PoseCondition]
+) -> tuple[Array, tuple[Turn, ...], list[PoseCondition], float]:
     """Turns and conditions in rows along the first axes, so that what is parallel, at right angles, in one point or on
     one axis is so exactly, as ranks want it; and how far that moves anything (sizes)."""
     moved, turns, rows = CHAIN_ROUNDING, list[Turn](), _rows([each.axis for each in freedoms])
@@ -85,8 +87,13 @@ def _exactly(freedoms: Sequence[Turn], conditions: Sequence[PoseCondition]
         a, o = direction(rows @ each.axis, [other.axis for other in turns], SAME_DIRECTION), rows @ each.point
         for k, other in enumerate(turns if not each.slides else ()):
             far = float(np.linalg.norm(np.cross(other.point - o, a)))
-            at = (None if other.slides else other.point if far <= SAME_POINT / RANK_GAP else
-                  lines.meeting_point([(o, a), (other.point, other.axis)], SAME_POINT / RANK_GAP))
+            at = (
+                None
+                if other.slides
+                else other.point
+                if far <= SAME_POINT / RANK_GAP
+                else lines.meeting_point([(o, a), (other.point, other.axis)], SAME_POINT / RANK_GAP)
+            )
             if at is not None:
                 off = max(float(np.linalg.norm(np.cross(p - at, b))) for p, b in ((o, a), (other.point, other.axis)))
                 moved = max(moved, off if off > CHAIN_ROUNDING else 0.0)
@@ -115,8 +122,7 @@ def _rows(axes: Sequence[Array]) -> Array:
     return np.stack([np.cross(y, z), y, z])
 
 
-def freedoms_of(joint: Joint, at: str, goal: ClosedConfiguration, middle: Middle, held: Sequence[str]
-                ) -> list[Turn]:
+def freedoms_of(joint: Joint, at: str, goal: ClosedConfiguration, middle: Middle, held: Sequence[str]) -> list[Turn]:
     """What a joint of R and P leaves free that is met from a link, none if it is ``held``. Raises ``NotConfined``."""
     turns = {JointType.REVOLUTE: 1, JointType.UNIVERSAL: 2, JointType.CYLINDRICAL: 1, JointType.PRISMATIC: 0}
     if joint.type not in turns or held.count(joint.name) not in (0, joint.type.freedoms):
@@ -129,8 +135,9 @@ def freedoms_of(joint: Joint, at: str, goal: ClosedConfiguration, middle: Middle
     return found
 
 
-def _carrier(measured: MeasuredRobot, leg: Leg, rest: Measurement, goal: ClosedConfiguration, middle: Middle
-             ) -> tuple[tuple[Turn, ...], list[tuple[PoseCondition, int]]]:
+def _carrier(
+    measured: MeasuredRobot, leg: Leg, rest: Measurement, goal: ClosedConfiguration, middle: Middle
+) -> tuple[tuple[Turn, ...], list[tuple[PoseCondition, int]]]:
     """The joints of a leg that are not held, from the base, and what is measured of it, with how many of them carry
     it."""
     anatomy, mechanism = measured.setting.anatomy, measured.setting.anatomy.mechanism
@@ -151,11 +158,18 @@ def _carrier(measured: MeasuredRobot, leg: Leg, rest: Measurement, goal: ClosedC
     for each in own:
         if isinstance(each, Encoder) and each.joint in leg.joints:
             continue
-        if not isinstance(each, Direction) or each.link not in links or (
-                each.seen_from or rest.reference) != mechanism.base:
-            raise NotConfined(mechanism.name, f"what is measured at leg {leg.label} is not a direction seen from "
-                              "the base")
+        if (
+            not isinstance(each, Direction)
+            or each.link not in links
+            or (each.seen_from or rest.reference) != mechanism.base
+        ):
+            raise NotConfined(
+                mechanism.name, f"what is measured at leg {leg.label} is not a direction seen from the base"
+            )
         d = goal.pose(each.link)[:3, :3] @ each.direction
-        told += [(AtAngle(leg.label, none, d, e, h), links[each.link])
-                 for e, h in zip((*plane_axes(d), d), (0.0, 0.0, 1.0), strict=True) if links[each.link]]
+        told += [
+            (AtAngle(leg.label, none, d, e, h), links[each.link])
+            for e, h in zip((*plane_axes(d), d), (0.0, 0.0, 1.0), strict=True)
+            if links[each.link]
+        ]
     return tuple(found), told

@@ -90,8 +90,14 @@ class Chain:
         return self.off + self.extent * _parallel_angles(self.bodies)
 
 
-def chain(anatomy: LegDecomposition, leg: Leg, held: Sequence[Observation], goal: ClosedConfiguration, tip: Array,
-          end: Array | str) -> Chain:
+def chain(
+    anatomy: LegDecomposition,
+    leg: Leg,
+    held: Sequence[Observation],
+    goal: ClosedConfiguration,
+    tip: Array,
+    end: Array | str,
+) -> Chain:
     """The chain of a leg to its ``tip`` (3,); ``end`` is ``free``, ``kept`` (its body's orientation) or the normal of
     the plane in which that turns. Raises :class:`Underived`."""
     bodies, off = _Walk(anatomy, leg, held, goal).bodies(tip)
@@ -107,18 +113,28 @@ def chain(anatomy: LegDecomposition, leg: Leg, held: Sequence[Observation], goal
 
 def _parallel_angles(bodies: Sequence[ChainBody]) -> float:
     """The angles (rad) of all pairs of directions of a chain that count as parallel, and are not but for rounding."""
-    found = [d for body in bodies for d in (*([] if body.axis is None else [body.axis]), *body.slides, *body.watched,
-                                            *(d for crank in body.cranks for d in (crank.axis, *crank.watched)))]
-    angles = [float(np.linalg.norm(cross(one, other))) for one, other in combinations(found, 2)
-              if lines.parallel(one, other)]
+    found = [
+        d
+        for body in bodies
+        for d in (
+            *([] if body.axis is None else [body.axis]),
+            *body.slides,
+            *body.watched,
+            *(d for crank in body.cranks for d in (crank.axis, *crank.watched)),
+        )
+    ]
+    angles = [
+        float(np.linalg.norm(cross(one, other))) for one, other in combinations(found, 2) if lines.parallel(one, other)
+    ]
     return sum(angle for angle in angles if angle > CHAIN_ROUNDING)
 
 
 class _Walk:
     """The path from the base to a leg's end, step by step."""
 
-    def __init__(self, anatomy: LegDecomposition, leg: Leg, held: Sequence[Observation],
-                 goal: ClosedConfiguration) -> None:
+    def __init__(
+        self, anatomy: LegDecomposition, leg: Leg, held: Sequence[Observation], goal: ClosedConfiguration
+    ) -> None:
         self.anatomy, self.leg, self.goal = anatomy, leg, goal
         self.watched: dict[str, list[Array]] = {}
         self.coordinates: dict[str, int] = {}
@@ -244,8 +260,14 @@ class _Walk:
         found.append(ChainBody(None, self._geometry(far, at)[0]))
 
 
-_TURNS = {JointType.REVOLUTE: True, JointType.UNIVERSAL: True, JointType.CYLINDRICAL: True, JointType.PLANAR: True,
-          JointType.PRISMATIC: False, JointType.FIXED: False}
+_TURNS = {
+    JointType.REVOLUTE: True,
+    JointType.UNIVERSAL: True,
+    JointType.CYLINDRICAL: True,
+    JointType.PLANAR: True,
+    JointType.PRISMATIC: False,
+    JointType.FIXED: False,
+}
 """Joints that are read axis by axis, and whether those are axes of turns."""
 
 
@@ -256,8 +278,11 @@ def _shift_bodies(bodies: Sequence[ChainBody], tip: Array, small: float) -> tupl
     for k, body in enumerate(bodies[1:], 1):
         before = bodies[k - 1] if bodies[k - 1].rigid and k > 1 else None
         after = bodies[k + 1] if k + 1 < len(bodies) and body.rigid else None
-        point, off = (body.point, 0.0) if body.axis is None else _meeting(
-            body, before, after, tip if k + 1 == len(bodies) and body.rigid else None, small)
+        point, off = (
+            (body.point, 0.0)
+            if body.axis is None
+            else _meeting(body, before, after, tip if k + 1 == len(bodies) and body.rigid else None, small)
+        )
         points.append(point)
         moved += off if off > CHAIN_ROUNDING * (small / SAME_POINT) else 0.0
     found = []
@@ -267,8 +292,9 @@ def _shift_bodies(bodies: Sequence[ChainBody], tip: Array, small: float) -> tupl
     return tuple(found), moved
 
 
-def _meeting(body: ChainBody, before: ChainBody | None, after: ChainBody | None, tip: Array | None, small: float
-             ) -> tuple[Array, float]:
+def _meeting(
+    body: ChainBody, before: ChainBody | None, after: ChainBody | None, tip: Array | None, small: float
+) -> tuple[Array, float]:
     """The point of a body's axis at which a ball, the tip or a neighbour's axis is, else its own; and how far from the
     axis that is (m)."""
     assert body.axis is not None

@@ -207,8 +207,10 @@ class Coplanar(PoseCondition):
 
     def slopes(self, x: Any, d: Any, of: Convert) -> tuple[Any, Any]:
         y, t = x - of(self.o), of(self.t)
-        return (np.stack([d[..., j] * t[k] - d[..., k] * t[j] for _, j, k in CYCLES], axis=-1),
-                np.stack([t[j] * y[..., k] - t[k] * y[..., j] for _, j, k in CYCLES], axis=-1))
+        return (
+            np.stack([d[..., j] * t[k] - d[..., k] * t[j] for _, j, k in CYCLES], axis=-1),
+            np.stack([t[j] * y[..., k] - t[k] * y[..., j] for _, j, k in CYCLES], axis=-1),
+        )
 
 
 CYCLES = ((0, 1, 2), (1, 2, 0), (2, 0, 1))

@@ -33,17 +33,26 @@ def drift(goal: ClosedConfiguration, pose: Task | None = None, moved: float = 0.
     rank = range_basis(J, 1.0)[1].value
     left, values, right = np.linalg.svd(J, full_matrices=False)
     sigma, bends = float(values[rank - 1]) if rank else np.inf, twin.nv * extent
-    if bends * miss > sigma ** 2 / 2:
+    if bends * miss > sigma**2 / 2:
         return float("inf")
     inverse: Array = right[:rank].T / values[:rank] @ left[:, :rank].T
     return MOVED * moved + 2.0 * twin.length * miss * max(
         float(np.linalg.norm(moved[:3], 2) + _lever(goal, link) * np.linalg.norm(moved[3:], 2))
-        for link, moved in zip(links, V @ inverse, strict=True))
+        for link, moved in zip(links, V @ inverse, strict=True)
+    )
 
 
 def _lever(goal: ClosedConfiguration, link: str) -> float:
     """How far a link's joint centres are from its origin (characteristic lengths)."""
     mechanism = goal.twin.mechanism
     origin = mechanism.links[link].pose[:3, 3]
-    return max([LEVER, *(float(np.linalg.norm(joint.point - origin)) / goal.twin.length
-                         for joint in mechanism.joints.values() if link in joint.links)])
+    return max(
+        [
+            LEVER,
+            *(
+                float(np.linalg.norm(joint.point - origin)) / goal.twin.length
+                for joint in mechanism.joints.values()
+                if link in joint.links
+            ),
+        ]
+    )

@@ -35,8 +35,10 @@ def off(system: System, k: int, at: Array, shift: float, turn: float) -> float:
 
 def meets(system: System, q: Array, goal: Array, shift: float, turn: float) -> bool:
     """Whether the exact pose about ``q`` can be that about ``goal``: all its tips can."""
-    return all(length(one - other) <= off(system, k, one, shift, turn) + tip_rounding(system, other)
-               for k, (one, other) in enumerate(zip(system.tips_at(q), system.tips_at(goal), strict=True)))
+    return all(
+        length(one - other) <= off(system, k, one, shift, turn) + tip_rounding(system, other)
+        for k, (one, other) in enumerate(zip(system.tips_at(q), system.tips_at(goal), strict=True))
+    )
 
 
 def is_excluded(system: System, q: Array, shift: float, turn: float) -> bool:
@@ -67,8 +69,13 @@ def torn(system: System, places: Mapping[int, tuple[Array, float]]) -> bool:
     frame = system.frame
     numbers = system.balls(frame)
     with ctx.workprec(PRECISION):
-        tips = {k: (numbers.vector(frame.point(at), (miss + tip_rounding(system, at)) / frame.size * UNIT),
-                    numbers.vector(system.tips[k] / frame.size)) for k, (at, miss) in places.items()}
+        tips = {
+            k: (
+                numbers.vector(frame.point(at), (miss + tip_rounding(system, at)) / frame.size * UNIT),
+                numbers.vector(system.tips[k] / frame.size),
+            )
+            for k, (at, miss) in places.items()
+        }
         arms = [(at - to, b - c) for (at, b), (to, c) in combinations(tips.values(), 2)]
         return any(not (arm @ arm - own @ own).contains(0) for arm, own in arms)
 
@@ -78,8 +85,10 @@ def words(goal: bool, lost: bool, fitting: Sequence[float], out: int, open_: int
     that fit, how many are excluded and how many are not decided."""
     parts = [f"{'none' if lost else 'one'} is the goal, at which all legs fit by construction"] if goal else []
     if fitting:
-        parts.append(f"{len(fitting)} fit{'s' * (len(fitting) == 1)} all legs to {max(fitting):.1e} of the robot's "
-                     "size, which does not prove it")
+        parts.append(
+            f"{len(fitting)} fit{'s' * (len(fitting) == 1)} all legs to {max(fitting):.1e} of the robot's "
+            "size, which does not prove it"
+        )
     parts.append(f"{out} excluded by the legs in interval arithmetic" if out else "none excluded")
     if open_:
         parts.append(f"{open_} neither excluded nor found to fit")
@@ -168,14 +177,18 @@ def as_meant(system: System) -> tuple[System, tuple[Meant, ...]]:
         return system, ()
     spheres = [k for k, curve in enumerate(system.curves) if isinstance(curve, Sphere)]
     points = {"platform": dict(enumerate(system.points)), "base": {k: system.curves[k].centre for k in spheres}}
-    apart = [(float(np.linalg.norm(at[i] - at[j])), where, i, j)
-             for where, at in points.items() for i, j in combinations(at, 2)]
+    apart = [
+        (float(np.linalg.norm(at[i] - at[j])), where, i, j)
+        for where, at in points.items()
+        for i, j in combinations(at, 2)
+    ]
     accepted = [each for each in apart if each[0] <= MEANT * system.size]
     largest = max((each[0] for each in accepted), default=0.0)
     smallest = min((each[0] for each in apart if each not in accepted), default=np.inf)
     if largest * RANK_GAP > smallest:
-        raise MeaningUndecided("joint centres that may be meant to be one", largest / system.size,
-                               smallest / system.size, RANK_GAP)
+        raise MeaningUndecided(
+            "joint centres that may be meant to be one", largest / system.size, smallest / system.size, RANK_GAP
+        )
     if largest == 0.0:
         return system, ()
     tips, curves, told = system.tips.copy(), list(system.curves), []

@@ -70,11 +70,16 @@ def formation_modes(setting: ObservedRobot) -> FormedModes:
         if formation.count == usual or (sliding is not None and not sliding.spheres):
             words = f"no measured value shows {flexes}: a continuum of dimension {formation.count}"
             return FormedModes(formation, (), words, degenerate=words, continuum=formation.count)
-        return FormedModes(formation, (goal,), "others are not searched for: the configuration is singular",
-                           degenerate=f"to first order no measured value shows {flexes}")
+        return FormedModes(
+            formation,
+            (goal,),
+            "others are not searched for: the configuration is singular",
+            degenerate=f"to first order no measured value shows {flexes}",
+        )
     if formation.group is None:
-        return FormedModes(formation, (goal,), "others are not searched for: a trivial motion ties a turn or a scale "
-                           "to another")
+        return FormedModes(
+            formation, (goal,), "others are not searched for: a trivial motion ties a turn or a scale to another"
+        )
     listed = None if sliding is None else sliding.modes(formation, goal)
     return listed or _search(question, formation, formation.group, goal)
 
@@ -82,8 +87,11 @@ def formation_modes(setting: ObservedRobot) -> FormedModes:
 def _slides(at: ClosedConfiguration) -> bool:
     """Whether all joints are slides that nothing closes: no body turns, and points are linear in the coordinates."""
     mechanism = at.twin.mechanism
-    return at.twin.nv == len(mechanism.joints) and not mechanism.couplings and all(
-        each.type is JointType.PRISMATIC and each.in_tree for each in mechanism.joints.values())
+    return (
+        at.twin.nv == len(mechanism.joints)
+        and not mechanism.couplings
+        and all(each.type is JointType.PRISMATIC and each.in_tree for each in mechanism.joints.values())
+    )
 
 
 class _Sliding:
@@ -103,8 +111,9 @@ class _Sliding:
         for each, place in seen:
             assert isinstance(each, CameraObservation | SeenAxis)
             ends = [(each.link, 1.0), (each.seen_from or self.question.reference, -1.0)]
-            slopes = np.array([sum(sign * (step.pose(link) - self.at.pose(link))[:3, 3] for link, sign in ends)
-                               for step in steps]).T
+            slopes = np.array(
+                [sum(sign * (step.pose(link) - self.at.pose(link))[:3, 3] for link, sign in ends) for step in steps]
+            ).T
             loci = each.loci(place)
             self.known &= bool(loci)
             for locus in loci:
@@ -127,23 +136,45 @@ class _Sliding:
             return None
         if more < 0 or not _has_rank(self.rows, self.slack, seen.value):
             return None
-        proof = (f"{len(self.rows)} planes in {self.at.twin.nv} slides, of rank {seen.value} for all that the file's "
-                 "decimals allow (interval arithmetic): ")
+        proof = (
+            f"{len(self.rows)} planes in {self.at.twin.nv} slides, of rank {seen.value} for all that the file's "
+            "decimals allow (interval arithmetic): "
+        )
         if not more:
-            return FormedModes(formation, (goal,), proof + "only trivial motions are left" + (
-                "; a negative scale would reverse what is measured" if group.scaled else ""), True, 1, "rank")
+            return FormedModes(
+                formation,
+                (goal,),
+                proof
+                + "only trivial motions are left"
+                + ("; a negative scale would reverse what is measured" if group.scaled else ""),
+                True,
+                1,
+                "rank",
+            )
         others = self._on_spheres(kernel, goal, group)
-        return None if others is None else FormedModes(
-            formation, (goal, *others), proof + "besides trivial motions a line is left, which the distances cut",
-            True, 1 + len(others), "rank")
+        return (
+            None
+            if others is None
+            else FormedModes(
+                formation,
+                (goal, *others),
+                proof + "besides trivial motions a line is left, which the distances cut",
+                True,
+                1 + len(others),
+                "rank",
+            )
+        )
 
     def _on_spheres(self, kernel: Array, goal: FormedMode, group: Similarities) -> list[FormedMode] | None:
         """What the spheres leave of the line of the ``kernel`` that is no trivial motion: σ with (σ w + 2 v) · w = 0;
         None where several nearly agree."""
         changed = np.vstack([slopes @ kernel for _, slopes in self.spheres])
         line = kernel @ np.linalg.svd(changed)[2][0]
-        cuts = [-2.0 * (v @ w) / (w @ w) for v, slopes in self.spheres
-                if np.linalg.norm(w := slopes @ line) > NAMED * self.at.twin.length]
+        cuts = [
+            -2.0 * (v @ w) / (w @ w)
+            for v, slopes in self.spheres
+            if np.linalg.norm(w := slopes @ line) > NAMED * self.at.twin.length
+        ]
         spread = float(np.ptp(cuts))
         if spread > NAMED:  # no second point is on all spheres
             return []
@@ -173,8 +204,13 @@ def _has_rank(rows: Array, slack: float, rank: int) -> bool:
     return True
 
 
-def _nearest(at: ClosedConfiguration, goal: ClosedConfiguration, question: Measurement, group: Similarities,
-             bodies: Sequence[str]) -> tuple[Bodies, float]:
+def _nearest(
+    at: ClosedConfiguration,
+    goal: ClosedConfiguration,
+    question: Measurement,
+    group: Similarities,
+    bodies: Sequence[str],
+) -> tuple[Bodies, float]:
     """The bodies at a configuration, moved by a trivial motion to where the sensed points are nearest to the goal's,
     and how far points (characteristic lengths of the goal) and bodies that turn are from there."""
     points, wanted = seen_at(at, question)[1], seen_at(goal, question)[1]
@@ -198,8 +234,13 @@ def _search(question: Measurement, formation: Formation, group: Similarities, go
         tell("starts")
         far = np.pi if starts % 2 else rng.uniform(0.0, np.pi)
         try:
-            q, residual = solve(twin, twin.integrate(twin.q0, rng.uniform(-far, far, twin.nv)), held, tolerance=SOLVED,
-                                iterations=SEARCH_ITERATIONS)
+            q, residual = solve(
+                twin,
+                twin.integrate(twin.q0, rng.uniform(-far, far, twin.nv)),
+                held,
+                tolerance=SOLVED,
+                iterations=SEARCH_ITERATIONS,
+            )
         except NotMeasured:  # on the way a point came to a camera's centre
             continue
         if residual > CLOSED:
@@ -209,8 +250,14 @@ def _search(question: Measurement, formation: Formation, group: Similarities, go
         if relation(there, question).rank < rank:
             loose += 1
             continue
-        known = next((k for k, mode in enumerate(modes) if _nearest(
-            there, mode.configuration, question, group, formation.bodies)[1] <= SAME_RELATION), None)
+        known = next(
+            (
+                k
+                for k, mode in enumerate(modes)
+                if _nearest(there, mode.configuration, question, group, formation.bodies)[1] <= SAME_RELATION
+            ),
+            None,
+        )
         if known is None:
             bodies, _ = _nearest(there, at, question, group, formation.bodies)
             modes.append(FormedMode(there, bodies, residual))
@@ -221,5 +268,11 @@ def _search(question: Measurement, formation: Formation, group: Similarities, go
     rare = sum(count == 1 for count in met[1:])
     proof = f"found from {starts} random starts of all bodies, of which {closed} closed"
     proof += f"; {rare} of the modes met only once" if rare else ""
-    return FormedModes(formation, tuple(modes), proof, degenerate=None if not loose else (
-        f"{loose} starts ended at configurations, not listed, at which more motions are not seen"))
+    return FormedModes(
+        formation,
+        tuple(modes),
+        proof,
+        degenerate=None
+        if not loose
+        else (f"{loose} starts ended at configurations, not listed, at which more motions are not seen"),
+    )

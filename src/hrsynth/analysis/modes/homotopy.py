@@ -241,7 +241,7 @@ def _step(J: Array, x: Array, F: Array) -> Array:
     except np.linalg.LinAlgError:  # NumPy does not say of which
         if len(x) == 1:
             return np.full(x.shape, np.inf, dtype=complex)
-        return np.concatenate([_step(J[k:k + 1], x[k:k + 1], F[k:k + 1]) for k in range(len(x))])
+        return np.concatenate([_step(J[k : k + 1], x[k : k + 1], F[k : k + 1]) for k in range(len(x))])
 
 
 def _border(J: Array, x: Array) -> Array:

@@ -80,9 +80,9 @@ def eigenvalues(system: CarriedPlatform, chosen: Sequence[Told], counted: Counte
     matrix = np.array(rows)
     Q, upper, _ = qr(matrix.conj().T, pivoting=True)
     pivots = np.abs(np.diag(upper))
-    kernel = Q[:, int(np.sum(pivots > RANK_OF_FORMS * pivots[0])):]
+    kernel = Q[:, int(np.sum(pivots > RANK_OF_FORMS * pivots[0])) :]
     lower = _within(sizes, steps, counted.k, np.zeros(len(t), dtype=int))
-    space = singular_decomposition(kernel[lower])[0][:, :counted.most]
+    space = singular_decomposition(kernel[lower])[0][:, : counted.most]
     place = {index: i for i, index in enumerate(lower)}
     home = [place[i] for i in _within(sizes, steps, counted.k + 1, np.zeros(len(t), dtype=int))]
     moved = [[place[i] for i in _within(sizes, steps, counted.k + 1, shift)] for shift in np.eye(len(t), dtype=int)]
@@ -96,8 +96,10 @@ def eigenvalues(system: CarriedPlatform, chosen: Sequence[Told], counted: Counte
 
 def _coefficients(system: CarriedPlatform, told: Told, own: Sequence[int]) -> Array:
     """Of exp(i m q), |m| up to half the degree, and of powers of slides; one axis a joint."""
-    nodes = [np.cos(np.pi * (np.arange(d + 1) + 0.5) / (d + 1)) if f.slides else 2 * np.pi * np.arange(d + 1) / (d + 1)
-             for f, d in zip(system.freedoms_, own, strict=True)]
+    nodes = [
+        np.cos(np.pi * (np.arange(d + 1) + 0.5) / (d + 1)) if f.slides else 2 * np.pi * np.arange(d + 1) / (d + 1)
+        for f, d in zip(system.freedoms_, own, strict=True)
+    ]
     grid = np.stack(np.meshgrid(*nodes, indexing="ij"), axis=-1)
     found = system.values(grid, [told])[0][..., 0].astype(complex)
     for k, (each, at, d) in enumerate(zip(system.freedoms_, nodes, own, strict=True)):
@@ -114,16 +116,23 @@ def _within(sizes: Sequence[int], steps: Array, k: int, shift: Array) -> list[in
     return [int(np.ravel_multi_index(tuple(start + at), sizes)) for at in np.ndindex(*size)]
 
 
-def _dimensions(system: CarriedPlatform, chosen: Sequence[Told], degrees: Sequence[Sequence[int]],
-                least: Sequence[int], t: Sequence[int]) -> list[int]:
+def _dimensions(
+    system: CarriedPlatform,
+    chosen: Sequence[Told],
+    degrees: Sequence[Sequence[int]],
+    least: Sequence[int],
+    t: Sequence[int],
+) -> list[int]:
     """dim (Wᵏ S + I_t) - dim I_t for k = 0, 1, …"""
     from flint import nmod_mat
 
     count = prod(d + 1 for d in t)
     points = np.random.default_rng(0).integers(1, PRIME, size=(2, len(t), count)).astype(object)
     axes = [residues(each.axis) for each in system.freedoms_]
-    w = [y if each.slides else (y * y + z * z * (a @ a)) % PRIME
-         for each, a, y, z in zip(system.freedoms_, axes, *points, strict=True)]
+    w = [
+        y if each.slides else (y * y + z * z * (a @ a)) % PRIME
+        for each, a, y, z in zip(system.freedoms_, axes, *points, strict=True)
+    ]
     moves = [_move(each, a, y, z, v) for each, a, y, z, v in zip(system.freedoms_, axes, *points, w, strict=True)]
     rows = []
     for each, own in zip(chosen, degrees, strict=True):

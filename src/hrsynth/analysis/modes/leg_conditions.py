@@ -66,8 +66,15 @@ def rigid_platform(measured: MeasuredRobot, goal: ClosedConfiguration) -> tuple[
     return bodies[0], Middle(goal.pose(bodies[0])[:3, 3], goal.twin.length)
 
 
-def leg_conditions(anatomy: LegDecomposition, leg: Leg, question: Measurement, goal: ClosedConfiguration,
-                   middle: Middle, plane: Array | None = None, kept: bool = False) -> tuple[Branches, float]:
+def leg_conditions(
+    anatomy: LegDecomposition,
+    leg: Leg,
+    question: Measurement,
+    goal: ClosedConfiguration,
+    middle: Middle,
+    plane: Array | None = None,
+    kept: bool = False,
+) -> tuple[Branches, float]:
     """All branches of what a leg, with its measurements held, asks of the platform, the goal's own first; and how far
     its geometry was moved (m). ``plane``: the normal of a motion in a plane; ``kept``: whether the platform does not
     turn. Raises ``NotConfined``."""
@@ -84,8 +91,11 @@ def leg_conditions(anatomy: LegDecomposition, leg: Leg, question: Measurement, g
     for tip in _tips(anatomy, path, goal) if rods is None else (rods.tip,):
         try:
             found = chain(anatomy, leg, own, goal, tip, "free")
-            ways: list[tuple[_Reading, Chain]] = [(partial(_of_tip, rods=rods), found), (_of_foot, found),
-                                                  (_in_plane, found)]
+            ways: list[tuple[_Reading, Chain]] = [
+                (partial(_of_tip, rods=rods), found),
+                (_of_foot, found),
+                (_in_plane, found),
+            ]
             if kept:
                 ways = [(_of_tip, replace(found, kept=True))]
             elif plane is not None:
@@ -99,8 +109,10 @@ def leg_conditions(anatomy: LegDecomposition, leg: Leg, question: Measurement, g
                     reasons.append(str(error))
         except Underived as error:
             reasons.append(str(error))
-    raise NotConfined(anatomy.mechanism.name, f"what leg {leg.label} requires of the platform is not known: "
-                                              f"{'; '.join(dict.fromkeys(reasons))}")
+    raise NotConfined(
+        anatomy.mechanism.name,
+        f"what leg {leg.label} requires of the platform is not known: {'; '.join(dict.fromkeys(reasons))}",
+    )
 
 
 def _tips(anatomy: LegDecomposition, path: Sequence[WordEdge], goal: ClosedConfiguration) -> Iterator[Array]:
@@ -109,8 +121,12 @@ def _tips(anatomy: LegDecomposition, path: Sequence[WordEdge], goal: ClosedConfi
     *others, (end, axes) = (carry_joint(anatomy.mechanism, joint, goal.pose) for joint in joints)
     yield end
     if joints[-1].type is JointType.REVOLUTE:
-        met = (lines.meeting_point([(end, axes[0]), (at, each)], SAME_POINT * goal.twin.length)
-               for at, own in others for each in own if not lines.parallel(axes[0], each))
+        met = (
+            lines.meeting_point([(end, axes[0]), (at, each)], SAME_POINT * goal.twin.length)
+            for at, own in others
+            for each in own
+            if not lines.parallel(axes[0], each)
+        )
         yield from (at for at in met if at is not None)
 
 
@@ -124,15 +140,21 @@ class _Rods:
     across: tuple[tuple[Array, Array], ...]
 
     @classmethod
-    def of(cls, anatomy: LegDecomposition, edge: WordEdge, own: Sequence[Observation], goal: ClosedConfiguration
-           ) -> _Rods | None:
+    def of(
+        cls, anatomy: LegDecomposition, edge: WordEdge, own: Sequence[Observation], goal: ClosedConfiguration
+    ) -> _Rods | None:
         """Those of the last part of a leg, where it is such rods."""
         if not isinstance(edge.word.items[0], Rods) or len(edge.joints) < 4:
             return None
         watched = {each.link for each in own if isinstance(each, Direction)}
         number = next((k for k, link in enumerate(edge.inside) if link in watched), 0)
-        ends = [[carry_joint(anatomy.mechanism, anatomy.mechanism.joints[name], goal.pose)[0]
-                 for name in edge.joints[k : k + 2]] for k in range(0, len(edge.joints), 2)]
+        ends = [
+            [
+                carry_joint(anatomy.mechanism, anatomy.mechanism.joints[name], goal.pose)[0]
+                for name in edge.joints[k : k + 2]
+            ]
+            for k in range(0, len(edge.joints), 2)
+        ]
         ends = [pair if edge.joints and edge.head in anatomy.platform else pair[::-1] for pair in ends]
         near, far = ends[number]
         others = [pair for k, pair in enumerate(ends) if k != number]
@@ -146,17 +168,20 @@ class _Rods:
         if Q is None and (axis is None or known[carrier - 1] is None):
             raise Underived("what carries its rods turns")
         if (Q is not None and np.abs(Q - np.eye(3)).max() > SAME_RELATION) or any(
-                Q is None and axis is not None and not lines.parallel(e / np.linalg.norm(e), axis)
-                for e, _ in self.across):
+            Q is None and axis is not None and not lines.parallel(e / np.linalg.norm(e), axis) for e, _ in self.across
+        ):
             raise Underived("what carries its rods turns them")
-        if any(abs(float(e @ e - f @ f)) > SAME_RELATION * found.length ** 2 for e, f in self.across):
+        if any(abs(float(e @ e - f @ f)) > SAME_RELATION * found.length**2 for e, f in self.across):
             raise Underived("its rods are not those of a parallelogram")
-        return [((self.along - e) / found.length, f / found.length, float((self.along - e) @ e) / found.length ** 2)
-                for e, f in self.across]
+        return [
+            ((self.along - e) / found.length, f / found.length, float((self.along - e) @ e) / found.length**2)
+            for e, f in self.across
+        ]
 
 
-def _of_tip(leg: str, found: Chain, count: int, tip: Array, middle: Middle, plane: Array | None,
-            rods: _Rods | None = None) -> _Read:
+def _of_tip(
+    leg: str, found: Chain, count: int, tip: Array, middle: Middle, plane: Array | None, rods: _Rods | None = None
+) -> _Read:
     """A tip that is confined, and angles that are kept."""
     seen: list[tuple[Reach | Quadrics, list[tuple[Array, Array, float]]]] = []
     moved = 0.0
@@ -177,8 +202,10 @@ def _of_tip(leg: str, found: Chain, count: int, tip: Array, middle: Middle, plan
         if not any(_alike(reach, other, found.length) and _same_turns(turns, others) for other, others in seen):
             seen.append((reach, turns))
     b = middle.point(tip)
-    return [[*_reach_conditions(leg, reach, tip, middle, plane), *(AtAngle(leg, b, c, a, h) for a, c, h in turns)]
-            for reach, turns in seen], moved
+    return [
+        [*_reach_conditions(leg, reach, tip, middle, plane), *(AtAngle(leg, b, c, a, h) for a, c, h in turns)]
+        for reach, turns in seen
+    ], moved
 
 
 def _alike(one: Reach | Quadrics, other: Reach | Quadrics, length: float) -> bool:
@@ -193,13 +220,19 @@ def _angle(reach: Reach | Quadrics, a: Array, c: Array, own: Array) -> tuple[Arr
 
 
 def _same_turns(one: list[tuple[Array, Array, float]], other: list[tuple[Array, Array, float]]) -> bool:
-    return all(any(bool(np.abs(s * a - b).max() <= SAME_RELATION and np.abs(c - d).max() <= SAME_RELATION)
-                   and abs(s * h - k) <= SAME_RELATION for s in (1, -1))
-               for (a, c, h), (b, d, k) in zip(one, other, strict=True))
+    return all(
+        any(
+            bool(np.abs(s * a - b).max() <= SAME_RELATION and np.abs(c - d).max() <= SAME_RELATION)
+            and abs(s * h - k) <= SAME_RELATION
+            for s in (1, -1)
+        )
+        for (a, c, h), (b, d, k) in zip(one, other, strict=True)
+    )
 
 
-def _reach_conditions(leg: str, reach: Reach | Quadrics, tip: Array, middle: Middle, plane: Array | None
-             ) -> list[PoseCondition]:
+def _reach_conditions(
+    leg: str, reach: Reach | Quadrics, tip: Array, middle: Middle, plane: Array | None
+) -> list[PoseCondition]:
     """The conditions that a tip is within its reach."""
     b, none, o = middle.point(tip), np.zeros(3), middle.point(reach.centre)
     if plane is not None:
@@ -215,14 +248,20 @@ def _reach_conditions(leg: str, reach: Reach | Quadrics, tip: Array, middle: Mid
         flat = [reach.axis]
     found: list[PoseCondition] = [OnPlane(leg, b, none, n, float(n @ o)) for n in flat]
     if isinstance(reach, Circle | Sphere):
-        found.append(OnRevolution(leg, b, none, o, np.array([0.0, 0.0, 1.0]),
-                                  np.array([(reach.radius / middle.size) ** 2, 0.0, -1.0])))
+        found.append(
+            OnRevolution(
+                leg, b, none, o, np.array([0.0, 0.0, 1.0]), np.array([(reach.radius / middle.size) ** 2, 0.0, -1.0])
+            )
+        )
     if isinstance(reach, Revolution):
         found.append(OnRevolution(leg, b, none, o, reach.axis, _profile(reach, middle)))
     if isinstance(reach, SweptCircle):
         r, s = (np.array(radius / middle.size) for radius in (reach.radius, reach.other))
-        found.append(OnTwoCircles(leg, b, none, o, reach.axis, r, reach.direction, s) if reach.other else
-                     OnCylinder(leg, b, none, o, reach.axis, r, reach.direction))
+        found.append(
+            OnTwoCircles(leg, b, none, o, reach.axis, r, reach.direction, s)
+            if reach.other
+            else OnCylinder(leg, b, none, o, reach.axis, r, reach.direction)
+        )
     return found
 
 
@@ -232,8 +271,7 @@ def _across(d: Array) -> list[Array]:
     return [np.cross(d, e) for k, e in enumerate(np.eye(3)) if k != skip]
 
 
-def _in_motion(leg: str, reach: Reach | Quadrics, b: Array, o: Array, n: Array, middle: Middle
-               ) -> list[PoseCondition]:
+def _in_motion(leg: str, reach: Reach | Quadrics, b: Array, o: Array, n: Array, middle: Middle) -> list[PoseCondition]:
     """The same in a plane with the normal n, whatever the heights above it."""
     none = np.zeros(3)
     if isinstance(reach, Point):
@@ -247,7 +285,7 @@ def _in_motion(leg: str, reach: Reach | Quadrics, b: Array, o: Array, n: Array, 
 
 
 def _profile(reach: Revolution, middle: Middle) -> Array:
-    return np.array(reach.profile) / [middle.size ** 2, middle.size, 1.0]
+    return np.array(reach.profile) / [middle.size**2, middle.size, 1.0]
 
 
 def _of_foot(leg: str, found: Chain, count: int, tip: Array, middle: Middle, plane: Array | None) -> _Read:
@@ -261,14 +299,15 @@ def _of_foot(leg: str, found: Chain, count: int, tip: Array, middle: Middle, pla
             moved = max(moved, radii)
             if (3 if plane is None else 2) - reach.freedoms != count:
                 raise Underived("its foot and how it turns the platform")
-            if not any(_alike(reach, other, found.length) and np.linalg.norm(foot - at) <= SAME_RELATION * found.length
-                       for other, at in seen):
+            if not any(
+                _alike(reach, other, found.length) and np.linalg.norm(foot - at) <= SAME_RELATION * found.length
+                for other, at in seen
+            ):
                 seen.append((reach, foot))
     return [_holds(leg, reach, foot, middle, plane) for reach, foot in seen], moved
 
 
-def _holds(leg: str, reach: Reach | Quadrics, foot: Array, middle: Middle, plane: Array | None
-           ) -> list[PoseCondition]:
+def _holds(leg: str, reach: Reach | Quadrics, foot: Array, middle: Middle, plane: Array | None) -> list[PoseCondition]:
     o, b, none = middle.point(foot), middle.point(reach.centre), np.zeros(3)
     if isinstance(reach, Revolution):
         return [OnMovingRevolution(leg, b, reach.axis, o, _profile(reach, middle))]
@@ -280,8 +319,9 @@ def _holds(leg: str, reach: Reach | Quadrics, foot: Array, middle: Middle, plane
     if isinstance(reach, Circle) and plane is not None:
         return _in_motion(leg, reach, b, o, plane, middle)
     if isinstance(reach, Circle | Sphere):
-        ball = OnRevolution(leg, b, none, o, np.array([0.0, 0.0, 1.0]),
-                            np.array([(reach.radius / middle.size) ** 2, 0.0, -1.0]))
+        ball = OnRevolution(
+            leg, b, none, o, np.array([0.0, 0.0, 1.0]), np.array([(reach.radius / middle.size) ** 2, 0.0, -1.0])
+        )
         return [*([OnMovingPlane(leg, b, reach.axis, o, 0.0)] if isinstance(reach, Circle) else []), ball]
     raise Underived(f"a {type(reach).__name__.lower()} of the platform that holds its foot")
 
@@ -291,11 +331,15 @@ def turned_round(found: Chain, known: Known) -> tuple[Array, Chain]:
     it. Raises :class:`Underived` where it holds a measurement."""
     last = max(k for k, Q in enumerate(known) if Q is not None)
     bodies = found.bodies[last:]
-    if any(body.cranks or body.watched or body.angles for body in bodies[1:]) or len(bodies) < 2 or any(
-            body.slides or body.cranks for body in found.bodies[:last + 1]):
+    if (
+        any(body.cranks or body.watched or body.angles for body in bodies[1:])
+        or len(bodies) < 2
+        or any(body.slides or body.cranks for body in found.bodies[: last + 1])
+    ):
         raise Underived("what is measured or carried does not let it be read from the platform")
-    foot = found.bodies[0].point + sum((Q @ body.shift for Q, body in zip(known[:last + 1], found.bodies, strict=False)
-                                        if Q is not None), np.zeros(3))
+    foot = found.bodies[0].point + sum(
+        (Q @ body.shift for Q, body in zip(known[: last + 1], found.bodies, strict=False) if Q is not None), np.zeros(3)
+    )
     if any(Q is None for Q in known[:last]):
         raise Underived("a body that turns before its foot")
     end = bodies[-1]
@@ -310,8 +354,12 @@ def _in_plane(leg: str, found: Chain, count: int, tip: Array, middle: Middle, pl
     """An axis t through the foot, axes n normal to it between which all lies in a plane, and an axis c through the tip
     normal to those: t, foot to tip and c lie in one plane."""
     bodies = found.bodies
-    if (count != 1 or any(body.watched or body.angles or body.cranks for body in bodies) or bodies[0].slides
-            or any(body.axis is None for body in bodies[1:])):
+    if (
+        count != 1
+        or any(body.watched or body.angles or body.cranks for body in bodies)
+        or bodies[0].slides
+        or any(body.axis is None for body in bodies[1:])
+    ):
         raise Underived("another chain of axes")
     parts = groups([(k, body.axis) for k, body in enumerate(found.bodies) if body.axis is not None])
     if [len(part) for part in parts] != [1, 2, 1]:
@@ -320,8 +368,15 @@ def _in_plane(leg: str, found: Chain, count: int, tip: Array, middle: Middle, pl
     first, *inner, last = found.bodies[1:]
     flat = [first.shift, *(v for body in (first, *inner) for v in body.slides), *(body.shift for body in inner)]
     small = SAME_RELATION * found.length
-    if (not lines.perpendicular(n, t) or not lines.perpendicular(n, c) or any(abs(float(n @ v)) > small for v in flat)
-            or np.linalg.norm(first.shift) > small or first.slides or last.slides or np.linalg.norm(last.shift) > small
-            or sum(len(body.slides) for body in inner) != 1):
+    if (
+        not lines.perpendicular(n, t)
+        or not lines.perpendicular(n, c)
+        or any(abs(float(n @ v)) > small for v in flat)
+        or np.linalg.norm(first.shift) > small
+        or first.slides
+        or last.slides
+        or np.linalg.norm(last.shift) > small
+        or sum(len(body.slides) for body in inner) != 1
+    ):
         raise Underived("axes that are not normal to each other")
     return [[Coplanar(leg, middle.point(tip), c, middle.point(first.point), t)]], 0.0

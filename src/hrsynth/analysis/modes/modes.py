@@ -42,9 +42,14 @@ from .solve import SystemModes, continuum
 from .tips import TipLoci
 from .ways import better_ways, solve_tips, without_couplings
 
-WITHIN = {"formation": "configurations up to trivial motions",
-          "translations": "poses turned as this one", "bodies": "poses whose bodies are turned as at this one",
-          "planar": "poses in the plane of motion", "spatial": "poses in space", "oriented": "poses in space"}
+WITHIN = {
+    "formation": "configurations up to trivial motions",
+    "translations": "poses turned as this one",
+    "bodies": "poses whose bodies are turned as at this one",
+    "planar": "poses in the plane of motion",
+    "spatial": "poses in space",
+    "oriented": "poses in space",
+}
 """Among which poses the modes are listed, for each way in which the platform moves."""
 
 
@@ -88,9 +93,15 @@ class AssemblyModes(Result, shown_as="modes"):
         if self.confined is not None:
             return WITHIN[self.confined.motion]
         system = None if self.model is None else self.model.system
-        motion = (system.poses.motion if isinstance(system, PosedPlatform) else
-                  "planar" if isinstance(system, PlanarLoops) else
-                  "spatial" if isinstance(system, CarriedPlatform) else None)
+        motion = (
+            system.poses.motion
+            if isinstance(system, PosedPlatform)
+            else "planar"
+            if isinstance(system, PlanarLoops)
+            else "spatial"
+            if isinstance(system, CarriedPlatform)
+            else None
+        )
         return None if motion is None else WITHIN[motion]
 
     @property
@@ -102,8 +113,11 @@ class AssemblyModes(Result, shown_as="modes"):
         """The robot and how many modes there are."""
         if self.formation is not None:
             return f"{self.setting.headline()}: {self.count} (formation)"
-        said = f"{self.count} ({self.kind} robot)" if not self.near else (
-            f"{self.alike} ({self.count}, {self.kind} robot)")
+        said = (
+            f"{self.count} ({self.kind} robot)"
+            if not self.near
+            else (f"{self.alike} ({self.count}, {self.kind} robot)")
+        )
         return f"{self.setting.headline()}: {said} at {self.pose}"
 
     @property
@@ -117,11 +131,14 @@ class AssemblyModes(Result, shown_as="modes"):
         if self.found.continuum is not None and (self.found.complex is not None or self.formation is not None):
             return "a continuum"
         if self.motions:
-            return (f"{len(self.motions)} self-motion{'s' * (len(self.motions) > 1)}, and {len(self.modes)} real that "
-                    f"{'lies' if len(self.modes) == 1 else 'lie'} on none")
+            return (
+                f"{len(self.motions)} self-motion{'s' * (len(self.motions) > 1)}, and {len(self.modes)} real that "
+                f"{'lies' if len(self.modes) == 1 else 'lie'} on none"
+            )
         other = f" and {len(self.antipodal)} antipodal" if self.antipodal else ""
         return f"{len(self.modes)} real{other}" + (
-            "" if self.found.complex is None else f" of {self.found.complex} complex")
+            "" if self.found.complex is None else f" of {self.found.complex} complex"
+        )
 
     def pose_of(self, motion: SelfMotion) -> Pose:
         """A pose on a self-motion, from which it was followed."""
@@ -130,28 +147,50 @@ class AssemblyModes(Result, shown_as="modes"):
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line, without the command's own fields."""
         found = self.found
-        return {"kind": self.kind, "at": self.pose.to_dict(), "within": self.within,
-                "observed": [o.to_dict() for o in self.setting.observed],
-                "complex": None if found.continuum else found.complex, "complete": found.complete,
-                "bound": found.bound, "proof": found.proof,
-                **({} if self.formation is None else {"formation": self.formation.to_dict()}),
-                "modes": [self._record(each) for each in self.modes],
-                "near_modes": [each.to_dict() for each in self.near], "measurement_bound": self.bound,
-                "antipodal": [self._record(each) for each in self.antipodal],
-                "degenerate": found.degenerate, "continuum": found.continuum,
-                "motions": [{"pose": self.pose_of(each).to_dict(), **each.to_dict()} for each in self.motions],
-                "meant": [each.to_dict(self.labels) for each in found.meant], "unlimited": list(self.setting.unlimited)}
+        return {
+            "kind": self.kind,
+            "at": self.pose.to_dict(),
+            "within": self.within,
+            "observed": [o.to_dict() for o in self.setting.observed],
+            "complex": None if found.continuum else found.complex,
+            "complete": found.complete,
+            "bound": found.bound,
+            "proof": found.proof,
+            **({} if self.formation is None else {"formation": self.formation.to_dict()}),
+            "modes": [self._record(each) for each in self.modes],
+            "near_modes": [each.to_dict() for each in self.near],
+            "measurement_bound": self.bound,
+            "antipodal": [self._record(each) for each in self.antipodal],
+            "degenerate": found.degenerate,
+            "continuum": found.continuum,
+            "motions": [{"pose": self.pose_of(each).to_dict(), **each.to_dict()} for each in self.motions],
+            "meant": [each.to_dict(self.labels) for each in found.meant],
+            "unlimited": list(self.setting.unlimited),
+        }
 
     def _record(self, mode: AssemblyMode) -> dict[str, Any]:
-        places = [] if self.formation is None else [
-            {"link": link, "pose": Pose.of(X).to_dict()} for link, X in (mode.bodies or {}).items()]
+        places = (
+            []
+            if self.formation is None
+            else [{"link": link, "pose": Pose.of(X).to_dict()} for link, X in (mode.bodies or {}).items()]
+        )
         return {**mode.to_dict(), **({"places": places} if places else {})}
 
 
 @question(formations=True)
-def modes(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
-          at: PoseLike | ClosedConfiguration | None = None, real: bool = False, cone: float | str = MEASUREMENT_BOUND,
-          as_written: bool = False, effort: float = EFFORT, seed: int = 0) -> AssemblyModes:
+def modes(
+    robot: RobotLike,
+    observe: LegsLike = None,
+    camera: CameraLike = None,
+    *,
+    see: SeeLike = None,
+    at: PoseLike | ClosedConfiguration | None = None,
+    real: bool = False,
+    cone: float | str = MEASUREMENT_BOUND,
+    as_written: bool = False,
+    effort: float = EFFORT,
+    seed: int = 0,
+) -> AssemblyModes:
     """All poses with what is observed at ``at`` (default: the zero configuration), or with ``real`` the motors'
     coordinates: complex solutions counted, real ones enclosed (theory.md 8; MMT 3.3, 4.1.2, 4.2).
 
@@ -176,8 +215,9 @@ def modes(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None,
     <AssemblyModes: 3rrr_m1, watching 1, 2, 3: 2 real of 6 complex (hidden robot) at x=0,y=0,z=0,phi=0deg>
     """
     if real and (observe not in (None, "all", ["all"]) or see is not None):
-        raise BadRequest("the motors are held instead of what is observed", f"real with {observe or see}",
-                         "one of the two")
+        raise BadRequest(
+            "the motors are held instead of what is observed", f"real with {observe or see}", "one of the two"
+        )
     bound = measurement_bound(cone)
     setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed, driven=real)
     if setting.robot.formation:
@@ -197,8 +237,15 @@ def modes(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None,
     return replace(found, candidates=(), near=near, bound=bound)
 
 
-def _list_modes(setting: ObservedRobot, measured: MeasuredRobot, goal: ClosedConfiguration, wanted: Task | None,
-                real: bool, as_written: bool, effort: float) -> AssemblyModes:
+def _list_modes(
+    setting: ObservedRobot,
+    measured: MeasuredRobot,
+    goal: ClosedConfiguration,
+    wanted: Task | None,
+    real: bool,
+    as_written: bool,
+    effort: float,
+) -> AssemblyModes:
     """The modes of the numbers as they are, and where near ones are sought."""
     motion = setting.motion
     pose = motion.pose(goal.pose(motion.link))
@@ -207,8 +254,15 @@ def _list_modes(setting: ObservedRobot, measured: MeasuredRobot, goal: ClosedCon
     if free:
         text = f"the {'motors' if real else 'measurements'} leave {free} of the platform's freedoms undetermined"
         own = self_motion(goal, measured.question, placing_links(setting.anatomy), goal=True)
-        return AssemblyModes(setting, kind, goal, pose, continuum(f"{text}: a continuum of dimension {free}", free),
-                             (), motions=() if own is None else (own,))
+        return AssemblyModes(
+            setting,
+            kind,
+            goal,
+            pose,
+            continuum(f"{text}: a continuum of dimension {free}", free),
+            (),
+            motions=() if own is None else (own,),
+        )
     tell("modes")
     try:
         if not as_written and _moves(setting, measured.question, goal):
@@ -216,13 +270,23 @@ def _list_modes(setting: ObservedRobot, measured: MeasuredRobot, goal: ClosedCon
         listed = _modes_by_system(setting, measured, goal, wanted, pose, kind, as_written, effort)
     except (NotConfined, Unsolved, TooLarge, MissingExtra) as error:
         return _modes_by_search(setting, measured.question, goal, pose, kind, error.reason)
-    moving = not listed.found.complete and not as_written and any(
-        mode.configuration is not None and _moves(setting, measured.question, mode.configuration)
-        for mode in listed.modes)
+    moving = (
+        not listed.found.complete
+        and not as_written
+        and any(
+            mode.configuration is not None and _moves(setting, measured.question, mode.configuration)
+            for mode in listed.modes
+        )
+    )
     if not moving and not listed.found.open:
         return listed
-    why = ("some of the solutions lie on a self-motion" if moving else "the equations depend on each other"
-           if listed.found.continuum is not None else str(listed.found.degenerate))
+    why = (
+        "some of the solutions lie on a self-motion"
+        if moving
+        else "the equations depend on each other"
+        if listed.found.continuum is not None
+        else str(listed.found.degenerate)
+    )
     found = _modes_by_search(setting, measured.question, goal, pose, kind, why)
     return found if moving or not any(mode.proved for mode in listed.modes) else replace(listed, motions=found.motions)
 
@@ -230,25 +294,57 @@ def _list_modes(setting: ObservedRobot, measured: MeasuredRobot, goal: ClosedCon
 def _modes_of_formation(setting: ObservedRobot, where: object, real: bool) -> AssemblyModes:
     """The modes of a formation; refuses poses and motors, which are those of one platform."""
     if where is not None or real:
-        raise BadRequest(f"{setting.robot.name}: poses and motors belong to one platform, and this is a formation",
-                         "real" if real else str(where),
-                         "nothing: what is measured at the file's configuration is held")
+        raise BadRequest(
+            f"{setting.robot.name}: poses and motors belong to one platform, and this is a formation",
+            "real" if real else str(where),
+            "nothing: what is measured at the file's configuration is held",
+        )
     tell("modes")
     found, goal = formation_modes(setting), setting.everything.start
-    system = SystemModes(found.complex, (), found.complete, found.proof, degenerate=found.degenerate,
-                         continuum=found.continuum, bound=found.bound)
+    system = SystemModes(
+        found.complex,
+        (),
+        found.complete,
+        found.proof,
+        degenerate=found.degenerate,
+        continuum=found.continuum,
+        bound=found.bound,
+    )
     first = setting.samples.question.platform
     listed = list[AssemblyMode]()
     for each in found.modes:
         at = each.configuration
         whole = Assembly(at, (), tuple(outside(at.twin, at.q)))
-        listed.append(AssemblyMode(
-            Pose.of(each.bodies[first]), np.inf, np.pi, each.residual, at is goal, whole.reachable, None, whole.verdict,
-            (), whole.beyond, (), at, proved=found.complete, length=goal.twin.length, bodies=each.bodies,
-            opposite=each.opposite))
-    return AssemblyModes(setting, "formation", goal, Pose.of(goal.pose(first)), system,
-                         tuple(mode for mode in listed if not mode.opposite), formation=found.formation,
-                         antipodal=tuple(mode for mode in listed if mode.opposite))
+        listed.append(
+            AssemblyMode(
+                Pose.of(each.bodies[first]),
+                np.inf,
+                np.pi,
+                each.residual,
+                at is goal,
+                whole.reachable,
+                None,
+                whole.verdict,
+                (),
+                whole.beyond,
+                (),
+                at,
+                proved=found.complete,
+                length=goal.twin.length,
+                bodies=each.bodies,
+                opposite=each.opposite,
+            )
+        )
+    return AssemblyModes(
+        setting,
+        "formation",
+        goal,
+        Pose.of(goal.pose(first)),
+        system,
+        tuple(mode for mode in listed if not mode.opposite),
+        formation=found.formation,
+        antipodal=tuple(mode for mode in listed if mode.opposite),
+    )
 
 
 def at_mode(listed: AssemblyModes | None, asked: ModeNumber) -> ClosedConfiguration:
@@ -257,15 +353,26 @@ def at_mode(listed: AssemblyModes | None, asked: ModeNumber) -> ClosedConfigurat
     assert listed is not None
     name, count = listed.setting.robot.name, len(listed.modes)
     if not 1 <= asked.number <= count:
-        raise BadRequest(f"{name}: a mode at {listed.pose}", str(asked),
-                         f"mode:1 to mode:{count}" if count else "no mode" if listed.found.continuum is None else
-                         "poses that do not form a continuum")
+        raise BadRequest(
+            f"{name}: a mode at {listed.pose}",
+            str(asked),
+            f"mode:1 to mode:{count}"
+            if count
+            else "no mode"
+            if listed.found.continuum is None
+            else "poses that do not form a continuum",
+        )
     mode = listed.modes[asked.number - 1]
     at = listed.goal if mode.goal else mode.configuration
     if at is None:
         left = " and ".join(f"{noun} {', '.join(names)}" for noun, names in mode.left_open)
-        raise PoseNotReached(name, f"{asked} ({mode.pose})", 0.0, str(listed.pose), reason="the robot was not found "
-                             f"assembled there: {left} stayed open")
+        raise PoseNotReached(
+            name,
+            f"{asked} ({mode.pose})",
+            0.0,
+            str(listed.pose),
+            reason=f"the robot was not found assembled there: {left} stayed open",
+        )
     return at if at.twin is listed.goal.twin else of_links(listed.goal.twin, at.pose)
 
 
@@ -274,24 +381,41 @@ def _moves(setting: ObservedRobot, question: Measurement, at: ClosedConfiguratio
     return leaves_free(at, question) and self_motion(at, question, placing_links(setting.anatomy)) is not None
 
 
-def _modes_by_search(setting: ObservedRobot, question: Measurement, goal: ClosedConfiguration, pose: Pose, kind: str,
-              reason: str) -> AssemblyModes:
+def _modes_by_search(
+    setting: ObservedRobot, question: Measurement, goal: ClosedConfiguration, pose: Pose, kind: str, reason: str
+) -> AssemblyModes:
     """The modes that a search finds, and why there is no list that could be complete."""
     done = search(goal, question, placing_links(setting.anatomy))
     size = max((motion.dimension for motion in done.motions), default=None)
-    found = SystemModes(None, (), False, f"{done.words}; not counted: {reason}", degenerate=done.degenerate,
-                        continuum=size)
-    return AssemblyModes(setting, kind, goal, pose, found,
-                         tuple(_read_found(setting, question, mode, mode.configuration is goal) for mode in done.modes),
-                         tuple(_read_found(setting, question, mode) for mode in done.near), motions=done.motions)
+    found = SystemModes(
+        None, (), False, f"{done.words}; not counted: {reason}", degenerate=done.degenerate, continuum=size
+    )
+    return AssemblyModes(
+        setting,
+        kind,
+        goal,
+        pose,
+        found,
+        tuple(_read_found(setting, question, mode, mode.configuration is goal) for mode in done.modes),
+        tuple(_read_found(setting, question, mode) for mode in done.near),
+        motions=done.motions,
+    )
 
 
 def _read_found(setting: ObservedRobot, question: Measurement, mode: FoundMode, goal: bool = False) -> AssemblyMode:
     return found_mode(setting, question, mode.configuration, mode.bodies, mode.residual, goal)
 
 
-def _modes_by_system(setting: ObservedRobot, measured: MeasuredRobot, goal: ClosedConfiguration, wanted: Task | None,
-            pose: Pose, kind: str, as_written: bool, effort: float) -> AssemblyModes:
+def _modes_by_system(
+    setting: ObservedRobot,
+    measured: MeasuredRobot,
+    goal: ClosedConfiguration,
+    wanted: Task | None,
+    pose: Pose,
+    kind: str,
+    as_written: bool,
+    effort: float,
+) -> AssemblyModes:
     """The modes as the solutions of the system that the tips' curves and surfaces give, or else of the conditions that
     the legs' joints give."""
     reasons, large = list[NotConfined | Unsolved | TooLarge | MissingExtra](), None
@@ -317,8 +441,7 @@ def _modes_by_system(setting: ObservedRobot, measured: MeasuredRobot, goal: Clos
     if not answers:
         raise large or reasons[0]
     # what is measured leaves no freedom: a continuum is that of legs which tips alone do not show
-    made, found = max(answers, key=lambda each: (each[1].complete, each[1].continuum is None,
-                                                 not better_ways(each[0])))
+    made, found = max(answers, key=lambda each: (each[1].complete, each[1].continuum is None, not better_ways(each[0])))
     if free is not None and made.closing is None:
         found = replace(found, proof=f"without couplings, which can only rule poses out: {found.proof}")
     reader = ModeReader(setting, measured.question if free is None else free[0].question, goal, made)
@@ -326,8 +449,14 @@ def _modes_by_system(setting: ObservedRobot, measured: MeasuredRobot, goal: Clos
     ordered = sorted(found.modes, key=lambda mode: mode is not at_goal)
     read = [reader.read(mode, mode is at_goal) for mode in ordered]
     near = [reader.read(mode, False) for mode in found.near if reader.away(mode) > SAME_NEAR_POSE]
-    return AssemblyModes(setting, kind, goal, pose, found, tuple(mode for mode in read if not mode.opposite),
-                         tuple(mode for mode in near if not mode.opposite), model=made,
-                         antipodal=tuple(mode for mode in read if mode.opposite))
-
-
+    return AssemblyModes(
+        setting,
+        kind,
+        goal,
+        pose,
+        found,
+        tuple(mode for mode in read if not mode.opposite),
+        tuple(mode for mode in near if not mode.opposite),
+        model=made,
+        antipodal=tuple(mode for mode in read if mode.opposite),
+    )

@@ -72,9 +72,15 @@ class SelfMotion:
         resting = [link for link in mechanism.links if link not in self.links and link != mechanism.base]
         moving = ", ".join(self.links) if resting else "all links"
         far = _far(self.shift, self.turn) + (", until it came back" if self.returns else "")
-        ends = "" if not self.beyond else (
-            f", beyond the limits of {', '.join(self.beyond)}; within all limits over {_far(*self.inside)}"
-            if any(self.inside) else f", all of it beyond the limits of {', '.join(self.beyond)}")
+        ends = (
+            ""
+            if not self.beyond
+            else (
+                f", beyond the limits of {', '.join(self.beyond)}; within all limits over {_far(*self.inside)}"
+                if any(self.inside)
+                else f", all of it beyond the limits of {', '.join(self.beyond)}"
+            )
+        )
         return f"of dimension {self.dimension}, which moves {moving} (followed over {far}{ends})"
 
     def passes(self, at: ClosedConfiguration, question: Measurement) -> bool:
@@ -88,10 +94,18 @@ class SelfMotion:
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
-        return {"dimension": self.dimension, "links": list(self.links), "followed_m": self.shift,
-                "followed_rad": self.turn, "returns": self.returns, "goal": self.goal, "met": self.met,
-                "beyond": list(self.beyond), "within_m": self.inside[0] if self.beyond else self.shift,
-                "within_rad": self.inside[1] if self.beyond else self.turn}
+        return {
+            "dimension": self.dimension,
+            "links": list(self.links),
+            "followed_m": self.shift,
+            "followed_rad": self.turn,
+            "returns": self.returns,
+            "goal": self.goal,
+            "met": self.met,
+            "beyond": list(self.beyond),
+            "within_m": self.inside[0] if self.beyond else self.shift,
+            "within_rad": self.inside[1] if self.beyond else self.turn,
+        }
 
 
 def _far(shift: float, turn: float) -> str:
@@ -99,8 +113,14 @@ def _far(shift: float, turn: float) -> str:
     return " and ".join([f"{shift:.3g} m"] * (shift > 0) + [f"{turn:.3g} rad"] * (turn > 0))
 
 
-def self_motion(at: ClosedConfiguration, question: Measurement, bodies: Sequence[str],
-                known: Sequence[SelfMotion] = (), *, goal: bool = False) -> SelfMotion | None:
+def self_motion(
+    at: ClosedConfiguration,
+    question: Measurement,
+    bodies: Sequence[str],
+    known: Sequence[SelfMotion] = (),
+    *,
+    goal: bool = False,
+) -> SelfMotion | None:
     """The motion through a closing with the measurements there held, one of those ``known`` where it may be that; None
     where the platform's bodies cannot move even to first order, or where no step stays closed: a singular pose."""
     twin = at.twin
@@ -119,19 +139,29 @@ def self_motion(at: ClosedConfiguration, question: Measurement, bodies: Sequence
     places = [q for walk in walks for q in walk.places]
     middle = [walk.places[len(walk.places) // 2] for walk in walks]
     size = min(each for each in [ways.shape[1], *(walker.around(q)[0].shape[1] for q in middle)] if each)
-    return SelfMotion(at, size, walker.links_moved(at.q, places), longest.shift * twin.length, longest.turn,
-                      longest.returns, goal, way=tuple(map(walker.bodies, places)),
-                      beyond=tuple(dict.fromkeys(name for walk in walks for name in walk.beyond)),
-                      inside=(longest.inside[0] * twin.length, longest.inside[1]))
+    return SelfMotion(
+        at,
+        size,
+        walker.links_moved(at.q, places),
+        longest.shift * twin.length,
+        longest.turn,
+        longest.returns,
+        goal,
+        way=tuple(map(walker.bodies, places)),
+        beyond=tuple(dict.fromkeys(name for walk in walks for name in walk.beyond)),
+        inside=(longest.inside[0] * twin.length, longest.inside[1]),
+    )
 
 
-def follow_motion(at: ClosedConfiguration, question: Measurement, twist: Array, count: int
-             ) -> tuple[tuple[ClosedConfiguration, ...], ...]:
+def follow_motion(
+    at: ClosedConfiguration, question: Measurement, twist: Array, count: int
+) -> tuple[tuple[ClosedConfiguration, ...], ...]:
     """The motion with the measurements held that begins with a twist (rows of t; m, rad) of the platform, and with its
     opposite: up to ``count`` closed configurations each way, none where the twist is one to first order only."""
     twin = at.twin
-    walker = _Follower(twin, Held.at(twin, at.q, question.reference, question.observations), question,
-                       (question.platform,))
+    walker = _Follower(
+        twin, Held.at(twin, at.q, question.reference, question.observations), question, (question.platform,)
+    )
     w = twist / np.repeat([twin.length, 1.0], 3)[: len(twist)]
     ways = (islice(walker.steps(at.q, sign * w / np.linalg.norm(w)), count) for sign in (1.0, -1.0))
     return tuple(tuple(ClosedConfiguration.of(twin, q) for q in way) for way in ways)
@@ -174,12 +204,15 @@ class _Follower:
         orthonormal basis of their twists, (rows, d), and joint velocities (nv, d), without idle ones, that make
         them."""
         _, values, right = np.linalg.svd(system(self.twin, q, self.held)[1])
-        kernel = right[int(np.sum(values > least * values.max(initial=1.0))):].T
+        kernel = right[int(np.sum(values > least * values.max(initial=1.0))) :].T
         X, V = self.twin.frames(q, self.names)
         point = self.question.point
-        rows = [v if point is None or name != self.question.platform
-                else point_velocity(v, x[:3, :3] @ point / self.twin.length)
-                for name, x, v in zip(self.names, X, V, strict=True)]
+        rows = [
+            v
+            if point is None or name != self.question.platform
+            else point_velocity(v, x[:3, :3] @ point / self.twin.length)
+            for name, x, v in zip(self.names, X, V, strict=True)
+        ]
         moves = np.vstack(rows) @ kernel
         basis, _ = range_basis(moves, 1.0)
         return basis, np.asarray(kernel @ np.linalg.lstsq(moves, basis, rcond=INVERTED)[0])
@@ -195,12 +228,22 @@ class _Follower:
         for c in np.vstack([np.eye(size), rng.normal(size=(size, size))]):
             step = joints @ (c / np.linalg.norm(c))
             part = MOTION_NEAR / max(1.0, float(np.abs(step).max()))  # of a unit twist of the bodies
-            there, residual = solve(self.twin, self.twin.integrate(q, part * step), self.held, tolerance=SOLVED,
-                                    iterations=SEARCH_ITERATIONS)
+            there, residual = solve(
+                self.twin,
+                self.twin.integrate(q, part * step),
+                self.held,
+                tolerance=SOLVED,
+                iterations=SEARCH_ITERATIONS,
+            )
             if residual <= CLOSED:
                 found.append(there)
-                came.append(np.concatenate([twist for name, X in self.bodies(there).items()
-                                            for twist in self._twist(name, X, home[name])]) @ basis / part)
+                came.append(
+                    np.concatenate(
+                        [twist for name, X in self.bodies(there).items() for twist in self._twist(name, X, home[name])]
+                    )
+                    @ basis
+                    / part
+                )
         _, values, right = np.linalg.svd(np.reshape(came, (-1, size)), full_matrices=False)
         return basis @ right[values > MOTION_BEND].T, found
 
@@ -214,9 +257,16 @@ class _Follower:
         """The links that are elsewhere, or turned, at one of some configurations."""
         links = tuple(link for link in self.twin.mechanism.links if link != self.twin.mechanism.base)
         home = self.twin.poses(q, links)
-        found = [max((pose_difference(X, Y, self.twin.length) for X, Y in (
-            (self.twin.poses(there, (link,))[0], home[k]) for there in places)), default=0.0)
-            for k, link in enumerate(links)]
+        found = [
+            max(
+                (
+                    pose_difference(X, Y, self.twin.length)
+                    for X, Y in ((self.twin.poses(there, (link,))[0], home[k]) for there in places)
+                ),
+                default=0.0,
+            )
+            for k, link in enumerate(links)
+        ]
         return tuple(link for link, far in zip(links, found, strict=True) if far > SAME_RELATION)
 
     def walk(self, q: Array, w: Array) -> _Followed:
@@ -229,14 +279,21 @@ class _Follower:
             for number, there in enumerate(self.steps(q, sign * w), 1):
                 now = self._platform(there)
                 places.append(there)
-                step = np.array([np.linalg.norm(now[:3, 3] - before[:3, 3]) / self.twin.length,
-                                 np.linalg.norm(logarithm(now[:3, :3] @ before[:3, :3].T))])
+                step = np.array(
+                    [
+                        np.linalg.norm(now[:3, 3] - before[:3, 3]) / self.twin.length,
+                        np.linalg.norm(logarithm(now[:3, :3] @ before[:3, :3].T)),
+                    ]
+                )
                 shift, turn = shift + float(step[0]), turn + float(step[1])
                 beyond |= dict.fromkeys(past := outside(self.twin, there))
                 taken.append((step, not past))
                 along, before = now[:3, 3] - before[:3, 3], now
-                returns = number > 2 and bodies_apart(self.bodies(there), self.bodies(q), self.question,
-                                                      self.twin.length) <= MOTION_STEP / 2
+                returns = (
+                    number > 2
+                    and bodies_apart(self.bodies(there), self.bodies(q), self.question, self.twin.length)
+                    <= MOTION_STEP / 2
+                )
                 if returns:
                     left = self._platform(q)[:3, 3] - now[:3, 3]
                     shift += math.copysign(float(np.linalg.norm(left)), float(left @ along)) / self.twin.length
@@ -247,8 +304,14 @@ class _Follower:
                 break
         small = SAME_RELATION * len(places)
         inside[inside <= small] = 0.0
-        return _Followed(tuple(places), shift if shift > small else 0.0, turn if turn > small else 0.0, returns,
-                         tuple(beyond), (float(inside[0]), float(inside[1])))
+        return _Followed(
+            tuple(places),
+            shift if shift > small else 0.0,
+            turn if turn > small else 0.0,
+            returns,
+            tuple(beyond),
+            (float(inside[0]), float(inside[1])),
+        )
 
     def steps(self, q: Array, w: Array) -> Iterator[Array]:
         """Closed configurations one step apart, until no step is closed again or the motion ends."""
@@ -271,8 +334,9 @@ class _Follower:
         for part in 0.5 ** np.arange(MOTION_HALVINGS):
             predicted = self.twin.integrate(q, part * step)
             there, residual = solve(self.twin, predicted, self.held, tolerance=SOLVED, iterations=15)
-            if residual <= CLOSED and (np.linalg.norm(self.twin.difference(predicted, there))
-                                       <= MOTION_BEND * part * np.linalg.norm(step)):
+            if residual <= CLOSED and (
+                np.linalg.norm(self.twin.difference(predicted, there)) <= MOTION_BEND * part * np.linalg.norm(step)
+            ):
                 return there
         return None
 
@@ -285,5 +349,7 @@ class _Follower:
 def bodies_apart(one: dict[str, Array], other: dict[str, Array], question: Measurement, length: float) -> float:
     """How far bodies are from where they are elsewhere, as :func:`pose_difference`; of a platform that is a point, the
     point."""
-    return max(pose_difference(X, other[body], length, question.point if body == question.platform else None)
-               for body, X in one.items())
+    return max(
+        pose_difference(X, other[body], length, question.point if body == question.platform else None)
+        for body, X in one.items()
+    )

@@ -41,8 +41,9 @@ class Parametrisation:
     others: Callable[[Any], list[Any]]
 
 
-def parametrise(quadrics: Sequence[Quadric], nonzero: Quadric | None = None, timeout: float = TIMEOUT
-                 ) -> Parametrisation | None:
+def parametrise(
+    quadrics: Sequence[Quadric], nonzero: Quadric | None = None, timeout: float = TIMEOUT
+) -> Parametrisation | None:
     """All solutions of quadrics with integer coefficients; None where they are infinitely many.
 
     With ``nonzero`` those at which that one vanishes are left out, by one more unknown, its inverse.
@@ -91,7 +92,7 @@ def write_system(quadrics: Sequence[Quadric], nonzero: Quadric | None = None) ->
 def _terms(quadric: Quadric) -> dict[str, int]:
     """The coefficients of a quadric, without their common divisor, by what they are multiplied with."""
     A = quadric.A
-    powers = ["", *(f"*{name}" for name in NAMES[:len(A) - 1])]
+    powers = ["", *(f"*{name}" for name in NAMES[: len(A) - 1])]
     terms = {f"{powers[i]}^2" if i else "": int(A[i, i]) for i in range(len(A))}
     terms |= {powers[i] + powers[j]: int(A[i, j] + A[j, i]) for j in range(len(A)) for i in range(j)}
     content = gcd(*terms.values()) or 1

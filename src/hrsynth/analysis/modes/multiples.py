@@ -44,8 +44,10 @@ def most_zeros(quadrics: Sequence[Quadric], enough: int) -> int | None:
         left.remove(k)
     if len(forms) < len(left):
         return None
-    flat = [{tuple(e[k] for k in left): int(c * math.lcm(*(d.denominator for d in form.values())))
-             for e, c in form.items()} for form in forms]
+    flat = [
+        {tuple(e[k] for k in left): int(c * math.lcm(*(d.denominator for d in form.values()))) for e, c in form.items()}
+        for form in forms
+    ]
     return _least(flat, partitions(list(range(len(left)))), enough) if left else 1
 
 
@@ -77,9 +79,13 @@ class Residues:
 
         made: list[Form] = [{e: residue(c) for e, c in form.items() if c} for form in forms]
         left = list(range(len(next(iter(made[0])))))
-        while pivots := [(sum(any(e[k] for e in other) for other in made), len(form), k, i)
-                         for i, form in enumerate(made) if all(sum(e) <= 1 for e in form)
-                         for k in left if _at(form, k)]:
+        while pivots := [
+            (sum(any(e[k] for e in other) for other in made), len(form), k, i)
+            for i, form in enumerate(made)
+            if all(sum(e) <= 1 for e in form)
+            for k in left
+            if _at(form, k)
+        ]:
             *_, k, i = min(pivots)  # the unknown that is in the fewest
             made = [_without(form, made[i], k) for form in made if form is not made[i]]
             left.remove(k)
@@ -106,7 +112,7 @@ def bezout(forms: Sequence[Form], groups: Sequence[Sequence[int]]) -> int:
         for used, count in ways.items():
             for k, degree in enumerate(degrees):
                 if degree and used[k] < len(groups[k]):
-                    key = (*used[:k], used[k] + 1, *used[k + 1:])
+                    key = (*used[:k], used[k] + 1, *used[k + 1 :])
                     total[key] = total.get(key, 0) + count * degree
         ways = total
     return sum(ways.values())
@@ -167,7 +173,7 @@ def _without(form: Form, line: Form, k: int) -> Form:
     given = {e: -c / _at(line, k) for e, c in line.items() if not e[k]}
     total = Form()
     for e, c in form.items():
-        terms = {(*e[:k], 0, *e[k + 1:]): c}
+        terms = {(*e[:k], 0, *e[k + 1 :]): c}
         for _ in range(e[k]):
             terms = _times(terms, given)
         total = _minus(total, terms, -1)
@@ -189,7 +195,7 @@ def partitions(left: list[int]) -> Iterator[list[list[int]]]:
     for rest in partitions(left[1:]):
         yield [[left[0]], *rest]
         for k in range(len(rest)):
-            yield [*rest[:k], [left[0], *rest[k]], *rest[k + 1:]]
+            yield [*rest[:k], [left[0], *rest[k]], *rest[k + 1 :]]
 
 
 def _least_bound(forms: Sequence[Form], groups: Sequence[Sequence[int]], enough: int) -> int | None:
@@ -198,15 +204,22 @@ def _least_bound(forms: Sequence[Form], groups: Sequence[Sequence[int]], enough:
 
     found = None
     for caps in sorted(product(range(2, CAP_OF_MULTIPLES + 1), repeat=len(groups)), key=sum):
-        if math.prod(math.comb(len(group) + cap, cap) for group, cap in zip(groups, caps, strict=True)
-                     ) > LARGEST_MULTIPLES:
+        if (
+            math.prod(math.comb(len(group) + cap, cap) for group, cap in zip(groups, caps, strict=True))
+            > LARGEST_MULTIPLES
+        ):
             continue
-        below = {e: min(cap - sum(e[k] for k in group) for group, cap in zip(groups, caps, strict=True))
-                 for e in product(range(max(caps) + 1), repeat=sum(map(len, groups)))}
+        below = {
+            e: min(cap - sum(e[k] for k in group) for group, cap in zip(groups, caps, strict=True))
+            for e in product(range(max(caps) + 1), repeat=sum(map(len, groups)))
+        }
         columns = sorted((e for e in below if below[e] >= 0), key=lambda e: below[e] > 0)
         edge = sum(below[e] == 0 for e in columns)
-        moved = [{tuple(map(sum, zip(e, by, strict=True))): c % PRIME for e, c in form.items()}
-                 for form in forms for by in columns]
+        moved = [
+            {tuple(map(sum, zip(e, by, strict=True))): c % PRIME for e, c in form.items()}
+            for form in forms
+            for by in columns
+        ]
         rows = [[row.get(e, 0) for e in columns] for row in moved if all(below.get(e, -1) >= 0 for e in row)]
         if not rows or nmod_mat([row[:edge] for row in rows], PRIME).rank() < edge:
             continue

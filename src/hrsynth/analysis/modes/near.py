@@ -46,14 +46,23 @@ class NearMode(AssemblyMode):
     @property
     def differs(self) -> str:
         """By how much what is measured differs at most, and how far away the pose is."""
-        far = f"{1e3 * self.distance:.3g} mm away" if self.distance > SAME_NEAR_POSE * self.length else (
-            f"turned by {np.degrees(self.turned):.3g}°")
+        far = (
+            f"{1e3 * self.distance:.3g} mm away"
+            if self.distance > SAME_NEAR_POSE * self.length
+            else (f"turned by {np.degrees(self.turned):.3g}°")
+        )
         return f"by {degrees(self.angle)}, {far}"
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
-        return {**super().to_dict(), "angle": self.angle, "distance_m": self.distance, "turned_rad": self.turned,
-                "stable": self.stable, "family": self.family}
+        return {
+            **super().to_dict(),
+            "angle": self.angle,
+            "distance_m": self.distance,
+            "turned_rad": self.turned,
+            "stable": self.stable,
+            "family": self.family,
+        }
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -91,8 +100,9 @@ def descend(start: ClosedConfiguration, question: Measurement, held: Held, bound
         return StationaryPose(at, angle, bool(_loop_rates(at, held, motions, rates).min(initial=1.0) > 0.0), False)
     moving = platform_motions(at, question)
     way = moving @ np.linalg.svd(held.rows(twin, at.q)[1] @ moving)[2][-1]
-    beside = (solve(twin, twin.integrate(at.q, step * way), tolerance=SOLVED)[0]
-              for step in (FAMILY_STEP, -FAMILY_STEP))
+    beside = (
+        solve(twin, twin.integrate(at.q, step * way), tolerance=SOLVED)[0] for step in (FAMILY_STEP, -FAMILY_STEP)
+    )
     return StationaryPose(at, angle, False, all(_largest(held.rows(twin, q)[0], held) <= bound for q in beside))
 
 
@@ -126,8 +136,14 @@ def _loop_rates(at: ClosedConfiguration, held: Held, motions: Array, rates: Arra
     return np.asarray(np.sort(np.linalg.eigvals(np.linalg.solve(rates.T @ rates, (bends + bends.T) / 2)).real))
 
 
-def near_modes(setting: ObservedRobot, goal: ClosedConfiguration, question: Measurement, known: Sequence[AssemblyMode],
-               candidates: Sequence[AssemblyMode], bound: float) -> tuple[NearMode, ...]:
+def near_modes(
+    setting: ObservedRobot,
+    goal: ClosedConfiguration,
+    question: Measurement,
+    known: Sequence[AssemblyMode],
+    candidates: Sequence[AssemblyMode],
+    bound: float,
+) -> tuple[NearMode, ...]:
     """The near modes with differences up to ``bound`` (rad) to which candidates lead, those of least difference first:
     isolated minima, none of them the goal or a ``known`` mode, and one of those that are connected."""
     held, found = Held.at(goal.twin, goal.q, question.reference, question.observations), list[NearMode]()
@@ -143,8 +159,14 @@ def near_modes(setting: ObservedRobot, goal: ClosedConfiguration, question: Meas
     return tuple(sorted((each for each in found if each not in families[1:]), key=lambda each: each.angle))
 
 
-def _near(setting: ObservedRobot, goal: ClosedConfiguration, question: Measurement, held: Held, mode: AssemblyMode,
-          bound: float) -> NearMode | None:
+def _near(
+    setting: ObservedRobot,
+    goal: ClosedConfiguration,
+    question: Measurement,
+    held: Held,
+    mode: AssemblyMode,
+    bound: float,
+) -> NearMode | None:
     """A candidate as a near mode; one at which the robot was not assembled as it is, its residual as the difference."""
     angle, stable, family = mode.residual, None, False
     if mode.configuration is not None:
@@ -158,8 +180,14 @@ def _near(setting: ObservedRobot, goal: ClosedConfiguration, question: Measureme
         at, angle, stable, family = least.configuration, least.angle, least.isolated or None, least.family
         mode = found_mode(setting, question, at, {body: at.pose(body) for body in mode.bodies or {}}, mode.residual)
     distance, turned = distance_from(setting.motion, goal, mode)
-    return NearMode(**{each.name: getattr(mode, each.name) for each in fields(AssemblyMode)}, angle=angle,
-                    distance=distance, turned=turned, stable=stable, family=family)
+    return NearMode(
+        **{each.name: getattr(mode, each.name) for each in fields(AssemblyMode)},
+        angle=angle,
+        distance=distance,
+        turned=turned,
+        stable=stable,
+        family=family,
+    )
 
 
 def degrees(angle: float) -> str:
@@ -186,7 +214,8 @@ def distance_from(motion: PlatformMotion, goal: ClosedConfiguration, mode: Assem
     home, there = goal.pose(motion.link), mode.pose
     at = np.array([there.x, there.y, there.z], dtype=float)
     return float(np.linalg.norm(at - motion.position(home))), (
-        0.0 if there.rotation is None else angle_of(there.rotation @ home[:3, :3].T))
+        0.0 if there.rotation is None else angle_of(there.rotation @ home[:3, :3].T)
+    )
 
 
 def measurement_bound(cone: float | str) -> float:

@@ -46,8 +46,11 @@ class PlanarLoop:
         for sign in (1, -1):
             total: dict[Exponents, complex] = {}
             for (slide, e), a in self.terms.items():
-                key = (*(max(0, sign * k) for k in e), *(max(0, -sign * k) for k in e),
-                       *(int(slide == k) for k in range(self.slides)))
+                key = (
+                    *(max(0, sign * k) for k in e),
+                    *(max(0, -sign * k) for k in e),
+                    *(int(slide == k) for k in range(self.slides)),
+                )
                 total[key] = total.get(key, 0j) + (a if sign > 0 else a.conjugate())
             yield total
 
@@ -87,7 +90,7 @@ class SumPart:
             for j, k in enumerate(e):
                 if k:
                     sign = 1 if k > 0 else -1
-                    part = a * self._slid(x, slide) * abs(k) * _product(x, (*e[:j], k - sign, *e[j + 1:]))
+                    part = a * self._slid(x, slide) * abs(k) * _product(x, (*e[:j], k - sign, *e[j + 1 :]))
                     found[j] += part
                     found[angles + j] += part * acb(0, sign)
             if slide >= 0:
@@ -163,8 +166,10 @@ class PlanarLoops(System):
     def forms(self) -> list[dict[Exponents, complex]]:
         """All equations as polynomials in u, v and t."""
         n = 2 * self.angles + self.slides
-        units = [{tuple(int(i in (k, self.angles + k)) for i in range(n)): 1 + 0j, (0,) * n: -1 + 0j}
-                 for k in range(self.angles)]
+        units = [
+            {tuple(int(i in (k, self.angles + k)) for i in range(n)): 1 + 0j, (0,) * n: -1 + 0j}
+            for k in range(self.angles)
+        ]
         return [*(form for loop in self.loops for form in loop.forms()), *units]
 
     @cached_property
@@ -180,9 +185,10 @@ class PlanarLoops(System):
 
     def pose_of(self, link: str, q: Array) -> Array:
         """X_BL of a link (4, 4), m."""
-        psi, t = q[:self.angles], q[self.angles:]
-        shift = sum(a * (1.0 if k < 0 else t[k]) * np.exp(1j * (np.array(e) @ psi))
-                    for (k, e), a in self.shifts[link].items())
+        psi, t = q[: self.angles], q[self.angles :]
+        shift = sum(
+            a * (1.0 if k < 0 else t[k]) * np.exp(1j * (np.array(e) @ psi)) for (k, e), a in self.shifts[link].items()
+        )
         start, angle = self.goal.pose(link), float(np.array(self.turns[link]) @ psi)
         moved = self.size * (np.real(shift) * self.frame[0] + np.imag(shift) * self.frame[1])
         return pose(start[:3, 3] + moved, rotation_about(self.normal, angle) @ start[:3, :3])
@@ -201,9 +207,12 @@ class PlanarLoops(System):
                 step[place] = 0.0 if k < 0 else factor * q[self.angles + k]
             else:
                 E = np.subtract(self.turns[joint.successor], self.turns[joint.predecessor])
-                axis = self.goal.pose(joint.predecessor)[:3, :3] @ twin.mechanism.links[joint.predecessor].inverse[
-                    :3, :3] @ joint.axis
-                step[place] = float(E @ q[:self.angles]) * np.sign(axis @ self.normal)
+                axis = (
+                    self.goal.pose(joint.predecessor)[:3, :3]
+                    @ twin.mechanism.links[joint.predecessor].inverse[:3, :3]
+                    @ joint.axis
+                )
+                step[place] = float(E @ q[: self.angles]) * np.sign(axis @ self.normal)
         return ClosedConfiguration.of(twin, close(twin, twin.integrate(self.goal.q, step), tolerance=SOLVED)[0])
 
     def pose_terms(self, x: Sequence[Any]) -> list[Any]:
@@ -214,9 +223,15 @@ class PlanarLoops(System):
             at = 0j if self.point is None else self._flat(self.goal.pose(body)[:3, :3] @ self.point)
             for sign in (1, -1):
                 turn = _product(x, tuple(sign * k for k in e))
-                shift = sum((_ball(a, sign) * (1 if k < 0 else x[2 * self.angles + k])
-                             * _product(x, tuple(sign * i for i in f))
-                             for (k, f), a in self.shifts[body].items()), turn * 0)
+                shift = sum(
+                    (
+                        _ball(a, sign)
+                        * (1 if k < 0 else x[2 * self.angles + k])
+                        * _product(x, tuple(sign * i for i in f))
+                        for (k, f), a in self.shifts[body].items()
+                    ),
+                    turn * 0,
+                )
                 found += [turn, shift] if self.point is None else [shift + turn * _ball(at, sign)]
         return found
 
@@ -237,12 +252,24 @@ def groupings(angles: int, slides: int, loops: Sequence[frozenset[int]]) -> Iter
     u, v, t = ([*range(k, k + n)] for k, n in ((0, angles), (angles, angles), (2 * angles, slides)))
     n = 2 * angles + slides
     alone = [[k] for k in t]
-    for groups in ([u, v, t], [u + v + t], [u, v, *alone], [u + v, t], [[k] for k in range(n)],
-                   [*map(list, zip(u, v, strict=True)), t]):
+    for groups in (
+        [u, v, t],
+        [u + v + t],
+        [u, v, *alone],
+        [u + v, t],
+        [[k] for k in range(n)],
+        [*map(list, zip(u, v, strict=True)), t],
+    ):
         yield [*filter(None, groups)]
     if len(parts := blocks(loops)) > 1:
-        own = [([u[k] for k in part if k < angles], [v[k] for k in part if k < angles],
-                [t[k - angles] for k in part if k >= angles]) for part in parts]
+        own = [
+            (
+                [u[k] for k in part if k < angles],
+                [v[k] for k in part if k < angles],
+                [t[k - angles] for k in part if k >= angles],
+            )
+            for part in parts
+        ]
         yield [group for part in own for group in part if group]
         yield [group for x, y, z in own for group in (x + y, z) if group]
         yield [x + y + z for x, y, z in own]
@@ -251,8 +278,11 @@ def groupings(angles: int, slides: int, loops: Sequence[frozenset[int]]) -> Iter
 
 def unknowns(terms: Iterable[tuple[int, Exponents]], angles: int) -> frozenset[int]:
     """The angles, and the slides after all angles, of a loop's terms: (slide, how often each angle)."""
-    return frozenset(k for slide, e in terms for k in (
-        *(j for j, times in enumerate(e) if times), *([angles + slide] if slide >= 0 else [])))
+    return frozenset(
+        k
+        for slide, e in terms
+        for k in (*(j for j, times in enumerate(e) if times), *([angles + slide] if slide >= 0 else []))
+    )
 
 
 def blocks(loops: Sequence[frozenset[int]]) -> list[list[int]]:
@@ -260,8 +290,15 @@ def blocks(loops: Sequence[frozenset[int]]) -> list[list[int]]:
     the same way what the others have besides."""
     left, found = [*filter(None, loops)], list[list[int]]()
     while left:
-        own = next((own for size in range(1, len(left)) for part in combinations(left, size)
-                    if len(own := frozenset[int]().union(*part)) == 2 * size), frozenset[int]().union(*left))
+        own = next(
+            (
+                own
+                for size in range(1, len(left))
+                for part in combinations(left, size)
+                if len(own := frozenset[int]().union(*part)) == 2 * size
+            ),
+            frozenset[int]().union(*left),
+        )
         found.append(sorted(own))
         left = [*filter(None, (each - own for each in left))]
     return found

@@ -32,7 +32,7 @@ def proposals(forms: Sequence[dict[Exponents, complex]], angles: int, enough: in
     twin = [*range(angles, 2 * angles), *range(angles), *range(2 * angles, M.shape[1])]
     for _ in range(PLANAR_STARTS):
         x = rng.normal(size=(64, M.shape[1])) + 1j * rng.normal(size=(64, M.shape[1]))
-        x[:, angles:2 * angles] = 1.0 / x[:, :angles]
+        x[:, angles : 2 * angles] = 1.0 / x[:, :angles]
         with np.errstate(all="ignore"):
             for _ in range(40):
                 values = np.exp(np.log(x) @ M.T)
@@ -49,8 +49,9 @@ def proposals(forms: Sequence[dict[Exponents, complex]], angles: int, enough: in
             close_ = np.abs(step).max(axis=1) < 1e-10 * (1.0 + np.abs(x).max(axis=1))
         for each in x[close_]:
             for y in (each, each[twin].conj()):
-                if len(found) < enough and not np.any(np.abs(found - y).max(axis=1, initial=0.0)
-                                                      < 1e-6 * (1.0 + np.abs(y).max())):
+                if len(found) < enough and not np.any(
+                    np.abs(found - y).max(axis=1, initial=0.0) < 1e-6 * (1.0 + np.abs(y).max())
+                ):
                     found = np.vstack([found, y])
         if len(found) >= enough:
             break
@@ -76,8 +77,10 @@ def solve_loops(measured: MeasuredRobot, goal: ClosedConfiguration, error: float
 
 def _judge(system: PlanarLoops) -> SystemModes:
     """The modes: as many closings as the degrees in groups of unknowns allow, or else the ranks of multiples."""
-    loops, angles, slides = (f"{n} {word}{'s' * (n != 1)}" for n, word in (
-        (len(system.loops), "loop"), (system.angles, "angle"), (system.slides, "slide")))
+    loops, angles, slides = (
+        f"{n} {word}{'s' * (n != 1)}"
+        for n, word in ((len(system.loops), "loop"), (system.angles, "angle"), (system.slides, "slide"))
+    )
     size = f"{loops}, {angles} and {slides}"
     most, why, bound = system.most, "degrees in groups of unknowns (Bézout)", "class"
     if most > LARGEST_LOOPS:
@@ -90,12 +93,17 @@ def _judge(system: PlanarLoops) -> SystemModes:
     if len(boxes) < most or lost or len(at_goal) != 1:
         raise Unsolved("the loops", f"{size}: of {most} closings at most ({why}) {len(boxes)} have boxes")
     seen = [system.pose_terms(_balls(box)) for box in boxes]
-    if any(all((a - b).contains(0) for a, b in zip(one, other, strict=True))
-           for k, one in enumerate(seen) for other in seen[:k]):
+    if any(
+        all((a - b).contains(0) for a, b in zip(one, other, strict=True))
+        for k, one in enumerate(seen)
+        for other in seen[:k]
+    ):
         raise Unsolved("the loops", f"{size}: several of {most} closings have one pose of the platform")
     real = [box for box in boxes if box.real]
-    proof = (f"{size}: at most {most} closings by {why}, {len(boxes)} enclosed apart from each other, complex ones "
-             f"too, {len(real)} real")
+    proof = (
+        f"{size}: at most {most} closings by {why}, {len(boxes)} enclosed apart from each other, complex ones "
+        f"too, {len(real)} real"
+    )
     if not system.besides:
         modes = tuple(_mode(system, box, True) for box in real)
         return SystemModes(len(boxes), modes, True, proof, bound=bound, enclosed=True)
@@ -111,36 +119,52 @@ def enclosures(system: PlanarLoops) -> list[PoseBox]:
 
 def is_excluded(system: PlanarLoops, box: PoseBox) -> bool:
     """Whether something that is measured besides is another at each closing in a real box."""
-    return any(not SumPart(each, part, system.slack).value(_balls(box)).contains(0) for each in system.besides
-               for part in (False, True))
+    return any(
+        not SumPart(each, part, system.slack).value(_balls(box)).contains(0)
+        for each in system.besides
+        for part in (False, True)
+    )
 
 
 def _balls(box: PoseBox) -> list[Any]:
     """The unknowns of a box as complex balls."""
     from flint import acb, arb
 
-    return [acb(arb(float(m.real), float(r)), arb(float(m.imag), 0.0 if box.real else float(r)))
-            for m, r in zip(box.middle, box.radii, strict=True)]
+    return [
+        acb(arb(float(m.real), float(r)), arb(float(m.imag), 0.0 if box.real else float(r)))
+        for m, r in zip(box.middle, box.radii, strict=True)
+    ]
 
 
 def _enclose(system: PlanarLoops, proposed: Array) -> tuple[list[PoseBox], int]:
     """Boxes of closings, apart from each other, and how many proposals have none."""
     a, slack = system.angles, system.slack
-    equations: list[Polynomial] = [*(SumPart(loop, part, slack) for loop in system.loops for part in (False, True)),
-                                   *(UnitLength((k, a + k)) for k in range(a))]
-    u, v, t = proposed[:, :a], proposed[:, a:2 * a], proposed[:, 2 * a:]
+    equations: list[Polynomial] = [
+        *(SumPart(loop, part, slack) for loop in system.loops for part in (False, True)),
+        *(UnitLength((k, a + k)) for k in range(a)),
+    ]
+    u, v, t = proposed[:, :a], proposed[:, a : 2 * a], proposed[:, 2 * a :]
     return zeros(equations, np.hstack([(u + v) / 2, (u - v) / 2j, t]))
 
 
 def _mode(system: PlanarLoops, box: PoseBox, proved: bool) -> SystemMode:
     """A real box as a mode, or as one that fits."""
     a, x = system.angles, box.middle.real
-    q = np.array([*np.arctan2(x[a:2 * a], x[:a]), *x[2 * a:]])
+    q = np.array([*np.arctan2(x[a : 2 * a], x[:a]), *x[2 * a :]])
     spread = [float(each.real.rad()) + float(each.imag.rad()) for each in system.pose_terms(_balls(box))]
     shift = 2.0 * system.size * max(spread)
     turn = 0.0 if system.point is not None else 4.0 * max(spread)
     at = np.array([*np.exp(1j * q[:a]), *np.exp(-1j * q[:a]), *q[a:]])
     forms = [*system.forms, *(form for each in system.besides for form in each.forms())]
-    residual = max(float(abs(sum(c * complex(np.prod(at ** e)) for e, c in form.items()))) for form in forms)
-    return SystemMode((), max(shift / system.size, turn), shift, turn, residual,
-                      frozen(system.pose_of(system.bodies[0], q)), frozen(q), proved=proved, fits=not proved)
+    residual = max(float(abs(sum(c * complex(np.prod(at**e)) for e, c in form.items()))) for form in forms)
+    return SystemMode(
+        (),
+        max(shift / system.size, turn),
+        shift,
+        turn,
+        residual,
+        frozen(system.pose_of(system.bodies[0], q)),
+        frozen(q),
+        proved=proved,
+        fits=not proved,
+    )

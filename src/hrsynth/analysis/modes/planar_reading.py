@@ -62,8 +62,11 @@ class _Reading:
         self.reference = measured.question.reference
         self.bodies, self.point = placing_links(anatomy), anatomy.point
         self.joints = list(self.mechanism.joints.values())
-        self.axes = {joint.name: self._displacement(joint.predecessor)[:3, :3] @ joint.axis for joint in self.joints
-                     if joint.type in KINDS}
+        self.axes = {
+            joint.name: self._displacement(joint.predecessor)[:3, :3] @ joint.axis
+            for joint in self.joints
+            if joint.type in KINDS
+        }
         self.normal = next((self.axes[joint.name] for joint in self.joints if joint.type is KINDS[0]), np.zeros(3))
         for joint in self.joints:
             along = abs(float(self.axes.get(joint.name, np.zeros(3)) @ self.normal))
@@ -97,9 +100,14 @@ class _Reading:
         shifts, loops = self._loops(turns, moves)
         told = [each for body in self.bodies for each in shifts[body]]
         told += [] if self.point is not None else [(-1, turns[body]) for body in self.bodies]
-        more = [*({(-1, turns[a]): 1 + 0j, (-1, turns[b]): -1 + 0j} for a, b in self._held_pairs(besides)),
-                *({(moves[each.joint][0], turns[self.mechanism.base]): 1 + 0j} for each in besides
-                  if isinstance(each, Encoder) and moves.get(each.joint, (-1, 0.0))[0] >= 0)]
+        more = [
+            *({(-1, turns[a]): 1 + 0j, (-1, turns[b]): -1 + 0j} for a, b in self._held_pairs(besides)),
+            *(
+                {(moves[each.joint][0], turns[self.mechanism.base]): 1 + 0j}
+                for each in besides
+                if isinstance(each, Encoder) and moves.get(each.joint, (-1, 0.0))[0] >= 0
+            ),
+        ]
         needed = _unknowns([*told, *(each for loop in more for each in loop)])
         geared = bool(self.mechanism.couplings)
         for size in range(len(loops) if geared else 1, len(loops) + 1):
@@ -110,11 +118,20 @@ class _Reading:
                     self.more = 2 * (len(loops) - size) > len(left)
                     return self._system(turns, moves, shifts, part, more, used)
         used = _unknowns([each for loop in loops for each in loop])
-        return (f"{len(loops)} loops, which give {2 * len(loops)} equations, have {sum(not k for k, _ in used)} angles "
-                f"and {sum(k for k, _ in used)} slides")
+        return (
+            f"{len(loops)} loops, which give {2 * len(loops)} equations, have {sum(not k for k, _ in used)} angles "
+            f"and {sum(k for k, _ in used)} slides"
+        )
 
-    def _system(self, turns: dict[str, Exponents], moves: dict[str, tuple[int, float]], shifts: dict[str, Sum],
-                loops: Sequence[Sum], more: Sequence[Sum], used: set[tuple[bool, int]]) -> PlanarLoops:
+    def _system(
+        self,
+        turns: dict[str, Exponents],
+        moves: dict[str, tuple[int, float]],
+        shifts: dict[str, Sum],
+        loops: Sequence[Sum],
+        more: Sequence[Sum],
+        used: set[tuple[bool, int]],
+    ) -> PlanarLoops:
         angles, slides = ([k for kind, k in sorted(used) if kind == slide] for slide in (False, True))
 
         def kept(e: Exponents) -> Exponents:
@@ -123,13 +140,26 @@ class _Reading:
         def of(terms: Sum) -> Sum:
             return {(slides.index(k) if k in slides else -1, kept(e)): a for (k, e), a in terms.items()}
 
-        whole = [tuple(PlanarLoop(of(loop), len(angles), len(slides)) for loop in part)
-                 for part in (map(_turn_loop, loops), loops, more)]
-        found = PlanarLoops((), np.zeros((0, 3)), self.goal, self.normal, {k: kept(e) for k, e in turns.items()},
-                           {body: of(shifts[body]) for body in self.bodies},
-                           {name: (slides.index(k) if k in slides else -1, by) for name, (k, by) in moves.items()},
-                           whole[0], len(angles), len(slides), self.bodies, self.point, whole[2],
-                           error=self.dropped * self.goal.twin.length)
+        whole = [
+            tuple(PlanarLoop(of(loop), len(angles), len(slides)) for loop in part)
+            for part in (map(_turn_loop, loops), loops, more)
+        ]
+        found = PlanarLoops(
+            (),
+            np.zeros((0, 3)),
+            self.goal,
+            self.normal,
+            {k: kept(e) for k, e in turns.items()},
+            {body: of(shifts[body]) for body in self.bodies},
+            {name: (slides.index(k) if k in slides else -1, by) for name, (k, by) in moves.items()},
+            whole[0],
+            len(angles),
+            len(slides),
+            self.bodies,
+            self.point,
+            whole[2],
+            error=self.dropped * self.goal.twin.length,
+        )
         return min(found, replace(found, loops=whole[1]), key=lambda each: each.most)
 
     def _turns(self) -> dict[str, Exponents]:
@@ -142,8 +172,9 @@ class _Reading:
             if not one.type.slides:
                 q = Fraction(ratio).limit_denominator(LARGEST_GEAR)
                 if abs(float(q) - ratio) > SAME_GEOMETRY or abs(q) > LARGEST_GEAR:
-                    raise self._refuse(f"coupling {name}: {ratio:g} is not a quotient of whole numbers up to "
-                                       f"{LARGEST_GEAR}")
+                    raise self._refuse(
+                        f"coupling {name}: {ratio:g} is not a quotient of whole numbers up to {LARGEST_GEAR}"
+                    )
                 row = Counter[str]()
                 for joint, factor in ((one, -q.numerator), (other, q.denominator)):
                     sense = factor * (1 if self.axes[joint.name] @ self.normal > 0 else -1)
@@ -151,25 +182,34 @@ class _Reading:
                     row.update({joint.predecessor: -sense})
                 rows.append(self._row(row))
         rows += [self._row({one: 1, other: -1}) for one, other in self._held_pairs(self.seen, [j.name for j in geared])]
-        if len(graphs.spanning_forest(self.mechanism.links, list({j.name: j for j in geared}.values()),
-                                      [0.0] * len(geared))) < len({joint.name for joint in geared}):
+        if len(
+            graphs.spanning_forest(
+                self.mechanism.links, list({j.name: j for j in geared}.values()), [0.0] * len(geared)
+            )
+        ) < len({joint.name for joint in geared}):
             raise self._refuse("its gears form a cycle")
         tied = whole_kernel(rows)
         assert tied is not None
         equal = [*(joint.links for joint in self.joints if joint.type.slides), *self._held_pairs(self.seen)]
         places = [[each[i] for each in tied] for i in range(len(self.places))]
-        rest = whole_kernel([[a - b for a, b in zip(*(places[self.places[link]] for link in links), strict=True)]
-                             for links in equal] or [[0] * len(tied)], whole=True)
+        rest = whole_kernel(
+            [[a - b for a, b in zip(*(places[self.places[link]] for link in links), strict=True)] for links in equal]
+            or [[0] * len(tied)],
+            whole=True,
+        )
         if rest is None:
             raise self._refuse("its gears have several positions for what is measured")
-        return {link: tuple(sum(a * b for a, b in zip(places[i], each, strict=True)) for each in rest)
-                for link, i in self.places.items()}
+        return {
+            link: tuple(sum(a * b for a, b in zip(places[i], each, strict=True)) for each in rest)
+            for link, i in self.places.items()
+        }
 
     def _row(self, entries: dict[str, int]) -> list[int]:
         return [entries.get(link, 0) for link in self.places]
 
-    def _held_pairs(self, seen: Sequence[Observation], joints: Sequence[str] | None = None
-                    ) -> Iterator[tuple[str, str]]:
+    def _held_pairs(
+        self, seen: Sequence[Observation], joints: Sequence[str] | None = None
+    ) -> Iterator[tuple[str, str]]:
         """Pairs of links that do not turn against each other, of ``joints`` alone where these are given."""
         for each in seen:
             if isinstance(each, Direction):
@@ -201,11 +241,13 @@ class _Reading:
                         roots[each] = a, factor * ratio * f / g
         held = {roots[seen.joint][0] for seen in self.seen if isinstance(seen, Encoder) and seen.joint in roots}
         free = [name for name in sliding if roots[name][0] == name and name not in held]
-        return {name: (free.index(root), factor) if root in free else (-1, 0.0)
-                for name, (root, factor) in roots.items()}
+        return {
+            name: (free.index(root), factor) if root in free else (-1, 0.0) for name, (root, factor) in roots.items()
+        }
 
-    def _loops(self, turns: dict[str, Exponents], moves: dict[str, tuple[int, float]]
-               ) -> tuple[dict[str, Sum], list[Sum]]:
+    def _loops(
+        self, turns: dict[str, Exponents], moves: dict[str, tuple[int, float]]
+    ) -> tuple[dict[str, Sum], list[Sum]]:
         """How each link's frame is shifted, and what vanishes for each joint besides a spanning tree."""
         still = (-1, (0,) * len(turns[self.mechanism.base]))
         tree = graphs.spanning_forest(self.mechanism.links, self.joints, [0.0] * len(self.joints))
@@ -213,8 +255,13 @@ class _Reading:
         for joint, near, far in graphs.outward(self.mechanism.base, tree):
             step = self._step(joint, turns, moves)
             origins[far] = self._sum(origins[near], step, 1 if near == joint.predecessor else -1)
-        loops = [self._sum(self._sum(origins[joint.predecessor], self._step(joint, turns, moves)),
-                           origins[joint.successor], -1) for joint in self.joints if joint not in tree]
+        loops = [
+            self._sum(
+                self._sum(origins[joint.predecessor], self._step(joint, turns, moves)), origins[joint.successor], -1
+            )
+            for joint in self.joints
+            if joint not in tree
+        ]
         shifts = {}
         for link, origin in origins.items():
             at = self._flat(self.goal.pose(link)[:3, 3])
@@ -227,6 +274,7 @@ class _Reading:
     def _fewer(self, loops: Sequence[Sum]) -> tuple[int, Sum] | None:
         """A loop's place, and its sum with another or difference from it, where that has fewer unknowns, or of as many
         fewer slides: the degrees are lower."""
+
         def size(loop: Sum) -> tuple[int, int]:
             unknowns = _unknowns(loop)
             return len(unknowns), sum(slide for slide, _ in unknowns)
@@ -260,7 +308,7 @@ def _turn_loop(loop: Sum) -> Sum:
     on = Counter(e for k, e in loop if k >= 0)
     if not on:
         return loop
-    (by, _), = on.most_common(1)
+    ((by, _),) = on.most_common(1)
     return {(k, tuple(a - b for a, b in zip(e, by, strict=True))): c for (k, e), c in loop.items()}
 
 
@@ -283,8 +331,9 @@ def whole_kernel(rows: Sequence[Sequence[int]], whole: bool = False) -> list[lis
             _, least, divisor = min(left)
             for _, k, v in left:
                 if k != least:
-                    basis[done + k] = [a - v // divisor * b
-                                       for a, b in zip(basis[done + k], basis[done + least], strict=True)]
+                    basis[done + k] = [
+                        a - v // divisor * b for a, b in zip(basis[done + k], basis[done + least], strict=True)
+                    ]
         if left:
             k = done + left[0][1]
             basis[done], basis[k] = basis[k], basis[done]

@@ -34,6 +34,7 @@ class Polynomial(Protocol):
 
     def value(self, x: Sequence[Any]) -> Any:
         """The value at balls x (n,)."""
+
     def slopes(self, x: Sequence[Any]) -> Sequence[Any]:
         """The derivative by each unknown (n,) at balls x (n,)."""
 
@@ -228,8 +229,14 @@ def _resultant_in_third(a: Sequence[fmpz_poly], b: Sequence[fmpz_poly]) -> list[
     """The resultant in y of Σ aₖ(x) yᵏ and Σ bₖ(z) yᵏ: coefficients of z⁰ … z⁴, as polynomials in x."""
     from flint import fmpz_poly
 
-    terms = [(a[2] * a[2], b[0] * b[0]), (a[0] * a[0], b[2] * b[2]), (-a[1] * a[2], b[0] * b[1]),
-             (-a[0] * a[1], b[1] * b[2]), (a[0] * a[2], b[1] * b[1] - 2 * b[0] * b[2]), (a[1] * a[1], b[0] * b[2])]
+    terms = [
+        (a[2] * a[2], b[0] * b[0]),
+        (a[0] * a[0], b[2] * b[2]),
+        (-a[1] * a[2], b[0] * b[1]),
+        (-a[0] * a[1], b[1] * b[2]),
+        (a[0] * a[2], b[1] * b[1] - 2 * b[0] * b[2]),
+        (a[1] * a[1], b[0] * b[2]),
+    ]
     return [sum((p * q[k] for p, q in terms), fmpz_poly()) for k in range(5)]
 
 

@@ -49,8 +49,10 @@ def _monomials(x: Any, exponents: Array) -> Any:
         powers.append(powers[-1] * x.T % PRIME)
     by = {(): x[:, 0] * 0 + 1}
     for i in range(x.shape[1]):
-        by = {each: by[each[:-1]] * powers[each[-1]][i] % PRIME if each[-1] else by[each[:-1]]
-              for each in dict.fromkeys(map(tuple, exponents[:, :i + 1].tolist()))}
+        by = {
+            each: by[each[:-1]] * powers[each[-1]][i] % PRIME if each[-1] else by[each[:-1]]
+            for each in dict.fromkeys(map(tuple, exponents[:, : i + 1].tolist()))
+        }
     return np.array(list(by.values()), dtype=object).reshape(-1, len(x))
 
 
@@ -62,7 +64,7 @@ def _values(shape: tuple[int, int], t: int, at: int) -> Any:
 
 def _conditions(forms: SquareForms, x: Any, others: Sequence[PoseCondition]) -> tuple[Any, list[Any]]:
     """w and conditions, as forms, at points x; shape (points,) each."""
-    y, s = x[:, :forms.shape[0]], x[:, forms.shape[0]:]
+    y, s = x[:, : forms.shape[0]], x[:, forms.shape[0] :]
     q = y @ residues(forms.poses.turns).T % PRIME
     w = np.sum(q * q, axis=1) % PRIME
     inverse = np.array([pow(int(v), -1, PRIME) for v in w], dtype=object)
@@ -114,8 +116,8 @@ class _Quotient:
                 continue
             for row, *of in zip(x, c, b, d, strict=True):
                 if (root := _root(*map(int, of))) is not None:
-                    found.append([*row[:place], root, *row[place + 1:]])
-            points = np.array(found[:len(kept)], dtype=object).reshape(-1, a + m)
+                    found.append([*row[:place], root, *row[place + 1 :]])
+            points = np.array(found[: len(kept)], dtype=object).reshape(-1, a + m)
             told = len(points) == len(kept) and nmod(_monomials(points, kept)).rank() == len(kept)
             return cls(place, power, points) if told else None
         return None
@@ -128,8 +130,10 @@ class _Quotient:
 
 def _parabola(forms: SquareForms, x: Any, place: int, one: PoseCondition) -> tuple[Any, Any, Any]:
     """c, b, d of a condition c v² + b v + d of degree 2 in an unknown v, the others as they are at points."""
-    d, plus, minus = (_conditions(forms, np.hstack([x[:, :place], x[:, :1] * 0 + v, x[:, place + 1:]]), [one])[1][0]
-                      for v in (0, 1, PRIME - 1))
+    d, plus, minus = (
+        _conditions(forms, np.hstack([x[:, :place], x[:, :1] * 0 + v, x[:, place + 1 :]]), [one])[1][0]
+        for v in (0, 1, PRIME - 1)
+    )
     half = (PRIME + 1) // 2
     return ((plus + minus) * half - d) % PRIME, (plus - minus) * half % PRIME, d
 

@@ -55,8 +55,13 @@ class Zero:
         from flint import arb
 
         slack = self.slack
-        flat = np.array([arb(v) if slack is None else arb(v, slack + NUMBER_ROUNDING * (1.0 + abs(v)))
-                         for v in np.ravel(values).tolist()], dtype=object)
+        flat = np.array(
+            [
+                arb(v) if slack is None else arb(v, slack + NUMBER_ROUNDING * (1.0 + abs(v)))
+                for v in np.ravel(values).tolist()
+            ],
+            dtype=object,
+        )
         return flat.reshape(np.shape(values)) if np.shape(values) else flat[0]
 
     @cached_property
@@ -86,8 +91,9 @@ class Zero:
         if self.slack is not None and values is getattr(self.condition, "f", None):
             from flint import arb
 
-            return np.array([arb(float(v), (self.slack + NUMBER_ROUNDING) * self._profile) for v in values],
-                            dtype=object)
+            return np.array(
+                [arb(float(v), (self.slack + NUMBER_ROUNDING) * self._profile) for v in values], dtype=object
+            )
         return self.of(values)
 
 
@@ -121,12 +127,12 @@ class PoseBox:
 
     def alike(self, x: Array) -> Array:
         """A pose with q and with -q, which are one; shape (2, n)."""
-        return np.array([x, np.r_[-x[:self.turned], x[self.turned:]]])
+        return np.array([x, np.r_[-x[: self.turned], x[self.turned :]]])
 
     def pose(self, poses: Poses) -> tuple[Array, Array]:
         """The quaternion (4,) and the position (3,) at the middle of a real box."""
         x = self.middle.real
-        return poses.turns @ x[:self.turned], poses.moves @ x[self.turned:]
+        return poses.turns @ x[: self.turned], poses.moves @ x[self.turned :]
 
     def holds(self, x: Array) -> bool:
         """Whether a pose is in it."""
@@ -155,8 +161,14 @@ def refine_poses(forms: SquareForms, y: Array, p: Array) -> Array:
             at, d = p + np.einsum("nia,na->ni", by_x, y), np.einsum("nia,na->ni", by_d, y)
             along, across = c.slopes(at, d, np.asarray)
             F.append(c.value(at, d, np.asarray))
-            J.append(np.hstack([2.0 * (np.einsum("ni,nia->na", along, by_x) + np.einsum("ni,nia->na", across, by_d)),
-                                along @ moves]))
+            J.append(
+                np.hstack(
+                    [
+                        2.0 * (np.einsum("ni,nia->na", along, by_x) + np.einsum("ni,nia->na", across, by_d)),
+                        along @ moves,
+                    ]
+                )
+            )
         try:
             x = x - np.linalg.solve(np.stack(J, axis=1), np.stack(F, axis=1)[:, :, None])[:, :, 0]
         except np.linalg.LinAlgError:
@@ -164,8 +176,9 @@ def refine_poses(forms: SquareForms, y: Array, p: Array) -> Array:
     return x
 
 
-def enclose_poses(forms: SquareForms, slack: float, proposed: tuple[Array, Array], needed: int = 0
-             ) -> tuple[list[PoseBox], int]:
+def enclose_poses(
+    forms: SquareForms, slack: float, proposed: tuple[Array, Array], needed: int = 0
+) -> tuple[list[PoseBox], int]:
     """Boxes of poses, each with one for all input within the slack (sizes), no two with the same; and how many
     proposals had none. Poses far from real ones may have a box for the numbers as they are alone. Where no ``needed``
     ones can be found any more, the others are not looked for."""
@@ -173,8 +186,10 @@ def enclose_poses(forms: SquareForms, slack: float, proposed: tuple[Array, Array
 
     turned = forms.poses.turns.shape[1]
     conditions = (*forms.planes, *forms.others)
-    equations, exact = (list[Polynomial]([UnitLength(range(turned)), *(Zero(c, forms.poses, each) for c in conditions)])
-                        for each in (slack, None))
+    equations, exact = (
+        list[Polynomial]([UnitLength(range(turned)), *(Zero(c, forms.poses, each) for c in conditions)])
+        for each in (slack, None)
+    )
     found: list[PoseBox] = []
     lost = 0
     with ctx.workprec(PRECISION):
@@ -205,7 +220,8 @@ def at_middle(boxes: Sequence[PoseBox], x: Array) -> PoseBox | None:
     if not boxes:
         return None
     same = np.abs(np.array([box.middle for box in boxes]) - boxes[0].alike(x)[:, None]) <= (
-        NEARLY_REAL_POSE * (1.0 + np.abs(x)))
+        NEARLY_REAL_POSE * (1.0 + np.abs(x))
+    )
     found = np.nonzero(np.any(np.all(same, axis=2), axis=0))[0]
     return boxes[found[0]] if len(found) else None
 

@@ -124,7 +124,7 @@ class SquareForms:
                 rows, others = more, [*others, each]
         if len(rows) < poses.freedoms:
             return None
-        free = np.linalg.svd(np.vstack([basis, np.zeros((1, basis.shape[1]))]))[2][len(planes):].T
+        free = np.linalg.svd(np.vstack([basis, np.zeros((1, basis.shape[1]))]))[2][len(planes) :].T
         return cls(poses, tuple(planes), free, tuple(others))
 
     @property
@@ -174,8 +174,13 @@ class SquareForms:
 def exponents(shape: tuple[int, int], t: int) -> Array:
     """The exponents of q and s in the monomials of a degree; shape (n, a + m)."""
     a, m = shape
-    found = [(*first, r - sum(first), *s) for s in product(range(t // 2 + 1), repeat=m) if (r := t - 2 * sum(s)) >= 0
-             for first in product(range(r + 1), repeat=a - 1) if sum(first) <= r]
+    found = [
+        (*first, r - sum(first), *s)
+        for s in product(range(t // 2 + 1), repeat=m)
+        if (r := t - 2 * sum(s)) >= 0
+        for first in product(range(r + 1), repeat=a - 1)
+        if sum(first) <= r
+    ]
     return np.array(found, dtype=int).reshape(-1, a + m)
 
 
@@ -215,13 +220,15 @@ def proposals(forms: SquareForms, t: int, number: int, k: int) -> tuple[Array, A
     count = int(POINTS * size) + 10
     y, s = _points(shape, count)
     high, R = _basis(shape, t, count), forms.poses.rotations(y)
-    rows = [(_basis(shape, t - degree, count) * (values / np.abs(values).max())[:, None]).T @ high
-            for values, degree in zip(forms.values(R, forms.position(R, s)), forms.degrees, strict=True)]
+    rows = [
+        (_basis(shape, t - degree, count) * (values / np.abs(values).max())[:, None]).T @ high
+        for values, degree in zip(forms.values(R, forms.position(R, s)), forms.degrees, strict=True)
+    ]
     space = np.eye(size)
     if rows:
         Q, upper, _ = qr(np.vstack(rows).T, pivoting=True)
         pivots = np.abs(np.diag(upper))
-        space = Q[:, int(np.sum(pivots > RANK_OF_FORMS * pivots[0])):]
+        space = Q[:, int(np.sum(pivots > RANK_OF_FORMS * pivots[0])) :]
     for step in range(k):
         space = _times(shape, t - 2 * step, count, "w")[0] @ space
     if space.shape[1] < number or (not k and space.shape[1] > number):
@@ -242,7 +249,6 @@ def proposals(forms: SquareForms, t: int, number: int, k: int) -> tuple[Array, A
     norms = np.sum(found * found, axis=1)
     real = np.abs(norms) > NO_POSE
     unit = by_w[0] @ X[:, real]
-    free = [np.sum(unit.conj() * each, axis=0) / np.sum(unit.conj() * unit, axis=0)
-            for each in by_s @ X[:, real]]
+    free = [np.sum(unit.conj() * each, axis=0) / np.sum(unit.conj() * unit, axis=0) for each in by_s @ X[:, real]]
     found = found[real] / np.sqrt(norms[real])[:, None]
     return found, forms.position(forms.poses.rotations(found), np.array(free).reshape(shape[1], len(found)).T)

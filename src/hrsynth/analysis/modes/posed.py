@@ -85,8 +85,7 @@ def pose_platform(measured: MeasuredRobot, goal: ClosedConfiguration) -> list[Po
     _, middle = rigid_platform(measured, goal)
     motion, normal = measured.moving
     rest, seen = sights(anatomy, measured.question, goal)
-    found = [leg_conditions(anatomy, leg, rest, goal, middle, normal, motion == "translations")
-             for leg in anatomy.legs]
+    found = [leg_conditions(anatomy, leg, rest, goal, middle, normal, motion == "translations") for leg in anatomy.legs]
     moved = MOVED * sum(each for _, each in found)
     held = any(branch for branches, _ in found for branch in branches)
     ways = [(turned, conditions(seen, middle, turned)) for turned in ((False,) if held else (False, True))]
@@ -96,14 +95,30 @@ def pose_platform(measured: MeasuredRobot, goal: ClosedConfiguration) -> list[Po
     legs: list[Branches] = [branches for branches, _ in found]
     if prod(map(len, legs)) > BRANCH_CHOICES:
         raise NotConfined(name, f"its legs have {prod(map(len, legs))} choices of branches")
-    if any(abs(float(c.value(c.b, c.c, np.asarray))) > SAME_RELATION * (1.0 + float(np.abs(getattr(c, "f", 0.0)).max()))
-           for branches in legs for c in branches[0]):
+    if any(
+        abs(float(c.value(c.b, c.c, np.asarray))) > SAME_RELATION * (1.0 + float(np.abs(getattr(c, "f", 0.0)).max()))
+        for branches in legs
+        for c in branches[0]
+    ):
         raise NotConfined(name, "the conditions of its legs are not met at the pose itself")
-    poses = (Poses.translating() if motion == "translations" else
-             Poses.spatial() if normal is None else Poses.planar(normal))
+    poses = (
+        Poses.translating() if motion == "translations" else Poses.spatial() if normal is None else Poses.planar(normal)
+    )
     asked = (_once([c for branch in chosen for c in branch]) for chosen in product(*legs))
-    return [PosedPlatform((), np.zeros((0, 3)), kept, middle, poses, turned, seen,
-                          counts, error=moved + MOVED * goal.twin.length * off) for kept, off in asked]
+    return [
+        PosedPlatform(
+            (),
+            np.zeros((0, 3)),
+            kept,
+            middle,
+            poses,
+            turned,
+            seen,
+            counts,
+            error=moved + MOVED * goal.twin.length * off,
+        )
+        for kept, off in asked
+    ]
 
 
 def _once(conditions: Sequence[PoseCondition]) -> tuple[tuple[PoseCondition, ...], float]:
@@ -111,8 +126,14 @@ def _once(conditions: Sequence[PoseCondition]) -> tuple[tuple[PoseCondition, ...
     numbers of such are apart (sizes)."""
     kept, off = list[PoseCondition](), 0.0
     for c in conditions:
-        apart = min((max(float(np.abs(c.b - k.b).max()), float(np.abs(c.n - k.n).max()), abs(c.h - k.h))
-                     for k in kept if isinstance(c, OnPlane) and isinstance(k, OnPlane)), default=np.inf)
+        apart = min(
+            (
+                max(float(np.abs(c.b - k.b).max()), float(np.abs(c.n - k.n).max()), abs(c.h - k.h))
+                for k in kept
+                if isinstance(c, OnPlane) and isinstance(k, OnPlane)
+            ),
+            default=np.inf,
+        )
         if apart > SAME_POINT / RANK_GAP:
             kept.append(c)
         else:
@@ -125,24 +146,34 @@ def most_posed(measured: MeasuredRobot, goal: ClosedConfiguration) -> int:
     return sum(_forms(measured, each).most for each in pose_platform(measured, goal))
 
 
-def solve_posed(measured: MeasuredRobot, goal: ClosedConfiguration, error: float = 0.0, effort: float = EFFORT
-                ) -> tuple[Model, SystemModes]:
+def solve_posed(
+    measured: MeasuredRobot, goal: ClosedConfiguration, error: float = 0.0, effort: float = EFFORT
+) -> tuple[Model, SystemModes]:
     """All modes of all choices of branches together, with the goal known to ``error`` (m). Raises ``NotConfined``, and
     ``Unsolved`` where not all poses are enclosed that there may be, or the choices need more than ``effort`` (s)."""
-    systems = [replace(each, error=each.error + max([error, *(sight.error(error, goal) for sight in each.seen)]))
-               for each in pose_platform(measured, goal)]
+    systems = [
+        replace(each, error=each.error + max([error, *(sight.error(error, goal) for sight in each.seen)]))
+        for each in pose_platform(measured, goal)
+    ]
     if not np.isfinite(error):
         raise NotConfined(measured.setting.robot.name, "no distance bounds how far it is from where its loops close")
     (body,) = leg_ends(measured.setting.anatomy)
     first = systems[0]
     X, back = goal.pose(body), inverse(pose(first.middle.origin))
-    made = Model(first, lambda q: {body: (inverse if first.back else np.asarray)(first.pose(q) @ back) @ X},
-                 first.home, first.back)
+    made = Model(
+        first,
+        lambda q: {body: (inverse if first.back else np.asarray)(first.pose(q) @ back) @ X},
+        first.home,
+        first.back,
+    )
     forms, found = _forms(measured, first), list[SystemModes]()
     needed = len(systems) * (FEW_FORMS_SECONDS + FORMS_SECONDS * (forms.size / LARGEST_FORMS) ** 3)
     if needed > max(effort, FEW_FORMS_SECONDS * (len(systems) == 1)):
-        raise Unsolved("conditions on the pose", f"{len(systems)} choices of branches, {forms.size} forms each, need "
-                                                 f"about {needed:.2g} s: too many (the effort is {effort:g} s)")
+        raise Unsolved(
+            "conditions on the pose",
+            f"{len(systems)} choices of branches, {forms.size} forms each, need "
+            f"about {needed:.2g} s: too many (the effort is {effort:g} s)",
+        )
     for system in systems:
         found.append(_judge(system, _forms(measured, system), system is first))
         if not found[-1].complete:
@@ -156,8 +187,11 @@ def _forms(measured: MeasuredRobot, system: PosedPlatform) -> SquareForms:
     if forms is None:
         raise NotConfined(measured.setting.robot.name, "the conditions of its legs do not decide its pose one by one")
     if forms.size > LARGEST_FORMS:
-        raise Unsolved("conditions on the pose", f"{forms.most} solutions at most, among {forms.size} forms of degree "
-                                                 f"{forms.degree}: too many (at most {LARGEST_FORMS})")
+        raise Unsolved(
+            "conditions on the pose",
+            f"{forms.most} solutions at most, among {forms.size} forms of degree "
+            f"{forms.degree}: too many (at most {LARGEST_FORMS})",
+        )
     return forms
 
 
@@ -165,9 +199,14 @@ def _judge(system: PosedPlatform, forms: SquareForms, own: bool) -> SystemModes:
     """The modes: as many as the degrees allow, or else as the ranks of all multiples of the conditions do; ``own``:
     whether the goal is one."""
     slack = system.error / system.size
-    product_ = ((f"the product of degrees {' · '.join(map(str, forms.degrees))}"
-                 f"{f' / {2 ** forms.shape[1]}' if forms.shape[1] else ''} (Bézout)") if forms.degrees
-                else "conditions that are all linear")
+    product_ = (
+        (
+            f"the product of degrees {' · '.join(map(str, forms.degrees))}"
+            f"{f' / {2 ** forms.shape[1]}' if forms.shape[1] else ''} (Bézout)"
+        )
+        if forms.degrees
+        else "conditions that are all linear"
+    )
     most, why, named = forms.most, product_, "class"
     proposed = proposals(forms, forms.degree, forms.most, 0)
     boxes, lost = ([], 1) if proposed is None else enclose_poses(forms, slack, proposed, most)
@@ -183,8 +222,10 @@ def _judge(system: PosedPlatform, forms: SquareForms, own: bool) -> SystemModes:
     goal = at_goal[0] if len(at_goal) == 1 else None
     complete = len(boxes) == most and (goal is not None) == own
     real = [box for box in boxes if box.real]
-    proof = (f"at most {most} pose{'s' * (most != 1)} by {why}, {len(boxes)} enclosed apart from each other, "
-             f"complex ones too{told_far(boxes)}, {len(real)} real")
+    proof = (
+        f"at most {most} pose{'s' * (most != 1)} by {why}, {len(boxes)} enclosed apart from each other, "
+        f"complex ones too{told_far(boxes)}, {len(real)} real"
+    )
     left = [c for c in system.conditions if c not in forms.planes and c not in forms.others]
     kept = [box for box in real if box is goal or not excluded_by(left, forms.poses, box, slack)]
     fitting = [box for box in kept if not left or box is goal or system.miss(box) <= VANISHES]
@@ -192,17 +233,34 @@ def _judge(system: PosedPlatform, forms: SquareForms, own: bool) -> SystemModes:
     open_ = len(kept) - len(fitting)
     if left:
         others = [mode.residual for mode in modes if not mode.proved]
-        proof = (f"from {len(system.conditions) - len(left)} of {len(system.conditions)} conditions: {proof}; of these "
-                 + words(goal is not None, False, others, len(real) - len(kept), open_))
-    return SystemModes(len(modes) if left else len(boxes), modes, complete and not open_, proof,
-                       bound=named if complete else "none", enclosed=complete)
+        proof = (
+            f"from {len(system.conditions) - len(left)} of {len(system.conditions)} conditions: {proof}; of these "
+            + words(goal is not None, False, others, len(real) - len(kept), open_)
+        )
+    return SystemModes(
+        len(modes) if left else len(boxes),
+        modes,
+        complete and not open_,
+        proof,
+        bound=named if complete else "none",
+        enclosed=complete,
+    )
 
 
 def _mode(system: PosedPlatform, box: PoseBox, proved: bool) -> SystemMode:
     """A real box as a mode."""
-    shift = system.size * float(np.linalg.norm(box.radii[box.turned:]))
+    shift = system.size * float(np.linalg.norm(box.radii[box.turned :]))
     # two unit quaternions at the distance δ are turned against each other by at most 4 asin(δ / 2) ≤ π δ
-    turn = np.pi * float(np.linalg.norm(box.radii[:box.turned]))
+    turn = np.pi * float(np.linalg.norm(box.radii[: box.turned]))
     q = system.place(box)
-    return SystemMode((), max(shift / system.size, turn), shift, turn, system.miss(box), frozen(system.pose(q)),
-                      frozen(q), proved=proved, fits=not proved)
+    return SystemMode(
+        (),
+        max(shift / system.size, turn),
+        shift,
+        turn,
+        system.miss(box),
+        frozen(system.pose(q)),
+        frozen(q),
+        proved=proved,
+        fits=not proved,
+    )

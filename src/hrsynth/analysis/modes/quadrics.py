@@ -165,8 +165,12 @@ def spokes(circle: Circle, frame: WorkingFrame, turn: float, numbers: Numbers) -
 
 def distance(one: Conic, other: Conic, squared: Any) -> Any:
     """The table of |tip₁ − tip₂|² = ``squared``."""
-    return (np.outer(one.Q, other.w) + np.outer(one.w, other.Q) - 2 * (one.N @ other.N.T)
-            - squared * np.outer(one.w, other.w))
+    return (
+        np.outer(one.Q, other.w)
+        + np.outer(one.w, other.Q)
+        - 2 * (one.N @ other.N.T)
+        - squared * np.outer(one.w, other.w)
+    )
 
 
 def on_plane(one: Conic, normal: Any, offset: Any) -> Any:
@@ -186,8 +190,11 @@ def sum_on_plane(one: Conic, other: Conic, sign: int, normal: Any, offset: Any) 
 
 def sum_on_sphere(one: Conic, other: Conic, sign: int, centre: Any, squared: Any) -> Any:
     """The table of |tip₁ ± tip₂ − centre|² = ``squared``."""
-    return (np.outer(on_sphere(one, centre, squared), other.w)
-            + np.outer(one.w, other.Q - sign * 2 * (other.N @ centre)) + sign * 2 * (one.N @ other.N.T))
+    return (
+        np.outer(on_sphere(one, centre, squared), other.w)
+        + np.outer(one.w, other.Q - sign * 2 * (other.N @ centre))
+        + sign * 2 * (one.N @ other.N.T)
+    )
 
 
 def _middle(curves: Sequence[Reach]) -> Array:
@@ -255,8 +262,10 @@ class PoseSystem:
         tips = chart.tips(numbers)
         groups = [conditions(tips[k], chart.reaches[k], chart.frame, numbers) for k in self.legs]
         needed = chart.count - len(chart.own) - sum(map(len, groups[:-1]))
-        return [Quadric(A) for A in (*chart.own, *(A for group in groups[:-1] for A in group),
-                                     *_combine(groups[-1], needed))]
+        return [
+            Quadric(A)
+            for A in (*chart.own, *(A for group in groups[:-1] for A in group), *_combine(groups[-1], needed))
+        ]
 
 
 def conditions(tip: Conic, reach: Reach, frame: WorkingFrame, numbers: Numbers) -> list[Any]:

@@ -100,8 +100,9 @@ class _Sum:
             return Circle(self.centre, axis, float(np.linalg.norm(spoke)), spoke)
         first = [axis for axis, _ in self.circles] or [_normal(self.lines)]
         normal = first[0]
-        if (all(lines.parallel(axis, normal) for axis in first)
-                and all(lines.perpendicular(d, normal) for d in self.lines)):
+        if all(lines.parallel(axis, normal) for axis in first) and all(
+            lines.perpendicular(d, normal) for d in self.lines
+        ):
             self.tilt += sum(abs(float(d @ normal)) for d in self.lines)
             return Plane(self.centre, normal)
         if len(self.circles) == 1 and all(lines.parallel(d, self.lines[0]) for d in self.lines):
@@ -157,8 +158,7 @@ def _crank(total: _Sum, Q: Array, axis: Array, vector: Array, watched: Sequence[
             angle = np.arctan2(axis @ np.cross(start, end), start @ end - (axis @ start) * (axis @ end))
             v = Q @ vector
             across = v - axis * float(axis @ v)
-            total.centre = (total.centre + v - across + across * np.cos(angle)
-                            + np.cross(axis, across) * np.sin(angle))
+            total.centre = total.centre + v - across + across * np.cos(angle) + np.cross(axis, across) * np.sin(angle)
             return
     total.turn(axis, Q @ vector)
 
@@ -166,8 +166,11 @@ def _crank(total: _Sum, Q: Array, axis: Array, vector: Array, watched: Sequence[
 def _turns(total: _Sum, body: ChainBody, Q: Array, a: Array) -> None:
     """A body that turns about the fixed direction Q a, counted from the orientation Q."""
     axis = Q @ a
-    if len(body.slides) == 1 and not body.cranks and not any(test(body.slides[0], a) for test in (
-            lines.parallel, lines.perpendicular)):
+    if (
+        len(body.slides) == 1
+        and not body.cranks
+        and not any(test(body.slides[0], a) for test in (lines.parallel, lines.perpendicular))
+    ):
         total.sweeps.append((axis, Q @ body.shift, Q @ body.slides[0]))
         return
     total.turn(axis, Q @ body.shift)
@@ -199,8 +202,13 @@ def apart(one: Reach | Quadrics, other: Reach | Quadrics, length: float) -> floa
     """How far two reaches are apart (characteristic lengths, radians); infinite where they are of different kinds."""
     if type(one) is not type(other):
         return np.inf
-    between = (one.miss(other.centre) if isinstance(one, Line | Plane) else
-               one.off(other.centre) if isinstance(one, SweptCircle) else one.centre - other.centre)
+    between = (
+        one.miss(other.centre)
+        if isinstance(one, Line | Plane)
+        else one.off(other.centre)
+        if isinstance(one, SweptCircle)
+        else one.centre - other.centre
+    )
     found = [float(np.linalg.norm(between)) / length]
     for name in ("direction", "normal", "axis"):
         if hasattr(one, name):

@@ -53,8 +53,13 @@ class Planar(System):
         super().__post_init__()
         n = self.X_plane[:3, 2]
         for curve in self.curves:
-            off = (length(cross(n, curve.axis)) if isinstance(curve, Circle) else
-                   abs(float(n @ curve.direction)) if isinstance(curve, Line) else 0.0)
+            off = (
+                length(cross(n, curve.axis))
+                if isinstance(curve, Circle)
+                else abs(float(n @ curve.direction))
+                if isinstance(curve, Line)
+                else 0.0
+            )
             if off > SAME_DIRECTION:
                 raise BadRequest("a curve outside the plane of motion, sine", off, f"at most {SAME_DIRECTION}")
         if self.surfaces:
@@ -158,16 +163,21 @@ def _third(conics: Sequence[Conic], tips: Sequence[Any], curve: Curve, frame: Wo
         d = direction(curve.direction, frame, numbers)
         normal = np.array([-d[1], d[0]])
         first, second = alpha.T @ gamma @ normal, beta.T @ gamma @ normal
-        return (np.outer(one.N @ first, other.w) + np.outer(one.w, other.N @ second)
-                - scale * (normal @ centre) * np.outer(one.w, other.w))
+        return (
+            np.outer(one.N @ first, other.w)
+            + np.outer(one.w, other.N @ second)
+            - scale * (normal @ centre) * np.outer(one.w, other.w)
+        )
     assert isinstance(curve, Circle)
     # |α tip₁ + β tip₂ − γ c|² = |γ|² ρ²
     rho = numbers.vector(np.array([curve.radius / frame.size]))[0]
     first, second = alpha.T @ gamma @ centre, beta.T @ gamma @ centre
-    return (np.outer((alpha.T @ alpha)[0, 0] * one.Q - 2 * (one.N @ first), other.w)
-            + np.outer(one.w, (beta.T @ beta)[0, 0] * other.Q - 2 * (other.N @ second))
-            + 2 * (one.N @ (alpha.T @ beta) @ other.N.T)
-            + scale * (centre @ centre - rho * rho) * np.outer(one.w, other.w))
+    return (
+        np.outer((alpha.T @ alpha)[0, 0] * one.Q - 2 * (one.N @ first), other.w)
+        + np.outer(one.w, (beta.T @ beta)[0, 0] * other.Q - 2 * (other.N @ second))
+        + 2 * (one.N @ (alpha.T @ beta) @ other.N.T)
+        + scale * (centre @ centre - rho * rho) * np.outer(one.w, other.w)
+    )
 
 
 def _turn_vector(turn: complex, v: Array) -> tuple[float, float]:
@@ -197,7 +207,7 @@ class Spatial(System):
     @property
     def points(self) -> Array:
         """The tips that are points of the platform, shape (n - arrows, 3)."""
-        return self.tips[:len(self.tips) - self.arrows]
+        return self.tips[: len(self.tips) - self.arrows]
 
     def pose(self, q: Array) -> Array:
         """The platform's frame in the base frame; shape (4, 4)."""
@@ -207,7 +217,7 @@ class Spatial(System):
         """Where the tips are at a pose; shape (legs, 3), metres."""
         X = self.pose(q)
         at = self.tips @ X[:3, :3].T
-        return np.vstack([X[:3, 3] + at[:len(self.points)], self.hub + at[len(self.points):]])
+        return np.vstack([X[:3, 3] + at[: len(self.points)], self.hub + at[len(self.points) :]])
 
     def spread(self, q: Array, apart: Mapping[int, float]) -> tuple[float, float]:
         """How far the platform's frame (m) and turn (rad) can be from those at q; see ``registered``."""
@@ -225,7 +235,7 @@ class Spatial(System):
         choices += [(i, j, k) for k in points for i, j in combinations(moving, 2)] + list(combinations(moving, 3))
         for legs in choices:
             a, b, c = self.tips[list(legs)]
-            if length(cross(b - a, c - a)) > SAME_POINT * self.size ** 2:
+            if length(cross(b - a, c - a)) > SAME_POINT * self.size**2:
                 yield self._square(legs, len(moving) == len(self.curves) == 3)
 
     def _square(self, legs: tuple[int, ...], whole: bool) -> SquareSystem:
@@ -246,8 +256,10 @@ class Spatial(System):
             if len(unknowns) == 2:
                 held = numbers.vector(frame.point(curves[2].centre))
                 reach = on_sphere(conics[1], held, arms[1][2] @ arms[1][2])
-                return [Equation(distance(conics[0], conics[1], arms[0][2] @ arms[0][2]), 0, 1),
-                        Equation(np.outer(np.array([1, 0, 0], dtype=object), reach), 0, 1)]
+                return [
+                    Equation(distance(conics[0], conics[1], arms[0][2] @ arms[0][2]), 0, 1),
+                    Equation(np.outer(np.array([1, 0, 0], dtype=object), reach), 0, 1),
+                ]
             return [Equation(distance(conics[i], conics[j], v @ v), i, j) for i, j, v in arms]
 
         def place(parameters: Sequence[float]) -> Array:

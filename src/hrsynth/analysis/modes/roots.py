@@ -170,11 +170,17 @@ def _roots(square: _Enclosing, order: tuple[int, ...], eliminant: Eliminant, far
     if kept_round:
         polynomial, pairs = without(polynomial, fmpz_poly([1, 0, 1]))
         extraneous = 2 * pairs
-    found = square.all_of(all_solutions(polynomial, lambda x, m: _over(x, m, order, eliminant, half_angles)),
-                          polynomial.degree(), farthest)
+    found = square.all_of(
+        all_solutions(polynomial, lambda x, m: _over(x, m, order, eliminant, half_angles)),
+        polynomial.degree(),
+        farthest,
+    )
     with ctx.workprec(PRECISION):
-        surely = all(square.complex_for_all(values) for values in found.values
-                     if NEARLY_DOUBLE / 2 <= off_real(values) < NEARLY_REAL)
+        surely = all(
+            square.complex_for_all(values)
+            for values in found.values
+            if NEARLY_DOUBLE / 2 <= off_real(values) < NEARLY_REAL
+        )
     return replace(found, extraneous=extraneous, complete=found.complete and not at_infinity and surely)
 
 
@@ -193,8 +199,9 @@ def all_solutions(polynomial: fmpz_poly, over: Callable[[Any, int], list[Solutio
     return resolved
 
 
-def _over(x: Any, multiplicity: int, order: tuple[int, ...], eliminant: Eliminant, half_angles: Sequence[bool]
-          ) -> list[Solution]:
+def _over(
+    x: Any, multiplicity: int, order: tuple[int, ...], eliminant: Eliminant, half_angles: Sequence[bool]
+) -> list[Solution]:
     """The solutions over a root, each with its multiplicity; none where they cannot be told from infinity or from each
     other."""
     one = _restore_order(order, (x, *eliminant.others(x)))
@@ -281,9 +288,18 @@ class Enclosing(ABC):
         near = set(map(id, values))
         distant = tuple(values for values, _ in solutions if id(values) not in near)
         proved = all(root.real and (root.unique or root.multiplicity > 1) for root in real)
-        return Roots(count, real, degree - far, complete=count == degree - far and proved and not undecided,
-                     closest=_closest(values), method=self.method, far=far, undecided=undecided, values=values,
-                     distant=distant)
+        return Roots(
+            count,
+            real,
+            degree - far,
+            complete=count == degree - far and proved and not undecided,
+            closest=_closest(values),
+            method=self.method,
+            far=far,
+            undecided=undecided,
+            values=values,
+            distant=distant,
+        )
 
     def _enclose(self, start: Sequence[Any], multiplicity: int) -> Root:
         """The box of a real solution: for the exact input where that can be proved, else for the rounded one."""
@@ -326,8 +342,13 @@ class _Enclosing(Enclosing):
     @cached_property
     def _radii(self) -> list[list[float]]:
         """Of each unknown's curve how far the exact coefficients of t⁰, t¹, t² can be from the rounded ones (m)."""
-        return [[math.hypot(*(float(each.rad()) for each in row if not isinstance(each, int))) * self.frame.size / UNIT
-                 for row in path.N] for path in self.conics]
+        return [
+            [
+                math.hypot(*(float(each.rad()) for each in row if not isinstance(each, int))) * self.frame.size / UNIT
+                for row in path.N
+            ]
+            for path in self.conics
+        ]
 
     def distance(self, values: Sequence[Any]) -> float:
         found = []
@@ -337,13 +358,17 @@ class _Enclosing(Enclosing):
         return max(found)
 
     def parameters(self, values: Sequence[Any]) -> tuple[Any, ...]:
-        return tuple(parameter(curve, self.frame, origin, t) for curve, origin, t in zip(
-            self.part.unknowns, self.part.turns(self.turn), values, strict=True))
+        return tuple(
+            parameter(curve, self.frame, origin, t)
+            for curve, origin, t in zip(self.part.unknowns, self.part.turns(self.turn), values, strict=True)
+        )
 
     def misses(self, own: Sequence[Any], values: Sequence[Any]) -> tuple[float, ...]:
         if self.part.exact is not None:
-            return tuple(self._miss(*each) for each in zip(self.part.unknowns, own, values,
-                                                           self.part.exact(self.balls), strict=True))
+            return tuple(
+                self._miss(*each)
+                for each in zip(self.part.unknowns, own, values, self.part.exact(self.balls), strict=True)
+            )
         found = []
         for curve, s, t, (r0, r1, r2) in zip(self.part.unknowns, own, values, self._radii, strict=True):
             ball, size = float(s.rad()), abs(float(t.mid())) + float(t.rad())
@@ -355,12 +380,14 @@ class _Enclosing(Enclosing):
         """As above, for a point that is none of the curve's own."""
         centre, powers = self.frame.point(curve.at(float(s.mid()))), np.array([1, t, t * t], dtype=object)
         w = (powers @ path.w) * UNIT
-        return self.frame.size * math.hypot(*(float((x / w - c).abs_upper())
-                                              for x, c in zip(powers @ path.N, centre.tolist(), strict=True)))
+        return self.frame.size * math.hypot(
+            *(float((x / w - c).abs_upper()) for x, c in zip(powers @ path.N, centre.tolist(), strict=True))
+        )
 
 
-def _nearer(solutions: Sequence[Solution], distance: Callable[[Sequence[Any]], float], farthest: float
-            ) -> tuple[list[Solution], int, bool]:
+def _nearer(
+    solutions: Sequence[Solution], distance: Callable[[Sequence[Any]], float], farthest: float
+) -> tuple[list[Solution], int, bool]:
     """The solutions within a distance (sizes), which are not at infinity but for rounding, how many are beyond, and
     whether that is not clear; ``distance`` gives that of a solution (sizes)."""
     if not np.isfinite(farthest):

@@ -52,7 +52,7 @@ class ModeSearch:
     @property
     def words(self) -> str:
         """What was done, and how well it covers."""
-        once = sum(mode.met == 1 for mode in self.modes[0 if any(motion.goal for motion in self.motions) else 1:])
+        once = sum(mode.met == 1 for mode in self.modes[0 if any(motion.goal for motion in self.motions) else 1 :])
         rare = "" if not once else f"; {once} of the modes {'was' if once == 1 else 'were'} met only once"
         moving = sum(motion.met for motion in self.motions)
         on = f", {moving} of them on self-motions" if moving else ""
@@ -63,8 +63,10 @@ class ModeSearch:
         """What is special: closings at which the platform is free to move to first order."""
         if not self.loose:
             return None
-        return (f"{self.loose} starts ended at poses, not listed, at which the measurements leave the platform a "
-                "freedom, and from which no self-motion was followed: singular poses")
+        return (
+            f"{self.loose} starts ended at poses, not listed, at which the measurements leave the platform a "
+            "freedom, and from which no self-motion was followed: singular poses"
+        )
 
 
 def search(goal: ClosedConfiguration, question: Measurement, bodies: Sequence[str]) -> ModeSearch:
@@ -94,8 +96,14 @@ def search(goal: ClosedConfiguration, question: Measurement, bodies: Sequence[st
         closed, quiet = closed + 1, quiet + 1
         at = ClosedConfiguration.of(twin, q)
         poses = _poses(at, bodies)
-        known = next((k for k, mode in enumerate(found)
-                      if bodies_apart(mode.bodies, poses, question, twin.length) <= SAME_RELATION), None)
+        known = next(
+            (
+                k
+                for k, mode in enumerate(found)
+                if bodies_apart(mode.bodies, poses, question, twin.length) <= SAME_RELATION
+            ),
+            None,
+        )
         if known is not None:
             mode = found[known]
             better = mode.configuration is not goal and outside(twin, mode.configuration.q) and not outside(twin, q)
@@ -118,8 +126,9 @@ def search(goal: ClosedConfiguration, question: Measurement, bodies: Sequence[st
     return ModeSearch(tuple(found), tuple(motions), starts, closed, loose, tuple(near))
 
 
-def _add_near(near: list[FoundMode], twin: PinocchioModel, q: Array, residual: float, bodies: Sequence[str],
-              question: Measurement) -> None:
+def _add_near(
+    near: list[FoundMode], twin: PinocchioModel, q: Array, residual: float, bodies: Sequence[str], question: Measurement
+) -> None:
     """Close the loops where a start ended that met loops and measurements nearly, and add that pose if it is new."""
     q, left = solve(twin, q, tolerance=SOLVED)
     if left > CLOSED:

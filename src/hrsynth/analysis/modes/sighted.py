@@ -44,7 +44,8 @@ class Sight:
         """How far a point of its curves within the robot's extent can be from the exact one (m), where a point of the
         robot is known to ``exact``."""
         points = [each.place for each in self.loci if not each.turns] + [
-            each.through for each in self.loci if not each.turns]
+            each.through for each in self.loci if not each.turns
+        ]
         if not points:
             return exact
         body = goal.pose(self.body)[:3, 3]
@@ -55,8 +56,9 @@ class Sight:
         return MOVED * (exact * max(1.0, far / LEVER) + rounding) * bent
 
 
-def sights(anatomy: LegDecomposition, question: Measurement, goal: ClosedConfiguration
-           ) -> tuple[Measurement, tuple[Sight, ...]]:
+def sights(
+    anatomy: LegDecomposition, question: Measurement, goal: ClosedConfiguration
+) -> tuple[Measurement, tuple[Sight, ...]]:
     """What is measured of legs, by their labels, and the sights. Raises ``NotConfined`` where what an observation
     leaves is not known, or what is observed is neither a leg's nor between base and platform."""
     base, bodies = anatomy.mechanism.base, leg_ends(anatomy)
@@ -84,8 +86,11 @@ def _of_leg(anatomy: LegDecomposition, seen: Observation) -> Observation:
     if joint is not None and set(joint.links) <= set(anatomy.platform):
         return replace(seen, leg="")
     for leg in anatomy.legs:
-        if seen.joint in leg.joints if isinstance(seen, Encoder) else isinstance(seen, Direction) and (
-                seen.link in leg.links):
+        if (
+            seen.joint in leg.joints
+            if isinstance(seen, Encoder)
+            else isinstance(seen, Direction) and (seen.link in leg.links)
+        ):
             return replace(seen, leg=leg.label)
     raise NotConfined(anatomy.mechanism.name, f"{seen.kind} {seen.leg} is of no leg and not between base and platform")
 
@@ -117,8 +122,7 @@ def _with_sights(confined: TipLoci, seen: Sequence[Sight], goal: ClosedConfigura
 
 
 def all_loci(measured: MeasuredRobot, goal: ClosedConfiguration) -> tuple[TipLoci, tuple[Sight, ...]]:
-    """Where tips of legs and seen points can be, all other measurements held; and the sights. Raises ``NotConfined``.
-    """
+    """Where tips of legs and seen points can be, all other measurements held; and sights. Raises ``NotConfined``."""
     setting = measured.setting
     rest, seen = sights(setting.anatomy, measured.question, goal)
     if not seen:
@@ -154,7 +158,7 @@ def _reach(locus: HeldPlace, plane: Array | None) -> Reach | None:
             return Sphere(locus.through, locus.radius)
         if len(locus.normals) == 1:
             return Plane(locus.through, locus.normals[0])
-        return (Line(locus.through, np.cross(*locus.normals)) if len(locus.normals) == 2 else Point(locus.through))
+        return Line(locus.through, np.cross(*locus.normals)) if len(locus.normals) == 2 else Point(locus.through)
     if locus.radius is not None:
         v = locus.place - locus.through
         centre = locus.through + plane * float(plane @ v)
@@ -173,14 +177,17 @@ def conditions(seen: Sequence[Sight], middle: Middle, turned: bool) -> list[Pose
         label, back = each.seen.leg, each.back != turned
         for locus in each.loci:
             if locus.turns:
-                found += [AtAngle(label, none, n if back else locus.place, locus.place if back else n,
-                                  float(n @ locus.place)) for n in locus.normals]
+                found += [
+                    AtAngle(label, none, n if back else locus.place, locus.place if back else n, float(n @ locus.place))
+                    for n in locus.normals
+                ]
                 continue
             place, through = middle.point(locus.place), middle.point(locus.through)
             body, rest = (through, place) if back else (place, through)
             if locus.radius is not None:
-                found.append(OnRevolution(label, body, none, rest, up,
-                                          np.array([(locus.radius / middle.size) ** 2, 0.0, -1.0])))
+                found.append(
+                    OnRevolution(label, body, none, rest, up, np.array([(locus.radius / middle.size) ** 2, 0.0, -1.0]))
+                )
             elif back and len(locus.normals) < 3:
                 found += [OnMovingPlane(label, body, n, rest, float(n @ (rest - body))) for n in locus.normals]
             else:
@@ -211,5 +218,9 @@ def behind(observed: Sequence[Observation], pose: Poses) -> tuple[str, ...] | No
     points = [o for o in observed if isinstance(o, CameraObservation) and o.camera is not None and o.spot]
     if not points:
         return None
-    return tuple(o.leg for o in points if o.camera is not None and transform(
-        inverse(pose(o.camera.link) @ o.camera.pose), transform(pose(o.link), o.at))[2] <= 0.0)
+    return tuple(
+        o.leg
+        for o in points
+        if o.camera is not None
+        and transform(inverse(pose(o.camera.link) @ o.camera.pose), transform(pose(o.link), o.at))[2] <= 0.0
+    )

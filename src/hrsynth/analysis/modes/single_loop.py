@@ -74,13 +74,21 @@ class SingleLoop(CarriedPlatform):
             parts = [np.zeros(3), each.axis / 2] if each.slides else [each.axis, np.cross(each.point, each.axis)]
             off = self.error / self.size * (1.0 + float(np.linalg.norm(each.point)))
             values = [0.0, *parts[0], 0.0, *parts[1]]
-            found.append(np.array([arb(v, 0.0 if v == 0.0 and k in (0, 4) else off + NUMBER_ROUNDING * (1.0 + abs(v)))
-                                   for k, v in enumerate(values)], dtype=object))
+            found.append(
+                np.array(
+                    [
+                        arb(v, 0.0 if v == 0.0 and k in (0, 4) else off + NUMBER_ROUNDING * (1.0 + abs(v)))
+                        for k, v in enumerate(values)
+                    ],
+                    dtype=object,
+                )
+            )
         return found
 
 
 def dual_product(a: Any, b: Any) -> Any:
     """The product of dual quaternions (8,)."""
+
     def product(p: Any, q: Any) -> Any:
         v, w = p[1:], q[1:]
         turned = [v[j] * w[k] - v[k] * w[j] for j, k in ((1, 2), (2, 0), (0, 1))]
@@ -99,8 +107,12 @@ def single_loop(measured: MeasuredRobot, goal: ClosedConfiguration, error: float
     mechanism, seen = goal.twin.mechanism, measured.question.observations
     bodies = leg_ends(measured.setting.anatomy)
     ends = [link for joint in mechanism.joints.values() for link in joint.links]
-    if (mechanism.couplings or len(bodies) != 1 or measured.setting.anatomy.point is not None
-            or any(ends.count(link) != 2 for link in mechanism.links)):
+    if (
+        mechanism.couplings
+        or len(bodies) != 1
+        or measured.setting.anatomy.point is not None
+        or any(ends.count(link) != 2 for link in mechanism.links)
+    ):
         raise NotConfined(mechanism.name, "it is not one loop, of which the platform is a body")
     middle = Middle(goal.pose(bodies[0])[:3, 3], goal.twin.length)
     held = [each.joint for each in seen if isinstance(each, Encoder)]
@@ -111,8 +123,15 @@ def single_loop(measured: MeasuredRobot, goal: ClosedConfiguration, error: float
         forward, places = joint.predecessor == at, list(goal.twin.coordinates.get(joint.name, ()))
         found = freedoms_of(joint, at, goal, middle, held)
         at = joint.other(at)
-        way.append(([(f, place, 1 if forward else -1)
-                     for f, place in zip(found, places if forward else places[::-1], strict=False)], at))
+        way.append(
+            (
+                [
+                    (f, place, 1 if forward else -1)
+                    for f, place in zip(found, places if forward else places[::-1], strict=False)
+                ],
+                at,
+            )
+        )
     for each in seen:
         if isinstance(each, Encoder):
             continue
@@ -134,9 +153,20 @@ def single_loop(measured: MeasuredRobot, goal: ClosedConfiguration, error: float
     chain = [one for part, _ in way for one in part]
     if not 0 < len(chain) <= LARGEST_CHAIN:
         raise NotConfined(mechanism.name, f"its loop has {len(chain)} free joints")
-    return SingleLoop((), np.zeros((0, 3)), tuple(one[0] for one in chain), (), middle, goal.pose(bodies[0]),
-                      sum(len(part) for part, _ in way[:k]), bodies[0], goal, measured.question,
-                      tuple(one[1:] for one in chain), error=error)
+    return SingleLoop(
+        (),
+        np.zeros((0, 3)),
+        tuple(one[0] for one in chain),
+        (),
+        middle,
+        goal.pose(bodies[0]),
+        sum(len(part) for part, _ in way[:k]),
+        bodies[0],
+        goal,
+        measured.question,
+        tuple(one[1:] for one in chain),
+        error=error,
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,10 +186,15 @@ class _Linear:
         """Of the first two, conjugate, of the last, and the axis in the middle."""
         h = [self.loop.axes()[k] for k in self.order]
         one = np.array([1, 0, 0, 0, 0, 0, 0, 0], dtype=object)
-        two, rest = h[:2], h[2 + (len(h) == LARGEST_CHAIN):]
+        two, rest = h[:2], h[2 + (len(h) == LARGEST_CHAIN) :]
         start = [one, -1 * two[0], -1 * two[1], dual_product(two[1], two[0])] if len(two) == 2 else [one, -1 * two[0]]
-        end = ([one] if not rest else [one, rest[0]] if len(rest) == 1 else
-               [one, rest[0], rest[1], dual_product(rest[0], rest[1])])
+        end = (
+            [one]
+            if not rest
+            else [one, rest[0]]
+            if len(rest) == 1
+            else [one, rest[0], rest[1], dual_product(rest[0], rest[1])]
+        )
         return start, end, h[2] if len(h) == LARGEST_CHAIN else None
 
     def matrix(self, t: Any) -> Any:
@@ -178,7 +213,7 @@ def _regular(rows: Any) -> bool:
     from scipy.linalg import qr
 
     middle = rows.astype(float)
-    chosen = np.sort(qr(middle.T, pivoting=True, mode="r")[1][:rows.shape[1]])
+    chosen = np.sort(qr(middle.T, pivoting=True, mode="r")[1][: rows.shape[1]])
     inverse = np.linalg.pinv(middle[chosen])
     return not (arb_mat(inverse.tolist()) * arb_mat(rows[chosen].tolist())).det().contains(0)
 
@@ -212,7 +247,7 @@ def _determinant(linear: _Linear) -> list[Any]:
             values.append([M.mid().det() * (M.mid().inv() * M).det()])
         except ZeroDivisionError:
             values.append([M.det()])
-    powers = arb_mat([[t ** k for k in range(5)] for t in nodes])
+    powers = arb_mat([[t**k for k in range(5)] for t in nodes])
     return [row[0] for row in (powers.inv() * arb_mat(values)).table()]
 
 
@@ -230,7 +265,8 @@ def _products(linear: _Linear, t: Any) -> Any:
     inverse = arb_mat(np.linalg.pinv(middle[chosen][:, others]).tolist())
     try:
         found = (inverse * arb_mat(M[chosen][:, others].tolist())).solve(
-            inverse * arb_mat([[-M[k, one]] for k in chosen]))
+            inverse * arb_mat([[-M[k, one]] for k in chosen])
+        )
     except ZeroDivisionError:
         return None
     x = np.array([arb(1)] * 8, dtype=object)
@@ -277,8 +313,10 @@ def _few(loop: SingleLoop) -> SystemModes:
         raise Unsolved("the loop", f"{n} free joints: the linear equations of its products have several solutions")
     box = _box(loop, [(arb(1), arb(0))] * n)
     assert box is not None
-    proof = (f"{n} free joint{'s' * (n > 1)} of one loop: at most one closing by the rank of linear equations in "
-             "balls, which is the goal")
+    proof = (
+        f"{n} free joint{'s' * (n > 1)} of one loop: at most one closing by the rank of linear equations in "
+        "balls, which is the goal"
+    )
     return SystemModes(1, (as_mode(loop, box, True, 0.0),), True, proof, bound="rank", enclosed=True)
 
 
@@ -306,8 +344,10 @@ def _zeros(linear: _Linear) -> SystemModes | None:
         return None
     kept = [each for each in told if each is at_goal[0] or not each[1]]
     modes = [_mode(linear.loop, each[0], each is at_goal[0]) for each in kept]
-    proof = (f"{LARGEST_CHAIN} free joints of one loop: at most {len(sure)} closings by the degree of a determinant, "
-             f"{len(sure)} zeros enclosed apart from each other, complex ones too, {len(told)} real")
+    proof = (
+        f"{LARGEST_CHAIN} free joints of one loop: at most {len(sure)} closings by the degree of a determinant, "
+        f"{len(sure)} zeros enclosed apart from each other, complex ones too, {len(told)} real"
+    )
     out = [as_mode(linear.loop, box, False) for box, excluded in told if (box, excluded) not in kept]
     return SystemModes.of_more(modes, out, proof, "class")
 

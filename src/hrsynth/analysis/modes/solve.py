@@ -65,9 +65,14 @@ class SystemMode(Value):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain numbers."""
-        return {"parameters": list(self.parameters), "radius": self.radius, "residual": self.residual,
-                "pose": self.pose.tolist(), "multiplicity": self.multiplicity,
-                "fits": self.residual if self.fits else None}
+        return {
+            "parameters": list(self.parameters),
+            "radius": self.radius,
+            "residual": self.residual,
+            "pose": self.pose.tolist(),
+            "multiplicity": self.multiplicity,
+            "fits": self.residual if self.fits else None,
+        }
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -119,19 +124,34 @@ class SystemModes(Value):
         fitting = tuple(mode for mode in modes if mode.proved or mode.residual <= VANISHES)
         open_ = len(modes) - len(fitting)
         told = words(True, False, [mode.residual for mode in fitting if not mode.proved], len(out), open_)
-        near = tuple(replace(mode, near=True) for mode in (*out, *modes)
-                     if mode not in fitting and mode.residual <= NEAR_MODE)
-        return cls(len(fitting), fitting, not open_, f"{proof}; of these {told}", near,
-                   bound="none" if open_ else bound, enclosed=True)
+        near = tuple(
+            replace(mode, near=True) for mode in (*out, *modes) if mode not in fitting and mode.residual <= NEAR_MODE
+        )
+        return cls(
+            len(fitting),
+            fitting,
+            not open_,
+            f"{proof}; of these {told}",
+            near,
+            bound="none" if open_ else bound,
+            enclosed=True,
+        )
 
     def __getstate__(self) -> dict[str, Any]:
         return {**super().__getstate__(), "solved": ()}
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line, without the command's own fields."""
-        return {"complex": self.complex, "complete": self.complete, "bound": self.bound, "proof": self.proof,
-                "modes": [each.to_dict() for each in self.modes], "near": [each.to_dict() for each in self.near],
-                "degenerate": self.degenerate, "continuum": self.continuum}
+        return {
+            "complex": self.complex,
+            "complete": self.complete,
+            "bound": self.bound,
+            "proof": self.proof,
+            "modes": [each.to_dict() for each in self.modes],
+            "near": [each.to_dict() for each in self.near],
+            "degenerate": self.degenerate,
+            "continuum": self.continuum,
+        }
 
 
 def solve(system: System, *, near: bool = True, goal: Array | None = None) -> SystemModes:
@@ -158,8 +178,7 @@ def _solve(system: System, near: bool, goal: Array | None) -> SystemModes:
             if not near:
                 return _judge(system, square, roots, None, goal)
             others = (each for each in system.squares() if each.legs != square.legs)
-            return _judge(system, square, roots,
-                           ((each, solve_square(each)) for each in islice(others, CHOICES)), goal)
+            return _judge(system, square, roots, ((each, solve_square(each)) for each in islice(others, CHOICES)), goal)
     if system.surfaces and not isinstance(system, Translating):
         return _propose(system, near, goal, propose_roots)
     return _undecided_modes(system, square is not None, goal, near)
@@ -175,8 +194,9 @@ def solve_by_msolve(system: System, *, near: bool = True, goal: Array | None = N
     return replace(_propose(system, near, goal, lambda part, enough: by_msolve(part)), meant=told)
 
 
-def _propose(system: System, near: bool, goal: Array | None,
-              proposer: Callable[[PoseSystem, int | None], Proposed | None]) -> SystemModes:
+def _propose(
+    system: System, near: bool, goal: Array | None, proposer: Callable[[PoseSystem, int | None], Proposed | None]
+) -> SystemModes:
     if system.missing:
         return _too_few(system)
     part = None
@@ -208,16 +228,28 @@ def _undecided_modes(system: System, tried: bool, goal: Array | None, near: bool
     continuum are looked for where ``near`` ones are."""
     known = () if goal is None else (_by_construction(system, goal, ()),)
     if not tried:
-        return SystemModes(len(known), known, False, "nothing proved", degenerate="no choice of legs decides the pose: "
-                           "tips on one line, in one point, or at rest", open=True)
+        return SystemModes(
+            len(known),
+            known,
+            False,
+            "nothing proved",
+            degenerate="no choice of legs decides the pose: tips on one line, in one point, or at rest",
+            open=True,
+        )
     if not near:
-        return SystemModes(len(known), known, False, "nothing proved", degenerate="the equations depend on each other",
-                           open=True)
+        return SystemModes(
+            len(known), known, False, "nothing proved", degenerate="the equations depend on each other", open=True
+        )
     size = dimension(system)
     if not size:
-        return SystemModes(len(known), known, False, "nothing proved",
-                           degenerate="the equations depend on each other, but no continuum of poses was found",
-                           open=True)
+        return SystemModes(
+            len(known),
+            known,
+            False,
+            "nothing proved",
+            degenerate="the equations depend on each other, but no continuum of poses was found",
+            open=True,
+        )
     return replace(continuum(f"the tips can move together: a continuum of dimension {size}", size), open=True)
 
 
@@ -226,23 +258,48 @@ def continuum(text: str, size: int) -> SystemModes:
     return SystemModes(0, (), False, "a continuum is not counted", degenerate=text, continuum=size)
 
 
-def _judge(system: System, square: Part, roots: Roots, others: Iterable[tuple[Part, Roots]] | None,
-            goal: Array | None, most: Bound | None = None) -> SystemModes:
+def _judge(
+    system: System,
+    square: Part,
+    roots: Roots,
+    others: Iterable[tuple[Part, Roots]] | None,
+    goal: Array | None,
+    most: Bound | None = None,
+) -> SystemModes:
     """The modes among the solutions of a square part, ``most`` at most; near ones are looked for from those of others
     too (not at all where these are None)."""
     found = [_mode(system, square, root) for root in roots.real]
     enclosed = roots.complete and all(mode.proved for mode in found)
-    bound, proof = (("resultant", _proof(system, roots)) if isinstance(square, SquareSystem)
-                    else _bound(system, square, most, roots))
+    bound, proof = (
+        ("resultant", _proof(system, roots))
+        if isinstance(square, SquareSystem)
+        else _bound(system, square, most, roots)
+    )
     if square.whole:
-        return SystemModes(roots.complex, tuple(found), enclosed and bound != "none", proof, (), _special(roots), None,
-                           bound, enclosed, solved=(Solved(system, square, roots, tuple(found), (True,) * len(found)),))
+        return SystemModes(
+            roots.complex,
+            tuple(found),
+            enclosed and bound != "none",
+            proof,
+            (),
+            _special(roots),
+            None,
+            bound,
+            enclosed,
+            solved=(Solved(system, square, roots, tuple(found), (True,) * len(found)),),
+        )
     whole = [mode for mode, root in zip(found, roots.real, strict=True) if not _torn(system, square, root)]
     at_goal = _goal(system, roots, whole, goal)
-    left = [mode for mode in whole if mode is at_goal
-            or not (mode.proved and is_excluded(system, mode.q, mode.shift, mode.turn))]
-    modes = tuple(mode if mode is at_goal else replace(mode, proved=False, fits=mode.proved)
-                  for mode in left if mode is at_goal or mode.residual <= VANISHES)
+    left = [
+        mode
+        for mode in whole
+        if mode is at_goal or not (mode.proved and is_excluded(system, mode.q, mode.shift, mode.turn))
+    ]
+    modes = tuple(
+        mode if mode is at_goal else replace(mode, proved=False, fits=mode.proved)
+        for mode in left
+        if mode is at_goal or mode.residual <= VANISHES
+    )
     enclosed = roots.complete and len(modes) == len(left) and all(mode.proved or mode.fits for mode in modes)
     open_ = [mode for mode in left if mode is not at_goal and mode.residual > VANISHES]
     lost = goal is not None and not any(_same(system, mode.q, goal) for mode in left)
@@ -252,17 +309,29 @@ def _judge(system: System, square: Part, roots: Roots, others: Iterable[tuple[Pa
         enclosed = False
     near = () if others is None else _near(system, found, modes, others)
     fitting = [mode.residual for mode in modes if mode is not at_goal]
-    proof = (f"from {len(square.legs)} of {len(system.curves)} tips: {proof}; of these "
-             + words(at_goal is not None, lost, fitting, len(found) - len(left), len(open_)))
+    proof = f"from {len(square.legs)} of {len(system.curves)} tips: {proof}; of these " + words(
+        at_goal is not None, lost, fitting, len(found) - len(left), len(open_)
+    )
     kept = tuple(mode in left and mode not in open_ for mode in found)
-    return SystemModes(len(modes), modes, enclosed and bound != "none", proof, near, _special(roots), None, bound,
-                       enclosed, solved=(Solved(system, square, roots, tuple(found), kept),))
+    return SystemModes(
+        len(modes),
+        modes,
+        enclosed and bound != "none",
+        proof,
+        near,
+        _special(roots),
+        None,
+        bound,
+        enclosed,
+        solved=(Solved(system, square, roots, tuple(found), kept),),
+    )
 
 
 def _by_construction(system: System, goal: Array, legs: tuple[int, ...]) -> SystemMode:
     """The goal as a mode whose place no solution proves."""
-    return SystemMode((), np.inf, np.inf, np.pi, system.residual(system.tips_at(goal)), frozen(system.pose(goal)),
-                      frozen(goal), legs)
+    return SystemMode(
+        (), np.inf, np.inf, np.pi, system.residual(system.tips_at(goal)), frozen(system.pose(goal)), frozen(goal), legs
+    )
 
 
 def _goal(system: System, roots: Roots, found: Sequence[SystemMode], goal: Array | None) -> SystemMode | None:
@@ -285,17 +354,22 @@ def _bound(system: System, part: PoseSystem, most: Bound | None, roots: Roots) -
     known += f", the {roots.far} far ones for the rounded geometry" if roots.far else ""
     count = roots.complex + roots.beyond + roots.far
     if most is not None and roots.apart and count == most.most:
-        return "class", (f"{proof}; the complex ones are enclosed too, apart from each other{known}, and there are at "
-                         f"most {most.most}: {most.why}")
+        return "class", (
+            f"{proof}; the complex ones are enclosed too, apart from each other{known}, and there are at "
+            f"most {most.most}: {most.why}"
+        )
     if roots.apart and part.chart.study is None and most_zeros(part.equations(), count) == count:
-        return "rank", (f"{proof}; the complex ones are enclosed too, apart from each other{known}, and there are no "
-                        "more: ranks of multiples of the equations modulo a prime of 62 bits")
+        return "rank", (
+            f"{proof}; the complex ones are enclosed too, apart from each other{known}, and there are no "
+            "more: ranks of multiples of the equations modulo a prime of 62 bits"
+        )
     limit = "" if most is None else f"{known}, of at most {most.most}: {most.why}"
     return "none", f"{proof}; that is what the solver found{limit}"
 
 
-def _near(system: System, found: Sequence[SystemMode], modes: Sequence[SystemMode], others: Iterable[tuple[Part, Roots]]
-          ) -> tuple[SystemMode, ...]:
+def _near(
+    system: System, found: Sequence[SystemMode], modes: Sequence[SystemMode], others: Iterable[tuple[Part, Roots]]
+) -> tuple[SystemMode, ...]:
     """Near modes, from all solutions of one square part and of others."""
     starts = [mode.q for mode in found]
     for other, found_there in others:
@@ -314,8 +388,19 @@ def _mode(system: System, square: Part, root: Root) -> SystemMode:
         own, apart = (), {k: miss + TIP_ROUNDING * system.size for k, miss in enumerate(root.misses)}
     shift, turn = system.spread(q, apart)
     sure = _sure(system, root) and bool(np.isfinite(shift))
-    return SystemMode(own, max(shift / system.size, turn), shift, turn, system.residual(at), frozen(system.pose(q)),
-                frozen(q), square.legs, root.multiplicity, sure, root.unique and not sure)
+    return SystemMode(
+        own,
+        max(shift / system.size, turn),
+        shift,
+        turn,
+        system.residual(at),
+        frozen(system.pose(q)),
+        frozen(q),
+        square.legs,
+        root.multiplicity,
+        sure,
+        root.unique and not sure,
+    )
 
 
 def _points(square: SquareSystem, root: Root) -> list[tuple[Array, float]]:
@@ -327,9 +412,13 @@ def _points(square: SquareSystem, root: Root) -> list[tuple[Array, float]]:
 def _torn(system: System, square: Part, root: Root) -> bool:
     """Whether the tips of a solution's legs are torn from a rigid platform; where none rests, the square part's
     equations are that they are not."""
-    return (isinstance(square, SquareSystem) and system.rigid and _sure(system, root)
-            and any(isinstance(system.curves[k], Point) for k in square.legs)
-            and torn(system, system.known_tips(square.legs, _points(square, root))))
+    return (
+        isinstance(square, SquareSystem)
+        and system.rigid
+        and _sure(system, root)
+        and any(isinstance(system.curves[k], Point) for k in square.legs)
+        and torn(system, system.known_tips(square.legs, _points(square, root)))
+    )
 
 
 def _sure(system: System, root: Root) -> bool:
@@ -368,11 +457,15 @@ def _proof(system: System, roots: Roots) -> str:
 
 def _special(roots: Roots) -> str | None:
     if roots.undecided:
-        return ("solutions of all distances: which of them a special geometry that is meant would send to infinity is "
-                "not decided")
+        return (
+            "solutions of all distances: which of them a special geometry that is meant would send to infinity is "
+            "not decided"
+        )
     if not nearly_double(roots):
         return None
     if any(root.multiplicity > 1 for root in roots.real):
         return "a double solution: a singular pose"
-    return (f"two solutions only {roots.closest:.1e} apart (allowed for distinct poses: {NEARLY_DOUBLE:g}): "
-            "a singular pose, to rounding")
+    return (
+        f"two solutions only {roots.closest:.1e} apart (allowed for distinct poses: {NEARLY_DOUBLE:g}): "
+        "a singular pose, to rounding"
+    )

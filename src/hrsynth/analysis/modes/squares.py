@@ -45,7 +45,7 @@ class SquareSystem:
 
     def turns(self, turn: float) -> list[float]:
         """Where each unknown's circle is counted from (rad)."""
-        return [each + turn for each in TURNS[:len(self.unknowns)]]
+        return [each + turn for each in TURNS[: len(self.unknowns)]]
 
     @property
     def round(self) -> list[bool]:
@@ -93,12 +93,20 @@ def three_surfaces(legs: Sequence[tuple[int, Surface]], whole: bool) -> tuple[fl
         rho = numbers.vector(np.array([last.radius / frame.size]))[0]
         return [single(on_sphere(point(numbers), centre, rho * rho))]
 
-    return sine, SquareSystem(tuple(k for k, _ in legs), (line,), frame, build, lambda s: line.at(s[0]), whole,
-                        lambda numbers: [point(numbers)])
+    return sine, SquareSystem(
+        tuple(k for k, _ in legs),
+        (line,),
+        frame,
+        build,
+        lambda s: line.at(s[0]),
+        whole,
+        lambda numbers: [point(numbers)],
+    )
 
 
 def _sort_surfaces(surfaces: Sequence[Surface]) -> list[Surface]:
     """A sphere last where there is one; of several candidates the one that leaves the others most apart."""
+
     def apart(last: int) -> tuple[bool, float]:
         one, two = (_normal(surface, surfaces[last]) for k, surface in enumerate(surfaces) if k != last)
         return isinstance(surfaces[last], Sphere), length(cross(one, two))
@@ -122,8 +130,12 @@ def _offset(surface: Surface, last: Surface, origin: Array) -> float:
         return float(surface.normal @ (surface.centre - origin))
     assert isinstance(last, Sphere)
     size = length(surface.centre - last.centre)
-    power = (last.radius ** 2 - surface.radius ** 2 + float((surface.centre - origin) @ (surface.centre - origin))
-             - float((last.centre - origin) @ (last.centre - origin)))
+    power = (
+        last.radius**2
+        - surface.radius**2
+        + float((surface.centre - origin) @ (surface.centre - origin))
+        - float((last.centre - origin) @ (last.centre - origin))
+    )
     return power / (2.0 * size) if size > 0 else 0.0
 
 

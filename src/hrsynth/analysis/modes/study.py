@@ -22,8 +22,9 @@ COUNT = 7
 """Unknowns: three of the quaternion, four of g."""
 
 
-def study(reaches: tuple[Reach, ...], b: Array, size: float, number: int, arrows: int, hub: Array
-          ) -> PoseParametrization:
+def study(
+    reaches: tuple[Reach, ...], b: Array, size: float, number: int, arrows: int, hub: Array
+) -> PoseParametrization:
     """The chart of a number for tips b (n, 3), the last of them arrows from a hub (3,)."""
     frame = spatial_frame(reaches, size)
     E = _quaternions(number)
@@ -55,8 +56,9 @@ def study(reaches: tuple[Reach, ...], b: Array, size: float, number: int, arrows
         return np.array([*(frame.origin + frame.size * (p @ frame.R)), *logarithm(turned)])
 
     normal = sum(_product(u, v) for u, v in zip(e, g, strict=True))
-    return PoseParametrization(frame, COUNT, reaches, tips, (normal,), place, Quadric(w),
-                               np.vstack([e, g]).astype(float))
+    return PoseParametrization(
+        frame, COUNT, reaches, tips, (normal,), place, Quadric(w), np.vstack([e, g]).astype(float)
+    )
 
 
 def forms() -> tuple[Array, Array]:
@@ -64,8 +66,13 @@ def forms() -> tuple[Array, Array]:
     (e, g)."""
     e, g = np.eye(8)[:4], np.eye(8)[4:]
     R, shift, back = _rotation(e), 2 * _vector(e, g, 1), 2 * _vector(e, g, -1)
-    parts = [sum(_product(v, v) for v in e), *np.moveaxis(R.reshape(8, 8, 9), 2, 0), *np.moveaxis(shift, 2, 0),
-             *np.moveaxis(back, 2, 0), 4 * sum(_product(v, v) for v in g)]
+    parts = [
+        sum(_product(v, v) for v in e),
+        *np.moveaxis(R.reshape(8, 8, 9), 2, 0),
+        *np.moveaxis(shift, 2, 0),
+        *np.moveaxis(back, 2, 0),
+        4 * sum(_product(v, v) for v in g),
+    ]
     quadrics = np.array(parts)
     normal = sum(_product(u, v) for u, v in zip(e, g, strict=True))
     return (normal + normal.T) / 2, (quadrics + quadrics.transpose(0, 2, 1)) / 2
@@ -98,7 +105,9 @@ def _rotation(e: Any) -> Any:
     """|e|² R; shape (8, 8, 3, 3)."""
     a, b, c, d = e
     s = _product
-    rows = [[s(a, a) + s(b, b) - s(c, c) - s(d, d), 2 * (s(b, c) - s(a, d)), 2 * (s(b, d) + s(a, c))],
-            [2 * (s(b, c) + s(a, d)), s(a, a) - s(b, b) + s(c, c) - s(d, d), 2 * (s(c, d) - s(a, b))],
-            [2 * (s(b, d) - s(a, c)), 2 * (s(c, d) + s(a, b)), s(a, a) - s(b, b) - s(c, c) + s(d, d)]]
+    rows = [
+        [s(a, a) + s(b, b) - s(c, c) - s(d, d), 2 * (s(b, c) - s(a, d)), 2 * (s(b, d) + s(a, c))],
+        [2 * (s(b, c) + s(a, d)), s(a, a) - s(b, b) + s(c, c) - s(d, d), 2 * (s(c, d) - s(a, b))],
+        [2 * (s(b, d) - s(a, c)), 2 * (s(c, d) + s(a, b)), s(a, a) - s(b, b) - s(c, c) + s(d, d)],
+    ]
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)

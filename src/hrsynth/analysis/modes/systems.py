@@ -46,8 +46,9 @@ class System(Value):
     def __post_init__(self) -> None:
         tips = frozen(self.tips)
         if tips.shape != (len(self.curves), self.space) or not np.all(np.isfinite(tips)):
-            raise BadRequest("tips of a platform", list(tips.shape),
-                             f"{len(self.curves)} by {self.space} finite numbers")
+            raise BadRequest(
+                "tips of a platform", list(tips.shape), f"{len(self.curves)} by {self.space} finite numbers"
+            )
         object.__setattr__(self, "tips", tips)
 
     @cached_property
@@ -97,8 +98,9 @@ class System(Value):
         """A working frame for all tips and what they can reach."""
         return spatial_frame(self.curves, self.size)
 
-    def apart(self, q: Array, at: Array, legs: Sequence[int], points: Sequence[tuple[Array, float]]
-              ) -> dict[int, float]:
+    def apart(
+        self, q: Array, at: Array, legs: Sequence[int], points: Sequence[tuple[Array, float]]
+    ) -> dict[int, float]:
         """How far the tips of some legs can be from those at q (m), which are ``at`` (legs, 3), with the point on each
         leg's curve and how far the exact one is from it (m); a tip at rest has no such point."""
         error = self.error + TIP_ROUNDING * self.size

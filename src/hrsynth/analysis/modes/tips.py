@@ -101,8 +101,9 @@ class TipLoci(Value):
     """Whether it is the base that is seen from the platform: tips are points of the base as if that moved."""
 
 
-def tip_loci(anatomy: LegDecomposition, question: Measurement, pattern: ConstraintPattern,
-                goal: ClosedConfiguration) -> TipLoci:
+def tip_loci(
+    anatomy: LegDecomposition, question: Measurement, pattern: ConstraintPattern, goal: ClosedConfiguration
+) -> TipLoci:
     """Where all watched legs' tips can be with the directions held at their values at ``goal``.
 
     Raises ``NotConfined`` where that is no point, line, circle, sphere or plane, or the platform's motion none of those
@@ -114,24 +115,30 @@ def tip_loci(anatomy: LegDecomposition, question: Measurement, pattern: Constrai
     if pattern.turning and not any(_turned_once(anatomy, question, leg, goal) for leg in pattern.legs):
         raise NotConfined(name, "its legs may hold the platform turned otherwise")
     plane = None if pattern.plane is None else _value(pattern.plane, goal)
-    end = (plane if plane is not None and pattern.motion == "planar" else
-           "free" if pattern.motion in ("spatial", "oriented") or anatomy.point is not None else "kept")
+    end = (
+        plane
+        if plane is not None and pattern.motion == "planar"
+        else "free"
+        if pattern.motion in ("spatial", "oriented") or anatomy.point is not None
+        else "kept"
+    )
     tips = tuple(_tip(anatomy, question, leg, goal, end) for leg in pattern.legs if not leg.free)
-    angles = tuple(_angle(anatomy, question, leg, goal) for leg in pattern.legs
-                   if pattern.motion == "oriented" and leg.turns < 3)
+    angles = tuple(
+        _angle(anatomy, question, leg, goal) for leg in pattern.legs if pattern.motion == "oriented" and leg.turns < 3
+    )
     slide, doubt = (None, None) if pattern.slide is None else _slide(anatomy, pattern, goal)
     return TipLoci(goal, pattern.motion, tips, pattern.bodies, plane, slide, angles, doubt=doubt)
 
 
-def _held_chain(anatomy: LegDecomposition, question: Measurement, leg: LockedLeg, at: ClosedConfiguration,
-          end: Array | str) -> Chain:
+def _held_chain(
+    anatomy: LegDecomposition, question: Measurement, leg: LockedLeg, at: ClosedConfiguration, end: Array | str
+) -> Chain:
     """The chain to a leg's tip, its observations held; raises ``Underived``."""
     own = [o for o in question.observations if o.leg == leg.label]
     return chain(anatomy, anatomy.leg(leg.label), own, at, _value(leg.tip, at) * at.twin.length, end)
 
 
-def _turned_once(anatomy: LegDecomposition, question: Measurement, leg: LockedLeg, goal: ClosedConfiguration
-                 ) -> bool:
+def _turned_once(anatomy: LegDecomposition, question: Measurement, leg: LockedLeg, goal: ClosedConfiguration) -> bool:
     """Whether the joints of a held leg leave its end one orientation, that at the goal, in all of its branches."""
     if leg.virtual or leg.turns:
         return False
@@ -148,13 +155,15 @@ def _angle(anatomy: LegDecomposition, question: Measurement, leg: LockedLeg, goa
         found = _held_chain(anatomy, question, leg, goal, "free")
         axis, direction = kept_angle(found)
     except Underived as error:
-        raise NotConfined(anatomy.mechanism.name, f"how leg {leg.label} turns the platform is not known: {error}"
-                          ) from None
+        raise NotConfined(
+            anatomy.mechanism.name, f"how leg {leg.label} turns the platform is not known: {error}"
+        ) from None
     return KeptAngle(leg.label, leg.body, goal.pose(leg.body)[:3, :3].T @ direction, axis, MOVED * found.moved)
 
 
-def _tip(anatomy: LegDecomposition, question: Measurement, leg: LockedLeg, goal: ClosedConfiguration,
-         end: Array | str) -> Tip:
+def _tip(
+    anatomy: LegDecomposition, question: Measurement, leg: LockedLeg, goal: ClosedConfiguration, end: Array | str
+) -> Tip:
     B = _value(leg.tip, goal) * goal.twin.length
     X = goal.pose(leg.body)
     place = X[:3, :3].T @ (B - X[:3, 3])
@@ -166,8 +175,9 @@ def _tip(anatomy: LegDecomposition, question: Measurement, leg: LockedLeg, goal:
     try:
         found, moved = branches(goal)
     except Underived as error:
-        return _fit_tip(anatomy, own, question.reference, Tip(leg.label, leg.body, place, Point(B), doubt=str(error)),
-                       leg, goal)
+        return _fit_tip(
+            anatomy, own, question.reference, Tip(leg.label, leg.body, place, Point(B), doubt=str(error)), leg, goal
+        )
     if moved:  # at the zero configuration, unless that is special, the file's own decimals show it
         with suppress(Underived):
             moved = branches(ClosedConfiguration(goal.twin, goal.twin.q0, 0.0))[1]
@@ -175,13 +185,22 @@ def _tip(anatomy: LegDecomposition, question: Measurement, leg: LockedLeg, goal:
     here = found[0][0]
     if here.freedoms == freedoms and np.linalg.norm(here.miss(B)) <= FOLLOWED * goal.twin.length:
         return Tip(leg.label, leg.body, place, here, tuple(found[1:]), moved=moved)
-    doubt = (f"its joints taken one by one leave {here.freedoms} freedoms, together {freedoms}"
-             if here.freedoms != freedoms else "its joints put its end elsewhere")
+    doubt = (
+        f"its joints taken one by one leave {here.freedoms} freedoms, together {freedoms}"
+        if here.freedoms != freedoms
+        else "its joints put its end elsewhere"
+    )
     return _fit_tip(anatomy, own, question.reference, Tip(leg.label, leg.body, place, Point(B), doubt=doubt), leg, goal)
 
 
-def _fit_tip(anatomy: LegDecomposition, own: Sequence[Observation], reference: str, tip: Tip, leg: LockedLeg,
-            goal: ClosedConfiguration) -> Tip:
+def _fit_tip(
+    anatomy: LegDecomposition,
+    own: Sequence[Observation],
+    reference: str,
+    tip: Tip,
+    leg: LockedLeg,
+    goal: ClosedConfiguration,
+) -> Tip:
     """A tip's curve or surface as the pattern names it, to which the leg's moves keep."""
     B = _value(leg.tip, goal) * goal.twin.length
     paths = _held_paths(own, reference, leg, goal, tip.place)
@@ -193,8 +212,11 @@ def _fit_tip(anatomy: LegDecomposition, own: Sequence[Observation], reference: s
         if miss <= SAME_RELATION:
             return replace(tip, curve=curve)
         worst = min(worst, miss)
-    what = ("is not confined to a curve or surface of a known kind" if worst == np.inf else
-            f"leaves its curve or surface by {worst:.2g} characteristic lengths")
+    what = (
+        "is not confined to a curve or surface of a known kind"
+        if worst == np.inf
+        else f"leaves its curve or surface by {worst:.2g} characteristic lengths"
+    )
     raise NotConfined(anatomy.mechanism.name, f"the tip of leg {leg.label} {what}")
 
 
@@ -226,8 +248,11 @@ def _rods(anatomy: LegDecomposition, leg: LockedLeg, along: Array, goal: ClosedC
     centres = [joint_at(goal, joint)[0] * goal.twin.length for joint in joints]
     between = [other - one for one, other in combinations(centres, 2)]
     small = SAME_POINT * goal.twin.length
-    return [rod for rod in between if np.linalg.norm(rod) > small
-            and np.linalg.norm(np.cross(rod, along)) <= SAME_RELATION * np.linalg.norm(rod)]
+    return [
+        rod
+        for rod in between
+        if np.linalg.norm(rod) > small and np.linalg.norm(np.cross(rod, along)) <= SAME_RELATION * np.linalg.norm(rod)
+    ]
 
 
 def _circle(tangent: Tangent, tip: Array, goal: ClosedConfiguration) -> Circle:
@@ -244,8 +269,9 @@ def _opposite(circle: Circle, tip: Array) -> Circle:
     return Circle(2 * tip - circle.centre, circle.axis, circle.radius, circle.centre - tip)
 
 
-def _slide(anatomy: LegDecomposition, pattern: ConstraintPattern, goal: ClosedConfiguration
-           ) -> tuple[Circle | Line, str | None]:
+def _slide(
+    anatomy: LegDecomposition, pattern: ConstraintPattern, goal: ClosedConfiguration
+) -> tuple[Circle | Line, str | None]:
     """The curve of the second body's origin relative to the first's, and why it may not be all.
 
     Where a P joins the bodies, a line. Where a parallelogram joins them it is that of a crank; else of the two circles
@@ -280,8 +306,9 @@ def _apart(pattern: ConstraintPattern, goal: ClosedConfiguration, q: Array) -> t
     return X[1, :3, 3] - X[0, :3, 3], V[1, :3] - V[0, :3]
 
 
-def _held_paths(own: Sequence[Observation], reference: str, leg: LockedLeg, goal: ClosedConfiguration, place: Array
-                ) -> list[Array]:
+def _held_paths(
+    own: Sequence[Observation], reference: str, leg: LockedLeg, goal: ClosedConfiguration, place: Array
+) -> list[Array]:
     """Positions of a tip when its leg alone, with what is measured held, is moved along each of its freedoms, and along
     some random combinations of them."""
     rest = decompose(rezero(goal))

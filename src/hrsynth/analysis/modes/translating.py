@@ -50,8 +50,9 @@ class Translating(Shifting):
         """Where the tips are at a pose; shape (legs, 3), metres."""
         return np.asarray(q + self.tips)
 
-    def apart(self, q: Array, at: Array, legs: Sequence[int], points: Sequence[tuple[Array, float]]
-              ) -> dict[int, float]:
+    def apart(
+        self, q: Array, at: Array, legs: Sequence[int], points: Sequence[tuple[Array, float]]
+    ) -> dict[int, float]:
         """As for any system; the points are places of p."""
         error = self.error + TIP_ROUNDING * self.size
         return dict.fromkeys(legs, max((miss + length(point - q) for point, miss in points), default=0.0) + error)
@@ -67,8 +68,9 @@ class Translating(Shifting):
         def tips(numbers: Numbers) -> list[Moving]:
             return [shifting(3, numbers.vector(np.zeros(3)))] * len(self.paths)
 
-        return PoseParametrization(frame, 3, self.paths, tips, (),
-                                   lambda x: frame.origin + frame.size * (np.array(x) @ frame.R))
+        return PoseParametrization(
+            frame, 3, self.paths, tips, (), lambda x: frame.origin + frame.size * (np.array(x) @ frame.R)
+        )
 
     def squares(self) -> Iterator[SquareSystem]:
         """A tip at rest; pairs of paths that are curves, those of one plane first; a curve and a surface; three
@@ -89,8 +91,10 @@ class Translating(Shifting):
         for i in moving:
             for j, surface in surfaces.items():
                 yield self._on_curve((i, j), curves[i], surface, len(self.curves) == 2)
-        triples = [three_surfaces([(k, surfaces[k]) for k in legs], len(self.curves) == 3)
-                   for legs in combinations(surfaces, 3)]
+        triples = [
+            three_surfaces([(k, surfaces[k]) for k in legs], len(self.curves) == 3)
+            for legs in combinations(surfaces, 3)
+        ]
         yield from (square for _, square in sorted(triples, key=lambda each: -each[0]))
 
     def _on_curve(self, legs: tuple[int, int], one: Curve, other: Reach, whole: bool) -> SquareSystem:
@@ -170,8 +174,9 @@ class Articulated(Shifting):
         origins = np.array([q[:3], q[:3] + self.slide.at(float(q[3]))])
         return np.asarray(origins[list(self.bodies)] + self.tips)
 
-    def apart(self, q: Array, at: Array, legs: Sequence[int], points: Sequence[tuple[Array, float]]
-              ) -> dict[int, float]:
+    def apart(
+        self, q: Array, at: Array, legs: Sequence[int], points: Sequence[tuple[Array, float]]
+    ) -> dict[int, float]:
         """As for any system; the points are a place of one body and one of the second relative to the first."""
         error = self.error + TIP_ROUNDING * self.size
         return dict.fromkeys(legs, sum(miss for _, miss in points) + error)
@@ -190,8 +195,11 @@ class Articulated(Shifting):
 
         def tips(numbers: Numbers) -> list[Moving]:
             centre = numbers.vector(frame.vector(self.slide.centre))
-            along = (spokes(self.slide, frame, 0.0, numbers) if isinstance(self.slide, Circle) else
-                     [direction(self.slide.direction, frame, numbers)])
+            along = (
+                spokes(self.slide, frame, 0.0, numbers)
+                if isinstance(self.slide, Circle)
+                else [direction(self.slide.direction, frame, numbers)]
+            )
             both = shifting(count, centre * 0), shifting(count, centre, tuple(enumerate(along, 4)))
             return [both[body] for body in self.bodies]
 
@@ -212,8 +220,11 @@ class Articulated(Shifting):
 
     def _along_slide(self, curve: Curve) -> bool:
         """Whether a circle lies in a plane parallel to the slide's."""
-        return (isinstance(curve, Circle) and isinstance(self.slide, Circle)
-                and length(cross(curve.axis, self.slide.axis)) < PARALLEL)
+        return (
+            isinstance(curve, Circle)
+            and isinstance(self.slide, Circle)
+            and length(cross(curve.axis, self.slide.axis)) < PARALLEL
+        )
 
     def _square(self, legs: tuple[int, int], first: Curve, onto: Line | Circle) -> SquareSystem:
         """The first leg's tip carries the slide to the second leg's curve."""

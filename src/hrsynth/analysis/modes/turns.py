@@ -42,8 +42,11 @@ def _settle(chain: Chain, known: Known, gain: float) -> list[tuple[Known, float]
     for step in (_driven_bodies, _watched_once, _between_two, _watched_twice, _between_three):
         for found in step(chain, known):
             if any(known[k] is None for k in found.places) or not found.turns:
-                return [each for turns, own in found.turns
-                        for each in _settle(chain, _with(known, found.places, turns), gain * own)]
+                return [
+                    each
+                    for turns, own in found.turns
+                    for each in _settle(chain, _with(known, found.places, turns), gain * own)
+                ]
     return [(known, gain)]
 
 
@@ -175,8 +178,9 @@ def _watched_twice(chain: Chain, known: Known) -> Iterator[_Found]:
             if both is not None:
                 keep = [n for n, place in enumerate(places) if place >= 0]
                 turns = [((Q @ first, Q @ first @ second), gain) for first, second, gain in both]
-                yield _Found(tuple(places[n] for n in keep),
-                             tuple((tuple(turn[n] for n in keep), gain) for turn, gain in turns))
+                yield _Found(
+                    tuple(places[n] for n in keep), tuple((tuple(turn[n] for n in keep), gain) for turn, gain in turns)
+                )
 
 
 def _gaps(chain: Chain, known: Known) -> Iterator[tuple[Array, Array, list[Way]]]:
@@ -207,8 +211,10 @@ def _between_three(chain: Chain, known: Known) -> Iterator[_Found]:
             a, b, c = (part[0][1] for part in parts)
             both = _cones(a, b, c, Q.T @ R @ c)
             if both is not None:
-                yield _Found((parts[0][-1][0], parts[1][-1][0]),
-                             tuple(((Q @ first, Q @ first @ second), gain) for first, second, gain in both))
+                yield _Found(
+                    (parts[0][-1][0], parts[1][-1][0]),
+                    tuple(((Q @ first, Q @ first @ second), gain) for first, second, gain in both),
+                )
 
 
 def _about(axis: Array, start: Array, end: Array) -> tuple[Array, float] | None:

@@ -26,8 +26,9 @@ from .sighted import all_loci
 from .solve import SystemModes
 
 
-def without_couplings(measured: MeasuredRobot, goal: ClosedConfiguration
-                      ) -> tuple[MeasuredRobot, ClosedConfiguration] | None:
+def without_couplings(
+    measured: MeasuredRobot, goal: ClosedConfiguration
+) -> tuple[MeasuredRobot, ClosedConfiguration] | None:
     """The robot without its couplings, at the same place, and with what is measured held: so are joints that couplings
     tie to motors that are held. It has all modes of the robot, and those at which couplings cannot be closed besides.
     None where it has no couplings, sees less than all freedoms without them, or what is measured is of joints that are
@@ -36,8 +37,10 @@ def without_couplings(measured: MeasuredRobot, goal: ClosedConfiguration
     if not mechanism.couplings:
         return None
     held = {each.joint for each in measured.question.observations if isinstance(each, Encoder)}
-    ties = [{mechanism.carrier(each, link).name for link in (each.predecessor, each.successor)}
-            for each in mechanism.couplings]
+    ties = [
+        {mechanism.carrier(each, link).name for link in (each.predecessor, each.successor)}
+        for each in mechanism.couplings
+    ]
     tied = set(held)
     while more := set().union(*(tie for tie in ties if tie & tied)) - tied:
         tied |= more
@@ -47,12 +50,21 @@ def without_couplings(measured: MeasuredRobot, goal: ClosedConfiguration
     except HrsynthError:
         return None
     links, joints = loose.mechanism.links, loose.mechanism.joints
-    if not tied <= joints.keys() or any(link not in links for each in measured.question.observations
-                                        for link in (each.link, each.seen_from or each.link)):
+    if not tied <= joints.keys() or any(
+        link not in links
+        for each in measured.question.observations
+        for link in (each.link, each.seen_from or each.link)
+    ):
         return None  # without couplings what they hold apart is one joint
     of = {name: leg.label for leg in loose.anatomy.legs for name in leg.joints}
-    seen = (*measured.question.observations, *(each for name in sorted(tied - held) for each in encoders(
-        loose.mechanism, loose.mechanism.joints[name], of.get(name, ""))))
+    seen = (
+        *measured.question.observations,
+        *(
+            each
+            for name in sorted(tied - held)
+            for each in encoders(loose.mechanism, loose.mechanism.joints[name], of.get(name, ""))
+        ),
+    )
     found = MeasuredRobot(loose, loose.measuring(seen))
     return (found, at) if found.rank == loose.dof and loose.anatomy.labels == setting.anatomy.labels else None
 
@@ -68,15 +80,21 @@ def better_ways(made: Model) -> tuple[Any, ...]:
     return (solve_loops, solve_carried) if few else (solve_loops,)
 
 
-def solve_tips(measured: MeasuredRobot, goal: ClosedConfiguration, exact: float, as_written: bool, effort: float
-               ) -> tuple[Model, SystemModes]:
+def solve_tips(
+    measured: MeasuredRobot, goal: ClosedConfiguration, exact: float, as_written: bool, effort: float
+) -> tuple[Model, SystemModes]:
     """All modes by where the tips of the legs can be, with the goal known to ``exact`` (m)."""
     confined, seen = all_loci(measured, goal)
     # a curve that was fitted to a leg's moves is not known to hold its exact tip
     fitted = confined.doubt is not None or any(tip.doubt is not None for tip in confined.tips)
-    confined = replace(confined, error=np.inf if fitted else max([exact, *(each.error(exact, goal) for each in seen)])
-                       + max([*(tip.moved for tip in confined.tips), *(angle.moved for angle in confined.angles)]),
-                       as_written=as_written)
+    confined = replace(
+        confined,
+        error=np.inf
+        if fitted
+        else max([exact, *(each.error(exact, goal) for each in seen)])
+        + max([*(tip.moved for tip in confined.tips), *(angle.moved for angle in confined.angles)]),
+        as_written=as_written,
+    )
     return solve_all(confined, effort=effort)
 
 

@@ -71,8 +71,14 @@ def by_homotopy(part: PoseSystem, enough: int | None) -> Proposed:
     assert part.chart.study is not None
     found = ends(part.equations(), part.chart.study, _resting(part), enough)
     values = [[acb(v.real, v.imag) for v in row] for row in found.solutions.tolist()]
-    return Proposed(tuple(zip(values, found.multiple, strict=True)), "homotopy", found.infinite, found.lost,
-                    found.loose > 0, found.far)
+    return Proposed(
+        tuple(zip(values, found.multiple, strict=True)),
+        "homotopy",
+        found.infinite,
+        found.lost,
+        found.loose > 0,
+        found.far,
+    )
 
 
 def _resting(part: PoseSystem) -> tuple[int, ...]:
@@ -101,8 +107,9 @@ def by_msolve(part: PoseSystem) -> Proposed | None:
     return Proposed(poses, "msolve's parametrisation", len(solutions) - len(poses), lost)
 
 
-def enclose_roots(part: PoseSystem, proposed: Proposed, most: Bound | None = None, balls: Within = Balls,
-             farthest: float = FARTHEST) -> Roots:
+def enclose_roots(
+    part: PoseSystem, proposed: Proposed, most: Bound | None = None, balls: Within = Balls, farthest: float = FARTHEST
+) -> Roots:
     """What is proposed for a choice of legs, as :func:`solve_square` gives it; where a degree bounds their number,
     solutions at infinity are counted too."""
     from flint import ctx
@@ -110,11 +117,15 @@ def enclose_roots(part: PoseSystem, proposed: Proposed, most: Bound | None = Non
     with ctx.workprec(PRECISION):
         thick = part.equations(balls)
     found = _Tips(balls, part.equations(), thick, part.chart).all_of(
-        proposed.solutions, len(proposed.solutions) + proposed.lost, farthest)
+        proposed.solutions, len(proposed.solutions) + proposed.lost, farthest
+    )
     with ctx.workprec(PRECISION):
         apart = all(root.real and root.thick for root in found.real) and _apart(
-            part.chart, thick, [root.parameters for root in found.real],
-            [values for values in found.values if not is_real(values)])
+            part.chart,
+            thick,
+            [root.parameters for root in found.real],
+            [values for values in found.values if not is_real(values)],
+        )
     if found.far and apart:
         apart = part.chart.study is None and _far_apart(part, found.distant)
     with ctx.workprec(PRECISION):
@@ -142,8 +153,13 @@ class _Tips(Enclosing):
 
     def distance(self, values: Sequence[Any]) -> float:
         x = np.array([1.0, *(complex(v) for v in values)])
-        return max(float(np.abs(np.einsum("i,ijd,j->d", x, tip.N.astype(float), x)).max()
-                         / (abs(x @ tip.w.astype(float) @ x) * UNIT + 1e-300)) for tip in self._rounded)
+        return max(
+            float(
+                np.abs(np.einsum("i,ijd,j->d", x, tip.N.astype(float), x)).max()
+                / (abs(x @ tip.w.astype(float) @ x) * UNIT + 1e-300)
+            )
+            for tip in self._rounded
+        )
 
     def parameters(self, values: Sequence[Any]) -> tuple[Any, ...]:
         return tuple(values)
@@ -168,17 +184,22 @@ def _far_apart(part: PoseSystem, far: Sequence[Sequence[Any]]) -> bool:
         for values in far:
             sizes = [2 ** max(0, math.frexp(float(abs(v).upper()))[1]) for v in values]
             D = np.diag(np.array([1, *sizes], dtype=object))
-            box = krawczyk([Quadric(D @ each.A @ D) for each in quadrics],
-                           [v / size for v, size in zip(values, sizes, strict=True)])
+            box = krawczyk(
+                [Quadric(D @ each.A @ D) for each in quadrics],
+                [v / size for v, size in zip(values, sizes, strict=True)],
+            )
             if box is None:
                 return False
             boxes.append([v * size for v, size in zip(box, sizes, strict=True)])
-        return all(any(not (v - w).contains(0) for v, w in zip(one, other, strict=True))
-                   for one, other in combinations(boxes, 2))
+        return all(
+            any(not (v - w).contains(0) for v, w in zip(one, other, strict=True))
+            for one, other in combinations(boxes, 2)
+        )
 
 
-def _apart(chart: PoseParametrization, thick: Sequence[Any], real: Sequence[Sequence[Any]],
-           values: Sequence[Sequence[Any]]) -> bool:
+def _apart(
+    chart: PoseParametrization, thick: Sequence[Any], real: Sequence[Sequence[Any]], values: Sequence[Sequence[Any]]
+) -> bool:
     """Whether all solutions, ``real`` ones in their boxes already, have boxes with one pose each, and no two the same;
     complex ones with their conjugates, so that none is real."""
     boxes = list(real)

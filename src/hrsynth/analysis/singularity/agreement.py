@@ -57,13 +57,28 @@ class Agreement(Value):
 
     def to_dict(self) -> dict[str, object]:
         """The record of the command line."""
-        return {"points": self.points, "disagreements": self.disagreements, "largest_angle": self.largest_angle,
-                "smallest_singular_value": self.smallest, "positive": self.sides[0], "negative": self.sides[1],
-                "on_locus": len(self.on_locus), "searches": self.searches}
+        return {
+            "points": self.points,
+            "disagreements": self.disagreements,
+            "largest_angle": self.largest_angle,
+            "smallest_singular_value": self.smallest,
+            "positive": self.sides[0],
+            "negative": self.sides[1],
+            "on_locus": len(self.on_locus),
+            "searches": self.searches,
+        }
 
 
-def agreement(start: ClosedConfiguration, question: Measurement, pattern: ConstraintPattern, condition: Condition,
-              count: int, *, seed: int = 0, placer: Placer | None = None) -> Agreement:
+def agreement(
+    start: ClosedConfiguration,
+    question: Measurement,
+    pattern: ConstraintPattern,
+    condition: Condition,
+    count: int,
+    *,
+    seed: int = 0,
+    placer: Placer | None = None,
+) -> Agreement:
     """Compare at ``count`` random reachable poses, at poses on the locus, and where descents of the rank itself from
     the weakest poses end.
 
@@ -114,9 +129,15 @@ def agreement(start: ClosedConfiguration, question: Measurement, pattern: Constr
     freedoms = max(relation(at, question).dof.value for at in [start, *(at for _, at in low)])
     others = [pair for pair in sorted(parts, key=_size) if all(pair[1] is not at for _, at in low)][:WEAKEST_STARTS]
     searches = 0
-    for starts in ([] if condition.never else
-                   [_crossings(walk, signs, pattern, condition), _descents(low, question, pattern, condition),
-                    _descents(others, question, pattern, condition)]):
+    for starts in (
+        []
+        if condition.never
+        else [
+            _crossings(walk, signs, pattern, condition),
+            _descents(low, question, pattern, condition),
+            _descents(others, question, pattern, condition),
+        ]
+    ):
         for at in starts:
             searches += 1
             if at is None or _beside(at, question, loops, freedoms) or _is_known(at, on_locus, question):
@@ -168,12 +189,14 @@ def _has_values(at: ClosedConfiguration, question: Measurement) -> bool:
 
 def _beside(at: ClosedConfiguration, question: Measurement, loops: float, freedoms: int) -> bool:
     """Whether no rank is certain at a configuration, or the platform itself has fewer freedoms there."""
-    return (not _has_values(at, question) or at.kernel()[1].weakest < loops
-            or relation(at, question).dof.value < freedoms)
+    return (
+        not _has_values(at, question) or at.kernel()[1].weakest < loops or relation(at, question).dof.value < freedoms
+    )
 
 
-def _is_missed(at: ClosedConfiguration, question: Measurement, pattern: ConstraintPattern, condition: Condition
-               ) -> bool:
+def _is_missed(
+    at: ClosedConfiguration, question: Measurement, pattern: ConstraintPattern, condition: Condition
+) -> bool:
     """Whether the rows behind the words clearly keep their rank where the relation loses its own."""
     try:
         rows = condition.rows(pattern.values_at([at]))
@@ -214,8 +237,9 @@ def _differ(*measures: Array) -> Array:
     return (table.min(axis=0) < RANK_CUTOFF) & (table.max(axis=0) > RANK_CUTOFF * RANK_GAP)
 
 
-def _relations(chunk: Sequence[ClosedConfiguration], question: Measurement, bodies: tuple[str, ...] = ()
-               ) -> tuple[Array, list[tuple[Array, Array, float]]]:
+def _relations(
+    chunk: Sequence[ClosedConfiguration], question: Measurement, bodies: tuple[str, ...] = ()
+) -> tuple[Array, list[tuple[Array, Array, float]]]:
     """Smallest singular value of Mᵀ at each configuration; for each the measured rates and the twists of ``bodies`` for
     a basis of the platform's motions, (m, k) and (6 bodies, k), and the largest singular value."""
     sigma, parts = [], []
@@ -242,8 +266,9 @@ def _weakest(here: PatternValues, question: Measurement, condition: Condition) -
     return sigma, angle
 
 
-def _crossings(walk: Sequence[ClosedConfiguration], signs: Sequence[float], pattern: ConstraintPattern,
-               condition: Condition) -> Iterator[ClosedConfiguration | None]:
+def _crossings(
+    walk: Sequence[ClosedConfiguration], signs: Sequence[float], pattern: ConstraintPattern, condition: Condition
+) -> Iterator[ClosedConfiguration | None]:
     """Zeros of the expression between neighbours of a walk at which it has different signs, None where one is not
     found."""
     from scipy.optimize import brentq
@@ -271,8 +296,9 @@ def _crossings(walk: Sequence[ClosedConfiguration], signs: Sequence[float], patt
             yield found if abs(float(condition.evaluate(pattern.values_at([found]))[0])) <= FOLLOWED else None
 
 
-def _sharpen(at: ClosedConfiguration, step: Array, pattern: ConstraintPattern, condition: Condition
-               ) -> ClosedConfiguration:
+def _sharpen(
+    at: ClosedConfiguration, step: Array, pattern: ConstraintPattern, condition: Condition
+) -> ClosedConfiguration:
     """A last Newton step along the mechanism's own motion, too short to need closing again."""
     kernel, _ = at.kernel()
     motion = kernel @ (kernel.T @ step)
@@ -288,8 +314,12 @@ def _sharpen(at: ClosedConfiguration, step: Array, pattern: ConstraintPattern, c
     return ClosedConfiguration.of(at.twin, at.twin.integrate(at.q, -here / slope * motion))
 
 
-def _descents(low: Sequence[tuple[float, ClosedConfiguration]], question: Measurement, pattern: ConstraintPattern,
-              condition: Condition) -> Iterator[ClosedConfiguration | None]:
+def _descents(
+    low: Sequence[tuple[float, ClosedConfiguration]],
+    question: Measurement,
+    pattern: ConstraintPattern,
+    condition: Condition,
+) -> Iterator[ClosedConfiguration | None]:
     """Zeros of the rows sought from weak poses: rows(q) x = 0 with |x| = 1; None where one is not found."""
     for _, start in low:
         yield descend(start, question, pattern, condition)
@@ -305,8 +335,9 @@ def _is_known(at: ClosedConfiguration, others: Sequence[ClosedConfiguration], qu
     return any(np.linalg.norm(X - other.pose(question.platform)) <= SAME_SPOT for other in others)
 
 
-def descend(start: ClosedConfiguration, question: Measurement, pattern: ConstraintPattern,
-            condition: Condition) -> ClosedConfiguration | None:
+def descend(
+    start: ClosedConfiguration, question: Measurement, pattern: ConstraintPattern, condition: Condition
+) -> ClosedConfiguration | None:
     """A pose on the locus near ``start``: least squares in the platform's motions and the lost one; None where there is
     none near."""
     from scipy.optimize import least_squares
@@ -321,8 +352,12 @@ def descend(start: ClosedConfiguration, question: Measurement, pattern: Constrai
         def reached(s: Array, here: ClosedConfiguration = here, motion: Array = motion) -> ClosedConfiguration:
             return step_from(here, motion @ s)
 
-        def residuals(z: Array, count: int = count, shape: tuple[int, ...] = shape,
-                      reached: Callable[[Array], ClosedConfiguration] = reached) -> Array:
+        def residuals(
+            z: Array,
+            count: int = count,
+            shape: tuple[int, ...] = shape,
+            reached: Callable[[Array], ClosedConfiguration] = reached,
+        ) -> Array:
             at = reached(z[:count])
             x = z[count:]
             try:
@@ -334,8 +369,15 @@ def descend(start: ClosedConfiguration, question: Measurement, pattern: Constrai
             return np.append(rows @ x, x @ x - 1.0)
 
         limits = np.concatenate([np.full(count, 0.3), np.full(len(x0), 2.0)])
-        fit = least_squares(residuals, np.concatenate([np.zeros(count), x0]), bounds=(-limits, limits),
-                            xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=60)
+        fit = least_squares(
+            residuals,
+            np.concatenate([np.zeros(count), x0]),
+            bounds=(-limits, limits),
+            xtol=1e-15,
+            ftol=1e-15,
+            gtol=1e-15,
+            max_nfev=60,
+        )
         there = reached(fit.x[:count])
         if there.residual > CLOSED:
             return None

@@ -31,13 +31,15 @@ class Quick:
     @classmethod
     def of(cls, placer: Placer | None, question: Measurement) -> Quick | None:
         """None where there is no batch, or it is not asked for its own directions."""
-        if placer is None or not all(isinstance(o, Direction) and o is placer.seen.get(o.leg)
-                                     for o in question.observations):
+        if placer is None or not all(
+            isinstance(o, Direction) and o is placer.seen.get(o.leg) for o in question.observations
+        ):
             return None
         return cls(placer, question)
 
-    def spectrum(self, configurations: Sequence[ClosedConfiguration], others: Spectrum, seed: int = 0
-                 ) -> tuple[Array, Array]:
+    def spectrum(
+        self, configurations: Sequence[ClosedConfiguration], others: Spectrum, seed: int = 0
+    ) -> tuple[Array, Array]:
         """The smallest and the largest singular value of Mᵀ at each configuration, (n,) each; by ``others`` where one
         is in another working mode than the batch's, or on the edge between two.
 

@@ -70,16 +70,34 @@ class Locus(Value):
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line: axes, what is fixed, and for each robot the tables (null: not reached)."""
         robots = {"hidden": self.hidden, "real": self.real}
-        return {"axes": {name: values.tolist() for name, values in self.grid.axes}, "fixed": self.grid.fixed.to_dict(),
-                "reached": self.reached,
-                **{name: field and {"expression": nested_lists(field.value), "type2": nested_lists(field.type2),
-                                    "type1": nested_lists(field.type1), "poses": field.spots.tolist(),
-                                    "curve": field.curve.tolist()}
-                   for name, field in robots.items()}}
+        return {
+            "axes": {name: values.tolist() for name, values in self.grid.axes},
+            "fixed": self.grid.fixed.to_dict(),
+            "reached": self.reached,
+            **{
+                name: field
+                and {
+                    "expression": nested_lists(field.value),
+                    "type2": nested_lists(field.type2),
+                    "type1": nested_lists(field.type1),
+                    "poses": field.spots.tolist(),
+                    "curve": field.curve.tolist(),
+                }
+                for name, field in robots.items()
+            },
+        }
 
 
-def locus(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None = None, camera: CameraLike = None, *,
-          see: SeeLike = None, plane: Pose | str | None = None, steps: int = STEPS, seed: int = 0) -> Locus:
+def locus(
+    robot: Mechanism | ObservedRobot,
+    observe: Sequence[str] | str | None = None,
+    camera: CameraLike = None,
+    *,
+    see: SeeLike = None,
+    plane: Pose | str | None = None,
+    steps: int = STEPS,
+    seed: int = 0,
+) -> Locus:
     """Where the hidden and the real robot (with its own motors) lose a freedom over a plane of poses.
 
     ``plane`` fixes parts of the pose so that two are left; a robot that is only partially controllable has no locus
@@ -104,8 +122,11 @@ def _controllable(setting: ObservedRobot) -> MeasuredRobot:
     """The hidden robot; raises ``BadRequest`` where it has no locus."""
     hidden = MeasuredRobot.of_directions(setting)
     if hidden.verdict.rank < setting.dof:
-        raise BadRequest(f"{setting.robot.name} has no locus: a freedom is lost at every pose", None,
-                         "legs that make it controllable")
+        raise BadRequest(
+            f"{setting.robot.name} has no locus: a freedom is lost at every pose",
+            None,
+            "legs that make it controllable",
+        )
     return hidden
 
 
@@ -123,8 +144,12 @@ def _locus(hidden: MeasuredRobot, real: MeasuredRobot | None, plane: Pose | None
     grid = frame_plane(start, question, motion, plane, steps, met)
     configurations = sweep(start, question, grid, motion, placer)
     if not any(configurations):
-        raise PlaneNotMet(start.twin.mechanism.name, f"the plane {grid.fixed}", "none of its poses is reached",
-                          grid_dependence(start, motion, grid))
+        raise PlaneNotMet(
+            start.twin.mechanism.name,
+            f"the plane {grid.fixed}",
+            "none of its poses is reached",
+            grid_dependence(start, motion, grid),
+        )
 
     def field(measured: MeasuredRobot) -> SingularityMap:
         tell("locus")
@@ -132,7 +157,7 @@ def _locus(hidden: MeasuredRobot, real: MeasuredRobot | None, plane: Pose | None
         reached = [(i, at) for i, at in enumerate(configurations) if at is not None]
         places, here = [i for i, _ in reached], [at for _, at in reached]
         quick = Quick.of(placer, measured.question)
-        smallest, largest = (spectrum(here, measured.question) if quick is None else quick.spectrum(here, spectrum))
+        smallest, largest = spectrum(here, measured.question) if quick is None else quick.spectrum(here, spectrum)
         value = condition.evaluate(measured.pattern.values_at(here))
         tables = []
         for column in (value, smallest, 1 / np.where(largest > 0, largest, np.nan)):
@@ -144,15 +169,21 @@ def _locus(hidden: MeasuredRobot, real: MeasuredRobot | None, plane: Pose | None
             spots = _spots(grid, [here[places.index(i)] for i in _valleys(tables[1])], measured)
             curve = PlaneOfPoses(measured.question, motion, grid).curve(configurations)
             spots = _aside(spots, curve, grid)
-        return SingularityMap(tables[0], condition.signed, tables[1], tables[2], spots, curve, condition.never,
-                              not measured.unexamined)
+        return SingularityMap(
+            tables[0], condition.signed, tables[1], tables[2], spots, curve, condition.never, not measured.unexamined
+        )
 
     return Locus(grid, field(hidden), None if real is None else field(real))
 
 
-def frame_plane(start: ClosedConfiguration, question: Measurement, motion: PlatformMotion, plane: Pose | None,
-                steps: int,
-           met: Callable[[ClosedConfiguration, Grid], NDArray[np.bool_]]) -> Grid:
+def frame_plane(
+    start: ClosedConfiguration,
+    question: Measurement,
+    motion: PlatformMotion,
+    plane: Pose | None,
+    steps: int,
+    met: Callable[[ClosedConfiguration, Grid], NDArray[np.bool_]],
+) -> Grid:
     """The grid that just holds what is reached of a plane; ``met`` says which cells of a coarse one are, (n,).
 
     Raises ``PlaneNotMet`` where the plane's own parts are out of reach, ``BadRequest`` where not two parts are free."""
@@ -169,8 +200,12 @@ def frame_plane(start: ClosedConfiguration, question: Measurement, motion: Platf
         if cells.min() > 0 and cells.max() < COARSE_GRID - 1:
             break
     steps_apart = np.array([values[1] - values[0] for _, values in axes])
-    found = np.array([[values[low], values[high]] for (_, values), low, high in zip(axes, cells.min(axis=0),
-                                                                                    cells.max(axis=0), strict=True)])
+    found = np.array(
+        [
+            [values[low], values[high]]
+            for (_, values), low, high in zip(axes, cells.min(axis=0), cells.max(axis=0), strict=True)
+        ]
+    )
     beside = {}
     for axis, end in product(range(2), range(2)):
         (pose,) = coarse.poses_at([cells[np.argsort(cells[:, axis], kind="stable")[-end]]])
@@ -185,12 +220,14 @@ def frame_plane(start: ClosedConfiguration, question: Measurement, motion: Platf
             found[axis, end] = _last(coarse, found, axis, end, partial(met, near))
         moved = float(np.max(np.abs(found - before) / steps_apart[:, None]))
     window = found + 0.75 * steps_apart[:, None] * [-1, 1]
-    return Grid(tuple((name, np.linspace(low, high, steps))
-                      for (name, _), (low, high) in zip(axes, window, strict=True)), plane)
+    return Grid(
+        tuple((name, np.linspace(low, high, steps)) for (name, _), (low, high) in zip(axes, window, strict=True)), plane
+    )
 
 
-def _begin_plane(start: ClosedConfiguration, question: Measurement, motion: PlatformMotion,
-           plane: Pose | None) -> tuple[Pose, tuple[str, ...], ClosedConfiguration]:
+def _begin_plane(
+    start: ClosedConfiguration, question: Measurement, motion: PlatformMotion, plane: Pose | None
+) -> tuple[Pose, tuple[str, ...], ClosedConfiguration]:
     """The plane's fixed parts, the two that vary, and a configuration in it; raises as ``framed``."""
     plane, names = _axes(start, motion, plane)
     try:
@@ -242,9 +279,11 @@ def _axes(start: ClosedConfiguration, motion: PlatformMotion, plane: Pose | None
     told = " and ".join(left) + (", which depend on each other" if len(left) > 1 else "")
     allowed = ["fewer parts held"] if fixed else []
     allowed += [f"for a line of poses --grid {left[0]}=-0.1:0.1:9 of check, accuracy or basins"] if left else []
-    raise BadRequest(f"{name}: a plane leaves two parts of the pose to vary, this one leaves "
-                     f"{told or 'none'}", str(plane) or "no part held",
-                     "; ".join(allowed) or "single poses, or a platform that shifts")
+    raise BadRequest(
+        f"{name}: a plane leaves two parts of the pose to vary, this one leaves {told or 'none'}",
+        str(plane) or "no part held",
+        "; ".join(allowed) or "single poses, or a platform that shifts",
+    )
 
 
 def _spread(motion: PlatformMotion, pair: tuple[str, str]) -> float:
@@ -256,8 +295,9 @@ def _spread(motion: PlatformMotion, pair: tuple[str, str]) -> float:
 def _coordinates(motion: PlatformMotion, at: ClosedConfiguration, names: Sequence[str]) -> list[float]:
     X = at.pose(motion.link)
     position, turn = motion.position(X), X[:3, :3] @ motion.home[:3, :3].T
-    return [turn_about(motion.normal, turn)[0] if name == "phi" else float(position["xyz".index(name)])
-            for name in names]
+    return [
+        turn_about(motion.normal, turn)[0] if name == "phi" else float(position["xyz".index(name)]) for name in names
+    ]
 
 
 def _valleys(table: Array) -> list[int]:
@@ -270,8 +310,9 @@ def _valleys(table: Array) -> list[int]:
     return sorted(map(int, cells), key=lambda cell: float(filled.flat[cell]))[:STARTS]
 
 
-def _same_mode(start: ClosedConfiguration, at: ClosedConfiguration, question: Measurement,
-               motion: PlatformMotion) -> bool:
+def _same_mode(
+    start: ClosedConfiguration, at: ClosedConfiguration, question: Measurement, motion: PlatformMotion
+) -> bool:
     """Whether the pose of ``at`` is singular in the working mode of ``start``, too."""
     try:
         there = reach(start, question, motion.pose(at.pose(motion.link)), motion)

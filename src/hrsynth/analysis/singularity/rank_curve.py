@@ -54,8 +54,11 @@ class PlaneOfPoses:
     def curve(self, configurations: Sequence[ClosedConfiguration | None]) -> Array:
         """Pieces (k, 2, 2) of the curve, from edge to edge of a cell, by the two coordinates that vary."""
         (_, x), (_, y) = self.grid.axes
-        weak = {cell: found for cell, at in zip(np.ndindex(len(x), len(y)), configurations, strict=True)
-                if at is not None and (found := self._weakest(at, np.array([x[cell[0]], y[cell[1]]]))) is not None}
+        weak = {
+            cell: found
+            for cell, at in zip(np.ndindex(len(x), len(y)), configurations, strict=True)
+            if at is not None and (found := self._weakest(at, np.array([x[cell[0]], y[cell[1]]]))) is not None
+        }
         crossed: dict[tuple[int, int, int], Array] = {}
         for (i, j), one in weak.items():
             for along, beside in enumerate(((i + 1, j), (i, j + 1))):

@@ -23,6 +23,7 @@ def lose(start: ClosedConfiguration, question: Measurement) -> ClosedConfigurati
     Gauss-Newton on M(s) x, with x the twist that M sees least where s = 0 and M that of :func:`twists_seen`: its norm
     is the smallest singular value, and at a zero its slope is that with x held.
     """
+
     def evaluate(at: ClosedConfiguration) -> tuple[Array, Array]:
         rows = twists_seen(at, question)
         x = np.linalg.svd(rows)[2][-1]

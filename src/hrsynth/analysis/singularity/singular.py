@@ -43,8 +43,12 @@ class Example(Value):
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
-        return {"pose": self.pose.to_dict(), "lost": [f.to_dict() for f in self.lost], "singular_value": self.sigma,
-                "singular_value_nearby": self.nearby}
+        return {
+            "pose": self.pose.to_dict(),
+            "lost": [f.to_dict() for f in self.lost],
+            "singular_value": self.sigma,
+            "singular_value_nearby": self.nearby,
+        }
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -84,25 +88,40 @@ class Singularity(Result, shown_as="singular"):
         kind = "motors" if self.real else "directions" if all(o.by_segment for o in seen) else "observations"
         checked = {"points": 0, "disagreements": 0} if self.checked is None else self.checked.to_dict()
         return {
-            "measured": {"kind": kind, "of": [o.leg if kind == "observations" else getattr(o, "joint", o.link)
-                                              for o in seen]},
-            "dof": self.verdict.dof, "verdict": self.verdict.verdict,
+            "measured": {
+                "kind": kind,
+                "of": [o.leg if kind == "observations" else getattr(o, "joint", o.link) for o in seen],
+            },
+            "dof": self.verdict.dof,
+            "verdict": self.verdict.verdict,
             "lost": [freedom.to_dict() for freedom in self.verdict.lost],
-            "always": self.always, "never": found is not None and found.never,
+            "always": self.always,
+            "never": found is not None and found.never,
             "unexamined": list(self.unexamined),
-            "words": self.words, "expression": "0" if found is None else str(found.expression),
+            "words": self.words,
+            "expression": "0" if found is None else str(found.expression),
             "where": {} if found is None else dict(found.where),
             "factors": [] if found is None else list(found.factors),
-            "parts": [] if found is None else [{"expression": str(part), "meaning": meaning}
-                                               for part, meaning in found.parts],
+            "parts": []
+            if found is None
+            else [{"expression": str(part), "meaning": meaning} for part, meaning in found.parts],
             "characteristic_length": self.setting.mechanism.length,
-            "checked": checked, "examples": [each.to_dict() for each in self.examples],
+            "checked": checked,
+            "examples": [each.to_dict() for each in self.examples],
         }
 
 
 @question()
-def singular(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *,
-             see: SeeLike = None, real: bool = False, points: int = POINTS, seed: int = 0) -> Singularity:
+def singular(
+    robot: RobotLike,
+    observe: LegsLike = None,
+    camera: CameraLike = None,
+    *,
+    see: SeeLike = None,
+    real: bool = False,
+    points: int = POINTS,
+    seed: int = 0,
+) -> Singularity:
     """The Type 2 condition of the hidden robot (``real``: of the real robot with its own motors), theory.md 7; MMT 3.3.
 
     It is computed from the real robot's legs and relation, which are those of the exact lift (theory.md 3).
@@ -117,16 +136,18 @@ def singular(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = No
     measured = MeasuredRobot.of(setting, real)
     question, verdict = measured.question, measured.verdict
     if not verdict.dof:
-        raise BadRequest(f"{setting.robot.name}: the platform has no freedom to lose", setting.mechanism.platform,
-                         "a platform that can move")
+        raise BadRequest(
+            f"{setting.robot.name}: the platform has no freedom to lose",
+            setting.mechanism.platform,
+            "a platform that can move",
+        )
     tell("pattern of the legs' wrenches")
     pattern = measured.pattern
     if verdict.rank < verdict.dof:
         words = always(pattern, verdict.never)
         return Singularity(setting, question, real, verdict, pattern, None, words, None, ())
     found = measured.condition
-    checked = agreement(setting.everything.start, question, pattern, found, points, seed=seed,
-                        placer=setting.placer)
+    checked = agreement(setting.everything.start, question, pattern, found, points, seed=seed, placer=setting.placer)
     tell("singular poses")
     examples = tuple(_example(setting, question, at) for at in checked.on_locus[:EXAMPLES])
     return Singularity(setting, question, real, verdict, pattern, found, found.words, checked, examples)

@@ -38,13 +38,23 @@ class RobotBatch:
 
     def of(self, some: Array) -> RobotBatch:
         """Those robots of the batch."""
-        return replace(self, constants=self.constants[:, some], turns={s: R[some] for s, R in self.turns.items()},
-                       dimension=self.dimension[:, some], signs=self.signs[:, some], moved=self.moved[:, some])
+        return replace(
+            self,
+            constants=self.constants[:, some],
+            turns={s: R[some] for s, R in self.turns.items()},
+            dimension=self.dimension[:, some],
+            signs=self.signs[:, some],
+            moved=self.moved[:, some],
+        )
 
     def at_poses(self, count: int) -> RobotBatch:
         """The same robots at so many poses: their legs as often."""
-        return replace(self, constants=np.tile(self.constants, count), signs=np.tile(self.signs, count),
-                       turns={s: np.concatenate([R] * count, axis=1) for s, R in self.turns.items()})
+        return replace(
+            self,
+            constants=np.tile(self.constants, count),
+            signs=np.tile(self.signs, count),
+            turns={s: np.concatenate([R] * count, axis=1) for s, R in self.turns.items()},
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,8 +80,12 @@ def batch(robots: Sequence[Sequence[LegFactor]], joints: int) -> RobotBatch:
     turns: dict[int, Array] = {}
     for slot in zip(*robots, strict=True):
         kind, values = slot[0].kind, np.stack([part.constant for part in slot])
-        which = np.array([count if part.dimension is None else own.index(part.dimension)
-                          for part, own in zip(slot, names, strict=True)])
+        which = np.array(
+            [
+                count if part.dimension is None else own.index(part.dimension)
+                for part, own in zip(slot, names, strict=True)
+            ]
+        )
         moves = np.array([part.joint is not None for part in slot])
         if kind == TURN:
             if np.array_equal(values, np.broadcast_to(np.eye(3), values.shape)):
@@ -82,8 +96,17 @@ def batch(robots: Sequence[Sequence[LegFactor]], joints: int) -> RobotBatch:
         signs = np.stack([np.zeros(n) if part.signs is None else part.signs for part in slot])
         kept.append((kind, values, which, signs, max(-1 if part.joint is None else part.joint for part in slot), moves))
     kinds, constants, dimension, signed, joint, moved = zip(*kept, strict=True)
-    return RobotBatch(list(kinds), np.stack(constants), turns, np.stack(dimension), np.stack(signed), list(joint),
-                 np.stack(moved), count, joints)
+    return RobotBatch(
+        list(kinds),
+        np.stack(constants),
+        turns,
+        np.stack(dimension),
+        np.stack(signed),
+        list(joint),
+        np.stack(moved),
+        count,
+        joints,
+    )
 
 
 def forward(of: RobotBatch, at: BatchState) -> tuple[Array, Array, Array, Array]:
@@ -130,8 +153,9 @@ def legs_at(of: RobotBatch, at: BatchState) -> Array:
     return at_point(screws, p)
 
 
-def close(of: RobotBatch, start: BatchState, turning: Array, shifting: Array, *, sized: bool
-          ) -> tuple[BatchState, NDArray[np.bool_]]:
+def close(
+    of: RobotBatch, start: BatchState, turning: Array, shifting: Array, *, sized: bool
+) -> tuple[BatchState, NDArray[np.bool_]]:
     """The nearest closed states, and which were reached, (B,). ``turning`` (B, poses, 3): about which of its axes the
     platform may turn, ``shifting`` (B, poses, 3) along which it may move; ``sized``: whether dimensions may change."""
     B, n, m = start.q.shape
@@ -152,15 +176,27 @@ def close(of: RobotBatch, start: BatchState, turning: Array, shifting: Array, *,
         if not keep.any():
             break
         work, part, at, p, of_joints, of_lengths, error = (
-            work[keep], part.of(keep), at.of(keep), p[keep], of_joints[keep], of_lengths[keep], error[keep])
-        J = np.concatenate([_rows(part, at, p, of_joints, of_lengths), _of_poses(at, turning[work], shifting[work], n)],
-                           axis=-1)
+            work[keep],
+            part.of(keep),
+            at.of(keep),
+            p[keep],
+            of_joints[keep],
+            of_lengths[keep],
+            error[keep],
+        )
+        J = np.concatenate(
+            [_rows(part, at, p, of_joints, of_lengths), _of_poses(at, turning[work], shifting[work], n)], axis=-1
+        )
         x = _step(J, np.concatenate([stiff, np.ones(n * m + 6 * poses)]), error.reshape(len(work), -1))
         lengths = at.lengths.copy()
-        lengths[:, :of.count] += x[:, :of.count]
-        moves = x[:, of.count + n * m:].reshape(len(work), poses, 6)
-        at = BatchState(lengths, at.q + x[:, of.count:of.count + n * m].reshape(len(work), n, m),
-                   at.p + shifting[work] * moves[..., :3], at.R @ exponential(turning[work] * moves[..., 3:]))
+        lengths[:, : of.count] += x[:, : of.count]
+        moves = x[:, of.count + n * m :].reshape(len(work), poses, 6)
+        at = BatchState(
+            lengths,
+            at.q + x[:, of.count : of.count + n * m].reshape(len(work), n, m),
+            at.p + shifting[work] * moves[..., :3],
+            at.R @ exponential(turning[work] * moves[..., 3:]),
+        )
     return state, done
 
 
@@ -168,10 +204,10 @@ def _rows(of: RobotBatch, at: BatchState, p: Array, of_joints: Array, of_lengths
     """The rates of the legs' ends with dimensions and joints, (B, n, 6, K + n m)."""
     B, n, m = at.q.shape
     J = np.zeros((B, n, 6, of.count + n * m))
-    J[..., :of.count] = np.swapaxes(at_point(of_lengths[:, :, :of.count], p), -1, -2)
+    J[..., : of.count] = np.swapaxes(at_point(of_lengths[:, :, : of.count], p), -1, -2)
     own = np.swapaxes(at_point(of_joints, p), -1, -2)
     for i in range(n):
-        J[:, i, :, of.count + i * m: of.count + (i + 1) * m] = own[:, i]
+        J[:, i, :, of.count + i * m : of.count + (i + 1) * m] = own[:, i]
     return J
 
 
@@ -181,8 +217,8 @@ def _of_poses(at: BatchState, turning: Array, shifting: Array, n: int) -> Array:
     J = np.zeros((B, n, 6, 6 * poses))
     for k in range(poses):
         legs = slice(k * n // poses, (k + 1) * n // poses)
-        J[:, legs, :3, 6 * k: 6 * k + 3] = -(np.eye(3) * shifting[:, k, None, :])[:, None]
-        J[:, legs, 3:, 6 * k + 3: 6 * k + 6] = -(at.R[:, k] * turning[:, k, None, :])[:, None]
+        J[:, legs, :3, 6 * k : 6 * k + 3] = -(np.eye(3) * shifting[:, k, None, :])[:, None]
+        J[:, legs, 3:, 6 * k + 3 : 6 * k + 6] = -(at.R[:, k] * turning[:, k, None, :])[:, None]
     return J
 
 

@@ -34,7 +34,7 @@ NUMBERS, OPEN = "numbers", "open"
 SETTLED = {
     MODULAR: "our figure, by ranks at a random closed configuration modulo two primes",
     LEGS: "our figure, by ranks of the single legs modulo two primes: all translations, and the turns that all have "
-          "in common; of a loss: the platform has more freedoms than there are motors",
+    "in common; of a loss: the platform has more freedoms than there are motors",
     SYMMETRIC: "our figure, by the same ranks at a symmetric configuration; losses can only be smaller elsewhere",
     NUMBERS: "our figure, by ranks of numbers with their gap, at two configurations of generic dimensions",
     OPEN: "not settled",
@@ -67,8 +67,17 @@ def compare_robot(robot: PublishedRobot, studies: Sequence[tuple[str, Studied]],
     found, choices = list[TableDisagreement](), list[dict[str, Any]]()
     where = f"{robot.file}:{robot.line}"
     if not moving.moves:
-        found.append(TableDisagreement(robot.name, robot.group, where, UNMOVED, robot.group,
-                                  ", ".join(f"{t}T{r}R" for t, r in moving.others) or "nothing", OPEN))
+        found.append(
+            TableDisagreement(
+                robot.name,
+                robot.group,
+                where,
+                UNMOVED,
+                robot.group,
+                ", ".join(f"{t}T{r}R" for t, r in moving.others) or "nothing",
+                OPEN,
+            )
+        )
     elif moving.finite is not None and moving.motion is not None:
         ours = "{}T{}R".format(*moving.motion)
         kind = MORE if moving.finite else SHAKY
@@ -84,15 +93,34 @@ def compare_robot(robot: PublishedRobot, studies: Sequence[tuple[str, Studied]],
     counts = _working(robot, by, moving)
     if counts["theirs"] is not None and counts["stated"] is not None and counts["theirs"] != counts["stated"]:
         kind = FEWER if counts["stated"] < counts["theirs"] else FURTHER
-        found.append(TableDisagreement(robot.name, robot.group, where, kind, str(counts["theirs"]),
-                                       str(counts["stated"]), judge.reason_of_count(moving, kind)))
+        found.append(
+            TableDisagreement(
+                robot.name,
+                robot.group,
+                where,
+                kind,
+                str(counts["theirs"]),
+                str(counts["stated"]),
+                judge.reason_of_count(moving, kind),
+            )
+        )
     return {
-        "robot": robot.name, "group": robot.group, "at": where, "moves": moving.moves,
-        "motion": "{}T{}R".format(*moving.motion) if moving.motion else None, "finite": moving.finite,
-        "idle": moving.idle, "angles": moving.letters, "related": moving.related, "gap": moving.gap,
+        "robot": robot.name,
+        "group": robot.group,
+        "at": where,
+        "moves": moving.moves,
+        "motion": "{}T{}R".format(*moving.motion) if moving.motion else None,
+        "finite": moving.finite,
+        "idle": moving.idle,
+        "angles": moving.letters,
+        "related": moving.related,
+        "gap": moving.gap,
         "watching": None if moving.watched is None else {**vars(moving.watched), "dof": sum(moving.motion or ())},
-        "choices": choices, "working": counts, "exact": judge.record(moving) if found else None,
-        "disagreements": [each.to_dict() for each in found]}
+        "choices": choices,
+        "working": counts,
+        "exact": judge.record(moving) if found else None,
+        "disagreements": [each.to_dict() for each in found],
+    }
 
 
 def _loss(robot: PublishedRobot, drive: MotorChoice, study: Studied, judge: _Judge) -> list[TableDisagreement]:
@@ -102,8 +130,17 @@ def _loss(robot: PublishedRobot, drive: MotorChoice, study: Studied, judge: _Jud
         return []
     name, where = f"{robot.name}A{drive.number}", f"{drive.file}:{drive.line}"
     kind = UNCOUNTED if motors.stated <= drive.loss < motors.left else LARGER if drive.loss < motors.left else SMALLER
-    return [TableDisagreement(name, robot.group, where, kind, str(drive.loss), f"{motors.left} ({motors.stated} stated)"
-                         if motors.left != motors.stated else str(motors.left), judge.loss(study, drive.driven, kind))]
+    return [
+        TableDisagreement(
+            name,
+            robot.group,
+            where,
+            kind,
+            str(drive.loss),
+            f"{motors.left} ({motors.stated} stated)" if motors.left != motors.stated else str(motors.left),
+            judge.loss(study, drive.driven, kind),
+        )
+    ]
 
 
 def _working(robot: PublishedRobot, by: dict[str, Studied], moving: Studied) -> dict[str, int | None]:
@@ -111,10 +148,18 @@ def _working(robot: PublishedRobot, by: dict[str, Studied], moving: Studied) -> 
     if not moving.moves:
         return {"theirs": robot.working, "ours": None, "stated": None}
     listed = {drive.driven: by.get(drive.angles, moving) for drive in robot.drives}
-    motors = [study.motors[driven] for joint in robot.tried for driven in [((joint,),) * robot.legs]
-              for study in [listed.get(driven, moving)] if study.moves]
-    return {"theirs": robot.working, "ours": sum(each.left == 0 for each in motors),
-            "stated": sum(each.stated == 0 for each in motors)}
+    motors = [
+        study.motors[driven]
+        for joint in robot.tried
+        for driven in [((joint,),) * robot.legs]
+        for study in [listed.get(driven, moving)]
+        if study.moves
+    ]
+    return {
+        "theirs": robot.working,
+        "ours": sum(each.left == 0 for each in motors),
+        "stated": sum(each.stated == 0 for each in motors),
+    }
 
 
 class _Judge:
@@ -171,8 +216,21 @@ class _Judge:
         ranks = self.ranks(study) if study.moves else "it was not found to move as stated"
         if isinstance(ranks, str):
             return ranks
-        return {"repeats_after": ranks[0].orbit, "angles": study.letters, "instances": [
-            {"prime": each.prime, "dof": each.dof, "translations": each.translations, "stated": each.stated,
-             "idle": each.idle, "left": {"".join(str(j + 1) for j in driven[0]): list(value)
-                                         for driven, value in each.left.items()}, **each.instance}
-            for each in ranks]}
+        return {
+            "repeats_after": ranks[0].orbit,
+            "angles": study.letters,
+            "instances": [
+                {
+                    "prime": each.prime,
+                    "dof": each.dof,
+                    "translations": each.translations,
+                    "stated": each.stated,
+                    "idle": each.idle,
+                    "left": {
+                        "".join(str(j + 1) for j in driven[0]): list(value) for driven, value in each.left.items()
+                    },
+                    **each.instance,
+                }
+                for each in ranks
+            ],
+        }

@@ -58,8 +58,10 @@ def by_legs(robot: PublishedRobot, letters: str, seed: int) -> tuple[int, int]:
 
     A leg that leaves all of them leaves T ⊕ Ω_i with Ω_i spanned by its axes, so the platform has 3 + dim ∩ Ω_i
     freedoms at every closed configuration with regular legs at which the axes are no more special than at random."""
-    found = {_Instance(prime, random.Random(f"legs {robot.name} {letters} {prime} {seed}")).by_legs(robot, letters)
-             for prime in PRIMES}
+    found = {
+        _Instance(prime, random.Random(f"legs {robot.name} {letters} {prime} {seed}")).by_legs(robot, letters)
+        for prime in PRIMES
+    }
     if len(found) > 1:
         raise NotExact("the ranks modulo two primes differ")
     return found.pop()
@@ -109,11 +111,15 @@ class _Instance(PrimeField):
 
     def _shared_turns(self, parts: Sequence[LegFactor]) -> dict[str, Turn]:
         """Random turns of the dimensions that are angles."""
-        return {name: self.any_turn() for name in dimensions(parts)
-                if any(part.dimension == name and part.kind < TX for part in parts)}
+        return {
+            name: self.any_turn()
+            for name in dimensions(parts)
+            if any(part.dimension == name and part.kind < TX for part in parts)
+        }
 
-    def _ranks(self, robot: PublishedRobot, parts: Sequence[LegFactor], axes: Any, asked: Sequence[Held],
-               orbit: int) -> ModularRanks:
+    def _ranks(
+        self, robot: PublishedRobot, parts: Sequence[LegFactor], axes: Any, asked: Sequence[Held], orbit: int
+    ) -> ModularRanks:
         shared = self._shared_turns(parts)
         target = self._target(robot, axes, orbit)
         legs, turned = [], list[dict[int, Turn]]()
@@ -136,10 +142,22 @@ class _Instance(PrimeField):
             own = sum(len(each) - self.rank(each) for each in some)
             all_left, _, stated_left = self._freedoms(some, axes, own)
             left[driven] = all_left, stated_left
-        return ModularRanks(self.p, dof, translations, stated, idle, left, orbit, {
-            "angles": {name: list(turn) for name, turn in shared.items()}, "lengths": lengths,
-            "turns": [{str(j): list(turn) for j, turn in each.items()} for each in turned],
-            "slides": [{str(j): value for j, value in each.items()} for each in slides], "position": p})
+        return ModularRanks(
+            self.p,
+            dof,
+            translations,
+            stated,
+            idle,
+            left,
+            orbit,
+            {
+                "angles": {name: list(turn) for name, turn in shared.items()},
+                "lengths": lengths,
+                "turns": [{str(j): list(turn) for j, turn in each.items()} for each in turned],
+                "slides": [{str(j): value for j, value in each.items()} for each in slides],
+                "position": p,
+            },
+        )
 
     def _target(self, robot: PublishedRobot, axes: Any, orbit: int) -> Matrix | None:
         """The orientation of the platform: the stated motion's; None where the first leg decides; that of a symmetric
@@ -170,8 +188,9 @@ class _Instance(PrimeField):
             found[-1] = self.times(found[-1], R)  # type: ignore[arg-type]
         return found
 
-    def _orient(self, parts: Sequence[LegFactor], leg: int, shared: dict[str, Turn], target: Matrix | None
-                ) -> tuple[dict[int, Turn], Matrix]:
+    def _orient(
+        self, parts: Sequence[LegFactor], leg: int, shared: dict[str, Turn], target: Matrix | None
+    ) -> tuple[dict[int, Turn], Matrix]:
         """Turns of a leg's joints with which it has the platform's orientation (any where there is none yet)."""
         whole = self._turns(parts, leg, shared)
         numbers: list[int] = whole[1::2]  # type: ignore[assignment]
@@ -218,15 +237,21 @@ class _Instance(PrimeField):
         Q, second = blocks[1], []
         if len(blocks) == 4:
             u, w = blocks[1][2], [row[2] for row in blocks[2]]
-            second = [self.turn_with((u[0] * w[0] + u[1] * w[1]) % self.p, (u[1] * w[0] - u[0] * w[1]) % self.p,
-                                  (D[2][2] - u[2] * w[2]) % self.p)]
+            second = [
+                self.turn_with(
+                    (u[0] * w[0] + u[1] * w[1]) % self.p,
+                    (u[1] * w[0] - u[0] * w[1]) % self.p,
+                    (D[2][2] - u[2] * w[2]) % self.p,
+                )
+            ]
             Q = self.times(self.times(Q, self.matrix(RZ, second[0])), blocks[2])
         first = self.turn_between((Q[0][2], Q[1][2]), (D[0][2], D[1][2]))
         last = self.times(self.transposed(self.times(self.matrix(RZ, first), Q)), D)
         return [first, *second, (last[0][0], last[1][0])]
 
-    def _columns(self, parts: Sequence[LegFactor], leg: int, shared: dict[str, Turn], joints: dict[int, Turn]
-                 ) -> list[Any]:
+    def _columns(
+        self, parts: Sequence[LegFactor], leg: int, shared: dict[str, Turn], joints: dict[int, Turn]
+    ) -> list[Any]:
         """The axis of each factor in the base, None of constant turns."""
         R, found = self.matrix(RZ, (1, 0)), list[Any]()
         for part in parts:
@@ -240,8 +265,9 @@ class _Instance(PrimeField):
                 R = self.times(R, self.matrix(part.kind, turn))
         return found
 
-    def _place(self, parts: Sequence[LegFactor], legs: list[list[Any]], names: list[str], n: int, orbit: int
-               ) -> tuple[dict[str, int], list[dict[int, int]], list[int]]:
+    def _place(
+        self, parts: Sequence[LegFactor], legs: list[list[Any]], names: list[str], n: int, orbit: int
+    ) -> tuple[dict[str, int], list[dict[int, int]], list[int]]:
         """Lengths, slides and position that close all legs: a random solution of linear equations."""
         from flint import nmod_mat
 
@@ -280,8 +306,15 @@ class _Instance(PrimeField):
         found = [{j: x[len(names) + leg % own * len(slides) + k] for k, j in enumerate(slides)} for leg in range(n)]
         return lengths, found, x[-4:-1]
 
-    def _screws(self, parts: Sequence[LegFactor], leg: int, axes: list[Any], lengths: dict[str, int],
-                slides: dict[int, int], p: list[int] | None) -> list[list[int]]:
+    def _screws(
+        self,
+        parts: Sequence[LegFactor],
+        leg: int,
+        axes: list[Any],
+        lengths: dict[str, int],
+        slides: dict[int, int],
+        p: list[int] | None,
+    ) -> list[list[int]]:
         """The screws (v, ω) of the joints at the base's origin."""
         at, found = [0, 0, 0], []
         for part, axis in zip(parts, axes, strict=True):
@@ -289,8 +322,11 @@ class _Instance(PrimeField):
                 continue
             if part.kind < TX:
                 if part.joint is not None:
-                    v = [at[1] * axis[2] - at[2] * axis[1], at[2] * axis[0] - at[0] * axis[2],
-                         at[0] * axis[1] - at[1] * axis[0]]
+                    v = [
+                        at[1] * axis[2] - at[2] * axis[1],
+                        at[2] * axis[0] - at[0] * axis[2],
+                        at[0] * axis[1] - at[1] * axis[0],
+                    ]
                     found.append([x % self.p for x in (*v, *axis)])
                 continue
             if part.joint is not None:
@@ -322,7 +358,7 @@ class _Instance(PrimeField):
         for each in screws:
             for k in range(size):
                 row = [0] * width
-                row[start: start + len(each)] = [s[k] for s in each]
+                row[start : start + len(each)] = [s[k] for s in each]
                 row[width - size + k] = self.p - 1
                 rows.append(row)
             start += len(each)

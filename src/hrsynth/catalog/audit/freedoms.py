@@ -38,8 +38,9 @@ def count_ranks(values: Array, scale: Array | float = 1.0) -> tuple[Array, Array
     size = np.maximum(values[..., :1], scale)
     relative = np.maximum(values / np.where(size > 0, size, 1.0), np.finfo(float).eps)
     rank = np.sum(relative > RANK_CUTOFF, axis=-1)
-    padded = np.concatenate([np.ones_like(relative[..., :1]), relative,
-                             np.full_like(relative[..., :1], np.finfo(float).eps)], axis=-1)
+    padded = np.concatenate(
+        [np.ones_like(relative[..., :1]), relative, np.full_like(relative[..., :1], np.finfo(float).eps)], axis=-1
+    )
     last = np.take_along_axis(padded, rank[..., None], -1)[..., 0]
     first = np.take_along_axis(padded, rank[..., None] + 1, -1)[..., 0]
     return rank, last / first

@@ -66,8 +66,14 @@ def places(legs: int, pairs: bool) -> list[tuple[float, float]]:
 def base_turn(method: int, beta: float) -> Array:
     """Base coupling: the frame of the first joint, but for the cone's inclination."""
     q = math.pi / 2
-    return {1: euler(0, 0, q + beta), 2: euler(-q, -beta, -q), 3: euler(-q, -q - beta, 0), 4: euler(0, 0, q + beta),
-            9: euler(q, 0, q), 10: np.eye(3)}[method if method not in BASE_PAIRS else method - 4]
+    return {
+        1: euler(0, 0, q + beta),
+        2: euler(-q, -beta, -q),
+        3: euler(-q, -q - beta, 0),
+        4: euler(0, 0, q + beta),
+        9: euler(q, 0, q),
+        10: np.eye(3),
+    }[method if method not in BASE_PAIRS else method - 4]
 
 
 def platform_turn(method: int, beta: float, base: Array) -> Array:
@@ -75,15 +81,23 @@ def platform_turn(method: int, beta: float, base: Array) -> Array:
     q = math.pi / 2
     if method == 7:
         return base
-    return {1: euler(0, 0, q + beta), 2: euler(-q, -beta, -q), 3: euler(-q, -q - beta, 0), 8: turn(RY, q),
-            9: euler(-q, -q - beta, 0), 10: turn(RX, -q) @ turn(RY, -beta) @ turn(RZ, -q)}[
-                method if method not in PLATFORM_PAIRS else method - 3]
+    return {
+        1: euler(0, 0, q + beta),
+        2: euler(-q, -beta, -q),
+        3: euler(-q, -q - beta, 0),
+        8: turn(RY, q),
+        9: euler(-q, -q - beta, 0),
+        10: turn(RX, -q) @ turn(RY, -beta) @ turn(RZ, -q),
+    }[method if method not in PLATFORM_PAIRS else method - 3]
 
 
 def free_angles(robot: PublishedRobot, letters: str) -> dict[str, float]:
     """The free angles of the chain that are held, by what is said of them."""
-    return {name: math.pi / 2 if letter == SQUARE else 0.0
-            for name, letter in zip(robot.chain.angles, letters, strict=False) if letter in (PARALLEL, SQUARE)}
+    return {
+        name: math.pi / 2 if letter == SQUARE else 0.0
+        for name, letter in zip(robot.chain.angles, letters, strict=False)
+        if letter in (PARALLEL, SQUARE)
+    }
 
 
 def factors(robot: PublishedRobot, letters: str = "") -> list[LegFactor]:
@@ -95,10 +109,13 @@ def factors(robot: PublishedRobot, letters: str = "") -> list[LegFactor]:
     ends = [platform_turn(robot.platform, beta, A) for (beta, _), A in zip(platform, bases, strict=True)]
     zero, ones = np.zeros(n), np.ones(n)
     cone = "cone" if robot.base in (4, 8) else None
-    found = [_turn(turn(RZ, beta) for beta, _ in base), LegFactor(TX, zero, "r_A", ones),
-             LegFactor(TY, zero, "d_A" if robot.base in BASE_PAIRS else None, np.array([side for _, side in base])),
-             _turn(turn(RZ, -beta) @ A for (beta, _), A in zip(base, bases, strict=True)),
-             LegFactor(RX, zero, cone, -ones)]
+    found = [
+        _turn(turn(RZ, beta) for beta, _ in base),
+        LegFactor(TX, zero, "r_A", ones),
+        LegFactor(TY, zero, "d_A" if robot.base in BASE_PAIRS else None, np.array([side for _, side in base])),
+        _turn(turn(RZ, -beta) @ A for (beta, _), A in zip(base, bases, strict=True)),
+        LegFactor(RX, zero, cone, -ones),
+    ]
     for i, joint in enumerate(robot.chain.joints):
         own = 4 if joint.kind == "R" else 5
         for k, (kind, value) in enumerate(zip((RZ, TZ, RX, TX, RZ, TZ), joint.cells, strict=True)):
@@ -109,21 +126,31 @@ def factors(robot: PublishedRobot, letters: str = "") -> list[LegFactor]:
             else:
                 found.append(LegFactor(kind, np.full(n, held[value] if isinstance(value, str) else value)))
     found.append(_turn([euler(*(robot.chain.end if len(robot.chain.joints) <= PLANAR else (0.0, 0.0, 0.0)))] * n))
-    found += [LegFactor(kind, zero, name, -ones)
-              for kind, name in zip((RZ, RY, RX), PLATFORM_ANGLES.get(robot.platform, (None,) * 3), strict=True)]
+    found += [
+        LegFactor(kind, zero, name, -ones)
+        for kind, name in zip((RZ, RY, RX), PLATFORM_ANGLES.get(robot.platform, (None,) * 3), strict=True)
+    ]
     pairs = "d_B" if robot.platform in PLATFORM_PAIRS else None
-    return [*found, LegFactor(RX, zero, cone if robot.platform == 7 else None, ones),
-            _turn((turn(RZ, -beta) @ B).T for (beta, _), B in zip(platform, ends, strict=True)),
-            LegFactor(TY, zero, pairs, -np.array([side for _, side in platform])), LegFactor(TX, zero, "r_B", -ones),
-            _turn(turn(RZ, -beta) for beta, _ in platform)]
+    return [
+        *found,
+        LegFactor(RX, zero, cone if robot.platform == 7 else None, ones),
+        _turn((turn(RZ, -beta) @ B).T for (beta, _), B in zip(platform, ends, strict=True)),
+        LegFactor(TY, zero, pairs, -np.array([side for _, side in platform])),
+        LegFactor(TX, zero, "r_B", -ones),
+        _turn(turn(RZ, -beta) for beta, _ in platform),
+    ]
 
 
 def _turn(turns: Iterable[Array]) -> LegFactor:
     return LegFactor(TURN, np.stack(list(turns)))
 
 
-PLATFORM_ANGLES = {7: ("phi_3", "phi_2", "phi_1"), 8: (None, None, "psi"), 9: (None, None, "phi"),
-                   10: (None, "phi", None)}
+PLATFORM_ANGLES = {
+    7: ("phi_3", "phi_2", "phi_1"),
+    8: (None, None, "psi"),
+    9: (None, None, "phi"),
+    10: (None, "phi", None),
+}
 """The free angles of a platform coupling, about z, y, x."""
 
 

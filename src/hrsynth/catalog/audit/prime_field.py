@@ -26,8 +26,12 @@ class PrimeField:
 
     def __init__(self, prime: int, draws: random.Random) -> None:
         self.p, self.random = prime, draws
-        root = next(r for g in itertools.count(2) for r in [pow(g, (prime - 1) // 240, prime)]
-                    if pow(r, 120, prime) == prime - 1 and pow(r, 80, prime) != 1 and pow(r, 48, prime) != 1)
+        root = next(
+            r
+            for g in itertools.count(2)
+            for r in [pow(g, (prime - 1) // 240, prime)]
+            if pow(r, 120, prime) == prime - 1 and pow(r, 80, prime) != 1 and pow(r, 48, prime) != 1
+        )
         self.root, self.half = root, (prime + 1) // 2
         self.i = pow(root, 60, prime)
 
@@ -101,8 +105,10 @@ class PrimeField:
 
     def times(self, A: Matrix, B: Matrix) -> Matrix:
         """A B."""
-        return [[sum(a * b for a, b in zip(row, column, strict=True)) % self.p for column in zip(*B, strict=True)]
-                for row in A]
+        return [
+            [sum(a * b for a, b in zip(row, column, strict=True)) % self.p for column in zip(*B, strict=True)]
+            for row in A
+        ]
 
     def transposed(self, A: Matrix) -> Matrix:
         """Aᵀ."""

@@ -50,39 +50,67 @@ class TableAudit:
         both = [c for c in counts if c["theirs"] is not None and c["stated"] is not None]
         kinds = Counter((each["kind"], each["settled"]) for record in records for each in record["disagreements"])
         return {
-            "group": name, "robots": len(records), "without_chain": sum(group == name for group, *_ in self.no_chain),
+            "group": name,
+            "robots": len(records),
+            "without_chain": sum(group == name for group, *_ in self.no_chain),
             "moves_as_stated": sum(r["moves"] and r["motion"] == name for r in records),
             "moves_further": sum(r["moves"] and r["motion"] != name for r in records),
             "not_found": sum(not r["moves"] for r in records),
-            "choices": len(choices), "choices_agree": sum(c["theirs"] == c["ours"] for c in stated),
+            "choices": len(choices),
+            "choices_agree": sum(c["theirs"] == c["ours"] for c in stated),
             "choices_agree_in_stated": sum(c["theirs"] == c["stated"] for c in stated),
             "choices_not_stated": sum(c["theirs"] is None for c in choices),
             "choices_not_compared": sum(c["theirs"] is not None and c["ours"] is None for c in choices),
-            "counts": len(both), "counts_agree": sum(c["theirs"] == c["stated"] for c in both),
+            "counts": len(both),
+            "counts_agree": sum(c["theirs"] == c["stated"] for c in both),
             "watching": self._watching(records),
-            "kinds": [{"kind": kind, "settled": settled, "number": number}
-                      for (kind, settled), number in sorted(kinds.items())]}
+            "kinds": [
+                {"kind": kind, "settled": settled, "number": number}
+                for (kind, settled), number in sorted(kinds.items())
+            ],
+        }
 
     @staticmethod
     def _watching(records: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
         """How many robots are controllable (watching all legs shows all freedoms), partially, or not, by the least
         number of legs that show as much as all."""
-        seen = [(sight["seen"], sight["dof"], sight["fewest"]) for record in records
-                for sight in [record["watching"]] if sight is not None]
-        words = Counter(("controllable" if s == dof else "partially controllable" if s else "uncontrollable", fewest)
-                        for s, dof, fewest in seen)
+        seen = [
+            (sight["seen"], sight["dof"], sight["fewest"])
+            for record in records
+            for sight in [record["watching"]]
+            if sight is not None
+        ]
+        words = Counter(
+            ("controllable" if s == dof else "partially controllable" if s else "uncontrollable", fewest)
+            for s, dof, fewest in seen
+        )
         return [{"verdict": verdict, "fewest": fewest, "number": n} for (verdict, fewest), n in sorted(words.items())]
 
     def to_dict(self) -> dict[str, Any]:
         agree = sum(not record["disagreements"] for record in self.records)
-        return {"folder": self.folder, "rows": self.rows, "compared": len(self.records), "agree": agree,
-                "groups": self.groups, "kinds": CLASSES, "settlements": SETTLED,
-                "disagreements": self.disagreements, "defects": [str(each) for each in self.defects],
-                "without_chain": [{"group": g, "robot": r, "chain": c} for g, r, c in self.no_chain]}
+        return {
+            "folder": self.folder,
+            "rows": self.rows,
+            "compared": len(self.records),
+            "agree": agree,
+            "groups": self.groups,
+            "kinds": CLASSES,
+            "settlements": SETTLED,
+            "disagreements": self.disagreements,
+            "defects": [str(each) for each in self.defects],
+            "without_chain": [{"group": g, "robot": r, "chain": c} for g, r, c in self.no_chain],
+        }
 
 
-def audit(folder: str | Path, *, only: str | None = None, sample: int | None = None, seed: int = 0,
-          kept: str | Path | None = None, tell: Tell | None = None) -> TableAudit:
+def audit(
+    folder: str | Path,
+    *,
+    only: str | None = None,
+    sample: int | None = None,
+    seed: int = 0,
+    kept: str | Path | None = None,
+    tell: Tell | None = None,
+) -> TableAudit:
     """Compare published tables with what is computed here.
 
     ``only`` one group, ``sample`` robots of each, drawn with ``seed``; records are ``kept`` in a file, a line each,
@@ -102,7 +130,7 @@ def audit(folder: str | Path, *, only: str | None = None, sample: int | None = N
     head = {"audit": str(folder), "only": only, "sample": sample, "seed": seed, "robots": len(robots)}
     with _Kept(kept, head) as done:
         for k in range(0, len(robots), AUDIT_BATCH):
-            chunk = robots[k: k + AUDIT_BATCH]
+            chunk = robots[k : k + AUDIT_BATCH]
             if any(_key(robot) not in done.records for robot in chunk):
                 done.add(list(_chunk(chunk, seed)))
             if tell is not None:
@@ -112,8 +140,9 @@ def audit(folder: str | Path, *, only: str | None = None, sample: int | None = N
     return TableAudit(str(folder), rows, records, tuple(tables.defects), tuple(lost))
 
 
-def _draw_robots(tables: PublishedTables, groups: Sequence[str], sample: int | None,
-                 seed: int) -> Iterator[PublishedRobot]:
+def _draw_robots(
+    tables: PublishedTables, groups: Sequence[str], sample: int | None, seed: int
+) -> Iterator[PublishedRobot]:
     for group in groups:
         robots = [robot for robot in tables.robots if robot.group == group]
         if sample is not None and sample < len(robots):
@@ -122,8 +151,11 @@ def _draw_robots(tables: PublishedTables, groups: Sequence[str], sample: int | N
 
 
 def _chunk(robots: Sequence[PublishedRobot], seed: int) -> Iterator[tuple[str, dict[str, Any]]]:
-    cases = [StudyCase(robot, letters) for robot in robots
-             for letters in dict.fromkeys([drive.angles for drive in robot.drives] or [""])]
+    cases = [
+        StudyCase(robot, letters)
+        for robot in robots
+        for letters in dict.fromkeys([drive.angles for drive in robot.drives] or [""])
+    ]
     studied: dict[str, list[tuple[str, Studied]]] = {}
     for case, found in study(cases, seed):
         studied.setdefault(_key(case.robot), []).append((case.letters, found))

@@ -102,7 +102,7 @@ def study(cases: Sequence[StudyCase], seed: int) -> Iterator[tuple[StudyCase, St
         alike.setdefault((case.robot.legs, len(case.robot.chain.joints), case.robot.motion), []).append(case)
     for (legs, joints, _), some in alike.items():
         for k in range(0, len(some), AUDIT_BATCH):
-            part = some[k: k + AUDIT_BATCH]
+            part = some[k : k + AUDIT_BATCH]
             yield from zip(part, _batch(part, np.random.default_rng([seed, legs, joints, k])), strict=True)
 
 
@@ -112,23 +112,23 @@ def _batch(cases: Sequence[StudyCase], random: np.random.Generator) -> list[Stud
     sparse = axes_of(cases[0].robot).sum() < 3
     for trial in range(AUDIT_TRIALS * (1 + sparse)):
         related = trial >= AUDIT_TRIALS
-        todo = [i for i, each in enumerate(found)
-                if each is None or (each.finite is not None and trial < AUDIT_TRIALS // 2)]
+        todo = [
+            i for i, each in enumerate(found) if each is None or (each.finite is not None and trial < AUDIT_TRIALS // 2)
+        ]
         if not todo:
             break
         letters = [cases[i].letters_of(trial) for i in todo]
-        for i, each, other in zip(todo, *_trial([cases[i].robot for i in todo], letters, random, related),
-                                  strict=True):
+        for i, each, other in zip(todo, *_trial([cases[i].robot for i in todo], letters, random, related), strict=True):
             if each is not None and (found[i] is None or each.finite is None):
                 found[i] = each
             if other is not None:
                 others[i].add(other)
-    return [each or Studied(False, others=tuple(sorted(other)))
-            for each, other in zip(found, others, strict=True)]
+    return [each or Studied(False, others=tuple(sorted(other))) for each, other in zip(found, others, strict=True)]
 
 
-def _trial(robots: Sequence[PublishedRobot], letters: Sequence[str], random: np.random.Generator, related: bool
-           ) -> tuple[list[Studied | None], list[tuple[int, int] | None]]:
+def _trial(
+    robots: Sequence[PublishedRobot], letters: Sequence[str], random: np.random.Generator, related: bool
+) -> tuple[list[Studied | None], list[tuple[int, int] | None]]:
     """One random start of each robot: what it does, None where it does not close or move as stated."""
     parts = [factors(robot, each) for robot, each in zip(robots, letters, strict=True)]
     of, axes, wanted = batch(parts, len(robots[0].chain.joints)), axes_of(robots[0]), sum(robots[0].motion)
@@ -155,17 +155,30 @@ def _trial(robots: Sequence[PublishedRobot], letters: Sequence[str], random: np.
             found.append(None)
             continue
         motion = (int(two.translations[b]), int(two.rotations[b]))
-        found.append(Studied(
-            True, motion, bool(finite[b]) if two.dof[b] > wanted else None, int(two.idle[b]),
-            {driven: HeldMotors(int(each[0][b]), int(each[1][b])) for driven, each in motors.items()}, related,
-            letters[b], gap, watching(later[b], robot.chain.kinds, int(two.dof[b])), screws=later[b]))
-    instead = [(int(two.translations[b]), int(two.rotations[b])) if same[b] and not related else None
-               for b in range(len(robots))]
+        found.append(
+            Studied(
+                True,
+                motion,
+                bool(finite[b]) if two.dof[b] > wanted else None,
+                int(two.idle[b]),
+                {driven: HeldMotors(int(each[0][b]), int(each[1][b])) for driven, each in motors.items()},
+                related,
+                letters[b],
+                gap,
+                watching(later[b], robot.chain.kinds, int(two.dof[b])),
+                screws=later[b],
+            )
+        )
+    instead = [
+        (int(two.translations[b]), int(two.rotations[b])) if same[b] and not related else None
+        for b in range(len(robots))
+    ]
     return found, instead
 
 
-def _close_at_random(of: RobotBatch, B: int, n: int, axes: Array, poses: int, random: np.random.Generator
-            ) -> tuple[BatchState, NDArray[np.bool_]]:
+def _close_at_random(
+    of: RobotBatch, B: int, n: int, axes: Array, poses: int, random: np.random.Generator
+) -> tuple[BatchState, NDArray[np.bool_]]:
     """Random dimensions closed at one random pose of the stated motion, or at several that are held."""
     lengths = random.uniform(0.3, 1.2, (B, of.count + 1))
     lengths[:, -1] = 0.0
@@ -175,8 +188,13 @@ def _close_at_random(of: RobotBatch, B: int, n: int, axes: Array, poses: int, ra
     q = np.tile(random.uniform(-2.0, 2.0, (B, n, of.joints)), (1, poses, 1))
     free = np.broadcast_to(axes if poses == 1 else np.zeros(3), (B, poses, 3))
     shifting = np.full((B, poses, 3), 1.0 if poses == 1 else 0.0)
-    return close(of.at_poses(poses) if poses > 1 else of, BatchState(lengths, q, p, exponential(turns)), free, shifting,
-                 sized=True)
+    return close(
+        of.at_poses(poses) if poses > 1 else of,
+        BatchState(lengths, q, p, exponential(turns)),
+        free,
+        shifting,
+        sized=True,
+    )
 
 
 def _first(state: BatchState, n: int) -> BatchState:
@@ -195,19 +213,25 @@ def _plain(parts: Sequence[Sequence[LegFactor]], state: BatchState) -> NDArray[n
     return good
 
 
-def _close_elsewhere(of: RobotBatch, state: BatchState, n: int, axes: Array, random: np.random.Generator, *, keep: bool
-             ) -> tuple[BatchState, NDArray[np.bool_]]:
+def _close_elsewhere(
+    of: RobotBatch, state: BatchState, n: int, axes: Array, random: np.random.Generator, *, keep: bool
+) -> tuple[BatchState, NDArray[np.bool_]]:
     """Closed again in the stated motion, elsewhere, and (unless ``keep``) with other dimensions."""
     at = _first(state, n)
     B = len(at.q)
     lengths = at.lengths * (1 + (0.0 if keep else AUDIT_CHANGED) * random.standard_normal(at.lengths.shape))
-    start = BatchState(lengths, at.q + AUDIT_CHANGED * random.standard_normal(at.q.shape),
-                  at.p + AUDIT_CHANGED * random.standard_normal(at.p.shape), at.R)
+    start = BatchState(
+        lengths,
+        at.q + AUDIT_CHANGED * random.standard_normal(at.q.shape),
+        at.p + AUDIT_CHANGED * random.standard_normal(at.p.shape),
+        at.R,
+    )
     return close(of, start, np.broadcast_to(axes, (B, 1, 3)), np.ones((B, 1, 3)), sized=False)
 
 
-def _can_leave(of: RobotBatch, at: BatchState, now: PlatformFreedoms, axes: Array, wanted: int,
-              random: np.random.Generator) -> Array:
+def _can_leave(
+    of: RobotBatch, at: BatchState, now: PlatformFreedoms, axes: Array, wanted: int, random: np.random.Generator
+) -> Array:
     """Whether platforms with more freedoms than stated can leave the stated motion for good: moved along a random twist
     and closed with all freedoms, the turn is off the stated axes, and the freedoms are as many."""
     B = len(at.q)
@@ -229,8 +253,9 @@ def _every(robots: Sequence[PublishedRobot]) -> list[Held]:
     return list(dict.fromkeys(driven for robot in robots for driven in motor_choices(robot)))
 
 
-def _freedoms_with_motors(legs: Array, later: Array, robots: Sequence[PublishedRobot], driven: Held, axes: Array
-          ) -> tuple[Array, Array, Array, Array]:
+def _freedoms_with_motors(
+    legs: Array, later: Array, robots: Sequence[PublishedRobot], driven: Held, axes: Array
+) -> tuple[Array, Array, Array, Array]:
     """PlatformFreedoms left with these motors held, of them stated ones, the gap, and whether both configurations
     agree."""
     mask = np.zeros(legs.shape[:3], dtype=bool)

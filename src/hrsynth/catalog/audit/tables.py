@@ -64,8 +64,9 @@ class LegChain:
     @cached_property
     def angles(self) -> tuple[str, ...]:
         """Its free angles in the order of their names, which is that of the letters of a choice of motors."""
-        return tuple(sorted({c for joint in self.joints for c in joint.cells
-                             if isinstance(c, str) and c.startswith(ANGLES)}))
+        return tuple(
+            sorted({c for joint in self.joints for c in joint.cells if isinstance(c, str) and c.startswith(ANGLES)})
+        )
 
 
 @dataclass(frozen=True)
@@ -137,14 +138,22 @@ def read(folder: str | Path) -> PublishedTables:
     once = _Once(found.defects)
     chains = {chain.name: chain for path in sorted((root / "chains").glob("*.csv")) for chain in _chains(path, once)}
     drives = _drives(root / "robots" / "actuation.csv", once)
-    working = {key: value for path in sorted((root / "synthesis").glob("*.csv"))
-               for key, value in _synthesis(path, once)}
+    working = {
+        key: value for path in sorted((root / "synthesis").glob("*.csv")) for key, value in _synthesis(path, once)
+    }
     for path in lists:
         found.robots += _robots(path, chains, drives, working, found, once)
     for (group, robot), choices in drives.items():
         if once.has(group) and not once.has(group, robot):
-            found.defects += [Defect(each.file, each.line, "a choice of motors of a robot that its group does not list",
-                                     f"{robot}A{each.number}") for each in choices]
+            found.defects += [
+                Defect(
+                    each.file,
+                    each.line,
+                    "a choice of motors of a robot that its group does not list",
+                    f"{robot}A{each.number}",
+                )
+                for each in choices
+            ]
     found.robots.sort(key=lambda robot: (robot.group, robot.name))
     return found
 
@@ -177,8 +186,9 @@ def cell_text(text: str) -> str:
     return shorten_text(text if text.isprintable() else ascii(text), 60)
 
 
-def _rows(path: Path, heads: int, defects: list[Defect], named: re.Pattern[str] | None = None, *,
-          bare: bool = False) -> Iterator[tuple[int, list[str]]]:
+def _rows(
+    path: Path, heads: int, defects: list[Defect], named: re.Pattern[str] | None = None, *, bare: bool = False
+) -> Iterator[tuple[int, list[str]]]:
     """The filled rows of a table after its heads, with their lines; a head that is ``named`` as a row is none. There is
     a row, if the table may not be ``bare``."""
     try:
@@ -212,8 +222,9 @@ def _chains(path: Path, once: _Once) -> Iterator[LegChain]:
     for line, row in _rows(path, 2, once.defects, CHAIN):
         match = CHAIN.match(row[0])
         if match is None or int(match[1]) != len(match[2]):
-            once.defects.append(Defect(str(path), line, "not the name of a chain", cell_text(row[0]),
-                                       "S4PRRR1, S6RRPRRR12V2"))
+            once.defects.append(
+                Defect(str(path), line, "not the name of a chain", cell_text(row[0]), "S4PRRR1, S6RRPRRR12V2")
+            )
             continue
         try:
             found = _chain(row, match[2])
@@ -227,7 +238,7 @@ def _chains(path: Path, once: _Once) -> Iterator[LegChain]:
 def _chain(row: list[str], kinds: str) -> LegChain:
     joints = []
     for i, kind in enumerate(kinds):
-        cells = row[1 + 8 * i: 9 + 8 * i]
+        cells = row[1 + 8 * i : 9 + 8 * i]
         if len(cells) < 7 or cells[0] != kind:
             raise ValueError(f"joint {i + 1} is not a whole {kind} joint")
         values = [cell(each) for each in cells[1:7]]
@@ -239,7 +250,7 @@ def _chain(row: list[str], kinds: str) -> LegChain:
             if k != own and isinstance(value, str) and (value.startswith("q") or value.startswith(ANGLES) != angle):
                 raise ValueError(f"joint {i + 1}: {value} is no {'angle' if angle else 'length'}, but in {CELLS[k]}")
         joints.append(PublishedJoint(kind, tuple(values)))
-    end = row[1 + 8 * len(kinds): 4 + 8 * len(kinds)]
+    end = row[1 + 8 * len(kinds) : 4 + 8 * len(kinds)]
     turns = [cell(each) if each else 0.0 for each in [*end, "", "", ""][:3]]
     if any(isinstance(each, str) for each in turns):
         raise ValueError("the turn of the end is not a number")
@@ -258,8 +269,9 @@ def cell(text: str) -> Cell:
     if math.isnan(value):
         raise ValueError(f"a cell is neither a number, a multiple of pi nor a name: {cell_text(text) or 'empty'}")
     if abs(value) > LARGEST_CELL or 0 < abs(value) < 1 / LARGEST_CELL:
-        raise ValueError(f"a cell is larger than {LARGEST_CELL:g}, or nearer to zero than its inverse: "
-                         f"{cell_text(text)}")
+        raise ValueError(
+            f"a cell is larger than {LARGEST_CELL:g}, or nearer to zero than its inverse: {cell_text(text)}"
+        )
     return value
 
 
@@ -279,11 +291,12 @@ def _drives(path: Path, once: _Once) -> dict[tuple[str, str], list[MotorChoice]]
         group, name = GROUP.search(row[0]), DRIVEN.match(row[1] if len(row) > 1 else "")
         robot = ROBOT.match(name[1]) if name else None
         if group is None or name is None or robot is None:
-            once.defects.append(Defect(str(path), line, "no choice of motors", cell_text(";".join(row[:2])),
-                                       "sym_3T0R;P3PRRR1G1P1A1"))
+            once.defects.append(
+                Defect(str(path), line, "no choice of motors", cell_text(";".join(row[:2])), "sym_3T0R;P3PRRR1G1P1A1")
+            )
             continue
         legs, joints = int(robot[1]), len(robot[2])
-        cells, rest = row[2: 2 + legs * joints], row[2 + legs * joints:]
+        cells, rest = row[2 : 2 + legs * joints], row[2 + legs * joints :]
         if len(cells) < legs * joints or any(each not in ("0", "1") for each in cells):
             what = f"not {legs} × {joints} joints that are driven (1) or not (0)"
             once.defects.append(Defect(str(path), line, what, cell_text(row[1])))
@@ -295,8 +308,9 @@ def _drives(path: Path, once: _Once) -> dict[tuple[str, str], list[MotorChoice]]
             continue
         driven = tuple(tuple(j for j in range(joints) if cells[i * joints + j] == "1") for i in range(legs))
         if once.new(path, line, row[1], "choice", group[0], name[1], int(name[2])):
-            found.setdefault((group[0], name[1]), []).append(MotorChoice(
-                int(name[2]), driven, loss, rest[1] if len(rest) > 1 else "", str(path), line))
+            found.setdefault((group[0], name[1]), []).append(
+                MotorChoice(int(name[2]), driven, loss, rest[1] if len(rest) > 1 else "", str(path), line)
+            )
     return found
 
 
@@ -317,21 +331,28 @@ def _synthesis(path: Path, once: _Once) -> Iterator[tuple[Combination, tuple[int
             once.defects.append(Defect(str(path), line, "not a whole number", cell_text(str(error))))
             continue
         if not CHAIN.match(row[0]) or legs is None or base is None or platform is None:
-            once.defects.append(Defect(str(path), line, "not a combination of a chain, legs, G and P",
-                                       cell_text(";".join(row[:4]))))
+            once.defects.append(
+                Defect(str(path), line, "not a combination of a chain, legs, G and P", cell_text(";".join(row[:4])))
+            )
             continue
         key = group[0], row[0], legs, base, platform
         if once.new(path, line, ";".join(row[:4]), "tried", *key):
             yield key, (status, count)
 
 
-def _robots(path: Path, chains: dict[str, LegChain], drives: dict[tuple[str, str], list[MotorChoice]],
-            working: dict[Combination, tuple[int | None, int | None]], found: PublishedTables, once: _Once
-            ) -> Iterator[PublishedRobot]:
+def _robots(
+    path: Path,
+    chains: dict[str, LegChain],
+    drives: dict[tuple[str, str], list[MotorChoice]],
+    working: dict[Combination, tuple[int | None, int | None]],
+    found: PublishedTables,
+    once: _Once,
+) -> Iterator[PublishedRobot]:
     group = GROUP.search(path.name)
     if group is None:
-        found.defects.append(Defect(str(path), None, "the name gives no group", cell_text(path.name),
-                                    "sym_3T0R_list.csv"))
+        found.defects.append(
+            Defect(str(path), None, "the name gives no group", cell_text(path.name), "sym_3T0R_list.csv")
+        )
         return
     before = len(found.defects)
     for line, row in _rows(path, 1, found.defects, ROBOT):
@@ -343,20 +364,40 @@ def _robots(path: Path, chains: dict[str, LegChain], drives: dict[tuple[str, str
             continue
         name = f"S{len(match[2])}{match[2]}{match[3]}"
         if any(row[1:2]) and row[1] != name:
-            found.defects.append(Defect(str(path), line, f"the chain of {row[0]} is not that of its name",
-                                        cell_text(row[1]), name))
+            found.defects.append(
+                Defect(str(path), line, f"the chain of {row[0]} is not that of its name", cell_text(row[1]), name)
+            )
             continue
         if name not in chains:
             found.no_chain.append((group[0], row[0], name))
             continue
         base, platform = int(match[4]), int(match[5])
         if not {base, platform} <= {*COUPLINGS} or (
-                int(match[1]) != 6 and (base in BASE_PAIRS or platform in PLATFORM_PAIRS)):
-            found.defects.append(Defect(str(path), line, "unknown couplings", f"G{base}P{platform}",
-                                        "1 to 10, pairs (G5 to G8, P4 to P6) of six legs"))
+            int(match[1]) != 6 and (base in BASE_PAIRS or platform in PLATFORM_PAIRS)
+        ):
+            found.defects.append(
+                Defect(
+                    str(path),
+                    line,
+                    "unknown couplings",
+                    f"G{base}P{platform}",
+                    "1 to 10, pairs (G5 to G8, P4 to P6) of six legs",
+                )
+            )
             continue
         status, count = working.get((group[0], name, int(match[1]), base, platform), (None, None))
-        yield PublishedRobot(group[0], row[0], chains[name], int(match[1]), base, platform, count, status,
-                             tuple(drives.get((group[0], row[0]), ())), str(path), line)
+        yield PublishedRobot(
+            group[0],
+            row[0],
+            chains[name],
+            int(match[1]),
+            base,
+            platform,
+            count,
+            status,
+            tuple(drives.get((group[0], row[0]), ())),
+            str(path),
+            line,
+        )
     if len(found.defects) == before:
         once.whole(group[0])

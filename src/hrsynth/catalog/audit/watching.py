@@ -36,7 +36,7 @@ def watching(screws: Array, kinds: str, dof: int) -> WatchedLegs | None:
             return None
         last, u = segment
         rates = np.zeros((3, m))
-        rates[:, :last + 1] = -hat(u) @ leg[:last + 1, 3:].T  # u̇ = ω × u, slides do not turn
+        rates[:, : last + 1] = -hat(u) @ leg[: last + 1, 3:].T  # u̇ = ω × u, slides do not turn
         _, s, Vt = np.linalg.svd(rates)
         rank, gap = count_ranks(s)
         if gap < RANK_GAP:
@@ -75,20 +75,27 @@ def _segment(leg: Array, kinds: str) -> tuple[int, Array] | None:
         return None
     if kinds[last] == "P":
         return last, leg[last, :3] / np.linalg.norm(leg[last, :3])
-    u = _between(leg[last - _together(leg, kinds, last) + 1: last + 1], leg[m - size:])
+    u = _between(leg[last - _together(leg, kinds, last) + 1 : last + 1], leg[m - size :])
     length = np.linalg.norm(u)
     return (last, u / length) if length > SAME_DIRECTION else None
 
 
 def _together(leg: Array, kinds: str, last: int) -> int:
     """How many turning joints up to ``last`` are one: three through a point, two that are perpendicular too."""
-    if last >= 2 and kinds[last - 2: last + 1] == "RRR" and all(
-            _meet(leg[a], leg[b]) for a, b in combinations(range(last - 2, last + 1), 2)):
-        points = [_point(leg[a: a + 2]) for a in (last - 2, last - 1)]
+    if (
+        last >= 2
+        and kinds[last - 2 : last + 1] == "RRR"
+        and all(_meet(leg[a], leg[b]) for a, b in combinations(range(last - 2, last + 1), 2))
+    ):
+        points = [_point(leg[a : a + 2]) for a in (last - 2, last - 1)]
         if np.linalg.norm(points[0] - points[1]) < SAME_DIRECTION:
             return 3
-    if last >= 1 and kinds[last - 1: last + 1] == "RR" and _meet(leg[last - 1], leg[last]) and (
-            abs(leg[last - 1, 3:] @ leg[last, 3:]) < SAME_DIRECTION):
+    if (
+        last >= 1
+        and kinds[last - 1 : last + 1] == "RR"
+        and _meet(leg[last - 1], leg[last])
+        and (abs(leg[last - 1, 3:] @ leg[last, 3:]) < SAME_DIRECTION)
+    ):
         return 2
     return 1
 

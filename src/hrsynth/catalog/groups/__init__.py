@@ -12,8 +12,13 @@ from ..words import SENSORS, RobotWord
 from . import deltas, mixed, planar, pods, schoenflies, sensors, spatial
 
 _LISTED: Mapping[str, Callable[[], Iterable[RobotWord]]] = {
-    "planar": planar.words, "pods": pods.words, "deltas": deltas.words, "mixed": mixed.words,
-    "schoenflies": schoenflies.words, "spatial": spatial.words}
+    "planar": planar.words,
+    "pods": pods.words,
+    "deltas": deltas.words,
+    "mixed": mixed.words,
+    "schoenflies": schoenflies.words,
+    "spatial": spatial.words,
+}
 """What each module lists, in no order, some of it twice or of another group."""
 
 

@@ -17,8 +17,9 @@ _ENDS = (["2SS"], ["2US"], ["U", "U"], ["U", "S"])
 
 def belongs(word: RobotWord) -> bool:
     """Whether all legs are an R or a P and then 2SS, 2US, UU or US."""
-    return all(leg.joints[0].letter in ("R", "P") and [joint.letter for joint in leg.joints[1:]] in _ENDS
-               for leg in word.legs)
+    return all(
+        leg.joints[0].letter in ("R", "P") and [joint.letter for joint in leg.joints[1:]] in _ENDS for leg in word.legs
+    )
 
 
 def _legs(bases: tuple[str, ...], rods: tuple[str, ...]) -> list[LegWord]:
@@ -34,8 +35,9 @@ def words() -> Iterator[RobotWord]:
     for count in (5, 6):
         yield from pairs(kinds, count)
     for rod in (*RODS, "2USt"):
-        along, across, up = (leg(f"P{axis}*-{rod.replace('t', side)}") for axis, side in (("x", "y"), ("y", "z"),
-                                                                                        ("z", "x")))
+        along, across, up = (
+            leg(f"P{axis}*-{rod.replace('t', side)}") for axis, side in (("x", "y"), ("y", "z"), ("z", "x"))
+        )
         for counts in product(range(3), repeat=3):
             if sum(counts) >= 2:
                 yield RobotWord.of([along] * counts[0] + [across] * counts[1] + [up] * counts[2])

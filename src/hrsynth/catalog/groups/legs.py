@@ -29,8 +29,10 @@ def base_driven(chain: LegWord) -> LegWord:
 def watch_each_segment(chain: LegWord) -> Iterator[LegWord]:
     """The leg with each segment observed in turn, one of those that always turn alike."""
     last = len(chain.joints) - (1 if chain.joints[-1].letter in COMPOSITE else 2)
-    seen = (LegWord(tuple(replace(joint, watched=i == place) for i, joint in enumerate(chain.joints))).canonical
-            for place in range(last, -1, -1))
+    seen = (
+        LegWord(tuple(replace(joint, watched=i == place) for i, joint in enumerate(chain.joints))).canonical
+        for place in range(last, -1, -1)
+    )
     yield from dict.fromkeys(seen)
 
 

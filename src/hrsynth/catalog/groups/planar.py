@@ -41,9 +41,13 @@ def with_parallelograms() -> Iterator[LegWord]:
 def _kinds(rail: str, motors: int, tip: str = "RP") -> list[LegWord]:
     """Chains with each motor on the first ``motors`` joints and each segment observed; with the rail x only those that
     begin with a P."""
-    return [moved for chain in chains(rail) if chain.joints[-1].letter in tip
-            and (rail == "h" or chain.joints[0].letter == "P")
-            for seen in watch_each_segment(chain) for moved in drive_each_joint(seen, range(motors))]
+    return [
+        moved
+        for chain in chains(rail)
+        if chain.joints[-1].letter in tip and (rail == "h" or chain.joints[0].letter == "P")
+        for seen in watch_each_segment(chain)
+        for moved in drive_each_joint(seen, range(motors))
+    ]
 
 
 def words() -> Iterator[RobotWord]:
@@ -58,8 +62,10 @@ def words() -> Iterator[RobotWord]:
                 yield RobotWord.of([moved] * 3)
                 if chain.joints[-1].letter == "R":
                     yield RobotWord.of([moved] * 2, platform="point")
-    simple, mixed = ([base_driven(seen) for chain in kinds for seen in watch_each_segment(chain)]
-                     for kinds in (chains(), [*chains(), *with_parallelograms()]))
+    simple, mixed = (
+        [base_driven(seen) for chain in kinds for seen in watch_each_segment(chain)]
+        for kinds in (chains(), [*chains(), *with_parallelograms()])
+    )
     yield from robots(simple, 4)
     yield from robots(mixed, 3)
     yield from robots([each for each in mixed if each.joints[-1].letter == "R"], 2, "point")

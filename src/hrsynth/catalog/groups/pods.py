@@ -16,9 +16,14 @@ UNCONSTRAINED = 6
 def belongs(word: RobotWord) -> bool:
     """Whether all legs have three joints, the middle one a P, and end on U, S or R, on one rigid platform."""
     return not word.platform and all(
-        len(leg.joints) == 3 and leg.joints[1].letter == "P" and leg.joints[2].letter in ("U", "S", "R")
-        and leg.joints[0].letter in ("U", "R", "S", "P", "C") and "o" not in leg.joints[0].axes
-        and {leg.joints[0].letter, leg.joints[2].letter} != {"R"} for leg in word.legs)
+        len(leg.joints) == 3
+        and leg.joints[1].letter == "P"
+        and leg.joints[2].letter in ("U", "S", "R")
+        and leg.joints[0].letter in ("U", "R", "S", "P", "C")
+        and "o" not in leg.joints[0].axes
+        and {leg.joints[0].letter, leg.joints[2].letter} != {"R"}
+        for leg in word.legs
+    )
 
 
 def words() -> Iterator[RobotWord]:

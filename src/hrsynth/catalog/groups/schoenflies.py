@@ -22,8 +22,14 @@ LEGS = 4
 def belongs(word: RobotWord) -> bool:
     """Whether four legs of one chain of R, P and U turn about z and horizontal directions of their own alone."""
     axes = {axis for leg in word.legs for joint in leg.joints if joint.letter != "P" for axis in joint.axes}
-    return (len(word.legs) == LEGS and not word.platform and len({str(leg.chain) for leg in word.legs}) == 1
-            and all(joint.letter in "RPU" for joint in word.legs[0].joints) and "z" in axes and axes <= set("zh"))
+    return (
+        len(word.legs) == LEGS
+        and not word.platform
+        and len({str(leg.chain) for leg in word.legs}) == 1
+        and all(joint.letter in "RPU" for joint in word.legs[0].joints)
+        and "z" in axes
+        and axes <= set("zh")
+    )
 
 
 def sequences() -> Iterator[str]:
@@ -31,8 +37,7 @@ def sequences() -> Iterator[str]:
     for count in (4, 5):
         for letters in map("".join, product("zhP", repeat=count)):
             turning = letters.replace("P", "")
-            if (re.fullmatch("z*(hhh?)?z*", turning) and 1 <= turning.count("z") <= 3
-                    and count == 3 + len(set(turning))):
+            if re.fullmatch("z*(hhh?)?z*", turning) and 1 <= turning.count("z") <= 3 and count == 3 + len(set(turning)):
                 yield letters
 
 
@@ -41,8 +46,11 @@ def chains() -> Iterator[LegWord]:
     for letters in sequences():
         own = iter("abc")
         plain = "-".join(f"P{next(own)}" if letter == "P" else f"R{letter}" for letter in letters)
-        for text in {plain.replace(*one).replace(*other) for one in (("", ""), ("Rz-Rh", "Uzh"))
-                     for other in (("", ""), ("Rh-Rz", "Uhz"))}:
+        for text in {
+            plain.replace(*one).replace(*other)
+            for one in (("", ""), ("Rz-Rh", "Uzh"))
+            for other in (("", ""), ("Rh-Rz", "Uhz"))
+        }:
             if text[0] != "U":
                 yield leg(text)
 

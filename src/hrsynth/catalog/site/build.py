@@ -37,12 +37,18 @@ class Site:
     """Words whose derivation, made now, does not end in what the record says, and what it ends in."""
 
     def to_dict(self) -> dict[str, Any]:
-        return {"index": str(self.index), "architectures": self.architectures, "pages": self.pages, "now": self.now,
-                "differ": [{"word": word, "derived": found} for word, found in self.differ]}
+        return {
+            "index": str(self.index),
+            "architectures": self.architectures,
+            "pages": self.pages,
+            "now": self.now,
+            "differ": [{"word": word, "derived": found} for word, found in self.differ],
+        }
 
 
-def site(catalog: Catalog, target: str | Path, *, workers: int = 1, anew: bool = False, tell: Tell | None = None
-         ) -> Site:
+def site(
+    catalog: Catalog, target: str | Path, *, workers: int = 1, anew: bool = False, tell: Tell | None = None
+) -> Site:
     """Write a catalog as a static site into a folder: new, empty, or of an older site, which it replaces as a whole.
 
     ``workers`` processes share the pages. A build that was broken off goes on where it was, unless ``anew``.
@@ -76,8 +82,9 @@ def site(catalog: Catalog, target: str | Path, *, workers: int = 1, anew: bool =
 def _make_pages(team: Executor, folder: Path, wanted: Sequence[Structure]) -> Iterator[Made]:
     packed = [each.pack() for each in wanted]
     try:
-        yield from team(partial(write_pages, str(folder)),
-                        (packed[i : i + CHUNK] for i in range(0, len(packed), CHUNK)))
+        yield from team(
+            partial(write_pages, str(folder)), (packed[i : i + CHUNK] for i in range(0, len(packed), CHUNK))
+        )
     except Stopped as stopped:
         raise BuildStopped(str(stopped), str(folder)) from stopped
 

@@ -50,8 +50,11 @@ def require_replaceable(site: Path, said: str) -> None:
         found = {each.name for each in site.iterdir()}
     if found and (STAMP not in found or found - OWN):
         other = sorted(found - OWN) or sorted(found)
-        raise BadRequest(f"cannot write the site: the folder holds other files ({other[0]} …)", said,
-                         "a new or an empty folder, or one that holds a site and nothing else")
+        raise BadRequest(
+            f"cannot write the site: the folder holds other files ({other[0]} …)",
+            said,
+            "a new or an empty folder, or one that holds a site and nothing else",
+        )
 
 
 @contextlib.contextmanager
@@ -75,8 +78,11 @@ def _prepare(folder: Path, stamp: dict[str, str], anew: bool) -> None:
             return
     other = sorted({each.name for each in folder.iterdir()} - OWN)
     if other:
-        raise BadRequest(f"cannot write the site: the folder of its draft holds other files ({other[0]} …)",
-                         str(folder), "that folder moved away")
+        raise BadRequest(
+            f"cannot write the site: the folder of its draft holds other files ({other[0]} …)",
+            str(folder),
+            "that folder moved away",
+        )
     for each in folder.iterdir():
         shutil.rmtree(each) if each.is_dir() else each.unlink()
     for name in FOLDERS:

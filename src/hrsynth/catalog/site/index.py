@@ -29,9 +29,9 @@ NUMBERS = ("legs", "dof", "rank", "fewest")
 EXPLAINED = {
     "hidden robot": "The mechanism that a controller moves when a camera watches only the directions of the legs.",
     "dof": "How many small motions the platform has: 2T1R are two translations and one rotation. Mobility counts the "
-           "motions of all links; idle ones leave the platform at rest.",
+    "motions of all links; idle ones leave the platform at rest.",
     "verdict": "Controllable: the watched directions show all motions of the platform. Partially controllable: some of "
-               "them. Uncontrollable: none.",
+    "them. Uncontrollable: none.",
     "exact": "Whether the verdict is proved in exact arithmetic for the architecture, or for random dimensions.",
     "legs needed": "The smallest sets of legs that show as much as all legs do.",
     "hidden robots": "The hidden robot of each of these sets alone, derived in the dimensions of the robot file.",
@@ -113,8 +113,13 @@ def notation(text: str) -> Markup:
 def _environment() -> Environment:
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
-    made = Environment(loader=PackageLoader("hrsynth.catalog.site"), autoescape=True, trim_blocks=True,
-                       lstrip_blocks=True, undefined=StrictUndefined)
+    made = Environment(
+        loader=PackageLoader("hrsynth.catalog.site"),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=StrictUndefined,
+    )
     made.policies["json.dumps_kwargs"] = {"sort_keys": True, "ensure_ascii": False}
     made.filters.update(notation=notation, named=address_name)
     made.globals.update(explained=EXPLAINED)

@@ -75,8 +75,12 @@ def _portrait(robot: Mechanism, studied: Study) -> Portrait:
     if studied.derivation is None:
         return Portrait.draw(robot, [robot.platform], (), None)
     setting = studied.derivation.setting
-    return Portrait.draw(robot, [link for link in setting.anatomy.platform if link in robot.links] or [robot.platform],
-                         _known_links(studied.observed, robot) or (), plane_normal(setting.motion))
+    return Portrait.draw(
+        robot,
+        [link for link in setting.anatomy.platform if link in robot.links] or [robot.platform],
+        _known_links(studied.observed, robot) or (),
+        plane_normal(setting.motion),
+    )
 
 
 def page(structure: Structure, studied: Study, robots: dict[str, Mechanism], drawn: Portrait | None) -> str:
@@ -84,18 +88,28 @@ def page(structure: Structure, studied: Study, robots: dict[str, Mechanism], dra
     derivation = studied.derivation
     hidden = None if derivation is None else derivation.hidden
     shown = robots.get(structure.fact["word"])
-    real = None if shown is None else robot_svg(shown, observed=_known_links(studied.observed, shown),
-                                                title="Real robot")
+    real = (
+        None if shown is None else robot_svg(shown, observed=_known_links(studied.observed, shown), title="Real robot")
+    )
     return render(
-        "page.html", structure=structure, fact=structure.fact, facts=list(facts(structure.fact, studied.smallest)),
-        turned=None if drawn is None else drawn.scene(), alias=alias(structure.fact["word"]),
-        cure=cure(structure.fact), rules=list(rules(structure.fact)),
-        differs=studied.differs, real=real,
+        "page.html",
+        structure=structure,
+        fact=structure.fact,
+        facts=list(facts(structure.fact, studied.smallest)),
+        turned=None if drawn is None else drawn.scene(),
+        alias=alias(structure.fact["word"]),
+        cure=cure(structure.fact),
+        rules=list(rules(structure.fact)),
+        differs=studied.differs,
+        real=real,
         hidden=None if hidden is None else robot_svg(hidden, virtual=_driven_joints(hidden), title="Hidden robot"),
         blind=derivation is not None and hidden is None,
         steps=[] if derivation is None else trace(derivation.steps),
-        variants=[_variant(record, None if "refused" in record else robots.get(record["word"]))
-                  for record in structure.records])
+        variants=[
+            _variant(record, None if "refused" in record else robots.get(record["word"]))
+            for record in structure.records
+        ],
+    )
 
 
 def _known_links(links: Iterable[str] | None, robot: Mechanism) -> list[str] | None:
@@ -113,16 +127,28 @@ def trace(steps: Iterable[Step]) -> list[dict[str, Any]]:
     for (rule, accepted, reason), part in groupby(steps, key=lambda step: (step.rule, step.accepted, step.reason)):
         alike = list(part)
         angles = [step.largest_angle for step in alike if step.largest_angle is not None]
-        found.append({"rule": rule, "legs": ", ".join(step.leg or "all" for step in alike), "accepted": accepted,
-                      "reason": reason, "angle": f"{max(angles):.1e}" if angles else ""})
+        found.append(
+            {
+                "rule": rule,
+                "legs": ", ".join(step.leg or "all" for step in alike),
+                "accepted": accepted,
+                "reason": reason,
+                "angle": f"{max(angles):.1e}" if angles else "",
+            }
+        )
     return found
 
 
 def _variant(record: Record, robot: Mechanism | None) -> dict[str, Any]:
     """What a page says of one architecture: its name, its motors, its file."""
-    return {"name": address_name(record["word"]), "word": record["word"], "notation": record.get("notation", ""),
-            "motors": motors(record) if "motors" in record else "",
-            "joints": [] if robot is None else _driven_joints(robot), "file": robot is not None}
+    return {
+        "name": address_name(record["word"]),
+        "word": record["word"],
+        "notation": record.get("notation", ""),
+        "motors": motors(record) if "motors" in record else "",
+        "joints": [] if robot is None else _driven_joints(robot),
+        "file": robot is not None,
+    }
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,6 +187,9 @@ def study(record: Record) -> Study:
 def _difference(found: Derivation, record: Record) -> str:
     """What a derivation ends in, where that is not what the record says."""
     hidden = found.hidden_architecture and found.hidden_architecture.ascii
-    same = (hidden, found.verdict.verdict, found.verdict.rank) == (record.get("hidden"), record["verdict"],
-                                                                   record["rank"])
+    same = (hidden, found.verdict.verdict, found.verdict.rank) == (
+        record.get("hidden"),
+        record["verdict"],
+        record["rank"],
+    )
     return "" if same else f"{hidden or 'no hidden robot'}, {found.verdict.verdict}, rank {found.verdict.rank}"

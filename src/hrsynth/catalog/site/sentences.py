@@ -11,11 +11,11 @@ from ..jsonl import Record
 RULES = {
     "motors off": "The motors are set free: the controller moves what the camera measures, not the motors.",
     "lift": "A virtual chain that constrains nothing is added to {legs}; its driven U joint measures the watched "
-            "direction.",
+    "direction.",
     "anchor locus": "In {legs} the point that carries this U joint moves on a surface or a curve, or is fixed, so that "
-                    "fewer virtual sliders carry it.",
+    "fewer virtual sliders carry it.",
     "direction locus": "In {legs} the watched direction turns about one axis or does not turn, so that one driven R "
-                       "joint or none measures it.",
+    "joint or none measures it.",
     "takeover": "In {legs} the virtual actuator takes the place of the real joint before the watched segment.",
     "companion": "In {legs} the rod next to the watched one moves with it.",
     "end change": "In {legs} the last S joint becomes a U joint.",
@@ -28,8 +28,11 @@ RULES = {
 _STEP = re.compile(r"(?P<rule>.*?)(?: (?P<legs>[0-9,]+))?")
 _PART = re.compile(r"(?P<kind>direction|line|encoder) (?P<name>\w+)")
 _PLACE = re.compile(r"(?:link|rod|joint)_(?P<leg>\d+)_(?P<joint>\d+)[ab]?")
-_KINDS = {"direction": "the direction of {}", "line": "the direction and the place of {}",
-          "encoder": "the encoder of {}"}
+_KINDS = {
+    "direction": "the direction of {}",
+    "line": "the direction and the place of {}",
+    "encoder": "the encoder of {}",
+}
 
 
 def rules(record: Record) -> Iterator[str]:
@@ -62,6 +65,9 @@ def _where(name: str) -> str:
     found = _PLACE.fullmatch(name)
     if found is None:
         return name
-    what = {"j": f"joint {found['joint']}", "l": f"the link after joint {found['joint']}",
-            "r": f"the rod at joint {found['joint']}"}[name[0]]
+    what = {
+        "j": f"joint {found['joint']}",
+        "l": f"the link after joint {found['joint']}",
+        "r": f"the rod at joint {found['joint']}",
+    }[name[0]]
     return f"{what} of leg {found['leg']} ({name})"

@@ -51,8 +51,11 @@ class Structure:
     def unpack(cls, text: str) -> Structure:
         """What ``pack`` wrote."""
         found: dict[str, Any] = json.loads(text)
-        return cls(found["word"], tuple(json.loads(each) for each in found["records"]),
-                   tuple((word, verdict) for word, verdict in found["kin"]))
+        return cls(
+            found["word"],
+            tuple(json.loads(each) for each in found["records"]),
+            tuple((word, verdict) for word, verdict in found["kin"]),
+        )
 
 
 def structures(records: Iterable[Record]) -> tuple[Structure, ...]:
@@ -69,6 +72,11 @@ def structures(records: Iterable[Record]) -> tuple[Structure, ...]:
             own[word] = part
             alike_unseen.setdefault(str(parse(unmoved).unmarked), []).append(word)
     kin = {word: words for words in alike_unseen.values() for word in words}
-    return tuple(Structure(word, tuple(own[word]), tuple((other, own[other][0].get("verdict", "refused"))
-                                                         for other in sorted(kin[word]) if other != word))
-                 for word in sorted(own))
+    return tuple(
+        Structure(
+            word,
+            tuple(own[word]),
+            tuple((other, own[other][0].get("verdict", "refused")) for other in sorted(kin[word]) if other != word),
+        )
+        for word in sorted(own)
+    )

@@ -54,8 +54,11 @@ def build(graph: JointGraph, overrides: Overrides) -> Mechanism:
     start = None if overrides.keyframe is None else graph.in_metres(posture(graph, overrides.keyframe))
     assembly = LoopAssembly(base, list(graph.joints.values()), graph.gears, start)
     if assembly.size > MOST_LOOP_COORDINATES or len(assembly.loops) > MOST_LOOP_COORDINATES:
-        raise BadRequest(f"{graph.file}: {len(assembly.loops)} loops through joints with {assembly.size} coordinates",
-                         None, f"up to {MOST_LOOP_COORDINATES} of each")
+        raise BadRequest(
+            f"{graph.file}: {len(assembly.loops)} loops through joints with {assembly.size} coordinates",
+            None,
+            f"up to {MOST_LOOP_COORDINATES} of each",
+        )
     open_at_zero = assembly.worst(assembly.zero())[1]
     length = assembly.length / graph.unit
     rounded = 0.0 if overrides.as_written else overrides.tolerance or rounding(graph.digits, length, open_at_zero)
@@ -66,8 +69,13 @@ def build(graph: JointGraph, overrides: Overrides) -> Mechanism:
     else:
         solution = solve(assembly)
     if not solution.residual <= assembly.noise:
-        raise LoopsNotClosed(graph.file, solution.residual, assembly.noise, assembly.worst(solution.values)[0],
-                             cure(solution.residual) or POSTURE)
+        raise LoopsNotClosed(
+            graph.file,
+            solution.residual,
+            assembly.noise,
+            assembly.worst(solution.values)[0],
+            cure(solution.residual) or POSTURE,
+        )
     _note_solution(graph, assembly, solution, overrides.keyframe)
     mechanism = replace(_mechanism(graph, base, platform, assembly, solution.values), choice=choice)
     mechanism = closures.points_as_hinges(mechanism, tolerance)
@@ -115,8 +123,11 @@ def _note_solution(graph: JointGraph, assembly: LoopAssembly, solution: LoopSolu
     if moved and miss > SAME_GEOMETRY:
         pushed = ", after a random push out of a flat pose" if solution.pushed else ""
         where = "the file's zero pose" if keyframe is None else f"the keyframe {keyframe!r}"
-        graph.note("solved", f"at {where} the loop {name!r} is open by {miss:.3g} (characteristic lengths, radians); "
-                             f"closed{pushed} with {moved}")
+        graph.note(
+            "solved",
+            f"at {where} the loop {name!r} is open by {miss:.3g} (characteristic lengths, radians); "
+            f"closed{pushed} with {moved}",
+        )
 
 
 def _mechanism(graph: JointGraph, base: str, platform: str, assembly: LoopAssembly, values: Values) -> Mechanism:
@@ -124,10 +135,21 @@ def _mechanism(graph: JointGraph, base: str, platform: str, assembly: LoopAssemb
     tree = {joint.name for joint, _, _ in assembly.tree}
     joints = {name: joint_at(joint, poses, name in tree) for name, joint in graph.joints.items()}
     links = {name: replace(link, pose=poses[name]) for name, link in graph.links.items()}
-    mechanism = Mechanism(graph.name, links, with_offsets(joints, assembly, values), base, platform,
-                          tuple(graph.observations), (), graph.camera, tuple(graph.rest), graph.file,
-                          tuple(graph.notes), formation=graph.formation,
-                          turns=graph.turns if platform == graph.platform else None)
+    mechanism = Mechanism(
+        graph.name,
+        links,
+        with_offsets(joints, assembly, values),
+        base,
+        platform,
+        tuple(graph.observations),
+        (),
+        graph.camera,
+        tuple(graph.rest),
+        graph.file,
+        tuple(graph.notes),
+        formation=graph.formation,
+        turns=graph.turns if platform == graph.platform else None,
+    )
     mechanism = as_written(spanning(mechanism), graph.sights, graph.cameras, graph.file)
     return replace(mechanism, couplings=tuple(_couplings(graph, mechanism)))
 
@@ -155,14 +177,22 @@ def _couplings(graph: JointGraph, mechanism: Mechanism) -> list[Coupling]:
         joints = [joint for joint in ends if joint is not None and joint.in_tree and joint.type.freedoms == 1]
         if len(joints) == 2 and gear.ratio == 0:
             where = graph.file if gear.line is None else f"{graph.file}:{gear.line}"
-            raise BadMechanism(f"{where}: coupling {gear.name!r}, which would hold joint {gear.driven!r}", gear.ratio,
-                               f"a ratio other than 0, or --freeze {gear.driven}")
+            raise BadMechanism(
+                f"{where}: coupling {gear.name!r}, which would hold joint {gear.driven!r}",
+                gear.ratio,
+                f"a ratio other than 0, or --freeze {gear.driven}",
+            )
         if len(joints) == 2:
             found.append(Coupling(gear.name, joints[0].successor, joints[1].successor, gear.ratio, gear.line))
-        elif all(joint is None or joint.type is not JointType.FIXED for joint in
-                 (graph.joints.get(gear.driver), graph.joints.get(gear.driven))):
-            raise BadMechanism(f"{graph.file}: coupling {gear.name!r} of a joint that closes a loop", gear.driven,
-                               "joints of one freedom in the spanning tree")
+        elif all(
+            joint is None or joint.type is not JointType.FIXED
+            for joint in (graph.joints.get(gear.driver), graph.joints.get(gear.driven))
+        ):
+            raise BadMechanism(
+                f"{graph.file}: coupling {gear.name!r} of a joint that closes a loop",
+                gear.driven,
+                "joints of one freedom in the spanning tree",
+            )
     return found
 
 
@@ -175,7 +205,10 @@ def _away_from_singular(mechanism: Mechanism) -> Mechanism:
         return mechanism
     here, after = assembly.rank(zero), assembly.rank(there)
     freedoms = [assembly.size - rank.value for rank in (here, after)]
-    why = (f"singular (its loops have {freedoms[0]} freedoms there, {freedoms[1]} nearby)" if freedoms[1] < freedoms[0]
-           else f"nearly singular (weakest singular value {here.weakest:.1e}, {after.weakest:.1e} nearby)")
+    why = (
+        f"singular (its loops have {freedoms[0]} freedoms there, {freedoms[1]} nearby)"
+        if freedoms[1] < freedoms[0]
+        else f"nearly singular (weakest singular value {here.weakest:.1e}, {after.weakest:.1e} nearby)"
+    )
     note = Note("solved", f"the zero pose is {why}: moved to {moves(assembly, there)}")
     return replace(with_zero_at(mechanism, assembly, there), notes=(*mechanism.notes, note))

@@ -53,8 +53,10 @@ def closure_candidates(graph: JointGraph, base: str) -> tuple[ClosureCandidate, 
     # near at zero, and farther apart elsewhere: joints that turn about the place itself do not separate frames there
     near = np.argwhere(np.triu((apart <= MAY_MEET) & (apart_moved > apart + MAY_MEET / 2), 1))
     busy = Counter(link for joint in joints for link in joint.links)
-    ranked = sorted(near.tolist(), key=lambda pair: (apart[*pair] > NOISE, sum(busy[links[i]] > 1 for i in pair),
-                                                     apart[*pair], *pair))
+    ranked = sorted(
+        near.tolist(),
+        key=lambda pair: (apart[*pair] > NOISE, sum(busy[links[i]] > 1 for i in pair), apart[*pair], *pair),
+    )
     found: list[ClosureCandidate] = []
     taken: dict[frozenset[int], list[Array]] = {}
     for i, j in ranked:
@@ -65,8 +67,9 @@ def closure_candidates(graph: JointGraph, base: str) -> tuple[ClosureCandidate, 
         if len(found) == MOST_CANDIDATES:
             break
         places.append(points[i])
-        found.append(ClosureCandidate((links[i], links[j]), float(apart[i, j] * assembly.length),
-                                      bool(apart[i, j] <= NOISE)))
+        found.append(
+            ClosureCandidate((links[i], links[j]), float(apart[i, j] * assembly.length), bool(apart[i, j] <= NOISE))
+        )
     return tuple(found)
 
 
@@ -76,8 +79,10 @@ def without_loop(graph: JointGraph, base: str) -> str | None:
         return None
     text = "nothing in the file closes a loop: it is read as an open chain"
     if found := closure_candidates(graph, base):
-        text += (f"; frames that lie near to each other: {comma_list(map(str, found), MOST_CANDIDATES)} (--close "
-                 f"{found[0].wish} lets two of them meet in a point)")
+        text += (
+            f"; frames that lie near to each other: {comma_list(map(str, found), MOST_CANDIDATES)} (--close "
+            f"{found[0].wish} lets two of them meet in a point)"
+        )
     return text
 
 
@@ -90,5 +95,7 @@ def _points(assembly: LoopAssembly, links: list[str], values: dict[str, Array]) 
 def _move_joints(assembly: LoopAssembly, seed: int = 0) -> dict[str, Array]:
     """All joints somewhere else."""
     rng = np.random.default_rng(seed)
-    return {joint.name: step_along(joint, zero(joint), rng.uniform(0.4, 1.0, joint.kind.freedoms), np.eye(3))
-            for joint, _, _ in assembly.tree}
+    return {
+        joint.name: step_along(joint, zero(joint), rng.uniform(0.4, 1.0, joint.kind.freedoms), np.eye(3))
+        for joint, _, _ in assembly.tree
+    }

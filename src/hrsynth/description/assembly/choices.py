@@ -56,8 +56,17 @@ def choices(path: Path, overrides: Overrides) -> ImportChoices:
     carried = {joint.links[1] for joint in graph.joints.values() if joint.in_tree}
     bases = dict.fromkeys([base, *(link for link in graph.links if link not in carried)])
     platforms, why, told = _platforms(graph, base)
-    return ImportChoices(graph.dialect, tuple(graph.links), tuple(graph.joints.values()), tuple(bases), platforms, why,
-                         told, closure_candidates(graph, base), tuple(graph.notes))
+    return ImportChoices(
+        graph.dialect,
+        tuple(graph.links),
+        tuple(graph.joints.values()),
+        tuple(bases),
+        platforms,
+        why,
+        told,
+        closure_candidates(graph, base),
+        tuple(graph.notes),
+    )
 
 
 def _platforms(graph: JointGraph, base: str) -> tuple[tuple[str, ...], str | None, bool]:

@@ -35,8 +35,11 @@ def merge_points(graph: JointGraph) -> None:
         if joints[1].name == merged.name + SECOND:
             continue
         what = "revolute joint" if merged.type is JointType.REVOLUTE else "rigid joint"
-        graph.note("merged", f"the points {', '.join(repr(joint.name) for joint in joints)} hold the same two links "
-                             f"together and are read as one {what}")
+        graph.note(
+            "merged",
+            f"the points {', '.join(repr(joint.name) for joint in joints)} hold the same two links "
+            f"together and are read as one {what}",
+        )
 
 
 def _joint_through(joints: list[JointSpec], noise: float) -> JointSpec | None:
@@ -52,8 +55,10 @@ def _joint_through(joints: list[JointSpec], noise: float) -> JointSpec | None:
     far = [np.linalg.norm(np.cross(arm, arm[k]), axis=1) for arm in arms]
     m = None if max(each.max() for each in far) <= (NOISE * size + noise) * size else int(np.argmax(far[0]))
     kind = JointType.REVOLUTE if m is None else JointType.FIXED
-    one, two = (FrameSpec(end.link, pose(point[0], _frame(arm[k], None if m is None else arm[m])), end.line)
-                for end, point, arm in zip(first.ends, points, arms, strict=True))
+    one, two = (
+        FrameSpec(end.link, pose(point[0], _frame(arm[k], None if m is None else arm[m])), end.line)
+        for end, point, arm in zip(first.ends, points, arms, strict=True)
+    )
     return replace(first, type=kind, ends=(one, two), axes=(Z,) * kind.axes)
 
 
@@ -81,8 +86,9 @@ def _plane_of(joint: Joint, joints: list[Joint], within: float) -> Array | None:
     """The normal of the plane in which the joint's two links move relative to each other, or None."""
     for candidate in _hinges_on(joint, joints):
         normal = candidate.axis
-        flat = graphs.adjacency(joint.links, (j.links for j in joints
-                                              if j.name != joint.name and _flat(j, normal, within)))
+        flat = graphs.adjacency(
+            joint.links, (j.links for j in joints if j.name != joint.name and _flat(j, normal, within))
+        )
         if joint.links[1] in graphs.component(flat, joint.links[0]):
             return normal
     return None
@@ -166,8 +172,13 @@ def _join(graph: JointGraph, name: str, bare: Callable[[str], bool], busy: Set[s
     chain = [graph.joints[each] for each in names if each in graph.joints]
     between = [joint.links[1] for joint in chain[:-1]]
     taken = stem in graph.joints and graph.joints[stem] not in (last, weld)
-    if not chain or len(chain) < len(names) or taken or not busy.isdisjoint((*names, weld.name)) or not all(
-            bare(link) and sum(link in joint.links for joint in graph.joints.values()) == 2 for link in between):
+    if (
+        not chain
+        or len(chain) < len(names)
+        or taken
+        or not busy.isdisjoint((*names, weld.name))
+        or not all(bare(link) and sum(link in joint.links for joint in graph.joints.values()) == 2 for link in between)
+    ):
         return
     whole = _whole(stem, chain, ROUNDED * graph.digits.last_place)
     if whole is None:
@@ -188,9 +199,14 @@ def _whole(name: str, chain: list[JointSpec], noise: float) -> JointSpec | None:
     if not others:
         return first
     kind = WHOLES.get("".join(str(joint.type) for joint in chain))
-    if kind is None or any(a.links[1] != b.links[0] for a, b in pairwise(chain)) or any(
+    if (
+        kind is None
+        or any(a.links[1] != b.links[0] for a, b in pairwise(chain))
+        or any(
             joint.limits != first.limits or (joint.motor is None) != (first.motor is None) or joint.xml
-            for joint in others):
+            for joint in others
+        )
+    ):
         return None
     frames = [np.eye(4)]
     for a, b in pairwise(chain):
@@ -199,7 +215,8 @@ def _whole(name: str, chain: list[JointSpec], noise: float) -> JointSpec | None:
     wanted = np.ones((2, 2)) if kind is JointType.CYLINDRICAL else np.eye(len(chain))
     points = np.array([X[:3, 3] for X in frames])
     if np.max(np.abs(points)) > NOISE + noise or np.max(np.abs(np.array(axes) @ np.array(axes).T - wanted)) > (
-            NOISE + noise):
+        NOISE + noise
+    ):
         return None
     kept = first.axes[:1] + chain[-1].axes[:1] if kind is JointType.UNIVERSAL else tuple(axes[-1:]) * kind.axes
     motor = first.motor and Motor(first.motor.name.removesuffix("__1"))

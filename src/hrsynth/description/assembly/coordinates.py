@@ -40,10 +40,14 @@ def without_coordinates(mechanism: Mechanism) -> Mechanism:
     if not is_connected(rest) or mobility(rest) != mobility(mechanism):
         return mechanism
     if in_space:
-        rest = rest.changed(joints=[Joint(first.name, JointType.FREE, bodies[0], bodies[1],
-                                          mechanism.links[bodies[1]].pose[:3, 3])])
-    note = Note("merged", f"the joints {', '.join(names)} place the platform and constrain nothing: read as "
-                          + ("a free joint" if in_space else "no leg"))
+        rest = rest.changed(
+            joints=[Joint(first.name, JointType.FREE, bodies[0], bodies[1], mechanism.links[bodies[1]].pose[:3, 3])]
+        )
+    note = Note(
+        "merged",
+        f"the joints {', '.join(names)} place the platform and constrain nothing: read as "
+        + ("a free joint" if in_space else "no leg"),
+    )
     return spanning(replace(rest, notes=(*mechanism.notes, note)))
 
 
@@ -61,15 +65,17 @@ def with_weighed_motors(mechanism: Mechanism) -> Mechanism:
     free = mobility(mechanism)
     if driven <= free:
         return mechanism
-    note = Note("open", f"{driven} coordinates are driven, but there are {free} freedoms: some motors may be on "
-                        "passive joints (--motors JOINTS to name the driven ones)")
+    note = Note(
+        "open",
+        f"{driven} coordinates are driven, but there are {free} freedoms: some motors may be on "
+        "passive joints (--motors JOINTS to name the driven ones)",
+    )
     return replace(mechanism, notes=(*mechanism.notes, note))
 
 
 def _chains(mechanism: Mechanism) -> list[list[Joint]]:
     """The passive chains from the base's body to the platform's, through links that hold nothing else."""
-    bonds = graphs.adjacency(mechanism.links,
-                             (j.links for j in mechanism.joints.values() if j.type is JointType.FIXED))
+    bonds = graphs.adjacency(mechanism.links, (j.links for j in mechanism.joints.values() if j.type is JointType.FIXED))
     base, platform = (graphs.component(bonds, link) for link in (mechanism.base, mechanism.platform))
     busy = {mechanism.reference, *(o.link for o in mechanism.observations)}
     busy |= {o.seen_from for o in mechanism.observations if o.seen_from is not None}
@@ -94,4 +100,5 @@ def _are_coordinates(mechanism: Mechanism, chain: Sequence[Joint]) -> bool:
     slides = [joint.axis for joint in chain if joint.type is JointType.PRISMATIC]
     centres = np.array([joint.point for joint in chain if joint.type is not JointType.PRISMATIC])
     return (not slides or bool(np.linalg.matrix_rank(np.array(slides), SAME_DIRECTION) == len(slides))) and bool(
-        np.max(np.abs(centres - centres[0])) <= SAME_POINT * mechanism.length)
+        np.max(np.abs(centres - centres[0])) <= SAME_POINT * mechanism.length
+    )

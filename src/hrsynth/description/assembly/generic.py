@@ -41,8 +41,9 @@ class _Ranks:
         names = [f"legs {', '.join(labels)} see", *single] if len(labels) > 1 else single
         for name, one, two in zip(names, self.seen, other.seen, strict=True):
             if (one, self.dof) != (two, other.dof):
-                return (f"there {name} {one} of the platform's {self.dof} freedoms, nearby {two}"
-                        + (f" of {other.dof}" if self.dof != other.dof else ""))
+                return f"there {name} {one} of the platform's {self.dof} freedoms, nearby {two}" + (
+                    f" of {other.dof}" if self.dof != other.dof else ""
+                )
         return f"there platform and segments move together in {self.dimension} ways, nearby in {other.dimension}"
 
 
@@ -86,22 +87,31 @@ def with_generic_zero(mechanism: Mechanism) -> Mechanism:
     labels = tuple(dict.fromkeys(each.leg for each in segments))
     lost = here.dof - here.seen[0] > generic.dof - generic.seen[0]
     kind = "a Type 2 singularity of all legs together" if lost else "special"
-    note = Note("solved", f"the zero pose is {kind} ({here.beside(generic, labels)}): moved to "
-                          f"{moves(assembly, there)} (--keyframe {STAY} to stay)")
+    note = Note(
+        "solved",
+        f"the zero pose is {kind} ({here.beside(generic, labels)}): moved to "
+        f"{moves(assembly, there)} (--keyframe {STAY} to stay)",
+    )
     return replace(with_zero_at(mechanism, assembly, there), notes=(*mechanism.notes, note))
 
 
-def _ranks(mechanism: Mechanism, point: Array | None, segments: list[Direction], assembly: LoopAssembly, values: Values
-           ) -> tuple[_Ranks, bool]:
+def _ranks(
+    mechanism: Mechanism, point: Array | None, segments: list[Direction], assembly: LoopAssembly, values: Values
+) -> tuple[_Ranks, bool]:
     """The ranks at closed values, and whether their gaps leave no doubt."""
     poses = assembly.scaled_poses(values)
     X = poses[mechanism.platform]
     links = {mechanism.platform, mechanism.reference, *(each.link for each in segments)}
     V = assembly.velocities(values, links)
-    platform = V[mechanism.platform] if point is None else point_velocity(V[mechanism.platform],
-                                                                          transform(X, point / assembly.length))
-    rates = [-hat(poses[each.link][:3, :3] @ each.direction) @ (V[each.link] - V[mechanism.reference])[3:]
-             for each in segments]
+    platform = (
+        V[mechanism.platform]
+        if point is None
+        else point_velocity(V[mechanism.platform], transform(X, point / assembly.length))
+    )
+    rates = [
+        -hat(poses[each.link][:3, :3] @ each.direction) @ (V[each.link] - V[mechanism.reference])[3:]
+        for each in segments
+    ]
     basis, whole = range_basis(np.vstack([platform, *rates]))
     rows = len(platform)
     t, u = basis[:rows], basis[rows:]
@@ -126,8 +136,10 @@ def _nearby(assembly: LoopAssembly, zero: Values, size: float, rng: np.random.Ge
     if residual > 10 * SOLVED or assembly.apart(ahead, there) > assembly.apart(ahead, zero) / 2:
         return None
     loose = {joint.name for joint, _, _ in assembly.tree} - {joint.name for joint in assembly.active}
-    return {name: value + size * rng.uniform(-1, 1, value.shape) if name in loose and value.ndim == 1 else value
-            for name, value in there.items()}
+    return {
+        name: value + size * rng.uniform(-1, 1, value.shape) if name in loose and value.ndim == 1 else value
+        for name, value in there.items()
+    }
 
 
 def _beyond_limits(mechanism: Mechanism, assembly: LoopAssembly, values: Values) -> float:
@@ -137,6 +149,9 @@ def _beyond_limits(mechanism: Mechanism, assembly: LoopAssembly, values: Values)
         limits = mechanism.joints[spec.name].limits
         if limits is not None and spec.kind.freedoms == 1:
             q = float(values[spec.name][0]) * assembly.unit(spec)
-            total += max(0.0, 0.0 if limits.lower is None else limits.lower - q,
-                         0.0 if limits.upper is None else q - limits.upper)
+            total += max(
+                0.0,
+                0.0 if limits.lower is None else limits.lower - q,
+                0.0 if limits.upper is None else q - limits.upper,
+            )
     return total

@@ -32,8 +32,10 @@ def base(graph: JointGraph) -> str:
     carried = {joint.links[1] for joint in graph.joints.values() if joint.in_tree}
     free = [link for link in graph.links if link not in carried] or list(graph.links)
     if len(free) > 1:
-        graph.note("guess", f"the base is link {free[0]!r}, the first of {len(free)} that no joint carries "
-                            "(--base LINK to change it)")
+        graph.note(
+            "guess",
+            f"the base is link {free[0]!r}, the first of {len(free)} that no joint carries (--base LINK to change it)",
+        )
     return free[0]
 
 
@@ -60,8 +62,10 @@ def standing(graph: JointGraph, base: str, wanted: str | None, platform: str | N
         if bearer.type is JointType.FREE and (loops or (platform != trunk and _moving(graph, trunk) > 2)):
             how = f"floats on the free joint {bearer.name!r}: it is the base, and what it floats in is left out"
         elif loops and bearer.type is JointType.PRISMATIC and _is_rail(graph, bearer, trunk, platform):
-            how = (f"slides on the rail {bearer.name!r}: it is the base, and what it slides on is left out "
-                   f"(--base {base} to keep it)")
+            how = (
+                f"slides on the rail {bearer.name!r}: it is the base, and what it slides on is left out "
+                f"(--base {base} to keep it)"
+            )
         else:
             break
         graph.note("guess", f"{trunk!r} {how}")
@@ -90,15 +94,23 @@ def _without_float(graph: JointGraph, base: str, named: set[str | None]) -> str:
     left = {each.links[0] for each in chain}
     slides, turns = ([axis for axis, kind in zip(axes, kinds, strict=False) if kind == each] for each in "PR")
     geared = {name for gear in graph.gears for name in (gear.driver, gear.driven)}
-    if sorted(kinds) != list("PPPRRR") or _moving(graph, link) < 3 or graph.platform in left or named & left or any(
-            each.motor is not None or each.name in geared for each in chain):
+    if (
+        sorted(kinds) != list("PPPRRR")
+        or _moving(graph, link) < 3
+        or graph.platform in left
+        or named & left
+        or any(each.motor is not None or each.name in geared for each in chain)
+    ):
         return base
     ranks = [np.linalg.matrix_rank(np.array(each), SAME_DIRECTION) for each in (slides, turns)]
     if ranks != [3, 3] or np.max(np.abs(np.array(centres) - centres[0])) > SAME_POINT:
         return base
     names = ", ".join(each.name for each in chain)
-    graph.note("guess", f"{link!r} floats on the joints {names}, which place it: it is the base, and what it floats in "
-                        f"is left out (--base {base} to keep it)")
+    graph.note(
+        "guess",
+        f"{link!r} floats on the joints {names}, which place it: it is the base, and what it floats in "
+        f"is left out (--base {base} to keep it)",
+    )
     for each in chain:
         del graph.joints[each.name], graph.links[each.links[0]]
     return link
@@ -147,8 +159,11 @@ def platform(graph: JointGraph, base: str) -> tuple[str, str]:
     if link is None:
         names = bodies.platform_candidates(rivals)
         chain = "".join(f"; {note.text}" for note in graph.notes if note.kind == "open")
-        raise BadRequest(f"{graph.file}: the file does not say which link is the platform, and several could be{chain}",
-                         None, "--platform LINK, such as " + ", ".join(names[:12]) + (" …" if names[12:] else ""))
+        raise BadRequest(
+            f"{graph.file}: the file does not say which link is the platform, and several could be{chain}",
+            None,
+            "--platform LINK, such as " + ", ".join(names[:12]) + (" …" if names[12:] else ""),
+        )
     graph.note("guess", f"the platform is link {link!r}, {why} (--platform LINK to change it)")
     return link, why
 
@@ -211,8 +226,9 @@ class _RigidBodies:
         else:
             found, most = self._most_ways(others, self.base, set(self.near))
             if len(found) == 1:
-                floats = sum(joint.type is JointType.FREE for link in self.members[found[0]]
-                             for joint in self.joints[link])
+                floats = sum(
+                    joint.type is JointType.FREE for link in self.members[found[0]] for joint in self.joints[link]
+                )
                 return self.title(found[0]), f"which {most - floats} ways connect to the base", ()
             distance = graphs.distances(self.near, self.base)
             rivals = [body for body in distance if distance[body] == max(distance.values())]
@@ -221,8 +237,11 @@ class _RigidBodies:
             return None, "", [*named, *closed]
         if named:
             named = _common(named, closed, framed)
-            return (self._end_of(named[0]), "whose name is that of a foot or tool", ()) if len(named) == 1 else (
-                None, "", named)
+            return (
+                (self._end_of(named[0]), "whose name is that of a foot or tool", ())
+                if len(named) == 1
+                else (None, "", named)
+            )
         if closed:
             closed = _common(closed, framed)
             return (self.title(closed[0]), why, ()) if len(closed) == 1 else (None, "", closed)
@@ -272,8 +291,13 @@ class _RigidBodies:
         joints."""
         name = self.title(body)
         kinds = {joint.type for link in self.members[body] for joint in self.joints[link]} - {JointType.FIXED}
-        return has_word(name, _SENSOR) or (len(self.near[body]) == 2 and (has_word(name, _ROD) or (
-            JointType.SPHERICAL in kinds and kinds <= {JointType.SPHERICAL, JointType.UNIVERSAL})))
+        return has_word(name, _SENSOR) or (
+            len(self.near[body]) == 2
+            and (
+                has_word(name, _ROD)
+                or (JointType.SPHERICAL in kinds and kinds <= {JointType.SPHERICAL, JointType.UNIVERSAL})
+            )
+        )
 
     def _blocks(self) -> list[set[str]]:
         """The bodies of each loop, of several loops where they share two bodies, and of each bond in no loop; none
@@ -323,7 +347,11 @@ class _RigidBodies:
         found = []
         for link in [each for each in self.members[body] if each not in self.closing]:
             own = self.joints[link]
-            if len(own) == 1 and own[0].type is JointType.FIXED and own[0].links[1] == link and not has_word(
-                    link, _SENSOR):
+            if (
+                len(own) == 1
+                and own[0].type is JointType.FIXED
+                and own[0].links[1] == link
+                and not has_word(link, _SENSOR)
+            ):
                 found.append(link)
         return found

@@ -54,16 +54,23 @@ class Ideal:
     def notes(self, tolerance: float, length: float, gap: float) -> list[Note]:
         """What was made exact, relation by relation; ``gap`` is that of the loops' singular values as written."""
         change = max(self.shift / length, self.turn)
-        found = [Note("merged", f"{len(self.mended)} relations of joints that hold to {tolerance:.1g} (characteristic "
-                                f"lengths, radians; the worst to {self.worst:.1e}) are made exact, largest change "
-                                f"{change:.1e}; centres moved by up to {1e3 * self.shift:.2g} mm, axes turned by up to "
-                                f"{np.rad2deg(self.turn):.2g} deg; the loops' singular values as written leave a gap "
-                                f"of {gap:.1e} (--tolerance to change it, --as-written to keep the numbers)")]
+        found = [
+            Note(
+                "merged",
+                f"{len(self.mended)} relations of joints that hold to {tolerance:.1g} (characteristic "
+                f"lengths, radians; the worst to {self.worst:.1e}) are made exact, largest change "
+                f"{change:.1e}; centres moved by up to {1e3 * self.shift:.2g} mm, axes turned by up to "
+                f"{np.rad2deg(self.turn):.2g} deg; the loops' singular values as written leave a gap "
+                f"of {gap:.1e} (--tolerance to change it, --as-written to keep the numbers)",
+            )
+        ]
         kinds: dict[str, dict[tuple[str, ...], None]] = defaultdict(dict)
         for relation in self.mended:
             kinds[relation.kind][relation.of] = None
-        found += [Note("merged", f"made to be {kind}: " + "; ".join(comma_list(names, 40) for names in groups))
-                  for kind, groups in kinds.items()]
+        found += [
+            Note("merged", f"made to be {kind}: " + "; ".join(comma_list(names, 40) for names in groups))
+            for kind, groups in kinds.items()
+        ]
         return found
 
 
@@ -110,10 +117,19 @@ def as_meant(mechanism: Mechanism, residual: float, tolerance: float, possible: 
         gap = written.rank(written.zero(), max(RANK_CUTOFF, NO_FINER * tolerance)).gap
         found, notes = spanning(ideal.mechanism), ideal.notes(tolerance, mechanism.length, gap)
     else:
-        found, notes = mechanism, [] if residual <= SAME_GEOMETRY else [Note(
-            "merged", f"the loops are open by up to {residual:.2g} (characteristic lengths, radians; a gap of "
-                      f"{1e3 * residual * mechanism.length:.2g} mm) at zero, within the tolerance of {tolerance:.1g}: "
-                      "the joints that close them are put in the middle")]
+        found, notes = (
+            mechanism,
+            []
+            if residual <= SAME_GEOMETRY
+            else [
+                Note(
+                    "merged",
+                    f"the loops are open by up to {residual:.2g} (characteristic lengths, radians; a gap of "
+                    f"{1e3 * residual * mechanism.length:.2g} mm) at zero, within the tolerance of {tolerance:.1g}: "
+                    "the joints that close them are put in the middle",
+                )
+            ],
+        )
     return _idealise_directions(replace(found, notes=(*mechanism.notes, *notes)) if notes else found, tolerance)
 
 
@@ -180,10 +196,18 @@ def nearest(mechanism: Mechanism, tolerance: float, known: Ideal | None = None) 
     mended = tuple(each for each in held if each.defect > EXACT)
     found = at.mechanism_of(x)
     pairs = [(mechanism.joints[name], joint) for name, joint in found.joints.items()]
-    return Ideal(found if mended else mechanism, normal, x, frozenset(_names(held)), mended,
-                 max(float(np.linalg.norm(a.point - b.point)) for a, b in pairs),
-                 max((float(np.linalg.norm(a - b)) for old, new in pairs
-                      for a, b in zip(old.axes, new.axes, strict=True)), default=0.0))
+    return Ideal(
+        found if mended else mechanism,
+        normal,
+        x,
+        frozenset(_names(held)),
+        mended,
+        max(float(np.linalg.norm(a.point - b.point)) for a, b in pairs),
+        max(
+            (float(np.linalg.norm(a - b)) for old, new in pairs for a, b in zip(old.axes, new.axes, strict=True)),
+            default=0.0,
+        ),
+    )
 
 
 def _names(relations: Sequence[GeometricRelation]) -> set[tuple[str, tuple[str, ...]]]:
@@ -198,8 +222,10 @@ def _project(at: JointCoordinates, relations: Sequence[GeometricRelation]) -> tu
         return start, 0.0
 
     def evaluate(x: Array) -> tuple[Array, Array]:
-        return (np.concatenate([each.value(x) for each in relations]),
-                np.vstack([each.gradient(x) for each in relations]))
+        return (
+            np.concatenate([each.value(x) for each in relations]),
+            np.vstack([each.gradient(x) for each in relations]),
+        )
 
     def advance(x: Array, here: Residual, factor: float) -> Array:
         # rows that depend on each other at the solution differ by the miss before it: they are not followed

@@ -53,8 +53,9 @@ class LoopAssembly:
     """Tree, loops and gears of a joint graph, in which tree joints take values; their zero pose may be a posture. Below
     ``noise`` an opening may be that of rounded numbers."""
 
-    def __init__(self, base: str, joints: Sequence[JointSpec], gears: Sequence[GearSpec] = (),
-                 start: Posture | None = None) -> None:
+    def __init__(
+        self, base: str, joints: Sequence[JointSpec], gears: Sequence[GearSpec] = (), start: Posture | None = None
+    ) -> None:
         self.base, self.noise = base, NOISE
         self._start = start or {}
         tree = spanning_tree(base, joints)
@@ -63,11 +64,15 @@ class LoopAssembly:
         used = {joint.name for joint, _, _ in tree}
         self._parent = {child: (joint, parent) for joint, parent, child in self.tree}
         reached = {base, *self._parent}
-        self.loops = [_scale(joint, self.length) for joint in joints
-                      if joint.name not in used and reached.issuperset(joint.links)]
+        self.loops = [
+            _scale(joint, self.length) for joint in joints if joint.name not in used and reached.issuperset(joint.links)
+        ]
         units = {joint.name: self.unit(joint) for joint in joints}
-        self.gears = [replace(g, ratio=g.ratio * units[g.driver] / units[g.driven], offset=g.offset / units[g.driven])
-                      for g in gears if g.driver in used and g.driven in used]
+        self.gears = [
+            replace(g, ratio=g.ratio * units[g.driver] / units[g.driven], offset=g.offset / units[g.driven])
+            for g in gears
+            if g.driver in used and g.driven in used
+        ]
         ways = [(self._way(loop.links[0]), self._way(loop.links[1])) for loop in self.loops]
         active = {name for one, two in ways for name in set(one) ^ set(two)}
         active |= {name for gear in self.gears for name in (gear.driver, gear.driven)}
@@ -78,8 +83,12 @@ class LoopAssembly:
             self._columns[joint.name] = slice(self.size, self.size + joint.kind.freedoms)
             self.size += joint.kind.freedoms
         self._carried = [self._signs(after) - self._signs(before) for before, after in ways]
-        self._ends = [(joint.ends[0].X, inverse(joint.ends[1].X)) if joint.links[0] == parent else
-                      (joint.ends[1].X, inverse(joint.ends[0].X)) for joint, parent, _ in self.tree]
+        self._ends = [
+            (joint.ends[0].X, inverse(joint.ends[1].X))
+            if joint.links[0] == parent
+            else (joint.ends[1].X, inverse(joint.ends[0].X))
+            for joint, parent, _ in self.tree
+        ]
         self._last: tuple[Values, dict[str, Array]] | None = None
         self._effort = len(self.tree) + len(self.loops) + self.size**2 // 50
         self._spent = 0
@@ -210,8 +219,9 @@ class LoopAssembly:
         """1 for the active coordinates, 0 for those of joints that are held, (size,)."""
         return np.array([float(joint.name not in held) for joint in self.active for _ in range(joint.kind.freedoms)])
 
-    def _polish(self, values: Values, at: Residual, system: Callable[[Values], tuple[Array, Array]]
-                ) -> tuple[Values, float]:
+    def _polish(
+        self, values: Values, at: Residual, system: Callable[[Values], tuple[Array, Array]]
+    ) -> tuple[Values, float]:
         """Plain Newton steps, faint directions too, as long as they are short for the residual that they remove."""
         start = (values, at.size)
         for _ in range(10):
@@ -246,7 +256,7 @@ class LoopAssembly:
     def kernel(self, values: Values) -> Array:
         """A basis (size, freedoms) of the velocities that keep the loops closed."""
         _, s, Vt = singular_decomposition(self.system(values)[1], full_matrices=True)
-        return np.asarray(Vt[int(np.sum(s > RANK_CUTOFF * max(s, default=1.0))):].T)
+        return np.asarray(Vt[int(np.sum(s > RANK_CUTOFF * max(s, default=1.0))) :].T)
 
     def worst(self, values: Values) -> tuple[str, float]:
         """The loop that is open most, and by how much."""
@@ -277,8 +287,10 @@ class LoopAssembly:
             if joint.limits is None or joint.kind not in SINGLE:
                 continue
             unit = self.unit(joint)
-            lower, upper = (far if bound is None else bound / unit
-                            for bound, far in ((joint.limits.lower, -np.inf), (joint.limits.upper, np.inf)))
+            lower, upper = (
+                far if bound is None else bound / unit
+                for bound, far in ((joint.limits.lower, -np.inf), (joint.limits.upper, np.inf))
+            )
             value = values.get(joint.name, np.array([closing.get(joint.name, 0.0) / unit]))
             if lower < upper and not lower - EXACT <= value[0] <= upper + EXACT:
                 inside = min(LIMIT_MARGIN, (upper - lower) / 4)
@@ -289,8 +301,11 @@ class LoopAssembly:
         """The same values (and what they leave open) with turns by whole ones that bring joints within their limits."""
         geared = {name for gear in self.gears for name in (gear.driver, gear.driven)}
         free = {joint.name for joint, _, _ in self.tree if joint.kind is JointType.REVOLUTE} - geared
-        turns = {name: values[name] + 2 * np.pi * np.round((inside - values[name]) / (2 * np.pi))
-                 for name, inside in self.beyond(values).items() if name in free}
+        turns = {
+            name: values[name] + 2 * np.pi * np.round((inside - values[name]) / (2 * np.pi))
+            for name, inside in self.beyond(values).items()
+            if name in free
+        }
         still = self.beyond(values | turns)
         return values | {name: value for name, value in turns.items() if name not in still}, residual
 
@@ -331,8 +346,10 @@ def joints_of(mechanism: Mechanism) -> list[JointSpec]:
 def gears_of(mechanism: Mechanism) -> list[GearSpec]:
     """A mechanism's couplings by the joints that carry their links."""
     carrier = {joint.successor: joint.name for joint in mechanism.joints.values() if joint.in_tree}
-    return [GearSpec(each.name, carrier[each.predecessor], carrier[each.successor], each.ratio)
-            for each in mechanism.couplings]
+    return [
+        GearSpec(each.name, carrier[each.predecessor], carrier[each.successor], each.ratio)
+        for each in mechanism.couplings
+    ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -373,8 +390,7 @@ def _within_limits(assembly: LoopAssembly, values: Values, held: frozenset[str],
     values, residual = assembly.wound(*assembly.close(values, held=held))
     first = LoopSolution(values, residual, pushed, tuple(assembly.beyond(values)))
     for _ in range(HELD_TRIES if residual <= assembly.noise else 0):
-        inside = {name: value for name, value in assembly.beyond(values).items()
-                  if name in values and name not in held}
+        inside = {name: value for name, value in assembly.beyond(values).items() if name in values and name not in held}
         if not inside:
             break
         near, left = assembly.wound(*assembly.close(assembly.followed(values | inside), held=held | inside.keys()))
@@ -400,8 +416,11 @@ def regular_values(assembly: LoopAssembly, values: Values) -> Values | None:
         """Whether a step leads to closed values, which are kept where the loops hold more, or more firmly, there."""
         there, residual = assembly.close(assembly.step(values, size / float(np.max(np.abs(direction))) * direction))
         rank = assembly.rank(there)
-        if residual <= 10 * SOLVED and rank.gap >= RANK_GAP and (
-                rank.value > here.value or (rank.value == here.value and rank.weakest > FIRMER_BY * here.weakest)):
+        if (
+            residual <= 10 * SOLVED
+            and rank.gap >= RANK_GAP
+            and (rank.value > here.value or (rank.value == here.value and rank.weakest > FIRMER_BY * here.weakest))
+        ):
             found.append((rank.value, rank.weakest, there))
         return residual <= 10 * SOLVED
 

@@ -120,8 +120,9 @@ class JointCoordinates:
         self.members: dict[int, list[tuple[str, int]]] = {}
         for group in _clusters(np.linalg.norm(np.cross(vectors[:, None], vectors[None]), axis=2), within):
             senses = [1.0 if vectors[i] @ vectors[group[0]] > 0 else -1.0 for i in group]
-            at = self._add(unit(np.sum([s * vectors[i] for s, i in zip(senses, group, strict=True)], axis=0)),
-                           len(group) ** 0.5)
+            at = self._add(
+                unit(np.sum([s * vectors[i] for s, i in zip(senses, group, strict=True)], axis=0)), len(group) ** 0.5
+            )
             self.members[at] = [axes[i] for i in group]
             self.direction.update({axes[i]: (at, s) for s, i in zip(senses, group, strict=True)})
         self.point = {joint.name: self._add(joint.point / mechanism.length) for joint in joints}
@@ -153,8 +154,12 @@ class JointCoordinates:
         length = self.mechanism.length
         found: list[Array] = []
         for one, two in bodies.pairs():
-            if one.type in LINES and two.type in LINES and self.axis_of(one) != self.axis_of(two) and \
-                    float(np.linalg.norm(np.cross(one.axis, two.axis))) > OBLIQUE:
+            if (
+                one.type in LINES
+                and two.type in LINES
+                and self.axis_of(one) != self.axis_of(two)
+                and float(np.linalg.norm(np.cross(one.axis, two.axis))) > OBLIQUE
+            ):
                 ends = lines.common_perpendicular(one.point, one.axis, two.point, two.axis)
                 if float(np.linalg.norm(ends[1] - ends[0])) <= self.within * length:
                     found.append((ends[0] + ends[1]) / 2 / length)
@@ -174,12 +179,20 @@ class JointCoordinates:
         """The mechanism with other centres and axes."""
         joints, centre = {}, dict(self.point)
         for place, names in self.places.items():
-            centre.update({name: place for name in names if np.linalg.norm(
-                self.start[place : place + 3] - self.mechanism.joints[name].point / self.mechanism.length)
-                <= self.within})
+            centre.update(
+                {
+                    name: place
+                    for name in names
+                    if np.linalg.norm(
+                        self.start[place : place + 3] - self.mechanism.joints[name].point / self.mechanism.length
+                    )
+                    <= self.within
+                }
+            )
         for name, joint in self.mechanism.joints.items():
-            axes = tuple(sense * x[at : at + 3] for at, sense in
-                         (self.direction[name, k] for k in range(len(joint.axes))))
+            axes = tuple(
+                sense * x[at : at + 3] for at, sense in (self.direction[name, k] for k in range(len(joint.axes)))
+            )
             at = centre[name]
             joints[name] = replace(joint, point=x[at : at + 3] * self.mechanism.length, axes=axes)
         return replace(self.mechanism, joints=joints)
@@ -201,8 +214,9 @@ def certain(at: JointCoordinates) -> Iterator[GeometricRelation]:
         yield GeometricRelation("unit", (), _length, (i,), 0.0)
     for joint in at.mechanism.joints.values():
         if joint.type is JointType.UNIVERSAL:
-            yield _perpendicular(at, joint.name, joint.name, at.direction[joint.name, 0][0],
-                                 at.direction[joint.name, 1][0])
+            yield _perpendicular(
+                at, joint.name, joint.name, at.direction[joint.name, 0][0], at.direction[joint.name, 1][0]
+            )
 
 
 def of_axes(at: JointCoordinates, bodies: Bodies) -> Iterator[GeometricRelation]:
@@ -210,8 +224,9 @@ def of_axes(at: JointCoordinates, bodies: Bodies) -> Iterator[GeometricRelation]
     x, length = at.start, at.mechanism.length
     for i, members in at.members.items():
         if len(members) > 1:
-            worst = max(float(np.linalg.norm(np.cross(at.mechanism.joints[name].axes[k], x[i : i + 3])))
-                        for name, k in members)
+            worst = max(
+                float(np.linalg.norm(np.cross(at.mechanism.joints[name].axes[k], x[i : i + 3]))) for name, k in members
+            )
             yield GeometricRelation("parallel", tuple(dict.fromkeys(name for name, _ in members)), _length, (i,), worst)
     seen = set()
     for one, two in Bodies(at.mechanism, (JointType.FIXED, JointType.PRISMATIC)).pairs():  # slides keep directions
@@ -224,15 +239,21 @@ def of_axes(at: JointCoordinates, bodies: Bodies) -> Iterator[GeometricRelation]
     for one, two in bodies.pairs():
         if one.type in LINES and two.type in LINES and at.axis_of(one) == at.axis_of(two):
             miss = lines.distance(one.point, two.point, two.axis) / length
-            yield GeometricRelation("coaxial", (one.name, two.name), _on_line,
-                                    (at.point[one.name], at.point[two.name], at.axis_of(one)), miss)
+            yield GeometricRelation(
+                "coaxial",
+                (one.name, two.name),
+                _on_line,
+                (at.point[one.name], at.point[two.name], at.axis_of(one)),
+                miss,
+            )
     for i, names in at.places.items():
         for name in names:
             joint, place = at.mechanism.joints[name], x[i : i + 3]
             if joint.type in LINES:
                 miss = lines.distance(place, joint.point / length, joint.axis)
-                yield GeometricRelation("through one point", tuple(names), _on_line,
-                                        (i, at.point[name], at.axis_of(joint)), miss)
+                yield GeometricRelation(
+                    "through one point", tuple(names), _on_line, (i, at.point[name], at.axis_of(joint)), miss
+                )
             elif at.point[name] != i:
                 miss = float(np.linalg.norm(place - joint.point / length))
                 yield GeometricRelation("through one point", tuple(names), np.subtract, (i, at.point[name]), miss)
@@ -240,8 +261,9 @@ def of_axes(at: JointCoordinates, bodies: Bodies) -> Iterator[GeometricRelation]
 
 def _perpendicular(at: JointCoordinates, one: str, two: str, i: int, j: int) -> GeometricRelation:
     x = at.start
-    return GeometricRelation("perpendicular", tuple(dict.fromkeys((one, two))), _normal, (i, j),
-                             abs(float(x[i : i + 3] @ x[j : j + 3])))
+    return GeometricRelation(
+        "perpendicular", tuple(dict.fromkeys((one, two))), _normal, (i, j), abs(float(x[i : i + 3] @ x[j : j + 3]))
+    )
 
 
 def of_centres(at: JointCoordinates, normal: Mechanism, x: Array) -> Iterator[GeometricRelation]:
@@ -279,8 +301,9 @@ def of_centres(at: JointCoordinates, normal: Mechanism, x: Array) -> Iterator[Ge
                 continue
             for a, name in axes.items():
                 names = (one.name, two.name, name)
-                yield GeometricRelation("in line with an axis", names, _on_line, (i, j, a),
-                                        float(np.linalg.norm(np.cross(arm, vector(a)))))
+                yield GeometricRelation(
+                    "in line with an axis", names, _on_line, (i, j, a), float(np.linalg.norm(np.cross(arm, vector(a))))
+                )
                 yield GeometricRelation("square to an axis", names, _across, (i, j, a), abs(float(arm @ vector(a))))
         yield from _flat([(joint.name, spot(joint)) for joint in balls], vector, at.within)
     for slide in normal.joints.values():
@@ -296,9 +319,11 @@ def of_centres(at: JointCoordinates, normal: Mechanism, x: Array) -> Iterator[Ge
     yield from _rods(bodies, spot, at, vector)
 
 
-def _flat(balls: Sequence[tuple[str, int]], vector: Callable[[int], Array], within: float
-          ) -> Iterator[GeometricRelation]:
+def _flat(
+    balls: Sequence[tuple[str, int]], vector: Callable[[int], Array], within: float
+) -> Iterator[GeometricRelation]:
     """All centres of a body in one plane with the three that span the largest triangle."""
+
     def area(three: Iterable[tuple[str, int]]) -> float:
         p, q, r = (vector(i) for _, i in three)
         return float(np.linalg.norm(np.cross(q - p, r - p)))
@@ -313,12 +338,14 @@ def _flat(balls: Sequence[tuple[str, int]], vector: Callable[[int], Array], with
     for name, i in balls:
         if i not in corners:
             miss = abs(float(_coplanar(*(vector(j) for j in (*corners, i)))[0])) / size
-            yield GeometricRelation("in one plane", (*(other for other, _ in three), name), _coplanar, (*corners, i),
-                                    miss)
+            yield GeometricRelation(
+                "in one plane", (*(other for other, _ in three), name), _coplanar, (*corners, i), miss
+            )
 
 
-def _rods(bodies: Bodies, spot: Callable[[Joint], int], at: JointCoordinates, vector: Callable[[int], Array]
-          ) -> Iterator[GeometricRelation]:
+def _rods(
+    bodies: Bodies, spot: Callable[[Joint], int], at: JointCoordinates, vector: Callable[[int], Array]
+) -> Iterator[GeometricRelation]:
     """Two links of two joints each between the same two bodies: equal from centre to centre."""
     table: dict[frozenset[int], list[Sequence[Joint]]] = defaultdict(list)
     for own, joints in bodies.on.items():

@@ -18,8 +18,10 @@ from ..jointgraph import ORIGIN, comma_list, scale_pose
 from ..jointmotion import displacement
 from .loops import SINGLE, LoopAssembly, Values
 
-COUNTED_FROM_ZERO = {"safety_controller": ("soft_lower_limit", "soft_upper_limit"),
-                     "calibration": ("rising", "falling", "reference_position")}
+COUNTED_FROM_ZERO = {
+    "safety_controller": ("soft_lower_limit", "soft_upper_limit"),
+    "calibration": ("rising", "falling", "reference_position"),
+}
 """Attributes of elements of a joint that are coordinates of it."""
 
 
@@ -28,8 +30,9 @@ def with_zero_at(mechanism: Mechanism, assembly: LoopAssembly, values: Values) -
     return zeroed_at(mechanism, assembly.poses(values), _singles(assembly, values))
 
 
-def zeroed_at(mechanism: Mechanism, poses: Mapping[str, Array], known: Mapping[str, float] = MappingProxyType({})
-             ) -> Mechanism:
+def zeroed_at(
+    mechanism: Mechanism, poses: Mapping[str, Array], known: Mapping[str, float] = MappingProxyType({})
+) -> Mechanism:
     """The same mechanism with its links, all of them, at these poses (4, 4) as its zero configuration.
 
     Limits, wrists, and what else a joint has that is counted from zero, move with it. ``known`` are coordinates of R
@@ -44,10 +47,16 @@ def zeroed_at(mechanism: Mechanism, poses: Mapping[str, Array], known: Mapping[s
         wrist = None if joint.wrist is None else joint.wrist.carried(X[:3, :3], Y[:3, :3])
         moved = replace(joint, point=X[:3, :3] @ joint.point + X[:3, 3], axes=axes, wrist=wrist)
         q = np.array([known[joint.name]]) if joint.name in known else _coordinates(joint, inverse(X) @ Y)
-        joints.append(_displaced(moved, X @ (ORIGIN if joint.offset is None else joint.offset) @ inverse(Y))
-                      if q is None else _counted_from(moved, q))
-    return mechanism.changed(links=[replace(link, pose=poses[name]) for name, link in mechanism.links.items()],
-                             joints=joints, scale=mechanism.length)
+        joints.append(
+            _displaced(moved, X @ (ORIGIN if joint.offset is None else joint.offset) @ inverse(Y))
+            if q is None
+            else _counted_from(moved, q)
+        )
+    return mechanism.changed(
+        links=[replace(link, pose=poses[name]) for name, link in mechanism.links.items()],
+        joints=joints,
+        scale=mechanism.length,
+    )
 
 
 def at_file_zero(mechanism: Mechanism) -> Mechanism | None:
@@ -59,13 +68,19 @@ def at_file_zero(mechanism: Mechanism) -> Mechanism | None:
         if joint.offset is None:
             continue
         if joint.offset.ndim == 1:
-            values[spec.name] = -joint.offset / ([assembly.length, 1.0] if joint.type is JointType.CYLINDRICAL
-                                                 else assembly.unit(spec))
+            values[spec.name] = -joint.offset / (
+                [assembly.length, 1.0] if joint.type is JointType.CYLINDRICAL else assembly.unit(spec)
+            )
             continue
         centre = pose(joint.point)
         D = scale_pose(inverse(centre) @ joint.offset @ centre, 1 / assembly.length)
-        values[spec.name] = D if joint.type is not JointType.PLANAR else np.array(
-            [turns_about(axis[None], D[:3, :3])[0] if K is not None else axis @ D[:3, 3] for axis, K in spec.parts])
+        values[spec.name] = (
+            D
+            if joint.type is not JointType.PLANAR
+            else np.array(
+                [turns_about(axis[None], D[:3, :3])[0] if K is not None else axis @ D[:3, 3] for axis, K in spec.parts]
+            )
+        )
     return with_zero_at(mechanism, assembly, values) if assembly.worst(values)[1] <= SAME_GEOMETRY else None
 
 
@@ -93,10 +108,22 @@ def _counted_from(joint: Joint, q: Array) -> Joint:
     if not q.any():
         return joint
     offset = q if joint.offset is None else q + joint.offset
-    moved = replace(joint, offset=frozen(offset) if np.abs(offset).max() > EXACT else None, turns=tuple(
-        (name, _shifted(limits, float(angle))) for (name, limits), angle in zip(joint.turns, q, strict=False)))
-    return moved if len(q) > 1 else replace(moved, limits=_shifted(joint.limits, float(q[0])),
-                                            xml=tuple(_recount(each, float(q[0])) for each in joint.xml))
+    moved = replace(
+        joint,
+        offset=frozen(offset) if np.abs(offset).max() > EXACT else None,
+        turns=tuple(
+            (name, _shifted(limits, float(angle))) for (name, limits), angle in zip(joint.turns, q, strict=False)
+        ),
+    )
+    return (
+        moved
+        if len(q) > 1
+        else replace(
+            moved,
+            limits=_shifted(joint.limits, float(q[0])),
+            xml=tuple(_recount(each, float(q[0])) for each in joint.xml),
+        )
+    )
 
 
 def _displaced(joint: Joint, F: Array) -> Joint:
@@ -133,8 +160,11 @@ def with_offsets(joints: Mapping[str, Joint], assembly: LoopAssembly, values: Va
 
 def _singles(assembly: LoopAssembly, values: Values) -> dict[str, float]:
     """The coordinates (m, rad) of the R and P of the tree."""
-    return {spec.name: float(values[spec.name][0]) * assembly.unit(spec) for spec, _, _ in assembly.tree
-            if spec.kind in SINGLE}
+    return {
+        spec.name: float(values[spec.name][0]) * assembly.unit(spec)
+        for spec, _, _ in assembly.tree
+        if spec.kind in SINGLE
+    }
 
 
 def _recount(fragment: str, q: float) -> str:

@@ -49,8 +49,9 @@ def _value_of(element: xml.Element, tag: str) -> str | None:
     return (child.get("value") or child.get("name") or child.text or "").strip() or None
 
 
-def _ends(reader: XmlReader, element: xml.Element, tags: tuple[str, str], frame_of: Frames
-          ) -> tuple[FrameSpec, FrameSpec] | None:
+def _ends(
+    reader: XmlReader, element: xml.Element, tags: tuple[str, str], frame_of: Frames
+) -> tuple[FrameSpec, FrameSpec] | None:
     """The two frames that child elements name; a name that is none, or one link twice, is a defect."""
     line, found = xml.line(element), []
     for tag in tags:
@@ -77,8 +78,11 @@ def read_drake(reader: XmlReader, graph: JointGraph, root: xml.Element, frame_of
             case "linear_bushing_rpy":
                 _bushing(reader, graph, element, frame_of)
             case name if name.endswith("_constraint"):
-                graph.note("open", f"<drake:{name}> (line {xml.line(element)}) is not read; where it holds two links "
-                                   "together, --close A@x,y,z:B@x,y,z:TYPE does so")
+                graph.note(
+                    "open",
+                    f"<drake:{name}> (line {xml.line(element)}) is not read; where it holds two links "
+                    "together, --close A@x,y,z:B@x,y,z:TYPE does so",
+                )
 
 
 def _ball_constraint(reader: XmlReader, graph: JointGraph, element: xml.Element, frame_of: Frames) -> None:
@@ -86,8 +90,9 @@ def _ball_constraint(reader: XmlReader, graph: JointGraph, element: xml.Element,
     if ends is None:
         return
     points = (_vector(reader, element, f"ball_constraint_{point}") for point in ("p_AP", "p_BQ"))
-    one, two = (FrameSpec(end.link, frozen(end.X @ pose(point)), end.line)
-                for end, point in zip(ends, points, strict=True))
+    one, two = (
+        FrameSpec(end.link, frozen(end.X @ pose(point)), end.line) for end, point in zip(ends, points, strict=True)
+    )
     graph.close(graph.fresh("ball_constraint"), JointType.SPHERICAL, (one, two), line=xml.line(element))
 
 
@@ -99,42 +104,65 @@ def _bushing(reader: XmlReader, graph: JointGraph, element: xml.Element, frame_o
     force, torque = (_vector(reader, element, f"{_BUSHING}{what}_stiffness") > 0 for what in ("force", "torque"))
     free = tuple(int(k) for k in np.flatnonzero(~force)), tuple(int(k) for k in np.flatnonzero(~torque))
     name, links = graph.fresh("bushing"), f"{ends[0].link}:{ends[1].link}"
-    kind = {(0, 0): JointType.FIXED, (0, 1): JointType.REVOLUTE, (0, 3): JointType.SPHERICAL,
-            (1, 0): JointType.PRISMATIC, (1, 1): JointType.CYLINDRICAL}.get((len(free[0]), len(free[1])))
+    kind = {
+        (0, 0): JointType.FIXED,
+        (0, 1): JointType.REVOLUTE,
+        (0, 3): JointType.SPHERICAL,
+        (1, 0): JointType.PRISMATIC,
+        (1, 1): JointType.CYLINDRICAL,
+    }.get((len(free[0]), len(free[1])))
     if kind is None or (kind is JointType.CYLINDRICAL and free[0] != free[1]):
-        graph.note("open", f"the bushing between {ends[0].link!r} and {ends[1].link!r} is not stiff against "
-                           f"{len(free[0])} translations and {len(free[1])} rotations, which no loop joint is: left "
-                           f"out (--close {links}:TYPE for the joint that it is meant to be)")
+        graph.note(
+            "open",
+            f"the bushing between {ends[0].link!r} and {ends[1].link!r} is not stiff against "
+            f"{len(free[0])} translations and {len(free[1])} rotations, which no loop joint is: left "
+            f"out (--close {links}:TYPE for the joint that it is meant to be)",
+        )
         return
     axis = np.eye(3)[(free[1] or free[0] or (2,))[0]]
     graph.close(name, kind, ends, [axis], xml.line(element))
-    graph.note("guess", f"{name!r} between {ends[0].link!r} and {ends[1].link!r} is read as a {kind.name.lower()} "
-                        "joint: it constrains the motions for which its stiffness is not zero")
+    graph.note(
+        "guess",
+        f"{name!r} between {ends[0].link!r} and {ends[1].link!r} is read as a {kind.name.lower()} "
+        "joint: it constrains the motions for which its stiffness is not zero",
+    )
 
 
 def _vector(reader: XmlReader, element: xml.Element, tag: str) -> Array:
     return reader.values(_value_of(element, tag), (0, 0, 0), xml.line(element), f"<{tag}>")
 
 
-def read_plugins(graph: JointGraph, plugins: list[xml.Element], poses: Mapping[str, Array], models: tuple[str, ...]
-                 ) -> None:
+def read_plugins(
+    graph: JointGraph, plugins: list[xml.Element], poses: Mapping[str, Array], models: tuple[str, ...]
+) -> None:
     """Gazebo's detachable joints hold two links as they lie at zero (``poses`` in the model's frame), to a model of
     another name than the robot's only where their frames coincide; plugins that attach links while the simulation runs
     are told. ``models``: the other models of the file."""
     for plugin in plugins:
         title = f"{plugin.get('name', '')} {plugin.get('filename', '')}".strip()
         label = title.partition(" ")[0] or "plugin"
-        named = [text for child in plugin.iter() if isinstance(child.tag, str) and _ENDS.search(child.tag)
-                 for text in [(child.text or "").strip()] if text in poses]
+        named = [
+            text
+            for child in plugin.iter()
+            if isinstance(child.tag, str) and _ENDS.search(child.tag)
+            for text in [(child.text or "").strip()]
+            if text in poses
+        ]
         if _DETACHABLE.search(title):
             _detachable(graph, plugin, poses, models)
         elif len(dict.fromkeys(named)) == 2:
             pair = ":".join(dict.fromkeys(named))
-            graph.note("open", f"the plugin {label!r} names two links; where it holds them together, "
-                               f"--close {pair}:fixed (or another type) does so")
+            graph.note(
+                "open",
+                f"the plugin {label!r} names two links; where it holds them together, "
+                f"--close {pair}:fixed (or another type) does so",
+            )
         elif _ATTACHER.search(title):
-            graph.note("open", f"the plugin {label!r} can hold links together while the simulation runs; "
-                               "the file does not say which: --close A:B:TYPE where that closes a loop")
+            graph.note(
+                "open",
+                f"the plugin {label!r} can hold links together while the simulation runs; "
+                "the file does not say which: --close A:B:TYPE where that closes a loop",
+            )
 
 
 def _detachable(graph: JointGraph, plugin: xml.Element, poses: Mapping[str, Array], models: tuple[str, ...]) -> None:
@@ -142,14 +170,22 @@ def _detachable(graph: JointGraph, plugin: xml.Element, poses: Mapping[str, Arra
     model = (plugin.findtext("child_model") or "").strip()
     X = inverse(poses[child]) @ poses[parent] if {parent, child} <= set(poses) and parent != child else None
     if X is not None and model not in ("", "__model__", graph.name, *models) and np.max(np.abs(X - np.eye(4))) > NOISE:
-        graph.note("open", f"the detachable joint from {parent!r} to {child!r} of the model {model!r}, which may be "
-                           f"this robot or another: left out (--close {parent}:{child}:TYPE where it closes a loop)")
+        graph.note(
+            "open",
+            f"the detachable joint from {parent!r} to {child!r} of the model {model!r}, which may be "
+            f"this robot or another: left out (--close {parent}:{child}:TYPE where it closes a loop)",
+        )
         return
     if X is None or model in models:
-        graph.note("ignored", f"the detachable joint from {parent!r} to {child!r} of the model {model!r}, which are "
-                              "not two links of this robot")
+        graph.note(
+            "ignored",
+            f"the detachable joint from {parent!r} to {child!r} of the model {model!r}, which are "
+            "not two links of this robot",
+        )
         return
     ends = FrameSpec(parent), FrameSpec(child, frozen(X))
     graph.close(graph.fresh("detachable_joint"), JointType.FIXED, ends, line=xml.line(plugin))
-    graph.note("guess", f"the detachable joint of Gazebo holds {parent!r} and {child!r} as they lie at zero: read as a "
-                        "rigid closure")
+    graph.note(
+        "guess",
+        f"the detachable joint of Gazebo holds {parent!r} and {child!r} as they lie at zero: read as a rigid closure",
+    )

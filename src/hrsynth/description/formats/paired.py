@@ -58,6 +58,9 @@ def other_pairs(graph: JointGraph, frames: Mapping[str, FrameSpec]) -> None:
         graph.closing.update({name, partner})
         read.setdefault("guess", []).append(wish)
     for kind_of_note, wishes in read.items():
-        what = ("frames close loops by their names (another type with --close A:B:TYPE): " if kind_of_note == "guess"
-                else "frames that by their names close a loop are left open, because the file closes others; --close ")
+        what = (
+            "frames close loops by their names (another type with --close A:B:TYPE): "
+            if kind_of_note == "guess"
+            else "frames that by their names close a loop are left open, because the file closes others; --close "
+        )
         graph.note(kind_of_note, what + ", ".join(wishes[:12]) + (" …" if wishes[12:] else ""))

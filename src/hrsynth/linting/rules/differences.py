@@ -76,8 +76,11 @@ def _ends(file: LintedFile) -> Iterator[Spot]:
         assert match is not None
         here = {match.links.get(link) for link in mine.links}
         if here != set(theirs.links):
-            yield Spot(mine.line, f"joint {_names_of(mine, theirs)} joins {' and '.join(mine.links)} here, "
-                                  f"{' and '.join(theirs.links)} there")
+            yield Spot(
+                mine.line,
+                f"joint {_names_of(mine, theirs)} joins {' and '.join(mine.links)} here, "
+                f"{' and '.join(theirs.links)} there",
+            )
     if match is None:
         return
     for role in ("base", "platform"):
@@ -94,10 +97,12 @@ def _geometry(file: LintedFile) -> Iterator[Spot]:
         worst = max(fit.misses, key=lambda name: fit.misses[name])
         if fit.misses[worst] > SAME_ROBOT:
             joint = match.one.joints[worst]
-            yield Spot(joint.line, f"link {link!r}: its joints do not lie as in the other file; best laid over each "
-                                   f"other they miss by up to {fit.misses[worst]:.3g} (characteristic lengths, "
-                                   f"radians), at joint {worst!r}")
-
+            yield Spot(
+                joint.line,
+                f"link {link!r}: its joints do not lie as in the other file; best laid over each "
+                f"other they miss by up to {fit.misses[worst]:.3g} (characteristic lengths, "
+                f"radians), at joint {worst!r}",
+            )
 
     fits = _fits(file, match)
     for name in match.joints:
@@ -105,29 +110,38 @@ def _geometry(file: LintedFile) -> Iterator[Spot]:
         if all(link in fits and max(fits[link].misses.values()) <= SAME_ROBOT for link in joint.links):
             apart = match.apart(name)
             if apart > SAME_ROBOT:
-                yield Spot(joint.line, f"joint {name!r}: its links lie elsewhere along its axis than in the other "
-                                       f"file, by {apart:.3g} (characteristic lengths)")
+                yield Spot(
+                    joint.line,
+                    f"joint {name!r}: its links lie elsewhere along its axis than in the other "
+                    f"file, by {apart:.3g} (characteristic lengths)",
+                )
 
 
 def _zero(file: LintedFile) -> Iterator[Spot]:
     match = _match(file)
     if match is None:
         return
-    fits = {link: fit for link, fit in _fits(file, match).items()
-            if fit.only and max(fit.misses.values()) <= SAME_ROBOT}
+    fits = {
+        link: fit for link, fit in _fits(file, match).items() if fit.only and max(fit.misses.values()) <= SAME_ROBOT
+    }
     moved = []
     for name in match.joints:
         joint = match.one.joints[name]
         if all(link in fits for link in joint.links):
             X, Y = (fits[link].X for link in joint.links)
-            size = max(float(np.max(np.abs(X[:3, :3] - Y[:3, :3]))),
-                       float(np.max(np.abs((X - Y) @ np.append(match.other.joints[match.joints[name]].point, 1.0))))
-                       / match.one.length)
+            size = max(
+                float(np.max(np.abs(X[:3, :3] - Y[:3, :3]))),
+                float(np.max(np.abs((X - Y) @ np.append(match.other.joints[match.joints[name]].point, 1.0))))
+                / match.one.length,
+            )
             if size > SAME_ROBOT:
                 moved.append(name)
     if moved:
-        yield Spot(None, f"the zero configuration is another one: {', '.join(moved[:8])}{' …' * bool(moved[8:])} stand "
-                         "otherwise in the other file")
+        yield Spot(
+            None,
+            f"the zero configuration is another one: {', '.join(moved[:8])}{' …' * bool(moved[8:])} stand "
+            "otherwise in the other file",
+        )
 
 
 def _senses(file: LintedFile) -> Iterator[Spot]:
@@ -151,17 +165,22 @@ def _partner(match: RobotMatch, theirs: Joint) -> str | None:
 def _motors(file: LintedFile) -> Iterator[Spot]:
     for mine, theirs in _pairs(file):
         if mine.actuated != theirs.actuated:
-            yield Spot(mine.line,
-                       f"joint {_names_of(mine, theirs)} is {'driven' if mine.actuated else 'passive'} here, "
-                                  f"{'driven' if theirs.actuated else 'passive'} there")
+            yield Spot(
+                mine.line,
+                f"joint {_names_of(mine, theirs)} is {'driven' if mine.actuated else 'passive'} here, "
+                f"{'driven' if theirs.actuated else 'passive'} there",
+            )
 
 
 def _limits(file: LintedFile) -> Iterator[Spot]:
     for mine, theirs in _pairs(file):
-        here, there = ((None, None) if each.limits is None else (each.limits.lower, each.limits.upper)
-                       for each in (mine, theirs))
-        if any((a is None) != (b is None) or (a is not None and abs(a - (b or 0.0)) > SAME_ROBOT * max(1.0, abs(a)))
-               for a, b in zip(here, there, strict=True)):
+        here, there = (
+            (None, None) if each.limits is None else (each.limits.lower, each.limits.upper) for each in (mine, theirs)
+        )
+        if any(
+            (a is None) != (b is None) or (a is not None and abs(a - (b or 0.0)) > SAME_ROBOT * max(1.0, abs(a)))
+            for a, b in zip(here, there, strict=True)
+        ):
             yield Spot(mine.line, f"joint {_names_of(mine, theirs)}: limits {_range(here)} here, {_range(there)} there")
 
 
@@ -194,8 +213,10 @@ def _gears(file: LintedFile) -> Iterator[Spot]:
     match = _match(file)
     if match is None:
         return
-    mine = {(match.links.get(each.predecessor, ""), match.links.get(each.successor, "")): each
-            for each in match.one.couplings}
+    mine = {
+        (match.links.get(each.predecessor, ""), match.links.get(each.successor, "")): each
+        for each in match.one.couplings
+    }
     theirs = {(each.predecessor, each.successor): each for each in match.other.couplings}
     for ends in dict.fromkeys([*mine, *theirs]):
         a, b = mine.get(ends), theirs.get(ends)
@@ -204,27 +225,50 @@ def _gears(file: LintedFile) -> Iterator[Spot]:
             yield Spot(None if a is None else a.line, f"{words[0]} here, {words[1]} there")
 
 
-def _rule(name: str, severity: str, title: str, find: Callable[[LintedFile], Iterator[Spot]],
-          explanation: str = "Two files of one robot that differ are two robots.") -> LintRule:
+def _rule(
+    name: str,
+    severity: str,
+    title: str,
+    find: Callable[[LintedFile], Iterator[Spot]],
+    explanation: str = "Two files of one robot that differ are two robots.",
+) -> LintRule:
     return LintRule(f"differs-{name}", severity, title, explanation, "correct the file that is wrong", find)
 
 
 RULES = (
-    _rule("joint", "error", "a joint or closure that one file has", _joints,
-          "It has no partner by name, place or structure. Closures that a dialect does not have are often lost this "
-          "way."),
+    _rule(
+        "joint",
+        "error",
+        "a joint or closure that one file has",
+        _joints,
+        "It has no partner by name, place or structure. Closures that a dialect does not have are often lost this way.",
+    ),
     _rule("type", "error", "joints of different types", _types),
     _rule("ends", "error", "joints between other links, another base or platform", _ends),
-    _rule("geometry", "error", "joints placed differently on a link", _geometry,
-          "Compared link by link, so it does not matter where the link is at zero, how its frame is placed, or where "
-          "along its axis a hinge has its origin."),
-    _rule("zero", "warning", "a different zero configuration", _zero,
-          "Coordinates of one file are not those of the other: motor offsets, limits and keyframes shift."),
-    _rule("sense", "warning", "a joint that counts in the opposite sense", _senses,
-          "A command for one moves the other backwards."),
+    _rule(
+        "geometry",
+        "error",
+        "joints placed differently on a link",
+        _geometry,
+        "Compared link by link, so it does not matter where the link is at zero, how its frame is placed, or where "
+        "along its axis a hinge has its origin.",
+    ),
+    _rule(
+        "zero",
+        "warning",
+        "a different zero configuration",
+        _zero,
+        "Coordinates of one file are not those of the other: motor offsets, limits and keyframes shift.",
+    ),
+    _rule(
+        "sense",
+        "warning",
+        "a joint that counts in the opposite sense",
+        _senses,
+        "A command for one moves the other backwards.",
+    ),
     _rule("motor", "error", "a joint that is driven in one file", _motors),
-    _rule("limit", "warning", "different limits", _limits,
-          "Measured from the zero of each file."),
+    _rule("limit", "warning", "different limits", _limits, "Measured from the zero of each file."),
     _rule("mass", "warning", "different masses or inertias", _masses),
     _rule("gear", "error", "different gears", _gears),
 )

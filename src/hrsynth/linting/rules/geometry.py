@@ -44,13 +44,17 @@ def _as_meant(file: LintedFile, robot: Mechanism) -> Mend | None:
         if not given.name.endswith(TIP) and joint.links != (one, tips.get(two, two)):
             return None
         found.append((joint, given.links, element))
-    seen = [(each.direction, element) for each in robot.observations if isinstance(each, SeenAxis)
-            and (element := file.element(each.line, "observe")) is not None]
+    seen = [
+        (each.direction, element)
+        for each in robot.observations
+        if isinstance(each, SeenAxis) and (element := file.element(each.line, "observe")) is not None
+    ]
     return partial(_write, found, seen, robot) if len(found) == len(robot.joints) + len(tips) else None
 
 
-def _write(joints: list[tuple[Joint, tuple[str, str], xml.Element]], seen: list[tuple[Array, xml.Element]],
-           robot: Mechanism) -> None:
+def _write(
+    joints: list[tuple[Joint, tuple[str, str], xml.Element]], seen: list[tuple[Array, xml.Element]], robot: Mechanism
+) -> None:
     for direction, element in seen:
         element.set("axis", numerals.exact_vector(direction))
     X = {name: link.pose for name, link in robot.links.items()}
@@ -81,9 +85,14 @@ def _place(element: xml.Element, X: Array) -> None:
 
 
 RULES = (
-    LintRule("geometry-rounded", "warning", "relations that hold up to printed digits",
-             "Axes parallel to six digits, rods of almost equal length: over-constrained loops lock or lose rank in "
-             "programs that take the digits literally. This program corrects such relations, and says so.",
-             "write the numbers with all their digits (in other dialects: hrsynth convert IN OUT)", _rounded,
-             mends=True),
+    LintRule(
+        "geometry-rounded",
+        "warning",
+        "relations that hold up to printed digits",
+        "Axes parallel to six digits, rods of almost equal length: over-constrained loops lock or lose rank in "
+        "programs that take the digits literally. This program corrects such relations, and says so.",
+        "write the numbers with all their digits (in other dialects: hrsynth convert IN OUT)",
+        _rounded,
+        mends=True,
+    ),
 )

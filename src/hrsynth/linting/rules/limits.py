@@ -19,8 +19,11 @@ def _order(file: LintedFile) -> Iterator[Spot]:
     for each in limits(file):
         if each.bounds is not None and each.bounds[0] > each.bounds[1]:
             lower, upper = each.bounds
-            yield Spot(xml.line(each.element), f"joint {each.joint!r}: lower limit {lower:g} above the upper one "
-                                               f"{upper:g}", partial(_exchange, each))
+            yield Spot(
+                xml.line(each.element),
+                f"joint {each.joint!r}: lower limit {lower:g} above the upper one {upper:g}",
+                partial(_exchange, each),
+            )
 
 
 def _exchange(limit: LimitElement) -> None:
@@ -40,10 +43,15 @@ def _empty(file: LintedFile) -> Iterator[Spot]:
 def _zero(file: LintedFile) -> Iterator[Spot]:
     for each in limits(file):
         home = (number(each.owner.get("ref")) or 0.0) if file.dialect == "mjcf" else 0.0
-        if each.bounds is not None and each.bounds[0] < each.bounds[1] and not (
-                each.bounds[0] <= home <= each.bounds[1]):
-            yield Spot(xml.line(each.element), f"joint {each.joint!r}: its limits {each.bounds[0]:g} to "
-                                               f"{each.bounds[1]:g} exclude its zero")
+        if (
+            each.bounds is not None
+            and each.bounds[0] < each.bounds[1]
+            and not (each.bounds[0] <= home <= each.bounds[1])
+        ):
+            yield Spot(
+                xml.line(each.element),
+                f"joint {each.joint!r}: its limits {each.bounds[0]:g} to {each.bounds[1]:g} exclude its zero",
+            )
 
 
 def _demanded(file: LintedFile) -> Iterator[Spot]:
@@ -52,8 +60,11 @@ def _demanded(file: LintedFile) -> Iterator[Spot]:
     for joint in joints(file):
         kind = joint.get("type")
         if joint.tag == "joint" and kind in ("revolute", "prismatic") and joint.find("limit") is None:
-            yield Spot(xml.line(joint), f"joint {joint.get('name')!r} of type {kind} has no <limit>",
-                       partial(_without_range, joint, kind))
+            yield Spot(
+                xml.line(joint),
+                f"joint {joint.get('name')!r} of type {kind} has no <limit>",
+                partial(_without_range, joint, kind),
+            )
 
 
 def _without_range(joint: xml.Element, kind: str) -> None:
@@ -73,21 +84,48 @@ def _unlimited(file: LintedFile) -> Iterator[Spot]:
 
 
 RULES = (
-    LintRule("limits-order", "error", "lower limit above upper limit",
-             "No value of the coordinate satisfies both. Some readers refuse the file, others ignore the limits.",
-             "exchange the two numbers", _order, mends=True),
-    LintRule("limits-empty", "warning", "both limits are the same number",
-             "Exporters write 0 and 0 where they know no range. Simulators then lock the joint; this program reads it "
-             "as free.",
-             "write the true range; a revolute joint without one is of type continuous", _empty),
-    LintRule("limits-zero", "warning", "limits exclude the zero of the joint",
-             "Loops are closed, mechanisms compared and most controllers started at the zero configuration. If limits "
-             "exclude it, simulators start with a jump.",
-             "measure the coordinate from another pose, or widen the limits", _zero),
-    LintRule("limits-demanded", "warning", "URDF requires limits for this joint",
-             "urdfdom, and with it most of ROS, refuses a revolute or prismatic joint without <limit>.",
-             "make a revolute joint continuous; give a prismatic one its range", _demanded, mends=True),
-    LintRule("motor-unlimited", "note", "a driven joint without a range",
-             "Paths, grids and the choice of legs respect limits only if the file gives them.",
-             "write the motor's range", _unlimited),
+    LintRule(
+        "limits-order",
+        "error",
+        "lower limit above upper limit",
+        "No value of the coordinate satisfies both. Some readers refuse the file, others ignore the limits.",
+        "exchange the two numbers",
+        _order,
+        mends=True,
+    ),
+    LintRule(
+        "limits-empty",
+        "warning",
+        "both limits are the same number",
+        "Exporters write 0 and 0 where they know no range. Simulators then lock the joint; this program reads it "
+        "as free.",
+        "write the true range; a revolute joint without one is of type continuous",
+        _empty,
+    ),
+    LintRule(
+        "limits-zero",
+        "warning",
+        "limits exclude the zero of the joint",
+        "Loops are closed, mechanisms compared and most controllers started at the zero configuration. If limits "
+        "exclude it, simulators start with a jump.",
+        "measure the coordinate from another pose, or widen the limits",
+        _zero,
+    ),
+    LintRule(
+        "limits-demanded",
+        "warning",
+        "URDF requires limits for this joint",
+        "urdfdom, and with it most of ROS, refuses a revolute or prismatic joint without <limit>.",
+        "make a revolute joint continuous; give a prismatic one its range",
+        _demanded,
+        mends=True,
+    ),
+    LintRule(
+        "motor-unlimited",
+        "note",
+        "a driven joint without a range",
+        "Paths, grids and the choice of legs respect limits only if the file gives them.",
+        "write the motor's range",
+        _unlimited,
+    ),
 )

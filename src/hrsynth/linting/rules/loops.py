@@ -66,13 +66,20 @@ def _open(file: LintedFile) -> Iterator[Spot]:
     size = ", ".join(f"{name!r} by {miss:.3g}" for name, miss in list(misses.items())[:6] if miss > NOISE)
     text = f"at zero the loops are open: {size} (characteristic lengths, radians)"
     if closed.residual > NOISE:
-        yield Spot(graph.joints[worst].line, text + f"; no way to close them was found (residual "
-                                                    f"{closed.residual:.3g})", None,
-                   "correct the dimensions, or the frames in which the closures are given")
+        yield Spot(
+            graph.joints[worst].line,
+            text + f"; no way to close them was found (residual {closed.residual:.3g})",
+            None,
+            "correct the dimensions, or the frames in which the closures are given",
+        )
         return
     text += f"; they close with {moves(assembly, closed.values)}"
-    yield Spot(graph.joints[worst].line, text, _mend_zero(file, graph, assembly, closed),
-               severity="warning" if file.refusal is None else None)
+    yield Spot(
+        graph.joints[worst].line,
+        text,
+        _mend_zero(file, graph, assembly, closed),
+        severity="warning" if file.refusal is None else None,
+    )
 
 
 def _by_digits(file: LintedFile, graph: JointGraph, assembly: LoopAssembly) -> bool:
@@ -105,8 +112,9 @@ def _mend_zero(file: LintedFile, graph: JointGraph, assembly: LoopAssembly, clos
     return partial(_rezero, moved, closed.values, graph, assembly)
 
 
-def _rezero(moved: list[tuple[JointSpec, xml.Element]], values: Values, graph: JointGraph,
-            assembly: LoopAssembly) -> None:
+def _rezero(
+    moved: list[tuple[JointSpec, xml.Element]], values: Values, graph: JointGraph, assembly: LoopAssembly
+) -> None:
     turned: dict[str | None, float] = {}
     for scaled, element in moved:
         joint = graph.joints[scaled.name]
@@ -166,8 +174,9 @@ def _mirrored(file: LintedFile) -> Iterator[Spot]:
     for loop in assembly.loops:
         joint = graph.joints[loop.name]
         if _opposite(joint, poses):
-            yield Spot(joint.line, f"the two axes of {joint.name!r} point opposite ways at zero",
-                       _turn_axis(file, joint))
+            yield Spot(
+                joint.line, f"the two axes of {joint.name!r} point opposite ways at zero", _turn_axis(file, joint)
+            )
 
 
 def _turn_axis(file: LintedFile, joint: JointSpec) -> Mend | None:
@@ -222,8 +231,10 @@ def _redundant(file: LintedFile) -> Iterator[Spot]:
     dead = set(found.dead())
     for name, count in found.redundant(rows).items():
         if name not in dead:
-            yield Spot(_line(file, name), f"{count} of the {rows(name)} constraints of {name!r} repeat those of the "
-                                          "loops before it")
+            yield Spot(
+                _line(file, name),
+                f"{count} of the {rows(name)} constraints of {name!r} repeat those of the loops before it",
+            )
 
 
 def is_unclosed(robot: Mechanism) -> bool:
@@ -269,35 +280,69 @@ def _coincide(file: LintedFile) -> Iterator[Spot]:
     for each in closure_candidates(graph, graph.base or guess.base(file.graph())):
         one, two = each.links
         if each.coincides and not held & {one, two} and not _consecutive(graph, one, two):
-            yield Spot(graph.links[two].line, f"the frames of {one!r} and {two!r} lie {1000 * each.distance:.3g} mm "
-                                              "apart at zero, and nothing keeps them together when the joints move",
-                       advice=f"if they should meet: --close {each.wish}")
+            yield Spot(
+                graph.links[two].line,
+                f"the frames of {one!r} and {two!r} lie {1000 * each.distance:.3g} mm "
+                "apart at zero, and nothing keeps them together when the joints move",
+                advice=f"if they should meet: --close {each.wish}",
+            )
 
 
 RULES = (
-    LintRule("loop-open", "error", "loops that are open at the zero configuration",
-             "A simulator pulls them shut with a jump, and where two closings are possible the wrong one may be taken. "
-             "This program finds the nearest closed pose, reports the joints that it moves, and counts from there.",
-             "correct the mistyped dimension or, if all are right, measure the joints that moved from where the loops "
-             "close", _open,
-             mends=True),
-    LintRule("loop-mirrored", "error", "a closure whose two axes point opposite ways",
-             "The hinge fits, but making the axes agree turns a link by half a turn: the robot is read as "
-             "its mirror image, or not at all.",
-             "reverse one of the two axes", _mirrored, mends=True),
-    LintRule("constraint-dead", "warning", "a closure or gear that constrains nothing",
-             "What is closed twice is overdetermined: solvers of constraint forces have no single answer, and rounded "
-             "numbers may lock the loop.",
-             "remove it", _dead, mends=True),
-    LintRule("constraint-redundant", "note", "constraints that repeat others",
-             "Normal in planar and over-constrained loops, and harmless in ideal geometry. Solvers of constraint "
-             "forces have no single answer, and rounded numbers may lock the loop.",
-             "nothing, or a joint with more freedoms (a ball instead of a hinge)", _redundant),
-    LintRule("loop-none", "warning", "no loop",
-             "The closures were perhaps lost in a conversion, or are in a file or launch script next to this one.",
-             "close it: --close A:B[:TYPE], where A and B are frames that meet", _none),
-    LintRule("frames-coincide", "warning", "frames that coincide and are not closed",
-             "Several tools mark a loop by two frames at the same place on links that move apart; a loop that is not "
-             "closed is an open chain.",
-             "if they should meet: --close A:B", _coincide),
+    LintRule(
+        "loop-open",
+        "error",
+        "loops that are open at the zero configuration",
+        "A simulator pulls them shut with a jump, and where two closings are possible the wrong one may be taken. "
+        "This program finds the nearest closed pose, reports the joints that it moves, and counts from there.",
+        "correct the mistyped dimension or, if all are right, measure the joints that moved from where the loops close",
+        _open,
+        mends=True,
+    ),
+    LintRule(
+        "loop-mirrored",
+        "error",
+        "a closure whose two axes point opposite ways",
+        "The hinge fits, but making the axes agree turns a link by half a turn: the robot is read as "
+        "its mirror image, or not at all.",
+        "reverse one of the two axes",
+        _mirrored,
+        mends=True,
+    ),
+    LintRule(
+        "constraint-dead",
+        "warning",
+        "a closure or gear that constrains nothing",
+        "What is closed twice is overdetermined: solvers of constraint forces have no single answer, and rounded "
+        "numbers may lock the loop.",
+        "remove it",
+        _dead,
+        mends=True,
+    ),
+    LintRule(
+        "constraint-redundant",
+        "note",
+        "constraints that repeat others",
+        "Normal in planar and over-constrained loops, and harmless in ideal geometry. Solvers of constraint "
+        "forces have no single answer, and rounded numbers may lock the loop.",
+        "nothing, or a joint with more freedoms (a ball instead of a hinge)",
+        _redundant,
+    ),
+    LintRule(
+        "loop-none",
+        "warning",
+        "no loop",
+        "The closures were perhaps lost in a conversion, or are in a file or launch script next to this one.",
+        "close it: --close A:B[:TYPE], where A and B are frames that meet",
+        _none,
+    ),
+    LintRule(
+        "frames-coincide",
+        "warning",
+        "frames that coincide and are not closed",
+        "Several tools mark a loop by two frames at the same place on links that move apart; a loop that is not "
+        "closed is an open chain.",
+        "if they should meet: --close A:B",
+        _coincide,
+    ),
 )

@@ -23,15 +23,20 @@ def moving(file: LintedFile) -> set[str]:
     graph = file.said
     if graph is None:
         return set()
-    return {link for joint in graph.joints.values() if joint.kind is not JointType.FIXED and joint.in_tree
-            for link in joint.links[1:]}
+    return {
+        link
+        for joint in graph.joints.values()
+        if joint.kind is not JointType.FIXED and joint.in_tree
+        for link in joint.links[1:]
+    }
 
 
 def _negative(file: LintedFile) -> Iterator[Spot]:
     for each in inertials(file):
         if each.mass is not None and (value := each.mass.value) is not None and value < 0:
-            yield Spot(xml.line(each.element), f"link {each.link!r} has the mass {value:g}",
-                       partial(_without_sign, each))
+            yield Spot(
+                xml.line(each.element), f"link {each.link!r} has the mass {value:g}", partial(_without_sign, each)
+            )
 
 
 def _without_sign(inertial: InertialElement) -> None:
@@ -60,9 +65,12 @@ def _impossible(file: LintedFile) -> Iterator[Spot]:
         values, _ = second_moments(each.inertia)
         if values[0] < -NO_BODY * float(np.max(np.abs(each.inertia))):
             moments = ", ".join(f"{value:.4g}" for value in np.linalg.eigvalsh(each.inertia))
-            yield Spot(xml.line(each.element), f"link {each.link!r}: principal moments {moments}, of which one is "
-                                               "negative or larger than the two others together",
-                       partial(_nearest, each))
+            yield Spot(
+                xml.line(each.element),
+                f"link {each.link!r}: principal moments {moments}, of which one is "
+                "negative or larger than the two others together",
+                partial(_nearest, each),
+            )
 
 
 def _nearest(inertial: InertialElement) -> None:
@@ -86,24 +94,48 @@ def _missing(file: LintedFile) -> Iterator[Spot]:
     for name in [name for name in graph.links if name in moved and not OWN.search(name)]:
         line = graph.links[name].line
         if not known & graphs.component(bonds, name) and file.element(line, "link", "body", name=name) is not None:
-            yield Spot(line, f"link {name!r} moves and has no <inertial>, as others in the file have, nor has one that "
-                             "is fixed to it")
+            yield Spot(
+                line,
+                f"link {name!r} moves and has no <inertial>, as others in the file have, nor has one that "
+                "is fixed to it",
+            )
 
 
 RULES = (
-    LintRule("mass-negative", "error", "negative mass",
-             "No body has one: simulators refuse the file, or the robot gains energy.",
-             "drop the sign", _negative, mends=True),
-    LintRule("mass-zero", "warning", "a moving link with an inertia but no mass",
-             "Gazebo drops such links, with their joints; MuJoCo refuses them.",
-             "write the link's mass, or omit <inertial> for a link without a body", _zero),
-    LintRule("inertia-triangle", "error", "an inertia that no body has",
-             "Principal moments are not negative, and the largest is at most the sum of the two others (triangle "
-             "inequality). MuJoCo and Gazebo refuse others; elsewhere simulations blow up.",
-             "take the nearest inertia that a body can have: negative second moments set to zero", _impossible,
-             mends=True),
-    LintRule("inertia-missing", "warning", "a moving link without <inertial> in a file that has some",
-             "When Gazebo reads a URDF it drops links without <inertial>, with all that is attached to them; MuJoCo "
-             "refuses moving bodies without mass.",
-             "write the link's mass and inertia", _missing),
+    LintRule(
+        "mass-negative",
+        "error",
+        "negative mass",
+        "No body has one: simulators refuse the file, or the robot gains energy.",
+        "drop the sign",
+        _negative,
+        mends=True,
+    ),
+    LintRule(
+        "mass-zero",
+        "warning",
+        "a moving link with an inertia but no mass",
+        "Gazebo drops such links, with their joints; MuJoCo refuses them.",
+        "write the link's mass, or omit <inertial> for a link without a body",
+        _zero,
+    ),
+    LintRule(
+        "inertia-triangle",
+        "error",
+        "an inertia that no body has",
+        "Principal moments are not negative, and the largest is at most the sum of the two others (triangle "
+        "inequality). MuJoCo and Gazebo refuse others; elsewhere simulations blow up.",
+        "take the nearest inertia that a body can have: negative second moments set to zero",
+        _impossible,
+        mends=True,
+    ),
+    LintRule(
+        "inertia-missing",
+        "warning",
+        "a moving link without <inertial> in a file that has some",
+        "When Gazebo reads a URDF it drops links without <inertial>, with all that is attached to them; MuJoCo "
+        "refuses moving bodies without mass.",
+        "write the link's mass and inertia",
+        _missing,
+    ),
 )

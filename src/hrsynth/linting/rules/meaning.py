@@ -17,8 +17,12 @@ def _unknown(file: LintedFile) -> Iterator[Spot]:
         return
     for each in formats.vocabulary(file.dialect).unknown(file.root):
         near, severity = each.remedy, "error" if each.meant else "warning" if each.remedy else None
-        yield Spot(each.line, f"unknown {each.place}, found {each.found}{near and f', nearly {near}'}",
-                   advice=near and f"write {near}", severity=severity)
+        yield Spot(
+            each.line,
+            f"unknown {each.place}, found {each.found}{near and f', nearly {near}'}",
+            advice=near and f"write {near}",
+            severity=severity,
+        )
 
 
 def _legs(file: LintedFile) -> Iterator[Spot]:
@@ -35,12 +39,22 @@ def _legs(file: LintedFile) -> Iterator[Spot]:
 
 
 RULES = (
-    LintRule("element-unknown", "note", "an element or attribute that the format does not have",
-             "Most readers ignore it silently, and use the default instead of what it was meant to say: an axis along "
-             "x, no motor, no limit. This program refuses one that is a misspelling (an error).",
-             "nothing, if another program reads it", _unknown),
-    LintRule("observe-legs", "error", "observed directions that contradict the robot's legs",
-             "A link that is in no leg, one label for two legs, two labels for one: the file is read, but commands "
-             "that watch legs refuse it.",
-             "correct the link or label named in the message", _legs),
+    LintRule(
+        "element-unknown",
+        "note",
+        "an element or attribute that the format does not have",
+        "Most readers ignore it silently, and use the default instead of what it was meant to say: an axis along "
+        "x, no motor, no limit. This program refuses one that is a misspelling (an error).",
+        "nothing, if another program reads it",
+        _unknown,
+    ),
+    LintRule(
+        "observe-legs",
+        "error",
+        "observed directions that contradict the robot's legs",
+        "A link that is in no leg, one label for two legs, two labels for one: the file is read, but commands "
+        "that watch legs refuse it.",
+        "correct the link or label named in the message",
+        _legs,
+    ),
 )

@@ -50,17 +50,37 @@ def _floating(file: LintedFile) -> Iterator[Spot]:
 
 
 RULES = (
-    LintRule("motor-none", "note", "no motor",
-             "The Type 2 singularities of the real robot depend on which joints are driven; URDF+ and plain URDF "
-             "often do not say so.",
-             "name them: one <transmission> each, or --motors JOINTS", _none),
-    LintRule("motors-few", "warning", "motors that do not determine the platform",
-             "With all motors held the platform can still move, near the zero configuration.",
-             "name the motor that is missing, or hold or drive the joint that is left free", _few),
-    LintRule("motors-many", "warning", "more driven coordinates than the mechanism has",
-             "Tools put an actuator on every joint, passive ones too. The motors then work against each other.",
-             "remove the motors of passive joints, or name the driven ones: --motors JOINTS", _many),
-    LintRule("motor-floating", "error", "a motor on a floating joint whose link other joints hold",
-             "The joint holds nothing and has no coordinates of its own: commands that move the robot refuse the file.",
-             "drive the joints that hold the link, and remove this motor", _floating),
+    LintRule(
+        "motor-none",
+        "note",
+        "no motor",
+        "The Type 2 singularities of the real robot depend on which joints are driven; URDF+ and plain URDF "
+        "often do not say so.",
+        "name them: one <transmission> each, or --motors JOINTS",
+        _none,
+    ),
+    LintRule(
+        "motors-few",
+        "warning",
+        "motors that do not determine the platform",
+        "With all motors held the platform can still move, near the zero configuration.",
+        "name the motor that is missing, or hold or drive the joint that is left free",
+        _few,
+    ),
+    LintRule(
+        "motors-many",
+        "warning",
+        "more driven coordinates than the mechanism has",
+        "Tools put an actuator on every joint, passive ones too. The motors then work against each other.",
+        "remove the motors of passive joints, or name the driven ones: --motors JOINTS",
+        _many,
+    ),
+    LintRule(
+        "motor-floating",
+        "error",
+        "a motor on a floating joint whose link other joints hold",
+        "The joint holds nothing and has no coordinates of its own: commands that move the robot refuse the file.",
+        "drive the joints that hold the link, and remove this motor",
+        _floating,
+    ),
 )

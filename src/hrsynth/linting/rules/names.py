@@ -51,8 +51,11 @@ def _reserved(file: LintedFile) -> Iterator[Spot]:
 def _motors(file: LintedFile) -> Iterator[Spot]:
     if file.root is None:
         return
-    names = file.root.iterfind("transmission") if file.dialect == "urdf" else (
-        each for section in file.root.findall("actuator") for each in section)
+    names = (
+        file.root.iterfind("transmission")
+        if file.dialect == "urdf"
+        else (each for section in file.root.findall("actuator") for each in section)
+    )
     seen: set[str] = set()
     for each in names:
         name = each.get("name") if isinstance(each.tag, str) else None
@@ -65,14 +68,18 @@ def _unused(file: LintedFile) -> Iterator[Spot]:
     graph = file.said
     if graph is None or len(graph.links) < 2:
         return
-    parts = sorted(graphs.components(graphs.adjacency(graph.links, (each.links for each in graph.joints.values()))),
-                   key=len, reverse=True)
+    parts = sorted(
+        graphs.components(graphs.adjacency(graph.links, (each.links for each in graph.joints.values()))),
+        key=len,
+        reverse=True,
+    )
     for part in parts[1:]:
         for name in (each for each in graph.links if each in part):
             alone = len(part) == 1 and name not in (graph.base, graph.platform)
             element = file.element(graph.links[name].line, "link", name=name) if alone else None
-            yield Spot(graph.links[name].line, f"link {name!r}: no joint connects it to the others",
-                       removal(file, element))
+            yield Spot(
+                graph.links[name].line, f"link {name!r}: no joint connects it to the others", removal(file, element)
+            )
 
 
 def removal(file: LintedFile, element: xml.Element | None) -> Mend | None:
@@ -105,20 +112,47 @@ def _remove(element: xml.Element) -> None:
 
 
 RULES = (
-    LintRule("name-clash", "note", "a joint with the name of a link",
-             "URDF allows it. SDFormat has a single namespace and refuses it, and frames with that name are "
-             "ambiguous in ROS and Gepetto.",
-             "rename one of them, wherever it is referred to", _clash),
-    LintRule("name-case", "note", "two names that differ in capitals only",
-             "People confuse them, and so do file systems where names become file names.",
-             "rename one of them", _case),
-    LintRule("name-reserved", "warning", "a name that SDFormat reserves",
-             "Names with ::, names between double underscores and `world` have special meanings in SDFormat; in "
-             "Gazebo, Drake and MuJoCo `world` is the ground.",
-             "rename the link", _reserved),
-    LintRule("motor-name", "warning", "two motors with the same name",
-             "Controllers find motors by their names.", "rename one of them", _motors),
-    LintRule("link-unused", "warning", "a link that no joint connects",
-             "Most readers refuse a second root; this one drops what is not connected to the base.",
-             "remove it, or add its joint", _unused, mends=True),
+    LintRule(
+        "name-clash",
+        "note",
+        "a joint with the name of a link",
+        "URDF allows it. SDFormat has a single namespace and refuses it, and frames with that name are "
+        "ambiguous in ROS and Gepetto.",
+        "rename one of them, wherever it is referred to",
+        _clash,
+    ),
+    LintRule(
+        "name-case",
+        "note",
+        "two names that differ in capitals only",
+        "People confuse them, and so do file systems where names become file names.",
+        "rename one of them",
+        _case,
+    ),
+    LintRule(
+        "name-reserved",
+        "warning",
+        "a name that SDFormat reserves",
+        "Names with ::, names between double underscores and `world` have special meanings in SDFormat; in "
+        "Gazebo, Drake and MuJoCo `world` is the ground.",
+        "rename the link",
+        _reserved,
+    ),
+    LintRule(
+        "motor-name",
+        "warning",
+        "two motors with the same name",
+        "Controllers find motors by their names.",
+        "rename one of them",
+        _motors,
+    ),
+    LintRule(
+        "link-unused",
+        "warning",
+        "a link that no joint connects",
+        "Most readers refuse a second root; this one drops what is not connected to the base.",
+        "remove it, or add its joint",
+        _unused,
+        mends=True,
+    ),
 )

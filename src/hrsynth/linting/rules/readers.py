@@ -47,8 +47,9 @@ def _construct(file: LintedFile, name: str, line: int | None) -> str | None:
     graph = file.said
     if graph is not None and graph.dialect == "Gepetto" and line is None:
         return "closed_loop of the YAML file"
-    element = file.element(line, *TAGS, *(f"{{*}}{tag}" for tag in ("ball_constraint", "linear_bushing_rpy")),
-                           name=name)
+    element = file.element(
+        line, *TAGS, *(f"{{*}}{tag}" for tag in ("ball_constraint", "linear_bushing_rpy")), name=name
+    )
     if file.dialect == "sdf" and (element is None or element.tag == "joint"):
         return "second joint of one child in SDFormat" if line is not None else None
     if element is None:
@@ -100,9 +101,14 @@ def _list_deeds(known: dict[str, str]) -> str:
 
 
 RULES = (
-    LintRule("reader-drops", "note", "a closure that other programs do not read",
-             "The file loads there as an open tree: it falls apart in simulation, and its Jacobians are those of "
-             "another robot. With --reader NAME only that program is considered.",
-             "write the file in a dialect that the program reads: hrsynth convert IN OUT.xml for MuJoCo, OUT.sdf for "
-             "Gazebo Classic, OUT.yaml for Gepetto's tools", _dropped),
+    LintRule(
+        "reader-drops",
+        "note",
+        "a closure that other programs do not read",
+        "The file loads there as an open tree: it falls apart in simulation, and its Jacobians are those of "
+        "another robot. With --reader NAME only that program is considered.",
+        "write the file in a dialect that the program reads: hrsynth convert IN OUT.xml for MuJoCo, OUT.sdf for "
+        "Gazebo Classic, OUT.yaml for Gepetto's tools",
+        _dropped,
+    ),
 )

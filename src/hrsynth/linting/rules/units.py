@@ -24,8 +24,12 @@ def in_degrees(value: float | None) -> bool:
 def _in_radians(value: float | None) -> bool:
     """Whether an angle looks like a simple part of a turn in radians, as it is printed."""
     steps = round((value or 0.0) / numerals.SIMPLE_ANGLE)
-    return value is not None and steps != 0 and not in_degrees(value) and \
-        abs(value - steps * numerals.SIMPLE_ANGLE) < NEARLY_ONE
+    return (
+        value is not None
+        and steps != 0
+        and not in_degrees(value)
+        and abs(value - steps * numerals.SIMPLE_ANGLE) < NEARLY_ONE
+    )
 
 
 def _convert(numbers: list[NumberAt]) -> Mend | None:
@@ -43,8 +47,9 @@ def _convert(numbers: list[NumberAt]) -> Mend | None:
 def _limits(file: LintedFile) -> Iterator[Spot]:
     if file.dialect == "mjcf":  # in which degrees are the default
         return
-    every = [(each, [end for end in (each.lower, each.upper) if end is not None])
-             for each in limits(file) if each.turns]
+    every = [
+        (each, [end for end in (each.lower, each.upper) if end is not None]) for each in limits(file) if each.turns
+    ]
     numbers = [end.value or 0.0 for _, ends in every for end in ends]
     whole = any(map(in_degrees, numbers)) and all(value % IN_DEGREES == 0 for value in numbers)
     for each, ends in every:
@@ -59,8 +64,11 @@ def _angles(file: LintedFile) -> Iterator[Spot]:
     for what, element, ends in _turns(file):
         sure = any(in_degrees(end.value) for end in ends)
         if sure or any(TURN_IN_RADIANS < abs(end.value or 0.0) <= 360 for end in ends):
-            yield Spot(xml.line(element), f"rpy {' '.join(str(end.text) for end in ends)}, of {what}",
-                       _convert(ends) if sure else None)
+            yield Spot(
+                xml.line(element),
+                f"rpy {' '.join(str(end.text) for end in ends)}, of {what}",
+                _convert(ends) if sure else None,
+            )
 
 
 def _turns(file: LintedFile) -> Iterator[tuple[str, xml.Element, list[NumberAt]]]:
@@ -69,12 +77,16 @@ def _turns(file: LintedFile) -> Iterator[tuple[str, xml.Element, list[NumberAt]]
         if file.dialect == "urdf" and isinstance(element.tag, str):
             count = len((element.get("rpy") or "").split())
             yield f"<{element.tag}>", element, [NumberAt(element, "rpy", place) for place in range(count)]
-        elif (file.dialect == "sdf" and element.tag == "pose" and len((element.text or "").split()) == 6
-              and element.get("degrees") not in ("true", "1") and element.get("rotation_format") != "quat_xyzw"):
+        elif (
+            file.dialect == "sdf"
+            and element.tag == "pose"
+            and len((element.text or "").split()) == 6
+            and element.get("degrees") not in ("true", "1")
+            and element.get("rotation_format") != "quat_xyzw"
+        ):
             of = element.getparent()
             name = "" if of is None else f" of <{of.tag}> {of.get('name') or ''}".rstrip()
-            yield (f"the pose{name}", element,
-                   [NumberAt(element, None, place) for place in (3, 4, 5)])
+            yield (f"the pose{name}", element, [NumberAt(element, None, place) for place in (3, 4, 5)])
 
 
 def _length(file: LintedFile) -> Iterator[Spot]:
@@ -93,8 +105,11 @@ def _axis(file: LintedFile) -> Iterator[Spot]:
             vector = _vector(axis.get("xyz"))
             size = 1.0 if vector is None else float(np.linalg.norm(vector))
             if vector is not None and size > 0 and abs(size - 1) > UNIT_AXIS:
-                yield Spot(xml.line(axis), f"joint {joint.get('name')!r}: an axis of length {size:.6g}",
-                           partial(axis.set, "xyz", numerals.axis(vector)))
+                yield Spot(
+                    xml.line(axis),
+                    f"joint {joint.get('name')!r}: an axis of length {size:.6g}",
+                    partial(axis.set, "xyz", numerals.axis(vector)),
+                )
 
 
 def _vector(text: str | None) -> Array | None:
@@ -112,24 +127,55 @@ def _inertia(file: LintedFile) -> Iterator[Spot]:
             continue
         gyration = float(np.sqrt(max(float(np.max(np.linalg.eigvalsh(each.inertia))), 0.0) / mass))
         if gyration > WIDEST_BODY * robot.length:
-            yield Spot(xml.line(each.element), f"link {each.link!r}: mass {mass:g} kg and the inertia of a body "
-                                               f"{gyration:.3g} m wide, in a robot of {robot.length:.3g} m")
+            yield Spot(
+                xml.line(each.element),
+                f"link {each.link!r}: mass {mass:g} kg and the inertia of a body "
+                f"{gyration:.3g} m wide, in a robot of {robot.length:.3g} m",
+            )
 
 
 RULES = (
-    LintRule("unit-limits", "warning", "limits that look like degrees",
-             "URDF and SDFormat use radians: 90 is fourteen turns, so the limit has no effect.",
-             "convert them to radians", _limits, mends=True),
-    LintRule("unit-angles", "warning", "roll, pitch, yaw that look like degrees",
-             "URDF and SDFormat use radians: 90 is fourteen turns and a bit, so the frame is turned by 116 degrees.",
-             "convert them to radians", _angles, mends=True),
-    LintRule("unit-length", "warning", "a robot as large as a house, or as small as a grain",
-             "Modelling tools export millimetres, readers expect metres.",
-             "scale it, or give --unit mm to every command", _length),
-    LintRule("unit-inertia", "warning", "an inertia in another unit than the mass",
-             "Tools export kg mm² or g mm². An inertia is at most its mass times the square of the body's extent.",
-             "convert the inertia to kg m²", _inertia),
-    LintRule("axis-length", "note", "an axis whose length is not one",
-             "This program and most others use only its direction; some scale the joint's speed by its length.",
-             "divide it by its length", _axis, mends=True),
+    LintRule(
+        "unit-limits",
+        "warning",
+        "limits that look like degrees",
+        "URDF and SDFormat use radians: 90 is fourteen turns, so the limit has no effect.",
+        "convert them to radians",
+        _limits,
+        mends=True,
+    ),
+    LintRule(
+        "unit-angles",
+        "warning",
+        "roll, pitch, yaw that look like degrees",
+        "URDF and SDFormat use radians: 90 is fourteen turns and a bit, so the frame is turned by 116 degrees.",
+        "convert them to radians",
+        _angles,
+        mends=True,
+    ),
+    LintRule(
+        "unit-length",
+        "warning",
+        "a robot as large as a house, or as small as a grain",
+        "Modelling tools export millimetres, readers expect metres.",
+        "scale it, or give --unit mm to every command",
+        _length,
+    ),
+    LintRule(
+        "unit-inertia",
+        "warning",
+        "an inertia in another unit than the mass",
+        "Tools export kg mm² or g mm². An inertia is at most its mass times the square of the body's extent.",
+        "convert the inertia to kg m²",
+        _inertia,
+    ),
+    LintRule(
+        "axis-length",
+        "note",
+        "an axis whose length is not one",
+        "This program and most others use only its direction; some scale the joint's speed by its length.",
+        "divide it by its length",
+        _axis,
+        mends=True,
+    ),
 )

@@ -1,6 +1,6 @@
 """A circle in space, as from stereo: its centre and its normal.
 
-    reference –U̲(C)–P̲–U̲(B)–R(d)– ℓ
+reference –U̲(C)–P̲–U̲(B)–R(d)– ℓ
 """
 
 from __future__ import annotations
@@ -32,8 +32,12 @@ from ..sights import (
 def circle_chain(at: Sighting, leg: str) -> tuple[VirtualJoint, ...]:
     """U̲P̲-U̲-R: five motors, R about the normal."""
     apart(at, at.B, 0.0, f"circle {leg!r}", "a centre outside of it")
-    return (gimbal(at.C, at.ray, at.far, actuated=True), VirtualJoint("P", at.C, (at.ray,), True),
-            gimbal(at.B, at.d, None, actuated=True), VirtualJoint("R", at.B, (at.d,)))
+    return (
+        gimbal(at.C, at.ray, at.far, actuated=True),
+        VirtualJoint("P", at.C, (at.ray,), True),
+        gimbal(at.B, at.d, None, actuated=True),
+        VirtualJoint("R", at.B, (at.d,)),
+    )
 
 
 def circle_wrenches(at: Sighting) -> list[Numbers]:
@@ -73,8 +77,9 @@ class SpaceCircle(CameraObservation):
 
     def sense(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
         """The centre beside its place, the normal in a cone."""
-        return np.concatenate([value[:3] + noise.get("m", 0.0) * shocks[0],
-                               tilt_vector(value[3:], shocks[1], noise.get("rad", 0.0))])
+        return np.concatenate(
+            [value[:3] + noise.get("m", 0.0) * shocks[0], tilt_vector(value[3:], shocks[1], noise.get("rad", 0.0))]
+        )
 
     @staticmethod
     def outline(p: Array, d: Array, r: float, size: float) -> Drawn:

@@ -1,6 +1,6 @@
 """The depth of a point: its coordinate along the camera's z axis.
 
-    reference –P̲(z)–PP–S(B)– ℓ
+reference –P̲(z)–PP–S(B)– ℓ
 """
 
 from __future__ import annotations

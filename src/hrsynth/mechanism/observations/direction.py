@@ -1,6 +1,6 @@
 """The direction of an axis: u, a unit vector.
 
-    reference –P–P–P– T –U̲– W –R(d)– ℓ        (MMT 3.2, Fig. 2(b))
+reference –P–P–P– T –U̲– W –R(d)– ℓ        (MMT 3.2, Fig. 2(b))
 """
 
 from __future__ import annotations
@@ -74,8 +74,9 @@ class SeenAxis(Observation):
         return tilt_vector(value, shocks[0], noise["rad"])
 
     @classmethod
-    def together(cls, observations: Sequence[Observation], X_reference: Array, X_links: Array, V_reference: Array,
-                 V_links: Array) -> tuple[Array, Array]:
+    def together(
+        cls, observations: Sequence[Observation], X_reference: Array, X_links: Array, V_reference: Array, V_links: Array
+    ) -> tuple[Array, Array]:
         seen = X_reference[..., :3, :3].swapaxes(-1, -2)
         u = np.matmul(X_links[..., :3, :3], _directions(tuple(observations)))[..., 0]
         across = np.zeros((*u.shape, 3))

@@ -1,6 +1,6 @@
 """The distance of a point.
 
-    reference –U(C)–P̲–S(B)– ℓ
+reference –U(C)–P̲–S(B)– ℓ
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """One edge of a cylinder in the image: the plane through C that touches it.
 
-    reference –U̲(C)–R(n)–P–C(d)– ℓ        as for a line in the image, the axis at the radius from the plane
+reference –U̲(C)–R(n)–P–C(d)– ℓ        as for a line in the image, the axis at the radius from the plane
 """
 
 from __future__ import annotations
@@ -24,8 +24,11 @@ def tangent(p: Array, d: Array, r: Array) -> Array:
     f = p - np.sum(p * d, axis=-1, keepdims=True) * d
     D = np.linalg.norm(f, axis=-1, keepdims=True)
     if not np.all(np.abs(r) < D):
-        raise NotMeasured("an edge of a cylinder: distance of its axis from the camera's centre (m)", float(D.min()),
-                          f"more than its radius {float(np.abs(r).max()):g}")
+        raise NotMeasured(
+            "an edge of a cylinder: distance of its axis from the camera's centre (m)",
+            float(D.min()),
+            f"more than its radius {float(np.abs(r).max()):g}",
+        )
     return np.asarray((r / D) * f / D + np.sqrt(1 - (r / D) ** 2) * cross(d, f / D))
 
 

@@ -1,6 +1,6 @@
 """Both edges of a cylinder of known radius: all of its axis.
 
-    reference –U̲(C)–R̲(n)–P̲–C(d)– ℓ        as for a line in space
+reference –U̲(C)–R̲(n)–P̲–C(d)– ℓ        as for a line in space
 """
 
 from __future__ import annotations
@@ -21,8 +21,7 @@ from .line import SpaceLine, line_chain, line_loci, line_wrenches
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CylinderEdges(CameraObservation):
-    """(n₁, n₂), the normals of both planes through C that touch the cylinder of axis (B, d): d ∥ n₁ × n₂ (MMT eq. 5).
-    """
+    """(n₁, n₂), the normals of both planes through C touching the cylinder of axis (B, d): d ∥ n₁ × n₂ (MMT eq. 5)."""
 
     kind = "edges"
     words = "both edges of a cylinder of known radius"
@@ -59,8 +58,9 @@ class CylinderEdges(CameraObservation):
     def sense(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
         """Each edge through two image points beside it."""
         by = self.pixels(noise)
-        return np.concatenate([shifted_line(n, shock, by) for n, shock in zip((value[:3], value[3:]), shocks,
-                                                                             strict=True)])
+        return np.concatenate(
+            [shifted_line(n, shock, by) for n, shock in zip((value[:3], value[3:]), shocks, strict=True)]
+        )
 
     @staticmethod
     def outline(p: Array, d: Array, r: float, size: float) -> Drawn:

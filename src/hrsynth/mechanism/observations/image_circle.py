@@ -1,6 +1,6 @@
 """A circle of known radius in the image: its conic.
 
-    reference –U̲(C)–P̲–U̲(B)–R(d)– ℓ        as for a circle, where C is not on its axis
+reference –U̲(C)–P̲–U̲(B)–R(d)– ℓ        as for a circle, where C is not on its axis
 """
 
 from __future__ import annotations
@@ -82,8 +82,14 @@ class ImageCircle(CameraObservation):
             columns = []
             for k, e in enumerate(np.eye(3)):
                 turned = other[..., k, None, None]
-                columns.append(_entries_of(2 * h * turned * np.eye(3) - turned * _both(p, d) - h * _both(e, other)
-                                       + (own[..., k, None, None] * rest if own is p else size * _both(e, d))))
+                columns.append(
+                    _entries_of(
+                        2 * h * turned * np.eye(3)
+                        - turned * _both(p, d)
+                        - h * _both(e, other)
+                        + (own[..., k, None, None] * rest if own is p else size * _both(e, d))
+                    )
+                )
             J = np.stack(columns, axis=-1)
             return np.asarray((J - q @ (np.swapaxes(q, -1, -2) @ J)) / norm)
 
@@ -92,8 +98,10 @@ class ImageCircle(CameraObservation):
     @staticmethod
     def error_jets(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
         h, rest = components.dot(p, d), components.dot(p, p) - r * r
-        Q = [[rest * d[i] * d[k] - h * (p[i] * d[k] + p[k] * d[i]) + (h * h if i == k else 0.0) for k in range(3)]
-             for i in range(3)]
+        Q = [
+            [rest * d[i] * d[k] - h * (p[i] * d[k] + p[k] * d[i]) + (h * h if i == k else 0.0) for k in range(3)]
+            for i in range(3)
+        ]
         return ellipse_fed(Q, _matrix(wanted))
 
     def error(self, value: Array, wanted: Array) -> Array:
@@ -118,7 +126,7 @@ class ImageCircle(CameraObservation):
     def outline(p: Array, d: Array, r: float, size: float) -> Drawn:
         """The circle, and eight rays to it."""
         around = ring(p, d, r)
-        return Drawn((around, *(np.array([0 * p, each]) for each in around[:-1:RING // 8])))
+        return Drawn((around, *(np.array([0 * p, each]) for each in around[: -1 : RING // 8])))
 
     @staticmethod
     def polylines(p: Array, d: Array, r: float, size: float) -> tuple[Array, ...]:

@@ -1,6 +1,6 @@
 """A line in the image: the plane of C and the line.
 
-    reference –U̲(C)–R(n)–P–C(d)– ℓ        U̲ turns the plane, R and P move in it, the line is the axis of C
+reference –U̲(C)–R(n)–P–C(d)– ℓ        U̲ turns the plane, R and P move in it, the line is the axis of C
 """
 
 from __future__ import annotations

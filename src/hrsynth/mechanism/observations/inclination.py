@@ -1,6 +1,6 @@
 """The inclination of a link, as an IMU at rest on it tells: the direction of the vertical, seen from the link.
 
-    link –P–P–P– T –U̲– W –R(d)– base        (as `direction`, the link is the reference; its yaw is never seen)
+link –P–P–P– T –U̲– W –R(d)– base        (as `direction`, the link is the reference; its yaw is never seen)
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """A line in space: its direction and its position.
 
-    reference –U̲(C)–R̲(n)–P̲–C(d)– ℓ        where it meets C: –P̲–P̲–U̲–C(d)–
+reference –U̲(C)–R̲(n)–P̲–C(d)– ℓ        where it meets C: –P̲–P̲–U̲–C(d)–
 """
 
 from __future__ import annotations
@@ -36,8 +36,11 @@ def line_chain(at: Sighting) -> tuple[VirtualJoint, ...]:
     away = at.foot - at.C
     if np.linalg.norm(away) > LINE_AT_CENTRE:
         return across(at, np.cross(unit(away), at.d), unit(away), 3)
-    return (*(VirtualJoint("P", at.B, (axis,), True) for axis in plane_axes(at.d)),
-            gimbal(at.B, at.d, None, actuated=True), VirtualJoint("C", at.B, (at.d,)))
+    return (
+        *(VirtualJoint("P", at.B, (axis,), True) for axis in plane_axes(at.d)),
+        gimbal(at.B, at.d, None, actuated=True),
+        VirtualJoint("C", at.B, (at.d,)),
+    )
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -1,6 +1,6 @@
 """A point in the image: the direction of the ray from C to B.
 
-    reference –U̲(C)–P–S(B)– ℓ
+reference –U̲(C)–P–S(B)– ℓ
 """
 
 from __future__ import annotations
@@ -82,8 +82,11 @@ class ImagePoint(CameraObservation):
 
     def chain(self, at: Sighting) -> tuple[VirtualJoint, ...]:
         apart(at, at.B, 0.0, f"point {self.leg!r}", "a point outside of it")
-        return (gimbal(at.C, at.ray, at.far, actuated=True), VirtualJoint("P", at.C, (at.ray,)),
-                VirtualJoint("S", at.B))
+        return (
+            gimbal(at.C, at.ray, at.far, actuated=True),
+            VirtualJoint("P", at.C, (at.ray,)),
+            VirtualJoint("S", at.B),
+        )
 
     def loci(self, at: Sighting) -> tuple[HeldPlace, ...]:
         return (kept_in(at.B, at.C, *normals(at.ray)),)

@@ -1,6 +1,6 @@
 """A point with its depth, as from stereo or of a sphere of known radius: all of B.
 
-    reference –U̲(C)–P̲–S(B)– ℓ
+reference –U̲(C)–P̲–S(B)– ℓ
 """
 
 from __future__ import annotations
@@ -52,8 +52,11 @@ class PointPosition(MetricPoint):
 
     def chain(self, at: Sighting) -> tuple[VirtualJoint, ...]:
         apart(at, at.B, 0.0, f"position {self.leg!r}", "a point outside of it")
-        return (gimbal(at.C, at.ray, at.far, actuated=True), VirtualJoint("P", at.C, (at.ray,), actuated=True),
-                VirtualJoint("S", at.B))
+        return (
+            gimbal(at.C, at.ray, at.far, actuated=True),
+            VirtualJoint("P", at.C, (at.ray,), actuated=True),
+            VirtualJoint("S", at.B),
+        )
 
     def loci(self, at: Sighting) -> tuple[HeldPlace, ...]:
         return (kept_in(at.B, at.B, *np.eye(3)),)

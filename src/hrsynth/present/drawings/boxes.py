@@ -48,19 +48,30 @@ class Ear:
 def boxes_of(mechanism: Mechanism, observed: Collection[str], virtual: Collection[str]) -> list[Box]:
     """Every joint in one box; a parallelogram whose cranks are neither observed nor joined to anything else is one."""
     kept = {mechanism.base, mechanism.platform, *observed}
-    pairs = [edge for edge in WordGraph(mechanism, kept).recognise().edges()
-             if edge.word == Word((Letter("Pi"),)) or edge.word == Word((Letter("Pi", True),))]
+    pairs = [
+        edge
+        for edge in WordGraph(mechanism, kept).recognise().edges()
+        if edge.word == Word((Letter("Pi"),)) or edge.word == Word((Letter("Pi", True),))
+    ]
     found: dict[str, Box] = {}
     for edge in pairs:
         joints = [mechanism.joints[name] for name in edge.joints]
-        found[edge.joints[0]] = Box("Π", edge.joints, edge.tail, edge.head, any(j.actuated for j in joints),
-                                    not set(edge.joints).isdisjoint(virtual), edge.inside)
+        found[edge.joints[0]] = Box(
+            "Π",
+            edge.joints,
+            edge.tail,
+            edge.head,
+            any(j.actuated for j in joints),
+            not set(edge.joints).isdisjoint(virtual),
+            edge.inside,
+        )
     inner = {name for edge in pairs for name in edge.joints}
     for joint in mechanism.joints.values():
         if joint.name not in inner:
             letter = "6" if joint.type is JointType.FREE else joint.type.value
-            found[joint.name] = Box(letter, (joint.name,), joint.predecessor, joint.successor, joint.actuated,
-                                    joint.name in virtual)
+            found[joint.name] = Box(
+                letter, (joint.name,), joint.predecessor, joint.successor, joint.actuated, joint.name in virtual
+            )
     return [found[name] for name in mechanism.joints if name in found]
 
 

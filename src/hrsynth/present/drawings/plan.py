@@ -82,8 +82,13 @@ class _LegBoxes:
     ears: tuple[Ear, ...]
 
 
-def plan(mechanism: Mechanism | LegDecomposition, *, observed: Collection[str] | None = None,
-         virtual: Collection[str] = (), leg: str | None = None) -> Layout:
+def plan(
+    mechanism: Mechanism | LegDecomposition,
+    *,
+    observed: Collection[str] | None = None,
+    virtual: Collection[str] = (),
+    leg: str | None = None,
+) -> Layout:
     """The plan of a mechanism, or of one that is already taken apart; of one ``leg`` by its label.
 
     ``observed`` are names of links (default: those of the mechanism's observations), ``virtual`` names of joints.
@@ -112,8 +117,9 @@ def _anatomy(mechanism: Mechanism) -> LegDecomposition | None:
         return None
 
 
-def _groups(mechanism: Mechanism, anatomy: LegDecomposition | None,
-            boxes: list[Box]) -> tuple[list[_LegBoxes], tuple[str, ...]]:
+def _groups(
+    mechanism: Mechanism, anatomy: LegDecomposition | None, boxes: list[Box]
+) -> tuple[list[_LegBoxes], tuple[str, ...]]:
     """The legs in the order of what they end on, the platform's own joints after those of the first end."""
     ends = (mechanism.base, mechanism.platform)
     everything = [_LegBoxes(None, tuple(ears(boxes, ends)))]
@@ -130,8 +136,11 @@ def _groups(mechanism: Mechanism, anatomy: LegDecomposition | None,
     attached = tuple(dict.fromkeys(leg.attach for leg in anatomy.legs))
     groups: list[_LegBoxes] = []
     for attach in attached:
-        groups += [_LegBoxes(leg.label, tuple(ears(members.get(leg.label, ()), (mechanism.base, attach))))
-                   for leg in anatomy.legs if leg.attach == attach]
+        groups += [
+            _LegBoxes(leg.label, tuple(ears(members.get(leg.label, ()), (mechanism.base, attach))))
+            for leg in anatomy.legs
+            if leg.attach == attach
+        ]
         if attach == attached[0] and inner:
             groups.append(_LegBoxes(None, tuple(ears(inner, attached))))
     return groups, anatomy.platform
@@ -157,8 +166,9 @@ _Way = tuple[str, tuple[Point, ...], int]
 """A link, the points of its line within a lane, the group."""
 
 
-def _place_groups(groups: Sequence[_LegBoxes], columns: dict[str, int]
-                  ) -> tuple[list[PlacedBox], list[_Way], list[Row]]:
+def _place_groups(
+    groups: Sequence[_LegBoxes], columns: dict[str, int]
+) -> tuple[list[PlacedBox], list[_Way], list[Row]]:
     spots: list[PlacedBox] = []
     ways: list[_Way] = []
     rows: list[Row] = []
@@ -204,8 +214,7 @@ def _between(ear: Ear, columns: dict[str, int], shared: set[str]) -> list[float]
     return xs
 
 
-def _ways(ear: Ear, xs: list[float], columns: dict[str, int], shared: set[str], lane: int,
-          row: int) -> list[_Way]:
+def _ways(ear: Ear, xs: list[float], columns: dict[str, int], shared: set[str], lane: int, row: int) -> list[_Way]:
     """The line of each link of an ear: from the box before it, through its own place, to the box after it."""
     found: list[_Way] = []
     for i, link in enumerate(ear.links):
@@ -217,19 +226,21 @@ def _ways(ear: Ear, xs: list[float], columns: dict[str, int], shared: set[str], 
     return found
 
 
-def _nets(mechanism: Mechanism, platform: Collection[str], ways: list[_Way],
-          columns: dict[str, int]) -> Iterable[Net]:
+def _nets(mechanism: Mechanism, platform: Collection[str], ways: list[_Way], columns: dict[str, int]) -> Iterable[Net]:
     table: dict[str, list[_Way]] = {}
     for way in ways:
         table.setdefault(way[0], []).append(way)
-    bars = {link: _reach(own) for link, own in table.items()
-            if len(own) > 1 or link == mechanism.base or link in platform}
+    bars = {
+        link: _reach(own) for link, own in table.items() if len(own) > 1 or link == mechanism.base or link in platform
+    }
     places = _apart(bars, columns)
     for link in mechanism.links:
         if link in table:
             at = float(columns[link])
-            moved = tuple(tuple((places.get(link, at) if x == at else x, lane) for x, lane in points)
-                          for _, points, _ in table[link])
+            moved = tuple(
+                tuple((places.get(link, at) if x == at else x, lane) for x, lane in points)
+                for _, points, _ in table[link]
+            )
             yield Net(link, moved, (places[link], *bars[link]) if link in bars else None, table[link][0][2])
 
 
@@ -246,6 +257,7 @@ def _apart(bars: dict[str, tuple[int, int]], columns: dict[str, int]) -> dict[st
         tracks: list[list[tuple[int, int]]] = []
         track = {link: _free(tracks, *bars[link]) for link in bars if columns[link] == column}
         step = BESIDE / max(len(tracks) - 1, 1)
-        places |= {link: column + step * number - (BESIDE / 2 if len(tracks) > 1 else 0.0)
-                   for link, number in track.items()}
+        places |= {
+            link: column + step * number - (BESIDE / 2 if len(tracks) > 1 else 0.0) for link, number in track.items()
+        }
     return places

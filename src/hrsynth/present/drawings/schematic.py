@@ -102,8 +102,13 @@ def _knees(drawn: Layout, number: int) -> tuple[tuple[float, float], ...]:
     return ((turns[0], 0.0), *zip(inner, rises, strict=True), (turns[-1], 0.0))
 
 
-def graph_svg(mechanism: Mechanism | LegDecomposition, *, observed: Collection[str] | None = None,
-              virtual: Collection[str] = (), title: str | None = None) -> str:
+def graph_svg(
+    mechanism: Mechanism | LegDecomposition,
+    *,
+    observed: Collection[str] | None = None,
+    virtual: Collection[str] = (),
+    title: str | None = None,
+) -> str:
     """The joint graph of a mechanism, base on the left, platform on the right.
 
     ``observed`` are names of links (default: those of the mechanism's observations), ``virtual`` names of joints that
@@ -112,21 +117,42 @@ def graph_svg(mechanism: Mechanism | LegDecomposition, *, observed: Collection[s
     drawn = plan(mechanism, observed=observed, virtual=virtual)
     scale = Scale(drawn.rows)
     dots = "".join(dot for net in drawn.nets for dot in _dots(net, scale))
-    return _picture(drawn, scale, title or f"Joint graph of {drawn.mechanism.name}", 70.0, 12, _bands(drawn, scale), [
-        _links(drawn, scale, stroke_width=1.5)
-        + svg.element("path", d=dots, stroke=svg.INK, stroke_width=6, stroke_linecap="round"),
-        *_boxes(drawn, scale), *_ends(drawn, scale, 11, 5, hatched=False)])
+    return _picture(
+        drawn,
+        scale,
+        title or f"Joint graph of {drawn.mechanism.name}",
+        70.0,
+        12,
+        _bands(drawn, scale),
+        [
+            _links(drawn, scale, stroke_width=1.5)
+            + svg.element("path", d=dots, stroke=svg.INK, stroke_width=6, stroke_linecap="round"),
+            *_boxes(drawn, scale),
+            *_ends(drawn, scale, 11, 5, hatched=False),
+        ],
+    )
 
 
-def robot_svg(mechanism: Mechanism | LegDecomposition, *, observed: Collection[str] | None = None,
-              virtual: Collection[str] = (), title: str | None = None) -> str:
+def robot_svg(
+    mechanism: Mechanism | LegDecomposition,
+    *,
+    observed: Collection[str] | None = None,
+    virtual: Collection[str] = (),
+    title: str | None = None,
+) -> str:
     """All legs of a mechanism as chains of symbols; arguments as for :func:`graph_svg`."""
     drawn = plan(mechanism, observed=observed, virtual=virtual)
     return _scheme(drawn, title or f"Kinematic scheme of {drawn.mechanism.name}")
 
 
-def leg_svg(mechanism: Mechanism | LegDecomposition, leg: str, *, observed: Collection[str] | None = None,
-            virtual: Collection[str] = (), title: str | None = None) -> str:
+def leg_svg(
+    mechanism: Mechanism | LegDecomposition,
+    leg: str,
+    *,
+    observed: Collection[str] | None = None,
+    virtual: Collection[str] = (),
+    title: str | None = None,
+) -> str:
     """One leg as a chain of symbols; raises ``BadRequest`` where there is no such leg."""
     drawn = plan(mechanism, observed=observed, virtual=virtual, leg=leg)
     return _scheme(drawn, title or f"Leg {leg} of {drawn.mechanism.name}")
@@ -144,8 +170,10 @@ def derivation_svg(found: Derivation) -> bytes:
     for words, scheme in schemes:
         size = re.search(r' width="([\d.]+)" height="([\d.]+)"', scheme)
         assert size is not None
-        parts += [svg.words(words, x + 16, 20, font_weight="bold"),
-                  scheme.replace("<svg ", f'<svg x="{svg.number(x)}" y="{svg.number(HEAD)}" ', 1)]
+        parts += [
+            svg.words(words, x + 16, 20, font_weight="bold"),
+            scheme.replace("<svg ", f'<svg x="{svg.number(x)}" y="{svg.number(HEAD)}" ', 1),
+        ]
         x, tall = x + float(size[1]) + BETWEEN, max(tall, float(size[2]))
     return svg.picture(x - BETWEEN, HEAD + tall, f"Derivation of {found.robot.name}", found.headline(), *parts).encode()
 
@@ -153,14 +181,25 @@ def derivation_svg(found: Derivation) -> bytes:
 def _scheme(drawn: Layout, name: str) -> str:
     bends = Bends.of(drawn)
     heads = "".join(_head(net, bends) for net in drawn.nets if net.link in drawn.observed)
-    return _picture(drawn, bends, name, 76, 14, _bands(drawn, bends), [
-        *_ends(drawn, bends, 16, 8, hatched=True), _links(drawn, bends, stroke_width=2, stroke_linejoin="round"),
-        svg.element("path", d=heads, fill=svg.VIRTUAL) if heads else "",
-        svg.element("g", *(_symbol(spot, bends) for spot in drawn.spots), stroke=svg.INK, stroke_width=1.6)])
+    return _picture(
+        drawn,
+        bends,
+        name,
+        76,
+        14,
+        _bands(drawn, bends),
+        [
+            *_ends(drawn, bends, 16, 8, hatched=True),
+            _links(drawn, bends, stroke_width=2, stroke_linejoin="round"),
+            svg.element("path", d=heads, fill=svg.VIRTUAL) if heads else "",
+            svg.element("g", *(_symbol(spot, bends) for spot in drawn.spots), stroke=svg.INK, stroke_width=1.6),
+        ],
+    )
 
 
-def _picture(drawn: Layout, scale: Scale, name: str, right: float, below: float, bands: list[str],
-             content: list[str]) -> str:
+def _picture(
+    drawn: Layout, scale: Scale, name: str, right: float, below: float, bands: list[str], content: list[str]
+) -> str:
     bottom = scale.band(drawn.rows[-1])[1]
     return svg.picture(scale.x(drawn.columns) + right, bottom + below, name, _describe(drawn), *bands, *content)
 
@@ -189,8 +228,9 @@ def _bands(drawn: Layout, scale: Scale) -> list[str]:
         start, end = scale.x(row.start), scale.x(row.end)
         found.append(svg.element("rect", x=start, y=upper, width=end - start, height=lower - upper, fill=svg.PALE))
         if row.label is not None:
-            found.append(svg.words(f"leg {row.label}", scale.x(0) - 12, (upper + lower) / 2 + 4, text_anchor="end",
-                                   fill=svg.INK))
+            found.append(
+                svg.words(f"leg {row.label}", scale.x(0) - 12, (upper + lower) / 2 + 4, text_anchor="end", fill=svg.INK)
+            )
         elif len(drawn.rows) > 1:
             found.append(svg.words("platform", end + 10, (upper + lower) / 2 + 4, fill=svg.INK))
     return found
@@ -199,8 +239,9 @@ def _bands(drawn: Layout, scale: Scale) -> list[str]:
 def _links(drawn: Layout, scale: Scale, **style: object) -> str:
     plain = [_net(net, scale) for net in drawn.nets if net.link not in drawn.observed]
     seen = [_net(net, scale) for net in drawn.nets if net.link in drawn.observed]
-    return (svg.element("g", *plain, fill="none", stroke=svg.INK, **style)
-            + svg.element("g", *seen, fill="none", stroke=svg.VIRTUAL, stroke_width=4, class_="observed"))
+    return svg.element("g", *plain, fill="none", stroke=svg.INK, **style) + svg.element(
+        "g", *seen, fill="none", stroke=svg.VIRTUAL, stroke_width=4, class_="observed"
+    )
 
 
 def _net(net: Net, scale: Scale) -> str:
@@ -229,8 +270,11 @@ def _head(net: Net, scale: Scale) -> str:
 
 def _boxes(drawn: Layout, scale: Scale) -> list[str]:
     found = []
-    for kind, fill, stroke in (("joint", "#fff", svg.INK), ("motor", svg.MOTOR, svg.INK),
-                               ("virtual", svg.VIRTUAL, svg.VIRTUAL)):
+    for kind, fill, stroke in (
+        ("joint", "#fff", svg.INK),
+        ("motor", svg.MOTOR, svg.INK),
+        ("virtual", svg.VIRTUAL, svg.VIRTUAL),
+    ):
         boxes = [_box(spot, scale) for spot in drawn.spots if spot.box.kind == kind]
         if boxes:
             found.append(svg.element("g", svg.element("g", *boxes, stroke=stroke), fill=fill, class_=kind))
@@ -240,11 +284,22 @@ def _boxes(drawn: Layout, scale: Scale) -> list[str]:
 def _box(spot: PlacedBox, scale: Scale) -> str:
     box, (x, y) = spot.box, scale.at(spot.x, spot.lane)
     said = ", ".join(box.joints) + {"virtual": ": virtual actuator", "motor": ": motor", "joint": ""}[box.kind]
-    return svg.element("g", svg.title(said), svg.element("rect", x=x - 12, y=y - 11, width=24, height=22, rx=2),
-                       svg.words(box.letter, x, y + 5, text_anchor="middle", font_size=14, stroke="none",
-                                 fill="#fff" if box.virtual else svg.INK,
-                                 text_decoration="underline" if box.driven else None),
-                       data_joint="\n".join(box.joints))
+    return svg.element(
+        "g",
+        svg.title(said),
+        svg.element("rect", x=x - 12, y=y - 11, width=24, height=22, rx=2),
+        svg.words(
+            box.letter,
+            x,
+            y + 5,
+            text_anchor="middle",
+            font_size=14,
+            stroke="none",
+            fill="#fff" if box.virtual else svg.INK,
+            text_decoration="underline" if box.driven else None,
+        ),
+        data_joint="\n".join(box.joints),
+    )
 
 
 def _symbol(spot: PlacedBox, bends: Bends) -> str:
@@ -255,10 +310,18 @@ def _symbol(spot: PlacedBox, bends: Bends) -> str:
     if box.letter in STRAIGHT:
         (a, b), (c, d) = (bends.at(spot.x + side, spot.lane) for side in (-0.05, 0.05))
         angle = math.degrees(math.atan2(d - b, c - a))
-    drawing = symbol(box.letter, x, y, angle, fill, f"{WORDS[box.letter]} {', '.join(box.joints)}{role}",
-                     "\n".join(box.joints))
-    letter = svg.words(box.letter, x, y - 16, text_anchor="middle", stroke="none", fill=svg.VIRTUAL if box.virtual else
-                       svg.INK, text_decoration="underline" if box.driven else None)
+    drawing = symbol(
+        box.letter, x, y, angle, fill, f"{WORDS[box.letter]} {', '.join(box.joints)}{role}", "\n".join(box.joints)
+    )
+    letter = svg.words(
+        box.letter,
+        x,
+        y - 16,
+        text_anchor="middle",
+        stroke="none",
+        fill=svg.VIRTUAL if box.virtual else svg.INK,
+        text_decoration="underline" if box.driven else None,
+    )
     return svg.element("g", drawing, letter, class_=box.kind, stroke=svg.VIRTUAL if box.virtual else None)
 
 

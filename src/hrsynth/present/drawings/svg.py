@@ -29,9 +29,11 @@ def number(value: float) -> str:
 
 def attributes(**values: object) -> str:
     """``stroke_width=2`` as `` stroke-width="2"``; None is left out."""
-    return "".join(f" {name.rstrip('_').replace('_', '-')}="
-                   f"{quoteattr(number(value) if isinstance(value, float) else str(value))}"
-                   for name, value in values.items() if value is not None)
+    return "".join(
+        f" {name.rstrip('_').replace('_', '-')}={quoteattr(number(value) if isinstance(value, float) else str(value))}"
+        for name, value in values.items()
+        if value is not None
+    )
 
 
 def element(name: str, *content: str, **values: object) -> str:
@@ -61,4 +63,5 @@ def picture(width: float, height: float, name: str, description: str, *content: 
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {number(width)} {number(height)}" '
         f'width="{number(width)}" height="{number(height)}" role="img" aria-label={quoteattr(name)} '
         f'font-family="{FONT}" font-size="12">{title(name)}{element("desc", escape(description))}'
-        f'{"".join(content)}</svg>\n')
+        f"{''.join(content)}</svg>\n"
+    )

@@ -14,21 +14,35 @@ SHAPES: dict[str, str] = {
     "E": f'<path d="{_RAIL}"/><rect x="-8" y="-4" width="16" height="8"/>',
     "F": '<path d="M-6 -6H6V6H-6Z"/>',
     "6": '<circle r="9" stroke-dasharray="3 2"/>',
-    "Π": '<path d="M-13 9L-7 -9H13L7 9Z"/>' + "".join(
-        f'<circle cx="{x}" cy="{y}" r="3"/>' for x, y in ((-13, 9), (-7, -9), (13, -9), (7, 9))),
+    "Π": '<path d="M-13 9L-7 -9H13L7 9Z"/>'
+    + "".join(f'<circle cx="{x}" cy="{y}" r="3"/>' for x, y in ((-13, 9), (-7, -9), (13, -9), (7, 9))),
 }
 """R a hinge seen along its axis, P a sleeve on a rod, U a cross, S a ball in a cup, C a sleeve that also turns, E a
 block between planes, Π a parallelogram with its four hinges."""
-WORDS = {"R": "revolute joint", "P": "prismatic joint", "U": "universal joint", "S": "spherical joint",
-         "C": "cylindrical joint", "E": "planar joint", "F": "fixed joint", "6": "no joint (six freedoms)",
-         "Π": "planar parallelogram"}
+WORDS = {
+    "R": "revolute joint",
+    "P": "prismatic joint",
+    "U": "universal joint",
+    "S": "spherical joint",
+    "C": "cylindrical joint",
+    "E": "planar joint",
+    "F": "fixed joint",
+    "6": "no joint (six freedoms)",
+    "Π": "planar parallelogram",
+}
 
 
 def symbol(letter: str, x: float, y: float, turned: float, fill: str, said: str, joints: str) -> str:
     """The symbol at a place, turned by an angle in degrees; ``joints`` are the names that it stands for."""
-    return svg.element("g", svg.title(said), SHAPES[letter], fill=fill, data_joint=joints,
-                       transform=f"translate({svg.number(x)} {svg.number(y)})"
-                                 + (f"rotate({svg.number(turned)})" if abs(turned) > 0.05 else ""))
+    return svg.element(
+        "g",
+        svg.title(said),
+        SHAPES[letter],
+        fill=fill,
+        data_joint=joints,
+        transform=f"translate({svg.number(x)} {svg.number(y)})"
+        + (f"rotate({svg.number(turned)})" if abs(turned) > 0.05 else ""),
+    )
 
 
 def arrow(start: svg.Place, end: svg.Place) -> str:

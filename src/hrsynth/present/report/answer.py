@@ -27,10 +27,13 @@ def answer(found: Derivation, told: Parts) -> Iterator[str]:
     modes = told.modes
     if not isinstance(modes, Refused) and modes.found.continuum is None and modes.modes:
         count = len(modes.modes)
-        yield (f"At home {modes.alike}; a run that starts far away may end at another than its goal." if modes.near else
-               f"At home {count} pose{'s have' if count > 1 else ' has'} the same {describe_held(found.setting)} "
-               f"({all_of(modes)})"
-               + ("; a run that starts far away may end at another than its goal." if count > 1 else "."))
+        yield (
+            f"At home {modes.alike}; a run that starts far away may end at another than its goal."
+            if modes.near
+            else f"At home {count} pose{'s have' if count > 1 else ' has'} the same {describe_held(found.setting)} "
+            f"({all_of(modes)})"
+            + ("; a run that starts far away may end at another than its goal." if count > 1 else ".")
+        )
     if not isinstance(told.accuracy, Refused):
         yield from errors(told.accuracy)
 
@@ -40,8 +43,10 @@ def describe_seen(found: Derivation) -> str:
     verdict, watched = found.verdict, _legs(found.setting.labels, found.setting)
     if (bodies := verdict.formation) is not None:
         rest = "".join(f"; {each.name}" for each in bodies.flexes) or "; nothing else"
-        return (f"Watching {watched} shows {verdict.rank} of the bodies' {found.dof} freedoms. Not seen: "
-                f"{', '.join(bodies.trivial) or 'no trivial motion'}{rest}.")
+        return (
+            f"Watching {watched} shows {verdict.rank} of the bodies' {found.dof} freedoms. Not seen: "
+            f"{', '.join(bodies.trivial) or 'no trivial motion'}{rest}."
+        )
     text = f"Watching {watched} shows {verdict.rank} of the platform's {found.dof} freedoms"
     return text + (f": not {verdict.named}" if verdict.lost else "") + "."
 
@@ -53,20 +58,28 @@ def enough(found: Derivation, legs: Legs) -> str:
         return f"No set of {things(found.setting)} shows any of the {found.dof} freedoms."
     sets = "; ".join(_legs(each, found.setting) for each in legs.minimal[:4])
     more = len(legs.minimal) - 4
-    return (f"Fewest {things(found.setting)} that show {best} of {found.dof}: {sets}"
-            + (f"; {more} more sets" if more > 0 else "") + ".")
+    return (
+        f"Fewest {things(found.setting)} that show {best} of {found.dof}: {sets}"
+        + (f"; {more} more sets" if more > 0 else "")
+        + "."
+    )
 
 
 def errors(found: Accuracy) -> Iterator[str]:
     """How far the platform may be from where the directions say."""
     field = found.field
     assert field is not None
-    said = [f"{_median(values):.2g} {unit}" for values, unit in (
-        (1e3 * field.position, "mm"), (np.degrees(field.orientation), "degrees")) if _median(values) > 0]
+    said = [
+        f"{_median(values):.2g} {unit}"
+        for values, unit in ((1e3 * field.position, "mm"), (np.degrees(field.orientation), "degrees"))
+        if _median(values) > 0
+    ]
     if said:
         what = "Directions" if found.blur.noise is None else "Measurements"
-        yield (f"{what} wrong by {wrong(found)} put the platform off by up to {' and '.join(said)} "
-               "(median over the map below, to first order).")
+        yield (
+            f"{what} wrong by {wrong(found)} put the platform off by up to {' and '.join(said)} "
+            "(median over the map below, to first order)."
+        )
 
 
 def _median(values: Array) -> float:

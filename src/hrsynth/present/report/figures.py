@@ -14,8 +14,11 @@ from ...rewrite.strategy import Step
 from ..drawings.schematic import graph_svg, leg_svg
 
 SOURCES = {rule.name: rule.source for rule in rules()}
-_NAMES = re.compile(r"<title>.*?</title>|<desc>.*?</desc>|<text[^>]*>leg [^<]*</text>"
-                    r'| (?:data-joint|data-link|aria-label)="[^"]*"', re.DOTALL)
+_NAMES = re.compile(
+    r"<title>.*?</title>|<desc>.*?</desc>|<text[^>]*>leg [^<]*</text>"
+    r'| (?:data-joint|data-link|aria-label)="[^"]*"',
+    re.DOTALL,
+)
 """What tells drawings of equal legs apart."""
 
 
@@ -53,10 +56,17 @@ def pairs(found: Derivation) -> list[LegPair]:
             continue
         drawing = None
         if hidden is not None and other is not None:
-            drawing = leg_svg(hidden, leg.label, observed=seen, virtual=actuators(found),
-                              title=f"Leg {leg.label} of the hidden robot")
-        kinds[key] = LegPair((leg.label,), key[2], key[0], word, leg_svg(
-            real, leg.label, observed=seen, title=f"Leg {leg.label} of the real robot"), drawing)
+            drawing = leg_svg(
+                hidden, leg.label, observed=seen, virtual=actuators(found), title=f"Leg {leg.label} of the hidden robot"
+            )
+        kinds[key] = LegPair(
+            (leg.label,),
+            key[2],
+            key[0],
+            word,
+            leg_svg(real, leg.label, observed=seen, title=f"Leg {leg.label} of the real robot"),
+            drawing,
+        )
     return list(kinds.values())
 
 
@@ -77,15 +87,22 @@ class StepFigure:
     def alike(self, other: StepFigure) -> bool:
         """Whether two steps of different legs look the same but for names."""
         drawings = ((self.before, other.before), (self.after, other.after))
-        return self.rule == other.rule and bool(self.legs and other.legs) and all(
-            _NAMES.sub("", a) == _NAMES.sub("", b) for a, b in drawings)
+        return (
+            self.rule == other.rule
+            and bool(self.legs and other.legs)
+            and all(_NAMES.sub("", a) == _NAMES.sub("", b) for a, b in drawings)
+        )
 
     def together(self, other: StepFigure) -> StepFigure:
         """This figure, which stands for another one too."""
         angles = [angle for angle in (self.largest_angle, other.largest_angle) if angle is not None]
-        return replace(self, steps=self.steps + other.steps, legs=self.legs + other.legs,
-                       reasons=tuple(dict.fromkeys(self.reasons + other.reasons)),
-                       largest_angle=max(angles, default=None))
+        return replace(
+            self,
+            steps=self.steps + other.steps,
+            legs=self.legs + other.legs,
+            reasons=tuple(dict.fromkeys(self.reasons + other.reasons)),
+            largest_angle=max(angles, default=None),
+        )
 
 
 def step_figures(found: Derivation) -> list[StepFigure]:
@@ -98,9 +115,16 @@ def step_figures(found: Derivation) -> list[StepFigure]:
             continue
         after, then = step.state.anatomy(), step.state.actuators
         leg = step.leg if step.leg in anatomy.labels and step.leg in after.labels else None
-        one = StepFigure(step.rule, SOURCES.get(step.rule, ""), (number,), (step.leg,) if step.leg else (),
-                         (step.reason,), step.largest_angle, _picture(step, "before", anatomy, leg, seen, virtual),
-                         _picture(step, "after", after, leg, seen, then))
+        one = StepFigure(
+            step.rule,
+            SOURCES.get(step.rule, ""),
+            (number,),
+            (step.leg,) if step.leg else (),
+            (step.reason,),
+            step.largest_angle,
+            _picture(step, "before", anatomy, leg, seen, virtual),
+            _picture(step, "after", after, leg, seen, then),
+        )
         alike = next((i for i, other in enumerate(drawn) if one.alike(other)), None)
         if alike is None:
             drawn.append(one)
@@ -110,8 +134,9 @@ def step_figures(found: Derivation) -> list[StepFigure]:
     return drawn
 
 
-def _picture(step: Step, word: str, anatomy: LegDecomposition, leg: str | None, seen: Collection[str],
-             virtual: Collection[str]) -> str:
+def _picture(
+    step: Step, word: str, anatomy: LegDecomposition, leg: str | None, seen: Collection[str], virtual: Collection[str]
+) -> str:
     title = f"{step.rule}: {word}" + (f" (leg {leg})" if leg else "")
     if leg is None:
         return graph_svg(anatomy, observed=seen, virtual=virtual, title=title)

@@ -63,8 +63,10 @@ def formula(expression: Any, said: str, zero: bool = True) -> str:
     found = _printer().doprint(expression).replace("&InvisibleTimes;", "\u2062")
     equals = "<mo>=</mo><mn>0</mn>" if zero else ""
     label = escape(said, {'"': "&quot;"})
-    return (f'<math xmlns="http://www.w3.org/1998/Math/MathML" display="block" aria-label="{label}">'
-            f"<mrow>{found}{equals}</mrow></math>")
+    return (
+        f'<math xmlns="http://www.w3.org/1998/Math/MathML" display="block" aria-label="{label}">'
+        f"<mrow>{found}{equals}</mrow></math>"
+    )
 
 
 def lower_indices(text: str) -> str:
@@ -81,16 +83,20 @@ def collect_symbols(where: Mapping[str, str]) -> list[tuple[str, str]]:
         head, number = (match[1], match[2]) if match else (symbol, "")
         pattern = _indices(meaning, number, set(where)) if number else meaning
         kinds.setdefault((head, pattern), []).append(number)
-    return [(f"{head}i", f"{pattern} (i = {', '.join(numbers)})") if len(numbers) > 1
-            else (head + numbers[0], pattern if not numbers[0] else where[head + numbers[0]])
-            for (head, pattern), numbers in kinds.items()]
+    return [
+        (f"{head}i", f"{pattern} (i = {', '.join(numbers)})")
+        if len(numbers) > 1
+        else (head + numbers[0], pattern if not numbers[0] else where[head + numbers[0]])
+        for (head, pattern), numbers in kinds.items()
+    ]
 
 
 def _indices(meaning: str, number: str, symbols: Collection[str]) -> str:
     """A meaning with the index instead of its number: a letter where it stands alone or in a formula, else low."""
     formula = set(re.findall(r"[^\W\d_]\w*", meaning)) <= {*symbols, *_FORMULA}
-    return re.sub(rf"(?<!\d){number}(?!\d)",
-                  lambda m: "i" if formula or meaning[m.start() - 1] in " _" else _LOW, meaning)
+    return re.sub(
+        rf"(?<!\d){number}(?!\d)", lambda m: "i" if formula or meaning[m.start() - 1] in " _" else _LOW, meaning
+    )
 
 
 def underline_motors(text: str) -> str:

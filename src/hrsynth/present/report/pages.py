@@ -36,19 +36,43 @@ def page(found: Derivation, told: Parts) -> bytes:
     observed = [o.link for o in found.setting.observed]
     graphs = [graph_svg(found.setting.anatomy, observed=observed, title=f"Joint graph of the real robot {name}")]
     if found.hidden is not None:
-        graphs.append(graph_svg(found.hidden, observed=observed, virtual=actuators(found),
-                                title=f"Joint graph of the hidden robot of {name}"))
-    return name_steering(_template().render(
-        found=found, setting=found.setting, told=told, answer=list(answer(found, told)),
-        portrait=Portrait.of(found.setting).svg(*PORTRAIT), name=name, graphs=graphs, real=str(found.architecture),
-        hidden=found.hidden_architecture and str(found.hidden_architecture), pairs=pairs(found),
-        errors=None if isinstance(errors, Refused) else (
-            f"{errors.blur.inside} of {wrong(errors)}" if errors.blur.noise is None else
-            f"{errors.blur.inside}, {wrong(errors)}"), things=things(found.setting), held=describe_held(found.setting),
-        watched=["leg " * o.by_segment + label_of(o) for o in found.setting.observed],
-        scenes=step_figures(found), modes_picture=None if isinstance(modes, Refused) or why_undrawn(modes) is not None
-        else _png(picture(modes)),
-        map=errors if isinstance(errors, Refused) else ask(name, lambda: _png(error_map(errors))))).encode()
+        graphs.append(
+            graph_svg(
+                found.hidden,
+                observed=observed,
+                virtual=actuators(found),
+                title=f"Joint graph of the hidden robot of {name}",
+            )
+        )
+    return name_steering(
+        _template().render(
+            found=found,
+            setting=found.setting,
+            told=told,
+            answer=list(answer(found, told)),
+            portrait=Portrait.of(found.setting).svg(*PORTRAIT),
+            name=name,
+            graphs=graphs,
+            real=str(found.architecture),
+            hidden=found.hidden_architecture and str(found.hidden_architecture),
+            pairs=pairs(found),
+            errors=None
+            if isinstance(errors, Refused)
+            else (
+                f"{errors.blur.inside} of {wrong(errors)}"
+                if errors.blur.noise is None
+                else f"{errors.blur.inside}, {wrong(errors)}"
+            ),
+            things=things(found.setting),
+            held=describe_held(found.setting),
+            watched=["leg " * o.by_segment + label_of(o) for o in found.setting.observed],
+            scenes=step_figures(found),
+            modes_picture=None
+            if isinstance(modes, Refused) or why_undrawn(modes) is not None
+            else _png(picture(modes)),
+            map=errors if isinstance(errors, Refused) else ask(name, lambda: _png(error_map(errors))),
+        )
+    ).encode()
 
 
 @cache
@@ -56,19 +80,40 @@ def _template() -> Any:
     from jinja2 import Environment, PackageLoader, StrictUndefined
     from markupsafe import Markup
 
-    environment = Environment(loader=PackageLoader("hrsynth.present.report", "."), autoescape=True,
-                              undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment = Environment(
+        loader=PackageLoader("hrsynth.present.report", "."),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
     environment.filters |= {
-        "barred": lambda text: Markup(underline_motors(text)), "indexed": lambda text: Markup(lower_indices(text)),
+        "barred": lambda text: Markup(underline_motors(text)),
+        "indexed": lambda text: Markup(lower_indices(text)),
         "sentence": lambda text: text[:1].upper() + text[1:].rstrip(".") + ".",
         "pose": lambda pose: str(pose).replace(",", ", "),
-        "angle": lambda value: "" if value is None else f"{value:.1e}"}
+        "angle": lambda value: "" if value is None else f"{value:.1e}",
+    }
     environment.tests["refused"] = lambda part: isinstance(part, Refused)
     environment.globals.update(
-        all_of=all_of, at_mode=at_mode, collected=collect_symbols, exact_words=exact_words, lost=lost_rows,
-                               at_zero=at_zero,
-        field_rows=field_rows, formula=formula, good=good, most=LARGEST_LIST, proved=proof_words, rank_gap=RANK_GAP,
-        same_relation=SAME_RELATION, sources=SOURCES, version=__version__, set_rows=set_rows, unseen=unseen)
+        all_of=all_of,
+        at_mode=at_mode,
+        collected=collect_symbols,
+        exact_words=exact_words,
+        lost=lost_rows,
+        at_zero=at_zero,
+        field_rows=field_rows,
+        formula=formula,
+        good=good,
+        most=LARGEST_LIST,
+        proved=proof_words,
+        rank_gap=RANK_GAP,
+        same_relation=SAME_RELATION,
+        sources=SOURCES,
+        version=__version__,
+        set_rows=set_rows,
+        unseen=unseen,
+    )
     return environment.get_template("page.html.j2")
 
 

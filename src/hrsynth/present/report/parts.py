@@ -54,9 +54,12 @@ def parts(found: Derivation, seed: int) -> Parts:
     """Ask for each part of a derivation's report, of the robot as it was observed for the derivation; ``seed`` is that
     of the derivation."""
     setting, name = found.setting, found.robot.name
-    return Parts(ask(name, lambda: legs(setting, seed=seed)),
-                 ask(name, lambda: singular(setting, points=POINTS, seed=seed)),
-                 ask(name, lambda: modes(setting, seed=seed)), ask(name, lambda: error_plane(setting, seed)))
+    return Parts(
+        ask(name, lambda: legs(setting, seed=seed)),
+        ask(name, lambda: singular(setting, points=POINTS, seed=seed)),
+        ask(name, lambda: modes(setting, seed=seed)),
+        ask(name, lambda: error_plane(setting, seed)),
+    )
 
 
 def ask(robot: str, question: Callable[[], Answer]) -> Answer | Refused:

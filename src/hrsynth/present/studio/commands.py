@@ -40,12 +40,12 @@ def lines(request: Request, name: str, *options: str, watching: bool = True, **g
         else:
             words += [flag, ",".join(value) if isinstance(value, tuple) else str(value)]
     if said:
-        values = ", ".join(f"{option}={list(value) if isinstance(value, tuple) else value!r}"
-                           for option, value in said.items())
+        values = ", ".join(
+            f"{option}={list(value) if isinstance(value, tuple) else value!r}" for option, value in said.items()
+        )
         robot = f"hrsynth.load({robot}, {values})"
     python += [f"{each}={value!r}" for each, value in given.items()]
-    return {"command": shlex.join([*words, *options]),
-            "python": f"hrsynth.{name}({', '.join([robot, *python])})"}
+    return {"command": shlex.join([*words, *options]), "python": f"hrsynth.{name}({', '.join([robot, *python])})"}
 
 
 def at_pose(setting: ObservedRobot, at: ClosedConfiguration) -> str:

@@ -16,11 +16,19 @@ HOST = "127.0.0.1"
 NAMES = (HOST, "localhost", "[::1]")
 """What a browser on this machine may call it."""
 HTTP_PORT = 80
-POLICY = ("default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
-          "connect-src 'self' {}; base-uri 'none'; form-action 'none'; frame-ancestors 'none'")
-HEADERS = {"x-content-type-options": "nosniff", "referrer-policy": "no-referrer", "cache-control": "no-store",
-           "cross-origin-resource-policy": "same-origin", "cross-origin-opener-policy": "same-origin",
-           "x-frame-options": "DENY", "connection": "close"}
+POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
+    "connect-src 'self' {}; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+HEADERS = {
+    "x-content-type-options": "nosniff",
+    "referrer-policy": "no-referrer",
+    "cache-control": "no-store",
+    "cross-origin-resource-policy": "same-origin",
+    "cross-origin-opener-policy": "same-origin",
+    "x-frame-options": "DENY",
+    "connection": "close",
+}
 
 
 class Guard:

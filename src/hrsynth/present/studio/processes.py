@@ -19,8 +19,9 @@ from ...budgets import LARGEST_ANSWER, MOST_WAITING, WORKER_START_SECONDS
 
 DESK = "hrsynth.present.studio.desk:Desk"
 """What answers."""
-START = ("import sys, json; sys.path[:] = json.loads(sys.argv[1]); from {} import main; "
-         "main(int(sys.argv[2]), sys.argv[3])")
+START = (
+    "import sys, json; sys.path[:] = json.loads(sys.argv[1]); from {} import main; main(int(sys.argv[2]), sys.argv[3])"
+)
 HEAD = 4
 """Bytes of a frame's length."""
 
@@ -37,9 +38,21 @@ class ForkServer:
         quiet = None if os.environ.get("HRSYNTH_DEBUG") else subprocess.DEVNULL
         with other:
             self.process = subprocess.Popen(
-                [sys.executable, "-I", "-c", START.format(f"{__package__}.worker"), json.dumps(sys.path),
-                 str(other.fileno()), self.desk],
-                stdin=subprocess.DEVNULL, stdout=quiet, stderr=quiet, pass_fds=[other.fileno()], start_new_session=True)
+                [
+                    sys.executable,
+                    "-I",
+                    "-c",
+                    START.format(f"{__package__}.worker"),
+                    json.dumps(sys.path),
+                    str(other.fileno()),
+                    self.desk,
+                ],
+                stdin=subprocess.DEVNULL,
+                stdout=quiet,
+                stderr=quiet,
+                pass_fds=[other.fileno()],
+                start_new_session=True,
+            )
 
     def channel(self) -> socket.socket:
         """The near end of the channel to a new child; closing it kills the child. Raises ``OSError``."""

@@ -186,8 +186,9 @@ class Request(Value):
         try:
             at = ClosedConfiguration.of(twin, q)
         except LoopsNotClosed as error:
-            raise BadRequest(f"{field}: the loops are not closed, residual", f"{error.residual:.2g}",
-                             f"up to {error.tolerance:g}") from None
+            raise BadRequest(
+                f"{field}: the loops are not closed, residual", f"{error.residual:.2g}", f"up to {error.tolerance:g}"
+            ) from None
         other = found.get("hidden")
         if mover.hidden is None:
             return Posed(at)

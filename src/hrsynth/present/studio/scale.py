@@ -45,8 +45,9 @@ def error(setting: ObservedRobot, at: ClosedConfiguration) -> dict[str, Any]:
     metres, radians = largest_by_ascent(at, setting.samples.question, Blur(np.full(len(setting.observed), CONE)))
     if np.isfinite([metres, radians]).all() and not (is_bounded(metres, at.twin.length) and is_bounded(radians)):
         return nothing(unit, NOT_BOUNDED)
-    return describe_error(finite(1e3 * metres), finite(math.degrees(radians)), unit,
-                          bool(setting.motion.rotations.shape[1]))
+    return describe_error(
+        finite(1e3 * metres), finite(math.degrees(radians)), unit, bool(setting.motion.rotations.shape[1])
+    )
 
 
 def describe_error(mm: float | None, deg: float | None, unit: str, turns: bool) -> dict[str, Any]:
@@ -57,8 +58,14 @@ def describe_error(mm: float | None, deg: float | None, unit: str, turns: bool) 
         return {"mm": mm, "deg": deg, "unit": unit, "step": len(NAMES) - 1, "words": LOST}
     step, size = step_of(value, unit), f"{round_digits(value)}{SIGNS[unit]}"
     turned = f"{round_digits(deg)}°" if turns and unit == "mm" else ""
-    return {"mm": mm, "deg": deg, "unit": unit, "step": step, "size": f"{size} and {turned}" if turned else size,
-            "words": f"about {size} off per 0.1°: {NAMES[step]}{f'; turned by about {turned}' if turned else ''}"}
+    return {
+        "mm": mm,
+        "deg": deg,
+        "unit": unit,
+        "step": step,
+        "size": f"{size} and {turned}" if turned else size,
+        "words": f"about {size} off per 0.1°: {NAMES[step]}{f'; turned by about {turned}' if turned else ''}",
+    }
 
 
 def nothing(unit: str, words: str) -> dict[str, Any]:

@@ -34,15 +34,25 @@ if TYPE_CHECKING:
     from ..view.view import View
 
 PAGE = Path(__file__).parent / "page"
-TYPES = {".html": "text/html; charset=utf-8", ".js": "text/javascript; charset=utf-8",
-         ".css": "text/css; charset=utf-8", ".svg": "image/svg+xml"}
+TYPES = {
+    ".html": "text/html; charset=utf-8",
+    ".js": "text/javascript; charset=utf-8",
+    ".css": "text/css; charset=utf-8",
+    ".svg": "image/svg+xml",
+}
 """What is shown of the page's folder."""
 MAIN = "studio.html"
 
 
 @with_spelling
-def studio(robot: str | Path | Mechanism | None = None, observe: Iterable[str | int] | str | None = None,
-           camera: str | None = None, *, port: int = 0, open_: bool = True) -> StudioServer:
+def studio(
+    robot: str | Path | Mechanism | None = None,
+    observe: Iterable[str | int] | str | None = None,
+    camera: str | None = None,
+    *,
+    port: int = 0,
+    open_: bool = True,
+) -> StudioServer:
     """Serve the studio on this machine, with a robot, a folder of robots or nothing, and open it in the browser:
     returns a server with ``address`` and ``stop()``, which also ends with this process. Port 0 is any free port.
 
@@ -81,20 +91,30 @@ def view_server(found: View, port: int = 0, open_: bool = True, source: dict[str
     from ...description.overrides import names
 
     if not all(seen.by_segment for seen in found.setting.observed):
-        raise BadRequest("a view that is served knows directions of segments only", ", ".join(found.setting.labels),
-                         "a page that needs no server (--static view.html, View.save)")
+        raise BadRequest(
+            "a view that is served knows directions of segments only",
+            ", ".join(found.setting.labels),
+            "a page that needs no server (--static view.html, View.save)",
+        )
     robot = found.setting.robot
     if source is None or "/" in (source["keyframe"] or ""):  # the page names no files
         given = _as_read(robot)
     else:
         lists = {"motors": names(source["motors"]), "freeze": names(source["freeze"] or None)}
-        options = {name: value for name, value in {**source, **lists}.items()
-                   if name != "robot" and value not in (None, "", []) and value is not False}
+        options = {
+            name: value
+            for name, value in {**source, **lists}.items()
+            if name != "robot" and value not in (None, "", []) and value is not False
+        }
         given = {"robot": source["robot"], "options": options}
-    first = {"watch": [seen.link for seen in found.setting.observed], "camera": found.setting.robot.camera,
-             "hidden": found.derivation is not None}
-    server = StudioServer(Opening(given=given, mechanism=robot if given is None else None, first=first, panels=False),
-                          port)
+    first = {
+        "watch": [seen.link for seen in found.setting.observed],
+        "camera": found.setting.robot.camera,
+        "hidden": found.derivation is not None,
+    }
+    server = StudioServer(
+        Opening(given=given, mechanism=robot if given is None else None, first=first, panels=False), port
+    )
     if open_:
         server.show()
     return server
@@ -142,8 +162,14 @@ def application(tabs: Tabs) -> Any:
             return Response(status_code=HTTPStatus.REQUEST_TIMEOUT)
         return JSONResponse({"file": name})
 
-    return Starlette(routes=[Route("/", page), Route("/{name}", page, methods=["GET"]),
-                             Route("/upload", upload, methods=["POST"]), WebSocketRoute("/live", tabs.serve)])
+    return Starlette(
+        routes=[
+            Route("/", page),
+            Route("/{name}", page, methods=["GET"]),
+            Route("/upload", upload, methods=["POST"]),
+            WebSocketRoute("/live", tabs.serve),
+        ]
+    )
 
 
 class StudioServer:
@@ -200,8 +226,9 @@ def require_libraries() -> None:
         raise MissingExtra("serving a page", "studio")
 
 
-def make_server(opening: Opening, port: int, forks: ForkServer
-                ) -> tuple[Server, Guard, tempfile.TemporaryDirectory[str]]:
+def make_server(
+    opening: Opening, port: int, forks: ForkServer
+) -> tuple[Server, Guard, tempfile.TemporaryDirectory[str]]:
     """The server, not started, who guards it, and the folder of what is dropped into its pages."""
     import h11
     import uvicorn
@@ -231,10 +258,21 @@ def make_server(opening: Opening, port: int, forks: ForkServer
     tabs = Tabs(forks, opening.write(Path(folder.name)), Path(folder.name))
     guard = Guard(application(tabs), port)
     config = uvicorn.Config(
-        guard, http=PatientProtocol, ws=WebSocketsSansIOProtocol, lifespan="off", loop="asyncio", log_config=None,
-        log_level="debug" if os.environ.get("HRSYNTH_DEBUG") else "critical", access_log=False, server_header=False,
-        proxy_headers=False, limit_concurrency=MOST_CONNECTIONS, ws_max_size=LARGEST_ASK, ws_per_message_deflate=False,
-        timeout_graceful_shutdown=int(FAREWELL_SECONDS))
+        guard,
+        http=PatientProtocol,
+        ws=WebSocketsSansIOProtocol,
+        lifespan="off",
+        loop="asyncio",
+        log_config=None,
+        log_level="debug" if os.environ.get("HRSYNTH_DEBUG") else "critical",
+        access_log=False,
+        server_header=False,
+        proxy_headers=False,
+        limit_concurrency=MOST_CONNECTIONS,
+        ws_max_size=LARGEST_ASK,
+        ws_per_message_deflate=False,
+        timeout_graceful_shutdown=int(FAREWELL_SECONDS),
+    )
     return uvicorn.Server(config), guard, folder
 
 

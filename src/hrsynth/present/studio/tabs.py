@@ -52,8 +52,9 @@ class Opening:
     def message(self, tab: str) -> str:
         """What a tab is told first."""
         start = None if self.given is None else {"source": "given", "options": {}}
-        return json.dumps({"tab": tab, "start": start, "folder": self.folder is not None, "panels": self.panels,
-                           **self.first})
+        return json.dumps(
+            {"tab": tab, "start": start, "folder": self.folder is not None, "panels": self.panels, **self.first}
+        )
 
 
 class BrowserTab:
@@ -62,10 +63,12 @@ class BrowserTab:
     def __init__(self, socket: WebSocket, uploads: UploadFolder, forks: ForkServer, opening: Opening) -> None:
         self.socket, self.uploads = socket, uploads
         folder = opening.folder
-        setup = json.dumps({"folder": None if folder is None else str(folder), "uploads": str(uploads.folder),
-                            "given": opening.given}).encode()
-        self.mover, self.desk = (WorkerProcess(forks, setup, seconds, socket.send_text)
-                                 for seconds in (MOVE_SECONDS, ASK_SECONDS))
+        setup = json.dumps(
+            {"folder": None if folder is None else str(folder), "uploads": str(uploads.folder), "given": opening.given}
+        ).encode()
+        self.mover, self.desk = (
+            WorkerProcess(forks, setup, seconds, socket.send_text) for seconds in (MOVE_SECONDS, ASK_SECONDS)
+        )
 
     async def run(self) -> None:
         """Answer until the socket is closed, from whichever side."""

@@ -84,8 +84,9 @@ def _warm(desk: Callable[..., Any], kind: str) -> None:
     gc.freeze()
 
 
-def _fork(channel: socket.socket, children: dict[int, socket.socket], others: list[socket.socket],
-          desk: Callable[..., Any]) -> None:
+def _fork(
+    channel: socket.socket, children: dict[int, socket.socket], others: list[socket.socket], desk: Callable[..., Any]
+) -> None:
     """A child at a channel; where no process is to be had the other end sees the channel closed."""
     try:
         pid = os.fork()

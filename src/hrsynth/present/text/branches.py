@@ -15,10 +15,17 @@ UNITS = "metres and radians"
 
 def branch(found: BranchProof) -> str:
     """The robot, then each part: its box, how much of it is proved, and what ends that."""
-    rows: Rows = [robot_row(found.robot), ("motors", ", ".join(found.motors)),
-                  ("passive", f"{len(found.passive)} coordinates"
-                   + (f", {len(found.held)} idle ones held" if found.held else "")),
-                  ("box", found.box), ("units", UNITS), *limits(found)]
+    rows: Rows = [
+        robot_row(found.robot),
+        ("motors", ", ".join(found.motors)),
+        (
+            "passive",
+            f"{len(found.passive)} coordinates" + (f", {len(found.held)} idle ones held" if found.held else ""),
+        ),
+        ("box", found.box),
+        ("units", UNITS),
+        *limits(found),
+    ]
     for part in found.parts:
         rows += _part(part)
     if not found.parts:
@@ -44,35 +51,62 @@ def _back(found: BranchProof) -> Rows:
     else:
         (low, high), (least, most) = found.back, found.proved
         whole = bool((low == least).all() and (high == most).all())
-        rows.append(("way back", f"no two motor settings in {'' if whole else 'a part of '}the proved box give the "
-                     "same platform pose on this branch, proved"))
+        rows.append(
+            (
+                "way back",
+                f"no two motor settings in {'' if whole else 'a part of '}the proved box give the "
+                "same platform pose on this branch, proved",
+            )
+        )
         if not whole:
-            rows.append(("that part", [f"{name} {a:.6g} to {b:.6g}" for name, a, b in
-                                       zip(found.motors, low, high, strict=True)]))
+            rows.append(
+                (
+                    "that part",
+                    [f"{name} {a:.6g} to {b:.6g}" for name, a, b in zip(found.motors, low, high, strict=True)],
+                )
+            )
     if found.regular:
         rows.append(("Type 1", "no such singularity on this branch in the proved box, proved"))
     return rows
 
 
 def _part(part: BranchPart) -> Rows:
-    bounds = [f"{name} {low:.6g} to {high:.6g} (of {first:.6g} to {last:.6g})" for name, low, high, first, last in
-              zip(part.motors, *part.proved, *part.asked, strict=True)]
+    bounds = [
+        f"{name} {low:.6g} to {high:.6g} (of {first:.6g} to {last:.6g})"
+        for name, low, high, first, last in zip(part.motors, *part.proved, *part.asked, strict=True)
+    ]
     rows: Rows = [("", ""), ("from", ", ".join(part.motors)), ("to", ", ".join(part.passive))]
     if not part.cells:
         return [*rows, ("branch", "undecided: no cell about the zero configuration could be proved")]
     weakest = min(cell.weakest for cell in part.cells)
     whole = part.share == 1.0
     but = " except for the redundant equations, which are bounded" if part.closed_to else ""
-    rows += [("branch", ("one branch, proved in the whole box" if whole else
-                         f"one branch, proved in {part.percent} % of the box") + but),
-             ("cells", f"{len(part.cells)}; smallest singular value of the loops at least {weakest:.3g}")]
+    rows += [
+        (
+            "branch",
+            ("one branch, proved in the whole box" if whole else f"one branch, proved in {part.percent} % of the box")
+            + but,
+        ),
+        ("cells", f"{len(part.cells)}; smallest singular value of the loops at least {weakest:.3g}"),
+    ]
     if not whole:
         rows.append(("proved box", bounds))
-    rows += [(f"turn of {name}", "comes back to itself" if same else "does not come back to itself")
-             for name, same in part.turns]
+    rows += [
+        (f"turn of {name}", "comes back to itself" if same else "does not come back to itself")
+        for name, same in part.turns
+    ]
     if part.redundant:
-        rows.append(("redundant", part.redundant + (
-            f": each holds to {part.closed_to:.2g} (cosines, or characteristic lengths)" if part.closed_to else "")))
+        rows.append(
+            (
+                "redundant",
+                part.redundant
+                + (
+                    f": each holds to {part.closed_to:.2g} (cosines, or characteristic lengths)"
+                    if part.closed_to
+                    else ""
+                ),
+            )
+        )
     return rows + ends(part)
 
 

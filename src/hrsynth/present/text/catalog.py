@@ -22,9 +22,13 @@ def entries(records: Sequence[Record], total: int, groups: Sequence[str] = ()) -
     """A line an entry, the first of many, and how many of all they are, in which groups; no others are looked at."""
     tables = [name for name in groups if name[:1].isdigit()]
     count = f"{len(records)} of {total} architectures" + "".join(
-        f" {what} {', '.join(names)}" for what, names in (
+        f" {what} {', '.join(names)}"
+        for what, names in (
             ("in the groups", [name for name in groups if name not in tables]),
-            ("and of published robots", tables)) if names)
+            ("and of published robots", tables),
+        )
+        if names
+    )
     if len(records) > SHOWN:
         count += f", the first {SHOWN} shown (all with --json; --legs, --motion, --verdict … ask for fewer)"
     return f"{table([_row(record) for record in records[:SHOWN]], HEADS)}\n\n{count}" if records else count
@@ -37,8 +41,10 @@ def entry(record: Record, drawn: str, note: str = "", smallest: Sequence[Record]
     return "\n\n".join([head, *legs, listing(_all(record, smallest)), *filter(None, [note])])
 
 
-LISTED: Mapping[str, type] = {**dict.fromkeys(("notation", "motion", "verdict"), str),
-                              **dict.fromkeys(("dof", "rank", "fewest"), int)}
+LISTED: Mapping[str, type] = {
+    **dict.fromkeys(("notation", "motion", "verdict"), str),
+    **dict.fromkeys(("dof", "rank", "fewest"), int),
+}
 """What every record that was not refused says in a list, and of which type."""
 TOLD: Mapping[str, type] = {**LISTED, "exact": bool, **dict.fromkeys(("mobility", "idle", "instances"), int)}
 """The same of one that is shown in full."""
@@ -46,8 +52,10 @@ TOLD: Mapping[str, type] = {**LISTED, "exact": bool, **dict.fromkeys(("mobility"
 
 def describe_built(groups: Iterable[Mapping[str, Any]]) -> str:
     """A line a group that was built."""
-    rows = [(*(str(each[name]) for name in ("group", "words", "now", "before")), each["file"] or "not complete")
-            for each in groups]
+    rows = [
+        (*(str(each[name]) for name in ("group", "words", "now", "before")), each["file"] or "not complete")
+        for each in groups
+    ]
     return table(rows, ("group", "words", "made now", "before", "file"))
 
 
@@ -61,17 +69,27 @@ def require_whole(record: Record, needed: Mapping[str, type]) -> None:
     """Raise ``BadRequest`` for a record of a file that does not say all that is shown, as a build does."""
     wrong = [name for name, kind in needed.items() if not isinstance(record.get(name), kind)]
     if wrong and "refused" not in record:
-        raise BadRequest(f"the catalog's record of {record['word'][:60]!r} is not whole", ", ".join(wrong),
-                         "records as hrsynth catalog build writes them")
+        raise BadRequest(
+            f"the catalog's record of {record['word'][:60]!r} is not whole",
+            ", ".join(wrong),
+            "records as hrsynth catalog build writes them",
+        )
 
 
 def _row(record: Record) -> tuple[str, ...]:
     require_whole(record, LISTED)
     if "refused" in record:
         return (record["word"], record.get("notation", ""), "", "", "", "refused", "", str(record["refused"]))
-    return (record["word"], record["notation"], str(record["dof"]), record["motion"], record.get("hidden", "none"),
-            record["verdict"], f"{record['rank']} of {record['dof']}",
-            ": ".join(filter(None, [str(record["fewest"]), _sets(record)])))
+    return (
+        record["word"],
+        record["notation"],
+        str(record["dof"]),
+        record["motion"],
+        record.get("hidden", "none"),
+        record["verdict"],
+        f"{record['rank']} of {record['dof']}",
+        ": ".join(filter(None, [str(record["fewest"]), _sets(record)])),
+    )
 
 
 def _sets(record: Record) -> str:
@@ -108,16 +126,25 @@ def facts(record: Record, smallest: Sequence[Record] = ()) -> Iterable[tuple[str
     if record.get("minimal"):
         yield f"{what} needed", _sets(record)
     if any(each["hidden"] != record.get("hidden") for each in smallest):
-        yield "hidden robots", "; ".join(f"{{{', '.join(each['legs'])}}}: {each['hidden'] or each['problem'] or 'none'}"
-                                         for each in smallest)
+        yield (
+            "hidden robots",
+            "; ".join(
+                f"{{{', '.join(each['legs'])}}}: {each['hidden'] or each['problem'] or 'none'}" for each in smallest
+            ),
+        )
     if record.get("condition"):
         yield "Type 2", str(record["condition"])
     if record.get("modes_bound") is not None:
         legs = f" with {what} {', '.join(record['modes_legs'])} {told}" if record.get("modes_legs") else ""
         proof = f", {PROOFS[record['modes_proof']]}" if record.get("modes_proof") in PROOFS else ""
         near = next((each["near"] for each in smallest if each["legs"] == record.get("modes_legs")), None)
-        yield "modes", (f"{record['modes_seen']} real seen of {record['modes_bound']} complex{legs}{proof}; "
-                        f"near modes {'not counted' if near is None else f'found: {near}'}")
+        yield (
+            "modes",
+            (
+                f"{record['modes_seen']} real seen of {record['modes_bound']} complex{legs}{proof}; "
+                f"near modes {'not counted' if near is None else f'found: {near}'}"
+            ),
+        )
     elif record["rank"] < record["dof"]:
         yield "modes", f"a continuum of dimension {record['dof'] - record['rank']} with all {what} {told}"
     if record.get("cure"):

@@ -23,13 +23,25 @@ def endings(found: Endings) -> str:
     drawn = [each for each in found.rests if each.stability in ("stable", "undecided")]
     others = [each for each in found.rests if each.stability not in ("stable", "undecided")]
     boxed = [each for each in found.rests if each.proved]
-    rows: Rows = [*head(found.setting), *camera(found.setting), ("goal", str(found.pose)),
-                  *([] if found.depth == "exact" else [("depth", f"{found.depth}, as the law assumes it")]), *GAP,
-                  ("attract", table(_lines(drawn)[0], HEADS).splitlines()), *GAP]
+    rows: Rows = [
+        *head(found.setting),
+        *camera(found.setting),
+        ("goal", str(found.pose)),
+        *([] if found.depth == "exact" else [("depth", f"{found.depth}, as the law assumes it")]),
+        *GAP,
+        ("attract", table(_lines(drawn)[0], HEADS).splitlines()),
+        *GAP,
+    ]
     if any(each.beyond for each in drawn):
         inside = [each for each in drawn if not each.beyond]
-        rows[-1:] = [("", f"within all limits of joints {len(inside)} of these {len(drawn)}"
-                          + (": the goal alone" if [each.kind for each in inside] == ["goal"] else "")), *GAP]
+        rows[-1:] = [
+            (
+                "",
+                f"within all limits of joints {len(inside)} of these {len(drawn)}"
+                + (": the goal alone" if [each.kind for each in inside] == ["goal"] else ""),
+            ),
+            *GAP,
+        ]
     if others:
         lines, counts = _lines(others)
         left = sum(counts[LISTED_SADDLES:])
@@ -37,8 +49,16 @@ def endings(found: Endings) -> str:
         rows += [("do not", [*told, *([f"and {left} more (--json lists them)"] if left > 0 else [])]), *GAP]
     rows += [("enclosed", _describe_enclosed(found, boxed)), *GAP]
     rows += [("continua", [f"‖e‖ = {each.error:.3g}, {each.stability}{_why(each)}" for each in found.continua])]
-    rows += [("all", [*(_signs(each, found) for each in found.lists if _are_met(each)),
-                      *_others(found, [each for each in found.lists if not _are_met(each)]), *_complete(found)])]
+    rows += [
+        (
+            "all",
+            [
+                *(_signs(each, found) for each in found.lists if _are_met(each)),
+                *_others(found, [each for each in found.lists if not _are_met(each)]),
+                *_complete(found),
+            ],
+        )
+    ]
     return listing(rows)
 
 
@@ -55,8 +75,11 @@ def _others(found: Endings, unmet: list[SignedModes]) -> list[str]:
     proved = sum(each.empty for each in unmet)
     if not unmet:
         return []
-    what = (f"{name_all('leg', unmet[0].reversed)} reversed" if len(unmet) == 1 else
-            f"{len(unmet)} other choices of reversed legs")
+    what = (
+        f"{name_all('leg', unmet[0].reversed)} reversed"
+        if len(unmet) == 1
+        else f"{len(unmet)} other choices of reversed legs"
+    )
     if proved < len(unmet):
         return [f"poses with {what}: none found, not proved"]
     return [f"poses with {what}: none, proved by boxes of poses{_turned(found, unmet[0].turns)}"]
@@ -67,11 +90,17 @@ def _complete(found: Endings) -> list[str]:
     if found.cover is None:
         return [f"the others are found, not proved to be all: {found.search.words}"]
     if not found.cover.complete:
-        return [f"the others are found, not proved to be all: {found.search.words}", found.cover.reason,
-                *_alone(found.cover)]
+        return [
+            f"the others are found, not proved to be all: {found.search.words}",
+            found.cover.reason,
+            *_alone(found.cover),
+        ]
     told, turns = found.cover, len(found.cover.cover.turns)
-    where = ("wherever the legs reach" if told.within is None else
-             f"with the point within {told.within:.3g} m of the goal's either way")
+    where = (
+        "wherever the legs reach"
+        if told.within is None
+        else f"with the point within {told.within:.3g} m of the goal's either way"
+    )
     if told.cover.struts is not None:
         where += f", while the platform translates, in {'the one turn' if turns == 1 else f'each of the {turns} turns'}"
         where += " in which it can"
@@ -81,17 +110,22 @@ def _complete(found: Endings) -> list[str]:
     apart = [f"the joints of {name_all('leg', told.cover.unread)} lock"] if told.cover.unread else []
     if told.unstretched is not None:
         apart += [f"leg {' or '.join(told.unstretched)} is stretched or has no length"] if told.unstretched else []
-        apart += ["a watched direction is at right angles to the desired one" if told.across == 1 else
-                  "both watched directions are at right angles to the desired ones"]
+        apart += [
+            "a watched direction is at right angles to the desired one"
+            if told.across == 1
+            else "both watched directions are at right angles to the desired ones"
+        ]
     where += f", except for poses at which {', or '.join(apart)}" if apart else ""
-    lines = [f"all rests, proved by {told.cover.boxes:,} boxes of poses: no other in any working mode of the legs, "
-             f"{where}"]
+    lines = [
+        f"all rests, proved by {told.cover.boxes:,} boxes of poses: no other in any working mode of the legs, {where}"
+    ]
     if told.crossings:
         lines += [f"except for rests that fill curves, at {told.crossings} points at which the joints of two legs lock"]
     if told.locked:
         most = max(within for _, within in told.locked)
-        lines += [f"except for {len(told.locked)} places, each within {1e3 * most:.2g} mm, at which legs may lock each "
-                  "other:"]
+        lines += [
+            f"except for {len(told.locked)} places, each within {1e3 * most:.2g} mm, at which legs may lock each other:"
+        ]
         places = max(0, math.ceil(-math.log10(most)))
         lines += [f"  ({', '.join(f'{round(float(x), places) + 0.0:g}' for x in p)}) m" for p, _ in told.locked]
     if told.apart:
@@ -103,10 +137,18 @@ def _alone(cover: RestCover) -> list[str]:
     """Critical poses that boxes alone prove, those at which E is least around first."""
     some = sorted(cover.alone, key=lambda each: each.stability in ("saddle", "unstable"))
     left = len(some) - LISTED_SADDLES
-    return [*([f"{len(some)} critical poses that boxes prove are not listed above, as the robot could not be closed "
-               "there or the command as computed does not vanish (so where joints lock):"] if some else []),
-            *(f"  {each.stability} at {each.pose}, ‖e‖ = {each.error[0]:.3g}" for each in some[:LISTED_SADDLES]),
-            *([f"  and {left} more (--json lists them)"] if left > 0 else [])]
+    return [
+        *(
+            [
+                f"{len(some)} critical poses that boxes prove are not listed above, as the robot could not be closed "
+                "there or the command as computed does not vanish (so where joints lock):"
+            ]
+            if some
+            else []
+        ),
+        *(f"  {each.stability} at {each.pose}, ‖e‖ = {each.error[0]:.3g}" for each in some[:LISTED_SADDLES]),
+        *([f"  and {left} more (--json lists them)"] if left > 0 else []),
+    ]
 
 
 def _describe_enclosed(found: Endings, boxed: list[RestPoint]) -> list[str]:
@@ -115,17 +157,21 @@ def _describe_enclosed(found: Endings, boxed: list[RestPoint]) -> list[str]:
         return []
     wide = max(each.shift for each in boxed), max(each.turn for each in boxed)
     what = "the loops" if not found.measured else f"the loops, of {', '.join(found.measured)} as far as independent"
-    return [f"{len(boxed)} of {len(found.rests)}: each the only rest in a box of joint coordinates, proved for {what}",
-            f"which puts it within {1e3 * wide[0]:.1g} mm and {wide[1]:.1g} rad; whether it attracts is proved for "
-            f"{sum(each.decided for each in boxed)}"]
+    return [
+        f"{len(boxed)} of {len(found.rests)}: each the only rest in a box of joint coordinates, proved for {what}",
+        f"which puts it within {1e3 * wide[0]:.1g} mm and {wide[1]:.1g} rad; whether it attracts is proved for "
+        f"{sum(each.decided for each in boxed)}",
+    ]
 
 
 def _lines(rests: list[RestPoint]) -> tuple[list[list[str]], list[int]]:
     """A row a rest, and one, with their number, of those whose rows would be equal: rods point the other way, or other
     links stand elsewhere, as rests with the same poses and measurements are one."""
     rows = Counter(tuple(_line(each)) for each in rests)
-    return [[*row, notes if count == 1 else f"{notes}{'; ' * bool(notes)}{count} rests, whose links stand differently"]
-            for (*row, notes), count in rows.items()], list(rows.values())
+    return [
+        [*row, notes if count == 1 else f"{notes}{'; ' * bool(notes)}{count} rests, whose links stand differently"]
+        for (*row, notes), count in rows.items()
+    ], list(rows.values())
 
 
 def _line(each: RestPoint) -> list[str]:
@@ -148,8 +194,13 @@ def _line(each: RestPoint) -> list[str]:
         notes.append(f"a near mode: no direction differs by more than {degrees(each.error)}")
     if each.rates and each.kind == "critical":
         notes.append(f"rates {', '.join(f'{(low + high) / 2:.3g}' for low, high in each.rates)}")
-    return [each.kind, f"{each.error:.3g}" if each.kind == "critical" else "0", each.stability, str(each.pose),
-            "; ".join(notes)]
+    return [
+        each.kind,
+        f"{each.error:.3g}" if each.kind == "critical" else "0",
+        each.stability,
+        str(each.pose),
+        "; ".join(notes),
+    ]
 
 
 def _signs(each: SignedModes, found: Endings) -> str:
@@ -161,15 +212,19 @@ def _signs(each: SignedModes, found: Endings) -> str:
         return f"poses {which}: {each.boxes}, proved to be all by boxes of poses{_turned(found, each.turns)}"
     more = each.turns > 1 and each.boxes is not None
     return f"poses {which}: {each.listed.count}, {all_of(each.listed)}" + (
-        f"; {each.boxes} in the {each.turns} turns in which the platform translates" if more else "")
+        f"; {each.boxes} in the {each.turns} turns in which the platform translates" if more else ""
+    )
 
 
 def _turned(found: Endings, turns: int = 1) -> str:
     """How a platform that only translates is turned where boxes looked; empty where it turns."""
     if found.setting.motion.rotations.shape[1]:
         return ""
-    return (", with the platform turned as at the goal" if turns == 1 else
-            f", in the {turns} turns in which the platform translates")
+    return (
+        ", with the platform turned as at the goal"
+        if turns == 1
+        else f", in the {turns} turns in which the platform translates"
+    )
 
 
 def _why(each: RestPoint) -> str:

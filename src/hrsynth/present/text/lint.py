@@ -44,8 +44,9 @@ def github(found: Lint) -> str:
 
 def _command(finding: Finding) -> str:
     place: dict[str, object] = {"file": finding.file, "line": finding.line, "title": finding.rule}
-    properties = ",".join(f"{key}={_escape(str(value), {':': '%3A', ',': '%2C'})}" for key, value in place.items()
-                          if value is not None)
+    properties = ",".join(
+        f"{key}={_escape(str(value), {':': '%3A', ',': '%2C'})}" for key, value in place.items() if value is not None
+    )
     text = finding.message if finding.advice is None else f"{finding.message} → {finding.advice}"
     return f"::{LEVELS[finding.severity]} {properties}::{_escape(text)}"
 
@@ -62,16 +63,37 @@ def sarif(found: Lint) -> str:
 
     rules = [rule for rule in lint_rules().values() if rule.name in found.rules]
     place = {rule.name: number for number, rule in enumerate(rules)}
-    driver = {"name": "hrsynth", "version": __version__, "semanticVersion": __version__, "rules": [
-        {"id": rule.name, "shortDescription": {"text": rule.title}, "fullDescription": {"text": rule.explanation},
-         "help": {"text": rule.advice}, "defaultConfiguration": {"level": rule.severity}} for rule in rules]}
-    results = [{"ruleId": each.rule, "ruleIndex": place[each.rule], "level": each.severity,
-                "message": {"text": each.message}, "locations": [{"physicalLocation": _location(each)}]}
-               for each in found.findings]
+    driver = {
+        "name": "hrsynth",
+        "version": __version__,
+        "semanticVersion": __version__,
+        "rules": [
+            {
+                "id": rule.name,
+                "shortDescription": {"text": rule.title},
+                "fullDescription": {"text": rule.explanation},
+                "help": {"text": rule.advice},
+                "defaultConfiguration": {"level": rule.severity},
+            }
+            for rule in rules
+        ],
+    }
+    results = [
+        {
+            "ruleId": each.rule,
+            "ruleIndex": place[each.rule],
+            "level": each.severity,
+            "message": {"text": each.message},
+            "locations": [{"physicalLocation": _location(each)}],
+        }
+        for each in found.findings
+    ]
     run = {"tool": {"driver": driver}, "columnKind": "unicodeCodePoints", "results": results}
     if found.unread:
-        told = [{"level": "error", "message": {"text": each.text},
-                 "locations": [{"physicalLocation": _location(each)}]} for each in found.unread]
+        told = [
+            {"level": "error", "message": {"text": each.text}, "locations": [{"physicalLocation": _location(each)}]}
+            for each in found.unread
+        ]
         run["invocations"] = [{"executionSuccessful": False, "toolExecutionNotifications": told}]
     return json.dumps({"$schema": SCHEMA, "version": "2.1.0", "runs": [run]}, ensure_ascii=False, indent=2)
 

@@ -42,9 +42,14 @@ if TYPE_CHECKING:
     from ...analysis.posture import Distances, Kinds, Posture
     from ...analysis.singularity.singular import Singularity
 
-STATES = {REGULAR: "regular", "type1": "Type 1 singularity", "type2": "Type 2 singularity",
-           "type3": "Type 3 singularity (Type 1 and 2 at once)", CONSTRAINT: "constraint singularity",
-           UNDECIDED: "not decided"}
+STATES = {
+    REGULAR: "regular",
+    "type1": "Type 1 singularity",
+    "type2": "Type 2 singularity",
+    "type3": "Type 3 singularity (Type 1 and 2 at once)",
+    CONSTRAINT: "constraint singularity",
+    UNDECIDED: "not decided",
+}
 _SINCE = {"hidden": "the observed directions", "real": "the motors' coordinates"}
 
 
@@ -52,11 +57,19 @@ def check(found: Check) -> str:
     """What is observed, a block for each pose, then redundant constraints and the grid in numbers."""
     seen = [f"{leg} ({', '.join(each)})" for leg, each in describe_watched(found.setting).items()]
     generic, written = found.setting.mobility, found.as_written
-    rows = [head(found.setting)[0], ("observed", seen), *camera(found.setting),
-            *known_row("mobility", None if written in (None, generic) else
-                   f"{written.total} as the file is written, {generic.total} in normal form"),
-            ("lengths in", f"{found.length:.4g} m (the characteristic length), angles in radians"),
-            *dropped_limits(found.setting)]
+    rows = [
+        head(found.setting)[0],
+        ("observed", seen),
+        *camera(found.setting),
+        *known_row(
+            "mobility",
+            None
+            if written in (None, generic)
+            else f"{written.total} as the file is written, {generic.total} in normal form",
+        ),
+        ("lengths in", f"{found.length:.4g} m (the characteristic length), angles in radians"),
+        *dropped_limits(found.setting),
+    ]
     for posture in found.postures:
         rows += [*GAP, ("pose", str(posture.pose)), *_posture(posture, found.length, found.setting)]
     for each in found.unreached:
@@ -69,12 +82,18 @@ def check(found: Check) -> str:
         size = " × ".join(f"{count} {name}" for count, name in axes)
         fixed, free = str(found.grid.grid.fixed), ", ".join(_free(found.grid))
         beyond = sum(bool(each.beyond) for each in found.grid.postures if each is not None)
-        rows.append(("grid", [
-            f"{size}: " + ", ".join(f"{counts[state]} {state}" for state in sorted(counts)),
-            *([found.grid.dependent] if found.grid.dependent else []),
-            *([f"{beyond} beyond limits of joints"] if beyond else []),
-            *([f"held: {fixed}"] if fixed else []),
-            f"free, at each pose nearest to the zero configuration: {free}" if free else "no part is free"]))
+        rows.append(
+            (
+                "grid",
+                [
+                    f"{size}: " + ", ".join(f"{counts[state]} {state}" for state in sorted(counts)),
+                    *([found.grid.dependent] if found.grid.dependent else []),
+                    *([f"{beyond} beyond limits of joints"] if beyond else []),
+                    *([f"held: {fixed}"] if fixed else []),
+                    f"free, at each pose nearest to the zero configuration: {free}" if free else "no part is free",
+                ],
+            )
+        )
     return listing(rows)
 
 
@@ -91,20 +110,40 @@ def _posture(posture: Posture, length: float, setting: ObservedRobot) -> Rows:
     shown = "directions" if all(each.by_segment for each in setting.observed) else "observations"
     mobility, far, dof = posture.mobility, posture.distances, posture.dof
     whose = "bodies have" if setting.mechanism.formation else "platform has"
-    rows = [*beyond_limits(posture.beyond),
-            *(("flat wrist", f"the R that make {name} one S are {math.degrees(angle):.2g} degrees from where their "
-               "axes lie in a plane and turn it in two ways: not counted below")
-              for name, angle in posture.flat_wrists.items()),
-            ("mobility", f"{mobility.total}, of which {mobility.idle} idle; the {whose} " + (
-        "one freedom" if dof == 1 else f"{dof} freedoms")),
-            *_kinds("hidden robot", f"the {shown} show {posture.hidden.rank} of {dof}", posture.hidden, "not seen",
-                    whole=posture.hidden.rank == dof),
-            *([] if posture.formation is None else [("verdict here", posture.formation.verdict)]),
-            *formation(posture.formation)]
+    rows = [
+        *beyond_limits(posture.beyond),
+        *(
+            (
+                "flat wrist",
+                f"the R that make {name} one S are {math.degrees(angle):.2g} degrees from where their "
+                "axes lie in a plane and turn it in two ways: not counted below",
+            )
+            for name, angle in posture.flat_wrists.items()
+        ),
+        (
+            "mobility",
+            f"{mobility.total}, of which {mobility.idle} idle; the {whose} "
+            + ("one freedom" if dof == 1 else f"{dof} freedoms"),
+        ),
+        *_kinds(
+            "hidden robot",
+            f"the {shown} show {posture.hidden.rank} of {dof}",
+            posture.hidden,
+            "not seen",
+            whole=posture.hidden.rank == dof,
+        ),
+        *([] if posture.formation is None else [("verdict here", posture.formation.verdict)]),
+        *formation(posture.formation),
+    ]
     if far.condition is not None and far.type2 is not None and far.type1 is not None:
-        rows += [("", f"singular values of Mᵀ {far.type2:.3g} to {1 / far.type1:.3g}, condition {far.condition:.3g}"),
-                 *([("", f"one degree of error in the {shown}{_describe_moved(far, length)}")]
-                   if all(each.angular for each in setting.observed) else [])]
+        rows += [
+            ("", f"singular values of Mᵀ {far.type2:.3g} to {1 / far.type1:.3g}, condition {far.condition:.3g}"),
+            *(
+                [("", f"one degree of error in the {shown}{_describe_moved(far, length)}")]
+                if all(each.angular for each in setting.observed)
+                else []
+            ),
+        ]
         if far.condition > 1 / NOISE:
             rows.append(("", f"nearly singular: dimensions known to {NOISE:g} cannot tell it from a singularity"))
     elif far.type2 is None:
@@ -115,8 +154,9 @@ def _posture(posture: Posture, length: float, setting: ObservedRobot) -> Rows:
         rows += _kinds("real robot", f"the motors determine {posture.real.rank} of {dof}", posture.real, "not held")
     if posture.constraint_singular:
         rows.append(("loops", ["lose rank here, the platform has", *(freedom.name for freedom in posture.gained)]))
-    rows += [("redundant here", f"the loop {each.loop}: {each.rows} more of its constraints")
-             for each in posture.redundant]
+    rows += [
+        ("redundant here", f"the loop {each.loop}: {each.rows} more of its constraints") for each in posture.redundant
+    ]
     return [*rows, ("loops' margin", f"{far.constraints:.3g} (weakest singular value, as part of the largest)")]
 
 
@@ -133,11 +173,16 @@ def _kinds(name: str, what: str, kinds: Kinds, lost: str, *, whole: bool = True)
 
 def _describe_moved(far: Distances, length: float) -> str:
     """How far one degree of error moves the platform, where that is a small motion."""
-    if far.millimetres is None or far.degrees is None or not (
-            is_bounded(far.millimetres / 1e3, length) and is_bounded(math.radians(far.degrees))):
+    if (
+        far.millimetres is None
+        or far.degrees is None
+        or not (is_bounded(far.millimetres / 1e3, length) and is_bounded(math.radians(far.degrees)))
+    ):
         return f": {NOT_BOUNDED}"
-    return (f", to first order: {_small(far.millimetres)} mm and {_small(far.degrees)} degrees along the weakest "
-            "freedom that they show")
+    return (
+        f", to first order: {_small(far.millimetres)} mm and {_small(far.degrees)} degrees along the weakest "
+        "freedom that they show"
+    )
 
 
 def _small(value: float) -> str:
@@ -150,30 +195,58 @@ def singularity(found: Singularity) -> str:
     name, seen = head(found.setting)
     motors = dict.fromkeys(str(getattr(o, "joint", o.link)) for o in found.question.observations)
     rows: Rows = [
-        name, ("motors", ", ".join(motors)) if found.real else seen,
+        name,
+        ("motors", ", ".join(motors)) if found.real else seen,
         ("verdict", f"{found.verdict.verdict} (rank {found.verdict.rank} of {found.verdict.dof})"),
-        ("Type 2", found.words)]
+        ("Type 2", found.words),
+    ]
     if condition is not None:
-        rows += [("expression", f"{condition.expression}{' (never zero)' if condition.never else ' = 0'}"),
-                 ("factors", [f"{part}: {meaning}" for part, meaning in condition.parts]),
-                 ("where", [f"{name}: {meaning}" for name, meaning in condition.where.items()]),
-                 ("split off", list(condition.factors))]
+        rows += [
+            ("expression", f"{condition.expression}{' (never zero)' if condition.never else ' = 0'}"),
+            ("factors", [f"{part}: {meaning}" for part, meaning in condition.parts]),
+            ("where", [f"{name}: {meaning}" for name, meaning in condition.where.items()]),
+            ("split off", list(condition.factors)),
+        ]
     rows.append(("loops", list(found.unexamined)))
     if checked is not None:
-        rows.append(("checked", [
-            f"{checked.points} random poses and {len(checked.on_locus)} on the locus, {checked.disagreements} "
-            "disagreements of words, expression and rank",
-            *([] if isinstance(condition, General) else [
-                f"largest angle between a leg's named wrenches and the rank's {checked.largest_angle:.1e} rad"])]))
+        rows.append(
+            (
+                "checked",
+                [
+                    f"{checked.points} random poses and {len(checked.on_locus)} on the locus, {checked.disagreements} "
+                    "disagreements of words, expression and rank",
+                    *(
+                        []
+                        if isinstance(condition, General)
+                        else [
+                            "largest angle between a leg's named wrenches and the rank's "
+                            f"{checked.largest_angle:.1e} rad"
+                        ]
+                    ),
+                ],
+            )
+        )
         if condition is not None and condition.signed:
-            rows.append(("", f"expression positive at {checked.sides[0]}, negative at {checked.sides[1]} of the random "
-                         "poses"))
+            rows.append(
+                ("", f"expression positive at {checked.sides[0]}, negative at {checked.sides[1]} of the random poses")
+            )
     if condition is not None and not condition.never and not found.examples:
         searches = 0 if checked is None else checked.searches
         rows.append(("singular at", f"not found by {searches} searches, which does not mean that there are none"))
-    rows.append(("singular at", [line for each in found.examples for line in (
-        str(each.pose), f"  singular value {each.sigma:.1e}, a centimetre away up to {each.nearby:.1e}; lost: "
-        + "; ".join(freedom.name for freedom in each.lost))]))
+    rows.append(
+        (
+            "singular at",
+            [
+                line
+                for each in found.examples
+                for line in (
+                    str(each.pose),
+                    f"  singular value {each.sigma:.1e}, a centimetre away up to {each.nearby:.1e}; lost: "
+                    + "; ".join(freedom.name for freedom in each.lost),
+                )
+            ],
+        )
+    )
     return listing(rows)
 
 
@@ -187,12 +260,16 @@ def modes(found: AssemblyModes) -> str:
     if found.near:
         rows += [("alike", f"{found.alike} (found, not proved, for errors up to {np.degrees(found.bound):.3g}°)")]
     if count.continuum is None or count.complex is None:
-        rows += [("modes", f"{found.count}, {all_of(found)}"),
-                 ("proof", count.proof)]
+        rows += [("modes", f"{found.count}, {all_of(found)}"), ("proof", count.proof)]
     for each in count.meant:
         legs = ", ".join(found.labels[k] for k in each.legs)
-        rows.append(("meant", f"legs {legs} share a joint centre of the {each.where} (to {each.defect:.1e} m; "
-                              "--as-written takes the numbers as they are)"))
+        rows.append(
+            (
+                "meant",
+                f"legs {legs} share a joint centre of the {each.where} (to {each.defect:.1e} m; "
+                "--as-written takes the numbers as they are)",
+            )
+        )
     rows += [*known_row("special", count.degenerate), *dropped_limits(found.setting)]
     for number, motion in enumerate(found.motions, 1):
         place = "the pose itself" if motion.goal else str(found.pose_of(motion))
@@ -200,15 +277,45 @@ def modes(found: AssemblyModes) -> str:
         met = f"; {starts} ended on it, or on one like it" if motion.met else ""
         rows += [*GAP, (f"motion {number}", [f"through {place}, found, not proved: a self-motion {motion.words}{met}"])]
     for number, mode in enumerate(found.modes, 1):
-        rows += [*GAP, (f"mode {number}", [f"{mode.pose}" + ("   (the pose itself)" if mode.goal else ""),
-                 proof_words(mode) if mode.fits is not None else f"{proof_words(mode)}, residual {mode.residual:.1e}",
-                 *ahead(mode), *at_mode(mode, found)])]
+        rows += [
+            *GAP,
+            (
+                f"mode {number}",
+                [
+                    f"{mode.pose}" + ("   (the pose itself)" if mode.goal else ""),
+                    proof_words(mode)
+                    if mode.fits is not None
+                    else f"{proof_words(mode)}, residual {mode.residual:.1e}",
+                    *ahead(mode),
+                    *at_mode(mode, found),
+                ],
+            ),
+        ]
     for number, mode in enumerate(found.antipodal, 1):
-        rows += [*GAP, (f"antipodal {number}", [f"{mode.pose}   not a mode: the opposite value of "
-                                                f"{', '.join(mode.opposite)}", proof_words(mode), *ahead(mode)])]
+        rows += [
+            *GAP,
+            (
+                f"antipodal {number}",
+                [
+                    f"{mode.pose}   not a mode: the opposite value of {', '.join(mode.opposite)}",
+                    proof_words(mode),
+                    *ahead(mode),
+                ],
+            ),
+        ]
     for number, mode in enumerate(found.near, 1):
-        rows += [*GAP, (f"near {number}", [f"{mode.pose}   found, not proved; what is measured differs {mode.differs}",
-                                           *_rests(mode), *ahead(mode), *at_mode(mode, found)])]
+        rows += [
+            *GAP,
+            (
+                f"near {number}",
+                [
+                    f"{mode.pose}   found, not proved; what is measured differs {mode.differs}",
+                    *_rests(mode),
+                    *ahead(mode),
+                    *at_mode(mode, found),
+                ],
+            ),
+        ]
     return listing(rows)
 
 
@@ -220,11 +327,19 @@ def _describe_formation(found: AssemblyModes, rows: Rows) -> str:
     for word, listed in (("mode", found.modes), ("antipodal", found.antipodal)):
         for number, mode in enumerate(listed, 1):
             told = [f"{body}: {Pose.of(X)}" for body, X in (mode.bodies or {}).items()]
-            rows += [*GAP, (f"{word} {number}", [
-                *["the configuration itself"] * mode.goal,
-                *[f"not a mode: the opposite value of {', '.join(mode.opposite)}"] * bool(mode.opposite), *told,
-                f"residual {mode.residual:.1e}",
-                *[f"beyond the limits of {', '.join(mode.beyond)}"] * bool(mode.beyond)])]
+            rows += [
+                *GAP,
+                (
+                    f"{word} {number}",
+                    [
+                        *["the configuration itself"] * mode.goal,
+                        *[f"not a mode: the opposite value of {', '.join(mode.opposite)}"] * bool(mode.opposite),
+                        *told,
+                        f"residual {mode.residual:.1e}",
+                        *[f"beyond the limits of {', '.join(mode.beyond)}"] * bool(mode.beyond),
+                    ],
+                ),
+            ]
     return listing(rows)
 
 
@@ -253,14 +368,18 @@ def all_of(found: AssemblyModes) -> str:
     if found.found.complete:
         fitting = sum(mode.fits is not None and not mode.goal for mode in found.modes)
         return f"proved to be all among {found.within}" + (
-            f"; {fitting} of them fit{'s' * (fitting == 1)}, not proved" if fitting else "")
+            f"; {fitting} of them fit{'s' * (fitting == 1)}, not proved" if fitting else ""
+        )
     return "found, not proved to be all"
 
 
 def proof_words(mode: AssemblyMode) -> str:
     """What is proved of a mode's place."""
-    within = "" if not np.isfinite(mode.radius) else f"to {mode.shift:.1e} m" + (f", {mode.turn:.1e} rad" if mode.turn
-                                                                                 else "")
+    within = (
+        ""
+        if not np.isfinite(mode.radius)
+        else f"to {mode.shift:.1e} m" + (f", {mode.turn:.1e} rad" if mode.turn else "")
+    )
     known = f"known {within}" if within else "known to no radius"
     if mode.proved:
         return f"{', '.join(mode.enclosed)}{' ' if mode.enclosed else ''}enclosed {within}"
@@ -288,38 +407,49 @@ def at_mode(mode: AssemblyMode, found: AssemblyModes) -> list[str]:
 def assembly(mode: AssemblyMode, unlimited: Sequence[str] = ()) -> list[str]:
     """Whether the real robot can be assembled at a mode, and why not; ``unlimited`` joints have limits that are not
     looked at."""
+
     def several(noun: str, labels: Sequence[str]) -> str:
         return f"{noun}{'s' * (len(labels) > 1)} {', '.join(labels)}"
 
     match mode.assembly:
         case "yes":
-            return ["the real robot can be assembled there" + (
-                ", as far as limits are looked at" if unlimited else "")]
+            return ["the real robot can be assembled there" + (", as far as limits are looked at" if unlimited else "")]
         case "beyond limits":
-            return [f"the real robot can be assembled there only beyond limits of joints: as found, of "
-                    f"{', '.join(mode.beyond)}"]
+            return [
+                f"the real robot can be assembled there only beyond limits of joints: as found, of "
+                f"{', '.join(mode.beyond)}"
+            ]
         case "no":
-            return [f"the real robot cannot be assembled there: {several('leg', [leg for leg, _ in mode.misses])}",
-                    *(f"leg {leg}: {miss}" for leg, miss in mode.misses)]
-    where = (f"beyond the limits of {', '.join(mode.beyond)}" if mode.beyond else
-             f"with {' and '.join(several(*each) for each in mode.left_open)} left open")
+            return [
+                f"the real robot cannot be assembled there: {several('leg', [leg for leg, _ in mode.misses])}",
+                *(f"leg {leg}: {miss}" for leg, miss in mode.misses),
+            ]
+    where = (
+        f"beyond the limits of {', '.join(mode.beyond)}"
+        if mode.beyond
+        else f"with {' and '.join(several(*each) for each in mode.left_open)} left open"
+    )
     return [f"the real robot was found assembled there only {where}; whether it can be there otherwise is not known"]
 
 
 def path(found: PathAnswer) -> str:
     """The verdict with its reason, the values at the two poses, and the path."""
     value = "expression" if found.signed else "smallest singular value"
-    rows = [*head(found.setting), ("from", f"{found.start.pose}   ({value} {found.start.value:.4g})"),
-            ("to", f"{found.goal.pose}   ({value} {found.goal.value:.4g})"),
-            *known_row("", "start and goal are the same pose: there is no path to find" if found.stays else None),
-            ("verdict", [f"{found.verdict} ({'certified' if found.certified else 'not certified'})", found.reason])]
+    rows = [
+        *head(found.setting),
+        ("from", f"{found.start.pose}   ({value} {found.start.value:.4g})"),
+        ("to", f"{found.goal.pose}   ({value} {found.goal.value:.4g})"),
+        *known_row("", "start and goal are the same pose: there is no path to find" if found.stays else None),
+        ("verdict", [f"{found.verdict} ({'certified' if found.certified else 'not certified'})", found.reason]),
+    ]
     if found.margin is not None:
         where = "all along the path" if found.certified and found.ways else "at both poses"
         rows.append(("margin", f"|{value}| at least {found.margin:.3g} {where}, {found.boxes} intervals"))
     if found.ways:
         rows.append(("path" if found.certified else "best path", [str(pose) for pose in found.poses]))
-    rows.append(("crossings", [f"leg {leg} changes its working mode at {found.poses[place]}"
-                               for leg, place in found.crossings]))
+    rows.append(
+        ("crossings", [f"leg {leg} changes its working mode at {found.poses[place]}" for leg, place in found.crossings])
+    )
     if found.road is not None:
         rows.append(("sampled", road(found.road, value)))
     return listing([*rows, *known_row("not proved", found.not_proved if found.certified else None)])
@@ -328,8 +458,9 @@ def path(found: PathAnswer) -> str:
 def road(found: SampledRoad, value: str) -> list[str]:
     """What poses on the straight way say."""
     signs = {None: "", 0: ", the same sign at all of them"}.get(found.changes, f", {found.changes} changes of its sign")
-    lines = [f"|{value}| at least {found.least:.3g} at {found.count} poses of the straight path, least at {found.at}"
-             f"{signs}"]
+    lines = [
+        f"|{value}| at least {found.least:.3g} at {found.count} poses of the straight path, least at {found.at}{signs}"
+    ]
     if found.reached < 1:
         lines.append(f"the robot was not followed further than {100 * found.reached:.0f} % of that path")
     return lines + [f"{found.lost} is not in front of its camera all along it"] * (found.lost is not None)
@@ -344,9 +475,12 @@ def atlas(found: Atlas) -> str:
     rows = [*head(listed.setting), ("held", f"{_describe_held(listed)} at {listed.pose}")]
     if listed.found.continuum is not None:
         return listing([*rows, *known_row("special", listed.found.degenerate)])
-    rows += [("modes", f"{listed.count}, {all_of(listed)}"),
-             ("aspects", f"{found.aspects_met} of the hidden robot: {aspect_groups(found)}"),
-             ("cuspidal", _cuspidal(found)), *GAP]
+    rows += [
+        ("modes", f"{listed.count}, {all_of(listed)}"),
+        ("aspects", f"{found.aspects_met} of the hidden robot: {aspect_groups(found)}"),
+        ("cuspidal", _cuspidal(found)),
+        *GAP,
+    ]
     numbers = range(1, len(found.places) + 1)
     wide = len(str(len(found.places)))
     rows.append(("", "  ".join(f"{k:>{wide}}" for k in numbers)))
@@ -358,8 +492,10 @@ def atlas(found: Atlas) -> str:
     for pair in found.pairs:
         if pair.answer is not None or pair.verdict == UNDECIDED_PAIR:
             told.setdefault(pair_words(pair), []).append("{}, {}".format(*pair.numbers))
-    rows += [(first, [words, *textwrap.wrap("; ".join(rest), initial_indent="so are modes ")])
-             for words, (first, *rest) in told.items()]
+    rows += [
+        (first, [words, *textwrap.wrap("; ".join(rest), initial_indent="so are modes ")])
+        for words, (first, *rest) in told.items()
+    ]
     paths = [pair.answer for pair in found.pairs if pair.verdict == SAME and pair.answer is not None]
     passed = ", ".join(dict.fromkeys(name for each in paths for name in each.unlimited))
     return listing([*rows, *known_row("not proved", f"limits of joints {passed}" if passed else None)])
@@ -377,8 +513,10 @@ def _cuspidal(found: Atlas) -> list[str]:
     direct = [pair for pair in changes if pair.answer is not None and not pair.answer.crossings]
     one, other = (direct or changes)[0].numbers
     how = "no leg changes its working mode" if direct else "legs change their working modes"
-    return [f"yes: modes {one} and {other} have the same directions, and a certified path without",
-            f"Type 2 singularity leads from one to the other; {how} on it"]
+    return [
+        f"yes: modes {one} and {other} have the same directions, and a certified path without",
+        f"Type 2 singularity leads from one to the other; {how} on it",
+    ]
 
 
 def pair_words(pair: ModePair) -> str:

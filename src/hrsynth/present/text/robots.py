@@ -43,8 +43,13 @@ if TYPE_CHECKING:
 
 NO_FREEDOM = "the platform has no freedom"
 NO_MATRIX = "there is no interaction matrix: observed links move while the platform rests"
-_KINDS = {"leg": "leg (direction of its default segment)", "direction": "direction of another link",
-          "line": "position of an observed line", "encoder": "encoder on a joint", "offered": "--see"}
+_KINDS = {
+    "leg": "leg (direction of its default segment)",
+    "direction": "direction of another link",
+    "line": "position of an observed line",
+    "encoder": "encoder on a joint",
+    "offered": "--see",
+}
 _SHOWN = 6
 """Sets of measurements listed at most."""
 
@@ -55,16 +60,21 @@ def robot(found: Mechanism) -> str:
     from ...mechanism.normal import normal_form
     from ...mechanism.sensors import defaults_of
 
-    rows: Rows = [("links, joints", f"{len(found.links)}, {len(found.joints)}"), ("base", found.base),
-                  ("bodies", ", ".join(found.bodies)) if found.formation else ("platform", found.platform_words),
-                  ("motors", ", ".join(joint.name for joint in found.joints.values() if joint.actuated) or "none"),
-                  *known_row("camera on", found.reference if found.reference != found.base else None)]
+    rows: Rows = [
+        ("links, joints", f"{len(found.links)}, {len(found.joints)}"),
+        ("base", found.base),
+        ("bodies", ", ".join(found.bodies)) if found.formation else ("platform", found.platform_words),
+        ("motors", ", ".join(joint.name for joint in found.joints.values() if joint.actuated) or "none"),
+        *known_row("camera on", found.reference if found.reference != found.base else None),
+    ]
     try:
         anatomy = decompose(normal_form(found).mechanism)
         rows.insert(0, ("robot", f"{found.name}   {anatomy.architecture()}"))
         watched = {label: f"watched at {o.link}" for label, o in defaults_of(anatomy).items()}
-        rows += [(f"leg {leg.label}", watched.get(leg.label, "no segment with a direction of its own"))
-                 for leg in anatomy.legs]
+        rows += [
+            (f"leg {leg.label}", watched.get(leg.label, "no segment with a direction of its own"))
+            for leg in anatomy.legs
+        ]
     except HrsynthError as error:
         rows[:0] = [("robot", [found.name, str(error)])]
     return listing([*rows, ("note", [str(note) for note in found.notes])])
@@ -80,31 +90,52 @@ def derivation(found: Derivation) -> str:
     if found.verdict.formation is not None:
         dof[0] = f"{found.dof} of {len(found.verdict.formation.bodies)} bodies{dof[0].removeprefix(str(found.dof))}"
     rows: Rows = [
-        name, *_ends(observed.anatomy), ("dof", dof), seen, *camera(observed),
+        name,
+        *_ends(observed.anatomy),
+        ("dof", dof),
+        seen,
+        *camera(observed),
         ("hidden robot", str(hidden) if hidden else "none: every observed direction is constant"),
-        ("verdict", [found.verdict.verdict, *([NO_FREEDOM] if not found.dof else []),
-                     *([near(found.verdict)] if found.verdict.near else [])]),
+        (
+            "verdict",
+            [
+                found.verdict.verdict,
+                *([NO_FREEDOM] if not found.dof else []),
+                *([near(found.verdict)] if found.verdict.near else []),
+            ],
+        ),
         *formation(found.verdict.formation),
         ("mode", _modes(observed)),
         ("architecture", wrap_lines(exact_words(found.exact, found.verdict.rank), LINE - NAMES)),
-        *lost_rows(found.verdict), ("at zero", [f"{each} (hrsynth check)" for each in at_zero(found.verdict)]),
+        *lost_rows(found.verdict),
+        ("at zero", [f"{each} (hrsynth check)" for each in at_zero(found.verdict)]),
         ("", [] if found.verdict.has_interaction_matrix else NO_MATRIX),
         ("certificate", wrap_lines(certificate(found.certificate), LINE - NAMES)),
         ("equal where", wrap_lines("; ".join(found.equal_where), LINE - NAMES) if hidden else []),
     ]
     if unchecked is not None:
         equivalent = "equivalent" if unchecked.equivalent else "NOT equivalent"
-        rows.append(("unchecked", [f"{unchecked.hidden}: {equivalent} ({unchecked.reason})",
-                                   *(f"gains {freedom.name}" for freedom in unchecked.gains),
-                                   *(f"loses {freedom.name}" for freedom in unchecked.loses)]))
+        rows.append(
+            (
+                "unchecked",
+                [
+                    f"{unchecked.hidden}: {equivalent} ({unchecked.reason})",
+                    *(f"gains {freedom.name}" for freedom in unchecked.gains),
+                    *(f"loses {freedom.name}" for freedom in unchecked.loses),
+                ],
+            )
+        )
     return "\n".join([listing(rows), "", table(list(_attempts(found.steps)), ("rule", "leg", "taken", "angle", "why"))])
 
 
 def _ends(anatomy: LegDecomposition) -> Rows:
     """The link of an articulated platform on which each leg ends: with the same letters it makes another robot."""
     links = {leg.attach: [each.label for each in anatomy.legs if each.attach == leg.attach] for leg in anatomy.legs}
-    return [] if len(links) < 2 else [
-        ("legs end on", "; ".join(f"{link}: {', '.join(labels)}" for link, labels in links.items()))]
+    return (
+        []
+        if len(links) < 2
+        else [("legs end on", "; ".join(f"{link}: {', '.join(labels)}" for link, labels in links.items()))]
+    )
 
 
 def _attempts(steps: Sequence[Step]) -> Iterator[tuple[str, ...]]:
@@ -112,12 +143,17 @@ def _attempts(steps: Sequence[Step]) -> Iterator[tuple[str, ...]]:
     for back, each in groupby(steps, lambda step: step.taken_back):
         run = list(each)
         starts = [i for i, step in enumerate(run) if step.rule == run[0].rule] if back else [0]
-        for step in run[:starts[1]] if len(starts) > 1 else run:
+        for step in run[: starts[1]] if len(starts) > 1 else run:
             angle = "" if step.largest_angle is None else f"{step.largest_angle:.1e}"
             yield step.rule, step.leg or "all", "yes" if step.accepted else "no", angle, step.reason
         if starts[1:]:
-            yield run[0].rule, run[0].leg or "all", "no", "", (
-                f"{len(starts) - 1} more proposals, taken back as well (--json lists them)")
+            yield (
+                run[0].rule,
+                run[0].leg or "all",
+                "no",
+                "",
+                (f"{len(starts) - 1} more proposals, taken back as well (--json lists them)"),
+            )
 
 
 def lost_rows(found: Verdict) -> Rows:
@@ -131,46 +167,66 @@ def at_zero(found: Verdict) -> list[str]:
     rank = found.rank_at_zero
     if rank is None:
         return []
-    return [f"{f'only {rank}' if rank else 'none'} of {found.dof} freedoms seen: the zero configuration is a Type 2 "
-            "singularity"]
+    return [
+        f"{f'only {rank}' if rank else 'none'} of {found.dof} freedoms seen: the zero configuration is a Type 2 "
+        "singularity"
+    ]
 
 
 def formation(found: Formation | None) -> Rows:
     """What is not seen of a formation."""
     if found is None:
         return []
-    return [("trivial", list(found.trivial) or "no motion: all are seen, or flexes"),
-            ("flexes", [each.name for each in found.flexes] or "none"), *known_row("special", found.special or None)]
+    return [
+        ("trivial", list(found.trivial) or "no motion: all are seen, or flexes"),
+        ("flexes", [each.name for each in found.flexes] or "none"),
+        *known_row("special", found.special or None),
+    ]
 
 
 def _modes(observed: ObservedRobot) -> list[str]:
     """For which operation mode a verdict holds, where others were met."""
     found = observed.beside()
     own = observed.everything.signature
-    return [f"for the operation mode of the zero configuration: {own.dof} dof ({own.motion}), mobility {own.mobility}",
-            *(f"another that was met: {text}" for text in found)] if found else []
+    return (
+        [
+            f"for the operation mode of the zero configuration: {own.dof} dof ({own.motion}), mobility {own.mobility}",
+            *(f"another that was met: {text}" for text in found),
+        ]
+        if found
+        else []
+    )
 
 
 def near(found: Verdict) -> str:
     """How far a verdict is from another one, where that is not far."""
     counts = found.rank and found.counted < SURELY_SOMETHING
-    return (f"near another verdict: a motion that counts as {'seen' if counts else 'not seen'} has the singular value "
-            f"{found.counted if counts else found.dropped:.1e}, which counts above {RANK_CUTOFF:.0e} (rates of the "
-            "directions, characteristic lengths, radians)")
+    return (
+        f"near another verdict: a motion that counts as {'seen' if counts else 'not seen'} has the singular value "
+        f"{found.counted if counts else found.dropped:.1e}, which counts above {RANK_CUTOFF:.0e} (rates of the "
+        "directions, characteristic lengths, radians)"
+    )
 
 
 def certificate(found: Certificate) -> str:
     """How closely the hidden robot agrees with the real one, and how closely it must."""
-    return (f"{'passed' if found.passed else 'FAILED'} at {found.samples} configurations"
-            f" ({found.discarded} discarded): {found.reason + '; ' if found.reason else ''}"
-            f"largest angle {found.largest_angle:.1e} (allowed {SAME_RELATION:.0e}), smallest rank gap "
-            f"{found.smallest_gap:.1e} (needed {RANK_GAP:.0e}), follows to {found.residual:.1e}")
+    return (
+        f"{'passed' if found.passed else 'FAILED'} at {found.samples} configurations"
+        f" ({found.discarded} discarded): {found.reason + '; ' if found.reason else ''}"
+        f"largest angle {found.largest_angle:.1e} (allowed {SAME_RELATION:.0e}), smallest rank gap "
+        f"{found.smallest_gap:.1e} (needed {RANK_GAP:.0e}), follows to {found.residual:.1e}"
+    )
 
 
 def verdict(found: Verdict) -> str:
     """What a set of legs sees, and what it does not."""
-    return listing([("legs", ", ".join(found.legs)), ("verdict", f"{found.verdict} (rank {found.rank} of {found.dof})"),
-                    ("lost", [freedom.name for freedom in found.lost])])
+    return listing(
+        [
+            ("legs", ", ".join(found.legs)),
+            ("verdict", f"{found.verdict} (rank {found.rank} of {found.dof})"),
+            ("lost", [freedom.name for freedom in found.lost]),
+        ]
+    )
 
 
 def exact_words(exact: ExactVerdict, rank: int) -> str:
@@ -180,8 +236,10 @@ def exact_words(exact: ExactVerdict, rank: int) -> str:
     text = f"{exact.verdict}, {exact.reason}"
     if exact.rank == rank:
         return text
-    return (f"{text}: generic geometry sees {exact.rank} of {exact.dof} freedoms, this robot {rank}, because of its "
-            "dimensions")
+    return (
+        f"{text}: generic geometry sees {exact.rank} of {exact.dof} freedoms, this robot {rank}, because of its "
+        "dimensions"
+    )
 
 
 def exact_cell(exact: ExactVerdict, rank: int) -> str:
@@ -201,62 +259,99 @@ def unseen(found: Verdict) -> str:
 
 def legs(found: Legs) -> str:
     """The smallest sets of the best rank, and one line a set of legs."""
-    rows = [(", ".join(each.legs), each.verdict, f"{each.rank} of {each.dof}", exact_cell(exact, each.rank),
-             unseen(each))
-            for each, exact in zip(found.sets, found.exact, strict=True)]
+    rows = [
+        (", ".join(each.legs), each.verdict, f"{each.rank} of {each.dof}", exact_cell(exact, each.rank), unseen(each))
+        for each, exact in zip(found.sets, found.exact, strict=True)
+    ]
     lost = "lost" if any(ELSEWHERE in row[-1] for row in rows) else f"lost (at {found.where})"
     if found.setting.mechanism.formation:
         lost = f"not seen (at {found.where})"
-    lines = [f"{found.robot}   {found.architecture}   {found.dof} dof",
-             f"platform: {found.setting.robot.platform_words}", "",
-             *wrap_lines(f"smallest sets of the best rank: {found.smallest}" if found.dof else NO_FREEDOM, more="  "),
-             "",
-             table(rows, ("legs", "verdict", "rank", "exact", lost)), "",
-             *(line for leg, seen in describe_watched(found.setting).items()
-               for line in wrap_lines(f"leg {leg}: {', '.join(seen)}", more="  "))]
-    lines += [f"not decided in exact arithmetic: {reason}"
-              for reason in dict.fromkeys(each.reason for each in found.exact if not each.exact)]
+    lines = [
+        f"{found.robot}   {found.architecture}   {found.dof} dof",
+        f"platform: {found.setting.robot.platform_words}",
+        "",
+        *wrap_lines(f"smallest sets of the best rank: {found.smallest}" if found.dof else NO_FREEDOM, more="  "),
+        "",
+        table(rows, ("legs", "verdict", "rank", "exact", lost)),
+        "",
+        *(
+            line
+            for leg, seen in describe_watched(found.setting).items()
+            for line in wrap_lines(f"leg {leg}: {', '.join(seen)}", more="  ")
+        ),
+    ]
+    lines += [
+        f"not decided in exact arithmetic: {reason}"
+        for reason in dict.fromkeys(each.reason for each in found.exact if not each.exact)
+    ]
     chance = max(each.chance for each in found.exact)
     if chance:
         lines.append(f"exact except for a chance below {power_above(chance)}: identities tested at random instances")
     lines += [f"legs {', '.join(each.legs)}: {near(each)}" for each in found.sets if each.near]
-    fewer = [f"{{{', '.join(each.legs)}}} ({each.rank_at_zero} of {each.dof})" for each in found.sets
-             if each.rank_at_zero is not None]
+    fewer = [
+        f"{{{', '.join(each.legs)}}} ({each.rank_at_zero} of {each.dof})"
+        for each in found.sets
+        if each.rank_at_zero is not None
+    ]
     if fewer:
-        lines += wrap_lines(f"at {found.where}, a Type 2 singularity with these, fewer freedoms are seen: "
-                         + "  ".join(fewer), more="  ")
+        lines += wrap_lines(
+            f"at {found.where}, a Type 2 singularity with these, fewer freedoms are seen: " + "  ".join(fewer),
+            more="  ",
+        )
     lines += _modes(found.setting)
     if not found.complete:
-        lines.append("not all sets are listed, there are too many: " + (
-            "no other set as small has the best rank at the samples" if found.minimal_complete else
-            "from the smallest sets no leg can be left out, but a smaller set may exist"))
+        lines.append(
+            "not all sets are listed, there are too many: "
+            + (
+                "no other set as small has the best rank at the samples"
+                if found.minimal_complete
+                else "from the smallest sets no leg can be left out, but a smaller set may exist"
+            )
+        )
     return "\n".join(lines)
 
 
 def describe_export(found: ExportedCode) -> str:
     """What the code is of, and where it answers."""
     proof, bounds = found.proof, found.bounds
-    rows: Rows = [robot_row(proof.robot), ("language", found.lang), ("motors", ", ".join(proof.motors)),
-                  ("joints", f"{len(proof.passive)} passive, {len(proof.held)} idle (held)"),
-                  ("directions", ", ".join(found.legs) or "none"),
-                  ("inverse", "in closed form" if found.closed else "by Newton's method, from nearby motors"),
-                  ("steps", [f"{bounds.steps} of Newton's method are enough, and an answer is within "
-                             f"{bounds.error:.2g} of",
-                             "the closure (rad, 1 or characteristic lengths), rounding included, proved",
-                             *([f"whether {bounds.more} is checked at run time"] if bounds.others else [])]
-                   if bounds else "not bounded in all cells: what is not confirmed is undecided")]
+    rows: Rows = [
+        robot_row(proof.robot),
+        ("language", found.lang),
+        ("motors", ", ".join(proof.motors)),
+        ("joints", f"{len(proof.passive)} passive, {len(proof.held)} idle (held)"),
+        ("directions", ", ".join(found.legs) or "none"),
+        ("inverse", "in closed form" if found.closed else "by Newton's method, from nearby motors"),
+        (
+            "steps",
+            [
+                f"{bounds.steps} of Newton's method are enough, and an answer is within {bounds.error:.2g} of",
+                "the closure (rad, 1 or characteristic lengths), rounding included, proved",
+                *([f"whether {bounds.more} is checked at run time"] if bounds.others else []),
+            ]
+            if bounds
+            else "not bounded in all cells: what is not confirmed is undecided",
+        ),
+    ]
     rows.append(("units", UNITS))
     for part in proof.parts:
-        rows.append(("answers for", [f"{name} {low:.6g} to {high:.6g}" for name, low, high in
-                                     zip(part.motors, *part.proved, strict=True)]
-                     + [f"and in all of {part.in_cells}, {100 * part.share:.4g} % of the box"]))
+        rows.append(
+            (
+                "answers for",
+                [f"{name} {low:.6g} to {high:.6g}" for name, low, high in zip(part.motors, *part.proved, strict=True)]
+                + [f"and in all of {part.in_cells}, {100 * part.share:.4g} % of the box"],
+            )
+        )
         rows += ends(part)
     rows += [("in no loop", [f"{name} {low:.6g} to {high:.6g}" for name, low, high in found.free])] * bool(found.free)
     rows += limits(proof)
     if proof.back is not None:
-        rows.append(("way back", [f"{name} {low:.6g} to {high:.6g}" for name, low, high in
-                                  zip(proof.motors, *proof.back, strict=True)]
-                     + ["no two motor settings in this box give the same platform pose on this branch, proved"]))
+        rows.append(
+            (
+                "way back",
+                [f"{name} {low:.6g} to {high:.6g}" for name, low, high in zip(proof.motors, *proof.back, strict=True)]
+                + ["no two motor settings in this box give the same platform pose on this branch, proved"],
+            )
+        )
     return listing([*rows, ("size", f"{len(found.code.encode()) / 1024:.0f} kB")])
 
 
@@ -268,8 +363,12 @@ def code(found: ExportedCode) -> bytes:
 def advice(found: Advice) -> str:
     """What is seen now, then the smallest sets of measurements that cure it, by kind."""
     now = found.now
-    rows = [*head(found.setting), *camera(found.setting), ("verdict", f"{now.verdict} (rank {now.rank} of {now.dof})"),
-            *lost_rows(now)]
+    rows = [
+        *head(found.setting),
+        *camera(found.setting),
+        ("verdict", f"{now.verdict} (rank {now.rank} of {now.dof})"),
+        *lost_rows(now),
+    ]
     return "\n".join([listing(rows), "", *_missing(found)])
 
 
@@ -290,13 +389,24 @@ def _missing(found: Advice) -> list[str]:
     if any(each.price != len(each.measurements) for each in found.sets):
         what = f"further measurements at a price of {found.sets[0].price:g}"
     ways = "one way" if len(found.sets) == 1 else f"{len(found.sets)} ways"
-    lines = [f"{best.verdict.capitalize()} (rank {best.rank} of {best.dof}) with {what}, {ways}, smallest rank gap "
-             f"{gap:.1e} (needed {RANK_GAP:.0e}):",
-             *(f"  {line}" for group in groups.items() for way in _ways(*group)
-               for line in wrap_lines(way, LINE - 2, more="    "))]
+    lines = [
+        f"{best.verdict.capitalize()} (rank {best.rank} of {best.dof}) with {what}, {ways}, smallest rank gap "
+        f"{gap:.1e} (needed {RANK_GAP:.0e}):",
+        *(
+            f"  {line}"
+            for group in groups.items()
+            for way in _ways(*group)
+            for line in wrap_lines(way, LINE - 2, more="    ")
+        ),
+    ]
     starred = any(m.actuated for each in found.sets for m in each.measurements)
-    return [*lines, *(["* a joint with a motor"] if starred else []), *_singular(found), *_options_that_ask(found),
-            *limits]
+    return [
+        *lines,
+        *(["* a joint with a motor"] if starred else []),
+        *_singular(found),
+        *_options_that_ask(found),
+        *limits,
+    ]
 
 
 def _singular(found: Advice) -> list[str]:
@@ -308,8 +418,11 @@ def _singular(found: Advice) -> list[str]:
     more = "" if len(fewer) <= _SHOWN else f"  and {len(fewer) - _SHOWN} more (rank_at_zero with --json)"
     see = "sees fewer freedoms" if len(fewer) == 1 else "see fewer freedoms"
     title = f"{which} {see} at the zero configuration, a Type 2 singularity with them:"
-    return [title] if len(fewer) == len(found.sets) else [
-        title, *(f"  {line}" for line in wrap_lines("  ".join(sets(fewer[:_SHOWN])) + more, LINE - 2, more="  "))]
+    return (
+        [title]
+        if len(fewer) == len(found.sets)
+        else [title, *(f"  {line}" for line in wrap_lines("  ".join(sets(fewer[:_SHOWN])) + more, LINE - 2, more="  "))]
+    )
 
 
 def _options_that_ask(found: Advice) -> list[str]:
@@ -318,8 +431,11 @@ def _options_that_ask(found: Advice) -> list[str]:
         return []
     for each in sorted(found.sets, key=lambda each: each.verdict.rank_at_zero is not None):
         see = [m.of if m.kind == "offered" else f"encoder:{m.of}" for m in each.measurements if m.kind != "leg"]
-        if all(m.kind in ("leg", "offered") or (m.kind == "encoder" and m.of in found.setting.robot.joints
-                                                and m.axis is None) for m in each.measurements):
+        if all(
+            m.kind in ("leg", "offered")
+            or (m.kind == "encoder" and m.of in found.setting.robot.joints and m.axis is None)
+            for m in each.measurements
+        ):
             legs = ",".join([*found.setting.labels, *(m.of for m in each.measurements if m.kind == "leg")])
             return ["for other commands: " + " ".join([f"--observe {legs}", *(f"--see {text}" for text in see)])]
     return []
@@ -330,9 +446,14 @@ def _ways(kinds: tuple[str, ...], found: Sequence[tuple[FurtherMeasurement, ...]
     counts = {kind: kinds.count(kind) for kind in kinds}
     names = {kind: list(dict.fromkeys(m.name for each in found for m in each if m.kind == kind)) for kind in counts}
     if len(found) == prod(comb(len(names[kind]), count) for kind, count in counts.items()):
-        return [" and ".join(f"{_KINDS[kind]}: any {'' if count == 1 else f'{count} '}of {', '.join(names[kind])}"
-                             if len(names[kind]) > count else f"{_KINDS[kind]}: {', '.join(names[kind])}"
-                             for kind, count in counts.items())]
+        return [
+            " and ".join(
+                f"{_KINDS[kind]}: any {'' if count == 1 else f'{count} '}of {', '.join(names[kind])}"
+                if len(names[kind]) > count
+                else f"{_KINDS[kind]}: {', '.join(names[kind])}"
+                for kind, count in counts.items()
+            )
+        ]
     title = " and ".join(_KINDS[kind] if count == 1 else f"{count} × {_KINDS[kind]}" for kind, count in counts.items())
     shown = "  ".join(sets([m.name for m in each] for each in found[:_SHOWN]))
     more = "" if len(found) <= _SHOWN else f"  and {len(found) - _SHOWN} more (all with --json)"
@@ -346,9 +467,13 @@ def view(found: View) -> str:
         low, high = slider.values[0], slider.values[-1]
         ends = f"{degrees(low):.3g}° to {degrees(high):.3g}°" if slider.unit == "rad" else f"{low:.4g} to {high:.4g} m"
         sliders.append(f"{slider.name}: {ends}, {len(slider.values)} closed configurations")
-    return listing([
-        robot_row(found.setting.robot, found.machines[0].words),
-        head(found.setting)[1],
-        *(("hidden robot", machine.words) for machine in found.machines[1:]), ("sliders", sliders),
-        ("other modes", ", ".join(outline.label for outline in found.mode_outlines) or []),
-        *(("note", note) for note in found.notes)])
+    return listing(
+        [
+            robot_row(found.setting.robot, found.machines[0].words),
+            head(found.setting)[1],
+            *(("hidden robot", machine.words) for machine in found.machines[1:]),
+            ("sliders", sliders),
+            ("other modes", ", ".join(outline.label for outline in found.mode_outlines) or []),
+            *(("note", note) for note in found.notes),
+        ]
+    )

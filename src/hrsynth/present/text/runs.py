@@ -51,42 +51,83 @@ def servo(found: Servo) -> str:
     """What was asked, where the run ended and why, what it passed, and how far noise kept it away."""
     from ...simulation.track import CONSTRAINT, LIMIT, TYPE_1, TYPE_2
 
-    passed = {TYPE_2: "crosses a Type 2 singularity of the hidden robot",
-              TYPE_1: "a watched leg passes its limit (Type 1) into another working mode",
-              LIMIT: "a leg that is not watched passes its limit",
-              CONSTRAINT: "crosses a constraint singularity of the loops"}
+    passed = {
+        TYPE_2: "crosses a Type 2 singularity of the hidden robot",
+        TYPE_1: "a watched leg passes its limit (Type 1) into another working mode",
+        LIMIT: "a leg that is not watched passes its limit",
+        CONSTRAINT: "crosses a constraint singularity of the loops",
+    }
     run, track, off = found.run, found.track, found.from_goal
-    rows = [*head(found.setting), ("from", str(found.start)), ("to", str(found.goal)),
-            ("controller", f"gain {found.gain:g} per second, sensed: {found.sense}"
-                           + ("" if found.depth == "exact" else f", depth: {found.depth}")
-                           + ("" if found.noise is None else f", noise {found.noise}")),
-            *dropped_limits(found.setting), *GAP,
-            ("ended", [f"{found.ended} after {run.times[-1]:.3g} s", found.ending.reason]),
-            ("at", str(found.pose))]
+    rows = [
+        *head(found.setting),
+        ("from", str(found.start)),
+        ("to", str(found.goal)),
+        (
+            "controller",
+            f"gain {found.gain:g} per second, sensed: {found.sense}"
+            + ("" if found.depth == "exact" else f", depth: {found.depth}")
+            + ("" if found.noise is None else f", noise {found.noise}"),
+        ),
+        *dropped_limits(found.setting),
+        *GAP,
+        ("ended", [f"{found.ended} after {run.times[-1]:.3g} s", found.ending.reason]),
+        ("at", str(found.pose)),
+    ]
     if found.ended != "goal":
         rows.append(("", f"{1e3 * off[0]:.4g} mm and {_degrees(off[1])} degrees from the goal"))
     if found.ending.modes is not None:
-        rows.append(("modes", [*(f"{i}: {mode.pose}" + ("   (the goal)" if mode.goal else "")
-                                 for i, mode in enumerate(found.ending.modes.modes, 1)),
-                               "numbered as modes --at the goal lists them"]))
+        rows.append(
+            (
+                "modes",
+                [
+                    *(
+                        f"{i}: {mode.pose}" + ("   (the goal)" if mode.goal else "")
+                        for i, mode in enumerate(found.ending.modes.modes, 1)
+                    ),
+                    "numbered as modes --at the goal lists them",
+                ],
+            )
+        )
     if found.spread is not None:
         s = found.spread
-        rows.append(("noise", f"in this run it stayed within {1e3 * s.metres:.3g} mm and {_degrees(s.radians)} "
-                              f"degrees of there, root mean square {1e3 * s.rms_metres:.2g} mm and "
-                              f"{_degrees(s.rms_radians)} degrees"))
+        rows.append(
+            (
+                "noise",
+                f"in this run it stayed within {1e3 * s.metres:.3g} mm and {_degrees(s.radians)} "
+                f"degrees of there, root mean square {1e3 * s.rms_metres:.2g} mm and "
+                f"{_degrees(s.rms_radians)} degrees",
+            )
+        )
         if s.aside:
-            rows.append(("", f"keeps it away: on average {1e3 * s.offset:.3g} mm from there, at "
-                             f"({' '.join(f'{value:.4g}' for value in s.mean)})"))
+            rows.append(
+                (
+                    "",
+                    f"keeps it away: on average {1e3 * s.offset:.3g} mm from there, at "
+                    f"({' '.join(f'{value:.4g}' for value in s.mean)})",
+                )
+            )
     rows.append(("notes" if found.spread is None and found.notes else "", list(found.notes)))
     least = track.to_dict(run.times.tolist())
     if least["smallest"] is not None:
         rows.append(("on the way", f"smallest singular value of Mᵀ {least['smallest']:.3g}, at {least['at']:.3g} s"))
-    rows += [("", f"{passed[each.kind]} at about {run.times[each.place]:.3g} s, near "
-                  f"{found.pose_of(run.configurations[each.place])}") for each in track.passages or ()]
+    rows += [
+        (
+            "",
+            f"{passed[each.kind]} at about {run.times[each.place]:.3g} s, near "
+            f"{found.pose_of(run.configurations[each.place])}",
+        )
+        for each in track.passages or ()
+    ]
     if track.passages == ():
         met = least["smallest"] is not None and least["smallest"] < DAMPED
-        rows.append(("", "a Type 2 singularity met and left again on the same side" if met
-                     else "no singularity of the hidden robot crossed"))
+        rows.append(
+            (
+                "",
+                "a Type 2 singularity met and left again on the same side"
+                if met
+                else "no singularity of the hidden robot crossed",
+            )
+        )
     return listing(rows)
 
 
@@ -95,26 +136,45 @@ def basins(found: Basins) -> str:
     from ...simulation.endings.basins import LETTERS, hindrances
 
     size = " × ".join(f"{count} {name}" for count, name in zip(found.grid.shape, found.grid.names, strict=True))
-    rows = [*head(found.setting), *camera(found.setting), ("to", str(found.goal)),
-            ("starts", f"{found.starts:,} of {size}: {replace(found.grid, fixed=Pose())}"),
-            *known_row("held", describe_held(found.grid, found.setting, found.abreast)), *GAP]
-    lines = [[letter, each.ending.name, f"{each.count:,}", f"{100 * each.share:.3g} %",
-              "" if each.pose is None else str(each.pose), str(each.example)]
-             for letter, each in zip(LETTERS, found.ends, strict=False)]
+    rows = [
+        *head(found.setting),
+        *camera(found.setting),
+        ("to", str(found.goal)),
+        ("starts", f"{found.starts:,} of {size}: {replace(found.grid, fixed=Pose())}"),
+        *known_row("held", describe_held(found.grid, found.setting, found.abreast)),
+        *GAP,
+    ]
+    lines = [
+        [
+            letter,
+            each.ending.name,
+            f"{each.count:,}",
+            f"{100 * each.share:.3g} %",
+            "" if each.pose is None else str(each.pose),
+            str(each.example),
+        ]
+        for letter, each in zip(LETTERS, found.ends, strict=False)
+    ]
     rows.append(("ends", table(lines, ("", "ended", "starts", "share", "at", "from, for example")).splitlines()))
-    rows += [("why" if number == 0 else "", f"{letter}: {each.ending.reason}")
-             for number, (letter, each) in enumerate(zip(LETTERS, found.ends, strict=False))]
+    rows += [
+        ("why" if number == 0 else "", f"{letter}: {each.ending.reason}")
+        for number, (letter, each) in enumerate(zip(LETTERS, found.ends, strict=False))
+    ]
     notes = []
     if not found.abreast:
         notes.append(f"each start simulated separately: {', '.join(hindrances(found.setting))}")
     elif found.checked:
-        notes.append(f"integrated together; of {found.checked} starts that were also simulated separately, "
-                     f"{found.agreed} ended at the same pose")
+        notes.append(
+            f"integrated together; of {found.checked} starts that were also simulated separately, "
+            f"{found.agreed} ended at the same pose"
+        )
     if found.abreast and found.followed:
         notes.append(f"{found.followed} runs could not be followed this way and were simulated separately")
     if count := int(np.sum(found.damped)):
-        notes.append(f"{count:,} runs ({100 * count / found.starts:.2g} %) come to a singularity on the way, where "
-                     "noise may lead them elsewhere")
+        notes.append(
+            f"{count:,} runs ({100 * count / found.starts:.2g} %) come to a singularity on the way, where "
+            "noise may lead them elsewhere"
+        )
     rows.append(("found", notes))
     if found.certified is not None:
         drawn = found.certified.length and not found.certified.aside
@@ -131,20 +191,30 @@ def _degrees(angle: float) -> str:
 def accuracy(found: Accuracy) -> str:
     """The cones, the range of errors over a grid, a block for each single pose."""
     name, _ = head(found.setting)
-    rows = [name, ("observed", ", ".join(f"{label_of(o)} {found.blur.words(i, o)}"
-                                         for i, o in enumerate(found.setting.observed))),
-            *camera(found.setting), ("errors", f"largest over all errors {found.blur.inside}, to first order"),
-            *dropped_limits(found.setting)]
+    rows = [
+        name,
+        (
+            "observed",
+            ", ".join(f"{label_of(o)} {found.blur.words(i, o)}" for i, o in enumerate(found.setting.observed)),
+        ),
+        *camera(found.setting),
+        ("errors", f"largest over all errors {found.blur.inside}, to first order"),
+        *dropped_limits(found.setting),
+    ]
     length = found.setting.everything.twin.length
     if found.field is not None:
         rows += [*GAP, *field_rows(found), *_limits_left(found)]
     if found.swept is not None:
         rows += [*GAP, *_swept_rows(found, found.swept), *_limits_left(found)]
     for errors, true in zip(found.poses, found.sampled, strict=True):
-        rows += [*GAP, ("pose", str(errors.pose)), *beyond_limits(errors.beyond),
-                 *_extent("position", errors.position, 1e3, "mm", length),
-                 *_extent("orientation", errors.orientation, 180 / np.pi, "degrees"),
-                 *([] if true is None else _samples(errors, true))]
+        rows += [
+            *GAP,
+            ("pose", str(errors.pose)),
+            *beyond_limits(errors.beyond),
+            *_extent("position", errors.position, 1e3, "mm", length),
+            *_extent("orientation", errors.orientation, 180 / np.pi, "degrees"),
+            *([] if true is None else _samples(errors, true)),
+        ]
     return listing(rows)
 
 
@@ -158,8 +228,10 @@ def field_rows(found: Accuracy) -> Rows:
     """What a grid holds: its size, what is reached of it, the range of the errors, how they were checked."""
     field, length = found.field, found.setting.everything.twin.length
     assert field is not None
-    ranges = [ErrorRange.of(field.position, LARGEST_FIRST_ORDER * length),
-              ErrorRange.of(field.orientation, LARGEST_FIRST_ORDER)]
+    ranges = [
+        ErrorRange.of(field.position, LARGEST_FIRST_ORDER * length),
+        ErrorRange.of(field.orientation, LARGEST_FIRST_ORDER),
+    ]
     position = _range(ranges[0], field.position, 1e3, "mm")
     orientation = _range(ranges[1], field.orientation, 180 / np.pi, "degrees")
     reached = f"{np.sum(field.reached)} of {field.reached.size}"
@@ -171,9 +243,17 @@ def _swept_rows(found: Accuracy, swept: SweptErrors) -> Rows:
     """The same of a grid that is in a file, of which no median is known."""
     tally = swept.tally
     reached = f"{tally.reached} of {swept.grid.size}" + (
-        f" ({swept.before} were there from an interrupted sweep)" if swept.before else "")
-    return _grid_rows(found, swept.grid, reached, _range(tally.position, None, 1e3, "mm"),
-                      _range(tally.orientation, None, 180 / np.pi, "degrees"), swept.spots, tally.gap)
+        f" ({swept.before} were there from an interrupted sweep)" if swept.before else ""
+    )
+    return _grid_rows(
+        found,
+        swept.grid,
+        reached,
+        _range(tally.position, None, 1e3, "mm"),
+        _range(tally.orientation, None, 180 / np.pi, "degrees"),
+        swept.spots,
+        tally.gap,
+    )
 
 
 def describe_held(grid: Grid, setting: ObservedRobot, as_at_home: bool) -> str | None:
@@ -182,34 +262,54 @@ def describe_held(grid: Grid, setting: ObservedRobot, as_at_home: bool) -> str |
     motion, typed = setting.motion, str(grid.fixed)
     if not as_at_home:
         free = ", ".join(motion.free({*grid.names, *grid.fixed.given}))
-        return (typed or None) if not free else (
-            f"{typed or 'nothing'}; free, at each pose nearest to the zero configuration: {free}")
+        return (
+            (typed or None)
+            if not free
+            else (f"{typed or 'nothing'}; free, at each pose nearest to the zero configuration: {free}")
+        )
     ends, _ = poses_over(motion, grid, setting.robot.name, grid.places_at(np.array([0, grid.size - 1])))
     first, last = (dict(part.split("=") for part in str(motion.pose(X)).split(",")) for X in ends)
     given = dict(part.split("=") for part in typed.split(",") if part)
     turned = {"phi", "rpy"} & {*grid.names, *given}
-    return ",".join(f"{name}={given.get(name, value)}" for name, value in {**first, **given}.items()
-                    if name in given or (value == last[name] and name not in grid.names
-                                         and not (turned and name in ("phi", "rpy")))) or None
+    return (
+        ",".join(
+            f"{name}={given.get(name, value)}"
+            for name, value in {**first, **given}.items()
+            if name in given
+            or (value == last[name] and name not in grid.names and not (turned and name in ("phi", "rpy")))
+        )
+        or None
+    )
 
 
-def _grid_rows(found: Accuracy, grid: Grid, reached: str, position: str, orientation: str, spots: Spots | None,
-               gap: float) -> Rows:
+def _grid_rows(
+    found: Accuracy, grid: Grid, reached: str, position: str, orientation: str, spots: Spots | None, gap: float
+) -> Rows:
     size = " × ".join(f"{count} {name}" for count, name in zip(grid.shape, grid.names, strict=True))
-    ranges = ", ".join(f"{name} {values[0]:.4g} to {values[-1]:.4g} {'rad' if name == 'phi' else 'm'}"
-                       for name, values in grid.axes)
-    rows = [("poses", f"{size}: {ranges}"), *known_row("held", describe_held(grid, found.setting, spots is not None)),
-            ("reached", reached), ("position", position), ("orientation", orientation)]
+    ranges = ", ".join(
+        f"{name} {values[0]:.4g} to {values[-1]:.4g} {'rad' if name == 'phi' else 'm'}" for name, values in grid.axes
+    )
+    rows = [
+        ("poses", f"{size}: {ranges}"),
+        *known_row("held", describe_held(grid, found.setting, spots is not None)),
+        ("reached", reached),
+        ("position", position),
+        ("orientation", orientation),
+    ]
     if spots is not None and spots.count:
-        rows.append(("checked", f"against Pinocchio at {spots.count} random poses, largest difference "
-                                f"{spots.difference:.1e}"))
+        rows.append(
+            ("checked", f"against Pinocchio at {spots.count} random poses, largest difference {spots.difference:.1e}")
+        )
     return [*rows, *(("", line) for line in _bounds(found.blur, "nowhere", gap))]
 
 
 def _bounds(blur: Blur, where: str, gap: float) -> list[str]:
     """How much too large errors may be, if they are bounds."""
-    return [f"three {blur.each}s or more: upper bounds, {where} more than {_percent(gap)} % too large"] if (
-        gap > SAME_RELATION) else []
+    return (
+        [f"three {blur.each}s or more: upper bounds, {where} more than {_percent(gap)} % too large"]
+        if (gap > SAME_RELATION)
+        else []
+    )
 
 
 def _range(found: ErrorRange, errors: Array | None, unit: float, word: str) -> str:
@@ -231,14 +331,20 @@ def _samples(errors: PoseErrors, true: Sampled) -> Rows:
         met += f", at the pose {true.usual:.3g}" + (": a singularity is near" if near else "")
     else:
         met += "; at the pose there is no Mᵀ: observed links move while the platform rests"
-    lines = [f"{true.count} true errors give up to {1e3 * true.position:.4g} mm, {np.degrees(true.orientation):.4g} "
-             "degrees", met]
+    lines = [
+        f"{true.count} true errors give up to {1e3 * true.position:.4g} mm, {np.degrees(true.orientation):.4g} degrees",
+        met,
+    ]
     if true.ended:
-        lines.append(f"for {len(true.ended)} of them the best fit becomes flat on the way, first at "
-                     f"{true.ended[0]:.2g} of the error: a controller slips away there, farther than computed")
+        lines.append(
+            f"for {len(true.ended)} of them the best fit becomes flat on the way, first at "
+            f"{true.ended[0]:.2g} of the error: a controller slips away there, farther than computed"
+        )
     if true.not_found:
-        lines.append(f"{true.not_found} of them were not followed to the end: the solver gave up, which says nothing "
-                     "of the robot")
+        lines.append(
+            f"{true.not_found} of them were not followed to the end: the solver gave up, which says nothing "
+            "of the robot"
+        )
     whole = not true.not_found
     if _apart(true.position, errors.position, whole) or _apart(true.orientation, errors.orientation, whole):
         lines.append("they differ from the maxima above, which are unreliable here")
@@ -256,8 +362,10 @@ def _extent(name: str, extent: ErrorEllipsoid, unit: float, word: str, length: f
     if extent.gap > SAME_RELATION:
         lines.append(f"an upper bound, at most {_percent(extent.gap)} % too large")
     if extent.anisotropy is not None and extent.least_direction is not None:
-        lines.append(f"least along {_vector(extent.least_direction)}: {unit * extent.least:.4g} {word}, anisotropy "
-                     f"{extent.anisotropy:.3g}")
+        lines.append(
+            f"least along {_vector(extent.least_direction)}: {unit * extent.least:.4g} {word}, anisotropy "
+            f"{extent.anisotropy:.3g}"
+        )
     return [(name, lines)]
 
 
@@ -283,42 +391,74 @@ def selection(found: Selection) -> str:
     observed, sight, blur = found.setting.observed, found.sight is not None, found.blur
     length = found.setting.everything.twin.length
     cones = dict.fromkeys(f"{np.degrees(cone):.4g}°" for cone in blur.cones)
-    angle = next(iter(cones)) if len(cones) == 1 else ", ".join(
-        f"{o.leg} {np.degrees(cone):.4g}°" for o, cone in zip(observed, blur.cones, strict=True))
+    angle = (
+        next(iter(cones))
+        if len(cones) == 1
+        else ", ".join(f"{o.leg} {np.degrees(cone):.4g}°" for o, cone in zip(observed, blur.cones, strict=True))
+    )
     name, _ = head(found.setting)
-    wrong = ("cones", f"{angle} about each direction") if blur.noise is None else (
-        "observed", ", ".join(f"{o.leg} {blur.words(i, o)}" for i, o in enumerate(observed)))
-    rows = [name, ("from", str(found.start)), ("to", str(found.goal)), wrong,
-            *dropped_limits(found.setting), ("sets", f"{len(found.candidates)}, kept: {len(found.kept)}")]
+    wrong = (
+        ("cones", f"{angle} about each direction")
+        if blur.noise is None
+        else ("observed", ", ".join(f"{o.leg} {blur.words(i, o)}" for i, o in enumerate(observed)))
+    )
+    rows = [
+        name,
+        ("from", str(found.start)),
+        ("to", str(found.goal)),
+        wrong,
+        *dropped_limits(found.setting),
+        ("sets", f"{len(found.candidates)}, kept: {len(found.kept)}"),
+    ]
     if found.unexamined:
         rows.append(("", f"not examined: {len(found.unexamined)} ({found.left})"))
     if found.sight is not None:
         rows.append(("camera", f"on {found.sight.reference}"))
     blocks = [listing(rows)]
     if found.kept:
-        heads = ["legs" if blur.noise is None else "observed", "others", "certified", "mm", "degrees", "modes",
-                 "aspect", *(["seen"] if sight else []), "run"]
+        heads = [
+            "legs" if blur.noise is None else "observed",
+            "others",
+            "certified",
+            "mm",
+            "degrees",
+            "modes",
+            "aspect",
+            *(["seen"] if sight else []),
+            "run",
+        ]
         blocks.append(table([_row(each, sight, length) for each in found.kept], heads))
-        blocks.append("others: poses besides the goal that were found to attract the loop; certified: how far\n"
-                      "around the goal runs in its working mode are certified to end at it; mm, degrees:\n"
-                      "largest errors at the goal; modes: those of the start / of the goal, in brackets those\n"
-                      "that the robot was found to reach; – not computed. Best first: by others, by certified\n"
-                      "(alike within a power of two), by mm")
+        blocks.append(
+            "others: poses besides the goal that were found to attract the loop; certified: how far\n"
+            "around the goal runs in its working mode are certified to end at it; mm, degrees:\n"
+            "largest errors at the goal; modes: those of the start / of the goal, in brackets those\n"
+            "that the robot was found to reach; – not computed. Best first: by others, by certified\n"
+            "(alike within a power of two), by mm"
+        )
         radii = [each.ends.radius for each in found.kept if each.ends is not None and each.ends.radius is not None]
         points = dict.fromkeys(each.measured for each in radii if each.measured)
         blocks += [f"distances from the goal: {each}" for each in points]
         if found.fewer is not None:
             blocks.append(found.fewer)
-    gaps = [part.gap for each in (*found.kept, *found.unexamined) if (errors := each.errors) is not None
-            for part in (errors.position, errors.orientation)]
+    gaps = [
+        part.gap
+        for each in (*found.kept, *found.unexamined)
+        if (errors := each.errors) is not None
+        for part in (errors.position, errors.orientation)
+    ]
     blocks += _bounds(blur, "none", max(gaps, default=0.0))
     if found.unexamined:
-        blocks.append(table([[_row(each, sight, length)[i] for i in (0, 3, 4)] for each in found.unexamined],
-                            ["not examined", "mm", "degrees"]))
+        blocks.append(
+            table(
+                [[_row(each, sight, length)[i] for i in (0, 3, 4)] for each in found.unexamined],
+                ["not examined", "mm", "degrees"],
+            )
+        )
     discarded = [each for each in found.candidates if each.discarded is not None]
     if discarded:
-        blocks.append(table([(", ".join(each.legs), str(each.discarded)) for each in discarded],
-                            ("discarded", "because")))
+        blocks.append(
+            table([(", ".join(each.legs), str(each.discarded)) for each in discarded], ("discarded", "because"))
+        )
     return "\n\n".join(blocks)
 
 
@@ -327,12 +467,16 @@ def _row(each: Candidate, sight: bool, length: float) -> list[str]:
     assert errors is not None
     seen = [] if not sight else ["–" if each.seen is None else f"{100 * min(each.seen.values()):.0f} %"]
     position, orientation = errors.position.largest, errors.orientation.largest
-    return [", ".join(each.legs), *_ends(each.ends),
-            f"{1e3 * position:.4g}" if is_bounded(position, length) else "not bounded",
-            f"{np.degrees(orientation):.4g}" if is_bounded(orientation) else "not bounded",
-            f"{_modes(each.start_modes)} / {_modes(each.goal_modes)}",
-            "–" if each.aspect is None else each.aspect.verdict, *seen,
-            "–" if each.run is None else each.run.verdict]
+    return [
+        ", ".join(each.legs),
+        *_ends(each.ends),
+        f"{1e3 * position:.4g}" if is_bounded(position, length) else "not bounded",
+        f"{np.degrees(orientation):.4g}" if is_bounded(orientation) else "not bounded",
+        f"{_modes(each.start_modes)} / {_modes(each.goal_modes)}",
+        "–" if each.aspect is None else each.aspect.verdict,
+        *seen,
+        "–" if each.run is None else each.run.verdict,
+    ]
 
 
 def _ends(ends: LoopEnds | None) -> list[str]:

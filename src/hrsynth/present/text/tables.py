@@ -55,8 +55,11 @@ def wrap_lines(text: str, columns: int = LINE, more: str = "") -> list[str]:
 
 def listing(rows: Iterable[tuple[str, str | Sequence[str]]]) -> str:
     """A line a value, the values under each other, the name before the first."""
-    lines = [(name if i == 0 else "", value) for name, values in rows
-             for i, value in enumerate([values] if isinstance(values, str) else values)]
+    lines = [
+        (name if i == 0 else "", value)
+        for name, values in rows
+        for i, value in enumerate([values] if isinstance(values, str) else values)
+    ]
     head = max(len(name) for name, _ in lines)
     return "\n".join(f"{name:<{head}}  {value}".rstrip() for name, value in lines)
 
@@ -101,8 +104,7 @@ def robot_row(robot: Mechanism, words: str = "") -> tuple[str, list[str]]:
 def head(found: ObservedRobot) -> Rows:
     """The robot and what is observed of it."""
     seen = ", ".join(label_of(each).replace(" ", "\u00a0") for each in found.observed)
-    return [robot_row(found.robot, str(found.anatomy.architecture())),
-            ("observed", wrap_lines(seen, LINE - NAMES))]
+    return [robot_row(found.robot, str(found.anatomy.architecture())), ("observed", wrap_lines(seen, LINE - NAMES))]
 
 
 def label_of(observation: Observation) -> str:
@@ -116,8 +118,11 @@ def describe_observation(observation: Observation) -> str:
     if "joint" in told:
         return f"encoder of {told['joint']}"
     of, by = observation.link, told["camera"] or observation.seen_from
-    return f"inclination of {by}" if told["kind"] == "inclination" else f"{observation.kind} of {of}" + (
-        f" by {by}" if by else "")
+    return (
+        f"inclination of {by}"
+        if told["kind"] == "inclination"
+        else f"{observation.kind} of {of}" + (f" by {by}" if by else "")
+    )
 
 
 def describe_watched(found: ObservedRobot) -> dict[str, list[str]]:
@@ -127,8 +132,11 @@ def describe_watched(found: ObservedRobot) -> dict[str, list[str]]:
     told: dict[str, list[str]] = {}
     for o, why in found.watched():
         said = o.to_dict()
-        where = "".join(f" {word} {point_text(said[key])}" for word, key in (("at", "at"), ("along", "axis"))
-                        if said[key] is not None)
+        where = "".join(
+            f" {word} {point_text(said[key])}"
+            for word, key in (("at", "at"), ("along", "axis"))
+            if said[key] is not None
+        )
         what = o.link if o.by_segment else describe_observation(o)
         told.setdefault(o.leg, []).append(f"{what}{where}{' of its frame' * bool(where)}, {why}")
     return told

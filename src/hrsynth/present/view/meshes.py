@@ -23,8 +23,13 @@ def meshes(setting: ObservedRobot, within: Path | None = None) -> tuple[tuple[Sh
     ``within`` no files are read that do not lie in that folder."""
     robot, mechanism = setting.robot, setting.mechanism
     found, missing, between, count = [], [], [], 0
-    shown = [solid for name, link in robot.links.items() if setting.normal.into.get(name) in mechanism.links
-             for solid in content_of(link, robot).solids if solid.role == "visual"]
+    shown = [
+        solid
+        for name, link in robot.links.items()
+        if setting.normal.into.get(name) in mechanism.links
+        for solid in content_of(link, robot).solids
+        if solid.role == "visual"
+    ]
     files = triangles([solid.file for solid in shown if solid.file is not None], robot.file, within)
     for name, link in robot.links.items():
         into = setting.normal.into.get(name)
@@ -65,6 +70,9 @@ def _surface(solid: Solid, files: Mapping[str, tuple[Array, Any] | None]) -> tup
         made = creation.icosphere(subdivisions=2, radius=solid.sizes[0])
     else:
         radius, height = solid.sizes
-        made = (creation.cylinder(radius=radius, height=height, sections=32) if solid.kind == "cylinder"
-                else creation.capsule(radius=radius, height=height, count=[16, 16]))
+        made = (
+            creation.cylinder(radius=radius, height=height, sections=32)
+            if solid.kind == "cylinder"
+            else creation.capsule(radius=radius, height=height, count=[16, 16])
+        )
     return np.asarray(made.vertices), np.asarray(made.faces)

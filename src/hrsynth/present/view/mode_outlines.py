@@ -42,8 +42,13 @@ class ModeOutline(Value):
     def scene(self) -> dict[str, Any]:
         """What the page is given."""
         places = [None if each is None else page_values(each[None])[0] for each in self.places]
-        return {"label": self.label, "words": self.words, "reachable": self.reachable,
-                "assembly": self.assembly, "places": places}
+        return {
+            "label": self.label,
+            "words": self.words,
+            "reachable": self.reachable,
+            "assembly": self.assembly,
+            "places": places,
+        }
 
 
 def mode_outlines(setting: ObservedRobot) -> tuple[tuple[ModeOutline, ...], tuple[str, ...]]:

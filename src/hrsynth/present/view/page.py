@@ -21,8 +21,10 @@ def static(found: View) -> bytes:
 
 def inline(found: View) -> str:
     """The same page in a frame, for a notebook."""
-    return (f'<iframe srcdoc="{escape(page(found))}" title="{escape(name_steering(found.headline()))}" '
-            'style="width: 100%; height: 560px; border: 0"></iframe>')
+    return (
+        f'<iframe srcdoc="{escape(page(found))}" title="{escape(name_steering(found.headline()))}" '
+        'style="width: 100%; height: 560px; border: 0"></iframe>'
+    )
 
 
 def page(found: View) -> str:
@@ -36,6 +38,12 @@ def page(found: View) -> str:
     # nothing that steers is hidden in an escape
     made.policies["json.dumps_kwargs"] = {"sort_keys": True, "ensure_ascii": False}
     template = made.from_string(text(FOLDER / "page.html"))
-    return name_steering(template.render(
-        robot=found.setting.robot.name, scene=found.scene(), style=text(FOLDER / "page.css", STAGE / "stage.css"),
-        three=text(STAGE / "three.min.js"), script=text(*(STAGE / name for name in SCRIPTS), FOLDER / "page.js")))
+    return name_steering(
+        template.render(
+            robot=found.setting.robot.name,
+            scene=found.scene(),
+            style=text(FOLDER / "page.css", STAGE / "stage.css"),
+            three=text(STAGE / "three.min.js"),
+            script=text(*(STAGE / name for name in SCRIPTS), FOLDER / "page.js"),
+        )
+    )

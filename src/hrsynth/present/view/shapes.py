@@ -50,8 +50,13 @@ class Shape(Value):
 
     def scene(self, places: dict[str, int]) -> dict[str, Any]:
         """What the page is given, links by their ``places``."""
-        record: dict[str, Any] = {"kind": self.kind, "link": places[self.link], "role": self.role, "size": self.size,
-                                  "points": np.round(self.points, PAGE_DIGITS).tolist()}
+        record: dict[str, Any] = {
+            "kind": self.kind,
+            "link": places[self.link],
+            "role": self.role,
+            "size": self.size,
+            "points": np.round(self.points, PAGE_DIGITS).tolist(),
+        }
         if self.other is not None:
             record["other"] = places[self.other]
         if self.faces is not None:
@@ -74,8 +79,11 @@ class Drawer(Value):
         """All shapes; ``travels`` are the ways (m) that sliders on the base go, from their places at zero."""
         meshed = {shape.link for shape in self.meshes}
         links = [shape for link in self.mechanism.links if link not in meshed for shape in self._rods(link)]
-        joints = [shape for joint in map(self._from_base, self.mechanism.joints.values())
-                  for shape in (*self._symbol(joint), *self._way(joint, travels))]
+        joints = [
+            shape
+            for joint in map(self._from_base, self.mechanism.joints.values())
+            for shape in (*self._symbol(joint), *self._way(joint, travels))
+        ]
         return (*links, *self.meshes, *joints)
 
     def sliders(self) -> Iterator[Joint]:
@@ -146,8 +154,9 @@ class Drawer(Value):
             ends = np.array([joint.point + way * joint.axis for way in travels[joint.name]])
             yield Shape("rail", joint.predecessor, ends, 0.6 * self.radius, BASE if role is LEG else role)
         elif joint.type.slides:
-            yield Shape("span", joint.predecessor, np.array([joint.point] * 2), INNER * self.radius, role,
-                        other=joint.successor)
+            yield Shape(
+                "span", joint.predecessor, np.array([joint.point] * 2), INNER * self.radius, role, other=joint.successor
+            )
 
 
 def _area(ring: Array) -> float:

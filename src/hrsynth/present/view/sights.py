@@ -38,8 +38,10 @@ class ShownSight(Value):
 
     def scene(self) -> dict[str, Any]:
         """What the page is given."""
-        rounded = {key: [np.round(each, PAGE_DIGITS).tolist() for each in every] for key, every in (
-            ("lines", self.drawn.lines), ("areas", self.drawn.areas), ("image", self.image))}
+        rounded = {
+            key: [np.round(each, PAGE_DIGITS).tolist() for each in every]
+            for key, every in (("lines", self.drawn.lines), ("areas", self.drawn.areas), ("image", self.image))
+        }
         return {"name": self.name, "camera": self.camera, **rounded}
 
 
@@ -81,10 +83,12 @@ def shown_sights(setting: ObservedRobot, at: ClosedConfiguration) -> tuple[Shown
         if isinstance(seen, CameraObservation):
             name = seen.camera.name if seen.camera else setting.mechanism.reference
             eye = next(i for i, each in enumerate(every) if each.name == name)
-        found.append(ShownSight(seen.leg, seen.draw(*poses, REACH * length), eye,
-                                tuple(seen.image(*poses, REACH * length))))
-    return *found, *(ShownSight(eye.name, _case(at.pose(eye.link) @ eye.pose, half_picture(eye), CASE * length))
-                     for eye in every)
+        found.append(
+            ShownSight(seen.leg, seen.draw(*poses, REACH * length), eye, tuple(seen.image(*poses, REACH * length)))
+        )
+    return *found, *(
+        ShownSight(eye.name, _case(at.pose(eye.link) @ eye.pose, half_picture(eye), CASE * length)) for eye in every
+    )
 
 
 def _case(X: Array, half: Array, depth: float) -> Drawn:

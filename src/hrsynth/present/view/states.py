@@ -51,10 +51,12 @@ class ViewState(Value):
 
     def scene(self) -> dict[str, Any]:
         """What the page is given."""
-        return {**{key: page_values(places) for key, places in self.places.items()},
-                "distance": None if self.distance is None else float(f"{self.distance:.5g}"),
-                **({} if self.error is None else {"error": dict(self.error)}),
-                **({"sights": [each.scene() for each in self.sights]} if self.sights else {})}
+        return {
+            **{key: page_values(places) for key, places in self.places.items()},
+            "distance": None if self.distance is None else float(f"{self.distance:.5g}"),
+            **({} if self.error is None else {"error": dict(self.error)}),
+            **({"sights": [each.scene() for each in self.sights]} if self.sights else {}),
+        }
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -70,13 +72,23 @@ class Slider(Value):
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
-        return {"name": self.name, "unit": self.unit, "values": list(self.values), "home": self.home,
-                "distances": [state.distance for state in self.states]}
+        return {
+            "name": self.name,
+            "unit": self.unit,
+            "values": list(self.values),
+            "home": self.home,
+            "distances": [state.distance for state in self.states],
+        }
 
     def scene(self) -> dict[str, Any]:
         """What the page is given."""
-        return {"name": self.name, "unit": self.unit, "values": [round(value, PAGE_DIGITS) for value in self.values],
-                "home": self.home, "states": [state.scene() for state in self.states]}
+        return {
+            "name": self.name,
+            "unit": self.unit,
+            "values": [round(value, PAGE_DIGITS) for value in self.values],
+            "home": self.home,
+            "states": [state.scene() for state in self.states],
+        }
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -138,8 +150,15 @@ class Mover(Value):
         """Where the robot comes to from ``here`` when its platform is drawn to the pose X (4, 4): as near as it goes,
         lengths in characteristic lengths, turns in radians."""
         motion = self.setting.motion
-        whole = Goal(motion.link, motion.point, motion.home[:3, :3], np.eye(3), motion.position(X), motion.normal,
-                     rotation=X[:3, :3] if motion.body and motion.rotations.shape[1] else None)
+        whole = Goal(
+            motion.link,
+            motion.point,
+            motion.home[:3, :3],
+            np.eye(3),
+            motion.position(X),
+            motion.normal,
+            rotation=X[:3, :3] if motion.body and motion.rotations.shape[1] else None,
+        )
         followed = self.follow_hidden(here, [approach(here.real, whole, APPROACH)])
         return followed[-1] if followed else here
 
@@ -148,8 +167,7 @@ class Mover(Value):
         return self.coordinates.read(posed.real.pose(self.setting.motion.link))
 
     def beside(self, at: ClosedConfiguration, q: Array) -> Posed | None:
-        """The real robot with the hidden one at ``q``, None where that is at another pose or its directions at others.
-        """
+        """The real robot with the hidden one at ``q``, None if that is at another pose or its directions at others."""
         assert self.hidden is not None
         return Posed(at, q) if np.linalg.norm(self._misses(at, q)) <= FOLLOWED else None
 
@@ -158,8 +176,9 @@ class Mover(Value):
         it does not arrive."""
         found = self.follow_hidden(self.home, [at])
         if not found:
-            goal = Coordinates(self.setting.motion, self.coordinates.places, self.coordinates.read(
-                at.pose(self.setting.motion.link)))
+            goal = Coordinates(
+                self.setting.motion, self.coordinates.places, self.coordinates.read(at.pose(self.setting.motion.link))
+            )
             halfway = goal.towards(self.home.real.pose(self.setting.motion.link), 0.5)
             way = [track(self.home.real, self.setting.motion, each)[0] for each in (halfway, goal)]
             found = self.follow_hidden(self.home, [*way, at])
@@ -193,8 +212,13 @@ class Mover(Value):
         up = self.follow_hidden(home, [at for _, at in ways[start + 1 :]])
         posed = [*reversed(down), home, *up]
         values = [value for value, _ in ways[start - len(down) : start + len(up) + 1]]
-        return Slider(self.coordinates.names[index], "rad" if turns else "m", tuple(values),
-                      tuple(map(self.with_error, posed)), len(down))
+        return Slider(
+            self.coordinates.names[index],
+            "rad" if turns else "m",
+            tuple(values),
+            tuple(map(self.with_error, posed)),
+            len(down),
+        )
 
     def follow_hidden(self, start: Posed, way: Iterable[ClosedConfiguration]) -> list[Posed]:
         """The way with the hidden robot beside the real one, as far as it can follow."""
@@ -218,8 +242,13 @@ class Mover(Value):
         target = self.setting.samples.question.target(at)
         assert self.hidden is not None
         links = self.hidden.mechanism.links
-        return Target(target.link, target.pose, target.point, target.reference,
-                      tuple(pair for pair in target.measured if pair[0].link in links))
+        return Target(
+            target.link,
+            target.pose,
+            target.point,
+            target.reference,
+            tuple(pair for pair in target.measured if pair[0].link in links),
+        )
 
 
 def displacements(mechanism: Mechanism, pose: Any) -> Array:

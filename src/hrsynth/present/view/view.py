@@ -51,10 +51,15 @@ class Machine(Value):
     def scene(self) -> dict[str, Any]:
         """What the page is given."""
         places = {name: i for i, name in enumerate(self.links)}
-        return {"key": self.key, "words": self.words, "links": list(self.links), "legs": list(self.legs),
-                "platform": [places[link] for link in self.platform],
-                "shapes": [shape.scene(places) for shape in self.shapes],
-                "frames": [{"link": places[link], "place": page_values(X[None])[0]} for link, X in self.frames]}
+        return {
+            "key": self.key,
+            "words": self.words,
+            "links": list(self.links),
+            "legs": list(self.legs),
+            "platform": [places[link] for link in self.platform],
+            "shapes": [shape.scene(places) for shape in self.shapes],
+            "frames": [{"link": places[link], "place": page_values(X[None])[0]} for link, X in self.frames],
+        }
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -105,12 +110,16 @@ class View(Result, shown_as="view"):
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
         return {
-            **self.setting.to_dict(), "dof": self.setting.dof,
+            **self.setting.to_dict(),
+            "dof": self.setting.dof,
             "shown": {machine.key: machine.words for machine in self.machines},
-            "distance": self.home.distance, "largest_distance": self.largest,
+            "distance": self.home.distance,
+            "largest_distance": self.largest,
             "sliders": [slider.to_dict() for slider in self.sliders],
-            "modes": [{"label": outline.label, "pose": outline.pose.to_dict(), "reachable": outline.reachable}
-                      for outline in self.mode_outlines],
+            "modes": [
+                {"label": outline.label, "pose": outline.pose.to_dict(), "reachable": outline.reachable}
+                for outline in self.mode_outlines
+            ],
             "notes": list(self.notes),
         }
 
@@ -118,17 +127,29 @@ class View(Result, shown_as="view"):
         """What the page is given."""
         every = eyes(self.setting)
         return {
-            **stage(self.setting, self.machines, self.arrows), "scale": scale(unit_of(self.setting)),
-            "home": self.home.scene(), "sliders": [slider.scene() for slider in self.sliders],
-            "ghosts": [outline.scene() for outline in self.mode_outlines], "notes": list(self.notes),
-            "cameras": [{"name": eye.name, "half": half.tolist()} for eye, half in
-                        zip(every, frames(every, self.home.sights), strict=True)],
+            **stage(self.setting, self.machines, self.arrows),
+            "scale": scale(unit_of(self.setting)),
+            "home": self.home.scene(),
+            "sliders": [slider.scene() for slider in self.sliders],
+            "ghosts": [outline.scene() for outline in self.mode_outlines],
+            "notes": list(self.notes),
+            "cameras": [
+                {"name": eye.name, "half": half.tolist()}
+                for eye, half in zip(every, frames(every, self.home.sights), strict=True)
+            ],
         }
 
 
 @question()
-def view(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
-         hidden: bool = False, seed: int = 0) -> View:
+def view(
+    robot: RobotLike,
+    observe: LegsLike = None,
+    camera: CameraLike = None,
+    *,
+    see: SeeLike = None,
+    hidden: bool = False,
+    seed: int = 0,
+) -> View:
     """A 3D view of a robot, with ``hidden`` also of its hidden robot: every position of a slider is a closed
     configuration in which only one of the platform's coordinates differs from the zero configuration.
 
@@ -149,28 +170,59 @@ def view(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, 
     shapes, missing = meshes(setting)
     home = mover.with_error(mover.home)
     states = (home, *(state for slider in sliders for state in slider.states))
-    machines = [machine_of(REAL, setting, setting.mechanism, str(setting.anatomy.architecture()),
-                           [state.places[REAL] for state in states], shapes)]
+    machines = [
+        machine_of(
+            REAL,
+            setting,
+            setting.mechanism,
+            str(setting.anatomy.architecture()),
+            [state.places[REAL] for state in states],
+            shapes,
+        )
+    ]
     if derivation is not None and other is not None:
-        machines.append(machine_of(HIDDEN, setting, other, str(derivation.hidden_architecture),
-                                   [state.places[HIDDEN] for state in states], shapes))
+        machines.append(
+            machine_of(
+                HIDDEN,
+                setting,
+                other,
+                str(derivation.hidden_architecture),
+                [state.places[HIDDEN] for state in states],
+                shapes,
+            )
+        )
     elif hidden:
         notes = (*notes, "every leg is blind: there is no hidden robot")
     arrows = tuple(arrows_of(setting, setting.observed))
-    return View(setting, derivation, mover, tuple(machines), home, sliders, arrows, found,
-                plane_normal(setting.motion), (*notes, *missing))
+    return View(
+        setting,
+        derivation,
+        mover,
+        tuple(machines),
+        home,
+        sliders,
+        arrows,
+        found,
+        plane_normal(setting.motion),
+        (*notes, *missing),
+    )
 
 
 def stage(setting: ObservedRobot, machines: Sequence[Machine], arrows: Iterable[Arrow]) -> dict[str, Any]:
     """What any page is given of what stands on its stage."""
     mechanism, normal = setting.mechanism, plane_normal(setting.motion)
     places = {name: i for i, name in enumerate(mechanism.links)}
-    return {"name": setting.robot.name, "length": mechanism.length, "radius": _radius(mechanism),
-            "freedoms": {key: np.round(rows, PAGE_DIGITS).tolist() for key, rows in freedoms(setting).items()},
-            "normal": None if normal is None else np.round(normal, PAGE_DIGITS).tolist(),
-            "machines": [machine.scene() for machine in machines],
-            "arrows": [{"leg": a.leg, "link": places[a.link], "ends": np.round(a.ends, PAGE_DIGITS).tolist()}
-                       for a in arrows]}
+    return {
+        "name": setting.robot.name,
+        "length": mechanism.length,
+        "radius": _radius(mechanism),
+        "freedoms": {key: np.round(rows, PAGE_DIGITS).tolist() for key, rows in freedoms(setting).items()},
+        "normal": None if normal is None else np.round(normal, PAGE_DIGITS).tolist(),
+        "machines": [machine.scene() for machine in machines],
+        "arrows": [
+            {"leg": a.leg, "link": places[a.link], "ends": np.round(a.ends, PAGE_DIGITS).tolist()} for a in arrows
+        ],
+    }
 
 
 def freedoms(setting: ObservedRobot) -> dict[str, Array]:
@@ -179,14 +231,17 @@ def freedoms(setting: ObservedRobot) -> dict[str, Array]:
     motion = setting.motion
     places = np.array(Coordinates.of(setting.everything.start, setting.everything.question, motion).places, dtype=int)
     found = {}
-    for key, span, at in (("translations", motion.translations, places[places < 3]),
-                          ("rotations", motion.rotations, places[places >= 3] - 3)):
+    for key, span, at in (
+        ("translations", motion.translations, places[places < 3]),
+        ("rotations", motion.rotations, places[places >= 3] - 3),
+    ):
         found[key] = span.T[: len(at)] if len(at) in (0, span.shape[1]) else np.eye(3)[at]
     return found
 
 
-def machine_of(key: str, setting: ObservedRobot, mechanism: Mechanism, words: str, places: Sequence[Array],
-               meshes: Sequence[Shape]) -> Machine:
+def machine_of(
+    key: str, setting: ObservedRobot, mechanism: Mechanism, words: str, places: Sequence[Array], meshes: Sequence[Shape]
+) -> Machine:
     """A mechanism to be drawn, ``key`` real or hidden, its rails as long as it slides in the ``places`` (links, 7)."""
     real = setting.mechanism
     kept = tuple(shape for shape in meshes if shape.link in mechanism.links)
@@ -194,8 +249,15 @@ def machine_of(key: str, setting: ObservedRobot, mechanism: Mechanism, words: st
     shapes = drawer.shapes(_travels(drawer, places))
     frames = tuple((link, place(mechanism.links[link].pose)) for link in (mechanism.base, mechanism.platform))
     legs = {link: leg.label for leg in setting.anatomy.legs for link in leg.links}
-    return Machine(key, words, tuple(mechanism.links), setting.anatomy.platform, shapes, frames,
-                   tuple(map(legs.get, mechanism.links)))
+    return Machine(
+        key,
+        words,
+        tuple(mechanism.links),
+        setting.anatomy.platform,
+        shapes,
+        frames,
+        tuple(map(legs.get, mechanism.links)),
+    )
 
 
 def _radius(mechanism: Mechanism) -> float:

@@ -1,7 +1,7 @@
 """Anchor locus: the anchor needs only as many sliders as its locus has dimensions.
 
-    PPP – T   →   (nothing) / P – T / PP – T        A is fixed / on a line / in a plane        (MMT 3.2)
-    PPP – T   →   T is the link before K             that link only translates itself
+PPP – T   →   (nothing) / P – T / PP – T        A is fixed / on a line / in a plane        (MMT 3.2)
+PPP – T   →   T is the link before K             that link only translates itself
 """
 
 from __future__ import annotations
@@ -31,8 +31,10 @@ def find(state: State, evidence: Evidence, chain: VirtualChain) -> Iterator[Matc
     elif proximal.translates or locus.dimension == 0:
         yield Match((chain, reference), "the anchor is fixed")
     elif locus.dimension < 3:
-        yield Match((chain, locus.axes[: locus.dimension]),
-                    f"the anchor moves {'on a line' if locus.dimension == 1 else 'in a plane'}")
+        yield Match(
+            (chain, locus.axes[: locus.dimension]),
+            f"the anchor moves {'on a line' if locus.dimension == 1 else 'in a plane'}",
+        )
 
 
 def apply(state: State, found: Carried) -> State:
@@ -55,13 +57,23 @@ def _sliding(state: State, chain: VirtualChain, axes: Array) -> State:
     links = chain.slider_links[: len(axes) - 1]
     path = [mechanism.reference, *links, chain.carrier]
     names = chain.sliders[: len(axes)]
-    joints = [Joint(name, JointType.PRISMATIC, a, b, chain.anchor, (axis,))
-              for name, a, b, axis in zip(names, path, path[1:], axes, strict=False)]
-    changed = mechanism.changed(remove_links=chain.slider_links[len(links):], remove_joints=chain.sliders,
-                                joints=joints)
+    joints = [
+        Joint(name, JointType.PRISMATIC, a, b, chain.anchor, (axis,))
+        for name, a, b, axis in zip(names, path, path[1:], axes, strict=False)
+    ]
+    changed = mechanism.changed(
+        remove_links=chain.slider_links[len(links) :], remove_joints=chain.sliders, joints=joints
+    )
     return state.with_chain(chain, replace(chain, sliders=names, slider_links=links), changed)
 
 
-RULE = Rule("anchor locus", "MMT 3.2", Stage.ANCHOR, find, apply, each_chain,
-            otherwise="the anchor moves in space, or the part before the observed link is not a chain of its own",
-            keeps=(LOOPS, AXES))
+RULE = Rule(
+    "anchor locus",
+    "MMT 3.2",
+    Stage.ANCHOR,
+    find,
+    apply,
+    each_chain,
+    otherwise="the anchor moves in space, or the part before the observed link is not a chain of its own",
+    keeps=(LOOPS, AXES),
+)

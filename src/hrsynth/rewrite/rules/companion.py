@@ -1,6 +1,6 @@
 """Companion: the parallel rod beside an observed one moves to T as well.
 
-    before –S– rod b   →   T –U– rod b        the vector between the two balls keeps its direction        (MMT Fig. 13)
+before –S– rod b   →   T –U– rod b        the vector between the two balls keeps its direction        (MMT Fig. 13)
 """
 
 from __future__ import annotations
@@ -28,9 +28,11 @@ def find(state: State, evidence: Evidence, chain: VirtualChain) -> Iterator[Matc
                 rods.setdefault(rod, joint)
     if rods:
         kept = all(proximal.keeps(joint.point - chain.anchor) for joint in rods.values())
-        yield Match((chain, list(rods.values())),
-                    f"{', '.join(map(repr, rods))} keeps its place beside the observed rod",
-                    None if kept else "the vector between the two rods' joints changes its direction")
+        yield Match(
+            (chain, list(rods.values())),
+            f"{', '.join(map(repr, rods))} keeps its place beside the observed rod",
+            None if kept else "the vector between the two rods' joints changes its direction",
+        )
 
 
 def apply(state: State, found: Beside) -> State:
@@ -38,9 +40,12 @@ def apply(state: State, found: Beside) -> State:
     chain, joints = found
     mechanism, before = state.mechanism, str(chain.before)
     actuator = mechanism.joints[chain.actuator]
-    moved = [ball_to_universal(joint, before, (actuator.axes[0], actuator.axes[1]))
-             if joint.type is JointType.SPHERICAL and actuator.type is JointType.UNIVERSAL else joint
-             for joint in joints]
+    moved = [
+        ball_to_universal(joint, before, (actuator.axes[0], actuator.axes[1]))
+        if joint.type is JointType.SPHERICAL and actuator.type is JointType.UNIVERSAL
+        else joint
+        for joint in joints
+    ]
     if chain.carrier != before:
         moved = [joint.relinked(before, chain.carrier) for joint in moved]
     return state.with_chain(chain, chain, mechanism.changed(joints=moved))

@@ -1,7 +1,7 @@
 """Direction locus: a direction that only turns about one axis needs one actuated R; a constant one needs none.
 
-    T –U̲– W   →   T –R̲– W        u stays in a plane or on a cone
-    chain      →   (nothing)       u is constant: the leg is blind        (MMT 3.2, 4.1.1; over the whole motion)
+T –U̲– W   →   T –R̲– W        u stays in a plane or on a cone
+chain      →   (nothing)       u is constant: the leg is blind        (MMT 3.2, 4.1.1; over the whole motion)
 """
 
 from __future__ import annotations
@@ -44,5 +44,13 @@ def apply(state: State, found: Turning) -> State:
     return state.with_chain(chain, chain, mechanism.changed(joints=[turned]))
 
 
-RULE = Rule("direction locus", "MMT 3.2, 4.1.1", Stage.DIRECTION, find, apply, each_chain,
-            otherwise="the direction moves in two ways", keeps=(LOOPS, AXES))
+RULE = Rule(
+    "direction locus",
+    "MMT 3.2, 4.1.1",
+    Stage.DIRECTION,
+    find,
+    apply,
+    each_chain,
+    otherwise="the direction moves in two ways",
+    keeps=(LOOPS, AXES),
+)

@@ -68,12 +68,17 @@ def _ends(state: State, evidence: Evidence, chain: VirtualChain) -> LegEnds | No
     """How a leg ends; None where its actuator is no U or its ends are no S."""
     mechanism, leg = state.mechanism, state.real.leg(chain.leg)
     actuator = mechanism.joints[chain.actuator]
-    ends = [j for j in mechanism.joints_of(leg.attach)
-            if j.type is JointType.SPHERICAL and j.other(leg.attach) in leg.links]
+    ends = [
+        j for j in mechanism.joints_of(leg.attach) if j.type is JointType.SPHERICAL and j.other(leg.attach) in leg.links
+    ]
     if actuator.type is not JointType.UNIVERSAL or not ends:
         return None
-    beside = [j for rod in evidence.parallel_rods(chain.link) for j in mechanism.joints_of(rod)
-              if j.other(rod) == chain.carrier]
+    beside = [
+        j
+        for rod in evidence.parallel_rods(chain.link)
+        for j in mechanism.joints_of(rod)
+        if j.other(rod) == chain.carrier
+    ]
     return LegEnds(chain, leg.attach, ends, beside, (actuator.axes[0], actuator.axes[1]), False)
 
 
@@ -81,11 +86,16 @@ def apply(state: State, found: list[LegEnds]) -> State:
     """U for S at all ends, and the actuators with the axes that were chosen."""
     for each in found:
         mechanism, (outer, inner) = state.mechanism, each.axes
-        joints = [ball_to_universal(end, end.other(each.attach), (inner, outer)) for end in each.ends
-                  if mechanism.joints[end.name].type is JointType.SPHERICAL]
+        joints = [
+            ball_to_universal(end, end.other(each.attach), (inner, outer))
+            for end in each.ends
+            if mechanism.joints[end.name].type is JointType.SPHERICAL
+        ]
         if each.turned:
-            joints += [ball_to_universal(joint, each.chain.carrier, each.axes)
-                       for joint in (mechanism.joints[each.chain.actuator], *each.beside)]
+            joints += [
+                ball_to_universal(joint, each.chain.carrier, each.axes)
+                for joint in (mechanism.joints[each.chain.actuator], *each.beside)
+            ]
         state = state.with_chain(each.chain, each.chain, mechanism.changed(joints=joints))
     return state
 

@@ -31,18 +31,30 @@ def find(state: State, evidence: Evidence, leg: str) -> Iterator[Match[str] | Re
     observed = state.observed_labels()
     ends = dict.fromkeys(each.attach for each in state.real.legs if each.label in observed)
     bodies = dict.fromkeys((*ends, *sorted(state.watched)))
-    yield Match(leg, "platform and observed legs move as before without it",
-                bodies=tuple(each for each in bodies if each not in (state.mechanism.platform, state.mechanism.base)))
+    yield Match(
+        leg,
+        "platform and observed legs move as before without it",
+        bodies=tuple(each for each in bodies if each not in (state.mechanism.platform, state.mechanism.base)),
+    )
 
 
 def apply(state: State, leg: str) -> State:
     """The robot without the leg's links and joints, virtual links included."""
     part, mechanism = state.real.leg(leg), state.mechanism
     links = [*part.links, *(name for name, owner in state.owners.items() if owner == leg)]
-    changed = mechanism.changed(remove_links=[name for name in links if name in mechanism.links],
-                                remove_joints=[name for name in part.joints if name in mechanism.joints])
+    changed = mechanism.changed(
+        remove_links=[name for name in links if name in mechanism.links],
+        remove_joints=[name for name in part.joints if name in mechanism.joints],
+    )
     return replace(state, mechanism=changed, removed=(*state.removed, leg))
 
 
-RULE = Rule("leg removal", "MMT 4.2", Stage.LEG, find, apply, whole_leg,
-            keeps=("the wrenches of removed legs are among those of the rest",))
+RULE = Rule(
+    "leg removal",
+    "MMT 4.2",
+    Stage.LEG,
+    find,
+    apply,
+    whole_leg,
+    keeps=("the wrenches of removed legs are among those of the rest",),
+)

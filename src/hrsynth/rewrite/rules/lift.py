@@ -52,10 +52,14 @@ def find(state: State, evidence: Evidence, leg: str) -> Iterator[Match[list[Lift
             found.append(_segment(state, evidence, observation, index, tag))
         else:
             found.append(_sensor(state, evidence, observation, index, tag))
-    words = dict.fromkeys("an encoder actuates its joint" if isinstance(each, Encoder) else
-                          "PPP-U̲-R(d) from the reference link to the observed link constrains nothing" if each.segment
-                          else "a chain of six freedoms from the reference link to the observed link constrains nothing"
-                          for each in found)
+    words = dict.fromkeys(
+        "an encoder actuates its joint"
+        if isinstance(each, Encoder)
+        else "PPP-U̲-R(d) from the reference link to the observed link constrains nothing"
+        if each.segment
+        else "a chain of six freedoms from the reference link to the observed link constrains nothing"
+        for each in found
+    )
     yield Match(found, "; ".join(words))
 
 
@@ -88,27 +92,51 @@ def apply(state: State, found: list[Lifting | Encoder]) -> State:
 def _lift(state: State, lifting: Lifting) -> State:
     mechanism, tag = state.mechanism, lifting.tag
     count = len(lifting.joints)
-    names, between = SEGMENT if lifting.segment else (
-        tuple(f"sense_{number}" for number in range(1, count + 1)),
-        tuple(f"sensor_{number}" for number in range(1, count)))
+    names, between = (
+        SEGMENT
+        if lifting.segment
+        else (
+            tuple(f"sense_{number}" for number in range(1, count + 1)),
+            tuple(f"sensor_{number}" for number in range(1, count)),
+        )
+    )
     joint_names, link_names = ([mechanism.fresh(f"{name}_{tag}") for name in each] for each in (names, between))
     path = [lifting.reference, *link_names, lifting.link]
-    joints = [Joint(name, JointType(joint.letter), a, b, joint.at, joint.axes, Motor(name) if joint.actuated else None)
-              for name, joint, a, b in zip(joint_names, lifting.joints, path, path[1:], strict=False)]
+    joints = [
+        Joint(name, JointType(joint.letter), a, b, joint.at, joint.axes, Motor(name) if joint.actuated else None)
+        for name, joint, a, b in zip(joint_names, lifting.joints, path, path[1:], strict=False)
+    ]
     links = [Link(name, pose(joint.at)) for name, joint in zip(link_names, lifting.joints, strict=False)]
     changed = mechanism.changed(links=links, joints=joints)
     if not lifting.segment:
         driven = tuple(joint.name for joint in joints if joint.actuated)
-        sensor = SensorChain(lifting.leg, lifting.link, lifting.reference, tuple(link_names), tuple(joint_names),
-                             driven)
+        sensor = SensorChain(
+            lifting.leg, lifting.link, lifting.reference, tuple(link_names), tuple(joint_names), driven
+        )
         return replace(state, mechanism=changed, sensors=(*state.sensors, sensor))
     turning, proximal = lifting.joints[3], lifting.proximal
     u: Array = lifting.joints[4].axes[0]
     k_joint, before = (None, None) if proximal is None else (proximal.k_joint.name, proximal.before)
-    chain = VirtualChain(lifting.leg, lifting.link, u, turning.at, k_joint, before, link_names[2],
-                         tuple(joint_names[:3]), tuple(link_names[:2]), joint_names[3], link_names[3], joint_names[4])
-    return replace(state, mechanism=changed, chains=(*state.chains, chain),
-                   owners={**state.owners, **{link: lifting.leg for link in link_names}})
+    chain = VirtualChain(
+        lifting.leg,
+        lifting.link,
+        u,
+        turning.at,
+        k_joint,
+        before,
+        link_names[2],
+        tuple(joint_names[:3]),
+        tuple(link_names[:2]),
+        joint_names[3],
+        link_names[3],
+        joint_names[4],
+    )
+    return replace(
+        state,
+        mechanism=changed,
+        chains=(*state.chains, chain),
+        owners={**state.owners, **{link: lifting.leg for link in link_names}},
+    )
 
 
 def _encode(state: State, seen: Encoder) -> State:
@@ -121,5 +149,4 @@ def _encode(state: State, seen: Encoder) -> State:
     return replace(state, mechanism=changed, sensors=(*state.sensors, sensor))
 
 
-RULE = Rule("lift", "MMT 3.2, Fig. 2(b)", Stage.LIFT, find, apply, whole_leg, always=True,
-            keeps=(AXES,))
+RULE = Rule("lift", "MMT 3.2, Fig. 2(b)", Stage.LIFT, find, apply, whole_leg, always=True, keeps=(AXES,))

@@ -1,6 +1,6 @@
 """Motors off: every real actuator becomes passive.
 
-    R̲ –  →  R –        (MMT 3.1, 4.2; always)
+R̲ –  →  R –        (MMT 3.1, 4.2; always)
 """
 
 from __future__ import annotations
@@ -18,8 +18,14 @@ def find(state: State, evidence: Evidence, leg: str) -> Iterator[Match[list[Join
     """All motors of all legs at once."""
     driven = [joint for joint in state.mechanism.joints.values() if joint.actuated]
     count = sum(joint.type.freedoms for joint in driven)
-    yield Match(driven, "the robot has no motors" if not count else "1 real motor becomes passive" if count == 1 else
-                f"{count} real motors become passive")
+    yield Match(
+        driven,
+        "the robot has no motors"
+        if not count
+        else "1 real motor becomes passive"
+        if count == 1
+        else f"{count} real motors become passive",
+    )
 
 
 def apply(state: State, driven: list[Joint]) -> State:

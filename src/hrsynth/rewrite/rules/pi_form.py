@@ -45,14 +45,32 @@ def apply(state: State, found: Circling) -> State:
     for tag, offset in offsets.items():
         crank = Link(mechanism.fresh(f"crank_{tag}"), pose(centre + offset))
         links.append(crank)
-        joints.append(Joint(mechanism.fresh(f"crank_base_{tag}"), JointType.REVOLUTE, mechanism.reference, crank.name,
-                            centre + offset, (base.axis,)))
-        joints.append(Joint(mechanism.fresh(f"crank_tip_{tag}"), JointType.REVOLUTE, crank.name, chain.carrier,
-                            chain.anchor + offset, (base.axis,)))
-    changed = mechanism.changed(remove_links=chain.slider_links, remove_joints=chain.sliders, links=links,
-                                joints=joints)
-    return state.with_chain(chain, replace(chain, sliders=(), slider_links=()), changed,
-                            {link.name: chain.leg for link in links})
+        joints.append(
+            Joint(
+                mechanism.fresh(f"crank_base_{tag}"),
+                JointType.REVOLUTE,
+                mechanism.reference,
+                crank.name,
+                centre + offset,
+                (base.axis,),
+            )
+        )
+        joints.append(
+            Joint(
+                mechanism.fresh(f"crank_tip_{tag}"),
+                JointType.REVOLUTE,
+                crank.name,
+                chain.carrier,
+                chain.anchor + offset,
+                (base.axis,),
+            )
+        )
+    changed = mechanism.changed(
+        remove_links=chain.slider_links, remove_joints=chain.sliders, links=links, joints=joints
+    )
+    return state.with_chain(
+        chain, replace(chain, sliders=(), slider_links=()), changed, {link.name: chain.leg for link in links}
+    )
 
 
 RULE = Rule("pi form", "MMT Fig. 4(c)", Stage.FORM, find, apply, each_chain, keeps=("no Π is flat",))

@@ -1,6 +1,6 @@
 """Prismatic merge: the actuator takes the place of the real joint on the reference link.
 
-    U–P̲–S   →   U̲–P–S        A is fixed on the reference link (UPS, UPU, RPS legs)        (MMT 4.2.1)
+U–P̲–S   →   U̲–P–S        A is fixed on the reference link (UPS, UPU, RPS legs)        (MMT 4.2.1)
 """
 
 from __future__ import annotations

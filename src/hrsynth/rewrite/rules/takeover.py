@@ -38,8 +38,9 @@ def find(state: State, evidence: Evidence, chain: VirtualChain) -> Iterator[Matc
         yield from substitution(state, evidence, chain)
 
 
-def substitution(state: State, evidence: Evidence, chain: VirtualChain
-                 ) -> Iterator[Match[Substitution | None] | Refusal]:
+def substitution(
+    state: State, evidence: Evidence, chain: VirtualChain
+) -> Iterator[Match[Substitution | None] | Refusal]:
     """The joint K of a chain that has not taken one over; None where another chain of the leg has taken it."""
     if chain.taken:
         return
@@ -61,15 +62,21 @@ def substitution(state: State, evidence: Evidence, chain: VirtualChain
     if K.type is not JointType.REVOLUTE and evidence.spins(chain.link, chain.direction):
         yield Match(found, f"{chain.link!r} can turn about its own direction with all else at rest")
     else:
-        yield Match(found, "done without its side condition",
-                    unmet=f"{chain.link!r} cannot turn about its own direction, and {K.name!r} is not an R or a U "
-                          "whose axes the actuator could take")
+        yield Match(
+            found,
+            "done without its side condition",
+            unmet=f"{chain.link!r} cannot turn about its own direction, and {K.name!r} is not an R or a U "
+            "whose axes the actuator could take",
+        )
 
 
 def _steady(K: Joint, actuator: Joint, proximal: ProximalChain) -> bool:
     """Condition (ii): K has as many axes as the direction has ways to move, the first one steady."""
-    return (K.type is actuator.type and proximal.keeps(K.axis)
-            and (K.type is not JointType.REVOLUTE or parallel(K.axis, actuator.axis)))
+    return (
+        K.type is actuator.type
+        and proximal.keeps(K.axis)
+        and (K.type is not JointType.REVOLUTE or parallel(K.axis, actuator.axis))
+    )
 
 
 def apply(state: State, found: Substitution | None) -> State:
@@ -79,17 +86,31 @@ def apply(state: State, found: Substitution | None) -> State:
     mechanism, chain = state.mechanism, found.chain
     actuator = mechanism.joints[chain.actuator]
     taken = replace(actuator, point=chain.anchor) if found.own is None else found.own
-    joints = [replace(taken, name=actuator.name, motor=actuator.motor, predecessor=chain.carrier, successor=chain.link,
-                      in_tree=True, limits=None, turns=(), xml=(), offset=None)]
+    joints = [
+        replace(
+            taken,
+            name=actuator.name,
+            motor=actuator.motor,
+            predecessor=chain.carrier,
+            successor=chain.link,
+            in_tree=True,
+            limits=None,
+            turns=(),
+            xml=(),
+            offset=None,
+        )
+    ]
     if chain.carrier != chain.before:
         kind, axes = (JointType.SPHERICAL, ()) if found.turning is None else (JointType.REVOLUTE, (found.turning,))
-        joints.append(Joint(mechanism.fresh(f"follow_{chain.leg}"), kind, str(chain.before), chain.carrier,
-                            chain.anchor, axes))
-    changed = mechanism.changed(remove_links=[chain.bearing] if chain.bearing else [],
-                                remove_joints=[str(chain.k_joint)], joints=joints)
-    return state.with_chain(chain, replace(chain, taken=True, spins=found.own is None, bearing=None, roll=None),
-                            changed)
+        joints.append(
+            Joint(mechanism.fresh(f"follow_{chain.leg}"), kind, str(chain.before), chain.carrier, chain.anchor, axes)
+        )
+    changed = mechanism.changed(
+        remove_links=[chain.bearing] if chain.bearing else [], remove_joints=[str(chain.k_joint)], joints=joints
+    )
+    return state.with_chain(
+        chain, replace(chain, taken=True, spins=found.own is None, bearing=None, roll=None), changed
+    )
 
 
-RULE = Rule("takeover", "MMT 3.2, Fig. 2(b)", Stage.JOINT, find, apply, each_chain,
-            keeps=(LOOPS, AXES))
+RULE = Rule("takeover", "MMT 3.2, Fig. 2(b)", Stage.JOINT, find, apply, each_chain, keeps=(LOOPS, AXES))

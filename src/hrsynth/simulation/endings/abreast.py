@@ -282,8 +282,11 @@ class Abreast:
         """Mark the runs that are at an end."""
         speed = np.linalg.norm(here.velocity, axis=1)
         shift = np.linalg.norm(self.X[live][:, :3, 3] - self.first[live][:, :3, 3], axis=1)
-        for word, at_end in ((REST, speed <= AT_REST * here.size),
-                             (TIME, self.times[live] >= horizon), (AWAY, shift > self.farthest)):
+        for word, at_end in (
+            (REST, speed <= AT_REST * here.size),
+            (TIME, self.times[live] >= horizon),
+            (AWAY, shift > self.farthest),
+        ):
             self.stopped[live[at_end & (self.stopped[live] == "")]] = word
 
 

@@ -80,9 +80,16 @@ class BasinEnd(Value):
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
-        return {"ended": self.ending.name, "reason": self.ending.reason, "matched_mode": self.ending.matched,
-                "pose": self.pose and self.pose.to_dict(), "error": None if self.X is None else self.size,
-                "starts": self.count, "share": self.share, "example": self.example.to_dict()}
+        return {
+            "ended": self.ending.name,
+            "reason": self.ending.reason,
+            "matched_mode": self.ending.matched,
+            "pose": self.pose and self.pose.to_dict(),
+            "error": None if self.X is None else self.size,
+            "starts": self.count,
+            "share": self.share,
+            "example": self.example.to_dict(),
+        }
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -121,8 +128,13 @@ class Basins(Result, shown_as="basins"):
         motion, goal = self.setting.motion, self.target.pose(self.setting.motion.link)
         half = [(found.angle or 0.0) if name == "phi" else found.length for name in self.grid.names]
         middle = place_of(motion, goal, self.grid.names)
-        near = Grid(tuple((name, np.linspace(m - REGION * h, m + REGION * h, REGION_SIDE[self.grid.ndim]))
-                          for name, m, h in zip(self.grid.names, middle, half, strict=True)), self.grid.fixed)
+        near = Grid(
+            tuple(
+                (name, np.linspace(m - REGION * h, m + REGION * h, REGION_SIDE[self.grid.ndim]))
+                for name, m, h in zip(self.grid.names, middle, half, strict=True)
+            ),
+            self.grid.fixed,
+        )
         X, possible = poses_over(motion, near, self.setting.robot.name, near.places())
         inside = np.array([met and found.holds(each) for met, each in zip(possible, X, strict=True)])
         return (near, inside.reshape(near.shape)) if inside.any() else None
@@ -133,17 +145,29 @@ class Basins(Result, shown_as="basins"):
         goal = next((i for i, each in enumerate(self.ends) if each.ending.name == GOAL), None)
         if self.region is None or goal is None:
             return 0.0
-        sizes = [np.sum(inside) * math.prod(float(v[1] - v[0]) for _, v in grid.axes)
-                 for grid, inside in (self.region, (self.grid, self.cells == goal))]
+        sizes = [
+            np.sum(inside) * math.prod(float(v[1] - v[0]) for _, v in grid.axes)
+            for grid, inside in (self.region, (self.grid, self.cells == goal))
+        ]
         return float(sizes[0] / sizes[1])
 
     def members(self, listed: Endings) -> tuple[int | None, ...]:
         """The place of each end in a list of rests with the same goal; None where it is not on the list, or no rest."""
         length, link = self.target.twin.length, self.setting.motion.link
         rests = [(rest.configuration.pose(link), rest.error) for rest in listed.rests]
-        return tuple(next((i for i, (X, size) in enumerate(rests) if each.X is not None
-                           and abs(size - each.size) <= RUNS_ALIKE
-                           and pose_difference(X, each.X, length) <= RUNS_ALIKE), None) for each in self.ends)
+        return tuple(
+            next(
+                (
+                    i
+                    for i, (X, size) in enumerate(rests)
+                    if each.X is not None
+                    and abs(size - each.size) <= RUNS_ALIKE
+                    and pose_difference(X, each.X, length) <= RUNS_ALIKE
+                ),
+                None,
+            )
+            for each in self.ends
+        )
 
     def headline(self) -> str:
         """The robot and what share of the starts ends at the goal."""
@@ -152,20 +176,46 @@ class Basins(Result, shown_as="basins"):
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line, without the command's own fields."""
-        return {"to": self.goal.to_dict(), **self.setting.to_dict(), "poses": str(self.grid),
-                "axes": {name: values.tolist() for name, values in self.grid.axes}, "starts": self.starts,
-                "ends": [each.to_dict() for each in self.ends], "cells": self.cells.tolist(),
-                "damped": int(np.sum(self.damped)), "abreast": self.abreast, "followed": self.followed,
-                "checked": self.checked, "agreed": self.agreed,
-                "certified": {"words": self.certified.words, "radius_m": self.certified.length,
-                              "radius_rad": self.certified.angle, "covered": self.covered,
-                              "undamped": self.certified.undamped_words} if self.certified else None}
+        return {
+            "to": self.goal.to_dict(),
+            **self.setting.to_dict(),
+            "poses": str(self.grid),
+            "axes": {name: values.tolist() for name, values in self.grid.axes},
+            "starts": self.starts,
+            "ends": [each.to_dict() for each in self.ends],
+            "cells": self.cells.tolist(),
+            "damped": int(np.sum(self.damped)),
+            "abreast": self.abreast,
+            "followed": self.followed,
+            "checked": self.checked,
+            "agreed": self.agreed,
+            "certified": {
+                "words": self.certified.words,
+                "radius_m": self.certified.length,
+                "radius_rad": self.certified.angle,
+                "covered": self.covered,
+                "undamped": self.certified.undamped_words,
+            }
+            if self.certified
+            else None,
+        }
 
 
 @question()
-def basins(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
-           to: PoseLike, plane: PoseLike | None = None, grid: str | None = None, steps: int | None = None,
-           jobs: int | None = None, depth: str = "exact", seed: int = 0) -> Basins:
+def basins(
+    robot: RobotLike,
+    observe: LegsLike = None,
+    camera: CameraLike = None,
+    *,
+    see: SeeLike = None,
+    to: PoseLike,
+    plane: PoseLike | None = None,
+    grid: str | None = None,
+    steps: int | None = None,
+    jobs: int | None = None,
+    depth: str = "exact",
+    seed: int = 0,
+) -> Basins:
     """Where the loop ends that servoes what is observed at the pose ``to``, from each start of a plane of poses (by
     default one through the goal, as far as it is reached, ``steps`` poses a side) or of a ``grid``, a line, plane or
     box such as ``x=-0.3:0.3:50,y=-0.3:0.3:50,z=-0.7``.
@@ -238,11 +288,31 @@ class BasinSearch:
             outcome, here = found.outcomes[i], np.flatnonzero(found.cells == i)
             cells[here] = number
             example = self._example(found.X[here])
-            ends.append(BasinEnd(outcome.ending, None if outcome.X is None else motion.pose(outcome.X), outcome.X,
-                                 outcome.size, len(here), len(here) / counts.sum(), example))
-        return Basins(self.setting, motion.pose(self.goal.pose(motion.link)), self.goal, grid, tuple(ends),
-                      cells.reshape(grid.shape), found.damped.reshape(grid.shape), self.flow is not None,
-                      found.followed, found.checked, found.agreed, found.certified)
+            ends.append(
+                BasinEnd(
+                    outcome.ending,
+                    None if outcome.X is None else motion.pose(outcome.X),
+                    outcome.X,
+                    outcome.size,
+                    len(here),
+                    len(here) / counts.sum(),
+                    example,
+                )
+            )
+        return Basins(
+            self.setting,
+            motion.pose(self.goal.pose(motion.link)),
+            self.goal,
+            grid,
+            tuple(ends),
+            cells.reshape(grid.shape),
+            found.damped.reshape(grid.shape),
+            self.flow is not None,
+            found.followed,
+            found.checked,
+            found.agreed,
+            found.certified,
+        )
 
     def _example(self, X: Array) -> Pose:
         """Of the starts X (n, 4, 4) that end alike the one nearest to their middle, if small steps lead there from the
@@ -274,12 +344,20 @@ class BasinSearch:
         shares = [starts[k::count] for k in range(count)]
         starts = np.concatenate(shares)
         # a step of few runs takes as long as one of a thousand: the last of all parts go on together
-        first, *others = self._run_all([partial(_follow_flow, flow.bare(), horizon, RUN_AWAY * length, X[share],
-                                                FLOW_FEW // count) for share in shares])
+        first, *others = self._run_all(
+            [
+                partial(_follow_flow, flow.bare(), horizon, RUN_AWAY * length, X[share], FLOW_FEW // count)
+                for share in shares
+            ]
+        )
         checked = np.random.default_rng(seed).choice(len(starts), min(FLOW_CHECKED, len(starts)), replace=False)
-        runs, certified, *alone = self._run_all([partial(first.together(others).run, horizon),
-                                                 partial(certified_radius, self.setting, self.goal),
-                                                 *self._single(self._start(X[starts[checked]]))])
+        runs, certified, *alone = self._run_all(
+            [
+                partial(first.together(others).run, horizon),
+                partial(certified_radius, self.setting, self.goal),
+                *self._single(self._start(X[starts[checked]])),
+            ]
+        )
         damped[starts] = runs.weak
         groups = runs.groups(length, flow.seen)
         shown = groups[:FLOW_NAMED]
@@ -290,31 +368,35 @@ class BasinSearch:
         numbers, outcomes = np.full(len(starts), -1), Outcomes(length)
         for group, outcome in zip(shown, told, strict=False):
             numbers[group] = outcomes.number(_at(outcome, runs.X[group[0]], length))
-        told = told[len(shown):]
+        told = told[len(shown) :]
         if len(away):
             numbers[away] = outcomes.number(told[0])
         numbers[runs.stopped == OVER] = outcomes.number(Outcome(Ending(TIME, "the time ran out")))
-        same = [outcome.alike(outcomes.all[numbers[run]], length)
-                for run, outcome in zip(checked, chain(*alone), strict=True) if numbers[run] >= 0]
-        for run, outcome in zip(followed, told[min(len(away), 1):], strict=True):
+        same = [
+            outcome.alike(outcomes.all[numbers[run]], length)
+            for run, outcome in zip(checked, chain(*alone), strict=True)
+            if numbers[run] >= 0
+        ]
+        for run, outcome in zip(followed, told[min(len(away), 1) :], strict=True):
             numbers[run] = outcomes.number(outcome)
         numbers[numbers < 0] = outcomes.number(Outcome(Ending(UNDECIDED, "not followed to an end")))
         cells[starts] = numbers
         return Found(outcomes.all, cells, damped, X, len(followed), len(same), sum(same), certified)
 
     def _one_by_one(self, X: Array, grid: Grid) -> Found:
-        """The outcomes of the starts of a grid, each simulated; X (n, 4, 4) are its poses with free parts as at home.
-        """
+        """The outcomes of the starts of a grid, each simulated; X (n, 4, 4) are its poses, free parts as at home."""
         everything = self.setting.everything
         at = sweep(everything.start, everything.question, grid, self.setting.motion, self.setting.placer)
         starts = np.array([i for i, each in enumerate(at) if each is not None], dtype=int)
         cells, outcomes = np.full(len(at), NOT_REACHED), Outcomes(self.goal.twin.length)
-        certified, *told = self._run_all([partial(certified_radius, self.setting, self.goal),
-                                          *self._single([at[i] for i in starts])])
+        certified, *told = self._run_all(
+            [partial(certified_radius, self.setting, self.goal), *self._single([at[i] for i in starts])]
+        )
         for i, outcome in zip(starts, chain(*told), strict=True):
             cells[i] = outcomes.number(outcome)
-        reached = np.array([there if each is None else each.pose(self.setting.motion.link)
-                            for each, there in zip(at, X, strict=True)])
+        reached = np.array(
+            [there if each is None else each.pose(self.setting.motion.link) for each, there in zip(at, X, strict=True)]
+        )
         return Found(outcomes.all, cells, np.zeros(len(at), dtype=bool), reached, len(starts), certified=certified)
 
     def _start(self, X: Array) -> list[ClosedConfiguration | None]:
@@ -340,8 +422,10 @@ def hindrances(setting: ObservedRobot) -> tuple[str, ...]:
     """Why runs of a robot cannot be integrated abreast."""
     own = set(map(id, setting.segments))
     kinds = dict.fromkeys("" if each.by_segment else each.kind for each in setting.observed if id(each) not in own)
-    found = [f"observations of kind {kind} are fed back" if kind else "other links are watched than by default"
-             for kind in kinds]
+    found = [
+        f"observations of kind {kind} are fed back" if kind else "other links are watched than by default"
+        for kind in kinds
+    ]
     if setting.mechanism.stops:
         found.append("a joint has limits")
     return tuple(found) or (("a leg has no closed form",) if setting.placer is None else ())
@@ -379,6 +463,9 @@ def _simulate(task: ServoTask, starts: Sequence[ClosedConfiguration | None]) -> 
         run = loop.simulate(start, task.conditions.horizon)
         ending = classifier.classify(run, measure_all(run.last, task.law.question)[0])
         rests = run.stopped in (SERVED_AT, REST, POISED)
-        found.append(Outcome(ending, run.last.pose(task.setting.motion.link), run.commands[-1].size) if rests
-                     else Outcome(ending))
+        found.append(
+            Outcome(ending, run.last.pose(task.setting.motion.link), run.commands[-1].size)
+            if rests
+            else Outcome(ending)
+        )
     return found

@@ -48,8 +48,9 @@ class Covers(Value):
         return self.setting.samples.question
 
     @classmethod
-    def of(cls, setting: ObservedRobot, goal: ClosedConfiguration, system: RestSystem, boxes: int | None, jobs: int
-           ) -> Covers:
+    def of(
+        cls, setting: ObservedRobot, goal: ClosedConfiguration, system: RestSystem, boxes: int | None, jobs: int
+    ) -> Covers:
         """Those of a goal; all critical ones with as many ``boxes`` at most, if that is asked, in so many processes
         (``jobs``)."""
         with part("poses without an error"):
@@ -59,8 +60,7 @@ class Covers(Value):
         with part("all rests"):
             return cls(system, setting, found, cover(setting, goal, budget=boxes, jobs=jobs))
 
-    def find_missed(self, known: Sequence[ClosedConfiguration], q: Array, idle: int, turn: int = 0
-                    ) -> list[Critical]:
+    def find_missed(self, known: Sequence[ClosedConfiguration], q: Array, idle: int, turn: int = 0) -> list[Critical]:
         """The proved critical points that none of the configurations (with coordinates q (c, N)) is at, as far as the
         robot is closed there, from these and (of each ``turn`` but the first) from coordinates scattered about them."""
         found: list[Critical] = []
@@ -75,8 +75,13 @@ class Covers(Value):
             left = [box for k, box in enumerate(each.found) if k not in met]
             if left:
                 falling = np.array([box.falling or 0 for box in left])
-                poses = CriticalPoses(np.array([box.p for box in left]), np.array([box.R for box in left]),
-                                      np.array([box.directions for box in left]), falling, 0 * falling)
+                poses = CriticalPoses(
+                    np.array([box.p for box in left]),
+                    np.array([box.R for box in left]),
+                    np.array([box.directions for box in left]),
+                    falling,
+                    0 * falling,
+                )
                 start, done = Lift(self.system, self.question.observations, each.error)(poses, q)
                 points = descend(self.system, start[done], falling[done], idle, np.inf)
                 found += [Critical(point, 0) for point in sharpen_points(self.system, points, idle)]
@@ -90,13 +95,24 @@ class Covers(Value):
         known = self.vanishing
         counts: Counter[tuple[str, ...]] | None = None
         if known.complete and known.bounded and not known.locked:
-            counts = Counter(tuple(leg for leg, u, w in zip(labels, each.directions, desired, strict=True) if u @ w < 0)
-                             for each in known.found)
+            counts = Counter(
+                tuple(leg for leg, u, w in zip(labels, each.directions, desired, strict=True) if u @ w < 0)
+                for each in known.found
+            )
         met = {each.reversed: each for each in lists}
-        every = [tuple(leg for leg, sign in zip(labels, signs, strict=True) if sign)
-                 for signs in product((False, True), repeat=len(labels))]
-        return [SignedModes(each, met[each].listed if each in met else None, None if counts is None else counts[each],
-                            len(known.turns)) for each in sorted(every, key=lambda each: each not in met)]
+        every = [
+            tuple(leg for leg, sign in zip(labels, signs, strict=True) if sign)
+            for signs in product((False, True), repeat=len(labels))
+        ]
+        return [
+            SignedModes(
+                each,
+                met[each].listed if each in met else None,
+                None if counts is None else counts[each],
+                len(known.turns),
+            )
+            for each in sorted(every, key=lambda each: each not in met)
+        ]
 
     def proves(self, rest: RestPoint) -> bool:
         """Whether boxes prove that a rest is by itself, though E is nearly flat there."""
@@ -109,20 +125,34 @@ class Covers(Value):
             return None
         told = self.every
         places = [told.place(each.configuration, directions(each.configuration, self.question)[0]) for each in rests]
-        held = [told.holds(each.configuration) and (told.loop is None or len(each.across) < told.loop.flat)
-                and not self._locks(told.unread, each.configuration)
-                for each, place in zip(rests, places, strict=True) if place is None]
+        held = [
+            told.holds(each.configuration)
+            and (told.loop is None or len(each.across) < told.loop.flat)
+            and not self._locks(told.unread, each.configuration)
+            for each, place in zip(rests, places, strict=True)
+            if place is None
+        ]
         within = None if told.bounded or told.error is None else COVER_REACH * told.error.length
         shorter = SHORTEST_ROD * told.error.length if told.short and told.error is not None else None
         alone = tuple(self._alone(told, each) for k, each in enumerate(told.found) if k not in places)
-        return RestCover(told, alone, sum(held), within, shorter,
-                         sum(told.is_turned(each.configuration) for each in rests), len(held) - sum(held))
+        return RestCover(
+            told,
+            alone,
+            sum(held),
+            within,
+            shorter,
+            sum(told.is_turned(each.configuration) for each in rests),
+            len(held) - sum(held),
+        )
 
     def _locks(self, labels: Sequence[str], at: ClosedConfiguration) -> bool:
         """Whether the joints of a leg lock: they move its end in fewer ways than at the zero configuration."""
         start, base = self.setting.everything.start, self.setting.mechanism.base
-        return any(leg_twists(at, leg, (), base).shape[1] < leg_twists(start, leg, (), base).shape[1]
-                   for leg in self.setting.anatomy.legs if leg.label in labels)
+        return any(
+            leg_twists(at, leg, (), base).shape[1] < leg_twists(start, leg, (), base).shape[1]
+            for leg in self.setting.anatomy.legs
+            if leg.label in labels
+        )
 
     def _alone(self, told: Cover, box: CriticalBox) -> BoxedRest:
         """A critical point that is no rest of the list."""

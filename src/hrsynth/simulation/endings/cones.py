@@ -83,9 +83,12 @@ def cut(middle: Array, half: Array, axis: NDArray[np.int64]) -> tuple[Array, Arr
     return np.concatenate([middle - shift, middle + shift]), np.concatenate([size, size])
 
 
-def proved_all_over(whole: Array, inside: Callable[[Array, Array], NDArray[np.bool_]],
-                    judge: Callable[[Array, Array], tuple[NDArray[np.bool_], NDArray[np.int64]]], most: int
-                    ) -> tuple[bool, int]:
+def proved_all_over(
+    whole: Array,
+    inside: Callable[[Array, Array], NDArray[np.bool_]],
+    judge: Callable[[Array, Array], tuple[NDArray[np.bool_], NDArray[np.int64]]],
+    most: int,
+) -> tuple[bool, int]:
     """Whether something is proved at all points of a region in the box |x| ≤ ``whole`` (n,), and by how many boxes.
 
     ``inside`` tells which boxes (c, n) meet the region, ``judge`` in which it is proved and across which axis to cut
@@ -119,17 +122,21 @@ class ConeProver:
 
         def along(x: Sequence[Any], number: Number) -> list[Any]:
             found = error.at(x[:n], [x[n:]], number)
-            return [*found.margins, *(x for each in found.seen for x in each.error),
-                    *(x for each in found.seen for x in each.rates[0])]
+            return [
+                *found.margins,
+                *(x for each in found.seen for x in each.error),
+                *(x for each in found.seen for x in each.rates[0]),
+            ]
 
         def jacobian(x: Sequence[Any], number: Number) -> list[Any]:
             found = error.at(x, [number(column) for column in W.T], number)
             return [*found.margins, *(x for each in found.seen for rate in zip(*each.rates, strict=True) for x in rate)]
 
         made = trace_formula(jacobian, n)
-        found = made.at([affine(np.zeros(1), np.zeros((1, n)), np.zeros(1))] * n)[len(error.limbs):]
-        return cls(error, W, np.array([each.v[0, 0] for each in found]).reshape(-1, n), trace_formula(along, 2 * n),
-                   made)
+        found = made.at([affine(np.zeros(1), np.zeros((1, n)), np.zeros(1))] * n)[len(error.limbs) :]
+        return cls(
+            error, W, np.array([each.v[0, 0] for each in found]).reshape(-1, n), trace_formula(along, 2 * n), made
+        )
 
     def core(self) -> tuple[float, float]:
         """The radius ρ of a ball |w| ≤ ρ in which the goal is the only critical point and E rises along rays, and a
@@ -151,10 +158,12 @@ class ConeProver:
         n = self.error.size
         off = rho * np.eye(n)
         # noise ε = w / ρ: x = W w
-        forms = [affine(np.zeros(1), (row @ off)[None], np.full(1, AFFINE_ROUNDING * rho * np.abs(row).sum()))
-                 for row in self.W]
+        forms = [
+            affine(np.zeros(1), (row @ off)[None], np.full(1, AFFINE_ROUNDING * rho * np.abs(row).sum()))
+            for row in self.W
+        ]
         found = self.jacobian.at(forms)
-        margins, rates = found[: len(self.error.limbs)], found[len(self.error.limbs):]
+        margins, rates = found[: len(self.error.limbs)], found[len(self.error.limbs) :]
         slopes = np.array([each.v[1:, 0] for each in rates]).reshape(*self.Q.shape, n)
         shift = np.array([each.v[0, 0] for each in rates]).reshape(self.Q.shape) - self.Q
         rest = np.linalg.norm(np.abs(shift) + np.array([each.r[0] for each in rates]).reshape(self.Q.shape))
@@ -184,27 +193,41 @@ class ConeProver:
         centre = t * cones.middle
         rounding = AFFINE_ROUNDING * high[:, None]
         around = np.concatenate([cones.half[:, :, None] * np.eye(n), np.zeros((count, n, n))], axis=-1)
-        found = self.formula.at([affine(middle @ row, np.einsum("cks,k->cs", part, row), off * np.abs(row).sum())
-                                 for middle, part, off in ((centre, slopes, rounding[:, 0]),
-                                                           (cones.middle, around, np.full(count, AFFINE_ROUNDING)))
-                                 for row in self.W])
+        found = self.formula.at(
+            [
+                affine(middle @ row, np.einsum("cks,k->cs", part, row), off * np.abs(row).sum())
+                for middle, part, off in (
+                    (centre, slopes, rounding[:, 0]),
+                    (cones.middle, around, np.full(count, AFFINE_ROUNDING)),
+                )
+                for row in self.W
+            ]
+        )
         reached = np.ones(count, dtype=bool)
         for each in found[:k]:
             reached &= each.low > 0
         times = affine(t, (off * np.concatenate([face, np.zeros_like(face)], axis=1))[:, None], AFFINE_ROUNDING * t)
         inverse = times.inverse()
         e, rate = (stack(part) for part in (found[k : k + len(self.Q)], found[k + len(self.Q) :]))
-        Qy, Qw = (affine(middle @ self.Q.T, np.einsum("cks,rk->crs", part, self.Q), off * np.abs(self.Q).sum(axis=1))
-                  for middle, part, off in ((centre, slopes, rounding),
-                                            (cones.middle, around, np.full_like(t, AFFINE_ROUNDING))))
+        Qy, Qw = (
+            affine(middle @ self.Q.T, np.einsum("cks,rk->crs", part, self.Q), off * np.abs(self.Q).sum(axis=1))
+            for middle, part, off in (
+                (centre, slopes, rounding),
+                (cones.middle, around, np.full_like(t, AFFINE_ROUNDING)),
+            )
+        )
         a, b = (e - Qy) * inverse, rate - Qw
         rise, twice = (Qw * (a + b) + a * b).sum(), (2.0 * (Qw * a) + a * a).sum()
         near, far = np.maximum(np.abs(cones.middle) - cones.half, 0.0), np.abs(cones.middle) + cones.half
         near, far = (near**2).sum(axis=1), (far**2).sum(axis=1)
         least, most = self.square
-        return SliceBounds(reached, least * near + rise.low, np.maximum(low**2 * (least * near + twice.low) / 2, 0.0),
-                           high**2 * (most * far + twice.high) / 2,
-                           np.where(face, 0.0, np.abs(np.nan_to_num(rise.v[1 : n + 1], nan=0.0)).T))
+        return SliceBounds(
+            reached,
+            least * near + rise.low,
+            np.maximum(low**2 * (least * near + twice.low) / 2, 0.0),
+            high**2 * (most * far + twice.high) / 2,
+            np.where(face, 0.0, np.abs(np.nan_to_num(rise.v[1 : n + 1], nan=0.0)).T),
+        )
 
 
 @dataclass(frozen=True, eq=False)

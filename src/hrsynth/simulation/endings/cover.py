@@ -92,8 +92,9 @@ class Cover(Value):
         if self.error.turns.shape[1] == 1:
             x = np.append(x, turn_about(self.error.turns[:, 0], R @ self.error.R.T)[0])
         periods = np.where(np.arange(len(x)) < k, np.inf, 2 * np.pi)
-        if any(np.all(_away(x, middle[: len(x)], periods) <= half[: len(x)] + FOLLOWED)
-               for middle, half in self.locked):
+        if any(
+            np.all(_away(x, middle[: len(x)], periods) <= half[: len(x)] + FOLLOWED) for middle, half in self.locked
+        ):
             return False
         if self.box is None:
             return True
@@ -119,14 +120,27 @@ class Cover(Value):
             return None
         p, R = (each[0] for each in self.error.coordinates.of([at]))
         far = max(1.0, float(np.abs(p).max()))
-        away = [max(np.abs(each.p / self.error.length - p).max() / far, np.abs(each.R - R).max(),
-                    np.abs(each.directions - u).max()) for each in self.found]
+        away = [
+            max(
+                np.abs(each.p / self.error.length - p).max() / far,
+                np.abs(each.R - R).max(),
+                np.abs(each.directions - u).max(),
+            )
+            for each in self.found
+        ]
         nearest = int(np.argmin(away))
         return nearest if away[nearest] < SAME_ENDING else None
 
 
-def cover(setting: ObservedRobot, goal: ClosedConfiguration, *, vanishing: bool = False, budget: int = COVER_BOXES,
-          reach: float = COVER_REACH, jobs: int = 1) -> Cover:
+def cover(
+    setting: ObservedRobot,
+    goal: ClosedConfiguration,
+    *,
+    vanishing: bool = False,
+    budget: int = COVER_BOXES,
+    reach: float = COVER_REACH,
+    jobs: int = 1,
+) -> Cover:
     """All critical points of the error to a goal that subdivision finds and proves, in every working mode: wherever
     legs reach, however far away where all rods slide in a plane, otherwise in a box that is ``reach`` characteristic
     lengths wide either way. ``vanishing``: those alone at which the error vanishes. Many boxes are shared by so many
@@ -138,8 +152,9 @@ def cover(setting: ObservedRobot, goal: ClosedConfiguration, *, vanishing: bool 
     low, high, bounded = bounds(error, reach)
     charts, endless = [each.list_charts(bounded) for each in families], families[0].endless
     loop = next((each for each in families if isinstance(each, LoopError | SpringError)), None)
-    parts = [[_boxes(each, low, high, reach, vanishing or loop not in (None, each)) for each in some]
-             for some in charts]
+    parts = [
+        [_boxes(each, low, high, reach, vanishing or loop not in (None, each)) for each in some] for some in charts
+    ]
     every = [part for some in parts for part in some]
     # the small ones first: what they do not use is left for the others
     for k, part in enumerate(reversed(every)):
@@ -148,34 +163,56 @@ def cover(setting: ObservedRobot, goal: ClosedConfiguration, *, vanishing: bool 
     found: list[CriticalBox] = []
     for family, some in zip(families, parts, strict=True):
         own: list[CriticalBox] = []
-        for zero in (zero for each in some for zero in each.zeros()
-                     if zero.error[0] == 0.0 or not each.vanishing or family.square is not None):
+        for zero in (
+            zero
+            for each in some
+            for zero in each.zeros()
+            if zero.error[0] == 0.0 or not each.vanishing or family.square is not None
+        ):
             if not any(_same(zero, other, family) for other in own):
                 own.append(zero)
         own = [_on_line(each, family.error, error) if len(each.x) < error.size else each for each in own]
-        found += [each for each in own if not isinstance(loop, LoopError)
-                  or not any(_alike(each, other, loop) for other in found)]
+        found += [
+            each
+            for each in own
+            if not isinstance(loop, LoopError) or not any(_alike(each, other, loop) for other in found)
+        ]
     left, lost = (
         [corners for part in every for corners in _corners(part.error, boxes(part), error.size)]
-        for boxes in (lambda part: part.left, lambda part: part.lost))
+        for boxes in (lambda part: part.left, lambda part: part.lost)
+    )
     locked, left = _places(join_boxes(lost), left, (high - low)[: error.size])
-    meeting = [each for each in found if each.error[0] > 0 and sum(
-        isinstance(family, PlaneError) and family.holds(each.R) for family in families) > 1]
+    meeting = [
+        each
+        for each in found
+        if each.error[0] > 0 and sum(isinstance(family, PlaneError) and family.holds(each.R) for family in families) > 1
+    ]
     near = SINGULAR_BOX * (high - low)[: error.size]
     locked += [(each.x[: error.size], np.maximum(each.radius[: error.size], near)) for each in meeting]
     found = [each for each in found if each not in meeting]
     found = [replace(each, directions=each.directions * own) for own in error.mirrors for each in found]
     free = [each for i, each in enumerate(error.limbs) if i not in families[0].joints and isinstance(each, SlidingRod)]
-    return Cover(tuple(found), tuple(left), sum(each.share for each in every) / len(every),
-                 sum(each.boxes for each in every), bounded or endless, "",
-                 None if endless and not bounded else (low, high), error,
-                 () if isinstance(loop, SpringError) or any(each.short for each in charts[0]) else tuple(free), struts,
-                 tuple(locked),
-                 () if struts is not None else unread(setting), loop, any(each.spent for each in every))
+    return Cover(
+        tuple(found),
+        tuple(left),
+        sum(each.share for each in every) / len(every),
+        sum(each.boxes for each in every),
+        bounded or endless,
+        "",
+        None if endless and not bounded else (low, high),
+        error,
+        () if isinstance(loop, SpringError) or any(each.short for each in charts[0]) else tuple(free),
+        struts,
+        tuple(locked),
+        () if struts is not None else unread(setting),
+        loop,
+        any(each.spent for each in every),
+    )
 
 
-def _families(setting: ObservedRobot, goal: ClosedConfiguration, vanishing: bool
-              ) -> tuple[PoseError, list[JointError], Struts | None]:
+def _families(
+    setting: ObservedRobot, goal: ClosedConfiguration, vanishing: bool
+) -> tuple[PoseError, list[JointError], Struts | None]:
     """The error, and all that boxes are to look at: the parts of which the closures are made up; raises
     ``NotEnclosed``."""
     try:
@@ -237,8 +274,11 @@ def _cut_long(every: Sequence[Subdivision], whole: Array, budget: int, jobs: int
     """Cut lost boxes on that together fill more than what can be told as one place, more finely step by step."""
     for finer in SINGULAR_FINER:
         own = [list(_corners(each.error, each.lost, len(whole))) for each in every]
-        long = [(low, high) for low, high in join_boxes(chain(*own))
-                if np.isfinite(high - low).all() and np.any(high - low > LOCKED_PLACE * whole)]
+        long = [
+            (low, high)
+            for low, high in join_boxes(chain(*own))
+            if np.isfinite(high - low).all() and np.any(high - low > LOCKED_PLACE * whole)
+        ]
         for each, boxes in zip(every, own, strict=True):
             chosen = [any(np.all((a <= low) & (high <= b)) for a, b in long) for low, high in boxes]
             left = budget - sum(other.boxes for other in every)
@@ -246,8 +286,9 @@ def _cut_long(every: Sequence[Subdivision], whole: Array, budget: int, jobs: int
                 each.cut_lost(chosen, finer, left, jobs)
 
 
-def _places(places: Sequence[tuple[Array, Array]], left: Sequence[tuple[Array, Array]], whole: Array
-            ) -> tuple[list[tuple[Array, Array]], list[tuple[Array, Array]]]:
+def _places(
+    places: Sequence[tuple[Array, Array]], left: Sequence[tuple[Array, Array]], whole: Array
+) -> tuple[list[tuple[Array, Array]], list[tuple[Array, Array]]]:
     """Places (corners) where equations may be dependent, as middles and half edges, each with the smallest of the boxes
     that are left open about it; and what is open besides: also what is long, or endless, and no place that can be told
     by a point."""
@@ -277,8 +318,10 @@ def join_boxes(boxes: Iterable[Sequence[Array]]) -> list[tuple[Array, Array]]:
             endless.append((low, high))
             continue
         while near := [k for k, (a, b) in enumerate(groups) if np.all((a <= high + room) & (low <= b + room))]:
-            low, high = np.min([low, *(groups[k][0] for k in near)], axis=0), np.max(
-                [high, *(groups[k][1] for k in near)], axis=0)
+            low, high = (
+                np.min([low, *(groups[k][0] for k in near)], axis=0),
+                np.max([high, *(groups[k][1] for k in near)], axis=0),
+            )
             groups = [each for k, each in enumerate(groups) if k not in near]
         groups.append((low, high))
     if endless:
@@ -291,16 +334,22 @@ def unread(setting: ObservedRobot) -> tuple[str, ...]:
     """The legs whose joints may lock where their closed forms are regular: those with U joints, or with rods side by
     side; of R and P in a plane, and of one rod between balls, the forms tell all."""
     joints = setting.mechanism.joints
-    return tuple(leg.label for leg in setting.anatomy.legs if leg.has_loops
-                 or any(joints[name].type is JointType.UNIVERSAL for name in leg.joints))
+    return tuple(
+        leg.label
+        for leg in setting.anatomy.legs
+        if leg.has_loops or any(joints[name].type is JointType.UNIVERSAL for name in leg.joints)
+    )
 
 
 def _on_line(zero: CriticalBox, line: PoseError, error: PoseError) -> CriticalBox:
     """A critical point of a line, where a rod lies along its leg's outer axes, among all: its coordinates about the
     goal. E falls in one direction more, in which the joints turn the rod off the line."""
-    return replace(zero, x=error.shifts.T @ (line.p + line.shifts @ zero.x - error.p),
-                   radius=np.abs(error.shifts.T @ line.shifts) @ zero.radius + FOLLOWED,
-                   falling=None if zero.falling is None else zero.falling + 1)
+    return replace(
+        zero,
+        x=error.shifts.T @ (line.p + line.shifts @ zero.x - error.p),
+        radius=np.abs(error.shifts.T @ line.shifts) @ zero.radius + FOLLOWED,
+        falling=None if zero.falling is None else zero.falling + 1,
+    )
 
 
 def bounds(error: PoseError, reach: float) -> tuple[Array, Array, bool]:
@@ -333,8 +382,9 @@ def bounds(error: PoseError, reach: float) -> tuple[Array, Array, bool]:
 
 def _alike(one: CriticalBox, other: CriticalBox, loop: LoopError) -> bool:
     """Whether two enclosed zeros are at one pose with the same directions of two rods."""
-    return (_meet(one, other, loop, list(range(loop.error.size)))
-            and bool(np.abs(one.directions - other.directions).max() < SAME_ENDING))
+    return _meet(one, other, loop, list(range(loop.error.size))) and bool(
+        np.abs(one.directions - other.directions).max() < SAME_ENDING
+    )
 
 
 def _same(one: CriticalBox, other: CriticalBox, error: JointError) -> bool:

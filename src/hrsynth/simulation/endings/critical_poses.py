@@ -83,8 +83,9 @@ class CriticalPoses(Value):
         return np.concatenate([self.p, *np.moveaxis(self.R, 1, 0), *np.moveaxis(self.directions, 1, 0)], axis=1)
 
 
-def critical_poses(setting: ObservedRobot, goal: ClosedConfiguration, seed: int = 0) -> tuple[
-        PoseError, CriticalPoses, CriticalPoses, int] | None:
+def critical_poses(
+    setting: ObservedRobot, goal: ClosedConfiguration, seed: int = 0
+) -> tuple[PoseError, CriticalPoses, CriticalPoses, int] | None:
     """The isolated ones that are found, with each choice of held legs in rounds until these add little, one each of
     those that fill curves, and an estimate of how many were not met; None where the error is no closed form of the
     pose."""
@@ -97,7 +98,8 @@ def critical_poses(setting: ObservedRobot, goal: ClosedConfiguration, seed: int 
     for system in systems:
         fresh: list[int] = []
         while len(fresh) < POSE_ROUNDS and (
-                len(fresh) < POSE_QUIET or sum(fresh[-POSE_QUIET:]) > POSE_LATE * len(found)):
+            len(fresh) < POSE_QUIET or sum(fresh[-POSE_QUIET:]) > POSE_LATE * len(found)
+        ):
             tell("poses")
             before = len(found)
             drawn, flat = _round(system, found, rng)
@@ -125,8 +127,11 @@ def _held_sets(error: PoseError) -> list[tuple[int, ...]]:
     watched = {each.limb for each in error.seen}
     idle = [i for i, limb in enumerate(error.limbs) if i not in watched and isinstance(limb, OnRod)]
     held = [chosen for size in range(min(len(idle), error.size - 1) + 1) for chosen in combinations(idle, size)]
-    return [(*chosen, *free) for free in ((), *((i,) for i in watched if i is not None and unbound(error.limbs[i])))
-            for chosen in held]
+    return [
+        (*chosen, *free)
+        for free in ((), *((i,) for i in watched if i is not None and unbound(error.limbs[i])))
+        for chosen in held
+    ]
 
 
 def _beside(system: LegSystem, found: CriticalPoses, count: int, rng: np.random.Generator) -> Array:
@@ -140,8 +145,9 @@ def _beside(system: LegSystem, found: CriticalPoses, count: int, rng: np.random.
     return x + rng.normal(size=x.shape) * rng.choice(BESIDE, size=(count, 1))
 
 
-def _round(system: LegSystem, old: CriticalPoses, rng: np.random.Generator) -> tuple[
-        CriticalPoses, dict[tuple[int, ...], CriticalPoses]]:
+def _round(
+    system: LegSystem, old: CriticalPoses, rng: np.random.Generator
+) -> tuple[CriticalPoses, dict[tuple[int, ...], CriticalPoses]]:
     """Starts led to critical points of each index: those at which the legs that are not looked at reach, and whose held
     legs hold them, isolated; of others one for each value of E and signs of the curvatures. Some starts lie beside
     poses that are known; half of the others are random poses, of half a leg's joints are so, which are more often near
@@ -150,20 +156,23 @@ def _round(system: LegSystem, old: CriticalPoses, rng: np.random.Generator) -> t
     low, high, _ = bounds(error, FARTHER * COVER_REACH)
     k, n = error.shifts.shape[1], system.quaternion.stop
     count = POSE_STARTS
-    x = np.concatenate([rng.uniform(low[:k], high[:k], (POSE_THINNED * count, k)),
-                        rng.normal(size=(POSE_THINNED * count, n - k))], axis=1)
+    x = np.concatenate(
+        [rng.uniform(low[:k], high[:k], (POSE_THINNED * count, k)), rng.normal(size=(POSE_THINNED * count, n - k))],
+        axis=1,
+    )
     own = system.draw(system.about_legs(x[: len(x) // 4], FARTHER, rng), rng)[: count // 2]
     y = np.concatenate([own, system.draw(x, rng)])[:count]
     if len(old):
-        near = system.draw(_beside(system, old, 4 * round(POSE_BESIDE * count), rng), rng)[:round(POSE_BESIDE * count)]
+        near = system.draw(_beside(system, old, 4 * round(POSE_BESIDE * count), rng), rng)[: round(POSE_BESIDE * count)]
         beside, families = _lead_starts(system, near, rng)
         some, more = _lead_starts(system, rng.permutation(y)[: len(y) - len(near)], rng)
         return _join([some, replace(beside, met=0 * beside.met)]), families | more
     return _lead_starts(system, y, rng)
 
 
-def _lead_starts(system: LegSystem, y: Array, rng: np.random.Generator) -> tuple[
-        CriticalPoses, dict[tuple[int, ...], CriticalPoses]]:
+def _lead_starts(
+    system: LegSystem, y: Array, rng: np.random.Generator
+) -> tuple[CriticalPoses, dict[tuple[int, ...], CriticalPoses]]:
     """What starts (c, N) lead to."""
     error = system.error
     with np.errstate(all="ignore"):
@@ -173,20 +182,30 @@ def _lead_starts(system: LegSystem, y: Array, rng: np.random.Generator) -> tuple
         y = np.array([each.q for each in kept]).reshape(len(kept), system.size[0])
         falling = np.array([np.sum(each.curvatures < -SAME_ENDING) for each in kept], dtype=np.intp)
         flat = np.array([np.sum(np.abs(each.curvatures) <= SAME_ENDING) for each in kept], dtype=np.intp)
-        found = CriticalPoses(error.length * system.point(y), system.rotation(y), system.directions(y), falling,
-                              np.ones(len(y), dtype=np.intp))
+        found = CriticalPoses(
+            error.length * system.point(y),
+            system.rotation(y),
+            system.directions(y),
+            falling,
+            np.ones(len(y), dtype=np.intp),
+        )
         reached = system.is_reached(y)
         across = np.abs(np.einsum("cla,la->cl", found.directions, system.wanted)) < SAME_ENDING
     families: dict[tuple[int, ...], CriticalPoses] = {}
     for k in np.flatnonzero(reached & (flat > 0)):
-        families[int(falling[k]), int(flat[k]), round(kept[k].value / SAME_ENDING),
-                 *across[k].astype(int)] = found.some(np.array([k]))
+        families[int(falling[k]), int(flat[k]), round(kept[k].value / SAME_ENDING), *across[k].astype(int)] = (
+            found.some(np.array([k]))
+        )
     return found.some(reached & (flat == 0)), families
 
 
 def _none(system: LegSystem) -> CriticalPoses:
-    return CriticalPoses(np.zeros((0, 3)), np.zeros((0, 3, 3)), np.zeros((0, len(system.error.seen), 3)),
-                         *np.zeros((2, 0), dtype=np.intp))
+    return CriticalPoses(
+        np.zeros((0, 3)),
+        np.zeros((0, 3, 3)),
+        np.zeros((0, len(system.error.seen), 3)),
+        *np.zeros((2, 0), dtype=np.intp),
+    )
 
 
 def _join(parts: list[CriticalPoses]) -> CriticalPoses:
@@ -212,8 +231,11 @@ class Lift:
         links = loops.mechanism.links
         self.body, zero = loops.way(loops.body[motion.link]), links[motion.link].pose
         self.point, self.axes = transform(zero, motion.point) / loops.length, zero[:3, :3].T
-        self.seen = [(loops.way(loops.body[each.link]), links[each.link].pose[:3, :3] @ each.direction)
-                     for each in observations if isinstance(each, SeenAxis)]
+        self.seen = [
+            (loops.way(loops.body[each.link]), links[each.link].pose[:3, :3] @ each.direction)
+            for each in observations
+            if isinstance(each, SeenAxis)
+        ]
 
     def vectors(self, carrier: SweptChains) -> list[CarriedVector]:
         """Where the platform's point is, how it is turned, and the directions."""
@@ -228,8 +250,9 @@ class Lift:
     def desired_values(self, poses: CriticalPoses) -> Array:
         """What they are to be, (c, k)."""
         turns = [poses.R[:, :, i] for i in range(3)] if self.turning else []
-        return np.concatenate([poses.p / self.system.system.length, *turns,
-                               *np.moveaxis(poses.directions, 1, 0)], axis=1)
+        return np.concatenate(
+            [poses.p / self.system.system.length, *turns, *np.moveaxis(poses.directions, 1, 0)], axis=1
+        )
 
     def __call__(self, poses: CriticalPoses, pool: Array, fit: Fit | None = None) -> tuple[Array, NDArray[np.bool_]]:
         """Coordinates (c, N), and for which (c,) poses some were found that ``fit``, by Gauss and Newton's steps from a
@@ -246,8 +269,13 @@ class Lift:
         found, done = np.zeros((len(poses), pool.shape[1])), np.zeros(len(poses), dtype=bool)
         if not len(poses):
             return found, done
-        near = [(group, np.array([np.argsort(np.abs(told[:, rows] - each[rows]).max(axis=1))[:POSE_TRIES]
-                                  for each in wanted])) for group, rows in self._groups()]
+        near = [
+            (
+                group,
+                np.array([np.argsort(np.abs(told[:, rows] - each[rows]).max(axis=1))[:POSE_TRIES] for each in wanted]),
+            )
+            for group, rows in self._groups()
+        ]
         for k in range(near[0][1].shape[1]):
             left = np.flatnonzero(~done)
             if not len(left):
@@ -271,8 +299,15 @@ class Lift:
         own = [trunk, *own]
         own[0] |= set(range(len(loops.coordinates))) - set().union(*own)
         pose = list(range(3 * (len(self.axes) if self.turning else 0) + 3))
-        return [(sorted(each), pose + [len(pose) + 3 * k + i for k, (way, _) in enumerate(self.seen)
-                                       if each & set(way) for i in range(3)]) for each in own if each]
+        return [
+            (
+                sorted(each),
+                pose
+                + [len(pose) + 3 * k + i for k, (way, _) in enumerate(self.seen) if each & set(way) for i in range(3)],
+            )
+            for each in own
+            if each
+        ]
 
     def _lead(self, q: Array, wanted: Array, steps: int = 40) -> tuple[Array, NDArray[np.bool_]]:
         size, q = q.shape[1], q.copy()
@@ -300,8 +335,9 @@ class Lift:
             back = np.swapaxes(J, 1, 2)
             damped = back @ J + (1e-13 + 1e-3 * np.minimum(r, 1.0) ** 2)[:, None, None] * np.eye(size)
             step = np.linalg.solve(damped, -back @ off[..., None])[..., 0]
-            q[going] = here + step * np.minimum(1.0, longest[going] / np.maximum(
-                np.abs(step).max(axis=1), 1e-300))[:, None]
+            q[going] = (
+                here + step * np.minimum(1.0, longest[going] / np.maximum(np.abs(step).max(axis=1), 1e-300))[:, None]
+            )
         return q, good
 
 

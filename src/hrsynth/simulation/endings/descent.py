@@ -142,8 +142,16 @@ class Expansion:
         order = np.argsort(np.where(still, np.inf, values), axis=-1, kind="stable")
         values, along = (np.take_along_axis(each, order, -1) for each in (values, along))
         vectors = np.take_along_axis(vectors, order[..., None, :], -1)
-        return cls(at.E, p, mu, along, values, Z @ vectors,
-                   np.maximum(np.linalg.norm(at.G, axis=-1), np.linalg.norm(flat, axis=-1)), idle)
+        return cls(
+            at.E,
+            p,
+            mu,
+            along,
+            values,
+            Z @ vectors,
+            np.maximum(np.linalg.norm(at.G, axis=-1), np.linalg.norm(flat, axis=-1)),
+            idle,
+        )
 
 
 def _shorten_steps(step: Array, longest: float) -> Array:
@@ -171,22 +179,25 @@ def are_closed(system: RestSystem, q: Array, within: float = CRITICAL) -> NDArra
     return np.asarray(np.linalg.norm(system.closures(q)[0], axis=-1) < within)
 
 
-def walk_at_random(system: RestSystem, q: Array, rng: np.random.Generator, steps: int,
-                   longest: float = WALK_STEP) -> Array:
+def walk_at_random(
+    system: RestSystem, q: Array, rng: np.random.Generator, steps: int, longest: float = WALK_STEP
+) -> Array:
     """Closed configurations (c, N), each led so many random steps along the loops; those that do not close stay."""
     for _ in range(steps):
         tangents = Tangents.of(RestEquations(system, list(q.T)).DG)
         way = times(tangents.Z, rng.normal(size=(len(q), tangents.Z.shape[-1])))
-        there = close_loops(system, q + longest * rng.uniform(0.2, 1.0, (len(q), 1)) * way / np.abs(way).max(
-            axis=-1, keepdims=True), 6)
+        there = close_loops(
+            system, q + longest * rng.uniform(0.2, 1.0, (len(q), 1)) * way / np.abs(way).max(axis=-1, keepdims=True), 6
+        )
         good = are_closed(system, there)
         good &= np.abs(there - q).max(axis=-1) < 2 * longest
         q = np.where(good[:, None], there, q)
     return q
 
 
-def descend(system: Critically, q: Array, index: NDArray[np.intp], idle: int, farthest: float = FARTHEST_ENDING
-            ) -> list[CriticalPoint]:
+def descend(
+    system: Critically, q: Array, index: NDArray[np.intp], idle: int, farthest: float = FARTHEST_ENDING
+) -> list[CriticalPoint]:
     """The critical points to which starts (c, N) lead, each sought as one of an index (c,), or (−1) by Newton's method
     whatever it is; none with a coordinate beyond ``farthest``."""
     if isinstance(system, RestSystem) and system.supposes:
@@ -197,8 +208,10 @@ def descend(system: Critically, q: Array, index: NDArray[np.intp], idle: int, fa
             break
         at = Expansion.of(system, q, idle)
         done = at.residual < CRITICAL
-        found += [CriticalPoint(q[k], at.multipliers[k], float(at.residual[k]), at.curvatures_of(k), float(at.E[k]))
-                  for k in map(int, np.flatnonzero(done))]
+        found += [
+            CriticalPoint(q[k], at.multipliers[k], float(at.residual[k]), at.curvatures_of(k), float(at.E[k]))
+            for k in map(int, np.flatnonzero(done))
+        ]
         up = np.arange(at.curvatures.shape[-1]) < np.minimum(index, at.freedoms)[:, None]
         size = np.maximum(np.abs(at.curvatures), CRITICAL_FLAT)
         # near a critical point: Newton's method, whatever it is
@@ -224,8 +237,11 @@ def sharpen_points(system: Critically, points: Sequence[CriticalPoint], idle: in
         size = np.where(np.abs(at.curvatures) > CRITICAL, at.curvatures, np.inf)
         q = q + times(at.directions, -at.slope / size) + at.closing
     at = Expansion.of(system, q, idle)
-    return [CriticalPoint(q[k], at.multipliers[k], float(at.residual[k]), at.curvatures_of(k), float(at.E[k]))
-            for k in range(len(q)) if at.residual[k] < CRITICAL]
+    return [
+        CriticalPoint(q[k], at.multipliers[k], float(at.residual[k]), at.curvatures_of(k), float(at.E[k]))
+        for k in range(len(q))
+        if at.residual[k] < CRITICAL
+    ]
 
 
 def settle(system: RestSystem, q: Array, index: NDArray[np.intp], idle: int) -> list[CriticalPoint]:

@@ -53,14 +53,16 @@ def reduced_gradient(M: AffineForms, slope: AffineForms, P: Places, N: Places) -
     A, rest = entries(M, order), entries(slope, order)
     A = combine(inverse(A.v[0, ..., :k]), A) if k else A
     n = order.shape[1]
-    found = _eliminate(k, n).together([*(A[..., i, j] for i in range(k) for j in range(n)),
-                                        *(rest[..., j] for j in range(n))])
+    found = _eliminate(k, n).together(
+        [*(A[..., i, j] for i in range(k) for j in range(n)), *(rest[..., j] for j in range(n))]
+    )
     return found[..., : N.shape[1]], found[..., N.shape[1] :]
 
 
 @lru_cache(maxsize=64)
 def _eliminate(k: int, n: int) -> BoxFormula:
     """What Gauss's elimination leaves of k rows of n numbers and one more, and the minors before its last step."""
+
     def formula(y: Sequence[Any], number: Any) -> list[Any]:
         rows, rest = [list(y[n * i : n * i + n]) for i in range(k)], list(y[n * k :])
         minors = rest

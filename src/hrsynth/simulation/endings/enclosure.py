@@ -85,12 +85,17 @@ def _enclose(system: RestSystem, q: Array, idle: int) -> list[EnclosedPoint | No
         forms = [affine(middle[:, i], np.zeros((len(middle), 0)), radius[:, i]) for i in range(size)]
         held = affine(mult, np.zeros((*mult.shape, 0)), radius[:, size:])
         at = RestEquations(system, forms)
-        F, K = (AffineForms(np.zeros((1, *shape)), np.zeros(shape))
-                for shape in (radius.shape, (*radius.shape, radius.shape[-1])))
+        F, K = (
+            AffineForms(np.zeros((1, *shape)), np.zeros(shape))
+            for shape in (radius.shape, (*radius.shape, radius.shape[-1]))
+        )
         bend, pull, DG = at.bend(held), at.pull(held), at.DG
-        for total, part, place in ((F, pull, (slice(size),)), (F, at.G, (slice(size, None),)),
-                                   (K, bend, (slice(size), slice(size))),
-                                   (K, DG, (slice(size, None), slice(size)))):
+        for total, part, place in (
+            (F, pull, (slice(size),)),
+            (F, at.G, (slice(size, None),)),
+            (K, bend, (slice(size), slice(size))),
+            (K, DG, (slice(size, None), slice(size))),
+        ):
             total.v[(..., *place)], total.r[(..., *place)] = part.v, part.r
         back = DG.transposed()
         K.v[..., :size, size:], K.r[..., :size, size:] = back.v, back.r
@@ -122,8 +127,14 @@ def _enclose(system: RestSystem, q: Array, idle: int) -> list[EnclosedPoint | No
         gram, inside = at.gram(), free[:, :, None] * free[:, None, :]
         rates = _rates(K, AffineForms(gram.v * inside, gram.r * inside), free, count)
     measured = unexplained_rows(system)
-    return [EnclosedPoint(q[k], found[k, :size] * free[k], None if inertia[k] < 0 else int(inertia[k]) - count,
-                          measured, rates[k]) if done[k] else None for k in range(len(q))]
+    return [
+        EnclosedPoint(
+            q[k], found[k, :size] * free[k], None if inertia[k] < 0 else int(inertia[k]) - count, measured, rates[k]
+        )
+        if done[k]
+        else None
+        for k in range(len(q))
+    ]
 
 
 def _rates(K: AffineForms, gram: AffineForms, free: Array, count: int) -> list[tuple[tuple[float, float], ...]]:
@@ -137,8 +148,12 @@ def _rates(K: AffineForms, gram: AffineForms, free: Array, count: int) -> list[t
     flat.v[..., :size, :size], flat.r[:, :size, :size] = gram.v, gram.r
     flat.v[0, :, :size, :size] += (1 - free)[..., None] * np.eye(size)
     definite = negative(flat) == count
-    about = np.array([_eigenvalues(k[:size, :size], g, k[size:, :size], np.flatnonzero(own), freedoms)
-                      for k, g, own in zip(K.v[0], gram.v[0], free, strict=True)])
+    about = np.array(
+        [
+            _eigenvalues(k[:size, :size], g, k[size:, :size], np.flatnonzero(own), freedoms)
+            for k, g, own in zip(K.v[0], gram.v[0], free, strict=True)
+        ]
+    )
     bounds = np.full((2, *about.shape), np.nan)
     for k in range(freedoms):
         for side, sign in enumerate((-1.0, 1.0)):
@@ -152,8 +167,10 @@ def _rates(K: AffineForms, gram: AffineForms, free: Array, count: int) -> list[t
                 proved = (below >= 0) & ((below - count <= k) if side == 0 else (below - count > k))
                 bounds[side, left[proved], k] = sigma[proved]
     known = definite & np.isfinite(bounds).all(axis=(0, 2))
-    return [tuple(zip(low, high, strict=True)) if good else () for good, low, high in
-            zip(known, bounds[0].tolist(), bounds[1].tolist(), strict=True)]
+    return [
+        tuple(zip(low, high, strict=True)) if good else ()
+        for good, low, high in zip(known, bounds[0].tolist(), bounds[1].tolist(), strict=True)
+    ]
 
 
 def _eigenvalues(H: Array, gram: Array, DG: Array, free: NDArray[np.intp], count: int) -> Array:
@@ -162,7 +179,7 @@ def _eigenvalues(H: Array, gram: Array, DG: Array, free: NDArray[np.intp], count
 
     if not (np.isfinite(H).all() and np.isfinite(gram).all() and np.isfinite(DG).all()):
         return np.full(count, np.nan)
-    Z = np.linalg.svd(DG[:, free])[2][len(DG):].T if len(DG) else np.eye(len(free))
+    Z = np.linalg.svd(DG[:, free])[2][len(DG) :].T if len(DG) else np.eye(len(free))
     part = np.ix_(free, free)
     try:
         values = eigh(Z.T @ H[part] @ Z, Z.T @ gram[part] @ Z, eigvals_only=True)
@@ -222,6 +239,8 @@ def idle_motions(system: RestSystem, q: Array, idle: int) -> Array:
 def unexplained_rows(system: RestSystem) -> tuple[str, ...]:
     """The loops of which equations were left out that do not follow from the chosen ones."""
     chosen = [loop.name for loop, _ in system.rows]
-    return tuple(loop.name for loop in system.system.loops
-                 if chosen.count(loop.name) < len(loop.rows)
-                 and chosen.count(loop.name) != dependent_rows(system.system, loop))
+    return tuple(
+        loop.name
+        for loop in system.system.loops
+        if chosen.count(loop.name) < len(loop.rows) and chosen.count(loop.name) != dependent_rows(system.system, loop)
+    )

@@ -55,9 +55,19 @@ NEARBY = 0.02
 
 
 @question()
-def endings(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
-            at: PoseLike | None = None, depth: str = "exact", complete: bool = False, effort: int = COVER_BOXES,
-            jobs: int | None = None, seed: int = 0) -> Endings:
+def endings(
+    robot: RobotLike,
+    observe: LegsLike = None,
+    camera: CameraLike = None,
+    *,
+    see: SeeLike = None,
+    at: PoseLike | None = None,
+    depth: str = "exact",
+    complete: bool = False,
+    effort: int = COVER_BOXES,
+    jobs: int | None = None,
+    seed: int = 0,
+) -> Endings:
     """Poses at which the loop can rest that servoes what is observed at ``at`` (default: the zero configuration): the
     goal, modes and antipodal poses, where the error vanishes, and critical poses, where it does not; and which of them
     attract.
@@ -109,18 +119,33 @@ class RestSearch:
         system = RestSystem.of(goal, question, setting.configurations, planes)
         values = measure_all(goal, question)[0]
         by_directions = all(isinstance(each, SeenAxis) for each in question.observations)
-        return cls(setting, goal, system, Law(question, setting.dof, 1.0, planes),
-                   np.array(values) if by_directions else values, depth)
+        return cls(
+            setting,
+            goal,
+            system,
+            Law(question, setting.dof, 1.0, planes),
+            np.array(values) if by_directions else values,
+            depth,
+        )
 
-    def answer(self, seed: int = 0, *, minima: bool = False, rounds: Iterable[Array] | None = None,
-               complete: bool = False, effort: int = COVER_BOXES, jobs: int = 1) -> Endings:
+    def answer(
+        self,
+        seed: int = 0,
+        *,
+        minima: bool = False,
+        rounds: Iterable[Array] | None = None,
+        complete: bool = False,
+        effort: int = COVER_BOXES,
+        jobs: int = 1,
+    ) -> Endings:
         """The rests that were found; ``minima`` and ``rounds`` as for :func:`.critical_points`, of minima alone neither
         lists nor enclosures; ``complete``: whether it is to be proved that they are all, with ``effort`` boxes at
         most in so many processes (``jobs``)."""
         setting, motion = self.setting, self.setting.motion
         further = None if minima or self.system.supposes else self._further(seed)
-        found = critical_points(self.system, setting, self.goal, seed, minima=minima, rounds=rounds, further=further,
-                                fit=self._near_mode)
+        found = critical_points(
+            self.system, setting, self.goal, seed, minima=minima, rounds=rounds, further=further, fit=self._near_mode
+        )
         found = found if further is None else replace(found, unmet=further.unmet)
         isolated = self._in_mode(found.isolated)
         covers = None
@@ -141,18 +166,32 @@ class RestSearch:
             proved = enclose_points(self.system, [isolated[k].point for k in whole], found.idle)
             for k, box in zip(whole, proved, strict=True):
                 boxes[k] = box
-        rests = _ways([each for one, box in zip(isolated, boxes, strict=True)
-                       if (each := self.read(one, box)) is not None], self)
-        continua = [each for one in self._in_mode(found.continua) if (each := self.read(one)) is not None
-                    and not (covers is not None and covers.proves(each))]
+        rests = _ways(
+            [each for one, box in zip(isolated, boxes, strict=True) if (each := self.read(one, box)) is not None], self
+        )
+        continua = [
+            each
+            for one in self._in_mode(found.continua)
+            if (each := self.read(one)) is not None and not (covers is not None and covers.proves(each))
+        ]
         measured = tuple(sorted({name for box in boxes if box for name in box.measured}))
         rests, continua = (_sort(each, motion.link, self.goal.twin.length) for each in (rests, continua))
         if covers is not None:
             lists = covers.complete_signs(lists, np.array(self.desired))
         lists.sort(key=lambda each: (len(each.reversed), each.reversed))
-        return Endings(setting, self.goal, motion.pose(self.goal.pose(motion.link)), self.desired, tuple(rests),
-                       tuple(continua), tuple(lists), measured, found,
-                       None if covers is None else covers.judge(rests), self.depth)
+        return Endings(
+            setting,
+            self.goal,
+            motion.pose(self.goal.pose(motion.link)),
+            self.desired,
+            tuple(rests),
+            tuple(continua),
+            tuple(lists),
+            measured,
+            found,
+            None if covers is None else covers.judge(rests),
+            self.depth,
+        )
 
     @property
     def _freedoms(self) -> int:
@@ -165,8 +204,12 @@ class RestSearch:
         if told is None:
             return None
         seen = self.setting.samples.members[0].relation
-        return Further(Lift(self.system, self.law.question.observations, told[0]), *told[1:],
-                       seen.mobility - seen.dimension, self._near_mode)
+        return Further(
+            Lift(self.system, self.law.question.observations, told[0]),
+            *told[1:],
+            seen.mobility - seen.dimension,
+            self._near_mode,
+        )
 
     def _lists(self, found: Sequence[Critical]) -> list[SignedModes]:
         """The lists of modes of those combinations of signs at which the error was found to vanish, that of the goal
@@ -186,8 +229,11 @@ class RestSearch:
             return []
         places = [each.configuration for each in given.listed.modes if each.configuration is not None]
         old = [at for each in found if each.point.vanishes and (at := self._place(each.point.q))]
-        new = [at for at in places if not any(self.alike(at, each) and self._reversed_legs(each) == given.reversed
-                                              for each in old)]
+        new = [
+            at
+            for at in places
+            if not any(self.alike(at, each) and self._reversed_legs(each) == given.reversed for each in old)
+        ]
         if not new:
             return []
         q = np.array([self.system.system.read(at.pose) for at in new])
@@ -219,8 +265,10 @@ class RestSearch:
 
     def alike(self, at: ClosedConfiguration, other: ClosedConfiguration) -> bool:
         """Whether the platform is at the same pose."""
-        return all(pose_difference(at.pose(body), other.pose(body), self.goal.twin.length) <= SAME_ENDING
-                   for body in placing_links(self.setting.anatomy))
+        return all(
+            pose_difference(at.pose(body), other.pose(body), self.goal.twin.length) <= SAME_ENDING
+            for body in placing_links(self.setting.anatomy)
+        )
 
     def read(self, found: Critical, box: EnclosedPoint | None = None) -> RestPoint | None:
         """A critical point as a pose of the robot; None where its loops do not close, or a camera does not see what it
@@ -244,13 +292,29 @@ class RestSearch:
         X = at.pose(motion.link)
         shift, turn = (np.inf, np.inf) if box is None else self._radius(box, X)
         least = CRITICAL_FLAT if len(point.curvatures) > self._freedoms else SAME_ENDING
-        state = stability(point.curvatures if box is None or box.index is None else box.signs(len(point.curvatures)),
-                          least)
-        return RestPoint(motion.pose(X), kind, state, error, tuple(map(float, point.curvatures)), at, shift, turn,
-                         box is not None and box.index is not None,
-                         () if box is None or singular is not None else box.rates, self._side(at), reversed_, across,
-                         singular,
-                         boundary, tuple(outside(at.twin, at.q)), self._other_legs(at), found.met)
+        state = stability(
+            point.curvatures if box is None or box.index is None else box.signs(len(point.curvatures)), least
+        )
+        return RestPoint(
+            motion.pose(X),
+            kind,
+            state,
+            error,
+            tuple(map(float, point.curvatures)),
+            at,
+            shift,
+            turn,
+            box is not None and box.index is not None,
+            () if box is None or singular is not None else box.rates,
+            self._side(at),
+            reversed_,
+            across,
+            singular,
+            boundary,
+            tuple(outside(at.twin, at.q)),
+            self._other_legs(at),
+            found.met,
+        )
 
     def _radius(self, box: EnclosedPoint, X: Array) -> tuple[float, float]:
         """How far the platform can be from its pose X (4, 4) over a box (m, rad)."""
@@ -259,8 +323,10 @@ class RestSearch:
         carrier, chain = SweptChains(loops, forms), loops.way(loops.body[motion.link])
         zero = loops.mechanism.links[motion.link].pose
         told = [transform(X, motion.point) / loops.length, *X[:3, :3].T]
-        vectors = [carrier.point(chain, transform(zero, motion.point) / loops.length),
-                   *(carrier.direction(chain, axis) for axis in zero[:3, :3].T)]
+        vectors = [
+            carrier.point(chain, transform(zero, motion.point) / loops.length),
+            *(carrier.direction(chain, axis) for axis in zero[:3, :3].T),
+        ]
         off = [float(np.linalg.norm((each.value - at).size)) for each, at in zip(vectors, told, strict=True)]
         # |ΔR| = 2 √2 sin(θ / 2) ≥ 2 √2 θ / π
         return off[0] * loops.length, float(np.pi / np.sqrt(8) * np.linalg.norm(off[1:])) if motion.body else 0.0
@@ -305,8 +371,11 @@ class RestSearch:
                 one, other = (self._forms.forms(each) for each in (self.goal, at))
         except NoLegForm:
             return None
-        return tuple(dict.fromkeys(str(limb.label) for limb, a, b in zip(one.limbs, one.modes, other.modes,
-                                                                        strict=True) if a != b))
+        return tuple(
+            dict.fromkeys(
+                str(limb.label) for limb, a, b in zip(one.limbs, one.modes, other.modes, strict=True) if a != b
+            )
+        )
 
     def _in_mode(self, found: Sequence[Critical]) -> list[Critical]:
         """Those near which configurations are of the operation mode of the zero configuration."""
@@ -331,9 +400,10 @@ def _ways(rests: Sequence[RestPoint], search: RestSearch) -> list[RestPoint]:
     working modes nearest to the goal's (where loops are singular, coordinates are known to half their digits), with how
     many there are."""
     setting = search.setting
-    segments, (home,
-               ) = ([np.concatenate([*measure_all(at, setting.everything.question)[0]]) for at in every] for every in
-                         ([each.configuration for each in rests], [search.goal]))
+    segments, (home,) = (
+        [np.concatenate([*measure_all(at, setting.everything.question)[0]]) for at in every]
+        for every in ([each.configuration for each in rests], [search.goal])
+    )
     told = np.array([_telling_values(each.configuration, search) for each in rests])
     groups: list[list[int]] = []
     for k in range(len(rests)):
@@ -343,10 +413,13 @@ def _ways(rests: Sequence[RestPoint], search: RestSearch) -> list[RestPoint]:
             groups[own[0]].append(k)
         else:
             groups.append([k])
-    best = [min(group, key=lambda k: (not rests[k].proved, float(np.linalg.norm(segments[k] - home))))
-            for group in groups]
-    return [replace(rests[k], ways=len(group), met=sum(rests[i].met for i in group))
-            for k, group in zip(best, groups, strict=True)]
+    best = [
+        min(group, key=lambda k: (not rests[k].proved, float(np.linalg.norm(segments[k] - home)))) for group in groups
+    ]
+    return [
+        replace(rests[k], ways=len(group), met=sum(rests[i].met for i in group))
+        for k, group in zip(best, groups, strict=True)
+    ]
 
 
 def _sort(rests: Sequence[RestPoint], link: str, length: float) -> list[RestPoint]:
@@ -355,13 +428,20 @@ def _sort(rests: Sequence[RestPoint], link: str, length: float) -> list[RestPoin
     kinds = (GOAL, MODE, ANTIPODAL, CRITICAL)
     named = sorted(rests, key=lambda each: (each.reversed, each.other_legs or ()))
     poses = [each.configuration.pose(link) for each in named]
-    rows = [[kinds.index(each.kind), not each.stable, each.error, *(X[:3, 3] / length), *X[:3, :3].ravel()]
-            for each, X in zip(named, poses, strict=True)]
+    rows = [
+        [kinds.index(each.kind), not each.stable, each.error, *(X[:3, 3] / length), *X[:3, :3].ravel()]
+        for each, X in zip(named, poses, strict=True)
+    ]
     return [named[i] for i in steady_order(np.array(rows, dtype=float).reshape(len(rows), 15), SAME_ENDING)]
 
 
 def _telling_values(at: ClosedConfiguration, search: RestSearch) -> Array:
     """Where the platform's bodies are (characteristic lengths), how they are turned, and all that is measured."""
     poses = [at.pose(body) for body in placing_links(search.setting.anatomy)]
-    return np.concatenate([*(X[:3, 3] / search.goal.twin.length for X in poses), *(X[:3, :3].ravel() for X in poses),
-                           *measure_all(at, search.law.question)[0]])
+    return np.concatenate(
+        [
+            *(X[:3, 3] / search.goal.twin.length for X in poses),
+            *(X[:3, :3].ravel() for X in poses),
+            *measure_all(at, search.law.question)[0],
+        ]
+    )

@@ -74,8 +74,9 @@ class DirectionTerm(Value):
 
     def cosine(self, carrier: SweptChains) -> Product:
         """c."""
-        return Product(carrier.direction(self.chains[0], self.direction),
-                       carrier.direction(self.chains[1], self.wanted))
+        return Product(
+            carrier.direction(self.chains[0], self.direction), carrier.direction(self.chains[1], self.wanted)
+        )
 
     def add(self, carrier: SweptChains, sums: ErrorSums) -> None:
         """As of :class:`ErrorTerm`."""
@@ -181,7 +182,6 @@ class SightTerm(Value):
             for place, product in enumerate(products):
                 add_bend(sums.bend, product, along[..., place])
 
-
     def add_supposed(self, carrier: SweptChains, sums: ErrorSums) -> None:
         """Add to ``slope`` and ``gram`` J̃ᵀe and J̃ᵀJ̃, J̃ the rates of e that hold if what is seen lies in the plane: for
         floats. It moves as the link does, x̃' = x' + ω × (x̃ − x)."""
@@ -241,17 +241,23 @@ class RestSystem(Value):
     terms: tuple[ErrorTerm, ...]
 
     @classmethod
-    def of(cls, goal: ClosedConfiguration, question: Measurement, generic: Sequence[ClosedConfiguration],
-           planes: Sequence[Array | None] | None = None) -> RestSystem:
+    def of(
+        cls,
+        goal: ClosedConfiguration,
+        question: Measurement,
+        generic: Sequence[ClosedConfiguration],
+        planes: Sequence[Array | None] | None = None,
+    ) -> RestSystem:
         """That of the values measured at a goal; which equations are independent is seen at ``generic`` configurations;
         ``planes`` (3,), in metres, are those in which the law supposes what is seen to lie, None where it knows them.
         """
         mechanism = goal.twin.mechanism
         system = loop_system(mechanism, ())
         values = measure(goal.twin, goal.q, question.reference, question.observations)[2]
-        terms = tuple(term(system, question.reference, each, value, None if plane is None else plane * system.length)
-                      for each, value, plane in zip(question.observations, values,
-                                                    planes or [None] * len(values), strict=True))
+        terms = tuple(
+            term(system, question.reference, each, value, None if plane is None else plane * system.length)
+            for each, value, plane in zip(question.observations, values, planes or [None] * len(values), strict=True)
+        )
         return cls(system, (), (), terms).select_rows_at(np.array([system.read(each.pose) for each in generic]))
 
     def select_rows_at(self, q: Array) -> RestSystem:
@@ -259,8 +265,11 @@ class RestSystem(Value):
         system = self.system
         every = [(loop, row) for loop in system.loops for row in loop.rows]
         chosen, count = independent(self.closures(q)[1], self.size[1] or None), len(every)
-        return replace(self, rows=tuple(every[k] for k in chosen if k < count),
-                       gears=tuple(system.gears[k - count] for k in chosen if k >= count))
+        return replace(
+            self,
+            rows=tuple(every[k] for k in chosen if k < count),
+            gears=tuple(system.gears[k - count] for k in chosen if k >= count),
+        )
 
     def closures(self, q: Array) -> tuple[Array, Array]:
         """All equations of the loops at configurations (c, N), (c, m'), and their derivatives (c, m', N): beyond
@@ -282,8 +291,11 @@ class RestSystem(Value):
     def scale(self, curvatures: Array) -> float:
         """Curvatures of E that are small are so beside this: E of directions is of size one; of what is far from a
         camera it hardly changes at all."""
-        return min(1.0, float(np.abs(curvatures).max(initial=0.0))) if any(
-            isinstance(each, SightTerm) for each in self.terms) else 1.0
+        return (
+            min(1.0, float(np.abs(curvatures).max(initial=0.0)))
+            if any(isinstance(each, SightTerm) for each in self.terms)
+            else 1.0
+        )
 
     def at(self, values: Sequence[Any]) -> RestEquations:
         """All of it at values (N,) of (c,) each."""
@@ -315,8 +327,9 @@ class RestEquations:
 
     def _error(self, **asked: bool) -> ErrorSums:
         size = self.system.size[0]
-        sums = ErrorSums(self.like, Total(self.like, (size,)), **{
-            each: Total(self.like, (size, size)) for each in asked})
+        sums = ErrorSums(
+            self.like, Total(self.like, (size,)), **{each: Total(self.like, (size, size)) for each in asked}
+        )
         for each in self.system.terms:
             each.add(self.carrier, sums)
         return sums
@@ -378,11 +391,25 @@ def term(system: LoopSystem, reference: str, seen: Observation, value: Array, pl
             return DirectionTerm(chains, R @ seen.direction, S @ value)
         case CameraObservation():
             C = Y @ seen.view
-            return SightTerm(chains, seen, transform(X, seen.at) / length, None if seen.axis is None else R @ seen.axis,
-                             (seen.radius or 0.0) / length, C[:3, 3] / length, C[:3, :3], value, plane)
+            return SightTerm(
+                chains,
+                seen,
+                transform(X, seen.at) / length,
+                None if seen.axis is None else R @ seen.axis,
+                (seen.radius or 0.0) / length,
+                C[:3, 3] / length,
+                C[:3, :3],
+                value,
+                plane,
+            )
         case SlideEncoder():
-            return SlideTerm(chains, transform(X, seen.point) / length, transform(Y, seen.start) / length,
-                             S @ seen.axis, float(value[0]))
+            return SlideTerm(
+                chains,
+                transform(X, seen.point) / length,
+                transform(Y, seen.start) / length,
+                S @ seen.axis,
+                float(value[0]),
+            )
         case AngleEncoder():
             normal = seen.start - (seen.axis @ seen.start) * seen.axis
             along = exponential(float(value[0]) * seen.axis) @ normal

@@ -124,8 +124,9 @@ class Flow(Value):
         """The rates of the margins (n, legs, d)."""
         n, d = len(X), self.batch.span.shape[1]
         steps = FLOW_SLOPE * np.concatenate([np.eye(d), -np.eye(d)])
-        around = self.margins(self.move(np.tile(X, (2 * d, 1, 1)), np.repeat(steps, n, axis=0)),
-                              np.tile(flipped, (2 * d, 1))).reshape(2, d, n, len(self.legs))
+        around = self.margins(
+            self.move(np.tile(X, (2 * d, 1, 1)), np.repeat(steps, n, axis=0)), np.tile(flipped, (2 * d, 1))
+        ).reshape(2, d, n, len(self.legs))
         return np.asarray((around[0] - around[1]).transpose(1, 2, 0) / (2 * FLOW_SLOPE))
 
     def move(self, X: Array, y: Array) -> Array:
@@ -177,8 +178,11 @@ class Flow(Value):
     def mode_placer(self, bits: int) -> Placer:
         """The robot in a working mode."""
         if bits not in self.modes:
-            legs = {name: replace(leg, mode=-leg.mode) if bits >> place & 1 else leg
-                    for place, (name, leg) in enumerate(self.batch.legs.items()) if isinstance(leg, ClosedFormLeg)}
+            legs = {
+                name: replace(leg, mode=-leg.mode) if bits >> place & 1 else leg
+                for place, (name, leg) in enumerate(self.batch.legs.items())
+                if isinstance(leg, ClosedFormLeg)
+            }
             self.modes[bits] = replace(self.placer, batch=replace(self.batch, legs=legs, programs={}))
         return self.modes[bits]
 

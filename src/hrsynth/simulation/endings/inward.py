@@ -32,8 +32,13 @@ class InwardProver:
     @classmethod
     def of(cls, error: PoseError) -> InwardProver:
         """The formulas of an error, traced."""
-        return cls(error, ConeProver.of(error, np.eye(error.size)), trace_formula(
-            lambda x, number: [part for each in error.at(x, [], number).seen for part in each.error], error.size))
+        return cls(
+            error,
+            ConeProver.of(error, np.eye(error.size)),
+            trace_formula(
+                lambda x, number: [part for each in error.at(x, [], number).seen for part in each.error], error.size
+            ),
+        )
 
     def core(self, radius: float) -> float:
         """The radius of a ball, at most ``radius``, in which |J⁺ (J − J̄)| < 1, J̄ the mean of J from the goal on: as
@@ -100,13 +105,19 @@ def inward_radius(error: PoseError, seed: int = 0) -> tuple[float, int]:
 
 def _hold_inwards(prover: InwardProver, radius: float, core: float) -> tuple[bool, int]:
     """Whether runs lead inwards all over the ball outside its core, by boxes that are cut where that is not proved."""
+
     def inside(middle: Array, half: Array) -> NDArray[np.bool_]:
         near, far = np.maximum(np.abs(middle) - half, 0.0), np.abs(middle) + half
         return (np.linalg.norm(near, axis=1) <= radius) & (np.linalg.norm(far, axis=1) > core)
 
     def judge(middle: Array, half: Array) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
-        proved, axis = zip(*(prover.inwards(middle[k : k + RADIUS_AT_ONCE], half[k : k + RADIUS_AT_ONCE])
-                             for k in range(0, len(middle), RADIUS_AT_ONCE)), strict=True)
+        proved, axis = zip(
+            *(
+                prover.inwards(middle[k : k + RADIUS_AT_ONCE], half[k : k + RADIUS_AT_ONCE])
+                for k in range(0, len(middle), RADIUS_AT_ONCE)
+            ),
+            strict=True,
+        )
         return np.concatenate(proved), np.concatenate(axis)
 
     return proved_all_over(np.full(prover.error.size, radius), inside, judge, INWARD_BOXES)

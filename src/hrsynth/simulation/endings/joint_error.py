@@ -73,8 +73,11 @@ class JointError(Value):
     def of(cls, error: PoseError, goal: PoseError | None = None, shortest: float = SHORTEST_ROD) -> JointError:
         """That about the goal; a rod that slides in a plane turns about the plane's normal."""
         limbs = tuple(_in_plane(error, limb) for limb in error.limbs)
-        joints = tuple(i for i, limb in enumerate(limbs) if isinstance(limb, OnCrank | OnRail)
-                       or (isinstance(limb, SlidingRod) and limb.axis is not None))
+        joints = tuple(
+            i
+            for i, limb in enumerate(limbs)
+            if isinstance(limb, OnCrank | OnRail) or (isinstance(limb, SlidingRod) and limb.axis is not None)
+        )
         return cls(replace(error, limbs=limbs), joints, goal or error, shortest=shortest)
 
     @property
@@ -82,11 +85,15 @@ class JointError(Value):
         """Those that together hold all poses: this one, and where all rods slide those of poses far away and about
         short rods; this one alone where that is not so."""
         if not all(isinstance(each, SlidingRod) for each in self.error.limbs) or any(
-                each.limb is None and (each.rule is None or np.any(each.rule.turned)) for each in self.error.seen):
+            each.limb is None and (each.rule is None or np.any(each.rule.turned)) for each in self.error.seen
+        ):
             return (self,)
         about = product(range(len(self.ends)), range(3))
-        return (self, *(replace(self, far=k) for k in range(self.error.shifts.shape[1])),
-                *(replace(self, short=each) for each in about))
+        return (
+            self,
+            *(replace(self, far=k) for k in range(self.error.shifts.shape[1])),
+            *(replace(self, short=each) for each in about),
+        )
 
     @property
     def endless(self) -> bool:
@@ -102,8 +109,11 @@ class JointError(Value):
         """Where the platform's point is, from that of the goal, when rods that slide and turn as they like in space
         have no length, (limbs, 3); none where length and direction of one do not tell where the platform is."""
         error = self.error
-        if error.shifts.shape[1] != 3 or self.size[0] != 3 or not all(
-                isinstance(each, SlidingRod) for each in error.limbs):
+        if (
+            error.shifts.shape[1] != 3
+            or self.size[0] != 3
+            or not all(isinstance(each, SlidingRod) for each in error.limbs)
+        ):
             return np.zeros((0, 3))
         return rodless(error) - error.p
 
@@ -134,8 +144,13 @@ class JointError(Value):
         found = [*(np.inf for _ in self.error.shifts.T), *(2 * np.pi for _ in self.error.turns.T)]
         for i in self.joints:
             limb = self.error.limbs[i]
-            found.append(np.inf if isinstance(limb, OnRail) else
-                         np.pi if isinstance(limb, SlidingRod) and limb.aside == 0 else 2 * np.pi)
+            found.append(
+                np.inf
+                if isinstance(limb, OnRail)
+                else np.pi
+                if isinstance(limb, SlidingRod) and limb.aside == 0
+                else 2 * np.pi
+            )
         return np.array(found)
 
     def box(self, low: Array, high: Array, reach: float) -> tuple[Array, Array]:
@@ -249,8 +264,9 @@ class JointError(Value):
                 seen.append(plus(transform_vector(turned, number(each.rule.turned)), number(each.rule.constant)))
         return g, seen, margins
 
-    def _place_platform(self, y: Sequence[Any], known: Number, number: Number
-                        ) -> tuple[Dual, Components, list[Dual], list[Dual]]:
+    def _place_platform(
+        self, y: Sequence[Any], known: Number, number: Number
+    ) -> tuple[Dual, Components, list[Dual], list[Dual]]:
         """w, the shift of the platform's point and the platform's rotation by rows, both times w, and u of a chart
         about a short rod."""
         k, x = self.error.shifts.shape[1], self.unknowns(y, range(self.freedoms))
@@ -315,15 +331,22 @@ class JointError(Value):
     @cached_property
     def errors(self) -> BoxFormula:
         """u × u* of all that is observed."""
-        return of_robot(lambda y, number: [
-            e.value for u, wanted in self._directions(y, number) for e in cross(u, wanted)], self.size[0])
+        return of_robot(
+            lambda y, number: [e.value for u, wanted in self._directions(y, number) for e in cross(u, wanted)],
+            self.size[0],
+        )
 
     @cached_property
     def asked(self) -> BoxFormula:
         """What vanishes where only such poses are asked for."""
-        return of_robot(lambda y, number: [
-            each.value for k, (u, wanted) in enumerate(self._directions(y, number))
-            for each in ([dot(u, wanted)] if k == self.square else cross(u, wanted))], self.size[0])
+        return of_robot(
+            lambda y, number: [
+                each.value
+                for k, (u, wanted) in enumerate(self._directions(y, number))
+                for each in ([dot(u, wanted)] if k == self.square else cross(u, wanted))
+            ],
+            self.size[0],
+        )
 
     @cached_property
     def directions(self) -> BoxFormula:
@@ -333,8 +356,10 @@ class JointError(Value):
     def _directions(self, y: Sequence[Any], number: Number) -> list[tuple[Sequence[Dual], list[Dual]]]:
         """The observed directions and the desired ones."""
         none = [0.0] * self.size[0]
-        return [(u, [Dual(number(each), none) for each in wanted])
-                for u, wanted in zip(self.parts(y, number)[1], self.wanted, strict=True)]
+        return [
+            (u, [Dual(number(each), none) for each in wanted])
+            for u, wanted in zip(self.parts(y, number)[1], self.wanted, strict=True)
+        ]
 
     @cached_property
     def slopes(self) -> BoxFormula:
@@ -344,8 +369,12 @@ class JointError(Value):
         def formula(y: Sequence[Any], number: Number) -> list[Any]:
             g, _, margins = self.parts(y, number)
             slopes = [-total(c.value * c.rates[j] for c in self._cosines(y, number)) for j in range(n)]
-            return [*(each.value for each in g), *(rate for each in g for rate in each.rates), *slopes,
-                    *(each.value for each in margins)]
+            return [
+                *(each.value for each in g),
+                *(rate for each in g for rate in each.rates),
+                *slopes,
+                *(each.value for each in margins),
+            ]
 
         return of_robot(formula, n)
 
@@ -369,6 +398,7 @@ class JointError(Value):
     def moments(self) -> BoxFormula:
         """Moments that vanish at a critical point: those about a watched leg's tip, to which the legs there add
         nothing. That of a leg is c (∂c g_θ − c_θ ∂g) / g_θ along a turn about the tip, all times all g_θ."""
+
         def formula(y: Sequence[Any], number: Number) -> list[Any]:
             error, k, found = self.error, self.error.shifts.shape[1], list[Any]()
             g = self.parts(y, number)[0]
@@ -383,8 +413,10 @@ class JointError(Value):
                 parts = []
                 for i in rest:
                     c = cosines[i]
-                    of_c, of_g = (total([each.rates[k], *(a * b for a, b in zip(along, each.rates, strict=False))])
-                                  for each in (c, g[i]))
+                    of_c, of_g = (
+                        total([each.rates[k], *(a * b for a, b in zip(along, each.rates, strict=False))])
+                        for each in (c, g[i])
+                    )
                     part = c.value * (of_c * slopes[i] - c.rates[self.freedoms + i] * of_g)
                     for other in rest:
                         part = part if other == i else part * slopes[other]
@@ -407,10 +439,20 @@ class JointError(Value):
             x, known = self.unknowns(y, range(n)), self.make_constant(number)
             mu = [Dual(each, none) for each in y[n:]]
             g, cosines = self.parts(x, known)[0], self._cosines(x, known)
-            rows = [total([*(c.value * c.rates[j] * -1.0 for c in cosines),
-                           *(each.rates[j] * own for each, own in zip(g, mu, strict=True))]) for j in range(n)]
-            return [rate for each in (*rows, *(each.value for each in g))
-                    for rate in (each.rates if isinstance(each, Dual) else none)]
+            rows = [
+                total(
+                    [
+                        *(c.value * c.rates[j] * -1.0 for c in cosines),
+                        *(each.rates[j] * own for each, own in zip(g, mu, strict=True)),
+                    ]
+                )
+                for j in range(n)
+            ]
+            return [
+                rate
+                for each in (*rows, *(each.value for each in g))
+                for rate in (each.rates if isinstance(each, Dual) else none)
+            ]
 
         return of_robot(formula, n + k)
 
@@ -435,6 +477,8 @@ def _in_plane(error: PoseError, limb: ClosedFormLeg) -> ClosedFormLeg:
     if not isinstance(limb, SlidingRod) or limb.axis is not None or error.shifts.shape[1] != 2:
         return limb
     normal = np.cross(*error.shifts.T)
-    off = [normal @ (error.p + limb.tip.constant + error.R @ limb.tip.turned - limb.centre),
-           *(np.cross(normal, error.turns.T).ravel())]
+    off = [
+        normal @ (error.p + limb.tip.constant + error.R @ limb.tip.turned - limb.centre),
+        *(np.cross(normal, error.turns.T).ravel()),
+    ]
     return limb if np.abs(off).max() > FOLLOWED else replace(limb, axis=normal)

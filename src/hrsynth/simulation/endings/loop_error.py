@@ -49,8 +49,10 @@ class Term:
         if self.one is None:
             return scale(z, number(self.size * self.axis)), number(self.axis)
         one, two, c, s = self.one, np.cross(self.axis, self.one), cosine(z), sine(z)
-        return (plus(scale(c, number(self.size * one)), scale(s, number(self.size * two))),
-                minus(scale(c, number(two)), scale(s, number(one))))
+        return (
+            plus(scale(c, number(self.size * one)), scale(s, number(self.size * two))),
+            minus(scale(c, number(two)), scale(s, number(one))),
+        )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -61,17 +63,24 @@ class LoopError(JointError):
     def about(cls, error: PoseError) -> LoopError:
         """Those of a pose's error; raises ``NotEnclosed`` where it is that of no such loop."""
         joints = tuple(each.limb for each in error.seen if each.limb is not None)
-        if len(error.seen) != 2 or len(set(joints)) != 2 or not all(
-                isinstance(error.limbs[i], OnCrank | OnRail) for i in joints):
+        if (
+            len(error.seen) != 2
+            or len(set(joints)) != 2
+            or not all(isinstance(error.limbs[i], OnCrank | OnRail) for i in joints)
+        ):
             raise NotEnclosed("not two rods of constant length are watched")
         found = cls(error, joints, error, shortest=0.0)
         if error.turns.shape[1] > 1 or any(abs(each.size) < EXACT for each in found.terms):
             raise NotEnclosed("the watched legs do not tell how the platform turns")
         if error.shifts.shape[1] == 2:
             normal = np.cross(*error.shifts.T)
-            off = [*(normal @ each for each in found.desired),
-                   *(np.linalg.norm(np.cross(normal, each.axis)) if each.one is not None else normal @ each.axis
-                     for each in found.terms)]
+            off = [
+                *(normal @ each for each in found.desired),
+                *(
+                    np.linalg.norm(np.cross(normal, each.axis)) if each.one is not None else normal @ each.axis
+                    for each in found.terms
+                ),
+            ]
         if error.shifts.shape[1] not in (2, 3) or (error.shifts.shape[1] == 2 and np.abs(off).max() > FOLLOWED):
             raise NotEnclosed("the legs move neither in a plane nor in space")
         return found
@@ -99,8 +108,11 @@ class LoopError(JointError):
         for sign, i in zip((1.0, -1.0), self.joints, strict=True):
             limb = error.limbs[i]
             assert isinstance(limb, OnCrank | OnRail)
-            found.append(Term(sign * limb.radius, limb.axis, across(limb)[0]) if isinstance(limb, OnCrank) else
-                         Term(sign, limb.axis))
+            found.append(
+                Term(sign * limb.radius, limb.axis, across(limb)[0])
+                if isinstance(limb, OnCrank)
+                else Term(sign, limb.axis)
+            )
         for axis in error.turns.T:
             arm = self._arm - axis * (axis @ self._arm)
             size = float(np.linalg.norm(arm))
@@ -145,8 +157,11 @@ class LoopError(JointError):
         assert isinstance(two, OnCrank | OnRail)
         u, m = self.desired[0], self.freedoms
         first = np.linalg.svd(u[None])[2][1] if m == 3 else np.cross(np.cross(*self.error.shifts.T), u)
-        w = number(first) if m == 2 else plus(
-            scale(cosine(y[0]), number(first)), scale(sine(y[0]), number(np.cross(u, first))))
+        w = (
+            number(first)
+            if m == 2
+            else plus(scale(cosine(y[0]), number(first)), scale(sine(y[0]), number(np.cross(u, first))))
+        )
         n, rod = (plus(scale(cosine(z), number(u)), scale(sine(z), w)) for z in y[m - 2 : m])
         tip, g = plus(scale(number(one.rod), rod), number(self._still)), list[Any]()
         for z, term in zip(y[m:], self.terms, strict=True):
@@ -163,8 +178,10 @@ class LoopError(JointError):
         (n, _, u), _ = self.vectors(y, number)
         t, theta = y[self.freedoms - 2 : self.freedoms]
         wanted, across_u = number(self.desired[1]), cross(n, u)
-        force = minus(scale(number(one.rod) * sine(t - theta) * dot(u, wanted), cross(wanted, u)),
-                      scale(number(two.rod) * cosine(theta) * sine(theta), across_u))
+        force = minus(
+            scale(number(one.rod) * sine(t - theta) * dot(u, wanted), cross(wanted, u)),
+            scale(number(two.rod) * cosine(theta) * sine(theta), across_u),
+        )
         length = (dot(u, u) - 1.0) * 0.5
         if self.freedoms == 2:
             return [length, dot(force, number(np.cross(*self.error.shifts.T)))]
@@ -182,6 +199,7 @@ class LoopError(JointError):
     @cached_property
     def slips(self) -> BoxFormula:
         """sin(t − θ) and n × u₂, which vanish together where the closure is singular."""
+
         def formula(y: Sequence[Any], number: Number) -> list[Any]:
             n, _, u = self.vectors(y, number)[0]
             return [sine(y[self.freedoms - 2] - y[self.freedoms - 1]), *cross(n, u)]
@@ -191,6 +209,7 @@ class LoopError(JointError):
     @cached_property
     def bends(self) -> BoxFormula:
         """The rates of all equations, one after the other."""
+
         def formula(y: Sequence[Any], known: Number) -> list[Any]:
             x, number = self.unknowns(y, range(self.size[0])), self.make_constant(known)
             return [rate for each in (*self.vectors(x, number)[1], *self.rest(x, number)) for rate in each.rates]
@@ -200,28 +219,37 @@ class LoopError(JointError):
     @cached_property
     def ways(self) -> BoxFormula:
         """Of each joint that turns, n along its axis and across it."""
+
         def formula(y: Sequence[Any], number: Number) -> list[Any]:
             n = self.vectors([*y, *(0.0 for _ in self.terms)], number)[0][0]
-            return [dot(n, number(way)) for each in self.terms if each.one is not None
-                    for way in (each.axis, each.one, np.cross(each.axis, each.one))]
+            return [
+                dot(n, number(way))
+                for each in self.terms
+                if each.one is not None
+                for way in (each.axis, each.one, np.cross(each.axis, each.one))
+            ]
 
         return of_robot(formula, self.freedoms)
 
     @cached_property
     def told(self) -> BoxFormula:
         """Coordinates about the goal: shifts, the turn, the joints of the watched limbs."""
+
         def formula(y: Sequence[Any], number: Number) -> list[Any]:
             error, m = self.error, self.freedoms
             limb = error.limbs[self.joints[0]]
             assert isinstance(limb, OnCrank | OnRail)
             rod = self.vectors(y, number)[0][1]
-            point = plus(number(limb.centre - limb.tip.constant - error.p),
-                         plus(scale(number(limb.rod), rod), self.terms[0].at(y[m], number)[0]))
+            point = plus(
+                number(limb.centre - limb.tip.constant - error.p),
+                plus(scale(number(limb.rod), rod), self.terms[0].at(y[m], number)[0]),
+            )
             arm = error.R @ limb.tip.turned
             for axis, z in zip(error.turns.T, y[m + 2 :], strict=True):
                 c, s = cosine(z), sine(z)
-                point = minus(point, plus(scale(s, number(np.cross(axis, arm))),
-                                          scale(c, number(arm - axis * (axis @ arm)))))
+                point = minus(
+                    point, plus(scale(s, number(np.cross(axis, arm))), scale(c, number(arm - axis * (axis @ arm))))
+                )
                 arm = axis * (axis @ arm)
             point = minus(point, number(arm))
             return [*(dot(point, number(way)) for way in error.shifts.T), *y[m + 2 :], *y[m : m + 2]]

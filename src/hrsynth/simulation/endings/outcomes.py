@@ -25,8 +25,10 @@ class Outcome(Value):
     def alike(self, other: Outcome, length: float) -> bool:
         """Whether two runs end alike: at one pose, or for one reason."""
         if self.X is None or other.X is None or self.ending.name != other.ending.name:
-            said = [(each.ending.name, each.ending.reason if each.ending.name == BOUNDARY else "", each.X is None)
-                    for each in (self, other)]
+            said = [
+                (each.ending.name, each.ending.reason if each.ending.name == BOUNDARY else "", each.X is None)
+                for each in (self, other)
+            ]
             return said[0] == said[1]
         return pose_difference(self.X, other.X, length) <= RUNS_ALIKE
 

@@ -72,14 +72,17 @@ class PlaneError(JointError):
         except NoLegForm as why:
             raise NotEnclosed(str(why)) from why
         if [str(limb.label) for limb in error.limbs] != [leg.label for leg in legs] or not all(
-                isinstance(limb, SlidingRod) for limb in error.limbs):
+            isinstance(limb, SlidingRod) for limb in error.limbs
+        ):
             raise depends
         N, places = np.array(normals), coordinates.of([goal, *configurations])
         h = [limb.tip.value(*places) @ n for limb, n in zip(error.limbs, N, strict=True)]
         if max(map(np.ptp, h)) > FOLLOWED:
             raise depends
-        limbs = tuple(replace(limb, axis=n) if isinstance(limb, SlidingRod) and limb.axis is None else limb
-                      for limb, n in zip(error.limbs, N, strict=True))
+        limbs = tuple(
+            replace(limb, axis=n) if isinstance(limb, SlidingRod) and limb.axis is None else limb
+            for limb, n in zip(error.limbs, N, strict=True)
+        )
         whole = JointError.of(replace(error, limbs=limbs))
         if len(whole.joints) < len(limbs):
             raise depends
@@ -90,10 +93,23 @@ class PlaneError(JointError):
         along, follow = V[rank:].T, -back @ arms
         offset = back @ rest - error.p
         offset -= along @ (along.T @ offset)
-        forms = [c * np.eye(4) - np.tensordot(row, TURNED, 1) for c, row in zip(
-            U.T[rank:] @ rest, U.T[rank:] @ arms, strict=True)]
-        return [cls(whole.error, whole.joints, whole.error, offset=offset, follow=follow, along=along, span=span,
-                    forms=np.array(left).reshape(-1, 4, 4)) for span, left in factors(np.eye(4), forms)]
+        forms = [
+            c * np.eye(4) - np.tensordot(row, TURNED, 1)
+            for c, row in zip(U.T[rank:] @ rest, U.T[rank:] @ arms, strict=True)
+        ]
+        return [
+            cls(
+                whole.error,
+                whole.joints,
+                whole.error,
+                offset=offset,
+                follow=follow,
+                along=along,
+                span=span,
+                forms=np.array(left).reshape(-1, 4, 4),
+            )
+            for span, left in factors(np.eye(4), forms)
+        ]
 
     @property
     def charts(self) -> tuple[JointError, ...]:
@@ -136,8 +152,9 @@ class PlaneError(JointError):
         turns = np.ones(self.freedoms - k)
         return (np.concatenate([middle - room, -turns, inner[6:]]), np.concatenate([middle + room, turns, outer[6:]]))
 
-    def _place_platform(self, y: Sequence[Any], known: Number, number: Number
-                        ) -> tuple[Dual, Components, list[Dual], list[Dual]]:
+    def _place_platform(
+        self, y: Sequence[Any], known: Number, number: Number
+    ) -> tuple[Dual, Components, list[Dual], list[Dual]]:
         k, x = self.along.shape[1], self.unknowns(y, range(self.freedoms))
         w, place = number(1.0), list(x[:k])
         if self.far is not None:
@@ -174,8 +191,9 @@ class PlaneError(JointError):
             q.insert(self.one, number(1.0))
             for form in self.forms:
                 own, r = self.span.T @ form @ self.span, len(q)
-                g.append(total(q[i] * q[j] * number(own[i, j] * (1 if i == j else 2))
-                               for i in range(r) for j in range(i, r)))
+                g.append(
+                    total(q[i] * q[j] * number(own[i, j] * (1 if i == j else 2)) for i in range(r) for j in range(i, r))
+                )
         return g, seen, margins
 
     @property
@@ -187,6 +205,7 @@ class PlaneError(JointError):
     def told(self) -> BoxFormula:
         """w, the platform's point from the goal's, times w, and the axis of its turn from the goal's, times the sine of
         its angle."""
+
         def formula(y: Sequence[Any], known: Number) -> list[Any]:
             number = self.make_constant(known)
             w, point, _, _ = self._place_platform(y, known, number)
@@ -201,15 +220,18 @@ class PlaneError(JointError):
     def enclose_chart(self, middle: Array, half: Array) -> tuple[Array, Array]:
         """What boxes (c, n) hold: shifts from the goal, axes of the turn times its sine, joints."""
         f, eye = self.freedoms, np.eye(self.freedoms)
-        forms = [affine(middle[:, i], half[:, i, None] * eye[i], AFFINE_ROUNDING * (1 + np.abs(middle[:, i])))
-                 for i in range(f)]
+        forms = [
+            affine(middle[:, i], half[:, i, None] * eye[i], AFFINE_ROUNDING * (1 + np.abs(middle[:, i])))
+            for i in range(f)
+        ]
         w, *rest = self.told.at(forms)
         found = stack(rest)
         low, high = found.low.copy(), found.high.copy()
         if self.far is not None:
             with np.errstate(all="ignore"):
-                ends = np.array([each / w_end for each in (low[:, :3], high[:, :3])
-                                 for w_end in (w.low[:, None], w.high[:, None])])
+                ends = np.array(
+                    [each / w_end for each in (low[:, :3], high[:, :3]) for w_end in (w.low[:, None], w.high[:, None])]
+                )
             low[:, :3], high[:, :3] = ends.min(axis=0), ends.max(axis=0)
             endless = (w.low <= 0) & (w.high >= 0)
             low[endless, :3], high[endless, :3] = -np.inf, np.inf
@@ -265,8 +287,13 @@ def _normal(mechanism: Mechanism, leg: Leg) -> Array | None:
     *own, ball = [mechanism.joints[name] for name in leg.joints]
     turns = [each for each in own if each.type is JointType.REVOLUTE]
     slides = [each for each in own if each.type is JointType.PRISMATIC]
-    if leg.has_loops or ball.type is not JointType.SPHERICAL or leg.attach not in ball.links or not turns or (
-            len(turns) + len(slides) < len(own)):
+    if (
+        leg.has_loops
+        or ball.type is not JointType.SPHERICAL
+        or leg.attach not in ball.links
+        or not turns
+        or (len(turns) + len(slides) < len(own))
+    ):
         return None
     normal = turns[0].axis
     off = [*(np.cross(normal, each.axis) for each in turns), *(np.array([normal @ each.axis]) for each in slides)]

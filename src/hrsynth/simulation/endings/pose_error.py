@@ -97,8 +97,10 @@ class Turning:
     @property
     def rates(self) -> list[Components]:
         """ė along each direction."""
-        return [cross(minus(plain, scale(normal / self.along, self.slip)), self.wanted)
-                for plain, normal in zip(self.plain, self.normal, strict=True)]
+        return [
+            cross(minus(plain, scale(normal / self.along, self.slip)), self.wanted)
+            for plain, normal in zip(self.plain, self.normal, strict=True)
+        ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,17 +158,33 @@ class PoseError(Value):
         motion = coordinates.motion
         known = pattern(setting.anatomy, [], coordinates, configurations)
         # a leg on whose rail the point itself lies asks for nothing: the point's one shift goes along it
-        pairs = [(limb, carried) for limb, carried in zip(known.forms(goal).limbs, known.carried, strict=True)
-                 if not (isinstance(limb, OnRail) and limb.rod <= EXACT and motion.translations.shape[1] == 1
-                         and not np.any(limb.tip.turned))]
+        pairs = [
+            (limb, carried)
+            for limb, carried in zip(known.forms(goal).limbs, known.carried, strict=True)
+            if not (
+                isinstance(limb, OnRail)
+                and limb.rod <= EXACT
+                and motion.translations.shape[1] == 1
+                and not np.any(limb.tip.turned)
+            )
+        ]
         read = JointRules.of(setting.anatomy, coordinates, configurations)
         seen = tuple(_seen_direction(o, known, pairs, read, [goal, *configurations]) for o in setting.observed)
         p, R = coordinates.of([goal])
         rules = tuple(f"direction of leg {o.leg}" for o in seen if o.rule is not None and o.rule.fitted)
-        return cls(coordinates.length, motion, p[0], R[0], motion.translations,
-                   motion.rotations if coordinates.turning else np.zeros((3, 0)),
-                   tuple(limb for limb, _ in pairs), seen,
-                   (*known.fitted, *rules), (*mechanism.stops, *mechanism.wrists), coordinates=coordinates)
+        return cls(
+            coordinates.length,
+            motion,
+            p[0],
+            R[0],
+            motion.translations,
+            motion.rotations if coordinates.turning else np.zeros((3, 0)),
+            tuple(limb for limb, _ in pairs),
+            seen,
+            (*known.fitted, *rules),
+            (*mechanism.stops, *mechanism.wrists),
+            coordinates=coordinates,
+        )
 
     @property
     def size(self) -> int:
@@ -186,8 +204,11 @@ class PoseError(Value):
     def mirrors(self) -> Array:
         """Signs (2ᵏ, legs, 1) of the observed directions under which E is the same at a pose, all 1 first: a rod that
         slides through a base point has its direction either way."""
-        both = [k for k, each in enumerate(self.seen) if each.limb is not None
-                and isinstance(leg := self.limbs[each.limb], SlidingRod) and leg.aside == 0]
+        both = [
+            k
+            for k, each in enumerate(self.seen)
+            if each.limb is not None and isinstance(leg := self.limbs[each.limb], SlidingRod) and leg.aside == 0
+        ]
         signs = np.ones((2 ** len(both), len(self.seen), 1))
         signs[:, both, 0] = list(product((1.0, -1.0), repeat=len(both)))
         return signs
@@ -214,8 +235,10 @@ class PoseError(Value):
         with np.errstate(all="ignore"):
             found = self.at(list(x.T), list(directions), _plain).seen
             e = [np.broadcast_to(each, len(x)) for one in found for each in one.error]
-            rates = [[np.broadcast_to(each, len(x)) for one in found for each in one.rates[j]]
-                     for j in range(len(directions))]
+            rates = [
+                [np.broadcast_to(each, len(x)) for one in found for each in one.rates[j]]
+                for j in range(len(directions))
+            ]
         return np.array(e).T, np.array(rates).transpose(2, 1, 0)
 
     def _twist(self, x: Components, R: Components, rates: Components, number: Number) -> Twist:
@@ -232,8 +255,9 @@ class PoseError(Value):
         arm: Components = transform_vector(R, number(limb.tip.turned)) if np.any(limb.tip.turned) else [0.0, 0.0, 0.0]
         return plus(plus(p, number(limb.tip.constant)), arm), arm
 
-    def _turning(self, seen: SeenDirection, here: Place, goal: Place, twists: Sequence[Twist], number: Number
-                 ) -> Turning:
+    def _turning(
+        self, seen: SeenDirection, here: Place, goal: Place, twists: Sequence[Twist], number: Number
+    ) -> Turning:
         """An observed direction, and how it changes with twists of the platform's point."""
         wanted, u = self._direction(seen, *goal, number), self._direction(seen, *here, number)
         if seen.limb is None:
@@ -260,8 +284,11 @@ class PoseError(Value):
         limb = self.limbs[seen.limb]
         tip = self._tip(limb, p, R, number)[0]
         carried = limb.at(tip, number, limb.mode)[1]
-        return scale(seen.sense / number(limb.rod), minus(tip, carried)) if isinstance(limb, OnRod) else scale(
-            seen.sense, carried)
+        return (
+            scale(seen.sense / number(limb.rod), minus(tip, carried))
+            if isinstance(limb, OnRod)
+            else scale(seen.sense, carried)
+        )
 
 
 def require_directions(setting: ObservedRobot) -> None:
@@ -276,8 +303,13 @@ def require_directions(setting: ObservedRobot) -> None:
         raise NotEnclosed("joints are coupled")
 
 
-def _seen_direction(observation: Observation, known: LegPattern, pairs: Sequence[tuple[ClosedFormLeg, NamedVector]],
-                    read: JointRules, configurations: Sequence[ClosedConfiguration]) -> SeenDirection:
+def _seen_direction(
+    observation: Observation,
+    known: LegPattern,
+    pairs: Sequence[tuple[ClosedFormLeg, NamedVector]],
+    read: JointRules,
+    configurations: Sequence[ClosedConfiguration],
+) -> SeenDirection:
     """Which limb's rod an observed direction is, at all configurations; raises ``NotEnclosed``."""
     assert isinstance(observation, Direction)
     feature = BodyVector("u", "observed", observation.link, observation.direction)
@@ -297,5 +329,6 @@ def _seen_direction(observation: Observation, known: LegPattern, pairs: Sequence
         if known.coordinates.turning and np.any(rule.turned) and np.any(rule.constant):
             raise NotEnclosed(f"the direction of link {observation.link} turns in part with the platform")
         return SeenDirection(observation.leg, 1.0, None, rule)
-    raise NotEnclosed(f"the direction of link {observation.link} of leg {observation.leg} is not that of a rod whose "
-                      "form is known")
+    raise NotEnclosed(
+        f"the direction of link {observation.link} of leg {observation.leg} is not that of a rod whose form is known"
+    )

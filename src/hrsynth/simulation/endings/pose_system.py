@@ -135,11 +135,22 @@ class Piece(Value):
         if self.free:
             assert limb is not None
             s, u, eye = o[:, :1], o[:, 1:], np.eye(4)
-            found = [Local((_dot(u, u) - 1) / 2, 0 * t, np.append(0 * s, u, axis=1), None, None,
-                           np.diag([0.0, 1.0, 1.0, 1.0]))]
-            found += [Local(x, axis + 0 * t, -np.append(u[:, k, None], s * axis, axis=1), None, None,
-                            -np.outer(eye[0], eye[k + 1]) - np.outer(eye[k + 1], eye[0]))
-                      for k, (x, axis) in enumerate(zip((t - limb.centre - s * u).T, np.eye(3), strict=True))]
+            found = [
+                Local(
+                    (_dot(u, u) - 1) / 2, 0 * t, np.append(0 * s, u, axis=1), None, None, np.diag([0.0, 1.0, 1.0, 1.0])
+                )
+            ]
+            found += [
+                Local(
+                    x,
+                    axis + 0 * t,
+                    -np.append(u[:, k, None], s * axis, axis=1),
+                    None,
+                    None,
+                    -np.outer(eye[0], eye[k + 1]) - np.outer(eye[k + 1], eye[0]),
+                )
+                for k, (x, axis) in enumerate(zip((t - limb.centre - s * u).T, np.eye(3), strict=True))
+            ]
             return found
         if isinstance(limb, SlidingRod):
             u, q = self.ring(o)
@@ -151,8 +162,9 @@ class Piece(Value):
         found = [Local((_dot(v, v) - limb.rod**2) / 2, v, -_dot(v, rate), np.eye(3), -rate, size - _dot(v, bend))]
         if self.held:
             third = -rate if isinstance(limb, OnCrank) else 0 * rate
-            found.append(Local(_dot(v, rate), rate, _dot(v, bend) - size, None, bend,
-                               _dot(v, third) - 3 * _dot(rate, bend)))
+            found.append(
+                Local(_dot(v, rate), rate, _dot(v, bend) - size, None, bend, _dot(v, third) - 3 * _dot(rate, bend))
+            )
         return found
 
 
@@ -192,8 +204,18 @@ class LegSystem(Value):
             free = i in held and limb is not None and unbound(limb)
             joint = 4 if free else int(limb is not None and not unbound(limb))
             wanted = np.zeros(3) if seen is None else np.array(error._direction(seen, *goal, lambda value: value))
-            pieces.append(Piece(point.follows, point.constant, bends(error.R @ point.turned, error.turns), limb,
-                                slice(place, place + joint) if joint else None, i in held, seen, wanted))
+            pieces.append(
+                Piece(
+                    point.follows,
+                    point.constant,
+                    bends(error.R @ point.turned, error.turns),
+                    limb,
+                    slice(place, place + joint) if joint else None,
+                    i in held,
+                    seen,
+                    wanted,
+                )
+            )
             place += joint
             count += joint + (i in held and not free)
         order = {each: number for number, each in enumerate(error.seen)}
@@ -246,8 +268,10 @@ class LegSystem(Value):
 
     def directions(self, y: Array) -> Array:
         """The observed ones (c, legs, 3)."""
-        return np.stack([piece.direction(self.tip(piece, y), piece.own(y)) for piece in self.pieces
-                         if piece.seen is not None], axis=1)
+        return np.stack(
+            [piece.direction(self.tip(piece, y), piece.own(y)) for piece in self.pieces if piece.seen is not None],
+            axis=1,
+        )
 
     def is_reached(self, y: Array) -> NDArray[np.bool_]:
         """Whether all other limbs reach, and no held leg's crank can stand anywhere as its tip is on its axis, (c,)."""

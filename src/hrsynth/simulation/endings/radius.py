@@ -88,8 +88,10 @@ class CertifiedRadius(Value):
         """Whether a platform pose X (4, 4) is one of those starts."""
         here = self.goal.pose(self.motion.link)
         shift = transform(X, self.motion.point) - transform(here, self.motion.point)
-        return bool(np.linalg.norm(shift) <= self.length and (
-            self.angle is None or angle_of(X[:3, :3] @ here[:3, :3].T) <= self.angle))
+        return bool(
+            np.linalg.norm(shift) <= self.length
+            and (self.angle is None or angle_of(X[:3, :3] @ here[:3, :3].T) <= self.angle)
+        )
 
 
 def certified_radius(setting: ObservedRobot, goal: ClosedConfiguration) -> CertifiedRadius:
@@ -112,8 +114,18 @@ def certified_radius(setting: ObservedRobot, goal: ClosedConfiguration) -> Certi
     reason = "forms of the legs and the error enclosed in cones about the goal"
     ball, more = inward_radius(error)
     aside = bool(np.linalg.norm(error.motion.point - setting.motion.point) > SAME_POINT * error.length)
-    return CertifiedRadius(goal, error.motion, reach * error.length, angle, proved.level, least,
-                           proved.boxes + boxes + more, reason, _product(ball) if error.turns.shape[1] else ball, aside)
+    return CertifiedRadius(
+        goal,
+        error.motion,
+        reach * error.length,
+        angle,
+        proved.level,
+        least,
+        proved.boxes + boxes + more,
+        reason,
+        _product(ball) if error.turns.shape[1] else ball,
+        aside,
+    )
 
 
 def _product(radius: float) -> float:
@@ -174,8 +186,9 @@ def _reach(proved: ProvedCones) -> tuple[float, int]:
         inside = reached & (c > E)
         low, high = np.where(inside, middle, low), np.where(inside, high, middle)
     seen = float(np.min(_gauge(error, low[:, None] * x)))
-    errors = trace_formula(lambda inputs, number: [x for each in error.at(inputs, [], number).seen for x in each.error],
-                    error.size)
+    errors = trace_formula(
+        lambda inputs, number: [x for each in error.at(inputs, [], number).seen for x in each.error], error.size
+    )
     Q, boxes = proved.prover.Q @ np.linalg.inv(W), 0
     for share in RADIUS_SHARES:
         held, used = _below(error, errors, Q, share * seen, c)

@@ -37,11 +37,18 @@ def narrow_joint(limb: ClosedFormLeg, along: Bounds, one: Bounds, two: Bounds, o
     """The bounds ``own`` of a joint, narrowed to where it can be while the tip is between bounds, from the centre along
     the axis and in the two directions across."""
     shifts = [0.0] if isinstance(limb, OnRail) else list(2 * np.pi * np.arange(-2, 3))
-    met = [(np.maximum(own[0], a + shift - BOX_ROUNDING * (1 + np.abs(a))),
-            np.minimum(own[1], b + shift + BOX_ROUNDING * (1 + np.abs(b))))
-           for a, b in _places(limb, along, one, two) for shift in shifts]
-    return (np.min([np.where(a <= b, a, np.inf) for a, b in met], axis=0),
-            np.max([np.where(a <= b, b, -np.inf) for a, b in met], axis=0))
+    met = [
+        (
+            np.maximum(own[0], a + shift - BOX_ROUNDING * (1 + np.abs(a))),
+            np.minimum(own[1], b + shift + BOX_ROUNDING * (1 + np.abs(b))),
+        )
+        for a, b in _places(limb, along, one, two)
+        for shift in shifts
+    ]
+    return (
+        np.min([np.where(a <= b, a, np.inf) for a, b in met], axis=0),
+        np.max([np.where(a <= b, b, -np.inf) for a, b in met], axis=0),
+    )
 
 
 def _places(limb: ClosedFormLeg, along: Bounds, one: Bounds, two: Bounds) -> list[Bounds]:
@@ -55,8 +62,10 @@ def _places(limb: ClosedFormLeg, along: Bounds, one: Bounds, two: Bounds) -> lis
         if isinstance(limb, OnCrank):
             low, high = _square(along)
             doubt = BOX_ROUNDING * (high + limb.radius**2 + limb.rod**2)
-            share = (_share(low + limb.radius**2 - limb.rod**2 - doubt, far, limb.radius, least=True),
-                     _share(high + limb.radius**2 - limb.rod**2 + doubt, far, limb.radius, least=False))
+            share = (
+                _share(low + limb.radius**2 - limb.rod**2 - doubt, far, limb.radius, least=True),
+                _share(high + limb.radius**2 - limb.rod**2 + doubt, far, limb.radius, least=False),
+            )
             a, b = _turn(share[1]), _turn(share[0])
             none = (share[0] > 1 + BOX_ROUNDING) | (share[1] < -1 - BOX_ROUNDING)
             a, b = np.where(none, np.nan, a), np.where(none, np.nan, b)

@@ -86,14 +86,29 @@ class RestPoint:
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
-        return {"pose": self.pose.to_dict(), "kind": self.kind, "stable": self.stable, "stability": self.stability,
-                "error": self.error, "curvatures": list(self.curvatures), "proved": self.proved,
-                "decided": self.decided, "rates": [list(each) for each in self.rates], "side": self.side,
-                "radius_m": self.shift if self.proved else None, "radius_rad": self.turn if self.proved else None,
-                "reversed": list(self.reversed), "across": list(self.across), "singular": self.singular,
-                "boundary": self.boundary, "assembly": self.assembly, "beyond": list(self.beyond),
-                "other_legs": None if self.other_legs is None else list(self.other_legs), "met": self.met,
-                "ways": self.ways}
+        return {
+            "pose": self.pose.to_dict(),
+            "kind": self.kind,
+            "stable": self.stable,
+            "stability": self.stability,
+            "error": self.error,
+            "curvatures": list(self.curvatures),
+            "proved": self.proved,
+            "decided": self.decided,
+            "rates": [list(each) for each in self.rates],
+            "side": self.side,
+            "radius_m": self.shift if self.proved else None,
+            "radius_rad": self.turn if self.proved else None,
+            "reversed": list(self.reversed),
+            "across": list(self.across),
+            "singular": self.singular,
+            "boundary": self.boundary,
+            "assembly": self.assembly,
+            "beyond": list(self.beyond),
+            "other_legs": None if self.other_legs is None else list(self.other_legs),
+            "met": self.met,
+            "ways": self.ways,
+        }
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -121,9 +136,13 @@ class SignedModes(Value):
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
         known = self.listed
-        return {"reversed": list(self.reversed), "modes": self.boxes if known is None else len(known.modes),
-                "complex": None if known is None or known.found.continuum else known.found.complex,
-                "boxes": self.boxes, "complete": self.complete}
+        return {
+            "reversed": list(self.reversed),
+            "modes": self.boxes if known is None else len(known.modes),
+            "complex": None if known is None or known.found.continuum else known.found.complex,
+            "boxes": self.boxes,
+            "complete": self.complete,
+        }
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -201,8 +220,10 @@ class RestCover(Value):
         if error is None:
             return ()
         k = error.shifts.shape[1]
-        return tuple((self._point(middle[:k]), error.length * float(np.linalg.norm(half[:k])))
-                     for middle, half in self.cover.locked)
+        return tuple(
+            (self._point(middle[:k]), error.length * float(np.linalg.norm(half[:k])))
+            for middle, half in self.cover.locked
+        )
 
     def _where(self) -> str:
         """Where the open boxes lie."""
@@ -216,8 +237,13 @@ class RestCover(Value):
         places = [np.array(each) for each in join_boxes(corners)] if len(corners) <= MOST_JOINED else []
         if not 0 < len(places) <= PLACES_TOLD:
             places = [np.stack([corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)])]
-        told = [(f"{cover.error.length * float(np.ptp(each, axis=0).max()):.3g} m about "
-                 f"({', '.join(f'{x:.3g}' for x in self._point(each.mean(axis=0)))})") for each in places]
+        told = [
+            (
+                f"{cover.error.length * float(np.ptp(each, axis=0).max()):.3g} m about "
+                f"({', '.join(f'{x:.3g}' for x in self._point(each.mean(axis=0)))})"
+            )
+            for each in places
+        ]
         return f", in {' and '.join(told)}"
 
     def _point(self, x: Array) -> Array:
@@ -229,14 +255,26 @@ class RestCover(Value):
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
         cover = self.cover
-        return {"complete": self.complete, "proved": len(cover.found), "boxes": cover.boxes, "open": len(cover.open),
-                "share": cover.share, "within_m": self.within, "shorter_m": self.shorter,
-                "turns": len(cover.turns), "turned": self.turned, "apart": self.apart, "crossings": self.crossings,
-                "locked": [{"p": list(p), "within_m": within} for p, within in self.locked],
-                "unread": list(cover.unread),
-                "unstretched": None if self.unstretched is None else list(self.unstretched), "across": self.across,
-                "alone": [each.to_dict() for each in self.alone], "strangers": self.strangers,
-                "reason": self.reason or None}
+        return {
+            "complete": self.complete,
+            "proved": len(cover.found),
+            "boxes": cover.boxes,
+            "open": len(cover.open),
+            "share": cover.share,
+            "within_m": self.within,
+            "shorter_m": self.shorter,
+            "turns": len(cover.turns),
+            "turned": self.turned,
+            "apart": self.apart,
+            "crossings": self.crossings,
+            "locked": [{"p": list(p), "within_m": within} for p, within in self.locked],
+            "unread": list(cover.unread),
+            "unstretched": None if self.unstretched is None else list(self.unstretched),
+            "across": self.across,
+            "alone": [each.to_dict() for each in self.alone],
+            "strangers": self.strangers,
+            "reason": self.reason or None,
+        }
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -290,20 +328,29 @@ class Endings(Result, shown_as="endings"):
 
     def headline(self) -> str:
         """The robot and how many rests there are."""
-        return (f"{self.setting.headline()}: {len(self.rests)} poses at which the loop to {self.pose} can rest, "
-                f"{len(self.attracting)} of them attract")
+        return (
+            f"{self.setting.headline()}: {len(self.rests)} poses at which the loop to {self.pose} can rest, "
+            f"{len(self.attracting)} of them attract"
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line, without the command's own fields."""
-        return {"at": self.pose.to_dict(), **self.setting.to_dict(), "complex": self.lists[0].to_dict()["complex"],
-                "depth": self.depth,
-                "complete": self.complete, "cover": None if self.cover is None else self.cover.to_dict(),
-                "signs": [each.to_dict() for each in self.lists],
-                "proof": self.search.words, "starts": self.starts, "attracting": len(self.attracting),
-                "measured": list(self.measured),
-                "endings": [each.to_dict() for each in self.endings],
-                "singular": [each.to_dict() for each in self.singular],
-                "continua": [each.to_dict() for each in self.continua]}
+        return {
+            "at": self.pose.to_dict(),
+            **self.setting.to_dict(),
+            "complex": self.lists[0].to_dict()["complex"],
+            "depth": self.depth,
+            "complete": self.complete,
+            "cover": None if self.cover is None else self.cover.to_dict(),
+            "signs": [each.to_dict() for each in self.lists],
+            "proof": self.search.words,
+            "starts": self.starts,
+            "attracting": len(self.attracting),
+            "measured": list(self.measured),
+            "endings": [each.to_dict() for each in self.endings],
+            "singular": [each.to_dict() for each in self.singular],
+            "continua": [each.to_dict() for each in self.continua],
+        }
 
 
 def stability(curvatures: Sequence[float] | Array, least: float = SAME_ENDING) -> str:

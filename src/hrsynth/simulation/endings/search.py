@@ -80,8 +80,10 @@ class CriticalPoints(Value):
         """What was done, and how well it covers."""
         also = f", {self.posed} more over the platform's pose" if self.posed else ""
         also += f"; estimated, by how often each was met: at least {self.unmet} more" if self.unmet else ""
-        return (f"found from {self.starts:,} random starts, {self.late} of {len(self.isolated) - self.posed} "
-                f"configurations first in the second half of these{also}")
+        return (
+            f"found from {self.starts:,} random starts, {self.late} of {len(self.isolated) - self.posed} "
+            f"configurations first in the second half of these{also}"
+        )
 
 
 def starts(system: RestSystem, homes: Array, seed: int = 0, setting: ObservedRobot | None = None) -> Iterator[Array]:
@@ -103,10 +105,17 @@ def starts(system: RestSystem, homes: Array, seed: int = 0, setting: ObservedRob
         yield q
 
 
-def critical_points(system: RestSystem, setting: ObservedRobot, goal: ClosedConfiguration, seed: int = 0, *,
-                    minima: bool = False, rounds: Iterable[Array] | None = None,
-                    further: Callable[[Array], Sequence[CriticalPoint]] | None = None,
-                    fit: Callable[[Array], NDArray[np.bool_]] | None = None) -> CriticalPoints:
+def critical_points(
+    system: RestSystem,
+    setting: ObservedRobot,
+    goal: ClosedConfiguration,
+    seed: int = 0,
+    *,
+    minima: bool = False,
+    rounds: Iterable[Array] | None = None,
+    further: Callable[[Array], Sequence[CriticalPoint]] | None = None,
+    fit: Callable[[Array], NDArray[np.bool_]] | None = None,
+) -> CriticalPoints:
     """The critical points to which random walks from the samples and from random closings lead, in rounds, until the
     later half of the starts finds few new ones; ``minima``: only descent, which finds what attracts; ``rounds``: of
     :func:`starts`, where they are known; ``further`` finds more of them, from configurations (n, N), beside those that
@@ -249,10 +258,16 @@ def anywhere(system: RestSystem, rng: np.random.Generator, count: int) -> Array:
 def reaches(system: RestSystem) -> Array:
     """How far (characteristic lengths) starts have each slide, (N,): to its limits where it has some; 0 of turns."""
     loops = system.system
-    ends = {stop.joint: max((abs(end) for end in (stop.lower, stop.upper) if np.isfinite(end)), default=0.0)
-            for stop in loops.mechanism.stops.values()}
-    return np.array([max(WIDEST_SLIDE, ends.get(each.joint, 0.0) / loops.length) if each.slides else 0.0
-                     for each in loops.coordinates])
+    ends = {
+        stop.joint: max((abs(end) for end in (stop.lower, stop.upper) if np.isfinite(end)), default=0.0)
+        for stop in loops.mechanism.stops.values()
+    }
+    return np.array(
+        [
+            max(WIDEST_SLIDE, ends.get(each.joint, 0.0) / loops.length) if each.slides else 0.0
+            for each in loops.coordinates
+        ]
+    )
 
 
 def in_mode(system: RestSystem, setting: ObservedRobot, q: Array) -> NDArray[np.bool_]:
@@ -267,7 +282,8 @@ def in_mode(system: RestSystem, setting: ObservedRobot, q: Array) -> NDArray[np.
         except LoopsNotClosed:
             continue
         kept[k] = law.in_front(at) > SEEN_ABOVE and (
-            not system.size[1] or drawn.signature.agrees(Signature.of(relation(at, drawn.question))))
+            not system.size[1] or drawn.signature.agrees(Signature.of(relation(at, drawn.question)))
+        )
     return kept
 
 
@@ -282,8 +298,13 @@ def along_all(system: RestSystem, q: Array) -> NDArray[np.bool_]:
     return ~np.any((sizes < CLOSURES_MEET * sizes[:, :1]) & (slopes > CLOSURES_MEET), axis=1)
 
 
-def marks(system: RestSystem, setting: ObservedRobot, bodies: Sequence[str], points: Sequence[CriticalPoint],
-          told: Sequence[Observation] | None = None) -> Array:
+def marks(
+    system: RestSystem,
+    setting: ObservedRobot,
+    bodies: Sequence[str],
+    points: Sequence[CriticalPoint],
+    told: Sequence[Observation] | None = None,
+) -> Array:
     """What tells configurations (n, k) apart: the poses of the platform's bodies and the directions of all segments
     that have one for each of these poses and what is measured (an arm's elbow that is free to move has not)."""
     if not points:
@@ -298,8 +319,11 @@ def marks(system: RestSystem, setting: ObservedRobot, bodies: Sequence[str], poi
             parts += [carrier.direction(chain, axis).value for axis in X[:3, :2].T]
     for seen in told_by(setting) if told is None else told:
         if isinstance(seen, SeenAxis):
-            parts.append(carrier.direction(loops.way(loops.body[seen.link]),
-                                           links[seen.link].pose[:3, :3] @ seen.direction).value)
+            parts.append(
+                carrier.direction(
+                    loops.way(loops.body[seen.link]), links[seen.link].pose[:3, :3] @ seen.direction
+                ).value
+            )
     return np.concatenate([np.broadcast_to(each, (len(points), 3)) for each in parts], axis=-1)
 
 
@@ -309,5 +333,9 @@ def told_by(setting: ObservedRobot) -> tuple[Observation, ...]:
     held = setting.samples.members[0].relation.dimension
     if every.members[0].relation.dimension == held:
         return every.question.observations
-    return tuple(o for o in every.question.observations if o.key in own or
-                 restrict_samples(every, [*setting.observed, o], ways=False).members[0].relation.dimension == held)
+    return tuple(
+        o
+        for o in every.question.observations
+        if o.key in own
+        or restrict_samples(every, [*setting.observed, o], ways=False).members[0].relation.dimension == held
+    )

@@ -84,8 +84,10 @@ class Springs:
     @cached_property
     def place(self) -> Components:
         """Where the first b is, times w, so that all forces balance."""
-        parts = [plus(scale(pull, u), scale(self.w * own, minus(a, b)))
-                 for pull, own, u, a, b in zip(self.pulls, self.stiffness, self.u, self.a, self.b, strict=True)]
+        parts = [
+            plus(scale(pull, u), scale(self.w * own, minus(a, b)))
+            for pull, own, u, a, b in zip(self.pulls, self.stiffness, self.u, self.a, self.b, strict=True)
+        ]
         return scale(1.0 / total(self.stiffness), [total(each) for each in zip(*parts, strict=True)])
 
     @cached_property
@@ -96,8 +98,10 @@ class Springs:
     @cached_property
     def forces(self) -> list[Components]:
         """f of each."""
-        return [minus(scale(pull, u), scale(own, rod))
-                for pull, own, u, rod in zip(self.pulls, self.stiffness, self.u, self.rods, strict=True)]
+        return [
+            minus(scale(pull, u), scale(own, rod))
+            for pull, own, u, rod in zip(self.pulls, self.stiffness, self.u, self.rods, strict=True)
+        ]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -115,8 +119,12 @@ class SpringError(JointError):
     def about(cls, error: PoseError) -> SpringError:
         """Those of a pose's error; raises ``NotEnclosed`` where it is not that of three such rods."""
         limbs = [error.limbs[each.limb] for each in error.seen if each.limb is not None]
-        if error.size < 6 or len(error.seen) != 3 or len(limbs) != 3 or not all(
-                isinstance(each, SlidingRod) and each.aside == 0 and each.axis is None for each in limbs):
+        if (
+            error.size < 6
+            or len(error.seen) != 3
+            or len(limbs) != 3
+            or not all(isinstance(each, SlidingRod) and each.aside == 0 and each.axis is None for each in limbs)
+        ):
             raise NotEnclosed("the platform turns about more than one axis, and not three rods that slide are watched")
         found = cls(error, (), error, shortest=0.0)
         if abs(np.linalg.det(found.desired)) < SAME_ENDING or found.sizes[3] < SAME_ENDING:
@@ -126,8 +134,11 @@ class SpringError(JointError):
     @property
     def limbs(self) -> list[SlidingRod]:
         """The watched ones."""
-        return [limb for each in self.error.seen if each.limb is not None
-                and isinstance(limb := self.error.limbs[each.limb], SlidingRod)]
+        return [
+            limb
+            for each in self.error.seen
+            if each.limb is not None and isinstance(limb := self.error.limbs[each.limb], SlidingRod)
+        ]
 
     @cached_property
     def desired(self) -> Array:
@@ -164,8 +175,10 @@ class SpringError(JointError):
     @property
     def charts(self) -> tuple[SpringError, ...]:
         """Those that together hold all planes, and both sides of the platform."""
-        return tuple(replace(self, one=one, distant=distant, side=side)
-                     for one, distant, side in product(range(3), (False, True), (1.0, -1.0)))
+        return tuple(
+            replace(self, one=one, distant=distant, side=side)
+            for one, distant, side in product(range(3), (False, True), (1.0, -1.0))
+        )
 
     def list_charts(self, bounded: bool) -> tuple[JointError, ...]:
         return self.charts
@@ -215,8 +228,14 @@ class SpringError(JointError):
         """Those at coordinates y."""
         x1, x2, _ = self.across(self.plane(y, number)[0], number)
         a, u = ([[dot(x, number(each)) for x in (x1, x2)] for each in some] for some in (self.bases, self.desired))
-        return Springs([sine(z) for z in y[3:6]], [cosine(z) for z in y[3:6]], self._points(y[6], number), a, u,
-                       y[2] if self.distant else number(1.0))
+        return Springs(
+            [sine(z) for z in y[3:6]],
+            [cosine(z) for z in y[3:6]],
+            self._points(y[6], number),
+            a,
+            u,
+            y[2] if self.distant else number(1.0),
+        )
 
     def _points(self, angle: Any, number: Number) -> list[list[Any]]:
         """The b in the plane's axes, from the first, turned by ψ."""
@@ -231,8 +250,11 @@ class SpringError(JointError):
         x1, x2, n = self.across(self.plane(y, number)[0], number)
         c, s, side = cosine(y[6]), sine(y[6]), self.side
         axes = [plus(scale(c, x1), scale(s, x2)), scale(side, minus(scale(c, x2), scale(s, x1))), scale(side, n)]
-        return [total(axis[i] * number(own[j]) for axis, own in zip(axes, self.frame, strict=True))
-                for i in range(3) for j in range(3)]
+        return [
+            total(axis[i] * number(own[j]) for axis, own in zip(axes, self.frame, strict=True))
+            for i in range(3)
+            for j in range(3)
+        ]
 
     def rest(self, y: Sequence[Any], number: Number) -> list[Any]:
         """What is left: of each rod f · (b − a) by its length, and by its force; and Σ f · (R b − a)."""
@@ -261,8 +283,9 @@ class SpringError(JointError):
         across, level = list[Any](), list[Any]()
         for i, j in PAIRS:
             rest, both = C[3 - i - j], S[i] * S[j]
-            ends = plus(scale(at.w * both, minus(at.a[i], at.a[j])),
-                        minus(scale(S[j] * C[i], u[i]), scale(S[i] * C[j], u[j])))
+            ends = plus(
+                scale(at.w * both, minus(at.a[i], at.a[j])), minus(scale(S[j] * C[i], u[i]), scale(S[i] * C[j], u[j]))
+            )
             pull, side = scale(rest * rest * both, ends), minus(b[i], b[j])
             across.append(side[0] * pull[1] - side[1] * pull[0])
             level.append(-_dot(side, pull))
@@ -280,6 +303,7 @@ class SpringError(JointError):
     @cached_property
     def bends(self) -> BoxFormula:
         """The rates of all equations, one after the other."""
+
         def formula(y: Sequence[Any], known: Number) -> list[Any]:
             x, number = self.unknowns(y, range(7)), self.make_constant(known)
             return [rate for each in (*self.told_joints(x, number), *self.rest(x, number)) for rate in each.rates]
@@ -290,11 +314,23 @@ class SpringError(JointError):
         """The same error over the pose, in the chart of its turn in which a component of the quaternion is 1, and of
         its shift about the goal or of those ``far`` away."""
         error = self.error
-        return PlaneError(error, (), error, far, shortest=0.0, offset=np.zeros(3), follow=np.zeros((3, 9)),
-                          along=error.shifts, span=np.eye(4), forms=np.zeros((0, 4, 4)), one=one)
+        return PlaneError(
+            error,
+            (),
+            error,
+            far,
+            shortest=0.0,
+            offset=np.zeros(3),
+            follow=np.zeros((3, 9)),
+            along=error.shifts,
+            span=np.eye(4),
+            forms=np.zeros((0, 4, 4)),
+            one=one,
+        )
 
     def tell_pose(self, one: int, far: int | None) -> BoxFormula:
         """Its coordinates there."""
+
         def formula(y: Sequence[Any], number: Number) -> list[Any]:
             at, m = self.springs(y, number), self.plane(y, number)[0]
             x1, x2, n = self.across(m, number)
@@ -313,6 +349,7 @@ class SpringError(JointError):
     @cached_property
     def ways(self) -> BoxFormula:
         """h and m · u* of each rod."""
+
         def formula(y: Sequence[Any], number: Number) -> list[Any]:
             _, h, along = self.plane(y, number)
             return [each for pair in zip(h, along, strict=True) for each in pair]
@@ -351,8 +388,9 @@ class SpringSubdivision(LoopSubdivision):
         ways = [(each.low, each.high) for each in self.error.ways.at(forms[:3])]
         for k in range(3):
             i = 3 + k
-            low[:, i], high[:, i] = narrow_joint(rod, (0 * low[:, 0], 0 * low[:, 0]), ways[2 * k], ways[2 * k + 1],
-                                                 (low[:, i], high[:, i]))
+            low[:, i], high[:, i] = narrow_joint(
+                rod, (0 * low[:, 0], 0 * low[:, 0]), ways[2 * k], ways[2 * k + 1], (low[:, i], high[:, i])
+            )
         good = np.all(low <= high, axis=1)
         across, level = ((each.low, each.high) for each in self.error.turns.at(forms[:6]))
         known = good & np.isfinite([*across, *level]).all(axis=0)
@@ -373,8 +411,10 @@ class SpringSubdivision(LoopSubdivision):
             if error.distant:
                 w = np.array([low[:, 2:3], high[:, 2:3]])
                 every, endless = [tau / each for tau in (least, most) for each in w], np.prod(w, axis=0) <= 0
-                least, most = np.where(endless, -np.inf, np.min(every, axis=0)), np.where(
-                    endless, np.inf, np.max(every, axis=0))
+                least, most = (
+                    np.where(endless, -np.inf, np.min(every, axis=0)),
+                    np.where(endless, np.inf, np.max(every, axis=0)),
+                )
             middle = error.bases + ((least + most) / 4)[:, :, None] * error.desired
             radius = (np.maximum(np.abs(least), np.abs(most)) + (most - least) / 2) / 2
             for length, (i, j) in zip(error.sizes, PAIRS, strict=False):

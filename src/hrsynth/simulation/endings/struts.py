@@ -52,11 +52,14 @@ class Struts(Value):
             ends = [each for each in joints if each.type is JointType.UNIVERSAL]
             slides = [each for each in joints if each.type is JointType.PRISMATIC]
             if (len(joints), len(ends), len(slides)) != (3, 2, 1) or not (
-                    isinstance(limb, SlidingRod) and limb.axis is None and str(limb.label) == leg.label):
+                isinstance(limb, SlidingRod) and limb.axis is None and str(limb.label) == leg.label
+            ):
                 return None
             ends.sort(key=lambda each: mechanism.base not in each.links)
-            outer, inner = zip(*(each.axes[:: 1 if each.predecessor in (mechanism.base, leg.attach) else -1]
-                                 for each in ends), strict=True)
+            outer, inner = zip(
+                *(each.axes[:: 1 if each.predecessor in (mechanism.base, leg.attach) else -1] for each in ends),
+                strict=True,
+            )
             square = [slides[0].axis @ inner[0], *(a @ b for a, b in zip(outer, inner, strict=True))]
             turn = goal.pose(leg.attach)[:3, :3] @ mechanism.links[leg.attach].pose[:3, :3].T
             off = [np.cross(inner[0], inner[1]), np.cross(outer[0], turn @ outer[1])]
@@ -71,9 +74,14 @@ class Struts(Value):
         """The error with the platform turned."""
         error = self.error
         offsets = [turn @ (limb.tip.constant + error.R @ limb.tip.turned) for limb in error.limbs]
-        return replace(error, R=turn @ error.R, limbs=tuple(
-            replace(limb, tip=PlatformPoint(True, np.zeros(3), offset))
-            for limb, offset in zip(error.limbs, offsets, strict=True)))
+        return replace(
+            error,
+            R=turn @ error.R,
+            limbs=tuple(
+                replace(limb, tip=PlatformPoint(True, np.zeros(3), offset))
+                for limb, offset in zip(error.limbs, offsets, strict=True)
+            ),
+        )
 
     def whole(self) -> list[JointError]:
         """The error at all turns; a rod counts as short by how far apart the tips are at which rods have no length."""
@@ -88,11 +96,21 @@ class Struts(Value):
         found = []
         for error, i in product(map(self.turned, self.turns), range(len(self.axes))):
             axis = self.axes[i]
-            seen = (SeenDirection(each.leg, each.sense, None, PlatformPoint(False, np.zeros(3), each.sense * axis))
-                    if each.limb == i else each if each.limb is None else
-                    replace(each, limb=each.limb - (each.limb > i)) for each in error.seen)
-            line = replace(error, p=rodless(error)[i], shifts=axis[:, None],
-                           limbs=(*error.limbs[:i], *error.limbs[i + 1 :]), seen=tuple(seen))
+            seen = (
+                SeenDirection(each.leg, each.sense, None, PlatformPoint(False, np.zeros(3), each.sense * axis))
+                if each.limb == i
+                else each
+                if each.limb is None
+                else replace(each, limb=each.limb - (each.limb > i))
+                for each in error.seen
+            )
+            line = replace(
+                error,
+                p=rodless(error)[i],
+                shifts=axis[:, None],
+                limbs=(*error.limbs[:i], *error.limbs[i + 1 :]),
+                seen=tuple(seen),
+            )
             found.append(JointError.of(line, self.error, 0.0))
         return found
 
@@ -119,8 +137,9 @@ def meetings(every: Sequence[Line]) -> list[Array]:
 
 def coincide(every: Sequence[Line]) -> bool:
     """Whether some two lines are one: two legs lock all along it, which fills more than points."""
-    return any(lines.parallel(a, b) and lines.distance(p, q, b) <= FOLLOWED
-               for (p, a), (q, b) in combinations(every, 2))
+    return any(
+        lines.parallel(a, b) and lines.distance(p, q, b) <= FOLLOWED for (p, a), (q, b) in combinations(every, 2)
+    )
 
 
 def parallel(axes: Array) -> Iterator[Array]:

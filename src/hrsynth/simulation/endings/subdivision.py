@@ -129,9 +129,12 @@ class Subdivision:
 
     def _run(self, middle: Array, half: Array, budget: int, jobs: int, stage: str) -> None:
         """Cut boxes (c, n): here as long as they are few, then in parts, those that wait dealt out again and again."""
+
         def say(looked: int, waiting: int, share: float) -> None:
-            tell(f"{stage}: {np.floor(100 * (1 - share)):.0f} % of the space settled, {looked:,} looked at of at most "
-                 f"{budget:,}, {waiting:,} waiting")
+            tell(
+                f"{stage}: {np.floor(100 * (1 - share)):.0f} % of the space settled, {looked:,} looked at of at most "
+                f"{budget:,}, {waiting:,} waiting"
+            )
 
         middle, half = self._cut(middle, half, min(budget, self.boxes + BOXES_ALONE), say)
         if len(middle) and self.boxes < budget:
@@ -139,8 +142,9 @@ class Subdivision:
             while len(middle) and self.boxes < budget:
                 room, waiting = min(BOXES_A_PART * BOX_PARTS, budget - self.boxes), list[Any]()
                 count, share, parts = len(middle), self.share + self._fill(half), min(BOX_PARTS, len(middle), room)
-                works = [partial(_cut_part, given, middle[k::parts], half[k::parts], room // parts)
-                         for k in range(parts)]
+                works = [
+                    partial(_cut_part, given, middle[k::parts], half[k::parts], room // parts) for k in range(parts)
+                ]
                 for boxes, found, rest in run_shared(works, min(jobs, BOX_PARTS)):
                     for own, new in zip(self._lists, found, strict=True):
                         own += new
@@ -163,8 +167,9 @@ class Subdivision:
         """What part of the whole boxes of half edges (c, n) fill."""
         return float(np.prod(half / self.whole, axis=1).sum())
 
-    def _cut(self, middle: Array, half: Array, budget: int, say: Callable[[int, int, float], None]
-             ) -> tuple[Array, Array]:
+    def _cut(
+        self, middle: Array, half: Array, budget: int, say: Callable[[int, int, float], None]
+    ) -> tuple[Array, Array]:
         """The boxes of these that wait when so many were looked at."""
         share = self.share
         while len(middle) and self.boxes < budget:
@@ -192,12 +197,22 @@ class Subdivision:
         low, high = low[known], high[known]
         middle, half = (low + high) / 2, (high - low) / 2 * (1 + BOX_ROUNDING)
         forms = forms_of(middle, half)
-        g = self.error.closing.together(forms) if self.error.size[1] else AffineForms(
-            np.zeros((middle.shape[1] + 1, len(middle), 0)), np.zeros((len(middle), 0)))
+        g = (
+            self.error.closing.together(forms)
+            if self.error.size[1]
+            else AffineForms(np.zeros((middle.shape[1] + 1, len(middle), 0)), np.zeros((len(middle), 0)))
+        )
         low, high = _narrow_symbols(g)
         if self.vanishing:
-            low, high = (pick(one, other) for pick, one, other in zip(
-                (np.maximum, np.minimum), (low, high), _narrow_symbols(self.error.asked.together(forms)), strict=True))
+            low, high = (
+                pick(one, other)
+                for pick, one, other in zip(
+                    (np.maximum, np.minimum),
+                    (low, high),
+                    _narrow_symbols(self.error.asked.together(forms)),
+                    strict=True,
+                )
+            )
         gone = np.any(low > high, axis=1)
         with np.errstate(all="ignore"):
             J = np.where(half[:, None] > 0, np.moveaxis(g.v[1:], 0, -1) / half[:, None], 0.0)
@@ -213,8 +228,16 @@ class Subdivision:
         tiny = np.all(size <= 100 * SMALLEST_BOX * self.whole, axis=1)
         look = np.flatnonzero(~gone & (tiny | np.all(high - low >= 2 * NARROWED, axis=1)))
         if len(look):
-            tube, loose = _tube(own[look], size[look], middle[look], half[look], P[look], N[look],
-                                AffineForms(follow.v[:, look], follow.r[look]), (back * g.r[:, None])[look])
+            tube, loose = _tube(
+                own[look],
+                size[look],
+                middle[look],
+                half[look],
+                P[look],
+                N[look],
+                AffineForms(follow.v[:, look], follow.r[look]),
+                (back * g.r[:, None])[look],
+            )
             settled, F = self._settle(tube, P[look], N[look])
             step = solution(np.moveaxis(F.v[1 : 1 + N.shape[1]], 0, -1), F.v[0])
             finite = np.isfinite(F.r).all(axis=1)
@@ -269,15 +292,22 @@ class Subdivision:
     def _values(self, forms: list[AffineForms]) -> tuple[AffineForms, AffineForms, AffineForms, list[AffineForms]]:
         """g (c, k), its rates (c, k, n), those of E (c, n), reach margins."""
         (n, k), out = self.error.size, self.error.slopes.together(forms)
-        g, M, slope, margins = (out[..., part] for part in np.split(
-            np.arange(out.r.shape[1]), [k, k + k * n, k + k * n + n]))
-        return (g, AffineForms(M.v.reshape(*M.v.shape[:-1], k, n), M.r.reshape(len(M.r), k, n)), slope,
-                [margins[..., i] for i in range(margins.r.shape[1])])
+        g, M, slope, margins = (
+            out[..., part] for part in np.split(np.arange(out.r.shape[1]), [k, k + k * n, k + k * n + n])
+        )
+        return (
+            g,
+            AffineForms(M.v.reshape(*M.v.shape[:-1], k, n), M.r.reshape(len(M.r), k, n)),
+            slope,
+            [margins[..., i] for i in range(margins.r.shape[1])],
+        )
 
     def _unique(self, middle: Array, half: Array, P: Places, wider: float) -> Flags:
         """Boxes (c, n) in which, made ``wider``, exactly one zero is proved, or that there is none in them."""
-        n, wide = self.error.size[0], np.maximum(
-            wider * np.maximum(half, THINNEST_BOX * half.max(axis=1, keepdims=True)), MET_AGAIN)
+        n, wide = (
+            self.error.size[0],
+            np.maximum(wider * np.maximum(half, THINNEST_BOX * half.max(axis=1, keepdims=True)), MET_AGAIN),
+        )
         multipliers, known = self._multipliers(middle, wide, P)
         mu = multipliers.v[0]
         room = np.maximum(multipliers.spread.max(axis=1, keepdims=True, initial=0.0), MET_AGAIN) * np.ones_like(mu)
@@ -346,8 +376,9 @@ class Subdivision:
         off = (combine(turned, rates.transposed()) - np.eye(k)).size
         with np.errstate(all="ignore"):
             most = (pull.size.max(axis=1, initial=0.0) / (1 - off.sum(axis=-1).max(axis=1, initial=0.0)))[:, None]
-            found = AffineForms(-pull.v, (pull.r + np.abs(pull.v[0]) + (off * most[:, None]).sum(axis=-1))
-                                * (1 + BOX_ROUNDING))
+            found = AffineForms(
+                -pull.v, (pull.r + np.abs(pull.v[0]) + (off * most[:, None]).sum(axis=-1)) * (1 + BOX_ROUNDING)
+            )
         found.v[0] = mu
         known = np.isfinite(found.size).all(axis=1) & np.all(most >= 0, axis=1)
         keep = known[:, None]
@@ -417,7 +448,8 @@ class Subdivision:
             inside = np.all(apart[left] <= room[left], axis=1)[:, None]
             x[left], own = np.where(inside, x[left], at[left]), frame[left]
             reach[left] = np.fmin(room[left], self._krawczyk(at[left], room[left], own)[1]) + np.where(
-                inside, apart[left], 0.0)
+                inside, apart[left], 0.0
+            )
             for _ in range(8):
                 reach[left] = np.fmin(reach[left], self._krawczyk(x[left], reach[left], own)[1])
         if far is not None:
@@ -447,14 +479,23 @@ class Subdivision:
         least, most = np.maximum(np.maximum(e.low, -e.high), 0.0), e.size
         p, R = self.error.pose(x[:, :n])
         low, high = self.error.enclose_chart(x[:, :n], radius[:, :n])
-        return [CriticalBox(error.length * p[i], R[i], (low[i] + high[i]) / 2, (high[i] - low[i]) / 2,
-                            (float(np.linalg.norm(least[i])), float(np.linalg.norm(most[i]))),
-                            int(falling[i]) if falling[i] >= 0 else None, u.v[0, i].reshape(-1, 3))
-                for i in range(len(x))]
+        return [
+            CriticalBox(
+                error.length * p[i],
+                R[i],
+                (low[i] + high[i]) / 2,
+                (high[i] - low[i]) / 2,
+                (float(np.linalg.norm(least[i])), float(np.linalg.norm(most[i]))),
+                int(falling[i]) if falling[i] >= 0 else None,
+                u.v[0, i].reshape(-1, 3),
+            )
+            for i in range(len(x))
+        ]
 
 
-def _cut_part(given: bytes, middle: Array, half: Array, budget: int
-              ) -> tuple[int, list[list[Any]], tuple[Array, Array]]:
+def _cut_part(
+    given: bytes, middle: Array, half: Array, budget: int
+) -> tuple[int, list[list[Any]], tuple[Array, Array]]:
     """How many boxes were cut, what was found of each kind, and the boxes that wait when so many were looked at."""
     part = replace(_read(given), left=[], lost=[], proved=[], flat=[])
     waiting = part._cut(middle, half, budget, lambda *_: None)
@@ -488,8 +529,9 @@ def _apart(boxes: AffineForms, at: Array, frame: Array) -> Array:
     with np.errstate(all="ignore"):
         size = combine(back, apart).size
         # s = back (z − at) + (1 − back frame) s
-        off = (np.abs(np.eye(frame.shape[-1]) - back @ frame)
-               + AFFINE_ROUNDING * (np.abs(back) @ np.abs(frame))).sum(axis=-1)
+        off = (np.abs(np.eye(frame.shape[-1]) - back @ frame) + AFFINE_ROUNDING * (np.abs(back) @ np.abs(frame))).sum(
+            axis=-1
+        )
         left = 1 - off.max(axis=1)
         return np.asarray(size + off * np.where(left > 0, size.max(axis=1) / left, np.inf)[:, None])
 
@@ -509,8 +551,9 @@ def _narrow_symbols(g: AffineForms, P: Places | None = None) -> tuple[Array, Arr
     return (at - far).max(axis=1, initial=-1.0), (at + far).min(axis=1, initial=1.0)
 
 
-def _tube(middle: Array, half: Array, old: Array, edges: Array, P: Places, N: Places, follow: AffineForms, doubts: Array
-          ) -> tuple[list[AffineForms], Flags]:
+def _tube(
+    middle: Array, half: Array, old: Array, edges: Array, P: Places, N: Places, follow: AffineForms, doubts: Array
+) -> tuple[list[AffineForms], Flags]:
     """The coordinates of boxes (c, n), those of P as they follow from N: ε_P = −(f₀ + Σ f_N ε_N + Σ ``doubts`` δ) ± r
     in the symbols of the ``old`` boxes, δ what each equation leaves open, the same for all of P; or as wide as they are
     where that is no narrower: these are loose (c, n), as those of N are."""
@@ -523,8 +566,10 @@ def _tube(middle: Array, half: Array, old: Array, edges: Array, P: Places, N: Pl
         shift = np.where(was > 0, np.take_along_axis(middle - old, N, 1) / was, 0.0)
         J, wide = columns(np.moveaxis(follow.v[1:], 0, -1), N), np.take_along_axis(edges, P, 1)
         at = np.take_along_axis(old, P, 1) - wide * (follow.v[0] + (J * shift[:, None]).sum(-1))
-        along, doubt = -wide[:, :, None] * np.concatenate([J * ratio[:, None], doubts], 2), wide * (
-            follow.r + BOX_ROUNDING)
+        along, doubt = (
+            -wide[:, :, None] * np.concatenate([J * ratio[:, None], doubts], 2),
+            wide * (follow.r + BOX_ROUNDING),
+        )
         rounded = wide * (np.maximum(follow.r - np.abs(doubts).sum(axis=2), 0.0) + 2 * BOX_ROUNDING)
     plain = np.take_along_axis(half, P, 1)
     good = np.isfinite(doubt) & np.isfinite(at) & np.isfinite(along).all(axis=-1) & (doubt < plain)

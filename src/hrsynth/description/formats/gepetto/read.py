@@ -19,9 +19,16 @@ from ...vocabulary import misspelt
 from ..urdf.read import read as read_urdf
 from .settings import KEYS, frames_of, settings_beside, settings_in, urdf_beside
 
-TYPES = {"SPHERICAL": JointType.SPHERICAL, "FIXED": JointType.FIXED, "UJOINT": JointType.UNIVERSAL,
-         "UNIVERSAL": JointType.UNIVERSAL, "REVOLUTE": JointType.REVOLUTE, "PRISMATIC": JointType.PRISMATIC,
-         "CYLINDRICAL": JointType.CYLINDRICAL, "FREEFLYER": JointType.FREE}
+TYPES = {
+    "SPHERICAL": JointType.SPHERICAL,
+    "FIXED": JointType.FIXED,
+    "UJOINT": JointType.UNIVERSAL,
+    "UNIVERSAL": JointType.UNIVERSAL,
+    "REVOLUTE": JointType.REVOLUTE,
+    "PRISMATIC": JointType.PRISMATIC,
+    "CYLINDRICAL": JointType.CYLINDRICAL,
+    "FREEFLYER": JointType.FREE,
+}
 
 LONGEST_NAME = 200
 
@@ -92,8 +99,11 @@ class _Settings:
             joint = self.graph.joints.get(name)
             found = _type(self._name("joint_type", kind))
             if joint is None or found is None:
-                raise xml.refusal(self.path, f"joint_name {name!r} with joint_type {str(kind)[:40]!r}",
-                               "a joint of the URDF; SPHERICAL, FIXED, UJOINT_XY, REVOLUTE_X, PRISMATIC_X …")
+                raise xml.refusal(
+                    self.path,
+                    f"joint_name {name!r} with joint_type {str(kind)[:40]!r}",
+                    "a joint of the URDF; SPHERICAL, FIXED, UJOINT_XY, REVOLUTE_X, PRISMATIC_X …",
+                )
             self.graph.joints[name] = replace(joint, type=found[0], axes=found[1], limits=None)
 
     def _closures(self) -> None:
@@ -111,8 +121,13 @@ class _Settings:
                 raise xml.refusal(self.path, f"closed_loop: {pair[0]!r} and {pair[1]!r} are the same link", "two links")
             point = words[number] == "3d"
             stems = [str(frame).removesuffix(suffix) for frame, suffix in zip(pair, (CUT, END), strict=True)]
-            name = self.graph.fresh(f"loop_{number + 1}" if stems[0] != stems[1] else stems[0] if point or
-                                    stems[0] not in self.graph.joints else stems[0] + WELD)
+            name = self.graph.fresh(
+                f"loop_{number + 1}"
+                if stems[0] != stems[1]
+                else stems[0]
+                if point or stems[0] not in self.graph.joints
+                else stems[0] + WELD
+            )
             kind = JointType.SPHERICAL if point else JointType.FIXED
             self.graph.close(name, kind, (FrameSpec(links[0]), FrameSpec(links[1])))
             if words[number] not in ("3d", "6d"):
@@ -142,8 +157,11 @@ class _Settings:
         if "name_mot" not in self.said:
             wanted = [name for name, joint in joints.items() if "mot" in name and joint.type is not JointType.FIXED]
             if wanted:
-                self.graph.note("guess", "the motors are " + ", ".join(wanted) + ": their names contain 'mot', the "
-                                         "convention of this dialect (--motors to change them)")
+                self.graph.note(
+                    "guess",
+                    "the motors are " + ", ".join(wanted) + ": their names contain 'mot', the "
+                    "convention of this dialect (--motors to change them)",
+                )
         for name in wanted:
             if name not in joints or joints[name].type is JointType.FIXED:
                 raise xml.refusal(self.path, f"name_mot: no joint {name!r} that moves", "joints of the URDF")

@@ -32,8 +32,12 @@ def settings_in(path: Path) -> dict[str, Any] | None:
             event = super().get_event()
             self.count += 1
             self.depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
-            if isinstance(event, yaml.AliasEvent) or getattr(event, "tag", None) or self.depth > 6 or (
-                    self.count > 20_000):
+            if (
+                isinstance(event, yaml.AliasEvent)
+                or getattr(event, "tag", None)
+                or self.depth > 6
+                or (self.count > 20_000)
+            ):
                 raise xml.refusal(path, "YAML with aliases or tags, too deep or too long", "lists of names")
             return event
 
@@ -64,11 +68,19 @@ def settings_beside(file: RobotFile) -> tuple[Path, dict[str, Any]] | None:
                 return beside, found
     if file.has("hrsynth"):
         return None
-    named = [(path, found) for path in in_folder(file.path, *ENDINGS) if (found := _closing(path)) is not None
-             and frames_of(found) <= {str(each.get("name")) for each in file.root.iter("link", "joint")}]
+    named = [
+        (path, found)
+        for path in in_folder(file.path, *ENDINGS)
+        if (found := _closing(path)) is not None
+        and frames_of(found) <= {str(each.get("name")) for each in file.root.iter("link", "joint")}
+    ]
     if len(named) > 1:
-        raise xml.refusal(file.path, f"{len(named)} YAML files next to it close its loops", "one of them named instead",
-                          value=", ".join(path.name for path, _ in named))
+        raise xml.refusal(
+            file.path,
+            f"{len(named)} YAML files next to it close its loops",
+            "one of them named instead",
+            value=", ".join(path.name for path, _ in named),
+        )
     return named[0] if named else None
 
 
@@ -90,8 +102,12 @@ def urdf_beside(settings: Path, frames: set[str], names_in: Callable[[Path], set
     others = [path for path in in_folder(settings, ".urdf") if frames and frames <= (names_in or _names_in)(path)]
     if len(others) == 1:
         return others[0]
-    raise xml.refusal(settings, f"{len(others) or 'no'} URDF file next to the YAML file" + (
-        " that has the frames of its closures" if others or frames else ""), settings.with_suffix(".urdf").name)
+    raise xml.refusal(
+        settings,
+        f"{len(others) or 'no'} URDF file next to the YAML file"
+        + (" that has the frames of its closures" if others or frames else ""),
+        settings.with_suffix(".urdf").name,
+    )
 
 
 def _names_in(path: Path) -> set[str]:
@@ -117,15 +133,19 @@ def _partner(path: Path, names_in: Callable[[Path], set[str]]) -> Path | None:
     except (BadRobotFile, OSError):
         return None
     beside = in_folder(path, *ENDINGS) if found is None else [found[0]]
-    return next((each for each in beside if found or (
-        _closing(each) is not None and _partner(each, names_in) == path)), None)
+    return next(
+        (each for each in beside if found or (_closing(each) is not None and _partner(each, names_in) == path)), None
+    )
 
 
 def frames_of(said: dict[str, Any]) -> set[str]:
     """The names of the frames that closures are said to join."""
     pairs = said.get("closed_loop")
-    flat = [each for pair in (pairs if isinstance(pairs, list) else []) for each in
-            (pair if isinstance(pair, list) else [pair])]
+    flat = [
+        each
+        for pair in (pairs if isinstance(pairs, list) else [])
+        for each in (pair if isinstance(pair, list) else [pair])
+    ]
     return {str(each) for each in flat}
 
 

@@ -42,7 +42,9 @@ class BodyContents:
             if file := given.get("file"):
                 scale = _numbers(given.get("scale"), (1.0, 1.0, 1.0))
                 self.meshes[given.get("name") or PurePosixPath(file).stem] = (
-                    str(PurePosixPath(folder) / file), scale or (1.0, 1.0, 1.0))
+                    str(PurePosixPath(folder) / file),
+                    scale or (1.0, 1.0, 1.0),
+                )
 
     def of(self, body: xml.Element, childclass: str | None) -> tuple[str, ...]:
         """The content of a body, as URDF has it: a shape that both is seen and collides is two."""
@@ -72,8 +74,11 @@ class BodyContents:
     def _solids(self, element: xml.Element, given: Mapping[str, str]) -> list[Solid]:
         kind, X = given.get("type", "mesh" if "mesh" in given else "sphere"), self._place(element)
         group = given.get("group", "0")
-        roles = ["visual"] if given.get("contype") == given.get("conaffinity") == "0" else (
-            ["collision"] if (_numbers(group, (0.0,)) or (0.0,))[0] >= 3 else ["visual", "collision"])
+        roles = (
+            ["visual"]
+            if given.get("contype") == given.get("conaffinity") == "0"
+            else (["collision"] if (_numbers(group, (0.0,)) or (0.0,))[0] >= 3 else ["visual", "collision"])
+        )
         colour = _numbers(given.get("rgba", self.colours.get(given.get("material", "")) or None), (0.0,) * 4)
         shown = given.get("rgba") or self.colours.get(given.get("material", ""))
         sizes = _sizes(given.get("size", ""))
@@ -89,15 +94,20 @@ class BodyContents:
             if given.get("mesh") not in self.meshes:
                 return []
             file, scale = self.meshes[given["mesh"]]
-            return [Solid(kind, (), X, role, given.get("name"), colour if shown and role == "visual" else None, file,
-                          scale) for role in roles]
+            return [
+                Solid(kind, (), X, role, given.get("name"), colour if shown and role == "visual" else None, file, scale)
+                for role in roles
+            ]
         count = {"box": 3, "sphere": 1}.get(kind, 2)
         if len(sizes) < count or not all(size > 0 for size in sizes[:count]):
             return []
         whole = {"box": tuple(2 * size for size in sizes[:3]), "sphere": sizes[:1]}.get(
-            kind, (sizes[0], 2 * sizes[-1 if count == 1 else 1]))
-        return [Solid(kind, whole, X, role, given.get("name"), colour if shown and role == "visual" else None)
-                for role in roles]
+            kind, (sizes[0], 2 * sizes[-1 if count == 1 else 1])
+        )
+        return [
+            Solid(kind, whole, X, role, given.get("name"), colour if shown and role == "visual" else None)
+            for role in roles
+        ]
 
 
 def _sizes(text: str) -> tuple[float, ...]:
@@ -134,11 +144,17 @@ def elements(robot: Mechanism) -> tuple[dict[str, list[xml.Element]], list[xml.E
         for solid in content.solids:
             own.append(_geom(solid, assets, names))
         found[link.name] = own
-    notes = [Note("warning", "masses and inertias that no body can have are not written: " + comma_list(odd))] if odd \
+    notes = (
+        [Note("warning", "masses and inertias that no body can have are not written: " + comma_list(odd))]
+        if odd
         else []
-    meshes = [xml.new("mesh", name=name, file=file) if scale == (1.0, 1.0, 1.0) else
-              xml.new("mesh", name=name, file=file, scale=numerals.exact_vector(scale))
-              for (file, scale), name in assets.items()]
+    )
+    meshes = [
+        xml.new("mesh", name=name, file=file)
+        if scale == (1.0, 1.0, 1.0)
+        else xml.new("mesh", name=name, file=file, scale=numerals.exact_vector(scale))
+        for (file, scale), name in assets.items()
+    ]
     return found, meshes, notes
 
 

@@ -6,19 +6,25 @@ from ...vocabulary import Vocabulary
 
 _ORIENTATION = "axisangle euler quat xyaxes zaxis"
 _EQUALITY = "active class name solimp solref"
-_JOINT = ("actuatorfrclimited actuatorfrcrange actuatorgravcomp armature axis class damping frictionloss group limited "
-          "margin name pos range ref solimpfriction solimplimit solreffriction solreflimit springdamper springref "
-          "springyield stiffness type user")
+_JOINT = (
+    "actuatorfrclimited actuatorfrcrange actuatorgravcomp armature axis class damping frictionloss group limited "
+    "margin name pos range ref solimpfriction solimplimit solreffriction solreflimit springdamper springref "
+    "springyield stiffness type user"
+)
 _ACTUATORS = "general motor position velocity intvelocity orientation pid damper cylinder muscle adhesion dcmotor"
-_ACTUATOR = ("actdim actearly actlimited actrange area armature bias biasprm biastype body class cogging controller "
-             "cranklength cranksite ctrllimited ctrlrange damping dampratio delay diameter dynprm dyntype ffrange "
-             "force forcelimited forcerange fpmax fvmax gain gainprm gaintype gear group imax inductance inheritrange "
-             "input interp joint jointinparent ki kp kv lengthrange lmax lmin lugre motorconst name nominal nsample "
-             "posrange range refsite resistance saturation scale site slewmax slidersite tausmooth tendon thermal "
-             "timeconst user velrange vmax")
-_INSIDE = ("body* joint* freejoint* geom* site* camera* light* attach* composite* flexcomp* plugin* frame* replicate* "
-           "include*")
-NAMES = Vocabulary(f"""
+_ACTUATOR = (
+    "actdim actearly actlimited actrange area armature bias biasprm biastype body class cogging controller "
+    "cranklength cranksite ctrllimited ctrlrange damping dampratio delay diameter dynprm dyntype ffrange "
+    "force forcelimited forcerange fpmax fvmax gain gainprm gaintype gear group imax inductance inheritrange "
+    "input interp joint jointinparent ki kp kv lengthrange lmax lmin lugre motorconst name nominal nsample "
+    "posrange range refsite resistance saturation scale site slewmax slidersite tausmooth tendon thermal "
+    "timeconst user velrange vmax"
+)
+_INSIDE = (
+    "body* joint* freejoint* geom* site* camera* light* attach* composite* flexcomp* plugin* frame* replicate* include*"
+)
+NAMES = Vocabulary(
+    f"""
 mujoco: model | compiler* option* size* statistic* visual* default* asset* worldbody* contact* deformable* equality*
     tendon* actuator* sensor* keyframe* custom* extension* include*
 compiler: alignfree angle assetdir autolimits balanceinertia boundinertia boundmass conflict coordinate discardvisual
@@ -52,4 +58,6 @@ keyframe: | key* include*
 key: act ctrl mpos mquat name plastic qpos qvel time
 custom: | numeric* text* tuple* include*
 text: data name
-""", "solreffix skinrender")
+""",
+    "solreffix skinrender",
+)

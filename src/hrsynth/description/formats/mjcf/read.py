@@ -20,8 +20,12 @@ from .defaults import Compiler, Defaults, with_includes
 from .names import NAMES
 
 WORLD = "world"
-_TYPES = {"hinge": JointType.REVOLUTE, "slide": JointType.PRISMATIC, "ball": JointType.SPHERICAL,
-          "free": JointType.FREE}
+_TYPES = {
+    "hinge": JointType.REVOLUTE,
+    "slide": JointType.PRISMATIC,
+    "ball": JointType.SPHERICAL,
+    "free": JointType.FREE,
+}
 
 
 def read(file: RobotFile) -> JointGraph:
@@ -110,8 +114,9 @@ class _MjcfReader(XmlReader):
             before, X = self._joint(joint, before, X, name, childclass, last=number == len(joints) - 1)
         self._children(element, name, childclass, ORIGIN)
 
-    def _joint(self, element: xml.Element, before: str, X: Array, body: str, childclass: str | None, *, last: bool
-               ) -> tuple[str, Array]:
+    def _joint(
+        self, element: xml.Element, before: str, X: Array, body: str, childclass: str | None, *, last: bool
+    ) -> tuple[str, Array]:
         """One joint of a body: from the link before it to the body, or to a link in between."""
         graph = self.result
         given = self.defaults.of(element, childclass)
@@ -136,8 +141,9 @@ class _MjcfReader(XmlReader):
         at = pose(centre)
         self.zeros[name] = self._angle(element, given, "ref", kind)
         ends = FrameSpec(before, frozen(X @ at), xml.line(element)), FrameSpec(after, frozen(at))
-        graph.joints[name] = JointSpec(name, kind, ends, axes, self._limits(element, given, name, kind),
-                                       line=xml.line(element))
+        graph.joints[name] = JointSpec(
+            name, kind, ends, axes, self._limits(element, given, name, kind), line=xml.line(element)
+        )
         return after, ORIGIN
 
     def _fresh(self, name: str) -> str:
@@ -186,17 +192,23 @@ class _MjcfReader(XmlReader):
         del self.defects[sound:]
         if ends is None or ends[0].link == ends[1].link:
             return ""
-        return " (--close " + ":".join(f"{end.link}@{numerals.exact_vector(end.X[:3, 3]).replace(' ', ',')}"
-                                       for end in ends) + " to close it)"
+        return (
+            " (--close "
+            + ":".join(f"{end.link}@{numerals.exact_vector(end.X[:3, 3]).replace(' ', ',')}" for end in ends)
+            + " to close it)"
+        )
 
     def _ends(self, element: xml.Element, given: dict[str, str]) -> tuple[FrameSpec, FrameSpec] | None:
         line = xml.line(element)
         if "site1" in given or "site2" in given:
             sites = [self.sites.get(given.get(key, "")) for key in ("site1", "site2")]
             if sites[0] is None or sites[1] is None:
-                self.defect(line, f"{element.tag} of unknown sites", " ".join(given.get(k, "?") for k in
-                                                                             ("site1", "site2")),
-                            comma_list(self.sites) or "a <site> of each name")
+                self.defect(
+                    line,
+                    f"{element.tag} of unknown sites",
+                    " ".join(given.get(k, "?") for k in ("site1", "site2")),
+                    comma_list(self.sites) or "a <site> of each name",
+                )
                 return None
             return FrameSpec(*sites[0], line), FrameSpec(*sites[1], line)
         names = [given.get("body1"), given.get("body2", WORLD)]
@@ -225,8 +237,9 @@ class _MjcfReader(XmlReader):
         coefficients = self._numbers(element, {"polycoef": " ".join((words + ["0"] * 5)[:5])}, "polycoef", (0,) * 5)
         for joint in (driven, driver):
             if joint is not None and joint not in graph.joints:
-                self.defect(line, f"joint equality {name!r}: unknown joint", joint,
-                            comma_list(graph.joints, like=joint))
+                self.defect(
+                    line, f"joint equality {name!r}: unknown joint", joint, comma_list(graph.joints, like=joint)
+                )
         if driven not in graph.joints or (driver is not None and driver not in graph.joints):
             return
         if driver is None:
@@ -261,7 +274,6 @@ class _MjcfReader(XmlReader):
         if joint is None:
             graph.note("ignored", f"the actuator {element.get('name')!r}, which drives no joint")
         elif joint not in graph.joints:
-            self.defect(xml.line(element), "actuator of an unknown joint", joint,
-                        comma_list(graph.joints, like=joint))
+            self.defect(xml.line(element), "actuator of an unknown joint", joint, comma_list(graph.joints, like=joint))
         elif graph.joints[joint].motor is None:
             graph.joints[joint] = replace(graph.joints[joint], motor=Motor(name))

@@ -32,20 +32,35 @@ def write(mechanism: Mechanism) -> Written:
     A revolute loop is two points on its axis; other loops are cut through the joint. Raises ``BadRequest`` for what
     cannot be said.
     """
-    floats = all(joint.predecessor == mechanism.base for joint in mechanism.joints.values()
-                 if joint.type is JointType.FREE)
+    floats = all(
+        joint.predecessor == mechanism.base for joint in mechanism.joints.values() if joint.type is JointType.FREE
+    )
     robot, lost = reduce(mechanism, (*_TREE, JointType.FREE) if floats else _TREE, _LOOPS)
     require_free_world(robot, WORLD, "MJCF")
-    custom = [xml.new("text", name=f"{PREFIX}_{key}_{number}", data=text)
-              for number, (key, text) in enumerate(annotations_of(robot), 1)]
+    custom = [
+        xml.new("text", name=f"{PREFIX}_{key}_{number}", data=text)
+        for number, (key, text) in enumerate(annotations_of(robot), 1)
+    ]
     loops = [element for joint in robot.joints.values() if not joint.in_tree for element in _closure(robot, joint)]
-    motors = [xml.new("motor", name=joint.motor.name, joint=joint.name) for joint in robot.joints.values()
-              if joint.motor is not None and joint.type is not JointType.FIXED]
+    motors = [
+        xml.new("motor", name=joint.motor.name, joint=joint.name)
+        for joint in robot.joints.values()
+        if joint.motor is not None and joint.type is not JointType.FIXED
+    ]
     inner, assets, odd = elements(robot)
-    sections = {"custom": custom, "asset": assets, "worldbody": _bodies(robot, inner),
-                "equality": [*loops, *_gears(robot)], "actuator": motors}
-    root = xml.new("mujoco", xml.new("compiler", angle="radian", boundmass="0.001", boundinertia="0.000001"),
-                   *(xml.new(tag, *elements) for tag, elements in sections.items() if elements), model=robot.name)
+    sections = {
+        "custom": custom,
+        "asset": assets,
+        "worldbody": _bodies(robot, inner),
+        "equality": [*loops, *_gears(robot)],
+        "actuator": motors,
+    }
+    root = xml.new(
+        "mujoco",
+        xml.new("compiler", angle="radian", boundmass="0.001", boundinertia="0.000001"),
+        *(xml.new(tag, *elements) for tag, elements in sections.items() if elements),
+        model=robot.name,
+    )
     return Written((xml.text_of(root),), (*lost, *_notes_on_losses(robot), *odd, *unsaid(robot, SIZES, dialect="MJCF")))
 
 
@@ -53,12 +68,17 @@ def _notes_on_losses(robot: Mechanism) -> list[Note]:
     """What MJCF has no words for: one-sided limits, limits of loops, of velocity and effort; names of fixed joints."""
     found = []
     bounded = [(joint, joint.limits) for joint in robot.joints.values() if joint.limits is not None]
-    lost = {"limits of closures": [joint for joint, own in bounded if not joint.in_tree
-                                   and (own.lower, own.upper) != (None, None)],
-            "one-sided limits": [joint for joint, own in bounded if joint.in_tree
-                                 and (own.lower is None) != (own.upper is None)],
-            "limits of velocity and effort": [joint for joint, own in bounded
-                                              if (own.velocity, own.effort) != (None, None)]}
+    lost = {
+        "limits of closures": [
+            joint for joint, own in bounded if not joint.in_tree and (own.lower, own.upper) != (None, None)
+        ],
+        "one-sided limits": [
+            joint for joint, own in bounded if joint.in_tree and (own.lower is None) != (own.upper is None)
+        ],
+        "limits of velocity and effort": [
+            joint for joint, own in bounded if (own.velocity, own.effort) != (None, None)
+        ],
+    }
     for what, joints in lost.items():
         if joints:
             found.append(Note("warning", f"{what} are not written: {comma_list([joint.name for joint in joints])}"))
@@ -93,8 +113,7 @@ def _bodies(robot: Mechanism, inner: Mapping[str, list[xml.Element]]) -> list[xm
 def _joint(robot: Mechanism, joint: Joint) -> xml.Element:
     if joint.type is JointType.FREE:
         return xml.new("freejoint", name=joint.name)
-    element = xml.new("joint", name=joint.name, type=_NAMES[joint.type],
-                      pos=_at(robot, joint.successor, joint.point))
+    element = xml.new("joint", name=joint.name, type=_NAMES[joint.type], pos=_at(robot, joint.successor, joint.point))
     if joint.axes:
         element.set("axis", numerals.exact_vector(robot.links[joint.successor].pose[:3, :3].T @ joint.axis))
     limits = joint.limits
@@ -115,16 +134,27 @@ def _closure(robot: Mechanism, joint: Joint) -> list[xml.Element]:
     if joint.type is JointType.FIXED:
         relative = inverse(robot.links[one].pose) @ robot.links[two].pose
         relpose = f"{_at(robot, one, joint.point)} {numerals.exact_vector(quaternions(relative[:3, :3]))}"
-        return [xml.new("weld", name=joint.name, body1=one, body2=two, relpose=relpose,
-                        anchor=_at(robot, two, joint.point))]
+        return [
+            xml.new("weld", name=joint.name, body1=one, body2=two, relpose=relpose, anchor=_at(robot, two, joint.point))
+        ]
     points = {joint.name: joint.point}
     if joint.type is JointType.REVOLUTE:
         points[joint.name + SECOND] = joint.point + robot.length * joint.axis
-    return [xml.new("connect", name=name, body1=one, body2=two, anchor=_at(robot, one, point))
-            for name, point in points.items()]
+    return [
+        xml.new("connect", name=name, body1=one, body2=two, anchor=_at(robot, one, point))
+        for name, point in points.items()
+    ]
 
 
 def _gears(robot: Mechanism) -> list[xml.Element]:
     carrier = {joint.successor: joint.name for joint in robot.joints.values() if joint.in_tree}
-    return [xml.new("joint", name=each.name, joint1=carrier[each.successor], joint2=carrier[each.predecessor],
-                    polycoef=numerals.exact_vector((0, each.ratio, 0, 0, 0))) for each in robot.couplings]
+    return [
+        xml.new(
+            "joint",
+            name=each.name,
+            joint1=carrier[each.successor],
+            joint2=carrier[each.predecessor],
+            polycoef=numerals.exact_vector((0, each.ratio, 0, 0, 0)),
+        )
+        for each in robot.couplings
+    ]

@@ -43,8 +43,9 @@ def read(file: RobotFile) -> Mechanism:
     """
     root = file.document
     defects, notes = NAMES.check(root, file)
-    robot = _NativeReader(str(file.path), root, defects, tolerance=file.tolerance,
-                          as_written=file.as_written).mechanism()
+    robot = _NativeReader(
+        str(file.path), root, defects, tolerance=file.tolerance, as_written=file.as_written
+    ).mechanism()
     return replace(robot, notes=(*notes, *robot.notes)) if notes else robot
 
 
@@ -155,15 +156,24 @@ class _NativeReader(UrdfReader):
             elif role == "platform":
                 self.formation = bool(self.seen)
                 if not self.formation:
-                    self.defect(xml.line(element), "no <platform>", None,
-                                "a <platform>, or of a formation <observe> between its bodies")
+                    self.defect(
+                        xml.line(element),
+                        "no <platform>",
+                        None,
+                        "a <platform>, or of a formation <observe> between its bodies",
+                    )
         for observe in element.findall("observe"):
             self.observe(observe)
         for child in xml.children(element):
             if child.tag not in OWN_TAGS and (
-                    child.tag in ELSEWHERE or difflib.get_close_matches(child.tag, OWN_TAGS, n=1, cutoff=0.75)):
-                self.defect(xml.line(child), "an element that has no meaning inside <hrsynth>", f"<{child.tag}>",
-                            ", ".join(f"<{tag}>" for tag in OWN_TAGS))
+                child.tag in ELSEWHERE or difflib.get_close_matches(child.tag, OWN_TAGS, n=1, cutoff=0.75)
+            ):
+                self.defect(
+                    xml.line(child),
+                    "an element that has no meaning inside <hrsynth>",
+                    f"<{child.tag}>",
+                    ", ".join(f"<{tag}>" for tag in OWN_TAGS),
+                )
         rest = xml.unknown(element, ["serial"], OWN_TAGS)
         if rest:
             bare = etree.Element("hrsynth")
@@ -177,8 +187,12 @@ class _NativeReader(UrdfReader):
         leg, link = self.attribute(element, "leg"), self.attribute(element, "link")
         self.check_link(link, xml.line(element), "observe: unknown link")
         if leg is not None and (leg == "all" or "," in leg):
-            self.defect(xml.line(element), "observe: a leg label that does not fit into a list of legs", leg,
-                        "a label without commas, other than all")
+            self.defect(
+                xml.line(element),
+                "observe: a leg label that does not fit into a list of legs",
+                leg,
+                "a label without commas, other than all",
+            )
         if self.attribute(element, "axis") is None:
             return
         direction = self.direction(element, "axis", (0, 0, 1))
@@ -194,23 +208,34 @@ class _NativeReader(UrdfReader):
         self.check_ends()
         watched = self.cameras or self.root.findall("hrsynth/observe[@kind]")
         if not (self.loops or self.root.findall("loop") or self.serial or watched):
-            self.defect(root_line, "no loop: not a parallel robot", None,
-                        'a <loop>; for a serial arm or a free body <hrsynth serial="true">')
+            self.defect(
+                root_line,
+                "no loop: not a parallel robot",
+                None,
+                'a <loop>; for a serial arm or a free body <hrsynth serial="true">',
+            )
         carriers: dict[str, JointSpec] = {}
         for joint in self.tree.values():
             child = joint.ends[1].link
             if child is None or child == joint.ends[0].link:
                 continue
             if child in carriers:
-                self.defect(joint.line, f"joint {joint.name!r}: its child already has a parent, through joint "
-                                        f"{carriers[child].name!r} (a loop is written as <loop>)", child)
+                self.defect(
+                    joint.line,
+                    f"joint {joint.name!r}: its child already has a parent, through joint "
+                    f"{carriers[child].name!r} (a loop is written as <loop>)",
+                    child,
+                )
             else:
                 carriers[child] = joint
         order = list(self.tree)
         for ring in self.rings():
             names = sorted((joint.name for joint in ring), key=order.index)
-            self.defect(self.tree[names[-1]].line, "tree joints that form a cycle (a loop is written as <loop>)",
-                        " ".join(names))
+            self.defect(
+                self.tree[names[-1]].line,
+                "tree joints that form a cycle (a loop is written as <loop>)",
+                " ".join(names),
+            )
         roots = [name for name in self.links if name not in carriers]
         for name in roots[1:]:
             self.defect(self.links[name].line, f"second root besides {roots[0]!r}: not the child of any joint", name)
@@ -228,9 +253,13 @@ class _NativeReader(UrdfReader):
             told = [*(each.link for each in self.seen), *(each.link for each in self.cameras)]
             self.platform, count = first_body(self.links, whole, base, told)
             if self.platform is None:
-                self.defect(line, f"no <platform>, and no formation: {count} of the bodies that are joined to "
-                                  "nothing but the base observe or are observed", None,
-                            "a <platform>, or two such bodies")
+                self.defect(
+                    line,
+                    f"no <platform>, and no formation: {count} of the bodies that are joined to "
+                    "nothing but the base observe or are observed",
+                    None,
+                    "a <platform>, or two such bodies",
+                )
         if self.platform is None:
             return
         if self.platform == base:
@@ -248,12 +277,34 @@ class _NativeReader(UrdfReader):
             if not joint.in_tree:
                 loops.append((joint, X_P, X_S))
             axes = tuple(X[:3, :3] @ axis for X, axis in zip((X_P, X_S), joint.axes, strict=False))
-            joints[joint.name] = Joint(joint.name, joint.kind, *joint.links, X_P[:3, 3], axes,
-                                       self.motors.get(joint.name), joint.limits, joint.in_tree, joint.xml, joint.line)
+            joints[joint.name] = Joint(
+                joint.name,
+                joint.kind,
+                *joint.links,
+                X_P[:3, 3],
+                axes,
+                self.motors.get(joint.name),
+                joint.limits,
+                joint.in_tree,
+                joint.xml,
+                joint.line,
+            )
         links = {key: replace(link, pose=poses[key]) for key, link in self.links.items()}
-        mechanism = Mechanism(name, links, joints, base, platform, tuple(self.observations), tuple(self.couplings),
-                              self.camera, tuple(self.rest), self.file, formation=self.formation,
-                              turns=self.turns, choice=FIRST if self.formation else NAMED)
+        mechanism = Mechanism(
+            name,
+            links,
+            joints,
+            base,
+            platform,
+            tuple(self.observations),
+            tuple(self.couplings),
+            self.camera,
+            tuple(self.rest),
+            self.file,
+            formation=self.formation,
+            turns=self.turns,
+            choice=FIRST if self.formation else NAMED,
+        )
         found = None if self.as_written or not loops else self.repair_rounding(mechanism, loops, poses)
         if found is not None:
             return found
@@ -262,8 +313,12 @@ class _NativeReader(UrdfReader):
                 cosine = float(X_P[:3, :3] @ joint.axes[0] @ (X_S[:3, :3] @ joint.axes[1]))
                 gap = np.linalg.norm(X_S[:3, 3] - X_P[:3, 3])
                 if gap <= SAME_GEOMETRY * mechanism.length and not abs(cosine) <= SAME_DIRECTION:
-                    self.defect(joint.line, f"universal loop {joint.name!r}: cosine between axis and axis2",
-                                f"{cosine:.3g}", "0")
+                    self.defect(
+                        joint.line,
+                        f"universal loop {joint.name!r}: cosine between axis and axis2",
+                        f"{cosine:.3g}",
+                        "0",
+                    )
         self.require_sound()
         require_closed(self.file, loops, mechanism.length)
         return self.with_sensors(chains.merge(mechanism))
@@ -272,8 +327,9 @@ class _NativeReader(UrdfReader):
         """With its cameras and observations of all kinds."""
         return as_written(mechanism, self.seen, self.cameras, self.file)
 
-    def repair_rounding(self, mechanism: Mechanism, loops: Sequence[tuple[JointSpec, Array, Array]],
-                        poses: Mapping[str, Array]) -> Mechanism | None:
+    def repair_rounding(
+        self, mechanism: Mechanism, loops: Sequence[tuple[JointSpec, Array, Array]], poses: Mapping[str, Array]
+    ) -> Mechanism | None:
         """The mechanism as it is meant, where its numbers are rounded; None where they are not, or not to blame."""
         if not (self.tolerance or self.digits.last_place):
             return None

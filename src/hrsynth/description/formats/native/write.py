@@ -58,8 +58,7 @@ class _NativeWriter:
         coordinates += [joint.point for joint in mechanism.joints.values()]
         scale = float(np.max(np.abs(coordinates)))
         if not scale <= LARGEST_NUMBER:
-            raise BadRequest("coordinates of links and joints", scale,
-                             f"finite numbers up to {LARGEST_NUMBER:g}")
+            raise BadRequest("coordinates of links and joints", scale, f"finite numbers up to {LARGEST_NUMBER:g}")
         self.decimals = numerals.length_decimals(scale)
         self.poses: dict[str, Array] = {mechanism.base: ORIGIN}
 
@@ -174,8 +173,7 @@ class _NativeWriter:
             for tag, keys in (("origin", ("xyz", "rpy")), ("image", IMAGE)):
                 if inside := {key: said[key] for key in keys if key in said}:
                     etree.SubElement(eye, tag, inside)
-        for seen in dict.fromkeys(tuple(attributes_of(o, robot, self.decimals).items())
-                                  for o in robot.observations):
+        for seen in dict.fromkeys(tuple(attributes_of(o, robot, self.decimals).items()) for o in robot.observations):
             etree.SubElement(element, "observe", dict(seen))
         for fragment in inner:
             whole = xml.parse_fragment(fragment)

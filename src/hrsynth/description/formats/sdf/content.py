@@ -43,8 +43,9 @@ def _place(reader: XmlReader, element: xml.Element) -> Array:
     return frozen(X)
 
 
-def _values(element: xml.Element | None, tag: str, default: tuple[float, ...] | None, count: int = 1
-            ) -> tuple[float, ...]:
+def _values(
+    element: xml.Element | None, tag: str, default: tuple[float, ...] | None, count: int = 1
+) -> tuple[float, ...]:
     given = text(element, tag)
     if given is None and default is not None:
         return default
@@ -68,8 +69,11 @@ def _solid(reader: XmlReader, element: xml.Element) -> Solid:
     kind, role, X = str(shape.tag), str(element.tag), _place(reader, element)
     name = None if name is None or _NUMBERED.fullmatch(name) else name
     diffuse = element.find("material/diffuse")
-    colour = None if diffuse is None else tuple(map(float, numerals.parse(diffuse.text or "", len(
-        (diffuse.text or "").split()))))
+    colour = (
+        None
+        if diffuse is None
+        else tuple(map(float, numerals.parse(diffuse.text or "", len((diffuse.text or "").split()))))
+    )
     colour = (*colour, 1.0) if colour is not None and len(colour) == 3 else colour
     if colour is not None and len(colour) != 4:
         raise ValueError("three or four numbers")
@@ -78,8 +82,9 @@ def _solid(reader: XmlReader, element: xml.Element) -> Solid:
         if file is None:
             raise ValueError("a file")
         return Solid(kind, (), X, role, name, colour, file, _values(shape, "scale", (1.0, 1.0, 1.0), 3))
-    sizes = _values(shape, "size", None, 3) if kind == "box" else tuple(
-        _values(shape, key, None)[0] for key in SIZES[kind])
+    sizes = (
+        _values(shape, "size", None, 3) if kind == "box" else tuple(_values(shape, key, None)[0] for key in SIZES[kind])
+    )
     if not all(size > 0 for size in sizes):
         raise ValueError("sizes above zero")
     return Solid(kind, sizes, X, role, name, colour)

@@ -15,8 +15,19 @@ from ...chains import part
 from ...elements import XmlReader, sound_limits
 from ...jointgraph import ORIGIN, FrameSpec, GearSpec, JointGraph, JointSpec
 
-TYPES = {"revolute": "R", "continuous": "R", "hinge": "R", "prismatic": "P", "ball": "S", "fixed": "F",
-         "universal": "U", "revolute2": "U", "screw": "H", "gearbox": "G", "piston": "C"}
+TYPES = {
+    "revolute": "R",
+    "continuous": "R",
+    "hinge": "R",
+    "prismatic": "P",
+    "ball": "S",
+    "fixed": "F",
+    "universal": "U",
+    "revolute2": "U",
+    "screw": "H",
+    "gearbox": "G",
+    "piston": "C",
+}
 _AXES = {"R": ("axis",), "P": ("axis",), "H": ("axis",), "C": ("axis",), "U": ("axis", "axis2")}
 
 
@@ -57,8 +68,17 @@ class JointFrames:
     named: Callable[[str], Array | None] = lambda name: None
 
 
-def add(reader: XmlReader, graph: JointGraph, element: xml.Element, links: tuple[str, str], frames: JointFrames,
-        version: tuple[int, int], *, in_tree: bool, prefix: str = "") -> None:
+def add(
+    reader: XmlReader,
+    graph: JointGraph,
+    element: xml.Element,
+    links: tuple[str, str],
+    frames: JointFrames,
+    version: tuple[int, int],
+    *,
+    in_tree: bool,
+    prefix: str = "",
+) -> None:
     """Add what a ``<joint>`` means to the graph: one joint, or a chain of them, or a gear."""
     line, bare, kind = xml.line(element), reader.attribute(element, "name"), TYPES.get(element.get("type", ""))
     if kind is None:
@@ -96,16 +116,33 @@ def mimics(reader: XmlReader, joints: Iterable[tuple[str, xml.Element]]) -> list
     for prefix, element in joints:
         for mimic in element.findall("axis/mimic"):
             name, driver = element.get("name"), reader.attribute(mimic, "joint")
-            ratio, offset, start = (float(numbers(reader, mimic.find(tag), (default,))[0]) for tag, default in
-                                    (("multiplier", 1.0), ("offset", 0.0), ("reference", 0.0)))
+            ratio, offset, start = (
+                float(numbers(reader, mimic.find(tag), (default,))[0])
+                for tag, default in (("multiplier", 1.0), ("offset", 0.0), ("reference", 0.0))
+            )
             if name is not None and driver is not None:
-                found.append(GearSpec(f"mimic_{prefix}{name}", prefix + driver, prefix + name, ratio,
-                                      offset - ratio * start, xml.line(mimic)))
+                found.append(
+                    GearSpec(
+                        f"mimic_{prefix}{name}",
+                        prefix + driver,
+                        prefix + name,
+                        ratio,
+                        offset - ratio * start,
+                        xml.line(mimic),
+                    )
+                )
     return found
 
 
-def _axis(reader: XmlReader, graph: JointGraph, joint: xml.Element, tag: str, frames: JointFrames,
-          version: tuple[int, int], name: str) -> Array:
+def _axis(
+    reader: XmlReader,
+    graph: JointGraph,
+    joint: xml.Element,
+    tag: str,
+    frames: JointFrames,
+    version: tuple[int, int],
+    name: str,
+) -> Array:
     """An axis in the joint's frame: up to 1.4 it is given in the model's, later in the joint's unless the file says."""
     element, xyz = joint.find(tag), joint.find(f"{tag}/xyz")
     if element is None:
@@ -150,8 +187,15 @@ def name_gears(reader: XmlReader, graph: JointGraph) -> None:
         names = []
         for end in (gear.driver, gear.driven):
             body, _, link = end.partition("\n")
-            own = [joint.name for joint in graph.joints.values() if joint.links == (body, link)
-                   and joint.type is JointType.REVOLUTE] if link else [body]
+            own = (
+                [
+                    joint.name
+                    for joint in graph.joints.values()
+                    if joint.links == (body, link) and joint.type is JointType.REVOLUTE
+                ]
+                if link
+                else [body]
+            )
             if len(own) != 1:
                 reader.defect(gear.line, f"gearbox {gear.name!r}: one revolute joint from its reference body", link)
                 break
@@ -163,11 +207,17 @@ def name_gears(reader: XmlReader, graph: JointGraph) -> None:
 
 def guess_motors(graph: JointGraph) -> None:
     """Where some joints have the effort limit zero and others do not, the others are the motors."""
-    efforts = {name: joint.limits.effort for name, joint in graph.joints.items()
-               if joint.limits is not None and joint.limits.effort is not None}
+    efforts = {
+        name: joint.limits.effort
+        for name, joint in graph.joints.items()
+        if joint.limits is not None and joint.limits.effort is not None
+    }
     driven = [name for name, effort in efforts.items() if effort > 0]
     if driven and any(effort == 0 for effort in efforts.values()):
         for name in driven:
             graph.joints[name] = replace(graph.joints[name], motor=Motor(f"motor_{name}"))
-        graph.note("guess", "the motors are " + ", ".join(driven) + ": the joints whose effort limit is not zero "
-                            "(--motors to change them)")
+        graph.note(
+            "guess",
+            "the motors are " + ", ".join(driven) + ": the joints whose effort limit is not zero "
+            "(--motors to change them)",
+        )

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from ...vocabulary import Vocabulary
 
-NAMES = Vocabulary("""
+NAMES = Vocabulary(
+    """
 sdf gazebo: version | world* model* actor* light* include*
 world: name | model* frame* joint* plugin* include* state* physics* light* actor* gui scene audio wind gravity
     magnetic_field atmosphere spherical_coordinates road* population*
@@ -34,6 +35,8 @@ sphere: | radius
 cylinder capsule: | radius length
 mesh: optimization | uri scale submesh convex_decomposition
 visual/material: | diffuse ambient specular emissive script* shader lighting pbr render_order double_sided shininess
-""", """
+""",
+    """
 damping friction spring_reference spring_stiffness ode bullet simbody solver_parallel
-""")
+""",
+)

@@ -87,8 +87,9 @@ class _SdfReader(XmlReader):
     def _states(self, model: str | None) -> None:
         """The joints' coordinates in the states of the document's worlds, by ``world_name``."""
         for state in self.root.iterfind("world/state"):
-            joints = [joint for each in state.findall("model") if each.get("name") == model
-                      for joint in each.findall("joint")]
+            joints = [
+                joint for each in state.findall("model") if each.get("name") == model for joint in each.findall("joint")
+            ]
             found = {}
             for joint in joints:
                 known = self.result.joints.get(joint.get("name", ""))
@@ -125,8 +126,12 @@ class _SdfReader(XmlReader):
     def _version(self) -> tuple[int, int]:
         text = self.root.get("version", "1.6")
         parts = text.split(".")
-        if len(parts) != 2 or not all(part.isascii() and part.isdigit() for part in parts) or len(text) > 8 or not (
-                (1, 4) <= (int(parts[0]), int(parts[1])) <= (1, 12)):
+        if (
+            len(parts) != 2
+            or not all(part.isascii() and part.isdigit() for part in parts)
+            or len(text) > 8
+            or not ((1, 4) <= (int(parts[0]), int(parts[1])) <= (1, 12))
+        ):
             self.defect(xml.line(self.root), "version of <sdf>", text, VERSIONS)
             raise BadRobotFile(self.defects)
         return int(parts[0]), int(parts[1])
@@ -160,8 +165,12 @@ class _SdfReader(XmlReader):
             elif element.tag == "frame":
                 host = element.get("attached_to")
                 fixed_to = host if host == WORLD else prefix + (host or MODEL)
-            frame = _FrameElement(element.find("pose"), self._host(prefix, element) or fixed_to or prefix + MODEL,
-                                  fixed_to, str(element.tag))
+            frame = _FrameElement(
+                element.find("pose"),
+                self._host(prefix, element) or fixed_to or prefix + MODEL,
+                fixed_to,
+                str(element.tag),
+            )
             if name in self.frames and not (element.tag == "joint" and self.frames[name].kind != "joint"):
                 self.defect(xml.line(element), f"second <{element.tag}> of the same name", name)
                 continue
@@ -228,14 +237,20 @@ class _SdfReader(XmlReader):
             return
         X_J = self._pose(self._host(prefix, element) or names[1], line) @ pose_of(self, element.find("pose"))
         X_PW, X_CW = inverse(self._pose(parent, line)), inverse(self._pose(child, line))
-        frames = JointFrames(X_PW @ X_J, X_CW @ X_J, X_J, self._pose(prefix + MODEL, line)[:3, :3],
-                             lambda name: self._pose(prefix + name, line) if prefix + name in self.frames else None)
+        frames = JointFrames(
+            X_PW @ X_J,
+            X_CW @ X_J,
+            X_J,
+            self._pose(prefix + MODEL, line)[:3, :3],
+            lambda name: self._pose(prefix + name, line) if prefix + name in self.frames else None,
+        )
         explicit = self.frames.get(names[0])
         if explicit is not None and explicit.kind == "frame":
             X_F = self._pose(names[0], line)
             if np.linalg.norm(X_F[:3, 3] - X_J[:3, 3]) > SAME_GEOMETRY:
-                self.result.assumed.setdefault("joints join the frames that they name, which do not coincide at the "
-                                               "file's pose", []).append(title)
+                self.result.assumed.setdefault(
+                    "joints join the frames that they name, which do not coincide at the file's pose", []
+                ).append(title)
                 frames = replace(frames, X_parent=X_PW @ X_F)
         in_tree = child not in self.carried and element.get("type") != "gearbox"
         if in_tree:

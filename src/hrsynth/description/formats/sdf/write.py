@@ -19,8 +19,13 @@ from ...jointgraph import comma_list
 from ...reduction import reduce, require_free_world
 from .content import write_content, write_pose
 
-_NAMES = {JointType.REVOLUTE: "revolute", JointType.PRISMATIC: "prismatic", JointType.SPHERICAL: "ball",
-         JointType.UNIVERSAL: "universal", JointType.FIXED: "fixed"}
+_NAMES = {
+    JointType.REVOLUTE: "revolute",
+    JointType.PRISMATIC: "prismatic",
+    JointType.SPHERICAL: "ball",
+    JointType.UNIVERSAL: "universal",
+    JointType.FIXED: "fixed",
+}
 WORLD = "world"
 _OWN = re.compile("__.*__", re.DOTALL)
 
@@ -59,8 +64,11 @@ def _names(robot: Mechanism) -> list[Note]:
     links, joints = robot.links.keys(), robot.joints.keys()
     own = sorted(name for name in {*links, *joints} if _OWN.fullmatch(name))
     if own:
-        raise BadRequest(f"{robot.name}: SDFormat reserves names between double underscores", ", ".join(own),
-                         "other names of links and joints")
+        raise BadRequest(
+            f"{robot.name}: SDFormat reserves names between double underscores",
+            ", ".join(own),
+            "other names of links and joints",
+        )
     odd = [f"{name!r} (::)" for name in sorted({*links, *joints}) if "::" in name]
     odd += [f"{name!r} (of a link and a joint)" for name in sorted(links & joints)]
     return [Note("warning", "names that Gazebo refuses, rename them: " + comma_list(odd))] if odd else []

@@ -124,8 +124,12 @@ def loop_joint(reader: UrdfReader, graph: JointGraph) -> None:
         name = reader.attribute(element, "name")
         kind = CONSTRAINTS.get(element.get("type", "spherical"))
         if kind is None or kind.axes > 1:
-            reader.defect(xml.line(element), "unknown loop_joint type", element.get("type"),
-                          ", ".join(key for key in CONSTRAINTS if key != "universal"))
+            reader.defect(
+                xml.line(element),
+                "unknown loop_joint type",
+                element.get("type"),
+                ", ".join(key for key in CONSTRAINTS if key != "universal"),
+            )
             continue
         axis = element.find("axis")
         z = Z if axis is None else reader.direction(axis, "xyz", (0, 0, 1))
@@ -136,8 +140,9 @@ def loop_joint(reader: UrdfReader, graph: JointGraph) -> None:
             if len(found) != 2:
                 reader.defect(xml.line(element), "loop_joint: number of links", str(len(found)), "2")
                 continue
-            one, two = (FrameSpec(reader.attribute(child, "link"), reader.pose(child), xml.line(child))
-                        for child in found)
+            one, two = (
+                FrameSpec(reader.attribute(child, "link"), reader.pose(child), xml.line(child)) for child in found
+            )
         if name is not None and _joins(reader, "loop_joint", element, (one, two)):
             graph.close(graph.fresh(name), kind, (one, two), [z], xml.line(element), reader.motors.get(name))
 
@@ -173,8 +178,14 @@ def named_frames(reader: UrdfReader, graph: JointGraph) -> None:
     carriers = {joint.links[0] for joint in graph.joints.values()}
     frames = {name: FrameSpec(name, line=link.line) for name, link in graph.links.items()}
     onshape_pairs(reader, graph, frames)
-    other_pairs(graph, {name: frame for name, frame in frames.items() if name not in carriers and name in carried
-                        and carried[name].type is JointType.FIXED})
+    other_pairs(
+        graph,
+        {
+            name: frame
+            for name, frame in frames.items()
+            if name not in carriers and name in carried and carried[name].type is JointType.FIXED
+        },
+    )
 
 
 CONVENTIONS = (

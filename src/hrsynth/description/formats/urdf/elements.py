@@ -19,8 +19,12 @@ from ...jointgraph import LOOP_TYPES, ORIGIN, FrameSpec, JointSpec
 from ...sights import SightSpec, spec_of
 
 TREE_TYPES = {
-    "revolute": JointType.REVOLUTE, "continuous": JointType.REVOLUTE, "prismatic": JointType.PRISMATIC,
-    "fixed": JointType.FIXED, "floating": JointType.FREE, "planar": JointType.PLANAR,
+    "revolute": JointType.REVOLUTE,
+    "continuous": JointType.REVOLUTE,
+    "prismatic": JointType.PRISMATIC,
+    "fixed": JointType.FIXED,
+    "floating": JointType.FREE,
+    "planar": JointType.PLANAR,
 }
 INTERFACE = "hardware_interface/VelocityJointInterface"
 _PLANAR = ("__x", "__y", "__turn")
@@ -58,8 +62,9 @@ class UrdfReader(XmlReader):
         for element in self.root.findall("coupling"):
             self.coupling(element, names)
 
-    def check_link(self, link: str | None, line: int | None, what: str, names: Mapping[str, object] | None = None
-                   ) -> bool:
+    def check_link(
+        self, link: str | None, line: int | None, what: str, names: Mapping[str, object] | None = None
+    ) -> bool:
         """Whether a link (or another of ``names``) exists; None was reported before."""
         table = self.links if names is None else names
         if link is None:
@@ -82,16 +87,21 @@ class UrdfReader(XmlReader):
     def joint(self, element: xml.Element) -> None:
         """A ``<joint>`` of the tree."""
         for mimic in element.findall("mimic"):
-            self.defect(xml.line(mimic), "a <mimic> is a gear between two joints, written differently in this dialect",
-                        element.get("name"), "a <coupling> with predecessor, successor and ratio")
+            self.defect(
+                xml.line(mimic),
+                "a <mimic> is a gear between two joints, written differently in this dialect",
+                element.get("name"),
+                "a <coupling> with predecessor, successor and ratio",
+            )
         self.add(element, TREE_TYPES, self.tree_ends(element), ["origin", "parent", "child"])
 
     def tree_ends(self, element: xml.Element) -> tuple[FrameSpec, FrameSpec]:
         """Parent and child of a ``<joint>``, whose frame is the child's."""
         return self.ends(element, ("parent", "child"), (self.origin(element), ORIGIN))
 
-    def ends(self, element: xml.Element, tags: tuple[str, str], frames: Sequence[Array] = ()
-             ) -> tuple[FrameSpec, FrameSpec]:
+    def ends(
+        self, element: xml.Element, tags: tuple[str, str], frames: Sequence[Array] = ()
+    ) -> tuple[FrameSpec, FrameSpec]:
         """The two ends of a joint, each in a child element that names its link; the frames in them are ``frames``, or
         what their ``<origin>`` says."""
         found = []
@@ -105,8 +115,9 @@ class UrdfReader(XmlReader):
                 found.append(FrameSpec(self.attribute(end, "link"), X, xml.line(end)))
         return found[0], found[1]
 
-    def add(self, element: xml.Element, types: Mapping[str, JointType], ends: tuple[FrameSpec, FrameSpec],
-            tags: list[str]) -> None:
+    def add(
+        self, element: xml.Element, types: Mapping[str, JointType], ends: tuple[FrameSpec, FrameSpec], tags: list[str]
+    ) -> None:
         """What tree joints and loops have in common."""
         name, kind = self.attribute(element, "name"), self.attribute(element, "type")
         type_ = None if kind is None else types.get(kind)
@@ -148,8 +159,15 @@ class UrdfReader(XmlReader):
             name = names[number]
             if name in self.tree or name in self.loops:
                 self.defect(joint.line, "a planar joint's own joint takes the name of a joint", name)
-            self.tree[name] = JointSpec(name, kind, (ends[number], ends[number + 1]), (axis,), joint.limits,
-                                        joint.xml if number == 0 else (), joint.line)
+            self.tree[name] = JointSpec(
+                name,
+                kind,
+                (ends[number], ends[number + 1]),
+                (axis,),
+                joint.limits,
+                joint.xml if number == 0 else (),
+                joint.line,
+            )
 
     def planar_parts(self, name: str) -> list[str]:
         """The joints that the planar joint of that name is."""
@@ -174,8 +192,12 @@ class UrdfReader(XmlReader):
         elif self.attribute(ratio, "value") is not None:
             value = float(self.numbers(ratio, "value", (1,))[0])
             if value == 0:
-                self.defect(xml.line(ratio), "ratio of a coupling, which would hold its second joint",
-                            ratio.get("value"), "a number other than 0, or a fixed joint")
+                self.defect(
+                    xml.line(ratio),
+                    "ratio of a coupling, which would hold its second joint",
+                    ratio.get("value"),
+                    "a number other than 0, or a fixed joint",
+                )
             if name and one.link and two.link:
                 self.couplings.append(Coupling(name, one.link, two.link, value, xml.line(element)))
 
@@ -230,7 +252,7 @@ class UrdfReader(XmlReader):
                 way.append(link)
                 link = carrier[link].ends[0].link
             if link in way:
-                yield [carrier[each] for each in reversed(way[way.index(link):])]
+                yield [carrier[each] for each in reversed(way[way.index(link) :])]
             clear.update(way)
 
 

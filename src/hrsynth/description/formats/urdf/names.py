@@ -5,7 +5,8 @@ from __future__ import annotations
 from ...vocabulary import Vocabulary
 from ..sdf.names import NAMES as SDF
 
-NAMES = Vocabulary("""
+NAMES = Vocabulary(
+    """
 robot: name version | link* joint* loop* coupling* transmission* hrsynth material* gazebo* constraint* loop_joint*
     frame* sensor* ros2_control* mujoco*
 link: name type | inertial visual* collision* contact origin sensor* self_collision_checking collision_checking*
@@ -46,7 +47,10 @@ material: name | color texture
 color: rgba
 texture: filename
 gazebo: reference | joint* plugin* ...
-""", """
+""",
+    """
 command_effort current gear_velocity reference
 group group_state end_effector disable_collisions enable_collisions passive_joint virtual_joint
-""", {"gazebo/joint": SDF})
+""",
+    {"gazebo/joint": SDF},
+)

@@ -20,8 +20,15 @@ from .names import NAMES
 
 WORLD = "world"
 TYPES = {**TREE_TYPES, "spherical": JointType.SPHERICAL, "ball": JointType.SPHERICAL}
-_KNOWN = ("link", "joint", "loop", "coupling", "transmission", "hrsynth",
-          *(convention.tag for convention in CONVENTIONS if convention.tag is not None))
+_KNOWN = (
+    "link",
+    "joint",
+    "loop",
+    "coupling",
+    "transmission",
+    "hrsynth",
+    *(convention.tag for convention in CONVENTIONS if convention.tag is not None),
+)
 
 
 def read(file: RobotFile, *, frames: bool = True) -> JointGraph:
@@ -72,8 +79,10 @@ class _TolerantReader(UrdfReader):
             self.carried.add(link)
         for mimic in element.findall("mimic")[:1]:
             driver = self.attribute(mimic, "joint")
-            ratio, offset = (float(self.numbers(mimic, key, (default,))[0]) for key, default in
-                             (("multiplier", 1.0), ("offset", 0.0)))
+            ratio, offset = (
+                float(self.numbers(mimic, key, (default,))[0])
+                for key, default in (("multiplier", 1.0), ("offset", 0.0))
+            )
             if name is not None and driver is not None:
                 self.mimics.append(GearSpec(f"mimic_{name}", driver, name, ratio, offset, xml.line(mimic)))
 
@@ -115,8 +124,9 @@ class _TolerantReader(UrdfReader):
             if None in ends:
                 self.defect(coupling.line, f"coupling {coupling.name!r}: a link that no joint carries")
             else:
-                graph.gears.append(GearSpec(coupling.name, str(ends[0]), str(ends[1]), coupling.ratio, 0.0,
-                                            coupling.line))
+                graph.gears.append(
+                    GearSpec(coupling.name, str(ends[0]), str(ends[1]), coupling.ratio, 0.0, coupling.line)
+                )
         graph.follow(self.mimics)
 
     def own(self, graph: JointGraph) -> None:

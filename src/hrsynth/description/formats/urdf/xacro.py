@@ -18,8 +18,9 @@ def is_needed(root: xml.Element) -> bool:
     if any("xacro}" in element.tag for element in root.iter("*") if isinstance(element.tag, str)):
         return True
     declared = any(str(uri).endswith("xacro") for uri in root.nsmap.values())
-    return declared and any(start in str(value) for element in root.iter("*") for value in element.attrib.values()
-                            for start in ("${", "$("))
+    return declared and any(
+        start in str(value) for element in root.iter("*") for value in element.attrib.values() for start in ("${", "$(")
+    )
 
 
 def expand(path: Path) -> xml.Element:
@@ -27,8 +28,11 @@ def expand(path: Path) -> xml.Element:
     import subprocess
 
     if importlib.util.find_spec("xacro") is None:
-        raise xml.refusal(path, "a xacro file, and the package xacro is not installed",
-                          "the extra hrsynth[xacro], or the URDF that it expands to")
+        raise xml.refusal(
+            path,
+            "a xacro file, and the package xacro is not installed",
+            "the extra hrsynth[xacro], or the URDF that it expands to",
+        )
     process = Path(__file__).with_name("xacro_process.py")
     command = [sys.executable, "-P", str(process), str(path.resolve()), str(LARGEST_FILE), str(MOST_ELEMENTS)]
     try:
@@ -39,8 +43,12 @@ def expand(path: Path) -> xml.Element:
         raise xml.refusal(path, "xacro was stopped", f"{XACRO_SECONDS} seconds and 900 MB of memory")
     if run.returncode:
         file, line, said = _last_message(run.stderr)
-        raise xml.refusal(path if file is None else xml.beside(path, file),
-                          f"xacro refuses it: {said[:300]}", "a file that xacro expands", line=line)
+        raise xml.refusal(
+            path if file is None else xml.beside(path, file),
+            f"xacro refuses it: {said[:300]}",
+            "a file that xacro expands",
+            line=line,
+        )
     places, _, text = run.stdout.partition("\n")
     root = xml.document(text, str(path))
     xml.give_places(root, path, json.loads(places))

@@ -34,12 +34,25 @@ MARK = "/find:package"
 
 VALUES = (bool, int, float, str, list, tuple, dict, type(None))
 OPERATORS: dict[type[ast.AST], Callable[..., Any]] = {
-    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
-    ast.FloorDiv: operator.floordiv, ast.Mod: operator.mod,
-    ast.UAdd: operator.pos, ast.USub: operator.neg, ast.Not: operator.not_,
-    ast.Eq: operator.eq, ast.NotEq: operator.ne, ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt,
-    ast.GtE: operator.ge, ast.Is: operator.is_, ast.IsNot: operator.is_not,
-    ast.In: lambda one, many: one in many, ast.NotIn: lambda one, many: one not in many,
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.FloorDiv: operator.floordiv,
+    ast.Mod: operator.mod,
+    ast.UAdd: operator.pos,
+    ast.USub: operator.neg,
+    ast.Not: operator.not_,
+    ast.Eq: operator.eq,
+    ast.NotEq: operator.ne,
+    ast.Lt: operator.lt,
+    ast.LtE: operator.le,
+    ast.Gt: operator.gt,
+    ast.GtE: operator.ge,
+    ast.Is: operator.is_,
+    ast.IsNot: operator.is_not,
+    ast.In: lambda one, many: one in many,
+    ast.NotIn: lambda one, many: one not in many,
 }
 CONSTANTS = {name: value for name, value in vars(math).items() if isinstance(value, float)}
 TEXT_METHODS = ("lower", "upper", "strip", "split", "replace", "startswith", "endswith")
@@ -53,9 +66,26 @@ def in_list(call: Callable[..., Any]) -> Callable[..., list[Any]]:
 Functions: TypeAlias = dict[str, Callable[..., Any]]
 MATH: Functions = {name: call for name, call in vars(math).items() if callable(call) and not name.startswith("_")}
 PYTHON: Functions = {
-    "abs": abs, "all": all, "any": any, "bool": bool, "dict": dict, "divmod": divmod, "float": float, "int": int,
-    "len": len, "list": list, "max": max, "min": min, "round": round, "sorted": sorted, "str": str, "sum": sum,
-    "tuple": tuple, "range": in_list(range), "reversed": in_list(reversed), "zip": in_list(zip),
+    "abs": abs,
+    "all": all,
+    "any": any,
+    "bool": bool,
+    "dict": dict,
+    "divmod": divmod,
+    "float": float,
+    "int": int,
+    "len": len,
+    "list": list,
+    "max": max,
+    "min": min,
+    "round": round,
+    "sorted": sorted,
+    "str": str,
+    "sum": sum,
+    "tuple": tuple,
+    "range": in_list(range),
+    "reversed": in_list(reversed),
+    "zip": in_list(zip),
     "enumerate": in_list(enumerate),
 }
 
@@ -64,7 +94,7 @@ def power(base: Any, exponent: Any) -> Any:
     """A power, in floats where the whole number would be long."""
     if isinstance(base, int) and isinstance(exponent, int) and abs(base).bit_length() * exponent > LONGEST_POWER:
         return float(base) ** float(exponent)
-    return base ** exponent
+    return base**exponent
 
 
 class Expression:
@@ -161,12 +191,16 @@ class Expression:
             holder = self.value(node.func.value)
             if isinstance(holder, str):
                 return getattr(holder, node.func.attr)(*arguments)
-        raise NameError(f"name {name!r} is not defined" if isinstance(node.func, ast.Name) else
-                        f"{name!r} is no function that is read")
+        raise NameError(
+            f"name {name!r} is not defined"
+            if isinstance(node.func, ast.Name)
+            else f"{name!r} is no function that is read"
+        )
 
 
 def restrict(xacro: Any, substitution: Any, folder: Path) -> None:
     """Have the package evaluate its expressions here, and read files of the folder, or of its package, only."""
+
     def locate(spec: str) -> str:
         return located(spec, folder)
 
@@ -195,12 +229,17 @@ def restrict(xacro: Any, substitution: Any, folder: Path) -> None:
     def evaluate_argument(text: str, context: Any) -> str:
         typed = {name: substitution.convert_value(value, "auto") for name, value in context.get("arg", {}).items()}
         names = {**CONSTANTS, "true": True, "false": False, **typed}
-        own: Functions = {"arg": lambda name: typed[name], "find": lambda package: MARK,
-                          "dirname": lambda: substitution._eval_dirname(context.get("filename"))}
+        own: Functions = {
+            "arg": lambda name: typed[name],
+            "find": lambda package: MARK,
+            "dirname": lambda: substitution._eval_dirname(context.get("filename")),
+        }
         return str(Expression(names, {**functions, **own}).evaluate(text))
 
-    for module, names in ((xacro, ("safe_eval", "_global_symbols", "abs_filename_spec")),
-                          (substitution, ("_eval", "_eval_find", "_eval_env", "_eval_optenv"))):
+    for module, names in (
+        (xacro, ("safe_eval", "_global_symbols", "abs_filename_spec")),
+        (substitution, ("_eval", "_eval_find", "_eval_env", "_eval_optenv")),
+    ):
         if not all(hasattr(module, name) for name in names):
             forbidden()
         module.eval = module.exec = module.compile = forbidden
@@ -235,9 +274,9 @@ def package_folders(folder: Path) -> list[Path]:
     """The folders in which a package's files may lie: the file's own, and those up to the one that says that it is a
     package; where none does, the one above, unless that is a root or a home."""
     above = [folder, *folder.parents]
-    for k, each in enumerate(above[:LEVELS + 1]):
+    for k, each in enumerate(above[: LEVELS + 1]):
         if any((each / name).is_file() for name in ("package.xml", "model.config")):
-            return above[:k + 1]
+            return above[: k + 1]
     shared = Path.home(), Path(os.environ.get("TMPDIR", "/tmp"))
     return above[:2] if len(above) > 2 and above[1] not in shared else above[:1]
 

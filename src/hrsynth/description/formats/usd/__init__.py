@@ -18,5 +18,12 @@ def _pack(text: str, path: Path) -> bytes:
     return binary(text, path)
 
 
-DIALECT = Dialect("usd", lambda file: file.start.startswith((*_TEXT, *_BINARY)), (".usda", ".usd", ".usdc"), rank=-2,
-                  begins=(*_TEXT, *_BINARY), packed=_pack, meshes=None)
+DIALECT = Dialect(
+    "usd",
+    lambda file: file.start.startswith((*_TEXT, *_BINARY)),
+    (".usda", ".usd", ".usdc"),
+    rank=-2,
+    begins=(*_TEXT, *_BINARY),
+    packed=_pack,
+    meshes=None,
+)

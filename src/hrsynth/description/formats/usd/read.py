@@ -27,8 +27,12 @@ from ...numerals import exact_vector
 from .stage import prims
 
 AXES = {"X": np.eye(3)[0], "Y": np.eye(3)[1], "Z": np.eye(3)[2]}
-_KINDS = {"PhysicsRevoluteJoint": JointType.REVOLUTE, "PhysicsPrismaticJoint": JointType.PRISMATIC,
-          "PhysicsSphericalJoint": JointType.SPHERICAL, "PhysicsFixedJoint": JointType.FIXED}
+_KINDS = {
+    "PhysicsRevoluteJoint": JointType.REVOLUTE,
+    "PhysicsPrismaticJoint": JointType.PRISMATIC,
+    "PhysicsSphericalJoint": JointType.SPHERICAL,
+    "PhysicsFixedJoint": JointType.FIXED,
+}
 FREEDOMS = ("transX", "transY", "transZ", "rotX", "rotY", "rotZ")
 _SWINGS = "D6 joints with two swings (Y, Z) are universal joints, first Y, then Z"
 _MIMIC = re.compile(r"physxMimicJoint:(\w+):gearing")
@@ -38,8 +42,11 @@ def read(file: RobotFile) -> JointGraph:
     """The joint graph of a USD stage; raises ``BadRobotFile`` with all its defects, ``MissingExtra`` without the
     package of OpenUSD."""
     if file.start.startswith(b"PK"):
-        raise xml.refusal(file.path, "a zip archive, such as a package of USD files, which is not read",
-                          "the robot file in it (unzip)")
+        raise xml.refusal(
+            file.path,
+            "a zip archive, such as a package of USD files, which is not read",
+            "the robot file in it (unzip)",
+        )
     told = prims(file.path)
     return _StageReader(str(file.path), told).graph()
 
@@ -117,8 +124,14 @@ class _StageReader:
             graph.links = {self.world: Link(self.world), **graph.links}
             graph.base = self.world
         else:
-            graph.base = next((self.bodies[path] for path, prim in self.prims.items()
-                               if path in self.bodies and prim.has("PhysicsArticulationRootAPI")), None)
+            graph.base = next(
+                (
+                    self.bodies[path]
+                    for path, prim in self.prims.items()
+                    if path in self.bodies and prim.has("PhysicsArticulationRootAPI")
+                ),
+                None,
+            )
         self._stand(graph)
         if own:
             self._says(own[0])
@@ -237,8 +250,12 @@ class _StageReader:
             return Solid("box", edges, frozen(X), role, name, colour) if min(edges) > 0 else None
         if prim.kind == "Sphere" and rounds and radius > 0:
             return Solid("sphere", (radius * float(sizes[0]),), frozen(X), role, name, colour)
-        if prim.kind in ("Cylinder", "Capsule") and abs(across[0] - across[1]) <= SINGLE * across[0] and min(
-                radius, height) > 0 and (prim.kind == "Cylinder" or rounds):
+        if (
+            prim.kind in ("Cylinder", "Capsule")
+            and abs(across[0] - across[1]) <= SINGLE * across[0]
+            and min(radius, height) > 0
+            and (prim.kind == "Cylinder" or rounds)
+        ):
             return Solid(prim.kind.lower(), (radius * across[0], height * long), turned, role, name, colour)
         return None
 
@@ -260,8 +277,11 @@ class _StageReader:
             self.defect(prim.path, "a distance joint", None, "two spherical joints and the rod between them")
             return
         if not prim.kind.startswith("Physics") or not prim.kind.endswith("Joint"):
-            graph.note("ignored", f"the joint {prim.name!r} of type {prim.kind or 'none'}, which UsdPhysics does not "
-                                  "have; --close says what it holds together")
+            graph.note(
+                "ignored",
+                f"the joint {prim.name!r} of type {prim.kind or 'none'}, which UsdPhysics does not "
+                "have; --close says what it holds together",
+            )
             return
         ends = [self._end(prim, side) for side in (0, 1)]
         if ends[0] is None or ends[1] is None:
@@ -320,8 +340,9 @@ class _StageReader:
             self.defect(prim.path, "unknown joint type", prim.kind, ", ".join((*_KINDS, "PhysicsJoint")))
         return tuple(each for each in FREEDOMS if each not in locked)
 
-    def _add(self, name: str, prim: _Prim, ends: tuple[FrameSpec, FrameSpec], free: tuple[str, ...], *, in_tree: bool
-             ) -> None:
+    def _add(
+        self, name: str, prim: _Prim, ends: tuple[FrameSpec, FrameSpec], free: tuple[str, ...], *, in_tree: bool
+    ) -> None:
         """One joint, or a chain of slides and turns where no type leaves just these free."""
         axes: tuple[Array, ...]
         slides, turns = ([AXES[each[-1]] for each in free if each.startswith(word)] for word in ("trans", "rot"))
@@ -351,8 +372,9 @@ class _StageReader:
                 return
         self.result.joints[name] = JointSpec(name, kind, ends, axes, limits, in_tree=in_tree)
 
-    def _chain(self, name: str, ends: tuple[FrameSpec, FrameSpec], slides: list[Array], turns: list[Array], *,
-               in_tree: bool) -> None:
+    def _chain(
+        self, name: str, ends: tuple[FrameSpec, FrameSpec], slides: list[Array], turns: list[Array], *, in_tree: bool
+    ) -> None:
         graph, before = self.result, ends[0]
         parts = [(JointType.PRISMATIC, axis) for axis in slides] + [(JointType.REVOLUTE, axis) for axis in turns[::-1]]
         for number, (kind, axis) in enumerate(parts, 1):
@@ -361,8 +383,9 @@ class _StageReader:
             if not last:
                 graph.links[title] = Link(title)
                 self.poses[title] = self.poses[str(ends[0].link)] @ ends[0].X
-            graph.joints[title] = JointSpec(title, kind, (before, ends[1] if last else FrameSpec(title)), (axis,),
-                                            in_tree=in_tree or not last)
+            graph.joints[title] = JointSpec(
+                title, kind, (before, ends[1] if last else FrameSpec(title)), (axis,), in_tree=in_tree or not last
+            )
             before = FrameSpec(title)
 
     def _limits(self, prim: _Prim, free: tuple[str, ...]) -> Limits | None:
@@ -371,12 +394,17 @@ class _StageReader:
         pairs = []
         for each in free:
             factor = math.pi / 180 if each.startswith("rot") else self.metres
-            keys = [("physics:lowerLimit", "physics:upperLimit"), tuple(f"limit:{each}:physics:{k}" for k in
-                                                                        ("low", "high"))]
-            found = next(((prim.values[a], prim.values[b]) for a, b in keys if a in prim.values and b in prim.values),
-                         (None, None))
-            pairs.append(tuple(None if value is None or not math.isfinite(value) else factor * value
-                               for value in found))
+            keys = [
+                ("physics:lowerLimit", "physics:upperLimit"),
+                tuple(f"limit:{each}:physics:{k}" for k in ("low", "high")),
+            ]
+            found = next(
+                ((prim.values[a], prim.values[b]) for a, b in keys if a in prim.values and b in prim.values),
+                (None, None),
+            )
+            pairs.append(
+                tuple(None if value is None or not math.isfinite(value) else factor * value for value in found)
+            )
         lower, upper = pairs[0] if pairs and len(set(pairs)) == 1 else (None, None)
         if lower is not None and upper is not None and not lower < upper:
             lower = upper = None
@@ -456,8 +484,11 @@ class _StageReader:
             near = replace(joint.ends[0], X=frozen(inverse(self.poses[joint.links[0]]) @ S))
             graph.joints[name] = replace(joint, ends=(near, joint.ends[1]), axes=axes, limits=limits)
         if apart:
-            graph.note("guess", "the bodies of these joints do not lie where the joints hold them, and are put there: "
-                                + comma_list(apart))
+            graph.note(
+                "guess",
+                "the bodies of these joints do not lie where the joints hold them, and are put there: "
+                + comma_list(apart),
+            )
 
     def _says(self, prim: _Prim) -> None:
         """Platform, camera, motors, observations, as our writer adds them."""
@@ -474,10 +505,14 @@ class _StageReader:
         for prim in joints:
             names = [each for each in self.titles.get(prim.path, []) if self.result.joints[each].kind.freedoms]
             if prim.has("PhysicsDriveAPI"):
-                drives = [value for key, value in prim.values.items()
-                          if re.fullmatch(r"drive:\w+:physics:(stiffness|damping)", key)]
-                limp = any(value == 0 for key, value in prim.values.items()
-                           if re.fullmatch(r"drive:\w+:physics:maxForce", key))
+                drives = [
+                    value
+                    for key, value in prim.values.items()
+                    if re.fullmatch(r"drive:\w+:physics:(stiffness|damping)", key)
+                ]
+                limp = any(
+                    value == 0 for key, value in prim.values.items() if re.fullmatch(r"drive:\w+:physics:maxForce", key)
+                )
                 gains |= dict.fromkeys(names, any(_number(value) > 0 for value in drives) and not limp)
         actuators = [prim for prim in self.prims.values() if prim.kind == "MjcActuator"]
         for prim in actuators:

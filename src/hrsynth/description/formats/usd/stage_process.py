@@ -82,8 +82,10 @@ def colour_of(prim: Any) -> Any:
     surface."""
     from pxr import UsdGeom, UsdShade
 
-    own, clear = (each.ComputeFlattened() if (each := UsdGeom.PrimvarsAPI(prim).GetPrimvar(name)) else None
-                  for name in ("displayColor", "displayOpacity"))
+    own, clear = (
+        each.ComputeFlattened() if (each := UsdGeom.PrimvarsAPI(prim).GetPrimvar(name)) else None
+        for name in ("displayColor", "displayOpacity")
+    )
     if own:
         return [*map(float, own[0]), float(clear[0]) if clear else 1.0] if len(own) == 1 else None
     material = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()[0]
@@ -104,18 +106,35 @@ def told(stage: Any) -> dict[str, Any]:
         relations = {str(each.GetName()): [str(to) for to in each.GetTargets()] for each in prim.GetRelationships()}
         shape, joint = prim.IsA(UsdGeom.Gprim), kind.endswith("Joint") and "physics:body1" in {**relations}
         joint = joint or prim.IsA(UsdPhysics.Joint) or "physics:body0" in relations
-        own = [each for each in prim.GetAttributes()
-               if shape or joint or any("Physics" in api for api in apis) or each.GetName().startswith("hrsynth:")]
-        found.append({"path": str(prim.GetPath()), "name": str(prim.GetName()), "type": kind, "apis": apis,
-                      "shape": shape, "joint": joint, "relations": relations,
-                      "values": {str(each.GetName()): plain(each.Get()) for each in own},
-                      "X": plain(cache.GetLocalToWorldTransform(prim)) if prim.IsA(UsdGeom.Xformable) else None,
-                      "colour": colour_of(prim) if shape or prim.HasAttribute("hrsynth:mesh") else None,
-                      "guide": shape and UsdGeom.Imageable(prim).ComputePurpose() == "guide"})
+        own = [
+            each
+            for each in prim.GetAttributes()
+            if shape or joint or any("Physics" in api for api in apis) or each.GetName().startswith("hrsynth:")
+        ]
+        found.append(
+            {
+                "path": str(prim.GetPath()),
+                "name": str(prim.GetName()),
+                "type": kind,
+                "apis": apis,
+                "shape": shape,
+                "joint": joint,
+                "relations": relations,
+                "values": {str(each.GetName()): plain(each.Get()) for each in own},
+                "X": plain(cache.GetLocalToWorldTransform(prim)) if prim.IsA(UsdGeom.Xformable) else None,
+                "colour": colour_of(prim) if shape or prim.HasAttribute("hrsynth:mesh") else None,
+                "guide": shape and UsdGeom.Imageable(prim).ComputePurpose() == "guide",
+            }
+        )
     root = stage.GetDefaultPrim()
-    return {"prims": found, "name": str(root.GetName()) if root else "",
-            "metres": UsdGeom.GetStageMetersPerUnit(stage), "metres_told": UsdGeom.StageHasAuthoredMetersPerUnit(stage),
-            "kilograms": UsdPhysics.GetStageKilogramsPerUnit(stage), "up": str(UsdGeom.GetStageUpAxis(stage))}
+    return {
+        "prims": found,
+        "name": str(root.GetName()) if root else "",
+        "metres": UsdGeom.GetStageMetersPerUnit(stage),
+        "metres_told": UsdGeom.StageHasAuthoredMetersPerUnit(stage),
+        "kilograms": UsdPhysics.GetStageKilogramsPerUnit(stage),
+        "up": str(UsdGeom.GetStageUpAxis(stage)),
+    }
 
 
 def obj(stage: Any, path: str) -> str:
@@ -123,12 +142,14 @@ def obj(stage: Any, path: str) -> str:
     from pxr import UsdGeom
 
     mesh = UsdGeom.Mesh(stage.GetPrimAtPath(path))
-    points, counts, corners = (each.Get() or [] for each in (
-        mesh.GetPointsAttr(), mesh.GetFaceVertexCountsAttr(), mesh.GetFaceVertexIndicesAttr()))
+    points, counts, corners = (
+        each.Get() or []
+        for each in (mesh.GetPointsAttr(), mesh.GetFaceVertexCountsAttr(), mesh.GetFaceVertexIndicesAttr())
+    )
     turn = -1 if mesh.GetOrientationAttr().Get() == "leftHanded" else 1
     lines, at = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in points], 0
     for count in counts:
-        face = list(corners[at:at + count])[::turn]
+        face = list(corners[at : at + count])[::turn]
         if any(not 0 <= corner < len(points) for corner in face) or len(face) < count:
             refuse(f"the faces of mesh {path} name points that do not exist")
         lines.append("f " + " ".join(str(corner + 1) for corner in face))
@@ -157,5 +178,8 @@ def main(largest: str, most: str, task: str, name: str, *rest: str) -> None:
         text = " ".join(str(error).split())
         what = text.partition(" : ")[2] or text or type(error).__name__
         place = re.search(r"([^'/]*):(\d+):\d+: ", what)
-        refuse(f"OpenUSD cannot read {place[1]} from line {place[2]} on, allowed: a whole stage" if place else
-               f"OpenUSD refuses it: {what[:300]}, allowed: a whole stage")
+        refuse(
+            f"OpenUSD cannot read {place[1]} from line {place[2]} on, allowed: a whole stage"
+            if place
+            else f"OpenUSD refuses it: {what[:300]}, allowed: a whole stage"
+        )

@@ -26,11 +26,22 @@ from ...meshes import triangles
 from ...tree import outward, spanning
 from .read import FREEDOMS
 
-_TYPES = {JointType.REVOLUTE: "PhysicsRevoluteJoint", JointType.PRISMATIC: "PhysicsPrismaticJoint",
-          JointType.SPHERICAL: "PhysicsSphericalJoint", JointType.FIXED: "PhysicsFixedJoint"}
-_FREE = {JointType.REVOLUTE: ("rotX",), JointType.PRISMATIC: ("transX",), JointType.SPHERICAL: FREEDOMS[3:],
-         JointType.UNIVERSAL: ("rotX", "rotY"), JointType.CYLINDRICAL: ("transX", "rotX"),
-         JointType.PLANAR: ("transY", "transZ", "rotX"), JointType.FREE: FREEDOMS, JointType.FIXED: ()}
+_TYPES = {
+    JointType.REVOLUTE: "PhysicsRevoluteJoint",
+    JointType.PRISMATIC: "PhysicsPrismaticJoint",
+    JointType.SPHERICAL: "PhysicsSphericalJoint",
+    JointType.FIXED: "PhysicsFixedJoint",
+}
+_FREE = {
+    JointType.REVOLUTE: ("rotX",),
+    JointType.PRISMATIC: ("transX",),
+    JointType.SPHERICAL: FREEDOMS[3:],
+    JointType.UNIVERSAL: ("rotX", "rotY"),
+    JointType.CYLINDRICAL: ("transX", "rotX"),
+    JointType.PLANAR: ("transY", "transZ", "rotX"),
+    JointType.FREE: FREEDOMS,
+    JointType.FIXED: (),
+}
 """What each type leaves free in frames whose x is the axis (of a universal joint the second; y is the first)."""
 
 
@@ -53,12 +64,16 @@ class _UsdWriter:
     def write(self) -> Written:
         robot, body = self.robot, list[str]()
         says = [f"{key} {text}" for key, text in annotations_of(robot, motors=True)]
-        body += [f"custom string {PREFIX}:name = {_text(robot.name)}",
-                 f"custom string[] {PREFIX}:says = [{', '.join(map(_text, says))}]"]
+        body += [
+            f"custom string {PREFIX}:name = {_text(robot.name)}",
+            f"custom string[] {PREFIX}:says = [{', '.join(map(_text, says))}]",
+        ]
         unread: list[str] = []
         contents = {name: content_of(link, robot) for name, link in robot.links.items()}
-        self.meshes = triangles([solid.file for content in contents.values() for solid in content.solids
-                                 if solid.file is not None], robot.file)
+        self.meshes = triangles(
+            [solid.file for content in contents.values() for solid in content.solids if solid.file is not None],
+            robot.file,
+        )
         for name, link in robot.links.items():
             body += self._body(name, link.pose, contents[name], unread)
         order = [*outward(robot), *(joint for joint in robot.joints.values() if not joint.in_tree)]
@@ -66,15 +81,28 @@ class _UsdWriter:
         joints = _prim("PhysicsFixedJoint", "to_world", weld)
         joints += [line for each in order for line in self._joint(each)]
         body += _prim("Scope", "joints", joints)
-        head = ["#usda 1.0", "(", f"    defaultPrim = {_text(self.root)}", "    kilogramsPerUnit = 1",
-                "    metersPerUnit = 1", '    upAxis = "Z"', ")", ""]
+        head = [
+            "#usda 1.0",
+            "(",
+            f"    defaultPrim = {_text(self.root)}",
+            "    kilogramsPerUnit = 1",
+            "    metersPerUnit = 1",
+            '    upAxis = "Z"',
+            ")",
+            "",
+        ]
         text = "\n".join([*head, *_prim("Xform", self.root, body, ["PhysicsArticulationRootAPI"])]) + "\n"
         self.lost += unsaid(robot, SIZES, dialect="USD")
         if unread:
             what = "meshes that cannot be read are written by their names alone: "
             self.lost.append(Note("warning", what + comma_list(unread)))
-        wide = [joint.name for joint in robot.joints.values() if joint.type is JointType.SPHERICAL
-                and joint.limits is not None and (joint.limits.lower, joint.limits.upper) != (None, None)]
+        wide = [
+            joint.name
+            for joint in robot.joints.values()
+            if joint.type is JointType.SPHERICAL
+            and joint.limits is not None
+            and (joint.limits.lower, joint.limits.upper) != (None, None)
+        ]
         if wide:
             what = "limits of the turns of spherical joints are not written: "
             self.lost.append(Note("warning", what + comma_list(wide)))
@@ -85,14 +113,18 @@ class _UsdWriter:
         inertial = content.inertial
         if inertial is not None and inertial.mass > 0:
             apis.append("PhysicsMassAPI")
-            lines += [f"float physics:mass = {_number(inertial.mass)}",
-                      f"point3f physics:centerOfMass = {_tuple(inertial.X[:3, 3])}"]
+            lines += [
+                f"float physics:mass = {_number(inertial.mass)}",
+                f"point3f physics:centerOfMass = {_tuple(inertial.X[:3, 3])}",
+            ]
             if inertial.inertia is not None:
                 R = inertial.X[:3, :3]
                 tensor = inertial.inertia if np.array_equal(R, np.eye(3)) else R @ inertial.inertia @ R.T
                 moments, turn = principal(tensor)
-                lines += [f"float3 physics:diagonalInertia = {_tuple(moments)}",
-                          f"quatf physics:principalAxes = {_tuple(quaternions(turn))}"]
+                lines += [
+                    f"float3 physics:diagonalInertia = {_tuple(moments)}",
+                    f"quatf physics:principalAxes = {_tuple(quaternions(turn))}",
+                ]
                 six = (*np.diag(tensor), tensor[0, 1], tensor[0, 2], tensor[1, 2])
                 lines.append(f"custom double[] {PREFIX}:inertia = [{', '.join(map(_number, six))}]")
         taken: dict[str, int] = {}
@@ -115,23 +147,30 @@ class _UsdWriter:
         kind, scale = {"box": "Cube"}.get(solid.kind, solid.kind.capitalize()), (1.0, 1.0, 1.0)
         if solid.file is not None:
             found = self.meshes[solid.file]
-            lines += [f"custom string {PREFIX}:mesh = {_text(solid.file)}",
-                      f"custom double3 {PREFIX}:scale = {_tuple(solid.scale)}"]
+            lines += [
+                f"custom string {PREFIX}:mesh = {_text(solid.file)}",
+                f"custom double3 {PREFIX}:scale = {_tuple(solid.scale)}",
+            ]
             if found is None:
                 unread.append(f"{link} ({solid.file})")
                 return _prim("Xform", title, [*lines, *_transform_of(solid.X)], apis)
             points, faces = found
             points = points * solid.scale
             rows = ", ".join(_tuple(np.round(point, 9) + 0.0) for point in points)
-            lines += [f"point3f[] points = [{rows}]", f"int[] faceVertexCounts = [{', '.join(['3'] * len(faces))}]",
-                      f"int[] faceVertexIndices = [{', '.join(str(v) for v in np.ravel(faces))}]",
-                      'uniform token subdivisionScheme = "none"']
+            lines += [
+                f"point3f[] points = [{rows}]",
+                f"int[] faceVertexCounts = [{', '.join(['3'] * len(faces))}]",
+                f"int[] faceVertexIndices = [{', '.join(str(v) for v in np.ravel(faces))}]",
+                'uniform token subdivisionScheme = "none"',
+            ]
         elif kind == "Cube":
             lines.append("double size = 1")
             scale = solid.sizes[0], solid.sizes[1], solid.sizes[2]
         else:
-            lines += [f"double {'height' if key == 'length' else key} = {_number(value)}"
-                      for key, value in zip(SIZES[solid.kind], solid.sizes, strict=True)]
+            lines += [
+                f"double {'height' if key == 'length' else key} = {_number(value)}"
+                for key, value in zip(SIZES[solid.kind], solid.sizes, strict=True)
+            ]
             lines += ['uniform token axis = "Z"'] * (kind != "Sphere")
         return _prim(kind, title, [*lines, *_transform_of(solid.X, scale)], apis)
 
@@ -145,11 +184,13 @@ class _UsdWriter:
         for side, link in enumerate(joint.links):
             X = inverse(robot.links[link].pose) @ X_J
             turn = quaternions(X[:3, :3])
-            lines += [f"rel physics:body{side} = </{self.root}/{self.names[link]}>",
-                      f"point3f physics:localPos{side} = {_tuple(X[:3, 3])}",
-                      f"quatf physics:localRot{side} = {_tuple(turn)}",
-                      f"custom double3 {PREFIX}:localPos{side} = {_tuple(X[:3, 3])}",
-                      f"custom quatd {PREFIX}:localRot{side} = {_tuple(turn)}"]
+            lines += [
+                f"rel physics:body{side} = </{self.root}/{self.names[link]}>",
+                f"point3f physics:localPos{side} = {_tuple(X[:3, 3])}",
+                f"quatf physics:localRot{side} = {_tuple(turn)}",
+                f"custom double3 {PREFIX}:localPos{side} = {_tuple(X[:3, 3])}",
+                f"custom quatd {PREFIX}:localRot{side} = {_tuple(turn)}",
+            ]
         apis: list[str] = []
         free = _FREE[kind]
         if kind in (JointType.REVOLUTE, JointType.PRISMATIC, JointType.SPHERICAL):
@@ -226,8 +267,11 @@ def _drive(kind: JointType, limits: Limits | None, free: tuple[str, ...], apis: 
 def _prim(kind: str, name: str, lines: Iterable[str], apis: Iterable[str] = ()) -> list[str]:
     """A prim: its schemas, and what it holds, one step further in."""
     schemas = ", ".join(map(_text, apis))
-    head = [f"def {kind} {_text(name)} (", f"    prepend apiSchemas = [{schemas}]", ")"] if schemas else [
-        f"def {kind} {_text(name)}"]
+    head = (
+        [f"def {kind} {_text(name)} (", f"    prepend apiSchemas = [{schemas}]", ")"]
+        if schemas
+        else [f"def {kind} {_text(name)}"]
+    )
     return [*head, "{", *(f"    {line}" for line in lines), "}"]
 
 

@@ -30,8 +30,11 @@ def answer(request: Request) -> dict[str, Any]:
     start = setting.everything.start
     chosen, verdict = min(found, key=lambda pair: _size(error(pair[0], start)))
     legs = list(verdict.legs) if verdict.rank else []
-    return {"sentences": [which(verdict), *(rest(chosen) if verdict == CONTROLLABLE else blind(verdict))],
-            "watch": legs, **lines(request, "legs", watching=False)}
+    return {
+        "sentences": [which(verdict), *(rest(chosen) if verdict == CONTROLLABLE else blind(verdict))],
+        "watch": legs,
+        **lines(request, "legs", watching=False),
+    }
 
 
 def watching(setting: ObservedRobot, verdict: Verdict) -> ObservedRobot:
@@ -52,11 +55,14 @@ def which(verdict: Verdict) -> str:
     if not verdict.dof:
         return "The platform has no freedom: there is nothing to control."
     if not verdict.rank:
-        return ("Watching the legs does not help: their directions do not change with the platform wherever it was "
-                "tried.")
+        return (
+            "Watching the legs does not help: their directions do not change with the platform wherever it was tried."
+        )
     lost = len(verdict.lost)
-    return (f"Watching legs is not enough: even with all of them {lost} of {verdict.dof} freedoms "
-            f"stay{'s' * (lost == 1)} unseen wherever it was tried: {verdict.named}.")
+    return (
+        f"Watching legs is not enough: even with all of them {lost} of {verdict.dof} freedoms "
+        f"stay{'s' * (lost == 1)} unseen wherever it was tried: {verdict.named}."
+    )
 
 
 def blind(verdict: Verdict) -> list[str]:
@@ -65,8 +71,10 @@ def blind(verdict: Verdict) -> list[str]:
         return []
     legs = name_all("leg", verdict.legs)
     seen = f"{legs[0].upper()}{legs[1:]} see{'s' * (len(verdict.legs) == 1)} as much as all of them together."
-    return [seen if verdict.rank else "However well the directions are measured, they say nothing about the platform.",
-            "Something else must be measured as well: the command advise lists what would do."]
+    return [
+        seen if verdict.rank else "However well the directions are measured, they say nothing about the platform.",
+        "Something else must be measured as well: the command advise lists what would do.",
+    ]
 
 
 def rest(setting: ObservedRobot) -> list[str]:
@@ -74,8 +82,11 @@ def rest(setting: ObservedRobot) -> list[str]:
     wrong = error(setting, setting.everything.start)
     value = wrong[wrong["unit"]]
     if value is None:
-        first = ("At the zero configuration a freedom is lost, so that the error has no bound there."
-                 if wrong["words"] == LOST else f"The error of the platform is then {wrong['words']}.")
+        first = (
+            "At the zero configuration a freedom is lost, so that the error has no bound there."
+            if wrong["words"] == LOST
+            else f"The error of the platform is then {wrong['words']}."
+        )
     else:
         first = f"At home the platform is then off by about {wrong['size']} per 0.1°."
     return [first, _elsewhere(setting)]
@@ -101,8 +112,11 @@ def _others(found: AssemblyModes, count: int, met: list[AssemblyMode]) -> str:
             there = f"{_number(count)} other pose{'s' * (count > 1)}"
             words = f"The legs look the same at {there}, but the robot does not reach {'them' if count > 1 else 'it'}"
         else:
-            words = f"No other pose has the same directions ({all_of(found)})" if known else (
-                "No other pose was found at which the legs look the same")
+            words = (
+                f"No other pose has the same directions ({all_of(found)})"
+                if known
+                else ("No other pose was found at which the legs look the same")
+            )
         return f"{words}." if known else f"{words}; there may be others that were not found."
     away = sorted(distance_from(found.setting.motion, found.goal, mode) for mode in met)
     near, turn = away[0]

@@ -17,13 +17,18 @@ def answer(request: Request) -> dict[str, Any]:
     here = request.here(request.mover())
     found = atlas(setting, at=here.real)
     known = len(set(found.count)) == 1 and all(pair.certified for pair in found.pairs)
-    return {"groups": [list(group) for group in found.groups],
-            "aspect": [next((i for i, group in enumerate(found.groups, 1) if known and number in group), None)
-                       for number in range(1, len(found.places) + 1)],
-            "words": words(found),
-            "pairs": [f"modes {one} and {other}: {pair_words(pair)}"
-                      for pair in found.pairs for one, other in [pair.numbers]],
-            **lines_at(request, "atlas", setting, here.real)}
+    return {
+        "groups": [list(group) for group in found.groups],
+        "aspect": [
+            next((i for i, group in enumerate(found.groups, 1) if known and number in group), None)
+            for number in range(1, len(found.places) + 1)
+        ],
+        "words": words(found),
+        "pairs": [
+            f"modes {one} and {other}: {pair_words(pair)}" for pair in found.pairs for one, other in [pair.numbers]
+        ],
+        **lines_at(request, "atlas", setting, here.real),
+    }
 
 
 def words(found: Atlas) -> str:

@@ -48,8 +48,11 @@ def _report(request: Request) -> tuple[str, bytes, dict[str, str]]:
 
 def _figure(request: Request) -> tuple[str, bytes, dict[str, str]]:
     same = lines(request, "derive")
-    return (request.derivation.robot.name, draw(request.derivation).content,
-            {**same, "python": f"hrsynth.draw({same['python']})"})
+    return (
+        request.derivation.robot.name,
+        draw(request.derivation).content,
+        {**same, "python": f"hrsynth.draw({same['python']})"},
+    )
 
 
 def _robot(request: Request) -> tuple[str, bytes, dict[str, str]]:
@@ -69,6 +72,9 @@ def _bytes(content: Any) -> bytes:
 
 
 KINDS: dict[str, tuple[str, str, Callable[[Request], tuple[str, bytes, dict[str, str]]]]] = {
-    "page": (".html", "text/html", _page), "report": (".html", "text/html", _report),
-    "figure": (".svg", "image/svg+xml", _figure), "robot": (".urdf", "application/xml", _robot)}
+    "page": (".html", "text/html", _page),
+    "report": (".html", "text/html", _report),
+    "figure": (".svg", "image/svg+xml", _figure),
+    "robot": (".urdf", "application/xml", _robot),
+}
 """Ending, type and maker of each kind."""

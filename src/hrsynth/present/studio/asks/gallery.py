@@ -33,9 +33,16 @@ def answer(request: Request) -> dict[str, Any]:
 def robots() -> list[dict[str, Any]]:
     """The shipped robots, sorted."""
     known = {each.name: each for each in ROBOTS}
-    return [{"source": f"{SHIPPED}:{name}", "name": name, "title": name.replace("_", " "),
-             "words": f"{parse(known[name].architecture)}, {known[name].dof} freedoms", "picture": picture(load(name))}
-            for name in shipped()]
+    return [
+        {
+            "source": f"{SHIPPED}:{name}",
+            "name": name,
+            "title": name.replace("_", " "),
+            "words": f"{parse(known[name].architecture)}, {known[name].dof} freedoms",
+            "picture": picture(load(name)),
+        }
+        for name in shipped()
+    ]
 
 
 def picture(robot: Mechanism) -> str:

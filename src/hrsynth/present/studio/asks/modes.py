@@ -22,9 +22,14 @@ def answer(request: Request) -> dict[str, Any]:
     setting = request.seeing()
     here = request.here(request.mover())
     found = modes(setting, at=here.real)
-    return {"modes": [*(_mode(request, found, number, mode) for number, mode in enumerate(found.modes, 1)),
-                      *(_near(request, found, number, mode) for number, mode in enumerate(found.near, 1))],
-            "words": words(found), **lines_at(request, "modes", setting, here.real)}
+    return {
+        "modes": [
+            *(_mode(request, found, number, mode) for number, mode in enumerate(found.modes, 1)),
+            *(_near(request, found, number, mode) for number, mode in enumerate(found.near, 1)),
+        ],
+        "words": words(found),
+        **lines_at(request, "modes", setting, here.real),
+    }
 
 
 def words(found: AssemblyModes) -> str:
@@ -50,9 +55,14 @@ def _near(request: Request, found: AssemblyModes, number: int, mode: NearMode) -
     return _told(request, found, f"near {number}", mode, told, mode.configuration)
 
 
-def _told(request: Request, found: AssemblyModes, label: str, mode: AssemblyMode, told: str,
-          there: ClosedConfiguration | None) -> dict[str, Any]:
+def _told(
+    request: Request, found: AssemblyModes, label: str, mode: AssemblyMode, told: str, there: ClosedConfiguration | None
+) -> dict[str, Any]:
     drawn = outline(found.setting, label, mode)
-    return {**drawn.scene(), "words": f"{drawn.words}: {told}",
-            "pose": mode.pose.to_dict(), "goal": mode.goal,
-            "here": None if there is None else request.describe_here(Posed(there))}
+    return {
+        **drawn.scene(),
+        "words": f"{drawn.words}: {told}",
+        "pose": mode.pose.to_dict(),
+        "goal": mode.goal,
+        "here": None if there is None else request.describe_here(Posed(there)),
+    }

@@ -53,12 +53,16 @@ def _draw_pose(request: Request, mover: Mover, here: Posed, place: Any) -> dict[
 
 def describe_pose(request: Request, mover: Mover, posed: Posed, stopped: bool = False) -> dict[str, Any]:
     """A configuration with all that is shown of it; ``stopped``: it is not where it was sent."""
-    return {"state": state(request, mover, posed), "here": request.describe_here(posed),
-            "values": mover.read(posed).tolist(), "stopped": stopped, "residual": posed.real.residual}
+    return {
+        "state": state(request, mover, posed),
+        "here": request.describe_here(posed),
+        "values": mover.read(posed).tolist(),
+        "stopped": stopped,
+        "residual": posed.real.residual,
+    }
 
 
 def state(request: Request, mover: Mover, posed: Posed) -> dict[str, Any]:
     """What is drawn of a configuration, how wrong the platform can be there, and the joints beyond their limits."""
-    wrong = (nothing(unit_of(mover.setting), "no leg is watched") if request.blind
-             else error(mover.setting, posed.real))
+    wrong = nothing(unit_of(mover.setting), "no leg is watched") if request.blind else error(mover.setting, posed.real)
     return {**mover.state(posed).scene(), "error": wrong, "beyond": outside(posed.real.twin, posed.real.q)}

@@ -37,8 +37,15 @@ def answer(request: Request) -> dict[str, Any]:
         if not guesses:
             raise
         name = request.source.robot.rpartition("/")[2]
-        return {"name": name, "words": "", "failed": "\n".join(error.lines()), "guesses": guesses, "dialect": dialect,
-                "notes": [str(note) for note in found.notes] if found else [], **lines(request, "derive")}
+        return {
+            "name": name,
+            "words": "",
+            "failed": "\n".join(error.lines()),
+            "guesses": guesses,
+            "dialect": dialect,
+            "notes": [str(note) for note in found.notes] if found else [],
+            **lines(request, "derive"),
+        }
 
 
 def scene(request: Request) -> dict[str, Any]:
@@ -54,9 +61,12 @@ def scene(request: Request) -> dict[str, Any]:
         **stage(setting, [machine], arrows_of(setting, known.values())),
         "words": f"{words}, {setting.dof} freedom{'s' * (setting.dof != 1)}",
         "legs": [_leg(request, setting, leg) for leg in setting.anatomy.legs],
-        "sliders": sliders(mover, request.ends), "scale": scale(unit_of(setting)),
-            **describe_pose(request, mover, here),
-        "notes": [*map(str, setting.robot.notes), *setting.beside(), *missing], **lines(request, "derive")}
+        "sliders": sliders(mover, request.ends),
+        "scale": scale(unit_of(setting)),
+        **describe_pose(request, mover, here),
+        "notes": [*map(str, setting.robot.notes), *setting.beside(), *missing],
+        **lines(request, "derive"),
+    }
 
 
 def sliders(mover: Mover, ends: Sequence[tuple[Posed, Posed]]) -> list[dict[str, Any]]:
@@ -67,8 +77,16 @@ def sliders(mover: Mover, ends: Sequence[tuple[Posed, Posed]]) -> list[dict[str,
         low, high = (float(mover.read(each)[number]) for each in pair)
         home = float(coordinates.values[number])
         low, high = sorted((min(low, home), max(high, home)))
-        made.append({"name": name, "label": name, "unit": "rad" if place >= 3 else "m",
-                     "min": round(low, PAGE_DIGITS), "max": round(high, PAGE_DIGITS), "home": home})
+        made.append(
+            {
+                "name": name,
+                "label": name,
+                "unit": "rad" if place >= 3 else "m",
+                "min": round(low, PAGE_DIGITS),
+                "max": round(high, PAGE_DIGITS),
+                "home": home,
+            }
+        )
     return made
 
 
@@ -84,17 +102,28 @@ def _leg(request: Request, setting: ObservedRobot, leg: Leg) -> dict[str, Any]:
             why = str(error)
     if shown is not None:
         why = reason(setting.anatomy, shown)
-    return {"name": leg.label, "words": str(setting.anatomy.word(leg)), "can": shown is not None, "why": why,
-            "watched": seen is not None and not request.blind, "link": None if shown is None else shown.link,
-            "ask": seen.link if seen and not (default and seen.link == default.link) else leg.label}
+    return {
+        "name": leg.label,
+        "words": str(setting.anatomy.word(leg)),
+        "can": shown is not None,
+        "why": why,
+        "watched": seen is not None and not request.blind,
+        "link": None if shown is None else shown.link,
+        "ask": seen.link if seen and not (default and seen.link == default.link) else leg.label,
+    }
 
 
 def guess_choices(request: Request) -> ImportChoices | None:
     """What the file leaves open, None where it says all, or cannot be read."""
     said = dict(request.source.options)
     try:
-        given = Overrides.said(base=said.get("base"), motors=said.get("motors"), close=said.get("close", ()),
-                               freeze=said.get("freeze", ()), unit=said.get("unit"))
+        given = Overrides.said(
+            base=said.get("base"),
+            motors=said.get("motors"),
+            close=said.get("close", ()),
+            freeze=said.get("freeze", ()),
+            unit=said.get("unit"),
+        )
         return choices(file_of(request.source.robot), given)
     except HrsynthError:
         return None
@@ -110,18 +139,31 @@ def offers(request: Request, found: ImportChoices) -> Iterator[dict[str, Any]]:
 
     if found.platforms:
         told = "chosen" if "platform" in said else found.why if found.told else "several could be"
-        yield offer("platform", said.get("platform", found.platforms[0]), told or "the file says so",
-                    list(found.platforms))
+        yield offer(
+            "platform", said.get("platform", found.platforms[0]), told or "the file says so", list(found.platforms)
+        )
     if len(found.bases) > 1:
         yield offer("base", said.get("base", found.bases[0]), "no joint carries it", list(found.bases))
     driven = [joint.name for joint in found.moving if joint.motor is not None]
     on_base = [joint.name for joint in found.moving if found.bases[0] in joint.links]
-    yield offer("motors", list(said.get("motors", driven)), "chosen" if "motors" in said else "as the file says",
-                [driven, on_base])
+    yield offer(
+        "motors",
+        list(said.get("motors", driven)),
+        "chosen" if "motors" in said else "as the file says",
+        [driven, on_base],
+    )
     if found.candidates or "close" in said:
         near = [each.wish for each in found.candidates]
-        yield offer("close", list(said.get("close", ())), "frames that lie near to each other could meet",
-                    [[], near, *([each] for each in near)])
+        yield offer(
+            "close",
+            list(said.get("close", ())),
+            "frames that lie near to each other could meet",
+            [[], near, *([each] for each in near)],
+        )
     yield offer("unit", said.get("unit", "m"), "of the file's lengths", list(UNITS))
-    yield offer("as_written", said.get("as_written", False), "otherwise what is parallel, or meets, up to "
-                "rounding is made so", [False, True])
+    yield offer(
+        "as_written",
+        said.get("as_written", False),
+        "otherwise what is parallel, or meets, up to rounding is made so",
+        [False, True],
+    )

@@ -76,19 +76,28 @@ def answer(request: Request) -> dict[str, Any]:
     same = NONE
     if grid is not None and (known or same_at(setting, here.real)):
         text = grid_text(grid)
-        same = (lines(request, "accuracy", "--cone", CONE_TEXT, "--grid", text, cone=CONE_TEXT, grid=text)
-                if kind == ACCURACY else lines(request, "check", "--grid", text, grid=text))
+        same = (
+            lines(request, "accuracy", "--cone", CONE_TEXT, "--grid", text, cone=CONE_TEXT, grid=text)
+            if kind == ACCURACY
+            else lines(request, "check", "--grid", text, grid=text)
+        )
     place = _placer(mover, pair, values)
     (a, b), (c, d) = (map(float, ends) for ends in ranges)
     across = mover.coordinates.places[third[0]] if third else None
-    return {"corners": [place(x, y).tolist() for x, y in ((a, c), (b, c), (b, d), (a, d))], "n": cells,
-            "values": nested_lists(found.values.T), "unit": unit if kind == ACCURACY else "",
-            "steps": list(STEPS[unit] if kind == ACCURACY else DISTANCES), "falling": kind == DISTANCE,
-            "at": float(values[third[0]]) if third else None,
-            "normal": np.eye(3)[across].tolist() if across is not None and across < 3 else None,
-            "locus": [[place(*point).tolist() for point in segment] for segment in found.locus],
-            "words": _words(kind, unit, found, here.real.twin.length) + ("" if grid is not None and known else SINGLY),
-            "of": [mover.coordinates.names[i] for i in pair], **same}
+    return {
+        "corners": [place(x, y).tolist() for x, y in ((a, c), (b, c), (b, d), (a, d))],
+        "n": cells,
+        "values": nested_lists(found.values.T),
+        "unit": unit if kind == ACCURACY else "",
+        "steps": list(STEPS[unit] if kind == ACCURACY else DISTANCES),
+        "falling": kind == DISTANCE,
+        "at": float(values[third[0]]) if third else None,
+        "normal": np.eye(3)[across].tolist() if across is not None and across < 3 else None,
+        "locus": [[place(*point).tolist() for point in segment] for segment in found.locus],
+        "words": _words(kind, unit, found, here.real.twin.length) + ("" if grid is not None and known else SINGLY),
+        "of": [mover.coordinates.names[i] for i in pair],
+        **same,
+    }
 
 
 SINGLY = " The poses were found one by one: where a freedom is lost between them is not drawn."
@@ -119,16 +128,22 @@ def _at_batch(mover: Mover, at: ClosedConfiguration) -> bool:
     return found is not None and float(np.linalg.norm(at.twin.difference(found.q, at.q))) < SAME_RELATION
 
 
-def together(mover: Mover, here: ClosedConfiguration, pair: tuple[int, int], values: Array,
-             ranges: list[Array], size: int) -> Grid | None:
+def together(
+    mover: Mover, here: ClosedConfiguration, pair: tuple[int, int], values: Array, ranges: list[Array], size: int
+) -> Grid | None:
     """The plane as a grid of poses, None where the parts of a pose do not say it."""
     names, motion = mover.coordinates.names, mover.setting.motion
     turns = [i for i, name in enumerate(names) if name not in SCALARS]
-    if turns and (set(turns) & set(pair) or not np.array_equal(values[turns], mover.coordinates.read(
-            here.pose(motion.link))[turns])):
+    if turns and (
+        set(turns) & set(pair)
+        or not np.array_equal(values[turns], mover.coordinates.read(here.pose(motion.link))[turns])
+    ):
         return None
-    parts: dict[str, Any] = {name: float(f"{value:.9g}") for i, (name, value) in enumerate(
-        zip(names, values, strict=True)) if i not in pair and i not in turns}
+    parts: dict[str, Any] = {
+        name: float(f"{value:.9g}")
+        for i, (name, value) in enumerate(zip(names, values, strict=True))
+        if i not in pair and i not in turns
+    }
     if turns:
         parts["rpy"] = motion.pose(here.pose(motion.link)).rpy
     axes = tuple((names[i], np.linspace(ends[0], ends[1], size)) for i, ends in zip(pair, ranges, strict=True))
@@ -138,8 +153,9 @@ def together(mover: Mover, here: ClosedConfiguration, pair: tuple[int, int], val
 def grid_text(grid: Grid) -> str:
     """The grid as an option says it."""
     held = [f"{name}={'/'.join(map(digits, values))}" for name, values in grid.fixed.given.items()]
-    return ",".join([*(f"{name}={digits(values[0])}:{digits(values[-1])}:{len(values)}" for name, values in grid.axes),
-                     *held])
+    return ",".join(
+        [*(f"{name}={digits(values[0])}:{digits(values[-1])}:{len(values)}" for name, values in grid.axes), *held]
+    )
 
 
 def by_batch(mapper: Mapper, grid: Grid, kind: str, unit: str) -> PoseField:
@@ -156,8 +172,16 @@ def by_batch(mapper: Mapper, grid: Grid, kind: str, unit: str) -> PoseField:
     return PoseField(table, segments[least < ON_LOCUS * usual])
 
 
-def one_by_one(mover: Mover, here: ClosedConfiguration, pair: tuple[int, int], values: Array,
-               ranges: list[Array], size: int, kind: str, unit: str) -> PoseField:
+def one_by_one(
+    mover: Mover,
+    here: ClosedConfiguration,
+    pair: tuple[int, int],
+    values: Array,
+    ranges: list[Array],
+    size: int,
+    kind: str,
+    unit: str,
+) -> PoseField:
     """The plane pose by pose, each led to from a neighbour, in the working mode of ``here``."""
     setting, motion, question = mover.setting, mover.setting.motion, mover.setting.samples.question
     aims = []

@@ -30,13 +30,19 @@ def answer(request: Request) -> dict[str, Any]:
     if number is None or number >= len(lost):
         raise BadRequest("number of a lost freedom", number, f"0 to {len(lost) - 1}" if lost else "none is lost here")
     question = setting.samples.question
-    ways = [mover.follow_hidden(here, way) for way in
-            follow_motion(here.real, question, lost[number].twist[: question.twist_rows], STEPS)]
-    frames = {id(each): {**state(request, mover, each), "here": request.describe_here(each)}
-              for each in (here, *ways[0], *ways[1])}
+    ways = [
+        mover.follow_hidden(here, way)
+        for way in follow_motion(here.real, question, lost[number].twist[: question.twist_rows], STEPS)
+    ]
+    frames = {
+        id(each): {**state(request, mover, each), "here": request.describe_here(each)}
+        for each in (here, *ways[0], *ways[1])
+    }
     cycle = [here, *_there_and_back(ways[0]), here, *_there_and_back(ways[1])]
-    return {"frames": [frames[id(each)] for each in cycle],
-            "words": _words(lost[number].name, question, here, [*ways[0], *ways[1]])}
+    return {
+        "frames": [frames[id(each)] for each in cycle],
+        "words": _words(lost[number].name, question, here, [*ways[0], *ways[1]]),
+    }
 
 
 def _there_and_back(way: list[Posed]) -> list[Posed]:

@@ -35,15 +35,26 @@ def answer(request: Request) -> dict[str, Any]:
     last = len(found.run.times) - 1
     chosen = sorted({round(last * part) for part in np.linspace(0, 1, FRAMES)})
     way = mover.follow_hidden(start, [found.run.configurations[i] for i in chosen])
-    frames = [{**state(request, mover, posed), "here": request.describe_here(posed), "t": float(found.run.times[i]),
-               "e": found.run.commands[i].size, "image": image(eye, reference, rods, posed.real.pose)}
-              for i, posed in zip(chosen, way, strict=False)]
+    frames = [
+        {
+            **state(request, mover, posed),
+            "here": request.describe_here(posed),
+            "t": float(found.run.times[i]),
+            "e": found.run.commands[i].size,
+            "image": image(eye, reference, rods, posed.real.pose),
+        }
+        for i, posed in zip(chosen, way, strict=False)
+    ]
     poses = [at_pose(setting, each.real) for each in (start, end)]
     same = lines(request, "servo", "--start", poses[0], "--goal", poses[1], start=poses[0], goal=poses[1])
-    return {"frames": frames, "desired": image(eye, reference, rods, end.real.pose),
-            "size": [eye.width, eye.height], "kind": found.ended,
-            "words": f"Ended in: {found.ended} ({found.ending.reason}), after {found.run.times[-1]:.3g} s",
-            **(same if same_at(setting, start.real, end.real) else NONE)}
+    return {
+        "frames": frames,
+        "desired": image(eye, reference, rods, end.real.pose),
+        "size": [eye.width, eye.height],
+        "kind": found.ended,
+        "words": f"Ended in: {found.ended} ({found.ending.reason}), after {found.run.times[-1]:.3g} s",
+        **(same if same_at(setting, start.real, end.real) else NONE),
+    }
 
 
 def _send_to(request: Request, mover: Mover, start: Posed) -> Posed:

@@ -39,24 +39,46 @@ def answer(request: Request) -> dict[str, Any]:
     """All that follows from which legs are watched, at ``here``."""
     setting = request.setting
     best = [each for each in smallest(all_legs(setting)) if each.rank]
-    sets = {"sets": [{"legs": list(each.legs), "words": words(each)} for each in best[:MOST_SETS]],
-            "more_sets": max(0, len(best) - MOST_SETS)}
+    sets = {
+        "sets": [{"legs": list(each.legs), "words": words(each)} for each in best[:MOST_SETS]],
+        "more_sets": max(0, len(best) - MOST_SETS),
+    }
     if request.blind:
-        return {"verdict": {"controllable": False, "words": "no leg is watched", "certainty": ""}, "rank": 0,
-                "dof": setting.dof, "lost": [], "hidden": None, "hidden_words": "", "condition": "", **sets,
-                "ellipsoid": None, "error": nothing(unit_of(setting), "no leg is watched"), **lines(request, "legs")}
+        return {
+            "verdict": {"controllable": False, "words": "no leg is watched", "certainty": ""},
+            "rank": 0,
+            "dof": setting.dof,
+            "lost": [],
+            "hidden": None,
+            "hidden_words": "",
+            "condition": "",
+            **sets,
+            "ellipsoid": None,
+            "error": nothing(unit_of(setting), "no leg is watched"),
+            **lines(request, "legs"),
+        }
     derivation, mover = request.derivation, request.mover()
     verdict, here = derivation.verdict, request.here(mover)
     posture = ConfigurationAnalysis.of(setting).examine(here.real)
     point = setting.motion.position(here.real.pose(setting.motion.link))
     return {
-        "verdict": {"controllable": verdict == CONTROLLABLE, "words": verdict.verdict,
-                    "certainty": exact_words(derivation.exact, verdict.rank)},
-        "rank": posture.hidden.rank, "dof": verdict.dof, "here": STATES[posture.hidden.state],
+        "verdict": {
+            "controllable": verdict == CONTROLLABLE,
+            "words": verdict.verdict,
+            "certainty": exact_words(derivation.exact, verdict.rank),
+        },
+        "rank": posture.hidden.rank,
+        "dof": verdict.dof,
+        "here": STATES[posture.hidden.state],
         "lost": [describe_lost(each, point.tolist()) for each in posture.hidden.lost],
-        "hidden": hidden_machine(request), "hidden_words": hidden_words(request), "condition": condition(setting),
-        **sets, "ellipsoid": ellipsoid(setting, here.real), "error": error(setting, here.real),
-        **lines(request, "derive")}
+        "hidden": hidden_machine(request),
+        "hidden_words": hidden_words(request),
+        "condition": condition(setting),
+        **sets,
+        "ellipsoid": ellipsoid(setting, here.real),
+        "error": error(setting, here.real),
+        **lines(request, "derive"),
+    }
 
 
 def words(verdict: Verdict) -> str:
@@ -67,8 +89,12 @@ def words(verdict: Verdict) -> str:
 def describe_lost(freedom: Freedom, point: list[float]) -> dict[str, Any]:
     """A lost freedom; its ``kind`` is translation or rotation (a screw is one too)."""
     turns = bool(np.linalg.norm(freedom.twist[3:]) > NAMED)
-    return {"words": freedom.name, "twist": freedom.to_dict()["twist"], "point": point,
-            "kind": "rotation" if turns else "translation"}
+    return {
+        "words": freedom.name,
+        "twist": freedom.to_dict()["twist"],
+        "point": point,
+        "kind": "rotation" if turns else "translation",
+    }
 
 
 def hidden_machine(request: Request) -> dict[str, Any] | None:
@@ -86,8 +112,11 @@ def hidden_words(request: Request) -> str:
     """The hidden robot's legs, and how it was compared with the real one."""
     found = request.derivation
     legs = found.hidden_architecture
-    return (f"{legs}; certificate {certificate(found.certificate)}" if legs
-            else "none: every observed direction is constant")
+    return (
+        f"{legs}; certificate {certificate(found.certificate)}"
+        if legs
+        else "none: every observed direction is constant"
+    )
 
 
 def condition(setting: ObservedRobot) -> str:
@@ -115,8 +144,9 @@ def smallest(setting: ObservedRobot) -> tuple[Verdict, ...]:
     for size in range(1, len(labels) + 1):
         found = []
         for chosen in combinations(labels, size):
-            samples = restrict_samples(setting.everything, [each for each in setting.observed if each.leg in chosen],
-                                 ways=False)
+            samples = restrict_samples(
+                setting.everything, [each for each in setting.observed if each.leg in chosen], ways=False
+            )
             if max(member.relation.rank for member in samples.members) == best:
                 with suppress(RankUndecided):
                     found.append(verdict_of(setting, chosen, samples))
